@@ -2,6 +2,7 @@
 //! one and no barrier separates them, a global memory barrier is placed before it. A tracker lives as long as its slots, so the
 //! accesses of one picture also count for the next.
 
+use crate::passes::slots::Shape;
 use crate::passes::{DispatchArgs, Part, Pass, Slot};
 use crate::scene::Scene;
 use std::ops::Range;
@@ -91,8 +92,12 @@ pub fn accesses(scene: &Scene, pass: &Pass, args: &DispatchArgs) -> Vec<Access> 
         let part = |slice: u32| slice.saturating_sub(bind.slot.first_texel(scene)[2]).min(all);
         let parts = match bind.part {
             Part::Whole => 0..all,
-            Part::Slice => part(args.slice)..part(args.slice) + 1,
-            Part::Layer => args.layer..args.layer + 1,
+            Part::Slices => match bind.slot.shape(scene) {
+                Shape::Three(_) => part(args.slice)..part(args.slice + args.slices),
+                Shape::Layers(_) => 0..args.slices,
+                Shape::Two(_) | Shape::Buffer(_) => 0..all,
+            },
+            Part::Layers => args.layer..args.layer + args.slices,
             Part::Around(more) => part(args.slice.saturating_sub(more))..part(args.slice + args.slices + more),
         };
         let image = if bind.slot.is_multibuffered() { args.image } else { 0 };
@@ -261,10 +266,11 @@ mod tests {
             }
         };
         for image in 0..2 {
-            for slice in 0..6 {
-                let args = DispatchArgs { layer: slice % 4, slice, image, ..DispatchArgs::default() };
-                let layer = args.layer..args.layer + 1;
-                operations.push(vec![Access::of_slot(Slot::Frames, 0, layer, true, PipelineStage::Copy)]);
+            // Frames alone, two and three at once.
+            for (n, (slice, slices)) in [(0, 1), (1, 2), (3, 3)].into_iter().enumerate() {
+                let args = DispatchArgs { layer: 6 * n as u32, slice, slices, image, ..DispatchArgs::default() };
+                let layers = args.layer..args.layer + slices;
+                operations.push(vec![Access::of_slot(Slot::Frames, 0, layers, true, PipelineStage::Copy)]);
                 run(Frequency::Frame, args, &mut operations);
             }
             run(

@@ -15,11 +15,12 @@ const GRAPH: [usize; 2] = [512, 256];
 /// curves. A single channel is stretched from its minimum to its maximum unless it is within 0..1.
 pub fn draw(slot: Slot, texels: Option<&Texels>, scene: &Scene) -> Picture {
     match (texels, slot.initializer()) {
-        (Some(texels), _) if texels.channels == 4 => colours(texels),
+        (Some(texels), _) if texels.channels == 4 && texels.size[2] == 1 => colours(texels),
+        (Some(texels), _) if texels.channels == 4 => sheet(texels, |n| colour(&texels.values[4 * n..])),
         (Some(texels), _) if matches!(slot, Slot::Distance | Slot::DistanceA | Slot::DistanceB) => {
-            sheet(texels, &distances(texels))
+            sheet(texels, grey(distances(texels)))
         }
-        (Some(texels), _) => sheet(texels, &stretched(texels)),
+        (Some(texels), _) => sheet(texels, grey(stretched(texels))),
         (None, Initializer::ByScene(make)) => curves(&make(scene), meaning(slot).0.len()),
         (None, _) => Picture { width: 1, height: 1, rgba: vec![0, 0, 0, 255] },
     }
@@ -29,8 +30,21 @@ fn byte(value: f64) -> u8 {
     (value.clamp(0.0, 1.0) * 255.0).round() as u8
 }
 
+fn colour(texel: &[f64]) -> [u8; 3] {
+    [byte(texel[0]), byte(texel[1]), byte(texel[2])]
+}
+
+/// Grey values, 0..1, as colours by index.
+fn grey(values: Vec<f64>) -> impl Fn(usize) -> [u8; 3] {
+    move |n| [byte(values[n]); 3]
+}
+
 fn colours(texels: &Texels) -> Picture {
-    let rgba = texels.values.chunks_exact(4).flat_map(|p| [byte(p[0]), byte(p[1]), byte(p[2]), 255]).collect();
+    let opaque = |p: &[f64]| {
+        let [r, g, b] = colour(p);
+        [r, g, b, 255]
+    };
+    let rgba = texels.values.chunks_exact(4).flat_map(opaque).collect();
     Picture { width: texels.size[0] as u32, height: texels.size[1] as u32, rgba }
 }
 
@@ -48,8 +62,8 @@ fn distances(texels: &Texels) -> Vec<f64> {
     texels.values.iter().map(|v| if is_hit(*v) { near(*v) } else { 0.0 }).collect()
 }
 
-/// A sheet of all slices, as square as possible, at most 2048 pixels wide.
-fn sheet(texels: &Texels, grey: &[f64]) -> Picture {
+/// A sheet of all slices, as square as possible, at most 2048 pixels wide. `colour` is that of the texel of this index.
+fn sheet(texels: &Texels, colour: impl Fn(usize) -> [u8; 3]) -> Picture {
     let [width, height, slices] = texels.size;
     let across = (((slices * height) as f64 / width as f64).sqrt().ceil() as usize).clamp(1, slices);
     let shrink = (across * width).div_ceil(2048).max(1);
@@ -60,9 +74,9 @@ fn sheet(texels: &Texels, grey: &[f64]) -> Picture {
     for z in 0..slices {
         for y in 0..h {
             for x in 0..w {
-                let value = byte(grey[(z * height + y * shrink) * width + x * shrink]);
+                let shown = colour((z * height + y * shrink) * width + x * shrink);
                 let at = 4 * ((z / across * h + y) * across * w + z % across * w + x);
-                picture.rgba[at..at + 3].fill(value);
+                picture.rgba[at..at + 3].copy_from_slice(&shown);
             }
         }
     }
@@ -146,6 +160,22 @@ fn meaning(slot: Slot) -> (&'static [&'static str], &'static str) {
             (&["echo", "found", "echo_behind", "unused"], "echo 0..1 after the grey window; found: 0 or 1")
         }
         Slot::SliceShares | Slot::PictureShares | Slot::Shadow | Slot::Occlusion => (GREY, "share, 0..1"),
+        Slot::LightMatter => {
+            (&["density", "echo"], "share of the densest matter; share of the range of the recording's samples")
+        }
+        Slot::LightPyramid1 | Slot::LightPyramid2 | Slot::LightPyramid3 | Slot::LightPyramid4 => {
+            (GREY, "share of the densest matter, 0..1")
+        }
+        Slot::LightArriving | Slot::LightScattered | Slot::LightScatteredB | Slot::BackLight => {
+            (&["red", "green", "blue", "density"], "light: share of what came; share of the densest matter")
+        }
+        Slot::LightNormals => (&["x", "y", "z", "highlight"], "direction, as long as it is certain; light"),
+        Slot::LightFrontA
+        | Slot::LightFrontB
+        | Slot::BackFrontA
+        | Slot::BackFrontB
+        | Slot::LightAmbient
+        | Slot::LightShade => (COLOUR, "light; 1 is that of an unshadowed light of strength 1"),
         Slot::VolumeLayer
         | Slot::VolumeBesideSurface
         | Slot::Rendered

@@ -1,5 +1,6 @@
 //! Plans a scene: which passes and slots it needs, and after a change of scene, what has to run again. Needs no GPU.
 
+use crate::passes::slots::frames_per_batch;
 use crate::passes::{DispatchArgs, Frequency, PASSES, Part, Pass, Slot, chain};
 use crate::scene::Scene;
 use std::collections::BTreeMap;
@@ -64,8 +65,8 @@ impl Plan {
             }
             match pass.needed(scene) {
                 Ok(why) => {
-                    let [x, y, z] =
-                        pass.invocations(scene, &DispatchArgs { slices: scene.slices(), ..DispatchArgs::default() });
+                    let [x, y, z] = pass
+                        .invocations(scene, &DispatchArgs { slices: pass.slices(scene), ..DispatchArgs::default() });
                     let each = match pass.frequency {
                         Frequency::Frame => "each frame",
                         Frequency::Volume => "each volume",
@@ -104,6 +105,9 @@ impl Plan {
                 let _ = writeln!(text, "{choice}");
             }
         }
+        for size in &scene.resolved_sizes {
+            let _ = writeln!(text, "{size}");
+        }
         let (bounds, [columns, rows, slices]) = (&scene.visible_bounds, scene.volume_size());
         let span = |axis: usize| format!("{}..{}", bounds.low[axis], bounds.high[axis]);
         let _ = writeln!(
@@ -133,7 +137,8 @@ impl Plan {
             return format!("copied into the 3D image as they arrive, by no pass{widened}");
         }
         let last = self.steps_of(Frequency::Frame).last().map_or("no pass", |(_, step)| step.pass.name);
-        format!("{last}, the last pass of a frame, writes them into the 3D image")
+        let at_once = frames_per_batch(scene);
+        format!("{last}, the last pass of a frame, writes them into the 3D image; of up to {at_once} frames at once")
     }
 
     /// What has to run again after a change from `old` to `new`; `self` is the plan of `new`. This does not depend on the meaning of

@@ -43,7 +43,7 @@ pub fn render_with(scene: &Scene, frames: &[Texels], replace: &mut Replacement) 
         }
     }
     for (_, step) in plan.steps_of(Frequency::Volume).chain(plan.steps_of(Frequency::Picture)) {
-        run(scene, step, &DispatchArgs { slices: scene.slices(), ..step.args() }, &mut slots, replace);
+        run(scene, step, &DispatchArgs { slices: step.pass.slices(scene), ..step.args() }, &mut slots, replace);
     }
     slots
 }

@@ -48,7 +48,7 @@ pub fn phantom(frames: usize, lines: usize, samples: usize) -> Result<Phantom, S
 /// A scene of the phantom's preset, as `echolume render` draws it, and what is set beyond it.
 pub fn scene(geometry: Geometry, set: &[String]) -> Result<Scene, String> {
     let mut layers = Layers::default();
-    layers.preset("phantom").map_err(|e| e.to_string())?;
+    layers.preset("face-classic").map_err(|e| e.to_string())?;
     for assignment in set {
         layers.set(assignment).map_err(|e| e.to_string())?;
     }

@@ -36,6 +36,19 @@ const fn sweep(name: &'static str, set: &'static [&'static str], passes: &'stati
 
 pub const SCENES: &[Stated] = &[
     sweep(
+        "light volume",
+        &["mode=volume", "light.volume={}"],
+        &[
+            "light_matter",
+            "light_reduce",
+            "light_propagate",
+            "light_propagate_back",
+            "light_diffuse",
+            "light_ambient",
+            "light_shade",
+        ],
+    ),
+    sweep(
         "preset",
         &[],
         &[

@@ -21,13 +21,15 @@ void main() {
     float low = 1.0, high = 0.0;
     // No tile outside.
     if (entry.w == 0.0) last = first - 1;
-    ivec3 extent = last - first + 1;
-    int count = extent.x * extent.y * extent.z;
-    for (int n = 0; n < count; ++n) {
-        ivec3 tap = first + ivec3(n % extent.x, (n / extent.x) % extent.y, n / (extent.x * extent.y));
-        vec2 range = texelFetch(tile_ranges, tap, 0).xy;
-        low = min(low, range.x);
-        high = max(high, range.y);
+    // No counter that is divided by the extent: a CPU divides integers lane by lane.
+    for (int z = first.z; z <= last.z; ++z) {
+        for (int y = first.y; y <= last.y; ++y) {
+            for (int x = first.x; x <= last.x; ++x) {
+                vec2 range = texelFetch(tile_ranges, ivec3(x, y, z), 0).xy;
+                low = min(low, range.x);
+                high = max(high, range.y);
+            }
+        }
     }
     imageStore(brick_ranges, at, vec4(low, high, 0.0, 0.0));
 }

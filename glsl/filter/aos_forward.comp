@@ -1,7 +1,8 @@
-// Forward elimination of (I - 2 tau A) u = f along a row or a column, A the diffusion of that axis (Weickert, ter Haar Romeny
-// and Viergever 1998). Every unknown becomes u[i] = forward[i] + shares[i] u[i+1].
+// Forward elimination of (I - 2 tau A) u = f along a row or a column, an invocation each; A is the diffusion of that axis (Weickert, ter Haar
+// Romeny and Viergever 1998). Every unknown becomes u[i] = forward[i] + shares[i] u[i+1].
 // variants: plane; picture PICTURE
 #version 460
+layout(local_size_x = 64) in;
 #include "aos.glsl"
 layout(constant_id = 1) const int CONDUCTANCE = 0; // 0 quotient, 1 exponential
 layout(scalar) uniform Params {
@@ -9,13 +10,13 @@ layout(scalar) uniform Params {
     float tau;
 };
 #include "diffusion.glsl"
-uniform texture2D source;
-uniform writeonly image2D shares;
-uniform writeonly image2D forward;
+uniform TEXTURE source;
+uniform writeonly IMAGE shares;
+uniform writeonly IMAGE forward;
 
 void main() {
     int line = int(gl_GlobalInvocationID.x);
-    ivec2 size = textureSize(source, 0);
+    ivec2 size = textureSize(source, 0).xy;
     if (line >= size[1 - AXIS]) return;
     int count = size[AXIS];
     T here = LOADED(texelFetch(source, texel(line, 0), 0)), before = T(0.0);

@@ -1,10 +1,11 @@
 // One axis of a separable Gaussian. Taps beyond the border are omitted and the weights renormalised: the border of the volume, since
-// all slices that a visible one needs are stored. An invocation makes four
-// adjacent texels along the axis and passes their taps through registers.
+// all slices that a visible one needs are stored. The sharpening kernel repeats the border instead, as samples of the volume do. An
+// invocation makes four adjacent texels along the axis and passes their taps through registers.
 // variants: plane; slice SLICE; volume VOLUME
 #version 460
 layout(constant_id = 0) const int RADIUS = 3;
 layout(constant_id = 1) const int AXIS = 0;
+layout(constant_id = 2) const int SHARPENS = 0; // 1: (-1, 8, -1)/6 in place of the Gaussian, against the blur of the cubic B-spline between slices
 #extension GL_EXT_scalar_block_layout : require
 #extension GL_EXT_control_flow_attributes : require
 layout(scalar) uniform Params {
@@ -32,16 +33,17 @@ void main() {
     [[unroll]] for (int i = -RADIUS - RUN + 1; i <= RADIUS; ++i) {
         ivec3 tap = at;
         tap[AXIS] += i + RUN - 1;
-        bool inside = tap[AXIS] >= 0 && tap[AXIS] < length;
+        bool inside = SHARPENS == 1 || (tap[AXIS] >= 0 && tap[AXIS] < length);
         tap[AXIS] = clamp(tap[AXIS], 0, min(length, size[AXIS] + RADIUS) - 1);
         float value = read_at(tap);
         taps = vec4(taps.yzw, inside ? value : 0.0);
         there = vec4(there.yzw, inside ? 1.0 : 0.0);
-        float w = i < -RADIUS ? 0.0 : exp(-float(i * i) * narrowness);
+        float bell = SHARPENS == 1 ? (i == 0 ? 8.0 / 6.0 : -1.0 / 6.0) : exp(-float(i * i) * narrowness);
+        float w = i < -RADIUS ? 0.0 : bell;
         sum += w * taps;
         weight += w * there;
     }
-    vec4 mean = sum / weight;
+    vec4 mean = SHARPENS == 1 ? clamp(sum, 0.0, 1.0) : sum / weight;
     for (int i = 0; i < RUN && at[AXIS] < size[AXIS]; ++i) {
         write_at(at, mean[i]);
         ++at[AXIS];

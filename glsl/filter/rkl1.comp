@@ -17,26 +17,27 @@ layout(scalar) uniform Params {
 };
 #define T float
 #include "diffusion.glsl"
-uniform texture2D last; // y[j-1]
+uniform texture2DArray last; // y[j-1]
 #ifdef LATER
-uniform texture2D before; // y[j-2]
+uniform texture2DArray before; // y[j-2]
 #endif
 #ifdef SLICE
 #include "stored_volume.glsl"
 uniform writeonly image3D target;
 #else
-uniform writeonly image2D target;
+uniform writeonly image2DArray target;
 #endif
 
 void main() {
-    ivec2 at = ivec2(gl_GlobalInvocationID.xy), size = textureSize(last, 0);
-    if (any(greaterThanEqual(at, size))) return;
+    ivec3 at = ivec3(gl_GlobalInvocationID); // z is the slice within the batch
+    ivec2 size = textureSize(last, 0).xy;
+    if (any(greaterThanEqual(at.xy, size))) return;
     float here = texelFetch(last, at, 0).x;
     float flow = 0.0;
     for (int i = 0; i < 4; ++i) {
-        ivec2 next = at + ivec2((i & 1) * (i - 2), (1 - (i & 1)) * (i - 1));
+        ivec2 next = at.xy + ivec2((i & 1) * (i - 2), (1 - (i & 1)) * (i - 1));
         if (any(lessThan(next, ivec2(0))) || any(greaterThanEqual(next, size))) continue;
-        float away = texelFetch(last, next, 0).x - here;
+        float away = texelFetch(last, ivec3(next, at.z), 0).x - here;
         flow += across(away) * away;
     }
     float result = mu * here + share * flow;
@@ -44,7 +45,7 @@ void main() {
     result += nu * texelFetch(before, at, 0).x;
 #endif
 #ifdef SLICE
-    ivec3 to = ivec3(at, slice) - first_stored;
+    ivec3 to = at + ivec3(0, 0, slice) - first_stored;
     if (all(lessThan(uvec3(to), uvec3(imageSize(target))))) imageStore(target, to, vec4(result, 0.0, 0.0, 0.0));
 #else
     imageStore(target, at, vec4(result, 0.0, 0.0, 0.0));

@@ -28,12 +28,16 @@ float middle_of(Ray ray, int i, float length, bool complete) {
     return SPREAD == 0 && complete ? offset_of(ray, float(i) + 0.5) : middle;
 }
 
-// Adds a step of this length, with the colour and absorption of place p, to the light of a ray.
-void add_step(vec4 entry, float length, vec3 p, inout vec3 colour, inout float opacity) {
-    float y = entry.a * absorption_scale * (length / step_length);
+#include "region_fade.glsl"
+#include "lit.glsl"
+
+// Adds a step of this length, with the colour and absorption of place p, to the light of a ray in direction `along`.
+void add_step(vec4 entry, float length, vec3 p, vec3 along, inout vec3 colour, inout float opacity) {
+    float y = entry.a * faded(p) * absorption_scale * (length / step_length);
     float a = COMPOSITING == 3 ? entry.a : COMPOSITING == 0 ? min(y, 1.0) : opacity_of(y);
     // The exponential rule's colour is premultiplied.
     float emitted = COMPOSITING == 3 ? 1.0 : a;
+    if (LIT == 1 && a > 0.0) entry.rgb = lit(entry.rgb, p, along);
     if (DEPTH_CODED == 1) entry.rgb *= mix(near_tint, far_tint, clamp(dot(p, depth_axis) - depth_near, 0.0, 1.0));
     colour += (1.0 - opacity) * emitted * entry.rgb;
     opacity += (1.0 - opacity) * a;

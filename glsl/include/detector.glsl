@@ -13,7 +13,7 @@ const int RING = 2 * HALF;
 const int MEMORY = 2 * RING; // samples in the noise estimate
 const float FOLLOW_LEVEL = 0.7; // an edge has been followed when D falls below this share of its largest value
 const float UNIT = 4194304.0; // of a sample in a long ring
-const int SEARCH_ROUGH = 0, SEARCH_FINE = 1, FOLLOW = 2;
+const int SEARCH_ROUGH = 0, SEARCH_FINE = 1, FOLLOW = 2, FOLLOWED = 3; // followed: the peak is known
 const int START = ROUGH > 1 ? SEARCH_ROUGH : SEARCH_FINE;
 const int NEVER = 0x7fffffff;
 const vec4 QUARTER = vec4(0.25);
@@ -38,7 +38,6 @@ float previous = 0.0;
 // sample after it is known, it may not be the largest, and there is no surface.
 float best = 0.0, before = 0.0, after = 0.0, top = 0.0;
 int best_at = 0;
-bool followed = false; // the peak is known
 bool confirmed = false; // the echo behind a rejected edge lasts
 // Place where D falls below FOLLOW_LEVEL of the peak, samples; NEVER where it did not. First sample that the ring may use.
 float fallen_at = float(NEVER);
@@ -85,13 +84,13 @@ void learn() {
         noise_mean = older_mean();
         noise_variance = older_variance();
         samples_learnt = float(HALF);
-        return;
+    } else {
+        float off = (HALF == 4 ? older.w : float(leaving) / UNIT) - noise_mean;
+        samples_learnt += 1.0;
+        float n = min(samples_learnt, float(MEMORY));
+        noise_mean += off / n;
+        noise_variance += (off * off * (1.0 - 1.0 / n) - noise_variance) / (n - 1.0);
     }
-    float off = (HALF == 4 ? older.w : float(leaving) / UNIT) - noise_mean;
-    samples_learnt += 1.0;
-    float n = min(samples_learnt, float(MEMORY));
-    noise_mean += off / n;
-    noise_variance += (off * off * (1.0 - 1.0 / n) - noise_variance) / (n - 1.0);
 }
 
 // Resets the search at sample i: after a gap, or for the next surface.
@@ -108,10 +107,12 @@ void restart(int i) {
 
 // Handles a sample i outside the insonified region. False: the ray is done.
 bool skip_sample(inout int i) {
-    if (state == FOLLOW || second_look) return false;
-    i += ROUGH;
-    restart(i);
-    return true;
+    bool searches = state < FOLLOW && !second_look;
+    if (searches) {
+        i += ROUGH;
+        restart(i);
+    }
+    return searches;
 }
 
 // Adds a sample to the ring; returns the new difference.
@@ -149,15 +150,16 @@ float noise_bar_at(int i, float difference) {
         if (searches && (SWEEP > 0 || i >= (RING - 1) * stride)) learn();
         float height = START == SEARCH_ROUGH ? rough_threshold : threshold;
         // The bar is that of the noise only where the difference exceeds the other.
-        if (difference <= min(height, threshold)) return 0.0;
-        bool has_statistics = SWEEP > 0 || samples_learnt > 0.0;
-        float deviation = noise * sqrt(has_statistics ? noise_variance : newer_variance());
-        noise_bar = deviation * (has_statistics ? 1.0 + float(RING) / max(samples_learnt, 1.0) : 1.0);
-        if (searches && difference > max(height, weak) && i >= HALF) {
-            weak = difference;
-            weak_at = i;
-            weak_segment = segment;
-            weak_level = polarity * (has_statistics ? noise_mean : older_mean()) + 0.5 * deviation;
+        if (difference > min(height, threshold)) {
+            bool has_statistics = SWEEP > 0 || samples_learnt > 0.0;
+            float deviation = noise * sqrt(has_statistics ? noise_variance : newer_variance());
+            noise_bar = deviation * (has_statistics ? 1.0 + float(RING) / max(samples_learnt, 1.0) : 1.0);
+            if (searches && difference > max(height, weak) && i >= HALF) {
+                weak = difference;
+                weak_at = i;
+                weak_segment = segment;
+                weak_level = polarity * (has_statistics ? noise_mean : older_mean()) + 0.5 * deviation;
+            }
         }
     }
     return noise_bar;
@@ -168,20 +170,21 @@ bool is_event(float difference, float noise_bar) {
     return filled >= RING && difference > max(START == SEARCH_ROUGH ? rough_threshold : threshold, noise_bar);
 }
 
-// One step of the state machine after sample i entered the ring; moves i to the next sample to take. False: the ray is done.
+// One step of the state machine after sample i entered the ring; moves i to the next sample to take. False: the ray is done. It has
+// one way out: an early return becomes a loop of one iteration, for which some drivers keep the state twice.
 bool step_detector(float difference, float noise_bar, inout int i) {
-    bool ready = filled >= RING;
+    bool ready = filled >= RING, goes_on = true;
+    int next = i + stride;
     if (ROUGH > 1 && state == SEARCH_ROUGH) {
         if (ready && difference > max(rough_threshold, noise_bar)) {
             limit = i + RING;
             // If the ring did not fire one sample earlier, the edge is in its newer half; in a new ring it may be anywhere.
             int back = filled > RING ? HALF * ROUGH + RING : RING * ROUGH;
-            i = max(i - back, segment);
-            fine_from = i;
+            next = max(i - back, segment);
+            fine_from = next;
             state = SEARCH_FINE;
             stride = 1;
             filled = 0;
-            return true;
         }
     } else if (state == SEARCH_FINE) {
         float bar = max(threshold, noise_bar);
@@ -196,20 +199,19 @@ bool step_detector(float difference, float noise_bar, inout int i) {
             first_echo = top;
             found = PLACE == 0;
             lasts = true;
-            followed = confirmed = false;
+            confirmed = false;
             fallen_at = float(NEVER);
-            if (PLACE == 0 && surfaces_passed + 1 == NUMBER && !(DETECTOR == 2 || second_look)) return false;
+            goes_on = PLACE > 0 || surfaces_passed + 1 < NUMBER || DETECTOR == 2 || second_look;
         } else if (second_look && i >= limit) {
-            return false;
+            goes_on = false;
         } else if (ROUGH > 1 && i >= limit) {
             // A false alarm: refill the rough ring so that it next covers samples that the fine search has not covered.
             state = SEARCH_ROUGH;
             stride = ROUGH;
             filled = 0;
-            i = limit - (RING - 2) * ROUGH;
-            segment = i;
-            fine_from = i;
-            return true;
+            next = limit - (RING - 2) * ROUGH;
+            segment = next;
+            fine_from = next;
         }
         after_speck = false;
     } else {
@@ -222,13 +224,15 @@ bool step_detector(float difference, float noise_bar, inout int i) {
         // The mean echo behind a rejected edge must exceed its level.
         if (i == fired + RING) confirmed = polarity * (newer_mean() + older_mean()) > 2.0 * weak_level;
         // Higher edges behind this one are others: its own difference does not fall far before it peaks.
-        if (!followed) {
+        if (state == FOLLOW) {
             float level = FOLLOW_LEVEL * best;
             // In the second look a dip in front of the known peak is one of the noise.
             bool falls = difference < level && (!second_look || i >= weak_at);
-            followed = falls || i >= (second_look ? max(fired + FOLLOW_LENGTH, weak_at + 2) : fired + FOLLOW_LENGTH);
+            bool followed = falls || i >= (second_look ? max(fired + FOLLOW_LENGTH, weak_at + 2) : fired + FOLLOW_LENGTH);
             if (falls) fallen_at = float(i) - (level - difference) / max(previous - difference, level - difference);
-            if (!followed && difference > best) {
+            if (followed) {
+                state = FOLLOWED;
+            } else if (difference > best) {
                 best = difference;
                 best_at = i;
                 before = previous;
@@ -238,13 +242,12 @@ bool step_detector(float difference, float noise_bar, inout int i) {
             }
         }
         bool is_last = DETECTOR < 2 && !second_look && surfaces_passed + 1 == NUMBER;
-        if (followed && (is_last || i >= fired + RING) && (DETECTOR < 2 || second_look || i >= best_at + HALF)) {
+        if (state == FOLLOWED && (is_last || i >= fired + RING) && (DETECTOR < 2 || second_look || i >= best_at + HALF)) {
             if (second_look) {
                 found = found && confirmed;
                 ++surfaces_passed;
-                return false;
-            }
-            if (DETECTOR == 2 && !lasts) {
+                goes_on = false;
+            } else if (DETECTOR == 2 && !lasts) {
                 if (best > weak) {
                     weak = best;
                     weak_at = best_at;
@@ -256,36 +259,37 @@ bool step_detector(float difference, float noise_bar, inout int i) {
                 limit = ROUGH > 1 ? i + RING * ROUGH : NEVER;
                 found = false;
                 after_speck = true;
-                previous = difference;
-                i += stride;
-                return true;
+            } else if (++surfaces_passed == NUMBER) {
+                goes_on = false;
+            } else {
+                // Search for the next surface from here.
+                restart(i);
+                found = false;
+                weak = 0.0;
+                next = i;
             }
-            if (++surfaces_passed == NUMBER) return false;
-            // Search for the next surface from here.
-            restart(i);
-            found = false;
-            weak = 0.0;
-            return true;
         }
     }
     previous = difference;
-    i += stride;
-    return true;
+    i = next;
+    return goes_on;
 }
 
 // At the end of the ray: true if the largest rejected edge is to be examined again, from i.
 bool look_again(inout int i) {
-    if (DETECTOR == 0 || second_look || weak == 0.0 || surfaces_passed + 1 != NUMBER || (state == FOLLOW && found)) return false;
-    second_look = true;
-    found = false;
-    i = max(weak_at - RING * ROUGH, weak_segment);
-    segment = i;
-    fine_from = i;
-    state = SEARCH_FINE;
-    stride = 1;
-    filled = 0;
-    limit = weak_at + RING;
-    return true;
+    bool again = DETECTOR > 0 && !second_look && weak != 0.0 && surfaces_passed + 1 == NUMBER && !(state >= FOLLOW && found);
+    if (again) {
+        second_look = true;
+        found = false;
+        i = max(weak_at - RING * ROUGH, weak_segment);
+        segment = i;
+        fine_from = i;
+        state = SEARCH_FINE;
+        stride = 1;
+        filled = 0;
+        limit = weak_at + RING;
+    }
+    return again;
 }
 
 // Position of the surface found, in samples. `risen_at`: where D rises above FOLLOW_LEVEL of the peak, or NEVER.

@@ -1,6 +1,6 @@
 // What a filter reads and writes, by variant. T is the type of one texel.
-//   plane     2D to 2D, one channel            slices between filters
-//   slice     2D to one slice of a 3D texture  the last filter of stage 1
+//   plane     layers to layers, one channel    slices between filters, an invocation's z is its slice within the batch
+//   slice     layers to slices of 3D texture   the last filter of stage 1
 //   volume    3D to 3D                         across slices; coordinates in the stored part
 //   distance  2D to 2D, one channel with misses
 //   picture   2D to 2D, colours, channel by channel
@@ -31,15 +31,23 @@ uniform texture3D source;
 ivec3 source_size() { return textureSize(source, 0); }
 T read_at(ivec3 at) { return LOADED(texelFetch(source, at, 0)); }
 #else
+#if defined(DISTANCE) || defined(PICTURE)
 uniform texture2D source;
 ivec3 source_size() { return ivec3(textureSize(source, 0), 1); }
 T read_at(ivec3 at) { return LOADED(texelFetch(source, at.xy, 0)); }
+#else
+uniform texture2DArray source;
+ivec3 source_size() { return textureSize(source, 0); }
+T read_at(ivec3 at) { return LOADED(texelFetch(source, ivec3(at.xy, gl_GlobalInvocationID.z), 0)); }
+#endif
 #endif
 
 #if defined(VOLUME) || defined(SLICE)
 uniform writeonly image3D target;
-#else
+#elif defined(DISTANCE) || defined(PICTURE)
 uniform writeonly image2D target;
+#else
+uniform writeonly image2DArray target;
 #endif
 
 // The first of the `run` texels along an axis that this invocation makes, relative to the visible rectangle of a slice.
@@ -60,8 +68,10 @@ void write_at(ivec3 at, T value) {
 #if defined(VOLUME)
     imageStore(target, at, STORED(value));
 #elif defined(SLICE)
-    imageStore(target, ivec3(at.xy, slice) - first_stored, STORED(value));
-#else
+    imageStore(target, at + ivec3(0, 0, slice) - first_stored, STORED(value));
+#elif defined(DISTANCE) || defined(PICTURE)
     imageStore(target, at.xy, STORED(value));
+#else
+    imageStore(target, at, STORED(value));
 #endif
 }

@@ -2,6 +2,10 @@
 // rows that the windows share, each for all four windows. The thresholds converge to the ranks, and once at most three values
 // are between a threshold and the rank, a last pass keeps the four least values above it. Only counts are stored, at any window
 // size. The including shader declares RADIUS and `float tap(ivec2, ivec2)`.
+//
+// Invocations of a subgroup go through the same rounds until none needs another: they would wait for each other anyway, and where they
+// leave a loop one by one, some drivers keep its variables twice.
+#extension GL_KHR_shader_subgroup_vote : require
 const vec4 PLACE = vec4(0.0, 1.0, 2.0, 3.0);
 const int ROUNDS = 6;
 
@@ -18,7 +22,7 @@ struct Counts {
 Counts counted(ivec2 at, ivec2 last, vec4 a, vec4 b, bool first) {
     Counts c = Counts(vec4[8](vec4(0.0), vec4(0.0), vec4(0.0), vec4(0.0), vec4(0.0), vec4(0.0), vec4(0.0), vec4(0.0)),
                       vec4(0.0), vec4(MISS), vec4(-MISS));
-    for (int y = -RADIUS; y < RADIUS + 4; ++y) {
+    [[dont_unroll]] for (int y = -RADIUS; y < RADIUS + 4; ++y) {
         vec4 row_a = vec4(0.0), row_b = vec4(0.0);
         float hits = 0.0, least = MISS, most = -MISS;
         [[unroll]] for (int x = -RADIUS; x <= RADIUS; ++x) {
@@ -58,8 +62,8 @@ float narrowed(ivec2 at, ivec2 last, float rank, float low, float high, float un
         // Clamped: the smallest numbers may be flushed to zero, and then no round would end on a value of the window.
         float guess = clamp(mix(low, high, share), low, high);
         float below = 0.0, equal = 0.0, under = low, over = high;
-        for (int y = -RADIUS; y <= RADIUS; ++y) {
-            for (int x = -RADIUS; x <= RADIUS; ++x) {
+        [[dont_unroll]] for (int y = -RADIUS; y <= RADIUS; ++y) {
+            [[dont_unroll]] for (int x = -RADIUS; x <= RADIUS; ++x) {
                 float value = tap(at + ivec2(x, y), last);
                 if (value < guess) {
                     below += 1.0;
@@ -100,7 +104,7 @@ vec4 medians(ivec2 at, ivec2 last) {
     }
     Counts c = counted(at, last, a, b, true);
     bvec4 surface = greaterThan(2.0 * c.hits, vec4((2 * RADIUS + 1) * (2 * RADIUS + 1)));
-    if (!any(surface)) return vec4(MISS);
+    if (!subgroupAny(any(surface))) return vec4(MISS);
     // The value of rank `rank` is from low to high; `under` values are below low, `upto` values are not above high.
     vec4 low = c.least, high = c.most, under = vec4(0.0), upto = c.hits, rank = floor((c.hits - 1.0) * 0.5);
     for (int round = 0; round < ROUNDS; ++round) {
@@ -114,7 +118,7 @@ vec4 medians(ivec2 at, ivec2 last) {
             upto = mix(upto, c.below[i], lower);
         }
         vec4 above = rank - under, within = max(upto - under, vec4(1.0));
-        if (!any(both(surface, both(greaterThan(above, vec4(3.0)), lessThan(low, high))))) break;
+        if (!subgroupAny(any(both(surface, both(greaterThan(above, vec4(3.0)), lessThan(low, high)))))) break;
         // The position of the rank for uniformly spread values, minus a margin so that the last pass starts from below.
         vec4 margin = 0.25 * sqrt(within);
         a = mix(low, high, clamp((above - 1.0 - margin) / within, 0.0, 1.0));
@@ -123,7 +127,7 @@ vec4 medians(ivec2 at, ivec2 last) {
     }
     // The four least values from low on, in order.
     vec4 v0 = vec4(MISS), v1 = v0, v2 = v0, v3 = v0;
-    for (int y = -RADIUS; y < RADIUS + 4; ++y) {
+    [[dont_unroll]] for (int y = -RADIUS; y < RADIUS + 4; ++y) {
         vec4 from = mix(vec4(MISS), low, holding(y));
         [[unroll]] for (int x = -RADIUS; x <= RADIUS; ++x) {
             float value = tap(at + ivec2(x, y), last);
@@ -137,7 +141,7 @@ vec4 medians(ivec2 at, ivec2 last) {
     vec4 above = rank - under;
     vec4 found = mix(mix(v0, v1, greaterThan(above, vec4(0.0))), mix(v2, v3, greaterThan(above, vec4(2.0))), greaterThan(above, vec4(1.0)));
     found = mix(vec4(MISS), found, surface);
-    for (int i = 0; i < 4; ++i) {
+    [[dont_unroll]] for (int i = 0; i < 4; ++i) {
         if (surface[i] && above[i] > 3.0) {
             found[i] = narrowed(at + ivec2(0, i), last, rank[i], low[i], high[i], under[i], upto[i] - under[i]);
         }

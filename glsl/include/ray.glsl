@@ -8,6 +8,7 @@ layout(constant_id = 0) const int SWEEP = 1;    // 0 Cartesian, 1 fan, 2 transla
 layout(constant_id = 1) const int ARRAY = 1;    // 0 linear, 1 curved, 2 curved with lines 90 degrees or more off the axis
 layout(constant_id = 2) const int SAMPLING = 0; // 0 the device's filter, 1 eight fetches; two loads of four packed
                                                 // neighbours: 2 of bytes, 3 of 16 bits of 0..1, 4 of half floats
+layout(constant_id = 19) const int ELEVATION = 0; // between slices: 0 linear, 1 the uniform cubic B-spline
 layout(constant_id = 20) const int CLIPS = 0;   // clip planes
 layout(constant_id = 21) const int SPREAD = 0;  // 1: steps grow with the range, as the sample spacing of a convex sweep does
 layout(constant_id = 22) const int SLIDING = 0; // 3 or 5: edge of the Gaussian that slides along the ray
@@ -233,24 +234,49 @@ vec4 neighbours_at(ivec3 at) {
     return vec4(unpackHalf2x16(bits.x), unpackHalf2x16(bits.y));
 }
 
+// Texels of a slice in the order of `neighbours_at`, in the same units; coordinates in the stored part.
+vec4 plane_at(ivec2 low, ivec2 high, int slice) {
+    if (SAMPLING > 1) return neighbours_at(ivec3(low, slice));
+    return vec4(fetch(ivec3(low, slice)), fetch(ivec3(high.x, low.y, slice)), fetch(ivec3(low.x, high.y, slice)), fetch(ivec3(high, slice)));
+}
+
+float filtered_by_device(vec3 texel) {
+    return textureLod(volume, (texel - vec3(first_stored) + 0.5) / vec3(last_stored - first_stored + 1), 0.0).x;
+}
+
+// The uniform cubic B-spline across the slices k - 1 to k + 2 around a place, without a prefilter; bilinear within a slice. The weights of
+// each pair of slices are those of one linear fetch between them (Sigg and Hadwiger 2005, GPU Gems 2, chapter 20).
+float bspline_volume(vec3 texel) {
+    // Two slices beyond the border nothing changes any more.
+    float z = clamp(texel.z, float(first_stored.z - 2), float(last_stored.z + 2));
+    float k = floor(z), t = z - k, s = 1.0 - t;
+    vec4 w = vec4(s * s * s, 4.0 - t * t * (6.0 - 3.0 * t), 4.0 - s * s * (6.0 - 3.0 * s), t * t * t) / 6.0;
+    if (SAMPLING == 0) {
+        float near = w.x + w.y, far = w.z + w.w;
+        return near * filtered_by_device(vec3(texel.xy, k - 1.0 + w.y / near)) + far * filtered_by_device(vec3(texel.xy, k + 1.0 + w.w / far));
+    }
+    vec2 at = clamp(texel.xy, vec2(first_stored.xy), vec2(last_stored.xy));
+    ivec2 low = ivec2(at), high = min(low + 1, last_stored.xy) - first_stored.xy;
+    vec2 share = at - vec2(low);
+    low -= first_stored.xy;
+    ivec4 slices = clamp(int(k) + ivec4(-1, 0, 1, 2), first_stored.z, last_stored.z) - first_stored.z;
+    vec4 plane = w.x * plane_at(low, high, slices.x) + w.y * plane_at(low, high, slices.y)
+               + w.z * plane_at(low, high, slices.z) + w.w * plane_at(low, high, slices.w);
+    vec2 row = mix(plane.xz, plane.yw, share.x);
+    return mix(row.x, row.y, share.y) * NEIGHBOUR_UNIT;
+}
+
 // The volume at texture indices; beyond the border it repeats the nearest texel. Beyond the stored part no sample is needed. Indices are
 // shifted to the image as integers, so that the same texels get the same weights wherever the stored part begins; the device's filter
 // divides by the image's size.
 float raw_volume(vec3 texel) {
-    if (SAMPLING == 0) return textureLod(volume, (texel - vec3(first_stored) + 0.5) / vec3(last_stored - first_stored + 1), 0.0).x;
+    if (ELEVATION == 1) return bspline_volume(texel);
+    if (SAMPLING == 0) return filtered_by_device(texel);
     vec3 at = clamp(texel, vec3(first_stored), vec3(last_stored));
     ivec3 low = ivec3(at), high = min(low + 1, last_stored) - first_stored;
     vec3 w = at - vec3(low);
     low -= first_stored;
-    vec4 near, far;
-    if (SAMPLING > 1) {
-        near = neighbours_at(low);
-        far = neighbours_at(ivec3(low.xy, high.z));
-    } else {
-        near = vec4(fetch(low), fetch(ivec3(high.x, low.yz)), fetch(ivec3(low.x, high.y, low.z)), fetch(ivec3(high.xy, low.z)));
-        far = vec4(fetch(ivec3(low.xy, high.z)), fetch(ivec3(high.x, low.y, high.z)), fetch(ivec3(low.x, high.yz)), fetch(high));
-    }
-    vec4 plane = mix(near, far, w.z);
+    vec4 plane = mix(plane_at(low.xy, high.xy, low.z), plane_at(low.xy, high.xy, high.z), w.z);
     vec2 row = mix(plane.xz, plane.yw, w.x);
     return mix(row.x, row.y, w.y) * NEIGHBOUR_UNIT;
 }

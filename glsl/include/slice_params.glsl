@@ -1,4 +1,4 @@
-    int slice;
+    int slice; // the first that is made
 #if !defined(DISTANCE) && !defined(PICTURE)
     int first_column; // of the rectangle that is made
     int first_row;

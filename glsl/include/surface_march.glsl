@@ -6,6 +6,7 @@
 //   to_composite     the first sample that is still to be composited; NEVER if none is
 //   take             takes sample i of the march: false if it is outside the insonified region. It composites sample `to_composite`.
 //   skip_transparent skips samples that are transparent, from `to_composite` on
+#extension GL_KHR_shader_subgroup_vote : require
 layout(constant_id = 6) const int BEHIND = 0; // samples averaged behind the surface
 
 bool take(Ray ray, int i, inout Slices slices, out float value);
@@ -42,18 +43,21 @@ float find_surface(Ray ray, inout Slices slices, out vec3 echo) {
     int end = count > 0 ? count + HALF * ROUGH + RING : first;
 
     segment = fine_from = first;
-    bool goes_on = true;
-    for (int i = first;;) {
-        if (goes_on && i >= end) goes_on = look_again(i);
-        if (!goes_on && !(COMPOSITES && to_composite < NEVER)) break;
+    // A subgroup marches until its last ray is done: rays that are would wait anyway. Where rays leave a loop one by one, some drivers
+    // keep its variables twice, and this loop carries the whole state.
+    int i = first;
+    bool goes_on = first < end;
+    do {
         if (SKIP == 1) {
             RaySegment here = segment_at(ray, i, SAMPLE_AT);
-            while (here.kind == EMPTY && state == START && !second_look && goes_on && i < end) {
-                // The same as if each sample were outside.
+            bool may_skip = state == START && !second_look && goes_on;
+            int from = i;
+            while (may_skip && here.kind == EMPTY && i < end) {
                 i += (here.stop - i + ROUGH - 1) / ROUGH * ROUGH;
-                restart(i);
                 here = segment_at(ray, i, SAMPLE_AT);
             }
+            // The same as if each sample were outside.
+            if (i > from) restart(i);
             if (here.kind == HOMOGENEOUS && DETECTOR == 0 && state == START && !second_look && goes_on && filled >= RING) {
                 // Refill the ring with the last samples of the segment, so that it holds what it would hold without skipping.
                 int stop = min(here.stop, end);
@@ -92,7 +96,8 @@ float find_surface(Ray ray, inout Slices slices, out vec3 echo) {
                 restart(i);
             }
         }
-        for (; waits || ((state != START || second_look || after_speck) && goes_on && n > 0 && i < end); --n) {
+        bool follows = waits || ((state != START || second_look || after_speck) && goes_on && n > 0 && i < end);
+        for (; follows; --n, follows = (state != START || second_look || after_speck) && goes_on && n > 0 && i < end) {
             float value = 0.0;
             if (waits || take(ray, i, slices, value)) {
                 if (!waits) {
@@ -104,9 +109,9 @@ float find_surface(Ray ray, inout Slices slices, out vec3 echo) {
             } else {
                 goes_on = skip_sample(i);
             }
-            if (!goes_on) break;
         }
-    }
+        if (goes_on && i >= end) goes_on = look_again(i);
+    } while (subgroupAny(goes_on || (COMPOSITES && to_composite < NEVER)));
     // The ray ended during the second look: nothing confirms that the echo lasts.
     if (second_look && surfaces_passed < NUMBER) found = false;
     float distance = MISS;

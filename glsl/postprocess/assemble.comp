@@ -1,10 +1,10 @@
-// The picture from the rendering: the mean of several rays per pixel, or interpolation between the rays where one ray makes four
+// The picture from the rendering: the mean of several rays per pixel, or interpolation between the rays where one ray makes several
 // pixels; in a 4-up picture, the rendering next to the planes; in a pair, the composited volume next to the lit surface.
 // variants: alone; four FOUR; pair PAIR
 #version 460
 #include "common.glsl"
 layout(constant_id = 0) const int RAYS = 1; // along each edge of a pixel
-layout(constant_id = 1) const int HALF = 0; // one ray makes four pixels
+layout(constant_id = 1) const int APART = 1; // pixels between two rays along each axis
 uniform texture2D rendered;
 #ifdef FOUR
 uniform texture2D planes;
@@ -43,9 +43,9 @@ void main() {
     if (!is_volume) at.x -= size.x / 2;
 #endif
     // Colours are already multiplied by their opacity.
-    if (HALF == 1) {
+    if (APART > 1) {
         ivec2 last = textureSize(rendered, 0) - 1;
-        vec2 place = clamp(0.5 * vec2(at) - 0.25, vec2(0.0), vec2(last));
+        vec2 place = clamp((vec2(at) + 0.5) / float(APART) - 0.5, vec2(0.0), vec2(last));
         ivec2 low = ivec2(place), high = min(low + 1, last);
         vec2 share = place - vec2(low);
         vec4 above = mix(ray_at(low), ray_at(ivec2(high.x, low.y)), share.x);

@@ -12,14 +12,14 @@ layout(scalar) uniform Params {
     float narrowness; // of the low pass: 1 / (2 sigma^2), 1/sample^2
     float per_octave; // 20 log10(2) / dynamic range
 };
-uniform texture2D frames; // one layer of the frame array
+uniform texture2DArray frames; // the batch's first frame is layer 0
 #ifdef GAINED
 readonly buffer Tgc { float entry[]; } tgc; // gain per sample: a factor of envelopes, an addend of compressed samples
 #endif
-uniform writeonly image2D conditioned;
+uniform writeonly image2DArray conditioned; // a layer for each frame of the batch
 
 float sample_at(ivec2 at) {
-    float value = clamp(texelFetch(frames, at, 0).x * gain + offset, 0.0, 1.0);
+    float value = clamp(texelFetch(frames, ivec3(at, gl_GlobalInvocationID.z), 0).x * gain + offset, 0.0, 1.0);
 #ifdef GAINED
     value = LOG == 1 ? value * tgc.entry[at.x] : value + tgc.entry[at.x];
 #endif
@@ -27,7 +27,7 @@ float sample_at(ivec2 at) {
 }
 
 void main() {
-    ivec2 at = ivec2(gl_GlobalInvocationID.xy);
+    ivec3 at = ivec3(gl_GlobalInvocationID);
     if (any(greaterThanEqual(at, imageSize(conditioned)))) return;
     int last = textureSize(frames, 0).x - 1;
     // Taps beyond the ends of the line are omitted and the weights renormalised.

@@ -7,11 +7,11 @@ layout(scalar) uniform Params {
     float offset;
 #include "slice_params.glsl"
 };
-uniform texture2D frames; // one layer of the frame array
+uniform texture2DArray frames; // the batch's first frame is layer 0
 #include "slice_target.glsl"
 
 void main() {
-    ivec2 at = made_texel();
-    if (any(greaterThanEqual(at, textureSize(frames, 0)))) return;
-    write_slice(at, clamp(texelFetch(frames, at, 0).x * gain + offset, 0.0, 1.0));
+    ivec3 at = made_texel();
+    if (any(greaterThanEqual(at.xy, textureSize(frames, 0).xy))) return;
+    write_slice(at, clamp(texelFetch(frames, ivec3(at.xy, gl_GlobalInvocationID.z), 0).x * gain + offset, 0.0, 1.0));
 }

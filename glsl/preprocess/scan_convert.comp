@@ -1,4 +1,4 @@
-// Converts one polar frame into one slice. The look-up table gives the fractional sample and line of each pixel. Pixels outside
+// Converts polar frames into slices. The look-up table gives the fractional sample and line of each pixel. Pixels outside
 // the sector are not written (thesis Fig. 31), or are black where a filter reads the slice next.
 // variants: plane; slice SLICE
 #version 460
@@ -8,16 +8,16 @@ layout(scalar) uniform Params {
     float offset;
 #include "slice_params.glsl"
 };
-uniform texture2D frames; // one layer of the frame array
+uniform texture2DArray frames; // the batch's first frame is layer 0
 uniform texture2D scan_lut;
 #include "slice_target.glsl"
 
-float sample_at(ivec2 at) { return texelFetch(frames, at, 0).x; }
+float sample_at(ivec2 at) { return texelFetch(frames, ivec3(at, gl_GlobalInvocationID.z), 0).x; }
 
 void main() {
-    ivec2 at = made_texel();
-    if (any(greaterThanEqual(at, textureSize(scan_lut, 0)))) return;
-    vec2 index = texelFetch(scan_lut, at, 0).xy;
+    ivec3 at = made_texel();
+    if (any(greaterThanEqual(at.xy, textureSize(scan_lut, 0)))) return;
+    vec2 index = texelFetch(scan_lut, at.xy, 0).xy;
     if (index.x < 0.0) { // outside the sector
 #ifndef SLICE
         // Filters with a large reach must not read what an earlier frame left there.
@@ -25,7 +25,7 @@ void main() {
 #endif
         return;
     }
-    ivec2 base = min(ivec2(index), textureSize(frames, 0) - 2);
+    ivec2 base = min(ivec2(index), textureSize(frames, 0).xy - 2);
     vec2 share = index - vec2(base);
     float near = mix(sample_at(base), sample_at(base + ivec2(1, 0)), share.x);
     float far = mix(sample_at(base + ivec2(0, 1)), sample_at(base + ivec2(1, 1)), share.x);

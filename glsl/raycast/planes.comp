@@ -5,6 +5,8 @@
 #include "common.glsl"
 layout(constant_id = 3) const int SAMPLES = 1; // through the slab
 layout(constant_id = 4) const int SLAB = 0;    // 0 mean, 1 largest, 2 smallest
+// 1: one plane fills the picture. Its vectors are those of the rays: a CPU reads tables lane by lane, which takes nearly as long as a sample.
+layout(constant_id = 5) const int ONE_TILE = 0;
 #ifdef TONED
 #include "tone_constants.glsl"
 #endif
@@ -28,30 +30,33 @@ uniform writeonly image2D picture;
 #define TARGET picture
 #endif
 
-// True inside the rendered box and on the near side of every clip plane.
-bool is_kept(vec3 p) {
-    bool kept = all(greaterThanEqual(p, box_low)) && all(lessThanEqual(p, box_high));
-    for (int i = 0; i < CLIPS; ++i) {
-        vec4 plane = i == 0 ? clip_0 : i == 1 ? clip_1 : i == 2 ? clip_2 : clip_3;
-        kept = kept && dot(plane.xyz, p) <= plane.w;
-    }
-    return kept;
-}
+#include "kept.glsl"
 
 void main() {
     ivec2 pixel = ivec2(gl_GlobalInvocationID.xy);
-    ivec2 size = imageSize(TARGET), cells = ivec2(columns, rows);
+    ivec2 size = imageSize(TARGET);
     if (any(greaterThanEqual(pixel, size))) return;
-    ivec2 cell = cell_of(pixel, size, cells);
-    int n = cell.y * columns + cell.x;
+    vec3 corner = origin, dx = origin_dx, dy = origin_dy, slab = direction;
+    ivec2 first = ivec2(0);
+    bool is_covered = true;
+    if (ONE_TILE == 0) {
+        ivec2 cells = ivec2(columns, rows), cell = cell_of(pixel, size, cells);
+        int n = cell.y * columns + cell.x;
+        first = cell_corner(cell, size, cells);
+        is_covered = n < tile_count();
+        corner = tile_corner(n);
+        dx = tile_dx(n);
+        dy = tile_dy(n);
+        slab = tile_slab(n);
+    }
     float value = SLAB == 2 ? 1.0 : 0.0;
     int count = 0;
-    if (n < tile_count()) {
-        vec2 at = vec2(pixel - cell_corner(cell, size, cells)) + 0.5;
-        vec3 middle = tile_corner(n) + tile_dx(n) * at.x + tile_dy(n) * at.y;
+    if (is_covered) {
+        vec2 at = vec2(pixel - first) + 0.5;
+        vec3 middle = corner + dx * at.x + dy * at.y;
         for (int i = 0; i < SAMPLES; ++i) {
             float through = SAMPLES > 1 ? float(i) / float(max(SAMPLES - 1, 1)) - 0.5 : 0.0;
-            vec3 p = SAMPLES > 1 ? middle + tile_slab(n) * through : middle;
+            vec3 p = SAMPLES > 1 ? middle + slab * through : middle;
             vec3 texel;
             if (!is_kept(p) || !locate(p, texel)) continue;
             float v = sample_volume(texel);
@@ -62,7 +67,7 @@ void main() {
     if (SLAB == 0) value /= float(max(count, 1));
 #ifdef TONED
     vec3 c = count > 0 ? toned(vec3(value)) : vec3(0.0);
-    imageStore(TARGET, pixel, vec4(with_lines(c, pixel, size), 1.0));
+    imageStore(TARGET, pixel, vec4(ONE_TILE == 0 ? with_lines(c, pixel, size) : c, 1.0));
 #else
     imageStore(TARGET, pixel, count > 0 ? vec4(vec3(value), 1.0) : vec4(0.0));
 #endif

@@ -15,7 +15,7 @@ uniform writeonly image2D picture;
 bool below(RaySegment s, float kept) {
     bool nothing = s.range.x > s.range.y;
     // Rounding may put a weighted mean beyond its texels.
-    const float beyond = SLIDING > 0 ? 1.00001 : 1.0;
+    const float beyond = SLIDING > 0 || ELEVATION > 0 ? 1.00001 : 1.0;
     return nothing || (KEPT == 0 ? windowed(s.range.y * beyond) + 1e-6 <= kept : windowed(s.range.x / beyond) - 1e-6 >= kept);
 }
 

@@ -32,7 +32,7 @@ int complete = 0; // steps of full length; one more may follow
 // Composites step i, with the sample before the window.
 void composite(Ray ray, int i, vec3 p, float raw) {
     float length = min(step_length, ray.leave - ray.enter - offset_of(ray, float(i)));
-    if (length > 0.0) add_step(looked_up(stretched(raw, volume_window_low, volume_window_scale)), length, p, colour, opacity);
+    if (length > 0.0) add_step(looked_up(stretched(raw, volume_window_low, volume_window_scale)), length, p, ray.direction, colour, opacity);
 }
 
 bool is_opaque() { return EARLY_END == 1 && opacity >= opaque_enough; }
@@ -82,5 +82,5 @@ void main() {
     }
     imageStore(distance_map, pixel, vec4(distance, 0.0, 0.0, 0.0));
     if (ECHO == 1) imageStore(surface, pixel, vec4(echo, 0.0));
-    imageStore(picture, pixel, vec4(colour, opacity));
+    imageStore(picture, pixel, developed(colour, opacity, pixel, imageSize(picture)));
 }

@@ -139,7 +139,7 @@ void main() {
                     entry = looked_up(sample_along(ray, i, sample_at, texel, slices));
                 }
                 float before = opacity;
-                add_step(entry, length, p, colour, opacity);
+                add_step(entry, length, p, ray.direction, colour, opacity);
 #ifdef HIT
                 // Interpolated between two samples, so that the surface has no terraces.
                 if (hit == MISS && opacity >= hit_opacity) {
@@ -152,7 +152,7 @@ void main() {
             if (front_known && i < to) front_inside = false;
         }
     }
-    imageStore(picture, pixel, vec4(colour, opacity));
+    imageStore(picture, pixel, developed(colour, opacity, pixel, imageSize(picture)));
 #ifdef HIT
     imageStore(distance_map, pixel, vec4(hit, 0.0, 0.0, 0.0));
 #endif

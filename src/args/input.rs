@@ -16,7 +16,7 @@ use std::sync::Arc;
 /// The arguments of every command that renders a recording.
 #[derive(clap::Args)]
 pub struct InputArgs {
-    /// Recording: MetaImage (.mha, .mhd), Kretz (.vol) or frames (.frames). Without one, a synthetic fetal head (preset phantom)
+    /// Recording: MetaImage (.mha, .mhd), Kretz (.vol) or frames (.frames). Without one, a synthetic fetal head (preset face)
     input: Option<PathBuf>,
     #[command(flatten)]
     scene: SceneArgs,
@@ -166,7 +166,10 @@ impl SceneArgs {
     pub fn layers(&self, is_phantom: bool, chosen: &[String]) -> Result<Layers, Failure> {
         let mut layers = Layers::default();
         if is_phantom {
-            layers.preset("phantom").map_err(input)?;
+            // The pair shows a surface.
+            let is_pair = self.layout.as_deref() == Some("pair");
+            let is_plain = self.preset.is_empty() && self.scene.is_none() && self.mode.is_none() && !is_pair;
+            layers.phantom(is_plain).map_err(input)?;
         }
         self.layers_over(layers, chosen)
     }

@@ -59,6 +59,7 @@ pub fn fault(scene: &Scene) -> Option<&'static str> {
         Mode::Volume if scene.settings.ray.sliding != 0 => {
             Some("ray.sliding filters samples, at distances of one step")
         }
+        Mode::Volume if scene.takes_bspline() => Some("ray.elevation is not linear"),
         Mode::Volume => None,
         _ => Some("only the integral of volume rendering (--mode vr) is bounded"),
     }

@@ -180,9 +180,11 @@ impl Filter {
         }
         let settings = layers.finish().map_err(input)?;
         match settings.slices.smooth {
-            Some(smooth) if smooth.elevation > 0.0 || smooth.kernel.is_some() => Err(input(
-                "--filter gaussian: elevation and kernel need several slices, and a picture is one; give lateral and depth",
-            )),
+            Some(smooth) if smooth.elevation > 0.0 || smooth.elevation_mm.is_some() || smooth.kernel.is_some() => {
+                Err(input(
+                    "--filter gaussian: elevation and kernel need several slices, and a picture is one; give lateral and depth",
+                ))
+            }
             Some(smooth) if smooth.lateral == 0.0 && smooth.depth == 0.0 => {
                 Err(input("--filter gaussian: give lateral, depth or both, standard deviations in pixels"))
             }

@@ -2,11 +2,10 @@
 
 use crate::args::{Output, check_outputs};
 use crate::files::signals::Writing;
-use crate::picture::check_target;
 use crate::probe::{Geometry, Grid};
 use crate::scene::insonified_box;
 use crate::source::convert::{Volume, VolumeFile, lattice};
-use crate::source::phantom::{Body, Phantom, PhantomOptions, Speckle};
+use crate::source::phantom::{Body, Label, Phantom, PhantomOptions, PointSpread, Sampling, Speckle, distance_path};
 use crate::source::recorder::{Header, Writer};
 use crate::source::sequence::{self, Sequence};
 use crate::source::{self, Source};
@@ -172,6 +171,10 @@ impl Info {
 }
 
 #[derive(clap::Args)]
+#[command(after_help = "Examples:\n  echolume phantom -o sweep.mha --volumes 4 --both-ways\n  \
+                        echolume phantom -o still.mha --sampling gallery    (111 frames of 192 lines of a fetus at rest)\n  \
+                        echolume phantom -o sweep.mha --truth truth.mha --truth-spacing 0.5    (compare with: echolume convert sweep.mha \
+                        volume.mha --spacing 0.5)")]
 pub struct MakePhantom {
     /// The sweep to write (.mha). Its geometry goes to NAME.probe.toml next to it
     #[arg(short, long, value_name = "FILE")]
@@ -191,6 +194,37 @@ pub struct MakePhantom {
     /// Share of the frame pitch that the motor travels during one frame, 0..1 [default: 0, with --both-ways 0.5]
     #[arg(long, value_name = "SHARE")]
     speed_ratio: Option<f64>,
+    /// Named set of the options below: live (37 frames of 128 lines), or gallery (111 frames of 192 lines, a narrower beam, --still)
+    #[arg(long, value_name = "NAME", default_value = "live")]
+    sampling: String,
+    /// Frames a volume [default: of the sampling]
+    #[arg(long, value_name = "N")]
+    frames: Option<usize>,
+    /// Scan lines a frame [default: of the sampling]
+    #[arg(long, value_name = "N")]
+    lines: Option<usize>,
+    /// Angle from the first frame to the last, degrees [default: 61]
+    #[arg(long, value_name = "DEG")]
+    fan: Option<f64>,
+    /// Standard deviation of the point-spread function along a scan line, mm [default: 0.35]
+    #[arg(long, value_name = "MM")]
+    psf_axial: Option<f64>,
+    /// The same from line to line, degrees [default: 0.8; gallery: 0.6]
+    #[arg(long, value_name = "DEG")]
+    psf_lateral: Option<f64>,
+    /// The same from frame to frame, degrees [default: 1.2; gallery: 0.6]
+    #[arg(long, value_name = "DEG")]
+    psf_elevation: Option<f64>,
+    /// The head does not move
+    #[arg(long)]
+    still: bool,
+    /// Also write what is where in the first volume of the head: labels to this file (.mha), and the signed distance from the
+    /// skin, mm, to NAME.distance.mha. 0 fluid, 1 skin, 2 hand, 3 cord, 4 skull, 5 brain, 6 choroid plexus, 7 ventricle, 8 falx, 9 uterus
+    #[arg(long, value_name = "FILE")]
+    truth: Option<PathBuf>,
+    /// Voxel spacing of these files, mm
+    #[arg(long, value_name = "MM", default_value_t = 1.0, requires = "truth")]
+    truth_spacing: f64,
     /// Write the echogenicity, without speckle and without the blur of the probe
     #[arg(long)]
     no_speckle: bool,
@@ -201,6 +235,8 @@ pub struct MakePhantom {
 
 impl MakePhantom {
     pub fn run(&self) -> Result<(), Failure> {
+        let usual = self.sampling.parse::<Sampling>().map_err(input)?.options();
+        let psf = usual.point_spread;
         let options = PhantomOptions {
             seed: self.seed,
             body: self.body.parse::<Body>().map_err(input)?,
@@ -212,13 +248,45 @@ impl MakePhantom {
                 _ => Speckle::Random,
             },
             speed_ratio: self.speed_ratio.unwrap_or(if self.both_ways { 0.5 } else { 0.0 }),
-            ..PhantomOptions::default()
+            frames: self.frames.unwrap_or(usual.frames),
+            lines: self.lines.unwrap_or(usual.lines),
+            fan_angle_deg: self.fan.unwrap_or(usual.fan_angle_deg),
+            point_spread: PointSpread {
+                axial_mm: self.psf_axial.unwrap_or(psf.axial_mm),
+                lateral_deg: self.psf_lateral.unwrap_or(psf.lateral_deg),
+                elevation_deg: self.psf_elevation.unwrap_or(psf.elevation_deg),
+            },
+            still: self.still || usual.still,
+            ..usual
         };
         let phantom = Phantom::new(options).map_err(input)?;
-        check_target(&self.output).map_err(failed)?;
+        self.check_outputs()?;
+        if let Some(truth) = &self.truth {
+            // First: what it refuses is refused before the sweep is computed.
+            let grid = phantom.truth_grid(self.truth_spacing).map_err(input)?;
+            phantom.write_truth(truth, &grid).map_err(failed)?;
+            let labels = Label::ALL.map(|label| format!("{} {}", label as u8, label.name())).join(", ");
+            say!("labels: {}, {labels}", truth.display());
+            say!("distance: {}, mm, negative inside", distance_path(truth).display());
+        }
         phantom.write(&self.output).map_err(failed)?;
         say!("sweep: {}", self.output.display());
         Ok(())
+    }
+}
+
+impl MakePhantom {
+    /// Refuses files that cannot be written, and two outputs in one file.
+    fn check_outputs(&self) -> Result<(), Failure> {
+        let distance = self.truth.as_deref().map(distance_path);
+        let beside = sequence::probe_file_path(&self.output);
+        let targets: [Output; 4] = [
+            (OUTPUT, Some(&self.output)),
+            (OUTPUT, Some(&beside)),
+            ("--truth", self.truth.as_deref()),
+            ("--truth", distance.as_deref()),
+        ];
+        check_outputs(&targets, [])
     }
 }
 

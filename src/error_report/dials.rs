@@ -61,6 +61,9 @@ pub const NAMES: &[&str] = &[
     "half",
     "brick",
     "transfer",
+    "light-cell",
+    "light-taps",
+    "light-widening",
 ];
 
 /// The dial of that name.
@@ -118,10 +121,12 @@ pub fn dial(name: &str, scene: &Scene) -> Result<Dial, String> {
             let pairs = Volume { compositing: Compositing::PreIntegrated, ..s.volume.clone() };
             let finest = if transfer::entries(&pairs).is_ok() { "pre-integrated" } else { "corrected" };
             let pairs_fit = finest == "pre-integrated";
-            // Exponential needs steps of one length, too.
+            // Exponential needs steps of one length, too, and takes the light of a step from a table.
             let possible = |k: &str| match k {
                 "pre-integrated" => pairs_fit,
-                "exponential" => pairs_fit && !scene.spreads(),
+                "exponential" => {
+                    pairs_fit && !scene.spreads() && scene.lit_by_volume().is_none() && scene.region_fade().is_none()
+                }
                 _ => true,
             };
             let others = kinds.iter().enumerate().filter(|(_, k)| **k != now && possible(k));
@@ -338,6 +343,7 @@ pub fn dial(name: &str, scene: &Scene) -> Result<Dial, String> {
         "half" => {
             need(!scene.is_flat(), "casts no ray")?;
             need(s.ray.rays == 1, "casts several rays for each pixel")?;
+            need(!s.ray.quarter, "casts one ray for 16 pixels")?;
             // Assigning `ray.rays` too keeps the two dials from being combined.
             let half = |on: bool| [format!("ray.half={on}"), "ray.rays=1".to_string()];
             let (word, value) = if s.ray.half { ("half", 0.25) } else { ("whole", 1.0) };
@@ -345,6 +351,28 @@ pub fn dial(name: &str, scene: &Scene) -> Result<Dial, String> {
                 if s.ray.half { at("whole".into(), &half(false), 1.0) } else { at("half".into(), &half(true), 0.25) };
             let best = |n: u32| ["ray.half=false".to_string(), format!("ray.rays={n}")];
             made("half", "rays a pixel", is(word.into(), value), vec![other], &best(3), &best(2))
+        }
+        "light-cell" => {
+            need(scene.lit_by_volume().is_some(), "has no light volume")?;
+            let now = scene.light_lattice().cell;
+            let set = |cell: f64| [format!("light.volume.cell={cell}")];
+            let others = [3.0, 2.0, 1.6, 1.2, 0.8, 0.6].into_iter().filter(|cell| (*cell - now).abs() > 1e-6);
+            let others = others.map(|cell| at(format!("{cell} mm"), &set(cell), cell)).collect();
+            made("light-cell", "mm", is(format!("{now:.2} mm"), now), others, &set(0.4), &set(0.5))
+        }
+        "light-taps" => {
+            let Some(light) = scene.lit_by_volume() else { return Err("has no light volume".into()) };
+            let set = |taps: u32| [format!("light.volume.taps={taps}")];
+            let others = [1, 2, 3].into_iter().filter(|taps| *taps != light.taps);
+            let others = others.map(|taps| at(taps.to_string(), &set(taps), f64::from(taps))).collect();
+            let now = is(light.taps.to_string(), f64::from(light.taps));
+            made("light-taps", "samples along the edge of a cell", now, others, &set(4), &set(3))
+        }
+        "light-widening" => {
+            let Some(light) = scene.lit_by_volume() else { return Err("has no light volume".into()) };
+            let others = [0.0, 0.2, 0.35, 0.5, 0.7, 1.0].into_iter().filter(|w| (*w - light.widening).abs() > 1e-9);
+            let others = others.map(|w| at(format!("{w} mm"), &[format!("light.volume.widening={w}")], w));
+            look("light-widening", "mm after 1 mm", others.collect())
         }
         _ => return Err(format!("is unknown; there are: {}, all", NAMES.join(", "))),
     };

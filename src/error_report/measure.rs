@@ -470,7 +470,7 @@ fn cost(scene: &Scene) -> f64 {
 /// The filters of slices, in samples of a ray.
 fn cost_of_slices(scene: &Scene) -> f64 {
     let pixels = scene.volume_size().iter().map(|n| f64::from(*n)).product::<f64>();
-    let slices = &scene.settings.slices;
+    let slices = &scene.slice_filters;
     let window = slices.sigma.map_or(0, |s| s.window.pow(2)) + slices.enhanced_sigma.map_or(0, |s| s.largest.pow(2));
     let diffused = slices.perona_malik.map_or(0, |p| 8 * p.repeat);
     // A filter tap costs a tenth of a sample through the inverse map.

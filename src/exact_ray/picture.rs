@@ -30,8 +30,17 @@ pub fn fault(scene: &Scene) -> Option<String> {
     if scene.is_flat() || s.mode == Mode::Cube {
         return Some("the mode casts no ray".into());
     }
+    if scene.lit_by_volume().is_some() {
+        return Some("light.volume takes light from a lattice".into());
+    }
+    if scene.region_fade().is_some() && scene.composites() {
+        return Some("region.fade is no part of the field along a ray".into());
+    }
     if s.ray.sliding != 0 {
         return Some("ray.sliding filters samples, at distances of one step".into());
+    }
+    if scene.takes_bspline() {
+        return Some("ray.elevation is not linear".into());
     }
     let surface = scene.detects_surface().then(|| surface::fault(scene)).flatten();
     surface.map(str::to_string)

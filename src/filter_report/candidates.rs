@@ -79,7 +79,7 @@ fn candidates_of_all(pitch: [f64; 2]) -> Vec<Candidate> {
     }
     // What the presets filter slices with, but for smoothing across frames.
     add(
-        "preset phantom",
+        "preset face-classic",
         "median, sigma 9x9 0.15, Gaussian 0.9 and 0.7 mm".into(),
         &[
             "slices.median=true".into(),

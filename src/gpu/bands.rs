@@ -2,8 +2,8 @@
 //! long, and the device is lost: after 2 s (Windows), 7.5 s (i915) or 10 s (amdgpu). The size of a band follows from the time that
 //! the pass took on this device.
 //!
-//! Invocations of every pass are independent: no shader has shared memory, a barrier or an atomic operation. So any division into
-//! workgroups gives the same texels. A software device has no watchdog and gets no bands, until it is lost.
+//! Workgroups of every pass are independent: no shader has an atomic operation, and only invocations of one workgroup share memory. So any
+//! division between workgroups gives the same texels. A software device has no watchdog and gets no bands, until it is lost.
 
 use crate::passes::{Pass, Stage};
 use std::sync::atomic::{AtomicU64, Ordering};

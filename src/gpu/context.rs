@@ -13,11 +13,12 @@ use super::window::target::Target;
 use crate::queues::MAX_QUEUES;
 use ash::vk;
 use gpu_allocator::vulkan::{Allocator, AllocatorCreateDesc};
+use std::any::Any;
 use std::collections::{BTreeSet, HashMap};
 use std::ffi::CString;
 use std::path::PathBuf;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
-use std::sync::{Arc, Mutex};
+use std::sync::{Arc, Mutex, Weak};
 use std::time::Instant;
 
 /// Which device a [`Context`] uses, and how.
@@ -61,6 +62,8 @@ pub struct Context {
     /// With [`ContextOptions::compile_statistics`], if the device has them.
     pub(super) executables: Option<ash::khr::pipeline_executable_properties::Device>,
     pub(super) pipeline_cache: PipelineCache,
+    /// What the renderers of the device share while one of them holds it: [`super::pipelines::Pipelines`], whose module depends on this one.
+    pub(super) shared: Mutex<Vec<Weak<dyn Any + Send + Sync>>>,
     /// Reports why the device was lost.
     pub(super) loss: LossReporting,
     /// In the order of `candidate.queues`: rendering, ingestion, copies.
@@ -211,6 +214,7 @@ impl Context {
             names: debug_utils.then(|| ash::ext::debug_utils::Device::new(instance, &device)),
             executables: has_statistics
                 .then(|| ash::khr::pipeline_executable_properties::Device::new(instance, &device)),
+            shared: Mutex::default(),
             pipeline_cache: PipelineCache::open(&device, &candidate.driver_identity, options.pipeline_cache.as_deref()),
             loss: LossReporting {
                 faults: candidate.device_fault.then(|| ash::ext::device_fault::Device::new(instance, &device)),

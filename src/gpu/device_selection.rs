@@ -168,6 +168,9 @@ fn candidate(entry: &ash::Entry, instance: &ash::Instance, handle: vk::PhysicalD
         need(v12.host_query_reset == vk::TRUE, "hostQueryReset");
         need(v13.synchronization2 == vk::TRUE, "synchronization2");
         need(v13.maintenance4 == vk::TRUE, "maintenance4");
+        let votes = v11.subgroup_supported_operations.contains(vk::SubgroupFeatureFlags::VOTE)
+            && v11.subgroup_supported_stages.contains(vk::ShaderStageFlags::COMPUTE);
+        need(votes, "subgroup votes in compute shaders");
         can_present &= v13.dynamic_rendering == vk::TRUE;
     }
     let queues = queues(&families);

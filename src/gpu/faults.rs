@@ -246,7 +246,9 @@ impl Faults {
     /// The input bytes of a slot for a single pass.
     pub(super) fn given(&self, slot: Slot, scene: &Scene, mut bytes: Vec<u8>) -> Vec<u8> {
         if slot == Slot::Frames {
-            self.frame(scene, &mut bytes);
+            let [width, height] = scene.frame_size().map(|n| n as usize);
+            let frames = bytes.chunks_mut(width * height * slot.format(scene).texel_bytes());
+            frames.for_each(|frame| self.frame(scene, frame));
         } else if self.change.get().is_some() && matches!(slot.initializer(), Initializer::ByScene(_)) {
             let values = bytemuck::pod_collect_to_vec(&bytes);
             bytes = bytemuck::cast_slice(&self.table(slot, scene, values)).to_vec();

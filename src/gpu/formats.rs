@@ -91,11 +91,19 @@ fn features(context: &Context, slot: Slot, scene: &Scene) -> vk::FormatFeatureFl
     features
 }
 
+/// Frames whose slots of stage 1 stay in the caches of a CPU.
+const FRAMES_IN_CACHE: u32 = 4;
+
 /// The scene with the fields that the device resolves: the fastest sampling, which reads eight texels if texels are loaded or the
-/// device cannot filter the volume's format; no packed neighbours if the device cannot hold them; and a deep picture for a deep window.
+/// device cannot filter the volume's format; no packed neighbours if the device cannot hold them; a deep picture for a deep window; and the shared
+/// memory of a GPU, for the solver of AOS. On a CPU few frames go through stage 1 at once: their slots stay in its caches.
 pub fn adapt_scene(context: &Context, texel_access: TexelAccess, scene: Scene) -> Scene {
     let filters = filters(context, Slot::Volume.format(&scene));
     let mut scene = scene.sampled(if filters { texel_access.sampling() } else { Sampling::Exact });
+    match context.candidate.is_software() {
+        true => scene.frames_at_once = FRAMES_IN_CACHE,
+        false => scene.shared_memory = context.limits.max_compute_shared_memory_size,
+    }
     // It is copied to the window by a blit.
     let wide = context.format_features(vulkan(Format::Rgba16f));
     scene.is_deep = context.is_deep.load(Ordering::Relaxed)

@@ -18,7 +18,7 @@ use std::sync::Arc;
 /// Runs single passes on inputs of the caller.
 pub struct PassRunner {
     context: Arc<Context>,
-    pipelines: Pipelines,
+    pipelines: Arc<Pipelines>,
     texel_access: TexelAccess,
 }
 
@@ -36,7 +36,7 @@ impl PassRunner {
     pub fn with_texel_access(context: &Arc<Context>, texel_access: TexelAccess) -> Result<PassRunner, GpuError> {
         Ok(PassRunner {
             context: context.clone(),
-            pipelines: Pipelines::new(context, embedded(), texel_access)?,
+            pipelines: Pipelines::shared(context, embedded(), texel_access)?,
             texel_access,
         })
     }
@@ -46,9 +46,10 @@ impl PassRunner {
         self.context.limits.sub_texel_precision_bits
     }
 
-    /// The scene as [`PassRunner::run`] runs it: with what the device resolves.
+    /// The scene as [`PassRunner::run`] runs it: with what the device resolves, except what dispatches there are, since those are the caller's.
     pub fn adapted(&self, scene: &Scene) -> Scene {
-        formats::adapt_scene(&self.context, self.texel_access, scene.clone())
+        let adapted = formats::adapt_scene(&self.context, self.texel_access, scene.clone());
+        Scene { shared_memory: scene.shared_memory, frames_at_once: scene.frames_at_once, ..adapted }
     }
 
     /// The shader of a pass in an adapted scene as the driver gets it.
@@ -103,7 +104,7 @@ impl PassRunner {
         for (bind, bytes) in staged {
             let Some(image) = slots.image(bind.slot, args.image) else { continue };
             let parts = match bind.part {
-                Part::Layer => args.layer..args.layer + 1,
+                Part::Layers => args.layer..args.layer + args.slices,
                 _ => 0..image.shape.parts(),
             };
             let copy = if bind.slot.is_multibuffered() { args.image } else { 0 };
@@ -141,7 +142,7 @@ pub struct PassTimer {
     recorder: Recorder,
     /// Every iteration of the pass.
     dispatches: Vec<(DispatchArgs, Arc<Pipeline>)>,
-    _pipelines: Pipelines,
+    _pipelines: Arc<Pipelines>,
     slots: SlotResources,
     timelines: Timelines,
     barriers: BarrierRecorder,
@@ -186,7 +187,7 @@ impl PassTimer {
         let iterations: Vec<DispatchArgs> =
             (0..(pass.repeat)(scene)).map(|iteration| DispatchArgs { iteration, ..first }).collect();
         let mut plan = Plan { steps: Vec::new(), slots: Vec::new() };
-        let pipelines = Pipelines::new(context, embedded(), texel_access)?;
+        let pipelines = Pipelines::shared(context, embedded(), texel_access)?;
         let mut dispatches = Vec::new();
         for args in iterations {
             let binds = [pass.reads(scene, &args), pass.writes(scene, &args)].concat();

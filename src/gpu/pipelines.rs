@@ -15,7 +15,7 @@ use ash::vk;
 use rayon::prelude::*;
 use std::collections::{HashMap, HashSet};
 use std::sync::atomic::Ordering;
-use std::sync::{Arc, Mutex};
+use std::sync::{Arc, LazyLock, Mutex, Weak};
 use std::time::{Duration, Instant};
 
 /// A compute pipeline and its layout.
@@ -62,11 +62,14 @@ pub struct Pipelines {
     sampler: vk::Sampler,
 }
 
-/// The embedded shaders.
+/// The embedded shaders: the same `Arc` at every call.
 pub fn embedded() -> Arc<Shaders> {
-    Arc::new(|name| {
-        spirv::embedded(name).map(spirv::words).ok_or_else(|| "is not embedded; run tools/shaders".to_string())
-    })
+    static EMBEDDED: LazyLock<Arc<Shaders>> = LazyLock::new(|| {
+        Arc::new(|name| {
+            spirv::embedded(name).map(spirv::words).ok_or_else(|| "is not embedded; run tools/shaders".to_string())
+        })
+    });
+    EMBEDDED.clone()
 }
 
 pub fn descriptor_type(kind: Kind) -> vk::DescriptorType {
@@ -81,6 +84,35 @@ pub fn descriptor_type(kind: Kind) -> vk::DescriptorType {
 }
 
 impl Pipelines {
+    /// Pipelines of these shaders. Those of the embedded shaders are shared by all that hold some of the same context: a second
+    /// renderer of a scene compiles nothing.
+    ///
+    /// # Errors
+    /// A device that fails.
+    pub fn shared(
+        context: &Arc<Context>,
+        shaders: Arc<Shaders>,
+        texel_access: TexelAccess,
+    ) -> Result<Arc<Pipelines>, GpuError> {
+        if !Arc::ptr_eq(&shaders, &embedded()) {
+            return Ok(Arc::new(Pipelines::new(context, shaders, texel_access)?));
+        }
+        let mut shared = context.shared.lock().unwrap_or_else(|e| e.into_inner());
+        shared.retain(|held| held.strong_count() > 0);
+        let mut held = shared.iter().filter_map(Weak::upgrade).filter_map(|held| held.downcast::<Pipelines>().ok());
+        if let Some(found) = held.find(|p| p.texel_access == texel_access) {
+            return Ok(found);
+        }
+        let made = Arc::new(Pipelines::new(context, shaders, texel_access)?);
+        let weak: Weak<Pipelines> = Arc::downgrade(&made);
+        shared.push(weak);
+        Ok(made)
+    }
+
+    /// Pipelines that nobody shares.
+    ///
+    /// # Errors
+    /// A device that fails.
     pub fn new(
         context: &Arc<Context>,
         shaders: Arc<Shaders>,

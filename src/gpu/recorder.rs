@@ -56,6 +56,8 @@ pub struct BufferLayout {
     pub row_length: u32,
     /// Rows from one image to the next.
     pub image_height: u32,
+    /// Bytes from one part to the next, where the last part comes first.
+    pub descending: Option<u64>,
 }
 
 /// Command buffers that are recorded and submitted again and again. One is enough, except for work in bands.
@@ -79,6 +81,8 @@ pub struct Recorder {
     /// Time stamps that were read, for later submissions.
     spare: Vec<Stamps>,
     time_stamps: TimeStamps,
+    /// How often each pass and copy of the recording counts as run: once for each frame of a batch.
+    pub runs: u32,
     /// Invocations are counted.
     statistics: bool,
     /// The value of the timeline at which the last submission is done.
@@ -123,6 +127,7 @@ impl Recorder {
             unread: Vec::new(),
             spare: Vec::new(),
             time_stamps,
+            runs: 1,
             statistics,
             done_at: 0,
             collected_to: 0,
@@ -151,6 +156,7 @@ impl Recorder {
         unsafe { self.context.device.reset_command_pool(self.pool, vk::CommandPoolResetFlags::empty()) }
             .context(|| format!("record '{}'", self.label))?;
         self.used = 0;
+        self.runs = 1;
         self.params_used = 0;
         self.sets.begin()?;
         if let Some(stamps) = &mut self.stamps {
@@ -256,7 +262,7 @@ impl Recorder {
     /// Submits the recording, after waits for other queues.
     pub fn submit(&mut self, barriers: &mut BarrierRecorder, timelines: &mut Timelines) -> Result<(), GpuError> {
         if let Some(stamps) = self.stamps.as_mut().filter(|_| self.time_stamps == TimeStamps::Ends) {
-            stamps.end_of(self.commands, self.label, std::mem::take(&mut self.open));
+            stamps.end_of(self.commands, self.label, self.runs, std::mem::take(&mut self.open));
             barriers.stamped(self.queue);
             self.after_stamp(barriers);
         }
@@ -391,7 +397,7 @@ impl Recorder {
         };
         match (&mut self.stamps, self.time_stamps) {
             (Some(stamps), TimeStamps::EachPass) => {
-                stamps.dispatch(commands, pass.name, vec![work], repeat);
+                stamps.dispatch(commands, pass.name, self.runs, vec![work], repeat);
                 barriers.stamped(self.queue);
                 self.after_stamp(barriers);
             }
@@ -423,7 +429,7 @@ impl Recorder {
     /// Where each pass is timed, writes a time stamp; the work since the last one is called `name`.
     pub fn stamp(&mut self, barriers: &mut BarrierRecorder, name: &'static str) {
         if let Some(stamps) = self.stamps.as_mut().filter(|_| self.time_stamps == TimeStamps::EachPass) {
-            stamps.end_of(self.commands, name, Vec::new());
+            stamps.end_of(self.commands, name, self.runs, Vec::new());
             barriers.stamped(self.queue);
             self.after_stamp(barriers);
         }
@@ -495,7 +501,7 @@ impl Recorder {
                 }
                 (_, Some((bind, Resource::Image(image)))) => {
                     let view = match bind.part {
-                        Part::Layer => image.layers[args.layer as usize],
+                        Part::Layers => image.from_layer[args.layer as usize],
                         _ => image.view,
                     };
                     places.push((binding, DescriptorInfo::Image(images.len())));
@@ -600,6 +606,14 @@ impl Recorder {
     ) {
         let parts = to.parts.clone();
         self.barrier(barriers, &[Access::of_slot(to.slot, to.copy, to.parts, true, PipelineStage::Copy)]);
+        let rows = 0..image.extent.height;
+        let regions: Vec<_> = match layout.descending {
+            None => vec![region(image, parts, rows, layout)],
+            Some(bytes) => std::iter::successors(Some(layout.offset), |offset| Some(offset + bytes))
+                .zip(parts.rev())
+                .map(|(offset, part)| region(image, part..part + 1, rows.clone(), BufferLayout { offset, ..layout }))
+                .collect(),
+        };
         // SAFETY: the buffer holds the bytes of these parts (its maker sized it so) and both live until the device is done.
         unsafe {
             self.context.device.cmd_copy_buffer_to_image(
@@ -607,7 +621,7 @@ impl Recorder {
                 from.handle,
                 image.handle,
                 vk::ImageLayout::GENERAL,
-                &[region(image, parts, 0..image.extent.height, layout)],
+                &regions,
             );
         }
     }

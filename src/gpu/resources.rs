@@ -21,8 +21,8 @@ pub struct Image {
     pub handle: vk::Image,
     /// A view of the complete image.
     pub view: vk::ImageView,
-    /// A view of each layer of an array: frames are read through these.
-    pub layers: Vec<vk::ImageView>,
+    /// Of the frame array, a view of the layers from each one on: a batch of frames begins with the first layer of its view.
+    pub from_layer: Vec<vk::ImageView>,
     pub extent: vk::Extent3D,
     pub shape: Shape,
     pub format: Format,
@@ -75,7 +75,7 @@ impl Image {
             context: context.clone(),
             handle,
             view: vk::ImageView::null(),
-            layers: Vec::new(),
+            from_layer: Vec::new(),
             extent,
             shape,
             format,
@@ -89,11 +89,11 @@ impl Image {
         let bound = unsafe { device.bind_image_memory(handle, allocation.memory(), allocation.offset()) };
         image.allocation = Some(allocation);
         bound.context(operation)?;
-        image.view = image.create_view(slot.name(), view_kind, 0, layers)?;
-        if let Shape::Layers(_) = shape {
+        image.view = image.create_view(slot.name(), view_kind, 0)?;
+        if slot == Slot::Frames {
             for layer in 0..layers {
-                let view = image.create_view(slot.name(), vk::ImageViewType::TYPE_2D, layer, 1)?;
-                image.layers.push(view);
+                let view = image.create_view(slot.name(), view_kind, layer)?;
+                image.from_layer.push(view);
             }
         }
         context.name(handle, slot.name());
@@ -106,14 +106,9 @@ impl Image {
         (self.shape, self.format.texel_bytes())
     }
 
-    fn create_view(
-        &self,
-        name: &str,
-        kind: vk::ImageViewType,
-        layer: u32,
-        layers: u32,
-    ) -> Result<vk::ImageView, GpuError> {
-        let range = vk::ImageSubresourceRange { base_array_layer: layer, layer_count: layers, ..WHOLE };
+    /// A view of the layers from `first` on.
+    fn create_view(&self, name: &str, kind: vk::ImageViewType, first: u32) -> Result<vk::ImageView, GpuError> {
+        let range = vk::ImageSubresourceRange { base_array_layer: first, ..WHOLE };
         let create = vk::ImageViewCreateInfo::default()
             .image(self.handle)
             .view_type(kind)
@@ -143,7 +138,7 @@ impl Drop for Image {
         }
         // SAFETY: whoever drops an image has waited for the device to be done with it; null handles are allowed.
         unsafe {
-            for view in self.layers.drain(..).chain([self.view]) {
+            for view in self.from_layer.drain(..).chain([self.view]) {
                 self.context.device.destroy_image_view(view, None);
             }
             self.context.device.destroy_image(self.handle, None);

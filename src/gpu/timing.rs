@@ -33,7 +33,7 @@ pub struct Stamps {
     /// The stamp that the next interval begins with.
     since: Option<u32>,
     intervals: Vec<Interval>,
-    /// Number of intervals for which there was no room.
+    /// Number of runs for which there was no room.
     left_out: u64,
     statistics: Option<vk::QueryPool>,
     /// Number of statistics queries used.
@@ -47,8 +47,8 @@ struct Interval {
     /// The query that counted its invocations.
     counted: Option<u32>,
     work: Vec<Work>,
-    /// It goes on in the next submission.
-    is_part: bool,
+    /// How many runs it counts as: none if it goes on in the next submission.
+    runs: u32,
 }
 
 /// The work between two time stamps, in ticks of the device.
@@ -58,8 +58,8 @@ pub struct Stamp {
     pub from: u64,
     pub to: u64,
     pub invocations: Option<u64>,
-    /// The work goes on in the next submission, so that this is no run of its own.
-    pub is_part: bool,
+    /// How many runs the work counts as: none if it goes on in the next submission.
+    pub runs: u32,
 }
 
 /// Time between two stamps, ns. The counter has `valid_bits` bits and wraps; `period` is ns per tick.
@@ -137,21 +137,22 @@ impl Stamps {
         self.since = self.stamp(commands);
     }
 
-    /// Writes a stamp: the work since the last one is called `name`. Once the capacity is used up, it is only counted.
-    pub(super) fn end_of(&mut self, commands: vk::CommandBuffer, name: &'static str, work: Vec<Work>) {
+    /// Writes a stamp: the work since the last one is called `name` and counts as so many runs. Once the capacity is used up, it is only
+    /// counted.
+    pub(super) fn end_of(&mut self, commands: vk::CommandBuffer, name: &'static str, runs: u32, work: Vec<Work>) {
         let from = self.since;
         self.since = self.stamp(commands);
         match (from, self.since) {
             (Some(from), Some(to)) => {
-                self.intervals.push(Interval { name, stamps: [from, to], counted: None, work, is_part: false });
+                self.intervals.push(Interval { name, stamps: [from, to], counted: None, work, runs });
             }
-            _ => self.left_out += 1,
+            _ => self.left_out += u64::from(runs),
         }
     }
 
     /// The last interval goes on in the next submission.
     pub(super) fn continues(&mut self) {
-        self.intervals.iter_mut().last().into_iter().for_each(|last| last.is_part = true);
+        self.intervals.iter_mut().last().into_iter().for_each(|last| last.runs = 0);
     }
 
     /// Records a dispatch with `record`, writes a stamp, and counts invocations if enabled.
@@ -159,6 +160,7 @@ impl Stamps {
         &mut self,
         commands: vk::CommandBuffer,
         name: &'static str,
+        runs: u32,
         work: Vec<Work>,
         record: impl FnOnce(),
     ) {
@@ -172,7 +174,7 @@ impl Stamps {
         pool.iter().for_each(|p| unsafe { device.cmd_end_query(commands, *p, query) });
         self.counted += u32::from(pool.is_some());
         let before = self.intervals.len();
-        self.end_of(commands, name, work);
+        self.end_of(commands, name, runs, work);
         if let (Some(_), Some(last)) = (pool, self.intervals.get_mut(before)) {
             last.counted = Some(query);
         }
@@ -190,12 +192,12 @@ impl Stamps {
         Some(at)
     }
 
-    /// Number of pieces of work that were stamped, or would have been.
+    /// Number of runs that were stamped, or would have been.
     pub(super) fn count(&self) -> u64 {
-        self.intervals.len() as u64 + self.left_out
+        self.intervals.iter().map(|interval| u64::from(interval.runs)).sum::<u64>() + self.left_out
     }
 
-    /// Number of pieces of work for which there was no room.
+    /// Number of runs for which there was no room.
     pub(super) fn left_out(&self) -> u64 {
         self.left_out
     }
@@ -211,7 +213,7 @@ impl Stamps {
             let [from, to] = interval.stamps.map(|at| ticks.get(at as usize).copied().unwrap_or(0));
             bands::measured(&interval.work, elapsed(from, to, valid_bits, period));
             let invocations = interval.counted.and_then(|q| counts.get(q as usize).copied());
-            Stamp { name: interval.name, from, to, invocations, is_part: interval.is_part }
+            Stamp { name: interval.name, from, to, invocations, runs: interval.runs }
         };
         Ok(self.intervals.iter().map(stamp).collect())
     }
@@ -280,7 +282,9 @@ impl Timings {
         let begin = began.elapsed();
         let done = work();
         let (begin, end) = (begin.as_nanos() as f64, began.elapsed().as_nanos() as f64);
-        self.spans.iter_mut().for_each(|s| s.list.push(Span { name, on_device: false, begin, end, invocations: None }));
+        self.spans
+            .iter_mut()
+            .for_each(|s| s.list.push(Span { name, on_device: false, begin, end, runs: 1, invocations: None }));
         done
     }
 
@@ -293,18 +297,17 @@ impl Timings {
             let ns = elapsed(stamp.from, stamp.to, valid_bits, period);
             match self.times.iter_mut().find(|t| t.name == stamp.name) {
                 Some(time) => {
-                    time.runs += u32::from(!stamp.is_part);
+                    time.runs += stamp.runs;
                     time.total += ns;
                 }
                 None => {
-                    let runs = u32::from(!stamp.is_part);
-                    self.times.push(PassTime { name: stamp.name, runs, total: ns });
+                    self.times.push(PassTime { name: stamp.name, runs: stamp.runs, total: ns });
                 }
             }
             if let Some(spans) = &mut self.spans {
                 let begin = spans.on_host_clock(stamp.from, valid_bits, period);
-                let (name, invocations) = (stamp.name, stamp.invocations);
-                spans.list.push(Span { name, on_device: true, begin, end: begin + ns, invocations });
+                let Stamp { name, runs, invocations, .. } = *stamp;
+                spans.list.push(Span { name, on_device: true, begin, end: begin + ns, runs, invocations });
             }
         }
     }
@@ -383,13 +386,15 @@ mod tests {
     #[test]
     fn runs_of_one_pass_are_added_up() {
         let mut timings = Timings { times: Vec::new(), untimed: 0, spans: None };
-        let stamp = |name, from, to| Stamp { name, from, to, invocations: None, is_part: false };
+        let stamp = |name, from, to| Stamp { name, from, to, invocations: None, runs: 1 };
         timings.add(&[stamp("a", 0, 1), stamp("b", 1, 3)], 64, 1.0);
         timings.add(&[stamp("a", 5, 8)], 64, 1.0);
         assert_eq!(timings.take_times()[0], PassTime { name: "a", runs: 2, total: 4.0 });
         assert!(timings.take_times().is_empty() && timings.take_spans().is_empty());
-        let part = Stamp { is_part: true, ..stamp("a", 0, 5) };
+        let part = Stamp { runs: 0, ..stamp("a", 0, 5) };
         timings.add(&[part, stamp("a", 6, 8)], 64, 1.0);
         assert_eq!(timings.take_times(), [PassTime { name: "a", runs: 1, total: 7.0 }], "one run in two submissions");
+        timings.add(&[Stamp { runs: 4, ..stamp("a", 0, 8) }], 64, 1.0);
+        assert_eq!(timings.take_times(), [PassTime { name: "a", runs: 4, total: 8.0 }], "four frames at once");
     }
 }

@@ -180,10 +180,12 @@ impl Stream {
         if let Some(session) = &mut self.session {
             session.phase.drained(arrived.is_none());
         }
-        match arrived {
+        let step = match arrived {
             Some(Arrived { event, at }) => self.take(event, at),
             None => Ok(Step::Progress),
-        }
+        };
+        self.submit_last()?;
+        step
     }
 
     fn step_between_pictures(&mut self, patience: Duration) -> Result<Step, StreamError> {
@@ -231,9 +233,19 @@ impl Stream {
         if let Some(end) = &self.end {
             return Ok(Step::End(end.clone()));
         }
-        match self.feed.next(patience) {
+        let step = match self.feed.next(patience) {
             Some(Arrived { event, at }) => self.take(event, at),
             None => Ok(Step::Progress),
+        };
+        self.submit_last()?;
+        step
+    }
+
+    /// Submits what was taken from the feed, unless more waits there: frames that wait together go through stage 1 together.
+    fn submit_last(&mut self) -> Result<(), StreamError> {
+        match &mut self.session {
+            Some(session) if self.feed.waiting() == 0 => Ok(session.renderer.submit_frames()?),
+            _ => Ok(()),
         }
     }
 

@@ -3,7 +3,10 @@
 //! filter that is not needed leaves no copy behind.
 
 use super::PASSES;
-use super::pass::{Arrays, Bind, Chain, Dispatch, DispatchArgs, Filter, Link, Need, Params, Pass, RUN, Slot};
+use super::pass::{
+    Arrays, Bind, Chain, Dispatch, DispatchArgs, Filter, Frequency, Link, Need, Params, Pass, RUN, Slot, Texels,
+};
+use super::slots::Shape;
 use crate::scene::{Rectangle, Scene, TILE, VisibleBounds};
 
 impl Chain {
@@ -27,7 +30,7 @@ impl Chain {
 
     /// What the last link writes; none: the next spare slot.
     fn last(self, scene: &Scene) -> Option<Slot> {
-        let slices = if scene.smoothing()[2] > 0.0 { Slot::SharpVolume } else { Slot::Volume };
+        let slices = if scene.filters_across_slices() { Slot::SharpVolume } else { Slot::Volume };
         (self == Chain::Slices).then_some(slices)
     }
 
@@ -40,10 +43,17 @@ impl Chain {
         filters.filter(move |(pass, filter)| filter.chain == self && (pass.needed)(scene).is_ok())
     }
 
+    /// True if the first of several filters is left out: the next reads what it would read.
+    fn omits_first(self, scene: &Scene) -> bool {
+        let mut requested = self.requested(scene);
+        requested.next().is_some_and(|(_, filter)| (filter.is_identity)(scene)) && requested.next().is_some()
+    }
+
     /// The filters that run, each with its number of links.
     fn filters(self, scene: &Scene) -> impl Iterator<Item = (&'static Pass, Filter, u32)> {
         let is_copied = self == Chain::Slices && copied(scene).is_some();
-        let filters = self.requested(scene).filter(move |_| !is_copied);
+        let omitted = usize::from(self.omits_first(scene));
+        let filters = self.requested(scene).skip(omitted).filter(move |_| !is_copied);
         filters.map(|(pass, filter)| (pass, filter, (pass.repeat)(scene) / (filter.dispatches)(scene)))
     }
 
@@ -111,6 +121,9 @@ impl Pass {
                 Ok(_) if copied(scene).is_some() => {
                     Err("the volume stores a frame's values without loss: it is copied there")
                 }
+                Ok(_) if (filter.is_identity)(scene) && Chain::Slices.omits_first(scene) => {
+                    Err("the first filter reads frames as they are")
+                }
                 need => need,
             },
             _ => (self.needed)(scene),
@@ -145,9 +158,44 @@ impl Pass {
         (self.writes)(scene, &Dispatch::new(args, self.link_slots(scene, args)))
     }
 
-    /// What a dispatch makes of all its extent, from the formula in f64; texels that it leaves NaN stay untouched.
+    /// What a dispatch makes of all its extent, from the formula in f64; texels that it leaves NaN stay untouched. Of the frame array,
+    /// `reads` has the layers of the dispatch.
     pub fn reference(&self, scene: &Scene, args: &DispatchArgs, reads: &Arrays, writes: &mut Arrays) {
-        (self.reference)(scene, &Dispatch::new(args, self.link_slots(scene, args)), reads, writes);
+        let slots = self.link_slots(scene, args);
+        if self.frequency != Frequency::Frame {
+            return (self.reference)(scene, &Dispatch::new(args, slots), reads, writes);
+        }
+        let is_layered = |bind: &Bind| matches!(bind.slot.shape(scene), Shape::Layers(_));
+        let (bound, written) = (self.reads(scene, args), self.writes(scene, args));
+        for n in 0..args.slices {
+            let (mut own, mut made) = (Arrays::default(), Arrays::default());
+            for bind in &bound {
+                let all = reads.get(bind.name);
+                own.insert(bind.name, if is_layered(bind) { all.layer(n as usize) } else { all.clone() });
+            }
+            for bind in &written {
+                let all = writes.get_mut(bind.name);
+                let before = match is_layered(bind) {
+                    true => all.layer(n as usize),
+                    false => std::mem::replace(all, Texels::untouched([0; 3], 1)),
+                };
+                made.insert(bind.name, before);
+            }
+            let args = DispatchArgs { slice: args.slice + n, slices: 1, ..*args };
+            (self.reference)(scene, &Dispatch::new(&args, slots), &own, &mut made);
+            for bind in &written {
+                let (all, made) = (writes.get_mut(bind.name), made.get_mut(bind.name));
+                match is_layered(bind) {
+                    true => all.set_layer(n as usize, made),
+                    false => std::mem::swap(all, made),
+                }
+            }
+        }
+    }
+
+    /// Slices of a dispatch that works on a complete volume; a pass over frames gets one frame.
+    pub fn slices(&self, scene: &Scene) -> u32 {
+        if self.frequency == Frequency::Volume { scene.slices() } else { 1 }
     }
 
     /// What a pass over slices has to make of each: what is visible, and as far around it as the filters after it look. None for

@@ -265,7 +265,7 @@ fn between_samples(scene: &Scene) -> bool {
 
 /// Ratio by which rounding may raise a sample above its largest texel: for a weighted mean, some ulps.
 fn beyond(scene: &Scene) -> f64 {
-    if scene.settings.ray.sliding > 0 { 1.0 + 1e-5 } else { 1.0 }
+    if scene.settings.ray.sliding > 0 || scene.takes_bspline() { 1.0 + 1e-5 } else { 1.0 }
 }
 
 fn window(scene: &Scene, view: View) -> Params {

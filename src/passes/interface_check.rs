@@ -1,6 +1,6 @@
 //! Checks a pass's declaration against its shader: names, types, access and dimensions. Needs no GPU.
 
-use super::pass::{Bind, DispatchArgs, Params, Part, Pass, Slot, Value};
+use super::pass::{Bind, DispatchArgs, Params, Pass, Slot, Value};
 use super::slots::{Format, Shape};
 use crate::scene::Scene;
 use crate::spirv::hoist_uniforms::hoist_uniforms;
@@ -9,9 +9,9 @@ use crate::spirv::strip_bindings::strip_bindings;
 use crate::spirv::texture_to_storage::{ImageFormat, texture_to_storage};
 use crate::spirv::{self, Access, Dimension, Kind, Member, Module};
 
-/// Textures that a shader declares and a pass may not bind: bricks, packed neighbours, and the echo at a surface. Specialization
+/// Textures that a shader declares and a pass may not bind: bricks, packed neighbours, the light volume, and the echo at a surface. Specialization
 /// constants say whether they are read or written.
-const OPTIONAL: [&str; 4] = ["bricks", "packed_neighbours", "surface", "volume_bricks"];
+const OPTIONAL: [&str; 6] = ["bricks", "light_normals", "light_shade", "packed_neighbours", "surface", "volume_bricks"];
 
 /// A pass's shader without the textures that this scene does not have.
 ///
@@ -115,11 +115,11 @@ fn check_bind(scene: &Scene, module: &Module, bind: &Bind, access: Access) -> Re
         return Err(format!("glsl declares '{}' {:?}, the pass takes filtered samples of it", bind.name, binding.kind));
     }
     let declared = binding.dimension;
-    let there = match (bind.slot.shape(scene), bind.part) {
-        (Shape::Two(_), _) | (Shape::Layers(_), Part::Layer) => Dimension::Two,
-        (Shape::Layers(_), _) => Dimension::Layers,
-        (Shape::Three(_), _) => Dimension::Three,
-        (Shape::Buffer(_), _) => Dimension::None,
+    let there = match bind.slot.shape(scene) {
+        Shape::Two(_) => Dimension::Two,
+        Shape::Layers(_) => Dimension::Layers,
+        Shape::Three(_) => Dimension::Three,
+        Shape::Buffer(_) => Dimension::None,
     };
     match declared == there {
         true => Ok(()),

@@ -166,8 +166,9 @@ pub fn self_attenuated_table(scene: &Scene) -> Vec<f32> {
     steps
 }
 
-fn transfer_of(scene: &Scene) -> Vec<[f64; 4]> {
-    transfer::table(&scene.settings.volume.transfer, scene.settings.volume.threshold, scene.transfer_entries())
+/// Red, green, blue and absorption over the sample value.
+pub(super) fn transfer_of(scene: &Scene) -> Vec<[f64; 4]> {
+    transfer::table_of(&scene.settings.volume, scene.reference_length(), scene.transfer_entries())
 }
 
 /// The tiles of a picture of planes, as `Sheet::table` lays them out, relative to [`Scene::local_origin`].

@@ -35,6 +35,7 @@ pub mod raycast {
     pub mod volume;
 }
 pub mod empty_space;
+pub mod light_volume;
 pub mod postprocess;
 pub mod preprocess;
 pub mod shade;
@@ -66,6 +67,13 @@ pub const PASSES: &[Pass] = &[
     raycast::surface::PASS,
     empty_space::CLASSIFY_VOLUME,
     empty_space::DISTANCE_VOLUME,
+    light_volume::MATTER,
+    light_volume::REDUCE,
+    light_volume::PROPAGATE,
+    light_volume::PROPAGATE_BACK,
+    light_volume::DIFFUSE,
+    light_volume::AMBIENT,
+    light_volume::SHADE,
     raycast::surface_and_volume::PASS,
     raycast::volume::PASS,
     raycast::projection::PASS,
@@ -92,6 +100,7 @@ pub const PASSES: &[Pass] = &[
 #[derive(Clone, Debug, PartialEq)]
 pub struct PassTime {
     pub name: &'static str,
+    /// Of a batch of frames, one for each frame.
     pub runs: u32,
     /// ns, all runs together.
     pub total: f64,
@@ -104,6 +113,8 @@ pub struct Span {
     pub on_device: bool,
     pub begin: f64,
     pub end: f64,
+    /// How many runs it counts as: one for each frame of a batch.
+    pub runs: u32,
     /// Shader invocations that the device counted, where it does.
     pub invocations: Option<u64>,
 }

@@ -45,19 +45,25 @@ pub enum Frequency {
     Picture,
 }
 
-/// The numbers that differ between two dispatches of the same pass and scene.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+/// The numbers that differ between two dispatches of the same pass and scene. By default a pass over frames gets one frame.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct DispatchArgs {
-    /// Layer of the frame array that holds the frame.
+    /// Layer of the frame array that holds the first frame.
     pub layer: u32,
-    /// Slice that the frame becomes; of a pass over the volume, the first slice that it writes.
+    /// The first slice that it writes, of frames the one that the first frame becomes.
     pub slice: u32,
-    /// Slices that a pass over the volume writes.
+    /// Slices that it writes: of a pass over frames, the number of frames.
     pub slices: u32,
     /// 0.. of a pass that repeats.
     pub iteration: u32,
     /// Which copy of the multi-buffered slots it uses.
     pub image: u32,
+}
+
+impl Default for DispatchArgs {
+    fn default() -> DispatchArgs {
+        DispatchArgs { layer: 0, slice: 0, slices: 1, iteration: 0, image: 0 }
+    }
 }
 
 /// One dispatch as its pass sees it: the numbers, and the slots of the filter chain that the pass is a link of.
@@ -113,10 +119,10 @@ impl Deref for Dispatch<'_> {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Part {
     Whole,
-    /// The dispatch's slice of a 3D texture.
-    Slice,
-    /// The dispatch's layer of the frame array.
-    Layer,
+    /// The dispatch's slices of a 3D texture, or a layer from the first on for each of them. All of a plane.
+    Slices,
+    /// The dispatch's layers of the frame array.
+    Layers,
     /// The dispatch's slices of a 3D texture, and that many more on either side.
     Around(u32),
 }
@@ -135,24 +141,28 @@ pub fn whole(name: &'static str, slot: Slot) -> Bind {
     Bind { name, slot, part: Part::Whole, filtered: false }
 }
 
-/// One slice of a 3D texture, or all of a plane.
-pub fn slice(name: &'static str, slot: Slot) -> Bind {
-    let part = if matches!(slot, Slot::Volume | Slot::SharpVolume) { Part::Slice } else { Part::Whole };
-    Bind { part, ..whole(name, slot) }
+/// The dispatch's slices.
+pub fn slices(name: &'static str, slot: Slot) -> Bind {
+    Bind { part: Part::Slices, ..whole(name, slot) }
 }
 
-pub fn layer(name: &'static str, slot: Slot) -> Bind {
-    Bind { part: Part::Layer, ..whole(name, slot) }
+pub fn layers(name: &'static str, slot: Slot) -> Bind {
+    Bind { part: Part::Layers, ..whole(name, slot) }
+}
+
+/// The dispatch's slices of a slot of a filter chain; of the frames, which a chain may begin with, its layers.
+pub(super) fn chain_slot(name: &'static str, slot: Slot) -> Bind {
+    if slot == Slot::Frames { layers(name, slot) } else { slices(name, slot) }
 }
 
 /// What a filter reads: its chain's slot, which shaders name `source`.
 pub(super) fn reads_source(_: &Scene, dispatch: &Dispatch) -> Vec<Bind> {
-    vec![whole("source", dispatch.source())]
+    vec![chain_slot("source", dispatch.source())]
 }
 
-/// What a filter writes: its chain's slot, which shaders name `target`; of the 3D texture one slice.
+/// What a filter writes: its chain's slot, which shaders name `target`; of the 3D texture the dispatch's slices.
 pub(super) fn writes_target(_: &Scene, dispatch: &Dispatch) -> Vec<Bind> {
-    vec![slice("target", dispatch.target())]
+    vec![slices("target", dispatch.target())]
 }
 
 /// A sequence of filters, each of which reads what the one before it wrote. Their order is that of [`PASSES`](super::PASSES).
@@ -190,12 +200,14 @@ pub struct Filter {
     pub reach: fn(&Scene) -> Option<[u32; 2]>,
     /// True if a step would store what it reads without loss: alone in its chain it is left out, and frames are copied.
     pub copies: fn(&Scene) -> bool,
+    /// True if the next filter could as well read what a step reads: before another filter the step is left out.
+    pub is_identity: fn(&Scene) -> bool,
 }
 
 impl Filter {
     /// A filter of that chain that reads one texel and takes one dispatch per step.
     pub const fn of(chain: Chain) -> Filter {
-        Filter { chain, dispatches: once, reach: |_| Some([0; 2]), copies: |_| false }
+        Filter { chain, dispatches: once, reach: |_| Some([0; 2]), copies: |_| false, is_identity: |_| false }
     }
 
     /// A filter of slices that looks that many columns and rows away.
@@ -241,7 +253,8 @@ pub struct Pass {
     /// Structure: a change of it is another pipeline.
     pub constants: fn(&Scene, &DispatchArgs) -> Vec<(&'static str, i32)>,
     pub tolerance: Tolerance,
-    /// The same from the formula, in f64. Reads arrays by the shader's names; texels it leaves NaN stay untouched.
+    /// The same from the formula, in f64. Reads arrays by the shader's names; texels it leaves NaN stay untouched. Of a pass over
+    /// frames it is called for each frame, with that frame's layer of every array of layers.
     pub reference: fn(&Scene, &Dispatch, &Arrays, &mut Arrays),
 }
 
@@ -253,9 +266,9 @@ pub(super) fn no_constants(_: &Scene, _: &DispatchArgs) -> Vec<(&'static str, i3
     Vec::new()
 }
 
-/// One invocation per texel of a slice.
-pub(super) fn slice_extent(scene: &Scene, _: &DispatchArgs) -> [u32; 3] {
-    [scene.grid.size[0], scene.grid.size[1], 1]
+/// One invocation per texel of each slice.
+pub(super) fn slice_extent(scene: &Scene, args: &DispatchArgs) -> [u32; 3] {
+    [scene.grid.size[0], scene.grid.size[1], args.slices]
 }
 
 /// One invocation per pixel.

@@ -132,7 +132,7 @@ fn distance(plane: &Plane, other: &Plane, place: DVec3) -> f64 {
 }
 
 /// The picture from the rendering: the mean of several rays per pixel, or interpolation between the rays where one ray makes
-/// four pixels; in a 4-up picture, the rendering next to the planes; in a pair, the composited volume next to the lit surface.
+/// several pixels; in a 4-up picture, the rendering next to the planes; in a pair, the composited volume next to the lit surface.
 pub const ASSEMBLE: Pass = Pass {
     name: "assemble",
     stage: Stage::Postprocess,
@@ -147,7 +147,7 @@ pub const ASSEMBLE: Pass = Pass {
         (Slot::Picture, _) => Err("one ray makes a pixel of the whole picture"),
         (_, Layout::Four) => Ok("the rendering stands beside three planes"),
         (_, Layout::Pair) => Ok("the volume stands beside the surface"),
-        (_, Layout::Single) if s.settings.ray.half => Ok("one ray makes four pixels"),
+        (_, Layout::Single) if s.settings.ray.apart() > 1 => Ok("one ray makes several pixels"),
         (_, Layout::Single) => Ok("several rays make a pixel"),
     },
     reads: |s, _| {
@@ -160,7 +160,7 @@ pub const ASSEMBLE: Pass = Pass {
     extent: picture_extent,
     repeat: once,
     params: |_, _| Params::default(),
-    constants: |s, _| vec![("RAYS", s.settings.ray.rays as i32), ("HALF", s.settings.ray.half as i32)],
+    constants: |s, _| vec![("RAYS", s.settings.ray.rays as i32), ("APART", s.settings.ray.apart() as i32)],
     tolerance: Tolerance {
         absolute: 1e-3,
         relative: 0.0,
@@ -189,8 +189,9 @@ pub const ASSEMBLE: Pass = Pass {
                     true => (reads.get("rendered"), corner),
                     false => (reads.get("composited"), [0, 0]),
                 };
-                if scene.settings.ray.half {
-                    picture.set([x, y, 0], &between(shown, x - corner[0], y - corner[1]));
+                if scene.settings.ray.apart() > 1 {
+                    let apart = f64::from(scene.settings.ray.apart());
+                    picture.set([x, y, 0], &between(shown, apart, x - corner[0], y - corner[1]));
                     continue;
                 }
                 let mut mean = [0.0; 4];
@@ -204,11 +205,11 @@ pub const ASSEMBLE: Pass = Pass {
     },
 };
 
-/// Linear interpolation between the rays around a pixel. Ray i goes through the common corner of pixels 2 i and 2 i + 1. Beyond
+/// Linear interpolation between the rays around a pixel. Ray i goes through the middle of the `apart` pixels from `apart` i on. Beyond
 /// the outermost ray its value repeats.
-fn between(rendered: &Texels, x: usize, y: usize) -> [f64; 4] {
+fn between(rendered: &Texels, apart: f64, x: usize, y: usize) -> [f64; 4] {
     let along = |pixel: usize, rays: usize| {
-        let at = ((pixel as f64 - 0.5) / 2.0).clamp(0.0, (rays - 1) as f64);
+        let at = ((pixel as f64 + 0.5) / apart - 0.5).clamp(0.0, (rays - 1) as f64);
         let low = at.floor() as usize;
         (low, (low + 1).min(rays - 1), at - at.floor())
     };

@@ -7,7 +7,7 @@ use crate::passes::slots::Format;
 use crate::scene::{Conditioning, Scene, VolumeFormat, gaussian_radius};
 use crate::source::StoredType;
 
-/// Scan conversion of one polar frame into one slice, through the look-up table (thesis 4.3, Fig. 31).
+/// Scan conversion of each polar frame into a slice, through the look-up table (thesis 4.3, Fig. 31).
 pub const SCAN_CONVERT: Pass = Pass {
     name: "scan_convert",
     stage: Stage::Preprocess,
@@ -21,7 +21,7 @@ pub const SCAN_CONVERT: Pass = Pass {
         None => Err("the volume is Cartesian already"),
     },
     reads: |s, _| {
-        let frames = if s.conditions() { whole("frames", Slot::Conditioned) } else { layer("frames", Slot::Frames) };
+        let frames = if s.conditions() { slices("frames", Slot::Conditioned) } else { layers("frames", Slot::Frames) };
         vec![frames, whole("scan_lut", Slot::ScanLut)]
     },
     writes: writes_target,
@@ -75,7 +75,7 @@ fn scale(scene: &Scene) -> (f64, f64) {
     if scene.conditions() { (1.0, 0.0) } else { normalisation(scene) }
 }
 
-/// Line conditioning of one polar frame before scan conversion (thesis 4.3): time gain compensation, Gaussian low pass and
+/// Line conditioning of polar frames before scan conversion (thesis 4.3): time gain compensation, Gaussian low pass and
 /// decimation along the lines, log compression. Sample j of the result is centred on sample j M of the frame.
 pub const CONDITION: Pass = Pass {
     name: "condition",
@@ -95,19 +95,19 @@ pub const CONDITION: Pass = Pass {
         Some(_) => Err("not asked for, and no line is longer than asked for"),
     },
     reads: |s, _| {
-        let mut reads = vec![layer("frames", Slot::Frames)];
+        let mut reads = vec![layers("frames", Slot::Frames)];
         reads.extend((!s.settings.conditioning.tgc.is_empty()).then_some(whole("tgc", Slot::Tgc)));
         reads
     },
-    writes: |_, _| vec![whole("conditioned", Slot::Conditioned)],
-    extent: |s, _| {
+    writes: |_, _| vec![slices("conditioned", Slot::Conditioned)],
+    extent: |s, t| {
         let [samples, lines] = s.line_lattice();
-        [samples, lines, 1]
+        [samples, lines, t.slices]
     },
     repeat: once,
     params: |s, _| {
         let (gain, offset) = normalisation(s);
-        let deviation = s.settings.conditioning.deviation(s.decimation());
+        let deviation = s.conditioning.deviation(s.decimation());
         let range = s.settings.conditioning.dynamic_range.unwrap_or(1.0);
         Params::default()
             .f32("gain", gain)
@@ -116,7 +116,7 @@ pub const CONDITION: Pass = Pass {
             .f32("per_octave", 20.0 * 2f64.log10() / range)
     },
     constants: |s, _| {
-        let c = &s.settings.conditioning;
+        let c = &s.conditioning;
         vec![
             ("RADIUS", gaussian_radius(c.deviation(s.decimation())) as i32),
             ("FACTOR", s.decimation() as i32),
@@ -133,7 +133,7 @@ pub const CONDITION: Pass = Pass {
     reference: |scene, _, reads, writes| {
         let frames = reads.get("frames");
         let target = writes.get_mut("conditioned");
-        let (c, factor) = (&scene.settings.conditioning, scene.decimation() as usize);
+        let (c, factor) = (&scene.conditioning, scene.decimation() as usize);
         let kernel = low_pass(c.deviation(scene.decimation()));
         for y in 0..target.size[1] {
             let line: Vec<f64> = (0..frames.size[0]).map(|i| gained(scene, c, i, frames.one(i, y, 0))).collect();
@@ -177,12 +177,12 @@ fn compressed(c: &Conditioning, value: f64) -> f64 {
     }
 }
 
-/// A slice of a Cartesian volume, scaled to 0..1.
+/// Slices of a Cartesian volume, scaled to 0..1.
 pub const LOAD_SLICE: Pass = Pass {
     name: "load_slice",
     stage: Stage::Preprocess,
     frequency: Frequency::Frame,
-    link: Link::Filter(Filter { copies: stores_without_loss, ..Filter::of(Chain::Slices) }),
+    link: Link::Filter(Filter { copies: stores_without_loss, is_identity: is_unscaled, ..Filter::of(Chain::Slices) }),
     shader: |_, t| {
         if t.writes_volume() { "preprocess/load_slice.slice" } else { "preprocess/load_slice.plane" }
     },
@@ -190,7 +190,7 @@ pub const LOAD_SLICE: Pass = Pass {
         None => Ok("the volume is Cartesian already: its slices are only scaled"),
         Some(_) => Err("frames are polar"),
     },
-    reads: |_, _| vec![layer("frames", Slot::Frames)],
+    reads: |_, _| vec![layers("frames", Slot::Frames)],
     writes: writes_target,
     extent: slice_extent,
     repeat: once,
@@ -225,6 +225,11 @@ fn stores_without_loss(scene: &Scene) -> bool {
         StoredType::U16 => matches!(format, Format::R16 | Format::R32f) && scene.input.range == [0.0, 65535.0],
         StoredType::F32 => format == Format::R32f && scene.input.range == [0.0, 1.0],
     }
+}
+
+/// True if a texture of the frames yields what this pass would make of them. Floats may be beyond 0..1 and are clamped.
+fn is_unscaled(scene: &Scene) -> bool {
+    scene.input.stored != StoredType::F32 && normalisation(scene) == (1.0, 0.0)
 }
 
 fn load_params(scene: &Scene, args: &DispatchArgs) -> Params {

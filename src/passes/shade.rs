@@ -60,7 +60,7 @@ pub const LIGHT: Pass = Pass {
             .vec3("surface_colour", light.surface_colour)
             .f32("texture_share", light.texture)
             .f32("shadow_strength", light.shadow.map_or(0.0, |s| s.strength))
-            .vec3("wrap", wrap(s.skin()))
+            .vec3("wrap", skin_wrap(s.skin()))
             .vec3("through", through(s.skin()))
             .f32("layer_share", s.settings.volume.veil)
     },
@@ -141,8 +141,12 @@ fn reference_pixel(scene: &Scene, reads: &Arrays, light: Option<(DVec3, DVec3)>,
 }
 
 /// Red wraps furthest: light travels furthest through skin at long wavelengths.
-fn wrap(skin: Option<Skin>) -> DVec3 {
-    DVec3::new(1.0, 0.55, 0.35) * skin.map_or(0.0, |s| s.wrap)
+pub(super) fn wrap(share: f64) -> DVec3 {
+    DVec3::new(1.0, 0.55, 0.35) * share
+}
+
+fn skin_wrap(skin: Option<Skin>) -> DVec3 {
+    wrap(skin.map_or(0.0, |s| s.wrap))
 }
 
 fn through(skin: Option<Skin>) -> DVec3 {
@@ -192,7 +196,7 @@ fn lit(scene: &Scene, reads: &Arrays, x: usize, y: usize) -> Option<(DVec3, DVec
     let (diffused, glow) = match scene.skin() {
         None => (DVec3::splat(facing * arrives), DVec3::ZERO),
         Some(_) => {
-            let wrap = wrap(scene.skin());
+            let wrap = skin_wrap(scene.skin());
             let wrapped = ((DVec3::splat(cosine) + wrap) / (1.0 + wrap)).max(DVec3::ZERO);
             // What a shadow leaves is red first.
             let softened = DVec3::splat(arrives) + (1.0 - arrives) * 0.5 * wrap;
@@ -415,7 +419,7 @@ fn camera_params(scene: &Scene) -> Params {
 
 /// Unit direction to a light that is infinitely far away.
 fn direction_to_light(scene: &Scene) -> DVec3 {
-    scene.rays.from_camera(scene.settings.light.direction.normalize())
+    scene.light_direction(scene.settings.light.direction)
 }
 
 /// Unit direction to a directional light, or the position of a point light as the shaders get it.

@@ -3,11 +3,28 @@
 
 use super::lookup_tables;
 use crate::scene::planes::TILE_VECTORS;
-use crate::scene::{Layout, Scene, SurfaceColour, VolumeFormat};
+use crate::scene::{Layout, Propagation, Scene, SurfaceColour, VolumeFormat};
 use crate::source::StoredType;
 
-/// Frames that may be uploaded at once: layers of the frame array, and slots of the staging ring.
-pub const FRAMES_IN_FLIGHT: u32 = 4;
+/// Batches of frames that may be in flight at once: entries of the staging ring. The frame array has layers for each.
+pub const BATCHES_IN_FLIGHT: u32 = 4;
+
+/// Most frames that go through stage 1 at once. Submitting a batch of so many costs little more than a single frame.
+const MAX_FRAMES: u64 = 16;
+
+/// Maximum bytes of the samples of a batch, and of each slot between its filters, unless a single frame is larger. So many texels
+/// occupy every device, and submitting them takes far less time than working on them.
+pub(crate) const BATCH_BYTES: u64 = 4 << 20;
+
+/// Consecutive frames that go through stage 1 at once, each pass in one dispatch.
+pub fn frames_per_batch(scene: &Scene) -> u32 {
+    let bytes =
+        |[width, height]: [u32; 2], format: Format| u64::from(width) * u64::from(height) * format.texel_bytes() as u64;
+    let largest = bytes(scene.frame_size(), frame_format(scene)).max(bytes(scene.grid.size, Format::R32f));
+    let largest = if scene.conditions() { largest.max(bytes(scene.line_lattice(), Format::R32f)) } else { largest };
+    let most = MAX_FRAMES.min(scene.slices().into()).min(scene.frames_at_once.max(1).into());
+    (BATCH_BYTES / largest).clamp(1, most) as u32
+}
 
 /// What a slot is.
 struct Descriptor {
@@ -109,33 +126,33 @@ use Descriptor as D;
 use Differs::{By, ByContent};
 
 slots! {
-    /// Arriving frames, one a layer.
+    /// Arriving frames, one a layer: those of every batch in flight.
     Frames = D::image("frames", frame_layers, frame_format).by_frames().across_queues();
     /// Gain of every sample of a line.
     Tgc = D::table("tgc", |s| Shape::Buffer(4 * s.frame_size()[0]), lookup_tables::tgc, ByContent);
     /// The frame after line conditioning: decimated samples x lines.
-    Conditioned = D::image("conditioned", |s| Shape::Two(s.line_lattice()), |_| Format::R32f).across_queues();
+    Conditioned = D::image("conditioned", |s| batch(s.line_lattice(), s), |_| Format::R32f).across_queues();
     /// (sample, line) of every slice pixel on the lattice that is scan-converted; -1 outside the sector.
     ScanLut = D::image("scan_lut", one_slice, |_| Format::Rg32f)
         .by_scene(lookup_tables::scan_lut, By(lattice_differs))
         .across_queues();
-    /// Slices between filters of stage 1.
-    SliceA = D::image("slice_a", one_slice, |_| Format::R32f).clear().across_queues();
-    SliceB = D::image("slice_b", one_slice, |_| Format::R32f).clear().across_queues();
-    /// How many rings the window of the enhanced sigma filter grew, at each pixel of the last slice.
-    Growth = D::image("growth", one_slice, |_| Format::R32f).across_queues();
+    /// Slices between filters of stage 1. In these slots each slice of a batch is a layer.
+    SliceA = D::image("slice_a", slices, |_| Format::R32f).clear().across_queues();
+    SliceB = D::image("slice_b", slices, |_| Format::R32f).clear().across_queues();
+    /// How many rings the window of the enhanced sigma filter grew, at each pixel of the last batch's slices.
+    Growth = D::image("growth", slices, |_| Format::R32f).across_queues();
     /// Of a slice's rows or columns under elimination: u = forward + shares u of the next pixel.
-    SliceShares = D::image("slice_shares", one_slice, |_| Format::R32f).across_queues();
-    SliceForward = D::image("slice_forward", one_slice, |_| Format::R32f).across_queues();
+    SliceShares = D::image("slice_shares", slices, |_| Format::R32f).across_queues();
+    SliceForward = D::image("slice_forward", slices, |_| Format::R32f).across_queues();
     /// A slice diffused along its rows.
-    SliceRows = D::image("slice_rows", one_slice, |_| Format::R32f).across_queues();
+    SliceRows = D::image("slice_rows", slices, |_| Format::R32f).across_queues();
     /// A slice after a complete step, and after the first half of one, of AOS with Richardson's extrapolation.
-    SliceStep = D::image("slice_step", one_slice, |_| Format::R32f).across_queues();
-    SliceHalfStep = D::image("slice_half_step", one_slice, |_| Format::R32f).across_queues();
+    SliceStep = D::image("slice_step", slices, |_| Format::R32f).across_queues();
+    SliceHalfStep = D::image("slice_half_step", slices, |_| Format::R32f).across_queues();
     /// A slice after a stage of RKL1. Each stage reads the last two.
-    SliceStageA = D::image("slice_stage_a", one_slice, |_| Format::R32f).across_queues();
-    SliceStageB = D::image("slice_stage_b", one_slice, |_| Format::R32f).across_queues();
-    SliceStageC = D::image("slice_stage_c", one_slice, |_| Format::R32f).across_queues();
+    SliceStageA = D::image("slice_stage_a", slices, |_| Format::R32f).across_queues();
+    SliceStageB = D::image("slice_stage_b", slices, |_| Format::R32f).across_queues();
+    SliceStageC = D::image("slice_stage_c", slices, |_| Format::R32f).across_queues();
     /// The volume before smoothing across slices.
     SharpVolume = D::image("sharp_volume", volume, volume_format).multibuffered().clear().across_queues();
     /// The 3D texture that rays are cast through: the part that is visible.
@@ -220,6 +237,31 @@ slots! {
         lookup_tables::block_table,
         ByContent,
     );
+    /// The light volume: density of the matter in each cell, and its echo.
+    LightMatter = D::image("light_matter", |s| Shape::Three(s.light_lattice().count), |_| Format::Rg16f);
+    /// The density in a Gaussian pyramid: cells of twice the edge at each level.
+    LightPyramid1 = D::image("light_pyramid_1", |s| light_level(s, 1), |_| Format::R16f);
+    LightPyramid2 = D::image("light_pyramid_2", |s| light_level(s, 2), |_| Format::R16f);
+    LightPyramid3 = D::image("light_pyramid_3", |s| light_level(s, 3), |_| Format::R16f);
+    LightPyramid4 = D::image("light_pyramid_4", |s| light_level(s, 4), |_| Format::R16f);
+    /// Light that has passed one layer of cells, and the next.
+    LightFrontA = D::image("light_front_a", |s| light_layer(s, false), |_| Format::Rgba32f);
+    LightFrontB = D::image("light_front_b", |s| light_layer(s, false), |_| Format::Rgba32f);
+    /// Light that arrives in each cell, and the density of its matter. The other slots are those of the passes that scatter it, which alternate: what
+    /// arrives stays, as many dispatches have made it.
+    LightArriving = D::image("light_arriving", |s| Shape::Three(s.light_lattice().count), |_| Format::Rgba16f);
+    LightScattered = D::image("light_scattered", |s| Shape::Three(s.light_lattice().count), |_| Format::Rgba16f);
+    LightScatteredB = D::image("light_scattered_b", |s| Shape::Three(s.light_lattice().count), |_| Format::Rgba16f);
+    /// The same of the back light, in cells of twice the edge.
+    BackFrontA = D::image("back_front_a", |s| light_layer(s, true), |_| Format::Rgba32f);
+    BackFrontB = D::image("back_front_b", |s| light_layer(s, true), |_| Format::Rgba32f);
+    BackLight = D::image("back_light", |s| light_level(s, 1), |_| Format::Rgba16f);
+    /// Light from all sides and from behind in cells of twice the edge: its colour, and the ambient share.
+    LightAmbient = D::image("light_ambient", |s| light_level(s, 1), |_| Format::Rgba16f);
+    /// Light that each cell scatters, and its ambient share.
+    LightShade = D::image("light_shade", |s| Shape::Three(s.light_lattice().count), |_| Format::Rgba16f);
+    /// Orientation of each cell, as long as it is certain, and the light for a highlight.
+    LightNormals = D::image("light_normals", |s| Shape::Three(s.light_lattice().count), |_| Format::Rgba16f);
     /// Distance along each pixel's ray, mm; the largest float where nothing was hit.
     Distance = D::image("distance_map", per_ray, |_| Format::R32f);
     DistanceA = D::image("distance_a", per_ray, |_| Format::R32f);
@@ -252,7 +294,16 @@ slots! {
 
 fn frame_layers(scene: &Scene) -> Shape {
     let [width, height] = scene.frame_size();
-    Shape::Layers([width, height, FRAMES_IN_FLIGHT])
+    Shape::Layers([width, height, BATCHES_IN_FLIGHT * frames_per_batch(scene)])
+}
+
+/// A layer for each frame of a batch.
+fn batch([width, height]: [u32; 2], scene: &Scene) -> Shape {
+    Shape::Layers([width, height, frames_per_batch(scene)])
+}
+
+fn slices(scene: &Scene) -> Shape {
+    batch(scene.grid.size, scene)
 }
 
 fn frame_format(scene: &Scene) -> Format {
@@ -289,6 +340,21 @@ fn four_texels(scene: &Scene) -> Format {
 
 fn per_brick(scene: &Scene) -> Shape {
     Shape::Three(scene.bricks().count)
+}
+
+/// Cells of a level of the light volume's pyramid.
+fn light_level(scene: &Scene, level: u32) -> Shape {
+    Shape::Three(scene.light_lattice().count.map(|n| n.div_ceil(1 << level)))
+}
+
+/// One layer of cells across the axis that the light comes along; of the back light, in cells of twice the edge.
+fn light_layer(scene: &Scene, is_back: bool) -> Shape {
+    let light = &scene.settings.light;
+    let volume = light.volume.unwrap_or_default();
+    let direction = if is_back { volume.back_direction } else { light.direction };
+    let axis = Propagation::new(scene.light_direction(direction)).axis;
+    let Shape::Three(count) = light_level(scene, u32::from(is_back)) else { return Shape::Two([1; 2]) };
+    Shape::Two(if axis == 0 { [count[1], count[2]] } else { [count[0], if axis == 1 { count[2] } else { count[1] }] })
 }
 
 fn entries(scene: &Scene) -> Shape {
@@ -381,11 +447,11 @@ impl Slot {
     }
 }
 
-/// The slot that stages 2 and 3 render into: the picture itself, unless several rays make a pixel, one ray makes four, or planes
+/// The slot that stages 2 and 3 render into: the picture itself, unless several rays make a pixel, one ray makes several, or planes
 /// or the volume are shown next to the rendering.
 pub fn rendered(scene: &Scene) -> Slot {
     let is_picture =
-        scene.settings.ray.rays == 1 && !scene.settings.ray.half && scene.settings.layout == Layout::Single;
+        scene.settings.ray.rays == 1 && scene.settings.ray.apart() == 1 && scene.settings.layout == Layout::Single;
     if is_picture || scene.is_flat() { Slot::Picture } else { Slot::Rendered }
 }
 

@@ -3,7 +3,7 @@
 use crate::gpu::{Context, GpuError, Renderer, RendererOptions, TimeStamps, pass_runner};
 use crate::machine::{self, CpuTime};
 use crate::passes::measure as loops;
-use crate::passes::{Bind, DispatchArgs, Frequency, Part, Pass, RUN, Slot, Span, chain, layer, slice};
+use crate::passes::{Bind, DispatchArgs, Part, Pass, RUN, Slot, Span, chain, layers, slices};
 use crate::plan::{Plan, Rerun, Step};
 use crate::profile::export::{self, Track};
 use crate::profile::statistics::Sample;
@@ -227,7 +227,7 @@ fn passes(plan: &Plan, scene: &Scene, repeats: &[Repeat], stamped: bool) -> Vec<
     let measured = |name: &'static str| {
         let steps: Vec<&Step> = plan.steps.iter().filter(|s| s.pass.name == name).collect();
         let first = repeats.first();
-        let runs = first.map_or(0, |r| r.of(name, true).count() as u32);
+        let runs = first.map_or(0, |r| r.of(name, true).map(|s| s.runs).sum());
         // With `still`, steps of stage 1 run only once.
         let times = if steps.is_empty() { 0 } else { u64::from(runs) / steps.len() as u64 };
         let bytes = |binds: fn(&Step, &Scene) -> Vec<Bind>| -> u64 {
@@ -274,18 +274,18 @@ fn hosts(repeats: &[Repeat]) -> Vec<PassProfile> {
 fn touched(bind: &Bind, scene: &Scene) -> u64 {
     let all = bind.slot.bytes(scene);
     match bind.part {
-        Part::Slice | Part::Layer => all / u64::from(bind.slot.shape(scene).parts()),
+        Part::Slices | Part::Layers => all / u64::from(bind.slot.shape(scene).parts()),
         Part::Whole | Part::Around(_) => all,
     }
 }
 
 /// Bytes that `runs` uploads or readbacks copy in each direction.
 fn copied_bytes(name: &str, scene: &Scene, runs: u64) -> u64 {
-    let frame = touched(&layer("frames", Slot::Frames), scene);
+    let frame = touched(&layers("frames", Slot::Frames), scene);
     match name {
         // One copy uploads several slices, and of each what is stored.
         "upload" if runs > 0 => match chain::copied(scene) {
-            Some(slot) => scene.visible_frames().len() as u64 * touched(&slice("volume", slot), scene),
+            Some(slot) => scene.visible_frames().len() as u64 * touched(&slices("volume", slot), scene),
             None => runs * frame,
         },
         "readback" => runs * Slot::Screen.bytes(scene),
@@ -295,7 +295,8 @@ fn copied_bytes(name: &str, scene: &Scene, runs: u64) -> u64 {
 
 /// Texels that one step fetches; None unless it is a filter whose window does not depend on the data.
 fn fetches(pass: &Pass, scene: &Scene, step: &Step) -> Option<u64> {
-    let args = DispatchArgs { slices: scene.slices(), ..step.args() };
+    // The filter of a slice runs once a frame; the caller multiplies by the number of frames.
+    let args = DispatchArgs { slices: pass.slices(scene), ..step.args() };
     let constants = (pass.constants)(scene, &args);
     let radius = constants.iter().find(|(name, _)| *name == "RADIUS").map(|(_, r)| *r as u64)?;
     let edge = 2 * radius + 1;
@@ -307,8 +308,6 @@ fn fetches(pass: &Pass, scene: &Scene, step: &Step) -> Option<u64> {
         "sigma" => edge * along,
         _ => return None,
     };
-    // The filter of a slice runs once a frame; the caller multiplies by the number of frames.
-    debug_assert!(pass.frequency != Frequency::Frame || args.slice == 0);
     Some(invocations * window)
 }
 

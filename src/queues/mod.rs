@@ -244,11 +244,11 @@ mod tests {
                 all.push(submission);
             };
             for (n, image) in (0..6u32).map(|n| (n, n % images)) {
-                for slice in 0..6 {
-                    let args =
-                        DispatchArgs { layer: (n * 6 + slice) % 4, slice, image, slices: 1, ..DispatchArgs::default() };
-                    let layer = args.layer..args.layer + 1;
-                    let copied = Access::of_slot(Slot::Frames, 0, layer, true, PipelineStage::Copy);
+                // Frames alone and two at once.
+                for (batch, (slice, slices)) in [(0, 1), (1, 1), (2, 2), (4, 1), (5, 1)].into_iter().enumerate() {
+                    let layer = (n * 5 + batch as u32) % 4 * 6;
+                    let args = DispatchArgs { layer, slice, image, slices, ..DispatchArgs::default() };
+                    let copied = Access::of_slot(Slot::Frames, 0, layer..layer + slices, true, PipelineStage::Copy);
                     // Without a queue for copies, the copy is part of the frame's submission.
                     match count {
                         3 => {

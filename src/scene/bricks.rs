@@ -138,6 +138,11 @@ impl Scene {
             // The side of a sample follows from its position, its value from its taps.
             extent.texels = Extent::of(self, low - taps, high + taps).texels;
         }
+        if self.takes_bspline() {
+            // Slices k - 1 to k + 2 around k..k + 1.
+            let [from, to] = &mut extent.texels[2];
+            (*from, *to) = (*from - 1.0, *to + 1.0);
+        }
         let [columns, rows, slices] = std::array::from_fn(|axis| {
             let last = f64::from(self.volume_size()[axis] - 1);
             let [from, to] = extent.texels[axis];
@@ -153,7 +158,7 @@ impl Scene {
 
     /// The values, apart from the geometry, that determine the brick tables. Equal keys give equal tables.
     pub fn brick_basis(&self) -> impl PartialEq + use<> {
-        (self.bricks(), self.grid, self.tap_reach())
+        (self.bricks(), self.grid, self.tap_reach(), self.takes_bspline())
     }
 }
 

@@ -38,13 +38,13 @@ impl Rays {
 }
 
 /// Number of rays along each axis: a quarter of a 4-up picture or half of a pair (rounded up), times the rays per pixel, or half
-/// (rounded up) with half resolution.
+/// or a quarter (rounded up) with that resolution.
 pub fn ray_size(settings: &Settings) -> [u32; 2] {
-    let full = full_size(settings);
-    if settings.ray.half { full.map(|n| n.div_ceil(2)) } else { full }
+    full_size(settings).map(|n| n.div_ceil(settings.ray.apart()))
 }
 
-fn full_size(settings: &Settings) -> [u32; 2] {
+/// The same where every pixel has a ray.
+pub(super) fn full_size(settings: &Settings) -> [u32; 2] {
     let tile = match settings.layout {
         Layout::Single => settings.picture.size,
         Layout::Four => settings.picture.size.map(|n| n.div_ceil(2)),
@@ -81,8 +81,8 @@ pub fn rays(settings: &Settings, low: DVec3, high: DVec3, depth_offset: f64, sti
 
     // Offset of the picture's upper left corner from its middle, pixels.
     let corner = |right: DVec3, up: DVec3| right * (-width / 2.0) + up * (height / 2.0);
-    // The ray of four pixels passes through their common corner.
-    let apart = if settings.ray.half { 2.0 } else { 1.0 };
+    // The ray of several pixels passes through their middle.
+    let apart = f64::from(settings.ray.apart());
     if camera.field_of_view > 0.0 {
         let spread = 2.0 * (camera.field_of_view.to_radians() / 2.0).tan() / height;
         // The picture fits the near side of the box at zoom 1. As the zoom grows the camera comes nearer to that side, and never into the box.

@@ -2,8 +2,9 @@
 
 use super::planes::{MAX_SLAB, MAX_TILES};
 use super::{
-    Clip, Conditioning, Distance, Edge, EnhancedSigma, Layout, Light, MAX_CLIPS, MAX_DEVIATION, MAX_PICTURE,
-    MAX_WINDOW, Mode, Noise, PeronaMalik, Scene, SceneError, Scheme, Settings, Sigma, refuse, transfer,
+    Bilateral, Clip, Compositing, Conditioning, Distance, Edge, Elevation, EnhancedSigma, Layout, Light, MAX_CLIPS,
+    MAX_DEVIATION, MAX_PICTURE, MAX_WINDOW, Mode, Noise, PeronaMalik, Scene, SceneError, Scheme, Settings, Sigma,
+    refuse, transfer,
 };
 use crate::probe::Geometry;
 use glam::DVec3;
@@ -25,10 +26,15 @@ pub(super) fn check(settings: &Settings) -> Result<(), SceneError> {
     }
     check_clip(&settings.clip)?;
     within("ray.rays", f64::from(settings.ray.rays), 1.0, 4.0)?;
-    if settings.ray.half && settings.ray.rays > 1 {
-        let fault =
-            format!("takes one ray for four pixels, ray.rays={} several for each: set one of them", settings.ray.rays);
-        return refuse("ray.half", fault);
+    for (key, is_set, pixels) in [("ray.half", settings.ray.half, "four"), ("ray.quarter", settings.ray.quarter, "16")]
+    {
+        if is_set && settings.ray.rays > 1 {
+            let rays = settings.ray.rays;
+            return refuse(
+                key,
+                format!("takes one ray for {pixels} pixels, ray.rays={rays} several for each: set one of them"),
+            );
+        }
     }
     let [width, height] = super::camera::ray_size(settings);
     if width > MAX_PICTURE || height > MAX_PICTURE {
@@ -46,17 +52,24 @@ pub(super) fn check(settings: &Settings) -> Result<(), SceneError> {
         within("slices.smooth.lateral", smooth.lateral, 0.0, 1000.0)?;
         within("slices.smooth.depth", smooth.depth, 0.0, 1000.0)?;
         within("slices.smooth.elevation", smooth.elevation, 0.0, 1000.0)?;
+        let elevation_mm = smooth.elevation_mm.unwrap_or(0.0);
+        within("slices.smooth.elevation_mm", elevation_mm, 0.0, 1000.0)?;
         if let Some(kernel) = smooth.kernel {
             if kernel != 3 && kernel != 5 {
                 return refuse("slices.smooth.kernel", format!("is {kernel}, must be 3 or 5"));
             }
-            if smooth.lateral != 0.0 || smooth.depth != 0.0 || smooth.elevation != 0.0 {
+            if smooth.lateral != 0.0 || smooth.depth != 0.0 || smooth.elevation != 0.0 || elevation_mm != 0.0 {
                 return refuse(
                     "slices.smooth.kernel",
                     "stands instead of lateral, depth and elevation: set it, or them",
                 );
             }
         }
+    }
+    let smooths =
+        s.smooth.is_some_and(|smooth| smooth.elevation_mm.unwrap_or(smooth.elevation) > 0.0 || smooth.kernel.is_some());
+    if settings.ray.elevation == Elevation::BsplineSharp && smooths {
+        return refuse("ray.elevation", "bspline-sharp sharpens across slices, slices.smooth smooths: set one of them");
     }
     check_sigma("slices.sigma", s.sigma)?;
     within("slices.estimator_edge", s.estimator_edge, 0.0, f64::INFINITY)?;
@@ -68,6 +81,16 @@ pub(super) fn check(settings: &Settings) -> Result<(), SceneError> {
     check_perona_malik("post.perona_malik", settings.post.perona_malik)?;
     if settings.post.perona_malik.is_some_and(|p| matches!(p.scheme, Scheme::AosRichardson | Scheme::Rkl1)) {
         return refuse("post.perona_malik", "pictures take the schemes explicit and aos only");
+    }
+    let post = &settings.post;
+    for (field, has_mm) in [
+        ("post.sigma", post.sigma.is_some_and(|s| s.window_mm.is_some())),
+        ("post.enhanced_sigma", post.enhanced_sigma.is_some_and(|e| e.window_mm.or(e.largest_mm).is_some())),
+        ("post.perona_malik", post.perona_malik.is_some_and(|p| p.width_mm.is_some())),
+    ] {
+        if has_mm {
+            return refuse(field, "filters the pixels of a finished picture: give its size in pixels");
+        }
     }
     if settings.post.enhanced_sigma.is_some_and(|e| e.growth) {
         return refuse("post.enhanced_sigma", NO_GROWTH);
@@ -128,6 +151,17 @@ pub(super) fn check(settings: &Settings) -> Result<(), SceneError> {
     within("surface.number", f64::from(f.number), 1.0, 8.0)?;
     within("surface.colour_depth", f.colour_depth, 0.01, 1000.0)?;
     check_light(&settings.light)?;
+    within("region.fade", settings.region.fade, 0.0, 100.0)?;
+    within("volume.extinction", settings.volume.extinction.unwrap_or(1.0), 1e-3, 1e3)?;
+    if settings.volume.compositing == Compositing::Exponential {
+        let table = "needs volume.compositing=riemann, corrected or pre-integrated: exponential takes the light of a step from a table";
+        if settings.light.volume.is_some() {
+            return refuse("light.volume", table);
+        }
+        if settings.region.fade > 0.0 {
+            return refuse("region.fade", table);
+        }
+    }
     within("post.brightness", settings.post.brightness, -1.0, 1.0)?;
     within("post.contrast", settings.post.contrast, 0.0, 10.0)?;
     within("post.gamma", settings.post.gamma, 0.1, 10.0)
@@ -165,6 +199,9 @@ pub(super) fn check_conditioning(c: &Conditioning, geometry: &Geometry) -> Resul
     if let Some(deviation) = c.low_pass {
         within("conditioning.low_pass", deviation, 0.0, MAX_DEVIATION)?;
     }
+    if let Some(mm) = c.low_pass_mm {
+        within("conditioning.low_pass_mm", mm, 0.0, 1000.0)?;
+    }
     if let Some(samples) = c.samples {
         within("conditioning.samples", f64::from(samples), 2.0, 65536.0)?;
     }
@@ -175,6 +212,7 @@ pub(super) fn check_conditioning(c: &Conditioning, geometry: &Geometry) -> Resul
                 ("conditioning.tgc", !c.tgc.is_empty()),
                 ("conditioning.dynamic_range", c.dynamic_range.is_some()),
                 ("conditioning.low_pass", c.low_pass.is_some_and(|d| d > 0.0)),
+                ("conditioning.low_pass_mm", c.low_pass_mm.is_some_and(|d| d > 0.0)),
             ] {
                 if asked {
                     return refuse(field, "conditions the lines of polar frames, and this volume is Cartesian already");
@@ -184,7 +222,8 @@ pub(super) fn check_conditioning(c: &Conditioning, geometry: &Geometry) -> Resul
         }
         Geometry::Sweep(probe) => {
             let factor = c.factor(probe.samples);
-            match c.deviation(factor) <= MAX_DEVIATION {
+            // One in mm is cut to the largest.
+            match c.low_pass_mm.is_some() || c.deviation(factor) <= MAX_DEVIATION {
                 true => Ok(()),
                 false => refuse(
                     "conditioning.samples",
@@ -210,6 +249,13 @@ fn check_light(l: &Light) -> Result<(), SceneError> {
     let shadow = l.shadow.unwrap_or_default();
     let occlusion = l.occlusion.unwrap_or_default();
     let skin = l.skin.unwrap_or_default();
+    let volume = l.volume.unwrap_or_default();
+    if !volume.back_direction.is_finite() || volume.back_direction.length() < 1e-6 {
+        return refuse("light.volume.back_direction", "must be finite and not zero");
+    }
+    if l.volume.is_some() && l.position.is_some() {
+        return refuse("light.volume", "takes a distant light: leave light.position out");
+    }
     for (field, value, low, high) in [
         ("light.ambient", l.ambient, 0.0, 10.0),
         ("light.diffuse", l.diffuse, 0.0, 10.0),
@@ -227,11 +273,27 @@ fn check_light(l: &Light) -> Result<(), SceneError> {
         ("light.skin.wrap", skin.wrap, 0.0, 1.0),
         ("light.skin.translucency", skin.translucency, 0.0, 1.0),
         ("light.skin.depth", skin.depth, 0.0, 100.0),
+        ("light.volume.cell", volume.cell, 0.2, 10.0),
+        ("light.volume.taps", f64::from(volume.taps), 1.0, 4.0),
+        ("light.volume.depth", volume.depth, 0.05, 100.0),
+        ("light.volume.warmth", volume.warmth, 0.0, 2.0),
+        ("light.volume.widening", volume.widening, 0.0, 2.0),
+        ("light.volume.scatter", volume.scatter, 0.0, 3.0),
+        ("light.volume.relief", volume.relief, 0.0, 1.0),
+        ("light.volume.wrap", volume.wrap, 0.0, 1.0),
+        ("light.volume.back", volume.back, 0.0, 10.0),
+        ("light.volume.exposure", volume.exposure, 0.0, 100.0),
     ] {
         within(field, value, low, high)?;
     }
-    let colours =
-        [("light.colour", l.colour), ("light.surface_colour", l.surface_colour), ("light.skin.colour", skin.colour)];
+    let colours = [
+        ("light.colour", l.colour),
+        ("light.surface_colour", l.surface_colour),
+        ("light.skin.colour", skin.colour),
+        ("light.volume.back_colour", volume.back_colour),
+        ("light.volume.ground.middle", volume.ground.unwrap_or_default().middle),
+        ("light.volume.ground.edge", volume.ground.unwrap_or_default().edge),
+    ];
     colours.iter().try_for_each(|(field, colour)| colour.iter().try_for_each(|v| within(field, *v, 0.0, 10.0)))
 }
 
@@ -240,6 +302,14 @@ pub(super) fn within(field: &'static str, value: f64, low: f64, high: f64) -> Re
         true => Ok(()),
         false => refuse(field, format!("is {value}, must lie in {low}..={high}")),
     }
+}
+
+/// A size of a filter in mm.
+fn in_mm(field: &'static str, mm: Option<f64>) -> Result<(), SceneError> {
+    mm.map_or(Ok(()), |mm| match (1e-3..=1e3).contains(&mm) {
+        true => Ok(()),
+        false => refuse(field, format!("is {mm} mm, must lie in 0.001..=1000 mm")),
+    })
 }
 
 /// `key`: the name of the window in that table, as the user wrote it.
@@ -252,6 +322,7 @@ fn check_window(field: &'static str, key: &str, window: u32) -> Result<(), Scene
 
 fn check_sigma(field: &'static str, sigma: Option<Sigma>) -> Result<(), SceneError> {
     let Some(sigma) = sigma else { return Ok(()) };
+    in_mm(field, sigma.window_mm)?;
     check_window(field, "window", sigma.window)?;
     // Infinity is allowed: the filter is then the box mean.
     match sigma.sigma >= 0.0 {
@@ -263,11 +334,15 @@ fn check_sigma(field: &'static str, sigma: Option<Sigma>) -> Result<(), SceneErr
 const NO_GROWTH: &str = "growth is counted on slices only: leave it out";
 
 fn check_distance(d: &Distance) -> Result<(), SceneError> {
+    in_mm("distance.median_mm", d.median_mm)?;
     if d.median > 0 {
         check_window("distance.median", "window", d.median)?;
     }
     if let Some(b) = d.bilateral {
-        within("distance.bilateral.pixels", b.pixels, 0.1, 10.0)?;
+        match b.mm {
+            Some(mm) => in_mm("distance.bilateral.mm", Some(mm))?,
+            None => within("distance.bilateral.pixels", b.pixels, Bilateral::MIN_PIXELS, Bilateral::MAX_PIXELS)?,
+        }
         within("distance.bilateral.distance", b.distance, 1e-3, 1e3)?;
         within("distance.bilateral.repeat", f64::from(b.repeat), 1.0, 16.0)?;
     }
@@ -298,10 +373,12 @@ fn check_distance(d: &Distance) -> Result<(), SceneError> {
 
 fn check_enhanced(field: &'static str, enhanced: Option<EnhancedSigma>) -> Result<(), SceneError> {
     let Some(e) = enhanced else { return Ok(()) };
-    check_sigma(field, Some(Sigma { window: e.window, sigma: e.sigma, noise: e.noise }))?;
+    check_sigma(field, Some(Sigma { window: e.window, window_mm: e.window_mm, sigma: e.sigma, noise: e.noise }))?;
+    in_mm(field, e.largest_mm)?;
     check_window(field, "largest", e.largest)?;
     check_edge(field, e.edge)?;
-    match e.largest < e.window {
+    // A window in mm is resolved to one that is no larger than the largest.
+    match e.largest < e.window && e.window_mm.is_none() && e.largest_mm.is_none() {
         true => refuse(field, format!("largest is {}, less than window {}", e.largest, e.window)),
         false => Ok(()),
     }
@@ -310,6 +387,7 @@ fn check_enhanced(field: &'static str, enhanced: Option<EnhancedSigma>) -> Resul
 fn check_perona_malik(field: &'static str, settings: Option<PeronaMalik>) -> Result<(), SceneError> {
     let Some(p) = settings else { return Ok(()) };
     check_edge(field, p.edge)?;
+    in_mm(field, p.width_mm)?;
     if !(1..=1000).contains(&p.repeat) {
         return refuse(field, format!("repeat is {}, must lie in 1..=1000", p.repeat));
     }

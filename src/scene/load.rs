@@ -14,9 +14,21 @@ const MAX_BYTES: u64 = 1 << 20;
 pub const PRESETS: &[(&str, &str)] = &[
     ("bmode", include_str!("presets/bmode.toml")),
     ("bone", include_str!("presets/bone.toml")),
+    ("face", include_str!("presets/face.toml")),
+    ("face-classic", include_str!("presets/face-classic.toml")),
     ("fetal", include_str!("presets/fetal.toml")),
-    ("phantom", include_str!("presets/phantom.toml")),
+    ("glass", include_str!("presets/glass.toml")),
     ("thesis", include_str!("presets/thesis.toml")),
+];
+
+/// Keys of one table that give the same size in two units.
+const RIVALS: &[(&str, &str)] = &[
+    ("median", "median_mm"),
+    ("window", "window_mm"),
+    ("largest", "largest_mm"),
+    ("pixels", "mm"),
+    ("elevation", "elevation_mm"),
+    ("low_pass", "low_pass_mm"),
 ];
 
 #[derive(Debug, thiserror::Error)]
@@ -43,6 +55,15 @@ impl Layers {
         let (_, text) =
             PRESETS.iter().find(|p| p.0 == name).ok_or_else(|| LoadError::UnknownPreset { name: name.to_string() })?;
         self.add(&format!("preset {name}"), text, None)
+    }
+
+    /// The presets of the built-in phantom: the face as a lit surface, and with `is_plain`, where nobody chose a look, light in the volume.
+    ///
+    /// # Errors
+    /// None: the presets are embedded, and a test reads them.
+    pub fn phantom(&mut self, is_plain: bool) -> Result<(), LoadError> {
+        self.preset("face-classic")?;
+        if is_plain { self.preset("face") } else { Ok(()) }
     }
 
     pub fn file(&mut self, path: &Path) -> Result<(), LoadError> {
@@ -153,6 +174,15 @@ fn points(path: &Path) -> Result<Value, LoadError> {
 
 /// Merges `over` into `under`, which is at `path` in the scene. The word `none` removes a setting that may be absent.
 fn merge(under: &mut Table, over: Table, path: &mut Vec<String>) {
+    // A size in one unit takes the place of an earlier layer's in the other.
+    for (pixels, mm) in RIVALS {
+        let gives = |key: &str| over.get(key).is_some_and(|value| value.as_str() != Some("none"));
+        match (gives(pixels), gives(mm)) {
+            (true, false) => drop(under.remove(*mm)),
+            (false, true) => drop(under.remove(*pixels)),
+            _ => {}
+        }
+    }
     for (key, value) in over {
         path.push(key.clone());
         match (under.get_mut(&key), value) {
@@ -230,9 +260,27 @@ mod tests {
     }
 
     #[test]
+    fn a_size_in_one_unit_takes_the_place_of_an_earlier_one_in_the_other() {
+        let sizes = |sets: &[&str]| {
+            let mut layers = Layers::default();
+            layers.preset("fetal").unwrap();
+            sets.iter().for_each(|set| layers.set(set).unwrap());
+            let settings = layers.finish().unwrap();
+            let smooth = settings.slices.smooth.unwrap();
+            (settings.distance.median, settings.distance.median_mm, smooth.elevation, smooth.elevation_mm)
+        };
+        assert_eq!(sizes(&[]), (19, None, 1.4, None));
+        assert_eq!(sizes(&["distance.median_mm=4"]), (0, Some(4.0), 1.4, None));
+        assert_eq!(sizes(&["distance.median_mm=4", "distance.median=7"]), (7, None, 1.4, None));
+        assert_eq!(sizes(&["distance.median_mm=none"]), (19, None, 1.4, None));
+        assert_eq!(sizes(&["slices.smooth.elevation_mm=2.5"]), (19, None, 0.0, Some(2.5)));
+        assert_eq!(sizes(&["slices.smooth={elevation=1,elevation_mm=2.5}"]), (19, None, 1.0, Some(2.5)));
+    }
+
+    #[test]
     fn none_works_in_a_file_and_for_any_setting_that_may_be_absent() {
         let mut layers = Layers::default();
-        layers.preset("phantom").unwrap();
+        layers.preset("face-classic").unwrap();
         let text = "[ray]\nstep = 'none'\n[camera]\ntarget = 'none'\n[distance]\nbilateral = 'none'\n[slices]\nestimator = 'none'";
         layers.add("scene.toml", text, None).unwrap();
         let settings = layers.clone().finish().unwrap();

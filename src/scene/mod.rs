@@ -5,17 +5,20 @@ mod bricks;
 pub mod camera;
 mod check;
 pub mod cube;
+mod light_lattice;
 pub mod load;
 pub mod planes;
 mod region;
 pub mod self_attenuation;
 pub mod settings;
+mod sizes;
 pub mod transfer;
 pub mod variants;
 pub mod visible_bounds;
 
 pub use bricks::{Bricks, Reach, Side, TILE};
 pub use camera::Rays;
+pub use light_lattice::{LightLattice, Propagation};
 pub use region::insonified_box;
 pub use settings::*;
 pub use visible_bounds::{Rectangle, VisibleBounds};
@@ -24,6 +27,7 @@ use crate::probe::{Array, Geometry, Probe};
 use crate::source::StoredType;
 use glam::DVec3;
 use region::{depth_offset, framed_low, is_still, slice_grid, visible_box};
+use sizes::{Pitches, ResolvedSize, Resolver};
 
 /// Maximum width and height of a picture, pixels.
 pub const MAX_PICTURE: u32 = 16384;
@@ -45,8 +49,8 @@ const SAMPLES_PER_PACKED_TEXEL: f64 = 6.0;
 
 /// Range of the tile that a texel belongs to, per texel (1.3 to 1.5).
 const TEXEL_COST: f64 = 1.4;
-/// Range of a brick, per tile that it may touch (8 to 10).
-const TILE_COST: f64 = 9.0;
+/// Range of a brick, per tile that it may touch (0.5 to 1.2).
+const TILE_COST: f64 = 1.0;
 /// Kind of a brick and its distance to the next of another kind, per brick (80 to 100).
 const BRICK_COST: f64 = 90.0;
 /// The dispatches of all of these, where there is little to do.
@@ -148,13 +152,24 @@ pub struct Scene {
     pub bricks_pay: bool,
     /// The picture has more than 8 bits a channel, because the window shows them. The device resolves this.
     pub is_deep: bool,
+    /// Bytes of shared memory that a workgroup may use to solve a row or a column under AOS; 0 if a single invocation solves it, as is
+    /// faster on a CPU. The device resolves this.
+    pub shared_memory: u32,
+    /// Maximum number of frames that go through stage 1 at once, 1... The device resolves this.
+    pub frames_at_once: u32,
     /// How the volume is sampled: the setting, or for `Auto` the last choice of [`Scene::sampled`].
     pub sampling: Sampling,
     /// Margin in pixels around the sector in which pixels take the nearest sample inside: the reach of the filters. 0 is the strict rule
     /// of the PLUS toolkit, which keeps a pixel only if all four neighbours exist.
     pub apron: f64,
+    /// Conditioning of lines, sizes in samples.
+    pub conditioning: Conditioning,
+    /// Filters of slices, sizes in slice pixels; the Gaussian's as set along lateral and depth, and in slices across them.
+    pub slice_filters: Slices,
     /// Filters of the distance map, sizes in rays.
     pub distance: Distance,
+    /// What became of sizes in mm, for `--explain`.
+    pub resolved_sizes: Vec<ResolvedSize>,
     /// The texels of the volume that stage 2 may read. Stage 1 computes only these.
     pub visible_bounds: visible_bounds::VisibleBounds,
     /// What a renderer stores beyond what this scene shows, from an earlier scene: [`Scene::keeping`].
@@ -230,7 +245,16 @@ impl Scene {
             );
         }
         let sampling = settings.ray.sampling;
-        let distance = if settings.ray.half { settings.distance.halved() } else { settings.distance.clone() };
+        let pitches = Pitches::new(&geometry, &grid, &rays, settings.ray.apart(), (low + high) / 2.0);
+        let mut resolver = Resolver { pitches, resolved: Vec::new() };
+        let conditioning = resolver.conditioning(&settings.conditioning);
+        let slice_filters = resolver.slices(&settings.slices);
+        let distance = resolver.distance(&settings.distance);
+        let distance = match settings.ray.apart() {
+            4 => distance.halved().halved(),
+            2 => distance.halved(),
+            _ => distance,
+        };
         let mut scene = Scene {
             geometry,
             input,
@@ -243,9 +267,14 @@ impl Scene {
             ring,
             bricks_pay: true,
             is_deep: false,
+            shared_memory: 0,
+            frames_at_once: u32::MAX,
             sampling,
             apron: 0.0,
+            conditioning,
+            slice_filters,
             distance,
+            resolved_sizes: resolver.resolved,
             visible_bounds: VisibleBounds::default(),
             kept_bounds: VisibleBounds::default(),
         };
@@ -315,7 +344,7 @@ impl Scene {
 
     /// True if lines are conditioned before scan conversion.
     pub fn conditions(&self) -> bool {
-        let c = &self.settings.conditioning;
+        let c = &self.conditioning;
         let on = !c.tgc.is_empty() || c.dynamic_range.is_some() || c.deviation(1) > 0.0 || self.decimation() > 1;
         on && self.probe().is_some()
     }
@@ -474,30 +503,60 @@ impl Scene {
         self.settings.mode.is_flat()
     }
 
-    /// Standard deviations of the 3D Gaussian in slice pixels, slice pixels and slices.
+    /// Standard deviations of the 3D Gaussian in slice pixels, slice pixels and slices. Across slices it is less than the setting where
+    /// the interpolation between slices smooths more than linear interpolation.
     pub fn smoothing(&self) -> [f64; 3] {
-        let smooth = self.settings.slices.smooth.unwrap_or_default();
+        let smooth = self.slice_filters.smooth.unwrap_or_default();
         if let Some(taps) = smooth.kernel {
             return [binomial_deviation(taps); 3];
         }
+        let elevation = self.left_to_smooth(smooth.elevation);
         if self.blurs() {
-            return [binomial_deviation(3), binomial_deviation(3), smooth.elevation];
+            return [binomial_deviation(3), binomial_deviation(3), elevation];
         }
-        [smooth.lateral / self.grid.pitch[0], smooth.depth / self.grid.pitch[1], smooth.elevation]
+        [smooth.lateral / self.grid.pitch[0], smooth.depth / self.grid.pitch[1], elevation]
+    }
+
+    /// The deviation of the Gaussian across slices, slices, that together with the interpolation between them has the variance of this
+    /// deviation and linear interpolation. The weights of two texels at a share t have the variance t (1 - t), 1/6 on average; those of
+    /// the cubic B-spline 1/3 everywhere.
+    fn left_to_smooth(&self, deviation: f64) -> f64 {
+        match self.settings.ray.elevation {
+            Elevation::Linear => deviation,
+            Elevation::Bspline | Elevation::BsplineSharp => {
+                (deviation * deviation - (1.0 / 3.0 - 1.0 / 6.0)).max(0.0).sqrt()
+            }
+        }
+    }
+
+    /// True if samples between slices are those of the cubic B-spline, which touch four slices.
+    pub fn takes_bspline(&self) -> bool {
+        self.settings.ray.elevation != Elevation::Linear
+    }
+
+    /// True if slices are sharpened across elevation.
+    pub fn sharpens(&self) -> bool {
+        self.settings.ray.elevation == Elevation::BsplineSharp
+    }
+
+    /// True if a pass filters across slices.
+    pub fn filters_across_slices(&self) -> bool {
+        self.smoothing_radius()[2] > 0
     }
 
     /// Taps of the 3D Gaussian on one side, along each axis.
     pub fn smoothing_radius(&self) -> [u32; 3] {
-        if let Some(taps) = self.settings.slices.smooth.and_then(|s| s.kernel) {
+        if let Some(taps) = self.slice_filters.smooth.and_then(|s| s.kernel) {
             return [taps / 2; 3];
         }
         let [lateral, depth, elevation] = self.smoothing().map(gaussian_radius);
+        let elevation = if self.sharpens() { 1 } else { elevation };
         if self.blurs() { [1, 1, elevation] } else { [lateral, depth, elevation] }
     }
 
     /// True if slices get the slight blur against wood grain: it is set, and no smoothing blurs them in their plane.
     fn blurs(&self) -> bool {
-        let smooth = self.settings.slices.smooth.unwrap_or_default();
+        let smooth = self.slice_filters.smooth.unwrap_or_default();
         self.settings.slices.blur && smooth.kernel.is_none() && smooth.lateral == 0.0 && smooth.depth == 0.0
     }
 
@@ -533,7 +592,7 @@ impl Scene {
 
     /// Largest difference of neighbouring distances within one surface, mm.
     pub fn cliff(&self) -> f64 {
-        self.settings.light.cliff * if self.settings.ray.half { 2.0 } else { 1.0 }
+        self.settings.light.cliff * f64::from(self.settings.ray.apart())
     }
 
     /// Position of a near light in space, mm.
@@ -545,7 +604,7 @@ impl Scene {
     fn filter_reach(&self) -> f64 {
         let [lateral, depth, _] = self.smoothing_radius().map(f64::from);
         let median = if self.settings.slices.median { 1.0 } else { 0.0 };
-        let slices = &self.settings.slices;
+        let slices = &self.slice_filters;
         let sigma = slices.sigma.map_or(0.0, |s| f64::from(s.window / 2));
         let enhanced = slices.enhanced_sigma.map_or(0.0, |e| f64::from(e.largest / 2));
         let estimator = match slices.estimator {
@@ -585,9 +644,8 @@ impl Scene {
 
     /// Samples of all rays of a picture, about.
     fn expected_samples(&self) -> f64 {
-        let rays: u64 = self.ray_size().iter().map(|n| u64::from(*n)).product();
-        // A moving view uses the same sampling as a still one.
-        let rays = if self.settings.ray.half { 4 * rays } else { rays };
+        // A moving view, whose rays are fewer, uses the same sampling and bricks as a still one.
+        let rays: u64 = camera::full_size(&self.settings).iter().map(|n| u64::from(*n)).product();
         // Mean ray length: half the diagonal of the box, since some rays miss it and some end early.
         rays as f64 * 0.5 * (self.high - self.low).length() / self.step
     }

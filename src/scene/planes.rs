@@ -200,19 +200,22 @@ impl Sheet {
         tile.plane.at + tile.plane.right * from_middle(x, 0) + tile.plane.down * from_middle(y, 1)
     }
 
+    /// The upper left corner of a tile in space, and the vectors of one pixel right, of one down, and through the slab, mm.
+    pub fn vectors(&self, tile: &Tile, thickness: f64) -> [DVec3; 4] {
+        let Plane { at, right, down, normal } = tile.plane;
+        let (dx, dy) = (right * self.pixel, down * self.pixel);
+        let [width, height] = tile.size.map(f64::from);
+        [at - dx * (width / 2.0) - dy * (height / 2.0), dx, dy, normal * thickness]
+    }
+
     /// The data of each tile for the shaders: the upper left corner in space and the vectors of one pixel right and down, the vector through
     /// the slab, the frame's colour and kind, and two cross-lines (a, b, c, present) with their colours, where a x + b y + c is the distance
     /// from the line in pixels, with (x, y) relative to the tile's corner.
     pub fn table(&self, thickness: f64) -> Vec<f64> {
         let mut table = Vec::with_capacity(self.tiles.len() * 4 * TILE_VECTORS as usize);
         for tile in &self.tiles {
-            let Plane { at, right, down, normal } = tile.plane;
-            let (dx, dy) = (right * self.pixel, down * self.pixel);
-            let [width, height] = tile.size.map(f64::from);
-            let corner = at - dx * (width / 2.0) - dy * (height / 2.0);
-            for v in [corner, dx, dy, normal * thickness] {
-                table.extend([v.x, v.y, v.z, 0.0]);
-            }
+            let vectors @ [corner, dx, dy, _] = self.vectors(tile, thickness);
+            vectors.iter().for_each(|v| table.extend([v.x, v.y, v.z, 0.0]));
             let ([r, g, b], kind) = match tile.frame {
                 Frame::None => ([0.0; 3], 0.0),
                 Frame::Around(colour) => (colour, 1.0),

@@ -87,6 +87,20 @@ pub fn table(transfer: &Transfer, threshold: f64, entries: usize) -> Vec<[f64; 4
         .collect()
 }
 
+/// The same for volume rendering: with [`Volume::extinction`] in place of opacities of one reference length, mm.
+pub fn table_of(volume: &Volume, reference_length: f64, entries: usize) -> Vec<[f64; 4]> {
+    let Some(extinction) = volume.extinction else { return table(&volume.transfer, volume.threshold, entries) };
+    let points = resolved(&volume.transfer);
+    (0..entries)
+        .map(|i| {
+            let value = i as f64 / (entries - 1) as f64;
+            let [r, g, b, a] = at(&points, value);
+            let absorption = (a * extinction * reference_length).min(OPAQUE);
+            [r, g, b, if value < volume.threshold { 0.0 } else { absorption }]
+        })
+        .collect()
+}
+
 /// The pre-integrated table: mean absorption, and mean colour weighted by it, over the sample values between entries `front` (row) and
 /// `back` (column) of a piecewise linear table. It holds for a step along which the value changes linearly.
 pub fn pre_integrated(table: &[[f64; 4]]) -> Vec<[f64; 4]> {

@@ -34,7 +34,7 @@ const MODES: [(Mode, &str); 10] = [
 const SAMPLINGS: [&str; 3] = ["hardware", "exact", "quads"];
 
 /// Filters, lights and other choices that are structure: each line is a table of a scene file.
-const CHOICES: [&str; 36] = [
+const CHOICES: [&str; 42] = [
     "slices.median = true",
     "slices.sigma = {}",
     "slices.enhanced_sigma = { window = 5, largest = 19, sigma = 0.1 }",
@@ -67,8 +67,14 @@ const CHOICES: [&str; 36] = [
     "surface.colour = 'rendered'",
     "surface.colour = 'behind'",
     "ray.half = true",
+    "ray.quarter = true",
     "ray.rays = 2",
+    "ray.elevation = 'bspline'",
+    "ray.elevation = 'bspline-sharp'",
     "mode = 'vr'\nvolume.compositing = 'pre-integrated'",
+    "mode = 'vr'\nlight.volume = {}",
+    "mode = 'vr'\nlight.volume = { ground = {}, back = 0 }\nregion.fade = 6",
+    "mode = 'mixed'\nlight.volume = {}",
     "mode = 'vr'\nvolume.shading = 'first-hit'",
     "mode = 'vr'\nvolume.shading = 'depth-coded'",
 ];

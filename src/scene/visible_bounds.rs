@@ -277,9 +277,11 @@ fn touched(scene: &Scene, look: &Look) -> Option<VisibleBounds> {
     let size = scene.volume_size();
     let texel = |index: f64, axis: usize| index.floor().clamp(0.0, f64::from(size[axis] - 1)) as u32;
     let spans = [column, row, slice];
+    // The B-spline takes one slice more on each side.
+    let more = [0.0, 0.0, f64::from(u8::from(scene.takes_bspline()))];
     let bounds = VisibleBounds {
-        low: std::array::from_fn(|a| texel(spans[a].0 - SLACK, a)),
-        high: std::array::from_fn(|a| texel(spans[a].1 + SLACK + 1.0, a) + 1),
+        low: std::array::from_fn(|a| texel(spans[a].0 - SLACK - more[a], a)),
+        high: std::array::from_fn(|a| texel(spans[a].1 + SLACK + 1.0 + more[a], a) + 1),
     };
     // The bounds may intersect the sector's bounding box but not the sector.
     Some(bounds).filter(|bounds| !bounds.is_empty())

@@ -179,22 +179,36 @@ impl Volume {
     /// # Errors
     /// An extension that is not a format, a full disk. No file is left then.
     pub fn write(&self, grid: &Grid, sample: SampleType, path: &Path, each: impl Fn()) -> Result<(), InputError> {
-        let format = VolumeFile::of(path)?;
-        let written = |e| InputError::unwritable(path, &e);
-        let mut file = Unfinished::create(path).map_err(written)?;
-        file.write_all(format.header(grid, sample).as_bytes()).map_err(written)?;
-        let mut slice = vec![0; grid.size[0] * grid.size[1] * sample.bytes()];
-        for z in 0..grid.size[2] {
-            slice.par_chunks_mut(grid.size[0] * sample.bytes()).enumerate().for_each(|(y, row)| {
-                for (x, voxel) in row.chunks_exact_mut(sample.bytes()).enumerate() {
-                    store(sample, self.at(place_of(grid, [x, y, z])), voxel);
-                }
-            });
-            file.write_all(&slice).map_err(written)?;
-            each();
-        }
-        file.finish().and_then(|()| file.rename()).map_err(written)
+        write_grid(grid, sample, path, |place| self.at(place), each)
     }
+}
+
+/// Writes a function of space, mm, on a grid; None is zero. `each` is called after every slice.
+///
+/// # Errors
+/// As [`Volume::write`].
+pub(super) fn write_grid(
+    grid: &Grid,
+    sample: SampleType,
+    path: &Path,
+    value: impl Fn(DVec3) -> Option<f64> + Sync,
+    each: impl Fn(),
+) -> Result<(), InputError> {
+    let format = VolumeFile::of(path)?;
+    let written = |e| InputError::unwritable(path, &e);
+    let mut file = Unfinished::create(path).map_err(written)?;
+    file.write_all(format.header(grid, sample).as_bytes()).map_err(written)?;
+    let mut slice = vec![0; grid.size[0] * grid.size[1] * sample.bytes()];
+    for z in 0..grid.size[2] {
+        slice.par_chunks_mut(grid.size[0] * sample.bytes()).enumerate().for_each(|(y, row)| {
+            for (x, voxel) in row.chunks_exact_mut(sample.bytes()).enumerate() {
+                store(sample, value(place_of(grid, [x, y, z])), voxel);
+            }
+        });
+        file.write_all(&slice).map_err(written)?;
+        each();
+    }
+    file.finish().and_then(|()| file.rename()).map_err(written)
 }
 
 /// The centre of a voxel, mm.

@@ -309,7 +309,7 @@ mod tests {
         let target = module.bindings.iter().find(|b| b.name == "target").unwrap();
         assert_eq!((target.kind, target.access, target.dimension), (Kind::Storage, Access::Write, Dimension::Three));
         let source = module.bindings.iter().find(|b| b.name == "source").unwrap();
-        assert_eq!((source.kind, source.dimension), (Kind::Sampled, Dimension::Two));
+        assert_eq!((source.kind, source.dimension), (Kind::Sampled, Dimension::Layers));
     }
 
     #[test]

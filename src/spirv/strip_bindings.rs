@@ -5,11 +5,11 @@
 use super::module::{HEADER_WORDS, Instruction, SpirvError, decode, encode, error, op, storage_class, text};
 use std::collections::HashSet;
 
-/// The module without the textures of these names. Texels fetched from them become undefined values, so no code that runs
+/// The module without the textures of these names. Texels fetched and samples taken from them become undefined values, so no code that runs
 /// may use one; texels stored to them are left out. Names that the module does not have are ignored.
 ///
 /// # Errors
-/// A module that breaks the format, or a texture that is used other than by fetches, stores of texels and size queries.
+/// A module that breaks the format, or a texture that is used other than by fetches, samples of a given level, stores of texels and size queries.
 pub fn strip_bindings(words: &[u32], names: &[&str]) -> Result<Vec<u32>, SpirvError> {
     let instructions = decode(words)?;
     let stripped = Stripped::find(&instructions, names);
@@ -44,6 +44,10 @@ impl Stripped {
                 (op::LOAD, [_, id, from, ..]) if stripped.variables.contains(from) => {
                     stripped.images.insert(*id);
                 }
+                // The image of a texture that is also sampled.
+                (op::IMAGE, [_, id, from]) if stripped.images.contains(from) => {
+                    stripped.images.insert(*id);
+                }
                 _ => {}
             }
         }
@@ -54,7 +58,8 @@ impl Stripped {
         let a = i.operands;
         let is_stripped = |id: &u32| self.variables.contains(id) || self.images.contains(id);
         match (i.opcode, a) {
-            (op::NAME | op::DECORATE, [id, ..]) | (op::VARIABLE | op::LOAD, [_, id, ..]) if is_stripped(id) => {}
+            (op::NAME | op::DECORATE, [id, ..]) | (op::VARIABLE | op::LOAD | op::IMAGE, [_, id, ..])
+                if is_stripped(id) => {}
             // Operands: execution model, function, name, and the variables of its interface.
             (op::ENTRY_POINT, [_, _, named @ ..]) => {
                 let ends = |word: &u32| word.to_le_bytes().contains(&0);
@@ -63,7 +68,9 @@ impl Stripped {
                 let used = used.iter().copied().filter(|id| !is_stripped(id));
                 out.extend(encode(op::ENTRY_POINT, &head.iter().copied().chain(used).collect::<Vec<_>>()));
             }
-            (op::IMAGE_FETCH | op::IMAGE_QUERY_SIZE_LOD, [of, result, image, ..]) if is_stripped(image) => {
+            (op::IMAGE_FETCH | op::IMAGE_QUERY_SIZE_LOD | op::IMAGE_SAMPLE_EXPLICIT_LOD, [of, result, image, ..])
+                if is_stripped(image) =>
+            {
                 out.extend(encode(op::UNDEF, &[*of, *result]));
             }
             (op::IMAGE_WRITE, [image, ..]) if is_stripped(image) => {}
@@ -105,9 +112,10 @@ mod tests {
     }
 
     #[test]
-    fn a_sampled_texture_is_refused_and_a_malformed_module_is_an_error() {
+    fn a_sampled_texture_is_removed_and_a_malformed_module_is_an_error() {
         let intact = words(embedded("raycast/surface.intra_frame_motion").unwrap());
-        assert!(strip_bindings(&intact, &["volume"]).is_err(), "it is read with a filter");
+        let without = reflect(&strip_bindings(&intact, &["volume"]).unwrap()).unwrap();
+        assert!(without.bindings.iter().all(|b| b.name != "volume"), "it is read with a filter and without");
         // Of the casters of rays this is the smallest: the time is that of its square.
         let intact = words(embedded("raycast/projection.intra_frame_motion").unwrap());
         for cut in 1..intact.len() {

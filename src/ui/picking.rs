@@ -28,7 +28,7 @@ impl<'a> Picker<'a> {
             rays: &scene.rays,
             corner: corner.map(f64::from),
             size: std::array::from_fn(|a| f64::from(size[a] - corner[a])),
-            rays_per_pixel: f64::from(ray.rays) * if ray.half { 0.5 } else { 1.0 },
+            rays_per_pixel: f64::from(ray.rays) / f64::from(ray.apart()),
         }
     }
 

@@ -222,7 +222,7 @@ pub const SLIDERS: &[Slider] = &[
     slider("Surface median", "px", Surface, [0.0, 31.0], 2.0).of(
         is_lit,
         |s| f64::from(s.distance.median),
-        |s, v| s.distance.median = odd(v),
+        |s, v| (s.distance.median, s.distance.median_mm) = (odd(v), None),
     ),
     slider("Surface smoothing", "px", Surface, [0.0, 10.0], 0.5).of(
         is_lit,
@@ -234,9 +234,24 @@ pub const SLIDERS: &[Slider] = &[
         |s| s.distance.bilateral.map_or(0.1, |b| b.distance),
         set_edge,
     ),
-    slider("Ambient", "", Light, [0.0, 2.0], 0.02).of(is_lit, |s| s.light.ambient, |s, v| s.light.ambient = v),
-    slider("Diffuse", "", Light, [0.0, 2.0], 0.02).of(is_lit, |s| s.light.diffuse, |s, v| s.light.diffuse = v),
-    slider("Specular", "", Light, [0.0, 2.0], 0.02).of(is_lit, |s| s.light.specular, |s, v| s.light.specular = v),
+    slider("Ambient", "", Light, [0.0, 2.0], 0.02).of(has_light, |s| s.light.ambient, |s, v| s.light.ambient = v),
+    slider("Diffuse", "", Light, [0.0, 2.0], 0.02).of(has_light, |s| s.light.diffuse, |s, v| s.light.diffuse = v),
+    slider("Specular", "", Light, [0.0, 2.0], 0.02).of(has_light, |s| s.light.specular, |s, v| s.light.specular = v),
+    slider("Light depth", "mm", Light, [0.2, 8.0], 0.1).of(
+        is_lit_inside,
+        |s| s.light.volume.map_or(0.2, |l| l.depth),
+        |s, v| s.light.volume.iter_mut().for_each(|l| l.depth = v),
+    ),
+    slider("Light warmth", "", Light, [0.0, 2.0], 0.05).of(
+        is_lit_inside,
+        |s| s.light.volume.map_or(0.0, |l| l.warmth),
+        |s, v| s.light.volume.iter_mut().for_each(|l| l.warmth = v),
+    ),
+    slider("Exposure", "", Light, [0.1, 4.0], 0.05).of(
+        is_lit_inside,
+        |s| s.light.volume.map_or(0.1, |l| l.exposure),
+        |s, v| s.light.volume.iter_mut().for_each(|l| l.exposure = v),
+    ),
     slider("Shadow", "", Light, [0.0, 1.0], 0.05).of(
         is_lit,
         |s| s.light.shadow.map_or(0.0, |l| l.strength),
@@ -288,9 +303,9 @@ pub const SLIDERS: &[Slider] = &[
         |s, v| s.camera.field_of_view = above(v, 1.0).unwrap_or(0.0),
     ),
     slider("Rays a pixel", "", Quality, [1.0, 4.0], 1.0).of(
-        |s| renders_rays(s) && !s.ray.half,
+        |s| renders_rays(s) && s.ray.apart() == 1,
         |s| f64::from(s.ray.rays),
-        |s, v| s.ray.rays = if s.ray.half { 1 } else { v.round() as u32 },
+        |s, v| s.ray.rays = if s.ray.apart() > 1 { 1 } else { v.round() as u32 },
     ),
 ];
 
@@ -329,6 +344,15 @@ fn is_first_hit(s: &Settings) -> bool {
 
 fn is_lit(s: &Settings) -> bool {
     matches!(s.mode, Mode::Surface | Mode::Mixed) || is_first_hit(s)
+}
+
+/// Whether light goes through the volume.
+fn is_lit_inside(s: &Settings) -> bool {
+    s.light.volume.is_some() && matches!(s.mode, Mode::Volume | Mode::Mixed)
+}
+
+fn has_light(s: &Settings) -> bool {
+    is_lit(s) || is_lit_inside(s)
 }
 
 /// A value that is off below its minimum.
@@ -464,8 +488,8 @@ fn set_opacity(s: &mut Settings, value: f64) {
 }
 
 fn set_bilateral(s: &mut Settings, value: f64) {
-    let filter = s.distance.bilateral.unwrap_or(Bilateral { pixels: 0.0, distance: 2.0, repeat: 1 });
-    s.distance.bilateral = above(value, 0.1).map(|pixels| Bilateral { pixels, ..filter });
+    let filter = s.distance.bilateral.unwrap_or(Bilateral { pixels: 0.0, mm: None, distance: 2.0, repeat: 1 });
+    s.distance.bilateral = above(value, 0.1).map(|pixels| Bilateral { pixels, mm: None, ..filter });
 }
 
 fn set_edge(s: &mut Settings, value: f64) {
@@ -487,6 +511,7 @@ fn set_smoothing(s: &mut Settings, value: f64) {
         lateral: scaled(filter.lateral, wide),
         depth: scaled(filter.depth, wide),
         elevation: if was > 0.0 { scaled(filter.elevation, 8.0) } else { filter.elevation.max(1.0) },
+        elevation_mm: filter.elevation_mm.filter(|_| was > 0.0).map(|mm| scaled(mm, 1000.0)),
         kernel: None,
     });
 }

@@ -16,11 +16,13 @@ pub struct SceneSpec {
     toml: String,
     /// Use pictures of floats, whatever the settings say.
     floats: bool,
+    /// Solve rows and columns under AOS in workgroups, as on a GPU.
+    shared_memory: u32,
 }
 
 impl SceneSpec {
     fn new(name: &str, geometry: &Geometry, input: Input, toml: String) -> SceneSpec {
-        SceneSpec { name: name.into(), geometry: geometry.clone(), input, toml, floats: false }
+        SceneSpec { name: name.into(), geometry: geometry.clone(), input, toml, floats: false, shared_memory: 0 }
     }
 
     /// Builds the scene.
@@ -31,6 +33,7 @@ impl SceneSpec {
         let mut scene =
             scene(self.geometry.clone(), self.input, &self.toml).map_err(|e| format!("{}: {e}", self.name))?;
         scene.settings.post.floats |= self.floats;
+        scene.shared_memory = self.shared_memory;
         Ok(scene)
     }
 }
@@ -43,8 +46,20 @@ pub fn scenes() -> Vec<SceneSpec> {
     let in_floats =
         straight.map(|spec| SceneSpec { name: format!("{}, in floats", spec.name), floats: true, ..spec.clone() });
     let in_floats: Vec<SceneSpec> = in_floats.collect();
-    ray_scenes().into_iter().chain(planes).chain(in_floats).collect()
+    let rays = ray_scenes();
+    // Rows and columns under AOS are solved in both ways on every device.
+    let diffused = rays.iter().filter(|spec| spec.toml.contains("'aos"));
+    let in_workgroups = diffused.map(|spec| SceneSpec {
+        name: format!("{}, in workgroups", spec.name),
+        shared_memory: LEAST_SHARED_MEMORY,
+        ..spec.clone()
+    });
+    let in_workgroups: Vec<SceneSpec> = in_workgroups.collect();
+    rays.into_iter().chain(in_workgroups).chain(planes).chain(in_floats).collect()
 }
+
+/// Shared memory that every device has, bytes.
+const LEAST_SHARED_MEMORY: u32 = 16 << 10;
 
 /// Edge of a brick where a scene states none, texels.
 const BRICK: u32 = 8;
@@ -245,6 +260,18 @@ fn plane_scenes() -> Vec<SceneSpec> {
     ] {
         scenes.push(SceneSpec::new(&toml.replace('\n', ", "), &Geometry::Sweep(wobbler()), BYTES, format!("{toml}\n{base}")));
     }
+    for (mode, size) in [("orthogonal", "[41, 33]"), ("cube", "[40, 30]")] {
+        let toml = format!(
+            "mode = '{mode}'\nslices.pixels = 33\nray = {{ sampling = 'exact', elevation = 'bspline' }}\npicture.size = {size}\n\
+             camera = {{ azimuth = -140, elevation = 25 }}"
+        );
+        scenes.push(SceneSpec::new(
+            &format!("{mode}, B-spline across slices"),
+            &Geometry::Sweep(wobbler()),
+            BYTES,
+            toml,
+        ));
+    }
     scenes
 }
 
@@ -313,6 +340,26 @@ fn ray_scenes() -> Vec<SceneSpec> {
             ray = { step = 0.45, sampling = 'exact' }";
         add(name, geometry, BYTES, toml);
     }
+    // Bytes that are not scaled: the first filter reads them as they are.
+    for (format, filters) in [
+        ("r8", "median = true"),
+        ("r8", "smooth = { lateral = 0.8 }"),
+        ("r8", "smooth = { depth = 0.8 }"),
+        ("r16f", "estimator = 'median', sigma = {}"),
+        ("r16", "sigma = { window = 5, sigma = 0.083 }"),
+        ("r32f", "enhanced_sigma = { window = 3, largest = 5, growth = true }"),
+        ("r32f", "perona_malik = { repeat = 2 }"),
+        ("r32f", "perona_malik = { scheme = 'rkl1', step = 2.0, repeat = 1 }"),
+        ("r32f", "perona_malik = { scheme = 'aos-richardson', step = 2.0, repeat = 1 }"),
+    ] {
+        let toml =
+            format!("mode = 'plane'\npicture = {{ size = [9, 7] }}\nslices = {{ format = '{format}', {filters} }}");
+        add(&format!("Cartesian, {filters}"), &cartesian([21, 13, 3]), BYTES, &toml);
+    }
+    // Rows that workgroups solve by both of their methods, in chunks of several pixels.
+    let toml = "mode = 'vr'\npicture = { size = [270, 7] }\nslices = { format = 'r32f', perona_malik = { scheme = 'aos', step = 1e3, repeat = 1 } }\n\
+                post = { perona_malik = { scheme = 'aos', step = 20.0, repeat = 1 } }\nray = { sampling = 'exact' }";
+    add("AOS of long rows", &cartesian([300, 11, 3]), BYTES, toml);
     for format in ["r8", "r16", "r16f", "r32f"] {
         for sampling in ["hardware", "exact", "quads"] {
             let toml = format!(
@@ -321,6 +368,31 @@ fn ray_scenes() -> Vec<SceneSpec> {
             add(&format!("volume in {format}, sampling {sampling}"), &sweep, BYTES, &toml);
         }
     }
+    let one_slice = cartesian([9, 8, 1]);
+    for (name, geometry) in
+        [("fan", &sweep), ("Cartesian", &cartesian([17, 23, 9])), ("Cartesian, one slice", &one_slice)]
+    {
+        for (sampling, elevation, format) in [
+            ("hardware", "bspline", "r8"),
+            ("exact", "bspline", "r16f"),
+            ("exact", "bspline-sharp", "r32f"),
+            ("quads", "bspline", "r8"),
+            ("quads", "bspline-sharp", "r16f"),
+        ] {
+            let toml = format!(
+                "slices = {{ pixels = 24, format = '{format}' }}\npicture = {{ size = [16, 16] }}\nsurface.edge = 1.8\n\
+                 ray = {{ step = 0.6, sampling = '{sampling}', elevation = '{elevation}' }}"
+            );
+            let modes: &[&str] = if name == "fan" { &["'sr'", "'vr'", "'mip'"] } else { &["'vr'"] };
+            for mode in modes {
+                let toml = format!("mode = {mode}\n{toml}");
+                add(&format!("{name}, {mode}, {elevation}, sampling {sampling}"), geometry, BYTES, &toml);
+            }
+        }
+    }
+    let joined = "mode = 'vr'\nslices = { pixels = 20, smooth = { elevation = 0.9 } }\npicture = { size = [9, 9] }\n\
+                  ray = { sampling = 'exact', elevation = 'bspline' }";
+    add("frames joined, B-spline between them", &sweep, BYTES, joined);
     for (name, stored, range) in [("u16", StoredType::U16, [1000.0, 40000.0]), ("f32", StoredType::F32, [-0.25, 1.5])] {
         let toml = "slices = { pixels = 9 }\npicture = { size = [1, 1] }\nray = { sampling = 'exact' }";
         add(&format!("frames in {name}, one pixel"), &sweep, Input { stored, range }, toml);
@@ -467,6 +539,16 @@ fn ray_scenes() -> Vec<SceneSpec> {
             "mode = 'sr'\nlayout = 'pair'\nvolume = { compositing = 'pre-integrated' }\nslices = { pixels = 30 }",
         ),
         ("veil and shadow", "mode = 'mixed'\nlight = { shadow = {} }\nslices = { pixels = 30 }"),
+        ("light volume", "mode = 'vr'\nlight = { volume = { cell = 5 } }\nslices = { pixels = 30 }"),
+        (
+            "light volume, from the side",
+            "mode = 'vr'\nlight = { direction = [-1, 0.2, 0.1], follows = 'region', specular = 0.5, volume = { cell = 4, back = 0, scatter = 0, widening = 2, \
+             taps = 2, ground = {} } }\nregion = { fade = 6 }\nvolume = { extinction = 0.5 }\nslices = { pixels = 30 }",
+        ),
+        (
+            "light volume, from the probe, over a surface",
+            "mode = 'mixed'\nlight = { direction = [0.1, 0.1, 1], volume = { cell = 4, warmth = 0, back_direction = [0, 1, -0.2] } }\nslices = { pixels = 30 }",
+        ),
         ("lit volume, shadow", "mode = 'vr'\nvolume = { shading = 'first-hit' }\nlight = { shadow = {}, skin = {} }\nslices = { pixels = 12 }"),
         ("lit volume, occlusion", "mode = 'vr'\nvolume = { shading = 'first-hit' }\nlight = { occlusion = {} }\nslices = { pixels = 12 }"),
         ("depth-coded", "mode = 'vr'\nvolume = { shading = 'depth-coded', transfer = 'warm' }\nslices = { pixels = 30 }"),

@@ -158,7 +158,7 @@ fn failed_once(
     let mut failed = 0;
     for (k, frame) in case.frames.iter().enumerate() {
         let bytes = frame.encode(format);
-        if renderer.frame(k as u32, &bytes, 0).is_err() {
+        if renderer.frame(k as u32, &bytes, 0).and_then(|()| renderer.submit_frames()).is_err() {
             failed += 1;
             renderer.frame(k as u32, &bytes, 0)?;
         }

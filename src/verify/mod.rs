@@ -234,7 +234,8 @@ pub struct DeviceUnderTest {
     pub context: Arc<Context>,
     pub level: Level,
     options: ContextOptions,
-    pass_runner: Option<PassRunner>,
+    /// Its pipelines are those of all renderers of the context, which compile each only once.
+    pass_runner: PassRunner,
     scenes: Rc<Vec<(String, Scene)>>,
     /// Called on every new context.
     prepare: Option<fn(&Context)>,
@@ -267,6 +268,7 @@ impl DeviceUnderTest {
     ) -> Result<DeviceUnderTest, GpuError> {
         let context = Context::new(options)?;
         prepare.iter().for_each(|prepare| prepare(&context));
+        let pass_runner = PassRunner::new(&context)?;
         let made = |spec: &built_in::SceneSpec| Ok((spec.name.clone(), spec.build()?));
         let scenes: Result<Vec<_>, String> = built_in::scenes().iter().map(made).collect();
         let scenes = Rc::new(scenes.map_err(GpuError::Broken)?);
@@ -274,7 +276,7 @@ impl DeviceUnderTest {
             context,
             level,
             options: options.clone(),
-            pass_runner: None,
+            pass_runner,
             scenes,
             prepare,
             injected_fault: None,
@@ -294,7 +296,7 @@ impl DeviceUnderTest {
             context: self.context.clone(),
             options: self.options.clone(),
             scenes: self.scenes.clone(),
-            pass_runner: None,
+            pass_runner: PassRunner::new(&self.context)?,
             injected_fault: Some(change),
             program: None,
             modes: None,
@@ -323,15 +325,8 @@ impl DeviceUnderTest {
     }
 
     /// The runner of single passes.
-    ///
-    /// # Errors
-    /// The device fails.
-    pub fn pass_runner(&mut self) -> Result<&mut PassRunner, GpuError> {
-        if self.pass_runner.is_none() {
-            self.pass_runner = Some(PassRunner::new(&self.context)?);
-        }
-        // It exists here.
-        self.pass_runner.as_mut().ok_or(GpuError::Broken("no pass can be run alone".into()))
+    pub fn pass_runner(&mut self) -> &mut PassRunner {
+        &mut self.pass_runner
     }
 
     /// Another context on the same device, because the old one was lost or will be.
@@ -372,8 +367,8 @@ impl DeviceUnderTest {
     }
 
     fn renew(&mut self) -> Result<(), GpuError> {
-        (self.pass_runner, self.messages_read) = (None, 0);
         self.context = self.another()?;
+        (self.pass_runner, self.messages_read) = (PassRunner::new(&self.context)?, 0);
         Ok(())
     }
 

@@ -7,8 +7,8 @@ use super::{Check, DeviceUnderTest, Findings};
 use crate::gpu::GpuError;
 use crate::gpu::pass_runner::PassRunner;
 use crate::passes::preprocess::PACKED_NEIGHBOURS;
-use crate::passes::slots::{Format, Initializer};
-use crate::passes::{Arrays, Bind, DispatchArgs, MISS, PASSES, Part, Pass, Slot, Texels};
+use crate::passes::slots::{Format, Initializer, Shape, frames_per_batch};
+use crate::passes::{Arrays, Bind, DispatchArgs, Frequency, MISS, PASSES, Part, Pass, Slot, Texels};
 use crate::plan::Plan;
 use crate::scene::Scene;
 use crate::verify::report::{Fault, Figure, Level, Unit};
@@ -44,7 +44,7 @@ pub fn run_with_reference(
     kind: &str,
     seed: u64,
 ) -> Result<DispatchComparison, GpuError> {
-    let args = dispatch_args_of(scene, iteration);
+    let args = dispatch_args_of(scene, pass, iteration);
     let inputs = inputs_of(scene, pass, &args, kind, seed);
     let writes = pass.writes(scene, &args);
     let mut expected = Arrays::default();
@@ -75,7 +75,7 @@ type Variant = (&'static str, Vec<(&'static str, i32)>, Vec<Format>);
 
 /// What distinguishes a pipeline: its shader, its constants, and the formats of its bindings.
 fn variant(scene: &Scene, pass: &Pass) -> Variant {
-    let args = dispatch_args_of(scene, 0);
+    let args = dispatch_args_of(scene, pass, 0);
     let bound = pass.reads(scene, &args).into_iter().chain(pass.writes(scene, &args));
     (pass.shader(scene, &args), (pass.constants)(scene, &args), bound.map(|b| b.slot.format(scene)).collect())
 }
@@ -126,7 +126,7 @@ impl PassSummary {
                 continue;
             }
             for iteration in 0..(pass.repeat)(scene) {
-                let result = run_with_reference(dut.pass_runner()?, scene, pass, iteration, kind, seed_of(pass, k))?;
+                let result = run_with_reference(dut.pass_runner(), scene, pass, iteration, kind, seed_of(pass, k))?;
                 let of = &result.comparison;
                 (self.largest, self.used) = (self.largest.max(of.largest), self.used.max(of.used));
                 (self.outliers, self.runs) = (self.outliers.max(of.outliers), self.runs + 1);
@@ -185,11 +185,12 @@ impl PassSummary {
 /// volumes blurred, so that it resembles tissue.
 pub(crate) const KINDS: [&str; 4] = ["noise", "zero", "one", "hot"];
 
-fn input(scene: &Scene, bind: &Bind, kind: &str, noise: &mut Noise) -> Texels {
+/// `slices`: those of the dispatch.
+fn input(scene: &Scene, bind: &Bind, slices: u32, kind: &str, noise: &mut Noise) -> Texels {
     let format = bind.slot.format(scene);
     let mut size = bind.slot.array_size(scene);
-    if bind.part == Part::Layer {
-        size[2] = 1;
+    if bind.part == Part::Layers {
+        size[2] = slices as usize;
     }
     let mut texels = Texels::from_fn(size, format.channels(), |_, _| 0.0);
     if let Initializer::ByScene(make) = bind.slot.initializer() {
@@ -199,6 +200,8 @@ fn input(scene: &Scene, bind: &Bind, kind: &str, noise: &mut Noise) -> Texels {
     let count = texels.values.len();
     let is_distance = matches!(bind.slot, Slot::Distance | Slot::DistanceA | Slot::DistanceB);
     let tilt = noise.range(-0.4, 0.4);
+    // A single texel: of layers in each.
+    let one = if matches!(bind.slot.shape(scene), Shape::Layers(_)) { count / size[2] } else { count };
     for i in 0..count {
         let (x, y) = ((i / format.channels() % size[0]) as f64, (i / format.channels() / size[0]) as f64);
         texels.values[i] = match (kind, is_distance) {
@@ -209,11 +212,11 @@ fn input(scene: &Scene, bind: &Bind, kind: &str, noise: &mut Noise) -> Texels {
             },
             ("zero", true) => MISS,
             ("one", true) => 42.0,
-            ("hot", true) if i == count / 2 => 33.0,
+            ("hot", true) if i % one == one / 2 => 33.0,
             ("hot", true) => MISS,
             ("noise", false) => noise.next(),
             ("one", false) => 1.0,
-            ("hot", false) if i == count / 2 => 1.0,
+            ("hot", false) if i % one == one / 2 => 1.0,
             _ => 0.0,
         };
     }
@@ -252,7 +255,7 @@ fn empty_space_of(scene: &Scene, slot: Slot, volume: &Texels) -> Texels {
         let (mut inputs, mut outputs) = (Arrays::default(), Arrays::default());
         for bind in step.pass.reads(scene, &args) {
             let there = slots.get(&bind.slot).cloned();
-            inputs.insert(bind.name, there.unwrap_or_else(|| input(scene, &bind, "zero", &mut Noise(1))));
+            inputs.insert(bind.name, there.unwrap_or_else(|| input(scene, &bind, args.slices, "zero", &mut Noise(1))));
         }
         for bind in step.pass.writes(scene, &args) {
             let channels = bind.slot.format(scene).channels();
@@ -270,11 +273,12 @@ fn empty_space_of(scene: &Scene, slot: Slot, volume: &Texels) -> Texels {
     slots.remove(&slot).unwrap_or_else(|| Texels::untouched([0; 3], 1))
 }
 
-/// Dispatch arguments that are not the first of anything: of the visible slices, which are stored.
-pub fn dispatch_args_of(scene: &Scene, iteration: u32) -> DispatchArgs {
+/// Dispatch arguments that are not the first of anything: of the visible slices, which are stored. Frames come in a batch.
+pub fn dispatch_args_of(scene: &Scene, pass: &Pass, iteration: u32) -> DispatchArgs {
     let visible = scene.visible_bounds.slices();
     let slice = (visible.start + visible.end) / 2;
     let slices = scene.slices().div_ceil(3).min(visible.end - slice);
+    let slices = if pass.frequency == Frequency::Frame { slices.clamp(1, frames_per_batch(scene)) } else { slices };
     DispatchArgs { layer: 2, slice, slices, iteration, image: 0 }
 }
 
@@ -286,7 +290,7 @@ pub fn inputs_of(scene: &Scene, pass: &Pass, args: &DispatchArgs, kind: &str, se
     for (n, bind) in reads.iter().enumerate() {
         // An image bound under two names has the same contents.
         let made = reads[..n].iter().find(|b| b.slot == bind.slot).map(|b| inputs.get(b.name).clone());
-        inputs.insert(bind.name, made.unwrap_or_else(|| input(scene, bind, kind, &mut noise)));
+        inputs.insert(bind.name, made.unwrap_or_else(|| input(scene, bind, args.slices, kind, &mut noise)));
     }
     for bricks in reads.iter().filter(|b| matches!(b.name, "bricks" | "volume_bricks")) {
         // Empty space must be consistent with the volume.

@@ -21,11 +21,15 @@ pub fn sent(
     Ok(renderer)
 }
 
-/// Sends the frames of a volume into one of the volume images, and selects it for the next picture.
+/// Sends the frames of a volume into one of the volume images, alone and in batches of two and three, and selects it for the next
+/// picture.
 pub fn send(renderer: &mut Renderer, frames: &[Texels], image: u32) -> Result<(), GpuError> {
     let format = Slot::Frames.format(renderer.scene());
     for (k, frame) in frames.iter().enumerate() {
         renderer.frame(k as u32, &frame.encode(format), image)?;
+        if [0, 2, 5].contains(&(k % 6)) {
+            renderer.submit_frames()?;
+        }
     }
     renderer.show(image)
 }

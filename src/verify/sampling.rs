@@ -154,8 +154,8 @@ fn check(dut: &mut DeviceUnderTest, format: &str) -> Result<Findings, GpuError> 
         let volume = Texels::decode(volume.size, stored, &volume.encode(stored));
         let mut inputs = Arrays::default();
         inputs.insert("volume", volume.clone());
-        let precision = FilterPrecision { bits: dut.pass_runner()?.filter_bits(), format: stored };
-        let outputs = dut.pass_runner()?.run(&scene, &POSITIONS, &DispatchArgs::default(), &inputs, POISON)?;
+        let precision = FilterPrecision { bits: dut.pass_runner().filter_bits(), format: stored };
+        let outputs = dut.pass_runner().run(&scene, &POSITIONS, &DispatchArgs::default(), &inputs, POISON)?;
         let got = outputs.get("values");
         let judged = judge(precision, &volume, got);
         let [width, height, _] = got.size;

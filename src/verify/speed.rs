@@ -11,9 +11,10 @@ use crate::verify::report::{Figure, Level};
 
 /// Scenes that together need every pass, with pictures as large as a tile of a small display. A pass is timed in the first scene that
 /// needs it.
-const SCENES: [&str; 15] = [
+const SCENES: [&str; 16] = [
     "mode = 'sr'",
     "mode = 'vr'",
+    "mode = 'vr'\nlight = { volume = {} }",
     "mode = 'mip'",
     "mode = 'orthogonal'",
     "mode = 'orthogonal'\npost = { floats = true }",

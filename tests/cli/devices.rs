@@ -60,7 +60,7 @@ fn a_rendering_on_a_device_that_hangs_fails_with_one_line() {
     let folder = Folder::new("hang-render");
     let (picture, report) = (folder.path("x.png"), folder.path("report.json"));
     let arguments = ["render", "--size", "64x64", "--device-timeout", "2s", "-o", &picture];
-    let settings = [("HANG", "10"), ("REPORT", report.as_str())];
+    let settings = [("HANG", "6"), ("REPORT", report.as_str())];
     let ran = finish(under_layer(Command::new(PROGRAM).args(arguments), &settings));
     refuses(&arguments, &ran, 1, &["the device did not finish within 2 s", "frame"]);
     assert!(!fs::exists(&picture).expect("look"));
@@ -82,6 +82,12 @@ fn dumped(folder: &Folder, name: &str, settings: &[(&str, &str)]) -> Vec<(String
     let (code, said, err) = if settings.is_empty() { finish(program) } else { finish(under_layer(program, settings)) };
     assert_eq!(code, Some(0), "{said}{err}");
     let mut files: Vec<_> = fs::read_dir(&dump).expect("list").map(|entry| entry.expect("an entry").path()).collect();
+    // What slots of frames hold in the end depends on the size of a batch, which the device's buffers limit.
+    let of_frames = |path: &std::path::Path| {
+        let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
+        ["frames", "slice_a", "slice_b", "conditioned"].iter().any(|slot| name.contains(slot))
+    };
+    files.retain(|path| !of_frames(path));
     files.sort();
     files.push(picture.into());
     let name = |path: &std::path::Path| path.extension().unwrap_or_default().to_string_lossy().into_owned();

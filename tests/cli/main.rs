@@ -114,7 +114,7 @@ fn no_wrong_probe_or_scene_file_is_taken_for_a_default() {
 #[test]
 fn no_wrong_setting_is_refused_without_its_flag_or_name() {
     let folder = Folder::new("settings");
-    let wrong = "--device 4096 | available: 0 ;--device no such card | available: 0 ;--preset foetal | bone, fetal;\
+    let wrong = "--device 4096 | available: 0 ;--device no such card | available: 0 ;--preset foetal | bone, face;\
                  --mode sideways | --mode;--volume 1 | --volume 1;--size 64 | --size;--size 64x | --size;\
                  --size 64x48x2 | --size;--size 1.5x2 | --size;--size 0x0 | 0x0;--size 16385x1 | 16384;\
                  --camera azimuth | --camera;--camera azimuth=east | --camera;--camera azimut=1 | --camera;\
@@ -128,6 +128,23 @@ fn no_wrong_setting_is_refused_without_its_flag_or_name() {
     for (setting, named) in wrong.split(';').map(|w| w.split_once(" | ").expect("a setting and what is said of it")) {
         let (flag, value) = setting.split_once(' ').expect("a flag and its value");
         folder.refuses(&[SWEEP, flag, value], &[named]);
+    }
+}
+
+/// The phantom is shown under light in the volume unless somebody chooses another look.
+#[test]
+fn the_default_look_of_the_phantom_gives_way_to_any_other() {
+    let plan = |flags: &[&str]| done(&[&["render", "--explain", "--size", "64x48"], flags].concat());
+    for (flags, pass) in [
+        (&[][..], "light_propagate"),
+        (&["--layout", "4up"], "light_propagate"),
+        (&["--mode", "sr"], "raycast_surface"),
+        (&["--layout", "pair"], "raycast_surface_and_volume"),
+        (&["--preset", "thesis"], "raycast_surface_and_volume"),
+    ] {
+        let text = plan(flags);
+        assert!(text.contains(&format!("+ {pass} ")), "{flags:?}: {text}");
+        assert_eq!(text.contains("+ light_propagate "), pass == "light_propagate", "{flags:?}: {text}");
     }
 }
 
@@ -205,6 +222,10 @@ fn no_slot_is_missing_from_the_dump_and_no_pass_from_the_times() {
     let slots: BTreeSet<String> = slots.iter().map(|s| format!("{s}.png")).collect();
     assert_eq!(dump.names(), slots);
     slots.iter().for_each(|s| assert!(png_size(&dump.path(s))[0] > 0));
+    // Volumes of colours are drawn too.
+    let lit = ["--mode", "vr", "--set", "light.volume={cell=6}", "--dump", &dump.path("")];
+    render(SWEEP, &folder.path("p.png"), &lit);
+    assert!(png_size(&dump.path("light_shade.png"))[0] > 0);
     for pass in first_words(passes, "  + ") {
         assert_eq!(said.lines().filter(|l| l.split_whitespace().nth(1) == Some(&pass)).count(), 1, "{pass}: {said}");
     }
@@ -329,14 +350,43 @@ fn no_file_is_needed_to_see_a_face_and_a_phantom_is_a_recording_like_any_other()
     done(&["render", "-o", &face, "--size", "64x48", "--validate"]);
     done(&["phantom", "-o", &sweep, "--volumes", "2", "--both-ways", "--speed-ratio", "0"]);
     assert!(done(&["info", &sweep]).contains("2 of 37 frames"));
-    render(&sweep, &again, &["--preset", "phantom"]);
+    render(&sweep, &again, &["--preset", "face"]);
     assert_eq!(fs::read(&face).expect("the face"), fs::read(&again).expect("the same from a file"));
-    for (arguments, named) in [(["--body", "tail"], "head, sphere"), (["--volumes", "0"], "volumes")] {
-        let output = folder.path("x.mha");
+    let output = folder.path("x.mha");
+    for (arguments, named) in [
+        (["--body", "tail"], "head, sphere"),
+        (["--volumes", "0"], "volumes"),
+        (["--sampling", "fast"], "live, gallery"),
+        (["--psf-elevation", "11"], "psf_elevation"),
+        (["--fan", "200"], "fan_angle"),
+        (["--truth", &output], "is written by"),
+    ] {
         let all = [&["phantom", "-o", &output], &arguments[..]].concat();
         refuses(&all, &run(&all), 2, &[named]);
     }
     assert!(!folder.names().iter().any(|n| n.starts_with('x')), "{:?}", folder.names());
+}
+
+#[test]
+fn a_phantom_has_the_sampling_and_the_truth_that_are_asked_for() {
+    let folder = Folder::new("truth");
+    let (sweep, truth) = (folder.path("sweep.mha"), folder.path("truth.mha"));
+    let sampling = ["--sampling", "gallery", "--frames", "7", "--lines", "40", "--fan", "50", "--psf-lateral", "0"];
+    let made = [&["phantom", "-o", &sweep, "--truth", &truth, "--truth-spacing", "4"][..], &sampling].concat();
+    let said = done(&made);
+    assert!(said.contains("6 choroid plexus") && said.contains("truth.distance.mha"), "{said}");
+    assert!(done(&["info", &sweep]).contains("1 of 7 frames"));
+    let probe = fs::read_to_string(folder.path("sweep.probe.toml")).expect("the probe file");
+    assert!(probe.contains("fan_angle_deg = 50.0"), "{probe}");
+    // The same grid as that of the converted sweep.
+    done(&["convert", &sweep, &folder.path("volume.mha"), "--spacing", "4"]);
+    let size = |name: &str| {
+        let text = done(&["info", &folder.path(name)]);
+        let line = text.lines().find(|l| l.contains(" x ")).expect("a size");
+        line.split_whitespace().map(str::to_owned).collect::<Vec<_>>()
+    };
+    assert_eq!(size("volume.mha"), size("truth.mha"));
+    assert_eq!(size("volume.mha"), size("truth.distance.mha"));
 }
 
 #[cfg(unix)]

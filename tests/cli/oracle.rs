@@ -1,4 +1,4 @@
-//! A second implementation of stage 2, in numpy, agrees with what the program writes.
+//! A second implementation of stage 2 and of the light volume, in numpy, agrees with what the program writes.
 
 use crate::common::files::repository;
 use crate::common::program::*;
@@ -27,6 +27,23 @@ fn numpy_casts_the_same_rays_through_the_same_volume() {
             ["\"wobble_radius\": 27.25", "\"wobble_radius\": 27.0"],
         ),
         ("volume", BONE, &["--preset", "bone", "--mode", "vr"], ["\"opacity\": 0.4", "\"opacity\": 0.35"]),
+        (
+            "light",
+            SWEEP,
+            &[
+                "--preset",
+                "fetal",
+                "--mode",
+                "vr",
+                "--set",
+                "light.volume={scatter=0,widening=0,warmth=0.7}",
+                "--set",
+                "light.follows=region",
+                "--set",
+                "light.direction=[-0.5,0.8,0.6]",
+            ],
+            ["\"warmth\": 0.7", "\"warmth\": 0.4"],
+        ),
     ] {
         let dump = Folder(folder.0.join(name));
         render(input, &folder.path("p.png"), &[more, &["--dump", &dump.path(""), "--raw"]].concat());

@@ -1,5 +1,6 @@
 //! A device with validation on, scenes, and noise that is the same everywhere.
 
+use echolume::gpu::pass_runner::PassRunner;
 use echolume::gpu::{Context, ContextOptions, Deadline, DeviceChoice, Renderer, RendererOptions};
 use echolume::passes::slots::Format;
 use echolume::passes::{Slot, Texels, is_hit};
@@ -7,7 +8,7 @@ use echolume::picture::Picture;
 use echolume::scene::Scene;
 use echolume::verify::built_in;
 use std::ops::Deref;
-use std::sync::Arc;
+use std::sync::{Arc, Mutex};
 use std::time::Duration;
 
 pub use super::files::*;
@@ -22,7 +23,12 @@ pub struct Device {
     context: Arc<Context>,
     /// The test expects messages.
     pub provoked: bool,
+    /// Holds the pipelines of all renderers of this context; `None` if no other test is to have it.
+    runner: Option<PassRunner>,
 }
+
+/// Contexts that no test uses now, with the pipelines that earlier tests needed: most of the time of a test was spent on compiling them.
+static IDLE: Mutex<Vec<(Arc<Context>, PassRunner)>> = Mutex::new(Vec::new());
 
 /// ECHOLUME_DEVICE picks another device than the first that fits.
 pub fn chosen() -> DeviceChoice {
@@ -30,7 +36,19 @@ pub fn chosen() -> DeviceChoice {
 }
 
 impl Device {
+    /// One that an earlier test may have used: for tests that only draw.
     pub fn new() -> Device {
+        let idle = IDLE.lock().unwrap_or_else(|e| e.into_inner()).pop();
+        if let Some((context, runner)) = idle {
+            return Device { context, provoked: false, runner: Some(runner) };
+        }
+        let mut device = Device::alone();
+        device.runner = Some(PassRunner::new(&device).expect("a runner of passes"));
+        device
+    }
+
+    /// One of its own: for tests that inject faults, expect messages, or count.
+    pub fn alone() -> Device {
         Device::watched(true)
     }
 
@@ -38,14 +56,14 @@ impl Device {
     pub fn watched(validation: bool) -> Device {
         let context = Context::new(&ContextOptions { device: chosen(), validation, ..ContextOptions::default() })
             .expect("a Vulkan device");
-        Device { context, provoked: false }
+        Device { context, provoked: false, runner: None }
     }
 
     /// One that is given up if it does not finish within two seconds, also in software. That is far more than a small picture takes.
     pub fn impatient() -> Device {
         let deadline = Deadline::After(Duration::from_secs(2));
         let options = ContextOptions { device: chosen(), validation: true, deadline, ..ContextOptions::default() };
-        Device { context: Context::new(&options).expect("a Vulkan device"), provoked: false }
+        Device { context: Context::new(&options).expect("a Vulkan device"), provoked: false, runner: None }
     }
 
     /// The device and driver, for output with `--nocapture`.
@@ -67,6 +85,10 @@ impl Drop for Device {
         if !std::thread::panicking() && !self.provoked {
             // One message is enough; many of the same would hide it.
             assert!(messages.is_empty(), "{} messages of validation, first: {}", messages.len(), messages[0]);
+        }
+        if let Some(runner) = self.runner.take().filter(|_| !std::thread::panicking()) {
+            assert!(!self.provoked, "a test that expects messages needs a device alone");
+            IDLE.lock().unwrap_or_else(|e| e.into_inner()).push((self.context.clone(), runner));
         }
     }
 }

@@ -29,6 +29,10 @@ const SETTINGS: &[(&str, &[&str])] = &[
     ("surface.edge", &["0.5", "3", "40", "samples"]),
     ("surface.colour", &["rendered", "behind"]),
     ("surface.colour_depth", &["0.01", "1000"]),
+    ("light.volume", &["{cell=5}", "{cell=3,back=0,scatter=0,ground={}}", "{cell=9,taps=4,widening=2}", "{cell=0}"]),
+    ("light.follows", &["region"]),
+    ("region.fade", &["6", "100"]),
+    ("volume.extinction", &["0.5", "1000"]),
     ("light.shadow", &["{}", "{dims='pixel'}"]),
     ("surface.start_depth", &["0", "10", "400"]),
     ("volume.start_depth", &["0", "10"]),
@@ -42,6 +46,13 @@ const SETTINGS: &[(&str, &[&str])] = &[
     ("slices.enhanced_sigma", &["{window=3,largest=7}", "{window=3,largest=7,growth=true}", "{centre='median'}"]),
     ("slices.perona_malik", &["{}", "{scheme='aos',step=1e6}", "{repeat=3,edge=0}", "{step=0.3}"]),
     ("slices.smooth", &["{lateral=1}", "{kernel=5}", "{elevation=2,depth=1}", "{lateral=900}"]),
+    ("slices.smooth.elevation_mm", &["0", "1.5", "900"]),
+    ("slices.sigma.window_mm", &["0.01", "2", "500"]),
+    ("slices.perona_malik.width_mm", &["0.01", "1"]),
+    ("conditioning.low_pass_mm", &["0", "1.5", "500"]),
+    ("distance.median_mm", &["0.01", "3", "500"]),
+    ("distance.bilateral.mm", &["0.01", "1", "500"]),
+    ("distance.enhanced_sigma.largest_mm", &["0.01", "4"]),
     ("slices.format", &["r8", "r16", "r16f", "r32f"]),
     ("conditioning", &["{samples=16}", "{dynamic_range=60,low_pass=2}", "{tgc=[{depth=5,gain=-3}]}"]),
     ("region.depth", &["[5,20]", "[20,5]", "[1e5,2e5]"]),
@@ -54,8 +65,10 @@ const SETTINGS: &[(&str, &[&str])] = &[
     ("camera.target", &["[0,20,0]", "[1e6,0,-1e6]"]),
     ("ray.step", &["0.5", "2", "1e3"]),
     ("ray.sampling", &["auto", "hardware", "exact", "quads"]),
+    ("ray.elevation", &["linear", "bspline", "bspline-sharp"]),
     ("ray.rays", &["2", "3"]),
     ("ray.half", &["true"]),
+    ("ray.quarter", &["true"]),
     ("ray.spread", &["0.5", "1"]),
     ("ray.sliding", &["3", "5"]),
     ("ray.entries", &["2", "65536"]),
@@ -73,7 +86,14 @@ const SETTINGS: &[(&str, &[&str])] = &[
     ("cube.inset.bottom", &["3", "1e3"]),
     ("cube.tilt.near", &["[0,12]", "[80,80]"]),
     ("cube.edges", &["true", "false"]),
-    ("distance", &["{median=3}", "{sigma={},enhanced_sigma={window=3,largest=5}}", "{bilateral={},perona_malik={}}"]),
+    (
+        "distance",
+        &[
+            "{median=3}",
+            "{sigma={},enhanced_sigma={window=3,largest=5}}",
+            "{bilateral={mm=1,distance=2},perona_malik={}}",
+        ],
+    ),
     ("light.position", &["[0,0,0]", "[5,-10,45]"]),
     ("light.direction", &["[0,0,-1]", "[1,0,0]"]),
     ("light.shadow", &["{}", "{softness=0,reach=1e4}"]),
@@ -155,7 +175,7 @@ impl Drop for Told {
 #[test]
 fn any_scene_is_drawn_or_refused_in_one_line_and_validation_is_silent() {
     let (seed, seconds) = (of_environment("SCENE_SEED").unwrap_or(1), of_environment("SCENE_SECONDS"));
-    let (mut noise, mut device, geometries, began) = (Noise(seed), Device::new(), geometries(), Instant::now());
+    let (mut noise, mut device, geometries, began) = (Noise(seed), Device::alone(), geometries(), Instant::now());
     // Messages are checked below, scene by scene.
     device.provoked = true;
     let mut told_by_validation = 0;

@@ -13,10 +13,11 @@ use std::sync::atomic::Ordering;
 const INVOCATIONS: u64 = 64;
 
 /// Together they need every pass, each with several rows of workgroups.
-const SCENES: [&str; 12] = [
+const SCENES: [&str; 13] = [
     ALL_FILTERS,
     "mode = 'vr'\nray = { brick = 4 }",
     "mode = 'sr'\nray = { brick = 4 }",
+    "mode = 'vr'\nlight = { volume = { cell = 3 } }",
     "mode = 'mip'",
     "mode = 'orthogonal'",
     "mode = 'orthogonal'\npost = { floats = true }",
@@ -87,7 +88,7 @@ fn invocations(extent: [u32; 3]) -> u64 {
 /// Every pass over the volume or the picture leaves the same bits in bands as in one piece, with as many invocations.
 #[test]
 fn bands_leave_the_bits_of_one_dispatch_in_every_pass() {
-    let device = Device::new();
+    let device = Device::alone();
     let mut divided: BTreeMap<&str, bool> = BTreeMap::new();
     for (name, scene) in SCENES.iter().zip(band_scenes()) {
         let (whole, dispatched) = made(&mut renderer(&device, &scene, &RendererOptions::default()));
@@ -127,7 +128,7 @@ fn shaded() -> Scene {
 /// Where nothing has to be divided, each step of the plan is one dispatch and a picture one submission.
 #[test]
 fn a_picture_that_needs_no_bands_has_none() {
-    let device = Device::new();
+    let device = Device::alone();
     let mut renderer = renderer(&device, &shaded(), &RendererOptions { log: true, ..Default::default() });
     let steps = renderer.plan().steps.iter().filter(|s| s.pass.frequency != Frequency::Frame).count();
     let submitted = renderer.log().expect("log").submissions.len();
@@ -151,7 +152,7 @@ fn a_picture_that_needs_no_bands_has_none() {
 /// what follows. On any number of queues every conflict stays ordered.
 #[test]
 fn each_band_is_a_submission_and_all_are_ordered() {
-    let device = Device::new();
+    let device = Device::alone();
     let bands = Bands::Fixed(INVOCATIONS);
     let scene = shaded();
     for queues in 1..=device.queue_count() {

@@ -138,7 +138,7 @@ fn oblique_walls_are_where_they_are_up_to_75_degrees() {
 }
 
 /// The share of a normal distribution below x standard deviations, by its series: to 1e-9 within 5.
-fn normal_distribution(x: f64) -> f64 {
+pub fn normal_distribution(x: f64) -> f64 {
     if x.abs() > 5.0 {
         return f64::from(u8::from(x > 0.0));
     }

@@ -87,7 +87,7 @@ const MODES: [&str; 31] = [
     "mode = 'mixed'\nsurface = { threshold = 0.2, sign = 'dark' }\nvolume = { threshold = 0.3, compositing = 'pre-integrated' }",
 ];
 
-const RAYS: [&str; 7] = [
+const RAYS: [&str; 10] = [
     "sampling = 'quads', step = 0.4",
     "sampling = 'hardware', step = 0.55, early_end = 0.0",
     "sampling = 'hardware', step = 0.4, spread = 1.0",
@@ -95,6 +95,9 @@ const RAYS: [&str; 7] = [
     "sampling = 'exact', step = 0.4, sliding = 3",
     "sampling = 'hardware', step = 0.25, sliding = 5",
     "sampling = 'exact', step = 0.3, sliding = 5, spread = 0.5",
+    "sampling = 'quads', step = 0.4, elevation = 'bspline'",
+    "sampling = 'hardware', step = 0.4, elevation = 'bspline'",
+    "sampling = 'exact', step = 0.4, elevation = 'bspline-sharp'",
 ];
 
 const CAMERAS: [&str; 3] =
@@ -142,9 +145,9 @@ fn empty_space_skipping_changes_no_bit_in_any_mode() {
             if g > 0 && (g + m) % 4 != 1 {
                 continue;
             }
-            // Exponential steps have one length.
-            let rays: Vec<&str> =
-                RAYS.into_iter().filter(|ray| !mode.contains("exponential") || !ray.contains("spread")).collect();
+            // Exponential steps, and those of a surface with the volume behind it in the same march, have one length.
+            let is_even = mode.contains("exponential") || (mode.contains("pair") && mode.contains("behind"));
+            let rays: Vec<&str> = RAYS.into_iter().filter(|ray| !is_even || !ray.contains("spread")).collect();
             let (ray, camera) = (rays[(g + m) % rays.len()], CAMERAS[(g + m / 2) % CAMERAS.len()]);
             let toml = |brick: u32| {
                 let more =

@@ -23,7 +23,7 @@ struct Playing {
 
 impl Playing {
     fn new(queues: usize) -> Playing {
-        let mut device = Device::new();
+        let mut device = Device::alone();
         device.provoked = device.queue_count() < queues;
         Playing { device, queues }
     }
@@ -172,7 +172,7 @@ fn a_complete_volume_never_mixes_frames_of_two() {
 /// Prevents times that leave out the frames which arrive while a picture is drawn, without a word.
 #[test]
 fn every_pass_of_every_frame_is_timed_or_counted() {
-    let device = Device::new();
+    let device = Device::alone();
     for (update, images) in [(Update::Whole, 3), (Update::Rolling, 2)] {
         let time_stamps = TimeStamps::EachPass;
         let options = live::StreamOptions { update, images, time_stamps, ..live::StreamOptions::default() };
@@ -194,10 +194,11 @@ fn every_pass_of_every_frame_is_timed_or_counted() {
 /// pipeline and no wait for the device to be idle.
 #[test]
 fn a_running_stream_allocates_and_compiles_nothing_and_never_stalls() {
-    let device = Device::new();
+    let device = Device::alone();
     for (update, toml) in [
         (Update::Whole, "mode = 'sr'\nslices.smooth = { elevation = 1.0 }"),
         (Update::Rolling, "mode = 'vr'\nslices.smooth = { elevation = 1.0 }"),
+        (Update::Rolling, "mode = 'vr'\nray = { elevation = 'bspline-sharp', brick = 8 }"),
         (Update::Whole, "mode = 'orthogonal'"),
     ] {
         let options = live::StreamOptions { update, ..live::StreamOptions::default() };

@@ -21,7 +21,7 @@ fn drawn(device: &Device, scene: Scene, options: &RendererOptions) -> Renderer {
 /// Prevents a lost device of which only the loss is said, although its driver knows more.
 #[test]
 fn the_error_of_a_lost_device_has_the_report_of_its_driver() {
-    let device = Device::new();
+    let device = Device::alone();
     let report = LossReport {
         description: "GPU hang".into(),
         addresses: vec![FaultAddress { kind: "invalid read", address: 0xabc0_0000, precision: 4096 }],
@@ -50,7 +50,7 @@ fn the_error_of_a_lost_device_has_the_report_of_its_driver() {
 /// Prevents allocations that push this program's or another's memory out of the device.
 #[test]
 fn an_allocation_over_the_memory_budget_is_refused_before_it_is_made() {
-    let device = Device::new();
+    let device = Device::alone();
     device.faults.limit_memory(4 << 20);
     let error = Renderer::new(&device, small(), &RendererOptions { volume_images: 3, ..Default::default() });
     assert!(error.is_ok(), "each of its allocations is below the budget");
@@ -72,7 +72,7 @@ fn an_allocation_over_the_memory_budget_is_refused_before_it_is_made() {
 /// Prevents a device that is lost to a watchdog again and again by the same picture: on each loss the bands become smaller.
 #[test]
 fn every_loss_halves_the_bands() {
-    let device = Device::new();
+    let device = Device::alone();
     let toml = "mode = 'mip'\npicture = { size = [512, 512] }\nslices = { pixels = 40 }";
     let rays = |losses| {
         let bands = Bands::Measured { losses };

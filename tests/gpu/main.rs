@@ -3,6 +3,7 @@
 
 mod any_scene;
 mod bands;
+mod batches;
 #[path = "../common/mod.rs"]
 mod common;
 mod conditioning;
@@ -14,6 +15,7 @@ mod detector;
 mod detector_convergence;
 mod detector_false_positives;
 mod diffusion;
+mod elevation;
 mod empty_space;
 mod extreme_geometry;
 mod extremes;
@@ -23,6 +25,7 @@ mod goldens;
 mod growth;
 mod half_resolution;
 mod known_answers;
+mod light_volume;
 mod live;
 mod live_control;
 mod live_failures;
@@ -42,6 +45,7 @@ mod sampling;
 mod sector;
 mod self_test;
 mod shading;
+mod sizes_in_mm;
 mod sliding;
 mod stored_volume;
 mod tiles;

@@ -50,7 +50,7 @@ fn storage_loads_and_texture_fetches_give_the_same_texels() {
             if !seen.insert((pass.shader(&scene, &DispatchArgs::default()), reads)) {
                 continue;
             }
-            let args = dispatch_args_of(&scene, 0);
+            let args = dispatch_args_of(&scene, pass, 0);
             let inputs = inputs_of(&scene, pass, &args, "noise", 3);
             let [fetched, stored] =
                 singles.each_mut().map(|s| s.run(&scene, pass, &args, &inputs, POISON).expect("dispatch"));
@@ -121,7 +121,7 @@ fn a_perturbed_input_swapped_parameters_and_half_a_pixel_are_each_noticed() {
     let mut toned = base.clone();
     toned.settings.post.brightness += 2.5 / 255.0;
     let mut narrow = base.clone();
-    narrow.settings.slices.sigma.as_mut().expect("sigma").sigma *= 0.8;
+    narrow.slice_filters.sigma.as_mut().expect("sigma").sigma *= 0.8;
     let cases: [(&str, &str, &Scene, &Scene); 6] = [
         ("half a pixel", "raycast_volume", &base, &half_pixel),
         ("half a slice pixel", "scan_convert", &base, &half_slice_pixel),
@@ -134,7 +134,7 @@ fn a_perturbed_input_swapped_parameters_and_half_a_pixel_are_each_noticed() {
         let pass = echolume::passes::by_name(name).expect("pass");
         let right = run_with_reference(&mut single, told, pass, 0, "noise", 5).expect("dispatch");
         assert!(right.comparison.worst.is_none(), "{name}, unperturbed: {:?}", right.comparison);
-        let args = DispatchArgs { layer: 2, slice: told.slices() / 2, slices: 1, iteration: 0, image: 0 };
+        let args = dispatch_args_of(told, pass, 0);
         let mut expected = Arrays::default();
         for bind in &right.writes {
             let channels = bind.slot.format(told).channels();
@@ -162,7 +162,7 @@ fn a_perturbed_input_swapped_parameters_and_half_a_pixel_are_each_noticed() {
     inputs.insert("source", source);
     let mut expected = Arrays::default();
     expected.insert("target", Texels::untouched(right.writes[0].slot.array_size(&base), 1));
-    pass.reference(&base, &DispatchArgs::default(), &inputs, &mut expected);
+    pass.reference(&base, &dispatch_args_of(&base, pass, 0), &inputs, &mut expected);
     let compared =
         verify::compare_outputs(pass, &base, ExtraTolerance::default(), POISON, &expected, &right.got, &right.writes);
     assert!(compared.worst.is_some(), "changed pixels went unnoticed");
@@ -177,15 +177,16 @@ fn texels_outside_the_sector_are_not_written() {
     let result = run_with_reference(&mut single, &scene, pass, 0, "one", 1).expect("dispatch");
     let (expected, got) = (result.expected, result.got);
     let Shape::Three([width, height, _]) = Slot::Volume.shape(&scene) else { panic!("volume") };
-    let outside = (width * height) as usize - expected.get("target").values.iter().filter(|v| !v.is_nan()).count();
+    let args = dispatch_args_of(&scene, pass, 0);
+    assert!(args.slices > 1, "a batch");
+    let (first, texels) = ((args.slice * width * height) as usize, (args.slices * width * height) as usize);
+    let outside = texels - expected.get("target").values.iter().filter(|v| !v.is_nan()).count();
     let poison = Texels::decode(
         [1; 3],
         Slot::Volume.format(&scene),
         &Texels::from_fn([1; 3], 1, |_, _| POISON).encode(Slot::Volume.format(&scene)),
     );
-    let slice =
-        &got.get("target").values[(scene.slices() / 2 * width * height) as usize..][..(width * height) as usize];
-    let left = slice.iter().filter(|v| **v == poison.values[0]).count();
+    let left = got.get("target").values[first..][..texels].iter().filter(|v| **v == poison.values[0]).count();
     assert!(outside > 500, "a sector leaves corners: {outside}");
     assert_eq!(left, outside);
 }

@@ -25,7 +25,7 @@ fn options(shaders: Arc<Shaders>) -> RendererOptions {
 /// Prevents a start that compiles one pipeline after the other: the first one that asks for its shader waits here for another to ask.
 #[test]
 fn the_pipelines_of_a_scene_are_compiled_at_the_same_time_and_once() {
-    let device = Device::new();
+    let device = Device::alone();
     let scene = scene(echolume::probe::Geometry::Sweep(wobbler()), BYTES, SETTINGS);
     let several = rayon::current_num_threads() > 1;
     let asked = Arc::new((Mutex::new(0u32), Condvar::new()));
@@ -57,10 +57,31 @@ fn the_pipelines_of_a_scene_are_compiled_at_the_same_time_and_once() {
     assert_eq!(made, keys.len() as u64, "{keys:?}");
 }
 
+/// A second renderer of a scene compiles nothing while the first holds its pipelines, and draws the same; shaders of its own are compiled.
+#[test]
+fn renderers_of_a_device_share_the_pipelines_of_the_embedded_shaders() {
+    let device = Device::alone();
+    let of = |settings: &str| scene(echolume::probe::Geometry::Sweep(wobbler()), BYTES, settings);
+    let made = || device.counts.pipelines.load(Ordering::Relaxed);
+    let frames = body_frames(&of(SETTINGS), |p| 0.5 + 0.4 * (0.3 * p.y).sin());
+    let mut first = rendered(&device, of(SETTINGS), &frames);
+    let compiled = made();
+    assert!(compiled > 5);
+    let mut second = rendered(&device, of(SETTINGS), &frames);
+    assert_eq!(made(), compiled, "the second renderer compiles what the first has");
+    let pictures = [&mut first, &mut second].map(|renderer| renderer.picture().expect("a picture").rgba);
+    assert!(pictures[0] == pictures[1], "the pictures differ");
+    drop(Renderer::new(&device, of(SETTINGS), &options(Arc::new(embedded))).expect("renderer"));
+    assert_eq!(made(), 2 * compiled, "shaders of another source are not those of the first");
+    drop((first, second));
+    drop(Renderer::new(&device, of(SETTINGS), &RendererOptions::default()).expect("renderer"));
+    assert_eq!(made(), 3 * compiled, "nobody held the pipelines");
+}
+
 /// Prevents another error each time, depending on which thread is faster: the first fault of the plan is reported.
 #[test]
 fn of_several_shaders_that_fail_the_first_of_the_plan_is_named() {
-    let device = Device::new();
+    let device = Device::alone();
     let scene = scene(echolume::probe::Geometry::Sweep(wobbler()), BYTES, SETTINGS);
     let plan = Plan::new(&scene);
     let first = plan.steps[0].pass.shader(&scene, &plan.steps[0].args());

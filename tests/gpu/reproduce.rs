@@ -46,7 +46,7 @@ fn share_beyond(bench: &DeviceUnderTest, folder: &Path, change: impl Fn(&mut Tex
     let (_, scene) = scenes.iter().find(|(name, _)| about["scene"] == name.as_str()).expect("its scene");
     let mut runner = PassRunner::new(&bench.context).expect("runner");
     let adapted = runner.adapted(scene);
-    let args = dispatch_args_of(&adapted, about["iteration"].as_u64().expect("a number") as u32);
+    let args = dispatch_args_of(&adapted, pass, about["iteration"].as_u64().expect("a number") as u32);
     let arrays = about["arrays"].as_array().expect("arrays");
     let of = |name: &str| arrays.iter().find(|array| array["name"] == name);
     let mut inputs = Arrays::default();

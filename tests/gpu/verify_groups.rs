@@ -44,7 +44,8 @@ fn failures(bench: &mut DeviceUnderTest, checks: &[Check]) -> Vec<String> {
 
 /// Spans of a picture: the host's, and two passes of the device.
 fn spans(first: [f64; 2], second: [f64; 2]) -> Vec<Span> {
-    let span = |name, on_device, [begin, end]: [f64; 2]| Span { name, on_device, begin, end, invocations: None };
+    let span =
+        |name, on_device, [begin, end]: [f64; 2]| Span { name, on_device, begin, end, runs: 1, invocations: None };
     vec![
         span("submit", false, [1000.0, 2000.0]),
         span("raycast_volume", true, first),

@@ -58,6 +58,27 @@ fn frames_in_the_volume_format_are_copied_without_a_pass() {
     }
 }
 
+/// Frames that are not scaled: the first filter reads them in their layers. All frames of the volume differ, and there are more than layers.
+#[test]
+fn the_first_filter_reads_unscaled_frames_as_they_are() {
+    let device = Device::new();
+    for (stored, full) in [(StoredType::U8, 255.0), (StoredType::U16, 65535.0)] {
+        for filters in ["median = true", "smooth = { lateral = 0.5, depth = 0.5 }", "perona_malik = { repeat = 2 }"] {
+            let scene = volume(stored, full, &format!("mode = 'mip'\nslices = {{ format = 'r32f', {filters} }}"));
+            let frames = body_frames(&scene, blob);
+            let frames: Vec<Texels> = (frames.iter())
+                .map(|f| Texels::decode(f.size, Slot::Frames.format(&scene), &f.encode(Slot::Frames.format(&scene))))
+                .collect();
+            let mut renderer = rendered(&device, scene.clone(), &frames);
+            assert!(!renderer.plan().steps.iter().any(|s| s.pass.name == "load_slice"), "{filters}");
+            let there = renderer.read(Slot::Volume).expect("read").expect("the volume");
+            let expected = echolume::reference::render(&scene, &frames);
+            let off = there.values.iter().zip(&expected[&Slot::Volume].values).map(|(a, b)| (a - b).abs());
+            assert!(off.fold(0.0, f64::max) < 2e-6, "{stored:?}, {filters}");
+        }
+    }
+}
+
 #[test]
 fn scaled_clamped_or_filtered_frames_are_not_copied() {
     let copied = |stored, full, toml: &str| chain::copied(&volume(stored, full, toml));

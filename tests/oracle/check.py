@@ -4,7 +4,8 @@
     echolume render RECORDING --dump DIR --raw ... && tests/oracle/check.py DIR
 
 It reads the volume, the rays and the settings of a dump, casts the rays again in double precision, and compares with what the program
-wrote: the distance map (mode surface, detector threshold without a rough search), or the rendered picture (modes mip and volume without shading).
+wrote: the distance map (mode surface, detector threshold without a rough search), the rendered picture (modes mip and volume without shading), or
+the light that arrives in the cells of a light volume (light.volume without widening and scatter, light.follows = region, a fan).
 Prints the differences; the exit code is 1 where they are larger than the limits below.
 """
 import json
@@ -153,11 +154,47 @@ def composited(scene, volume):
     return colour
 
 
+def light(scene, folder):
+    """Light along single rays through the density of a light volume: Lambert and Beer's law, not from layer to layer. (n, 3) twice: theirs, ours."""
+    density = np.load(folder / "light_matter.npy").astype(float)[..., 0]  # elevation, depth, lateral
+    arriving = np.load(folder / "light_arriving.npy").astype(float)
+    settings = scene["settings"]["light"]
+    right, up, viewer = np.array(settings["direction"]) / np.linalg.norm(settings["direction"])
+    towards = np.array([up, -viewer, right])  # of the axes of the arrays
+    volume = settings["volume"]
+    extinction = np.array([0.557, 1.0, 1.286]) ** volume["warmth"] / volume["depth"]
+    size = np.array(density.shape)
+    # Cells near matter: elsewhere there is little to compare.
+    cells = np.argwhere(density > 0.02)
+    cells = cells[np.random.default_rng(1).permutation(len(cells))[:6000]]
+    step, optical = 0.5, np.zeros(len(cells))
+    for n in range(int(2 * np.linalg.norm(size))):
+        at = cells + towards * step * (n + 0.5)
+        inside = np.all((at >= -0.5) & (at <= size - 0.5), axis=1)
+        if not inside.any():
+            break
+        at = np.clip(at, 0, size - 1)
+        low = np.minimum(at.astype(int), size - 2)
+        share, value = at - low, 0.0
+        for corner in np.ndindex(2, 2, 2):
+            weight = np.prod(np.where(corner, share, 1 - share), axis=1)
+            value = value + weight * density[tuple((low + corner).T)]
+        optical += inside * value * step * volume["cell"]
+    return arriving[tuple(cells.T)][:, :3], np.exp(-optical[:, None] * extinction)
+
+
 def main():
     folder = Path(sys.argv[1])
     scene = json.loads((folder / "scene.json").read_text())
     volume = Volume(folder, scene)
     mode = scene["settings"]["mode"]
+    if scene["settings"]["light"].get("volume"):
+        theirs, ours = light(scene, folder)
+        off, bias = np.abs(theirs - ours).mean(), np.abs((theirs - ours).mean(axis=0)).max()
+        alike = np.corrcoef(theirs[:, 1], ours[:, 1])[0, 1]
+        # The lattice spreads light over half a cell a layer, so that single cells differ; their mean does not.
+        print(f"light: mean {ours.mean():.3f}; {off:.3f} apart on average, {bias:.4f} in the mean of a colour, correlation {alike:.4f}")
+        sys.exit(not (0.05 < ours.mean() < 0.95 and off < 0.05 and bias < 0.01 and alike > 0.97))
     if mode == "surface":
         theirs, ours = np.load(folder / "distance_map.npy").astype(float).ravel(), surface(scene, volume)
         hit = theirs < json.loads((folder / "distance_map.json").read_text())["no_surface"]

@@ -17,5 +17,6 @@ mod profile;
 mod references;
 mod rules;
 mod sampling;
+mod sizes_in_mm;
 mod supply;
 mod verify_report;

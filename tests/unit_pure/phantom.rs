@@ -3,7 +3,9 @@
 
 use crate::common::files::Folder;
 use echolume::probe::{Advance, Geometry, Indices, Probe};
-use echolume::source::phantom::{Body, DYNAMIC_RANGE, Phantom, PhantomOptions, Speckle, Truth};
+use echolume::source::phantom::{
+    Body, DYNAMIC_RANGE, Label, Phantom, PhantomOptions, PointSpread, Sampling, Speckle, Truth, distance_path,
+};
 use echolume::source::{Frame, Recording};
 use std::fs;
 
@@ -233,6 +235,17 @@ fn impossible_sweeps_and_files_are_refused_in_one_line() {
         (PhantomOptions { frames: 1024, lines: 1024, samples: 8192, ..ok.clone() }, "samples"),
         (PhantomOptions { samples: usize::MAX, ..ok.clone() }, "samples"),
         (PhantomOptions { speed_ratio: 1.5, ..ok.clone() }, "speed_ratio"),
+        (PhantomOptions { fan_angle_deg: 5.0, ..ok.clone() }, "fan_angle"),
+        (PhantomOptions { fan_angle_deg: f64::NAN, ..ok.clone() }, "fan_angle"),
+        (PhantomOptions { point_spread: PointSpread { axial_mm: -1.0, ..ok.point_spread }, ..ok.clone() }, "psf_axial"),
+        (
+            PhantomOptions { point_spread: PointSpread { lateral_deg: 11.0, ..ok.point_spread }, ..ok.clone() },
+            "psf_lateral",
+        ),
+        (
+            PhantomOptions { point_spread: PointSpread { elevation_deg: f64::NAN, ..ok.point_spread }, ..ok.clone() },
+            "psf_elevation",
+        ),
         (PhantomOptions { speed_ratio: f64::NAN, ..ok.clone() }, "speed_ratio"),
     ];
     for (options, field) in wrong {
@@ -245,6 +258,10 @@ fn impossible_sweeps_and_files_are_refused_in_one_line() {
     for body in Body::ALL {
         assert_eq!(body.name().parse::<Body>().unwrap(), body);
     }
+    for sampling in Sampling::ALL {
+        assert_eq!(sampling.name().parse::<Sampling>().unwrap(), sampling);
+    }
+    assert!("fast".parse::<Sampling>().unwrap_err().to_string().contains("live, gallery"));
 
     let folder = Folder::new("refused");
     fs::create_dir(folder.join("folder.mha")).unwrap();
@@ -294,4 +311,171 @@ fn the_mean_over_all_speckle_is_the_mean_of_many_realisations() {
         // It is not simply the echogenicity.
         assert!(mean != sweep(1, Speckle::None), "{body}");
     }
+}
+
+/// The power of speckle of a Gaussian point-spread function of sd s is correlated by exp(-d^2 / 2 s^2) over a distance d.
+#[test]
+fn the_point_spread_is_as_wide_as_it_says() {
+    let point_spread = PointSpread { axial_mm: 0.5, lateral_deg: 0.9, elevation_deg: 1.1 };
+    let options = PhantomOptions { body: Body::Constant, frames: 61, point_spread, ..PhantomOptions::default() };
+    let phantom = phantom(options.clone());
+    let probe = phantom.probe(0);
+    let power: Vec<Vec<f64>> = phantom
+        .volume(0)
+        .iter()
+        .map(|frame| {
+            frame.bytes.iter().map(|v| 10f64.powf((f64::from(*v) / 255.0 - 1.0) * DYNAMIC_RANGE / 10.0)).collect()
+        })
+        .collect();
+    // Near the focus, where the beam is narrowest.
+    let middle = (55.0 / probe.sample_pitch) as usize;
+    let samples = middle - 20..middle + 20;
+    let correlation = |frames: usize, lines: usize, along: usize| {
+        let pairs = (5..options.frames - 5).flat_map(|f| {
+            let samples = samples.clone();
+            (5..options.lines - 5).flat_map(move |l| samples.clone().map(move |s| (f, l, s)))
+        });
+        let at = |f: usize, l: usize, s: usize| power[f][l * probe.samples + s];
+        let pairs: Vec<[f64; 2]> = pairs.map(|(f, l, s)| [at(f, l, s), at(f + frames, l + lines, s + along)]).collect();
+        let [(ma, sa), (mb, sb)] = [0, 1].map(|i| mean_and_sd(pairs.iter().map(move |p| p[i])));
+        pairs.iter().map(|[a, b]| (a - ma) * (b - mb)).sum::<f64>() / pairs.len() as f64 / (sa * sb)
+    };
+    let expected = |distance: f64, sd: f64| (-(distance / sd).powi(2) / 2.0).exp();
+    let [line, frame] = [probe.lines.pitch(), probe.slices.pitch()].map(f64::to_degrees);
+    for (found, expected) in [
+        (correlation(0, 0, 2), expected(2.0 * probe.sample_pitch, 0.5)),
+        (correlation(0, 1, 0), expected(line, 0.9)),
+        (correlation(0, 2, 0), expected(2.0 * line, 0.9)),
+        (correlation(1, 0, 0), expected(frame, 1.1)),
+        (correlation(2, 0, 0), expected(2.0 * frame, 1.1)),
+    ] {
+        assert!((found - expected).abs() < 0.04, "{found:.3} for {expected:.3}");
+    }
+}
+
+#[test]
+fn samplings_differ_in_density_and_a_gallery_is_still() {
+    assert!(Sampling::Live.options() == PhantomOptions::default());
+    let gallery = Sampling::Gallery.options();
+    assert_eq!((gallery.frames, gallery.lines, gallery.point_spread.elevation_deg), (111, 192, 0.6));
+    let made =
+        phantom(PhantomOptions { volumes: 2, frames: 5, lines: 24, samples: 64, speckle: Speckle::None, ..gallery });
+    let [first, second] = [0, 1].map(|v| made.volume(v).into_iter().map(|f| f.bytes).collect::<Vec<_>>());
+    assert!(first == second, "nothing moves");
+}
+
+/// No sample of the outermost frame above the crown meets the head: the vault is inside the fan.
+#[test]
+fn the_vault_lies_inside_the_fan() {
+    let phantom = phantom(PhantomOptions { samples: 128, ..PhantomOptions::default() });
+    let probe = phantom.probe(0);
+    let clear = (0..probe.samples).flat_map(|sample| (0..128).map(move |line| (sample as f64, f64::from(line))));
+    let nearest = clear
+        .map(|(sample, line)| probe.to_space(Indices { sample, line, slice: 36.0 }))
+        .map(|place| phantom.distance(0, place).unwrap())
+        .fold(f64::MAX, f64::min);
+    assert!(nearest > 2.0, "{nearest} mm");
+}
+
+/// What a sweep without speckle shows is what the truth says, at the time at which each line is fired.
+#[test]
+fn the_truth_is_what_the_sweep_shows() {
+    let made = phantom(PhantomOptions {
+        speckle: Speckle::None,
+        volumes: 2,
+        both_ways: true,
+        frames: 13,
+        lines: 64,
+        ..PhantomOptions::default()
+    });
+    for volume in 0..2 {
+        let mut seen = [0; 2];
+        let mut shallow = 0;
+        each_sample(&made, volume, |probe, at, grey| {
+            let place = probe.to_space(at);
+            let label = made.label(volume, place).unwrap();
+            let inside = -made.distance(volume, place).unwrap();
+            if label == Label::Fluid {
+                seen[0] += 1;
+                assert!(grey < 45.0, "{grey} in fluid at {place}");
+            }
+            let skin = [Label::Skin, Label::Hand, Label::Cord].contains(&label);
+            if skin && (0.0..1.5).contains(&inside) {
+                shallow += 1;
+                seen[1] += usize::from(grey > 120.0);
+            }
+            assert!(inside <= 0.05 || label != Label::Fluid, "{place}: {inside} mm inside");
+        });
+        // Some skin lies in the shadow of other parts.
+        assert!(seen[0] > 10_000 && shallow > 1000, "{seen:?}, {shallow}");
+        assert!(seen[1] as f64 > 0.7 * f64::from(shallow), "{} of {shallow} bright", seen[1]);
+    }
+}
+
+/// The distance is a length: on either side of the skin it changes by as much as the point moves along the normal.
+#[test]
+fn distances_near_the_skin_are_lengths() {
+    let made = phantom(PhantomOptions { still: true, ..small(Body::Head) });
+    let probe = made.probe(0);
+    let mut slopes = Vec::new();
+    for (line, slice) in (0..48).flat_map(|line| (2..7).map(move |slice| (line, slice))) {
+        // Down a line to the skin, by bisection.
+        let at = |sample: f64| probe.to_space(Indices { sample, line: f64::from(line), slice: f64::from(slice) });
+        let distance = |sample: f64| made.distance(0, at(sample)).unwrap();
+        let Some(inside) = (0..256).find(|s| distance(f64::from(*s)) < 0.0) else { continue };
+        let (mut low, mut high) = (f64::from(inside) - 1.0, f64::from(inside));
+        for _ in 0..40 {
+            let middle = (low + high) / 2.0;
+            if distance(middle) < 0.0 { high = middle } else { low = middle }
+        }
+        let place = at(high);
+        let gradient = [glam::DVec3::X, glam::DVec3::Y, glam::DVec3::Z].map(|axis| {
+            let reach = 0.2;
+            (made.distance(0, place + axis * reach).unwrap() - made.distance(0, place - axis * reach).unwrap())
+                / (2.0 * reach)
+        });
+        slopes.push(glam::DVec3::from(gradient).length());
+    }
+    slopes.sort_by(f64::total_cmp);
+    let [low, high] = [slopes.len() / 10, slopes.len() * 9 / 10].map(|i| slopes[i]);
+    // In a fold the nearest skin changes, and with it the slope.
+    assert!(slopes.len() > 80 && low > 0.85 && high < 1.2, "{low} to {high} of {}", slopes.len());
+}
+
+#[test]
+fn the_written_truth_reads_back_and_has_every_label() {
+    let folder = Folder::new("truth");
+    let path = folder.join("truth.mha");
+    let made = phantom(PhantomOptions::default());
+    let grid = made.truth_grid(2.0).unwrap();
+    made.write_truth(&path, &grid).unwrap();
+    assert_eq!(distance_path(&path), folder.join("truth.distance.mha"));
+    let read = |path| {
+        let mut recording = Recording::open(path, None).unwrap();
+        let Geometry::Cartesian(read) = recording.geometry(0) else { panic!("is a volume") };
+        assert_eq!(read.size, grid.size);
+        read_back(&mut recording)
+    };
+    let (labels, distances) = (read(&path), read(&distance_path(&path)));
+    let mut counts = [0; 10];
+    for (z, (labels, distances)) in labels.iter().zip(&distances).enumerate() {
+        for (i, (label, distance)) in labels.bytes.iter().zip(distances.bytes.chunks_exact(4)).enumerate() {
+            counts[usize::from(*label)] += 1;
+            let distance = f32::from_le_bytes(distance.try_into().unwrap());
+            let is_fetus = !["fluid", "uterus"].contains(&Label::ALL[usize::from(*label)].name());
+            assert_eq!(is_fetus, distance <= 0.0, "slice {z}, voxel {i}: label {label}, {distance} mm");
+        }
+    }
+    assert!(counts.iter().all(|n| *n > 20), "{counts:?}");
+    for (n, label) in Label::ALL.into_iter().enumerate() {
+        assert_eq!(label as usize, n);
+    }
+
+    let ball = phantom(small(Body::Sphere));
+    let error = ball.truth_grid(2.0).unwrap_err().to_string();
+    assert!(error.lines().count() == 1 && error.contains("only the head"), "{error}");
+    for spacing in [0.0, -1.0, f64::NAN, 1e-4] {
+        assert!(made.truth_grid(spacing).unwrap_err().to_string().contains("truth_spacing"), "{spacing}");
+    }
+    assert!(made.write_truth(&folder.join("truth.nrrd"), &grid).is_err());
 }

@@ -3,7 +3,7 @@
 
 use crate::common::files::repository;
 use crate::common::probes::{voxels, wobbler};
-use crate::common::scenes::{BYTES, scene};
+use crate::common::scenes::{BYTES, FLOATS, scene};
 use echolume::passes::{DispatchArgs, PASSES, Pass, interface_check, measure};
 use echolume::probe::{Advance, Axis, Geometry, Motion, Probe};
 use echolume::scene::Scene;
@@ -199,6 +199,8 @@ fn scenes() -> Vec<Scene> {
          light = { shadow = {}, occlusion = {}, skin = {} }",
         "light = { shadow = {} }",
         "light = { occlusion = {} }",
+        "light = { volume = { cell = 8 } }",
+        "light = { volume = { cell = 8, back = 0, scatter = 0, ground = {} } }\nregion = { fade = 3 }",
         "conditioning = { samples = 16, dynamic_range = 60 }",
         "conditioning = { tgc = [{ depth = 5, gain = -3 }] }",
         "slices = { median = true }",
@@ -214,6 +216,8 @@ fn scenes() -> Vec<Scene> {
         "slices = { smooth = { lateral = 1.0 } }",
         "ray = { rays = 2 }",
         "ray = { sampling = 'quads' }",
+        "ray = { elevation = 'bspline' }",
+        "ray = { sampling = 'exact', elevation = 'bspline-sharp' }",
     ];
     let mut scenes = Vec::new();
     for geometry in &geometries {
@@ -245,17 +249,33 @@ fn scenes() -> Vec<Scene> {
             scenes.push(scene(geometry.clone(), BYTES, sections));
         }
     }
+    // Values that a filter cannot read from the frames.
+    scenes.push(scene(voxels([8, 8, 8]), FLOATS, "slices = { median = true }"));
+    // With the shared memory of a GPU.
+    let diffused = scenes.iter().filter(|s| s.settings.slices.perona_malik.is_some());
+    let in_workgroups: Vec<_> = diffused.map(|s| Scene { shared_memory: 16 << 10, ..s.clone() }).collect();
+    scenes.extend(in_workgroups);
     scenes
 }
 
 #[test]
 fn every_pass_agrees_with_every_shader_it_may_use() {
     let mut used = Vec::new();
+    // All that a check depends on: many scenes declare the same.
+    let mut checked = BTreeSet::new();
     for scene in scenes() {
         for pass in PASSES.iter().filter(|p| p.is_needed(&scene)) {
             for iteration in 0..(pass.repeat)(&scene) {
                 let args = DispatchArgs { iteration, ..DispatchArgs::default() };
                 let shader = pass.shader(&scene, &args);
+                let binds = [pass.reads(&scene, &args), pass.writes(&scene, &args)].concat();
+                let slots: Vec<_> = binds.iter().map(|b| (b.slot.format(&scene), b.slot.shape(&scene))).collect();
+                let numbers: Vec<_> =
+                    pass.numbers(&scene, &args).0.iter().map(|(name, v)| (*name, std::mem::discriminant(v))).collect();
+                let constants = (pass.constants)(&scene, &args);
+                if !checked.insert(format!("{} {shader} {binds:?} {slots:?} {numbers:?} {constants:?}", pass.name)) {
+                    continue;
+                }
                 let bytes =
                     spirv::embedded(shader).unwrap_or_else(|| panic!("{}: {shader} is not embedded", pass.name));
                 // As compiled, and with its textures as storage images.

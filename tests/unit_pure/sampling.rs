@@ -98,3 +98,32 @@ fn a_single_wrong_sample_is_outside() {
     let judged = judge(FilterPrecision { bits: 8, format: Format::R16 }, &volume, &got);
     assert_eq!((judged.outside, judged.worst.map(|w| w.0)), (1, Some([30, 20])));
 }
+
+/// Against the closed formula of the uniform cubic B-spline of a point, and on fields that it keeps.
+#[test]
+fn samples_across_slices_are_those_of_the_cubic_bspline() {
+    let bell = |x: f64| match x.abs() {
+        x if x < 1.0 => 2.0 / 3.0 - x * x + x.powi(3) / 2.0,
+        x if x < 2.0 => (2.0 - x).powi(3) / 6.0,
+        _ => 0.0,
+    };
+    let point = Texels::from_fn([3, 2, 9], 1, |[x, y, z], _| f64::from((x, y, z) == (1, 0, 4)));
+    let slope = Texels::from_fn([3, 2, 9], 1, |[x, y, z], _| 0.1 * x as f64 + 0.2 * y as f64 + 0.05 * z as f64);
+    let even = Texels::from_fn([3, 2, 9], 1, |_, _| 0.7);
+    for n in 0..=160 {
+        let z = -4.0 + 0.1 * f64::from(n);
+        // Bilinear within the slice.
+        let of_point = 0.75 * 0.6 * bell(z - 4.0);
+        assert!((point.bspline_across_slices([0.75, 0.4, z]) - of_point).abs() < 1e-12, "{z}");
+        assert!((even.bspline_across_slices([0.75, 0.4, z]) - 0.7).abs() < 1e-12, "{z}");
+        if (1.0..=7.0).contains(&z) {
+            let there = 0.075 + 0.08 + 0.05 * z;
+            assert!((slope.bspline_across_slices([0.75, 0.4, z]) - there).abs() < 1e-12, "{z}");
+        }
+    }
+    // The border is repeated: its own slice has 5/6 there, its neighbour 1/6, and two slices out nothing else is left.
+    let border = Texels::from_fn([1, 1, 4], 1, |[_, _, z], _| if z == 0 { 1.0 } else { 0.4 });
+    for (z, expected) in [(0.0, 0.9), (-2.0, 1.0), (3.0, 0.4), (5.0, 0.4)] {
+        assert!((border.bspline_across_slices([0.0, 0.0, z]) - expected).abs() < 1e-12, "{z}");
+    }
+}

@@ -3,7 +3,8 @@
 //
 //   ECHOLUME_LAYER_REPORT=FILE       appends a line of JSON per device: commands, submissions, memory by type and by use of its buffers
 //   ECHOLUME_LAYER_LOG=FILE          appends every begin, bind, dispatch, barrier, time stamp and submission
-//   ECHOLUME_LAYER_HANG=N            the Nth submission of a device and all later ones never complete; only the first device that gets there
+//   ECHOLUME_LAYER_HANG=N            the Nth submission of a device and all later ones never complete; only the first device that gets there.
+//                                    SIGALRM ends a program that is still running 45 s later, so that a missing deadline fails a test
 //   ECHOLUME_LAYER_DROP_BARRIERS=N   memory barriers are dropped from the Nth of a device on
 //   ECHOLUME_LAYER_DROP_WAITS=1      submissions do not wait for semaphores
 //   ECHOLUME_LAYER_MAX_GROUPS=N      a submission with a dispatch of more than N workgroups loses the device, as a watchdog would
@@ -538,7 +539,10 @@ static VKAPI_ATTR VkResult VKAPI_CALL Submit2(VkQueue q, uint32_t n, const VkSub
     pthread_mutex_lock(&lock);
     d->submissions += n;
     if (most && largest_groups(d, n, s, most)) d->lost = 1;
-    if (hang && d->submissions >= hang && !is_hung_once) d->hangs = is_hung_once = 1;
+    if (hang && d->submissions >= hang && !is_hung_once) {
+        d->hangs = is_hung_once = 1;
+        alarm(45);
+    }
     int swallowed = d->hangs;
     d->swallowed += swallowed ? n : 0;
     if (!swallowed && number("ECHOLUME_LAYER_COMPLETE"))

@@ -128,7 +128,7 @@ impl Renderer {
                     let runs = affected(unprocessed, step.reach(scene)).into_iter();
                     runs.map(|run| run.start.max(low)..run.end.min(high)).filter(|run| !run.is_empty()).collect()
                 }
-                _ => std::iter::once(0..0).collect(),
+                _ => std::iter::once(0..1).collect(),
             };
             if step.pass.frequency == Frequency::Volume && !runs.is_empty() {
                 self.filtered_bounds = scene.visible_bounds;

@@ -1,9 +1,67 @@
 //! Stage 1: frames arrive complete or line by line, in a ring of staging buffers, and are converted into slices of a volume
-//! image. If frames need no conversion, consecutive slices are copied in batches.
+//! image, consecutive ones in a batch: one submission, and one dispatch of each pass. If frames need no conversion, the batch is copied.
 
 use super::*;
 use crate::source::StoredType;
 use std::mem::MaybeUninit;
+use std::ops::Range;
+
+/// How frames are written into the staging buffers.
+#[derive(Clone, Copy)]
+pub(super) struct Staging {
+    /// The slot that they are copied into, if no pass converts them.
+    copied: Option<Slot>,
+    /// Bytes of each.
+    bytes: usize,
+    /// Number of frames that a buffer holds.
+    frames: u32,
+    /// A batch may arrive in descending order: its frames are copied one by one, from offsets that every queue can copy from.
+    descends: bool,
+    write: fn(&[u8], &mut Space),
+}
+
+impl Staging {
+    /// `max_buffer`: bytes of the largest buffer of the device.
+    pub(super) fn new(scene: &Scene, max_buffer: u64) -> Staging {
+        let bytes = staged_bytes(scene);
+        let copied = chain::copied(scene);
+        let frames = match copied {
+            Some(_) => (BATCH_BYTES / bytes).clamp(1, scene.slices().into()) as u32,
+            None => frames_per_batch(scene),
+        };
+        let frames = u64::from(frames).min(max_buffer / bytes.max(1)).max(1) as u32;
+        Staging { copied, bytes: bytes as usize, frames, descends: bytes.is_multiple_of(4), write: stage_of(scene) }
+    }
+}
+
+/// Consecutive slices in the staging buffer of a ring entry that are not submitted yet, in the order in which they arrived.
+pub(super) struct SliceBatch {
+    image: u32,
+    first: u32,
+    count: u32,
+    is_descending: bool,
+}
+
+impl SliceBatch {
+    /// The slices that would continue it: of the first, both neighbours. None if the buffer is full.
+    fn continuations(&self, staging: &Staging) -> impl Iterator<Item = u32> {
+        let (is_full, is_first) = (self.count >= staging.frames, self.count == 1);
+        let up = (is_first || !self.is_descending).then_some(self.first + self.count);
+        let descends = self.is_descending || (is_first && staging.descends);
+        let down = descends.then(|| self.first.checked_sub(self.count)).flatten();
+        up.into_iter().chain(down).filter(move |_| !is_full)
+    }
+
+    fn add(&mut self, slice: u32) {
+        self.is_descending = slice < self.first;
+        self.count += 1;
+    }
+
+    fn slices(&self) -> Range<u32> {
+        let low = if self.is_descending { self.first + 1 - self.count } else { self.first };
+        low..low + self.count
+    }
+}
 
 impl InFlight {
     /// The recorder that reads the staging buffer.
@@ -27,33 +85,42 @@ impl InFlight {
         self.recorder.set_aside(timelines, timings)
     }
 
-    /// Copies the staging buffer into an image, in a submission of its own if there is a queue for copies. The recorder of the
-    /// frame is open afterwards.
+    /// Copies the staging buffer into layers of the frame array, in a submission of its own if there is a queue for copies. The
+    /// recorder of the frames is open afterwards.
     fn copy(
         &mut self,
         barriers: &mut BarrierRecorder,
         timelines: &mut Timelines,
         slots: &SlotResources,
-        place: SlotParts,
+        (place, layout): (SlotParts, BufferLayout),
     ) -> Result<(), GpuError> {
+        let frames = place.parts.len() as u32;
+        let by = self.first();
+        by.begin(barriers, timelines)?;
+        by.runs = frames;
         if let Some(target) = slots.image(place.slot, place.copy) {
             let InFlight { copier, recorder, staging } = self;
             let by = copier.as_mut().unwrap_or(recorder);
-            by.copy_in(barriers, (staging, BufferLayout::default()), target, place);
+            by.copy_in(barriers, (staging, layout), target, place);
             by.stamp(barriers, "upload");
         }
         if let Some(copier) = &mut self.copier {
             copier.submit(barriers, timelines)?;
             self.recorder.begin(barriers, timelines)?;
+            self.recorder.runs = frames;
         }
         Ok(())
     }
 }
 
 impl Renderer {
-    /// Submits one frame to stage 1, which writes slice `slice` of volume image `image`. `bytes` are samples of the stored type,
+    /// Sends one frame to stage 1, which writes slice `slice` of volume image `image`. `bytes` are samples of the stored type,
     /// line by line. Returns when the bytes are copied; waits only if the ring is full. A frame that is not visible in this
     /// scene is skipped and counted.
+    ///
+    /// Consecutive slices, up or down, go through stage 1 together. The frame waits for its successors until the batch is full, no
+    /// visible slice can follow, another slice comes, [`Renderer::submit_frames`] is called, anything reads the volume, or the scene
+    /// changes.
     ///
     /// # Errors
     /// A frame of the wrong size, a slice or image that does not exist, a device that fails.
@@ -65,8 +132,8 @@ impl Renderer {
         self.lines(slice, 0, bytes, image).map(|_| ())
     }
 
-    /// Takes scan lines of a frame as they arrive, from line `first` on. Returns true if they completed the frame, which then went
-    /// to stage 1. Lines arrive in order. Line 0 begins a frame; a frame that was not complete is dropped and counted.
+    /// Takes scan lines of a frame as they arrive, from line `first` on. Returns true if they completed the frame, which then goes
+    /// to stage 1 as with [`Renderer::frame`]. Lines arrive in order. Line 0 begins a frame; a frame that was not complete is dropped and counted.
     ///
     /// # Errors
     /// A partial line, lines out of order, or too many; a slice or image that does not exist; a device that fails.
@@ -112,25 +179,40 @@ impl Renderer {
             self.received = whole;
             sent?;
         }
-        self.unprocessed[image as usize][slice as usize] = true;
         Ok(true)
     }
 
-    /// Writes a complete frame into the staging buffer of the next entry, and submits it or adds it to the batch.
+    /// Writes a complete frame into the staging buffer, after the batch or after submitting it, and submits the batch that nothing can
+    /// follow.
     fn send(&mut self, slice: u32, image: u32, bytes: &[u8]) -> Result<(), GpuError> {
-        let is_copied = chain::copied(&self.scene).is_some();
-        let offset = match is_copied {
-            true => self.batch_offset(slice, image)?,
-            false => {
-                self.wait_for_ring()?;
-                0
-            }
-        };
+        let follows =
+            |batch: &SliceBatch| batch.image == image && batch.continuations(&self.staging).any(|next| next == slice);
+        if !self.batch.as_ref().is_some_and(follows) {
+            self.flush()?;
+            self.wait_for_ring()?;
+        }
         let bytes = self.context.faults.changed_frame(&self.scene, bytes);
-        let (stage, staged) = (stage_of(&self.scene), staged_bytes(&self.scene) as usize);
+        let Staging { bytes: length, write, .. } = self.staging;
+        let at = self.batch.as_ref().map_or(0, |batch| batch.count as usize) * length;
         let space = self.ring[self.ring_index].staging.space();
-        self.timings.host("stage", || stage(&bytes, &mut space[offset..offset + staged]));
-        if is_copied { self.extend_batch() } else { self.ingest(slice, image) }
+        self.timings.host("stage", || write(&bytes, &mut space[at..at + length]));
+        match &mut self.batch {
+            Some(batch) => batch.add(slice),
+            None => self.batch = Some(SliceBatch { image, first: slice, count: 1, is_descending: false }),
+        }
+        self.unprocessed[image as usize][slice as usize] = true;
+        let visible = self.scene.visible_frames();
+        let grows = |batch: &SliceBatch| batch.continuations(&self.staging).any(|next| visible.contains(&next));
+        if self.batch.as_ref().is_some_and(grows) { Ok(()) } else { self.flush() }
+    }
+
+    /// Submits the frames that wait for their successors, so that the device works on them until more arrive. What is only copied goes on
+    /// waiting: submitting a slice takes longer than copying it.
+    ///
+    /// # Errors
+    /// A device that fails.
+    pub fn submit_frames(&mut self) -> Result<(), GpuError> {
+        if self.staging.copied.is_some() { Ok(()) } else { self.flush() }
     }
 
     /// Waits until the next entry is free, and adds up its times.
@@ -144,16 +226,32 @@ impl Renderer {
         }
     }
 
-    /// Submits the frame in the next entry's staging buffer: a copy to its layer, then the passes of stage 1.
-    fn ingest(&mut self, slice: u32, image: u32) -> Result<(), GpuError> {
-        let layer = self.ring_index;
-        self.ring_index = (layer + 1) % self.ring.len();
-        let (entry, layer) = (&mut self.ring[layer], layer as u32);
-        entry.first().begin(&mut self.barriers, &self.timelines)?;
-        let place = SlotParts { slot: Slot::Frames, copy: 0, parts: layer..layer + 1 };
-        entry.copy(&mut self.barriers, &mut self.timelines, &self.slots, place)?;
+    /// Submits the batch. If that fails it is kept, and submitted again with the next frame.
+    pub(super) fn flush(&mut self) -> Result<(), GpuError> {
+        let Some(batch) = &self.batch else { return Ok(()) };
+        let (image, slices) = (batch.image, batch.slices());
+        let layout = BufferLayout {
+            descending: (batch.is_descending && batch.count > 1).then_some(self.staging.bytes as u64),
+            ..BufferLayout::default()
+        };
+        match self.staging.copied {
+            Some(slot) => self.copy_slices(slot, image, slices, layout)?,
+            None => self.convert(image, slices, layout)?,
+        }
+        self.batch = None;
+        self.ring_index = (self.ring_index + 1) % self.ring.len();
+        Ok(())
+    }
+
+    /// Submits the frames in the entry's staging buffer: a copy to its layers, then the passes of stage 1.
+    fn convert(&mut self, image: u32, slices: Range<u32>, layout: BufferLayout) -> Result<(), GpuError> {
+        let (slice, slices) = (slices.start, slices.end - slices.start);
+        let layer = self.ring_index as u32 * self.staging.frames;
+        let entry = &mut self.ring[self.ring_index];
+        let place = SlotParts { slot: Slot::Frames, copy: 0, parts: layer..layer + slices };
+        entry.copy(&mut self.barriers, &mut self.timelines, &self.slots, (place, layout))?;
         for (i, step) in self.plan.steps_of(Frequency::Frame) {
-            let args = DispatchArgs { layer, slice, slices: 1, iteration: step.iteration, image };
+            let args = DispatchArgs { layer, slice, slices, iteration: step.iteration, image };
             let (slots, pipeline, scene) = (&self.slots, &*self.steps[i], &self.scene);
             entry
                 .recorder
@@ -161,6 +259,25 @@ impl Renderer {
         }
         let (recorder, barriers, timelines) = (&mut entry.recorder, &mut self.barriers, &mut self.timelines);
         self.timings.host("submit", || recorder.submit(barriers, timelines))
+    }
+
+    /// Submits a copy of the slices in the entry's staging buffer into a volume image. No pass follows it.
+    fn copy_slices(
+        &mut self,
+        slot: Slot,
+        image: u32,
+        slices: Range<u32>,
+        layout: BufferLayout,
+    ) -> Result<(), GpuError> {
+        let [column, row, first] = slot.first_texel(&self.scene);
+        let place = SlotParts { slot, copy: image, parts: slices.start - first..slices.end - first };
+        // Of each frame what is stored.
+        let [row_length, image_height] = self.scene.frame_size();
+        let texel = u64::from(row) * u64::from(row_length) + u64::from(column);
+        let offset = texel * slot.format(&self.scene).texel_bytes() as u64;
+        let layout = BufferLayout { offset, row_length, image_height, ..layout };
+        let entry = &mut self.ring[self.ring_index];
+        entry.submit_copy(&mut self.barriers, &mut self.timelines, &self.slots, (place, layout), &mut self.timings)
     }
 
     /// Number of frames that were dropped because another began before all of their lines had arrived.
@@ -208,25 +325,14 @@ fn copy_clamped(from: &[u8], to: &mut Space) {
     });
 }
 
-/// Maximum bytes of a batch, unless a single slice is larger. Copying so much takes far longer than submitting it.
-const BATCH_BYTES: u64 = 4 << 20;
-
-/// Number of frames that the staging buffer of a ring entry holds.
-fn frames_per_upload(scene: &Scene) -> u64 {
-    match chain::copied(scene) {
-        Some(_) => (BATCH_BYTES / staged_bytes(scene)).clamp(1, u64::from(scene.slices())),
-        None => 1,
-    }
-}
-
 impl Renderer {
     /// Allocates the ring.
     pub(super) fn new_ring(&self) -> Result<Vec<InFlight>, GpuError> {
         let (context, count) = (&self.context, self.barriers.queues.count());
-        let bytes = frames_per_upload(&self.scene) * staged_bytes(&self.scene);
+        let bytes = u64::from(self.staging.frames) * self.staging.bytes as u64;
         let (copy, ingest) = (QueueRole::Copy.queue(count), QueueRole::Ingest.queue(count));
         // Slices of a 3D image are not subresources: not every queue can copy a single one.
-        let copies = copy != ingest && (chain::copied(&self.scene).is_none() || context.queue(copy).copies_slices);
+        let copies = copy != ingest && (self.staging.copied.is_none() || context.queue(copy).copies_slices);
         let entry = |_| {
             let copier = || Recorder::new(context, copy, "copy", self.time_stamps, false);
             Ok(InFlight {
@@ -235,52 +341,7 @@ impl Renderer {
                 staging: Buffer::new(context, "staging", bytes, Purpose::Staging)?,
             })
         };
-        (0..FRAMES_IN_FLIGHT).map(entry).collect()
-    }
-
-    /// Byte offset of this slice in the next entry's staging buffer: after the batch, which is submitted first if the slice does
-    /// not follow it.
-    fn batch_offset(&mut self, slice: u32, image: u32) -> Result<usize, GpuError> {
-        let follows = |s: &SliceBatch| s.image == image && s.first + s.count == slice;
-        if self.batch.as_ref().is_some_and(|batch| !follows(batch)) {
-            self.flush()?;
-            self.batch = None;
-        }
-        if self.batch.is_none() {
-            self.wait_for_ring()?;
-        }
-        let batch = self.batch.get_or_insert(SliceBatch { image, first: slice, count: 0 });
-        Ok(batch.count as usize * staged_bytes(&self.scene) as usize)
-    }
-
-    /// Adds a complete slice to the batch, and submits the batch when it is full.
-    fn extend_batch(&mut self) -> Result<(), GpuError> {
-        let Some(batch) = &mut self.batch else { return Ok(()) };
-        batch.count += 1;
-        let next = (u64::from(batch.count) + 1) * staged_bytes(&self.scene);
-        match next > self.ring[self.ring_index].staging.size {
-            true => self.flush(),
-            false => Ok(()),
-        }
-    }
-
-    /// Submits the batch.
-    pub(super) fn flush(&mut self) -> Result<(), GpuError> {
-        let Some(slot) = chain::copied(&self.scene) else { return Ok(()) };
-        let Some(SliceBatch { image, first, count }) = self.batch.take_if(|batch| batch.count > 0) else {
-            return Ok(());
-        };
-        let from = self.ring_index;
-        self.ring_index = (from + 1) % FRAMES_IN_FLIGHT as usize;
-        let [column, row, slice] = slot.first_texel(&self.scene);
-        let place = SlotParts { slot, copy: image, parts: first - slice..first - slice + count };
-        // Of each frame what is stored.
-        let [row_length, image_height] = self.scene.frame_size();
-        let texel = u64::from(row) * u64::from(row_length) + u64::from(column);
-        let offset = texel * slot.format(&self.scene).texel_bytes() as u64;
-        let layout = BufferLayout { offset, row_length, image_height };
-        let entry = &mut self.ring[from];
-        entry.submit_copy(&mut self.barriers, &mut self.timelines, &self.slots, (place, layout), &mut self.timings)
+        (0..BATCHES_IN_FLIGHT).map(entry).collect()
     }
 }
 

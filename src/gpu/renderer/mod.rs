@@ -1,5 +1,5 @@
-//! The four stages on one device: frames in, pictures out. Each frame uses an entry of a ring (staging buffer, layer of the frame
-//! array, command buffer), so that several are in flight. A picture runs only the passes whose inputs changed.
+//! The four stages on one device: frames in, pictures out. Each batch of frames uses an entry of a ring (staging buffer, layers of the
+//! frame array, command buffer), so that several are in flight. A picture runs only the passes whose inputs changed.
 
 mod draw;
 mod ingest;
@@ -16,13 +16,14 @@ use super::resources::SlotResources;
 use super::timeline::Timelines;
 use super::timing::{TimeStamps, Timings};
 use crate::passes::chain;
-use crate::passes::slots::{FRAMES_IN_FLIGHT, Format, Initializer};
+use crate::passes::slots::{BATCH_BYTES, BATCHES_IN_FLIGHT, Format, Initializer, frames_per_batch};
 use crate::passes::{DispatchArgs, Frequency, PassTime, Slot, Span, Stage, Texels};
 use crate::picture::Picture;
 use crate::plan::{Contents, Plan, Rerun, affected};
 use crate::queues::oracle::SubmissionLog;
 use crate::queues::{MAX_QUEUES, QueueRole, QueueTracker};
 use crate::scene::{Scene, VisibleBounds};
+use ingest::{SliceBatch, Staging};
 use std::collections::HashSet;
 use std::sync::Arc;
 use std::time::Duration;
@@ -42,6 +43,8 @@ pub struct RendererOptions {
     pub bands: Bands,
     /// How single texels are read; `None` selects what is fast on the device.
     pub texel_access: Option<TexelAccess>,
+    /// Maximum number of frames that go through stage 1 at once, 1..; `None` selects what is fast on the device.
+    pub frames_at_once: Option<u32>,
     /// Number of queues, 1..=3; `None` uses all that the device has. With fewer on the device than given, several of them share
     /// one.
     pub queues: Option<usize>,
@@ -62,6 +65,7 @@ impl Default for RendererOptions {
             time_stamps: TimeStamps::default(),
             bands: Bands::default(),
             texel_access: None,
+            frames_at_once: None,
             queues: None,
             readback: true,
             wake: None,
@@ -84,11 +88,10 @@ struct PartialFrame {
     image: u32,
 }
 
-/// Consecutive slices in the staging buffer of a ring entry that are not submitted yet.
-struct SliceBatch {
-    image: u32,
-    first: u32,
-    count: u32,
+/// The scene with the fields that the device resolves, and this many frames through stage 1 at once if that is given.
+fn adapted(context: &Context, texel_access: TexelAccess, frames_at_once: Option<u32>, scene: Scene) -> Scene {
+    let adapted = formats::adapt_scene(context, texel_access, scene);
+    Scene { frames_at_once: frames_at_once.unwrap_or(adapted.frames_at_once), ..adapted }
 }
 
 /// Renders one scene: frames are sent into volume images, and pictures come out. The scene can be changed at any time.
@@ -127,8 +130,11 @@ pub struct Renderer {
     received: Vec<u8>,
     /// Frames that were dropped because another began before all of their lines had arrived.
     incomplete: u64,
-    /// Slices that will be copied together.
+    /// Frames that will be submitted together.
     batch: Option<SliceBatch>,
+    /// As [`RendererOptions::frames_at_once`].
+    frames_at_once: Option<u32>,
+    staging: Staging,
     /// A picture has been submitted and not waited for.
     drawing: bool,
     /// The picture's image holds a picture, or will when the device is done.
@@ -157,11 +163,12 @@ impl Renderer {
     /// A slot that the device cannot hold, or a shader that does not compile; the error names it.
     pub fn new(context: &Arc<Context>, scene: Scene, options: &RendererOptions) -> Result<Renderer, GpuError> {
         let texel_access = options.texel_access.unwrap_or(TexelAccess::for_device(&context.candidate));
-        let scene = formats::adapt_scene(context, texel_access, scene);
+        let scene = adapted(context, texel_access, options.frames_at_once, scene);
         let plan = Plan::new(&scene);
         formats::check(context, &plan, &scene)?;
-        let pipelines = Arc::new(Pipelines::new(context, options.shaders.clone(), texel_access)?);
+        let pipelines = Pipelines::shared(context, options.shaders.clone(), texel_access)?;
         let steps = pipelines.of_plan(&plan, &scene)?;
+        let staging = Staging::new(&scene, context.candidate.max_buffer);
         let queues = options.queues.unwrap_or(context.queue_count()).clamp(1, MAX_QUEUES);
         let mut renderer = Renderer {
             ring: Vec::new(),
@@ -194,6 +201,8 @@ impl Renderer {
             received: Vec::new(),
             incomplete: 0,
             batch: None,
+            frames_at_once: options.frames_at_once,
+            staging,
             drawing: false,
             drawn: false,
             presented: 0,
@@ -328,7 +337,7 @@ impl Renderer {
     /// # Errors
     /// A shader that does not compile, or a slot that the device cannot hold.
     pub fn prepare(&mut self, scene: &Scene) -> Result<bool, GpuError> {
-        let scene = formats::adapt_scene(&self.context, self.texel_access, scene.clone());
+        let scene = adapted(&self.context, self.texel_access, self.frames_at_once, scene.clone());
         let plan = Plan::new(&scene);
         formats::check(&self.context, &plan, &scene)?;
         self.compiler()?.prepare(&plan, &scene)
@@ -369,7 +378,9 @@ impl Renderer {
     /// If a shader does not compile or the device can never hold a slot, the old scene stays in use. If memory runs out
     /// halfway, nothing can be drawn until another change succeeds; that one rebuilds everything.
     pub fn change(&mut self, scene: Scene) -> Result<Rerun, GpuError> {
-        let mut scene = formats::adapt_scene(&self.context, self.texel_access, scene.keeping(&self.scene));
+        // Frames that wait go through the stage 1 that they were sent to.
+        self.flush()?;
+        let mut scene = adapted(&self.context, self.texel_access, self.frames_at_once, scene.keeping(&self.scene));
         let plan = Plan::new(&scene);
         // After the visible region shrank, the volume still holds the larger one.
         let before = Scene { visible_bounds: self.filtered_bounds, ..self.scene.clone() };
@@ -446,6 +457,7 @@ impl Renderer {
                     self.incomplete += u64::from(self.partial.take().is_some());
                     self.batch = None;
                     self.slots.clear();
+                    self.staging = Staging::new(&self.scene, self.context.candidate.max_buffer);
                     self.ring = self.new_ring()?;
                     self.ring_index = 0;
                 }
@@ -534,13 +546,15 @@ impl Renderer {
         Ok(self.dispatch_extents(work)?.into_iter().map(|(name, _)| name).collect())
     }
 
-    /// The names of the passes that `work` dispatches, and their invocations along x, y, z; in bands, those of each band.
+    /// The names of the passes that `work` dispatches, frames that it leaves waiting included, and their invocations along x, y, z; in
+    /// bands, those of each band.
     pub fn dispatch_extents<T>(
         &mut self,
         work: impl FnOnce(&mut Renderer) -> Result<T, GpuError>,
     ) -> Result<Vec<(&'static str, [u32; 3])>, GpuError> {
+        self.flush()?;
         self.barriers.dispatched = Some(Vec::new());
-        let done = work(self);
+        let done = work(self).and_then(|done| self.flush().map(|()| done));
         let dispatched = self.barriers.dispatched.take().unwrap_or_default();
         done.map(|_| dispatched)
     }
@@ -567,7 +581,7 @@ impl Renderer {
 }
 
 fn frame_bytes(scene: &Scene) -> u64 {
-    Slot::Frames.bytes(scene) / u64::from(FRAMES_IN_FLIGHT)
+    Slot::Frames.bytes(scene) / u64::from(Slot::Frames.shape(scene).parts())
 }
 
 fn readback(context: &Arc<Context>, scene: &Scene) -> Result<Readback, GpuError> {

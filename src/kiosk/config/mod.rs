@@ -273,7 +273,8 @@ impl Config {
     pub fn layers(&self) -> Result<Layers, LoadError> {
         let mut layers = Layers::default();
         if self.source == PHANTOM {
-            layers.preset(PHANTOM)?;
+            let is_pair = self.scene.get("layout").and_then(|layout| layout.as_str()) == Some("pair");
+            layers.phantom(self.preset.is_empty() && !self.scene.contains_key("mode") && !is_pair)?;
         }
         for preset in &self.preset {
             layers.preset(preset)?;

@@ -1,21 +1,17 @@
 //! Anisotropic diffusion in semi-implicit steps by additive operator splitting (Weickert, ter Haar Romeny and Viergever 1998):
 //! u' = 1/2 sum over both axes of (I - 2 tau A(u))^-1 u, with Perona and Malik's conductance between neighbours. Stable at any
-//! tau, and within the range of what was there. Each axis is eliminated forwards and substituted backwards, an invocation a
-//! row or a column: four dispatches a step.
+//! tau, and within the range of what was there. Each axis is solved by one of two methods ([`Solver`]).
 
 use super::estimator::storable_edge;
 use super::perona_malik::{conductance, constant, need};
 use crate::passes::pass::*;
-use crate::scene::{PeronaMalik, Scheme};
-
-/// Dispatches of one step: rows forward and backward, columns forward and backward.
-pub(super) const DISPATCHES: u32 = 4;
+use crate::scene::{PeronaMalik, Scene, Scheme};
 
 pub(super) const TOLERANCE: Tolerance = Tolerance {
     absolute: 3e-5,
     relative: 3e-6,
     outliers: 0.0,
-    why: "every term of the sweeps is positive, so that a row of n pixels is off by about n ulp; noise in place of shares of at \
+    why: "every term of the solvers is positive, so that a row of n pixels is off by about n ulp; noise in place of shares of at \
           most 1 sums to tens; then what the target's format stores",
 };
 
@@ -23,141 +19,228 @@ pub const SLICE: Pass = Pass {
     name: "aos_slice",
     stage: Stage::Preprocess,
     frequency: Frequency::Frame,
-    link: Link::Filter(Filter { dispatches: |_| DISPATCHES, ..Filter::of_slices(|_| None) }),
-    shader: |_, t| match turn_of(t) {
+    link: Link::Filter(Filter { dispatches: |s| SLICES.solver(s).dispatches(), ..Filter::of_slices(|_| None) }),
+    shader: |s, t| match SLICES.turn_of(s, t) {
         (_, Sweep::Forward) => "filter/aos_forward.plane",
         (0, Sweep::Backward) => "filter/aos_backward.rows",
-        _ if t.writes_volume() => "filter/aos_backward.slice",
-        _ => "filter/aos_backward.plane",
+        (_, Sweep::Backward) if t.writes_volume() => "filter/aos_backward.slice",
+        (_, Sweep::Backward) => "filter/aos_backward.plane",
+        (0, Sweep::Both) => "filter/aos_solve.rows",
+        (_, Sweep::Both) if t.writes_volume() => "filter/aos_solve.slice",
+        (_, Sweep::Both) => "filter/aos_solve.plane",
     },
-    needed: |s| need(s.settings.slices.perona_malik, Scheme::Aos),
-    reads: |_, t| SLICE_SLOTS.reads(t.source(), t),
-    writes: |_, t| SLICE_SLOTS.writes(slice("target", t.target()), t),
-    extent: |s, t| lines(s.grid.size, t),
-    repeat: |s| DISPATCHES * s.settings.slices.perona_malik.unwrap_or_default().repeat,
-    params: |s, t| params(s.settings.slices.perona_malik, t),
-    constants: |s, t| constants(s.settings.slices.perona_malik, t),
+    needed: |s| need(s.slice_filters.perona_malik, Scheme::Aos),
+    reads: |s, t| SLICES.reads(s, t.source(), t),
+    writes: |s, t| SLICES.writes(s, slices("target", t.target()), t),
+    extent: |s, t| SLICES.extent(s, t),
+    repeat: |s| SLICES.solver(s).dispatches() * s.slice_filters.perona_malik.unwrap_or_default().repeat,
+    params: |s, t| SLICES.params(s, s.slice_filters.perona_malik, t),
+    constants: |s, t| SLICES.constants(s, s.slice_filters.perona_malik, t),
     tolerance: TOLERANCE,
-    reference: |s, t, reads, writes| reference(s.settings.slices.perona_malik, t, reads, writes),
+    reference: |s, t, reads, writes| SLICES.reference(s, s.slice_filters.perona_malik, t, reads, writes),
 };
 
 pub const PICTURE: Pass = Pass {
     name: "aos_picture",
     stage: Stage::Postprocess,
     frequency: Frequency::Picture,
-    link: Link::Filter(Filter { dispatches: |_| DISPATCHES, ..Filter::of(Chain::Pictures) }),
-    shader: |_, t| match turn_of(t) {
+    link: Link::Filter(Filter { dispatches: |s| PICTURES.solver(s).dispatches(), ..Filter::of(Chain::Pictures) }),
+    shader: |s, t| match PICTURES.turn_of(s, t) {
         (_, Sweep::Forward) => "filter/aos_forward.picture",
         (0, Sweep::Backward) => "filter/aos_backward.picture_rows",
-        _ => "filter/aos_backward.picture",
+        (_, Sweep::Backward) => "filter/aos_backward.picture",
+        (0, Sweep::Both) => "filter/aos_solve.picture_rows",
+        (_, Sweep::Both) => "filter/aos_solve.picture",
     },
     needed: |s| need(s.settings.post.perona_malik, Scheme::Aos),
-    reads: |_, t| PICTURE_SLOTS.reads(t.source(), t),
-    writes: |_, t| PICTURE_SLOTS.writes(whole("target", t.target()), t),
-    extent: |s, t| lines(s.picture_size(), t),
-    repeat: |s| DISPATCHES * s.settings.post.perona_malik.unwrap_or_default().repeat,
-    params: |s, t| params(s.settings.post.perona_malik, t),
-    constants: |s, t| constants(s.settings.post.perona_malik, t),
+    reads: |s, t| PICTURES.reads(s, t.source(), t),
+    writes: |s, t| PICTURES.writes(s, slices("target", t.target()), t),
+    extent: |s, t| PICTURES.extent(s, t),
+    repeat: |s| PICTURES.solver(s).dispatches() * s.settings.post.perona_malik.unwrap_or_default().repeat,
+    params: |s, t| PICTURES.params(s, s.settings.post.perona_malik, t),
+    constants: |s, t| PICTURES.constants(s, s.settings.post.perona_malik, t),
     tolerance: TOLERANCE,
-    reference: |s, t, reads, writes| reference(s.settings.post.perona_malik, t, reads, writes),
+    reference: |s, t, reads, writes| PICTURES.reference(s, s.settings.post.perona_malik, t, reads, writes),
 };
 
-/// The slots between the sweeps.
-pub(super) struct Between {
+/// How the rows and columns of an image are solved.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Solver {
+    /// Each is eliminated forwards and substituted backwards, an invocation a row or a column: a dispatch each. That is the least work, and
+    /// what a CPU does fastest.
+    Thomas,
+    /// In one dispatch, a workgroup a row or a column: by parallel cyclic reduction to as many systems as the workgroup has invocations. A GPU has
+    /// work for all its processors only so.
+    Hybrid,
+}
+
+/// Invocations of a workgroup of the hybrid solver: THREADS of aos_solve.comp.
+const THREADS: u32 = 128;
+
+/// Most unknowns that an invocation of the hybrid solver keeps in registers.
+const MAX_CHUNK: u32 = 16;
+
+impl Solver {
+    /// Dispatches of one step, half of them for each axis.
+    pub(super) fn dispatches(self) -> u32 {
+        if self == Solver::Thomas { 4 } else { 2 }
+    }
+}
+
+/// The images of one kind under AOS: the slots between the dispatches of a step, the size, and the number of channels.
+pub(super) struct Images {
     shares: Slot,
     forward: Slot,
     rows: Slot,
+    size: fn(&Scene) -> [u32; 2],
+    channels: u32,
+    /// Images that a dispatch solves: the slices of a batch, or the picture.
+    images: fn(&DispatchArgs) -> u32,
 }
 
-pub(super) const SLICE_SLOTS: Between =
-    Between { shares: Slot::SliceShares, forward: Slot::SliceForward, rows: Slot::SliceRows };
-const PICTURE_SLOTS: Between =
-    Between { shares: Slot::PictureShares, forward: Slot::PictureForward, rows: Slot::PictureRows };
+pub(super) const SLICES: Images = Images {
+    shares: Slot::SliceShares,
+    forward: Slot::SliceForward,
+    rows: Slot::SliceRows,
+    size: |s| s.grid.size,
+    channels: 1,
+    images: |t| t.slices,
+};
+const PICTURES: Images = Images {
+    shares: Slot::PictureShares,
+    forward: Slot::PictureForward,
+    rows: Slot::PictureRows,
+    size: Scene::picture_size,
+    channels: 4,
+    images: |_| 1,
+};
 
 #[derive(Clone, Copy, PartialEq)]
 pub(super) enum Sweep {
     Forward,
     Backward,
+    Both,
 }
 
-/// The axis (0 along rows, 1 along columns) and the direction of a dispatch.
-pub(super) fn turn_of(args: &DispatchArgs) -> (usize, Sweep) {
-    let sweep = if args.iteration.is_multiple_of(2) { Sweep::Forward } else { Sweep::Backward };
-    ((args.iteration % DISPATCHES / 2) as usize, sweep)
-}
+impl Images {
+    /// The hybrid solver wherever a workgroup's memory holds the longest row or column.
+    pub(super) fn solver(&self, scene: &Scene) -> Solver {
+        let chunk = (0..2).map(|axis| self.chunk(scene, axis)).max().unwrap_or(0);
+        // An equation has three coefficients and a right side.
+        let bytes = 4 * (3 + self.channels) * THREADS * chunk;
+        if chunk <= MAX_CHUNK && bytes <= scene.shared_memory { Solver::Hybrid } else { Solver::Thomas }
+    }
 
-impl Between {
-    pub(super) fn reads(&self, source: Slot, args: &DispatchArgs) -> Vec<Bind> {
-        let swept = || vec![whole("shares", self.shares), whole("forward", self.forward)];
-        match turn_of(args) {
-            (_, Sweep::Forward) => vec![whole("source", source)],
-            (0, Sweep::Backward) => swept(),
-            _ => [swept(), vec![whole("rows", self.rows)]].concat(),
+    /// Unknowns of each invocation of the hybrid solver.
+    fn chunk(&self, scene: &Scene, axis: usize) -> u32 {
+        (self.size)(scene)[axis].div_ceil(THREADS)
+    }
+
+    /// The axis (0 along rows, 1 along columns) of a dispatch, and which sweeps it makes.
+    pub(super) fn turn_of(&self, scene: &Scene, args: &DispatchArgs) -> (usize, Sweep) {
+        match self.solver(scene) {
+            Solver::Hybrid => ((args.iteration % 2) as usize, Sweep::Both),
+            Solver::Thomas => {
+                let sweep = if args.iteration.is_multiple_of(2) { Sweep::Forward } else { Sweep::Backward };
+                ((args.iteration % 4 / 2) as usize, sweep)
+            }
         }
     }
 
-    pub(super) fn writes(&self, target: Bind, args: &DispatchArgs) -> Vec<Bind> {
-        match turn_of(args) {
-            (_, Sweep::Forward) => vec![whole("shares", self.shares), whole("forward", self.forward)],
-            (0, Sweep::Backward) => vec![whole("target", self.rows)],
+    pub(super) fn reads(&self, scene: &Scene, source: Slot, args: &DispatchArgs) -> Vec<Bind> {
+        let (axis, sweep) = self.turn_of(scene, args);
+        let mut reads = match sweep {
+            Sweep::Forward | Sweep::Both => vec![chain_slot("source", source)],
+            Sweep::Backward => vec![slices("shares", self.shares), slices("forward", self.forward)],
+        };
+        reads.extend((axis == 1 && sweep != Sweep::Forward).then_some(slices("rows", self.rows)));
+        reads
+    }
+
+    pub(super) fn writes(&self, scene: &Scene, target: Bind, args: &DispatchArgs) -> Vec<Bind> {
+        match self.turn_of(scene, args) {
+            (_, Sweep::Forward) => vec![slices("shares", self.shares), slices("forward", self.forward)],
+            (0, _) => vec![slices("target", self.rows)],
             _ => vec![target],
         }
     }
-}
 
-pub(super) fn lines(size: [u32; 2], args: &DispatchArgs) -> [u32; 3] {
-    [size[1 - turn_of(args).0], 1, 1]
-}
-
-pub(super) fn params(settings: Option<PeronaMalik>, args: &DispatchArgs) -> Params {
-    let p = settings.unwrap_or_default();
-    match turn_of(args).1 {
-        Sweep::Forward => Params::default().f32("edge", storable_edge(p.edge)).f32("tau", p.step),
-        Sweep::Backward => Params::default().i32("slice", args.slice),
+    pub(super) fn extent(&self, scene: &Scene, args: &DispatchArgs) -> [u32; 3] {
+        let (axis, sweep) = self.turn_of(scene, args);
+        let each = if sweep == Sweep::Both { THREADS } else { 1 };
+        [each * (self.size)(scene)[1 - axis], 1, (self.images)(args)]
     }
-}
 
-pub(super) fn constants(settings: Option<PeronaMalik>, args: &DispatchArgs) -> Vec<(&'static str, i32)> {
-    let (axis, sweep) = turn_of(args);
-    let mut constants = vec![("AXIS", axis as i32)];
-    constants.extend((sweep == Sweep::Forward).then(|| constant(settings)));
-    constants
-}
+    pub(super) fn params(&self, scene: &Scene, settings: Option<PeronaMalik>, args: &DispatchArgs) -> Params {
+        let p = settings.unwrap_or_default();
+        let of_system = || Params::default().f32("edge", storable_edge(p.edge)).f32("tau", p.step);
+        match self.turn_of(scene, args).1 {
+            Sweep::Forward => of_system(),
+            Sweep::Backward => Params::default().i32("slice", args.slice),
+            Sweep::Both => of_system().i32("slice", args.slice),
+        }
+    }
 
-pub(super) fn reference(settings: Option<PeronaMalik>, args: &DispatchArgs, reads: &Arrays, writes: &mut Arrays) {
-    let p = settings.unwrap_or_default();
-    let (axis, sweep) = turn_of(args);
-    let size = reads.get(if sweep == Sweep::Forward { "source" } else { "shares" }).size;
-    for line in 0..size[1 - axis] {
-        let texel = |i: usize| if axis == 0 { [i, line, 0] } else { [line, i, 0] };
-        match sweep {
-            Sweep::Forward => {
-                let source = reads.get("source");
-                let values: Vec<&[f64]> = (0..size[axis]).map(|i| source.get(texel(i))).collect();
-                let weights: Vec<f64> = values.windows(2).map(|w| 2.0 * p.step * conductance(&p, w[0], w[1])).collect();
-                for i in 0..size[axis] {
-                    let (share, forward) = eliminated(&weights, &values, i);
-                    writes.get_mut("shares").set(texel(i), &[share]);
-                    writes.get_mut("forward").set(texel(i), &forward);
+    pub(super) fn constants(
+        &self,
+        scene: &Scene,
+        settings: Option<PeronaMalik>,
+        args: &DispatchArgs,
+    ) -> Vec<(&'static str, i32)> {
+        let (axis, sweep) = self.turn_of(scene, args);
+        let mut constants = vec![("AXIS", axis as i32)];
+        constants.extend((sweep != Sweep::Backward).then(|| constant(settings)));
+        constants.extend((sweep == Sweep::Both).then(|| ("CHUNK", self.chunk(scene, axis) as i32)));
+        constants
+    }
+
+    pub(super) fn reference(
+        &self,
+        scene: &Scene,
+        settings: Option<PeronaMalik>,
+        args: &DispatchArgs,
+        reads: &Arrays,
+        writes: &mut Arrays,
+    ) {
+        let p = settings.unwrap_or_default();
+        let (axis, sweep) = self.turn_of(scene, args);
+        let size = reads.get(if sweep == Sweep::Backward { "shares" } else { "source" }).size;
+        for line in 0..size[1 - axis] {
+            let texel = |i: usize| if axis == 0 { [i, line, 0] } else { [line, i, 0] };
+            let eliminations: Vec<(f64, Vec<f64>)> = match sweep {
+                Sweep::Backward => {
+                    let (shares, forward) = (reads.get("shares"), reads.get("forward"));
+                    (0..size[axis]).map(|i| (shares.get(texel(i))[0], forward.get(texel(i)).to_vec())).collect()
                 }
+                Sweep::Forward | Sweep::Both => {
+                    let source = reads.get("source");
+                    let values: Vec<&[f64]> = (0..size[axis]).map(|i| source.get(texel(i))).collect();
+                    let weights: Vec<f64> =
+                        values.windows(2).map(|w| 2.0 * p.step * conductance(&p, w[0], w[1])).collect();
+                    (0..size[axis]).map(|i| eliminated(&weights, &values, i)).collect()
+                }
+            };
+            if sweep == Sweep::Forward {
+                for (i, (share, forward)) in eliminations.iter().enumerate() {
+                    writes.get_mut("shares").set(texel(i), &[*share]);
+                    writes.get_mut("forward").set(texel(i), forward);
+                }
+                continue;
             }
-            Sweep::Backward => {
-                let (shares, forward) = (reads.get("shares"), reads.get("forward"));
-                let target = writes.get_mut("target");
-                for i in 0..size[axis] {
-                    // All that later pixels pass on, each through the shares of those between.
-                    let mut u = vec![0.0; forward.channels];
-                    let mut through = 1.0;
-                    for j in i..size[axis] {
-                        u.iter_mut().zip(forward.get(texel(j))).for_each(|(u, f)| *u += through * f);
-                        through *= shares.one(texel(j)[0], texel(j)[1], 0);
-                    }
-                    if axis == 1 {
-                        u.iter_mut().zip(reads.get("rows").get(texel(i))).for_each(|(u, r)| *u = 0.5 * (*u + r));
-                    }
-                    let [x, y, _] = texel(i);
-                    target.set([x, y, if target.size[2] > 1 { args.slice as usize } else { 0 }], &u);
+            let target = writes.get_mut("target");
+            for i in 0..size[axis] {
+                // All that later pixels pass on, each through the shares of those between.
+                let mut u = vec![0.0; eliminations[i].1.len()];
+                let mut through = 1.0;
+                for (share, forward) in &eliminations[i..] {
+                    u.iter_mut().zip(forward).for_each(|(u, f)| *u += through * f);
+                    through *= share;
                 }
+                if axis == 1 {
+                    u.iter_mut().zip(reads.get("rows").get(texel(i))).for_each(|(u, r)| *u = 0.5 * (*u + r));
+                }
+                let [x, y, _] = texel(i);
+                target.set([x, y, if target.size[2] > 1 { args.slice as usize } else { 0 }], &u);
             }
         }
     }

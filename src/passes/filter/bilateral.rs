@@ -65,7 +65,7 @@ pub const DISTANCE: Pass = Pass {
 };
 
 fn settings(scene: &Scene) -> Bilateral {
-    scene.distance.bilateral.unwrap_or(Bilateral { pixels: 1.0, distance: 1.0, repeat: 1 })
+    scene.distance.bilateral.unwrap_or(Bilateral { pixels: 1.0, mm: None, distance: 1.0, repeat: 1 })
 }
 
 /// Two standard deviations hold 95 % of the weight.

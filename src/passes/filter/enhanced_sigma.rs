@@ -13,21 +13,21 @@ pub const SLICE: Pass = Pass {
     name: "enhanced_sigma_slice",
     stage: Stage::Preprocess,
     frequency: Frequency::Frame,
-    link: Link::Filter(Filter::of_slices(|s| Some([reach(s, s.settings.slices.enhanced_sigma); 2]))),
+    link: Link::Filter(Filter::of_slices(|s| Some([reach(s, s.slice_filters.enhanced_sigma); 2]))),
     shader: |_, t| match t.writes_volume() {
         true => "filter/enhanced_sigma.slice",
         false => "filter/enhanced_sigma.plane",
     },
-    needed: |s| need(s.settings.slices.enhanced_sigma),
+    needed: |s| need(s.slice_filters.enhanced_sigma),
     reads: reads_source,
     writes: writes_target,
     extent: slice_extent,
     repeat: once,
-    params: |s, t| params(s.settings.slices.enhanced_sigma, LEAST, t),
-    constants: |s, _| constants(s, s.settings.slices.enhanced_sigma),
+    params: |s, t| params(s.slice_filters.enhanced_sigma, LEAST, t),
+    constants: |s, _| constants(s, s.slice_filters.enhanced_sigma),
     tolerance: Tolerance { absolute: 6e-4, relative: 0.0, outliers: 2e-3, why: WHY },
     reference: |s, t, reads, writes| {
-        let enhanced = Enhanced::new(s, s.settings.slices.enhanced_sigma, LEAST, |_| true);
+        let enhanced = Enhanced::new(s, s.slice_filters.enhanced_sigma, LEAST, |_| true);
         enhanced.filter(t, reads, writes, |found| found.mean);
     },
 };
@@ -84,17 +84,17 @@ pub const GROWTH: Pass = Pass {
     frequency: Frequency::Frame,
     link: Link::Observer(Chain::Slices),
     shader: |_, _| "filter/enhanced_sigma.growth",
-    needed: |s| match s.settings.slices.enhanced_sigma {
+    needed: |s| match s.slice_filters.enhanced_sigma {
         Some(e) if e.growth && e.sigma > 0.0 => Ok("the windows' growth is asked for"),
         Some(e) if e.growth => Err("a sigma of 0 grows no window"),
         _ => Err("not asked for"),
     },
     reads: reads_source,
-    writes: |_, _| vec![whole("target", Slot::Growth)],
+    writes: |_, _| vec![slices("target", Slot::Growth)],
     extent: slice_extent,
     repeat: once,
-    params: |s, t| params(s.settings.slices.enhanced_sigma, LEAST, t),
-    constants: |s, _| constants(s, s.settings.slices.enhanced_sigma),
+    params: |s, t| params(s.slice_filters.enhanced_sigma, LEAST, t),
+    constants: |s, _| constants(s, s.slice_filters.enhanced_sigma),
     tolerance: Tolerance {
         absolute: 0.0,
         relative: 0.0,
@@ -102,7 +102,7 @@ pub const GROWTH: Pass = Pass {
         why: "whole rings; a pixel at exactly 2 sigma may count or not, and with it a ring",
     },
     reference: |s, t, reads, writes| {
-        let enhanced = Enhanced::new(s, s.settings.slices.enhanced_sigma, LEAST, |_| true);
+        let enhanced = Enhanced::new(s, s.slice_filters.enhanced_sigma, LEAST, |_| true);
         enhanced.filter(t, reads, writes, |found| vec![f64::from(found.rings)]);
     },
 };
@@ -224,7 +224,7 @@ impl Enhanced {
 /// Shares of the pixels, within the sector, whose window's edge grew by +0, +2, +4 ... up to the largest (thesis Tables 7-9),
 /// from the map that [`GROWTH`] writes. They sum to 1.
 pub fn growth_shares(scene: &Scene, growth: &Texels) -> Vec<f64> {
-    let enhanced = scene.settings.slices.enhanced_sigma.unwrap_or_default();
+    let enhanced = scene.slice_filters.enhanced_sigma.unwrap_or_default();
     let rings = (enhanced.largest / 2).saturating_sub(enhanced.window / 2) as usize;
     let mut counts = vec![0u64; rings + 1];
     for y in 0..growth.size[1] {

@@ -48,7 +48,7 @@ pub const ELEVATION: Pass = Pass {
     frequency: Frequency::Volume,
     link: Link::AfterSlices,
     shader: |_, _| "filter/gaussian.volume",
-    needed: |s| need(s, 2),
+    needed: |s| if s.sharpens() { Ok("the cubic B-spline is to meet the slices") } else { need(s, 2) },
     reads: |s, _| {
         let part = Part::Around(s.smoothing_radius()[2]);
         vec![Bind { part, ..whole("source", Slot::SharpVolume) }]
@@ -59,7 +59,10 @@ pub const ELEVATION: Pass = Pass {
     params: |s, t| params(s, 2, t).i32("slices", t.slices),
     constants: |s, _| constants(s, 2),
     tolerance: TOLERANCE,
-    reference: |s, t, reads, writes| reference(s, 2, t, reads, writes),
+    reference: |s, t, reads, writes| match s.sharpens() {
+        true => sharpened(t, reads, writes),
+        false => reference(s, 2, t, reads, writes),
+    },
 };
 
 fn need(scene: &Scene, axis: usize) -> Need {
@@ -68,11 +71,27 @@ fn need(scene: &Scene, axis: usize) -> Need {
 
 fn params(scene: &Scene, axis: usize, args: &DispatchArgs) -> Params {
     let deviation = scene.smoothing()[axis];
-    Params::default().f32("narrowness", 0.5 / (deviation * deviation)).i32("slice", args.slice)
+    // Without a Gaussian the shader has other weights, and no use for this one.
+    let narrowness = if deviation > 0.0 { 0.5 / (deviation * deviation) } else { 0.0 };
+    Params::default().f32("narrowness", narrowness).i32("slice", args.slice)
 }
 
 fn constants(scene: &Scene, axis: usize) -> Vec<(&'static str, i32)> {
-    vec![("RADIUS", scene.smoothing_radius()[axis] as i32), ("AXIS", axis as i32)]
+    let sharpens = axis == 2 && scene.sharpens();
+    vec![("RADIUS", scene.smoothing_radius()[axis] as i32), ("AXIS", axis as i32), ("SHARPENS", sharpens as i32)]
+}
+
+/// (-1, 8, -1)/6 across slices, the border repeated. The cubic B-spline passes 1 - w^2/6 of a slow wave of w radians a slice; this kernel
+/// passes 1 + w^2/6.
+fn sharpened(args: &DispatchArgs, reads: &Arrays, writes: &mut Arrays) {
+    let source = reads.get("source");
+    let target = writes.get_mut("target");
+    for z in args.slice as usize..(args.slice + args.slices) as usize {
+        for (x, y) in (0..source.size[1]).flat_map(|y| (0..source.size[0]).map(move |x| (x, y))) {
+            let tap = |away: i64| source.clamped(x as i64, y as i64, z as i64 + away);
+            target.set([x, y, z], &[((8.0 * tap(0) - tap(-1) - tap(1)) / 6.0).clamp(0.0, 1.0)]);
+        }
+    }
 }
 
 fn reference(scene: &Scene, axis: usize, args: &DispatchArgs, reads: &Arrays, writes: &mut Arrays) {

@@ -16,15 +16,15 @@ pub const SLICE: Pass = Pass {
         true => "filter/perona_malik.slice",
         false => "filter/perona_malik.plane",
     },
-    needed: |s| need(s.settings.slices.perona_malik, Scheme::Explicit),
+    needed: |s| need(s.slice_filters.perona_malik, Scheme::Explicit),
     reads: reads_source,
     writes: writes_target,
     extent: slice_extent,
-    repeat: |s| repeat(s.settings.slices.perona_malik),
-    params: |s, t| params(s.settings.slices.perona_malik, t),
-    constants: |s, _| vec![constant(s.settings.slices.perona_malik)],
+    repeat: |s| repeat(s.slice_filters.perona_malik),
+    params: |s, t| params(s.slice_filters.perona_malik, t),
+    constants: |s, _| vec![constant(s.slice_filters.perona_malik)],
     tolerance: Tolerance { absolute: 1e-6, relative: 0.0, outliers: 0.0, why: WHY },
-    reference: |s, t, reads, writes| reference(s.settings.slices.perona_malik, t, reads, writes, |_| true),
+    reference: |s, t, reads, writes| reference(s.slice_filters.perona_malik, t, reads, writes, |_| true),
 };
 
 pub const DISTANCE: Pass = Pass {

@@ -21,18 +21,18 @@ pub const SLICE: Pass = Pass {
         stage if stage == stages(s) && t.writes_volume() => "filter/rkl1.slice",
         _ => "filter/rkl1.plane",
     },
-    needed: |s| need(s.settings.slices.perona_malik, Scheme::Rkl1),
+    needed: |s| need(s.slice_filters.perona_malik, Scheme::Rkl1),
     reads: |s, t| {
         // After no stage: the step's beginning.
         let after = |n: u32| if n == 0 { t.source() } else { kept(n) };
         let stage = stage_of(s, t);
-        let mut reads = vec![whole("last", after(stage - 1))];
-        reads.extend((stage > 1).then(|| whole("before", after(stage - 2))));
+        let mut reads = vec![chain_slot("last", after(stage - 1))];
+        reads.extend((stage > 1).then(|| chain_slot("before", after(stage - 2))));
         reads
     },
     writes: |s, t| match stage_of(s, t) {
-        stage if stage == stages(s) => vec![slice("target", t.target())],
-        stage => vec![whole("target", kept(stage))],
+        stage if stage == stages(s) => vec![slices("target", t.target())],
+        stage => vec![slices("target", kept(stage))],
     },
     extent: slice_extent,
     repeat: |s| stages(s) * settings(s).repeat,
@@ -46,7 +46,7 @@ pub const SLICE: Pass = Pass {
             .f32("share", c.share * p.step)
             .i32("slice", t.slice)
     },
-    constants: |s, _| vec![constant(s.settings.slices.perona_malik)],
+    constants: |s, _| vec![constant(s.slice_filters.perona_malik)],
     tolerance: Tolerance {
         absolute: 3e-6,
         relative: 3e-6,
@@ -58,7 +58,7 @@ pub const SLICE: Pass = Pass {
 };
 
 fn settings(scene: &Scene) -> PeronaMalik {
-    scene.settings.slices.perona_malik.unwrap_or_default()
+    scene.slice_filters.perona_malik.unwrap_or_default()
 }
 
 fn stages(scene: &Scene) -> u32 {

@@ -12,17 +12,17 @@ pub const SLICE: Pass = Pass {
     name: "sigma_slice",
     stage: Stage::Preprocess,
     frequency: Frequency::Frame,
-    link: Link::Filter(Filter::of_slices(|s| Some([radius(s.settings.slices.sigma); 2]))),
+    link: Link::Filter(Filter::of_slices(|s| Some([radius(s.slice_filters.sigma); 2]))),
     shader: |_, t| if t.writes_volume() { "filter/sigma.slice" } else { "filter/sigma.plane" },
-    needed: |s| need(s.settings.slices.sigma),
+    needed: |s| need(s.slice_filters.sigma),
     reads: reads_source,
     writes: writes_target,
     extent: |s, t| in_runs(slice_extent(s, t), 1),
     repeat: once,
-    params: |s, t| params(s.settings.slices.sigma, t),
-    constants: |s, _| constants(s.settings.slices.sigma),
+    params: |s, t| params(s.slice_filters.sigma, t),
+    constants: |s, _| constants(s.slice_filters.sigma),
     tolerance: Tolerance { absolute: 6e-4, relative: 0.0, outliers: 1e-3, why: WHY },
-    reference: |s, t, reads, writes| reference(s.settings.slices.sigma, t, reads, writes, |_| true),
+    reference: |s, t, reads, writes| reference(s.slice_filters.sigma, t, reads, writes, |_| true),
 };
 
 pub const DISTANCE: Pass = Pass {

@@ -41,7 +41,7 @@ pub const PASS: Pass = Pass {
     constants: |s, _| {
         let mut constants = ray::constants(s);
         // Clip planes are half-spaces of the block.
-        constants.retain(|(name, _)| matches!(*name, "SWEEP" | "ARRAY" | "SAMPLING"));
+        constants.retain(|(name, _)| matches!(*name, "SWEEP" | "ARRAY" | "SAMPLING" | "ELEVATION"));
         constants.push(("EDGES", s.settings.cube.edges as i32));
         constants
     },
@@ -112,7 +112,7 @@ fn reference_pixel(scene: &Scene, volume: &Texels, block: &[HalfSpace], x: f64, 
     };
     let Some(texel) = ray::texel(scene, place) else { return [0.0; 4] };
     let [low, high] = scene.settings.cube.window;
-    let value = ((volume.trilinear(texel) - low) / (high - low)).clamp(0.0, 1.0);
+    let value = ((ray::interpolated(scene, volume, texel) - low) / (high - low)).clamp(0.0, 1.0);
     let grey = value * (1.0 - scene.settings.cube.shading * (1.0 - normal.dot(direction).abs()));
     let near = match own {
         Some(own) if scene.settings.cube.edges => {

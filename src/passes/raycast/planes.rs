@@ -92,9 +92,10 @@ fn params(scene: &Scene) -> Params {
 
 fn constants(scene: &Scene) -> Vec<(&'static str, i32)> {
     let mut constants = ray::constants(scene);
-    constants.retain(|(name, _)| matches!(*name, "SWEEP" | "ARRAY" | "SAMPLING" | "CLIPS"));
+    constants.retain(|(name, _)| matches!(*name, "SWEEP" | "ARRAY" | "SAMPLING" | "ELEVATION" | "CLIPS"));
     constants.push(("SAMPLES", scene.slab_samples() as i32));
     constants.push(("SLAB", scene.settings.planes.slab.number()));
+    constants.push(("ONE_TILE", (scene.tile_count() == 1) as i32));
     constants
 }
 
@@ -104,19 +105,16 @@ fn value_at(scene: &Scene, volume: &Texels, sheet: &Sheet, x: usize, y: usize) -
     slab(scene, volume, sheet.place(tile, x, y), tile.plane.normal)
 }
 
-/// The scene without its camera and its rays' step, which no plane depends on.
+/// The scene without its camera and its rays' step, which no plane depends on. Where one plane fills the picture, the rays begin at its
+/// pixels, and their direction is that through the slab.
 fn unmoved(scene: &Scene) -> Scene {
     let zero = DVec3::ZERO;
-    let rays = crate::scene::Rays {
-        origin: zero,
-        origin_dx: zero,
-        origin_dy: zero,
-        direction: DVec3::Y,
-        direction_dx: zero,
-        direction_dy: zero,
-        ..scene.rays
+    let sheet = scene.sheet();
+    let vectors = match &sheet.tiles[..] {
+        [tile] => sheet.vectors(tile, scene.settings.planes.thickness),
+        _ => [zero, zero, zero, DVec3::Y],
     };
-    Scene { rays, step: 1.0, ..scene.clone() }
+    ray::unmoved(scene, vectors)
 }
 
 /// The value of a slab around a point; none where all of it is cut away or not insonified.
@@ -147,5 +145,5 @@ fn value(scene: &Scene, volume: &Texels, place: DVec3) -> Option<f64> {
     }
     let [low, high] = scene.settings.planes.window;
     let at = ray::texel(scene, place)?;
-    Some(((volume.trilinear(at) - low) / (high - low)).clamp(0.0, 1.0))
+    Some(((ray::interpolated(scene, volume, at) - low) / (high - low)).clamp(0.0, 1.0))
 }

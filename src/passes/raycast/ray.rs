@@ -23,11 +23,11 @@ macro_rules! variant {
         }
     };
 }
-pub(super) use variant;
+pub(in crate::passes) use variant;
 
 /// Whether the sweep look-up table, the table of slices (non-uniform sweep), and the line look-up table (intra-frame motion) are
 /// needed.
-pub(super) fn tables(scene: &Scene) -> (bool, bool, bool) {
+pub(in crate::passes) fn tables(scene: &Scene) -> (bool, bool, bool) {
     match &scene.geometry {
         Geometry::Sweep(probe) => {
             let swept = !matches!(probe.motion, Motion::Still { .. });
@@ -42,7 +42,7 @@ pub(super) fn tables(scene: &Scene) -> (bool, bool, bool) {
     }
 }
 
-pub(super) fn reads(scene: &Scene) -> Vec<Bind> {
+pub(in crate::passes) fn reads(scene: &Scene) -> Vec<Bind> {
     let (swept, non_uniform, moving) = tables(scene);
     let mut reads = vec![Bind { filtered: scene.filters_in_hardware(), ..whole("volume", Slot::Volume) }];
     reads.extend(swept.then_some(whole("sweep_lut", Slot::SweepLut)));
@@ -59,7 +59,7 @@ pub(super) fn marching_reads(scene: &Scene, skipping: Skipping) -> Vec<Bind> {
     reads
 }
 
-pub(super) fn constants(scene: &Scene) -> Vec<(&'static str, i32)> {
+pub(in crate::passes) fn constants(scene: &Scene) -> Vec<(&'static str, i32)> {
     let (sweep, array) = match &scene.geometry {
         Geometry::Cartesian(_) => (0, 0),
         Geometry::Sweep(probe) => (
@@ -79,6 +79,7 @@ pub(super) fn constants(scene: &Scene) -> Vec<(&'static str, i32)> {
         ("SWEEP", sweep),
         ("ARRAY", array),
         ("SAMPLING", !scene.filters_in_hardware() as i32),
+        ("ELEVATION", scene.takes_bspline() as i32),
         ("CLIPS", scene.settings.clip.len() as i32),
         ("SPREAD", scene.spreads() as i32),
     ]
@@ -94,6 +95,26 @@ pub(super) fn marching_constants(scene: &Scene, skipping: Skipping) -> Vec<(&'st
     constants.push(skipping.constant());
     constants.push(("SLIDING", scene.settings.ray.sliding as i32));
     constants
+}
+
+/// The same for a pass that casts no ray: a camera that moves changes nothing.
+pub(in crate::passes) fn unmoved_params(scene: &Scene, view: View) -> Params {
+    params(&unmoved(scene, [DVec3::ZERO, DVec3::ZERO, DVec3::ZERO, DVec3::Y]), view, 1.0)
+}
+
+/// The scene with rays of one direction from an origin and its steps of a pixel right and down, and without its rays' step.
+pub(super) fn unmoved(scene: &Scene, [origin, origin_dx, origin_dy, direction]: [DVec3; 4]) -> Scene {
+    let zero = DVec3::ZERO;
+    let rays = crate::scene::Rays {
+        origin,
+        origin_dx,
+        origin_dy,
+        direction,
+        direction_dx: zero,
+        direction_dy: zero,
+        ..scene.rays
+    };
+    Scene { rays, step: 1.0, ..scene.clone() }
 }
 
 pub(super) fn params(scene: &Scene, view: View, step: f64) -> Params {
@@ -229,6 +250,11 @@ impl<'a> Ray<'a> {
         self.origin + self.direction * (self.enter + offset)
     }
 
+    /// Unit direction, away from the eye.
+    pub fn direction(&self) -> DVec3 {
+        self.direction
+    }
+
     /// Whether a place that many mm behind the entry is in the insonified region.
     pub fn is_inside(&self, offset: f64) -> bool {
         texel(self.scene, self.place(offset)).is_some()
@@ -240,7 +266,7 @@ impl<'a> Ray<'a> {
         let at = texel(self.scene, self.place(offset))?;
         let edge = i64::from(self.scene.settings.ray.sliding);
         let value = match edge {
-            0 => self.volume.trilinear(at),
+            0 => interpolated(self.scene, self.volume, at),
             _ => self.filtered(n, edge / 2),
         };
         let [low, high] = self.window;
@@ -258,7 +284,7 @@ impl<'a> Ray<'a> {
                 let place = middle + (self.across[0] * x as f64 + self.across[1] * y as f64) * apart;
                 if let Some(at) = texel(self.scene, place) {
                     let w = weight(x) * weight(y) * weight(along);
-                    sum += w * self.volume.trilinear(at);
+                    sum += w * interpolated(self.scene, self.volume, at);
                     weights += w;
                 }
             }
@@ -270,8 +296,13 @@ impl<'a> Ray<'a> {
     pub fn echo(&self, distance: f64) -> Option<f64> {
         let [low, high] = self.window;
         let at = texel(self.scene, self.origin + self.direction * distance)?;
-        Some(((self.volume.trilinear(at) - low) / (high - low)).clamp(0.0, 1.0))
+        Some(((interpolated(self.scene, self.volume, at) - low) / (high - low)).clamp(0.0, 1.0))
     }
+}
+
+/// The volume at texture indices, as the scene interpolates it.
+pub(in crate::passes) fn interpolated(scene: &Scene, volume: &Texels, at: [f64; 3]) -> f64 {
+    if scene.takes_bspline() { volume.bspline_across_slices(at) } else { volume.trilinear(at) }
 }
 
 /// Ratio of the step to the scene's step at a place: proportional to the range from the array's apex.
@@ -311,6 +342,24 @@ pub(crate) fn span(scene: &Scene, view: View, origin: DVec3, direction: DVec3) -
         }
     }
     (enter, leave)
+}
+
+/// Texture indices of a place in space, beyond the sweep those of its nearest end; none outside the scan lines.
+pub(in crate::passes) fn texel_beyond_sweep(scene: &Scene, place: DVec3) -> Option<[f64; 3]> {
+    let Geometry::Sweep(probe) = &scene.geometry else { return texel(scene, place) };
+    let (x, y, position) = probe.inverse_sweep_map(place);
+    let at = probe.to_indices(place);
+    // The shader's table ends with the sweep.
+    let (low, high) = sweep_span(probe);
+    let (low, high) = match probe.motion {
+        Motion::Fan { .. } => (2.0 * low.atan(), 2.0 * high.atan()),
+        Motion::Translated | Motion::Still { .. } => (low, high),
+    };
+    let slice = probe.slice_index(position.clamp(low, high), at.line);
+    let grid = &scene.grid;
+    let pixel = [(x - grid.origin[0]) / grid.pitch[0], (y - grid.origin[1]) / grid.pitch[1]];
+    let in_plane = crate::probe::Indices { slice: 0.0, ..at };
+    inside(probe, in_plane).then_some([pixel[0], pixel[1], slice])
 }
 
 /// Texture indices of a place in space; none outside the insonified region. By the exact inverse of the probe's maps, not by the

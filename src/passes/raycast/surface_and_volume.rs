@@ -4,6 +4,7 @@
 
 use super::{ray, surface, volume};
 use crate::passes::empty_space;
+use crate::passes::light_volume;
 use crate::passes::pass::*;
 
 pub const PASS: Pass = Pass {
@@ -15,6 +16,7 @@ pub const PASS: Pass = Pass {
         // What either of the two need not see is left out of that one.
         reads.extend(empty_space::volume_skipping(s).slot().map(|slot| whole("volume_bricks", slot)));
         reads.push(whole("transfer", Slot::Transfer));
+        reads.extend(light_volume::reads(s));
         reads
     },
     writes: |s, _| {
@@ -30,7 +32,7 @@ pub const PASS: Pass = Pass {
     },
     constants: |s, _| {
         let mut constants = surface::constants(s);
-        constants.extend(volume::compositing_constants(s));
+        constants.extend(volume::compositing_constants(s, false));
         constants
     },
     tolerance: Tolerance {
@@ -40,11 +42,11 @@ pub const PASS: Pass = Pass {
         why: "of distances, the tolerance of raycast_surface; of colours, that of raycast_volume, on the same samples",
     },
     reference: |scene, _, reads, writes| {
-        let (texels, transfer) = (reads.get("volume"), reads.get("transfer"));
+        let texels = reads.get("volume");
         let size = writes.get("picture").size;
         for (x, y) in (0..size[1]).flat_map(|y| (0..size[0]).map(move |x| (x, y))) {
             surface::reference_ray(scene, texels, writes, x, y);
-            let colour = volume::composited(scene, texels, transfer, scene.ring.step, [x, y]);
+            let colour = volume::composited(scene, reads, scene.ring.step, [x, y]);
             writes.get_mut("picture").set([x, y, 0], &colour);
         }
     },

@@ -1,6 +1,6 @@
 //! A survey of what the rays or planes of a picture meet, in f64 on the CPU: where a picture is wholly one colour, it tells why.
 
-use super::ray::{Ray, texel};
+use super::ray::{Ray, interpolated, texel};
 use crate::passes::texels::Texels;
 use crate::scene::{Mode, Scene, View};
 
@@ -97,7 +97,7 @@ fn planes(scene: &Scene, volume: &Texels, survey: &mut Survey) {
         }
         survey.met += 1;
         if let Some(at) = texel(scene, place) {
-            survey.take(volume.trilinear(at));
+            survey.take(interpolated(scene, volume, at));
         }
     }
 }

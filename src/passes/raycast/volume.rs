@@ -3,6 +3,7 @@
 use super::composite::{March, Medium, Place};
 use super::ray;
 use crate::passes::empty_space;
+use crate::passes::light_volume::{self, Lit};
 use crate::passes::pass::*;
 use crate::scene::{Compositing, Mode, Scene, Shading, SurfaceColour, self_attenuation};
 use glam::DVec3;
@@ -31,6 +32,7 @@ pub const PASS: Pass = Pass {
             Compositing::Riemann | Compositing::Corrected => whole("transfer", Slot::Transfer),
         });
         let needs_distance = matches!(kind(s), Kind::Layer | Kind::Behind);
+        reads.extend(light_volume::reads(s));
         reads.extend(needs_distance.then_some(whole("distance_map", Slot::Distance)));
         reads
     },
@@ -51,7 +53,7 @@ pub const PASS: Pass = Pass {
     },
     constants: |s, _| {
         let mut constants = ray::marching_constants(s, empty_space::volume_skipping(s));
-        constants.extend(compositing_constants(s));
+        constants.extend(compositing_constants(s, kind(s) == Kind::Alone));
         constants
     },
     tolerance: Tolerance {
@@ -65,7 +67,7 @@ pub const PASS: Pass = Pass {
     reference: |scene, _, reads, writes| {
         let volume = reads.get("volume");
         let table = reads.get("transfer");
-        let tables = Tables { of_steps: table, curve: curve(scene, table) };
+        let tables = Tables { of_steps: table, curve: curve(scene, table), lit: Lit::new(scene, reads) };
         let size = writes.get("picture").size;
         for y in 0..size[1] {
             for x in 0..size[0] {
@@ -79,7 +81,8 @@ pub const PASS: Pass = Pass {
                     }
                     Kind::Alone | Kind::Colour | Kind::Hit => {}
                 }
-                let (colour, hit) = composite(scene, &ray, &tables);
+                let (light, hit) = composite(scene, &ray, &tables);
+                let colour = light_volume::developed(scene, kind(scene) == Kind::Alone, light, [x, y]);
                 writes.get_mut("picture").set([x, y, 0], &colour);
                 if kind(scene) == Kind::Hit {
                     writes.get_mut("distance_map").set([x, y, 0], &[hit]);
@@ -93,35 +96,39 @@ pub const PASS: Pass = Pass {
 pub(super) fn compositing_params(scene: &Scene, params: Params, step: f64) -> Params {
     let volume = &scene.settings.volume;
     let (axis, near) = depth_axis(scene);
-    params
+    let params = params
         .f32("absorption_scale", step / reference_length(scene))
         .f32("opaque_enough", 1.0 - scene.settings.ray.early_end)
         .vec3("near_tint", volume.near_tint)
         .vec3("far_tint", volume.far_tint)
         .vec3("depth_axis", axis)
-        .f32("depth_near", scene.limit_to_local(axis, near))
+        .f32("depth_near", scene.limit_to_local(axis, near));
+    light_volume::params(scene, params)
 }
 
-/// Constants of compositing.
-pub(super) fn compositing_constants(scene: &Scene) -> [(&'static str, i32); 4] {
+/// Constants of compositing; `is_alone`: what is composited fills the picture.
+pub(super) fn compositing_constants(scene: &Scene, is_alone: bool) -> Vec<(&'static str, i32)> {
     let compositing = match scene.settings.volume.compositing {
         Compositing::Riemann => 0,
         Compositing::Corrected => 1,
         Compositing::PreIntegrated => 2,
         Compositing::Exponential => 3,
     };
-    [
+    let mut constants = vec![
         ("EARLY_END", (scene.settings.ray.early_end > 0.0) as i32),
         ("COMPOSITING", compositing),
         ("DEPTH_CODED", (scene.settings.volume.shading == Shading::DepthCoded) as i32),
         ("ENTRIES", scene.transfer_entries() as i32),
-    ]
+    ];
+    constants.extend(light_volume::constants(scene, is_alone));
+    constants
 }
 
 /// Red, green, blue and opacity of a whole ray with this step, mm, through the table of the transfer function over the value.
-pub(super) fn composited(scene: &Scene, volume: &Texels, transfer: &Texels, step: f64, [x, y]: [usize; 2]) -> [f64; 4] {
-    let ray = ray::Ray::cast(scene, volume, scene.volume_view(), step, x, y);
-    composite(scene, &ray, &Tables { of_steps: transfer, curve: Vec::new() }).0
+pub(super) fn composited(scene: &Scene, reads: &Arrays, step: f64, [x, y]: [usize; 2]) -> [f64; 4] {
+    let ray = ray::Ray::cast(scene, reads.get("volume"), scene.volume_view(), step, x, y);
+    let tables = Tables { of_steps: reads.get("transfer"), curve: Vec::new(), lit: Lit::new(scene, reads) };
+    light_volume::developed(scene, false, composite(scene, &ray, &tables).0, [x, y])
 }
 
 #[derive(PartialEq)]
@@ -163,6 +170,7 @@ struct Tables<'a> {
     of_steps: &'a Texels,
     /// Over the value: what a step of another length is integrated from. Empty unless the rule is exponential.
     curve: Vec<[f64; 4]>,
+    lit: Option<Lit<'a>>,
 }
 
 fn curve(scene: &Scene, table: &Texels) -> Vec<[f64; 4]> {
@@ -199,11 +207,20 @@ struct RayMedium<'a> {
 impl RayMedium<'_> {
     fn tinted(&self, rgba: [f64; 4], offset: f64) -> [f64; 4] {
         let settings = &self.scene.settings.volume;
+        let place = self.ray.place(offset);
+        let rgba = match &self.tables.lit {
+            Some(lit) => {
+                let [r, g, b] = lit.light(self.scene, [rgba[0], rgba[1], rgba[2]], place, self.ray.direction());
+                [r, g, b, rgba[3]]
+            }
+            None => rgba,
+        };
+        let rgba = [rgba[0], rgba[1], rgba[2], rgba[3] * self.scene.faded(place)];
         if settings.shading != Shading::DepthCoded {
             return rgba;
         }
         let (axis, near) = self.depth_axis;
-        let depth = (self.ray.place(offset).dot(axis) - near).clamp(0.0, 1.0);
+        let depth = (place.dot(axis) - near).clamp(0.0, 1.0);
         let tint = |c: usize| settings.near_tint[c] + (settings.far_tint[c] - settings.near_tint[c]) * depth;
         std::array::from_fn(|c| if c < 3 { rgba[c] * tint(c) } else { rgba[c] })
     }

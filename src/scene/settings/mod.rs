@@ -157,6 +157,9 @@ pub struct Region {
     pub depth: Option<[f64; 2]>,
     /// Elevation bounds, mm.
     pub elevation: Option<[f64; 2]>,
+    /// Length over which what is composited fades towards the faces of the region, except the shallowest, 0..=100 mm. It is also the radius of the
+    /// region's edges and corners.
+    pub fade: f64,
 }
 
 /// A clip plane. It removes the side that its normal points to. Coordinates are lateral, depth (from the probe's face), elevation.

@@ -16,13 +16,22 @@ pub struct Conditioning {
     /// Standard deviation of the Gaussian low pass along each line, samples, 0..=32; 0 for none. Absent: half the decimation factor if
     /// lines are decimated, else none.
     pub low_pass: Option<f64>,
+    /// The same in mm along the line, 0..=1000, in place of `low_pass`; at most 32 samples.
+    pub low_pass_mm: Option<f64>,
     /// Most samples per line, 2..=65536. Longer lines are low-passed and decimated by the smallest integer factor that meets this.
     pub samples: Option<u32>,
 }
 
 impl Default for Conditioning {
     fn default() -> Self {
-        Conditioning { tgc: Vec::new(), dynamic_range: None, compressed_range: 60.0, low_pass: None, samples: None }
+        Conditioning {
+            tgc: Vec::new(),
+            dynamic_range: None,
+            compressed_range: 60.0,
+            low_pass: None,
+            low_pass_mm: None,
+            samples: None,
+        }
     }
 }
 
@@ -138,6 +147,9 @@ pub enum VolumeFormat {
 pub struct Sigma {
     /// Window size, pixels; odd.
     pub window: u32,
+    /// The same in mm, 0.001..=1000, in place of `window`: the nearest odd number of pixels, at most 63; less than two are no filter. Not
+    /// in `post`.
+    pub window_mm: Option<f64>,
     /// Standard deviation of the noise. A neighbour counts within 2 sigma. In 0..1 on slices and pictures, in mm on distances; relative to
     /// the centre's value if the noise is multiplicative.
     pub sigma: f64,
@@ -147,7 +159,7 @@ pub struct Sigma {
 
 impl Default for Sigma {
     fn default() -> Self {
-        Sigma { window: 7, sigma: 0.1, noise: Noise::Additive }
+        Sigma { window: 7, window_mm: None, sigma: 0.1, noise: Noise::Additive }
     }
 }
 
@@ -171,6 +183,10 @@ pub struct EnhancedSigma {
     pub window: u32,
     /// Largest window size, pixels; odd. Thesis Tables 7-9: 17, 19, 19, 21, 21, 23 for starts of 3, 5, 7, 9, 11, 13.
     pub largest: u32,
+    /// The starting window in mm, 0.001..=1000, in place of `window`: the nearest odd number of pixels, 3..=63. Not in `post`.
+    pub window_mm: Option<f64>,
+    /// The largest window in mm, in place of `largest`: as large as the first at least; less than two pixels are no filter. Not in `post`.
+    pub largest_mm: Option<f64>,
     /// Standard deviation of the noise. A neighbour counts within 2 sigma of the centre. In 0..1 on slices and on the brightness of
     /// pictures, in mm on distances; relative to the centre if the noise is multiplicative.
     pub sigma: f64,
@@ -189,6 +205,8 @@ impl Default for EnhancedSigma {
         EnhancedSigma {
             window: 5,
             largest: 19,
+            window_mm: None,
+            largest_mm: None,
             sigma: 0.1,
             noise: Noise::Additive,
             centre: None,
@@ -240,11 +258,21 @@ pub struct PeronaMalik {
     pub step: f64,
     /// Number of steps, 1..=1000.
     pub repeat: u32,
+    /// Width of the diffusion in mm, 0.001..=1000: the standard deviation of the Gaussian that it is where no edge stops it. It takes the
+    /// place of `repeat` in the explicit scheme, whose step is then at most `step`, and of `step` in the others. Not in `post`.
+    pub width_mm: Option<f64>,
 }
 
 impl Default for PeronaMalik {
     fn default() -> Self {
-        PeronaMalik { scheme: Scheme::Explicit, edge: 0.1, conductance: Conductance::Quotient, step: 0.2, repeat: 5 }
+        PeronaMalik {
+            scheme: Scheme::Explicit,
+            edge: 0.1,
+            conductance: Conductance::Quotient,
+            step: 0.2,
+            repeat: 5,
+            width_mm: None,
+        }
     }
 }
 
@@ -305,6 +333,8 @@ pub struct Smooth {
     pub depth: f64,
     /// Standard deviation along elevation, slices.
     pub elevation: f64,
+    /// The same in mm at the middle of the region, 0..=1000, in place of `elevation`: it follows the slice pitch. At most 32 slices.
+    pub elevation_mm: Option<f64>,
     /// Taps along each axis, 3 or 5, in place of the deviations above: a Gaussian in pixels, pixels and slices with the deviation
     /// sqrt(n - 1) / 2 of the binomial of n taps, cut off there.
     pub kernel: Option<u32>,

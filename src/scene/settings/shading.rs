@@ -10,6 +10,9 @@ use serde::{Deserialize, Serialize};
 pub struct Distance {
     /// Window size of the median filter, pixels; odd, 0 for none.
     pub median: u32,
+    /// The same in mm at the middle of the region, 0.001..=1000, in place of `median`: the nearest odd number of pixels, at most 63; less
+    /// than two are no filter.
+    pub median_mm: Option<f64>,
     /// Bilateral filter.
     pub bilateral: Option<Bilateral>,
     /// Sigma filter; sigma in mm.
@@ -24,18 +27,24 @@ impl Distance {
     /// The filters for half as many rays per axis. They cover the same part of the picture, and diffusion runs for the same time.
     pub fn halved(&self) -> Distance {
         let window = |edge: u32| 2 * (edge / 4).max(1) + 1;
+        let half = |mm: Option<f64>| mm.map(|mm| mm / 2.0);
         Distance {
             median: if self.median > 0 { window(self.median) } else { 0 },
-            bilateral: self.bilateral.map(|b| Bilateral { pixels: b.pixels / 2.0, ..b }),
-            sigma: self.sigma.map(|s| Sigma { window: window(s.window), ..s }),
+            median_mm: half(self.median_mm),
+            bilateral: self.bilateral.map(|b| Bilateral { pixels: b.pixels / 2.0, mm: half(b.mm), ..b }),
+            sigma: self.sigma.map(|s| Sigma { window: window(s.window), window_mm: half(s.window_mm), ..s }),
             enhanced_sigma: self.enhanced_sigma.map(|e| {
                 let (start, largest) = (window(e.window), window(e.largest));
-                EnhancedSigma { window: start, largest, ..e }
+                let (window_mm, largest_mm) = (half(e.window_mm), half(e.largest_mm));
+                EnhancedSigma { window: start, largest, window_mm, largest_mm, ..e }
             }),
             perona_malik: self.perona_malik.map(|p| {
                 // Time goes as the square of a length.
                 let repeat = p.repeat.div_ceil(4);
-                PeronaMalik { step: p.step * f64::from(p.repeat) / (4.0 * f64::from(repeat)), repeat, ..p }
+                let step = p.step * f64::from(p.repeat) / (4.0 * f64::from(repeat));
+                // A width in mm sets the number of steps itself.
+                let step = if p.width_mm.is_some() { p.step } else { step };
+                PeronaMalik { step, repeat, width_mm: half(p.width_mm), ..p }
             }),
         }
     }
@@ -45,13 +54,23 @@ impl Distance {
 #[derive(Clone, Copy, Debug, PartialEq, Deserialize, Serialize)]
 #[serde(deny_unknown_fields)]
 pub struct Bilateral {
-    /// Standard deviation in the picture, pixels.
+    /// Standard deviation in the picture, pixels, 0.1..=10.
+    #[serde(default)]
     pub pixels: f64,
+    /// The same in mm at the middle of the region, 0.001..=1000, in place of `pixels`: at most 10 pixels; less than a tenth is no filter.
+    #[serde(default)]
+    pub mm: Option<f64>,
     /// Standard deviation of the distance, mm.
     pub distance: f64,
     /// Number of repetitions, 1..=16.
     #[serde(default = "once")]
     pub repeat: u32,
+}
+
+impl Bilateral {
+    /// Least and largest standard deviation in the picture, pixels.
+    pub const MIN_PIXELS: f64 = 0.1;
+    pub const MAX_PIXELS: f64 = 10.0;
 }
 
 fn once() -> u32 {
@@ -64,6 +83,8 @@ fn once() -> u32 {
 pub struct Light {
     /// Direction from the surface to a distant light.
     pub direction: DVec3,
+    /// What the direction is relative to.
+    pub follows: Follows,
     /// Position of a near (point) light, mm from the camera's target. Absent: the light is distant.
     pub position: Option<DVec3>,
     /// Ambient coefficient of Blinn-Phong shading, 0..10.
@@ -88,12 +109,28 @@ pub struct Light {
     pub occlusion: Option<Occlusion>,
     /// Skin shading.
     pub skin: Option<Skin>,
+    /// Light that goes through the composited volume and is scattered in it: for volume rendering, the layer of mode mixed, and surfaces that
+    /// the volume colours. It takes a distant light.
+    pub volume: Option<LightVolume>,
+}
+
+/// What the direction to a light is relative to.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Follows {
+    /// The camera: the light stays where it is in the picture. The default.
+    #[default]
+    Camera,
+    /// The region: the light stays where it is in the body, in the axes of a camera that is not turned. A view that turns then needs no new
+    /// light volume.
+    Region,
 }
 
 impl Default for Light {
     fn default() -> Self {
         Light {
             direction: DVec3::new(-0.5, 0.6, 0.6),
+            follows: Follows::Camera,
             position: None,
             ambient: 0.18,
             diffuse: 0.75,
@@ -106,6 +143,79 @@ impl Default for Light {
             shadow: None,
             occlusion: None,
             skin: None,
+            volume: None,
+        }
+    }
+}
+
+/// Light volume: light is propagated through a lattice of cells over the region, absorbed by what the transfer function makes opaque, red least,
+/// spread as it goes, and scattered on in tissue. The coefficients of the light are those of `light`. Colours are linear light: Narkowicz's fit (2015)
+/// of the ACES film curve compresses them, so that no highlight is cut off, and a gamma of 2.2 encodes them for a screen.
+#[derive(Clone, Copy, Debug, PartialEq, Deserialize, Serialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct LightVolume {
+    /// Edge of a cell, 0.2..=10 mm. A region of more than 4 million cells gets larger ones.
+    pub cell: f64,
+    /// Samples along each edge of a cell, 1..=4.
+    pub taps: u32,
+    /// Depth of light: the path through the most opaque tissue after which 1/e of green light is left, 0.05..=100 mm.
+    pub depth: f64,
+    /// Warmth: how much deeper red light goes than green, and green than blue, 0..=2; 0 is grey.
+    pub warmth: f64,
+    /// Standard deviation over which light has spread after 1 mm, mm, 0..=2; it grows with the square root of the path. The lattice spreads light
+    /// over at least half a cell a layer.
+    pub widening: f64,
+    /// Standard deviation over which tissue scatters green light, 0..=3 mm; red further, blue less.
+    pub scatter: f64,
+    /// How much light depends on the orientation of the tissue's surface, 0..=1.
+    pub relief: f64,
+    /// Wrap-around of the light, 0..=1.
+    pub wrap: f64,
+    /// Coefficient of the back light, 0..=10.
+    pub back: f64,
+    /// Direction from the tissue to the back light, in the same axes as `light.direction`.
+    pub back_direction: DVec3,
+    /// Colour of the back light.
+    pub back_colour: [f64; 3],
+    /// Exposure: factor of the light before the response curve, 0..=100.
+    pub exposure: f64,
+    /// What is behind a volume that fills the picture. Absent: black.
+    pub ground: Option<Ground>,
+}
+
+/// A ground that is bright in the middle of the picture, a little above it, and falls off to its edges. Colours are linear light, like those of
+/// the transfer function.
+#[derive(Clone, Copy, Debug, PartialEq, Deserialize, Serialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct Ground {
+    /// Colour in the middle, 0..=1.
+    pub middle: [f64; 3],
+    /// Colour at the edges, 0..=1.
+    pub edge: [f64; 3],
+}
+
+impl Default for Ground {
+    fn default() -> Self {
+        Ground { middle: [0.022, 0.013, 0.009], edge: [0.004, 0.0025, 0.002] }
+    }
+}
+
+impl Default for LightVolume {
+    fn default() -> Self {
+        LightVolume {
+            cell: 0.8,
+            taps: 1,
+            depth: 1.4,
+            warmth: 1.0,
+            widening: 0.35,
+            scatter: 0.9,
+            relief: 0.85,
+            wrap: 0.35,
+            back: 0.12,
+            back_direction: DVec3::new(0.7, 0.6, -0.45),
+            back_colour: [0.9, 0.4, 0.22],
+            exposure: 1.0,
+            ground: None,
         }
     }
 }

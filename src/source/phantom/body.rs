@@ -141,11 +141,12 @@ pub(super) enum Scatterers {
 }
 
 impl Scatterers {
-    pub fn new(body: Body, probe: &Probe) -> Scatterers {
+    /// `still`: a body that could move does not.
+    pub fn new(body: Body, probe: &Probe, still: bool) -> Scatterers {
         let face = probe.array_radius();
         let depth = |depth: f64| face + depth;
         let truth = match body {
-            Body::Head => return Scatterers::Head(Box::new(Head::new(face))),
+            Body::Head => return Scatterers::Head(Box::new(Head::new(face, still))),
             Body::Sphere => Truth::Sphere {
                 centre: DVec3::new(4.0, depth(62.0), -3.0),
                 radius: 20.0,

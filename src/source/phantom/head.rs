@@ -1,6 +1,10 @@
 //! The fetal head in fluid: echoes and attenuation along a scan line.
 
-use super::anatomy::{self, normal};
+use super::face;
+use super::labels::Label;
+use super::limbs::{Hand, cord, shoulders};
+use super::shape::{gradient, normal};
+use super::skull::{Intracranial, intracranial, is_bone};
 use super::speckle::{Beam, Echo};
 use glam::{Mat3, Vec3, vec3};
 use std::f32::consts::TAU;
@@ -16,20 +20,23 @@ const SKIN_FACING: f32 = 4.0;
 const SKIN_MIRROR: f32 = -12.0;
 const SOFT: f32 = -11.0;
 const BONE: f32 = -4.5;
-const BRAIN: f32 = -32.0;
+const BRAIN: f32 = -29.0;
+const THALAMUS: f32 = -34.0;
+const SULCUS: f32 = -15.0;
+const FALX: f32 = -12.0;
+const CHOROID_PLEXUS: f32 = -11.0;
 const WALL: f32 = -19.0;
 const LINING: f32 = -11.0;
 const PROBE_SKIN: f32 = -9.0;
 
 /// Two-way attenuation beyond the time-gain compensation, dB/mm.
 const LOSS_SOFT: f32 = 0.12;
-const LOSS_BONE: f32 = 4.5;
+const LOSS_BONE: f32 = 2.5;
 /// Gain of the compensation at every depth, dB/mm. It makes tissue behind fluid brighter.
 const GAIN: f32 = 0.05;
 
-/// Thicknesses, mm.
+/// Thickness, mm.
 const SKIN_THICKNESS: f32 = 2.2;
-const BONE_THICKNESS: f32 = 1.6;
 
 /// Scale of the anatomy: mm in space for one mm of the model.
 const SCALE: f32 = 1.0;
@@ -41,6 +48,8 @@ pub(super) struct Head {
     origin: Vec3,
     /// Y of the array's face.
     face: f32,
+    /// Nothing moves.
+    still: bool,
 }
 
 /// The moving parts at one time.
@@ -49,8 +58,7 @@ struct Pose {
     rotation: Mat3,
     /// Opening of the jaw, mm.
     mouth: f32,
-    /// Flexion of the fingers, 0..=1.
-    curl: f32,
+    hand: Hand,
 }
 
 impl Pose {
@@ -59,12 +67,12 @@ impl Pose {
         // 0 at time 0, 1 after half a period.
         let swing = |period: f64| (0.5 - 0.5 * (std::f64::consts::TAU * time / period).cos()) as f32;
         // The head is slightly tilted, and nods and rotates by a few degrees.
-        let yaw = (-7.0 + 15.0 * swing(9.0)).to_radians();
+        let yaw = (-7.0 + 11.0 * swing(9.0)).to_radians();
         let pitch = (2.0 - 3.0 * swing(7.0)).to_radians();
         let roll = 4.0f32.to_radians();
         let rotation = Mat3::from_rotation_z(roll) * Mat3::from_rotation_x(pitch) * Mat3::from_rotation_y(yaw);
-        // The lips are a little apart; a yawn every five seconds.
-        Pose { rotation, mouth: 1.4 + 5.0 * swing(5.0).powi(3), curl: 0.25 + 0.6 * swing(6.0) }
+        // Asleep, the lips apart, with a yawn every five seconds.
+        Pose { rotation, mouth: 1.7 + 4.8 * swing(5.0).powi(3), hand: Hand::new(0.25 + 0.6 * swing(6.0)) }
     }
 }
 
@@ -79,18 +87,25 @@ enum Tissue {
 #[derive(Clone, Copy, PartialEq)]
 enum Part {
     Head,
-    Limb,
+    Hand,
+    Cord,
+    Trunk,
 }
 
 impl Head {
-    /// A head in front of an array whose face is at Y = `face` mm.
-    pub fn new(face: f64) -> Head {
+    /// A head in front of an array whose face is at Y = `face` mm. `still`: it stays as it is at time 0.
+    pub fn new(face: f64, still: bool) -> Head {
         let face = face as f32;
-        Head { origin: vec3(0.0, face + 55.0, 5.0), face }
+        // The whole vault is inside the fan.
+        Head { origin: vec3(0.0, face + 55.0, 0.0), face, still }
+    }
+
+    fn pose(&self, time: f64) -> Pose {
+        Pose::at(if self.still { 0.0 } else { time })
     }
 
     pub fn along(&self, beam: &Beam, out: &mut [Echo]) {
-        let pose = Pose::at(beam.time);
+        let pose = self.pose(beam.time);
         let pitch = beam.pitch as f32;
         let direction = beam.direction();
         let mut loss = 0.0;
@@ -104,13 +119,8 @@ impl Head {
             let tissue = self.tissue(place, &pose);
             let (echo, lost) = match tissue {
                 Tissue::Inside(deep, part) => {
-                    let faced = *facing.get_or_insert_with(|| {
-                        let n = normal(place, |p| match self.tissue(p, &pose) {
-                            Tissue::Inside(deep, _) => -deep,
-                            Tissue::Fluid(away) => away,
-                        });
-                        -n.dot(direction)
-                    });
+                    let faced = *facing
+                        .get_or_insert_with(|| -normal(place, |p| self.tissue(p, &pose).distance()).dot(direction));
                     self.flesh(place, &pose, deep, part, faced.max(0.0))
                 }
                 Tissue::Fluid(away) if wall < 0.0 => {
@@ -144,11 +154,52 @@ impl Head {
 
     fn tissue(&self, place: Vec3, pose: &Pose) -> Tissue {
         let p = self.local(place);
-        let head = anatomy::skin(pose.rotation * p, pose.mouth) * SCALE;
-        let limb = anatomy::hand(p, pose.curl).min(anatomy::cord(p)).min(anatomy::shoulders(p)) * SCALE;
-        match head.min(limb) {
+        let mut nearest = (face::skin(pose.rotation * p, pose.mouth), Part::Head);
+        for (distance, part) in
+            [(shoulders(p), Part::Trunk), (pose.hand.distance(p), Part::Hand), (cord(p), Part::Cord)]
+        {
+            if distance < nearest.0 {
+                nearest = (distance, part);
+            }
+        }
+        match nearest.0 * SCALE {
             away if away > 0.0 => Tissue::Fluid(away),
-            deep => Tissue::Inside(-deep, if head <= limb { Part::Head } else { Part::Limb }),
+            deep => Tissue::Inside(-deep, nearest.1),
+        }
+    }
+
+    /// Distance of a place from the skin at a time, mm, negative inside; to first order, so exact on the skin itself.
+    pub fn distance(&self, place: Vec3, time: f64) -> f32 {
+        // Far from the skin the slope is that of the bounds, not of the surface.
+        const NEAR: f32 = 2.0;
+        let pose = self.pose(time);
+        let distance = |p| self.tissue(p, &pose).distance();
+        let here = distance(place);
+        if here.abs() > NEAR { here } else { here / gradient(place, distance).length().clamp(0.5, 2.0) }
+    }
+
+    /// What is at a place at a time.
+    pub fn label(&self, place: Vec3, time: f64) -> Label {
+        let pose = self.pose(time);
+        match self.tissue(place, &pose) {
+            Tissue::Fluid(_) if self.wall(place) < 0.0 => Label::Fluid,
+            Tissue::Fluid(_) => Label::Uterus,
+            Tissue::Inside(_, Part::Hand) => Label::Hand,
+            Tissue::Inside(_, Part::Cord) => Label::Cord,
+            Tissue::Inside(_, Part::Trunk) => Label::Skin,
+            Tissue::Inside(_, Part::Head) => {
+                let p = pose.rotation * self.local(place);
+                if is_bone(p, pose.mouth) {
+                    return Label::Skull;
+                }
+                match intracranial(p) {
+                    None => Label::Skin,
+                    Some(Intracranial::Brain | Intracranial::Thalamus | Intracranial::Sulcus) => Label::Brain,
+                    Some(Intracranial::ChoroidPlexus) => Label::ChoroidPlexus,
+                    Some(Intracranial::Fluid) => Label::Ventricle,
+                    Some(Intracranial::Falx) => Label::Falx,
+                }
+            }
         }
     }
 
@@ -171,22 +222,36 @@ impl Head {
             mirror: if deep < 0.5 { SKIN_MIRROR + 20.0 * facing.max(0.1).log10() * 3.0 } else { Echo::SILENT.mirror },
         };
         let soft = Echo { diffuse: SOFT + texture(place, 0.5), ..Echo::SILENT };
-        if part == Part::Limb {
+        if part != Part::Head {
             return (if deep < SKIN_THICKNESS { skin() } else { soft }, LOSS_SOFT);
         }
         let p = pose.rotation * self.local(place);
-        let bone = -anatomy::bone(p, pose.mouth) * SCALE;
-        let in_brain = anatomy::brain(p) < 0.0;
-        if bone > 0.0 && bone < BONE_THICKNESS {
+        if is_bone(p, pose.mouth) {
             (Echo { diffuse: BONE + 3.0 * facing, ..Echo::SILENT }, LOSS_BONE)
         } else if deep < SKIN_THICKNESS {
             (skin(), LOSS_SOFT)
-        } else if in_brain {
-            // The falx between the hemispheres.
-            let falx = if p.x.abs() < 0.7 { 9.0 } else { 0.0 };
-            (Echo { diffuse: BRAIN + falx + texture(place, 0.25), ..Echo::SILENT }, LOSS_SOFT)
+        } else if let Some(part) = intracranial(p) {
+            let level = match part {
+                Intracranial::Brain => BRAIN + texture(place, 0.25),
+                Intracranial::Thalamus => THALAMUS,
+                Intracranial::Sulcus => SULCUS,
+                Intracranial::Falx => FALX,
+                Intracranial::ChoroidPlexus => CHOROID_PLEXUS + texture(place, 0.5),
+                Intracranial::Fluid => FLUID,
+            };
+            (Echo { diffuse: level, ..Echo::SILENT }, LOSS_SOFT)
         } else {
             (soft, LOSS_SOFT)
+        }
+    }
+}
+
+impl Tissue {
+    /// Distance from the nearest skin, mm, negative inside.
+    fn distance(&self) -> f32 {
+        match *self {
+            Tissue::Inside(deep, _) => -deep,
+            Tissue::Fluid(away) => away,
         }
     }
 }

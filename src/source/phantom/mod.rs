@@ -1,18 +1,29 @@
 //! The phantom: simulated sweeps of an exactly known body with a wobbling abdominal probe.
 //!
 //! Each scan line is a straight line through the body, at the motor's angle and the time at which it is fired. The body defines
-//! an echogenicity (`body`, `head`), and `speckle` adds the speckle of a real image. `source` hands out the frames. The same options give the same bytes on every machine
+//! an echogenicity (`body`, and `head` with `face`, `limbs` and `skull`), `truth` tells what is where, and `speckle` adds the speckle of a real image. `source` hands out the frames. The same options give the same bytes on every machine
 //! with the same mathematics library, with any number of threads.
 
-mod anatomy;
 mod body;
+mod face;
 mod head;
+mod labels;
+mod limbs;
+mod sampling;
+mod shape;
+mod skull;
 mod source;
 mod speckle;
+#[cfg(test)]
+mod tests;
+mod truth;
 
 pub use body::{Body, RampTruth, Truth, Wire};
+pub use labels::Label;
+pub use sampling::{PointSpread, Sampling};
 pub use source::{CachedPhantom, PhantomSource};
 pub use speckle::DYNAMIC_RANGE;
+pub use truth::distance_path;
 
 use crate::files::InputError;
 use crate::probe::{Advance, Array, Axis, Motion, Probe, Volumes};
@@ -30,7 +41,7 @@ use std::path::Path;
 const ARRAY_RADIUS: f64 = 40.0;
 const WOBBLE_RADIUS: f64 = 25.0;
 const SECTOR_ANGLE_DEG: f64 = 75.0;
-/// Angle from the first frame to the last.
+/// Default angle from the first frame to the last.
 pub const FAN_ANGLE_DEG: f64 = 61.0;
 /// Depth of the last sample, mm.
 const END_DEPTH: f64 = 120.0;
@@ -80,6 +91,11 @@ pub struct PhantomOptions {
     pub lines: usize,
     /// Samples a line, 16..=8192, over a depth of 120 mm.
     pub samples: usize,
+    /// Angle from the first frame to the last, degrees, 10..=120.
+    pub fan_angle_deg: f64,
+    pub point_spread: PointSpread,
+    /// The head does not move.
+    pub still: bool,
 }
 
 impl Default for PhantomOptions {
@@ -94,6 +110,9 @@ impl Default for PhantomOptions {
             frames: 37,
             lines: 128,
             samples: 512,
+            fan_angle_deg: FAN_ANGLE_DEG,
+            point_spread: PointSpread { axial_mm: 0.35, lateral_deg: 0.8, elevation_deg: 1.2 },
+            still: false,
         }
     }
 }
@@ -126,6 +145,10 @@ impl Phantom {
         if !(0.0..=1.0).contains(&options.speed_ratio) {
             return Err(refusal("speed_ratio", format!("is {}, must lie in 0..=1", options.speed_ratio)));
         }
+        if !(10.0..=120.0).contains(&options.fan_angle_deg) {
+            return Err(refusal("fan_angle", format!("is {}, must lie in 10..=120", options.fan_angle_deg)));
+        }
+        options.point_spread.check()?;
         let volumes = Volumes {
             both_ways: options.both_ways,
             speed_ratio: options.speed_ratio,
@@ -139,11 +162,11 @@ impl Phantom {
             sample_pitch: END_DEPTH / (options.samples - 1) as f64,
             samples: options.samples,
             motion: Motion::Fan { wobble_radius: WOBBLE_RADIUS },
-            slices: spread(FAN_ANGLE_DEG, options.frames),
+            slices: spread(options.fan_angle_deg, options.frames),
             advance: Advance::None,
             sound_speed: SOUND_SPEED,
         };
-        let scatterers = Scatterers::new(options.body, &probe);
+        let scatterers = Scatterers::new(options.body, &probe, options.still);
         let phantom = Phantom { options, probe, volumes, scatterers };
         for volume in 0..phantom.options.volumes.min(2) {
             phantom.probe(volume).check().map_err(|e| refusal(e.field, e.fault))?;
@@ -174,17 +197,13 @@ impl Phantom {
         let probe = self.probe(volume);
         let backward = self.volumes.backward(volume);
         let frames = self.options.frames;
-        let number_of = |slice: usize| if backward { frames - 1 - slice } else { slice };
-        // A line takes 2 d / c (thesis 4.3), and the next one follows at once.
-        let line_time = probe.acquisition_time() / (frames * self.options.lines) as f64;
-        let time_of = |slice: usize| ((volume * frames + number_of(slice)) * self.options.lines) as f64 * line_time;
 
         let echoes: Vec<Vec<Echo>> = (0..frames)
             .into_par_iter()
             .map(|slice| {
                 let mut echoes = vec![Echo::SILENT; self.options.lines * self.options.samples];
                 for (line, out) in echoes.chunks_exact_mut(self.options.samples).enumerate() {
-                    let time = time_of(slice) + line as f64 * line_time;
+                    let time = self.line_time(volume, slice, line);
                     self.scatterers.along(&Beam::new(&probe, line, slice, time), out);
                 }
                 echoes
@@ -192,9 +211,10 @@ impl Phantom {
             .collect();
         // Scatterers at rest give the same speckle in every volume. Those of a moving body do not.
         let noise_of_volume = if self.options.body == Body::Head { volume as u64 } else { 0 };
+        let psf = &self.options.point_spread;
         let slices: Vec<Vec<u8>> = match self.options.speckle {
-            Speckle::Random => speckle::slices(&echoes, &probe, self.options.seed, noise_of_volume),
-            Speckle::Mean => speckle::mean_slices(&echoes, &probe),
+            Speckle::Random => speckle::slices(&echoes, &probe, psf, self.options.seed, noise_of_volume),
+            Speckle::Mean => speckle::mean_slices(&echoes, &probe, psf),
             Speckle::None => echoes.par_iter().map(|slice| slice.iter().map(|e| grey(e.bare())).collect()).collect(),
         };
         let mut made: Vec<Frame> = slices
@@ -202,15 +222,27 @@ impl Phantom {
             .enumerate()
             .map(|(slice, bytes)| Frame {
                 volume: volume as u32,
-                number: number_of(slice) as u32,
+                number: self.number_of(volume, slice) as u32,
                 slice,
                 backward,
-                time: Some(time_of(slice)),
+                time: Some(self.line_time(volume, slice, 0)),
                 bytes,
             })
             .collect();
         made.sort_by_key(|frame| frame.number);
         made
+    }
+
+    /// The number of a slice in order of acquisition.
+    fn number_of(&self, volume: usize, slice: usize) -> usize {
+        if self.volumes.backward(volume) { self.options.frames - 1 - slice } else { slice }
+    }
+
+    /// When a line is fired, s. A line takes 2 d / c (thesis 4.3), and the next one follows at once.
+    fn line_time(&self, volume: usize, slice: usize, line: usize) -> f64 {
+        let PhantomOptions { frames, lines, .. } = self.options;
+        let each = self.probe.acquisition_time() / (frames * lines) as f64;
+        ((volume * frames + self.number_of(volume, slice)) * lines + line) as f64 * each
     }
 
     /// Writes all volumes as a PLUS sequence (`.mha`), and its probe file `<stem>.probe.toml`. Both files are complete, or neither exists.
@@ -281,10 +313,15 @@ fn probe_file(phantom: &Phantom) -> String {
         "[array]\nkind = \"curved\"\nradius_mm = {ARRAY_RADIUS:?}\n\n\
          [lines]\nsector_angle_deg = {SECTOR_ANGLE_DEG:?}\n\n\
          [depth]\nstart_mm = {:?}\nsample_pitch_mm = {:?}\n\n\
-         [motion]\nkind = \"fan\"\nwobble_radius_mm = {WOBBLE_RADIUS:?}\nfan_angle_deg = {FAN_ANGLE_DEG:?}\n\
+         [motion]\nkind = \"fan\"\nwobble_radius_mm = {WOBBLE_RADIUS:?}\nfan_angle_deg = {:?}\n\
          frames_per_volume = {}\nboth_ways = {}\nspeed_ratio = {:?}\n\n\
          [sound]\nspeed_m_per_s = {SOUND_SPEED:?}\n",
-        probe.start_depth, probe.sample_pitch, options.frames, options.both_ways, options.speed_ratio
+        probe.start_depth,
+        probe.sample_pitch,
+        options.fan_angle_deg,
+        options.frames,
+        options.both_ways,
+        options.speed_ratio
     );
     text
 }

@@ -4,6 +4,7 @@
 //! function; its magnitude is the envelope. Where the medium is constant that is fully developed speckle: Rayleigh in
 //! amplitude (mean / sd 1.913), Fisher-Tippett in dB (sd 5.57 dB).
 
+use super::sampling::PointSpread;
 use crate::probe::{Indices, Probe};
 use glam::{DVec3, Vec3};
 use rayon::prelude::*;
@@ -90,13 +91,8 @@ pub(super) fn grey(level: f32) -> u8 {
     ((1.0 + level / DYNAMIC_RANGE as f32) * 255.0).round() as u8
 }
 
-/// Standard deviations of the point-spread function of the field: in samples along the line,
-const AXIAL: f32 = 1.5;
-/// in lines at the focus, and how much more at 40 mm from it,
-const LATERAL: f32 = 1.35;
-const DEFOCUS: f32 = 0.5;
-/// and in frames.
-const ELEVATION: f32 = 0.7;
+/// How much wider the beam is at 40 mm from the focus, as a share of its width at the focus.
+const DEFOCUS: f32 = 0.37;
 /// Depth of the focus, mm.
 const FOCUS: f64 = 55.0;
 
@@ -110,8 +106,8 @@ struct Field {
 }
 
 /// Grey values of all slices of a volume, in geometric order like `echoes`.
-pub(super) fn slices(echoes: &[Vec<Echo>], probe: &Probe, seed: u64, volume: u64) -> Vec<Vec<u8>> {
-    let blur = Blur::new(probe);
+pub(super) fn slices(echoes: &[Vec<Echo>], probe: &Probe, psf: &PointSpread, seed: u64, volume: u64) -> Vec<Vec<u8>> {
+    let blur = Blur::new(probe, psf);
     let fields: Vec<Field> = echoes
         .par_iter()
         .enumerate()
@@ -120,7 +116,7 @@ pub(super) fn slices(echoes: &[Vec<Echo>], probe: &Probe, seed: u64, volume: u64
     (0..fields.len())
         .into_par_iter()
         .map(|slice| {
-            let near = across_slices(slice, fields.len());
+            let near = blur.across_slices(slice, fields.len());
             // At the ends of the fan the existing frames carry all the power.
             let power: f32 = near.clone().map(|(_, w)| w * w).sum();
             let mut sum = Field::silent(echoes[slice].len());
@@ -134,8 +130,8 @@ pub(super) fn slices(echoes: &[Vec<Echo>], probe: &Probe, seed: u64, volume: u64
 
 /// Grey values of all slices of a volume as their mean over all speckle, in geometric order like `echoes`: the frame that a filter of speckle
 /// should find. The power of the scatterers is blurred by the square of the point-spread function, the specular echo by the function itself.
-pub(super) fn mean_slices(echoes: &[Vec<Echo>], probe: &Probe) -> Vec<Vec<u8>> {
-    let blur = Blur::new(probe);
+pub(super) fn mean_slices(echoes: &[Vec<Echo>], probe: &Probe, psf: &PointSpread) -> Vec<Vec<u8>> {
+    let blur = Blur::new(probe, psf);
     let squared = blur.squared();
     // Amplitude of the specular echo, power of the scatterers.
     let parts: Vec<[Vec<f32>; 2]> = echoes
@@ -150,7 +146,7 @@ pub(super) fn mean_slices(echoes: &[Vec<Echo>], probe: &Probe) -> Vec<Vec<u8>> {
     (0..parts.len())
         .into_par_iter()
         .map(|slice| {
-            let near = || across_slices(slice, parts.len());
+            let near = || blur.across_slices(slice, parts.len());
             let power: f32 = near().map(|(_, w)| w * w).sum();
             let mean = |i: usize| {
                 let mirror: f32 = near().map(|(k, w)| w * parts[k][0][i]).sum();
@@ -190,15 +186,6 @@ fn exponential_integral(x: f64) -> f64 {
     // From its tail, which is far beyond the precision from x = 1 on.
     let tail = (1..=200).rev().fold(0.0, |tail, k| f64::from(k) / (1.0 + f64::from(k) / (x + tail)));
     (-x).exp() / (x + tail)
-}
-
-/// The slices that the point-spread function of a slice reaches, with their weights.
-fn across_slices(slice: usize, count: usize) -> impl Iterator<Item = (usize, f32)> + Clone {
-    let reach = (3.0 * ELEVATION).ceil() as isize;
-    (-reach..=reach).filter_map(move |k| {
-        let other = slice.checked_add_signed(k).filter(|other| *other < count)?;
-        Some((other, bell(k as f32, ELEVATION)))
-    })
 }
 
 /// Noise of unit power times the square root of the echogenicity, plus the specular echo in phase.
@@ -243,15 +230,20 @@ struct Blur {
     axial: Vec<f32>,
     /// Weights of each line from -reach to reach, one a sample: the beam widens away from its focus.
     lateral: Vec<Vec<f32>>,
+    /// Standard deviation across slices, in slices.
+    elevation: f32,
 }
 
 impl Blur {
-    fn new(probe: &Probe) -> Blur {
+    fn new(probe: &Probe, psf: &PointSpread) -> Blur {
+        // From lengths and angles to samples, lines and slices.
+        let axial = (psf.axial_mm / probe.sample_pitch) as f32;
+        let focused = (psf.lateral_deg.to_radians() / probe.lines.pitch()) as f32;
+        let elevation = (psf.elevation_deg.to_radians() / probe.slices.pitch()) as f32;
         let width = |sample: usize| {
             let depth = probe.start_depth + probe.sample_pitch * sample as f64;
-            LATERAL + DEFOCUS * ((depth - FOCUS) / 40.0).powi(2).min(2.0) as f32
+            focused * (1.0 + DEFOCUS * ((depth - FOCUS) / 40.0).powi(2).min(2.0) as f32)
         };
-        let reach = |sd: f32| (3.0 * sd).ceil() as isize;
         let widest = (0..probe.samples).map(width).fold(0.0, f32::max);
         let bells = |sd: f32, reach: isize| {
             let bells: Vec<f32> = (-reach..=reach).map(|d| bell(d as f32, sd)).collect();
@@ -265,7 +257,7 @@ impl Blur {
                 weights[sample] = w;
             }
         }
-        Blur { samples: probe.samples, axial: bells(AXIAL, reach(AXIAL)), lateral }
+        Blur { samples: probe.samples, axial: bells(axial, reach(axial)), lateral, elevation }
     }
 
     fn apply(&self, field: Field) -> Field {
@@ -279,7 +271,21 @@ impl Blur {
     /// The square of the point-spread function, which blurs power.
     fn squared(&self) -> Blur {
         let square = |weights: &Vec<f32>| weights.iter().map(|w| w * w).collect();
-        Blur { samples: self.samples, axial: square(&self.axial), lateral: self.lateral.iter().map(square).collect() }
+        Blur {
+            samples: self.samples,
+            axial: square(&self.axial),
+            lateral: self.lateral.iter().map(square).collect(),
+            ..*self
+        }
+    }
+
+    /// The slices that the point-spread function of a slice reaches, with their weights.
+    fn across_slices(&self, slice: usize, count: usize) -> impl Iterator<Item = (usize, f32)> + Clone {
+        let (reach, sd) = (reach(self.elevation), self.elevation);
+        (-reach..=reach).filter_map(move |k| {
+            let other = slice.checked_add_signed(k).filter(|other| *other < count)?;
+            Some((other, bell(k as f32, sd)))
+        })
     }
 
     /// Along the lines.
@@ -318,7 +324,16 @@ impl Blur {
     }
 }
 
+/// Beyond so many steps a bell is neglected.
+fn reach(sd: f32) -> isize {
+    (3.0 * sd).ceil() as isize
+}
+
+/// 1 at distance 0. Without width it is 0 everywhere else.
 fn bell(distance: f32, sd: f32) -> f32 {
+    if distance == 0.0 {
+        return 1.0;
+    }
     (-0.5 * (distance / sd).powi(2)).exp()
 }
 

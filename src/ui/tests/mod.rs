@@ -160,7 +160,7 @@ fn sliders_have_unique_names_and_the_indices_that_keys_use() {
 #[test]
 fn a_slider_shows_the_value_that_was_set() {
     for mode in ["surface", "volume", "mixed", "mip", "plane", "tomography", "cube"] {
-        for preset in ["phantom", "thesis", "bmode"] {
+        for preset in ["face", "face-classic", "thesis", "bmode"] {
             let window = settings(preset, &format!("mode='{mode}'"));
             for slider in SLIDERS.iter().filter(|s| s.applies(&window)) {
                 for share in [0.3, 0.8] {

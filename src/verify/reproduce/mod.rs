@@ -10,7 +10,7 @@ use crate::files;
 use crate::gpu::GpuError;
 use crate::machine;
 use crate::passes::slots::Format;
-use crate::passes::{Arrays, Bind, PASSES, Part, Pass, Texels, interface_check};
+use crate::passes::{Arrays, Bind, DispatchArgs, PASSES, Pass, Texels, interface_check};
 use crate::scene::Scene;
 use crate::spirv::{Access, Dimension, Kind};
 use serde_json::json;
@@ -114,7 +114,7 @@ pub enum ReproduceError {
 fn find(dut: &mut DeviceUnderTest, pass: &'static Pass) -> Result<(Case, bool), ReproduceError> {
     let scenes = dut.scenes();
     let size = |scene: &Scene| -> u64 {
-        let args = dispatch_args_of(scene, 0);
+        let args = dispatch_args_of(scene, pass, 0);
         pass.reads(scene, &args).iter().chain(&pass.writes(scene, &args)).map(|bind| bind.slot.bytes(scene)).sum()
     };
     let mut needed: Vec<&(String, Scene)> = scenes.iter().filter(|(_, scene)| pass.is_needed(scene)).collect();
@@ -129,13 +129,13 @@ fn find(dut: &mut DeviceUnderTest, pass: &'static Pass) -> Result<(Case, bool), 
     }
     for choice in &tried {
         let Choice { scene, kind, iteration, seed, .. } = *choice;
-        let worst = run_with_reference(dut.pass_runner()?, scene, pass, iteration, kind, seed)?.comparison.worst;
+        let worst = run_with_reference(dut.pass_runner(), scene, pass, iteration, kind, seed)?.comparison.worst;
         if worst.is_some() {
             return Ok((case(dut, pass, choice)?, true));
         }
     }
     let is_telling = |choice: &&Choice| {
-        let writes = pass.writes(choice.scene, &dispatch_args_of(choice.scene, choice.iteration));
+        let writes = pass.writes(choice.scene, &dispatch_args_of(choice.scene, pass, choice.iteration));
         writes.iter().map(|bind| bind.slot.shape(choice.scene).texels()).sum::<u64>() >= MIN_TEXELS
     };
     let first = tried.iter().find(is_telling).or(tried.first());
@@ -153,9 +153,10 @@ struct Choice<'a> {
 }
 
 fn case(dut: &mut DeviceUnderTest, pass: &'static Pass, choice: &Choice) -> Result<Case, GpuError> {
-    let runner = dut.pass_runner()?;
+    let runner = dut.pass_runner();
     let scene = &runner.adapted(choice.scene);
-    let args = dispatch_args_of(scene, choice.iteration);
+    // Of the frame array there are the layers of the dispatch.
+    let args = DispatchArgs { layer: 0, ..dispatch_args_of(scene, pass, choice.iteration) };
     // The inputs of the check, which come from the scene before it is adapted.
     let inputs = inputs_of(choice.scene, pass, &args, choice.kind, choice.seed);
     let mut expected = Arrays::default();
@@ -231,11 +232,7 @@ fn before(scene: &Scene, bind: &Bind, inputs: &Arrays, is_output: bool) -> (Vec<
             Texels::from_fn(bind.slot.shape(scene).size(), format.channels(), |_, _| filler)
         }
     };
-    let mut size = texels.size;
-    if bind.part == Part::Layer {
-        size[2] = 1;
-    }
-    (texels.encode(format), size)
+    (texels.encode(format), texels.size)
 }
 
 /// Writes the files. Returns their names, and why there is no script.

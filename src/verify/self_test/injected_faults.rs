@@ -2,6 +2,7 @@
 //! and in the screen.
 
 use crate::passes::fault_injection::{Change, InjectedFault};
+use crate::passes::slots::frames_per_batch;
 use crate::passes::{DispatchArgs, Params, Slot, Value};
 use crate::scene::Scene;
 use crate::spirv::mutate::{F_ADD, F_SUB, FMAX, FMIN, add_to_writes, replace_last, replace_last_opcode, round_to_half};
@@ -36,9 +37,9 @@ fn swap(params: &mut Params, a: &str, b: &str) {
     }
 }
 
-/// One slice of a volume, not the one with which single passes are checked.
+/// The batch with one slice of a volume, not the one with which single passes are checked.
 fn one_of_many(scene: &Scene, args: &DispatchArgs) -> bool {
-    scene.slices() > 3 && args.slice == scene.slices() / 3
+    scene.slices() > 3 && (args.slice..args.slice + args.slices).contains(&(scene.slices() / 3))
 }
 
 /// Shifts rays by half a pixel to the right.
@@ -73,15 +74,18 @@ fn rounded_to_half(values: &mut [f32]) {
 pub(super) const FAULTS: &[InjectedFault] = &[
     InjectedFault {
         name: "stale slice",
-        what: "one frame of a volume is dropped on its way, and its slice shows the one before",
+        what: "frames of a volume are dropped on their way, and their slices show the ones before",
         change: Change::LeftOut { pass: "scan_convert", which: one_of_many },
     },
     InjectedFault {
         name: "layer of the ring reused too early",
-        what: "one frame of a volume is overwritten by its successor before it is read",
+        what: "frames of a volume are overwritten by their successors before they are read",
         change: Change::DispatchArgs {
             pass: "scan_convert",
-            by: |scene, args| args.layer = (args.layer + u32::from(one_of_many(scene, args))) % 4,
+            by: |scene, args| {
+                let (next, layers) = (frames_per_batch(scene), Slot::Frames.shape(scene).parts());
+                args.layer = (args.layer + u32::from(one_of_many(scene, args)) * next) % layers;
+            },
         },
     },
     InjectedFault {
@@ -89,7 +93,7 @@ pub(super) const FAULTS: &[InjectedFault] = &[
         what: "the motor's way back is taken for its way there",
         change: Change::DispatchArgs {
             pass: "scan_convert",
-            by: |scene, args| args.slice = scene.slices() - 1 - args.slice,
+            by: |scene, args| args.slice = scene.slices().saturating_sub(args.slice + args.slices),
         },
     },
     InjectedFault {
@@ -162,7 +166,7 @@ pub(super) const FAULTS: &[InjectedFault] = &[
             pass: "perona_malik_slice",
             which: |scene, args| {
                 args.iteration > 0
-                    && args.iteration + 1 == scene.settings.slices.perona_malik.as_ref().map_or(0, |p| p.repeat)
+                    && args.iteration + 1 == scene.slice_filters.perona_malik.as_ref().map_or(0, |p| p.repeat)
             },
         },
     },

@@ -7,7 +7,7 @@ use echolume::gpu::faults::InjectionPoint;
 /// Prevents a console that ends with its probe, or does not find it again by itself.
 #[test]
 fn a_lost_source_is_awaited_and_the_picture_stays() {
-    let device = Device::new();
+    let device = Device::alone();
     let sources = Arc::new(Mutex::new(Vec::new()));
     let mut options = options();
     options.retry = Some(Duration::from_millis(20));
@@ -41,7 +41,7 @@ fn a_lost_source_is_awaited_and_the_picture_stays() {
 /// Prevents an accidental touch from ending a kiosk, and a kiosk that cannot be ended.
 #[test]
 fn a_kiosk_is_left_by_its_chord_alone_and_a_window_by_escape() {
-    let device = Device::new();
+    let device = Device::alone();
     let chord = "ctrl+alt+q".parse().expect("keys");
     let (all, none) = (Modifiers { control: true, alt: true, shift: false }, Modifiers::default());
     for is_kiosk in [true, false] {
@@ -69,7 +69,7 @@ fn a_lost_device_is_reported_and_the_next_one_shows_the_same() {
     for (seam, is_frozen) in
         [(InjectionPoint::Submit, true), (InjectionPoint::Submit, false), (InjectionPoint::Wait, true)]
     {
-        let (device, other) = (Device::new(), Device::new());
+        let (device, other) = (Device::alone(), Device::alone());
         let mut desk = Desk::new(&device, options());
         desk.begin();
         let seen: Vec<_> = (0..3).map(|number| desk.live(number)).collect();
@@ -98,7 +98,7 @@ fn a_lost_device_is_reported_and_the_next_one_shows_the_same() {
 /// Prevents a console that stands still with a device that does not finish.
 #[test]
 fn a_hung_device_is_given_up_and_the_next_one_shows_the_same() {
-    let (device, other) = (Device::impatient(), Device::new());
+    let (device, other) = (Device::impatient(), Device::alone());
     let mut desk = Desk::new(&device, options());
     desk.begin();
     let seen: Vec<_> = (0..2).map(|number| desk.live(number)).collect();
@@ -116,7 +116,7 @@ fn a_hung_device_is_given_up_and_the_next_one_shows_the_same() {
 /// Prevents a console that stays black because memory ran out at the wrong moment.
 #[test]
 fn running_out_of_memory_anywhere_is_recovered() {
-    let device = Device::new();
+    let device = Device::alone();
     let mut reached = 0;
     for n in (0..60).step_by(8) {
         let sources = Arc::new(Mutex::new(Vec::new()));

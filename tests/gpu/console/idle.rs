@@ -5,7 +5,7 @@ use super::*;
 /// Prevents a kiosk that runs hot all night: an unchanging picture causes no dispatch and no wake-up.
 #[test]
 fn an_idle_console_dispatches_nothing_and_asks_for_no_wake_up() {
-    let device = Device::new();
+    let device = Device::alone();
     for (overlay, panels, hud) in [(true, false, false), (false, false, false), (true, true, true)] {
         let mut desk = Desk::new(&device, ConsoleOptions { overlay, panels, scale: 0.5, ..options() });
         desk.console.resize([400, 240]);
@@ -43,7 +43,7 @@ fn an_idle_console_dispatches_nothing_and_asks_for_no_wake_up() {
 /// Prevents a view that stays coarse, and one that is slow during a drag because it is fine.
 #[test]
 fn an_exceeded_frame_budget_lowers_quality_only_during_interaction() {
-    let device = Device::new();
+    let device = Device::alone();
     let mut settings = plain();
     settings.light.shadow = Some(Default::default());
     let budget = Some(Duration::from_nanos(1));

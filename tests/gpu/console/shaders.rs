@@ -68,7 +68,7 @@ fn negative(picture: &Picture) -> Picture {
 
 #[test]
 fn an_edited_shader_is_drawn_with_and_a_broken_one_leaves_the_last_good_picture() {
-    let (device, glsl) = (Device::new(), Glsl::new());
+    let (device, glsl) = (Device::alone(), Glsl::new());
     let mut desk = Desk::new(&device, ConsoleOptions { shaders: Some(glsl.folder()), ..options() });
     desk.begin();
     let first = desk.live(0);
@@ -109,8 +109,8 @@ fn an_edited_shader_is_drawn_with_and_a_broken_one_leaves_the_last_good_picture(
     assert!(difference(&restored, &expected).1 <= 1.0, "what was restored is not drawn");
     glsl.edit(
         SLICES,
-        "void write_slice(ivec2 at, float value) {",
-        "void write_slice(ivec2 at, float value) {\n    value *= 0.5;",
+        "void write_slice(ivec3 at, float value) {",
+        "void write_slice(ivec3 at, float value) {\n    value *= 0.5;",
     );
     draws(&mut desk, "stage 1 is as before", |now| difference(now, &restored).0 > 1.0);
     glsl.restore(SLICES);
@@ -119,7 +119,7 @@ fn an_edited_shader_is_drawn_with_and_a_broken_one_leaves_the_last_good_picture(
 
 #[test]
 fn every_compiler_of_the_system_draws_what_the_embedded_shaders_draw() {
-    let device = Device::new();
+    let device = Device::alone();
     let glslang = Compiler::glslang().expect("glslangValidator: tools/test installs it");
     let Compiler::Glslang { validator, .. } = &glslang else { panic!("{}", glslang.name()) };
     let slower = Compiler::Glslang { validator: validator.clone(), optimizer: None };

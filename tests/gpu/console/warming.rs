@@ -29,7 +29,7 @@ impl Desk {
 /// Prevents a view that makes its user wait for a compiler after the first click on a mode, a layout or a preset's settings.
 #[test]
 fn after_a_rest_no_mode_layout_or_preset_compiles_anything() {
-    let device = Device::new();
+    let device = Device::alone();
     let mut desk = Desk::new(&device, ConsoleOptions { warms: true, ..options() });
     desk.begin();
     desk.live(0);
@@ -76,7 +76,7 @@ fn after_a_rest_no_mode_layout_or_preset_compiles_anything() {
         }
         assert_eq!(compiled(&device), count, "{name} is compiled when it is chosen");
     }
-    assert_eq!(PRESETS.len(), 5);
+    assert_eq!(PRESETS.len(), 7);
     // Nothing is left to do around the same settings.
     assert_eq!(desk.warm_up(&device), 0);
 }
@@ -84,7 +84,7 @@ fn after_a_rest_no_mode_layout_or_preset_compiles_anything() {
 /// Prevents warming that competes with what the user asks for, and one that is never taken up again.
 #[test]
 fn an_input_ends_warming_and_a_rest_takes_it_up_again() {
-    let device = Device::new();
+    let device = Device::alone();
     let mut desk = Desk::new(&device, ConsoleOptions { warms: true, ..options() });
     desk.begin();
     desk.live(0);
@@ -105,7 +105,7 @@ fn an_input_ends_warming_and_a_rest_takes_it_up_again() {
 /// Prevents a kiosk that compiles and wakes up for ever: warming ends, and then nothing is due.
 #[test]
 fn a_warmed_console_rests() {
-    let device = Device::new();
+    let device = Device::alone();
     let mut desk = Desk::new(&device, ConsoleOptions { warms: true, overlay: false, ..options() });
     desk.begin();
     desk.live(0);

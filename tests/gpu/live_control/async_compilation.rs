@@ -23,7 +23,7 @@ fn waking() -> (Arc<AtomicU64>, live::StreamOptions) {
 #[test]
 fn a_new_mode_compiles_in_the_background_while_pictures_continue() {
     // Expected pictures are drawn on another device, so that every pipeline here belongs to the stream.
-    let (device, plain) = (Device::new(), Device::new());
+    let (device, plain) = (Device::alone(), Device::alone());
     let (woken, options) = waking();
     let mut now = "mode = 'mip'";
     let mut bench = Bench::new(&device, now, options);
@@ -61,7 +61,7 @@ fn a_new_mode_compiles_in_the_background_while_pictures_continue() {
 /// Prevents a stream that ends or goes black because settings exceed the device; and that they return with another device.
 #[test]
 fn settings_too_large_for_the_device_are_reported_and_the_picture_stays() {
-    let (device, other) = (Device::new(), Device::new());
+    let (device, other) = (Device::alone(), Device::alone());
     let (_, options) = waking();
     let toml = "mode = 'mip'";
     let mut bench = Bench::new(&device, toml, options);
@@ -100,7 +100,7 @@ fn settings_too_large_for_the_device_are_reported_and_the_picture_stays() {
 /// Prevents a stream that never draws again because memory ran out once, anywhere: the previous settings are drawn again.
 #[test]
 fn running_out_of_memory_rejects_the_settings_and_keeps_the_stream() {
-    let (device, plain) = (Device::new(), Device::new());
+    let (device, plain) = (Device::alone(), Device::alone());
     let (before, after) = ("mode = 'mip'", "mode = 'sr'\nslices.median = true");
     let (old, new) = (of(&plain, before, 1), of(&plain, after, 1));
     let mut refused = 0;

@@ -7,7 +7,7 @@ use echolume::source::recorder::Reader;
 /// frames arrived while frozen from being shown as complete.
 #[test]
 fn frames_received_while_frozen_are_recorded_and_change_no_picture() {
-    let device = Device::new();
+    let device = Device::alone();
     for update in [Update::Whole, Update::Rolling] {
         let folder = Folder::new("frozen");
         let file = folder.join("exam.frames");
@@ -40,10 +40,11 @@ fn frames_received_while_frozen_are_recorded_and_change_no_picture() {
 /// Prevents a replay of something that was not shown, volumes that are counted twice, and a cine position that points at another volume.
 #[test]
 fn a_replayed_volume_is_identical_to_the_live_picture() {
-    let device = Device::new();
+    let device = Device::alone();
     for (update, toml) in [
         (Update::Whole, "mode = 'vr'\nslices.smooth = { elevation = 1.0 }"),
         (Update::Rolling, "mode = 'vr'\nslices.smooth = { elevation = 1.0 }"),
+        (Update::Rolling, "mode = 'vr'\nray = { elevation = 'bspline-sharp', brick = 8 }"),
         (Update::Whole, "mode = 'orthogonal'"),
     ] {
         let mut bench = Bench::new(&device, toml, kept(update));
@@ -71,7 +72,7 @@ fn a_replayed_volume_is_identical_to_the_live_picture() {
 /// Prevents a replay from mixing with the volume that is arriving meanwhile, without a spare image and with one.
 #[test]
 fn cine_replay_and_arriving_frames_do_not_mix() {
-    let device = Device::new();
+    let device = Device::alone();
     let toml = "mode = 'mip'\nslices.everything = true";
     for images in [2, 3] {
         let mut bench = Bench::new(&device, toml, live::StreamOptions { images, ..kept(Update::Whole) });
@@ -101,7 +102,7 @@ fn cine_replay_and_arriving_frames_do_not_mix() {
 /// Prevents frozen pictures with parts of the previous settings, and frames that are sent again without a need.
 #[test]
 fn settings_changed_while_frozen_redraw_the_same_volume() {
-    let device = Device::new();
+    let device = Device::alone();
     for update in [Update::Whole, Update::Rolling] {
         let mut bench = Bench::new(&device, "mode = 'mip'", kept(update));
         bench.begin(header(0.3));
@@ -141,7 +142,7 @@ fn settings_changed_while_frozen_redraw_the_same_volume() {
 /// volume is shown than the last requested one.
 #[test]
 fn settings_changed_during_a_replay_restart_the_replay() {
-    let device = Device::new();
+    let device = Device::alone();
     for update in [Update::Whole, Update::Rolling] {
         for asked in [None, Some(0)] {
             let mut bench = Bench::new(&device, "mode = 'mip'", kept(update));
@@ -174,7 +175,7 @@ fn settings_changed_during_a_replay_restart_the_replay() {
 /// Prevents a stream that waits for ever for frames that were not kept.
 #[test]
 fn without_a_cine_loop_only_changed_settings_wait_for_the_next_volume() {
-    let device = Device::new();
+    let device = Device::alone();
     for update in [Update::Whole, Update::Rolling] {
         let options = live::StreamOptions { update, ..live::StreamOptions::default() };
         let mut bench = Bench::new(&device, "mode = 'mip'", options);

@@ -16,7 +16,7 @@ fn other() -> (Header, Vec<Frame>) {
 /// Prevents a new source from being treated as late because it counts from zero, and volumes of two sources from being confused.
 #[test]
 fn a_new_source_that_counts_from_zero_continues_with_its_own_volumes() {
-    let device = Device::new();
+    let device = Device::alone();
     for update in [Update::Whole, Update::Rolling] {
         let mut bench = Bench::new(&device, "mode = 'mip'", kept(update));
         bench.begin(header(0.3));
@@ -57,7 +57,7 @@ fn a_new_source_that_counts_from_zero_continues_with_its_own_volumes() {
 /// Prevents a reopened device from showing another volume than the one being viewed, or nothing.
 #[test]
 fn a_frozen_volume_outlives_its_device() {
-    let (device, other, third) = (Device::new(), Device::new(), Device::new());
+    let (device, other, third) = (Device::alone(), Device::alone(), Device::alone());
     for update in [Update::Whole, Update::Rolling] {
         let mut bench = Bench::new(&device, "mode = 'vr'", kept(update));
         bench.begin(header(0.3));
@@ -79,7 +79,7 @@ fn a_frozen_volume_outlives_its_device() {
 /// Prevents the viewed volume from vanishing because a cable was changed, and a probe that is never shown.
 #[test]
 fn a_geometry_change_while_frozen_waits_until_the_stream_resumes() {
-    let device = Device::new();
+    let device = Device::alone();
     let mut bench = Bench::new(&device, "mode = 'mip'", kept(Update::Whole));
     bench.begin(header(0.3));
     let seen: Vec<_> = (0..2).map(|number| bench.live(number)).collect();
@@ -109,7 +109,7 @@ fn a_geometry_change_while_frozen_waits_until_the_stream_resumes() {
 /// Prevents a device that runs hot for a picture that stands still.
 #[test]
 fn an_idle_stream_reports_it_and_does_nothing() {
-    let device = Device::new();
+    let device = Device::alone();
     let mut bench = Bench::new(&device, "mode = 'sr'", kept(Update::Whole));
     assert!(bench.stream.is_idle(), "before anything came");
     bench.begin(header(0.3));

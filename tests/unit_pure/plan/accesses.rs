@@ -3,6 +3,7 @@
 use super::{FILTERED, scene};
 use crate::common::probes::voxels;
 use echolume::barriers::{Access, PipelineStage, PipelineStages, Resource, accesses};
+use echolume::passes::slots::frames_per_batch;
 use echolume::passes::{DispatchArgs, Slot, by_name};
 use std::ops::Range;
 
@@ -34,6 +35,27 @@ fn a_pass_over_frames_touches_its_layer_and_one_over_slices_its_slice() {
     let whole = |slot| (slot, 0, 0..1);
     assert_eq!(reads, [whole(Slot::SliceShares), whole(Slot::SliceForward), whole(Slot::SliceRows)]);
     assert_eq!(writes, [(Slot::SharpVolume, 1, 3..4)]);
+    // A batch of two.
+    let two = DispatchArgs { slices: 2, ..args };
+    assert_eq!(touched("load_slice", two), (vec![(Slot::Frames, 0, 2..4)], vec![(Slot::SliceA, 0, 0..2)]));
+    let (reads, writes) = touched("aos_slice", DispatchArgs { iteration: 7, ..two });
+    assert!(reads.iter().all(|(_, _, parts)| *parts == (0..2)), "{reads:?}");
+    assert_eq!(writes, [(Slot::SharpVolume, 1, 3..5)]);
+}
+
+/// A layer for each frame of a batch, as many as 4 MiB hold, at most 16; the frame array holds four batches.
+#[test]
+fn a_batch_is_as_large_as_its_frames_are_small() {
+    for (size, frames) in
+        [([6, 8, 5], 5), ([6, 8, 500], 16), ([512, 512, 40], 4), ([1024, 600, 40], 1), ([2000, 2000, 3], 1)]
+    {
+        let scene = scene(voxels(size), FILTERED);
+        assert_eq!(frames_per_batch(&scene), frames, "{size:?}");
+        for (slot, batches) in [(Slot::Frames, 4), (Slot::SliceA, 1), (Slot::SliceShares, 1)] {
+            assert_eq!(slot.shape(&scene).parts(), batches * frames, "{slot:?} of {size:?}");
+            assert!(frames == 1 || slot.bytes(&scene) <= u64::from(batches) << 22);
+        }
+    }
 }
 
 #[test]

@@ -4,7 +4,7 @@ use super::{fan, scene};
 use crate::common::probes::voxels;
 use crate::common::scenes;
 use echolume::passes::chain::{copied, distance_end, picture_end};
-use echolume::passes::{DispatchArgs, Pass, Slot, by_name, rendered};
+use echolume::passes::{DispatchArgs, Part, Pass, Slot, by_name, rendered};
 use echolume::probe::Advance;
 use echolume::scene::{Input, Scene, VisibleBounds};
 use echolume::source::StoredType;
@@ -37,6 +37,28 @@ fn filters_alternate_between_two_slots_and_the_last_writes_the_target() {
     }
     let smoothed = scene(voxels([8, 8, 5]), "slices = { median = true, smooth = { elevation = 1.0 } }");
     assert_eq!(self::link(&smoothed, "median_slice", 0), (Slot::SliceA, Slot::SharpVolume));
+}
+
+#[test]
+fn filters_read_frames_that_are_not_scaled_as_they_are() {
+    let of = |stored, range, toml: &str| scenes::scene(voxels([8, 8, 5]), Input { stored, range }, toml);
+    let filters = "slices = { median = true, smooth = { lateral = 1.0 } }";
+    for (stored, full) in [(StoredType::U8, 255.0), (StoredType::U16, 65535.0)] {
+        let frames = of(stored, [0.0, full], filters);
+        assert_eq!(pass("load_slice").needed(&frames), Err("the first filter reads frames as they are"));
+        assert_eq!(link(&frames, "median_slice", 0), (Slot::Frames, Slot::SliceA));
+        assert_eq!(link(&frames, "gaussian_lateral", 0), (Slot::SliceA, Slot::Volume));
+        let read = pass("median_slice").reads(&frames, &args(0));
+        assert_eq!((read[0].slot, read[0].part), (Slot::Frames, Part::Layers));
+        assert!(
+            pass("load_slice").is_needed(&of(stored, [0.0, full], "slices.format = 'r16f'")),
+            "no filter reads them"
+        );
+        assert!(pass("load_slice").is_needed(&of(stored, [1.0, full], filters)), "scaled");
+    }
+    assert!(pass("load_slice").is_needed(&of(StoredType::F32, [0.0, 1.0], filters)), "clamped");
+    let polar = scenes::scene(fan(Advance::None), Input { stored: StoredType::U8, range: [0.0, 255.0] }, filters);
+    assert!(pass("scan_convert").is_needed(&polar));
 }
 
 #[test]

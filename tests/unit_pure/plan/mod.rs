@@ -6,18 +6,22 @@ mod chains;
 mod reruns;
 
 use crate::common::probes::{voxels, wobbler};
-use crate::common::scenes::{self, BYTES};
+use crate::common::scenes;
 use echolume::passes::{Frequency, Slot};
 use echolume::plan::{Plan, Step, affected};
 use echolume::probe::{Advance, Geometry, Probe};
-use echolume::scene::{Scene, VisibleBounds};
+use echolume::scene::{Input, Scene, VisibleBounds};
+use echolume::source::StoredType;
 
 fn fan(advance: Advance) -> Geometry {
     Geometry::Sweep(Probe { advance, ..wobbler() })
 }
 
+/// Bytes that a pass scales: slices of voxels take one more.
+const SCALED: Input = Input { stored: StoredType::U8, range: [0.0, 200.0] };
+
 fn scene(geometry: Geometry, toml: &str) -> Scene {
-    scenes::scene(geometry, BYTES, toml)
+    scenes::scene(geometry, SCALED, toml)
 }
 
 fn step<'a>(plan: &'a Plan, name: &str) -> &'a Step {
@@ -62,7 +66,7 @@ fn a_step_reaches_as_many_slices_as_its_gaussian() {
     assert_eq!(step(&plan, "median_slice").reach(&scene(voxels([6, 8, 5]), FILTERED)), 0);
 }
 
-/// Frames of 6x8 bytes, four in flight; two spare slices, the three slots of an elimination, all of f32; two
+/// Batches of five frames of 6x8 bytes, four in flight; five layers each of two spare slots and the three of an elimination, all of f32; two
 /// volumes of 6x8x5 in R16F; a picture of 5x4 in RGBA16F and one of bytes.
 #[test]
 fn a_plan_counts_the_bytes_of_its_slots() {
@@ -73,7 +77,7 @@ fn a_plan_counts_the_bytes_of_its_slots() {
         ["frames", "slice_a", "slice_b", "slice_shares", "slice_forward", "slice_rows", "sharp_volume", "volume"];
     assert_eq!(slots[..8], expected);
     assert_eq!(slots[8..], ["picture", "screen"]);
-    assert_eq!(plan.bytes(&scene), 48 * 4 + 5 * 48 * 4 + 2 * 240 * 2 + 20 * 8 + 20 * 4);
+    assert_eq!(plan.bytes(&scene), 5 * 48 * 4 + 5 * 5 * 48 * 4 + 2 * 240 * 2 + 20 * 8 + 20 * 4);
 }
 
 #[test]
@@ -100,7 +104,7 @@ fn a_plan_explains_itself() {
         line("visible"),
         "visible: columns 0..6 of 6, rows 0..8 of 8, slices 0..5 of 5: 100.0 % of the volume; frames 0..5"
     );
-    assert_eq!(line("total"), "total 2352 bytes");
+    assert_eq!(line("total"), "total 6960 bytes");
 }
 
 #[test]

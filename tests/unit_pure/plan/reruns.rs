@@ -99,7 +99,7 @@ fn slots_of_another_shape_format_or_meaning_are_created_again() {
     let Geometry::Sweep(mut probe) = fan(Advance::None) else { panic!("a sweep") };
     probe.sound_speed = 1500.0;
     assert_eq!(rerun(&with(""), &scene(Geometry::Sweep(probe), SURFACE)), Rerun::Everything);
-    let input = Input { range: [0.0, 200.0], ..with("").input };
+    let input = Input { range: [0.0, 100.0], ..with("").input };
     let brighter = Scene::new(fan(Advance::None), input, with("").settings).expect("scene");
     assert_eq!(rerun(&with(""), &brighter), Rerun::Everything);
     // Frames that are only copied have no pass that could show the change.

@@ -35,14 +35,14 @@ const ALL: &str =
 fn filters_of_slices_go_from_slot_to_slot_and_the_last_into_the_volume() {
     let scene = slices([21, 10], &format!("{ALL}, smooth = {{ lateral = 1.0, depth = 2.0, elevation = 1.0 }}"));
     for (name, expected) in [
-        ("median_slice", "filter/median.plane: slice_a -> slice_b [21, 3, 1]"),
-        ("estimator_slice", "filter/estimator.plane: slice_b -> slice_a [21, 10, 1]"),
-        ("sigma_slice", "filter/sigma.plane: slice_a -> slice_b [21, 3, 1]"),
-        ("growth_slice", "filter/enhanced_sigma.growth: slice_b -> growth [21, 10, 1]"),
-        ("enhanced_sigma_slice", "filter/enhanced_sigma.plane: slice_b -> slice_a [21, 10, 1]"),
-        ("perona_malik_slice", "filter/perona_malik.plane: slice_a -> slice_b [21, 10, 1]"),
-        ("gaussian_lateral", "filter/gaussian.plane: slice_b -> slice_a [6, 10, 1]"),
-        ("gaussian_depth", "filter/gaussian.slice: slice_a -> sharp_volume [21, 3, 1]"),
+        ("median_slice", "filter/median.plane: slice_a -> slice_b [21, 3, 2]"),
+        ("estimator_slice", "filter/estimator.plane: slice_b -> slice_a [21, 10, 2]"),
+        ("sigma_slice", "filter/sigma.plane: slice_a -> slice_b [21, 3, 2]"),
+        ("growth_slice", "filter/enhanced_sigma.growth: slice_b -> growth [21, 10, 2]"),
+        ("enhanced_sigma_slice", "filter/enhanced_sigma.plane: slice_b -> slice_a [21, 10, 2]"),
+        ("perona_malik_slice", "filter/perona_malik.plane: slice_a -> slice_b [21, 10, 2]"),
+        ("gaussian_lateral", "filter/gaussian.plane: slice_b -> slice_a [6, 10, 2]"),
+        ("gaussian_depth", "filter/gaussian.slice: slice_a -> sharp_volume [21, 3, 2]"),
         ("gaussian_elevation", "filter/gaussian.volume: sharp_volume -> volume [21, 10, 1]"),
     ] {
         assert_eq!(told(&scene, name, 0), expected);
@@ -69,12 +69,12 @@ fn elimination_goes_forth_and_back_along_rows_and_then_columns() {
     assert_eq!((pass("aos_slice").repeat)(&scene), 8);
     let last = "shares, slice_forward, slice_rows -> ";
     for (iteration, expected) in [
-        (0, "filter/aos_forward.plane: slice_a -> slice_shares, slice_forward [10, 1, 1]".into()),
-        (1, "filter/aos_backward.rows: slice_shares, slice_forward -> slice_rows [10, 1, 1]".into()),
-        (2, "filter/aos_forward.plane: slice_a -> slice_shares, slice_forward [21, 1, 1]".into()),
-        (3, format!("filter/aos_backward.plane: slice_{last}slice_b [21, 1, 1]")),
-        (4, "filter/aos_forward.plane: slice_b -> slice_shares, slice_forward [10, 1, 1]".into()),
-        (7, format!("filter/aos_backward.slice: slice_{last}volume [21, 1, 1]")),
+        (0, "filter/aos_forward.plane: slice_a -> slice_shares, slice_forward [10, 1, 2]".into()),
+        (1, "filter/aos_backward.rows: slice_shares, slice_forward -> slice_rows [10, 1, 2]".into()),
+        (2, "filter/aos_forward.plane: slice_a -> slice_shares, slice_forward [21, 1, 2]".into()),
+        (3, format!("filter/aos_backward.plane: slice_{last}slice_b [21, 1, 2]")),
+        (4, "filter/aos_forward.plane: slice_b -> slice_shares, slice_forward [10, 1, 2]".into()),
+        (7, format!("filter/aos_backward.slice: slice_{last}volume [21, 1, 2]")),
     ] {
         let expected: String = expected;
         assert_eq!(told(&scene, "aos_slice", iteration), expected);
@@ -101,6 +101,42 @@ fn elimination_goes_forth_and_back_along_rows_and_then_columns() {
     let back =
         (pass("aos_picture").params)(&scene, &DispatchArgs { iteration: 1, slice: 2, ..DispatchArgs::default() });
     assert_eq!(back.0, [("slice", Value::I32(2))]);
+}
+
+#[test]
+fn workgroups_solve_rows_and_columns_that_their_memory_holds() {
+    let of = |size, bytes| {
+        let aos = slices(size, "perona_malik = { scheme = 'aos', repeat = 2 }");
+        Scene { shared_memory: bytes, ..aos }
+    };
+    let scene = of([21, 300], 16 << 10);
+    assert_eq!((pass("aos_slice").repeat)(&scene), 4);
+    for (iteration, expected) in [
+        (0, "filter/aos_solve.rows: slice_a -> slice_rows [38400, 1, 2]"),
+        (1, "filter/aos_solve.plane: slice_a, slice_rows -> slice_b [2688, 1, 2]"),
+        (2, "filter/aos_solve.rows: slice_b -> slice_rows [38400, 1, 2]"),
+        (3, "filter/aos_solve.slice: slice_b, slice_rows -> volume [2688, 1, 2]"),
+    ] {
+        assert_eq!(told(&scene, "aos_slice", iteration), expected);
+    }
+    assert_eq!(constants(&scene, "aos_slice", 2), [("AXIS", 0), ("CONDUCTANCE", 0), ("CHUNK", 1)]);
+    assert_eq!(constants(&scene, "aos_slice", 3), [("AXIS", 1), ("CONDUCTANCE", 0), ("CHUNK", 3)]);
+    // 16 bytes a pixel of a slice, 28 of a picture, in whole chunks of 128.
+    for (size, bytes, dispatches) in [
+        ([1024, 9], 16 << 10, 4),
+        ([1025, 9], 16 << 10, 8),
+        ([9, 1025], 16 << 10, 8),
+        ([9, 1025], 32 << 10, 4),
+        ([2048, 9], 64 << 10, 4),
+        ([2049, 9], 64 << 10, 8),
+        ([9, 9], 0, 8),
+    ] {
+        assert_eq!((pass("aos_slice").repeat)(&of(size, bytes)), dispatches, "{size:?} in {bytes} bytes");
+    }
+    for (size, dispatches) in [([512, 9], 2), ([513, 9], 4)] {
+        let aos = picture(size, "perona_malik = { scheme = 'aos', repeat = 1 }");
+        assert_eq!((pass("aos_picture").repeat)(&Scene { shared_memory: 16 << 10, ..aos }), dispatches, "{size:?}");
+    }
 }
 
 #[test]
@@ -192,7 +228,7 @@ fn shaders_and_references_get_the_same_parameters() {
     for (axis, name, radius, narrowness) in
         [(0, "gaussian_lateral", 6, 0.125), (1, "gaussian_depth", 3, 0.5), (2, "gaussian_elevation", 2, 2.0)]
     {
-        assert_eq!(constants(&scene, name, 0), [("RADIUS", radius), ("AXIS", axis)]);
+        assert_eq!(constants(&scene, name, 0), [("RADIUS", radius), ("AXIS", axis), ("SHARPENS", 0)]);
         assert_eq!(numbers(&scene, name)[..2], [("narrowness", narrowness), ("slice", 1.0)]);
     }
     assert_eq!(numbers(&scene, "gaussian_elevation")[2], ("slices", 2.0));

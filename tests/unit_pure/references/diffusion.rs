@@ -163,7 +163,7 @@ fn a_semi_implicit_step_of_a_picture_goes_by_all_its_colours() {
 
 #[test]
 fn the_last_sweep_of_a_slice_goes_where_it_belongs() {
-    let scene = slices([3, 2], "perona_malik = { scheme = 'aos' }");
+    let scene = slices([3, 2], "perona_malik = { scheme = 'aos', repeat = 1 }");
     let mut reads = Arrays::default();
     reads.insert("shares", plane([3, 2], |_, _| 0.0));
     reads.insert("forward", plane([3, 2], |x, _| x as f64));

@@ -122,7 +122,7 @@ fn a_filtered_slice_is_written_to_its_own_layer() {
         ("estimator_slice", "estimator = 'gradient-inverse'"),
         ("sigma_slice", "sigma = {}"),
         ("enhanced_sigma_slice", "enhanced_sigma = {}"),
-        ("perona_malik_slice", "perona_malik = {}"),
+        ("perona_malik_slice", "perona_malik = { repeat = 1 }"),
         ("gaussian_lateral", "smooth = { lateral = 1.0 }"),
         ("gaussian_depth", "smooth = { depth = 1.0 }"),
     ] {
@@ -135,6 +135,28 @@ fn a_filtered_slice_is_written_to_its_own_layer() {
         for (x, y) in window(source.size, 0, 0, 9) {
             assert_eq!(volume.one(x, y, 2), flat.one(x, y, 0), "{name}");
             assert!(volume.one(x, y, 0).is_nan() && volume.one(x, y, 1).is_nan(), "{name}");
+        }
+    }
+}
+
+/// A batch is its frames one by one, in planes and in the volume.
+#[test]
+fn the_reference_of_a_batch_filters_each_frame() {
+    let scene = scene([6, 5, 4], "mode = 'mip'\nslices = { median = true }");
+    let frames: Vec<Texels> = (0..3).map(|n| noise([6, 5], n)).collect();
+    let stacked = Texels::from_fn([6, 5, 3], 1, |[x, y, z], _| frames[z].one(x, y, 0));
+    let batch = dispatched(
+        &scene,
+        "median_slice",
+        &stacked,
+        DispatchArgs { slice: 1, slices: 3, ..DispatchArgs::default() },
+        4,
+    );
+    for (n, frame) in frames.iter().enumerate() {
+        let alone = filtered(&scene, "median_slice", frame);
+        for (x, y) in window(alone.size, 0, 0, 9) {
+            assert_eq!(batch.one(x, y, 1 + n), alone.one(x, y, 0));
+            assert!(batch.one(x, y, 0).is_nan());
         }
     }
 }

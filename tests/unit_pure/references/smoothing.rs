@@ -113,6 +113,70 @@ fn a_gaussian_across_slices_writes_only_the_slices_of_its_dispatch() {
     }
 }
 
+/// One slice of a value between others of 0.5: 8/6 and -1/6 of what it has more, clamped; the border is repeated.
+#[test]
+fn slices_are_sharpened_across_elevation_by_their_kernel() {
+    let scene = scene([2, 1, 6], "ray = { elevation = 'bspline-sharp' }");
+    let source = Texels::from_fn([2, 1, 6], 1, |[x, _, z], _| match (x, z) {
+        (0, 2) => 0.74,
+        (1, 0) => 0.8,
+        (1, 5) => 1.0,
+        _ => 0.5,
+    });
+    let (mut reads, mut writes) = (Arrays::default(), Arrays::default());
+    reads.insert("source", source);
+    writes.insert("target", Texels::untouched([2, 1, 6], 1));
+    let args = DispatchArgs { slice: 0, slices: 6, ..DispatchArgs::default() };
+    pass("gaussian_elevation").reference(&scene, &args, &reads, &mut writes);
+    let target = writes.get("target");
+    for (z, expected) in [0.5, 0.46, 0.82, 0.46, 0.5, 0.5].into_iter().enumerate() {
+        assert!((target.one(0, 0, z) - expected).abs() < 1e-12, "{z}: {}", target.one(0, 0, z));
+    }
+    for (z, expected) in [0.85, 0.45, 0.5, 0.5, 0.5 - 0.5 / 6.0, 1.0].into_iter().enumerate() {
+        assert!((target.one(1, 0, z) - expected).abs() < 1e-12, "{z}: {}", target.one(1, 0, z));
+    }
+    // A wave of w radians a slice: the kernel passes (4 - cos w) / 3, the B-spline at a slice (2 + cos w) / 3.
+    let w = 0.4f64;
+    let wave = Texels::from_fn([1, 1, 64], 1, |[_, _, z], _| 0.5 + 0.3 * (w * z as f64).cos());
+    let scene = self::scene([1, 1, 64], "ray = { elevation = 'bspline-sharp' }");
+    reads.insert("source", wave.clone());
+    writes.insert("target", Texels::untouched([1, 1, 64], 1));
+    let args = DispatchArgs { slice: 0, slices: 64, ..DispatchArgs::default() };
+    pass("gaussian_elevation").reference(&scene, &args, &reads, &mut writes);
+    let passed = (4.0 - w.cos()) / 3.0 * (2.0 + w.cos()) / 3.0;
+    for z in 5..59 {
+        let met = writes.get("target").bspline_across_slices([0.0, 0.0, z as f64]);
+        assert!((met - 0.5 - passed * (wave.one(0, 0, z) - 0.5)).abs() < 1e-12, "slice {z}");
+    }
+    assert!(1.0 - passed < 0.003, "nearly interpolating: {passed}");
+}
+
+/// Between slices the B-spline has a variance of 1/3 slice^2 and linear interpolation 1/6 on average.
+#[test]
+fn the_gaussian_across_slices_leaves_the_bspline_its_part_of_the_variance() {
+    for elevation in [0.0, 0.3, 0.5, 0.8, 2.0] {
+        let of = |ray: &str| {
+            let toml = format!(
+                "slices = {{ smooth = {{ lateral = 1.0, elevation = {elevation} }} }}\nray.elevation = '{ray}'"
+            );
+            self::scene([3, 3, 9], &toml)
+        };
+        let ([a, b, linear], [c, d, bspline]) = (of("linear").smoothing(), of("bspline").smoothing());
+        assert_eq!((a, b, linear), (c, d, elevation));
+        let left = elevation * elevation + 1.0 / 6.0 - 1.0 / 3.0;
+        assert!((bspline * bspline - left.max(0.0)).abs() < 1e-12, "{elevation}: {bspline}");
+        assert_eq!(of("bspline").filters_across_slices(), left > 0.0, "{elevation}");
+    }
+    // The variance of the B-spline itself: of a point, over all places between slices.
+    let point = Texels::from_fn([1, 1, 9], 1, |[_, _, z], _| f64::from(z == 4));
+    let places = (0..8000).map(|n| f64::from(n) * 1e-3);
+    let moments = places.fold([0.0; 2], |[sum, squares], z| {
+        let weight = point.bspline_across_slices([0.0, 0.0, z]) * 1e-3;
+        [sum + weight, squares + weight * (z - 4.0).powi(2)]
+    });
+    assert!((moments[0] - 1.0).abs() < 1e-6 && (moments[1] - 1.0 / 3.0).abs() < 1e-6, "{moments:?}");
+}
+
 /// Every hit of a window is weighted by its distance and its similarity; misses stay and have no weight.
 #[test]
 fn a_bilateral_filter_weighs_by_place_and_by_distance() {

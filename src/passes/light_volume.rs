@@ -1,0 +1,692 @@
+//! The light volume: a lattice of cells over the region in which light is absorbed by what the transfer function makes opaque, spreads, and is
+//! scattered on (half angle slicing, Kniss et al. 2003; extinction pyramids, Schlegel, Makhinya and Pajarola 2011). It does not depend on the
+//! view unless the light follows the camera. Volume rendering takes the light of each sample from it.
+
+use super::raycast::ray;
+use crate::passes::lookup_tables::transfer_of;
+use crate::passes::pass::*;
+use crate::passes::shade::wrap;
+use crate::passes::slots::Shape;
+use crate::scene::{Ground, LightLattice, LightVolume, Propagation, Scene};
+use glam::DVec3;
+
+/// Slope of the echo at which the orientation of a surface is certain, 1/mm: half that of skin in fluid after a Gaussian of 1.5 mm.
+const CERTAIN_SLOPE: f64 = 0.04;
+/// Density that fluid counts as where light is scattered: FLUID of diffuse.comp.
+const FLUID: f64 = 0.0015;
+/// Smallest and largest variance of the kernel of propagate.comp, cells^2, for which no weight is negative.
+const VARIANCES: [f64; 2] = [0.25, 0.75];
+/// mm along a cone of ambient light, and the length that each place stands for: REACH and LENGTH of ambient.comp.
+const REACH: [f64; 4] = [2.5, 5.0, 10.0, 20.0];
+const LENGTH: [f64; 4] = [2.5, 3.5, 7.0, 12.0];
+
+fn need(scene: &Scene) -> Need {
+    match (scene.lit_by_volume(), scene.composites()) {
+        (Some(_), _) => Ok("light goes through the composited volume"),
+        (None, true) => Err("no light volume is asked for"),
+        (None, false) => Err("nothing is composited in this mode"),
+    }
+}
+
+fn need_back(scene: &Scene) -> Need {
+    match scene.lit_by_volume() {
+        Some(light) if light.back > 0.0 => Ok("a light shines from behind"),
+        Some(_) => Err("the back light has no strength"),
+        None => need(scene),
+    }
+}
+
+fn light_of(scene: &Scene) -> LightVolume {
+    scene.settings.light.volume.unwrap_or_default()
+}
+
+/// Density of matter of an absorption of 1 over the reference length: the most opaque matter of the transfer function has a density of 1.
+fn density(scene: &Scene) -> f64 {
+    let largest = transfer_of(scene).iter().map(|entry| entry[3]).fold(0.0, f64::max);
+    if largest > 0.0 { 1.0 / largest } else { 0.0 }
+}
+
+fn cells(scene: &Scene) -> [u32; 3] {
+    scene.light_lattice().count
+}
+
+/// The density and the echo of each cell. Matter does not fade towards the faces of the region here: what it cuts lies in the shade of what is beyond.
+pub const MATTER: Pass = Pass {
+    name: "light_matter",
+    stage: Stage::Raycast,
+    frequency: Frequency::Picture,
+    link: Link::None,
+    shader: |s, _| ray::variant!(s, "light_volume/matter"),
+    needed: need,
+    reads: |s, _| {
+        let mut reads = ray::reads(s);
+        reads.push(whole("transfer", Slot::Transfer));
+        reads
+    },
+    writes: |_, _| vec![whole("matter", Slot::LightMatter)],
+    extent: |s, _| cells(s),
+    repeat: once,
+    params: |s, _| {
+        let lattice = s.light_lattice();
+        ray::unmoved_params(s, s.volume_view())
+            .vec3("light_low", s.to_local(lattice.low))
+            .f32("cell", lattice.cell)
+            .f32("density", density(s))
+    },
+    constants: |s, _| {
+        let mut constants = ray::constants(s);
+        constants.retain(|(name, _)| matches!(*name, "SWEEP" | "ARRAY" | "SAMPLING" | "ELEVATION" | "CLIPS"));
+        constants.push(("ENTRIES", s.transfer_entries() as i32));
+        constants.push(("TAPS", light_of(s).taps as i32));
+        constants
+    },
+    tolerance: Tolerance {
+        absolute: 4e-3,
+        relative: 0.0,
+        outliers: 4e-3,
+        why: "a place is off by 1e-5 mm in f32, so a sample by as much of a voxel's contrast, which the transfer function multiplies; a \
+              cell at the very border of the sector or the box may fall on either side",
+    },
+    reference: |scene, _, reads, writes| {
+        let volume = reads.get("volume");
+        let table = transfer_of(scene);
+        let (lattice, taps, view) = (scene.light_lattice(), light_of(scene).taps, scene.volume_view());
+        let (density, parts) = (density(scene), f64::from(taps.pow(3)));
+        let target = writes.get_mut("matter");
+        for_cells(lattice.count, |at| {
+            let (mut dense, mut echo) = (0.0, 0.0);
+            for n in 0..taps.pow(3) {
+                let tap =
+                    [n % taps, n / taps % taps, n / taps.pow(2)].map(|tap| (f64::from(tap) + 0.5) / f64::from(taps));
+                let place = lattice.place(std::array::from_fn(|a| at[a] as f64 + tap[a]));
+                let is_kept = place.cmpge(view.low).all()
+                    && place.cmple(scene.high).all()
+                    && scene.clips().all(|(normal, limit)| normal.dot(place) <= limit);
+                let Some(texel) = ray::texel_beyond_sweep(scene, place).filter(|_| is_kept) else { continue };
+                let value = ray::interpolated(scene, volume, texel);
+                let [low, high] = view.window;
+                let entry = ((value - low) / (high - low)).clamp(0.0, 1.0) * (table.len() - 1) as f64;
+                let n = (entry as usize).min(table.len() - 2);
+                let absorption = table[n][3] + (table[n + 1][3] - table[n][3]) * (entry - n as f64);
+                dense += absorption;
+                echo += value;
+            }
+            target.set(at, &[(density * dense / parts).min(1.0), echo / parts]);
+        });
+    },
+};
+
+/// The levels of the pyramid, one after the other.
+pub const REDUCE: Pass = Pass {
+    name: "light_reduce",
+    shader: |_, _| "light_volume/reduce.plain",
+    reads: |_, t| vec![whole("source", level(t.iteration))],
+    writes: |_, t| vec![whole("target", level(t.iteration + 1))],
+    extent: |s, t| cells(s).map(|n| n.div_ceil(2 << t.iteration)),
+    repeat: |_| 4,
+    params: |_, _| Params::default(),
+    constants: no_constants,
+    tolerance: Tolerance {
+        absolute: 1e-6,
+        relative: 6e-4,
+        outliers: 0.0,
+        why: "64 terms in f32, none negative; then R16F",
+    },
+    reference: |_, _, reads, writes| {
+        let source = reads.get("source");
+        let target = writes.get_mut("target");
+        let taps = [(-1, 1.0), (0, 3.0), (1, 3.0), (2, 1.0)];
+        for_cells(target.size.map(|n| n as u32), |at| {
+            let [x, y, z] = at.map(|n| 2 * n as i64);
+            let mut sum = 0.0;
+            for (k, down) in taps {
+                for (j, along) in taps {
+                    for (i, across) in taps {
+                        sum += across * along * down * source.clamped(x + i, y + j, z + k);
+                    }
+                }
+            }
+            target.set(at, &[sum / 512.0]);
+        });
+    },
+    ..MATTER
+};
+
+fn level(n: u32) -> Slot {
+    match n {
+        0 => Slot::LightMatter,
+        1 => Slot::LightPyramid1,
+        2 => Slot::LightPyramid2,
+        3 => Slot::LightPyramid3,
+        _ => Slot::LightPyramid4,
+    }
+}
+
+/// One of the lights that are propagated.
+struct Beam {
+    matter: Slot,
+    fronts: [Slot; 2],
+    arriving: Slot,
+    is_back: bool,
+}
+
+const KEY: Beam = Beam {
+    matter: Slot::LightMatter,
+    fronts: [Slot::LightFrontA, Slot::LightFrontB],
+    arriving: Slot::LightArriving,
+    is_back: false,
+};
+const BACK: Beam = Beam {
+    matter: Slot::LightPyramid1,
+    fronts: [Slot::BackFrontA, Slot::BackFrontB],
+    arriving: Slot::BackLight,
+    is_back: true,
+};
+
+impl Beam {
+    fn propagation(&self, scene: &Scene) -> Propagation {
+        let direction = if self.is_back { light_of(scene).back_direction } else { scene.settings.light.direction };
+        Propagation::new(scene.light_direction(direction))
+    }
+
+    fn cells(&self, scene: &Scene) -> [u32; 3] {
+        cells(scene).map(|n| if self.is_back { n / 2 } else { n })
+    }
+
+    fn cell(&self, scene: &Scene) -> f64 {
+        scene.light_lattice().cell * if self.is_back { 2.0 } else { 1.0 }
+    }
+
+    fn layers(&self, scene: &Scene) -> u32 {
+        self.cells(scene)[self.propagation(scene).axis]
+    }
+
+    /// The layer that a dispatch lights: the light's end of the axis comes first.
+    fn layer(&self, scene: &Scene, args: &DispatchArgs) -> u32 {
+        let n = args.iteration;
+        if self.propagation(scene).from_high { self.layers(scene) - 1 - n } else { n }
+    }
+
+    fn reads(&self, args: &DispatchArgs) -> Vec<Bind> {
+        let mut reads = vec![whole("matter", self.matter)];
+        reads.extend((args.iteration > 0).then(|| whole("front", self.fronts[(args.iteration as usize + 1) % 2])));
+        reads
+    }
+
+    fn writes(&self, args: &DispatchArgs) -> Vec<Bind> {
+        vec![whole("next_front", self.fronts[args.iteration as usize % 2]), whole("arriving", self.arriving)]
+    }
+
+    fn extent(&self, scene: &Scene) -> [u32; 3] {
+        let Shape::Two([width, height]) = self.fronts[0].shape(scene) else { return [1; 3] };
+        [width, height, 1]
+    }
+
+    fn variance(&self, scene: &Scene) -> f64 {
+        let path = self.propagation(scene).path * self.cell(scene);
+        let [low, high] = VARIANCES;
+        (light_of(scene).widening.powi(2) * path / self.cell(scene).powi(2)).clamp(low, high)
+    }
+
+    /// Absorption of red, green and blue over the path through one layer of density 1.
+    fn absorption(&self, scene: &Scene) -> [f64; 3] {
+        let light = light_of(scene);
+        let extinction = if self.is_back { light.back_extinction() } else { light.extinction() };
+        extinction.map(|e| e * self.propagation(scene).path * self.cell(scene))
+    }
+
+    fn params(&self, scene: &Scene, args: &DispatchArgs) -> Params {
+        Params::default()
+            .i32("layer", self.layer(scene, args))
+            .vec2("shift", self.propagation(scene).shift)
+            .f32("variance", self.variance(scene))
+            .vec3("absorption", self.absorption(scene))
+    }
+
+    fn reference(&self, scene: &Scene, args: &DispatchArgs, reads: &Arrays, writes: &mut Arrays) {
+        let found = self.propagation(scene);
+        let layer = self.layer(scene, args) as usize;
+        let [width, height, _] = self.extent(scene).map(|n| n as usize);
+        let (absorption, variance) = (self.absorption(scene), self.variance(scene));
+        // The share of each of three cells, with the mean and the variance asked for.
+        let shares = |shift: f64| {
+            let spread = variance + shift * shift;
+            [(spread - shift) / 2.0, 1.0 - spread, (spread + shift) / 2.0]
+        };
+        let whole = found.shift.map(|shift| (shift + 0.5).floor());
+        let [across, down] = [0, 1].map(|a| shares(found.shift[a] - whole[a]));
+        for (u, v) in (0..height).flat_map(|v| (0..width).map(move |u| (u, v))) {
+            let cell = match found.axis {
+                0 => [layer, u, v],
+                1 => [u, layer, v],
+                _ => [u, v, layer],
+            };
+            let mut light = [1.0; 3];
+            if args.iteration > 0 {
+                let front = reads.get("front");
+                light = [0.0; 3];
+                for (i, j) in (0..3).flat_map(|j| (0..3).map(move |i| (i, j))) {
+                    let tap = |at: usize, whole: f64, n: usize, size: usize| {
+                        (at as i64 + whole as i64 + n as i64 - 1).clamp(0, size as i64 - 1) as usize
+                    };
+                    let from = front.get([tap(u, whole[0], i, width), tap(v, whole[1], j, height), 0]);
+                    light.iter_mut().zip(from).for_each(|(light, from)| *light += across[i] * down[j] * from);
+                }
+            }
+            let dense = reads.get("matter").get(cell)[0];
+            let half: [f64; 3] = absorption.map(|a| (-0.5 * a * dense).exp());
+            let there: [f64; 3] = std::array::from_fn(|c| light[c] * half[c]);
+            let on: [f64; 3] = std::array::from_fn(|c| there[c] * half[c]);
+            writes.get_mut("arriving").set(cell, &[there[0], there[1], there[2], dense]);
+            writes.get_mut("next_front").set([u, v, 0], &[on[0], on[1], on[2], 1.0]);
+        }
+    }
+}
+
+/// The light that `light.direction` names, layer by layer.
+pub const PROPAGATE: Pass = Pass {
+    name: "light_propagate",
+    shader: |_, t| if t.iteration == 0 { "light_volume/propagate.first" } else { "light_volume/propagate.next" },
+    reads: |_, t| KEY.reads(t),
+    writes: |_, t| KEY.writes(t),
+    extent: |s, _| KEY.extent(s),
+    repeat: |s| KEY.layers(s),
+    params: |s, t| KEY.params(s, t),
+    constants: |s, _| vec![("AXIS", KEY.propagation(s).axis as i32)],
+    tolerance: Tolerance {
+        absolute: 1e-6,
+        relative: 6e-4,
+        outliers: 0.0,
+        why: "nine terms in f32, none negative; then RGBA16F",
+    },
+    reference: |s, t, reads, writes| KEY.reference(s, t, reads, writes),
+    ..MATTER
+};
+
+/// The back light, in larger cells.
+pub const PROPAGATE_BACK: Pass = Pass {
+    name: "light_propagate_back",
+    needed: need_back,
+    reads: |_, t| BACK.reads(t),
+    writes: |_, t| BACK.writes(t),
+    extent: |s, _| BACK.extent(s),
+    repeat: |s| BACK.layers(s),
+    params: |s, t| BACK.params(s, t),
+    constants: |s, _| vec![("AXIS", BACK.propagation(s).axis as i32)],
+    reference: |s, t, reads, writes| BACK.reference(s, t, reads, writes),
+    ..PROPAGATE
+};
+
+/// Light that tissue scatters, along one axis a dispatch.
+pub const DIFFUSE: Pass = Pass {
+    name: "light_diffuse",
+    shader: |_, _| "light_volume/diffuse.plain",
+    needed: |s| match s.lit_by_volume() {
+        Some(light) if light.scatter > 0.0 => Ok("tissue scatters light"),
+        Some(_) => Err("tissue scatters no light"),
+        None => need(s),
+    },
+    reads: |_, t| vec![whole("pyramid_1", Slot::LightPyramid1), whole("source", scattered(t.iteration))],
+    writes: |_, t| vec![whole("target", scattered(t.iteration + 1))],
+    extent: |s, _| cells(s),
+    repeat: |_| 3,
+    params: |s, _| Params::default().vec3("narrowness", scatter(s).map(|deviation| 0.5 / (deviation * deviation))),
+    constants: |s, t| {
+        let widest = scatter(s).into_iter().fold(0.0, f64::max);
+        vec![("AXIS", t.iteration as i32), ("RADIUS", (2.0 * widest).ceil() as i32)]
+    },
+    tolerance: Tolerance {
+        absolute: 1e-5,
+        relative: 1e-3,
+        outliers: 0.0,
+        why: "a mean with weights that are off by 1e-6 each; then RGBA16F",
+    },
+    reference: |scene, t, reads, writes| {
+        let (pyramid, source) = (reads.get("pyramid_1"), reads.get("source"));
+        let target = writes.get_mut("target");
+        let deviations = scatter(scene);
+        let radius = (2.0 * deviations.into_iter().fold(0.0, f64::max)).ceil() as i64;
+        let axis = t.iteration as usize;
+        for_cells(cells(scene), |at| {
+            let light = source.get(at);
+            let mut mean = [light[0], light[1], light[2], light[3]];
+            let [x, y, z] = at.map(|n| n / 2);
+            if pyramid.one(x, y, z) > 0.0 {
+                for (c, deviation) in deviations.iter().enumerate() {
+                    let (mut sum, mut weights) = (0.0, 0.0);
+                    for i in -radius..=radius {
+                        let along = at[axis] as i64 + i;
+                        if along < 0 || along >= source.size[axis] as i64 {
+                            continue;
+                        }
+                        let mut tap = at;
+                        tap[axis] = along as usize;
+                        let share = (-0.5 * (i as f64 / deviation).powi(2)).exp() * (source.get(tap)[3] + FLUID);
+                        sum += share * source.get(tap)[c];
+                        weights += share;
+                    }
+                    mean[c] = sum / weights;
+                }
+            }
+            target.set(at, &mean);
+        });
+    },
+    ..MATTER
+};
+
+/// The light after so many of the three axes.
+fn scattered(axes: u32) -> Slot {
+    match axes {
+        0 => Slot::LightArriving,
+        2 => Slot::LightScatteredB,
+        _ => Slot::LightScattered,
+    }
+}
+
+/// Standard deviations over which red, green and blue light are scattered, cells; more than 0.
+fn scatter(scene: &Scene) -> [f64; 3] {
+    light_of(scene).scatter_deviations().map(|deviation| (deviation / scene.light_lattice().cell).clamp(0.05, 12.0))
+}
+
+/// Light from everywhere above, and from behind.
+pub const AMBIENT: Pass = Pass {
+    name: "light_ambient",
+    shader: |s, _| if need_back(s).is_ok() { "light_volume/ambient.back" } else { "light_volume/ambient.plain" },
+    reads: |s, _| {
+        let mut reads: Vec<Bind> = (1..=4)
+            .zip(["pyramid_1", "pyramid_2", "pyramid_3", "pyramid_4"])
+            .map(|(n, name)| whole(name, level(n)))
+            .collect();
+        reads.extend(need_back(s).is_ok().then_some(whole("back_light", Slot::BackLight)));
+        reads
+    },
+    writes: |_, _| vec![whole("ambient_light", Slot::LightAmbient)],
+    extent: |s, _| cells(s).map(|n| n / 2),
+    repeat: once,
+    params: |s, _| {
+        let light = light_of(s);
+        let params = Params::default()
+            .f32("absorption", light.ambient_extinction())
+            .f32("density", 0.5 / s.light_lattice().cell)
+            .vec3("powers", light.ambient_powers())
+            .f32("ambient", s.settings.light.ambient);
+        match need_back(s) {
+            Ok(_) => params.vec3("back_colour", light.back_colour.map(|c| c * light.back)),
+            Err(_) => params,
+        }
+    },
+    constants: no_constants,
+    tolerance: Tolerance {
+        absolute: 2e-5,
+        relative: 1e-3,
+        outliers: 0.0,
+        why: "a place is off by 1e-6 cells, a power by 1e-5 of what it is; then RGBA16F",
+    },
+    reference: |scene, _, reads, writes| {
+        let light = light_of(scene);
+        let density = 0.5 / scene.light_lattice().cell;
+        let target = writes.get_mut("ambient_light");
+        let pyramid = ["pyramid_1", "pyramid_2", "pyramid_3", "pyramid_4"].map(|name| reads.get(name));
+        let ambient = scene.settings.light.ambient;
+        for_cells(target.size.map(|n| n as u32), |at| {
+            let coarse: [usize; 3] = std::array::from_fn(|a| (at[a] / 2).min(pyramid[1].size[a] - 1));
+            let mut open = 1.0;
+            if pyramid[1].get(coarse)[0] > 0.0 {
+                let share = |cone: DVec3| {
+                    let matter: f64 = (0..4)
+                        .map(|level| {
+                            let place: [f64; 3] = std::array::from_fn(|a| {
+                                let cells = at[a] as f64 + 0.5 + cone[a] * REACH[level] * density;
+                                cells / f64::from(1 << level) - 0.5
+                            });
+                            pyramid[level].trilinear(clamped(place, pyramid[level])) * LENGTH[level]
+                        })
+                        .sum();
+                    (-light.ambient_extinction() * matter).exp()
+                };
+                open = cones().into_iter().map(share).sum::<f64>() / 7.0;
+            }
+            let powers = light.ambient_powers();
+            let mut rgba = [0.0, 0.0, 0.0, ambient * open];
+            for c in 0..3 {
+                rgba[c] = ambient * open.max(1e-6).powf(powers[c]);
+                if need_back(scene).is_ok() {
+                    rgba[c] += light.back * light.back_colour[c] * reads.get("back_light").get(at)[c];
+                }
+            }
+            target.set(at, &rgba);
+        });
+    },
+    ..MATTER
+};
+
+/// Directions towards the probe: one along depth, six around it.
+fn cones() -> [DVec3; 7] {
+    std::array::from_fn(|n| match n {
+        0 => DVec3::NEG_Y,
+        _ => {
+            let (sin, cos) = ((n - 1) as f64 * std::f64::consts::FRAC_PI_3).sin_cos();
+            DVec3::new(0.8 * cos, -0.6, 0.8 * sin)
+        }
+    })
+}
+
+/// What leaves each cell, and its orientation.
+pub const SHADE: Pass = Pass {
+    name: "light_shade",
+    shader: |_, _| "light_volume/shade.plain",
+    reads: |s, _| {
+        let arriving = if (DIFFUSE.needed)(s).is_ok() { Slot::LightScattered } else { Slot::LightArriving };
+        vec![
+            whole("matter", Slot::LightMatter),
+            whole("pyramid_1", Slot::LightPyramid1),
+            whole("arriving", arriving),
+            whole("ambient_light", Slot::LightAmbient),
+        ]
+    },
+    writes: |_, _| vec![whole("light_shade", Slot::LightShade), whole("light_normals", Slot::LightNormals)],
+    extent: |s, _| cells(s),
+    repeat: once,
+    params: |s, _| {
+        let (light, volume) = (&s.settings.light, light_of(s));
+        Params::default()
+            .vec3("towards", s.light_direction(light.direction))
+            .f32("diffuse", light.diffuse)
+            .vec3("light_colour", light.colour)
+            .vec3("wrap", wrap(volume.wrap))
+            .f32("relief", volume.relief)
+            .f32("cell", s.light_lattice().cell)
+            .f32("slope", CERTAIN_SLOPE)
+    },
+    constants: no_constants,
+    tolerance: Tolerance {
+        absolute: 2e-4,
+        relative: 2e-3,
+        outliers: 2e-3,
+        why: "differences of echoes in f32, an orientation where they nearly cancel; then RGBA16F",
+    },
+    reference: |scene, _, reads, writes| {
+        let (light, volume, cell) = (&scene.settings.light, light_of(scene), scene.light_lattice().cell);
+        let towards = scene.light_direction(light.direction);
+        let wrap = wrap(volume.wrap);
+        let (matter, pyramid) = (reads.get("matter"), reads.get("pyramid_1"));
+        let ambient_light = reads.get("ambient_light");
+        for_cells(cells(scene), |at| {
+            let (mut shade, mut oriented) = ([0.0; 4], [0.0; 4]);
+            let [x, y, z] = at.map(|n| n / 2);
+            if pyramid.one(x, y, z) > 0.0 {
+                let gradient = slope_at(matter, at) / cell;
+                let steep = gradient.length();
+                let normal = if steep > 1e-9 { -gradient / steep } else { DVec3::ZERO };
+                let certain = (steep / CERTAIN_SLOPE).min(1.0);
+                let wrapped = ((DVec3::splat(normal.dot(towards)) + wrap) / (1.0 + wrap)).max(DVec3::ZERO);
+                let arriving = reads.get("arriving").get(at);
+                let place: [f64; 3] = std::array::from_fn(|a| (at[a] as f64 + 0.5) / 2.0 - 0.5);
+                let ambient = ambient_light.interpolated(clamped(place, ambient_light));
+                for c in 0..3 {
+                    let facing = 1.0 + certain * volume.relief * (1.6 * wrapped[c] - 1.0);
+                    shade[c] = light.colour[c] * (light.diffuse * arriving[c] * facing + ambient[c]);
+                    oriented[c] = certain * normal[c];
+                }
+                shade[3] = ambient[3];
+                oriented[3] = arriving[1] * light.colour[1];
+            }
+            writes.get_mut("light_shade").set(at, &shade);
+            writes.get_mut("light_normals").set(at, &oriented);
+        });
+    },
+    ..MATTER
+};
+
+/// Difference of the echo over one cell along each axis, weighted by (1, 2, 1) along the other two.
+fn slope_at(matter: &Texels, at: [usize; 3]) -> DVec3 {
+    let echo = |away: [i64; 3]| {
+        let tap = std::array::from_fn(|a| (at[a] as i64 + away[a]).clamp(0, matter.size[a] as i64 - 1) as usize);
+        matter.get(tap)[1]
+    };
+    let along = |axis: usize| {
+        let mut sum = 0.0;
+        for (i, j) in (-1..=1).flat_map(|j| (-1..=1).map(move |i| (i, j))) {
+            let weight = f64::from((2 - i32::abs(i)) * (2 - i32::abs(j)));
+            let tap = |step: i64| {
+                let mut away = [0; 3];
+                (away[axis], away[(axis + 1) % 3], away[(axis + 2) % 3]) = (step, i64::from(i), i64::from(j));
+                echo(away)
+            };
+            sum += weight * (tap(1) - tap(-1));
+        }
+        sum / 32.0
+    };
+    DVec3::new(along(0), along(1), along(2))
+}
+
+/// A place in texels, moved to the nearest texel's centre where it is beyond them.
+fn clamped(place: [f64; 3], texels: &Texels) -> [f64; 3] {
+    std::array::from_fn(|a| place[a].clamp(0.0, (texels.size[a] - 1) as f64))
+}
+
+fn for_cells(count: [u32; 3], mut of: impl FnMut([usize; 3])) {
+    let [width, height, depth] = count.map(|n| n as usize);
+    for z in 0..depth {
+        for y in 0..height {
+            (0..width).for_each(|x| of([x, y, z]));
+        }
+    }
+}
+
+/// Reciprocal of the length over which matter fades towards the faces of the region; 0 if it does not.
+fn fade_density(scene: &Scene) -> f64 {
+    scene.region_fade().map_or(0.0, |fade| 1.0 / fade)
+}
+
+/// What a pass that composites reads of the light volume.
+pub(super) fn reads(scene: &Scene) -> Vec<Bind> {
+    let filtered = scene.filters_in_hardware();
+    match scene.lit_by_volume() {
+        Some(_) => [("light_shade", Slot::LightShade), ("light_normals", Slot::LightNormals)]
+            .map(|(name, slot)| Bind { filtered, ..whole(name, slot) })
+            .to_vec(),
+        None => Vec::new(),
+    }
+}
+
+/// Adds the numbers of the light volume to those of a pass that composites.
+pub(super) fn params(scene: &Scene, params: Params) -> Params {
+    let light = &scene.settings.light;
+    let volume = light_of(scene);
+    let ground = volume.ground.unwrap_or_default();
+    let (low, density) = match scene.lit_by_volume() {
+        Some(_) => (scene.light_lattice().low, 1.0 / scene.light_lattice().cell),
+        None => (scene.local_origin(), 0.0),
+    };
+    params
+        .f32("fade_density", fade_density(scene))
+        .vec3("light_low", scene.to_local(low))
+        .f32("light_density", density)
+        .vec3("light_towards", scene.light_direction(light.direction))
+        .vec3("light_colour", light.colour)
+        .f32("specular", light.specular)
+        .f32("shininess", light.shininess)
+        .f32("exposure", volume.exposure)
+        .vec3("ground_middle", ground.middle)
+        .vec3("ground_edge", ground.edge)
+}
+
+/// Constants of a pass that composites; `is_alone`: what it makes fills the picture.
+pub(super) fn constants(scene: &Scene, is_alone: bool) -> [(&'static str, i32); 3] {
+    [
+        ("FADE", scene.region_fade().is_some() as i32),
+        ("LIT", scene.lit_by_volume().is_some() as i32),
+        ("GROUND", ground_of(scene, is_alone).is_some() as i32),
+    ]
+}
+
+fn ground_of(scene: &Scene, is_alone: bool) -> Option<Ground> {
+    scene.lit_by_volume().filter(|_| is_alone)?.ground
+}
+
+/// The light of a ray as it is shown: through the response curve, premultiplied.
+pub(super) fn developed(scene: &Scene, is_alone: bool, rgba: [f64; 4], pixel: [usize; 2]) -> [f64; 4] {
+    let Some(volume) = scene.lit_by_volume() else { return rgba };
+    let film = |light: f64| {
+        let c = light * volume.exposure;
+        (c * (2.51 * c + 0.03) / (c * (2.43 * c + 0.59) + 0.14)).clamp(0.0, 1.0).powf(1.0 / 2.2)
+    };
+    let opacity = rgba[3];
+    let Some(ground) = ground_of(scene, is_alone) else {
+        let shown = |c: usize| if opacity > 0.0 { opacity * film(rgba[c] / opacity) } else { 0.0 };
+        return [shown(0), shown(1), shown(2), opacity];
+    };
+    let size = scene.ray_size().map(f64::from);
+    let edge = size[0].min(size[1]);
+    let [right, down] =
+        [0, 1].map(|a| (pixel[a] as f64 + 0.5 - size[a] / 2.0) / edge + if a == 1 { 0.05 } else { 0.0 });
+    let share = (1.0 - 2.6 * (right * right + down * down)).clamp(0.0, 1.0);
+    let shown =
+        |c: usize| film(rgba[c] + (1.0 - opacity) * (ground.edge[c] + (ground.middle[c] - ground.edge[c]) * share));
+    [shown(0), shown(1), shown(2), 1.0]
+}
+
+/// The light volume as the reference of a pass that composites sees it.
+pub(super) struct Lit<'a> {
+    shade: &'a Texels,
+    normals: &'a Texels,
+    lattice: LightLattice,
+    towards: DVec3,
+}
+
+/// Share of the ambient light that a grazing view adds: SHEEN of lit.glsl.
+const SHEEN: f64 = 0.3;
+
+impl<'a> Lit<'a> {
+    pub fn new(scene: &Scene, reads: &'a Arrays) -> Option<Lit<'a>> {
+        scene.lit_by_volume()?;
+        Some(Lit {
+            shade: reads.get("light_shade"),
+            normals: reads.get("light_normals"),
+            lattice: scene.light_lattice(),
+            towards: scene.light_direction(scene.settings.light.direction),
+        })
+    }
+
+    /// The light of matter of this colour at a place in space that is seen along a unit direction.
+    pub fn light(&self, scene: &Scene, albedo: [f64; 3], place: DVec3, along: DVec3) -> [f64; 3] {
+        let cells = (place - self.lattice.low) / self.lattice.cell - 0.5;
+        let at = clamped(cells.to_array(), self.shade);
+        let (shade, oriented) = (self.shade.interpolated(at), self.normals.interpolated(at));
+        let direction = DVec3::new(oriented[0], oriented[1], oriented[2]);
+        let certain = direction.length();
+        if certain < 1e-4 {
+            return std::array::from_fn(|c| albedo[c] * shade[c]);
+        }
+        let normal = direction / certain;
+        let halfway = (self.towards - along).try_normalize().unwrap_or(DVec3::ZERO);
+        let gloss = if normal.dot(self.towards) > 0.0 { normal.dot(halfway).max(0.0) } else { 0.0 };
+        let light = &scene.settings.light;
+        let grazing = 1.0 - (-normal.dot(along)).max(0.0);
+        let highlight = light.specular * gloss.powf(light.shininess) * certain * oriented[3];
+        std::array::from_fn(|c| {
+            albedo[c] * (shade[c] + shade[3] * SHEEN * grazing.powi(3)) + highlight * light.colour[c]
+        })
+    }
+}

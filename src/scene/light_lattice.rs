@@ -1,0 +1,177 @@
+//! The light volume: its lattice of cells over the region, and the directions and colours of the lights that go through it.
+
+use super::region::is_still;
+use super::{Follows, LightVolume, Scene};
+use glam::DVec3;
+
+/// Maximum number of cells of the lattice, nearly.
+const MAX_CELLS: f64 = 4e6;
+
+/// Cubic cells over the rendered box.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct LightLattice {
+    /// Corner of the first cell, mm in space.
+    pub low: DVec3,
+    /// Edge of a cell, mm.
+    pub cell: f64,
+    /// Number of cells along each axis, even.
+    pub count: [u32; 3],
+}
+
+impl LightLattice {
+    /// A place in space, from a place in cells: cell n reaches from n to n + 1.
+    pub fn place(&self, cells: [f64; 3]) -> DVec3 {
+        self.low + DVec3::from(cells) * self.cell
+    }
+}
+
+/// How light comes through the lattice: layer by layer across one axis.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Propagation {
+    /// The axis that the light is nearest to.
+    pub axis: usize,
+    /// True if the light comes from the high end of the axis.
+    pub from_high: bool,
+    /// Cells along the other two axes, in their order, from a place to where its light comes from, one layer nearer to the light.
+    pub shift: [f64; 2],
+    /// Path through one layer, cells.
+    pub path: f64,
+}
+
+impl Propagation {
+    /// `towards`: unit direction to the light.
+    pub fn new(towards: DVec3) -> Propagation {
+        let sizes = towards.abs();
+        let axis = if sizes.z >= sizes.x && sizes.z >= sizes.y {
+            2
+        } else if sizes.y >= sizes.x {
+            1
+        } else {
+            0
+        };
+        let others = match axis {
+            0 => [1, 2],
+            1 => [0, 2],
+            _ => [0, 1],
+        };
+        let along = sizes[axis];
+        Propagation {
+            axis,
+            from_high: towards[axis] > 0.0,
+            shift: others.map(|other| towards[other] / along),
+            path: 1.0 / along,
+        }
+    }
+}
+
+/// Ratios of red and blue light to green in tissue at a warmth of 1: of the extinction, of the extinction of the back light, and of the distance
+/// over which it is scattered. Chosen by eye.
+const EXTINCTION: [f64; 3] = [0.557, 1.0, 1.286];
+const BACK_EXTINCTION: [f64; 3] = [0.2, 0.7, 1.4];
+const SCATTER: [f64; 3] = [1.78, 1.0, 0.667];
+/// Powers of the share of ambient light that arrives, and the ratio of its extinction to that of green light: it comes from all sides.
+const AMBIENT_POWERS: [f64; 3] = [1.0, 1.35, 1.55];
+const AMBIENT_EXTINCTION: f64 = 0.7;
+
+impl LightVolume {
+    /// Extinction of red, green and blue light in matter of density 1, 1/mm.
+    pub fn extinction(&self) -> [f64; 3] {
+        EXTINCTION.map(|ratio| ratio.powf(self.warmth) / self.depth)
+    }
+
+    /// The same of the back light.
+    pub fn back_extinction(&self) -> [f64; 3] {
+        let [_, green, _] = BACK_EXTINCTION;
+        BACK_EXTINCTION.map(|ratio| green * (ratio / green).powf(self.warmth) / self.depth)
+    }
+
+    /// The same of ambient light, of any colour.
+    pub fn ambient_extinction(&self) -> f64 {
+        AMBIENT_EXTINCTION / self.depth
+    }
+
+    /// Powers of the share of ambient light that arrives.
+    pub fn ambient_powers(&self) -> [f64; 3] {
+        AMBIENT_POWERS.map(|power| 1.0 + self.warmth * (power - 1.0))
+    }
+
+    /// Standard deviations over which tissue scatters red, green and blue light, mm.
+    pub fn scatter_deviations(&self) -> [f64; 3] {
+        SCATTER.map(|ratio| ratio.powf(self.warmth) * self.scatter)
+    }
+}
+
+impl Scene {
+    /// The light volume, if something is composited that it lights.
+    pub fn lit_by_volume(&self) -> Option<LightVolume> {
+        self.settings.light.volume.filter(|_| self.composites())
+    }
+
+    /// The lattice of the light volume over the box that is composited. Cells are larger than asked for where there would be too many.
+    pub fn light_lattice(&self) -> LightLattice {
+        let low = self.volume_view().low;
+        let extent = self.high - low;
+        let asked = self.settings.light.volume.unwrap_or_default().cell;
+        // A tenth more, since counts are rounded up.
+        let fitting = (1.1 * extent.x * extent.y * extent.z / MAX_CELLS).cbrt();
+        let cell = asked.max(fitting).max(extent.max_element() / 1024.0);
+        let count: [u32; 3] = std::array::from_fn(|a| 2 * ((extent[a] / cell / 2.0).ceil().max(1.0) as u32));
+        let size = DVec3::from(count.map(f64::from)) * cell;
+        LightLattice { low: low - (size - extent) / 2.0, cell, count }
+    }
+
+    /// A direction in the axes that `light.follows` names, in space, as a unit vector.
+    pub fn light_direction(&self, direction: DVec3) -> DVec3 {
+        let v = direction.normalize();
+        match self.settings.light.follows {
+            Follows::Camera => self.rays.from_camera(v),
+            // A camera that is not turned looks along depth, elevation is up; at a single frame it looks along elevation, depth is down.
+            Follows::Region if is_still(&self.geometry) => DVec3::new(v.x, -v.y, -v.z),
+            Follows::Region => DVec3::new(v.x, -v.z, v.y),
+        }
+    }
+
+    /// Length over which matter fades towards the faces of the region, mm; none if it does not.
+    pub fn region_fade(&self) -> Option<f64> {
+        Some(self.settings.region.fade).filter(|fade| *fade > 0.0)
+    }
+
+    /// The share of the matter that is left at a place in space, near the faces of the region.
+    pub fn faded(&self, place: DVec3) -> f64 {
+        let Some(fade) = self.region_fade() else { return 1.0 };
+        let (low, high) = (place - self.volume_view().low, self.high - place);
+        // Edges and corners are round.
+        let to_faces = DVec3::new(low.x.min(high.x), high.y, low.z.min(high.z));
+        let t = (1.0 - (1.0 - to_faces / fade).max(DVec3::ZERO).length()).clamp(0.0, 1.0);
+        t * t * (3.0 - 2.0 * t)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn light_goes_across_the_axis_that_it_is_nearest_to() {
+        let towards = DVec3::new(-0.6, -0.48, 0.64);
+        let found = Propagation::new(towards);
+        assert_eq!((found.axis, found.from_high), (2, true));
+        let expected = [-0.6 / 0.64, -0.48 / 0.64];
+        assert!((0..2).all(|i| (found.shift[i] - expected[i]).abs() < 1e-12), "{found:?}");
+        assert!((found.path - 1.0 / 0.64).abs() < 1e-12);
+        let found = Propagation::new(DVec3::NEG_Y);
+        assert_eq!((found.axis, found.from_high, found.shift, found.path), (1, false, [0.0, 0.0], 1.0));
+    }
+
+    #[test]
+    fn red_light_goes_deepest_and_a_warmth_of_0_is_grey() {
+        let warm = LightVolume::default();
+        for [red, green, blue] in [warm.extinction(), warm.back_extinction()] {
+            assert!(red < green && green < blue);
+        }
+        let grey = LightVolume { warmth: 0.0, ..warm };
+        assert_eq!(grey.extinction(), [1.0 / 1.4; 3]);
+        assert_eq!(grey.ambient_powers(), [1.0; 3]);
+        assert_eq!(grey.scatter_deviations(), [grey.scatter; 3]);
+    }
+}

@@ -1,0 +1,87 @@
+//! How densely a phantom's sweep is sampled, and how far the probe blurs it.
+
+use super::{PhantomOptions, refusal};
+use crate::files::InputError;
+use std::fmt;
+use std::str::FromStr;
+
+/// Standard deviations of the point-spread function of the field, of which the magnitude is shown. 0 is no blur.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct PointSpread {
+    /// Along a scan line, mm, 0..=5.
+    pub axial_mm: f64,
+    /// From line to line at the focus, degrees, 0..=10. Away from the focus it is wider.
+    pub lateral_deg: f64,
+    /// From frame to frame, degrees, 0..=10.
+    pub elevation_deg: f64,
+}
+
+impl PointSpread {
+    /// # Errors
+    /// A standard deviation that is out of its range.
+    pub(super) fn check(&self) -> Result<(), InputError> {
+        let parts = [
+            ("psf_axial", self.axial_mm, 5),
+            ("psf_lateral", self.lateral_deg, 10),
+            ("psf_elevation", self.elevation_deg, 10),
+        ];
+        for (field, sd, most) in parts {
+            if !(0.0..=f64::from(most)).contains(&sd) {
+                return Err(refusal(field, format!("is {sd}, must lie in 0..={most}")));
+            }
+        }
+        Ok(())
+    }
+}
+
+/// Named sets of options.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Sampling {
+    /// What a live probe acquires in under a second: 37 frames of 128 lines.
+    #[default]
+    Live,
+    /// A slow, dense sweep of a fetus at rest, for stills: 111 frames of 192 lines and a narrower beam.
+    Gallery,
+}
+
+impl Sampling {
+    pub const ALL: [Sampling; 2] = [Sampling::Live, Sampling::Gallery];
+
+    pub fn name(self) -> &'static str {
+        match self {
+            Sampling::Live => "live",
+            Sampling::Gallery => "gallery",
+        }
+    }
+
+    /// One volume of the head in this sampling.
+    pub fn options(self) -> PhantomOptions {
+        let live = PhantomOptions::default();
+        match self {
+            Sampling::Live => live,
+            Sampling::Gallery => PhantomOptions {
+                frames: 111,
+                lines: 192,
+                point_spread: PointSpread { lateral_deg: 0.6, elevation_deg: 0.6, ..live.point_spread },
+                still: true,
+                ..live
+            },
+        }
+    }
+}
+
+impl fmt::Display for Sampling {
+    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        f.write_str(self.name())
+    }
+}
+
+impl FromStr for Sampling {
+    type Err = InputError;
+
+    fn from_str(name: &str) -> Result<Sampling, InputError> {
+        let known = || Sampling::ALL.map(Sampling::name).join(", ");
+        let found = Sampling::ALL.into_iter().find(|sampling| sampling.name() == name);
+        found.ok_or_else(|| refusal("sampling", format!("'{name}' is not known, must be one of {}", known())))
+    }
+}

@@ -1,0 +1,76 @@
+//! The truth of the fetal head as volume files: a label at each voxel, and the signed distance from the skin.
+
+use super::Phantom;
+use super::body::{Scatterers, refusal};
+use super::head::Head;
+use super::labels::Label;
+use crate::files::InputError;
+use crate::probe::{Geometry, Grid};
+use crate::source::convert::{VolumeFile, lattice, write_grid};
+use crate::source::samples::SampleType;
+use glam::DVec3;
+use std::path::{Path, PathBuf};
+
+/// Where the signed distance goes that belongs to a label volume: `truth.mha` gives `truth.distance.mha`.
+pub fn distance_path(labels: &Path) -> PathBuf {
+    labels.with_extension("distance.mha")
+}
+
+impl Phantom {
+    /// The label at a place of the space of [`crate::probe::Probe`], mm, in a volume, at the time at which the beam passes there.
+    ///
+    /// # Errors
+    /// A body other than the head, which has a formula instead: [`Phantom::truth`].
+    pub fn label(&self, volume: usize, place: DVec3) -> Result<Label, InputError> {
+        let head = self.head()?;
+        Ok(head.label(place.as_vec3(), self.time_at(volume, place)))
+    }
+
+    /// Distance of such a place from the skin of head, trunk, hand or cord, mm, negative inside; to first order, so exact on
+    /// the skin itself. The uterus does not count.
+    ///
+    /// # Errors
+    /// As [`Phantom::label`].
+    pub fn distance(&self, volume: usize, place: DVec3) -> Result<f64, InputError> {
+        let head = self.head()?;
+        Ok(f64::from(head.distance(place.as_vec3(), self.time_at(volume, place))))
+    }
+
+    /// The grid of the truth: over the insonified region, as [`lattice`] of the sweep, `spacing` mm apart.
+    ///
+    /// # Errors
+    /// A body other than the head, a spacing that is no length or makes too many voxels.
+    pub fn truth_grid(&self, spacing: f64) -> Result<Grid, InputError> {
+        self.head()?;
+        lattice(&Geometry::Sweep(self.probe(0)), spacing).map_err(|fault| refusal("truth_spacing", fault))
+    }
+
+    /// Writes the truth of the first volume as two MetaImages on a grid: labels (u8, [`Label`]) to `path`, distances (f32, mm, as
+    /// [`Phantom::distance`]) to [`distance_path`]. Both have values outside the sector, too.
+    ///
+    /// # Errors
+    /// A body other than the head, a path that does not end in .mha, a file that cannot be written. A file that is there is complete.
+    pub fn write_truth(&self, path: &Path, grid: &Grid) -> Result<(), InputError> {
+        self.head()?;
+        if VolumeFile::of(path)? != VolumeFile::MetaImage {
+            return Err(InputError::new(path, "file", "must end in .mha"));
+        }
+        let label = |place| self.label(0, place).ok().map(|label| f64::from(label as u8));
+        write_grid(grid, SampleType::U8, path, label, || ())?;
+        write_grid(grid, SampleType::F32, &distance_path(path), |place| self.distance(0, place).ok(), || ())
+    }
+
+    fn head(&self) -> Result<&Head, InputError> {
+        match &self.scatterers {
+            Scatterers::Head(head) => Ok(head),
+            Scatterers::Exact { .. } => Err(refusal("body", "is not the head: only the head has labels")),
+        }
+    }
+
+    /// When the beam passes a place, s; outside the sector, when it is nearest in line and frame.
+    fn time_at(&self, volume: usize, place: DVec3) -> f64 {
+        let at = self.probe(volume).to_indices(place);
+        let nearest = |index: f64, count: usize| index.round().clamp(0.0, (count - 1) as f64) as usize;
+        self.line_time(volume, nearest(at.slice, self.options.frames), nearest(at.line, self.options.lines))
+    }
+}

@@ -1,0 +1,191 @@
+//! The light volume against closed formulas: a slab, a sphere, two spheres, and what no formula may break.
+
+use crate::common::gpu::*;
+use crate::common::probes::voxels;
+use crate::common::scenes::{BYTES, scene};
+use echolume::gpu::Renderer;
+use echolume::passes::{Slot, Texels};
+use echolume::scene::Scene;
+use glam::DVec3;
+
+/// Voxels of 1 mm whose centres count from 0.
+const SIZE: [usize; 3] = [48, 40, 44];
+/// Light towards +elevation unless another is given, in matter with 1/e of all colours after 5 mm.
+const LIGHT: &str = "follows = 'region', direction = [0, 1, 0]";
+const GREY: &str = "cell = 1, depth = 5, warmth = 0, scatter = 0, widening = 0, back = 0";
+
+fn look(light: &str, volume: &str) -> Scene {
+    let toml = format!(
+        "mode = 'vr'\npicture.size = [32, 32]\nvolume.extinction = 0.2\nvolume.transfer = [{{ at = 0, colour = [1, 1, 1], opacity = 0 }}, \
+         {{ at = 1, colour = [1, 1, 1], opacity = 1 }}]\nlight = {{ {light}, volume = {{ {volume} }} }}"
+    );
+    scene(voxels(SIZE), BYTES, &toml)
+}
+
+/// A slot of the picture of matter with this density at a place in mm.
+fn lit(device: &Device, scene: &Scene, density: impl Fn(DVec3) -> f64, slot: Slot) -> Texels {
+    let mut renderer = Renderer::new(device, scene.clone(), &Default::default()).expect("renderer");
+    let [width, height, slices] = SIZE;
+    for k in 0..slices {
+        let value = |i: usize, j: usize| density(DVec3::new(i as f64, j as f64, k as f64));
+        let bytes: Vec<u8> = (0..height)
+            .flat_map(|j| (0..width).map(move |i| (i, j)))
+            .map(|(i, j)| (255.0 * value(i, j)).round() as u8)
+            .collect();
+        renderer.frame(k as u32, &bytes, 0).expect("frame");
+    }
+    renderer.show(0).expect("show");
+    renderer.picture().expect("picture");
+    renderer.read(slot).expect("read").expect("of the plan")
+}
+
+/// The value of a light at a place in mm: between the cells around it.
+fn at(scene: &Scene, light: &Texels, place: DVec3) -> [f64; 4] {
+    let lattice = scene.light_lattice();
+    let cells = (place - lattice.low) / lattice.cell - 0.5;
+    let cells = std::array::from_fn(|a| cells[a].clamp(0.0, (light.size[a] - 1) as f64));
+    light.interpolated(cells)
+}
+
+fn slab(from: f64, to: f64) -> impl Fn(DVec3) -> f64 {
+    move |p| if (from..=to).contains(&p.z) { 1.0 } else { 0.0 }
+}
+
+/// Behind a slab of 10 mm is left what the law of Lambert and Beer leaves, for any direction and colour; in front of it all.
+#[test]
+fn a_slab_absorbs_by_the_length_of_the_path() {
+    let device = Device::new();
+    for (direction, cosine) in [("[0, 1, 0]", 1.0), ("[0.6, 0.8, 0]", 0.8), ("[-0.36, 0.8, 0.48]", 0.8)] {
+        let light = format!("follows = 'region', direction = {direction}");
+        let scene = look(&light, &GREY.replace("warmth = 0", "warmth = 1"));
+        let arriving = lit(&device, &scene, slab(20.0, 29.0), Slot::LightArriving);
+        let extinction = scene.settings.light.volume.expect("asked for").extinction();
+        for (c, extinction) in extinction.into_iter().enumerate() {
+            // Half of each border's cell on either side: ten cells.
+            let expected = (-extinction * 10.0 / cosine).exp();
+            let behind = at(&scene, &arriving, DVec3::new(24.0, 20.0, 12.0))[c];
+            assert!((behind - expected).abs() < 0.01 * expected, "{direction} channel {c}: {behind}, not {expected}");
+            let before = at(&scene, &arriving, DVec3::new(24.0, 20.0, 36.0))[c];
+            assert!((before - 1.0).abs() < 2e-3, "{direction} channel {c}: {before}");
+        }
+        assert!(extinction[0] < extinction[1] && extinction[1] < extinction[2], "red goes deepest");
+    }
+    assert!(device.messages().is_empty(), "{:?}", device.messages());
+}
+
+fn ball(middle: DVec3, radius: f64) -> impl Fn(DVec3) -> f64 {
+    // A voxel across the border counts by its share, nearly.
+    move |p| (radius + 0.5 - p.distance(middle)).clamp(0.0, 1.0)
+}
+
+/// On the axis behind a sphere light has passed its diameter; beside it nothing.
+#[test]
+fn a_sphere_casts_a_shadow_of_its_chords() {
+    let device = Device::new();
+    let scene = look(LIGHT, GREY);
+    let (middle, radius) = (DVec3::new(24.0, 20.0, 26.0), 8.0);
+    let arriving = lit(&device, &scene, ball(middle, radius), Slot::LightArriving);
+    for off in [0.0, 2.0, 4.0] {
+        // Light that spreads mixes chords: the lattice spreads it over half a cell a layer, 4 mm^2 over the 16 layers, half of it
+        // on average over those within and behind the sphere. The mean of the second derivative times half the variance.
+        let chord = |off: f64| 2.0 * (radius * radius - off * off).max(0.0).sqrt();
+        let expected = (-chord(off) / 5.0).exp();
+        let behind = at(&scene, &arriving, middle + DVec3::new(off, 0.0, -10.0))[1];
+        assert!((behind - expected).abs() < 0.02 + 0.15 * expected, "{off} mm off the axis: {behind}, not {expected}");
+    }
+    let beside = at(&scene, &arriving, middle + DVec3::new(18.0, 0.0, -10.0))[1];
+    assert!(beside > 0.995, "{beside}");
+}
+
+/// A sphere in the shadow of another gets the product, whether the first is seen or not: the light volume knows no view.
+#[test]
+fn shadows_of_two_spheres_multiply_and_do_not_depend_on_the_view() {
+    let device = Device::new();
+    let scene = look(LIGHT, GREY);
+    let (first, second) = (ball(DVec3::new(24.0, 20.0, 34.0), 6.0), ball(DVec3::new(24.0, 20.0, 16.0), 6.0));
+    let both = lit(&device, &scene, |p| first(p).max(second(p)), Slot::LightArriving);
+    let (one, other) =
+        (lit(&device, &scene, &first, Slot::LightArriving), lit(&device, &scene, &second, Slot::LightArriving));
+    let place = DVec3::new(24.0, 20.0, 6.0);
+    let [both_left, one_left, other_left] = [&both, &one, &other].map(|light| at(&scene, light, place)[1]);
+    // Light that spread behind the first is not parallel any more: a few percent.
+    assert!((both_left - one_left * other_left).abs() < 0.05, "{both_left}, {one_left} x {other_left}");
+    assert!(both_left < 0.6 * one_left && one_left < 0.3, "{both_left} {one_left}");
+
+    let mut turned = scene.settings.clone();
+    (turned.camera.azimuth, turned.camera.elevation) = (70.0, 30.0);
+    let turned = Scene::new(scene.geometry.clone(), scene.input, turned).expect("scene");
+    assert_eq!(lit(&device, &turned, |p| first(p).max(second(p)), Slot::LightArriving).values, both.values);
+}
+
+/// A camera that turns needs no new light, unless the light follows it.
+#[test]
+fn a_view_that_turns_keeps_the_light_of_the_region() {
+    let device = Device::new();
+    for (follows, again) in [("region", false), ("camera", true)] {
+        let light = format!("follows = '{follows}', direction = [0.3, 1, 0.2]");
+        let scene = look(&light, GREY);
+        let mut renderer = Renderer::new(&device, scene.clone(), &Default::default()).expect("renderer");
+        let frame = vec![128; SIZE[0] * SIZE[1]];
+        (0..SIZE[2]).for_each(|k| renderer.frame(k as u32, &frame, 0).expect("frame"));
+        renderer.show(0).expect("show");
+        renderer.picture().expect("picture");
+        let mut turned = scene.settings.clone();
+        turned.camera.azimuth = 25.0;
+        let turned = Scene::new(scene.geometry.clone(), scene.input, turned).expect("scene");
+        let passes = renderer.dispatched_passes(|r| r.change(turned).and_then(|_| r.picture())).expect("picture");
+        assert!(passes.contains(&"raycast_volume") && !passes.contains(&"light_matter"), "{follows}: {passes:?}");
+        assert_eq!(passes.contains(&"light_propagate"), again, "{follows}: {passes:?}");
+    }
+}
+
+/// Passes that run again may find what they read overwritten by later ones of the same chain.
+#[test]
+fn any_change_of_the_light_gives_the_picture_of_a_fresh_renderer() {
+    let device = Device::new();
+    let frame: Vec<u8> =
+        (0..SIZE[0] * SIZE[1]).map(|i| if i / SIZE[0] > 14 { 160 + (i % 7) as u8 * 10 } else { 0 }).collect();
+    let rendered = |scene: &Scene| {
+        let mut renderer = Renderer::new(&device, scene.clone(), &Default::default()).expect("renderer");
+        (0..SIZE[2]).for_each(|k| renderer.frame(k as u32, &frame, 0).expect("frame"));
+        renderer.show(0).expect("show");
+        renderer.picture().expect("picture");
+        renderer
+    };
+    let warm = GREY.replace("cell = 1", "cell = 2");
+    let scenes = [
+        look(LIGHT, &warm.replace("scatter = 0", "scatter = 2")),
+        look(LIGHT, &warm.replace("scatter = 0", "scatter = 1")),
+        look(LIGHT, &warm),
+        look(LIGHT, &warm.replace("back = 0", "back = 1").replace("scatter = 0", "scatter = 3")),
+        look("direction = [1, 0.1, 0.2]", &warm.replace("scatter = 0", "scatter = 3")),
+        look("direction = [1, 0.1, 0.2], ambient = 0.6", &warm.replace("scatter = 0", "scatter = 0.5")),
+        look("direction = [-0.1, 0.1, 1]", &warm.replace("cell = 2", "cell = 3").replace("scatter = 0", "scatter = 1")),
+    ];
+    let mut renderer = rendered(&scenes[0]);
+    for (n, scene) in scenes.iter().enumerate().skip(1).chain([(0, &scenes[0])]) {
+        renderer.change(scene.clone()).expect("change");
+        let changed = renderer.picture().expect("picture");
+        assert!(changed == rendered(scene).picture().expect("picture"), "scene {n}");
+    }
+}
+
+/// Scattering moves light inside of matter and makes none: under constant light it is constant, and no cell gets more than the brightest has.
+#[test]
+fn scattered_light_is_a_mean_of_what_arrives() {
+    let device = Device::new();
+    let scattering = GREY.replace("scatter = 0", "scatter = 2");
+    let scene = look(LIGHT, &scattering);
+    let matter = |p: DVec3| slab(10.0, 30.0)(p) * if p.x > 24.0 { 1.0 } else { 0.4 };
+    let (arriving, scattered) = (
+        lit(&device, &look(LIGHT, GREY), matter, Slot::LightArriving),
+        lit(&device, &scene, matter, Slot::LightScattered),
+    );
+    let largest = |light: &Texels| light.values.chunks_exact(4).map(|c| c[1]).fold(0.0, f64::max);
+    assert!(largest(&scattered) <= largest(&arriving) * 1.001);
+    // Deep in the slab light arrives from its brighter side.
+    let deep = DVec3::new(40.0, 20.0, 15.0);
+    assert!(at(&scene, &scattered, deep)[1] > 1.05 * at(&scene, &arriving, deep)[1]);
+    let empty = lit(&device, &scene, |_| 0.0, Slot::LightScattered);
+    assert!(empty.values.chunks_exact(4).all(|c| c[..3].iter().all(|v| (v - 1.0).abs() < 1e-3)));
+}
