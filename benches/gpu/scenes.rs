@@ -48,9 +48,10 @@ pub const SCENES: &[Stated] = &[
             "light_shade",
         ],
     ),
+    // Light from the side: the preset's own, from above, leaves a small picture without a shadow.
     sweep(
         "preset",
-        &[],
+        &["light.direction=[0.9,0.2,0.3]"],
         &[
             "scan_convert",
             "median_slice",
@@ -138,8 +139,16 @@ pub const SCENES: &[Stated] = &[
     sweep("4-up, two rays", &["layout=four", "ray.rays=2"], &["assemble"]),
     Stated {
         name: "Cartesian",
-        // The preset's region is the sweep's.
-        set: &["region.lateral=[-1e3, 1e3]", "region.depth=[-1e3, 1e3]", "region.elevation=[-1e3, 1e3]"],
+        // The preset's region is the sweep's. A filter would read the samples as they are, and 8 bits would be copied.
+        set: &[
+            "slices.median=false",
+            "slices.sigma=none",
+            "slices.smooth=none",
+            "slices.format=r16f",
+            "region.lateral=[-1e3, 1e3]",
+            "region.depth=[-1e3, 1e3]",
+            "region.elevation=[-1e3, 1e3]",
+        ],
         passes: &["load_slice"],
         cartesian: true,
     },
