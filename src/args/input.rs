@@ -137,7 +137,7 @@ pub struct SceneArgs {
     /// File of settings (TOML)
     #[arg(long, value_name = "FILE")]
     scene: Option<PathBuf>,
-    /// Preset of settings: bmode, bone, fetal, phantom, thesis. May be repeated; a later one overrides an earlier one
+    /// Preset of settings: bmode, bone, face, face-classic, fetal, glass, thesis. May be repeated; a later one overrides an earlier one
     #[arg(long, value_name = "NAME")]
     preset: Vec<String>,
     /// Width and height of the picture, pixels

@@ -19,6 +19,8 @@ use std::time::{Duration, SystemTime};
 
 /// A pipeline with what its compilation took.
 pub struct MeasuredPipeline {
+    /// The first pass that uses it.
+    pub pass: &'static str,
     pub shader: &'static str,
     /// Specialization constants by name.
     pub constants: Vec<(&'static str, i32)>,
@@ -141,6 +143,7 @@ fn measure_targets(
         let pipeline = pipelines.compile(target.key.0, prepare(pipelines, target, run)?, how)?;
         let (shader, constants, formats) = target.key.clone();
         measured.push(MeasuredPipeline {
+            pass: target.pass.name,
             shader,
             constants,
             formats,

@@ -243,6 +243,7 @@ fn passes(plan: &Plan, scene: &Scene, repeats: &[Repeat], stamped: bool) -> Vec<
             bytes_written: bytes(|s, scene| s.pass.writes(scene, &s.args())) + copied,
             fetches: steps.iter().map(|s| fetches(s.pass, scene, s)).sum::<Option<u64>>().map(|n| n * times),
             filtered: None,
+            dispatched: (!steps.is_empty()).then(|| times * steps.iter().map(|s| dispatched(s, scene)).sum::<u64>()),
             invocations: first.and_then(|r| r.of(name, true).map(|s| s.invocations).sum()),
         }
     };
@@ -265,6 +266,7 @@ fn hosts(repeats: &[Repeat]) -> Vec<PassProfile> {
         bytes_written: 0,
         fetches: None,
         filtered: None,
+        dispatched: None,
         invocations: None,
     };
     names(repeats, false).into_iter().map(host).collect()
@@ -293,14 +295,18 @@ fn copied_bytes(name: &str, scene: &Scene, runs: u64) -> u64 {
     }
 }
 
+/// Invocations that a step asks for. The filter of a slice runs once a frame; the caller multiplies by the number of frames.
+fn dispatched(step: &Step, scene: &Scene) -> u64 {
+    let args = DispatchArgs { slices: step.pass.slices(scene), ..step.args() };
+    step.pass.invocations(scene, &args).iter().map(|n| u64::from(*n)).product()
+}
+
 /// Texels that one step fetches; None unless it is a filter whose window does not depend on the data.
 fn fetches(pass: &Pass, scene: &Scene, step: &Step) -> Option<u64> {
-    // The filter of a slice runs once a frame; the caller multiplies by the number of frames.
     let args = DispatchArgs { slices: pass.slices(scene), ..step.args() };
     let constants = (pass.constants)(scene, &args);
     let radius = constants.iter().find(|(name, _)| *name == "RADIUS").map(|(_, r)| *r as u64)?;
     let edge = 2 * radius + 1;
-    let invocations: u64 = pass.invocations(scene, &args).iter().map(|n| u64::from(*n)).product();
     // One invocation filters a run of neighbours and shares their window.
     let along = edge + u64::from(RUN) - 1;
     let window = match pass.name.split('_').next()? {
@@ -308,7 +314,7 @@ fn fetches(pass: &Pass, scene: &Scene, step: &Step) -> Option<u64> {
         "sigma" => edge * along,
         _ => return None,
     };
-    Some(invocations * window)
+    Some(dispatched(step, scene) * window)
 }
 
 /// Repeats of each ceiling loop; the median is reported.

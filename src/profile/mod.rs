@@ -138,6 +138,9 @@ pub struct PassProfile {
     /// Filtered texture samples in a repeat, if they can be counted.
     #[serde(default)]
     pub filtered: Option<u64>,
+    /// Invocations that a repeat asks for, without those that fill up workgroups.
+    #[serde(default)]
+    pub dispatched: Option<u64>,
     /// Compute shader invocations in a repeat, from pipeline statistics if the device has them.
     #[serde(default)]
     pub invocations: Option<u64>,

@@ -232,8 +232,8 @@ mod tests {
         for name in ["distance_map", "sweep_lut", "Params", "nothing"] {
             assert!(texture_to_storage(&intact, &[(name, ImageFormat::R8)]).is_err(), "{name}");
         }
-        // Of the casters of rays this is the smallest: the time is that of its square.
-        let intact = words(embedded("raycast/projection.intra_frame_motion").unwrap());
+        // A small ray caster: the time is that of its square.
+        let intact = words(embedded("raycast/planes.intra_frame_motion").unwrap());
         for cut in 1..intact.len() {
             let _ = texture_to_storage(&intact[..cut], &[("volume", ImageFormat::R8)]);
         }

@@ -13,6 +13,7 @@ use crate::plan::Plan;
 use crate::scene::Scene;
 use crate::verify::report::{Fault, Figure, Level, Unit};
 use std::collections::HashSet;
+use std::hash::{DefaultHasher, Hash, Hasher};
 
 /// Value of outputs before a pass: no pass computes it by chance, and every format stores it (nearly).
 pub const POISON: f64 = 0.654_321;
@@ -73,6 +74,23 @@ pub(super) fn seed_of(pass: &Pass, kind: usize) -> u64 {
 
 type Variant = (&'static str, Vec<(&'static str, i32)>, Vec<Format>);
 
+/// What distinguishes a dispatch on inputs of one kind: two that are equal here give the same results, because the device is given nothing else.
+fn dispatch_key(scene: &Scene, pass: &Pass) -> u64 {
+    let mut hasher = DefaultHasher::new();
+    variant(scene, pass).hash(&mut hasher);
+    for iteration in 0..(pass.repeat)(scene) {
+        let args = dispatch_args_of(scene, pass, iteration);
+        format!("{:?} {:?}", (pass.params)(scene, &args), (pass.extent)(scene, &args)).hash(&mut hasher);
+        for bind in pass.reads(scene, &args).into_iter().chain(pass.writes(scene, &args)) {
+            (bind.name, bind.slot.array_size(scene)).hash(&mut hasher);
+            if let Initializer::ByScene(make) = bind.slot.initializer() {
+                bytemuck::cast_slice::<f32, u8>(&make(scene)).hash(&mut hasher);
+            }
+        }
+    }
+    hasher.finish()
+}
+
 /// What distinguishes a pipeline: its shader, its constants, and the formats of its bindings.
 fn variant(scene: &Scene, pass: &Pass) -> Variant {
     let args = dispatch_args_of(scene, pass, 0);
@@ -82,11 +100,14 @@ fn variant(scene: &Scene, pass: &Pass) -> Variant {
 
 fn check(dut: &mut DeviceUnderTest, pass: &'static Pass) -> Result<Findings, GpuError> {
     let (mut sum, scenes) = (PassSummary::default(), dut.scenes());
-    let mut variants = HashSet::new();
+    let (mut variants, mut dispatches) = (HashSet::new(), HashSet::new());
     for s in (0..scenes.len()).filter(|s| pass.is_needed(&scenes[*s].1)) {
         // At the quick level: every pipeline once, and some of the other scenes.
         let is_new = variants.insert(variant(&scenes[s].1, pass));
-        if dut.level == Level::Full || is_new || s as u64 % 9 == seed_of(pass, 0) % 9 {
+        if dut.level == Level::Full {
+            // Noise in every scene, so that a setting that the shader is not given is noticed; extremes once for each different dispatch.
+            sum.add(dut, pass, s, dispatches.insert(dispatch_key(&scenes[s].1, pass)))?;
+        } else if is_new || s as u64 % 9 == seed_of(pass, 0) % 9 {
             sum.add(dut, pass, s, is_new)?;
         }
     }
@@ -116,13 +137,13 @@ struct PassSummary {
 }
 
 impl PassSummary {
-    /// `is_new`: no earlier scene had this pipeline.
+    /// `is_new`: no earlier scene had this pipeline, or at the full level this dispatch.
     fn add(&mut self, dut: &mut DeviceUnderTest, pass: &'static Pass, s: usize, is_new: bool) -> Result<(), GpuError> {
         let (scenes, level) = (dut.scenes(), dut.level);
         let (name, scene) = &scenes[s];
         for (k, kind) in KINDS.iter().enumerate() {
             // Always noise; at the quick level only one of the extremes, alternating.
-            if level == Level::Quick && k > 0 && (!is_new || 1 + s % (KINDS.len() - 1) != k) {
+            if k > 0 && (!is_new || level == Level::Quick && 1 + s % (KINDS.len() - 1) != k) {
                 continue;
             }
             for iteration in 0..(pass.repeat)(scene) {

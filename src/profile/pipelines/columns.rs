@@ -85,6 +85,7 @@ mod tests {
             values: statistics.iter().map(|name| e.iter().find(|s| s.0 == name).map(|s| s.1)).collect(),
         };
         let pipeline = Pipeline {
+            pass: None,
             shader: "a".into(),
             constants: Default::default(),
             formats: vec![],

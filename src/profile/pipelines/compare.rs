@@ -142,6 +142,7 @@ mod tests {
     /// Waves, spills, registers, instructions of pipelines that differ by a constant.
     fn profile(pipelines: &[(i32, [f64; 4])]) -> PipelineProfile {
         let one = |(constant, values): &(i32, [f64; 4])| Pipeline {
+            pass: None,
             shader: "a.b".into(),
             constants: [("N".to_string(), *constant)].into(),
             formats: vec!["R8".into()],

@@ -58,6 +58,9 @@ pub struct PipelineProfile {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Pipeline {
+    /// The first pass that uses it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub pass: Option<String>,
     pub shader: String,
     /// Specialization constants by name.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
@@ -137,6 +140,7 @@ fn pipeline(measured: MeasuredPipeline, statistics: &[String]) -> Pipeline {
         subgroup: e.subgroup,
     };
     Pipeline {
+        pass: Some(measured.pass.into()),
         shader: measured.shader.into(),
         constants: measured.constants.into_iter().map(|(name, value)| (name.to_string(), value)).collect(),
         formats: measured.formats.iter().map(|format| format!("{format:?}")).collect(),
