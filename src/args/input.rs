@@ -1,6 +1,7 @@
 //! Arguments of commands that render a recording: the recording, the settings of the scene in layers, the device, and checks of outputs.
 
 use super::pipeline_folder::pipeline_folder;
+use super::recording::open_recording;
 use crate::files::signals;
 use crate::files::{check_target, replace};
 use crate::gpu::context::list;
@@ -8,7 +9,7 @@ use crate::gpu::{Context, ContextOptions, Deadline, DeviceChoice, GpuError, Texe
 use crate::scene::load::Layers;
 use crate::scene::{Input, Scene};
 use crate::source::phantom::{self, Phantom, PhantomSource};
-use crate::source::{self, Frame, Source};
+use crate::source::{Frame, Source};
 use crate::terminal::{Failure, failed, input, say};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -20,7 +21,8 @@ pub struct InputArgs {
     input: Option<PathBuf>,
     #[command(flatten)]
     scene: SceneArgs,
-    /// Geometry of the probe (TOML) [default: NAME.probe.toml or probe.toml next to the recording]
+    /// Geometry of the probe (TOML) [default: NAME.probe.toml next to the recording, or
+    /// probe.toml there if the recording does not state its own]
     #[arg(long, value_name = "FILE")]
     probe: Option<PathBuf>,
     /// Volume of the recording to use, counted from 0
@@ -102,7 +104,7 @@ impl InputArgs {
 
     fn source(&self) -> Result<Box<dyn Source>, Failure> {
         match &self.input {
-            Some(file) => source::open(file, self.probe.as_deref()).map_err(input),
+            Some(file) => open_recording(file, self.probe.as_deref()),
             None => Ok(Box::new(PhantomSource::new(Phantom::new(phantom::PhantomOptions::default()).map_err(input)?))),
         }
     }

@@ -1,6 +1,7 @@
 //! Arguments of commands that render live: the source of frames, and how volumes become pictures.
 
 use super::motor::{MotorArgs, PlannedSweep};
+use super::recording::{open_recording, say_probe_file};
 use crate::gpu::TimeStamps;
 use crate::kiosk::config::Config;
 use crate::live::Update;
@@ -117,6 +118,7 @@ impl SourceArgs {
             return self.phantom(sweep.as_ref());
         }
         let source: Box<dyn Live> = if self.source == "-" {
+            say_probe_file(self.probe.as_deref());
             Box::new(Piped::new(std::io::stdin(), self.probe.as_deref()).map_err(input)?)
         } else if let Some(address) = network {
             if address.is_empty() {
@@ -131,7 +133,7 @@ impl SourceArgs {
             let network = Network::connect(address, self.network()?);
             Box::new(network.map_err(|e| failed(format!("{}: {e}", self.source)))?)
         } else {
-            let recording = crate::source::open(self.path(), self.probe.as_deref()).map_err(input)?;
+            let recording = open_recording(self.path(), self.probe.as_deref())?;
             // The frame rate of a free-running probe is limited by the speed of sound.
             let rate = self.rate.or(sweep.as_ref().and_then(|_| acoustic_rate(&*recording)));
             Box::new(PlaybackSource::new(recording, self.playback(rate)?, self.rounds))

@@ -1,6 +1,6 @@
 //! `echolume convert`, `echolume info` and `echolume phantom`: recordings are converted, described and made.
 
-use crate::args::{Output, check_outputs};
+use crate::args::{Output, check_outputs, open_recording};
 use crate::files::signals::Writing;
 use crate::probe::{Geometry, Grid};
 use crate::scene::insonified_box;
@@ -31,7 +31,8 @@ pub struct Convert {
     /// Volume of the recording to use, counted from 0
     #[arg(long, value_name = "N", default_value_t = 0)]
     volume: usize,
-    /// Geometry of the probe (TOML) [default: NAME.probe.toml or probe.toml next to the recording]
+    /// Geometry of the probe (TOML) [default: NAME.probe.toml next to the recording, or
+    /// probe.toml there if the recording does not state its own]
     #[arg(long, value_name = "FILE")]
     probe: Option<PathBuf>,
     /// Write the frames of all complete volumes as a PLUS sequence, and their geometry to NAME.probe.toml next to it
@@ -48,7 +49,7 @@ impl Convert {
             return self.sequence();
         }
         VolumeFile::of(&self.output).map_err(input)?;
-        let mut recording = source::open(&self.input, self.probe.as_deref()).map_err(input)?;
+        let mut recording = open_recording(&self.input, self.probe.as_deref())?;
         let shown = self.input.display();
         if self.volume >= recording.volumes() {
             let there = recording.volumes();
@@ -94,7 +95,7 @@ impl Convert {
         if VolumeFile::of(&self.output).map_err(input)? != VolumeFile::MetaImage {
             return Err(input(format!("{}: a sequence must end in .mha", self.output.display())));
         }
-        let mut recording = source::open(&self.input, self.probe.as_deref()).map_err(input)?;
+        let mut recording = open_recording(&self.input, self.probe.as_deref())?;
         let beside = sequence::probe_file_path(&self.output);
         self.check_outputs(&[(OUTPUT, Some(&self.output)), (OUTPUT, Some(&beside))], &*recording)?;
         let sequence = Sequence::of(&mut *recording, &self.input).map_err(input)?;
@@ -115,7 +116,7 @@ impl Convert {
         if self.spacing.is_some() || self.volume != 0 || self.sequence {
             return Err(input("--spacing, --volume and --sequence apply to .mha; .frames holds every frame unchanged"));
         }
-        let mut recording = source::open(&self.input, self.probe.as_deref()).map_err(input)?;
+        let mut recording = open_recording(&self.input, self.probe.as_deref())?;
         let first = recording.geometry(0);
         let second = if recording.volumes() > 1 { recording.geometry(1) } else { first.clone() };
         let mut frame = recording.next_frame().map_err(input)?;
@@ -154,7 +155,8 @@ impl Convert {
 pub struct Info {
     /// MetaImage (.mha, .mhd), Kretz (.vol) or .frames file
     file: PathBuf,
-    /// Geometry of the probe (TOML) [default: NAME.probe.toml or probe.toml next to the file]
+    /// Geometry of the probe (TOML) [default: NAME.probe.toml next to the file, or probe.toml there if
+    /// the file does not state its own]
     #[arg(long, value_name = "FILE")]
     probe: Option<PathBuf>,
 }

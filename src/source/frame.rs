@@ -4,7 +4,7 @@ use super::samples::{SampleType, StoredType};
 use crate::files::InputError;
 use crate::probe::{Advance, Geometry};
 use serde::{Deserialize, Serialize};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 /// Most frames a volume, for every reader.
 const MAX_SLICES: usize = 1 << 16;
@@ -115,6 +115,10 @@ pub trait Source: Send {
     /// Every file that is read; none for a source that is computed.
     fn files(&self) -> Vec<PathBuf> {
         Vec::new()
+    }
+    /// The probe file that the geometry is from; None if the source states it itself.
+    fn probe_file(&self) -> Option<&Path> {
+        None
     }
     /// When the last frame that was returned had arrived, s on the recorder's clock; None if that was not recorded.
     fn arrival(&self) -> Option<f64> {

@@ -80,6 +80,7 @@ pub(super) fn read(path: &Path) -> Result<Layout, InputError> {
         pixels: Pixels { path: path.into(), offset, length, compressed: false },
         line_order: LineOrder::InOrder,
         geometry,
+        states_geometry: true,
         times: BTreeMap::new(),
         remarks,
     };

@@ -25,6 +25,8 @@ pub(super) struct Layout {
     pub pixels: Pixels,
     pub line_order: LineOrder,
     pub geometry: StoredGeometry,
+    /// The file states where its samples lie. If not, a `probe.toml` of the folder applies.
+    pub states_geometry: bool,
     /// Time stamps by frame, s.
     pub times: BTreeMap<usize, f64>,
     /// Remarks for users: title and text. Never a patient field.

@@ -42,6 +42,11 @@ pub(super) fn read(path: &Path) -> Result<Layout, InputError> {
         Some(probe) => StoredGeometry::Sweep(Box::new(probe)),
         None => own_pictures(path, &header, grid, &lines)?,
     };
+    let states_geometry = match &geometry {
+        StoredGeometry::Sweep(_) => true,
+        StoredGeometry::Pictures(..) => !header.has_scan_lines() && header.first_of(&PLACEMENT_KEYS).is_some(),
+        StoredGeometry::Missing(_) => false,
+    };
     if let Some(orientation) = header.get("UltrasoundImageOrientation") {
         remarks.push(("orientation".into(), quoted(orientation)));
     }
@@ -57,6 +62,7 @@ pub(super) fn read(path: &Path) -> Result<Layout, InputError> {
         pixels: Pixels { path: path.into(), offset: header.length, length: 0, compressed: false },
         line_order: lines,
         geometry,
+        states_geometry,
         times: header.times.range(..frames).map(|(k, t)| (*k, *t)).collect(),
         remarks,
     };
@@ -140,9 +146,9 @@ fn own_pictures(path: &Path, header: &Header, mut grid: Grid, lines: &LineOrder)
             return header.fault("UltrasoundImageType", fault);
         }
     }
-    // Frames in time are not neighbours in space: each is a volume of one slice.
-    let in_time = header.sequence || header.get("Kinds").is_some_and(|k| k.split_whitespace().nth(2) == Some("list"));
-    let volumes = if in_time { std::mem::replace(&mut grid.size[2], 1) } else { 1 };
+    // Frames in time are not neighbours in space: each is a volume of one slice. `Kinds = domain domain list` alone does not make them
+    // so: the PLUS toolkit writes it into its volumes, too.
+    let volumes = if header.sequence { std::mem::replace(&mut grid.size[2], 1) } else { 1 };
     Ok(StoredGeometry::Pictures(grid, volumes))
 }
 
@@ -228,7 +234,6 @@ const KEYS: &[&str] = &[
     "ElementNumberOfChannels",
     "HeaderSize",
     "ElementDataFile",
-    "Kinds",
     "UltrasoundImageOrientation",
     "UltrasoundImageType",
     "IsTransducerConvex",
@@ -239,6 +244,10 @@ const KEYS: &[&str] = &[
     "FramePitch",
     "AxialResolution",
 ];
+
+/// The fields that place the samples in space.
+const PLACEMENT_KEYS: [&str; 8] =
+    ["ElementSpacing", "ElementSize", "Offset", "Position", "Origin", "TransformMatrix", "Rotation", "Orientation"];
 
 struct Header<'a> {
     path: &'a Path,
@@ -316,6 +325,11 @@ impl<'a> Header<'a> {
 
     fn get(&self, field: &str) -> Option<&str> {
         self.fields.get(field).map(String::as_str)
+    }
+
+    /// True if the header says that the rows of a frame are scan lines.
+    fn has_scan_lines(&self) -> bool {
+        self.get("UltrasoundImageOrientation").is_some_and(|word| word.starts_with('F'))
     }
 
     /// The first existing field of several spellings, with its value.

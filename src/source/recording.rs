@@ -38,8 +38,8 @@ enum Placement {
 }
 
 impl Recording {
-    /// Opens a file. Its geometry comes from the given probe file, otherwise from one in the folder of the recording
-    /// ([`ProbeFile::find_for`]), otherwise from the recording itself. All samples are read once unless the range of their values is
+    /// Opens a file. Its geometry comes from the given probe file, otherwise from `<stem>.probe.toml` in its folder, otherwise from the
+    /// recording itself, otherwise from the `probe.toml` of the folder. All samples are read once unless the range of their values is
     /// known.
     ///
     /// # Errors
@@ -312,20 +312,25 @@ impl Recording {
     }
 }
 
-/// The probe file to use. None if there is none, or if the `probe.toml` of the folder does not apply to this recording.
+/// The probe file to use. None if there is none, or if the `probe.toml` of the folder does not apply to this recording: it is for those
+/// that do not state their own geometry.
 fn choose_probe_file(path: &Path, given: Option<&Path>, layout: &mut Layout) -> Result<Option<ProbeFile>, InputError> {
     let found = given.map(Path::to_path_buf).or_else(|| ProbeFile::find_for(path));
     let Some(found) = found else { return Ok(None) };
+    let is_for_all = given.is_none() && found.file_name().is_some_and(|n| n == "probe.toml");
+    let mut leave_out = |why: &str| {
+        layout.remarks.push(("not used".into(), format!("{}: {why}", describe::path(&found))));
+        Ok(None)
+    };
     if let LineOrder::Pictures(word) = &layout.line_order {
-        let for_all = given.is_none() && found.file_name().is_some_and(|n| n == "probe.toml");
-        let fault = format!("is {word}: pictures, not scan lines, so {} does not apply", describe::path(&found));
-        if !for_all {
-            return Err(InputError::new(path, "UltrasoundImageOrientation", fault));
+        if is_for_all {
+            return leave_out("the frames are pictures, not scan lines");
         }
-        layout
-            .remarks
-            .push(("not used".into(), format!("{}: the frames are pictures, not scan lines", describe::path(&found))));
-        return Ok(None);
+        let fault = format!("is {word}: pictures, not scan lines, so {} does not apply", describe::path(&found));
+        return Err(InputError::new(path, "UltrasoundImageOrientation", fault));
+    }
+    if is_for_all && layout.states_geometry {
+        return leave_out("the recording states its own geometry; --probe overrides it");
     }
     ProbeFile::read(&found).map(Some)
 }
@@ -387,5 +392,9 @@ impl Source for Recording {
 
     fn files(&self) -> Vec<PathBuf> {
         self.files()
+    }
+
+    fn probe_file(&self) -> Option<&Path> {
+        self.probe_file.as_deref()
     }
 }
