@@ -1,7 +1,7 @@
 //! Arguments of commands that render a recording: the recording, the settings of the scene in layers, the device, and checks of outputs.
 
 use super::pipeline_folder::pipeline_folder;
-use super::recording::open_recording;
+use super::recording::{GeometryArgs, open_recording};
 use crate::files::signals;
 use crate::files::{check_target, replace};
 use crate::gpu::context::list;
@@ -17,14 +17,12 @@ use std::sync::Arc;
 /// The arguments of every command that renders a recording.
 #[derive(clap::Args)]
 pub struct InputArgs {
-    /// Recording: MetaImage (.mha, .mhd), Kretz (.vol) or frames (.frames). Without one, a synthetic fetal head (preset face)
+    /// Recording: MetaImage (.mha, .mhd), NRRD (.nrrd), NIfTI (.nii), Kretz (.vol), each also as .gz, or frames (.frames). Without one, a synthetic fetal head (preset face)
     input: Option<PathBuf>,
     #[command(flatten)]
     scene: SceneArgs,
-    /// Geometry of the probe (TOML) [default: NAME.probe.toml next to the recording, or
-    /// probe.toml there if the recording does not state its own]
-    #[arg(long, value_name = "FILE")]
-    probe: Option<PathBuf>,
+    #[command(flatten)]
+    geometry: GeometryArgs,
     /// Volume of the recording to use, counted from 0
     #[arg(long, value_name = "N", default_value_t = 0)]
     volume: usize,
@@ -60,7 +58,7 @@ impl InputArgs {
     /// Refuses outputs that would replace an input: the files of the source or of the settings. See [`check_outputs`].
     pub fn check_outputs(&self, outputs: &[Output], source: &dyn Source) -> Result<(), Failure> {
         let mut read = source.files();
-        read.extend(self.probe.clone());
+        read.extend(self.geometry.probe.clone());
         read.extend(self.scene.files());
         check_outputs(outputs, read.iter().map(PathBuf::as_path))
     }
@@ -104,7 +102,7 @@ impl InputArgs {
 
     fn source(&self) -> Result<Box<dyn Source>, Failure> {
         match &self.input {
-            Some(file) => open_recording(file, self.probe.as_deref()),
+            Some(file) => open_recording(file, self.geometry.options()),
             None => Ok(Box::new(PhantomSource::new(Phantom::new(phantom::PhantomOptions::default()).map_err(input)?))),
         }
     }

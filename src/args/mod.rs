@@ -10,5 +10,5 @@ pub use input::{InputArgs, Output, SceneArgs, check_outputs, open_device, open_d
 pub use motor::{SerialArgs, motor_failure, motor_table};
 #[cfg(feature = "view")]
 pub use pipeline_folder::pipeline_folder;
-pub use recording::open_recording;
+pub use recording::{GeometryArgs, open_recording};
 pub use source::{SourceArgs, StreamArgs};

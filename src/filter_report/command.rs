@@ -6,6 +6,7 @@ use super::{Area, Areas, Report, export, sheet};
 use crate::args::{Output, check_outputs, open_device, open_recording, write_report};
 use crate::gpu::DeviceChoice;
 use crate::machine;
+use crate::source::OpenOptions;
 use crate::terminal::{Failure, failed, input, say};
 use std::path::{Path, PathBuf};
 
@@ -75,7 +76,7 @@ impl FilterReport {
         check_outputs(&targets, self.recordings.iter().map(PathBuf::as_path))?;
         let mut sources = Vec::new();
         for file in &self.recordings {
-            sources.push(open_recording(file, None)?);
+            sources.push(open_recording(file, OpenOptions::default())?);
         }
         let context = open_device(self.device.clone(), false)?;
         let options = MeasureOptions { only: &self.filter, pixels: self.pixels, repeats: self.repeat as usize };

@@ -2,7 +2,7 @@
 
 use super::samples::{SampleType, StoredType};
 use crate::files::InputError;
-use crate::probe::{Advance, Geometry};
+use crate::probe::{Advance, Geometry, World};
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
 
@@ -115,6 +115,10 @@ pub trait Source: Send {
     /// Every file that is read; none for a source that is computed.
     fn files(&self) -> Vec<PathBuf> {
         Vec::new()
+    }
+    /// Where the voxels of Cartesian volumes are in the world; None where the source does not say, and for sweeps.
+    fn world(&self) -> Option<World> {
+        None
     }
     /// The probe file that the geometry is from; None if the source states it itself.
     fn probe_file(&self) -> Option<&Path> {

@@ -1,15 +1,15 @@
 //! GE Kretz volumes (`.vol`): a magic, then items of {u16 group, u16 element, u32 length, bytes}, little-endian, up to
 //! FFFF,FFFF. Groups 0110 and 0120 hold the patient's identity: their bytes are skipped, never read.
 
-use super::layout::{Layout, LineOrder, Pixels, StoredGeometry, extent};
-use super::samples::SampleType;
+use super::layout::{Cartesian, Layout, LineOrder, StoredGeometry, extent};
+use super::packed::{InputFile, Pixels};
+use super::pixel::{Number, PixelFormat};
 use crate::files::InputError;
 use crate::probe::file::SLAB;
-use crate::probe::{Advance, Array, Axis, Grid, Motion, Probe};
+use crate::probe::{Advance, Array, Axis, AxisOrder, Grid, Motion, Probe, World};
 use std::collections::{BTreeMap, HashMap};
 use std::f64::consts::FRAC_PI_2;
-use std::fs::File;
-use std::io::{self, BufReader, Read};
+use std::io::{self, Read};
 use std::path::Path;
 
 const MAGIC: &[u8; 16] = b"KRETZFILE 1.0   ";
@@ -47,8 +47,9 @@ struct Items<'a> {
     four_d: bool,
 }
 
-pub(super) fn read(path: &Path) -> Result<Layout, InputError> {
-    let items = Items::walk(path)?;
+pub(super) fn read(file: &InputFile) -> Result<Layout, InputError> {
+    let path = file.path;
+    let items = Items::walk(file)?;
     if items.wavelet {
         return Err(InputError::new(
             path,
@@ -71,13 +72,16 @@ pub(super) fn read(path: &Path) -> Result<Layout, InputError> {
         remarks.push(("more data".into(), format!("{} bytes behind the voxels; not read", length - claimed)));
     }
     let geometry = items.geometry(samples, lines, frames)?;
+    let pixels = match file.is_packed() {
+        true => file.pixels(offset),
+        false => Pixels { length, ..file.pixels(offset) },
+    };
     let layout = Layout {
         format: "Kretz volume",
-        sample: SampleType::U8,
-        big_endian: false,
+        pixel: PixelFormat::grey(Number::U8),
         frame_size: [samples, lines],
         frames,
-        pixels: Pixels { path: path.into(), offset, length, compressed: false },
+        pixels,
         line_order: LineOrder::InOrder,
         geometry,
         states_geometry: true,
@@ -89,11 +93,11 @@ pub(super) fn read(path: &Path) -> Result<Layout, InputError> {
 }
 
 impl<'a> Items<'a> {
-    fn walk(path: &'a Path) -> Result<Items<'a>, InputError> {
+    fn walk(file: &InputFile<'a>) -> Result<Items<'a>, InputError> {
+        let path = file.path;
         let unreadable = |e| InputError::unreadable(path, &e);
-        let file = File::open(path).map_err(unreadable)?;
-        let there = file.metadata().map_err(unreadable)?.len();
-        let mut input = BufReader::new(file);
+        let there = file.most_bytes();
+        let mut input = file.open().map_err(unreadable)?;
         let mut magic = [0; 16];
         let whole = fill(&mut input, &mut magic).map_err(unreadable)?;
         if !whole || magic != *MAGIC {
@@ -138,8 +142,7 @@ impl<'a> Items<'a> {
                 unread = length - bytes.len() as u64;
                 items.small.insert(tag, bytes);
             }
-            // Bounded by the length of the file, which fits.
-            input.seek_relative(unread as i64).map_err(unreadable)?;
+            input.skip(unread).map_err(unreadable)?;
             at += length;
         }
         Err(InputError::new(path, "items", format!("are more than {MAX_ITEMS}, before FFFF,FFFF")))
@@ -196,8 +199,9 @@ impl<'a> Items<'a> {
         }
         let tables = [SWEEP_ANGLES, LINE_ANGLES].map(|tag| self.small.get(&tag).is_some_and(|b| !b.is_empty()));
         if tables == [false, false] {
-            let grid = Grid { size: [samples, lines, frames], spacing: [step; 3], origin: [0.0; 3] };
-            return Ok(StoredGeometry::Pictures(grid, 1));
+            let size = [samples, lines, frames];
+            let world = World::of(&Grid { size, spacing: [step; 3], origin: [0.0; 3] });
+            return Ok(StoredGeometry::Cartesian(Cartesian { size, volumes: 1, world, order: AxisOrder::STORED }));
         }
         let radius = self.number(ARRAY_RADIUS, "array radius")? * step;
         let (motion, slices) = if frames == 1 {
