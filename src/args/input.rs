@@ -167,8 +167,10 @@ impl SceneArgs {
         let mut layers = Layers::default();
         if is_phantom {
             // The pair shows a surface.
-            let is_pair = self.layout.as_deref() == Some("pair");
-            let is_plain = self.preset.is_empty() && self.scene.is_none() && self.mode.is_none() && !is_pair;
+            let is_pair = self.layout.as_deref().is_some_and(|layout| layout.eq_ignore_ascii_case("pair"));
+            // A layout may be typed as a mode.
+            let has_mode = self.mode.as_deref().is_some_and(|mode| mode_setting(mode).starts_with("mode="));
+            let is_plain = self.preset.is_empty() && self.scene.is_none() && !has_mode && !is_pair;
             layers.phantom(is_plain).map_err(input)?;
         }
         self.layers_over(layers, chosen)
@@ -208,15 +210,17 @@ impl SceneArgs {
     /// Each flag as it was typed, with the assignment that it stands for.
     fn assignments(&self) -> Result<Vec<(String, String)>, Failure> {
         let mut set = Vec::new();
-        set.extend(self.mode.as_ref().map(|mode| (format!("--mode {mode}"), format!("mode={mode}"))));
+        set.extend(self.mode.as_ref().map(|mode| (format!("--mode {mode}"), mode_setting(mode))));
         for (name, key, value) in
             [("--layout", "layout", &self.layout), ("--transfer", "volume.transfer", &self.transfer)]
         {
-            set.extend(value.as_ref().map(|value| (format!("{name} {value}"), format!("{key}={value}"))));
+            let lower = |value: &str| if key == "layout" { value.to_ascii_lowercase() } else { value.into() };
+            set.extend(value.as_ref().map(|value| (format!("{name} {value}"), format!("{key}={}", lower(value)))));
         }
         if let Some(size) = &self.size {
             let flag = format!("--size {size}");
-            let edges = size.split_once('x').and_then(|(w, h)| Some((w.parse::<u32>().ok()?, h.parse::<u32>().ok()?)));
+            let edges =
+                size.split_once(['x', 'X']).and_then(|(w, h)| Some((w.parse::<u32>().ok()?, h.parse::<u32>().ok()?)));
             let (w, h) = edges.ok_or_else(|| input(format!("{flag}: must read WIDTHxHEIGHT in pixels, as 512x512")))?;
             set.push((flag, format!("picture.size=[{w},{h}]")));
         }
@@ -257,6 +261,29 @@ impl SceneArgs {
             ..ContextOptions::default()
         })
     }
+}
+
+/// Other names of modes.
+const MODE_SYNONYMS: [(&str, &str); 9] = [
+    ("ortho", "orthogonal"),
+    ("slices", "orthogonal"),
+    ("tomo", "tomography"),
+    ("tui", "tomography"),
+    ("x-ray", "xray"),
+    ("average", "mean"),
+    ("avgip", "mean"),
+    ("vrt", "vr"),
+    ("maxip", "mip"),
+];
+
+/// The setting that a mode stands for, whatever its case. `4up` is a layout.
+fn mode_setting(mode: &str) -> String {
+    let lower = mode.to_ascii_lowercase();
+    if ["4up", "4-up"].contains(&&*lower) {
+        return "layout=4up".into();
+    }
+    let name = MODE_SYNONYMS.iter().find(|(other, _)| *other == lower).map_or(&*lower, |(_, name)| name);
+    format!("mode={name}")
 }
 
 /// Opens the chosen device, or the best one, and prints its name on one line.
