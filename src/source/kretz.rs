@@ -45,6 +45,8 @@ struct Items<'a> {
     wavelet: bool,
     /// There are items of further volumes in time (4D).
     four_d: bool,
+    /// The file ends behind a whole item, without the mark.
+    no_end: bool,
 }
 
 pub(super) fn read(file: &InputFile) -> Result<Layout, InputError> {
@@ -71,7 +73,13 @@ pub(super) fn read(file: &InputFile) -> Result<Layout, InputError> {
     if length > claimed {
         remarks.push(("more data".into(), format!("{} bytes behind the voxels; not read", length - claimed)));
     }
+    if items.no_end {
+        remarks.push(("end mark".into(), "FFFF,FFFF is missing; the items before it are whole".into()));
+    }
     let geometry = items.geometry(samples, lines, frames)?;
+    let falls = |tag, count| items.table(tag, "angles").map(|table| table.len() == count && is_falling(&table));
+    let line_order = if falls(LINE_ANGLES, lines)? { LineOrder::Reversed } else { LineOrder::InOrder };
+    let backward = frames > 1 && falls(SWEEP_ANGLES, frames)?;
     let pixels = match file.is_packed() {
         true => file.pixels(offset),
         false => Pixels { length, ..file.pixels(offset) },
@@ -82,8 +90,9 @@ pub(super) fn read(file: &InputFile) -> Result<Layout, InputError> {
         frame_size: [samples, lines],
         frames,
         pixels,
-        line_order: LineOrder::InOrder,
+        line_order,
         geometry,
+        backward,
         states_geometry: true,
         times: BTreeMap::new(),
         remarks,
@@ -103,10 +112,15 @@ impl<'a> Items<'a> {
         if !whole || magic != *MAGIC {
             return Err(InputError::new(path, "magic", "is not 'KRETZFILE 1.0   ', the only version that is read"));
         }
-        let mut items = Items { path, small: HashMap::new(), voxels: None, wavelet: false, four_d: false };
+        let mut items =
+            Items { path, small: HashMap::new(), voxels: None, wavelet: false, four_d: false, no_end: false };
         let mut at = MAGIC.len() as u64;
         for _ in 0..MAX_ITEMS {
             let mut head = [0; 8];
+            if at == there && !file.is_packed() && items.voxels.is_some() {
+                items.no_end = true;
+                return Ok(items);
+            }
             if !fill(&mut input, &mut head).map_err(unreadable)? {
                 return Err(InputError::new(path, "items", format!("cut short after {there} bytes, before FFFF,FFFF")));
             }
@@ -182,14 +196,18 @@ impl<'a> Items<'a> {
         }
     }
 
-    /// Angles centred on pi/2, one of `count`.
+    /// Angles centred on pi/2, one of `count`, in rising order.
     fn angles(&self, tag: Tag, title: &str, count: usize) -> Result<Axis, InputError> {
         let table = self.table(tag, title)?;
         if table.len() != count {
             return self.fault(tag, title, format!("has {} entries, must have {count}", table.len()));
         }
-        let axis = Axis::from_table(table.iter().map(|a| a - FRAC_PI_2).collect());
-        if axis.is_valid() { Ok(axis) } else { self.fault(tag, title, "must rise from each to the next") }
+        let mut angles: Vec<f64> = table.iter().map(|a| a - FRAC_PI_2).collect();
+        if is_falling(&angles) {
+            angles.reverse();
+        }
+        let axis = Axis::from_table(angles);
+        if axis.is_valid() { Ok(axis) } else { self.fault(tag, title, "must rise or fall from each to the next") }
     }
 
     fn geometry(&self, samples: usize, lines: usize, frames: usize) -> Result<StoredGeometry, InputError> {
@@ -223,6 +241,11 @@ impl<'a> Items<'a> {
             sound_speed: SOUND_SPEED,
         })))
     }
+}
+
+/// True if a table falls: its last line or frame comes first in space.
+fn is_falling(table: &[f64]) -> bool {
+    table.len() > 1 && table[0] > table[table.len() - 1]
 }
 
 fn name((group, element): Tag, title: &str) -> String {

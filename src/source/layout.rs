@@ -22,6 +22,8 @@ pub(super) struct Layout {
     pub pixels: Pixels,
     pub line_order: LineOrder,
     pub geometry: StoredGeometry,
+    /// The frames of a sweep come from the last slice to the first.
+    pub backward: bool,
     /// The file states where its samples lie. If not, a `probe.toml` of the folder applies.
     pub states_geometry: bool,
     /// Time stamps by frame, s.

@@ -77,6 +77,7 @@ pub(super) fn read(file: &InputFile) -> Result<Layout, InputError> {
         pixels: file.pixels(header.length),
         line_order: lines,
         geometry,
+        backward: false,
         states_geometry,
         times: header.times.range(..frames).map(|(k, t)| (*k, *t)).collect(),
         remarks,

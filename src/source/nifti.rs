@@ -133,6 +133,7 @@ pub(super) fn read(file: &InputFile) -> Result<Layout, InputError> {
         pixels: pixels(file, &header)?,
         line_order: LineOrder::InOrder,
         geometry: StoredGeometry::Cartesian(Cartesian { size, volumes, world, order: AxisOrder::STORED }),
+        backward: false,
         states_geometry: true,
         times: times(&header, size[2], volumes),
         remarks,

@@ -103,6 +103,7 @@ pub(super) fn read(file: &InputFile) -> Result<Layout, InputError> {
             world,
             order: AxisOrder::STORED,
         }),
+        backward: false,
         states_geometry,
         times: header.times.range(..frames as usize).map(|(k, t)| (*k, *t)).collect(),
         remarks: Vec::new(),

@@ -79,7 +79,8 @@ impl Recording {
             }
             (None, StoredGeometry::Sweep(probe)) => {
                 probe.check().map_err(|e| geometry_error(path, &e))?;
-                (Placement::Sweep(probe.clone()), Volumes::forward(layout.frames, 1))
+                let volumes = Volumes { first_backward: layout.backward, ..Volumes::forward(layout.frames, 1) };
+                (Placement::Sweep(probe.clone()), volumes)
             }
             (None, StoredGeometry::Cartesian(file)) => {
                 let drawn = Drawn::new(path, file, options.depth_axis, stored_bytes, &mut remarks)?;

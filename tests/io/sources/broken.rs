@@ -25,7 +25,9 @@ fn a_file_cut_off_anywhere_is_one_line_and_no_panic() {
     ];
     for (name, whole) in &small {
         assert!(total(folder.write(name, whole)).is_ok(), "{name}");
-        for cut in 0..whole.len() {
+        // A Kretz file may lack its last item, the end mark of 8 bytes.
+        let last_item = if name.ends_with(".vol") { whole.len() - 8 } else { whole.len() };
+        for cut in (0..whole.len()).filter(|cut| *cut != last_item) {
             assert!(total(folder.write(name, &whole[..cut])).is_err(), "{name} cut at {cut} of {}", whole.len());
         }
     }
