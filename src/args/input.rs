@@ -1,6 +1,7 @@
 //! Arguments of commands that render a recording: the recording, the settings of the scene in layers, the device, and checks of outputs.
 
 use super::pipeline_folder::pipeline_folder;
+use super::recording::{GeometryArgs, open_recording};
 use crate::files::signals;
 use crate::files::{check_target, replace};
 use crate::gpu::context::list;
@@ -8,7 +9,7 @@ use crate::gpu::{Context, ContextOptions, Deadline, DeviceChoice, GpuError, Texe
 use crate::scene::load::Layers;
 use crate::scene::{Input, Scene};
 use crate::source::phantom::{self, Phantom, PhantomSource};
-use crate::source::{self, Frame, Source};
+use crate::source::{Frame, Source};
 use crate::terminal::{Failure, failed, input, say};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -16,13 +17,12 @@ use std::sync::Arc;
 /// The arguments of every command that renders a recording.
 #[derive(clap::Args)]
 pub struct InputArgs {
-    /// Recording: MetaImage (.mha, .mhd), Kretz (.vol) or frames (.frames). Without one, a synthetic fetal head (preset face)
+    /// Recording: MetaImage (.mha, .mhd), NRRD (.nrrd), NIfTI (.nii), Kretz (.vol), each also as .gz, or frames (.frames). Without one, a synthetic fetal head (preset face)
     input: Option<PathBuf>,
     #[command(flatten)]
     scene: SceneArgs,
-    /// Geometry of the probe (TOML) [default: NAME.probe.toml or probe.toml next to the recording]
-    #[arg(long, value_name = "FILE")]
-    probe: Option<PathBuf>,
+    #[command(flatten)]
+    geometry: GeometryArgs,
     /// Volume of the recording to use, counted from 0
     #[arg(long, value_name = "N", default_value_t = 0)]
     volume: usize,
@@ -58,7 +58,7 @@ impl InputArgs {
     /// Refuses outputs that would replace an input: the files of the source or of the settings. See [`check_outputs`].
     pub fn check_outputs(&self, outputs: &[Output], source: &dyn Source) -> Result<(), Failure> {
         let mut read = source.files();
-        read.extend(self.probe.clone());
+        read.extend(self.geometry.probe.clone());
         read.extend(self.scene.files());
         check_outputs(outputs, read.iter().map(PathBuf::as_path))
     }
@@ -102,7 +102,7 @@ impl InputArgs {
 
     fn source(&self) -> Result<Box<dyn Source>, Failure> {
         match &self.input {
-            Some(file) => source::open(file, self.probe.as_deref()).map_err(input),
+            Some(file) => open_recording(file, self.geometry.options()),
             None => Ok(Box::new(PhantomSource::new(Phantom::new(phantom::PhantomOptions::default()).map_err(input)?))),
         }
     }
@@ -167,8 +167,10 @@ impl SceneArgs {
         let mut layers = Layers::default();
         if is_phantom {
             // The pair shows a surface.
-            let is_pair = self.layout.as_deref() == Some("pair");
-            let is_plain = self.preset.is_empty() && self.scene.is_none() && self.mode.is_none() && !is_pair;
+            let is_pair = self.layout.as_deref().is_some_and(|layout| layout.eq_ignore_ascii_case("pair"));
+            // A layout may be typed as a mode.
+            let has_mode = self.mode.as_deref().is_some_and(|mode| mode_setting(mode).starts_with("mode="));
+            let is_plain = self.preset.is_empty() && self.scene.is_none() && !has_mode && !is_pair;
             layers.phantom(is_plain).map_err(input)?;
         }
         self.layers_over(layers, chosen)
@@ -208,15 +210,17 @@ impl SceneArgs {
     /// Each flag as it was typed, with the assignment that it stands for.
     fn assignments(&self) -> Result<Vec<(String, String)>, Failure> {
         let mut set = Vec::new();
-        set.extend(self.mode.as_ref().map(|mode| (format!("--mode {mode}"), format!("mode={mode}"))));
+        set.extend(self.mode.as_ref().map(|mode| (format!("--mode {mode}"), mode_setting(mode))));
         for (name, key, value) in
             [("--layout", "layout", &self.layout), ("--transfer", "volume.transfer", &self.transfer)]
         {
-            set.extend(value.as_ref().map(|value| (format!("{name} {value}"), format!("{key}={value}"))));
+            let lower = |value: &str| if key == "layout" { value.to_ascii_lowercase() } else { value.into() };
+            set.extend(value.as_ref().map(|value| (format!("{name} {value}"), format!("{key}={}", lower(value)))));
         }
         if let Some(size) = &self.size {
             let flag = format!("--size {size}");
-            let edges = size.split_once('x').and_then(|(w, h)| Some((w.parse::<u32>().ok()?, h.parse::<u32>().ok()?)));
+            let edges =
+                size.split_once(['x', 'X']).and_then(|(w, h)| Some((w.parse::<u32>().ok()?, h.parse::<u32>().ok()?)));
             let (w, h) = edges.ok_or_else(|| input(format!("{flag}: must read WIDTHxHEIGHT in pixels, as 512x512")))?;
             set.push((flag, format!("picture.size=[{w},{h}]")));
         }
@@ -257,6 +261,29 @@ impl SceneArgs {
             ..ContextOptions::default()
         })
     }
+}
+
+/// Other names of modes.
+const MODE_SYNONYMS: [(&str, &str); 9] = [
+    ("ortho", "orthogonal"),
+    ("slices", "orthogonal"),
+    ("tomo", "tomography"),
+    ("tui", "tomography"),
+    ("x-ray", "xray"),
+    ("average", "mean"),
+    ("avgip", "mean"),
+    ("vrt", "vr"),
+    ("maxip", "mip"),
+];
+
+/// The setting that a mode stands for, whatever its case. `4up` is a layout.
+fn mode_setting(mode: &str) -> String {
+    let lower = mode.to_ascii_lowercase();
+    if ["4up", "4-up"].contains(&&*lower) {
+        return "layout=4up".into();
+    }
+    let name = MODE_SYNONYMS.iter().find(|(other, _)| *other == lower).map_or(&*lower, |(_, name)| name);
+    format!("mode={name}")
 }
 
 /// Opens the chosen device, or the best one, and prints its name on one line.

@@ -3,10 +3,12 @@
 mod input;
 mod motor;
 mod pipeline_folder;
+mod recording;
 mod source;
 
 pub use input::{InputArgs, Output, SceneArgs, check_outputs, open_device, open_device_for_statistics, write_report};
 pub use motor::{SerialArgs, motor_failure, motor_table};
 #[cfg(feature = "view")]
 pub use pipeline_folder::pipeline_folder;
+pub use recording::{GeometryArgs, open_recording};
 pub use source::{SourceArgs, StreamArgs};

@@ -1,6 +1,7 @@
 //! Arguments of commands that render live: the source of frames, and how volumes become pictures.
 
 use super::motor::{MotorArgs, PlannedSweep};
+use super::recording::{GeometryArgs, open_recording, say_probe_file};
 use crate::gpu::TimeStamps;
 use crate::kiosk::config::Config;
 use crate::live::Update;
@@ -14,7 +15,7 @@ use crate::source::phantom::{self, CachedPhantom, Phantom};
 use crate::source::piped::Piped;
 use crate::terminal::{Failure, failed, input};
 use clap::Parser;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 /// Volumes of the phantom. They are computed once and played in a loop: two sweeps forth and two back.
 const PHANTOM_VOLUMES: usize = 4;
@@ -26,13 +27,12 @@ const NETWORK: &str = "igtl://";
 /// The source of live frames.
 #[derive(Clone, clap::Args)]
 pub struct SourceArgs {
-    /// phantom; a recording (.mha, .mhd, .vol, .frames); - for standard input (a line of JSON, then raw frames, as
+    /// phantom; a recording (.mha, .mhd, .nrrd, .nii, .vol, each also as .gz, .frames); - for standard input (a line of JSON, then raw frames, as
     /// tools/pipe_frames.py writes them); igtl://HOST[:PORT] for OpenIGTLink
     #[arg(long, value_name = "SOURCE", default_value = "phantom")]
     source: String,
-    /// Geometry of the probe (TOML), for sources that do not state it
-    #[arg(long, value_name = "FILE")]
-    probe: Option<PathBuf>,
+    #[command(flatten)]
+    geometry: GeometryArgs,
     /// Rate of a recording or the phantom, volumes per second [default: as fast as possible; the phantom: 1]
     #[arg(long, value_name = "N", conflicts_with = "real_time")]
     rate: Option<f64>,
@@ -112,12 +112,16 @@ impl SourceArgs {
         let network = self.source.strip_prefix(NETWORK);
         let is_file = !self.is_phantom() && self.source != "-" && network.is_none();
         let fan = self.is_phantom().then_some(phantom::FAN_ANGLE_DEG);
-        let sweep = self.motor.plan(self.probe.as_deref(), is_file.then(|| self.path()), fan)?;
+        let sweep = self.motor.plan(self.geometry.probe.as_deref(), is_file.then(|| self.path()), fan)?;
+        if self.geometry.depth_axis.is_some() && !is_file {
+            return Err(input("--depth-axis: is for recordings of Cartesian volumes"));
+        }
         if self.is_phantom() {
             return self.phantom(sweep.as_ref());
         }
         let source: Box<dyn Live> = if self.source == "-" {
-            Box::new(Piped::new(std::io::stdin(), self.probe.as_deref()).map_err(input)?)
+            say_probe_file(self.geometry.probe.as_deref());
+            Box::new(Piped::new(std::io::stdin(), self.geometry.probe.as_deref()).map_err(input)?)
         } else if let Some(address) = network {
             if address.is_empty() {
                 return Err(input(format!("--source {}: must read igtl://HOST or igtl://HOST:PORT", self.source)));
@@ -131,7 +135,7 @@ impl SourceArgs {
             let network = Network::connect(address, self.network()?);
             Box::new(network.map_err(|e| failed(format!("{}: {e}", self.source)))?)
         } else {
-            let recording = crate::source::open(self.path(), self.probe.as_deref()).map_err(input)?;
+            let recording = open_recording(self.path(), self.geometry.options())?;
             // The frame rate of a free-running probe is limited by the speed of sound.
             let rate = self.rate.or(sweep.as_ref().and_then(|_| acoustic_rate(&*recording)));
             Box::new(PlaybackSource::new(recording, self.playback(rate)?, self.rounds))

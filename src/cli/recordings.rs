@@ -1,13 +1,14 @@
 //! `echolume convert`, `echolume info` and `echolume phantom`: recordings are converted, described and made.
 
-use crate::args::{Output, check_outputs};
+use crate::args::{GeometryArgs, Output, check_outputs, open_recording};
 use crate::files::signals::Writing;
-use crate::probe::{Geometry, Grid};
+use crate::probe::{Geometry, Grid, World};
 use crate::scene::insonified_box;
-use crate::source::convert::{Volume, VolumeFile, lattice};
+use crate::source::convert::{Target, Volume, lattice};
 use crate::source::phantom::{Body, Label, Phantom, PhantomOptions, PointSpread, Sampling, Speckle, distance_path};
 use crate::source::recorder::{Header, Writer};
 use crate::source::sequence::{self, Sequence};
+use crate::source::volume_file::VolumeFile;
 use crate::source::{self, Source};
 use crate::terminal::{Failure, failed, input, remark, say};
 use std::path::PathBuf;
@@ -21,21 +22,26 @@ const OUTPUT: &str = "output";
                         echolume convert sweep.frames sweep.mha --sequence    (frames of whole volumes, for other programs)\n  \
                         echolume render volume.mha --mode mip -o mip.png    (the result is a recording, too)")]
 pub struct Convert {
-    /// MetaImage (.mha, .mhd), Kretz (.vol) or .frames file
+    /// MetaImage (.mha, .mhd), NRRD (.nrrd), NIfTI (.nii), Kretz (.vol), each also as .gz, or .frames file
     input: PathBuf,
-    /// File to write: .mha or .nrrd for a volume, .frames for every frame unchanged, .mha with --sequence
+    /// File to write: .mha, .nrrd, .nii or .nii.gz for a volume, .frames for every frame unchanged, .mha with --sequence
     output: PathBuf,
-    /// Voxel spacing along every axis, mm [default: the sample spacing of a scan line]
+    /// Voxel spacing along every axis, mm [default: a Cartesian volume keeps its voxels; a sweep gets the sample spacing of a scan line]
     #[arg(long, value_name = "MM", allow_negative_numbers = true)]
     spacing: Option<f64>,
     /// Volume of the recording to use, counted from 0
     #[arg(long, value_name = "N", default_value_t = 0)]
     volume: usize,
-    /// Geometry of the probe (TOML) [default: NAME.probe.toml or probe.toml next to the recording]
+    #[command(flatten)]
+    geometry: GeometryArgs,
+    /// Value of voxels outside the sector, in the file's own units
+    #[arg(long, value_name = "VALUE", default_value_t = 0.0, allow_negative_numbers = true)]
+    outside: f64,
+    /// Also write a volume of 1 inside the sector and 0 outside
     #[arg(long, value_name = "FILE")]
-    probe: Option<PathBuf>,
+    mask: Option<PathBuf>,
     /// Write the frames of all complete volumes as a PLUS sequence, and their geometry to NAME.probe.toml next to it
-    #[arg(long, conflicts_with_all = ["spacing", "volume"])]
+    #[arg(long, conflicts_with_all = ["spacing", "volume", "outside", "mask"])]
     sequence: bool,
 }
 
@@ -48,19 +54,30 @@ impl Convert {
             return self.sequence();
         }
         VolumeFile::of(&self.output).map_err(input)?;
-        let mut recording = source::open(&self.input, self.probe.as_deref()).map_err(input)?;
+        let mut recording = open_recording(&self.input, self.geometry.options())?;
         let shown = self.input.display();
         if self.volume >= recording.volumes() {
             let there = recording.volumes();
             return Err(input(format!("{shown}: --volume {}: there are {there}, numbered from 0", self.volume)));
         }
         let geometry = recording.geometry(self.volume);
-        let usual = match &geometry {
-            Geometry::Sweep(probe) => probe.sample_pitch,
-            Geometry::Cartesian(grid) => grid.spacing.into_iter().fold(f64::INFINITY, f64::min),
+        let grid = match (&geometry, self.spacing) {
+            // Every voxel stays what and where it is.
+            (Geometry::Cartesian(grid), None) => *grid,
+            (Geometry::Sweep(probe), None) => lattice(&geometry, probe.sample_pitch)
+                .map_err(|e| input(format!("the sample spacing {e}; give --spacing")))?,
+            (_, Some(spacing)) => lattice(&geometry, spacing).map_err(|e| input(format!("--spacing {e}")))?,
         };
-        let grid = lattice(&geometry, self.spacing.unwrap_or(usual)).map_err(|e| input(format!("--spacing {e}")))?;
-        self.check_outputs(&[(OUTPUT, Some(&self.output))], &*recording)?;
+        let mut target = Target::new(grid, recording.sample_type());
+        if let (Some(world), Geometry::Cartesian(own)) = (recording.world(), &geometry) {
+            target.world = world.on(own, &grid);
+        }
+        target.outside = self.outside;
+        target.check(&self.output).map_err(input)?;
+        if let Some(mask) = &self.mask {
+            VolumeFile::of(mask).map_err(input)?;
+        }
+        self.check_outputs(&[(OUTPUT, Some(&self.output)), ("--mask", self.mask.as_deref())], &*recording)?;
         let first = geometry.clone();
         let mut volume = Volume::new(geometry, recording.stored_type());
         recording.skip_to_volume(self.volume).map_err(input)?;
@@ -73,20 +90,27 @@ impl Convert {
             there += 1;
         }
         let bar = indicatif::ProgressBar::new(grid.size[2] as u64).with_message("slices");
-        volume.write(&grid, recording.sample_type(), &self.output, || bar.inc(1)).map_err(failed)?;
+        volume.write(&target, &self.output, || bar.inc(1)).map_err(failed)?;
         bar.finish_and_clear();
-        let ([x, y, z], [spacing, ..]) = (grid.size, grid.spacing);
+        if let Some(mask) = &self.mask {
+            volume.write_mask(&target, mask).map_err(failed)?;
+            say!("mask: {}, 1 inside and 0 outside", mask.display());
+        }
+        let ([x, y, z], [dx, dy, dz]) = (grid.size, grid.spacing);
+        let spacing = if dx == dy && dy == dz { format!("{dx}") } else { format!("{dx} x {dy} x {dz}") };
         let missing = if there < each { format!(", {there} of {each} frames are there") } else { String::new() };
         say!("volume: {}, {x} x {y} x {z} voxels of {spacing} mm{missing}", self.output.display());
         if !volume.meets(&grid) {
             remark(&format!("{}: is empty: {}", self.output.display(), thinner_than(&grid, &first)));
+        } else if let Some(left) = self.spacing.and_then(|mm| what_is_left(mm, &grid, &first)) {
+            remark(&format!("{}: {left}", self.output.display()));
         }
         Ok(())
     }
 
     fn check_outputs(&self, targets: &[Output], recording: &dyn Source) -> Result<(), Failure> {
         let read = recording.files();
-        check_outputs(targets, read.iter().chain(&self.probe).map(PathBuf::as_path))
+        check_outputs(targets, read.iter().chain(&self.geometry.probe).map(PathBuf::as_path))
     }
 
     /// Writes the frames of all complete volumes as a PLUS sequence.
@@ -94,7 +118,7 @@ impl Convert {
         if VolumeFile::of(&self.output).map_err(input)? != VolumeFile::MetaImage {
             return Err(input(format!("{}: a sequence must end in .mha", self.output.display())));
         }
-        let mut recording = source::open(&self.input, self.probe.as_deref()).map_err(input)?;
+        let mut recording = open_recording(&self.input, self.geometry.options())?;
         let beside = sequence::probe_file_path(&self.output);
         self.check_outputs(&[(OUTPUT, Some(&self.output)), (OUTPUT, Some(&beside))], &*recording)?;
         let sequence = Sequence::of(&mut *recording, &self.input).map_err(input)?;
@@ -112,11 +136,18 @@ impl Convert {
 
     /// Writes every frame of every volume unchanged, as .frames.
     fn record(&self) -> Result<(), Failure> {
-        if self.spacing.is_some() || self.volume != 0 || self.sequence {
-            return Err(input("--spacing, --volume and --sequence apply to .mha; .frames holds every frame unchanged"));
+        if self.spacing.is_some() || self.volume != 0 || self.sequence || self.outside != 0.0 || self.mask.is_some() {
+            return Err(input(
+                "--spacing, --volume, --outside, --mask and --sequence apply to volumes; .frames holds every frame unchanged",
+            ));
         }
-        let mut recording = source::open(&self.input, self.probe.as_deref()).map_err(input)?;
+        let mut recording = open_recording(&self.input, self.geometry.options())?;
         let first = recording.geometry(0);
+        if let (Some(world), Geometry::Cartesian(grid)) = (recording.world(), &first)
+            && world != World::of(grid)
+        {
+            remark(&format!("{}: a .frames file does not keep the orientation in the world", self.output.display()));
+        }
         let second = if recording.volumes() > 1 { recording.geometry(1) } else { first.clone() };
         let mut frame = recording.next_frame().map_err(input)?;
         let is_backward = frame.as_ref().is_some_and(|frame| frame.backward);
@@ -152,16 +183,15 @@ impl Convert {
 
 #[derive(clap::Args)]
 pub struct Info {
-    /// MetaImage (.mha, .mhd), Kretz (.vol) or .frames file
+    /// MetaImage (.mha, .mhd), NRRD (.nrrd), NIfTI (.nii), Kretz (.vol), each also as .gz, or .frames file
     file: PathBuf,
-    /// Geometry of the probe (TOML) [default: NAME.probe.toml or probe.toml next to the file]
-    #[arg(long, value_name = "FILE")]
-    probe: Option<PathBuf>,
+    #[command(flatten)]
+    geometry: GeometryArgs,
 }
 
 impl Info {
     pub fn run(&self) -> Result<(), Failure> {
-        let facts = source::description(&self.file, self.probe.as_deref()).map_err(input)?;
+        let facts = source::description(&self.file, self.geometry.options()).map_err(input)?;
         let width = facts.iter().map(|(name, _)| name.chars().count()).max().unwrap_or(0);
         for (name, value) in facts {
             say!("{name:width$}  {value}");
@@ -298,4 +328,15 @@ fn thinner_than(grid: &Grid, geometry: &Geometry) -> String {
     format!(
         "the sector is {x:.2} x {y:.2} x {z:.2} mm, and none of the voxels, --spacing {spacing} mm apart, lies in it"
     )
+}
+
+/// What a spacing leaves of a region, if that is one or two voxels along an axis that had more.
+fn what_is_left(spacing: f64, grid: &Grid, geometry: &Geometry) -> Option<String> {
+    let (low, high) = insonified_box(geometry);
+    let extent = (high - low).to_array();
+    let [columns, rows] = geometry.frame_size();
+    let before = [columns, rows, geometry.slices()];
+    let is_little = (0..3).any(|n| grid.size[n] <= 2 && before[n] > 4 && extent[n] > 0.0);
+    let ([x, y, z], [a, b, c]) = (extent, grid.size);
+    is_little.then(|| format!("--spacing {spacing} mm leaves {a} x {b} x {c} voxels of {x:.2} x {y:.2} x {z:.2} mm"))
 }

@@ -3,10 +3,10 @@
 use super::candidates::candidates;
 use super::measure::{MeasureError, MeasureOptions, count, phantom, recording};
 use super::{Area, Areas, Report, export, sheet};
-use crate::args::{Output, check_outputs, open_device, write_report};
+use crate::args::{Output, check_outputs, open_device, open_recording, write_report};
 use crate::gpu::DeviceChoice;
 use crate::machine;
-use crate::source;
+use crate::source::OpenOptions;
 use crate::terminal::{Failure, failed, input, say};
 use std::path::{Path, PathBuf};
 
@@ -76,7 +76,7 @@ impl FilterReport {
         check_outputs(&targets, self.recordings.iter().map(PathBuf::as_path))?;
         let mut sources = Vec::new();
         for file in &self.recordings {
-            sources.push(source::open(file, None).map_err(input)?);
+            sources.push(open_recording(file, OpenOptions::default())?);
         }
         let context = open_device(self.device.clone(), false)?;
         let options = MeasureOptions { only: &self.filter, pixels: self.pixels, repeats: self.repeat as usize };

@@ -6,8 +6,10 @@ pub mod file;
 pub mod geometry;
 pub mod grid;
 pub mod motor;
+pub mod world;
 
 pub use axis::Axis;
 pub use file::ProbeFile;
 pub use geometry::{Advance, Array, GeometryError, Indices, Motion, Probe, Volumes};
 pub use grid::{Geometry, Grid};
+pub use world::{AxisOrder, DepthAxis, World};

@@ -3,8 +3,9 @@
 
 use super::frame::Frame;
 use super::samples::{SampleType, StoredType};
-use crate::files::{InputError, Unfinished};
-use crate::probe::{Geometry, Grid, Probe};
+use super::volume_file::VolumeFile;
+use crate::files::InputError;
+use crate::probe::{Geometry, Grid, Probe, World};
 use glam::DVec3;
 use rayon::prelude::*;
 use std::io::Write;
@@ -14,57 +15,46 @@ use std::path::Path;
 const MAX_EDGE: f64 = 16384.0;
 const MAX_VOXELS: f64 = 8_589_934_592.0;
 
-/// Formats of volume files that can be written.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum VolumeFile {
-    /// MetaImage with header and samples in one file (.mha).
-    MetaImage,
-    /// NRRD 4 with header and raw samples in one file (.nrrd).
-    Nrrd,
+/// What is written: the lattice, its place in the world, the type of the samples, and the value outside the insonified region.
+#[derive(Clone, Copy, Debug)]
+pub struct Target {
+    pub grid: Grid,
+    /// Where the voxels are (LPS).
+    pub world: World,
+    pub sample: SampleType,
+    /// In the units of the file.
+    pub outside: f64,
 }
 
-impl VolumeFile {
-    /// The format for the extension of a file name.
-    ///
-    /// # Errors
-    /// Another extension.
-    pub fn of(path: &Path) -> Result<VolumeFile, InputError> {
-        let ending = path.extension().and_then(|e| e.to_str()).unwrap_or("").to_ascii_lowercase();
-        match &*ending {
-            "mha" => Ok(VolumeFile::MetaImage),
-            "nrrd" => Ok(VolumeFile::Nrrd),
-            _ => Err(InputError::new(path, "file", "must end in .mha or .nrrd")),
-        }
+impl Target {
+    /// A lattice whose axes are those of the world, with 0 outside.
+    pub fn new(grid: Grid, sample: SampleType) -> Target {
+        Target { grid, world: World::of(&grid), sample, outside: 0.0 }
     }
 
-    fn header(self, grid: &Grid, sample: SampleType) -> String {
-        let [x, y, z] = grid.size;
-        let [dx, dy, dz] = grid.spacing;
-        let [ox, oy, oz] = grid.origin;
-        match self {
-            VolumeFile::MetaImage => {
-                let kind = sample.metaimage();
-                format!(
-                    "ObjectType = Image\nNDims = 3\nBinaryData = True\nBinaryDataByteOrderMSB = False\nCompressedData = False\n\
-                     TransformMatrix = 1 0 0 0 1 0 0 0 1\nOffset = {ox} {oy} {oz}\nElementSpacing = {dx} {dy} {dz}\n\
-                     DimSize = {x} {y} {z}\nElementType = {kind}\nElementDataFile = LOCAL\n"
-                )
-            }
-            VolumeFile::Nrrd => {
-                let kind = match sample {
-                    SampleType::U8 => "uint8",
-                    SampleType::U16 => "uint16",
-                    SampleType::I16 => "int16",
-                    SampleType::F32 => "float",
-                };
-                format!(
-                    "NRRD0004\n# Lateral, depth and elevation of an ultrasound probe, mm.\ntype: {kind}\ndimension: 3\n\
-                     space dimension: 3\nsizes: {x} {y} {z}\nspace directions: ({dx},0,0) (0,{dy},0) (0,0,{dz})\n\
-                     kinds: domain domain domain\nspace units: \"mm\" \"mm\" \"mm\"\nspace origin: ({ox},{oy},{oz})\n\
-                     endian: little\nencoding: raw\n\n"
-                )
-            }
+    /// Checks that a file can hold it, before any work is done.
+    ///
+    /// # Errors
+    /// An extension that is not a format, an axis that is too long for the format, an outside value that the type of the samples does not
+    /// have.
+    pub fn check(&self, path: &Path) -> Result<(), InputError> {
+        let most = VolumeFile::of(path)?.most_along_axis();
+        if let Some(long) = self.grid.size.iter().find(|n| **n > most) {
+            let fault = format!("would have {long} voxels along an axis, the format holds {most}");
+            return Err(InputError::new(path, "file", fault));
         }
+        let [low, high] = match self.sample {
+            SampleType::U8 => [0.0, 255.0],
+            SampleType::U16 => [0.0, 65535.0],
+            SampleType::I16 => [-32768.0, 32767.0],
+            SampleType::F32 => [f64::from(f32::MIN), f64::from(f32::MAX)],
+        };
+        let is_whole = self.sample == SampleType::F32 || self.outside.fract() == 0.0;
+        if !(low..=high).contains(&self.outside) || !is_whole {
+            let fault = format!("{} is no value of {}", self.outside, self.sample);
+            return Err(InputError::new(path, "--outside", fault));
+        }
+        Ok(())
     }
 }
 
@@ -168,18 +158,35 @@ impl Volume {
         })
     }
 
+    /// The stored value of a voxel of a target; None outside the insonified region. Voxels of the volume itself are not interpolated.
+    fn value(&self, target: &Target, voxel: [usize; 3]) -> Option<f64> {
+        match &self.geometry {
+            Geometry::Cartesian(own) if *own == target.grid => Some(self.sample(voxel)),
+            _ => self.at(place_of(&target.grid, voxel)),
+        }
+    }
+
     fn indices(&self, probe: &Probe, place: DVec3) -> [f64; 3] {
         let at = probe.to_indices(place);
         [at.sample, at.line, at.slice]
     }
 
-    /// Writes the volume on a grid. `sample`: the type of the original file, which is used for the values. Voxels outside the sector are
-    /// zero. `each` is called after every slice.
+    /// Writes the volume on a lattice. `target.sample`: the type of the original file, which is used for the values. `each` is called
+    /// after every slice.
     ///
     /// # Errors
-    /// An extension that is not a format, a full disk. No file is left then.
-    pub fn write(&self, grid: &Grid, sample: SampleType, path: &Path, each: impl Fn()) -> Result<(), InputError> {
-        write_grid(grid, sample, path, |place| self.at(place), each)
+    /// As [`Target::check`], and a full disk. No file is left then.
+    pub fn write(&self, target: &Target, path: &Path, each: impl Fn()) -> Result<(), InputError> {
+        write_voxels(target, path, |voxel| self.value(target, voxel), each)
+    }
+
+    /// Writes 1 for voxels inside the insonified region and 0 for those outside, on the same lattice.
+    ///
+    /// # Errors
+    /// As [`Volume::write`].
+    pub fn write_mask(&self, target: &Target, path: &Path) -> Result<(), InputError> {
+        let mask = Target { sample: SampleType::U8, outside: 0.0, ..*target };
+        write_voxels(&mask, path, |voxel| self.value(target, voxel).map(|_| 1.0), || ())
     }
 }
 
@@ -194,21 +201,30 @@ pub(super) fn write_grid(
     value: impl Fn(DVec3) -> Option<f64> + Sync,
     each: impl Fn(),
 ) -> Result<(), InputError> {
-    let format = VolumeFile::of(path)?;
+    write_voxels(&Target::new(*grid, sample), path, |voxel| value(place_of(grid, voxel)), each)
+}
+
+fn write_voxels(
+    target: &Target,
+    path: &Path,
+    value: impl Fn([usize; 3]) -> Option<f64> + Sync,
+    each: impl Fn(),
+) -> Result<(), InputError> {
+    target.check(path)?;
+    let Target { grid, sample, outside, .. } = *target;
     let written = |e| InputError::unwritable(path, &e);
-    let mut file = Unfinished::create(path).map_err(written)?;
-    file.write_all(format.header(grid, sample).as_bytes()).map_err(written)?;
+    let mut file = VolumeFile::of(path)?.create(path, grid.size, &target.world, sample).map_err(written)?;
     let mut slice = vec![0; grid.size[0] * grid.size[1] * sample.bytes()];
     for z in 0..grid.size[2] {
         slice.par_chunks_mut(grid.size[0] * sample.bytes()).enumerate().for_each(|(y, row)| {
             for (x, voxel) in row.chunks_exact_mut(sample.bytes()).enumerate() {
-                store(sample, value(place_of(grid, [x, y, z])), voxel);
+                store(sample, value([x, y, z]).map_or(outside, |value| value - sample.shift()), voxel);
             }
         });
         file.write_all(&slice).map_err(written)?;
         each();
     }
-    file.finish().and_then(|()| file.rename()).map_err(written)
+    file.finish().map_err(written)
 }
 
 /// The centre of a voxel, mm.
@@ -216,16 +232,12 @@ fn place_of(grid: &Grid, voxel: [usize; 3]) -> DVec3 {
     DVec3::from(grid.origin) + DVec3::from(grid.spacing) * DVec3::from_array(voxel.map(|n| n as f64))
 }
 
-/// Writes a stored value in the type of the file, rounded to nearest.
-fn store(sample: SampleType, value: Option<f64>, voxel: &mut [u8]) {
-    let whole = value.unwrap_or(0.0).round();
+/// Writes a value in the type of the file, rounded to nearest.
+fn store(sample: SampleType, value: f64, voxel: &mut [u8]) {
     match sample {
-        SampleType::U8 => voxel.copy_from_slice(&[whole as u8]),
-        SampleType::U16 => voxel.copy_from_slice(&(whole as u16).to_le_bytes()),
-        SampleType::I16 => {
-            let signed = value.map_or(0.0, |_| whole - sample.shift());
-            voxel.copy_from_slice(&(signed as i16).to_le_bytes());
-        }
-        SampleType::F32 => voxel.copy_from_slice(&(value.unwrap_or(0.0) as f32).to_le_bytes()),
+        SampleType::U8 => voxel.copy_from_slice(&[value.round() as u8]),
+        SampleType::U16 => voxel.copy_from_slice(&(value.round() as u16).to_le_bytes()),
+        SampleType::I16 => voxel.copy_from_slice(&(value.round() as i16).to_le_bytes()),
+        SampleType::F32 => voxel.copy_from_slice(&(value as f32).to_le_bytes()),
     }
 }

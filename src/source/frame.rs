@@ -2,9 +2,9 @@
 
 use super::samples::{SampleType, StoredType};
 use crate::files::InputError;
-use crate::probe::{Advance, Geometry};
+use crate::probe::{Advance, Geometry, World};
 use serde::{Deserialize, Serialize};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 /// Most frames a volume, for every reader.
 const MAX_SLICES: usize = 1 << 16;
@@ -115,6 +115,14 @@ pub trait Source: Send {
     /// Every file that is read; none for a source that is computed.
     fn files(&self) -> Vec<PathBuf> {
         Vec::new()
+    }
+    /// Where the voxels of Cartesian volumes are in the world; None where the source does not say, and for sweeps.
+    fn world(&self) -> Option<World> {
+        None
+    }
+    /// The probe file that the geometry is from; None if the source states it itself.
+    fn probe_file(&self) -> Option<&Path> {
+        None
     }
     /// When the last frame that was returned had arrived, s on the recorder's clock; None if that was not recorded.
     fn arrival(&self) -> Option<f64> {

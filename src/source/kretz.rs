@@ -1,15 +1,15 @@
 //! GE Kretz volumes (`.vol`): a magic, then items of {u16 group, u16 element, u32 length, bytes}, little-endian, up to
 //! FFFF,FFFF. Groups 0110 and 0120 hold the patient's identity: their bytes are skipped, never read.
 
-use super::layout::{Layout, LineOrder, Pixels, StoredGeometry, extent};
-use super::samples::SampleType;
+use super::layout::{Cartesian, Layout, LineOrder, StoredGeometry, extent};
+use super::packed::{InputFile, Pixels};
+use super::pixel::{Number, PixelFormat};
 use crate::files::InputError;
 use crate::probe::file::SLAB;
-use crate::probe::{Advance, Array, Axis, Grid, Motion, Probe};
+use crate::probe::{Advance, Array, Axis, AxisOrder, Grid, Motion, Probe, World};
 use std::collections::{BTreeMap, HashMap};
 use std::f64::consts::FRAC_PI_2;
-use std::fs::File;
-use std::io::{self, BufReader, Read};
+use std::io::{self, Read};
 use std::path::Path;
 
 const MAGIC: &[u8; 16] = b"KRETZFILE 1.0   ";
@@ -45,10 +45,13 @@ struct Items<'a> {
     wavelet: bool,
     /// There are items of further volumes in time (4D).
     four_d: bool,
+    /// The file ends behind a whole item, without the mark.
+    no_end: bool,
 }
 
-pub(super) fn read(path: &Path) -> Result<Layout, InputError> {
-    let items = Items::walk(path)?;
+pub(super) fn read(file: &InputFile) -> Result<Layout, InputError> {
+    let path = file.path;
+    let items = Items::walk(file)?;
     if items.wavelet {
         return Err(InputError::new(
             path,
@@ -70,16 +73,27 @@ pub(super) fn read(path: &Path) -> Result<Layout, InputError> {
     if length > claimed {
         remarks.push(("more data".into(), format!("{} bytes behind the voxels; not read", length - claimed)));
     }
+    if items.no_end {
+        remarks.push(("end mark".into(), "FFFF,FFFF is missing; the items before it are whole".into()));
+    }
     let geometry = items.geometry(samples, lines, frames)?;
+    let falls = |tag, count| items.table(tag, "angles").map(|table| table.len() == count && is_falling(&table));
+    let line_order = if falls(LINE_ANGLES, lines)? { LineOrder::Reversed } else { LineOrder::InOrder };
+    let backward = frames > 1 && falls(SWEEP_ANGLES, frames)?;
+    let pixels = match file.is_packed() {
+        true => file.pixels(offset),
+        false => Pixels { length, ..file.pixels(offset) },
+    };
     let layout = Layout {
         format: "Kretz volume",
-        sample: SampleType::U8,
-        big_endian: false,
+        pixel: PixelFormat::grey(Number::U8),
         frame_size: [samples, lines],
         frames,
-        pixels: Pixels { path: path.into(), offset, length, compressed: false },
-        line_order: LineOrder::InOrder,
+        pixels,
+        line_order,
         geometry,
+        backward,
+        states_geometry: true,
         times: BTreeMap::new(),
         remarks,
     };
@@ -88,20 +102,25 @@ pub(super) fn read(path: &Path) -> Result<Layout, InputError> {
 }
 
 impl<'a> Items<'a> {
-    fn walk(path: &'a Path) -> Result<Items<'a>, InputError> {
+    fn walk(file: &InputFile<'a>) -> Result<Items<'a>, InputError> {
+        let path = file.path;
         let unreadable = |e| InputError::unreadable(path, &e);
-        let file = File::open(path).map_err(unreadable)?;
-        let there = file.metadata().map_err(unreadable)?.len();
-        let mut input = BufReader::new(file);
+        let there = file.most_bytes();
+        let mut input = file.open().map_err(unreadable)?;
         let mut magic = [0; 16];
         let whole = fill(&mut input, &mut magic).map_err(unreadable)?;
         if !whole || magic != *MAGIC {
             return Err(InputError::new(path, "magic", "is not 'KRETZFILE 1.0   ', the only version that is read"));
         }
-        let mut items = Items { path, small: HashMap::new(), voxels: None, wavelet: false, four_d: false };
+        let mut items =
+            Items { path, small: HashMap::new(), voxels: None, wavelet: false, four_d: false, no_end: false };
         let mut at = MAGIC.len() as u64;
         for _ in 0..MAX_ITEMS {
             let mut head = [0; 8];
+            if at == there && !file.is_packed() && items.voxels.is_some() {
+                items.no_end = true;
+                return Ok(items);
+            }
             if !fill(&mut input, &mut head).map_err(unreadable)? {
                 return Err(InputError::new(path, "items", format!("cut short after {there} bytes, before FFFF,FFFF")));
             }
@@ -137,8 +156,7 @@ impl<'a> Items<'a> {
                 unread = length - bytes.len() as u64;
                 items.small.insert(tag, bytes);
             }
-            // Bounded by the length of the file, which fits.
-            input.seek_relative(unread as i64).map_err(unreadable)?;
+            input.skip(unread).map_err(unreadable)?;
             at += length;
         }
         Err(InputError::new(path, "items", format!("are more than {MAX_ITEMS}, before FFFF,FFFF")))
@@ -178,14 +196,18 @@ impl<'a> Items<'a> {
         }
     }
 
-    /// Angles centred on pi/2, one of `count`.
+    /// Angles centred on pi/2, one of `count`, in rising order.
     fn angles(&self, tag: Tag, title: &str, count: usize) -> Result<Axis, InputError> {
         let table = self.table(tag, title)?;
         if table.len() != count {
             return self.fault(tag, title, format!("has {} entries, must have {count}", table.len()));
         }
-        let axis = Axis::from_table(table.iter().map(|a| a - FRAC_PI_2).collect());
-        if axis.is_valid() { Ok(axis) } else { self.fault(tag, title, "must rise from each to the next") }
+        let mut angles: Vec<f64> = table.iter().map(|a| a - FRAC_PI_2).collect();
+        if is_falling(&angles) {
+            angles.reverse();
+        }
+        let axis = Axis::from_table(angles);
+        if axis.is_valid() { Ok(axis) } else { self.fault(tag, title, "must rise or fall from each to the next") }
     }
 
     fn geometry(&self, samples: usize, lines: usize, frames: usize) -> Result<StoredGeometry, InputError> {
@@ -195,8 +217,9 @@ impl<'a> Items<'a> {
         }
         let tables = [SWEEP_ANGLES, LINE_ANGLES].map(|tag| self.small.get(&tag).is_some_and(|b| !b.is_empty()));
         if tables == [false, false] {
-            let grid = Grid { size: [samples, lines, frames], spacing: [step; 3], origin: [0.0; 3] };
-            return Ok(StoredGeometry::Pictures(grid, 1));
+            let size = [samples, lines, frames];
+            let world = World::of(&Grid { size, spacing: [step; 3], origin: [0.0; 3] });
+            return Ok(StoredGeometry::Cartesian(Cartesian { size, volumes: 1, world, order: AxisOrder::STORED }));
         }
         let radius = self.number(ARRAY_RADIUS, "array radius")? * step;
         let (motion, slices) = if frames == 1 {
@@ -218,6 +241,11 @@ impl<'a> Items<'a> {
             sound_speed: SOUND_SPEED,
         })))
     }
+}
+
+/// True if a table falls: its last line or frame comes first in space.
+fn is_falling(table: &[f64]) -> bool {
+    table.len() > 1 && table[0] > table[table.len() - 1]
 }
 
 fn name((group, element): Tag, title: &str) -> String {

@@ -1,36 +1,52 @@
 //! MetaImage (`.mha`, `.mhd`): plain volumes, the sequences of the PLUS toolkit, and UsTK's pre-scan sweeps.
 
-use super::layout::{Layout, LineOrder, Pixels, StoredGeometry, extent};
-use super::samples::SampleType;
+use super::layout::{Cartesian, Layout, LineOrder, StoredGeometry, extent};
+use super::packed::{Encoding, InputFile, Pixels};
+use super::pixel::{Number, PixelFormat};
 use crate::files::{InputError, quoted};
 use crate::probe::file::SLAB;
-use crate::probe::{Advance, Array, Axis, Grid, Motion, Probe};
+use crate::probe::{Advance, Array, Axis, AxisOrder, Motion, Probe, World};
+use glam::DVec3;
 use std::collections::{BTreeMap, HashMap};
-use std::fs::{self, File};
+use std::fs;
 use std::io::{BufRead, BufReader, Read};
 use std::path::Path;
 
-pub(super) fn read(path: &Path) -> Result<Layout, InputError> {
-    let header = Header::read(path)?;
+/// The number types that are read, by their names.
+const NUMBERS: [(&str, Number); 10] = [
+    ("MET_UCHAR", Number::U8),
+    ("MET_CHAR", Number::I8),
+    ("MET_USHORT", Number::U16),
+    ("MET_SHORT", Number::I16),
+    ("MET_UINT", Number::U32),
+    ("MET_INT", Number::I32),
+    ("MET_ULONG_LONG", Number::U64),
+    ("MET_LONG_LONG", Number::I64),
+    ("MET_FLOAT", Number::F32),
+    ("MET_DOUBLE", Number::F64),
+];
+
+pub(super) fn read(file: &InputFile) -> Result<Layout, InputError> {
+    let path = file.path;
+    let header = Header::read(file)?;
     if let Some(other) = header.get("ObjectType").filter(|t| *t != "Image") {
         return header.fault("ObjectType", format!("{} is not read, only Image is", quoted(other)));
     }
-    if header.integer("ElementNumberOfChannels")?.is_some_and(|n| n != 1) {
-        return header.fault("ElementNumberOfChannels", "must be 1: colour is not read");
-    }
-    let sample = match header.need("ElementType")? {
-        "MET_UCHAR" => SampleType::U8,
-        "MET_USHORT" => SampleType::U16,
-        "MET_SHORT" => SampleType::I16,
-        "MET_FLOAT" => SampleType::F32,
-        other => {
-            let read = "MET_UCHAR, MET_USHORT, MET_SHORT and MET_FLOAT are";
-            return header.fault("ElementType", format!("{} is not read, only {read}", quoted(other)));
-        }
+    let channels = match header.integer("ElementNumberOfChannels")? {
+        None | Some(1) => 1,
+        Some(colours @ (3 | 4)) => colours as usize,
+        Some(other) => return header.fault("ElementNumberOfChannels", format!("is {other}, must be 1, 3 or 4")),
     };
+    let word = header.need("ElementType")?;
+    let Some((_, number)) = NUMBERS.iter().find(|(name, _)| *name == word) else {
+        let names = NUMBERS.map(|(name, _)| name).join(", ");
+        return header.fault("ElementType", format!("{} is not read, only {names} are", quoted(word)));
+    };
+    let big_endian = header.flag("BinaryDataByteOrderMSB")?.or(header.flag("ElementByteOrderMSB")?).unwrap_or(false);
+    let pixel = PixelFormat { number: *number, channels, big_endian, scale: None };
     let [width, height, frames] = dimensions(path, &header)?;
     let mut remarks = Vec::new();
-    let grid = lattice(&header, [width, height, frames], &mut remarks)?;
+    let world = world(&header)?;
     let lines = line_order(&header)?;
     let pre_scan = prescan_probe(&header, [width, height], frames)?;
     let format = match &pre_scan {
@@ -40,7 +56,12 @@ pub(super) fn read(path: &Path) -> Result<Layout, InputError> {
     };
     let geometry = match pre_scan {
         Some(probe) => StoredGeometry::Sweep(Box::new(probe)),
-        None => own_pictures(path, &header, grid, &lines)?,
+        None => own_pictures(path, &header, ([width, height, frames], world), &lines)?,
+    };
+    let states_geometry = match &geometry {
+        StoredGeometry::Sweep(_) => true,
+        StoredGeometry::Cartesian(_) => !header.has_scan_lines() && header.first_of(&PLACEMENT_KEYS).is_some(),
+        StoredGeometry::Missing(_) => false,
     };
     if let Some(orientation) = header.get("UltrasoundImageOrientation") {
         remarks.push(("orientation".into(), quoted(orientation)));
@@ -50,17 +71,18 @@ pub(super) fn read(path: &Path) -> Result<Layout, InputError> {
     }
     let mut layout = Layout {
         format,
-        sample,
-        big_endian: header.flag("BinaryDataByteOrderMSB")?.or(header.flag("ElementByteOrderMSB")?).unwrap_or(false),
+        pixel,
         frame_size: [width, height],
         frames,
-        pixels: Pixels { path: path.into(), offset: header.length, length: 0, compressed: false },
+        pixels: file.pixels(header.length),
         line_order: lines,
         geometry,
+        backward: false,
+        states_geometry,
         times: header.times.range(..frames).map(|(k, t)| (*k, *t)).collect(),
         remarks,
     };
-    find_pixels(path, &header, &mut layout)?;
+    find_pixels(file, &header, &mut layout)?;
     layout.check(path, "DimSize")?;
     Ok(layout)
 }
@@ -86,29 +108,35 @@ fn dimensions(path: &Path, header: &Header) -> Result<[usize; 3], InputError> {
     Ok(size)
 }
 
-/// The grid of the voxels. A rotation in space is not applied.
-fn lattice(header: &Header, size: [usize; 3], remarks: &mut Vec<(String, String)>) -> Result<Grid, InputError> {
+/// Where the voxels lie. MetaImage has the directions of the axes one after another, in LPS.
+fn world(header: &Header) -> Result<World, InputError> {
     let count = if header.get("NDims") == Some("2") { 2 } else { 3 };
-    let mut grid = Grid { size, spacing: [1.0; 3], origin: [0.0; 3] };
+    let mut spacing = [1.0; 3];
+    let mut named = "TransformMatrix";
     if let Some((field, _)) = header.first_of(&["ElementSpacing", "ElementSize"]) {
+        named = field;
         for (i, value) in header.numbers(field, count)?.into_iter().enumerate() {
             if value <= 0.0 {
                 return header.fault(field, format!("{}is {value}, must be above 0", which(i, count)));
             }
-            grid.spacing[i] = value;
+            spacing[i] = value;
         }
     }
+    let mut origin = [0.0; 3];
     if let Some((field, _)) = header.first_of(&["Offset", "Position", "Origin"]) {
-        grid.origin[..count].copy_from_slice(&header.numbers(field, count)?);
+        origin[..count].copy_from_slice(&header.numbers(field, count)?);
     }
+    let mut axes = [DVec3::X, DVec3::Y, DVec3::Z];
     if let Some((field, _)) = header.first_of(&["TransformMatrix", "Rotation", "Orientation"]) {
-        let matrix = header.numbers(field, count * count)?;
-        let identity = |i: usize| if i.is_multiple_of(count + 1) { 1.0 } else { 0.0 };
-        if matrix.iter().enumerate().any(|(i, v)| (v - identity(i)).abs() > 1e-9) {
-            remarks.push(("rotation".into(), format!("{field} is not the identity; not applied")));
+        named = field;
+        for (axis, direction) in axes.iter_mut().zip(header.numbers(field, count * count)?.chunks_exact(count)) {
+            let mut whole = [0.0; 3];
+            whole[..count].copy_from_slice(direction);
+            *axis = DVec3::from(whole).normalize_or_zero();
         }
     }
-    Ok(grid)
+    let axes = [0, 1, 2].map(|n| axes[n] * spacing[n]);
+    World::new(axes, DVec3::from(origin)).map_err(|why| InputError::new(header.path, named, why))
 }
 
 /// PLUS names the axes of a frame by their direction on the transducer, the fastest one first. F is away from it, so FM is scan lines in
@@ -117,16 +145,21 @@ fn line_order(header: &Header) -> Result<LineOrder, InputError> {
     match header.get("UltrasoundImageOrientation") {
         None | Some("FM" | "FMA") => Ok(LineOrder::InOrder),
         Some("FU" | "FUA") => Ok(LineOrder::Reversed),
-        Some(word) if word.starts_with(['M', 'U']) => Ok(LineOrder::Pictures(quoted(word))),
+        Some(word) if word.starts_with(['M', 'U', 'A', 'D']) => Ok(LineOrder::Pictures(quoted(word))),
         Some(other) => header.fault(
             "UltrasoundImageOrientation",
-            format!("{} is not read: scan lines must be FM or FU, pictures begin with M or U", quoted(other)),
+            format!("{} is not read: scan lines must be FM or FU, pictures begin with M, U, A or D", quoted(other)),
         ),
     }
 }
 
 /// A file without pre-scan keys holds pictures, unless it says that its frames are scan lines.
-fn own_pictures(path: &Path, header: &Header, mut grid: Grid, lines: &LineOrder) -> Result<StoredGeometry, InputError> {
+fn own_pictures(
+    path: &Path,
+    header: &Header,
+    (mut size, world): ([usize; 3], World),
+    lines: &LineOrder,
+) -> Result<StoredGeometry, InputError> {
     match (header.get("UltrasoundImageType"), lines) {
         (None | Some("US_IMG_TYPE_XX"), _) | (Some("BRIGHTNESS"), LineOrder::Pictures(_)) => {}
         (Some(converted), _) if converted.starts_with("POSTSCAN") => {}
@@ -140,16 +173,22 @@ fn own_pictures(path: &Path, header: &Header, mut grid: Grid, lines: &LineOrder)
             return header.fault("UltrasoundImageType", fault);
         }
     }
-    // Frames in time are not neighbours in space: each is a volume of one slice.
-    let in_time = header.sequence || header.get("Kinds").is_some_and(|k| k.split_whitespace().nth(2) == Some("list"));
-    let volumes = if in_time { std::mem::replace(&mut grid.size[2], 1) } else { 1 };
-    Ok(StoredGeometry::Pictures(grid, volumes))
+    // Frames in time are not neighbours in space: each is a volume of one slice. `Kinds = domain domain list` alone does not make them
+    // so: the PLUS toolkit writes it into its volumes, too.
+    let volumes = if header.sequence { std::mem::replace(&mut size[2], 1) } else { 1 };
+    let order = header.get("UltrasoundImageOrientation").and_then(AxisOrder::of_plus);
+    let order = order.filter(|order| volumes == 1 || order.keeps_frames()).filter(|_| !header.has_scan_lines());
+    let order = order.unwrap_or(AxisOrder::STORED);
+    // The matrix is that of the axes as PLUS draws them, the spacing that of the stored ones.
+    let directions = world.directions();
+    let axes = [0, 1, 2].map(|n| directions.col(n) * world.axis(order.stored[n]).length());
+    let world = World::new(axes, world.origin()).map_err(|why| InputError::new(path, "TransformMatrix", why))?;
+    Ok(StoredGeometry::Cartesian(Cartesian { size, volumes, world, order }))
 }
 
 /// Finds the location and the length of the samples.
-fn find_pixels(path: &Path, header: &Header, layout: &mut Layout) -> Result<(), InputError> {
+fn find_pixels(file: &InputFile, header: &Header, layout: &mut Layout) -> Result<(), InputError> {
     let name = header.need("ElementDataFile")?;
-    let pixels = &mut layout.pixels;
     if name != "LOCAL" {
         let plain = Path::new(name).file_name().is_some_and(|n| n == name) && !name.contains('\\');
         if name.starts_with("LIST") || name.contains('%') {
@@ -159,31 +198,43 @@ fn find_pixels(path: &Path, header: &Header, layout: &mut Layout) -> Result<(), 
             let fault = format!("{} must be LOCAL or the name of a file in the same folder", quoted(name));
             return header.fault("ElementDataFile", fault);
         }
-        pixels.path = path.with_file_name(name);
-        pixels.offset = 0;
+        let path = file.path.with_file_name(name);
+        let length = match fs::metadata(&path) {
+            Ok(metadata) if metadata.is_file() => metadata.len(),
+            Ok(_) => return header.fault("ElementDataFile", format!("{} is not a regular file", quoted(name))),
+            Err(error) => return header.fault("ElementDataFile", format!("{} cannot be read: {error}", quoted(name))),
+        };
+        layout.pixels = Pixels { path, offset: 0, length, encoding: Encoding::Raw, inside: 0 };
     }
-    let metadata = match fs::metadata(&pixels.path) {
-        Ok(metadata) if metadata.is_file() => metadata,
-        Ok(_) => return header.fault("ElementDataFile", format!("{} is not a regular file", quoted(name))),
-        Err(error) => return header.fault("ElementDataFile", format!("{} cannot be read: {error}", quoted(name))),
-    };
-    pixels.compressed = header.flag("CompressedData")?.unwrap_or(false);
-    if !pixels.compressed && header.flag("BinaryData")? == Some(false) {
+    let is_packed = layout.pixels.is_compressed();
+    let is_compressed = header.flag("CompressedData")?.unwrap_or(false);
+    if is_compressed && is_packed {
+        return header.fault("CompressedData", "is True in a .gz file: data that are compressed twice are not read");
+    }
+    if !is_compressed && header.flag("BinaryData")? == Some(false) {
         return header.fault("BinaryData", "numbers written as text are not read");
     }
     let claimed = layout.frame_bytes() * layout.frames as u64;
     let pixels = &mut layout.pixels;
+    let end = pixels.offset + pixels.length;
     match header.integer("HeaderSize")? {
         None | Some(0) => {}
+        Some(bytes @ 1..) if is_packed => pixels.inside = bytes as u64,
         Some(bytes @ 1..) => pixels.offset = bytes as u64,
         // In MetaIO this means that the samples are the last bytes of the file.
-        Some(-1) if !pixels.compressed => {
-            pixels.offset = metadata.len().saturating_sub(claimed).max(pixels.offset);
+        Some(-1) if !is_compressed && !is_packed => {
+            pixels.offset = end.saturating_sub(claimed).max(pixels.offset);
         }
         Some(other) => return header.fault("HeaderSize", format!("{other} is not possible here")),
     }
-    pixels.length = metadata.len().saturating_sub(pixels.offset);
-    let known = match (pixels.compressed, header.integer("CompressedDataSize")?) {
+    if is_packed {
+        return Ok(());
+    }
+    if is_compressed {
+        pixels.encoding = Encoding::Zlib;
+    }
+    pixels.length = end.saturating_sub(pixels.offset);
+    let known = match (is_compressed, header.integer("CompressedDataSize")?) {
         (false, _) => claimed,
         (true, None | Some(0)) => pixels.length,
         (true, Some(bytes @ 1..)) if bytes as u64 > pixels.length => {
@@ -228,7 +279,6 @@ const KEYS: &[&str] = &[
     "ElementNumberOfChannels",
     "HeaderSize",
     "ElementDataFile",
-    "Kinds",
     "UltrasoundImageOrientation",
     "UltrasoundImageType",
     "IsTransducerConvex",
@@ -239,6 +289,10 @@ const KEYS: &[&str] = &[
     "FramePitch",
     "AxialResolution",
 ];
+
+/// The fields that place the samples in space.
+const PLACEMENT_KEYS: [&str; 8] =
+    ["ElementSpacing", "ElementSize", "Offset", "Position", "Origin", "TransformMatrix", "Rotation", "Orientation"];
 
 struct Header<'a> {
     path: &'a Path,
@@ -254,9 +308,10 @@ struct Header<'a> {
 }
 
 impl<'a> Header<'a> {
-    fn read(path: &'a Path) -> Result<Header<'a>, InputError> {
-        let file = File::open(path).map_err(|e| InputError::unreadable(path, &e))?;
-        let mut input = BufReader::new(file.take(MAX_HEADER_BYTES));
+    fn read(file: &InputFile<'a>) -> Result<Header<'a>, InputError> {
+        let path = file.path;
+        let stream = file.open().map_err(|e| InputError::unreadable(path, &e))?;
+        let mut input = BufReader::new(stream.take(MAX_HEADER_BYTES));
         let mut header =
             Header { path, fields: HashMap::new(), times: BTreeMap::new(), not_ok: 0, sequence: false, length: 0 };
         let mut line = Vec::new();
@@ -316,6 +371,11 @@ impl<'a> Header<'a> {
 
     fn get(&self, field: &str) -> Option<&str> {
         self.fields.get(field).map(String::as_str)
+    }
+
+    /// True if the header says that the rows of a frame are scan lines.
+    fn has_scan_lines(&self) -> bool {
+        self.get("UltrasoundImageOrientation").is_some_and(|word| word.starts_with('F'))
     }
 
     /// The first existing field of several spellings, with its value.

@@ -6,6 +6,8 @@
 
 pub mod convert;
 mod describe;
+mod drawn;
+mod formats;
 mod frame;
 pub mod freehand;
 pub mod igtl;
@@ -14,16 +16,21 @@ mod layout;
 pub mod live;
 mod metaimage;
 pub mod motor_tracking;
+mod nifti;
+mod nrrd;
+mod packed;
 pub mod phantom;
 pub mod piped;
+mod pixel;
 pub mod recorder;
 pub mod recording;
 pub mod samples;
 pub mod sequence;
 mod value_range;
+pub mod volume_file;
 
 pub use crate::files::InputError;
-pub use crate::probe::{Geometry, Grid};
+pub use crate::probe::{DepthAxis, Geometry, Grid};
 pub use frame::{Frame, Header, Source};
 pub use recording::Recording;
 pub use samples::{SampleType, StoredType};
@@ -32,25 +39,51 @@ use std::fs::{self, File};
 use std::io::Read;
 use std::path::Path;
 
-/// Opens a `.frames` file or any other recording; the content decides which. `probe`: the probe file to use, see [`Recording::open`].
+/// What a user can say about a file that is opened.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct OpenOptions<'a> {
+    /// The probe file to use.
+    pub probe: Option<&'a Path>,
+    /// The stored axis of a Cartesian volume that is drawn as depth; None: that of the file's orientation, or y.
+    pub depth_axis: Option<DepthAxis>,
+}
+
+/// As [`open_with`], with the stored order of axes. `probe`: the probe file to use.
 ///
 /// # Errors
-/// As [`recorder::Reader::open`] and [`Recording::open`].
+/// As [`open_with`].
 pub fn open(path: &Path, probe: Option<&Path>) -> Result<Box<dyn Source>, InputError> {
+    open_with(path, OpenOptions { probe, depth_axis: None })
+}
+
+/// Opens a `.frames` file or any other recording; the content decides which.
+///
+/// # Errors
+/// As [`recorder::Reader::open`] and [`Recording::open_with`].
+pub fn open_with(path: &Path, options: OpenOptions) -> Result<Box<dyn Source>, InputError> {
     match is_frames(path) {
-        true => Ok(Box::new(recorder::Reader::open(path)?)),
-        false => Ok(Box::new(Recording::open(path, probe)?)),
+        true => Ok(Box::new(frames(path, options)?)),
+        false => Ok(Box::new(Recording::open_with(path, options)?)),
     }
 }
 
 /// A description of such a file for users: pairs of title and value. Never a patient's name or number.
 ///
 /// # Errors
-/// As [`open`]; a `.frames` file is read completely, and may fail while that is done.
-pub fn description(path: &Path, probe: Option<&Path>) -> Result<Vec<(String, String)>, InputError> {
+/// As [`open_with`]; a `.frames` file is read completely, and may fail while that is done.
+pub fn description(path: &Path, options: OpenOptions) -> Result<Vec<(String, String)>, InputError> {
     match is_frames(path) {
-        true => recorder::Reader::open(path)?.description(),
-        false => Ok(Recording::open(path, probe)?.description()),
+        true => frames(path, options)?.description(),
+        false => Ok(Recording::open_with(path, options)?.description()),
+    }
+}
+
+fn frames(path: &Path, options: OpenOptions) -> Result<recorder::Reader, InputError> {
+    match options.depth_axis {
+        Some(_) => {
+            Err(InputError::new(path, "--depth-axis", "is not for .frames files, whose frames are as they arrived"))
+        }
+        None => recorder::Reader::open(path),
     }
 }
 

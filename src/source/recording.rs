@@ -1,15 +1,17 @@
 //! Recorded files (MetaImage, PLUS sequences, Kretz volumes), read one frame at a time in bounded memory.
 
+use super::drawn::Drawn;
+use super::formats::read_layout;
 use super::frame::{Frame, Source};
-use super::layout::{Layout, LineOrder, PixelStream, StoredGeometry};
-use super::samples::{self, Replaced, SampleType, StoredType};
+use super::layout::{Layout, LineOrder, StoredGeometry};
+use super::packed::PixelStream;
+use super::samples::{Replaced, SampleType, StoredType};
 use super::value_range::ValueRange;
-use super::{describe, kretz, metaimage, recorder};
+use super::{OpenOptions, describe};
 use crate::files::InputError;
 use crate::probe::file::geometry_error;
-use crate::probe::{Geometry, Grid, Probe, ProbeFile, Volumes};
-use std::fs::{self, File};
-use std::io::{self, Read};
+use crate::probe::{Geometry, Probe, ProbeFile, Volumes, World};
+use std::io;
 use std::path::{Path, PathBuf};
 
 /// A recorded file that is read frame by frame.
@@ -29,24 +31,47 @@ pub struct Recording {
     next: usize,
     /// A complete frame was read, so that the next one may be allocated at once.
     proven: bool,
+    /// A volume in drawn order, with its number, where drawn slices are not stored frames.
+    turned: Option<(usize, Vec<u8>)>,
+    /// The next frame of it, counted from the first of the file.
+    next_drawn: usize,
 }
 
 /// Geometry of all volumes, without the advance of each.
 enum Placement {
     Sweep(Box<Probe>),
-    Cartesian(Grid),
+    Cartesian(Box<Drawn>),
 }
 
 impl Recording {
-    /// Opens a file. Its geometry comes from the given probe file, otherwise from one in the folder of the recording
-    /// ([`ProbeFile::find_for`]), otherwise from the recording itself. All samples are read once unless the range of their values is
+    /// As [`Recording::open_with`], with the stored order of axes.
+    ///
+    /// # Errors
+    /// As [`Recording::open_with`].
+    pub fn open(path: &Path, probe: Option<&Path>) -> Result<Recording, InputError> {
+        Recording::open_with(path, OpenOptions { probe, depth_axis: None })
+    }
+
+    /// Opens a file. Its geometry comes from the given probe file, otherwise from `<stem>.probe.toml` in its folder, otherwise from the
+    /// recording itself, otherwise from the `probe.toml` of the folder. All samples are read once unless the range of their values is
     /// known.
     ///
     /// # Errors
-    /// A file that cannot be read, has an unknown format or is damaged, or a geometry that is missing or impossible.
-    pub fn open(path: &Path, probe: Option<&Path>) -> Result<Recording, InputError> {
+    /// A file that cannot be read, has an unknown format or is damaged, or a geometry that is missing or impossible. A depth axis for a
+    /// recording that is not Cartesian.
+    pub fn open_with(path: &Path, options: OpenOptions) -> Result<Recording, InputError> {
         let mut layout = read_layout(path)?;
-        let probe_file = choose_probe_file(path, probe, &mut layout)?;
+        let probe_file = choose_probe_file(path, options.probe, &mut layout)?;
+        let is_cartesian = probe_file.is_none() && matches!(layout.geometry, StoredGeometry::Cartesian(_));
+        if options.depth_axis.is_some() && !is_cartesian {
+            return Err(InputError::new(
+                path,
+                "--depth-axis",
+                "is for Cartesian volumes; the probe says where depth is",
+            ));
+        }
+        let stored_bytes = layout.pixel.sample().bytes();
+        let mut remarks = Vec::from_iter(layout.pixel.remark().map(|text| ("pixels".to_string(), text)));
         let (placement, volumes) = match (&probe_file, &layout.geometry) {
             (Some(file), _) => {
                 let (probe, volumes) = file.geometry(layout.frame_size[0], layout.frame_size[1], layout.frames)?;
@@ -54,15 +79,20 @@ impl Recording {
             }
             (None, StoredGeometry::Sweep(probe)) => {
                 probe.check().map_err(|e| geometry_error(path, &e))?;
-                (Placement::Sweep(probe.clone()), Volumes::forward(layout.frames, 1))
+                let volumes = Volumes { first_backward: layout.backward, ..Volumes::forward(layout.frames, 1) };
+                (Placement::Sweep(probe.clone()), volumes)
             }
-            (None, StoredGeometry::Pictures(grid, count)) => {
-                grid.check().map_err(|e| geometry_error(path, &e))?;
-                (Placement::Cartesian(*grid), Volumes::forward(grid.size[2], *count))
+            (None, StoredGeometry::Cartesian(file)) => {
+                let drawn = Drawn::new(path, file, options.depth_axis, stored_bytes, &mut remarks)?;
+                (Placement::Cartesian(Box::new(drawn)), Volumes::forward(file.size[2], file.volumes))
             }
             (None, StoredGeometry::Missing(error)) => return Err(error.clone()),
         };
-        let proven = !layout.pixels.compressed;
+        for (_, text) in remarks.iter().filter(|(title, _)| title == "handedness") {
+            tracing::warn!(file = %describe::path(path), "{text}");
+        }
+        layout.remarks.extend(remarks);
+        let proven = !layout.pixels.is_compressed();
         let mut recording = Recording {
             path: path.into(),
             layout,
@@ -76,6 +106,8 @@ impl Recording {
             stream: None,
             next: 0,
             proven,
+            turned: None,
+            next_drawn: 0,
         };
         match probe_file.and_then(|f| f.range()) {
             Some(range) => recording.range = range.map(|v| v + recording.sample_type().shift()),
@@ -85,19 +117,19 @@ impl Recording {
         Ok(recording)
     }
 
-    /// The file format: "MetaImage", "PLUS sequence", "MetaImage pre-scan sweep" or "Kretz volume".
+    /// The file format: "MetaImage", "PLUS sequence", "MetaImage pre-scan sweep", "Kretz volume", "NRRD" or "NIfTI".
     pub fn format(&self) -> &'static str {
         self.layout.format
     }
 
     /// Type of the samples in the file.
     pub fn sample_type(&self) -> SampleType {
-        self.layout.sample
+        self.layout.pixel.sample()
     }
 
     /// Type of the samples in the frames.
     pub fn stored_type(&self) -> StoredType {
-        self.layout.sample.stored()
+        self.layout.pixel.sample().stored()
     }
 
     /// Number of all frames, including those after the last complete volume.
@@ -116,7 +148,18 @@ impl Recording {
     }
 
     pub fn frames_per_volume(&self) -> usize {
-        self.volumes.frames
+        match &self.placement {
+            Placement::Sweep(_) => self.volumes.frames,
+            Placement::Cartesian(drawn) => drawn.grid.size[2],
+        }
+    }
+
+    /// Where the voxels of a Cartesian volume are; None for a sweep.
+    pub fn world(&self) -> Option<World> {
+        match &self.placement {
+            Placement::Sweep(_) => None,
+            Placement::Cartesian(drawn) => Some(drawn.world),
+        }
     }
 
     /// Geometry of a volume, including the motor's travel during each frame.
@@ -126,7 +169,7 @@ impl Recording {
                 let advance = self.volumes.advance(volume, &probe.slices);
                 Geometry::Sweep(Probe { advance, ..(**probe).clone() })
             }
-            Placement::Cartesian(grid) => Geometry::Cartesian(*grid),
+            Placement::Cartesian(drawn) => Geometry::Cartesian(drawn.grid),
         }
     }
 
@@ -151,6 +194,9 @@ impl Recording {
     /// # Errors
     /// Data that cannot be read, are cut short or are corrupt.
     pub fn next_frame(&mut self) -> Result<Option<Frame>, InputError> {
+        if self.is_turned() {
+            return self.next_turned();
+        }
         let index = self.next;
         if index >= self.frames_to_read() {
             return Ok(None);
@@ -164,10 +210,16 @@ impl Recording {
         };
         let (volume, number) = (index / self.volumes.frames, index % self.volumes.frames);
         let backward = self.volumes.backward(volume);
+        let (bytes, slice) = match &self.placement {
+            Placement::Cartesian(drawn) if !drawn.is_stored() => {
+                drawn.frame(&bytes, number, self.stored_type().bytes())
+            }
+            _ => (bytes, if backward { self.volumes.frames - 1 - number } else { number }),
+        };
         Ok(Some(Frame {
             volume: volume as u32,
             number: number as u32,
-            slice: if backward { self.volumes.frames - 1 - number } else { number },
+            slice,
             backward,
             time: self.layout.times.get(&index).copied(),
             bytes,
@@ -176,7 +228,53 @@ impl Recording {
 
     /// Moves back to the first frame.
     pub fn rewind(&mut self) {
-        (self.stream, self.next) = (None, 0);
+        (self.stream, self.next, self.next_drawn) = (None, 0, 0);
+    }
+
+    /// True if drawn slices are not stored frames.
+    fn is_turned(&self) -> bool {
+        matches!(&self.placement, Placement::Cartesian(drawn) if !drawn.order.keeps_frames())
+    }
+
+    /// The next frame of a volume that is put together in memory.
+    fn next_turned(&mut self) -> Result<Option<Frame>, InputError> {
+        let slices = self.frames_per_volume();
+        let (volume, number) = (self.next_drawn / slices, self.next_drawn % slices);
+        let Placement::Cartesian(drawn) = &self.placement else { return Ok(None) };
+        let (order, stored, [columns, rows, _]) = (drawn.order, drawn.stored, drawn.grid.size);
+        if volume >= self.volumes.count {
+            return Ok(None);
+        }
+        let width = self.stored_type().bytes();
+        if self.turned.as_ref().is_none_or(|(there, _)| *there != volume) {
+            self.turned = None;
+            if self.next != volume * stored[2] {
+                (self.stream, self.next) = (None, volume * stored[2]);
+            }
+            let mut all = Vec::new();
+            for _ in 0..stored[2] {
+                match self.read_frame() {
+                    Ok(bytes) => all.extend(bytes),
+                    Err(error) => {
+                        self.stream = None;
+                        return Err(error);
+                    }
+                }
+            }
+            self.turned = Some((volume, order.reorder(&all, stored, width)));
+        }
+        let slice = columns * rows * width;
+        let whole = self.turned.as_ref().map(|(_, whole)| &whole[..]).unwrap_or_default();
+        let bytes = whole.get(number * slice..(number + 1) * slice).unwrap_or_default().to_vec();
+        self.next_drawn += 1;
+        Ok(Some(Frame {
+            volume: volume as u32,
+            number: number as u32,
+            slice: number,
+            backward: false,
+            time: self.layout.times.get(&(volume * stored[2])).copied(),
+            bytes,
+        }))
     }
 
     /// Moves to the first frame of a volume. In a compressed file all frames before it are inflated again.
@@ -191,6 +289,10 @@ impl Recording {
                 "volume",
                 format!("there is no {volume}, the last is {}", there - 1),
             ));
+        }
+        self.next_drawn = volume * self.frames_per_volume();
+        if self.is_turned() {
+            return Ok(());
         }
         let target = volume * self.volumes.frames;
         if target < self.next {
@@ -208,7 +310,7 @@ impl Recording {
         let mut rows: Vec<(String, String)> = Vec::new();
         let mut add = |title: &str, value: String| rows.push((title.into(), value));
         add("format", self.format().into());
-        add("compression", if self.layout.pixels.compressed { "zlib" } else { "none" }.into());
+        add("compression", self.layout.pixels.encoding.name().into());
         add("samples", self.sample_type().to_string());
         let [first, second] = self.layout.frame_size;
         match self.placement {
@@ -220,7 +322,10 @@ impl Recording {
         add("geometry from", self.probe_file.as_ref().map_or("the file itself".into(), |p| describe::path(p)));
         match &self.placement {
             Placement::Sweep(probe) => rows.extend(describe::probe(probe)),
-            Placement::Cartesian(grid) => rows.extend(describe::grid(grid)),
+            Placement::Cartesian(drawn) => {
+                rows.extend(describe::grid(&drawn.grid));
+                rows.extend(drawn.description());
+            }
         }
         let [low, high] = self.range.map(|v| describe::number(v - self.sample_type().shift()));
         let how = if self.measured { " (measured)" } else { "" };
@@ -275,7 +380,7 @@ impl Recording {
                 tracing::warn!(file = %describe::path(&self.path), bytes = more, "more samples than frames; not read");
             }
         }
-        let replaced = samples::store(self.layout.sample, self.layout.big_endian, &mut bytes);
+        let (mut bytes, replaced) = self.layout.pixel.convert(bytes);
         self.count(index, replaced);
         if matches!((&self.layout.line_order, &self.placement), (LineOrder::Reversed, Placement::Sweep(_))) {
             let line = self.layout.frame_size[0] * self.stored_type().bytes();
@@ -312,44 +417,33 @@ impl Recording {
     }
 }
 
-/// The probe file to use. None if there is none, or if the `probe.toml` of the folder does not apply to this recording.
+/// The probe file to use. None if there is none, or if the `probe.toml` of the folder does not apply to this recording: it is for those
+/// that do not state their own geometry.
 fn choose_probe_file(path: &Path, given: Option<&Path>, layout: &mut Layout) -> Result<Option<ProbeFile>, InputError> {
-    let found = given.map(Path::to_path_buf).or_else(|| ProbeFile::find_for(path));
+    // "sweep.mha.gz" has the probe file of "sweep.mha".
+    let named = if path.extension().is_some_and(|e| e.eq_ignore_ascii_case("gz")) {
+        path.with_extension("")
+    } else {
+        path.into()
+    };
+    let found = given.map(Path::to_path_buf).or_else(|| ProbeFile::find_for(&named));
     let Some(found) = found else { return Ok(None) };
+    let is_for_all = given.is_none() && found.file_name().is_some_and(|n| n == "probe.toml");
+    let mut leave_out = |why: &str| {
+        layout.remarks.push(("not used".into(), format!("{}: {why}", describe::path(&found))));
+        Ok(None)
+    };
     if let LineOrder::Pictures(word) = &layout.line_order {
-        let for_all = given.is_none() && found.file_name().is_some_and(|n| n == "probe.toml");
-        let fault = format!("is {word}: pictures, not scan lines, so {} does not apply", describe::path(&found));
-        if !for_all {
-            return Err(InputError::new(path, "UltrasoundImageOrientation", fault));
+        if is_for_all {
+            return leave_out("the frames are pictures, not scan lines");
         }
-        layout
-            .remarks
-            .push(("not used".into(), format!("{}: the frames are pictures, not scan lines", describe::path(&found))));
-        return Ok(None);
+        let fault = format!("is {word}: pictures, not scan lines, so {} does not apply", describe::path(&found));
+        return Err(InputError::new(path, "UltrasoundImageOrientation", fault));
+    }
+    if is_for_all && layout.states_geometry {
+        return leave_out("the recording states its own geometry; --probe overrides it");
     }
     ProbeFile::read(&found).map(Some)
-}
-
-/// Reads the layout of a file with the reader for its content, or else for the extension of its name.
-fn read_layout(path: &Path) -> Result<Layout, InputError> {
-    let unreadable = |e| InputError::unreadable(path, &e);
-    // A pipe or a folder has no size to check claims against, and opening a pipe may block for ever.
-    if !fs::metadata(path).map_err(unreadable)?.is_file() {
-        return Err(InputError::new(path, "file", "is not a regular file"));
-    }
-    let file = File::open(path).map_err(unreadable)?;
-    let mut start = Vec::new();
-    file.take(64).read_to_end(&mut start).map_err(unreadable)?;
-    let ending = path.extension().and_then(|e| e.to_str()).unwrap_or("").to_ascii_lowercase();
-    if start.starts_with(b"KRETZFILE") {
-        kretz::read(path)
-    } else if start.starts_with(b"ObjectType") || start.starts_with(b"NDims") || ["mha", "mhd"].contains(&&*ending) {
-        metaimage::read(path)
-    } else if recorder::Reader::is_one(&start) {
-        Err(InputError::new(path, "file", "holds frames as they arrived, not a recording"))
-    } else {
-        Err(InputError::new(path, "file", "is of no known format; MetaImage (.mha, .mhd) and Kretz (.vol) are read"))
-    }
 }
 
 impl Source for Recording {
@@ -387,5 +481,13 @@ impl Source for Recording {
 
     fn files(&self) -> Vec<PathBuf> {
         self.files()
+    }
+
+    fn world(&self) -> Option<World> {
+        self.world()
+    }
+
+    fn probe_file(&self) -> Option<&Path> {
+        self.probe_file.as_deref()
     }
 }

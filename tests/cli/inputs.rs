@@ -98,3 +98,25 @@ fn a_recording_that_goes_on_in_a_hole_is_read_as_far_as_it_goes() {
     let has = |title: &str, value: &str| said.lines().any(|l| l.starts_with(title) && l.ends_with(value));
     assert!(has("frames", " 31") && has("index", "made anew") && has("lost", "bytes at the end"), "{said}");
 }
+
+/// Modes, layouts and sizes are taken in any case, and modes by their other names.
+#[test]
+fn modes_have_other_names_and_no_case() {
+    let plan = |flags: &[&str]| {
+        let (code, out, err) = run(&[&["render", "--explain"], flags].concat());
+        assert_eq!(code, Some(0), "{flags:?}: {err}");
+        out
+    };
+    for (typed, meant) in [
+        (&["--mode", "ORTHO"], &["--mode", "orthogonal"]),
+        (&["--mode", "slices"], &["--mode", "orthogonal"]),
+        (&["--mode", "X-Ray"], &["--mode", "xray"]),
+        (&["--mode", "4up"], &["--layout", "4up"]),
+        (&["--layout", "4UP"], &["--layout", "4up"]),
+        (&["--size", "64X48"], &["--size", "64x48"]),
+    ] {
+        assert_eq!(plan(typed), plan(meant), "{typed:?}");
+    }
+    assert_ne!(plan(&["--mode", "mip"]), plan(&["--mode", "vr"]));
+    assert!(run(&["render", "--explain", "--mode", "sideways"]).2.contains("sideways"));
+}

@@ -4,7 +4,8 @@ use crate::common::files::{Folder, SWEEP};
 use crate::common::probes::wobbler;
 use crate::common::program;
 use echolume::probe::{Advance, Axis, Geometry, Grid, Indices, Probe};
-use echolume::source::convert::{Volume, VolumeFile, lattice};
+use echolume::source::convert::{Target, Volume, lattice};
+use echolume::source::volume_file::VolumeFile;
 use echolume::source::{Frame, Recording, SampleType, StoredType};
 use glam::DVec3;
 use std::path::Path;
@@ -79,7 +80,7 @@ fn a_written_volume_is_read_back_voxel_by_voxel() {
         let path = folder.join("volume.mha");
         let done = std::sync::atomic::AtomicUsize::new(0);
         volume
-            .write(&grid, sample, &path, || {
+            .write(&Target::new(grid, sample), &path, || {
                 done.fetch_add(1, std::sync::atomic::Ordering::Relaxed);
             })
             .expect("written");
@@ -104,7 +105,7 @@ fn a_written_volume_is_read_back_voxel_by_voxel() {
         }
     }
     let path = folder.join("volume.nrrd");
-    volume.write(&grid, SampleType::U16, &path, || {}).expect("written");
+    volume.write(&Target::new(grid, SampleType::U16), &path, || {}).expect("written");
     let bytes = std::fs::read(&path).expect("read");
     let end = bytes.windows(2).position(|w| w == b"\n\n").expect("the header's end") + 2;
     let header = String::from_utf8_lossy(&bytes[..end]).into_owned();
@@ -142,7 +143,7 @@ fn the_command_writes_a_volume_or_one_line_and_nothing() {
         (vec![SWEEP, to, "--spacing", "1e-5"], "voxels"),
         (vec![SWEEP, to, "--volume", "9"], "--volume 9"),
         (vec![SWEEP, "/dev/null/volume.mha"], "/dev/null/volume.mha"),
-        (vec![SWEEP, "volume.png"], "must end in .mha or .nrrd"),
+        (vec![SWEEP, "volume.png"], "must end in .mha, .nrrd"),
         (vec!["nothing.mha", to], "nothing.mha"),
         (vec![to, to], "would replace an input"),
     ] {

@@ -3,6 +3,7 @@
 #[path = "../common/mod.rs"]
 mod common;
 mod convert;
+mod formats;
 mod igtl;
 mod interrupted;
 #[cfg(target_os = "linux")]

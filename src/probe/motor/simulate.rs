@@ -6,7 +6,7 @@
 //! the protocol and of how a motor moves, not of the firmware of a product.
 
 use super::table::{MotorTable, Side};
-use super::tmcl::{self, LENGTH, Reply, Request, SUCCESS, axis, command};
+use super::tmcl::{self, LENGTH, Reply, Request, SUCCESS, WRONG_CHECKSUM, axis, command};
 use rustix::event::{PollFd, PollFlags, Timespec, poll};
 use rustix::pty::{OpenptFlags, grantpt, ioctl_tiocgptpeer, openpt, ptsname, unlockpt};
 use rustix::termios::{OptionalActions, ioctl_tiocnxcl, tcgetattr, tcsetattr};
@@ -216,11 +216,17 @@ impl Line {
                         if request.command == command::MOVE_TO {
                             positioned.get_or_insert(now);
                         }
-                        replies.push(module.answer(&request).bytes());
+                        replies.push(module.answer(&request));
                         pending = rest.to_vec();
                     }
                     // For another module: no reply.
                     Some(_) => pending = rest.to_vec(),
+                    // A request for this module whose bytes were changed on the way. No whole one begins within it.
+                    None if first[0] == self.address && !has_request(&pending[1..], self.address) => {
+                        let (module, command) = (self.address, first[1]);
+                        replies.push(Reply { host: HOST, module, status: WRONG_CHECKSUM, command, value: 0 }.bytes());
+                        pending = rest.to_vec();
+                    }
                     // Out of step: the next byte may be the first.
                     None => drop(pending.remove(0)),
                 }
@@ -259,6 +265,12 @@ impl Line {
     }
 }
 
+/// True if a whole request for a module is among the bytes.
+fn has_request(bytes: &[u8], address: u8) -> bool {
+    let requests = bytes.windows(LENGTH).filter_map(|w| Request::parse(w.try_into().ok()?));
+    requests.into_iter().any(|request| request.address == address)
+}
+
 /// The bytes that are sent for reply number `count`.
 fn with_fault(mut reply: [u8; LENGTH], due: Option<FaultKind>, count: usize) -> Vec<u8> {
     let mut bytes = Vec::new();
@@ -283,6 +295,10 @@ const MAX_STEP: f64 = 5e-4;
 const START_ANGLE: f64 = 7.0;
 /// Distance of the limit switches from the ends of the largest sweep, degrees.
 const LIMIT_MARGIN: f64 = 3.0;
+/// Address of the host.
+const HOST: u8 = 2;
+/// Version of the firmware: 1.16.
+const VERSION: i32 = 0x0110;
 /// Status codes.
 const BAD_COMMAND: u8 = 2;
 const BAD_TYPE: u8 = 3;
@@ -328,6 +344,9 @@ impl Module {
     fn new(table: &MotorTable) -> Module {
         let shaft = START_ANGLE * table.steps_per_degree();
         let mut axes = BTreeMap::from([(axis::SEARCH_MODE, 1), (axis::SWITCH_SPEED, 1)]);
+        axes.extend([(axis::RUN_CURRENT, 128), (axis::STANDBY_CURRENT, 8), (axis::FREEWHEELING, 0)]);
+        axes.extend([(axis::RIGHT_LIMIT_OFF, 0), (axis::LEFT_LIMIT_OFF, 0)]);
+        axes.insert(axis::MICROSTEPS, table.microsteps.trailing_zeros().cast_signed());
         axes.insert(axis::MAX_SPEED, table.velocity(table.search_speed()));
         axes.insert(axis::SEARCH_SPEED, table.velocity(table.search_speed()));
         axes.insert(axis::MAX_ACCELERATION, table.acceleration(table.acceleration_deg_per_s2));
@@ -434,8 +453,11 @@ impl Module {
                 }
             }
         }
-        let ahead = if self.speed > 0.0 { Side::Right } else { Side::Left };
-        if self.speed != 0.0 && self.closed(ahead) {
+        let (ahead, off) = match self.speed > 0.0 {
+            true => (Side::Right, axis::RIGHT_LIMIT_OFF),
+            false => (Side::Left, axis::LEFT_LIMIT_OFF),
+        };
+        if self.speed != 0.0 && self.closed(ahead) && self.register(off) == 0.0 {
             self.halt();
         }
     }
@@ -452,14 +474,21 @@ impl Module {
         (self.shaft + self.offset).round() as i32
     }
 
-    /// Carries a request out.
-    fn answer(&mut self, request: &Request) -> Reply {
+    /// Carries a request out. Returns the bytes of the reply, which is text where the version was asked for as text.
+    fn answer(&mut self, request: &Request) -> [u8; LENGTH] {
         self.since_command = 0.0;
+        if (request.command, request.kind) == (command::VERSION, 0) {
+            let text = format!("{:04}V{}{:02}", self.number % 10_000, VERSION >> 8, VERSION & 0xff);
+            let mut bytes = [0; LENGTH];
+            bytes[0] = HOST;
+            bytes[1..].iter_mut().zip(text.bytes()).for_each(|(byte, letter)| *byte = letter);
+            return bytes;
+        }
         let (status, value) = match self.carry_out(request) {
             Ok(value) => (SUCCESS, value),
             Err(status) => (status, 0),
         };
-        Reply { host: 2, module: self.table.address, status, command: request.command, value }
+        Reply { host: HOST, module: self.table.address, status, command: request.command, value }.bytes()
     }
 
     fn carry_out(&mut self, request: &Request) -> Result<i32, u8> {
@@ -490,7 +519,8 @@ impl Module {
                 _ => return Err(BAD_TYPE),
             },
             command::GET_INPUT => return Ok(0),
-            command::VERSION => return Ok(i32::from(self.number) << 16 | 0x0110),
+            command::VERSION if kind == 1 => return Ok(i32::from(self.number) << 16 | VERSION),
+            command::VERSION => return Err(BAD_TYPE),
             _ => return Err(BAD_COMMAND),
         }
         Ok(value)
@@ -499,6 +529,12 @@ impl Module {
     fn set(&mut self, parameter: u8, value: i32) -> Result<i32, u8> {
         match parameter {
             axis::TARGET => self.activity = Activity::Position(f64::from(value)),
+            axis::TARGET_SPEED => self.activity = Activity::Velocity(f64::from(value) / self.table.speed_scale()),
+            // The simulated motor has the microsteps of its table.
+            axis::MICROSTEPS if self.axes.get(&parameter) != Some(&value) => return Err(BAD_VALUE),
+            axis::RUN_CURRENT | axis::STANDBY_CURRENT if !(0..=255).contains(&value) => return Err(BAD_VALUE),
+            axis::RIGHT_LIMIT_OFF | axis::LEFT_LIMIT_OFF if !(0..=1).contains(&value) => return Err(BAD_VALUE),
+            axis::FREEWHEELING if !(0..=65535).contains(&value) => return Err(BAD_VALUE),
             axis::POSITION => self.offset = f64::from(value) - self.shaft,
             axis::MAX_SPEED | axis::MAX_ACCELERATION | axis::SEARCH_SPEED | axis::SWITCH_SPEED if value < 0 => {
                 return Err(BAD_VALUE);
@@ -518,6 +554,10 @@ impl Module {
                 _ => self.counter(),
             },
             axis::POSITION => self.counter(),
+            axis::TARGET_SPEED => match self.activity {
+                Activity::Velocity(speed) => (speed * self.table.speed_scale()).round() as i32,
+                _ => (self.speed * self.table.speed_scale()).round() as i32,
+            },
             axis::SPEED => (self.speed * self.table.speed_scale()).round() as i32,
             axis::REACHED => i32::from(matches!(self.activity, Activity::Position(t) if t as i32 == self.counter())),
             axis::HOME_SWITCH => i32::from(self.home_closed()),

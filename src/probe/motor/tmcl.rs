@@ -26,16 +26,24 @@ pub mod command {
 pub mod axis {
     pub const TARGET: u8 = 0;
     pub const POSITION: u8 = 1;
+    pub const TARGET_SPEED: u8 = 2;
     pub const SPEED: u8 = 3;
     pub const MAX_SPEED: u8 = 4;
     pub const MAX_ACCELERATION: u8 = 5;
+    pub const RUN_CURRENT: u8 = 6;
+    pub const STANDBY_CURRENT: u8 = 7;
     pub const REACHED: u8 = 8;
     pub const HOME_SWITCH: u8 = 9;
     pub const RIGHT_LIMIT: u8 = 10;
     pub const LEFT_LIMIT: u8 = 11;
+    pub const RIGHT_LIMIT_OFF: u8 = 12;
+    pub const LEFT_LIMIT_OFF: u8 = 13;
+    /// Microsteps of a full step, as a power of 2.
+    pub const MICROSTEPS: u8 = 140;
     pub const SEARCH_MODE: u8 = 193;
     pub const SEARCH_SPEED: u8 = 194;
     pub const SWITCH_SPEED: u8 = 195;
+    pub const FREEWHEELING: u8 = 204;
 }
 
 /// The global parameter (bank 0) of the module's own watchdog, the "serial heartbeat": milliseconds without a command after
@@ -45,12 +53,15 @@ pub const WATCHDOG: u8 = 68;
 /// Status of a reply: the command was carried out.
 pub const SUCCESS: u8 = 100;
 
+/// Status of a reply: the checksum of the request was wrong.
+pub const WRONG_CHECKSUM: u8 = 1;
+
 /// Description of a status code.
 pub fn status_words(status: u8) -> &'static str {
     match status {
         SUCCESS => "carried out",
         101 => "stored in the module's program instead of carried out",
-        1 => "it received a wrong checksum",
+        WRONG_CHECKSUM => "it received a wrong checksum",
         2 => "it does not know this command",
         3 => "it does not know this parameter",
         4 => "the value is out of its range",

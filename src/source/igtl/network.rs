@@ -9,13 +9,13 @@ use super::codec::BODY_LIMIT;
 use super::message::{Image, Message, Scalar};
 use super::pairing::Pairing;
 use crate::files::escaped;
-use crate::probe::{Geometry, Grid};
+use crate::probe::{AxisOrder, Geometry, Grid};
 use crate::source::frame::{Frame, Header};
 use crate::source::freehand::{self, Compounder, Lattice, Pose, TrackedFrame};
 use crate::source::live::{Event, Live};
 use crate::source::samples::{Replaced, SampleType, StoredType, store};
 use crate::source::value_range::ValueRange;
-use glam::DAffine3;
+use glam::{DAffine3, DVec3};
 use std::io;
 use std::time::{Duration, Instant};
 
@@ -393,6 +393,8 @@ struct CartesianVolume {
     components: u8,
     stored: StoredType,
     grid: Grid,
+    /// The image's axes are left-handed: its rows are read from last pixel to first, so that it is not shown mirrored.
+    mirrored: bool,
     range: [f64; 2],
     bytes: Vec<u8>,
 }
@@ -401,8 +403,8 @@ impl CartesianVolume {
     /// Stores the slices of an image. If it does not belong to the present volume, a new one is begun, whose missing slices are 0. Returns
     /// the number of samples that read as 0 because they are not finite or denormal.
     ///
-    /// Lateral is the image's i, depth its j, elevation its k. Lateral and elevation are centred, depth begins at 0. The position in the
-    /// patient is not used. The values shown as 0 and 1 are 0 and 255 for 8 bits, otherwise the smallest and largest of the first message.
+    /// Lateral is the image's i, depth its j, elevation its k. Lateral and elevation are centred, depth begins at 0. Of the matrix the
+    /// handedness is used: rows of a left-handed image are reversed. The values shown as 0 and 1 are 0 and 255 for 8 bits, otherwise the smallest and largest of the first message.
     ///
     /// # Errors
     /// In words, an image that cannot be used. The volume is not changed.
@@ -421,9 +423,15 @@ impl CartesianVolume {
             let [x, y, z] = grid.size;
             return Err(format!("a volume of {x} x {y} x {z} voxels; at most {max_bytes} bytes are taken"));
         };
-        let (brought, replaced) = samples(image)?;
+        let mirrored = is_left_handed(&image);
+        let (mut brought, replaced) = samples(image)?;
+        if mirrored {
+            let rows = AxisOrder { reversed: [true, false, false], ..AxisOrder::STORED };
+            brought = rows.reorder(&brought, [usize::from(i), usize::from(j), usize::from(slices)], stored.bytes());
+        }
         let is_same = |w: &&mut CartesianVolume| {
-            w.scalar == scalar && w.components == components && w.grid.size == grid.size && w.is_at(&grid)
+            let is_like = w.scalar == scalar && w.components == components && w.mirrored == mirrored;
+            is_like && w.grid.size == grid.size && w.is_at(&grid)
         };
         let whole = match volume.as_mut().filter(is_same) {
             Some(whole) => whole,
@@ -431,7 +439,20 @@ impl CartesianVolume {
                 let mut values = ValueRange::new(stored);
                 values.take(&brought);
                 let range = range_of(stored, values);
-                volume.insert(CartesianVolume { scalar, components, stored, grid, range, bytes: vec![0; all] })
+                if mirrored {
+                    tracing::warn!(
+                        "the axes of the image are left-handed: its rows are reversed, so that it is not shown mirrored"
+                    );
+                }
+                volume.insert(CartesianVolume {
+                    scalar,
+                    components,
+                    stored,
+                    grid,
+                    mirrored,
+                    range,
+                    bytes: vec![0; all],
+                })
             }
         };
         let at = usize::from(first) * slice;
@@ -456,6 +477,12 @@ impl CartesianVolume {
         let [x, y, _] = self.grid.size;
         self.bytes.chunks_exact(x * y * self.stored.bytes()).nth(k)
     }
+}
+
+/// True if i, j and k are left-handed. Both coordinate systems of images are right-handed.
+fn is_left_handed(image: &Image) -> bool {
+    let [i, j, k] = image.axes.map(|axis| DVec3::from(axis.map(f64::from)));
+    i.cross(j).dot(k) < 0.0
 }
 
 /// The grid of an image. An axis of one pixel may have any spacing, or none.

@@ -6,8 +6,9 @@ use super::head::Head;
 use super::labels::Label;
 use crate::files::InputError;
 use crate::probe::{Geometry, Grid};
-use crate::source::convert::{VolumeFile, lattice, write_grid};
+use crate::source::convert::{lattice, write_grid};
 use crate::source::samples::SampleType;
+use crate::source::volume_file::VolumeFile;
 use glam::DVec3;
 use std::path::{Path, PathBuf};
 

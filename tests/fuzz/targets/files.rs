@@ -44,6 +44,14 @@ pub fn metaimage(bytes: &[u8]) -> String {
     recording(&path, None) + &recording(&path, Some(&probe))
 }
 
+pub fn nrrd(bytes: &[u8]) -> String {
+    recording(&written("input.nrrd", bytes), None)
+}
+
+pub fn nifti(bytes: &[u8]) -> String {
+    recording(&written("input.nii", bytes), None)
+}
+
 pub fn kretz(bytes: &[u8]) -> String {
     recording(&written("input.vol", bytes), None)
 }

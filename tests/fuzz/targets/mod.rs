@@ -65,6 +65,33 @@ pub const TARGETS: &[Target] = &[
         also: &["tests/data/wobbler-4dc7/sweep.vol"],
     },
     Target {
+        name: "nrrd",
+        run: files::nrrd,
+        text: true,
+        memory: 64 * MIB,
+        rounds: 25_000,
+        also: &[
+            "tests/data/formats/raw-ras.nrrd",
+            "tests/data/formats/gzip-lps.nrrd",
+            "tests/data/formats/bzip2-las.nrrd",
+            "tests/data/formats/detached.nhdr",
+        ],
+    },
+    Target {
+        name: "nifti",
+        run: files::nifti,
+        text: false,
+        memory: 64 * MIB,
+        rounds: 25_000,
+        also: &[
+            "tests/data/formats/oblique.nii",
+            "tests/data/formats/both.nii",
+            "tests/data/formats/mirrored.nii.gz",
+            "tests/data/formats/big-endian-4d.nii",
+            "tests/data/formats/rgb.nii",
+        ],
+    },
+    Target {
         name: "probe",
         run: motor::probe_file,
         text: true,

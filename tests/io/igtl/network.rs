@@ -106,6 +106,21 @@ fn volumes_keep_their_values_and_only_a_changed_geometry_begins_a_new_stream() {
 }
 
 #[test]
+fn a_left_handed_image_is_not_shown_mirrored() {
+    let plain = image(1.0, [4, 3, 2]);
+    let [i, j, k] = plain.axes;
+    let mirrored = Image { axes: [i.map(|v| -v), j, k], ..plain.clone() };
+    let turned = Image { axes: [i.map(|v| -v), j.map(|v| -v), k], ..plain.clone() };
+    let every = [&plain, &mirrored, &turned];
+    let mut network = connect(every.into_iter().flat_map(|i| bytes(&Message::Image(i.clone()))).collect(), options());
+    let reversed: Vec<u8> = plain.bytes.chunks(4).flat_map(|row| row.iter().rev().copied()).collect();
+    for expected in [&plain.bytes, &reversed, &plain.bytes] {
+        let (_, frames) = volume(&mut network, 2);
+        assert_eq!(all(&frames), *expected);
+    }
+}
+
+#[test]
 fn complete_slices_are_placed_and_smaller_parts_are_refused() {
     let whole = image(1.0, [4, 3, 4]);
     let part = |offset: [u16; 3], size: [u16; 3], value: u8| Image {

@@ -25,7 +25,7 @@ fn forward_and_backward_sweeps_keep_their_slices_in_geometric_order() {
 }
 
 #[test]
-fn a_given_probe_file_wins_over_one_beside_and_that_over_the_header() {
+fn a_given_probe_file_wins_over_one_of_the_recording_and_that_over_the_header() {
     let folder = Folder::new("precedence");
     let sweep = folder.write("sweep.mha", fs::read(stored("wobbler-4dc7/sweep.mha")).unwrap());
     let text = fs::read_to_string(stored("wobbler-4dc7/probe.toml")).unwrap();
@@ -33,7 +33,9 @@ fn a_given_probe_file_wins_over_one_beside_and_that_over_the_header() {
     let radius = |given| probe_of(&Recording::open(sweep.as_ref(), given).unwrap()).array_radius();
     assert_eq!(radius(None), 39.8);
     folder.write("probe.toml", with_radius("41"));
-    assert_eq!(radius(None), 41.0);
+    assert_eq!(radius(None), 39.8, "the header states the geometry");
+    let rows = Recording::open(sweep.as_ref(), None).unwrap().description();
+    assert!(rows.iter().any(|(title, text)| title == "not used" && text.contains("probe.toml")), "{rows:?}");
     folder.write("sweep.probe.toml", with_radius("42"));
     assert_eq!(radius(None), 42.0);
     let given = folder.write("other.toml", with_radius("43"));
@@ -56,4 +58,35 @@ fn the_range_of_the_probe_file_is_in_the_units_of_the_recording() {
         .write("probe.toml", format!("{}[samples]\nrange = [-100, 400]\n", TABLE.replace("frames_per_volume = 3", "")));
     let path = folder.write("r.mha", image("4 2 3", "MET_SHORT", "", &[0; 48]));
     assert_eq!(open(&path).range(), [32668.0, 33168.0]);
+}
+
+/// The folder's probe.toml is for recordings that do not say where their samples lie. Kretz volumes and converted volumes do.
+#[test]
+fn the_probe_file_of_the_folder_serves_only_recordings_without_geometry() {
+    let folder = Folder::new("folder-probe");
+    folder.write("probe.toml", TABLE.replace("frames_per_volume = 3", ""));
+    let is_sweep =
+        |name: &str, bytes: Vec<u8>| matches!(open(folder.write(name, bytes)).geometry(0), Geometry::Sweep(_));
+    let data = [0; 24];
+    assert!(is_sweep("bare.mha", image("4 2 3", "MET_UCHAR", "", &data)));
+    let lines = "UltrasoundImageOrientation = FM\nElementSpacing = 1 1 1\n";
+    assert!(is_sweep("lines.mha", image("4 2 3", "MET_UCHAR", lines, &data)));
+    for placed in ["ElementSpacing = 1 1 1\n", "Offset = 0 0 0\n", "TransformMatrix = 1 0 0 0 1 0 0 0 1\n"] {
+        assert!(!is_sweep("placed.mha", image("4 2 3", "MET_UCHAR", placed, &data)), "{placed}");
+    }
+    let volume = open(folder.write("v.vol", kretz(&[-0.1, 0.0, 0.1], &[-0.1, 0.1], b"")));
+    assert_eq!(probe_of(&volume).array_radius(), 40.0);
+}
+
+/// The PLUS toolkit writes "domain domain list" into volumes that it reconstructs. Only frames with `Seq_` fields are a sequence.
+#[test]
+fn a_list_without_fields_of_frames_is_a_volume() {
+    let folder = Folder::new("kinds");
+    let kinds = "Kinds = domain domain list\nElementSpacing = 1 2 3\n";
+    let shape = |more: &str| {
+        let recording = open(folder.write("k.mha", image("4 2 3", "MET_UCHAR", more, &[7; 24])));
+        (recording.volumes(), recording.frames_per_volume())
+    };
+    assert_eq!(shape(kinds), (1, 3));
+    assert_eq!(shape(&format!("{kinds}Seq_Frame0000_Timestamp = 0\n")), (3, 1));
 }

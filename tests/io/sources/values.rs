@@ -157,7 +157,7 @@ fn uneven_kretz_tables_stay_uneven() {
             close(axis.at(i as f64), *value);
         }
     }
-    let falling = folder.write("f.vol", kretz(&[-0.3, -0.1, 0.25], &[0.4, 0.1, 0.0], b""));
+    let falling = folder.write("f.vol", kretz(&[-0.3, -0.1, 0.25], &[0.4, 0.0, 0.1], b""));
     assert!(total(&falling).unwrap_err().contains("C300,0001"));
 }
 
@@ -182,7 +182,8 @@ fn no_patient_field_is_ever_shown() {
     let folder = Folder::new("patient");
     let whole = kretz(&[-0.1, 0.1], &[-0.1, 0.1], b"");
     let mut shown = format!("{:?}", open(folder.write("p.vol", &whole)).description());
-    for cut in 0..whole.len() {
+    // Without the end mark of 8 bytes it is read.
+    for cut in (0..whole.len()).filter(|cut| *cut != whole.len() - 8) {
         shown += &total(folder.write("p.vol", &whole[..cut])).unwrap_err();
     }
     let more = "PatientName = SECRET^PATIENT\nSeq_Frame0000_PatientName = SECRET\nComment = SECRET\n";
@@ -222,4 +223,29 @@ fn data_in_a_second_file_are_found_behind_its_header() {
     assert!(total(header("HeaderSize = 8\n")).unwrap_err().contains("23 of 24"));
     assert_eq!(total(header("")).unwrap()[..7], [9; 7]);
     assert!(open(header("")).description().iter().any(|(title, _)| title == "more data"));
+}
+
+/// Angles from the last line or frame to the first describe the same volume as the frames in their order.
+#[test]
+fn falling_kretz_tables_and_a_missing_end_mark_are_read() {
+    let folder = Folder::new("falling");
+    let lines = [-0.1, 0.0, 0.1];
+    let rising = kretz(&lines, &[-0.1, 0.1], b"");
+    let falling = kretz(&[0.1, 0.0, -0.1], &[0.1, -0.1], b"");
+    let places = |bytes: &[u8]| {
+        let mut recording = open(folder.write("f.vol", bytes));
+        let mut slices: Vec<_> = all_frames(&mut recording).unwrap().into_iter().map(|f| (f.slice, f.bytes)).collect();
+        slices.sort();
+        (recording.geometry(0), slices)
+    };
+    let ((forth, ahead), (back, behind)) = (places(&rising), places(&falling));
+    assert_eq!(forth, back);
+    // The voxels count up in the order of the file: the last line of the last frame is stored last.
+    assert_eq!(ahead[0].1[..4], [0, 1, 2, 3]);
+    assert_eq!(behind[1].1[8..], [0, 1, 2, 3], "the first stored line has the largest angles");
+    let mixed = kretz(&[0.1, -0.1, 0.0], &[-0.1, 0.1], b"");
+    assert!(total(folder.write("m.vol", mixed)).unwrap_err().contains("rise or fall"));
+    let open_ended = &rising[..rising.len() - 8];
+    assert_eq!(places(open_ended), places(&rising));
+    assert!(open(folder.write("e.vol", open_ended)).description().iter().any(|(title, _)| title == "end mark"));
 }

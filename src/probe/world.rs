@@ -1,0 +1,331 @@
+//! Where the voxels of a Cartesian lattice lie in the world, and in which order its axes are drawn.
+//!
+//! The world is LPS: x to the patient's left, y to posterior, z to superior, in mm. A volume is drawn along its own axes, which [`Grid`]
+//! holds: lateral, depth, elevation. [`World`] stands beside it and places it. Both are right-handed, so that a volume whose axes are
+//! left-handed in the world (a mirrored one) is drawn with one axis reversed.
+
+use super::grid::Grid;
+use glam::{DMat3, DMat4, DVec3};
+
+/// Largest cosine of the angle between two axes that counts as perpendicular: 0.06 degrees, as files round their matrices.
+const MAX_COSINE: f64 = 1e-3;
+/// Letters of the directions of the world: along x, y and z, and against them.
+const LETTERS: [[&str; 2]; 3] = [["left", "right"], ["posterior", "anterior"], ["superior", "inferior"]];
+
+/// The map from voxel indices to the world, mm (LPS).
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct World {
+    voxel_to_world: DMat4,
+}
+
+impl World {
+    /// The world of a lattice whose voxels are `axes` apart (mm, LPS), with voxel (0, 0, 0) centred on `origin`.
+    ///
+    /// # Errors
+    /// In words: numbers that are not finite, an axis of no length, axes that are not perpendicular to 0.06 degrees.
+    pub fn new(axes: [DVec3; 3], origin: DVec3) -> Result<World, String> {
+        if !(origin.is_finite() && axes.iter().all(|a| a.is_finite())) {
+            return Err("holds a number that is not finite".into());
+        }
+        if axes.iter().any(|a| a.length().is_nan() || a.length() <= 0.0 || !a.length().is_finite()) {
+            return Err("has an axis of no length".into());
+        }
+        let unit = axes.map(|a| a / a.length());
+        for (a, b) in [(0, 1), (0, 2), (1, 2)] {
+            let cosine = unit[a].dot(unit[b]);
+            if cosine.is_nan() || cosine.abs() > MAX_COSINE {
+                let angle = cosine.clamp(-1.0, 1.0).acos().to_degrees();
+                return Err(format!(
+                    "has axes {angle:.2} degrees apart, which are only drawn where they are perpendicular"
+                ));
+            }
+        }
+        let [x, y, z] = axes.map(|a| a.extend(0.0));
+        Ok(World { voxel_to_world: DMat4::from_cols(x, y, z, origin.extend(1.0)) })
+    }
+
+    /// The world of a lattice whose own axes are those of the world.
+    pub fn of(grid: &Grid) -> World {
+        World { voxel_to_world: lattice(grid) }
+    }
+
+    /// The step from one voxel to the next along an axis, 0 to 2, mm.
+    pub fn axis(&self, axis: usize) -> DVec3 {
+        self.voxel_to_world.col(axis.min(2)).truncate()
+    }
+
+    /// The centre of voxel (0, 0, 0), mm.
+    pub fn origin(&self) -> DVec3 {
+        self.voxel_to_world.w_axis.truncate()
+    }
+
+    /// The place of a fractional voxel index, mm.
+    pub fn at(&self, voxel: DVec3) -> DVec3 {
+        self.voxel_to_world.transform_point3(voxel)
+    }
+
+    /// The unit directions of the axes, as columns.
+    pub fn directions(&self) -> DMat3 {
+        DMat3::from_cols(self.axis(0).normalize(), self.axis(1).normalize(), self.axis(2).normalize())
+    }
+
+    /// True if the axes are left-handed in the world: drawn in their order, the volume would look mirrored.
+    pub fn is_left_handed(&self) -> bool {
+        self.directions().determinant() < 0.0
+    }
+
+    /// The world of the same voxels after [`AxisOrder`]. `size`: voxels along the axes as they are stored.
+    pub fn reordered(&self, order: &AxisOrder, size: [usize; 3]) -> World {
+        let mut origin = self.origin();
+        let axes = [0, 1, 2].map(|drawn| {
+            let stored = order.stored[drawn];
+            let step = self.axis(stored);
+            if !order.reversed[drawn] {
+                return step;
+            }
+            origin += step * size[stored].saturating_sub(1) as f64;
+            -step
+        });
+        let [x, y, z] = axes.map(|a| a.extend(0.0));
+        World { voxel_to_world: DMat4::from_cols(x, y, z, origin.extend(1.0)) }
+    }
+
+    /// The lattice that is drawn: along its own axes, with the coordinates that the world has when it is turned into them. For axes along
+    /// those of the world, these are the coordinates of the world.
+    pub fn grid(&self, size: [usize; 3]) -> Grid {
+        let spacing = [0, 1, 2].map(|n| self.axis(n).length());
+        let origin = self.directions().transpose() * self.origin();
+        // No negative zero, which would be shown.
+        Grid { size, spacing, origin: origin.to_array().map(|v| v + 0.0) }
+    }
+
+    /// The world of another lattice in the same drawn space: `of` is the lattice of `self`.
+    pub fn on(&self, of: &Grid, other: &Grid) -> World {
+        if of.spacing == other.spacing && of.origin == other.origin {
+            return *self;
+        }
+        World { voxel_to_world: self.voxel_to_world * lattice(of).inverse() * lattice(other) }
+    }
+
+    /// The direction of the world that each axis points to most, in words.
+    pub fn nearest(&self) -> [&'static str; 3] {
+        [0, 1, 2].map(|n| {
+            let step = self.axis(n);
+            let main = largest(step);
+            LETTERS[main][usize::from(step[main] < 0.0)]
+        })
+    }
+}
+
+/// Voxel indices to the drawn space of a grid, mm.
+fn lattice(grid: &Grid) -> DMat4 {
+    DMat4::from_translation(DVec3::from(grid.origin)) * DMat4::from_scale(DVec3::from(grid.spacing))
+}
+
+/// The component of the largest size.
+fn largest(step: DVec3) -> usize {
+    (1..3).fold(0, |main, n| if step[n].abs() > step[main].abs() { n } else { main })
+}
+
+/// The order in which the stored axes of a Cartesian volume are drawn as lateral, depth and elevation.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct AxisOrder {
+    /// The stored axis (0 fastest) of each drawn one.
+    pub stored: [usize; 3],
+    /// Drawn from its last index to its first.
+    pub reversed: [bool; 3],
+}
+
+/// The stored axis that is drawn as depth.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct DepthAxis {
+    axis: usize,
+    reversed: bool,
+}
+
+impl std::str::FromStr for DepthAxis {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<DepthAxis, String> {
+        let (reversed, name) = match text.strip_prefix('-') {
+            Some(rest) => (true, rest),
+            None => (false, text),
+        };
+        match ["x", "y", "z"].iter().position(|axis| name.eq_ignore_ascii_case(axis)) {
+            Some(axis) => Ok(DepthAxis { axis, reversed }),
+            None => Err("must be x, y, z, -x, -y or -z".into()),
+        }
+    }
+}
+
+impl AxisOrder {
+    /// The stored order.
+    pub const STORED: AxisOrder = AxisOrder { stored: [0, 1, 2], reversed: [false; 3] };
+
+    /// An order of the same handedness with a given depth. Frames stay frames where they can.
+    pub fn with_depth(depth: DepthAxis) -> AxisOrder {
+        let (stored, reversed) = match (depth.axis, depth.reversed) {
+            (0, false) => ([1, 0, 2], [true, false, false]),
+            (0, true) => ([1, 0, 2], [false, true, false]),
+            (1, false) => ([0, 1, 2], [false; 3]),
+            (1, true) => ([0, 1, 2], [false, true, true]),
+            (_, false) => ([0, 2, 1], [false, false, true]),
+            (_, true) => ([0, 2, 1], [false, true, false]),
+        };
+        AxisOrder { stored, reversed }
+    }
+
+    /// The order of the PLUS toolkit's image orientation: two or three letters, one a stored axis. M(arked) and U(nmarked) are lateral,
+    /// F(ar) and N(ear) depth, A(scending) and D(escending) elevation. None for other words.
+    pub fn of_plus(word: &str) -> Option<AxisOrder> {
+        let letters: Vec<char> = word.chars().chain("A".chars().filter(|_| word.len() == 2)).collect();
+        let mut order = AxisOrder { stored: [3; 3], reversed: [false; 3] };
+        for (stored, letter) in letters.iter().enumerate() {
+            let (drawn, reversed) = match letter {
+                'M' => (0, false),
+                'U' => (0, true),
+                'F' => (1, false),
+                'N' => (1, true),
+                'A' => (2, false),
+                'D' => (2, true),
+                _ => return None,
+            };
+            (order.stored[drawn], order.reversed[drawn]) = (stored, reversed);
+        }
+        (letters.len() == 3 && order.stored.iter().all(|n| *n < 3)).then_some(order)
+    }
+
+    /// The stored order with one axis reversed, so that a left-handed lattice becomes right-handed. Depth stays. An axis against its
+    /// direction of the world is preferred, lateral before elevation.
+    pub fn with_other_hand(world: &World) -> AxisOrder {
+        let is_against = |n: &usize| {
+            let step = world.axis(*n);
+            step[largest(step)] < 0.0
+        };
+        let chosen = [0, 2].into_iter().find(is_against).unwrap_or(0);
+        AxisOrder { stored: [0, 1, 2], reversed: [0, 1, 2].map(|n| n == chosen) }
+    }
+
+    /// This order, and `next` after it.
+    pub fn then(&self, next: &AxisOrder) -> AxisOrder {
+        AxisOrder {
+            stored: next.stored.map(|n| self.stored[n]),
+            reversed: [0, 1, 2].map(|n| next.reversed[n] != self.reversed[next.stored[n]]),
+        }
+    }
+
+    /// True if each drawn slice is a stored frame, with its pixels in another order at most.
+    pub fn keeps_frames(&self) -> bool {
+        self.stored[2] == 2
+    }
+
+    /// The drawn size of a stored one.
+    pub fn size(&self, stored: [usize; 3]) -> [usize; 3] {
+        self.stored.map(|axis| stored[axis])
+    }
+
+    /// The stored axes by name, in drawn order: "x, -z, y".
+    pub fn names(&self) -> String {
+        let name = |n: usize| format!("{}{}", if self.reversed[n] { "-" } else { "" }, ["x", "y", "z"][self.stored[n]]);
+        [0, 1, 2].map(name).join(", ")
+    }
+
+    /// Pixels of `width` bytes in drawn order. `size`: of the stored block, whose bytes are all there.
+    pub fn reorder(&self, bytes: &[u8], size: [usize; 3], width: usize) -> Vec<u8> {
+        let stride = [1, size[0], size[0] * size[1]];
+        let [columns, rows, slices] = self.size(size);
+        let step = |n: usize, index: usize, count: usize| {
+            stride[self.stored[n]] * if self.reversed[n] { count - 1 - index } else { index }
+        };
+        let mut out = Vec::with_capacity(bytes.len());
+        for k in 0..slices {
+            for j in 0..rows {
+                let row = step(2, k, slices) + step(1, j, rows);
+                for i in 0..columns {
+                    let at = (row + step(0, i, columns)) * width;
+                    out.extend_from_slice(bytes.get(at..at + width).unwrap_or_default());
+                }
+            }
+        }
+        out
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const GRID: Grid = Grid { size: [4, 3, 2], spacing: [0.5, 1.0, 2.0], origin: [-3.0, 7.0, 11.0] };
+
+    #[test]
+    fn axes_along_the_world_keep_its_coordinates_exactly() {
+        let world = World::of(&GRID);
+        assert_eq!((world.grid(GRID.size), world.is_left_handed()), (GRID, false));
+        assert_eq!(world.at(DVec3::new(2.0, 1.0, 1.0)), DVec3::new(-2.0, 8.0, 13.0));
+        assert_eq!(world.nearest(), ["left", "posterior", "superior"]);
+    }
+
+    #[test]
+    fn a_reordered_lattice_has_each_voxel_where_it_was() {
+        let turned = DMat3::from_euler(glam::EulerRot::XYZ, 0.3, -1.1, 2.0);
+        let axes = [turned.x_axis * 0.5, turned.y_axis, turned.z_axis * -2.0];
+        let world = World::new(axes, DVec3::new(-30.0, 7.0, 110.0)).unwrap();
+        assert!(world.is_left_handed());
+        for text in ["x", "y", "z", "-x", "-y", "-z"] {
+            let order = AxisOrder::with_depth(text.parse().unwrap());
+            let drawn = world.reordered(&order, GRID.size);
+            assert!(drawn.is_left_handed(), "a depth axis does not change the hand: {text}");
+            let order = order.then(&AxisOrder::with_other_hand(&drawn));
+            let drawn = world.reordered(&order, GRID.size);
+            assert!(!drawn.is_left_handed());
+            // Each voxel holds its own index.
+            let all: Vec<u8> = (0..24).collect();
+            let moved = order.reorder(&all, GRID.size, 1);
+            let size = order.size(GRID.size);
+            for (n, stored) in moved.iter().map(|v| usize::from(*v)).enumerate() {
+                let cell = |n: usize, size: [usize; 3]| {
+                    DVec3::new((n % size[0]) as f64, (n / size[0] % size[1]) as f64, (n / (size[0] * size[1])) as f64)
+                };
+                let (there, here) = (world.at(cell(stored, GRID.size)), drawn.at(cell(n, size)));
+                assert!(there.distance(here) < 1e-9, "{text}: voxel {n}");
+            }
+            let grid = drawn.grid(size);
+            let back = drawn.directions() * (DVec3::from(grid.origin));
+            assert!(back.distance(drawn.origin()) < 1e-9);
+        }
+    }
+
+    /// The letters of PLUS's igsioCommon.h: the direction of each stored axis.
+    #[test]
+    fn plus_orientations_are_marked_far_ascending() {
+        let order = |word: &str| AxisOrder::of_plus(word).map(|order| order.names());
+        let shown = [("MF", "x, y, z"), ("UF", "-x, y, z"), ("MN", "x, -y, z"), ("UN", "-x, -y, z")];
+        for (word, names) in shown.into_iter().chain([("UND", "-x, -y, -z"), ("AMF", "y, z, x"), ("FMA", "y, x, z")]) {
+            assert_eq!(order(word).as_deref(), Some(names), "{word}");
+        }
+        for word in ["", "M", "MM", "MFAA", "MUA", "XX", "mf"] {
+            assert_eq!(order(word), None, "{word}");
+        }
+    }
+
+    #[test]
+    fn only_perpendicular_axes_of_a_length_are_a_world() {
+        let at = |x: DVec3| World::new([x, DVec3::Y, DVec3::Z], DVec3::ZERO);
+        assert!(at(DVec3::new(1.0, 5e-4, 0.0)).is_ok());
+        for bad in [DVec3::ZERO, DVec3::NAN, DVec3::Y, DVec3::new(1.0, 2e-3, 0.0), DVec3::splat(1e300)] {
+            assert!(at(bad).is_err(), "{bad}");
+        }
+        assert!(World::new([DVec3::X, DVec3::Y, DVec3::Z], DVec3::INFINITY).is_err());
+    }
+
+    #[test]
+    fn another_lattice_in_the_same_space_has_the_same_world() {
+        let turned = DMat3::from_euler(glam::EulerRot::XYZ, 0.3, -1.1, 2.0);
+        let world = World::new([turned.x_axis, turned.y_axis * 0.4, turned.z_axis], DVec3::new(5.0, 6.0, 7.0)).unwrap();
+        let own = world.grid([9, 9, 9]);
+        let finer = Grid { size: [17; 3], spacing: [0.5, 0.2, 0.5], origin: own.origin };
+        let there = world.on(&own, &finer);
+        assert!(there.at(DVec3::new(4.0, 6.0, 2.0)).distance(world.at(DVec3::new(2.0, 3.0, 1.0))) < 1e-9);
+        assert_eq!(world.on(&own, &own), world);
+    }
+}

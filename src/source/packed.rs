@@ -1,0 +1,231 @@
+//! Files that may be packed as a whole (.gz), and the samples in them as a stream of bytes.
+//!
+//! A packed file is read through its decompressor from the start, each time anew; nothing is unpacked to a disk.
+
+use crate::files::InputError;
+use bzip2::bufread::MultiBzDecoder;
+use flate2::bufread::MultiGzDecoder;
+use flate2::{Decompress, FlushDecompress, Status};
+use std::fs::{self, File};
+use std::io::{self, BufRead, BufReader, Read, Seek, SeekFrom};
+use std::path::{Path, PathBuf};
+
+const GZIP: [u8; 2] = [0x1f, 0x8b];
+
+/// How samples are compressed.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Encoding {
+    Raw,
+    Zlib,
+    Gzip,
+    Bzip2,
+}
+
+impl Encoding {
+    /// Its name for users.
+    pub fn name(self) -> &'static str {
+        match self {
+            Encoding::Raw => "none",
+            Encoding::Zlib => "zlib",
+            Encoding::Gzip => "gzip",
+            Encoding::Bzip2 => "bzip2",
+        }
+    }
+
+    /// Largest ratio that it can reach. Deflate: 258 bytes from two bits, so 1032 (zlib, "technical details"). Bzip2: a block of 900 kB
+    /// holds runs of 259 bytes in 5, 46 MB from about 40 bytes.
+    pub fn most(self) -> u64 {
+        match self {
+            Encoding::Raw => 1,
+            Encoding::Zlib | Encoding::Gzip => 1032,
+            Encoding::Bzip2 => 1_200_000,
+        }
+    }
+}
+
+/// A regular file that is read from its start, through gzip if it is packed.
+pub(super) struct InputFile<'a> {
+    pub path: &'a Path,
+    packed: bool,
+    bytes: u64,
+}
+
+impl<'a> InputFile<'a> {
+    /// Finds out whether a file is packed.
+    ///
+    /// # Errors
+    /// A file that cannot be read, or is not a regular file.
+    pub fn new(path: &'a Path) -> Result<InputFile<'a>, InputError> {
+        let unreadable = |e| InputError::unreadable(path, &e);
+        let metadata = fs::metadata(path).map_err(unreadable)?;
+        // A pipe or a folder has no size to check claims against, and opening a pipe may block for ever.
+        if !metadata.is_file() {
+            return Err(InputError::new(path, "file", "is not a regular file"));
+        }
+        let mut start = Vec::new();
+        File::open(path).and_then(|file| file.take(2).read_to_end(&mut start)).map_err(unreadable)?;
+        Ok(InputFile { path, packed: start == GZIP, bytes: metadata.len() })
+    }
+
+    /// True if the whole file is packed.
+    pub fn is_packed(&self) -> bool {
+        self.packed
+    }
+
+    /// The bytes from the start, unpacked.
+    pub fn open(&self) -> io::Result<PixelStream> {
+        self.pixels(0).open(0)
+    }
+
+    /// The first bytes, unpacked; fewer if there are fewer.
+    ///
+    /// # Errors
+    /// A file that cannot be read.
+    pub fn start(&self, bytes: u64) -> Result<Vec<u8>, InputError> {
+        let mut start = Vec::new();
+        let read = self.open().and_then(|file| file.take(bytes).read_to_end(&mut start));
+        match read {
+            // What is cut short or corrupt is reported where it is read.
+            Err(e) if !self.packed => Err(InputError::unreadable(self.path, &e)),
+            _ => Ok(start),
+        }
+    }
+
+    /// Most bytes that the file can hold unpacked.
+    pub fn most_bytes(&self) -> u64 {
+        match self.packed {
+            true => self.bytes.saturating_mul(Encoding::Gzip.most()).saturating_add(1024),
+            false => self.bytes,
+        }
+    }
+
+    /// Samples in this file `offset` bytes after its start, unpacked, up to its end.
+    pub fn pixels(&self, offset: u64) -> Pixels {
+        let path = self.path.to_path_buf();
+        match self.packed {
+            true => Pixels { path, offset: 0, length: self.bytes, encoding: Encoding::Gzip, inside: offset },
+            false => {
+                Pixels { path, offset, length: self.bytes.saturating_sub(offset), encoding: Encoding::Raw, inside: 0 }
+            }
+        }
+    }
+}
+
+/// The location of the samples: file and range of bytes.
+#[derive(Clone, Debug)]
+pub(super) struct Pixels {
+    pub path: PathBuf,
+    /// Offset of the first byte.
+    pub offset: u64,
+    /// Length in the file, bytes, compressed or not.
+    pub length: u64,
+    pub encoding: Encoding,
+    /// Bytes of the decompressed stream that come before the samples.
+    pub inside: u64,
+}
+
+/// The samples as a stream.
+pub(super) enum PixelStream {
+    Raw(BufReader<File>),
+    Packed(Box<dyn Read + Send>),
+}
+
+impl Pixels {
+    /// True if the samples are compressed.
+    pub fn is_compressed(&self) -> bool {
+        self.encoding != Encoding::Raw
+    }
+
+    /// Opens the stream `skip` bytes after its beginning. A compressed stream is decompressed up to there.
+    pub fn open(&self, skip: u64) -> io::Result<PixelStream> {
+        let mut file = File::open(&self.path)?;
+        if !self.is_compressed() {
+            file.seek(SeekFrom::Start(self.offset.saturating_add(skip)))?;
+            return Ok(PixelStream::Raw(BufReader::new(file)));
+        }
+        file.seek(SeekFrom::Start(self.offset))?;
+        let input = BufReader::new(file.take(self.length));
+        let packed: Box<dyn Read + Send> = match self.encoding {
+            Encoding::Gzip => Box::new(MultiGzDecoder::new(input)),
+            Encoding::Bzip2 => Box::new(MultiBzDecoder::new(input)),
+            _ => Box::new(Inflate { input, state: Decompress::new(true), ended: false }),
+        };
+        let mut stream = PixelStream::Packed(packed);
+        stream.skip(self.inside.saturating_add(skip))?;
+        Ok(stream)
+    }
+}
+
+impl PixelStream {
+    pub fn skip(&mut self, bytes: u64) -> io::Result<()> {
+        match self {
+            PixelStream::Raw(file) => file.seek_relative(i64::try_from(bytes).map_err(io::Error::other)?),
+            PixelStream::Packed(stream) => {
+                let skipped = io::copy(&mut stream.take(bytes), &mut io::sink())?;
+                if skipped == bytes { Ok(()) } else { Err(io::ErrorKind::UnexpectedEof.into()) }
+            }
+        }
+    }
+
+    /// Appends `bytes` bytes to `out`, or as many as there are. The buffer grows with the data that arrive and not with the requested
+    /// number, which may come from a false header.
+    pub fn fill(&mut self, bytes: u64, out: &mut Vec<u8>) -> io::Result<()> {
+        match self {
+            PixelStream::Raw(file) => file.take(bytes).read_to_end(out)?,
+            PixelStream::Packed(stream) => stream.take(bytes).read_to_end(out)?,
+        };
+        Ok(())
+    }
+
+    /// Reads a compressed stream to its end, where its checksum is verified. Returns the number of bytes that were left.
+    pub fn finish(&mut self) -> io::Result<u64> {
+        match self {
+            PixelStream::Raw(_) => Ok(0),
+            PixelStream::Packed(stream) => io::copy(stream, &mut io::sink()),
+        }
+    }
+}
+
+impl Read for PixelStream {
+    fn read(&mut self, out: &mut [u8]) -> io::Result<usize> {
+        match self {
+            PixelStream::Raw(file) => file.read(out),
+            PixelStream::Packed(stream) => stream.read(out),
+        }
+    }
+}
+
+/// A zlib stream. Unlike flate2's own reader it detects a stream that is cut short.
+struct Inflate {
+    input: BufReader<io::Take<File>>,
+    state: Decompress,
+    ended: bool,
+}
+
+impl Read for Inflate {
+    fn read(&mut self, out: &mut [u8]) -> io::Result<usize> {
+        while !self.ended && !out.is_empty() {
+            let input = self.input.fill_buf()?;
+            let no_more = input.is_empty();
+            let (taken, made) = (self.state.total_in(), self.state.total_out());
+            let status = self
+                .state
+                .decompress(input, out, FlushDecompress::None)
+                .map_err(|_| io::Error::new(io::ErrorKind::InvalidData, "the compressed stream is corrupt"))?;
+            let taken = (self.state.total_in() - taken) as usize;
+            let made = (self.state.total_out() - made) as usize;
+            self.input.consume(taken);
+            self.ended = status == Status::StreamEnd;
+            if made > 0 {
+                return Ok(made);
+            }
+            if !self.ended && no_more {
+                return Err(io::ErrorKind::UnexpectedEof.into());
+            }
+            if !self.ended && taken == 0 {
+                return Err(io::Error::new(io::ErrorKind::InvalidData, "the compressed stream is stuck"));
+            }
+        }
+        Ok(0)
+    }
+}

@@ -1,0 +1,189 @@
+//! Volume files that are written: MetaImage, NRRD and NIfTI-1, each with its voxel-to-world matrix. A file is whole or does not exist.
+
+use super::samples::SampleType;
+use crate::files::{InputError, Unfinished};
+use crate::probe::World;
+use flate2::Compression;
+use flate2::write::GzEncoder;
+use glam::{DMat3, DQuat, DVec3};
+use std::io::{self, Write};
+use std::path::Path;
+
+/// Formats of volume files that can be written.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum VolumeFile {
+    /// MetaImage with header and samples in one file (.mha).
+    MetaImage,
+    /// NRRD 4 with header and raw samples in one file (.nrrd).
+    Nrrd,
+    /// NIfTI-1 with header and samples in one file (.nii), or the same packed by gzip (.nii.gz).
+    Nifti { packed: bool },
+}
+
+/// Bytes before the samples of a NIfTI-1 file: the header, and four zeros for "no extension".
+const NIFTI_OFFSET: usize = 352;
+
+impl VolumeFile {
+    /// The format for the extension of a file name.
+    ///
+    /// # Errors
+    /// Another extension.
+    pub fn of(path: &Path) -> Result<VolumeFile, InputError> {
+        let name = path.file_name().unwrap_or_default().to_string_lossy().to_ascii_lowercase();
+        let formats = [
+            (".mha", VolumeFile::MetaImage),
+            (".nrrd", VolumeFile::Nrrd),
+            (".nii", VolumeFile::Nifti { packed: false }),
+            (".nii.gz", VolumeFile::Nifti { packed: true }),
+        ];
+        match formats.iter().find(|(ending, _)| name.ends_with(ending)) {
+            Some((_, format)) => Ok(*format),
+            None => Err(InputError::new(path, "file", "must end in .mha, .nrrd, .nii or .nii.gz")),
+        }
+    }
+
+    /// Most voxels along an axis.
+    pub(super) fn most_along_axis(self) -> usize {
+        match self {
+            VolumeFile::Nifti { .. } => i16::MAX as usize,
+            _ => 65_536,
+        }
+    }
+
+    /// Begins a file: its header.
+    pub(super) fn create(
+        self,
+        path: &Path,
+        size: [usize; 3],
+        world: &World,
+        sample: SampleType,
+    ) -> io::Result<VolumeWriter> {
+        let file = Unfinished::create(path)?;
+        let mut writer = match self {
+            VolumeFile::Nifti { packed: true } => {
+                VolumeWriter::Packed(Box::new(GzEncoder::new(file, Compression::default())))
+            }
+            _ => VolumeWriter::Plain(file),
+        };
+        writer.write_all(&self.header(size, world, sample))?;
+        Ok(writer)
+    }
+
+    fn header(self, size: [usize; 3], world: &World, sample: SampleType) -> Vec<u8> {
+        match self {
+            VolumeFile::MetaImage => metaimage(size, world, sample).into_bytes(),
+            VolumeFile::Nrrd => nrrd(size, world, sample).into_bytes(),
+            VolumeFile::Nifti { .. } => nifti(size, world, sample),
+        }
+    }
+}
+
+/// Three numbers, without negative zeros.
+fn three(v: DVec3, between: &str) -> String {
+    v.to_array().map(|n| (n + 0.0).to_string()).join(between)
+}
+
+fn metaimage([x, y, z]: [usize; 3], world: &World, sample: SampleType) -> String {
+    let kind = sample.metaimage();
+    let directions = world.directions();
+    let matrix = [0, 1, 2].map(|n| three(directions.col(n), " ")).join(" ");
+    let spacing = three(DVec3::from([0, 1, 2].map(|n| world.axis(n).length())), " ");
+    let origin = three(world.origin(), " ");
+    format!(
+        "ObjectType = Image\nNDims = 3\nBinaryData = True\nBinaryDataByteOrderMSB = False\nCompressedData = False\n\
+         TransformMatrix = {matrix}\nOffset = {origin}\nElementSpacing = {spacing}\n\
+         DimSize = {x} {y} {z}\nElementType = {kind}\nElementDataFile = LOCAL\n"
+    )
+}
+
+fn nrrd([x, y, z]: [usize; 3], world: &World, sample: SampleType) -> String {
+    let kind = match sample {
+        SampleType::U8 => "uint8",
+        SampleType::U16 => "uint16",
+        SampleType::I16 => "int16",
+        SampleType::F32 => "float",
+    };
+    let directions = [0, 1, 2].map(|n| format!("({})", three(world.axis(n), ","))).join(" ");
+    let origin = three(world.origin(), ",");
+    format!(
+        "NRRD0004\n# The axes are lateral, depth and elevation of an ultrasound probe.\ntype: {kind}\ndimension: 3\n\
+         space: left-posterior-superior\nsizes: {x} {y} {z}\nspace directions: {directions}\n\
+         kinds: domain domain domain\nspace units: \"mm\" \"mm\" \"mm\"\nspace origin: ({origin})\n\
+         endian: little\nencoding: raw\n\n"
+    )
+}
+
+/// A header of 348 bytes with sform and qform, both of the scanner, and no extension.
+fn nifti(size: [usize; 3], world: &World, sample: SampleType) -> Vec<u8> {
+    let (datatype, bits) = match sample {
+        SampleType::U8 => (2i16, 8i16),
+        SampleType::I16 => (4, 16),
+        SampleType::U16 => (512, 16),
+        SampleType::F32 => (16, 32),
+    };
+    let mut bytes = vec![0; NIFTI_OFFSET];
+    let mut put = |at: usize, value: &[u8]| bytes[at..at + value.len()].copy_from_slice(value);
+    put(0, &348i32.to_le_bytes());
+    // The sizes were checked against the format.
+    let dim = [3, size[0] as i16, size[1] as i16, size[2] as i16, 1, 1, 1, 1];
+    put(40, &dim.map(i16::to_le_bytes).concat());
+    put(70, &[datatype, bits].map(i16::to_le_bytes).concat());
+    // From LPS to RAS.
+    let ras = |v: DVec3| DVec3::new(-v.x, -v.y, v.z) + DVec3::ZERO;
+    let axes = [0, 1, 2].map(|n| ras(world.axis(n)));
+    let origin = ras(world.origin());
+    let hand = if world.is_left_handed() { -1.0 } else { 1.0 };
+    let spacing = axes.map(DVec3::length);
+    let pixdim = [hand, spacing[0], spacing[1], spacing[2], 0.0, 0.0, 0.0, 0.0];
+    put(76, &pixdim.map(|v| (v as f32).to_le_bytes()).concat());
+    put(108, &(NIFTI_OFFSET as f32).to_le_bytes());
+    put(112, &1.0f32.to_le_bytes());
+    // mm.
+    put(123, &[2]);
+    put(252, &[1i16, 1].map(i16::to_le_bytes).concat());
+    let rotation = DMat3::from_cols(axes[0] / spacing[0], axes[1] / spacing[1], axes[2] / spacing[2] * hand);
+    let turn = DQuat::from_mat3(&rotation).normalize();
+    let turn = if turn.w < 0.0 { -turn } else { turn };
+    let place = [turn.x, turn.y, turn.z, origin.x, origin.y, origin.z];
+    put(256, &place.map(|v| (v as f32).to_le_bytes()).concat());
+    for row in 0..3 {
+        let values = [axes[0][row], axes[1][row], axes[2][row], origin[row]];
+        put(280 + 16 * row, &values.map(|v| (v as f32).to_le_bytes()).concat());
+    }
+    put(344, b"n+1\0");
+    bytes
+}
+
+/// A volume file that is being written.
+pub(super) enum VolumeWriter {
+    Plain(Unfinished),
+    Packed(Box<GzEncoder<Unfinished>>),
+}
+
+impl VolumeWriter {
+    /// Puts the complete file in its place.
+    pub fn finish(self) -> io::Result<()> {
+        let mut file = match self {
+            VolumeWriter::Plain(file) => file,
+            VolumeWriter::Packed(packed) => packed.finish()?,
+        };
+        file.finish()?;
+        file.rename()
+    }
+}
+
+impl Write for VolumeWriter {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        match self {
+            VolumeWriter::Plain(file) => file.write(bytes),
+            VolumeWriter::Packed(packed) => packed.write(bytes),
+        }
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        match self {
+            VolumeWriter::Plain(file) => file.flush(),
+            VolumeWriter::Packed(packed) => packed.flush(),
+        }
+    }
+}
