@@ -1,4 +1,4 @@
-//! The simulated module as any TMCL client meets it: raw bytes on its port. The requests are those that PyTrinamic sends.
+//! The simulated module as any TMCL client meets it: raw bytes on its port, the kinds of requests that a stock client sends.
 
 use crate::common::motor::simulated;
 use echolume::probe::motor::tmcl::{LENGTH, Reply, Request, checksum, version_text};

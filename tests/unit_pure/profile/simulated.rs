@@ -81,6 +81,7 @@ pub fn pass(name: &str, samples_ns: Vec<f64>) -> PassProfile {
         bytes_written: 1_000_000,
         fetches: None,
         filtered: Some(8_000_000),
+        dispatched: Some(262_144),
         invocations: Some(262_144),
     }
 }
