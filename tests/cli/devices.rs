@@ -22,7 +22,7 @@ fn a_stream_goes_on_after_its_device_hung() {
     let report = folder.path("report.json");
     let mut program = Command::new(PROGRAM);
     program.args(["stream", "--null", "--rate", "4", "--volumes", "8", "--device-timeout", "3s", "--validate"]);
-    let settings = [("HANG", "200"), ("REPORT", report.as_str())];
+    let settings = [("HANG", "60"), ("REPORT", report.as_str())];
     let (code, said, err) = finish(under_layer(program.args(SMALL), &settings));
     assert_eq!(code, Some(0), "{said}{err}");
     assert_eq!(said.matches("stalled: the device did not finish within 3 s").count(), 1, "{said}");

@@ -71,7 +71,7 @@ fn wrong_recordings_cause_neither_a_panic_nor_a_picture() {
     for (file, named) in [
         (&folder.path("none.mha"), "cannot be read"),
         (&folder.path(""), "not a regular file"),
-        (&folder.write("p.png", b"\x89PNG\r\n\x1a\n\0\0\0\rIHDR"), "no known format"),
+        (&folder.write("p.png", b"\x89PNG\r\n\x1a\n\0\0\0\rIHDR"), "is a PNG picture"),
         (&cut(SWEEP, 0), "0.mha"),
         (&cut(SWEEP, sweep.len() - 1), "cut short"),
         (&cut(BONE, 300_000), "cut short"),

@@ -74,7 +74,12 @@ fn no_layer_uses_a_layer_above_it() {
         assert!(!within.is_empty(), "{place} is gone");
         for (name, text) in within {
             for word in *forbidden {
-                assert!(!code(text).contains(word), "{name} names {word}, which its layer does not know");
+                // `std::hash::` does not name `ash::`.
+                let code = code(text);
+                let is_named = code
+                    .match_indices(word)
+                    .any(|(at, _)| !code[..at].ends_with(|before: char| before.is_alphanumeric() || before == '_'));
+                assert!(!is_named, "{name} names {word}, which its layer does not know");
             }
         }
     }
