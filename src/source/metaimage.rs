@@ -8,7 +8,6 @@ use crate::probe::file::SLAB;
 use crate::probe::{Advance, Array, Axis, AxisOrder, Motion, Probe, World};
 use glam::DVec3;
 use std::collections::{BTreeMap, HashMap};
-use std::fs;
 use std::io::{BufRead, BufReader, Read};
 use std::path::Path;
 
@@ -190,21 +189,13 @@ fn own_pictures(
 fn find_pixels(file: &InputFile, header: &Header, layout: &mut Layout) -> Result<(), InputError> {
     let name = header.need("ElementDataFile")?;
     if name != "LOCAL" {
-        let plain = Path::new(name).file_name().is_some_and(|n| n == name) && !name.contains('\\');
         if name.starts_with("LIST") || name.contains('%') {
             return header.fault("ElementDataFile", "a list of files is not read, only LOCAL or one file name");
         }
-        if !plain {
-            let fault = format!("{} must be LOCAL or the name of a file in the same folder", quoted(name));
-            return header.fault("ElementDataFile", fault);
-        }
-        let path = file.path.with_file_name(name);
-        let length = match fs::metadata(&path) {
-            Ok(metadata) if metadata.is_file() => metadata.len(),
-            Ok(_) => return header.fault("ElementDataFile", format!("{} is not a regular file", quoted(name))),
-            Err(error) => return header.fault("ElementDataFile", format!("{} cannot be read: {error}", quoted(name))),
+        layout.pixels = match Pixels::beside(file.path, name) {
+            Ok(pixels) => pixels,
+            Err(fault) => return header.fault("ElementDataFile", fault),
         };
-        layout.pixels = Pixels { path, offset: 0, length, encoding: Encoding::Raw, inside: 0 };
     }
     let is_packed = layout.pixels.is_compressed();
     let is_compressed = header.flag("CompressedData")?.unwrap_or(false);

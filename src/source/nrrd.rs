@@ -8,7 +8,6 @@ use crate::files::{InputError, quoted};
 use crate::probe::{AxisOrder, World};
 use glam::DVec3;
 use std::collections::{BTreeMap, HashMap};
-use std::fs;
 use std::io::{BufRead, BufReader, Read};
 use std::path::Path;
 
@@ -229,21 +228,13 @@ fn find_pixels(file: &InputFile, header: &Header, layout: &mut Layout) -> Result
     if let Some(name) = header.get("data file") {
         let name = name.trim_start_matches("./");
         let is_list = name.starts_with("LIST") || name.contains('%');
-        let plain = Path::new(name).file_name().is_some_and(|n| n == name) && !name.contains('\\');
         if is_list {
             return header.fault("data file", "a list of files is not read, only one file name");
         }
-        if !plain {
-            return header
-                .fault("data file", format!("{} must be the name of a file in the same folder", quoted(name)));
-        }
-        let path = file.path.with_file_name(name);
-        let length = match fs::metadata(&path) {
-            Ok(metadata) if metadata.is_file() => metadata.len(),
-            Ok(_) => return header.fault("data file", format!("{} is not a regular file", quoted(name))),
-            Err(error) => return header.fault("data file", format!("{} cannot be read: {error}", quoted(name))),
+        layout.pixels = match Pixels::beside(file.path, name) {
+            Ok(pixels) => pixels,
+            Err(fault) => return header.fault("data file", fault),
         };
-        layout.pixels = Pixels { path, offset: 0, length, encoding: Encoding::Raw, inside: 0 };
     }
     let encoding = match header.need("encoding")?.to_ascii_lowercase().as_str() {
         "raw" => Encoding::Raw,

@@ -2,7 +2,7 @@
 //!
 //! A packed file is read through its decompressor from the start, each time anew; nothing is unpacked to a disk.
 
-use crate::files::InputError;
+use crate::files::{InputError, quoted};
 use bzip2::bufread::MultiBzDecoder;
 use flate2::bufread::MultiGzDecoder;
 use flate2::{Decompress, FlushDecompress, Status};
@@ -131,6 +131,25 @@ pub(super) enum PixelStream {
 }
 
 impl Pixels {
+    /// All bytes of a file that a header names, which must lie in the folder of the header.
+    ///
+    /// # Errors
+    /// What is wrong with the name or with the file.
+    pub fn beside(header: &Path, name: &str) -> Result<Pixels, String> {
+        let is_plain = Path::new(name).file_name().is_some_and(|n| n == name) && !name.contains('\\');
+        if !is_plain {
+            return Err(format!("{} must be the name of a file in the same folder", quoted(name)));
+        }
+        let path = header.with_file_name(name);
+        match fs::metadata(&path) {
+            Ok(metadata) if metadata.is_file() => {
+                Ok(Pixels { path, offset: 0, length: metadata.len(), encoding: Encoding::Raw, inside: 0 })
+            }
+            Ok(_) => Err(format!("{} is not a regular file", quoted(name))),
+            Err(error) => Err(format!("{} cannot be read: {error}", quoted(name))),
+        }
+    }
+
     /// True if the samples are compressed.
     pub fn is_compressed(&self) -> bool {
         self.encoding != Encoding::Raw
