@@ -4,7 +4,7 @@ use super::face;
 use super::labels::Label;
 use super::limbs::{Hand, cord, shoulders};
 use super::shape::{gradient, normal};
-use super::skull::{Intracranial, intracranial, is_bone};
+use super::skull::{self, Intracranial, intracranial, is_bone};
 use super::speckle::{Beam, Echo};
 use glam::{Mat3, Vec3, vec3};
 use std::f32::consts::TAU;
@@ -20,6 +20,11 @@ const SKIN_FACING: f32 = 4.0;
 const SKIN_MIRROR: f32 = -12.0;
 const SOFT: f32 = -11.0;
 const BONE: f32 = -4.5;
+/// Level of the specular echo from a bone that faces the beam. Bone reflects about a tenth of the power, far more than soft tissue scatters
+/// back: it saturates the grey scale, as in a real picture.
+const BONE_MIRROR: f32 = 13.0;
+/// Thickness of the layer that the specular echo of a bone comes from, mm: rough on the scale of a wavelength.
+const BONE_FACE: f32 = 0.5;
 const BRAIN: f32 = -29.0;
 const THALAMUS: f32 = -34.0;
 const SULCUS: f32 = -15.0;
@@ -37,6 +42,8 @@ const GAIN: f32 = 0.05;
 
 /// Thickness, mm.
 const SKIN_THICKNESS: f32 = 2.2;
+/// Least depth of a bone below the skin, mm.
+const SKIN_LEAST: f32 = 0.8;
 
 /// Scale of the anatomy: mm in space for one mm of the model.
 const SCALE: f32 = 1.0;
@@ -121,7 +128,7 @@ impl Head {
                 Tissue::Inside(deep, part) => {
                     let faced = *facing
                         .get_or_insert_with(|| -normal(place, |p| self.tissue(p, &pose).distance()).dot(direction));
-                    self.flesh(place, &pose, deep, part, faced.max(0.0))
+                    self.flesh(place, direction, &pose, deep, part, faced.max(0.0))
                 }
                 Tissue::Fluid(away) if wall < 0.0 => {
                     facing = None;
@@ -215,19 +222,25 @@ impl Head {
     }
 
     /// Echo and loss (dB/mm) inside the fetus.
-    fn flesh(&self, place: Vec3, pose: &Pose, deep: f32, part: Part, facing: f32) -> (Echo, f32) {
+    fn flesh(&self, place: Vec3, direction: Vec3, pose: &Pose, deep: f32, part: Part, facing: f32) -> (Echo, f32) {
         let skin = || Echo {
             diffuse: SKIN + SKIN_FACING * facing,
             // A specular echo returns only if the surface faces the beam.
             mirror: if deep < 0.5 { SKIN_MIRROR + 20.0 * facing.max(0.1).log10() * 3.0 } else { Echo::SILENT.mirror },
         };
         let soft = Echo { diffuse: SOFT + texture(place, 0.5), ..Echo::SILENT };
+        let p = self.local(place);
+        if part == Part::Hand && deep > SKIN_LEAST && pose.hand.bone(p) < 0.0 {
+            let surface = |place: Vec3| pose.hand.bone(self.local(place));
+            return (bone_echo(place, direction, facing, surface), LOSS_BONE);
+        }
         if part != Part::Head {
             return (if deep < SKIN_THICKNESS { skin() } else { soft }, LOSS_SOFT);
         }
-        let p = pose.rotation * self.local(place);
+        let p = pose.rotation * p;
         if is_bone(p, pose.mouth) {
-            (Echo { diffuse: BONE + 3.0 * facing, ..Echo::SILENT }, LOSS_BONE)
+            let surface = |place: Vec3| skull::bone(pose.rotation * self.local(place), pose.mouth);
+            (bone_echo(place, direction, facing, surface), LOSS_BONE)
         } else if deep < SKIN_THICKNESS {
             (skin(), LOSS_SOFT)
         } else if let Some(part) = intracranial(p) {
@@ -254,6 +267,16 @@ impl Tissue {
             Tissue::Fluid(away) => away,
         }
     }
+}
+
+/// Echo of a place in a bone. `surface`: distance from the bone, mm; `facing`: cosine of the angle between the beam and the skin's normal.
+fn bone_echo(place: Vec3, direction: Vec3, facing: f32, surface: impl Fn(Vec3) -> f32) -> Echo {
+    let mirror = match -surface(place) < BONE_FACE {
+        // A rough face: its amplitude falls with the cosine, not as fast as a smooth mirror's.
+        true => BONE_MIRROR + 20.0 * (-normal(place, surface).dot(direction)).max(0.05).log10(),
+        false => Echo::SILENT.mirror,
+    };
+    Echo { diffuse: BONE + 3.0 * facing, mirror }
 }
 
 /// The received echo of a level, dB.

@@ -76,6 +76,39 @@ impl Hand {
     }
 }
 
+impl Hand {
+    /// Distance from the nearest bone of fingers, thumb, palm and forearm, mm, negative inside. The joints are of cartilage, which is dark.
+    pub fn bone(&self, p: Vec3) -> f32 {
+        /// Shares of the way from joint to joint at which bone begins and ends.
+        const SHAFT: [f32; 2] = [0.14, 0.86];
+        let p = p - HAND;
+        let bound = ball(p, vec3(40.0, -40.0, -10.0), 40.0);
+        if bound > 4.0 {
+            return bound;
+        }
+        let shaft =
+            |from: Vec3, to: Vec3, radii: [f32; 2]| rod(p, from.lerp(to, SHAFT[0]), from.lerp(to, SHAFT[1]), radii);
+        let mut d = f32::MAX;
+        let carpus = vec3(40.5, -48.0, -9.5);
+        for finger in &self.fingers {
+            let knuckle = finger.joints[0] + vec3(0.0, 0.0, -0.6);
+            let root = carpus + (knuckle - carpus) * vec3(0.35, 0.18, 0.2);
+            d = d.min(shaft(root, knuckle, [1.4, 1.3]));
+            for (i, pair) in finger.joints.windows(2).enumerate() {
+                let radius = [1.25, 1.1, 1.0][i];
+                d = d.min(shaft(pair[0], pair[1], [radius, radius]));
+            }
+        }
+        let (root, middle, tip) = (vec3(33.5, -45.5, -8.0), vec3(26.6, -36.5, -3.9), vec3(24.6, -30.2, -3.0));
+        d = d.min(shaft(root, middle, [1.4, 1.3])).min(shaft(middle, tip, [1.2, 1.0]));
+        for side in [-2.6, 2.6] {
+            let across = vec3(side, 0.0, 0.0);
+            d = d.min(rod(p, vec3(44.0, -56.0, -12.2) + across, vec3(50.0, -78.0, -18.0) + across, [1.7, 1.9]));
+        }
+        d
+    }
+}
+
 impl Finger {
     fn distance(&self, p: Vec3) -> f32 {
         let [root, knuckle, middle, tip] = self.joints;
