@@ -105,6 +105,9 @@ impl Plan {
                 let _ = writeln!(text, "{choice}");
             }
         }
+        for found in &scene.found {
+            let _ = writeln!(text, "chosen: {found}");
+        }
         for size in &scene.resolved_sizes {
             let _ = writeln!(text, "{size}");
         }

@@ -6,8 +6,10 @@ use crate::files::signals;
 use crate::files::{check_target, replace};
 use crate::gpu::context::list;
 use crate::gpu::{Context, ContextOptions, Deadline, DeviceChoice, GpuError, TexelAccess, device_selection};
+use crate::probe::Geometry;
+use crate::scene::default_look::block_edge;
 use crate::scene::load::Layers;
-use crate::scene::{Input, Scene};
+use crate::scene::{EchoHistogram, EchoLevels, Input, Scene};
 use crate::source::phantom::{self, Phantom, PhantomSource};
 use crate::source::{Frame, Source};
 use crate::terminal::{Failure, failed, input, say};
@@ -36,18 +38,40 @@ impl InputArgs {
 
     /// Like [`InputArgs::open`], with `chosen` assignments as a layer of settings below the flags and `--set`.
     pub fn open_with(&self, chosen: &[String]) -> Result<(Box<dyn Source>, Scene), Failure> {
-        let source = self.source()?;
+        let mut source = self.source()?;
         if self.volume >= source.volumes() {
             let (wanted, count) = (self.volume, source.volumes());
             return Err(input(format!("{}: --volume {wanted}: there are {count}, numbered from 0", self.name())));
         }
         let geometry = source.geometry(self.volume);
-        let settings = self.layers_with(chosen)?.finish().map_err(input)?;
+        let layers = self.layers_with(chosen)?;
+        let settings = layers.clone().finish().map_err(input)?;
         // i16 samples are stored with an offset, which the setting does not have.
         let asked = settings.samples.range.map(|range| range.map(|value| value + source.sample_type().shift()));
         let samples = Input { stored: source.stored_type(), range: asked.unwrap_or_else(|| source.range()) };
-        let scene = Scene::new(geometry, samples, settings).map_err(input)?;
+        let levels = match layers.needs_levels() {
+            true => self.levels(&mut *source, &geometry, samples)?,
+            false => None,
+        };
+        let completed = layers.completed(&geometry, levels.as_ref()).map_err(input)?;
+        let mut scene = Scene::new(geometry, samples, completed.settings).map_err(input)?;
+        scene.found = completed.said;
         Ok((source, scene))
+    }
+
+    /// The levels of the echoes of the chosen volume, whose frames are read for it.
+    fn levels(
+        &self,
+        source: &mut dyn Source,
+        geometry: &Geometry,
+        samples: Input,
+    ) -> Result<Option<EchoLevels>, Failure> {
+        let mut histogram = EchoHistogram::new(geometry, samples, block_edge(geometry));
+        self.for_each_frame(source, |frame| {
+            histogram.take(&frame.bytes);
+            Ok(())
+        })?;
+        Ok(histogram.levels())
     }
 
     /// The recording as it was typed, or `phantom`.
@@ -137,7 +161,8 @@ pub struct SceneArgs {
     /// File of settings (TOML)
     #[arg(long, value_name = "FILE")]
     scene: Option<PathBuf>,
-    /// Preset of settings: bmode, bone, face, face-classic, fetal, glass, thesis. May be repeated; a later one overrides an earlier one
+    /// Preset of settings: bmode, bone, face, face-classic, fetal, glass, skeleton, thesis, vessel. May be repeated; a later one
+    /// overrides an earlier one. Without one, windows and filters of a recording follow from its echoes
     #[arg(long, value_name = "NAME")]
     preset: Vec<String>,
     /// Width and height of the picture, pixels

@@ -61,7 +61,8 @@ pub struct Stream {
 impl Stream {
     pub fn run(&self) -> Result<(), Failure> {
         let update = self.stream.update()?;
-        let settings = self.scene.layers(self.source.is_phantom(), &[])?.finish().map_err(input)?;
+        let layers = self.scene.layers(self.source.is_phantom(), &[])?;
+        let settings = layers.clone().finish().map_err(input)?;
         if let Some(folder) = &self.out {
             std::fs::create_dir_all(folder)
                 .map_err(|e| failed(format!("{}: cannot be written: {e}", folder.display())))?;
@@ -74,7 +75,8 @@ impl Stream {
         let feed = Feed::new(source, self.record.as_deref())
             .map_err(|e| failed(format!("a thread for the source cannot be started: {e}")))?;
         let (images, queues, time_stamps) = (self.stream.images, self.stream.queues(), self.stream.time_stamps());
-        let options = StreamOptions { update, images, queues, time_stamps, ..StreamOptions::default() };
+        let options =
+            StreamOptions { update, images, queues, time_stamps, chosen: Some(layers), ..StreamOptions::default() };
         let mut stream = Live::new(&context, feed, settings, options);
         let done = self.run_stream(&mut stream, update, &mut context);
         drop(stream);

@@ -190,8 +190,10 @@ impl View {
         if let Some(file) = &self.record {
             super::stream::check_record(file, self.source.path())?;
         }
+        let layers = self.scene.layers(self.source.is_phantom(), &[])?;
         let options = ConsoleOptions {
-            settings: self.scene.layers(self.source.is_phantom(), &[])?.finish().map_err(input)?,
+            settings: layers.clone().finish().map_err(input)?,
+            chosen: Some(layers),
             update: self.stream.update()?,
             cine: CineLimits { volumes: self.cine as usize, bytes: (self.cine_memory as usize) << 20 },
             budget: self.budget()?,

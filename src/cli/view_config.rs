@@ -112,8 +112,10 @@ impl ConsoleConfig {
         let layers = config.layers().map_err(|e| input(config.flag_error(&e.to_string())))?;
         let (live, display, files) = (&config.live, &config.display, &config.files);
         let record = live.record.as_ref().map(|folder| folder.join(format!("echolume-{}.frames", stamp())));
+        let layers = scene.layers_over(layers, &[])?;
         let options = ConsoleOptions {
-            settings: scene.layers_over(layers, &[])?.finish().map_err(input)?,
+            settings: layers.clone().finish().map_err(input)?,
+            chosen: Some(layers),
             update: live.update,
             cine: CineLimits { volumes: live.cine_volumes as usize, bytes: (live.cine_memory_mb as usize) << 20 },
             budget: display.budget,

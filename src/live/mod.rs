@@ -7,6 +7,7 @@
 
 pub mod cine;
 pub mod feed;
+mod first_volume;
 mod phase;
 mod session;
 pub mod statistics;

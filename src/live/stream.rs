@@ -2,6 +2,7 @@
 
 use super::cine::{Cine, CineLimits};
 use super::feed::{Arrived, Feed};
+use super::first_volume::FirstVolume;
 use super::phase::{Pending, Phase};
 use super::session::{Begun, FinishedPicture, Session, Views};
 use super::statistics::Statistics;
@@ -9,6 +10,7 @@ use super::volume_pool::{Update, VolumeCounts, VolumePool};
 use crate::gpu::shader_reload::ShaderFolder;
 use crate::gpu::{self, Bands, Context, GpuError, Renderer, SceneMaker, TimeStamps, Wake};
 use crate::probe::Probe;
+use crate::scene::load::Layers;
 use crate::scene::{Scene, SceneError, Settings};
 use crate::source::Frame;
 use crate::source::live::Event;
@@ -39,6 +41,8 @@ pub struct StreamOptions {
     pub time_stamps: TimeStamps,
     /// Shaders to use instead of the embedded ones. Those that change are loaded again between two pictures.
     pub shaders: Option<Arc<ShaderFolder>>,
+    /// What was chosen: settings that nobody chose follow from the geometry and the first whole volume. None: the settings are complete.
+    pub chosen: Option<Layers>,
 }
 
 impl Default for StreamOptions {
@@ -52,6 +56,7 @@ impl Default for StreamOptions {
             wake: None,
             time_stamps: TimeStamps::default(),
             shaders: None,
+            chosen: None,
         }
     }
 }
@@ -84,6 +89,9 @@ pub struct Stream {
     feed: Feed,
     settings: Settings,
     options: StreamOptions,
+    first_volume: Option<FirstVolume>,
+    /// Settings that were found and that [`Stream::take_found`] has not returned yet.
+    found: Option<Settings>,
     /// None before the first frame header, and after a geometry that could not be set up.
     session: Option<Session>,
     cine: Cine,
@@ -116,6 +124,8 @@ impl Stream {
             context: context.clone(),
             feed,
             settings,
+            first_volume: options.chosen.clone().map(FirstVolume::new),
+            found: None,
             options,
             session: None,
             cine: Cine::new(CineLimits::default(), 0),
@@ -259,6 +269,7 @@ impl Stream {
             Event::Frame(mut frame) => {
                 frame.volume = frame.volume.saturating_add(self.volume_base);
                 let result = self.upload(&frame, None, at);
+                self.look_at(&frame, None);
                 if matches!(result, Ok(Step::Progress)) {
                     self.cine.frame(frame);
                 }
@@ -267,6 +278,7 @@ impl Stream {
             Event::Lines { mut frame, first } => {
                 frame.volume = frame.volume.saturating_add(self.volume_base);
                 let result = self.upload(&frame, Some(first), at);
+                self.look_at(&frame, Some(first));
                 if let (Ok(Step::Progress), Some(session)) = (&result, &self.session) {
                     let (total, lines) =
                         (session.renderer.frame_bytes(), session.renderer.scene().frame_size()[1] as usize);
@@ -327,6 +339,22 @@ impl Stream {
         }
     }
 
+    /// Looks for the levels of the first whole volume, and draws by them from then on.
+    fn look_at(&mut self, frame: &Frame, first: Option<usize>) {
+        let Some(settings) = self.first_volume.as_mut().and_then(|search| search.frame(frame, first)) else { return };
+        let settings = Settings { picture: self.settings.picture.clone(), ..settings };
+        self.found = Some(settings.clone());
+        // A user may have changed settings meanwhile. The caller knows, and lays its own over these.
+        if let Err(fault) = self.change(settings) {
+            tracing::debug!("windows of the first volume: {fault}");
+        }
+    }
+
+    /// The settings that were found from the source since the last call, for the caller to build on. They are drawn already.
+    pub fn take_found(&mut self) -> Option<Settings> {
+        self.found.take()
+    }
+
     /// Creates the session of a geometry. If the geometry is the previous one, the cine loop is kept and the volume on display is
     /// sent again.
     fn begin_geometry(&mut self, header: Header) -> Result<(), StreamError> {
@@ -335,6 +363,10 @@ impl Stream {
         let shown = session.as_ref().and_then(|session| session.replayed_volume().or(session.current_volume()));
         let to_restore = shown.or_else(|| self.cine.volumes().back().map(|kept| kept.volume)).filter(|_| is_same);
         self.header = Some(header.clone());
+        if let Some(settings) = self.first_volume.as_mut().and_then(|search| search.begin(&header)) {
+            self.settings = Settings { picture: self.settings.picture.clone(), ..settings };
+            self.found = Some(self.settings.clone());
+        }
         // Freed before the new one is created: both may not fit into device memory.
         if let Some(Session { pool, .. }) = session {
             self.previous_pool = Some(pool);

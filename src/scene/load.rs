@@ -4,6 +4,7 @@ use super::{Settings, TransferPoint};
 use crate::files;
 use crate::text::printable;
 use serde::Deserialize;
+use std::collections::BTreeSet;
 use std::path::Path;
 use toml::{Table, Value};
 
@@ -18,7 +19,9 @@ pub const PRESETS: &[(&str, &str)] = &[
     ("face-classic", include_str!("presets/face-classic.toml")),
     ("fetal", include_str!("presets/fetal.toml")),
     ("glass", include_str!("presets/glass.toml")),
+    ("skeleton", include_str!("presets/skeleton.toml")),
     ("thesis", include_str!("presets/thesis.toml")),
+    ("vessel", include_str!("presets/vessel.toml")),
 ];
 
 /// Keys of one table that give the same size in two units.
@@ -43,18 +46,57 @@ pub enum LoadError {
 
 /// Layers of settings as TOML tables, merged key by key.
 #[derive(Clone, Default)]
-pub struct Layers(Table);
+pub struct Layers {
+    merged: Table,
+    /// The presets among them.
+    presets: Vec<String>,
+    /// The paths of the values that other layers than presets give.
+    given: BTreeSet<String>,
+}
 
 impl Layers {
     /// One layer that holds all of `settings`. Empty if they cannot be written as TOML.
     pub fn of(settings: &Settings) -> Option<Layers> {
-        Table::try_from(settings).ok().map(Layers)
+        Table::try_from(settings).ok().map(|merged| Layers { merged, ..Layers::default() })
+    }
+
+    /// These layers with those of `over` on top. What `over` gives without a preset counts as given.
+    pub(super) fn with(mut self, over: &Layers) -> Layers {
+        merge(&mut self.merged, over.merged.clone(), &mut Vec::new());
+        // A `none` of these layers left nothing to merge.
+        for path in over.given.iter().filter(|path| !holds(&over.merged, path)) {
+            remove(&mut self.merged, path);
+        }
+        Layers { presets: over.presets.clone(), given: over.given.clone(), ..self }
+    }
+
+    /// The presets among the layers, in their order.
+    pub fn presets(&self) -> &[String] {
+        &self.presets
+    }
+
+    /// True if a layer other than a preset gives this value, a value of this table, or the whole table that it is in.
+    pub fn gives(&self, path: &str) -> bool {
+        self.given.iter().any(|given| {
+            let (longer, shorter) =
+                if given.len() > path.len() { (given.as_str(), path) } else { (path, given.as_str()) };
+            longer.strip_prefix(shorter).is_some_and(|rest| rest.is_empty() || rest.starts_with('.'))
+        })
+    }
+
+    /// True if any layer, presets included, gives this value or table.
+    pub fn has(&self, path: &str) -> bool {
+        self.gives(path) || holds(&self.merged, path)
     }
 
     pub fn preset(&mut self, name: &str) -> Result<(), LoadError> {
         let (_, text) =
             PRESETS.iter().find(|p| p.0 == name).ok_or_else(|| LoadError::UnknownPreset { name: name.to_string() })?;
-        self.add(&format!("preset {name}"), text, None)
+        let given = self.given.clone();
+        self.add(&format!("preset {name}"), text, None)?;
+        self.given = given;
+        self.presets.push(name.to_string());
+        Ok(())
     }
 
     /// The presets of the built-in phantom: the face as a lit surface, and with `is_plain`, where nobody chose a look, light in the volume.
@@ -135,16 +177,54 @@ impl Layers {
                 volume.insert("transfer".into(), points);
             }
         }
-        merge(&mut self.0, table, &mut Vec::new());
+        add_paths(&table, "", &mut self.given);
+        merge(&mut self.merged, table, &mut Vec::new());
         self.settings().map(drop).map_err(|e| LoadError::Layer { layer: layer.into(), fault: one_line(&e, "") })
     }
 
     fn settings(&self) -> Result<Settings, toml::de::Error> {
-        Settings::deserialize(self.0.clone())
+        Settings::deserialize(self.merged.clone())
     }
 
     pub fn finish(self) -> Result<Settings, LoadError> {
         self.settings().map_err(|e| LoadError::Layer { layer: "scene".into(), fault: one_line(&e, "") })
+    }
+}
+
+/// The settings of a preset alone.
+pub(super) fn preset_settings(name: &str) -> Option<Settings> {
+    let mut layers = Layers::default();
+    layers.preset(name).ok()?;
+    layers.finish().ok()
+}
+
+/// Adds the paths of all values of a table.
+fn add_paths(table: &Table, before: &str, paths: &mut BTreeSet<String>) {
+    for (key, value) in table {
+        let path = if before.is_empty() { key.clone() } else { format!("{before}.{key}") };
+        match value {
+            Value::Table(inner) if !inner.is_empty() => add_paths(inner, &path, paths),
+            _ => drop(paths.insert(path)),
+        }
+    }
+}
+
+/// True if a table has a value at `path`.
+fn holds(table: &Table, path: &str) -> bool {
+    match path.split_once('.') {
+        None => table.contains_key(path),
+        Some((key, rest)) => table.get(key).and_then(Value::as_table).is_some_and(|inner| holds(inner, rest)),
+    }
+}
+
+fn remove(table: &mut Table, path: &str) {
+    match path.split_once('.') {
+        None => drop(table.remove(path)),
+        Some((key, rest)) => {
+            if let Some(Value::Table(inner)) = table.get_mut(key) {
+                remove(inner, rest);
+            }
+        }
     }
 }
 

@@ -5,6 +5,8 @@ mod bricks;
 pub mod camera;
 mod check;
 pub mod cube;
+pub mod default_look;
+mod echo_levels;
 mod light_lattice;
 pub mod load;
 pub mod planes;
@@ -18,6 +20,7 @@ pub mod visible_bounds;
 
 pub use bricks::{Bricks, Reach, Side, TILE};
 pub use camera::Rays;
+pub use echo_levels::{EchoHistogram, EchoLevels};
 pub use light_lattice::{LightLattice, Propagation};
 pub use region::insonified_box;
 pub use settings::*;
@@ -170,6 +173,8 @@ pub struct Scene {
     pub distance: Distance,
     /// What became of sizes in mm, for `--explain`.
     pub resolved_sizes: Vec<ResolvedSize>,
+    /// How settings that nobody chose were found, for `--explain`; one line each.
+    pub found: Vec<String>,
     /// The texels of the volume that stage 2 may read. Stage 1 computes only these.
     pub visible_bounds: visible_bounds::VisibleBounds,
     /// What a renderer stores beyond what this scene shows, from an earlier scene: [`Scene::keeping`].
@@ -275,6 +280,7 @@ impl Scene {
             slice_filters,
             distance,
             resolved_sizes: resolver.resolved,
+            found: Vec::new(),
             visible_bounds: VisibleBounds::default(),
             kept_bounds: VisibleBounds::default(),
         };

@@ -53,6 +53,19 @@ impl Controls {
         *self = again;
     }
 
+    /// Takes another start. The settings follow it unless the user has changed any of them.
+    pub(super) fn adopt(&mut self, start: Settings) {
+        let picture = self.settings.picture.clone();
+        let is_untouched = Settings { picture: self.start.picture.clone(), ..self.settings.clone() } == self.start;
+        self.start = Settings { picture: self.start.picture.clone(), ..start };
+        if is_untouched {
+            self.settings = Settings { picture, ..self.start.clone() };
+            if !self.settings.mode.is_flat() {
+                self.rendered = self.settings.mode;
+            }
+        }
+    }
+
     /// Sets width and height of the picture, pixels. The minimum is 64, so that a sheet of tiles has a pixel for each tile; a smaller
     /// window shows the picture scaled down.
     pub(super) fn resize(&mut self, size: [u32; 2]) {

@@ -5,6 +5,7 @@ mod bricks;
 #[path = "../common/mod.rs"]
 mod common;
 mod compositing_orders;
+mod default_look;
 mod error_report;
 mod exact_ray;
 mod freehand;

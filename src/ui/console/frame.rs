@@ -87,6 +87,13 @@ impl Console {
         }
     }
 
+    /// Takes over settings that the stream found from its source, as far as the user has not changed any.
+    fn adopt_found(&mut self) {
+        if let Some(settings) = self.stream.take_found() {
+            self.controls.adopt(settings);
+        }
+    }
+
     /// Runs the stream until a picture is finished, it has nothing to do, or its time slice ends.
     fn run_stream(&mut self, now: Instant) -> Result<(), ConsoleError> {
         let begun = Instant::now();
@@ -99,7 +106,7 @@ impl Console {
                     break;
                 }
                 Ok(Step::Fault(fault)) => self.notify(&fault, true),
-                Ok(Step::Progress) => {}
+                Ok(Step::Progress) => self.adopt_found(),
                 Ok(Step::End(why)) => self.source_ended(why, now),
                 Err(StreamError::Gpu(lost)) if lost.is_device_lost() => return Err(ConsoleError::DeviceLost(lost)),
                 // A device that fails every time is treated as lost.

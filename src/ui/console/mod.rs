@@ -19,6 +19,7 @@ use crate::gpu::{Context, GpuError, TimeStamps, Wake};
 use crate::kiosk::chord::Chord;
 use crate::live::cine::CineLimits;
 use crate::live::{self, Feed, Stream, StreamError, Update};
+use crate::scene::load::Layers;
 use crate::scene::{Layout, Settings, variants};
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -40,6 +41,8 @@ const CINE_INTERVAL: Duration = Duration::from_millis(200);
 /// What a console is created with.
 pub struct ConsoleOptions {
     pub settings: Settings,
+    /// What was chosen of them: the rest follows from the source. None: the settings are complete.
+    pub chosen: Option<Layers>,
     pub update: Update,
     /// Number of volume images, 2 or 3.
     pub images: u32,
@@ -81,6 +84,7 @@ impl Default for ConsoleOptions {
     fn default() -> ConsoleOptions {
         ConsoleOptions {
             settings: Settings::default(),
+            chosen: None,
             update: Update::Whole,
             images: 3,
             queues: None,
@@ -227,6 +231,7 @@ impl Console {
             cine: options.cine,
             wake: Some(options.wake.clone()),
             shaders: options.shaders.clone(),
+            chosen: options.chosen,
         };
         let watch = options.shaders.as_ref().map(|folder| Watch::new(folder, options.wake.clone())).transpose();
         let (shader_watch, watch_fault) = match watch {

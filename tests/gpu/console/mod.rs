@@ -39,6 +39,7 @@ pub fn plain() -> Settings {
 pub fn options() -> ConsoleOptions {
     ConsoleOptions {
         settings: plain(),
+        chosen: None,
         update: Update::Whole,
         images: 3,
         queues: None,

@@ -76,7 +76,7 @@ fn after_a_rest_no_mode_layout_or_preset_compiles_anything() {
         }
         assert_eq!(compiled(&device), count, "{name} is compiled when it is chosen");
     }
-    assert_eq!(PRESETS.len(), 7);
+    assert_eq!(PRESETS.len(), 9);
     // Nothing is left to do around the same settings.
     assert_eq!(desk.warm_up(&device), 0);
 }

@@ -1,0 +1,149 @@
+//! Settings of a stream that nobody chose, from its geometry and its first whole volume. They are then kept: windows that follow each volume would make
+//! the picture pump.
+
+use crate::scene::default_look::block_edge;
+use crate::scene::load::Layers;
+use crate::scene::{EchoHistogram, Input, Settings};
+use crate::source::Frame;
+use crate::source::recorder::Header;
+
+/// The search for the levels of a stream's echoes.
+pub(super) struct FirstVolume {
+    layers: Layers,
+    header: Option<Header>,
+    /// None when the levels are known, or not needed.
+    collected: Option<Collected>,
+}
+
+/// The volume that is being collected.
+struct Collected {
+    histogram: EchoHistogram,
+    volume: Option<u32>,
+    /// By slice: it was taken.
+    seen: Vec<bool>,
+    /// A frame that arrives in pieces.
+    partial: Vec<u8>,
+}
+
+impl FirstVolume {
+    pub fn new(layers: Layers) -> FirstVolume {
+        FirstVolume { layers, header: None, collected: None }
+    }
+
+    /// The settings for a geometry, before any frame. None if it is the previous one, whose settings stay.
+    pub fn begin(&mut self, header: &Header) -> Option<Settings> {
+        if self.header.as_ref() == Some(header) {
+            return None;
+        }
+        self.collected = self.layers.needs_levels().then(|| Collected::new(header));
+        self.header = Some(header.clone());
+        Some(self.layers.completed(&header.forward, None).ok()?.settings)
+    }
+
+    /// Takes a frame, or lines of it from `first` on. The settings, if it makes the first volume whole.
+    pub fn frame(&mut self, frame: &Frame, first: Option<usize>) -> Option<Settings> {
+        let (header, collected) = (self.header.as_ref()?, self.collected.as_mut()?);
+        let [width, lines] = header.forward.frame_size();
+        let line = width * header.stored.bytes();
+        let is_whole = match first {
+            None => collected.take(header, frame, &frame.bytes),
+            Some(first) => {
+                collected.partial.resize(line * lines, 0);
+                let place = collected.partial.get_mut(first * line..)?.get_mut(..frame.bytes.len())?;
+                place.copy_from_slice(&frame.bytes);
+                first * line + frame.bytes.len() == line * lines && {
+                    let complete = std::mem::take(&mut collected.partial);
+                    collected.take(header, frame, &complete)
+                }
+            }
+        };
+        if !is_whole {
+            return None;
+        }
+        let levels = collected.histogram.levels();
+        // A volume without echoes, as of a probe in air, tells nothing: the next one is tried.
+        if levels.is_none() {
+            self.collected = Some(Collected::new(header));
+            return None;
+        }
+        self.collected = None;
+        Some(self.layers.completed(&header.forward, levels.as_ref()).ok()?.settings)
+    }
+}
+
+impl Collected {
+    fn new(header: &Header) -> Collected {
+        let input = Input { stored: header.stored, range: header.range };
+        Collected {
+            histogram: EchoHistogram::new(&header.forward, input, block_edge(&header.forward)),
+            volume: None,
+            seen: vec![false; header.forward.slices()],
+            partial: Vec::new(),
+        }
+    }
+
+    /// Takes a complete frame. True if all of its volume were taken.
+    fn take(&mut self, header: &Header, frame: &Frame, bytes: &[u8]) -> bool {
+        if self.volume.replace(frame.volume) != Some(frame.volume) {
+            // The volume before was not whole.
+            *self = Collected { volume: Some(frame.volume), ..Collected::new(header) };
+        }
+        match self.seen.get_mut(frame.slice) {
+            Some(seen) if !*seen => *seen = true,
+            _ => return false,
+        }
+        self.histogram.take(bytes);
+        self.seen.iter().all(|seen| *seen)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::probe::{Geometry, Grid};
+    use crate::scene::Mode;
+    use crate::source::StoredType;
+
+    fn header() -> Header {
+        let grid = Geometry::Cartesian(Grid { origin: [0.0; 3], spacing: [1.0; 3], size: [32, 32, 2] });
+        Header { forward: grid.clone(), backward: grid, stored: StoredType::U8, range: [0.0, 255.0] }
+    }
+
+    fn frame(volume: u32, slice: usize, tissue: u8) -> Frame {
+        let bytes = (0..32 * 32).map(|n| if n % 32 < 12 { 20 } else { tissue }).collect();
+        Frame { volume, number: slice as u32, slice, backward: false, time: None, bytes }
+    }
+
+    #[test]
+    fn the_first_whole_volume_decides_and_no_later_one() {
+        let mut first = FirstVolume::new(Layers::default());
+        let begun = first.begin(&header()).expect("by geometry");
+        assert_eq!(begun.mode, Mode::Volume);
+        assert_eq!(first.frame(&frame(0, 1, 240), None), None);
+        // Volume 0 lacks a slice.
+        assert_eq!(first.frame(&frame(1, 0, 120), None), None);
+        assert_eq!(first.frame(&frame(1, 0, 120), None), None, "the same slice again");
+        let found = first.frame(&frame(1, 1, 120), None).expect("whole");
+        assert_ne!(found.volume.transfer, begun.volume.transfer);
+        let points = crate::scene::transfer::resolved(&found.volume.transfer);
+        assert!((points[points.len() - 1].at - 120.0 / 255.0).abs() < 0.01, "{points:?}");
+        assert_eq!(first.frame(&frame(2, 0, 250), None), None);
+        assert_eq!(first.frame(&frame(2, 1, 250), None), None, "the picture does not pump");
+        assert_eq!(first.begin(&header()), None);
+    }
+
+    #[test]
+    fn frames_in_pieces_count_when_they_are_complete() {
+        let mut first = FirstVolume::new(Layers::default());
+        first.begin(&header());
+        let mut found = None;
+        for slice in 0..2 {
+            let whole = frame(0, slice, 120);
+            for (line, bytes) in [(0, &whole.bytes[..320]), (10, &whole.bytes[320..])] {
+                assert_eq!(found, None);
+                found = first.frame(&Frame { bytes: bytes.to_vec(), ..whole.clone() }, Some(line));
+            }
+        }
+        assert!(found.is_some());
+    }
+}

@@ -1,0 +1,301 @@
+//! Settings that nobody chose, from the recording itself: so that the first picture of a recording without a preset shows something.
+//!
+//! - Without a preset, windows, threshold and ramp follow from the levels of the echoes ([`EchoLevels`]), and filters from the size of the volume:
+//!   volume rendering under light, with a ramp between the threshold and the brighter class.
+//! - A single frame is shown as a plane.
+//! - Planes and the solid block are cut from a lightly filtered volume over the full sector, whatever a preset of a rendering crops and smooths.
+//! - The solid block is turned and cut. The minimum projection takes a slab: over the whole depth every ray meets fluid or shadow somewhere.
+//!
+//! What a user sets wins, key by key; a window and what is drawn through it belong together, and one of them that is set keeps both.
+
+use super::echo_levels::EchoLevels;
+use super::load::{Layers, LoadError, preset_settings};
+use super::region::insonified_box;
+use super::{Layout, Mode, Settings, TransferPoint, transfer};
+use crate::probe::{Geometry, Motion};
+use std::path::Path;
+use toml::{Table, Value};
+
+/// Presets that smooth and crop the volume for a rendering of the built-in phantom.
+const RENDERINGS: [&str; 5] = ["face", "face-classic", "glass", "skeleton", "vessel"];
+/// Share of the volume's longest edge that the smoothing has as its standard deviation: 1.1 mm of 120.
+const SMOOTHING: f64 = 0.009;
+/// Limits of it, mm: below is speckle, above lids and lips go.
+const SMOOTHING_RANGE: [f64; 2] = [0.3, 1.2];
+/// The smoothing of planes and blocks as a share of it: speckle becomes finer, edges stay.
+const LIGHT: f64 = 0.3;
+/// Thickness of the slab of the minimum projection, mm.
+const SLAB: f64 = 12.0;
+/// Edge of a block of the histogram, in standard deviations of the smoothing: a box of 2.5 in two dimensions averages about as much speckle
+/// as the Gaussian in three leaves of a mode's width.
+const BLOCK: f64 = 2.5;
+/// Extinction of the ramp times the smoothing's standard deviation: 1.4/mm at 1.1 mm. A shell of tissue is as opaque in a smaller volume.
+const OPTICAL_DEPTH: f64 = 1.54;
+
+/// Levels of a face in fluid.
+const UNKNOWN: EchoLevels =
+    EchoLevels { dark: 0.05, threshold: 0.4, bright: 0.68, mean: 0.3, low: 0.02, high: 0.95, start: None };
+
+/// Settings and how those that nobody chose were found, one line each.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Completed {
+    pub settings: Settings,
+    pub said: Vec<String>,
+}
+
+/// Standard deviation of the default smoothing of a volume, mm.
+fn smoothing(geometry: &Geometry) -> f64 {
+    let (low, high) = insonified_box(geometry);
+    let [least, most] = SMOOTHING_RANGE;
+    let wanted = SMOOTHING * (high - low).max_element();
+    if wanted.is_finite() { wanted.clamp(least, most) } else { most }
+}
+
+/// Edge of the blocks whose means tell the levels of a volume, mm.
+pub fn block_edge(geometry: &Geometry) -> f64 {
+    BLOCK * smoothing(geometry)
+}
+
+impl Layers {
+    /// True if the levels of the echoes decide anything: no preset describes the recording.
+    pub fn needs_levels(&self) -> bool {
+        self.presets().is_empty()
+    }
+
+    /// The settings for a geometry, with what nobody chose. Without `levels` windows are those of a face in fluid.
+    ///
+    /// # Errors
+    /// As for [`Layers::finish`].
+    pub fn completed(&self, geometry: &Geometry, levels: Option<&EchoLevels>) -> Result<Completed, LoadError> {
+        let chosen = self.clone().finish()?;
+        let mut found = Found { layers: self, under: Table::new(), over: Table::new(), said: Vec::new() };
+        let mode = found.mode(geometry, &chosen);
+        let is_plain = self.presets().is_empty();
+        let is_section = mode.is_flat() || mode == Mode::Cube;
+        if is_section && (is_plain || self.presets().iter().all(|preset| RENDERINGS.contains(&preset.as_str()))) {
+            found.section(geometry);
+        }
+        if mode == Mode::Cube {
+            found.cube(geometry);
+        }
+        if mode == Mode::MinIp {
+            found.slab(geometry, &chosen);
+        }
+        if is_plain && !is_section {
+            found.filters(geometry, mode);
+        }
+        if is_plain {
+            found.windows(geometry, levels, mode);
+        }
+        let Found { under, over, said, .. } = found;
+        let mut layers = Layers::default();
+        layers.table("defaults of the recording", under, Path::new(""))?;
+        let mut layers = layers.with(self);
+        layers.table("defaults of the mode", over, Path::new(""))?;
+        Ok(Completed { settings: layers.finish()?, said })
+    }
+}
+
+/// The defaults that were found: below the layers, and above those of presets.
+struct Found<'a> {
+    layers: &'a Layers,
+    under: Table,
+    over: Table,
+    said: Vec<String>,
+}
+
+impl Found<'_> {
+    fn mode(&mut self, geometry: &Geometry, chosen: &Settings) -> Mode {
+        let is_frame = geometry.slices() == 1
+            || matches!(geometry, Geometry::Sweep(probe) if matches!(probe.motion, Motion::Still { .. }));
+        if self.layers.has("mode") || chosen.layout != Layout::Single || !self.layers.presets().is_empty() {
+            return chosen.mode;
+        }
+        let (mode, name, why) = match is_frame {
+            true => (Mode::Plane, "plane", "a single frame"),
+            false => (Mode::Volume, "volume", "no preset"),
+        };
+        put(&mut self.under, "mode", name.into());
+        self.said.push(format!("mode: {name}: {why}"));
+        mode
+    }
+
+    /// A lightly filtered volume over the full sector.
+    fn section(&mut self, geometry: &Geometry) {
+        let deviation = LIGHT * smoothing(geometry);
+        let is_preset = !self.layers.presets().is_empty();
+        if !self.layers.gives("region") && is_preset {
+            for side in ["lateral", "depth", "elevation"] {
+                put(&mut self.over, &format!("region.{side}"), "none".into());
+            }
+            put(&mut self.over, "region.fade", 0.0.into());
+            self.said.push("region: all of the sector, for sections".into());
+        }
+        if !self.layers.gives("slices") {
+            for filter in ["sigma", "enhanced_sigma", "perona_malik", "estimator"] {
+                put(&mut self.over, &format!("slices.{filter}"), "none".into());
+            }
+            put(&mut self.over, "slices.median", false.into());
+            let smooth = Table::from_iter(
+                ["lateral", "depth", "elevation_mm"].map(|axis| (axis.to_string(), Value::from(rounded(deviation)))),
+            );
+            put(&mut self.over, "slices.smooth", smooth.into());
+            self.said.push(format!("slices.smooth: {} mm, light, for sections", rounded(deviation)));
+        }
+    }
+
+    fn cube(&mut self, geometry: &Geometry) {
+        if !["azimuth", "elevation"].iter().any(|angle| self.layers.has(&format!("camera.{angle}"))) {
+            put(&mut self.over, "camera.azimuth", (-30.0).into());
+            put(&mut self.over, "camera.elevation", 30.0.into());
+            // What a preset aims at is a face, seen from the front.
+            if !self.layers.gives("camera") {
+                put(&mut self.over, "camera.target", "none".into());
+                put(&mut self.over, "camera.zoom", 1.0.into());
+            }
+            self.said.push("camera: the block is turned by 30 degrees".into());
+        }
+        if !self.layers.has("cube.inset") && !self.layers.gives("region") {
+            let (low, high) = insonified_box(geometry);
+            let inset = rounded(0.4 * (high - low).z);
+            put(&mut self.over, "cube.inset.bottom", inset.into());
+            self.said.push(format!("cube.inset.bottom: {inset} mm: the block is cut open"));
+        }
+    }
+
+    fn slab(&mut self, geometry: &Geometry, chosen: &Settings) {
+        if self.layers.gives("region") || geometry.slices() == 1 {
+            return;
+        }
+        let offset = super::region::depth_offset(geometry);
+        let (low, high) = insonified_box(geometry);
+        let [near, far] = chosen.region.depth.unwrap_or([low.y - offset, high.y - offset]);
+        let (middle, half) = ((near + far) / 2.0, (far - near).min(SLAB) / 2.0);
+        let depth = [middle - half, middle + half].map(rounded);
+        put(&mut self.over, "region.depth", Value::from(depth.to_vec()));
+        if let Some([lateral, _, elevation]) = chosen.camera.target.filter(|_| !self.layers.gives("camera")) {
+            put(&mut self.over, "camera.target", Value::from(vec![lateral, rounded(middle), elevation]));
+        }
+        self.said.push(format!("region.depth: {} to {} mm: a minimum projection takes a slab", depth[0], depth[1]));
+    }
+
+    /// The filters of a rendering, by the size of the volume.
+    fn filters(&mut self, geometry: &Geometry, mode: Mode) {
+        let deviation = smoothing(geometry);
+        if !self.layers.gives("slices") {
+            for axis in ["lateral", "depth", "elevation_mm"] {
+                put(&mut self.under, &format!("slices.smooth.{axis}"), rounded(deviation).into());
+            }
+            self.said.push(format!("slices.smooth: {} mm, by the size of the volume", rounded(deviation)));
+        }
+        if matches!(mode, Mode::Surface | Mode::Mixed) && !self.layers.gives("distance") {
+            put(&mut self.under, "distance.median_mm", rounded(2.5 * deviation).into());
+            put(&mut self.under, "distance.bilateral.mm", rounded(1.2 * deviation).into());
+            put(&mut self.under, "distance.bilateral.distance", rounded(2.5 * deviation).into());
+        }
+        if !self.layers.gives("ray.elevation") && !self.layers.gives("ray.sampling") {
+            put(&mut self.under, "ray.elevation", "bspline".into());
+        }
+    }
+
+    /// Windows and ramp. Without `levels`, before the first volume of a stream, they are those of a face in fluid: what changes later are numbers
+    /// alone, and no pipeline is compiled again.
+    fn windows(&mut self, geometry: &Geometry, levels: Option<&EchoLevels>, mode: Mode) {
+        let EchoLevels { dark, threshold, bright, mean, low, high, start } = *levels.unwrap_or(&UNKNOWN);
+        let source = if levels.is_some() { "from the echoes" } else { "as no echoes are known" };
+        let layers = self.layers;
+        let window = |low: f64, high: f64| {
+            let low = low.clamp(0.0, 0.98);
+            Value::from([low, high.clamp(low + 0.02, 1.0)].map(rounded).to_vec())
+        };
+        self.said.extend(levels.map(|_| format!(
+            "echoes: darker class {dark:.3}, threshold {threshold:.3}, brighter class {bright:.3}; samples {low:.3} to {high:.3}"
+        )));
+        let (under, said) = (&mut self.under, &mut self.said);
+        let set = |key: &str, value: Value, under: &mut Table, said: &mut Vec<String>| {
+            said.push(format!("{key}: {value}, {source}"));
+            put(under, key, value);
+        };
+        if matches!(mode, Mode::Volume | Mode::Mixed | Mode::Surface) {
+            let is_window = layers.gives("volume.window") || layers.gives("volume.threshold");
+            if layers.gives("volume.transfer") || layers.gives("volume.extinction") {
+                if !is_window {
+                    // Transfer functions with a name are transparent up to a fifth of the window.
+                    set("volume.window", window(threshold - (bright - threshold), high), under, said);
+                }
+            } else if !is_window {
+                let (from, to) = (rounded(threshold), rounded(bright.max(threshold + 0.02).min(1.0)));
+                said.push(format!("volume.transfer: opaque from {from} to {to}, {source}"));
+                put(under, "volume.transfer", ramp(from, to));
+                let extinction = rounded(OPTICAL_DEPTH / smoothing(geometry));
+                put(under, "volume.extinction", extinction.into());
+            }
+            if !layers.gives("surface.window") && !layers.gives("surface.threshold") {
+                set("surface.window", window(threshold, bright + 1.5 * (bright - threshold)), under, said);
+                set("surface.threshold", 0.12.into(), under, said);
+            }
+        }
+        // Of a preset's light only what nobody set.
+        if mode == Mode::Volume && !layers.gives("light") && !layers.gives("volume") && !layers.gives("clip") {
+            if let Some(Value::Table(light)) = light_of_face() {
+                said.push("light: as in preset face".into());
+                under.insert("light".into(), Value::Table(light));
+            }
+        }
+        let is_rendering = matches!(mode, Mode::Volume | Mode::Mixed | Mode::Surface | Mode::Mip);
+        if let Some(start) = start.filter(|_| is_rendering && !layers.gives("region") && !layers.gives("clip")) {
+            let (low, high) = insonified_box(geometry);
+            let (start, end) = (rounded(start), rounded(high.y - super::region::depth_offset(geometry)));
+            if start < end && start > low.y - super::region::depth_offset(geometry) {
+                said.push(format!("region.depth: from {start} mm: in front of it is a layer next to the probe"));
+                put(under, "region.depth", Value::from(vec![start, end]));
+            }
+        }
+        if !layers.gives("projection.window") {
+            let shown = match mode {
+                Mode::Mip => window(threshold, high),
+                Mode::MinIp => window(low, bright),
+                Mode::Mean => window(0.2 * mean, 2.2 * mean),
+                _ => window(dark, high),
+            };
+            set("projection.window", shown, under, said);
+        }
+        for key in ["planes.window", "cube.window"] {
+            if !layers.gives(key) {
+                set(key, window(low, high), under, said);
+            }
+        }
+    }
+}
+
+/// The light of preset `face`.
+fn light_of_face() -> Option<Value> {
+    let settings = preset_settings("face")?;
+    Value::try_from(settings.light).ok()
+}
+
+/// The points of preset `face`, a soft shell from dark to light skin, over another interval of echoes.
+fn ramp(from: f64, to: f64) -> Value {
+    let points = preset_settings("face").map(|s| transfer::resolved(&s.volume.transfer)).unwrap_or_default();
+    let (first, last) = (points.first().map_or(0.0, |p| p.at), points.last().map_or(1.0, |p| p.at));
+    let moved = points.iter().map(|p| TransferPoint { at: from + (to - from) * (p.at - first) / (last - first), ..*p });
+    Value::try_from(moved.collect::<Vec<_>>()).unwrap_or(Value::Array(Vec::new()))
+}
+
+/// Sets `key.path` in a table.
+fn put(table: &mut Table, path: &str, value: Value) {
+    match path.split_once('.') {
+        None => drop(table.insert(path.into(), value)),
+        Some((key, rest)) => {
+            let inner = table.entry(key).or_insert_with(|| Value::Table(Table::new()));
+            if let Value::Table(inner) = inner {
+                put(inner, rest, value);
+            }
+        }
+    }
+}
+
+/// To four digits after the point: settings that are read by people.
+fn rounded(value: f64) -> f64 {
+    (value * 1e4).round() / 1e4
+}

@@ -1,0 +1,233 @@
+//! What nobody chose: the levels of a recording's echoes, and the settings that follow from them, its size and the mode.
+
+use echolume::probe::{Advance, Array, Axis, Geometry, Grid, Motion, Probe};
+use echolume::scene::load::{Layers, PRESETS};
+use echolume::scene::{ColourMap, EchoHistogram, EchoLevels, Input, Mode, Settings, Slices, transfer};
+use echolume::source::StoredType;
+
+fn grid(size: [usize; 3]) -> Geometry {
+    Geometry::Cartesian(Grid { origin: [0.0; 3], spacing: [0.5; 3], size })
+}
+
+const BYTES: Input = Input { stored: StoredType::U8, range: [0.0, 255.0] };
+
+/// Speckle of a mean: uniform between 0.4 and 1.6 of it, from a counter.
+fn speckle(mean: f64, n: usize) -> u8 {
+    let u = (n as f64 * 0.618_033_988_75).fract();
+    (mean * (0.4 + 1.2 * u)).round() as u8
+}
+
+#[test]
+fn fluid_and_tissue_are_told_apart_through_speckle() {
+    // Samples of both overlap: those of fluid reach 64, those of tissue begin at 40.
+    let mut histogram = EchoHistogram::new(&grid([64, 64, 1]), BYTES, 4.0);
+    let frame: Vec<u8> = (0..64 * 64).map(|n| speckle(if n % 64 < 32 { 40.0 } else { 100.0 }, n)).collect();
+    histogram.take(&frame);
+    let levels = histogram.levels().expect("levels");
+    assert!((levels.dark * 255.0 - 40.0).abs() < 4.0, "{levels:?}");
+    assert!((levels.bright * 255.0 - 100.0).abs() < 4.0, "{levels:?}");
+    assert!((levels.threshold * 255.0 - 70.0).abs() < 8.0, "{levels:?}");
+    assert!((levels.mean * 255.0 - 70.0).abs() < 2.0 && levels.low < 0.1 && levels.high > 0.6, "{levels:?}");
+    // In the order of the frames, and again.
+    assert_eq!(histogram.levels(), Some(levels));
+}
+
+#[test]
+fn what_is_outside_of_the_sector_does_not_count() {
+    let mut with = EchoHistogram::new(&grid([64, 64, 1]), BYTES, 2.0);
+    let mut without = with.clone();
+    let inside = |n: usize| speckle(if n % 64 < 16 { 40.0 } else { 100.0 }, n);
+    with.take(&(0..64 * 64).map(|n| if n % 64 < 48 { inside(n) } else { 0 }).collect::<Vec<u8>>());
+    without.take(&(0..64 * 64).map(|n| if n % 64 < 48 { inside(n) } else { inside(n - 16) }).collect::<Vec<u8>>());
+    let (with, without) = (with.levels().expect("levels"), without.levels().expect("levels"));
+    assert!((with.dark - without.dark).abs() < 0.02 && (with.bright - without.bright).abs() < 0.02, "{with:?}");
+}
+
+/// A wall next to the probe, fluid, and a body behind it; without the wall there is nothing to leave out.
+#[test]
+fn what_is_of_interest_begins_behind_the_layer_next_to_the_probe() {
+    let start = |wall: usize, body: usize| {
+        let mut histogram = EchoHistogram::new(&grid([64, 64, 1]), BYTES, 1.0);
+        let is_bright = |row: usize| row < wall || row >= body;
+        let frame: Vec<u8> = (0..64 * 64).map(|n| speckle(if is_bright(n / 64) { 150.0 } else { 20.0 }, n)).collect();
+        histogram.take(&frame);
+        histogram.levels().expect("levels").start
+    };
+    // Rows of 0.5 mm: fluid from 6 to 16 mm, its middle within half a block of 11 mm.
+    let found = start(12, 32).expect("a layer");
+    assert!((found - 11.0).abs() <= 0.75, "{found}");
+    assert_eq!((start(0, 32), start(12, 64)), (None, None));
+}
+
+#[test]
+fn words_and_floats_have_the_levels_of_bytes() {
+    let frame: Vec<f64> = (0..32 * 32).map(|n| if n % 32 < 20 { 0.1 } else { 0.7 }).collect();
+    let levels = |stored: StoredType, range: [f64; 2], bytes: Vec<u8>| {
+        let mut histogram = EchoHistogram::new(&grid([32, 32, 1]), Input { stored, range }, 1.0);
+        histogram.take(&bytes);
+        histogram.levels().expect("levels")
+    };
+    let bytes = levels(StoredType::U8, [0.0, 200.0], frame.iter().map(|v| (v * 200.0) as u8).collect());
+    let words = frame.iter().flat_map(|v| ((v * 6e4) as u16).to_le_bytes()).collect();
+    let words = levels(StoredType::U16, [0.0, 6e4], words);
+    let floats = frame.iter().flat_map(|v| ((v - 3.0) as f32).to_le_bytes()).collect();
+    let floats = levels(StoredType::F32, [-3.0, -2.0], floats);
+    for levels in [bytes, words, floats] {
+        assert!((levels.dark - 0.1).abs() < 2e-3 && (levels.bright - 0.7).abs() < 2e-3, "{levels:?}");
+        // The middle of an empty gap.
+        assert!((levels.threshold - 0.4).abs() < 2e-3, "{levels:?}");
+    }
+}
+
+#[test]
+fn nothing_follows_from_nothing() {
+    let mut histogram = EchoHistogram::new(&grid([64, 64, 1]), BYTES, 2.0);
+    assert_eq!(histogram.levels(), None);
+    histogram.take(&[7; 10]);
+    assert_eq!(histogram.levels(), None, "a frame that is cut short");
+    histogram.take(&[0; 64 * 64]);
+    assert_eq!(histogram.levels(), None, "all outside");
+    histogram.take(&[9; 64 * 64]);
+    assert_eq!(histogram.levels(), None, "all the same");
+}
+
+const LEVELS: EchoLevels =
+    EchoLevels { dark: 0.1, threshold: 0.3, bright: 0.5, mean: 0.25, low: 0.02, high: 0.9, start: None };
+
+fn voxels(slices: usize) -> Geometry {
+    Geometry::Cartesian(Grid { origin: [0.0; 3], spacing: [1.0; 3], size: [100, 80, slices] })
+}
+
+fn fan() -> Geometry {
+    Geometry::Sweep(Probe {
+        array: Array::Curved { radius: 40.0 },
+        lines: Axis::centred(0.01, 64),
+        start_depth: 0.0,
+        sample_pitch: 0.5,
+        samples: 240,
+        motion: Motion::Fan { wobble_radius: 25.0 },
+        slices: Axis::centred(0.02, 32),
+        advance: Advance::None,
+        sound_speed: 1540.0,
+    })
+}
+
+fn layers(presets: &[&str], sets: &[&str]) -> Layers {
+    let mut layers = Layers::default();
+    presets.iter().for_each(|preset| layers.preset(preset).expect("preset"));
+    sets.iter().for_each(|set| layers.set(set).expect("set"));
+    layers
+}
+
+fn completed(geometry: &Geometry, presets: &[&str], sets: &[&str]) -> Settings {
+    layers(presets, sets).completed(geometry, Some(&LEVELS)).expect("settings").settings
+}
+
+fn span(settings: &Settings) -> [f64; 2] {
+    let points = transfer::resolved(&settings.volume.transfer);
+    [points[0].at, points[points.len() - 1].at]
+}
+
+#[test]
+fn a_recording_gets_its_ramp_and_windows_from_its_echoes() {
+    let settings = completed(&fan(), &[], &[]);
+    assert_eq!(settings.mode, Mode::Volume);
+    assert_eq!(span(&settings), [0.3, 0.5]);
+    assert!(settings.light.volume.is_some() && settings.volume.extinction.is_some_and(|e| e > 1.0));
+    assert_eq!((settings.surface.window, settings.planes.window), ([0.3, 0.8], [0.02, 0.9]));
+    assert_eq!(completed(&fan(), &[], &["mode=mip"]).projection.window, [0.3, 0.9]);
+    // Smaller volumes are smoothed less.
+    let smooth = |geometry: &Geometry| completed(geometry, &[], &[]).slices.smooth.expect("smooth").lateral;
+    assert!((smooth(&voxels(40)) - 0.9).abs() < 0.01 && smooth(&fan()) > 1.0);
+}
+
+#[test]
+fn a_rendering_begins_behind_the_layer_next_to_the_probe() {
+    let levels = EchoLevels { start: Some(20.0), ..LEVELS };
+    let depth = |sets: &[&str]| {
+        layers(&[], sets).completed(&fan(), Some(&levels)).expect("settings").settings.region.depth.map(|d| d[0])
+    };
+    assert_eq!((depth(&[]), depth(&["mode=sr"]), depth(&["mode=plane"])), (Some(20.0), Some(20.0), None));
+    assert_eq!(depth(&["region.lateral=[-20,20]"]), None);
+}
+
+#[test]
+fn what_a_user_sets_wins() {
+    let given = completed(&fan(), &[], &["volume.window=[0.2,0.7]", "surface.threshold=0.05", "slices.median=true"]);
+    assert_eq!((given.volume.window, given.surface.window, given.surface.threshold), ([0.2, 0.7], [0.0, 1.0], 0.05));
+    assert_eq!(given.volume.transfer, Settings::default().volume.transfer);
+    assert_eq!(given.slices, Slices { median: true, ..Slices::default() });
+    assert_eq!(given.light.volume, None, "the light belongs to the ramp");
+    // A transfer function with a name gets a window.
+    let bone = completed(&fan(), &[], &["volume.transfer=bone"]);
+    assert_ne!(bone.volume.window, [0.0, 1.0]);
+    assert_eq!(completed(&fan(), &[], &["slices.smooth=none"]).slices.smooth, None);
+    assert_eq!(completed(&fan(), &[], &["light.volume=none"]).light.volume, None);
+    let mip = completed(&fan(), &[], &["mode=mip", "projection.window=[0,1]", "post.colour_map=ice"]);
+    assert_eq!((mip.projection.window, mip.post.colour_map), ([0.0, 1.0], ColourMap::Ice));
+}
+
+#[test]
+fn a_preset_keeps_its_pictures() {
+    for (preset, _) in PRESETS {
+        for mode in ["vr", "sr", "mixed", "mip", "xray"] {
+            let set = format!("mode={mode}");
+            let plain = layers(&[preset], &[&set]).finish().expect("settings");
+            assert_eq!(completed(&fan(), &[preset], &[&set]), plain, "{preset}, {mode}");
+        }
+    }
+    assert!(!layers(&["face"], &[]).needs_levels() && layers(&[], &["mode=vr"]).needs_levels());
+}
+
+#[test]
+fn a_single_frame_is_a_plane_unless_a_mode_is_chosen() {
+    assert_eq!(completed(&voxels(1), &[], &[]).mode, Mode::Plane);
+    assert_eq!(completed(&voxels(1), &[], &["mode=vr"]).mode, Mode::Volume);
+    assert_eq!(completed(&voxels(40), &[], &["layout=pair"]).mode, Mode::Surface);
+}
+
+#[test]
+fn sections_show_the_whole_sector_hardly_filtered() {
+    for preset in ["face", "face-classic", "glass", "skeleton", "vessel"] {
+        for mode in ["mode=orthogonal", "mode=plane", "mode=cube"] {
+            let settings = completed(&fan(), &[preset], &[mode]);
+            assert_eq!((settings.region.depth, settings.region.fade, settings.slices.median), (None, 0.0, false));
+            let smooth = settings.slices.smooth.expect("light");
+            assert!(smooth.lateral < 0.5 && smooth.elevation == 0.0 && smooth.elevation_mm.is_some(), "{smooth:?}");
+            assert!(settings.slices.sigma.is_none());
+        }
+    }
+    let given = completed(&fan(), &["face"], &["mode=plane", "region.depth=[20,60]", "slices.blur=true"]);
+    assert_eq!((given.region.depth, given.region.lateral.is_some()), (Some([20.0, 60.0]), true));
+    assert!(given.slices.smooth.is_some_and(|s| s.lateral == 1.1), "as in the preset: {:?}", given.slices.smooth);
+    // The pipeline of the thesis and a B-mode picture are what they are.
+    for preset in ["thesis", "bmode"] {
+        let set = ["mode=plane"];
+        assert_eq!(completed(&fan(), &[preset], &set), layers(&[preset], &set).finish().expect("settings"));
+    }
+}
+
+#[test]
+fn a_block_is_turned_and_cut_and_a_minimum_projection_takes_a_slab() {
+    let block = completed(&fan(), &["face"], &["mode=cube"]);
+    assert_eq!((block.camera.azimuth, block.camera.elevation, block.camera.target), (-30.0, 30.0, None));
+    assert!(block.cube.inset.bottom > 5.0);
+    let turned = completed(&fan(), &[], &["mode=cube", "camera.azimuth=10", "cube.inset.near=3"]);
+    assert_eq!((turned.camera.azimuth, turned.camera.elevation, turned.cube.inset.bottom), (10.0, 0.0, 0.0));
+    let slab = completed(&fan(), &[], &["mode=minip"]).region.depth.expect("slab");
+    assert!((slab[1] - slab[0] - 12.0).abs() < 1e-3, "{slab:?}");
+    let of_face = completed(&fan(), &["face"], &["mode=minip"]);
+    assert_eq!((of_face.region.depth, of_face.camera.target), (Some([53.0, 65.0]), Some([2.0, 59.0, -1.0])));
+    assert_eq!(completed(&fan(), &[], &["mode=minip", "region.depth=[10,90]"]).region.depth, Some([10.0, 90.0]));
+}
+
+#[test]
+fn every_choice_is_said() {
+    let said = layers(&[], &[]).completed(&fan(), Some(&LEVELS)).expect("settings").said.join("\n");
+    for part in ["mode: volume", "slices.smooth", "threshold 0.300", "opaque from 0.3 to 0.5", "surface.window"] {
+        assert!(said.contains(part), "{part} in {said}");
+    }
+    let blind = layers(&[], &[]).completed(&fan(), None).expect("settings").said.join("\n");
+    assert!(blind.contains("as no echoes are known") && !blind.contains("from the echoes"), "{blind}");
+    assert!(layers(&["face"], &[]).completed(&fan(), None).expect("settings").said.is_empty());
+}
