@@ -33,11 +33,16 @@ pub struct InputArgs {
 impl InputArgs {
     /// Opens the recording and builds the scene of the chosen volume.
     pub fn open(&self) -> Result<(Box<dyn Source>, Scene), Failure> {
-        self.open_with(&[])
+        self.open_scene(&[], false)
     }
 
-    /// Like [`InputArgs::open`], with `chosen` assignments as a layer of settings below the flags and `--set`.
-    pub fn open_with(&self, chosen: &[String]) -> Result<(Box<dyn Source>, Scene), Failure> {
+    /// Like [`InputArgs::open`], to show a picture: settings that nobody chose follow from the recording. What measures takes the settings as
+    /// they are. `chosen` assignments are a layer below the flags and `--set`.
+    pub fn open_to_show(&self, chosen: &[String]) -> Result<(Box<dyn Source>, Scene), Failure> {
+        self.open_scene(chosen, true)
+    }
+
+    fn open_scene(&self, chosen: &[String], to_show: bool) -> Result<(Box<dyn Source>, Scene), Failure> {
         let mut source = self.source()?;
         if self.volume >= source.volumes() {
             let (wanted, count) = (self.volume, source.volumes());
@@ -49,13 +54,20 @@ impl InputArgs {
         // i16 samples are stored with an offset, which the setting does not have.
         let asked = settings.samples.range.map(|range| range.map(|value| value + source.sample_type().shift()));
         let samples = Input { stored: source.stored_type(), range: asked.unwrap_or_else(|| source.range()) };
-        let levels = match layers.needs_levels() {
+        let levels = match to_show && layers.needs_levels() {
             true => self.levels(&mut *source, &geometry, samples)?,
             false => None,
         };
-        let completed = layers.completed(&geometry, levels.as_ref()).map_err(input)?;
-        let mut scene = Scene::new(geometry, samples, completed.settings).map_err(input)?;
-        scene.found = completed.said;
+        // Of a volume that is all the same nothing follows, and what was set explains the picture best.
+        let (settings, found) = match to_show && (levels.is_some() || !layers.needs_levels()) {
+            true => {
+                let completed = layers.completed(&geometry, levels.as_ref()).map_err(input)?;
+                (completed.settings, completed.said)
+            }
+            false => (settings, Vec::new()),
+        };
+        let mut scene = Scene::new(geometry, samples, settings).map_err(input)?;
+        scene.found = found;
         Ok((source, scene))
     }
 

@@ -170,7 +170,7 @@ impl Render {
 
     /// Opens the recording and builds its scene, with the settings that keep the budget if there is one.
     fn open(&self) -> Result<(Box<dyn Source>, Scene), Failure> {
-        let (Some(budget), Some(file)) = (&self.budget, &self.report) else { return self.input.open() };
+        let (Some(budget), Some(file)) = (&self.budget, &self.report) else { return self.input.open_to_show(&[]) };
         let time = parse_nanoseconds("--budget", budget)?;
         let report = read_report(file)?;
         let (_, scene) = self.input.open()?;
@@ -191,7 +191,7 @@ impl Render {
         let choice = &report.choices[chosen];
         let of = if report.is_of(&scene) { "this scene" } else { "another scene, whose error it is" };
         say!("budget {budget}: {}, measured on {} with {of}", choice.describe(measure), report.device);
-        self.input.open_with(&choice.set)
+        self.input.open_to_show(&choice.set)
     }
 
     /// Says whether the picture kept the budget.
