@@ -230,7 +230,7 @@ impl Found<'_> {
                 let extinction = rounded(OPTICAL_DEPTH / smoothing(geometry));
                 put(under, "volume.extinction", extinction.into());
             }
-            if !layers.gives("surface.window") && !layers.gives("surface.threshold") {
+            if levels.is_some() && !layers.gives("surface.window") && !layers.gives("surface.threshold") {
                 set("surface.window", window(threshold, bright + 1.5 * (bright - threshold)), under, said);
                 set("surface.threshold", 0.12.into(), under, said);
             }
@@ -250,6 +250,10 @@ impl Found<'_> {
                 said.push(format!("region.depth: from {start} mm: in front of it is a layer next to the probe"));
                 put(under, "region.depth", Value::from(vec![start, end]));
             }
+        }
+        // Windows alone change no pipeline: until the echoes are known they stay as they are.
+        if levels.is_none() {
+            return;
         }
         if !layers.gives("projection.window") {
             let shown = match mode {
