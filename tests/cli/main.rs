@@ -124,11 +124,12 @@ fn no_wrong_setting_is_refused_without_its_flag_or_name() {
                  --roi lateral=nan:600 | region.lateral;--set threshold | key.path=value;--set a\nb=1 | unknown field;\
                  --set surface.treshold=0.1 | treshold;--set surface.threshold=nan | surface.threshold;\
                  --set surface.noise=11 | surface.noise;--set surface.detector=sharp | detector;\
-                 --set slices.pixels=100000 | 4096;--set surface.start_depth=500 | start_depth";
+                 --set slices.pixels=100000 | 4096";
     for (setting, named) in wrong.split(';').map(|w| w.split_once(" | ").expect("a setting and what is said of it")) {
         let (flag, value) = setting.split_once(' ').expect("a flag and its value");
         folder.refuses(&[SWEEP, flag, value], &[named]);
     }
+    folder.refuses(&[SWEEP, "--mode", "sr", "--set", "surface.start_depth=500"], &["start_depth"]);
 }
 
 /// The phantom is shown under light in the volume unless somebody chooses another look.

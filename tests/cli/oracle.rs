@@ -29,7 +29,14 @@ fn numpy_casts_the_same_rays_through_the_same_volume() {
         (
             "mip",
             SWEEP,
-            &["--mode", "mip", "--camera", "azimuth=20,elevation=-15,field_of_view=30"],
+            &[
+                "--mode",
+                "mip",
+                "--set",
+                "ray.elevation=linear",
+                "--camera",
+                "azimuth=20,elevation=-15,field_of_view=30",
+            ],
             ["\"wobble_radius\": 27.25", "\"wobble_radius\": 27.0"],
         ),
         ("volume", BONE, &["--preset", "bone", "--mode", "vr"], ["\"opacity\": 0.4", "\"opacity\": 0.35"]),
