@@ -236,11 +236,10 @@ impl Found<'_> {
             }
         }
         // Of a preset's light only what nobody set.
-        if mode == Mode::Volume && !layers.gives("light") && !layers.gives("volume") && !layers.gives("clip") {
-            if let Some(Value::Table(light)) = light_of_face() {
-                said.push("light: as in preset face".into());
-                under.insert("light".into(), Value::Table(light));
-            }
+        let is_lit = mode == Mode::Volume && !layers.gives("light") && !layers.gives("volume") && !layers.gives("clip");
+        if is_lit && let Some(Value::Table(light)) = light_of_face() {
+            said.push("light: as in preset face".into());
+            under.insert("light".into(), Value::Table(light));
         }
         let is_rendering = matches!(mode, Mode::Volume | Mode::Mixed | Mode::Surface | Mode::Mip);
         if let Some(start) = start.filter(|_| is_rendering && !layers.gives("region") && !layers.gives("clip")) {
