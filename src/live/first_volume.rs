@@ -1,9 +1,9 @@
 //! Settings of a stream that nobody chose, from its geometry and its first whole volume. They are then kept: windows that follow each volume would make
 //! the picture pump.
 
-use crate::scene::default_look::block_edge;
+use crate::scene::default_look::{Defaults, block_edge};
 use crate::scene::load::Layers;
-use crate::scene::{EchoHistogram, Input, Settings};
+use crate::scene::{EchoHistogram, EchoLevels, Input};
 use crate::source::Frame;
 use crate::source::recorder::Header;
 
@@ -30,18 +30,22 @@ impl FirstVolume {
         FirstVolume { layers, header: None, collected: None }
     }
 
-    /// The settings for a geometry, before any frame. None if it is the previous one, whose settings stay.
-    pub fn begin(&mut self, header: &Header) -> Option<Settings> {
+    /// What settings follow from for a geometry, before any frame. None if it is the previous one, whose settings stay.
+    pub fn begin(&mut self, header: &Header) -> Option<Defaults> {
         if self.header.as_ref() == Some(header) {
             return None;
         }
         self.collected = self.layers.needs_levels().then(|| Collected::new(header));
         self.header = Some(header.clone());
-        Some(self.layers.completed(&header.forward, None).ok()?.settings)
+        Some(self.defaults(header, None))
     }
 
-    /// Takes a frame, or lines of it from `first` on. The settings, if it makes the first volume whole.
-    pub fn frame(&mut self, frame: &Frame, first: Option<usize>) -> Option<Settings> {
+    fn defaults(&self, header: &Header, levels: Option<EchoLevels>) -> Defaults {
+        Defaults { layers: self.layers.clone(), geometry: header.forward.clone(), levels }
+    }
+
+    /// Takes a frame, or lines of it from `first` on. What settings follow from, if it makes the first volume whole.
+    pub fn frame(&mut self, frame: &Frame, first: Option<usize>) -> Option<Defaults> {
         let (header, collected) = (self.header.as_ref()?, self.collected.as_mut()?);
         let [width, lines] = header.forward.frame_size();
         let line = width * header.stored.bytes();
@@ -67,7 +71,7 @@ impl FirstVolume {
             return None;
         }
         self.collected = None;
-        Some(self.layers.completed(&header.forward, levels.as_ref()).ok()?.settings)
+        Some(self.defaults(self.header.as_ref()?, levels))
     }
 }
 
@@ -101,7 +105,7 @@ impl Collected {
 mod tests {
     use super::*;
     use crate::probe::{Geometry, Grid};
-    use crate::scene::Mode;
+    use crate::scene::{Mode, Settings};
     use crate::source::StoredType;
 
     fn header() -> Header {
@@ -117,19 +121,20 @@ mod tests {
     #[test]
     fn the_first_whole_volume_decides_and_no_later_one() {
         let mut first = FirstVolume::new(Layers::default());
-        let begun = first.begin(&header()).expect("by geometry");
+        let settings = |found: Option<Defaults>| -> Option<Settings> { Some(found?.settings().expect("settings")) };
+        let begun = settings(first.begin(&header())).expect("by geometry");
         assert_eq!(begun.mode, Mode::Volume);
-        assert_eq!(first.frame(&frame(0, 1, 240), None), None);
+        assert!(first.frame(&frame(0, 1, 240), None).is_none());
         // Volume 0 lacks a slice.
-        assert_eq!(first.frame(&frame(1, 0, 120), None), None);
-        assert_eq!(first.frame(&frame(1, 0, 120), None), None, "the same slice again");
-        let found = first.frame(&frame(1, 1, 120), None).expect("whole");
+        assert!(first.frame(&frame(1, 0, 120), None).is_none());
+        assert!(first.frame(&frame(1, 0, 120), None).is_none(), "the same slice again");
+        let found = settings(first.frame(&frame(1, 1, 120), None)).expect("whole");
         assert_ne!(found.volume.transfer, begun.volume.transfer);
         let points = crate::scene::transfer::resolved(&found.volume.transfer);
         assert!((points[points.len() - 1].at - 120.0 / 255.0).abs() < 0.01, "{points:?}");
-        assert_eq!(first.frame(&frame(2, 0, 250), None), None);
-        assert_eq!(first.frame(&frame(2, 1, 250), None), None, "the picture does not pump");
-        assert_eq!(first.begin(&header()), None);
+        assert!(first.frame(&frame(2, 0, 250), None).is_none());
+        assert!(first.frame(&frame(2, 1, 250), None).is_none(), "the picture does not pump");
+        assert!(first.begin(&header()).is_none());
     }
 
     #[test]
@@ -140,7 +145,7 @@ mod tests {
         for slice in 0..2 {
             let whole = frame(0, slice, 120);
             for (line, bytes) in [(0, &whole.bytes[..320]), (10, &whole.bytes[320..])] {
-                assert_eq!(found, None);
+                assert!(found.is_none());
                 found = first.frame(&Frame { bytes: bytes.to_vec(), ..whole.clone() }, Some(line));
             }
         }

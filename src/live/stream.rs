@@ -10,6 +10,7 @@ use super::volume_pool::{Update, VolumeCounts, VolumePool};
 use crate::gpu::shader_reload::ShaderFolder;
 use crate::gpu::{self, Bands, Context, GpuError, Renderer, SceneMaker, TimeStamps, Wake};
 use crate::probe::Probe;
+use crate::scene::default_look::Defaults;
 use crate::scene::load::Layers;
 use crate::scene::{Scene, SceneError, Settings};
 use crate::source::Frame;
@@ -90,8 +91,8 @@ pub struct Stream {
     settings: Settings,
     options: StreamOptions,
     first_volume: Option<FirstVolume>,
-    /// Settings that were found and that [`Stream::take_found`] has not returned yet.
-    found: Option<Settings>,
+    /// What settings follow from, found and not yet returned by [`Stream::take_found`].
+    found: Option<Defaults>,
     /// None before the first frame header, and after a geometry that could not be set up.
     session: Option<Session>,
     cine: Cine,
@@ -341,17 +342,21 @@ impl Stream {
 
     /// Looks for the levels of the first whole volume, and draws by them from then on.
     fn look_at(&mut self, frame: &Frame, first: Option<usize>) {
-        let Some(settings) = self.first_volume.as_mut().and_then(|search| search.frame(frame, first)) else { return };
-        let settings = Settings { picture: self.settings.picture.clone(), ..settings };
-        self.found = Some(settings.clone());
+        let Some(found) = self.first_volume.as_mut().and_then(|search| search.frame(frame, first)) else { return };
         // A user may have changed settings meanwhile. The caller knows, and lays its own over these.
-        if let Err(fault) = self.change(settings) {
-            tracing::debug!("windows of the first volume: {fault}");
+        match found.settings().map(|settings| Settings { picture: self.settings.picture.clone(), ..settings }) {
+            Ok(settings) => {
+                if let Err(fault) = self.change(settings) {
+                    tracing::debug!("windows of the first volume: {fault}");
+                }
+                self.found = Some(found);
+            }
+            Err(fault) => tracing::debug!("windows of the first volume: {fault}"),
         }
     }
 
-    /// The settings that were found from the source since the last call, for the caller to build on. They are drawn already.
-    pub fn take_found(&mut self) -> Option<Settings> {
+    /// What was found from the source since the last call, for the caller to build on. The settings that follow from it are drawn already.
+    pub fn take_found(&mut self) -> Option<Defaults> {
         self.found.take()
     }
 
@@ -363,9 +368,10 @@ impl Stream {
         let shown = session.as_ref().and_then(|session| session.replayed_volume().or(session.current_volume()));
         let to_restore = shown.or_else(|| self.cine.volumes().back().map(|kept| kept.volume)).filter(|_| is_same);
         self.header = Some(header.clone());
-        if let Some(settings) = self.first_volume.as_mut().and_then(|search| search.begin(&header)) {
+        let found = self.first_volume.as_mut().and_then(|search| search.begin(&header));
+        if let Some(settings) = found.as_ref().and_then(|found| found.settings().ok()) {
             self.settings = Settings { picture: self.settings.picture.clone(), ..settings };
-            self.found = Some(self.settings.clone());
+            self.found = found;
         }
         // Freed before the new one is created: both may not fit into device memory.
         if let Some(Session { pool, .. }) = session {

@@ -9,7 +9,7 @@
 //! What a user sets wins, key by key; a window and what is drawn through it belong together, and one of them that is set keeps both.
 
 use super::echo_levels::EchoLevels;
-use super::load::{Layers, LoadError, preset_settings};
+use super::load::{Layers, LoadError, preset_settings, rebase};
 use super::region::insonified_box;
 use super::{Layout, Mode, Settings, TransferPoint, transfer};
 use crate::probe::{Geometry, Motion};
@@ -56,7 +56,54 @@ pub fn block_edge(geometry: &Geometry) -> f64 {
     BLOCK * smoothing(geometry)
 }
 
+/// What settings that nobody chose follow from.
+#[derive(Clone, Debug)]
+pub struct Defaults {
+    pub layers: Layers,
+    pub geometry: Geometry,
+    /// None before the first whole volume.
+    pub levels: Option<EchoLevels>,
+}
+
+impl Defaults {
+    /// The settings for the mode that was chosen.
+    ///
+    /// # Errors
+    /// As for [`Layers::finish`].
+    pub fn settings(&self) -> Result<Settings, LoadError> {
+        Ok(self.layers.completed(&self.geometry, self.levels.as_ref())?.settings)
+    }
+
+    /// The settings as if the mode and the layout of `other` were chosen.
+    fn of_mode(&self, other: &Settings) -> Option<Settings> {
+        let layers = self.layers.clone().in_mode(other.mode, other.layout)?;
+        Some(layers.completed(&self.geometry, self.levels.as_ref()).ok()?.settings)
+    }
+
+    /// Settings whose mode or layout was changed to those of `to`. What still is as it was found for the mode of `from` becomes what is found for
+    /// the new one; what was set meanwhile stays.
+    pub fn switched(&self, from: &Settings, to: Settings) -> Settings {
+        if (from.mode, from.layout) == (to.mode, to.layout) {
+            return to;
+        }
+        match (self.of_mode(from), self.of_mode(&to)) {
+            (Some(before), Some(after)) => rebase(&to, &before, &after).unwrap_or(to),
+            _ => to,
+        }
+    }
+}
+
 impl Layers {
+    /// The layers with another mode and layout on top, as if a user had given them.
+    fn in_mode(mut self, mode: Mode, layout: Layout) -> Option<Layers> {
+        let table = Table::from_iter([
+            ("mode".to_string(), Value::try_from(mode).ok()?),
+            ("layout".to_string(), Value::try_from(layout).ok()?),
+        ]);
+        self.table("mode", table, Path::new("")).ok()?;
+        Some(self)
+    }
+
     /// True if the levels of the echoes decide anything: no preset describes the recording.
     pub fn needs_levels(&self) -> bool {
         self.presets().is_empty()
@@ -108,7 +155,9 @@ impl Found<'_> {
     fn mode(&mut self, geometry: &Geometry, chosen: &Settings) -> Mode {
         let is_frame = geometry.slices() == 1
             || matches!(geometry, Geometry::Sweep(probe) if matches!(probe.motion, Motion::Still { .. }));
-        if self.layers.has("mode") || chosen.layout != Layout::Single || !self.layers.presets().is_empty() {
+        // A pair is of mode surface; a single frame has no layout.
+        let is_fixed = chosen.layout == Layout::Pair || (chosen.layout == Layout::Four && is_frame);
+        if self.layers.has("mode") || is_fixed || !self.layers.presets().is_empty() {
             return chosen.mode;
         }
         let (mode, name, why) = match is_frame {

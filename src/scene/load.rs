@@ -45,7 +45,7 @@ pub enum LoadError {
 }
 
 /// Layers of settings as TOML tables, merged key by key.
-#[derive(Clone, Default)]
+#[derive(Clone, Debug, Default)]
 pub struct Layers {
     merged: Table,
     /// The presets among them.
@@ -188,6 +188,32 @@ impl Layers {
 
     pub fn finish(self) -> Result<Settings, LoadError> {
         self.settings().map_err(|e| LoadError::Layer { layer: "scene".into(), fault: one_line(&e, "") })
+    }
+}
+
+/// `current` with what changed from `before` to `after`, value by value. A value that is not as it was before stays; so does a table with such a
+/// value that is no longer in `after`. None if that makes no settings.
+pub fn rebase(current: &Settings, before: &Settings, after: &Settings) -> Option<Settings> {
+    let table = |settings: &Settings| Table::try_from(settings).ok();
+    let mut rebased = table(current)?;
+    rebase_table(&mut rebased, &table(before)?, &table(after)?);
+    Settings::deserialize(rebased).ok()
+}
+
+fn rebase_table(current: &mut Table, before: &Table, after: &Table) {
+    let keys: BTreeSet<String> = before.keys().chain(after.keys()).cloned().collect();
+    for key in keys {
+        let was = before.get(&key);
+        if current.get(&key) == was {
+            match after.get(&key) {
+                Some(value) => drop(current.insert(key, value.clone())),
+                None => drop(current.remove(&key)),
+            }
+        } else if let (Some(Value::Table(current)), Some(Value::Table(was)), Some(Value::Table(after))) =
+            (current.get_mut(&key), was, after.get(&key))
+        {
+            rebase_table(current, was, after);
+        }
     }
 }
 

@@ -79,27 +79,29 @@ const CHOICES: [&str; 42] = [
     "mode = 'vr'\nvolume.shading = 'depth-coded'",
 ];
 
-/// Every mode, layout and preset that a user may switch to from these settings; these are first. A preset is laid over them.
-pub fn switches(from: &Settings) -> Vec<Variant> {
+/// Every mode, layout and preset that a user may switch to from these settings; these are first. A preset is laid over them. `follow` adds what
+/// follows from another mode or layout.
+pub fn switches(from: &Settings, follow: impl Fn(Settings) -> Settings) -> Vec<Variant> {
     let mut variants = vec![Variant::new("as it is", from.clone())];
     for (mode, name) in MODES {
         let mut settings = from.clone();
         settings.set_mode(mode);
         settings.layout = Layout::Single;
-        variants.push(Variant::new(format!("mode {name}"), settings.clone()));
+        variants.push(Variant::new(format!("mode {name}"), follow(settings.clone())));
         if !mode.is_flat() {
             settings.layout = Layout::Four;
-            variants.push(Variant::new(format!("mode {name}, layout 4up"), settings));
+            variants.push(Variant::new(format!("mode {name}, layout 4up"), follow(settings)));
         }
     }
-    variants.push(Variant::new("layout pair", Settings { mode: Mode::Surface, layout: Layout::Pair, ..from.clone() }));
+    let pair = Settings { mode: Mode::Surface, layout: Layout::Pair, ..from.clone() };
+    variants.push(Variant::new("layout pair", follow(pair)));
     variants.extend(PRESETS.iter().filter_map(|(preset, _)| preset_over(from, preset)));
     variants
 }
 
 /// [`switches`], each way to sample the volume in every mode, every mode of every preset, and every filter and light.
 pub fn all(from: &Settings) -> Vec<Variant> {
-    let mut variants = switches(from);
+    let mut variants = switches(from, |settings| settings);
     for sampling in SAMPLINGS {
         let text = format!("ray.sampling = '{sampling}'");
         if let Some(sampled) = changed(from, &text) {
@@ -149,7 +151,8 @@ mod tests {
     fn no_variant_is_lost_and_each_differs_from_the_start() {
         let from = Settings::default();
         let variants = all(&from);
-        let count = switches(&from).len() + SAMPLINGS.len() * MODES.len() + PRESETS.len() * MODES.len() + CHOICES.len();
+        let count =
+            switches(&from, |s| s).len() + SAMPLINGS.len() * MODES.len() + PRESETS.len() * MODES.len() + CHOICES.len();
         assert_eq!(variants.len(), count);
         let of_choices = &variants[count - CHOICES.len()..];
         for variant in of_choices {
@@ -162,7 +165,7 @@ mod tests {
     #[test]
     fn every_mode_and_layout_is_among_the_switches() {
         let from = Settings { layout: Layout::Pair, ..Settings::default() };
-        let variants = switches(&from);
+        let variants = switches(&from, |s| s);
         assert_eq!(variants[0].settings, from);
         for (mode, _) in MODES {
             let layouts: Vec<Layout> =

@@ -3,6 +3,8 @@
 use super::command::{Command, Tool};
 use super::sliders::SLIDERS;
 use super::view;
+use crate::scene::default_look::Defaults;
+use crate::scene::load;
 use crate::scene::planes::MAX_TILES;
 use crate::scene::{Camera, Cube, Inset, Layout, MAX_PICTURE, Mode, Planes, Scene, Settings, Shadow, Tilt, Transfer};
 use std::borrow::Cow;
@@ -27,13 +29,15 @@ pub struct Controls {
     tool: Tool,
     /// The last mode that renders the volume: a 4-up picture returns to it.
     rendered: Mode,
+    /// What settings that nobody chose follow from. None: they are complete.
+    defaults: Option<Defaults>,
 }
 
 impl Controls {
     /// `settings`: the start, which [`Command::Reset`] restores.
     pub(super) fn new(settings: Settings) -> Controls {
         let rendered = if settings.mode.is_flat() { Mode::default() } else { settings.mode };
-        Controls { start: settings.clone(), settings, tool: Tool::default(), rendered }
+        Controls { start: settings.clone(), settings, tool: Tool::default(), rendered, defaults: None }
     }
 
     pub fn settings(&self) -> &Settings {
@@ -49,20 +53,39 @@ impl Controls {
         let picture = self.settings.picture.clone();
         let mut again = Controls::new(self.start.clone());
         again.settings.picture = picture;
+        again.defaults = self.defaults.take();
         again.start = std::mem::take(&mut self.start);
         *self = again;
     }
 
-    /// Takes another start. The settings follow it unless the user has changed any of them.
-    pub(super) fn adopt(&mut self, start: Settings) {
+    /// Takes what was found from a source. Settings that were changed since the start stay.
+    pub(super) fn adopt(&mut self, found: Defaults) {
+        let Ok(start) = found.settings() else { return };
         let picture = self.settings.picture.clone();
-        let is_untouched = Settings { picture: self.start.picture.clone(), ..self.settings.clone() } == self.start;
-        self.start = Settings { picture: self.start.picture.clone(), ..start };
-        if is_untouched {
-            self.settings = Settings { picture, ..self.start.clone() };
-            if !self.settings.mode.is_flat() {
-                self.rendered = self.settings.mode;
+        let start = Settings { picture: self.start.picture.clone(), ..start };
+        // The mode of the start may change with the source, one that the user chose may not.
+        let (earlier, later) = match in_mode_of(&self.start, &self.settings) {
+            same if same == self.start => (same, start.clone()),
+            other => {
+                let earlier = self.defaults.as_ref().map(|earlier| earlier.switched(&self.start, other.clone()));
+                (earlier.unwrap_or_else(|| other.clone()), found.switched(&start, in_mode_of(&start, &other)))
             }
+        };
+        if let Some(settings) = load::rebase(&self.settings, &earlier, &later) {
+            self.settings = Settings { picture, ..settings };
+        }
+        self.start = start;
+        self.defaults = Some(found);
+        if !self.settings.mode.is_flat() {
+            self.rendered = self.settings.mode;
+        }
+    }
+
+    /// Settings with another mode or layout than the current ones, and what follows from it.
+    pub(super) fn switched(&self, to: Settings) -> Settings {
+        match &self.defaults {
+            Some(defaults) => defaults.switched(&self.settings, to),
+            None => to,
         }
     }
 
@@ -102,7 +125,7 @@ impl Controls {
         }
         // The scene lags behind if several commands come between two pictures: each one builds on the settings of the one before.
         let Some(now) = scene.and_then(|scene| self.current(scene)) else { return Change::Nothing };
-        match self.changed(command, &now).and_then(|settings| drawable(&now, settings)) {
+        match self.changed(command, &now).and_then(|settings| drawable(&now, self.switched(settings))) {
             Some(settings) if settings != self.settings => {
                 if !settings.mode.is_flat() {
                     self.rendered = settings.mode;
@@ -207,6 +230,11 @@ impl Controls {
         };
         Some(Shadow { strength, ..now.or(start).unwrap_or_default() })
     }
+}
+
+/// Settings with the mode and the layout of others.
+fn in_mode_of(settings: &Settings, other: &Settings) -> Settings {
+    Settings { mode: other.mode, layout: other.layout, ..settings.clone() }
 }
 
 fn set_slider(settings: &mut Settings, now: &Scene, index: usize, value: f64) -> Option<()> {

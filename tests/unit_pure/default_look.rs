@@ -1,9 +1,11 @@
 //! What nobody chose: the levels of a recording's echoes, and the settings that follow from them, its size and the mode.
 
 use echolume::probe::{Advance, Array, Axis, Geometry, Grid, Motion, Probe};
-use echolume::scene::load::{Layers, PRESETS};
-use echolume::scene::{ColourMap, EchoHistogram, EchoLevels, Input, Mode, Settings, Slices, transfer};
+use echolume::scene::default_look::Defaults;
+use echolume::scene::load::{Layers, PRESETS, rebase};
+use echolume::scene::{Camera, ColourMap, EchoHistogram, EchoLevels, Input, Mode, Settings, Slices, transfer};
 use echolume::source::StoredType;
+use std::path::Path;
 
 fn grid(size: [usize; 3]) -> Geometry {
     Geometry::Cartesian(Grid { origin: [0.0; 3], spacing: [0.5; 3], size })
@@ -230,4 +232,62 @@ fn every_choice_is_said() {
     let blind = layers(&[], &[]).completed(&fan(), None).expect("settings").said.join("\n");
     assert!(blind.contains("as no echoes are known") && !blind.contains("from the echoes"), "{blind}");
     assert!(layers(&["face"], &[]).completed(&fan(), None).expect("settings").said.is_empty());
+}
+
+fn levels_of_halves() -> Option<EchoLevels> {
+    let mut histogram = EchoHistogram::new(&grid([64, 64, 1]), BYTES, 4.0);
+    histogram.take(&(0..64 * 64).map(|n| speckle(if n % 64 < 32 { 40.0 } else { 100.0 }, n)).collect::<Vec<u8>>());
+    histogram.levels()
+}
+
+/// A window that changes to another mode shows what a picture of that mode alone shows, but for what the user set meanwhile.
+#[test]
+fn a_change_of_mode_brings_what_follows_from_it_and_keeps_what_was_set() {
+    let given = |text: &str| {
+        let mut layers = Layers::default();
+        layers.table("test", toml::from_str(text).expect("TOML"), Path::new("")).expect("settings");
+        layers
+    };
+    let geometry = grid([64, 64, 64]);
+    let defaults = Defaults { layers: Layers::default(), geometry: geometry.clone(), levels: levels_of_halves() };
+    let start = defaults.settings().expect("settings");
+    for (mode, name) in [(Mode::Mixed, "mixed"), (Mode::Mip, "mip"), (Mode::Cube, "cube"), (Mode::Plane, "plane")] {
+        let alone =
+            Defaults { layers: given(&format!("mode = '{name}'")), ..defaults.clone() }.settings().expect("settings");
+        let mut to = start.clone();
+        to.set_mode(mode);
+        let switched = defaults.switched(&start, to.clone());
+        assert_eq!(switched, alone, "{name}");
+        // And back.
+        let back = Settings { mode: start.mode, ..switched.clone() };
+        assert_eq!(defaults.switched(&switched, back), start, "{name}");
+        // What was set stays, also what the mode changes otherwise.
+        to.light.ambient = 0.123;
+        to.projection.window = [0.11, 0.77];
+        to.planes.window = [0.11, 0.77];
+        to.slices.smooth.as_mut().expect("smooth").depth = 0.4321;
+        let switched = defaults.switched(&Settings { mode: start.mode, ..to.clone() }, to.clone());
+        let mut expected = alone.clone();
+        expected.light.ambient = 0.123;
+        expected.projection.window = [0.11, 0.77];
+        expected.planes.window = [0.11, 0.77];
+        expected.slices.smooth.as_mut().expect("smooth").depth = 0.4321;
+        assert_eq!(switched, expected, "{name}");
+    }
+}
+
+#[test]
+fn values_that_were_changed_since_outlast_a_rebase() {
+    let settings = |text: &str| -> Settings { toml::from_str(text).expect("settings") };
+    let before = settings("[camera]\nzoom = 2\n[light.shadow]\nstrength = 0.5\n[region]\ndepth = [1, 2]");
+    let after = settings("[camera]\nzoom = 3\nazimuth = 10\n[region]\nlateral = [3, 4]");
+    assert_eq!(rebase(&before, &before, &after), Some(after.clone()));
+    let current = Settings { camera: Camera { zoom: 5.0, ..before.camera }, ..before.clone() };
+    let expected = Settings { camera: Camera { zoom: 5.0, ..after.camera }, ..after.clone() };
+    assert_eq!(rebase(&current, &before, &after), Some(expected));
+    // A table that `after` has no more stays whole if something in it was changed.
+    let mut current = before.clone();
+    current.light.shadow.as_mut().expect("shadow").strength = 0.7;
+    let rebased = rebase(&current, &before, &after).expect("settings");
+    assert_eq!((rebased.light.shadow, rebased.camera), (current.light.shadow, after.camera));
 }

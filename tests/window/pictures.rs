@@ -25,7 +25,7 @@ fn every_mode_in_a_window_is_the_headless_picture_byte_for_byte() {
         view.shows(&headless(size, &["--mode", mode]), mode);
     }
     desk.tap(TAB);
-    view.shows(&headless(size, &["--layout", "4up"]), "4-up");
+    view.shows(&headless(size, &["--layout", "4up", "--mode", "sr"]), "4-up");
     view.leave();
 }
 

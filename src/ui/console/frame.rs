@@ -87,10 +87,10 @@ impl Console {
         }
     }
 
-    /// Takes over settings that the stream found from its source, as far as the user has not changed any.
+    /// Takes over what the stream found from its source. What the user has set stays.
     fn adopt_found(&mut self) {
-        if let Some(settings) = self.stream.take_found() {
-            self.controls.adopt(settings);
+        if let Some(found) = self.stream.take_found() {
+            self.controls.adopt(found);
         }
     }
 

@@ -561,7 +561,8 @@ impl Console {
         let (_, settings) = self.effective_settings(now);
         let lowered = self.rungs.iter().skip(1).filter(|_| self.frame_budget.budget().is_some());
         let lowered: Vec<Settings> = lowered.map(|rung| rung.apply(&settings, voxel)).collect();
-        let switches = variants::switches(&settings).into_iter().map(|variant| variant.settings);
+        let switches =
+            variants::switches(&settings, |to| self.controls.switched(to)).into_iter().map(|variant| variant.settings);
         self.stream.warm(lowered.into_iter().chain(switches).collect());
         self.warmed = Some(self.controls.settings().clone());
     }

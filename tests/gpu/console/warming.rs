@@ -62,7 +62,8 @@ fn after_a_rest_no_mode_layout_or_preset_compiles_anything() {
         assert_eq!(compiled(&device), count, "{layout:?} is compiled when it is chosen");
     }
     // The settings of the presets, given to the stream as a configuration would.
-    let presets = variants::switches(&desk.drawn()).into_iter().filter(|v| v.name.starts_with("preset"));
+    let presets =
+        variants::switches(&desk.drawn(), |settings| settings).into_iter().filter(|v| v.name.starts_with("preset"));
     for variant in presets {
         let stream = desk.console.stream();
         // A preset may show what this small sweep does not have.
