@@ -3,6 +3,7 @@
 use crate::gpu::{Context, GpuError, Renderer, RendererOptions, TimeStamps, pass_runner};
 use crate::machine::{self, CpuTime};
 use crate::passes::measure as loops;
+use crate::passes::slots::Shape;
 use crate::passes::{Bind, DispatchArgs, Part, Pass, RUN, Slot, Span, chain, layers, slices};
 use crate::plan::{Plan, Rerun, Step};
 use crate::profile::export::{self, Track};
@@ -231,7 +232,11 @@ fn passes(plan: &Plan, scene: &Scene, repeats: &[Repeat], stamped: bool) -> Vec<
         // With `still`, steps of stage 1 run only once.
         let times = if steps.is_empty() { 0 } else { u64::from(runs) / steps.len() as u64 };
         let bytes = |binds: fn(&Step, &Scene) -> Vec<Bind>| -> u64 {
-            times * steps.iter().flat_map(|s| binds(s, scene)).map(|b| touched(&b, scene)).sum::<u64>()
+            times
+                * steps
+                    .iter()
+                    .map(|s| binds(s, scene).iter().map(|b| visited(s.pass, b, scene)).sum::<u64>())
+                    .sum::<u64>()
         };
         let copied = copied_bytes(name, scene, runs.into());
         PassProfile {
@@ -279,6 +284,18 @@ fn touched(bind: &Bind, scene: &Scene) -> u64 {
         Part::Slices | Part::Layers => all / u64::from(bind.slot.shape(scene).parts()),
         Part::Whole | Part::Around(_) => all,
     }
+}
+
+/// [`touched`] by one dispatch of a pass. One that is repeated with a flat extent visits one layer of a 3D texture each time.
+fn visited(pass: &Pass, bind: &Bind, scene: &Scene) -> u64 {
+    let repeats = (pass.repeat)(scene);
+    let args = DispatchArgs::default();
+    let is_layer = repeats > 1 && bind.part == Part::Whole && (pass.extent)(scene, &args)[2] == 1;
+    let layers = match bind.slot.shape(scene) {
+        Shape::Three([_, _, layers]) if is_layer && layers > 1 => u64::from(repeats),
+        _ => 1,
+    };
+    touched(bind, scene) / layers
 }
 
 /// Bytes that `runs` uploads or readbacks copy in each direction.
