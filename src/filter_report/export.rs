@@ -82,7 +82,7 @@ fn table(subject: &Subject, rows: &[&Row]) -> String {
         }
         lines.push(line);
     }
-    debug_assert!(rows.iter().all(|r| r.pixels.len() == subject.size[0] * subject.size[1]));
+    assert!(rows.iter().all(|r| r.pixels.len() == subject.size[0] * subject.size[1]));
     markdown_table(&lines)
 }
 

@@ -342,7 +342,7 @@ mod tests {
         redactor.add_recording(Path::new("/data/anna.mha"));
         for part in ["anna ", "/data/a: ", "a.mha ", "://a@", "'"] {
             assert!(redactor.redact(&part.repeat(1 << 17)).len() < 100);
-            let redacted_text = redactor.redact(&(part.repeat(2000) + "\n").repeat(4));
+            let redacted_text = redactor.redact(&(part.repeat(600) + "\n").repeat(4));
             assert_eq!((redacted_text.lines().count(), redacted_text.contains("anna")), (4, false));
         }
     }

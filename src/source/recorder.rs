@@ -113,7 +113,7 @@ impl Writer {
         for time in [frame.time.unwrap_or(0.0), arrived] {
             self.frame.extend(time.to_le_bytes());
         }
-        debug_assert_eq!(self.frame.len(), FRAME_HEAD);
+        assert_eq!(self.frame.len(), FRAME_HEAD);
         self.frame.extend(&frame.bytes);
         self.frame.extend(CRC.checksum(&self.frame).to_le_bytes());
         let offset = self.at;

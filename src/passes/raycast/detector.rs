@@ -488,7 +488,8 @@ mod tests {
                         if height * largest_difference(sd, 1.0) <= 1.25 * threshold {
                             continue;
                         }
-                        for offset in 0..8 {
+                        // Fine steps cost the most and differ least.
+                        for offset in (0..8).step_by(if half > 8 { 4 } else { 1 }) {
                             let edge = 15.0 + f64::from(offset) / (8.0 * f64::from(half));
                             let found = place_on(&settings, half, |x| {
                                 height * 0.5 * (1.0 + erf((x - edge) / (sd * 2f64.sqrt())))
@@ -518,8 +519,9 @@ mod tests {
             for (low, (height, widest)) in [(1.0, 1.0), (0.2, 0.5)].into_iter().enumerate() {
                 let settings = Surface { threshold: 0.05, place, rough: 1, ..Surface::default() };
                 for half in [4, 8, 16, 64] {
-                    for (sd, offset) in
-                        [0.125, 0.25, 0.5, 0.75, 1.0].into_iter().flat_map(|sd| (0..16).map(move |offset| (sd, offset)))
+                    for (sd, offset) in [0.125, 0.25, 0.5, 0.75, 1.0]
+                        .into_iter()
+                        .flat_map(|sd| (0..16).step_by(if half > 8 { 4 } else { 1 }).map(move |offset| (sd, offset)))
                     {
                         if sd > widest {
                             continue;
