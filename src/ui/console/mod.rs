@@ -6,12 +6,12 @@ mod frame;
 use super::command::{Command, HeldKeys, Tool};
 use super::controls::{Change, Controls};
 use super::export::Exporter;
-use super::frame_budget::{FrameBudget, Rung, built_in_ladder};
+use super::frame_budget::{self, Pace, Quality, Rung, built_in_ladder};
 use super::gestures::Gestures;
 use super::input::Input;
 use super::panels::{self, Note, Panels};
 use super::picking::Viewport;
-use super::source_supervisor::{OpenSource, SourceSupervisor};
+use super::source_supervisor::{OpenSource, SourceKind, SourceSupervisor};
 use super::times::Times;
 use crate::gpu::shader_reload::{ShaderFolder, Watch};
 use crate::gpu::window::Screen;
@@ -19,8 +19,9 @@ use crate::gpu::{Context, GpuError, TimeStamps, Wake};
 use crate::kiosk::chord::Chord;
 use crate::live::cine::CineLimits;
 use crate::live::{self, Feed, Stream, StreamError, Update};
+use crate::plan::Work;
 use crate::scene::load::Layers;
-use crate::scene::{Layout, Settings, variants};
+use crate::scene::{Layout, Scene, Settings, variants};
 use std::path::PathBuf;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
@@ -56,6 +57,8 @@ pub struct ConsoleOptions {
     pub rungs: Vec<Rung>,
     /// How long to wait before a source that ended is opened again. None: the end of the source is final.
     pub retry: Option<Duration>,
+    /// Where the frames come from, for messages.
+    pub source: SourceKind,
     /// A file for all frames that arrive.
     pub record: Option<PathBuf>,
     /// The folder for saved pictures and loops.
@@ -93,6 +96,7 @@ impl Default for ConsoleOptions {
             budget: None,
             rungs: built_in_ladder(),
             retry: None,
+            source: SourceKind::default(),
             record: None,
             folder: ".".into(),
             overlay: true,
@@ -149,17 +153,17 @@ pub struct Console {
     gestures: Gestures,
     keys: HeldKeys,
     exporter: Exporter,
-    frame_budget: FrameBudget,
-    rungs: Vec<Rung>,
+    pace: Pace,
+    rungs: Arc<Vec<Rung>>,
     panels: Panels,
     times: Times,
     fixed: FixedOptions,
     /// Size of the window, pixels.
     size: [u32; 2],
     started: Instant,
-    /// The settings that the stream was given last, and their rung of the quality ladder.
+    /// The settings that the stream was given last, and what they leave out.
     sent_settings: Option<Settings>,
-    rung: usize,
+    quality: Quality,
     /// Settings that could not be drawn, to report them only once.
     rejected_settings: Option<Settings>,
     notes: Vec<(Instant, Note)>,
@@ -186,6 +190,10 @@ pub struct Console {
     statistics_at: Instant,
     /// When a frame or a source came last.
     last_arrival: Instant,
+    /// Why the source is not connected, as it was shown last.
+    disconnected: Option<String>,
+    /// Since when the program is busy with what came: silence is not counted meanwhile.
+    busy_since: Option<Instant>,
     frames: u64,
     /// Faults of the device since the last picture.
     device_faults: u32,
@@ -213,6 +221,7 @@ struct FixedOptions {
     exit: Option<Chord>,
     is_kiosk: bool,
     warms: bool,
+    source: SourceKind,
 }
 
 impl Console {
@@ -222,6 +231,11 @@ impl Console {
         let shows_panels = options.panels && options.overlay;
         let mut controls = Controls::new(options.settings);
         controls.resize(panels::picture_area(size, options.scale, shows_panels).1);
+        let rungs = Arc::new(options.rungs);
+        let lowered = options.budget.map(|_| {
+            let rungs = rungs.clone();
+            Arc::new(move |scene: &Scene| frame_budget::lowered(&rungs, scene)) as live::Lowered
+        });
         let stream_options = live::StreamOptions {
             update: options.update,
             images: options.images,
@@ -232,13 +246,13 @@ impl Console {
             wake: Some(options.wake.clone()),
             shaders: options.shaders.clone(),
             chosen: options.chosen,
+            lowered,
         };
         let watch = options.shaders.as_ref().map(|folder| Watch::new(folder, options.wake.clone())).transpose();
         let (shader_watch, watch_fault) = match watch {
             Ok(watch) => (watch, None),
             Err(fault) => (None, Some(fault)),
         };
-        let time_shares: Vec<f64> = options.rungs.iter().map(|rung| rung.time_share).collect();
         let mut console = Console {
             screen: None,
             stream: Stream::new(context, Feed::none(), controls.settings().clone(), stream_options),
@@ -248,8 +262,8 @@ impl Console {
             gestures: Gestures::default(),
             keys: HeldKeys::default(),
             exporter: Exporter::new(options.folder, options.wake),
-            frame_budget: FrameBudget::new(options.budget, &time_shares),
-            rungs: options.rungs,
+            pace: Pace::new(options.budget, &rungs),
+            rungs,
             panels: Panels::new(options.scale),
             times: Times::default(),
             fixed: FixedOptions {
@@ -257,11 +271,12 @@ impl Console {
                 is_kiosk: options.is_kiosk,
                 exit: options.exit,
                 warms: options.warms,
+                source: options.source,
             },
             size,
             started: now,
             sent_settings: None,
-            rung: 0,
+            quality: Quality::default(),
             rejected_settings: None,
             notes: Vec::new(),
             needs_redraw: true,
@@ -277,6 +292,8 @@ impl Console {
             warmed: None,
             statistics_at: now,
             last_arrival: now,
+            disconnected: None,
+            busy_since: None,
             frames: 0,
             device_faults: 0,
             stall_shown_until: None,
@@ -434,30 +451,42 @@ impl Console {
         self.screen.as_ref()
     }
 
-    /// The rung of the quality ladder for the last settings that were sent to the stream.
-    pub fn rung(&self) -> usize {
-        self.rung
+    /// What the last settings that were sent to the stream leave out.
+    pub fn quality(&self) -> Quality {
+        self.quality
     }
 
     /// Executes a command.
     pub fn execute(&mut self, command: &Command, now: Instant) {
         tracing::debug!("{command:?}");
         self.user_acts(now);
+        let before = is_of_tone(command).then(|| self.controls.settings().clone());
         match self.controls.apply(command, self.stream.scene()) {
             Change::Nothing => return,
             Change::Tool => {}
             Change::Settings => {
                 self.unsent_input.get_or_insert(now);
                 if is_continuous(command) {
-                    self.frame_budget.view_moved(now);
+                    let work = before.map_or(Work::Rays, |before| self.work_since(before));
+                    self.pace.moved(work, now);
                 } else {
                     // Another scene takes another time.
-                    self.frame_budget.forget();
+                    self.pace.forget();
                 }
             }
             Change::Caller(command) => self.execute_own(&command, now),
         }
         self.needs_redraw = true;
+    }
+
+    /// How much of the picture a change from these settings draws again.
+    fn work_since(&self, before: Settings) -> Work {
+        let Some(shown) = self.stream.scene() else { return Work::Rays };
+        let scene = |settings: Settings| Scene::new(shown.geometry.clone(), shown.input, settings);
+        match (scene(before), scene(self.controls.settings().clone())) {
+            (Ok(before), Ok(after)) => Work::between(&before, &after),
+            _ => Work::Rays,
+        }
     }
 
     /// Executes a command that does not concern settings.
@@ -557,13 +586,13 @@ impl Console {
         if !is_due || is_done || !self.stream.renderer().is_some_and(|renderer| renderer.has_drawn()) {
             return;
         }
-        let voxel = self.stream.scene().map_or(0.5, |scene| scene.grid.pitch[0].min(scene.grid.pitch[1]));
+        let voxel = self.stream.scene().map_or(0.5, frame_budget::voxel);
         let (_, settings) = self.effective_settings(now);
-        let lowered = self.rungs.iter().skip(1).filter(|_| self.frame_budget.budget().is_some());
-        let lowered: Vec<Settings> = lowered.map(|rung| rung.apply(&settings, voxel)).collect();
-        let switches =
-            variants::switches(&settings, |to| self.controls.switched(to)).into_iter().map(|variant| variant.settings);
-        self.stream.warm(lowered.into_iter().chain(switches).collect());
+        let lowered = self.rungs.iter().skip(1).filter(|_| self.pace.budget().is_some());
+        let lowered = lowered.map(|rung| (rung.apply(&settings, voxel), Some(settings.clone())));
+        let switches = variants::switches(&settings, |to| self.controls.switched(to)).into_iter();
+        let next = lowered.chain(switches.map(|variant| (variant.settings, None))).collect();
+        self.stream.warm(next);
         self.warmed = Some(self.controls.settings().clone());
     }
 
@@ -573,21 +602,33 @@ impl Console {
         (self.fixed.warms && self.warmed.is_none() && at > now).then_some(at)
     }
 
-    /// The rung that keeps the frame budget now, and the settings on it.
-    fn effective_settings(&self, now: Instant) -> (usize, Settings) {
-        let rung = self.frame_budget.rung(now).min(self.rungs.len().saturating_sub(1));
-        let voxel = self.stream.scene().map_or(0.5, |scene| scene.grid.pitch[0].min(scene.grid.pitch[1]));
-        let settings = self.controls.settings();
-        let mut effective = match self.rungs.get(rung) {
-            Some(rung) => rung.apply(settings, voxel),
-            None => settings.clone(),
-        };
+    /// The settings of a view at rest.
+    fn full_settings(&self) -> Settings {
+        let mut full = self.controls.settings().clone();
         // A region that grows and a plane that moves show slices that were left out. With all of them processed, dragging needs no frame
         // again.
-        let cuts_planes = effective.mode.is_flat() || effective.layout == Layout::Four;
-        effective.slices.everything |= cuts_planes || matches!(self.controls.tool(), Tool::Region | Tool::Clip);
-        (rung, effective)
+        let cuts_planes = full.mode.is_flat() || full.layout == Layout::Four;
+        full.slices.everything |= cuts_planes || matches!(self.controls.tool(), Tool::Region | Tool::Clip);
+        full
     }
+
+    /// The quality that keeps the frame budget now, and the settings of it.
+    fn effective_settings(&self, now: Instant) -> (Quality, Settings) {
+        let quality = self.pace.quality(now);
+        let voxel = self.stream.scene().map_or(0.5, frame_budget::voxel);
+        let full = self.full_settings();
+        let lowered = match self.rungs.get(quality.rays) {
+            Some(rung) => rung.apply(&full, voxel),
+            None => full,
+        };
+        (quality, frame_budget::shaded(lowered, quality.shading))
+    }
+}
+
+/// True for continuous commands that may leave the rays as they are.
+fn is_of_tone(command: &Command) -> bool {
+    use Command::{MoveCrossing, MoveLight, RotatePlanes, SetSlider, StepPlane, StepSlider};
+    matches!(command, MoveLight(_) | StepPlane(_) | MoveCrossing(_) | RotatePlanes(_) | SetSlider(..) | StepSlider(..))
 }
 
 /// True for commands that a drag or a held key gives repeatedly.
