@@ -9,6 +9,7 @@ pub mod default_look;
 mod echo_levels;
 mod light_lattice;
 pub mod load;
+pub mod marks;
 pub mod planes;
 mod region;
 pub mod self_attenuation;
