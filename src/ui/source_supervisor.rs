@@ -29,14 +29,19 @@ pub enum SourceKind {
 pub(super) type SourceNotice = (&'static str, String, bool);
 
 impl SourceKind {
+    /// What its pictures show, if that is no patient.
+    pub(super) fn origin(self) -> Option<&'static str> {
+        (self == SourceKind::Demo).then_some("Demo data (phantom)")
+    }
+
     /// What there is to say about a source in this state. `disconnected`: why it is not connected. `is_silent`: no frame came for a while in
-    /// which the program could have taken one. `has_drawn`: there is a picture.
+    /// which the program could have taken one. `has_shown`: a volume was shown.
     pub(super) fn notice(
         self,
         state: &SourceState,
         disconnected: Option<&str>,
         is_silent: bool,
-        has_drawn: bool,
+        has_shown: bool,
     ) -> Option<SourceNotice> {
         use SourceKind::{Demo, Pipe, Probe, Recording};
         let waiting = match self {
@@ -61,7 +66,7 @@ impl SourceKind {
                 Pipe => Some(("No frames on standard input", "It is open but nothing comes.".into(), true)),
                 _ => Some(("No frames from the probe", "It is connected but sends nothing.".into(), true)),
             },
-            (SourceState::Open, None) if !has_drawn => Some((waiting, String::new(), false)),
+            (SourceState::Open, None) if !has_shown => Some((waiting, String::new(), false)),
             (SourceState::Open, None) => None,
         }
     }
@@ -244,8 +249,8 @@ mod tests {
 
     #[test]
     fn a_notice_names_what_is_missing() {
-        let title = |kind: SourceKind, state: &SourceState, gone: Option<&str>, is_silent, has_drawn| {
-            kind.notice(state, gone, is_silent, has_drawn).map(|(title, ..)| title)
+        let title = |kind: SourceKind, state: &SourceState, gone: Option<&str>, is_silent, has_shown| {
+            kind.notice(state, gone, is_silent, has_shown).map(|(title, ..)| title)
         };
         let missing = SourceState::Retrying("a.mha: no such file".into());
         for kind in [SourceKind::Demo, SourceKind::Recording, SourceKind::Pipe] {

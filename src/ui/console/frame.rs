@@ -52,8 +52,17 @@ impl Console {
         }
         while let Some(saved) = self.exporter.poll() {
             match saved {
-                Ok(file) => self.notify(&format!("Saved {}", file.display()), false),
-                Err(fault) => self.notify(&format!("Not saved: {fault}"), true),
+                Ok(file) => {
+                    if file.extension().is_some_and(|end| end == "frames") {
+                        self.saved_volume = self.saving_volume.take();
+                        self.request.exit |= std::mem::take(&mut self.leaves_when_saved);
+                    }
+                    self.notify(&format!("Saved {}", file.display()), false);
+                }
+                Err(fault) => {
+                    self.leaves_when_saved = false;
+                    self.notify(&format!("Not saved: {fault}"), true);
+                }
             }
         }
         self.advance_cine(now);
@@ -298,7 +307,7 @@ impl Console {
         let exit_key = match (&self.fixed.exit, self.fixed.is_kiosk) {
             (Some(chord), true) => chord.to_string(),
             (None, true) => String::new(),
-            (_, false) => "Escape, Q".into(),
+            (_, false) => String::new(),
         };
         let state = PanelState {
             controls: &self.controls,
@@ -309,6 +318,10 @@ impl Console {
             // egui panics if a list has a negative height.
             shows_help: self.shows_help && self.size[1] as f32 > MIN_HELP_HEIGHT * self.panels.scale(),
             shows_times: self.shows_times,
+            help_search: self.help_search.as_deref(),
+            saves_bar: self.saves_bar,
+            origin: self.fixed.source.origin(),
+            asks_to_leave: self.asks_to_leave,
             is_frozen: self.stream.is_frozen(),
             is_playing: self.next_cine_step.is_some(),
             cine: (self.stream.cine().volumes().len(), self.stream.cine_position()),
@@ -346,7 +359,8 @@ impl Console {
         }
         let is_silent = now.saturating_duration_since(self.last_arrival) >= SILENCE && !self.stream.is_frozen();
         let (state, gone) = (self.source.state(), self.stream.disconnected());
-        let notice = self.fixed.source.notice(state, gone.as_deref(), is_silent, self.stream.volumes_shown() > 0)?;
+        let has_shown = self.stream.volumes_shown() > 0;
+        let notice = self.fixed.source.notice(state, gone.as_deref(), is_silent, has_shown)?;
         Some(banner(notice.0, &notice.1, notice.2))
     }
 }

@@ -8,7 +8,7 @@ use super::controls::{Change, Controls};
 use super::export::Exporter;
 use super::frame_budget::{self, Pace, Quality, Rung, built_in_ladder};
 use super::gestures::Gestures;
-use super::input::Input;
+use super::input::{Input, Key};
 use super::panels::{self, Note, Panels};
 use super::picking::Viewport;
 use super::source_supervisor::{OpenSource, SourceKind, SourceSupervisor};
@@ -19,12 +19,13 @@ use crate::gpu::{Context, GpuError, TimeStamps, Wake};
 use crate::kiosk::chord::Chord;
 use crate::live::cine::CineLimits;
 use crate::live::{self, Feed, Stream, StreamError, Update};
+use crate::marked;
 use crate::plan::Work;
 use crate::scene::load::Layers;
 use crate::scene::{Layout, Scene, Settings, variants};
 use std::path::PathBuf;
 use std::sync::Arc;
-use std::time::{Duration, Instant};
+use std::time::{Duration, Instant, SystemTime};
 
 /// How long a note is shown.
 const NOTE_TIME: Duration = Duration::from_secs(5);
@@ -36,6 +37,8 @@ const FAULT_CHECK_INTERVAL: Duration = Duration::from_secs(2);
 const MAX_NOTES: usize = 4;
 /// How long after the last input pipelines that may be needed next are compiled.
 const REST_BEFORE_WARMING: Duration = Duration::from_secs(1);
+/// Longest text that the help is searched for, characters.
+const MAX_SEARCH: usize = 40;
 /// Time between two volumes of a cine loop.
 const CINE_INTERVAL: Duration = Duration::from_millis(200);
 
@@ -65,6 +68,8 @@ pub struct ConsoleOptions {
     pub folder: PathBuf,
     /// Draws panels, notes and marks over the picture.
     pub overlay: bool,
+    /// Saves pictures with the patient's sides and a bar: scale, depth, mode, time.
+    pub bar: bool,
     /// Shows sliders and buttons at the start.
     pub panels: bool,
     /// Pixels per point.
@@ -100,6 +105,7 @@ impl Default for ConsoleOptions {
             record: None,
             folder: ".".into(),
             overlay: true,
+            bar: true,
             panels: true,
             scale: 1.0,
             exit: None,
@@ -174,6 +180,17 @@ pub struct Console {
     shows_help: bool,
     shows_times: bool,
     shows_panels: bool,
+    /// Asks whether to save the loop before leaving.
+    /// Saves pictures with a bar.
+    saves_bar: bool,
+    /// What the help is searched for; none while it is not.
+    help_search: Option<String>,
+    asks_to_leave: bool,
+    leaves_when_saved: bool,
+    is_full_screen: bool,
+    /// The newest volume of the loop that is being saved, and of the one that was saved last.
+    saving_volume: Option<u32>,
+    saved_volume: Option<u32>,
     /// Where to draw the pointer, pixels of the window.
     pointer: Option<[f64; 2]>,
     /// When the next volume of the cine loop is due, while it plays.
@@ -222,6 +239,8 @@ struct FixedOptions {
     is_kiosk: bool,
     warms: bool,
     source: SourceKind,
+    /// Everything that arrives is recorded to a file.
+    records: bool,
 }
 
 impl Console {
@@ -231,7 +250,7 @@ impl Console {
         let shows_panels = options.panels && options.overlay;
         let mut controls = Controls::new(options.settings);
         controls.resize(panels::picture_area(size, options.scale, shows_panels).1);
-        let rungs = Arc::new(options.rungs);
+        let (rungs, records) = (Arc::new(options.rungs), options.record.is_some());
         let lowered = options.budget.map(|_| {
             let rungs = rungs.clone();
             Arc::new(move |scene: &Scene| frame_budget::lowered(&rungs, scene)) as live::Lowered
@@ -272,6 +291,7 @@ impl Console {
                 exit: options.exit,
                 warms: options.warms,
                 source: options.source,
+                records,
             },
             size,
             started: now,
@@ -284,6 +304,13 @@ impl Console {
             shows_help: false,
             shows_times: false,
             shows_panels,
+            saves_bar: options.bar,
+            help_search: None,
+            asks_to_leave: false,
+            leaves_when_saved: false,
+            is_full_screen: false,
+            saving_volume: None,
+            saved_volume: None,
             pointer: None,
             next_cine_step: None,
             unsent_input: None,
@@ -397,8 +424,10 @@ impl Console {
         {
             self.request.exit = true;
         }
-        if let Some(command) = self.keys.input(input) {
-            self.execute(&command, now);
+        let is_search = self.search_help(input);
+        if let Some(command) = self.keys.input(input).filter(|_| !is_search) {
+            let command = if self.asks_to_leave { answer(input) } else { Some(command) };
+            command.iter().for_each(|command| self.execute(command, now));
         }
         let area = self.picture_area();
         let at = match input {
@@ -410,12 +439,32 @@ impl Console {
             corner: area.0.map(f64::from),
             size: area.1.map(f64::from),
             scene: self.stream.scene(),
-            is_covered: is_over_panel && self.fixed.overlay,
+            is_covered: self.asks_to_leave || (is_over_panel && self.fixed.overlay),
             now: now.saturating_duration_since(self.started),
         };
         for command in self.gestures.input(input, &on, self.controls.tool(), self.keys.modifiers()) {
             self.execute(&command, now);
         }
+    }
+
+    /// Takes a key for the search of the help. True if it is none of the view's own.
+    fn search_help(&mut self, input: &Input) -> bool {
+        let (true, Input::Key { key, pressed: true }) = (self.shows_help && !self.asks_to_leave, input) else {
+            return false;
+        };
+        let modifiers = self.keys.modifiers();
+        match (&mut self.help_search, key) {
+            (None, Key::Char('/')) => self.help_search = Some(String::new()),
+            (Some(text), Key::Char(letter)) if !modifiers.control && !modifiers.alt => {
+                if text.chars().count() < MAX_SEARCH {
+                    text.push(*letter);
+                }
+            }
+            (Some(text), Key::Space) => text.push(' '),
+            (Some(text), Key::Backspace) => _ = text.pop(),
+            _ => return false,
+        }
+        true
     }
 
     /// Sets where to draw a pointer, pixels, if no windowing system draws one.
@@ -514,16 +563,25 @@ impl Console {
                 };
             }
             Command::SavePicture => self.save_picture(),
-            Command::SaveLoop => self.save_loop(),
-            Command::ToggleHelp => self.shows_help = !self.shows_help,
+            Command::SaveLoop => _ = self.save_loop(),
+            Command::ToggleHelp => (self.shows_help, self.help_search) = (!self.shows_help, None),
+            Command::SearchHelp => self.help_search = Some(String::new()),
+            Command::SavesBar(saves_bar) => self.saves_bar = saves_bar,
             Command::ToggleTimes => self.shows_times = !self.shows_times,
             Command::TogglePanels => {
                 self.shows_panels = !self.shows_panels && self.fixed.overlay;
                 self.resize_picture();
             }
             Command::ToggleFullScreen => self.request.toggle_full_screen |= !self.fixed.is_kiosk,
+            Command::Back => self.go_back(),
             // A kiosk ends only with its exit keys: a sleeve may press Escape.
-            Command::Exit => self.request.exit |= !self.fixed.is_kiosk,
+            Command::Exit if self.fixed.is_kiosk => {}
+            Command::Exit if self.has_unsaved_loop() => self.asks_to_leave = true,
+            Command::Exit | Command::Discard => self.request.exit |= !self.fixed.is_kiosk,
+            Command::SaveAndExit => {
+                self.asks_to_leave = false;
+                self.leaves_when_saved = self.save_loop();
+            }
             _ => {}
         }
     }
@@ -548,15 +606,70 @@ impl Console {
 
     fn save_picture(&mut self) {
         let picture = match self.stream.renderer().filter(|renderer| renderer.has_drawn()) {
-            Some(renderer) => renderer.end_picture().map_err(|e| e.to_string()),
+            Some(renderer) => match renderer.end_picture() {
+                Ok(picture) => Ok((picture, renderer.scene().clone())),
+                Err(fault) => Err(fault.to_string()),
+            },
             None => Err("there is no picture yet".into()),
         };
-        if let Err(fault) = picture.and_then(|picture| self.exporter.picture(picture)) {
+        let (has_bar, time) = (self.saves_bar, marked::time_line(SystemTime::now()));
+        let origin = self.fixed.source.origin();
+        let saved = picture.and_then(|(picture, scene)| {
+            self.exporter.picture(move || match has_bar {
+                true => marked::marked(&picture, &scene, &time, origin),
+                false => Ok(picture),
+            })
+        });
+        if let Err(fault) = saved {
             self.notify(&format!("The picture was not saved: {fault}"), true);
         }
     }
 
-    fn save_loop(&mut self) {
+    /// Closes the uppermost of what is open; else leaves full screen; else leaves the program.
+    fn go_back(&mut self) {
+        if self.asks_to_leave {
+            self.asks_to_leave = false;
+        } else if self.help_search.is_some() {
+            self.help_search = None;
+        } else if self.shows_help {
+            self.shows_help = false;
+        } else if self.shows_times {
+            self.shows_times = false;
+        } else if self.is_full_screen && !self.fixed.is_kiosk {
+            self.request.toggle_full_screen = true;
+        } else {
+            self.execute_own(&Command::Exit, Instant::now());
+        }
+    }
+
+    /// True if volumes of the loop exist nowhere else: neither in a file that they were read from or recorded to, nor in one that was saved.
+    fn has_unsaved_loop(&self) -> bool {
+        let is_only_here = matches!(self.fixed.source, SourceKind::Probe | SourceKind::Pipe) && !self.fixed.records;
+        let newest = self.stream.cine().volumes().back().map(|kept| kept.volume);
+        is_only_here && newest.is_some() && newest != self.saved_volume
+    }
+
+    /// The user asked the windowing system to close the window: asks first if that loses a loop. False if it may be closed at once.
+    pub(super) fn asks_before_closing(&mut self) -> bool {
+        if self.asks_to_leave || !self.has_unsaved_loop() {
+            return false;
+        }
+        (self.asks_to_leave, self.needs_redraw) = (true, true);
+        true
+    }
+
+    /// Tells whether the window fills the screen and can leave it.
+    pub fn set_full_screen(&mut self, is_full_screen: bool) {
+        self.is_full_screen = is_full_screen;
+    }
+
+    /// True while the console asks whether to save the loop before it leaves.
+    pub fn asks_to_leave(&self) -> bool {
+        self.asks_to_leave
+    }
+
+    /// Saves the cine loop. False if it cannot be.
+    fn save_loop(&mut self) -> bool {
         let volumes: Vec<_> = self.stream.cine().volumes().iter().cloned().collect();
         let saved = match self.stream.header() {
             Some(header) if !volumes.is_empty() => {
@@ -565,9 +678,11 @@ impl Console {
             }
             _ => Err("there are no volumes yet".into()),
         };
-        if let Err(fault) = saved {
+        self.saving_volume = self.stream.cine().volumes().back().map(|kept| kept.volume).filter(|_| saved.is_ok());
+        if let Err(fault) = &saved {
             self.notify(&format!("The loop was not saved: {fault}"), true);
         }
+        saved.is_ok()
     }
 
     /// Leaves the processor to what the user asks for.
@@ -622,6 +737,16 @@ impl Console {
             None => full,
         };
         (quality, frame_budget::shaded(lowered, quality.shading))
+    }
+}
+
+/// The command of a key while the console asks whether to save the loop before it leaves.
+fn answer(input: &Input) -> Option<Command> {
+    match input {
+        Input::Key { key: Key::Enter, .. } => Some(Command::SaveAndExit),
+        Input::Key { key: Key::Char('l'), .. } => Some(Command::Discard),
+        Input::Key { key: Key::Escape, .. } => Some(Command::Back),
+        _ => None,
     }
 }
 

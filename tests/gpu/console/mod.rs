@@ -53,6 +53,7 @@ pub fn options() -> ConsoleOptions {
         record: None,
         folder: std::env::temp_dir(),
         overlay: true,
+        bar: false,
         panels: false,
         scale: 1.0,
         exit: None,
