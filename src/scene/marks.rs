@@ -131,7 +131,7 @@ impl Scene {
         let probe = match marks.probe {
             ProbeMarker::First => last.map(Edge::opposite),
             ProbeMarker::Last => last,
-            ProbeMarker::None => None,
+            ProbeMarker::Hidden => None,
         };
         (letters, probe)
     }

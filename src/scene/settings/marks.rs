@@ -28,8 +28,8 @@ pub enum ProbeMarker {
     First,
     /// At the last scan line.
     Last,
-    /// Not shown.
-    None,
+    /// It is not shown.
+    Hidden,
 }
 
 /// The sides of the patient at the two ends of an axis.

@@ -45,8 +45,9 @@ pub(super) fn paint(ui: &Ui, state: &PanelState, scale: f32) {
         colours(&painter, picture, scene);
     }
     if let Some(origin) = state.origin {
-        let at = picture.center_top() + vec2(0.0, 8.0);
-        text(&painter, at, Align2::CENTER_TOP, origin, WARNING);
+        // Between the letter of the upper edge and a marker in the corner.
+        let at = picture.right_top() + vec2(-32.0, 6.0);
+        text(&painter, at, Align2::RIGHT_TOP, origin, WARNING);
     }
 }
 
@@ -150,7 +151,7 @@ fn axes(painter: &Painter, area: Rect, scene: &Scene) {
         // An axis along the view is too short for a name.
         if arm.length() > 9.0 {
             // A single letter would be read as a side of the patient.
-            let out = arm.normalized() * 12.0;
+            let out = arm.normalized() * vec2(10.0 + 3.5 * name.len() as f32, 12.0);
             text(painter, centre + arm + out, Align2::CENTER_CENTER, name, colour);
         }
     }

@@ -175,7 +175,7 @@ pub(super) fn show_controls(ui: &mut Ui, state: &PanelState, width: f32, execute
                     Colour::Map(map) => execute(Command::ColourMap(map)),
                 },
             );
-            let is_lit = settings.mode == Mode::Surface || settings.light.shadow.is_some();
+            let is_lit = SLIDERS.iter().any(|slider| slider.name == "Shadow" && slider.applies(settings));
             if is_lit {
                 let mut on = settings.light.shadow.is_some_and(|shadow| shadow.strength > 0.0);
                 if switch(ui, &mut on, "Cast shadows", "The lamp casts shadows on the surface.") {
