@@ -1,7 +1,7 @@
 //! Plans a scene: which passes and slots it needs, and after a change of scene, what has to run again. Needs no GPU.
 
 use crate::passes::slots::frames_per_batch;
-use crate::passes::{DispatchArgs, Frequency, PASSES, Part, Pass, Slot, chain};
+use crate::passes::{DispatchArgs, Frequency, PASSES, Part, Pass, Slot, Stage, chain};
 use crate::scene::Scene;
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
@@ -31,7 +31,40 @@ pub enum Rerun {
     Steps { steps: Vec<usize>, slots: Vec<Slot> },
 }
 
+/// How much of a picture a change draws again, from the least to the most.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Work {
+    /// Planes beside a rendering, and stage 4: both take little time.
+    Tone,
+    /// Stage 3, on the distance map as it is.
+    Shading,
+    /// Rays are cast.
+    Rays,
+}
+
+impl Work {
+    /// What a change from `before` to `after` draws again.
+    pub fn between(before: &Scene, after: &Scene) -> Work {
+        let plan = Plan::new(after);
+        match plan.rerun(before, after) {
+            Rerun::Steps { steps, .. } => plan.work(after, steps),
+            Rerun::Frames | Rerun::Everything => Work::Rays,
+        }
+    }
+}
+
 impl Plan {
+    /// How much of a picture these steps draw, by their index in [`Plan::steps`].
+    pub fn work(&self, scene: &Scene, steps: impl IntoIterator<Item = usize>) -> Work {
+        let work_of = |step: &Step| match step.pass.stage {
+            Stage::Raycast if step.pass.name.starts_with("raycast_planes") && !scene.is_flat() => Work::Tone,
+            Stage::Preprocess | Stage::Raycast => Work::Rays,
+            Stage::Shade => Work::Shading,
+            Stage::Postprocess => Work::Tone,
+        };
+        steps.into_iter().filter_map(|i| self.steps.get(i)).map(work_of).max().unwrap_or(Work::Tone)
+    }
+
     /// The plan of a scene.
     pub fn new(scene: &Scene) -> Plan {
         let mut steps = Vec::new();

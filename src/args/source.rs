@@ -14,6 +14,8 @@ use crate::source::motor_tracking::FreeRunning;
 use crate::source::phantom::{self, CachedPhantom, Phantom};
 use crate::source::piped::Piped;
 use crate::terminal::{Failure, failed, input};
+#[cfg(feature = "view")]
+use crate::ui::source_supervisor::SourceKind;
 use clap::Parser;
 use std::path::Path;
 
@@ -92,6 +94,17 @@ impl SourceArgs {
     /// True if the source is the built-in phantom.
     pub fn is_phantom(&self) -> bool {
         self.source == "phantom"
+    }
+
+    /// Where the frames come from.
+    #[cfg(feature = "view")]
+    pub fn kind(&self) -> SourceKind {
+        match self.source.as_str() {
+            _ if self.is_phantom() => SourceKind::Demo,
+            "-" => SourceKind::Pipe,
+            source if source.starts_with(NETWORK) => SourceKind::Probe,
+            _ => SourceKind::Recording,
+        }
     }
 
     /// The name of the source for messages.

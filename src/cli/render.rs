@@ -9,6 +9,7 @@ use crate::error_report::{Measure, choose, map};
 use crate::files;
 use crate::gpu::shader_reload::ShaderFolder;
 use crate::gpu::{Bands, Context, GpuError, Renderer, RendererOptions, TimeStamps};
+use crate::marked;
 use crate::passes::{PassTime, Slot, Texels};
 use crate::picture::Picture;
 use crate::plan::Plan;
@@ -19,6 +20,7 @@ use crate::source::{Frame, Source};
 use crate::terminal::{Failure, failed, input, remark, say};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
+use std::time::SystemTime;
 
 #[derive(clap::Args)]
 #[command(
@@ -112,7 +114,7 @@ impl Render {
             }
         };
         let compared = finer.map(|finer| (scene, finer));
-        picture.save(&self.output).map_err(failed)?;
+        self.save(&picture, renderer.scene())?;
         say!("picture: {}", self.output.display());
         let measured = renderer.take_times().map_err(failed)?;
         self.judge_budget(&measured)?;
@@ -136,6 +138,17 @@ impl Render {
         match context.messages().first() {
             None => Ok(()),
             Some(first) => Err(failed(format!("validation: {first}"))),
+        }
+    }
+
+    /// Saves the picture, with its marks if the settings ask for them.
+    fn save(&self, picture: &Picture, scene: &Scene) -> Result<(), Failure> {
+        match scene.settings.marks.bar {
+            false => picture.save(&self.output).map_err(failed),
+            true => {
+                let marked = marked::marked(picture, scene, &marked::time_line(SystemTime::now()), None);
+                marked.and_then(|marked| marked.save(&self.output)).map_err(failed)
+            }
         }
     }
 

@@ -10,7 +10,7 @@ use crate::source::live::Live;
 use crate::terminal::{Failure, failed, input};
 use crate::ui::console::{Console, ConsoleOptions, StartupFault};
 use crate::ui::frame_budget::{Rung, built_in_ladder, measured_ladder};
-use crate::ui::source_supervisor::OpenSource;
+use crate::ui::source_supervisor::{OpenSource, SourceKind};
 use crate::ui::window::{self, MakeConsole, WindowOptions};
 use std::path::Path;
 use std::sync::{Arc, Mutex};
@@ -141,6 +141,8 @@ impl ConsoleConfig {
 
     /// The arguments of the console: how to open the source, and its options. `factor`: pixels per point of the window system.
     pub fn options(self, factor: f32, wake: Wake, startup_fault: Option<StartupFault>) -> (OpenSource, ConsoleOptions) {
+        let scale = self.options.scale * factor;
+        let kind = self.source.as_ref().map_or(SourceKind::default(), SourceArgs::kind);
         let (source, first) = (self.source, Mutex::new(self.first));
         let open: OpenSource = Arc::new(move || match first.lock().unwrap_or_else(|e| e.into_inner()).take() {
             Some(source) => Ok(source),
@@ -149,8 +151,7 @@ impl ConsoleConfig {
                 None => Err("there is no source".into()),
             },
         });
-        let scale = self.options.scale * factor;
-        (open, ConsoleOptions { scale, wake, startup_fault, ..self.options })
+        (open, ConsoleOptions { scale, source: kind, wake, startup_fault, ..self.options })
     }
 }
 

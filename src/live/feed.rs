@@ -53,6 +53,8 @@ struct Queue {
     newest: Option<u32>,
     /// A frame of this volume was lost. Its remaining frames are of no use.
     lost_volume: Option<u32>,
+    /// Why the source is not connected at the moment.
+    disconnected: Option<String>,
 }
 
 fn bytes_of(event: &Event) -> usize {
@@ -65,6 +67,15 @@ fn bytes_of(event: &Event) -> usize {
 impl Shared {
     fn lock(&self) -> MutexGuard<'_, Queue> {
         self.queue.lock().unwrap_or_else(|e| e.into_inner())
+    }
+
+    fn set_disconnected(&self, why: Option<String>) {
+        let mut queue = self.lock();
+        if queue.disconnected != why {
+            queue.disconnected = why;
+            drop(queue);
+            self.wake.iter().for_each(|wake| wake());
+        }
     }
 
     /// Adds an event. For a frame, waits until it fits, or loses it together with the rest of its volume. Other events are never lost.
@@ -146,6 +157,11 @@ impl Feed {
         self.shared.lock().events.len()
     }
 
+    /// Why the source is not connected at the moment, on one line; None while it is.
+    pub fn disconnected(&self) -> Option<String> {
+        self.shared.lock().disconnected.clone()
+    }
+
     /// Number of frames that could not be recorded, and of other failures of the recording.
     pub fn unrecorded(&self) -> u64 {
         self.shared.unrecorded.load(Ordering::Relaxed)
@@ -179,6 +195,7 @@ fn listen(mut source: Box<dyn Live>, mut tap: Option<RecordingTap>, shared: &Sha
     while !shared.stop.load(Ordering::Relaxed) {
         let event = source.next(PATIENCE);
         let at = Instant::now();
+        shared.set_disconnected(source.disconnected());
         let is_frame = matches!(event, Event::Frame(_) | Event::Lines { .. });
         if records && is_frame && tap.is_none() {
             shared.unrecorded.fetch_add(1, Ordering::Relaxed);

@@ -6,7 +6,7 @@ use super::statistics::Statistics;
 use super::volume_pool::{Update, VolumePool};
 use crate::gpu::{GpuError, Renderer, SceneMaker};
 use crate::picture::Picture;
-use crate::plan::Rerun;
+use crate::plan::{Rerun, Work};
 use crate::probe::Geometry;
 use crate::scene::{Input, Scene, SceneError, Settings};
 use crate::source::recorder::Header;
@@ -28,6 +28,8 @@ pub struct FinishedPicture {
     pub latency: Duration,
     /// From the beginning of its drawing to now.
     pub took: Duration,
+    /// How much of it was drawn again.
+    pub work: Work,
 }
 
 /// The scenes of a stream: one for each direction of the sweep, and mixtures of both for rolling volumes. All see the same visible
@@ -52,6 +54,30 @@ impl Views {
         backward.visible_bounds = forward.visible_bounds;
         let is_directional = header.forward != header.backward;
         Ok(Views { forward, backward, is_directional, is_mixed: is_directional && update == Update::Rolling })
+    }
+
+    /// The same with a stage 1 that also serves pictures of `full`, and of what `lowered` makes of that scene. What of it cannot be drawn is
+    /// left out.
+    ///
+    /// # Errors
+    /// Settings that this geometry cannot be drawn with.
+    pub fn sharing(
+        self,
+        header: &Header,
+        full: &Settings,
+        lowered: &dyn Fn(&Scene) -> Vec<Settings>,
+    ) -> Result<Views, SceneError> {
+        let input = Input { stored: header.stored, range: header.range };
+        let scene = |geometry: &Geometry, of: &Settings| Scene::new(geometry.clone(), input, of.clone());
+        let mut geometries = vec![&header.forward];
+        geometries.extend(self.is_directional.then_some(&header.backward));
+        let full = scene(&header.forward, full)?;
+        let others = lowered(&full);
+        let others: Vec<Scene> =
+            geometries.into_iter().flat_map(|g| others.iter().filter_map(|s| scene(g, s).ok())).collect();
+        let others: Vec<&Scene> = others.iter().chain([&self.forward, &self.backward]).collect();
+        let (forward, backward) = (self.forward.clone(), self.backward.clone());
+        Ok(Views { forward: forward.sharing(&full, &others), backward: backward.sharing(&full, &others), ..self })
     }
 
     /// The scene that the first frames are filtered for. The filters are the same in all of them.
@@ -279,7 +305,8 @@ impl Session {
         arrived.iter().for_each(|at| statistics.record_latency(now.saturating_duration_since(*at)));
         statistics.pictures += 1;
         let latency = arrived.iter().max().map_or(Duration::ZERO, |at| now.saturating_duration_since(*at));
-        Ok(FinishedPicture { volume, picture, latency, took: now.saturating_duration_since(self.begun) })
+        let (took, work) = (now.saturating_duration_since(self.begun), self.renderer.drawn_work());
+        Ok(FinishedPicture { volume, picture, latency, took, work })
     }
 
     /// Starts to send a volume again, instead of one that is being sent. Without a free volume image nothing happens.

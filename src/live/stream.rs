@@ -44,7 +44,13 @@ pub struct StreamOptions {
     pub shaders: Option<Arc<ShaderFolder>>,
     /// What was chosen: settings that nobody chose follow from the geometry and the first whole volume. None: the settings are complete.
     pub chosen: Option<Layers>,
+    /// Other settings that the pictures of a volume are drawn with in turn, from the scene at full quality: stage 1 serves them too, so that
+    /// a change among them sends no frame again.
+    pub lowered: Option<Lowered>,
 }
+
+/// The settings that a scene at full quality is drawn with while the view moves.
+pub type Lowered = Arc<dyn Fn(&Scene) -> Vec<Settings> + Send + Sync>;
 
 impl Default for StreamOptions {
     fn default() -> StreamOptions {
@@ -58,6 +64,7 @@ impl Default for StreamOptions {
             time_stamps: TimeStamps::default(),
             shaders: None,
             chosen: None,
+            lowered: None,
         }
     }
 }
@@ -89,6 +96,8 @@ pub struct Stream {
     context: Arc<Context>,
     feed: Feed,
     settings: Settings,
+    /// The settings at full quality, if [`Stream::settings`] are lowered ones.
+    full: Option<Settings>,
     options: StreamOptions,
     first_volume: Option<FirstVolume>,
     /// What settings follow from, found and not yet returned by [`Stream::take_found`].
@@ -125,6 +134,7 @@ impl Stream {
             context: context.clone(),
             feed,
             settings,
+            full: None,
             first_volume: options.chosen.clone().map(FirstVolume::new),
             found: None,
             options,
@@ -216,7 +226,7 @@ impl Stream {
             Begun::Refused(fault) => {
                 // Another geometry or device does not try the refused settings again.
                 if session.pending.is_none() {
-                    self.settings = session.views.first().settings.clone();
+                    (self.settings, self.full) = (session.views.first().settings.clone(), None);
                 }
                 return Ok(Step::Fault(fault));
             }
@@ -371,13 +381,14 @@ impl Stream {
         let found = self.first_volume.as_mut().and_then(|search| search.begin(&header));
         if let Some(settings) = found.as_ref().and_then(|found| found.settings().ok()) {
             self.settings = Settings { picture: self.settings.picture.clone(), ..settings };
+            self.full = None;
             self.found = found;
         }
         // Freed before the new one is created: both may not fit into device memory.
         if let Some(Session { pool, .. }) = session {
             self.previous_pool = Some(pool);
         }
-        let views = Views::new(&header, &self.settings, self.options.update)?;
+        let views = views(&header, &self.settings, self.full.as_ref(), &self.options)?;
         if let Some(cut) = views.first().probe().and_then(Probe::folded) {
             tracing::warn!("{cut}");
         }
@@ -426,10 +437,22 @@ impl Stream {
     /// Settings that the geometry cannot be drawn with; the previous ones remain. What only the device refuses is reported by a later
     /// [`Step::Fault`].
     pub fn change(&mut self, settings: Settings) -> Result<(), StreamError> {
+        self.change_to(settings, None)
+    }
+
+    /// As [`Stream::change`], to settings that are lowered from `full` for a while.
+    ///
+    /// # Errors
+    /// As for [`Stream::change`].
+    pub fn lower(&mut self, settings: Settings, full: Settings) -> Result<(), StreamError> {
+        self.change_to(settings, Some(full))
+    }
+
+    fn change_to(&mut self, settings: Settings, full: Option<Settings>) -> Result<(), StreamError> {
         if let (Some(session), Some(header)) = (&mut self.session, &self.header) {
-            session.pending = Pending::Ready(Views::new(header, &settings, self.options.update)?);
+            session.pending = Pending::Ready(views(header, &settings, full.as_ref(), &self.options)?);
         }
-        self.settings = settings;
+        (self.settings, self.full) = (settings, full);
         Ok(())
     }
 
@@ -489,12 +512,16 @@ impl Stream {
     /// Compiles in the background, while nothing else is to be compiled, what these settings would need, in this order, instead of those
     /// given before. Settings that cannot be drawn are left out. Nothing happens before the first header, and without
     /// [`StreamOptions::wake`].
-    pub fn warm(&mut self, next: Vec<Settings>) {
+    /// Each comes with the settings at full quality that it is lowered from, if it is.
+    pub fn warm(&mut self, next: Vec<(Settings, Option<Settings>)>) {
         let (Some(session), Some(header)) = (&mut self.session, &self.header) else { return };
-        let (header, update) = (Arc::new(header.clone()), self.options.update);
-        let scenes = next.into_iter().map(|settings| {
-            let (header, backward) = (header.clone(), session.swept_backward().to_vec());
-            let make = move || Some(Views::new(&header, &settings, update).ok()?.of(&backward).into_owned());
+        let (header, options) = (Arc::new(header.clone()), self.options.clone());
+        let scenes = next.into_iter().map(|(settings, full)| {
+            let (header, options, backward) = (header.clone(), options.clone(), session.swept_backward().to_vec());
+            let make = move || {
+                let views = views(&header, &settings, full.as_ref(), &options).ok()?;
+                Some(views.of(&backward).into_owned())
+            };
             Box::new(make) as SceneMaker
         });
         let scenes = scenes.collect();
@@ -524,6 +551,11 @@ impl Stream {
     /// True while a picture is being drawn.
     pub fn is_drawing(&self) -> bool {
         self.session.as_ref().is_some_and(|session| session.phase.is_drawing())
+    }
+
+    /// Why the source is not connected at the moment, on one line; None while it is.
+    pub fn disconnected(&self) -> Option<String> {
+        self.feed.disconnected()
     }
 
     /// True if events of the source are queued.
@@ -616,5 +648,19 @@ impl Stream {
     /// The renderer, to read pictures and volumes from it; none before the first frame.
     pub fn renderer(&mut self) -> Option<&mut Renderer> {
         self.session.as_mut().map(|session| &mut session.renderer)
+    }
+}
+
+/// The views of settings, which may be lowered from `full`.
+fn views(
+    header: &Header,
+    settings: &Settings,
+    full: Option<&Settings>,
+    options: &StreamOptions,
+) -> Result<Views, SceneError> {
+    let views = Views::new(header, settings, options.update)?;
+    match &options.lowered {
+        Some(lowered) => views.sharing(header, full.unwrap_or(settings), &**lowered),
+        None => Ok(views),
     }
 }

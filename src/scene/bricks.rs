@@ -112,7 +112,8 @@ impl Scene {
         }
         let count = count(edge);
         // One brick more on each side than samples reach.
-        let (first, last) = match marched_box(self) {
+        let marched = self.shared.as_ref().map_or_else(|| marched_box(self), |shared| shared.marched);
+        let (first, last) = match marched {
             Some((from, to)) => {
                 let first = (((from - low) / edge).floor() - 1.0).clamp(DVec3::ZERO, count - 1.0);
                 (first, (((to - low) / edge).ceil() + 1.0).clamp(first + 1.0, count))
@@ -152,8 +153,9 @@ impl Scene {
     }
 
     /// Reach of the sliding filter around a sample, mm: its taps along the ray, and the same distance to both sides.
-    fn tap_reach(&self) -> f64 {
-        reach(self, self.step.max(self.ring.step), self.settings.ray.sliding / 2) * 3f64.sqrt()
+    pub(super) fn tap_reach(&self) -> f64 {
+        let own = reach(self, self.step.max(self.ring.step), self.settings.ray.sliding / 2) * 3f64.sqrt();
+        self.shared.as_ref().map_or(own, |shared| shared.taps)
     }
 
     /// The values, apart from the geometry, that determine the brick tables. Equal keys give equal tables.

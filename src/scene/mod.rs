@@ -9,6 +9,7 @@ pub mod default_look;
 mod echo_levels;
 mod light_lattice;
 pub mod load;
+pub mod marks;
 pub mod planes;
 mod region;
 pub mod self_attenuation;
@@ -24,7 +25,7 @@ pub use echo_levels::{EchoHistogram, EchoLevels};
 pub use light_lattice::{LightLattice, Propagation};
 pub use region::insonified_box;
 pub use settings::*;
-pub use visible_bounds::{Rectangle, VisibleBounds};
+pub use visible_bounds::{Rectangle, Shared, VisibleBounds};
 
 use crate::probe::{Array, Geometry, Probe};
 use crate::source::StoredType;
@@ -179,6 +180,8 @@ pub struct Scene {
     pub visible_bounds: visible_bounds::VisibleBounds,
     /// What a renderer stores beyond what this scene shows, from an earlier scene: [`Scene::keeping`].
     pub kept_bounds: visible_bounds::VisibleBounds,
+    /// What stage 1 prepares for other pictures of the same volume: [`Scene::sharing`].
+    pub shared: Option<Shared>,
 }
 
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -283,6 +286,7 @@ impl Scene {
             found: Vec::new(),
             visible_bounds: VisibleBounds::default(),
             kept_bounds: VisibleBounds::default(),
+            shared: None,
         };
         for (axis, field) in
             ["slices.smooth.lateral", "slices.smooth.depth", "slices.smooth.elevation"].iter().enumerate()
@@ -653,7 +657,8 @@ impl Scene {
         // A moving view, whose rays are fewer, uses the same sampling and bricks as a still one.
         let rays: u64 = camera::full_size(&self.settings).iter().map(|n| u64::from(*n)).product();
         // Mean ray length: half the diagonal of the box, since some rays miss it and some end early.
-        rays as f64 * 0.5 * (self.high - self.low).length() / self.step
+        rays as f64 * 0.5 * (self.high - self.low).length()
+            / self.shared.as_ref().map_or(self.step, |shared| shared.step)
     }
 
     fn visible_texels(&self) -> f64 {

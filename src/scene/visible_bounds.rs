@@ -48,6 +48,17 @@ impl VisibleBounds {
     }
 }
 
+/// What stage 1 prepares for the pictures of a volume that are drawn in turn: those of a view at rest and of the same view in motion.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Shared {
+    /// Step along a ray of the picture at rest, mm.
+    pub(super) step: f64,
+    /// Corners of the box that holds every sample of every ray, mm in space; none if it may grow at any time, or no ray is cast.
+    pub(super) marched: Option<(DVec3, DVec3)>,
+    /// Longest reach of the sliding filter, mm.
+    pub(super) taps: f64,
+}
+
 /// Columns and rows of a slice.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Rectangle {
@@ -121,6 +132,21 @@ impl Scene {
         let is_held = shown.visible_bounds.is_empty() || stored.holds(&shown.stored_bounds());
         let is_kept = shown.volume_size() == before.volume_size() && is_held;
         Scene { kept_bounds: if is_kept { stored } else { VisibleBounds::default() }, ..shown }
+    }
+
+    /// The scene with a stage 1 that serves `full`, itself and `others`, scenes of the same volume and the same filters. What follows from the
+    /// number of samples follows from those of `full`, so that no change among them sends a frame again.
+    pub fn sharing(self, full: &Scene, others: &[&Scene]) -> Scene {
+        let all = || others.iter().copied().chain([full, &self]);
+        let visible_bounds = all().map(|scene| scene.visible_bounds).fold(self.visible_bounds, VisibleBounds::with);
+        // None is a box that may grow at any time.
+        let marched = all().map(marched_box).reduce(|a, b| {
+            let ((a, b), (c, d)) = (a?, b?);
+            Some((a.min(c), b.max(d)))
+        });
+        let taps = all().map(Scene::tap_reach).fold(0.0, f64::max);
+        let shared = Shared { step: full.step, marched: marched.flatten(), taps };
+        Scene { visible_bounds, shared: Some(shared), ..self }
     }
 
     /// Share of the volume's texels within the visible bounds.

@@ -31,6 +31,11 @@ pub trait Live: Send {
     /// True if the source loses nothing when it is not asked for a while, as a file or a pipe. Otherwise complete volumes are lost
     /// instead when the caller is slow.
     fn can_wait(&self) -> bool;
+
+    /// Why nothing can arrive at the moment, on one line, such as a connection that was refused. None while the source is connected.
+    fn disconnected(&self) -> Option<String> {
+        None
+    }
 }
 
 /// When the frames of a file arrive.

@@ -39,6 +39,8 @@ pub enum Command {
     RotatePlanes([f64; 2]),
     /// Sets a slider, by its index in [`super::sliders::SLIDERS`], to a value.
     SetSlider(usize, f64),
+    /// Sets a slider to the value of the start.
+    ResetSlider(usize),
     /// Moves a slider by a number of its steps.
     StepSlider(usize, i32),
     Transfer(TransferName),
@@ -58,12 +60,23 @@ pub enum Command {
     /// Saves the volumes of the cine loop as a recording.
     SaveLoop,
     ToggleHelp,
+    /// Starts a search of the help.
+    SearchHelp,
+    /// Saves pictures with a bar, or without.
+    SavesBar(bool),
     /// Shows or hides the times of the passes.
     ToggleTimes,
     /// Shows or hides sliders and buttons.
     TogglePanels,
     ToggleFullScreen,
+    /// Closes what is open, else leaves full screen, else leaves the program.
+    Back,
+    /// Leaves the program. If that loses a loop, asks first.
     Exit,
+    /// Saves the cine loop, and leaves the program when it is saved.
+    SaveAndExit,
+    /// Leaves the program without another question.
+    Discard,
 }
 
 /// What a drag on the picture does.
@@ -188,7 +201,7 @@ pub const KEY_BINDINGS: &[Binding] = &[
     on(Function(2), "times of the passes", Command::ToggleTimes),
     on(Function(3), "sliders", Command::TogglePanels),
     on(Function(11), "full screen", Command::ToggleFullScreen),
-    on(Key::Escape, "quit", Command::Exit),
+    on(Key::Escape, "close what is open, leave full screen, quit", Command::Back),
     on(Char('q'), "quit", Command::Exit),
 ];
 

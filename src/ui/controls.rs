@@ -89,6 +89,15 @@ impl Controls {
         }
     }
 
+    /// The settings of the start as they would be in the current mode.
+    fn switched_start(&self) -> Settings {
+        let other = in_mode_of(&self.start, &self.settings);
+        match &self.defaults {
+            Some(defaults) => defaults.switched(&self.start, other),
+            None => other,
+        }
+    }
+
     /// Sets width and height of the picture, pixels. The minimum is 64, so that a sheet of tiles has a pixel for each tile; a smaller
     /// window shows the picture scaled down.
     pub(super) fn resize(&mut self, size: [u32; 2]) {
@@ -117,10 +126,15 @@ impl Controls {
             | Command::SavePicture
             | Command::SaveLoop
             | Command::ToggleHelp
+            | Command::SearchHelp
+            | Command::SavesBar(_)
             | Command::ToggleTimes
             | Command::TogglePanels
             | Command::ToggleFullScreen
-            | Command::Exit => return Change::Caller(*command),
+            | Command::Back
+            | Command::Exit
+            | Command::SaveAndExit
+            | Command::Discard => return Change::Caller(*command),
             _ => {}
         }
         // The scene lags behind if several commands come between two pictures: each one builds on the settings of the one before.
@@ -206,6 +220,11 @@ impl Controls {
                 new.planes.tilt = view::wrap_degrees(new.planes.tilt + by[1]);
             }
             Command::SetSlider(index, value) => set_slider(&mut new, now, index, value)?,
+            Command::ResetSlider(index) => {
+                let start = self.switched_start();
+                let slider = SLIDERS.get(index).filter(|slider| slider.applies(&start))?;
+                set_slider(&mut new, now, index, slider.get(&start))?;
+            }
             Command::StepSlider(index, steps) => {
                 let slider = SLIDERS.get(index)?;
                 let value = slider.get(&new) + f64::from(steps) * slider.step;

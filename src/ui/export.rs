@@ -35,12 +35,15 @@ impl Exporter {
         Some(done)
     }
 
-    /// Saves a picture as PNG.
+    /// Saves a picture as PNG, which `make` makes in the background.
     ///
     /// # Errors
     /// Too many files are being saved, or no thread can be started.
-    pub(super) fn picture(&mut self, picture: Picture) -> Result<(), String> {
-        self.save("png", move |file| picture.save(file))
+    pub(super) fn picture(
+        &mut self,
+        make: impl FnOnce() -> Result<Picture, String> + Send + 'static,
+    ) -> Result<(), String> {
+        self.save("png", move |file| make()?.save(file))
     }
 
     /// Saves volumes as a recording of frames.
@@ -130,12 +133,13 @@ mod tests {
         let picture = Picture { width: 2, height: 1, rgba: vec![1, 2, 3, 255, 4, 5, 6, 255] };
         let folder = std::env::temp_dir().join(format!("echolume-saved-{}", std::process::id()));
         let mut exporter = Exporter::new(folder.clone(), Arc::new(|| ()));
-        exporter.picture(picture.clone()).expect("thread");
+        let same = picture.clone();
+        exporter.picture(move || Ok(same)).expect("thread");
         let file = wait(&mut exporter).expect("saved");
         assert_eq!(Picture::load(&file).expect("picture"), picture);
         std::fs::remove_dir_all(&folder).expect("folder");
         let mut nowhere = Exporter::new(PathBuf::from("/dev/null/pictures"), Arc::new(|| ()));
-        nowhere.picture(picture).expect("thread");
+        nowhere.picture(move || Ok(picture)).expect("thread");
         assert!(wait(&mut nowhere).unwrap_err().contains("/dev/null/pictures"));
     }
 }

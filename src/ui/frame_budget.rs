@@ -5,8 +5,9 @@
 //! the built-in ones, which were found to cost the least error for the time that they save.
 
 use crate::error_report::{Combination, Measure, Report, choose};
+use crate::plan::Work;
 use crate::scene::load::Layers;
-use crate::scene::{Settings, Transfer};
+use crate::scene::{Ray, Scene, Settings, Transfer};
 use std::time::{Duration, Instant};
 
 /// The view is at rest so long after its last movement.
@@ -19,6 +20,114 @@ const MARGIN: f64 = 0.85;
 const FORGET_AFTER: u32 = 32;
 /// Pictures on a rung before a better one is tried.
 const MIN_PICTURES: u32 = 4;
+
+/// What is left out of a picture: the rungs of the two ladders, 0 for full quality.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Quality {
+    /// Of the rays and of all that follows.
+    pub rays: usize,
+    /// Of the shading alone, on a complete distance map.
+    pub shading: usize,
+}
+
+/// The frame budget of each kind of work. What only changes tone, colours or planes beside a rendering is always drawn in full.
+#[derive(Clone, Debug)]
+pub(super) struct Pace {
+    rays: FrameBudget,
+    shading: FrameBudget,
+}
+
+impl Pace {
+    /// `rungs`: of the rays.
+    pub(super) fn new(budget: Option<Duration>, rungs: &[Rung]) -> Pace {
+        let shares: Vec<f64> = rungs.iter().map(|rung| rung.time_share).collect();
+        let shading = SHADING.map(|(_, share)| share);
+        Pace { rays: FrameBudget::new(budget, &shares), shading: FrameBudget::new(budget, &shading) }
+    }
+
+    pub(super) fn budget(&self) -> Option<Duration> {
+        self.rays.budget()
+    }
+
+    /// Records that the user moved what takes this work.
+    pub(super) fn moved(&mut self, work: Work, now: Instant) {
+        match work {
+            Work::Rays => self.rays.view_moved(now),
+            Work::Shading => self.shading.view_moved(now),
+            Work::Tone => {}
+        }
+    }
+
+    /// Discards the measurements: the scene changed.
+    pub(super) fn forget(&mut self) {
+        self.rays.forget();
+        self.shading.forget();
+    }
+
+    /// When a moving view comes to rest.
+    pub(super) fn rests_at(&self, now: Instant) -> Option<Instant> {
+        self.rays.rests_at(now).into_iter().chain(self.shading.rests_at(now)).min()
+    }
+
+    /// The quality of the next picture.
+    pub(super) fn quality(&self, now: Instant) -> Quality {
+        match self.rays.is_moving(now) {
+            true => Quality { rays: self.rays.rung(now), shading: 0 },
+            false => Quality { rays: 0, shading: self.shading.rung(now) },
+        }
+    }
+
+    /// Records the time of a picture of this quality that took this work.
+    pub(super) fn picture_took(&mut self, work: Work, quality: Quality, time: Duration) {
+        match work {
+            Work::Rays if quality.shading == 0 => self.rays.picture_took(quality.rays, time),
+            Work::Shading if quality.rays == 0 => self.shading.picture_took(quality.shading, time),
+            _ => {}
+        }
+    }
+}
+
+/// The ladder of the shading: what is left out, and the time as a fraction of that of all of stage 3. A first estimate.
+const SHADING: [(&str, f64); 3] = [("full quality", 1.0), ("no occlusion", 0.6), ("no occlusion, no shadow", 0.25)];
+
+/// The settings on a rung of the shading. Rays and filters of the distance map stay as they are.
+pub(super) fn shaded(mut settings: Settings, rung: usize) -> Settings {
+    if rung > 0 {
+        settings.light.occlusion = None;
+    }
+    if rung > 1 {
+        settings.light.shadow = None;
+    }
+    settings
+}
+
+/// The description of a quality for the display of times.
+pub(super) fn label(quality: Quality, rungs: &[Rung]) -> &str {
+    match quality {
+        Quality { rays: 0, shading } => SHADING[shading.min(SHADING.len() - 1)].0,
+        Quality { rays, .. } => rungs.get(rays).map_or(SHADING[0].0, |rung| rung.label.as_str()),
+    }
+}
+
+/// What the rungs make of a scene at full quality, once each as far as stage 1 can tell them apart.
+pub(super) fn lowered(rungs: &[Rung], scene: &Scene) -> Vec<Settings> {
+    let mut all: Vec<Settings> = Vec::new();
+    for rung in rungs.iter().skip(1) {
+        let settings = rung.apply(&scene.settings, voxel(scene));
+        let ray = Ray { half: false, quarter: false, rays: 1, ..settings.ray };
+        let (distance, light, post) = Default::default();
+        let plain = Settings { ray, distance, light, post, ..settings };
+        if !all.contains(&plain) {
+            all.push(plain);
+        }
+    }
+    all
+}
+
+/// Edge of a slice pixel, mm: the step unless one is set.
+pub(super) fn voxel(scene: &Scene) -> f64 {
+    scene.grid.pitch[0].min(scene.grid.pitch[1])
+}
 
 /// Chooses the rung for a view that moves. Rung 0 is full quality; each one after it is faster.
 #[derive(Clone, Debug)]
@@ -80,13 +189,17 @@ impl FrameBudget {
     }
 
     /// Records the time of a picture on a rung, and chooses the next rung. Times of a view at rest are ignored unless it is on the rung of
-    /// the moving view.
+    /// the moving view, or keeps the budget as it is.
     pub(super) fn picture_took(&mut self, rung: usize, time: Duration) {
         let Some(budget) = self.budget.map(|b| b.as_secs_f64()) else { return };
+        let time = time.as_secs_f64();
         if rung != self.rung {
+            // Another mode takes less: it needs no ladder.
+            if rung == 0 && time <= budget * MARGIN {
+                self.choose(0);
+            }
             return;
         }
-        let time = time.as_secs_f64();
         self.mean = if self.pictures == 0 { time } else { self.mean + NEW_WEIGHT * (time - self.mean) };
         self.pictures = self.pictures.saturating_add(1);
         // The expected ratios come from another scene or device.

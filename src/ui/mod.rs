@@ -18,6 +18,7 @@ pub mod direct;
 pub mod export;
 pub mod frame_budget;
 mod gestures;
+mod hints;
 pub mod input;
 pub mod panels;
 mod picking;

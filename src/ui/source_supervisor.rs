@@ -11,6 +11,67 @@ use std::time::{Duration, Instant};
 /// Opens a source, or returns the reason in one line.
 pub type OpenSource = Arc<dyn Fn() -> Result<Box<dyn Live>, String> + Send + Sync>;
 
+/// Where frames come from, for messages.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum SourceKind {
+    /// The built-in phantom.
+    Demo,
+    /// A file.
+    Recording,
+    /// Standard input.
+    Pipe,
+    /// A probe, or a server with one.
+    #[default]
+    Probe,
+}
+
+/// A message about a source: its title, its text, and whether it is a fault.
+pub(super) type SourceNotice = (&'static str, String, bool);
+
+impl SourceKind {
+    /// What its pictures show, if that is no patient.
+    pub(super) fn origin(self) -> Option<&'static str> {
+        (self == SourceKind::Demo).then_some("Demo data (phantom)")
+    }
+
+    /// What there is to say about a source in this state. `disconnected`: why it is not connected. `is_silent`: no frame came for a while in
+    /// which the program could have taken one. `has_shown`: a volume was shown.
+    pub(super) fn notice(
+        self,
+        state: &SourceState,
+        disconnected: Option<&str>,
+        is_silent: bool,
+        has_shown: bool,
+    ) -> Option<SourceNotice> {
+        use SourceKind::{Demo, Pipe, Probe, Recording};
+        let waiting = match self {
+            Demo => "Computing the demo data",
+            Recording => "Reading the recording",
+            Pipe => "Waiting for frames on standard input",
+            Probe => "Connecting to the probe",
+        };
+        let again = match self {
+            Demo => "No demo data: trying again",
+            Recording => "The recording cannot be opened: trying again",
+            Pipe => "Standard input cannot be read: trying again",
+            Probe => "No probe: trying again",
+        };
+        match (state, disconnected) {
+            (SourceState::Opening, _) => Some((waiting, String::new(), false)),
+            (SourceState::Retrying(why), _) => Some((again, why.clone(), true)),
+            (SourceState::Ended(why), _) => Some(("The source ended", why.clone()?, true)),
+            (SourceState::Open, Some(why)) => Some(("Not connected: trying again", why.into(), true)),
+            // Files and the phantom are read by this program: if they take long, it is busy.
+            (SourceState::Open, None) if is_silent && matches!(self, Pipe | Probe) => match self {
+                Pipe => Some(("No frames on standard input", "It is open but nothing comes.".into(), true)),
+                _ => Some(("No frames from the probe", "It is connected but sends nothing.".into(), true)),
+            },
+            (SourceState::Open, None) if !has_shown => Some((waiting, String::new(), false)),
+            (SourceState::Open, None) => None,
+        }
+    }
+}
+
 /// The state of the source.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(super) enum SourceState {
@@ -184,6 +245,28 @@ mod tests {
         supervisor.ended(None, Instant::now());
         assert_eq!(supervisor.state(), &SourceState::Retrying("the source ended".into()));
         assert!(poll(&mut supervisor, Duration::from_secs(6)));
+    }
+
+    #[test]
+    fn a_notice_names_what_is_missing() {
+        let title = |kind: SourceKind, state: &SourceState, gone: Option<&str>, is_silent, has_shown| {
+            kind.notice(state, gone, is_silent, has_shown).map(|(title, ..)| title)
+        };
+        let missing = SourceState::Retrying("a.mha: no such file".into());
+        for kind in [SourceKind::Demo, SourceKind::Recording, SourceKind::Pipe] {
+            assert!(
+                title(kind, &missing, None, false, false).is_some_and(|title| !title.contains("probe")),
+                "{kind:?}"
+            );
+        }
+        assert_eq!(title(SourceKind::Probe, &missing, None, false, true), Some("No probe: trying again"));
+        let (open, silent) = (SourceState::Open, true);
+        assert_eq!(title(SourceKind::Probe, &open, None, silent, true), Some("No frames from the probe"));
+        assert_eq!(title(SourceKind::Recording, &open, None, silent, true), None, "the program itself reads it");
+        let why = "cannot connect: the connection was refused: no server listens at localhost:1";
+        let refused = SourceKind::Probe.notice(&open, Some(why), silent, true);
+        assert!(refused.is_some_and(|(title, text, is_fault)| is_fault && !title.contains("frames") && text == why));
+        assert_eq!(title(SourceKind::Probe, &open, None, false, true), None);
     }
 
     #[test]

@@ -112,6 +112,7 @@ impl WindowLoop<'_> {
         let screen = Screen::new(&context, Target::Window(window.clone()), size, self.options.present_mode)?;
         let mut console = (self.make)(&context, size, window.scale_factor() as f32, self.wake.clone());
         console.set_screen(Some(screen));
+        console.set_full_screen(self.options.full_screen);
         self.ends = self.options.time.map(|time| Instant::now() + time);
         (self.window, self.context, self.console) = (Some(window), Some(context), Some(console));
         Ok(())
@@ -192,6 +193,7 @@ impl WindowLoop<'_> {
             let factor = window.scale_factor() as f32;
             let mut console = (self.make)(context, self.size, factor, self.wake.clone());
             console.set_screen(screen);
+            console.set_full_screen(window.fullscreen().is_some());
             self.console = Some(console);
         }
         if let Some(screen) = self.console.as_ref().and_then(Console::screen) {
@@ -199,7 +201,9 @@ impl WindowLoop<'_> {
         }
         if let (true, Some(window)) = (next.toggle_full_screen, &self.window) {
             let full = window.fullscreen().is_none().then(|| Fullscreen::Borderless(self.monitor(events)));
+            let is_full_screen = full.is_some();
             window.set_fullscreen(full);
+            self.console.iter_mut().for_each(|console| console.set_full_screen(is_full_screen));
         }
         let at = next.wake_at.into_iter().chain(self.ends).min();
         events.set_control_flow(at.map_or(ControlFlow::Wait, |at| match at <= now {
@@ -230,7 +234,8 @@ impl ApplicationHandler<()> for WindowLoop<'_> {
                 self.recovery.lost(Lost::Screen, Instant::now());
             }
             WindowEvent::Destroyed => events.exit(),
-            WindowEvent::CloseRequested if !self.options.stays_open => events.exit(),
+            WindowEvent::CloseRequested if self.options.stays_open || console.asks_before_closing() => {}
+            WindowEvent::CloseRequested => events.exit(),
             WindowEvent::Resized(size) => {
                 self.size = (*size).into();
                 console.resize(self.size);

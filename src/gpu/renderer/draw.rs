@@ -4,6 +4,7 @@
 use super::*;
 #[cfg(feature = "view")]
 use crate::gpu::window::screen::{Drawn, Panels, PresentOutcome, Screen};
+use crate::plan::Work;
 
 impl Renderer {
     /// The next picture shows volume image `image`. All of its visible frames must have been sent.
@@ -54,6 +55,11 @@ impl Renderer {
     /// How long the device has been at work without finishing anything; zero if it is idle.
     pub fn busy_for(&self) -> Duration {
         self.timelines.busy_for()
+    }
+
+    /// How much of the last picture was drawn again, also if it is in flight.
+    pub fn drawn_work(&self) -> Work {
+        self.drawn_work
     }
 
     /// True if there is a picture of the current size, done or in flight.
@@ -116,6 +122,9 @@ impl Renderer {
     fn draw(&mut self) -> Result<(), GpuError> {
         self.flush()?;
         self.plan.complete(&self.scene, &mut self.stale, &self.contents);
+        let stale =
+            self.plan.steps.iter().enumerate().filter(|(i, s)| self.stale[*i] && s.pass.frequency != Frequency::Frame);
+        self.drawn_work = self.plan.work(&self.scene, stale.map(|(i, _)| i));
         self.picture.collect(&self.timelines, &mut self.timings)?;
         self.picture.begin(&mut self.barriers, &self.timelines)?;
         let unprocessed = &self.unprocessed[self.shown as usize];

@@ -19,7 +19,7 @@ use crate::passes::chain;
 use crate::passes::slots::{BATCH_BYTES, BATCHES_IN_FLIGHT, Format, Initializer, frames_per_batch};
 use crate::passes::{DispatchArgs, Frequency, PassTime, Slot, Span, Stage, Texels};
 use crate::picture::Picture;
-use crate::plan::{Contents, Plan, Rerun, affected};
+use crate::plan::{Contents, Plan, Rerun, Work, affected};
 use crate::queues::oracle::SubmissionLog;
 use crate::queues::{MAX_QUEUES, QueueRole, QueueTracker};
 use crate::scene::{Scene, VisibleBounds};
@@ -139,6 +139,8 @@ pub struct Renderer {
     drawing: bool,
     /// The picture's image holds a picture, or will when the device is done.
     drawn: bool,
+    /// How much of the picture was drawn last.
+    drawn_work: Work,
     /// The value of queue 0's timeline at which the last presentation is done.
     presented: u64,
     /// The volume image that pictures show.
@@ -205,6 +207,7 @@ impl Renderer {
             staging,
             drawing: false,
             drawn: false,
+            drawn_work: Work::Rays,
             presented: 0,
             shown: 0,
             timings: Timings::new(context, options.spans),
@@ -322,8 +325,14 @@ impl Renderer {
 impl Renderer {
     /// True if `scene` differs from the current one, ignoring fields that the device resolves.
     pub fn differs_from(&self, scene: &Scene) -> bool {
-        (&scene.geometry, &scene.settings, scene.input, scene.visible_bounds)
-            != (&self.scene.geometry, &self.scene.settings, self.scene.input, self.scene.visible_bounds)
+        (&scene.geometry, &scene.settings, scene.input, scene.visible_bounds, &scene.shared)
+            != (
+                &self.scene.geometry,
+                &self.scene.settings,
+                self.scene.input,
+                self.scene.visible_bounds,
+                &self.scene.shared,
+            )
     }
 
     /// True if the last change of scene failed halfway: nothing can be drawn until another change succeeds.

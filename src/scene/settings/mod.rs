@@ -1,11 +1,13 @@
 //! The settings of a scene: keys, types, defaults and units of the TOML scene file. Lengths are in mm, angles in degrees, samples and
 //! opacities in 0..1. Every struct refuses unknown keys, so that a typing error does not silently become a default.
 
+mod marks;
 mod planes;
 mod preprocess;
 mod raycast;
 mod shading;
 
+pub use marks::*;
 pub use planes::*;
 pub use preprocess::*;
 pub use raycast::*;
@@ -53,6 +55,8 @@ pub struct Settings {
     pub light: Light,
     /// Stage 4: filters, tone and colour of the picture.
     pub post: Post,
+    /// Marks beside the picture.
+    pub marks: Marks,
 }
 
 impl Settings {

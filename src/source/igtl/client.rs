@@ -220,6 +220,10 @@ impl Shared {
         while !self.lock().stop {
             let ended = match self.open(address, options) {
                 Ok(stream) => self.receive(&stream, options),
+                Err(error) if error.kind() == ErrorKind::ConnectionRefused => {
+                    let why = format!("cannot connect: the connection was refused: no server listens at {address}");
+                    ConnectionEnd { why, useful: false }
+                }
                 Err(error) => ConnectionEnd { why: format!("cannot connect: {error}"), useful: false },
             };
             if ended.useful {

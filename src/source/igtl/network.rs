@@ -229,6 +229,11 @@ impl Live for Network {
     fn can_wait(&self) -> bool {
         false
     }
+
+    fn disconnected(&self) -> Option<String> {
+        let is_connected = self.client.statistics().connected;
+        (!is_connected).then(|| self.client.last_error().unwrap_or_else(|| "connecting".into()))
+    }
 }
 
 /// Longest wait for the first frames, and most bytes of them.

@@ -256,6 +256,10 @@ impl Live for MotorTracked {
     fn can_wait(&self) -> bool {
         false
     }
+
+    fn disconnected(&self) -> Option<String> {
+        self.source.disconnected()
+    }
 }
 
 /// The header of frames that are swept at `speed` deg/s, the slices in rad, and the time that sound needs for a frame, s.

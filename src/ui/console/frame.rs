@@ -4,6 +4,7 @@ use super::{Console, ConsoleError, FAULT_CHECK_INTERVAL, LoopRequest};
 use crate::gpu;
 use crate::gpu::window::PresentOutcome;
 use crate::live::{Feed, FinishedPicture, Step, StreamError};
+use crate::ui::frame_budget;
 use crate::ui::panels::{Banner, PanelState};
 use crate::ui::source_supervisor::SourceState;
 use crate::ui::times::RecentTimes;
@@ -17,6 +18,8 @@ const MAX_DEVICE_FAULTS: u32 = 5;
 const STATISTICS_INTERVAL: Duration = Duration::from_secs(1);
 /// A warning is shown if no frame comes for so long.
 const SILENCE: Duration = Duration::from_secs(3);
+/// An update that takes so long does not count as silence of the source.
+const LONG_UPDATE: Duration = Duration::from_millis(100);
 /// While the next picture is not ready, the window keeps the old content for so long: less disturbing than a black moment.
 const BLANK_DELAY: Duration = Duration::from_millis(400);
 /// Interval of the attempts to present while there is no surface.
@@ -34,6 +37,9 @@ impl Console {
     /// # Errors
     /// The device or the screen is lost.
     pub fn update(&mut self, now: Instant) -> Result<LoopRequest, ConsoleError> {
+        let begun = Instant::now();
+        let busy = self.busy_since.take().map_or(Duration::ZERO, |since| now.saturating_duration_since(since));
+        self.last_arrival += busy;
         if let Some((fault, at)) = &mut self.startup_fault
             && now >= *at
         {
@@ -46,8 +52,17 @@ impl Console {
         }
         while let Some(saved) = self.exporter.poll() {
             match saved {
-                Ok(file) => self.notify(&format!("Saved {}", file.display()), false),
-                Err(fault) => self.notify(&format!("Not saved: {fault}"), true),
+                Ok(file) => {
+                    if file.extension().is_some_and(|end| end == "frames") {
+                        self.saved_volume = self.saving_volume.take();
+                        self.request.exit |= std::mem::take(&mut self.leaves_when_saved);
+                    }
+                    self.notify(&format!("Saved {}", file.display()), false);
+                }
+                Err(fault) => {
+                    self.leaves_when_saved = false;
+                    self.notify(&format!("Not saved: {fault}"), true);
+                }
             }
         }
         self.advance_cine(now);
@@ -63,18 +78,22 @@ impl Console {
         let stall_ends = self.stall_shown_until.take_if(|until| *until <= now).is_some();
         self.needs_redraw |= self.notes.len() != before || stall_ends || self.repaint_at.is_some_and(|at| at <= now);
         self.present(now)?;
+        // What takes long here keeps no frame from coming, but from being taken.
+        self.last_arrival += Some(begun.elapsed()).filter(|took| *took >= LONG_UPDATE).unwrap_or_default();
+        let is_busy = self.stream.is_drawing() || !self.stream.is_idle();
+        self.busy_since = is_busy.then_some(now);
         Ok(LoopRequest { wake_at: self.next_wake(now), ..std::mem::take(&mut self.request) })
     }
 
     /// Gives the stream the settings that are to be drawn now.
     fn send_settings(&mut self, now: Instant) {
-        let (rung, settings) = self.effective_settings(now);
+        let (quality, settings) = self.effective_settings(now);
         if self.sent_settings.as_ref() == Some(&settings) || self.rejected_settings.as_ref() == Some(&settings) {
             return;
         }
-        self.needs_redraw |= rung != self.rung;
-        self.rung = rung;
-        match self.stream.change(settings.clone()) {
+        self.needs_redraw |= quality != self.quality;
+        self.quality = quality;
+        match self.stream.lower(settings.clone(), self.full_settings()) {
             Ok(()) => {
                 self.sent_settings = Some(settings);
                 let first_input = self.unsent_input.take().or(self.unshown_input.map(|(input, _)| input));
@@ -127,6 +146,9 @@ impl Console {
             }
         }
         let frames = self.stream.frames();
+        let gone = self.stream.disconnected();
+        self.needs_redraw |= gone != self.disconnected;
+        self.disconnected = gone;
         if frames != self.frames {
             (self.frames, self.last_arrival) = (frames, now);
         }
@@ -145,7 +167,7 @@ impl Console {
 
     fn picture_finished(&mut self, picture: &FinishedPicture) {
         self.has_new_picture = true;
-        self.frame_budget.picture_took(self.rung, picture.took);
+        self.pace.picture_took(picture.work, self.quality, picture.took);
         self.times.pictures.add(picture.took);
     }
 
@@ -187,7 +209,7 @@ impl Console {
             fault_check,
             self.present_retry_at,
             self.source.wakes_at(),
-            self.frame_budget.rests_at(now),
+            self.pace.rests_at(now),
             self.repaint_at,
             self.next_cine_step,
             self.stall_shown_until,
@@ -281,11 +303,11 @@ impl Console {
     /// Lays out the panels and executes the commands that they give.
     fn lay_out_panels(&mut self, now: Instant, has_drawn: bool) -> gpu::window::Panels {
         let notes: Vec<_> = self.notes.iter().map(|(_, note)| note.clone()).collect();
-        let quality = self.rungs.get(self.rung).map_or("full quality", |rung| rung.label.as_str());
+        let quality = frame_budget::label(self.quality, &self.rungs);
         let exit_key = match (&self.fixed.exit, self.fixed.is_kiosk) {
             (Some(chord), true) => chord.to_string(),
             (None, true) => String::new(),
-            (_, false) => "Escape, Q".into(),
+            (_, false) => String::new(),
         };
         let state = PanelState {
             controls: &self.controls,
@@ -296,12 +318,16 @@ impl Console {
             // egui panics if a list has a negative height.
             shows_help: self.shows_help && self.size[1] as f32 > MIN_HELP_HEIGHT * self.panels.scale(),
             shows_times: self.shows_times,
+            help_search: self.help_search.as_deref(),
+            saves_bar: self.saves_bar,
+            origin: self.fixed.source.origin(),
+            asks_to_leave: self.asks_to_leave,
             is_frozen: self.stream.is_frozen(),
             is_playing: self.next_cine_step.is_some(),
             cine: (self.stream.cine().volumes().len(), self.stream.cine_position()),
             has_drawn,
             quality,
-            budget: self.frame_budget.budget(),
+            budget: self.pace.budget(),
             banner: self.banner(now),
             notes: &notes,
             exit_key: &exit_key,
@@ -332,14 +358,9 @@ impl Console {
             return Some(banner("The graphics device stalled", text, true));
         }
         let is_silent = now.saturating_duration_since(self.last_arrival) >= SILENCE && !self.stream.is_frozen();
-        match self.source.state() {
-            SourceState::Opening => Some(banner("Connecting to the probe", "", false)),
-            SourceState::Retrying(why) => Some(banner("No probe: trying again", why, true)),
-            SourceState::Ended(Some(why)) => Some(banner("The source ended", why, true)),
-            SourceState::Open if is_silent => {
-                Some(banner("No frames from the probe", "It is connected but sends nothing.", true))
-            }
-            SourceState::Ended(None) | SourceState::Open => None,
-        }
+        let (state, gone) = (self.source.state(), self.stream.disconnected());
+        let has_shown = self.stream.volumes_shown() > 0;
+        let notice = self.fixed.source.notice(state, gone.as_deref(), is_silent, has_shown)?;
+        Some(banner(notice.0, &notice.1, notice.2))
     }
 }

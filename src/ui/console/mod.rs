@@ -6,12 +6,12 @@ mod frame;
 use super::command::{Command, HeldKeys, Tool};
 use super::controls::{Change, Controls};
 use super::export::Exporter;
-use super::frame_budget::{FrameBudget, Rung, built_in_ladder};
+use super::frame_budget::{self, Pace, Quality, Rung, built_in_ladder};
 use super::gestures::Gestures;
-use super::input::Input;
+use super::input::{Input, Key};
 use super::panels::{self, Note, Panels};
 use super::picking::Viewport;
-use super::source_supervisor::{OpenSource, SourceSupervisor};
+use super::source_supervisor::{OpenSource, SourceKind, SourceSupervisor};
 use super::times::Times;
 use crate::gpu::shader_reload::{ShaderFolder, Watch};
 use crate::gpu::window::Screen;
@@ -19,11 +19,13 @@ use crate::gpu::{Context, GpuError, TimeStamps, Wake};
 use crate::kiosk::chord::Chord;
 use crate::live::cine::CineLimits;
 use crate::live::{self, Feed, Stream, StreamError, Update};
+use crate::marked;
+use crate::plan::Work;
 use crate::scene::load::Layers;
-use crate::scene::{Layout, Settings, variants};
+use crate::scene::{Layout, Scene, Settings, variants};
 use std::path::PathBuf;
 use std::sync::Arc;
-use std::time::{Duration, Instant};
+use std::time::{Duration, Instant, SystemTime};
 
 /// How long a note is shown.
 const NOTE_TIME: Duration = Duration::from_secs(5);
@@ -35,6 +37,8 @@ const FAULT_CHECK_INTERVAL: Duration = Duration::from_secs(2);
 const MAX_NOTES: usize = 4;
 /// How long after the last input pipelines that may be needed next are compiled.
 const REST_BEFORE_WARMING: Duration = Duration::from_secs(1);
+/// Longest text that the help is searched for, characters.
+const MAX_SEARCH: usize = 40;
 /// Time between two volumes of a cine loop.
 const CINE_INTERVAL: Duration = Duration::from_millis(200);
 
@@ -56,12 +60,16 @@ pub struct ConsoleOptions {
     pub rungs: Vec<Rung>,
     /// How long to wait before a source that ended is opened again. None: the end of the source is final.
     pub retry: Option<Duration>,
+    /// Where the frames come from, for messages.
+    pub source: SourceKind,
     /// A file for all frames that arrive.
     pub record: Option<PathBuf>,
     /// The folder for saved pictures and loops.
     pub folder: PathBuf,
     /// Draws panels, notes and marks over the picture.
     pub overlay: bool,
+    /// Saves pictures with the patient's sides and a bar: scale, depth, mode, time.
+    pub bar: bool,
     /// Shows sliders and buttons at the start.
     pub panels: bool,
     /// Pixels per point.
@@ -93,9 +101,11 @@ impl Default for ConsoleOptions {
             budget: None,
             rungs: built_in_ladder(),
             retry: None,
+            source: SourceKind::default(),
             record: None,
             folder: ".".into(),
             overlay: true,
+            bar: true,
             panels: true,
             scale: 1.0,
             exit: None,
@@ -149,17 +159,17 @@ pub struct Console {
     gestures: Gestures,
     keys: HeldKeys,
     exporter: Exporter,
-    frame_budget: FrameBudget,
-    rungs: Vec<Rung>,
+    pace: Pace,
+    rungs: Arc<Vec<Rung>>,
     panels: Panels,
     times: Times,
     fixed: FixedOptions,
     /// Size of the window, pixels.
     size: [u32; 2],
     started: Instant,
-    /// The settings that the stream was given last, and their rung of the quality ladder.
+    /// The settings that the stream was given last, and what they leave out.
     sent_settings: Option<Settings>,
-    rung: usize,
+    quality: Quality,
     /// Settings that could not be drawn, to report them only once.
     rejected_settings: Option<Settings>,
     notes: Vec<(Instant, Note)>,
@@ -170,6 +180,17 @@ pub struct Console {
     shows_help: bool,
     shows_times: bool,
     shows_panels: bool,
+    /// Asks whether to save the loop before leaving.
+    /// Saves pictures with a bar.
+    saves_bar: bool,
+    /// What the help is searched for; none while it is not.
+    help_search: Option<String>,
+    asks_to_leave: bool,
+    leaves_when_saved: bool,
+    is_full_screen: bool,
+    /// The newest volume of the loop that is being saved, and of the one that was saved last.
+    saving_volume: Option<u32>,
+    saved_volume: Option<u32>,
     /// Where to draw the pointer, pixels of the window.
     pointer: Option<[f64; 2]>,
     /// When the next volume of the cine loop is due, while it plays.
@@ -186,6 +207,10 @@ pub struct Console {
     statistics_at: Instant,
     /// When a frame or a source came last.
     last_arrival: Instant,
+    /// Why the source is not connected, as it was shown last.
+    disconnected: Option<String>,
+    /// Since when the program is busy with what came: silence is not counted meanwhile.
+    busy_since: Option<Instant>,
     frames: u64,
     /// Faults of the device since the last picture.
     device_faults: u32,
@@ -213,6 +238,9 @@ struct FixedOptions {
     exit: Option<Chord>,
     is_kiosk: bool,
     warms: bool,
+    source: SourceKind,
+    /// Everything that arrives is recorded to a file.
+    records: bool,
 }
 
 impl Console {
@@ -222,6 +250,11 @@ impl Console {
         let shows_panels = options.panels && options.overlay;
         let mut controls = Controls::new(options.settings);
         controls.resize(panels::picture_area(size, options.scale, shows_panels).1);
+        let (rungs, records) = (Arc::new(options.rungs), options.record.is_some());
+        let lowered = options.budget.map(|_| {
+            let rungs = rungs.clone();
+            Arc::new(move |scene: &Scene| frame_budget::lowered(&rungs, scene)) as live::Lowered
+        });
         let stream_options = live::StreamOptions {
             update: options.update,
             images: options.images,
@@ -232,13 +265,13 @@ impl Console {
             wake: Some(options.wake.clone()),
             shaders: options.shaders.clone(),
             chosen: options.chosen,
+            lowered,
         };
         let watch = options.shaders.as_ref().map(|folder| Watch::new(folder, options.wake.clone())).transpose();
         let (shader_watch, watch_fault) = match watch {
             Ok(watch) => (watch, None),
             Err(fault) => (None, Some(fault)),
         };
-        let time_shares: Vec<f64> = options.rungs.iter().map(|rung| rung.time_share).collect();
         let mut console = Console {
             screen: None,
             stream: Stream::new(context, Feed::none(), controls.settings().clone(), stream_options),
@@ -248,8 +281,8 @@ impl Console {
             gestures: Gestures::default(),
             keys: HeldKeys::default(),
             exporter: Exporter::new(options.folder, options.wake),
-            frame_budget: FrameBudget::new(options.budget, &time_shares),
-            rungs: options.rungs,
+            pace: Pace::new(options.budget, &rungs),
+            rungs,
             panels: Panels::new(options.scale),
             times: Times::default(),
             fixed: FixedOptions {
@@ -257,11 +290,13 @@ impl Console {
                 is_kiosk: options.is_kiosk,
                 exit: options.exit,
                 warms: options.warms,
+                source: options.source,
+                records,
             },
             size,
             started: now,
             sent_settings: None,
-            rung: 0,
+            quality: Quality::default(),
             rejected_settings: None,
             notes: Vec::new(),
             needs_redraw: true,
@@ -269,6 +304,13 @@ impl Console {
             shows_help: false,
             shows_times: false,
             shows_panels,
+            saves_bar: options.bar,
+            help_search: None,
+            asks_to_leave: false,
+            leaves_when_saved: false,
+            is_full_screen: false,
+            saving_volume: None,
+            saved_volume: None,
             pointer: None,
             next_cine_step: None,
             unsent_input: None,
@@ -277,6 +319,8 @@ impl Console {
             warmed: None,
             statistics_at: now,
             last_arrival: now,
+            disconnected: None,
+            busy_since: None,
             frames: 0,
             device_faults: 0,
             stall_shown_until: None,
@@ -380,8 +424,10 @@ impl Console {
         {
             self.request.exit = true;
         }
-        if let Some(command) = self.keys.input(input) {
-            self.execute(&command, now);
+        let is_search = self.search_help(input);
+        if let Some(command) = self.keys.input(input).filter(|_| !is_search) {
+            let command = if self.asks_to_leave { answer(input) } else { Some(command) };
+            command.iter().for_each(|command| self.execute(command, now));
         }
         let area = self.picture_area();
         let at = match input {
@@ -393,12 +439,32 @@ impl Console {
             corner: area.0.map(f64::from),
             size: area.1.map(f64::from),
             scene: self.stream.scene(),
-            is_covered: is_over_panel && self.fixed.overlay,
+            is_covered: self.asks_to_leave || (is_over_panel && self.fixed.overlay),
             now: now.saturating_duration_since(self.started),
         };
         for command in self.gestures.input(input, &on, self.controls.tool(), self.keys.modifiers()) {
             self.execute(&command, now);
         }
+    }
+
+    /// Takes a key for the search of the help. True if it is none of the view's own.
+    fn search_help(&mut self, input: &Input) -> bool {
+        let (true, Input::Key { key, pressed: true }) = (self.shows_help && !self.asks_to_leave, input) else {
+            return false;
+        };
+        let modifiers = self.keys.modifiers();
+        match (&mut self.help_search, key) {
+            (None, Key::Char('/')) => self.help_search = Some(String::new()),
+            (Some(text), Key::Char(letter)) if !modifiers.control && !modifiers.alt => {
+                if text.chars().count() < MAX_SEARCH {
+                    text.push(*letter);
+                }
+            }
+            (Some(text), Key::Space) => text.push(' '),
+            (Some(text), Key::Backspace) => _ = text.pop(),
+            _ => return false,
+        }
+        true
     }
 
     /// Sets where to draw a pointer, pixels, if no windowing system draws one.
@@ -434,30 +500,42 @@ impl Console {
         self.screen.as_ref()
     }
 
-    /// The rung of the quality ladder for the last settings that were sent to the stream.
-    pub fn rung(&self) -> usize {
-        self.rung
+    /// What the last settings that were sent to the stream leave out.
+    pub fn quality(&self) -> Quality {
+        self.quality
     }
 
     /// Executes a command.
     pub fn execute(&mut self, command: &Command, now: Instant) {
         tracing::debug!("{command:?}");
         self.user_acts(now);
+        let before = is_of_tone(command).then(|| self.controls.settings().clone());
         match self.controls.apply(command, self.stream.scene()) {
             Change::Nothing => return,
             Change::Tool => {}
             Change::Settings => {
                 self.unsent_input.get_or_insert(now);
                 if is_continuous(command) {
-                    self.frame_budget.view_moved(now);
+                    let work = before.map_or(Work::Rays, |before| self.work_since(before));
+                    self.pace.moved(work, now);
                 } else {
                     // Another scene takes another time.
-                    self.frame_budget.forget();
+                    self.pace.forget();
                 }
             }
             Change::Caller(command) => self.execute_own(&command, now),
         }
         self.needs_redraw = true;
+    }
+
+    /// How much of the picture a change from these settings draws again.
+    fn work_since(&self, before: Settings) -> Work {
+        let Some(shown) = self.stream.scene() else { return Work::Rays };
+        let scene = |settings: Settings| Scene::new(shown.geometry.clone(), shown.input, settings);
+        match (scene(before), scene(self.controls.settings().clone())) {
+            (Ok(before), Ok(after)) => Work::between(&before, &after),
+            _ => Work::Rays,
+        }
     }
 
     /// Executes a command that does not concern settings.
@@ -485,16 +563,25 @@ impl Console {
                 };
             }
             Command::SavePicture => self.save_picture(),
-            Command::SaveLoop => self.save_loop(),
-            Command::ToggleHelp => self.shows_help = !self.shows_help,
+            Command::SaveLoop => _ = self.save_loop(),
+            Command::ToggleHelp => (self.shows_help, self.help_search) = (!self.shows_help, None),
+            Command::SearchHelp => self.help_search = Some(String::new()),
+            Command::SavesBar(saves_bar) => self.saves_bar = saves_bar,
             Command::ToggleTimes => self.shows_times = !self.shows_times,
             Command::TogglePanels => {
                 self.shows_panels = !self.shows_panels && self.fixed.overlay;
                 self.resize_picture();
             }
             Command::ToggleFullScreen => self.request.toggle_full_screen |= !self.fixed.is_kiosk,
+            Command::Back => self.go_back(),
             // A kiosk ends only with its exit keys: a sleeve may press Escape.
-            Command::Exit => self.request.exit |= !self.fixed.is_kiosk,
+            Command::Exit if self.fixed.is_kiosk => {}
+            Command::Exit if self.has_unsaved_loop() => self.asks_to_leave = true,
+            Command::Exit | Command::Discard => self.request.exit |= !self.fixed.is_kiosk,
+            Command::SaveAndExit => {
+                self.asks_to_leave = false;
+                self.leaves_when_saved = self.save_loop();
+            }
             _ => {}
         }
     }
@@ -519,15 +606,70 @@ impl Console {
 
     fn save_picture(&mut self) {
         let picture = match self.stream.renderer().filter(|renderer| renderer.has_drawn()) {
-            Some(renderer) => renderer.end_picture().map_err(|e| e.to_string()),
+            Some(renderer) => match renderer.end_picture() {
+                Ok(picture) => Ok((picture, renderer.scene().clone())),
+                Err(fault) => Err(fault.to_string()),
+            },
             None => Err("there is no picture yet".into()),
         };
-        if let Err(fault) = picture.and_then(|picture| self.exporter.picture(picture)) {
+        let (has_bar, time) = (self.saves_bar, marked::time_line(SystemTime::now()));
+        let origin = self.fixed.source.origin();
+        let saved = picture.and_then(|(picture, scene)| {
+            self.exporter.picture(move || match has_bar {
+                true => marked::marked(&picture, &scene, &time, origin),
+                false => Ok(picture),
+            })
+        });
+        if let Err(fault) = saved {
             self.notify(&format!("The picture was not saved: {fault}"), true);
         }
     }
 
-    fn save_loop(&mut self) {
+    /// Closes the uppermost of what is open; else leaves full screen; else leaves the program.
+    fn go_back(&mut self) {
+        if self.asks_to_leave {
+            self.asks_to_leave = false;
+        } else if self.help_search.is_some() {
+            self.help_search = None;
+        } else if self.shows_help {
+            self.shows_help = false;
+        } else if self.shows_times {
+            self.shows_times = false;
+        } else if self.is_full_screen && !self.fixed.is_kiosk {
+            self.request.toggle_full_screen = true;
+        } else {
+            self.execute_own(&Command::Exit, Instant::now());
+        }
+    }
+
+    /// True if volumes of the loop exist nowhere else: neither in a file that they were read from or recorded to, nor in one that was saved.
+    fn has_unsaved_loop(&self) -> bool {
+        let is_only_here = matches!(self.fixed.source, SourceKind::Probe | SourceKind::Pipe) && !self.fixed.records;
+        let newest = self.stream.cine().volumes().back().map(|kept| kept.volume);
+        is_only_here && newest.is_some() && newest != self.saved_volume
+    }
+
+    /// The user asked the windowing system to close the window: asks first if that loses a loop. False if it may be closed at once.
+    pub(super) fn asks_before_closing(&mut self) -> bool {
+        if self.asks_to_leave || !self.has_unsaved_loop() {
+            return false;
+        }
+        (self.asks_to_leave, self.needs_redraw) = (true, true);
+        true
+    }
+
+    /// Tells whether the window fills the screen and can leave it.
+    pub fn set_full_screen(&mut self, is_full_screen: bool) {
+        self.is_full_screen = is_full_screen;
+    }
+
+    /// True while the console asks whether to save the loop before it leaves.
+    pub fn asks_to_leave(&self) -> bool {
+        self.asks_to_leave
+    }
+
+    /// Saves the cine loop. False if it cannot be.
+    fn save_loop(&mut self) -> bool {
         let volumes: Vec<_> = self.stream.cine().volumes().iter().cloned().collect();
         let saved = match self.stream.header() {
             Some(header) if !volumes.is_empty() => {
@@ -536,9 +678,11 @@ impl Console {
             }
             _ => Err("there are no volumes yet".into()),
         };
-        if let Err(fault) = saved {
+        self.saving_volume = self.stream.cine().volumes().back().map(|kept| kept.volume).filter(|_| saved.is_ok());
+        if let Err(fault) = &saved {
             self.notify(&format!("The loop was not saved: {fault}"), true);
         }
+        saved.is_ok()
     }
 
     /// Leaves the processor to what the user asks for.
@@ -557,13 +701,13 @@ impl Console {
         if !is_due || is_done || !self.stream.renderer().is_some_and(|renderer| renderer.has_drawn()) {
             return;
         }
-        let voxel = self.stream.scene().map_or(0.5, |scene| scene.grid.pitch[0].min(scene.grid.pitch[1]));
+        let voxel = self.stream.scene().map_or(0.5, frame_budget::voxel);
         let (_, settings) = self.effective_settings(now);
-        let lowered = self.rungs.iter().skip(1).filter(|_| self.frame_budget.budget().is_some());
-        let lowered: Vec<Settings> = lowered.map(|rung| rung.apply(&settings, voxel)).collect();
-        let switches =
-            variants::switches(&settings, |to| self.controls.switched(to)).into_iter().map(|variant| variant.settings);
-        self.stream.warm(lowered.into_iter().chain(switches).collect());
+        let lowered = self.rungs.iter().skip(1).filter(|_| self.pace.budget().is_some());
+        let lowered = lowered.map(|rung| (rung.apply(&settings, voxel), Some(settings.clone())));
+        let switches = variants::switches(&settings, |to| self.controls.switched(to)).into_iter();
+        let next = lowered.chain(switches.map(|variant| (variant.settings, None))).collect();
+        self.stream.warm(next);
         self.warmed = Some(self.controls.settings().clone());
     }
 
@@ -573,21 +717,43 @@ impl Console {
         (self.fixed.warms && self.warmed.is_none() && at > now).then_some(at)
     }
 
-    /// The rung that keeps the frame budget now, and the settings on it.
-    fn effective_settings(&self, now: Instant) -> (usize, Settings) {
-        let rung = self.frame_budget.rung(now).min(self.rungs.len().saturating_sub(1));
-        let voxel = self.stream.scene().map_or(0.5, |scene| scene.grid.pitch[0].min(scene.grid.pitch[1]));
-        let settings = self.controls.settings();
-        let mut effective = match self.rungs.get(rung) {
-            Some(rung) => rung.apply(settings, voxel),
-            None => settings.clone(),
-        };
+    /// The settings of a view at rest.
+    fn full_settings(&self) -> Settings {
+        let mut full = self.controls.settings().clone();
         // A region that grows and a plane that moves show slices that were left out. With all of them processed, dragging needs no frame
         // again.
-        let cuts_planes = effective.mode.is_flat() || effective.layout == Layout::Four;
-        effective.slices.everything |= cuts_planes || matches!(self.controls.tool(), Tool::Region | Tool::Clip);
-        (rung, effective)
+        let cuts_planes = full.mode.is_flat() || full.layout == Layout::Four;
+        full.slices.everything |= cuts_planes || matches!(self.controls.tool(), Tool::Region | Tool::Clip);
+        full
     }
+
+    /// The quality that keeps the frame budget now, and the settings of it.
+    fn effective_settings(&self, now: Instant) -> (Quality, Settings) {
+        let quality = self.pace.quality(now);
+        let voxel = self.stream.scene().map_or(0.5, frame_budget::voxel);
+        let full = self.full_settings();
+        let lowered = match self.rungs.get(quality.rays) {
+            Some(rung) => rung.apply(&full, voxel),
+            None => full,
+        };
+        (quality, frame_budget::shaded(lowered, quality.shading))
+    }
+}
+
+/// The command of a key while the console asks whether to save the loop before it leaves.
+fn answer(input: &Input) -> Option<Command> {
+    match input {
+        Input::Key { key: Key::Enter, .. } => Some(Command::SaveAndExit),
+        Input::Key { key: Key::Char('l'), .. } => Some(Command::Discard),
+        Input::Key { key: Key::Escape, .. } => Some(Command::Back),
+        _ => None,
+    }
+}
+
+/// True for continuous commands that may leave the rays as they are.
+fn is_of_tone(command: &Command) -> bool {
+    use Command::{MoveCrossing, MoveLight, RotatePlanes, SetSlider, StepPlane, StepSlider};
+    matches!(command, MoveLight(_) | StepPlane(_) | MoveCrossing(_) | RotatePlanes(_) | SetSlider(..) | StepSlider(..))
 }
 
 /// True for commands that a drag or a held key gives repeatedly.

@@ -1,13 +1,17 @@
-//! Annotations of the picture: a scale in every tile, the orientation of the axes, and a colour bar.
+//! Annotations of the picture: in every tile a scale, the patient's sides and the probe's marker; the orientation of the axes, and a colour
+//! bar.
 
-use super::{PanelState, SMALL_TEXT, TEXT, WEAK_TEXT, picture_rect};
+use super::{ACCENT, PanelState, SMALL_TEXT, TEXT, WARNING, WEAK_TEXT, picture_rect};
 use crate::passes::postprocess;
+use crate::scene::marks::{BAR_LENGTHS, TileMarks};
 use crate::scene::{Layout, Mode, Scene, transfer};
 use egui::{Align2, Color32, FontId, Painter, Pos2, Rect, Stroke, Ui, Vec2, pos2, vec2};
 use glam::DVec3;
 
-/// Lengths that a scale bar may have, mm.
-const LENGTHS: [f64; 9] = [0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0, 200.0];
+/// A smaller tile has no axes and no colour bar, points: they would lie over the anatomy.
+const MIN_FOR_AXES: f32 = 300.0;
+/// A smaller tile has no scale either, points.
+const MIN_FOR_SCALE: f32 = 90.0;
 
 pub(super) fn paint(ui: &Ui, state: &PanelState, scale: f32) {
     let Some(scene) = state.scene else { return };
@@ -17,54 +21,55 @@ pub(super) fn paint(ui: &Ui, state: &PanelState, scale: f32) {
         return;
     }
     let painter = ui.ctx().layer_painter(egui::LayerId::background()).with_clip_rect(picture);
-    let [width, height] = scene.picture_size().map(f64::from);
-    let tile = |corner: [f64; 2], size: [f64; 2]| {
-        let at = picture.min + vec2(corner[0] as f32, corner[1] as f32) / scale;
-        Rect::from_min_size(at, vec2(size[0] as f32, size[1] as f32) / scale)
-    };
-    if scene.cuts_planes() {
-        let sheet = scene.sheet();
+    let marks = scene.marks();
+    for (n, tile) in marks.iter().enumerate() {
+        let [corner, size] = [tile.corner, tile.size].map(|[x, y]| vec2(x as f32, y as f32) / scale);
+        let area = Rect::from_min_size(picture.min + corner, size);
+        if area.width().min(area.height()) < MIN_FOR_SCALE {
+            continue;
+        }
+        sides(&painter, area, tile);
         // All tiles of a tomography have the same scale: only the first one shows it.
-        let scaled_tiles = if scene.settings.mode == Mode::Tomography { 1 } else { sheet.tiles.len() };
-        for shown in sheet.tiles.iter().take(scaled_tiles) {
-            let area = tile(shown.corner.map(f64::from), shown.size.map(f64::from));
-            let per_point = sheet.pixel * f64::from(scale);
-            match shown.plane.down.y > 0.99 {
-                true => {
-                    let top = shown.plane.at.y - depth_offset(scene) - sheet.pixel * f64::from(shown.size[1]) / 2.0;
-                    ruler(&painter, area, top, per_point);
-                }
-                false => bar(&painter, area, per_point),
-            }
+        if n > 0 && scene.settings.mode == Mode::Tomography {
+            continue;
+        }
+        match tile.depth_from {
+            Some(top) => ruler(&painter, area, top, tile.pixel * f64::from(scale)),
+            None => bar(&painter, area, tile.pixel * f64::from(scale)),
+        }
+        if tile.is_rendering && area.width().min(area.height()) >= MIN_FOR_AXES {
+            axes(&painter, area, scene);
         }
     }
-    if !scene.is_flat() {
-        let [columns, rows] = match scene.settings.layout {
-            Layout::Single => [1.0, 1.0],
-            Layout::Four => [2.0, 2.0],
-            Layout::Pair => [2.0, 1.0],
-        };
-        let corner = [(width - width / columns).floor(), (height - height / rows).floor()];
-        let area = tile(corner, [width - corner[0], height - corner[1]]);
-        bar(&painter, area, rendered_pixel(scene, width - corner[0]) * f64::from(scale));
-        axes(&painter, area, scene);
+    if picture.width().min(picture.height()) >= MIN_FOR_AXES && scene.settings.layout != Layout::Four {
+        colours(&painter, picture, scene);
     }
-    colours(&painter, picture, scene);
+    if let Some(origin) = state.origin {
+        // Between the letter of the upper edge and a marker in the corner.
+        let at = picture.right_top() + vec2(-32.0, 6.0);
+        text(&painter, at, Align2::RIGHT_TOP, origin, WARNING);
+    }
 }
 
-/// The difference between Y in space and the depth below the probe's face, mm.
-fn depth_offset(scene: &Scene) -> f64 {
-    scene.probe().map_or(0.0, |probe| probe.array_radius())
-}
-
-/// Size of a pixel at the camera's target, mm. `width`: of the rendered tile, pixels.
-fn rendered_pixel(scene: &Scene, width: f64) -> f64 {
-    let rays = &scene.rays;
-    let apart = match rays.is_perspective {
-        true => rays.direction_dx.length() * (rays.target - rays.origin).dot(rays.forward),
-        false => rays.origin_dx.length(),
+/// The letters of the patient's sides, and a dot on the side of the probe's marker.
+fn sides(painter: &Painter, area: Rect, tile: &TileMarks) {
+    let at = |[x, y]: [f64; 2]| {
+        let half = area.size() / 2.0 - vec2(16.0, 16.0);
+        area.center() + vec2(x as f32 * half.x, y as f32 * half.y)
     };
-    apart * f64::from(scene.ray_size()[0]) / width.max(1.0)
+    for (edge, letter) in &tile.letters {
+        let font = FontId::proportional(SMALL_TEXT * 1.3);
+        let place = at(edge.offset());
+        painter.text(place + vec2(1.0, 1.0), Align2::CENTER_CENTER, letter, font.clone(), Color32::BLACK);
+        painter.text(place, Align2::CENTER_CENTER, letter, font, Color32::WHITE);
+    }
+    if let Some(edge) = tile.probe {
+        // In the corner of that side, where no letter is.
+        let [x, y] = edge.offset();
+        let place = at([if x == 0.0 { -1.0 } else { x }, if y == 0.0 { -1.0 } else { y }]);
+        painter.circle_filled(place, 7.0, Color32::from_black_alpha(160));
+        painter.circle_filled(place, 5.0, ACCENT);
+    }
 }
 
 fn line(painter: &Painter, from: Pos2, to: Pos2) {
@@ -86,7 +91,7 @@ fn ruler(painter: &Painter, area: Rect, top: f64, per_point: f64) {
         return;
     }
     // The ticks are far enough apart for their numbers.
-    let step = LENGTHS.into_iter().find(|mm| mm / per_point >= 34.0).unwrap_or(200.0);
+    let step = BAR_LENGTHS.into_iter().find(|mm| mm / per_point >= 34.0).unwrap_or(200.0);
     let x = area.left() + 6.0;
     let at = |depth: f64| area.top() + ((depth - top) / per_point) as f32;
     let from = ((top.max(0.0) / step).ceil() * step).max(0.0);
@@ -108,7 +113,7 @@ fn bar(painter: &Painter, area: Rect, per_point: f64) {
         return;
     }
     let max_length = f64::from(area.width()) * 0.3 * per_point;
-    let Some(mm) = LENGTHS.into_iter().rev().find(|mm| *mm <= max_length) else { return };
+    let Some(mm) = BAR_LENGTHS.into_iter().rev().find(|mm| *mm <= max_length) else { return };
     let width = (mm / per_point) as f32;
     let right = pos2(area.right() - 16.0, area.bottom() - 16.0);
     let left = right - vec2(width, 0.0);
@@ -126,9 +131,9 @@ fn axes(painter: &Painter, area: Rect, scene: &Scene) {
     painter.circle_filled(centre, 50.0, Color32::from_black_alpha(110));
     let rays = &scene.rays;
     let named = [
-        (DVec3::X, "lateral", Color32::from_rgb(235, 110, 100)),
+        (DVec3::X, "lat.", Color32::from_rgb(235, 110, 100)),
         (DVec3::Y, "depth", Color32::from_rgb(120, 205, 120)),
-        (DVec3::Z, "elevation", Color32::from_rgb(110, 160, 245)),
+        (DVec3::Z, "elev.", Color32::from_rgb(110, 160, 245)),
     ];
     let mut arms: Vec<(f64, Vec2, &str, Color32)> = named
         .iter()
@@ -145,8 +150,9 @@ fn axes(painter: &Painter, area: Rect, scene: &Scene) {
         painter.circle_filled(centre + arm, 4.0, colour);
         // An axis along the view is too short for a name.
         if arm.length() > 9.0 {
-            let out = arm.normalized() * 11.0;
-            text(painter, centre + arm + out, Align2::CENTER_CENTER, &name[..1].to_uppercase(), colour);
+            // A single letter would be read as a side of the patient.
+            let out = arm.normalized() * vec2(10.0 + 3.5 * name.len() as f32, 12.0);
+            text(painter, centre + arm + out, Align2::CENTER_CENTER, name, colour);
         }
     }
 }

@@ -1,25 +1,28 @@
-//! The panels with buttons and sliders: modes and tools on the left, sliders on the right, the cine loop below.
+//! The panels with buttons and sliders: modes and tools on the left, controls on the right, the cine loop below. The six controls that
+//! every examination needs are in front; the others are below them, by stage.
 
-use super::{
-    ACCENT, CINE_BAR_HEIGHT, MODES_WIDTH, PanelState, SLIDERS_WIDTH, SMALL_TEXT, TOUCH_SIZE, WARNING, WEAK_TEXT,
-};
-use crate::scene::{ColourMap, Layout, Mode, PlaneName, Transfer, TransferName};
+use super::{ACCENT, BUTTON, PanelState, SMALL_TEXT, TEXT, TEXT_SIZE, TOUCH_SIZE, WARNING, WEAK_TEXT};
+use crate::scene::{ColourMap, Layout, Mode, PlaneName, Settings, Transfer, TransferName};
 use crate::ui::command::{Command, Tool};
-use crate::ui::sliders::{Group, SLIDERS};
-use egui::{Align, Button, Color32, Panel, RichText, ScrollArea, Slider, Ui, vec2};
+use crate::ui::hints;
+use crate::ui::sliders::{Group, SLIDERS, Slider as Control};
+use egui::{
+    Align, Button, CollapsingHeader, Color32, FontId, Label, Panel, Rect, RichText, ScrollArea, Sense, Slider, Stroke,
+    StrokeKind, Ui, WidgetInfo, WidgetType, pos2, vec2,
+};
 
 /// All modes, in the order of their keys.
-const MODES: [(Mode, &str); 10] = [
-    (Mode::Surface, "Surface"),
-    (Mode::Volume, "Volume"),
-    (Mode::Mixed, "Mixed"),
-    (Mode::Mip, "MIP"),
-    (Mode::MinIp, "MinIP"),
-    (Mode::Mean, "X-ray"),
-    (Mode::Plane, "Plane"),
-    (Mode::Orthogonal, "3 planes"),
-    (Mode::Tomography, "Slices"),
-    (Mode::Cube, "Cube"),
+const MODES: [Mode; 10] = [
+    Mode::Surface,
+    Mode::Volume,
+    Mode::Mixed,
+    Mode::Mip,
+    Mode::MinIp,
+    Mode::Mean,
+    Mode::Plane,
+    Mode::Orthogonal,
+    Mode::Tomography,
+    Mode::Cube,
 ];
 
 const TOOLS: [(Tool, &str); 5] = [
@@ -32,21 +35,37 @@ const TOOLS: [(Tool, &str); 5] = [
 
 const PLANES: [(PlaneName, &str); 3] = [(PlaneName::A, "A"), (PlaneName::B, "B"), (PlaneName::C, "C")];
 
-pub(super) fn show_modes(ui: &mut Ui, state: &PanelState, execute: &mut dyn FnMut(Command)) {
-    Panel::left("rail").exact_size(MODES_WIDTH).resizable(false).show_separator_line(false).show(ui, |ui| {
-        let settings = state.controls.settings();
-        ui.add_space(6.0);
-        heading(ui, "Mode");
-        pairs(ui, &MODES, |mode| settings.mode == mode, |mode| execute(Command::Mode(mode)));
-        heading(ui, "Layout");
-        let layouts = [(Layout::Single, "Single"), (Layout::Four, "4-up"), (Layout::Pair, "VR | SR")];
-        pairs(ui, &layouts, |layout| settings.layout == layout, |layout| execute(Command::Layout(layout)));
-        heading(ui, "Drag");
-        pairs(ui, &TOOLS, |tool| state.controls.tool() == tool, |tool| execute(Command::Tool(tool)));
-        if settings.mode.is_flat() && settings.mode != Mode::Orthogonal {
-            heading(ui, "Plane");
-            row(ui, &PLANES, 3, |plane| settings.planes.plane == plane, |plane| execute(Command::Plane(plane)));
-        }
+/// The controls in front: their names, and the sliders of which the first that the mode has is meant.
+pub(super) const FRONT: [(&str, &[&str]); 6] = [
+    ("Threshold", &["Threshold"]),
+    ("Gain", &["Gain"]),
+    ("Smooth", &["Smoothing"]),
+    ("Brightness", &["Exposure", "Gamma"]),
+    ("Light", &["Diffuse"]),
+    ("Depth", &["Start depth"]),
+];
+
+pub(super) fn show_modes(ui: &mut Ui, state: &PanelState, width: f32, execute: &mut dyn FnMut(Command)) {
+    Panel::left("rail").exact_size(width).resizable(false).show_separator_line(false).show(ui, |ui| {
+        // A low window scrolls.
+        ScrollArea::vertical().auto_shrink(false).show(ui, |ui| {
+            let settings = state.controls.settings();
+            let row = Row { width, height: TOUCH_SIZE * 0.92 };
+            ui.add_space(6.0);
+            heading(ui, "Mode");
+            let modes = MODES.map(|mode| (mode, mode.title()));
+            row.show(ui, &modes, 2, |m| settings.mode == m, hints::of_mode, |m| execute(Command::Mode(m)));
+            heading(ui, "Layout");
+            let layouts = [(Layout::Single, "Single"), (Layout::Four, "4-up"), (Layout::Pair, "VR | SR")];
+            row.show(ui, &layouts, 2, |l| settings.layout == l, hints::of_layout, |l| execute(Command::Layout(l)));
+            heading(ui, "Drag");
+            row.show(ui, &TOOLS, 2, |t| state.controls.tool() == t, hints::of_tool, |t| execute(Command::Tool(t)));
+            if settings.mode.is_flat() && settings.mode != Mode::Orthogonal {
+                heading(ui, "Plane");
+                let hint = |_| "The plane that is shown and moved.";
+                row.show(ui, &PLANES, 3, |p| settings.planes.plane == p, hint, |p| execute(Command::Plane(p)));
+            }
+        });
     });
 }
 
@@ -54,102 +73,191 @@ fn heading(ui: &mut Ui, text: &str) {
     ui.label(RichText::new(text).size(SMALL_TEXT).color(WEAK_TEXT));
 }
 
-fn pairs<T: Copy>(ui: &mut Ui, all: &[(T, &str)], is: impl Fn(T) -> bool, mut select: impl FnMut(T)) {
-    for two in all.chunks(2) {
-        row(ui, two, 2, &is, &mut select);
+/// Rows of buttons of which one is chosen.
+struct Row {
+    /// Width of the panel, points.
+    width: f32,
+    height: f32,
+}
+
+impl Row {
+    fn show<T: Copy>(
+        &self,
+        ui: &mut Ui,
+        all: &[(T, &str)],
+        columns: usize,
+        is: impl Fn(T) -> bool,
+        hint: impl Fn(T) -> &'static str,
+        mut select: impl FnMut(T),
+    ) {
+        let gap = ui.spacing().item_spacing.x;
+        let width = (self.width - 16.0 - gap * (columns - 1) as f32) / columns as f32;
+        for some in all.chunks(columns) {
+            ui.horizontal(|ui| {
+                for (value, name) in some {
+                    let button = Button::selectable(is(*value), *name).frame_when_inactive(true);
+                    if ui.add(button.min_size(vec2(width, self.height))).on_hover_text(hint(*value)).clicked() {
+                        select(*value);
+                    }
+                }
+            });
+        }
     }
 }
 
-/// A row of buttons, each with the width of one of `columns`.
-fn row<T: Copy>(ui: &mut Ui, all: &[(T, &str)], columns: usize, is: impl Fn(T) -> bool, mut select: impl FnMut(T)) {
-    ui.horizontal(|ui| {
-        let gap = ui.spacing().item_spacing.x;
-        let width = (MODES_WIDTH - 16.0 - gap * (columns - 1) as f32) / columns as f32;
-        for (value, name) in all {
-            let button = Button::selectable(is(*value), *name).frame_when_inactive(true);
-            if ui.add(button.min_size(vec2(width, TOUCH_SIZE * 0.92))).clicked() {
-                select(*value);
-            }
-        }
-    });
+/// Colours of what is shown: of a volume those of its transfer function, of other modes those of the picture.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Colour {
+    Transfer(TransferName),
+    Map(ColourMap),
 }
 
-const TRANSFERS: [(TransferName, &str); 6] = [
-    (TransferName::Grey, "Grey"),
-    (TransferName::Sepia, "Sepia"),
-    (TransferName::Skin, "Skin"),
-    (TransferName::Bone, "Bone"),
-    (TransferName::Cool, "Cool"),
-    (TransferName::Warm, "Warm"),
+const OF_VOLUME: [(Colour, &str); 6] = [
+    (Colour::Transfer(TransferName::Grey), "Grey"),
+    (Colour::Transfer(TransferName::Sepia), "Sepia"),
+    (Colour::Transfer(TransferName::Skin), "Skin"),
+    (Colour::Transfer(TransferName::Bone), "Bone"),
+    (Colour::Transfer(TransferName::Cool), "Cool"),
+    (Colour::Transfer(TransferName::Warm), "Warm"),
 ];
 
-const MAPS: [(ColourMap, &str); 5] = [
-    (ColourMap::None, "As is"),
-    (ColourMap::Grey, "Grey"),
-    (ColourMap::Sepia, "Sepia"),
-    (ColourMap::Skin, "Skin"),
-    (ColourMap::Ice, "Ice"),
+const OF_PICTURE: [(Colour, &str); 5] = [
+    (Colour::Map(ColourMap::None), "As is"),
+    (Colour::Map(ColourMap::Grey), "Grey"),
+    (Colour::Map(ColourMap::Sepia), "Sepia"),
+    (Colour::Map(ColourMap::Skin), "Skin"),
+    (Colour::Map(ColourMap::Ice), "Ice"),
 ];
 
-pub(super) fn show_sliders(ui: &mut Ui, state: &PanelState, execute: &mut dyn FnMut(Command)) {
+fn colours(settings: &Settings) -> &'static [(Colour, &'static str)] {
+    match settings.mode {
+        Mode::Volume | Mode::Mixed => &OF_VOLUME,
+        _ => &OF_PICTURE,
+    }
+}
+
+/// The index of the slider of a control in front, if the mode has one.
+pub(super) fn front(sliders: &[&str], settings: &Settings) -> Option<usize> {
+    sliders.iter().find_map(|name| SLIDERS.iter().position(|s| s.name == *name && s.applies(settings)))
+}
+
+pub(super) fn show_controls(ui: &mut Ui, state: &PanelState, width: f32, execute: &mut dyn FnMut(Command)) {
     let settings = state.controls.settings();
-    Panel::right("column").exact_size(SLIDERS_WIDTH).resizable(false).show_separator_line(false).show(ui, |ui| {
+    Panel::right("column").exact_size(width).resizable(false).show_separator_line(false).show(ui, |ui| {
         ScrollArea::vertical().auto_shrink(false).show(ui, |ui| {
             // Leaves room for the scroll bar, which covers the edge.
-            ui.set_max_width(SLIDERS_WIDTH - 32.0);
+            ui.set_max_width(width - 32.0);
             ui.add_space(6.0);
+            heading(ui, "Controls");
+            let in_front = FRONT.map(|(name, sliders)| (name, front(sliders, settings)));
+            for (name, number) in in_front {
+                match number {
+                    Some(number) => slider(ui, state, number, name, true, execute),
+                    None => absent(ui, name),
+                }
+            }
+            let colours = colours(settings);
+            ui.add_space(4.0);
+            ui.label("Colour");
+            let is = |colour| match colour {
+                Colour::Transfer(name) => settings.volume.transfer == Transfer::Named(name),
+                Colour::Map(map) => settings.post.colour_map == map,
+            };
+            let hint = |_| "Colours of the tissue; they stand for no flow.";
+            Row { width: width - 24.0, height: TOUCH_SIZE * 0.8 }.show(
+                ui,
+                colours,
+                3,
+                is,
+                hint,
+                |colour| match colour {
+                    Colour::Transfer(name) => execute(Command::Transfer(name)),
+                    Colour::Map(map) => execute(Command::ColourMap(map)),
+                },
+            );
+            let is_lit = SLIDERS.iter().any(|slider| slider.name == "Shadow" && slider.applies(settings));
+            if is_lit {
+                let mut on = settings.light.shadow.is_some_and(|shadow| shadow.strength > 0.0);
+                if switch(ui, &mut on, "Cast shadows", "The lamp casts shadows on the surface.") {
+                    execute(Command::Shadow(on));
+                }
+            }
+            let mut saves_bar = state.saves_bar;
+            let hint = "Saved pictures carry the patient's sides, and a bar with scale, depth, mode and time.";
+            if switch(ui, &mut saves_bar, "Bar on saved pictures", hint) {
+                execute(Command::SavesBar(saves_bar));
+            }
+            ui.add_space(8.0);
+            heading(ui, "Advanced");
             for (group, name) in Group::ALL {
-                let mut there = SLIDERS.iter().enumerate().filter(|(_, s)| s.group == group && s.applies(settings));
-                let Some(first) = there.next() else { continue };
-                ui.label(RichText::new(name).size(SMALL_TEXT).color(WEAK_TEXT));
-                for (number, _) in std::iter::once(first).chain(there) {
-                    slider(ui, state, number, execute);
+                let is_there = |(number, s): &(usize, &Control)| {
+                    s.group == group && s.applies(settings) && in_front.iter().all(|(_, front)| *front != Some(*number))
+                };
+                let there: Vec<usize> = SLIDERS.iter().enumerate().filter(is_there).map(|(number, _)| number).collect();
+                if there.is_empty() {
+                    continue;
                 }
-                match group {
-                    Group::Volume => {
-                        let is = |name| settings.volume.transfer == Transfer::Named(name);
-                        choices(ui, "Transfer function", &TRANSFERS, is, |name| execute(Command::Transfer(name)));
+                CollapsingHeader::new(name).id_salt(name).show_unindented(ui, |ui| {
+                    for number in there {
+                        slider(ui, state, number, SLIDERS[number].name, false, execute);
                     }
-                    Group::Image => {
-                        let is = |map| settings.post.colour_map == map;
-                        choices(ui, "Colours", &MAPS, is, |map| execute(Command::ColourMap(map)));
-                    }
-                    Group::Light => {
-                        let on = settings.light.shadow.is_some();
-                        choices(
-                            ui,
-                            "Shadow",
-                            &[(true, "On"), (false, "Off")],
-                            |s| s == on,
-                            |s| execute(Command::Shadow(s)),
-                        );
-                    }
-                    _ => {}
-                }
-                ui.add_space(6.0);
+                });
             }
         });
     });
 }
 
-fn slider(ui: &mut Ui, state: &PanelState, number: usize, execute: &mut dyn FnMut(Command)) {
+/// A control in front that the mode has not: it keeps its place.
+fn absent(ui: &mut Ui, name: &str) {
+    ui.horizontal(|ui| {
+        ui.label(RichText::new(name).color(WEAK_TEXT.gamma_multiply(0.6)));
+        ui.with_layout(egui::Layout::right_to_left(Align::Center), |ui| {
+            ui.label(RichText::new("-").color(WEAK_TEXT.gamma_multiply(0.6)));
+        });
+    });
+    let size = vec2(ui.available_width(), TOUCH_SIZE * 0.62);
+    ui.allocate_exact_size(size, Sense::hover()).1.on_hover_text("This mode has no such control.");
+}
+
+fn slider(
+    ui: &mut Ui,
+    state: &PanelState,
+    number: usize,
+    name: &str,
+    is_large: bool,
+    execute: &mut dyn FnMut(Command),
+) {
     let slider = &SLIDERS[number];
+    let hint = hints::of_slider(slider.name);
     let settings = state.controls.settings();
     let [low, high] = state.scene.map_or(slider.range, |scene| slider.range_in(scene));
     let before = slider.get(settings);
+    if slider.range == [0.0, 1.0] && slider.step == 1.0 {
+        let mut on = before >= 0.5;
+        if switch(ui, &mut on, name, hint) {
+            execute(Command::SetSlider(number, f64::from(u8::from(on))));
+        }
+        return;
+    }
     let mut value = before.clamp(low, high.max(low));
     let digits = (-slider.step.log10().floor()).clamp(0.0, 3.0) as usize;
     ui.horizontal(|ui| {
-        ui.label(slider.name);
-        ui.with_layout(egui::Layout::right_to_left(egui::Align::Center), |ui| {
-            let unit = if slider.unit.is_empty() { String::new() } else { format!(" {}", slider.unit) };
-            ui.label(RichText::new(format!("{before:.digits$}{unit}")).color(ACCENT));
+        let text = RichText::new(name);
+        ui.label(if is_large { text.strong() } else { text });
+        ui.with_layout(egui::Layout::right_to_left(Align::Center), |ui| {
+            let space = if slider.unit.is_empty() || slider.unit == "°" { "" } else { " " };
+            ui.label(RichText::new(format!("{before:.digits$}{space}{}", slider.unit)).color(ACCENT));
         });
     });
-    ui.spacing_mut().slider_width = SLIDERS_WIDTH - 44.0;
+    ui.spacing_mut().slider_width = ui.available_width();
     // Tall enough for a finger, although the rail is thin.
-    ui.spacing_mut().interact_size.y = TOUCH_SIZE * 0.62;
+    ui.spacing_mut().interact_size.y = TOUCH_SIZE * if is_large { 0.62 } else { 0.5 };
     let response = ui.add(Slider::new(&mut value, low..=high.max(low)).show_value(false).step_by(slider.step));
+    let response = response.on_hover_text(format!("{hint} Double click: as at the start."));
+    if response.double_clicked() {
+        execute(Command::ResetSlider(number));
+        return;
+    }
     // egui also reports a change when it rounds a value to the step, without any input.
     let is_held = response.dragged() || response.clicked() || response.is_pointer_button_down_on();
     if is_held && value != before {
@@ -157,72 +265,154 @@ fn slider(ui: &mut Ui, state: &PanelState, number: usize, execute: &mut dyn FnMu
     }
 }
 
-fn choices<T: Copy>(ui: &mut Ui, name: &str, all: &[(T, &str)], is: impl Fn(T) -> bool, mut select: impl FnMut(T)) {
-    ui.label(name);
-    ui.horizontal_wrapped(|ui| {
-        ui.spacing_mut().item_spacing = vec2(6.0, 6.0);
-        let width = (SLIDERS_WIDTH - 44.0 - 12.0) / 3.0;
-        for (value, name) in all {
-            let button = Button::selectable(is(*value), *name).frame_when_inactive(true);
-            if ui.add(button.min_size(vec2(width, TOUCH_SIZE * 0.8))).clicked() {
-                select(*value);
-            }
-        }
-    });
+/// A switch with its name; the whole row reacts. True if the user changed it.
+fn switch(ui: &mut Ui, on: &mut bool, name: &str, hint: &str) -> bool {
+    let (area, response) = ui.allocate_exact_size(vec2(ui.available_width(), TOUCH_SIZE * 0.75), Sense::click());
+    let response = response.on_hover_text(hint);
+    if response.clicked() {
+        *on = !*on;
+    }
+    response.widget_info(|| WidgetInfo::selected(WidgetType::Checkbox, true, *on, name));
+    let (width, height) = (44.0, 24.0);
+    let right = pos2(area.right() - width, area.center().y - height / 2.0);
+    let track = Rect::from_min_size(right, vec2(width, height));
+    let painter = ui.painter();
+    let fill = if *on { ACCENT.gamma_multiply(0.55) } else { BUTTON };
+    painter.rect_filled(track, height / 2.0, fill);
+    let edge = if response.hovered() || response.has_focus() { TEXT } else { WEAK_TEXT };
+    painter.rect_stroke(track, height / 2.0, Stroke::new(1.0, edge), StrokeKind::Inside);
+    let x = if *on { track.right() - height / 2.0 } else { track.left() + height / 2.0 };
+    painter.circle_filled(pos2(x, track.center().y), height / 2.0 - 4.0, Color32::WHITE);
+    let font = FontId::proportional(TEXT_SIZE);
+    // A long name ends before the switch.
+    let name = painter.layout_no_wrap(name.to_string(), font, TEXT);
+    let at = pos2(area.left(), area.center().y - name.size().y / 2.0);
+    let clip = Rect::from_min_max(area.min, pos2(track.left() - 6.0, area.bottom()));
+    painter.with_clip_rect(clip).galley(at, name, TEXT);
+    response.clicked()
 }
 
-pub(super) fn show_cine_bar(ui: &mut Ui, state: &PanelState, execute: &mut dyn FnMut(Command)) {
-    Panel::bottom("bar").exact_size(CINE_BAR_HEIGHT).resizable(false).show_separator_line(false).show(ui, |ui| {
+pub(super) fn show_cine_bar(ui: &mut Ui, state: &PanelState, height: f32, execute: &mut dyn FnMut(Command)) {
+    Panel::bottom("bar").exact_size(height).resizable(false).show_separator_line(false).show(ui, |ui| {
+        let touch = (height - 12.0).min(TOUCH_SIZE);
         ui.horizontal_centered(|ui| {
+            let room = ui.available_width();
+            let is_narrow = room < 420.0;
             let (label, fill) = match state.is_frozen {
                 true => ("FROZEN", WARNING.gamma_multiply(0.75)),
                 false => ("Freeze", ACCENT.gamma_multiply(0.45)),
             };
             let text = RichText::new(label).color(Color32::WHITE).strong();
-            if ui.add(Button::new(text).fill(fill).min_size(vec2(120.0, TOUCH_SIZE))).clicked() {
+            let width = if is_narrow { 84.0 } else { 120.0 };
+            let hint = "Keeps this volume on the screen (Space).";
+            if ui.add(Button::new(text).fill(fill).min_size(vec2(width, touch))).on_hover_text(hint).clicked() {
                 execute(Command::Freeze);
             }
-            cine(ui, state, execute);
+            let mut left = room - width - ui.spacing().item_spacing.x;
+            // In the order in which they give way to a narrow window; the first is always there.
+            let buttons = [
+                (
+                    if is_narrow { "Save" } else { "Save picture" },
+                    if is_narrow { 64.0 } else { 124.0 },
+                    Command::SavePicture,
+                    "Saves the picture (P).",
+                ),
+                ("?", 44.0, Command::ToggleHelp, "All keys and gestures (H)."),
+                ("Save loop", 100.0, Command::SaveLoop, "Saves the last volumes as a recording (R)."),
+                ("Reset", 70.0, Command::Reset, "All settings as at the start (Backspace)."),
+                ("Full screen", 110.0, Command::ToggleFullScreen, "Fills the screen, or leaves it (F11)."),
+                ("Times", 70.0, Command::ToggleTimes, "Times of pictures and frames (F2)."),
+            ];
+            let mut shown = Vec::new();
+            for (n, (label, width, command, hint)) in buttons.into_iter().enumerate() {
+                let wanted = width + ui.spacing().item_spacing.x;
+                // The loop needs its buttons and some of its slider.
+                let kept = match n {
+                    0 => 0.0,
+                    1 => 60.0,
+                    _ => 330.0,
+                };
+                if n == 0 || left >= wanted + kept {
+                    left -= wanted;
+                    shown.push((label, width, command, hint));
+                }
+            }
+            if left >= 150.0 {
+                cine(ui, state, left, touch, execute);
+            }
             ui.with_layout(egui::Layout::right_to_left(Align::Center), |ui| {
-                let mut button = |label: &str, width: f32, command| {
-                    if ui.add(Button::new(label).min_size(vec2(width, TOUCH_SIZE))).clicked() {
+                // From the right: help first, the picture next to the loop.
+                shown.sort_by_key(|(label, ..)| match *label {
+                    "?" => 0,
+                    "Full screen" => 1,
+                    "Times" => 2,
+                    "Reset" => 3,
+                    "Save loop" => 4,
+                    _ => 5,
+                });
+                for (label, width, command, hint) in shown {
+                    if ui.add(Button::new(label).min_size(vec2(width, touch))).on_hover_text(hint).clicked() {
                         execute(command);
                     }
-                };
-                button("?", 52.0, Command::ToggleHelp);
-                button("Full screen", 110.0, Command::ToggleFullScreen);
-                button("Times", 70.0, Command::ToggleTimes);
-                button("Reset", 70.0, Command::Reset);
-                button("Save loop", 100.0, Command::SaveLoop);
-                button("Save picture", 120.0, Command::SavePicture);
+                }
             });
         });
     });
 }
 
-fn cine(ui: &mut Ui, state: &PanelState, execute: &mut dyn FnMut(Command)) {
+/// The cine loop in so much room, points.
+fn cine(ui: &mut Ui, state: &PanelState, room: f32, touch: f32, execute: &mut dyn FnMut(Command)) {
     let (count, place) = state.cine;
     if count == 0 {
         ui.label(RichText::new("no volumes yet").color(WEAK_TEXT));
         return;
     }
     let label = if state.is_playing { "Stop" } else { "Play" };
-    if ui.add(Button::new(label).min_size(vec2(64.0, TOUCH_SIZE))).clicked() {
+    let hint = "Plays the last volumes as a loop (Enter).";
+    if ui.add(Button::new(label).min_size(vec2(64.0, touch))).on_hover_text(hint).clicked() {
         execute(Command::PlayCine);
     }
-    for (label, by) in [("<", -1), (">", 1)] {
-        if ui.add(Button::new(label).min_size(vec2(44.0, TOUCH_SIZE))).clicked() {
-            execute(Command::StepCine(by));
+    if room >= 330.0 {
+        for (label, by, hint) in [("<", -1, "One volume back (Left)."), (">", 1, "One volume forth (Right).")] {
+            if ui.add(Button::new(label).min_size(vec2(44.0, touch))).on_hover_text(hint).clicked() {
+                execute(Command::StepCine(by));
+            }
+        }
+        ui.spacing_mut().slider_width = (room - 290.0).clamp(30.0, 400.0);
+        let mut at = place.map_or(count, |p| p + 1);
+        let slider = ui.add_enabled(count > 1, Slider::new(&mut at, 1..=count).show_value(false));
+        let slider = slider.on_hover_text("The volumes of the loop, oldest first.");
+        let is_held = slider.dragged() || slider.clicked() || slider.is_pointer_button_down_on();
+        if is_held && place != Some(at - 1) {
+            execute(Command::SeekCine(at - 1));
         }
     }
-    // Leaves room for the buttons on the right.
-    ui.spacing_mut().slider_width = (ui.available_width() - 690.0).clamp(60.0, 400.0);
-    let mut at = place.map_or(count, |p| p + 1);
-    let slider = ui.add_enabled(count > 1, Slider::new(&mut at, 1..=count).show_value(false));
-    let is_held = slider.dragged() || slider.clicked() || slider.is_pointer_button_down_on();
-    if is_held && place != Some(at - 1) {
-        execute(Command::SeekCine(at - 1));
-    }
     let shown = place.map_or("-".into(), |p| (p + 1).to_string());
-    ui.label(format!("{shown} of {count}"));
+    ui.add(Label::new(format!("{shown} of {count}")).extend());
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scene::load::Layers;
+
+    #[test]
+    fn every_mode_has_the_controls_in_front_that_it_can_have() {
+        for mode in MODES {
+            let mut settings = Layers::default().finish().expect("settings");
+            settings.set_mode(mode);
+            let names: Vec<&str> = FRONT
+                .iter()
+                .filter(|(_, sliders)| front(sliders, &settings).is_some())
+                .map(|(name, _)| *name)
+                .collect();
+            assert!(["Gain", "Smooth", "Brightness"].iter().all(|name| names.contains(name)), "{mode:?}: {names:?}");
+            assert!(mode != Mode::Surface || names.len() == FRONT.len(), "{mode:?}: {names:?}");
+        }
+        for (name, sliders) in FRONT {
+            for slider in sliders {
+                assert!(SLIDERS.iter().any(|s| s.name == *slider), "{name}: no slider {slider}");
+            }
+        }
+    }
 }

@@ -91,9 +91,14 @@ impl Panels {
             let execute = &mut |command| commands.push(command);
             let shows_panels = state.shows_panels && state.picture.1 != size;
             if shows_panels {
-                controls::show_cine_bar(ui, state, execute);
-                controls::show_modes(ui, state, execute);
-                controls::show_sliders(ui, state, execute);
+                let Edges { left, right, below } = Edges::of(points.into(), true);
+                controls::show_cine_bar(ui, state, below, execute);
+                if left > 0.0 {
+                    controls::show_modes(ui, state, left, execute);
+                }
+                if right > 0.0 {
+                    controls::show_controls(ui, state, right, execute);
+                }
             }
             if state.has_drawn && state.shows_panels {
                 annotations::paint(ui, state, self.scale);
@@ -104,6 +109,9 @@ impl Panels {
             overlays::show_notes(ui, state, self.scale);
             if state.shows_help {
                 overlays::show_help(ui, state, execute);
+            }
+            if state.asks_to_leave {
+                overlays::ask_to_leave(ui, execute);
             }
             overlays::paint_pointer(ui, state, self.scale);
         });
@@ -195,12 +203,42 @@ impl EguiInput {
     }
 }
 
-/// Sizes of the panels, points: buttons on the left, sliders on the right, cine loop below.
+/// Sizes of the panels, points: buttons on the left, controls on the right, cine loop below.
 const MODES_WIDTH: f32 = 208.0;
-const SLIDERS_WIDTH: f32 = 330.0;
-const CINE_BAR_HEIGHT: f32 = 76.0;
+const CONTROLS_WIDTH: [f32; 2] = [212.0, 330.0];
+const CINE_BAR_HEIGHT: [f32; 2] = [60.0, 76.0];
 /// A smaller window shows the picture without panels, points.
-const MIN_WINDOW: [f32; 2] = [760.0, 420.0];
+const MIN_WINDOW: [f32; 2] = [180.0, 150.0];
+/// A smaller window has only the bar below, points.
+const MIN_FOR_MODES: [f32; 2] = [600.0, 300.0];
+/// A lower window has no controls, points.
+const MIN_FOR_CONTROLS: f32 = 440.0;
+/// A window of this height has a high bar, points.
+const HIGH_WINDOW: f32 = 600.0;
+/// Largest share of the width that both columns have together: the picture keeps half of the window.
+const COLUMNS_SHARE: f32 = 0.42;
+
+/// What the panels take of a window at its edges, points; 0 without a panel.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+struct Edges {
+    left: f32,
+    right: f32,
+    below: f32,
+}
+
+impl Edges {
+    fn of([width, height]: [f32; 2], shows_panels: bool) -> Edges {
+        let fits = |least: [f32; 2]| width >= least[0] && height >= least[1];
+        if !shows_panels || !fits(MIN_WINDOW) {
+            return Edges::default();
+        }
+        let left = if fits(MIN_FOR_MODES) { MODES_WIDTH } else { 0.0 };
+        let room = (COLUMNS_SHARE * width - left).min(CONTROLS_WIDTH[1]);
+        let has_controls = left > 0.0 && height >= MIN_FOR_CONTROLS && room >= CONTROLS_WIDTH[0];
+        let below = CINE_BAR_HEIGHT[usize::from(height >= HIGH_WINDOW)];
+        Edges { left, right: if has_controls { room } else { 0.0 }, below }
+    }
+}
 
 /// What the panels show.
 pub(super) struct PanelState<'a> {
@@ -212,6 +250,14 @@ pub(super) struct PanelState<'a> {
     pub(super) shows_panels: bool,
     pub(super) shows_help: bool,
     pub(super) shows_times: bool,
+    /// What the help is searched for, while it is.
+    pub(super) help_search: Option<&'a str>,
+    /// Saves pictures with a bar.
+    pub(super) saves_bar: bool,
+    /// What the pictures show, if that is no patient.
+    pub(super) origin: Option<&'a str>,
+    /// Asks whether to save the loop before leaving.
+    pub(super) asks_to_leave: bool,
     pub(super) is_frozen: bool,
     pub(super) is_playing: bool,
     /// Number of volumes in the cine loop, and the index of the one that is shown.
@@ -246,12 +292,9 @@ pub(super) struct Note {
 
 /// The area that the panels leave for the picture in a window of this size: upper left corner and size, pixels.
 pub fn picture_area(size: [u32; 2], scale: f32, shows_panels: bool) -> ([u32; 2], [u32; 2]) {
-    let points = size.map(|n| n as f32 / scale);
-    if !shows_panels || points[0] < MIN_WINDOW[0] || points[1] < MIN_WINDOW[1] {
-        return ([0, 0], size.map(|n| n.max(1)));
-    }
-    let [left, right, below] = [MODES_WIDTH, SLIDERS_WIDTH, CINE_BAR_HEIGHT].map(|edge| (edge * scale).round() as u32);
-    ([left, 0], [(size[0] - left - right).max(1), (size[1] - below).max(1)])
+    let Edges { left, right, below } = Edges::of(size.map(|n| n as f32 / scale), shows_panels);
+    let [left, right, below] = [left, right, below].map(|edge| (edge * scale).round() as u32);
+    ([left, 0], [size[0].saturating_sub(left + right).max(1), size[1].saturating_sub(below).max(1)])
 }
 
 /// The area of the picture in points.
@@ -308,8 +351,7 @@ fn apply_theme(context: &egui::Context) {
     style.spacing.slider_rail_height = 10.0;
     style.spacing.scroll.bar_width = 14.0;
     style.interaction.selectable_labels = false;
-    // A tooltip would cover the picture, and a finger cannot hover.
-    style.interaction.tooltip_delay = f32::INFINITY;
+    style.interaction.tooltip_delay = 0.6;
     let visuals = &mut style.visuals;
     visuals.panel_fill = PANEL;
     visuals.window_fill = PANEL;
@@ -327,4 +369,25 @@ fn apply_theme(context: &egui::Context) {
     visuals.widgets.active.bg_fill = ACCENT.gamma_multiply(0.4);
     visuals.widgets.active.weak_bg_fill = ACCENT.gamma_multiply(0.4);
     context.set_style_of(Theme::Dark, style);
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_picture_keeps_half_of_every_window_and_freeze_is_always_there() {
+        for size in [[640, 480], [800, 600], [1000, 700], [1024, 768], [1280, 800], [1920, 1080], [3840, 2160]] {
+            for scale in [1.0_f32, 1.25, 1.5, 2.0, 2.5, 3.0] {
+                let (corner, picture) = picture_area(size, scale, true);
+                let [window, shown] = [size, picture].map(|[w, h]| f64::from(w) * f64::from(h));
+                assert!(shown >= 0.5 * window, "{size:?} at {scale}: {picture:?}");
+                assert!(picture[1] < size[1], "{size:?} at {scale}: no bar");
+                assert!(corner[0] + picture[0] <= size[0], "{size:?} at {scale}: {corner:?} {picture:?}");
+            }
+        }
+        assert!(picture_area([1280, 800], 1.0, true).1[0] + 208 < 1280, "controls");
+        assert_eq!(picture_area([1280, 800], 1.0, false), ([0, 0], [1280, 800]));
+        assert_eq!(picture_area([1, 0], 1.0, true), ([0, 0], [1, 1]));
+    }
 }

@@ -1,13 +1,15 @@
-//! What is drawn over the picture: banner and notes, times, help, and the pointer where no windowing system draws one.
+//! What is drawn over the picture: banner and notes, times, help, a question with its answers, and the pointer where no windowing system draws one.
 
 use super::{
-    ACCENT, BACKGROUND, FAULT, GOOD, LARGE_TEXT, PANEL, PanelState, SMALL_TEXT, TEXT, TEXT_SIZE, WARNING, WEAK_TEXT,
-    picture_rect,
+    ACCENT, BACKGROUND, FAULT, GOOD, LARGE_TEXT, PANEL, PanelState, SMALL_TEXT, TEXT, TEXT_SIZE, TOUCH_SIZE, WARNING,
+    WEAK_TEXT, picture_rect,
 };
 use crate::ui::command::{self, Command};
+use crate::ui::hints;
+use crate::ui::sliders::SLIDERS;
 use egui::{
-    Align2, Area, Color32, Frame, Id, LayerId, Margin, Mesh, Order, Rect, RichText, ScrollArea, Shape, Stroke, Ui,
-    Vec2, pos2, vec2,
+    Align2, Area, Button, Color32, Frame, Id, LayerId, Margin, Mesh, Order, Rect, RichText, ScrollArea, Shape, Stroke,
+    Ui, Vec2, pos2, vec2,
 };
 
 pub(super) fn show_notes(ui: &mut Ui, state: &PanelState, scale: f32) {
@@ -175,6 +177,28 @@ const GESTURES: [(&str, &str); 9] = [
     ("Planes, then click", "move the point where the three planes cross"),
 ];
 
+/// A line of the help: keys or gesture, and what it does.
+type HelpLine = (String, String);
+
+/// The groups of the help that contain a text, with those of their lines that do; all for an empty text.
+fn found(exit_key: &str, search: &str) -> Vec<(&'static str, Vec<HelpLine>)> {
+    let keys = command::help().map(|(key, label)| (key, label.to_string()));
+    let exit = (!exit_key.is_empty()).then(|| (exit_key.to_string(), "quit".to_string()));
+    let gestures = GESTURES.iter().map(|(gesture, label)| (gesture.to_string(), label.to_string()));
+    let controls = SLIDERS.iter().map(|slider| (slider.name.to_string(), hints::of_slider(slider.name).to_string()));
+    // Without a search all of it has to fit one page.
+    let controls: Vec<HelpLine> = if search.is_empty() { Vec::new() } else { controls.collect() };
+    let wanted: Vec<String> = search.split_whitespace().map(str::to_lowercase).collect();
+    let groups =
+        [("Keys", keys.chain(exit).collect::<Vec<_>>()), ("Gestures", gestures.collect()), ("Controls", controls)];
+    let has = |line: &HelpLine| {
+        let text = format!("{} {}", line.0, line.1).to_lowercase();
+        wanted.iter().all(|word| text.contains(word))
+    };
+    let groups = groups.map(|(name, lines)| (name, lines.into_iter().filter(has).collect::<Vec<_>>()));
+    groups.into_iter().filter(|(_, lines)| !lines.is_empty()).collect()
+}
+
 pub(super) fn show_help(ui: &mut Ui, state: &PanelState, execute: &mut dyn FnMut(Command)) {
     let screen = ui.ctx().content_rect();
     let mut is_closed = false;
@@ -183,43 +207,42 @@ pub(super) fn show_help(ui: &mut Ui, state: &PanelState, execute: &mut dyn FnMut
         |ui| {
             let frame = Frame::new()
                 .fill(PANEL.gamma_multiply(0.97))
-                .inner_margin(Margin::same(18))
+                .inner_margin(Margin::same(14))
                 .corner_radius(10)
                 .stroke(Stroke::new(1.0, WEAK_TEXT));
             frame.show(ui, |ui| {
-                let width = (screen.width() - 80.0).clamp(100.0, 1080.0);
+                let width = (screen.width() - 48.0).clamp(100.0, 1400.0);
                 ui.set_width(width);
+                ui.spacing_mut().item_spacing.y = 3.0;
                 ui.horizontal(|ui| {
                     ui.heading("Keys and gestures");
                     ui.with_layout(egui::Layout::right_to_left(egui::Align::Center), |ui| {
                         is_closed = ui.button("Close").clicked();
+                        let label = match state.help_search {
+                            Some(text) => format!("Search: {text}_"),
+                            None => "Search  ( / )".into(),
+                        };
+                        if ui.button(label).clicked() {
+                            execute(Command::SearchHelp);
+                        }
                     });
                 });
-                let height = (screen.height() - 150.0).max(0.0);
+                let height = (screen.height() - 110.0).max(0.0);
+                let lines = lines_of(&found(state.exit_key, state.help_search.unwrap_or_default()));
                 ScrollArea::vertical().max_height(height).min_scrolled_height(height).show(ui, |ui| {
-                    let keys: Vec<(String, &str)> = command::help().collect();
-                    let half = keys.len().div_ceil(2);
-                    let rows = |ui: &mut Ui, rows: &[(String, &str)]| {
-                        for (key, label) in rows {
-                            row(ui, key, label);
+                    let columns = ((width / 330.0) as usize).clamp(1, 3);
+                    let each = lines.len().div_ceil(columns).max(1);
+                    // As small as it has to be for one page, and no smaller than can be read.
+                    let size = (height / (each as f32 + 1.0) - 4.0).clamp(MIN_HELP_TEXT, TEXT_SIZE - 2.0);
+                    ui.columns(columns, |columns| {
+                        for (column, lines) in columns.iter_mut().zip(lines.chunks(each)) {
+                            lines.iter().for_each(|line| help_line(column, line, size));
                         }
-                    };
-                    match width > 760.0 {
-                        true => ui.columns(2, |columns| {
-                            rows(&mut columns[0], &keys[..half]);
-                            rows(&mut columns[1], &keys[half..]);
-                        }),
-                        false => rows(ui, &keys),
+                    });
+                    if lines.is_empty() {
+                        ui.label("Nothing is found.");
                     }
-                    if !state.exit_key.is_empty() {
-                        row(ui, state.exit_key, "quit");
-                    }
-                    ui.separator();
-                    for (gesture, label) in GESTURES {
-                        row(ui, gesture, label);
-                    }
-                    ui.add_space(8.0);
-                    ui.label(RichText::new("Echolume is not a medical device.").size(SMALL_TEXT).color(WEAK_TEXT));
+                    ui.label(RichText::new("Echolume is not a medical device.").size(MIN_HELP_TEXT).color(WEAK_TEXT));
                 });
             });
         },
@@ -229,10 +252,73 @@ pub(super) fn show_help(ui: &mut Ui, state: &PanelState, execute: &mut dyn FnMut
     }
 }
 
-fn row(ui: &mut Ui, key: &str, label: &str) {
-    ui.horizontal(|ui| {
-        ui.add_sized([150.0, TEXT_SIZE], egui::Label::new(RichText::new(key).color(ACCENT).size(TEXT_SIZE - 2.0)));
-        ui.label(RichText::new(label).size(TEXT_SIZE - 2.0));
+/// Smallest text of the help, points.
+const MIN_HELP_TEXT: f32 = 11.0;
+
+/// A row of the help.
+enum HelpRow {
+    Heading(&'static str),
+    Line(HelpLine),
+}
+
+fn lines_of(groups: &[(&'static str, Vec<HelpLine>)]) -> Vec<HelpRow> {
+    let rows = groups.iter().flat_map(|(name, lines)| {
+        std::iter::once(HelpRow::Heading(name)).chain(lines.iter().cloned().map(HelpRow::Line))
+    });
+    rows.collect()
+}
+
+fn help_line(ui: &mut Ui, row: &HelpRow, size: f32) {
+    match row {
+        HelpRow::Heading(name) => _ = ui.label(RichText::new(*name).size(size).color(WEAK_TEXT)),
+        HelpRow::Line((key, label)) => {
+            ui.horizontal(|ui| {
+                let width = (ui.available_width() * 0.4).min(190.0);
+                let key = egui::Label::new(RichText::new(key).color(ACCENT).size(size)).truncate();
+                ui.allocate_ui_with_layout(
+                    vec2(width, size + 2.0),
+                    egui::Layout::left_to_right(egui::Align::Center),
+                    |ui| {
+                        ui.set_min_width(width);
+                        ui.add(key);
+                    },
+                );
+                ui.add(egui::Label::new(RichText::new(label).size(size)).truncate()).on_hover_text(label);
+            });
+        }
+    }
+}
+
+/// Asks whether to save the loop before the program ends.
+pub(super) fn ask_to_leave(ui: &Ui, execute: &mut dyn FnMut(Command)) {
+    let screen = ui.ctx().content_rect();
+    // Nothing behind it reacts.
+    let shade = Area::new(Id::new("shade")).order(Order::Foreground).fixed_pos(screen.min);
+    shade.show(ui.ctx(), |ui| {
+        ui.allocate_rect(screen, egui::Sense::click_and_drag());
+        ui.painter().rect_filled(screen, 0.0, Color32::from_black_alpha(150));
+    });
+    let area = Area::new(Id::new("leave")).order(Order::Tooltip).anchor(Align2::CENTER_CENTER, vec2(0.0, 0.0));
+    area.show(ui.ctx(), |ui| {
+        let frame = Frame::new().fill(PANEL).inner_margin(Margin::same(20)).corner_radius(10);
+        frame.stroke(Stroke::new(2.0, ACCENT)).show(ui, |ui| {
+            ui.set_width((screen.width() - 80.0).clamp(120.0, 420.0));
+            ui.heading("The loop is not saved");
+            ui.label(RichText::new("Its volumes are lost when the program ends.").size(TEXT_SIZE));
+            ui.add_space(8.0);
+            let answers = [
+                ("Save and leave  (Enter)", ACCENT.gamma_multiply(0.45), Command::SaveAndExit),
+                ("Leave without saving  (L)", Color32::TRANSPARENT, Command::Discard),
+                ("Stay  (Esc)", Color32::TRANSPARENT, Command::Back),
+            ];
+            for (text, fill, command) in answers {
+                let button = Button::new(text).min_size(vec2(ui.available_width(), TOUCH_SIZE * 0.85));
+                let button = if fill == Color32::TRANSPARENT { button } else { button.fill(fill) };
+                if ui.add(button).clicked() {
+                    execute(command);
+                }
+            }
+        });
     });
 }
 
@@ -266,6 +352,19 @@ pub(super) fn paint_pointer(ui: &Ui, state: &PanelState, scale: f32) {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn the_help_is_searched_by_all_of_its_words() {
+        let all: usize = found("", "").iter().map(|(_, lines)| lines.len()).sum();
+        assert_eq!(all, command::help().count() + GESTURES.len());
+        let names = |search: &str| -> Vec<String> {
+            found("Ctrl+Alt+Q", search).into_iter().flat_map(|(_, lines)| lines).map(|(key, _)| key).collect()
+        };
+        assert!(names("save picture").contains(&"P".to_string()));
+        assert!(names("SPECKLE").contains(&"Smoothing".to_string()), "controls are found by what they do");
+        assert_eq!(names("ctrl+alt quit"), ["Ctrl+Alt+Q"]);
+        assert!(names("no such thing").is_empty());
+    }
 
     #[test]
     fn the_triangles_fill_the_outline() {

@@ -1,5 +1,6 @@
 //! Gestures, keys and settings together, without a window; and known answers for what commands change.
 
+mod budget;
 mod gestures;
 mod sequences;
 

@@ -144,3 +144,53 @@ fn running_out_of_memory_anywhere_is_recovered() {
     }
     assert!(reached > 2, "{reached}");
 }
+
+/// Prevents a key that leaves the program while help is open, and a loop of a probe that is lost by one key.
+#[test]
+fn escape_closes_what_is_open_and_leaving_asks_for_a_loop_that_is_not_saved() {
+    let (device, folder) = (Device::alone(), Folder::new("leaving"));
+    let mut desk = Desk::new(&device, ConsoleOptions { folder: folder.0.clone(), ..options() });
+    let escape = |desk: &mut Desk| {
+        desk.press(Key::Escape);
+        let request = desk.tick(Instant::now());
+        (request.exit, request.toggle_full_screen)
+    };
+    desk.console.set_full_screen(true);
+    desk.press(Key::Char('h'));
+    desk.press(Key::Function(2));
+    assert_eq!(escape(&mut desk), (false, false), "it closes the help");
+    assert_eq!(escape(&mut desk), (false, false), "it closes the times");
+    assert_eq!(escape(&mut desk), (false, true), "it leaves full screen");
+    desk.console.set_full_screen(false);
+    assert_eq!(escape(&mut desk), (true, false), "nothing was recorded: it leaves");
+    desk.begin();
+    let picture = desk.live(0);
+    assert_eq!(escape(&mut desk), (false, false));
+    assert!(desk.console.asks_to_leave());
+    // Other keys do nothing while it asks.
+    desk.press(Key::Char('q'));
+    desk.press(Key::Char('4'));
+    desk.rest();
+    assert!(desk.console.asks_to_leave() && desk.picture() == picture);
+    assert_eq!(escape(&mut desk), (false, false));
+    assert!(!desk.console.asks_to_leave(), "it stays");
+    desk.press(Key::Char('q'));
+    desk.press(Key::Char('l'));
+    assert!(desk.tick(Instant::now()).exit, "without saving");
+    desk.press(Key::Char('q'));
+    desk.press(Key::Enter);
+    let begun = Instant::now();
+    while !desk.tick(Instant::now()).exit {
+        assert!(begun.elapsed() < BOUND, "it is never saved");
+    }
+    folder.wait("frames", |_| Some(()));
+    assert_eq!(escape(&mut desk), (true, false), "it is saved: it leaves");
+    desk.live(1);
+    desk.press(Key::Char('q'));
+    assert!(!desk.tick(Instant::now()).exit && desk.console.asks_to_leave(), "another volume came");
+    // What was read from a file is there.
+    let mut desk = Desk::new(&device, ConsoleOptions { source: SourceKind::Recording, ..options() });
+    desk.begin();
+    desk.live(0);
+    assert_eq!(escape(&mut desk), (true, false));
+}

@@ -60,7 +60,7 @@ fn an_exceeded_frame_budget_lowers_quality_only_during_interaction() {
         desk.console.input(&Input::Moved([40.0 + f64::from(n % 20), 36.0 - f64::from(n % 13)]));
         desk.tick(now);
         // The pointer first leaves the range of a click, and the first picture measures the time.
-        assert!(n < 12 || desk.console.rung() == last, "{n}: rung {}", desk.console.rung());
+        assert!(n < 12 || desk.console.quality().rays == last, "{n}: {:?}", desk.console.quality());
         let begun = Instant::now();
         while desk.console.stream().is_drawing() && begun.elapsed() < BOUND {
             desk.tick(now);
@@ -70,6 +70,6 @@ fn an_exceeded_frame_budget_lowers_quality_only_during_interaction() {
     }
     desk.console.input(&Input::Button { button: Button::Left, pressed: false });
     desk.rest();
-    assert_eq!(desk.console.rung(), 0);
+    assert_eq!(desk.console.quality(), Quality::default());
     assert!(desk.picture() == headless(&device, &desk.drawn(), &body(0)), "{coarse} coarse pictures");
 }

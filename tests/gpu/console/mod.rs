@@ -1,5 +1,6 @@
 //! The console without a screen: input, pictures, and faults.
 
+mod budget;
 mod failures;
 mod gestures;
 mod idle;
@@ -20,9 +21,9 @@ use echolume::source::Frame;
 use echolume::source::live::{Event, Live};
 use echolume::ui::command::{Command, Tool};
 use echolume::ui::console::{Console, ConsoleError, ConsoleOptions, LoopRequest};
-use echolume::ui::frame_budget::built_in_ladder;
+use echolume::ui::frame_budget::{Quality, built_in_ladder};
 use echolume::ui::input::{Button, Input, Key, Modifiers};
-use echolume::ui::source_supervisor::OpenSource;
+use echolume::ui::source_supervisor::{OpenSource, SourceKind};
 use std::sync::mpsc::{Receiver, Sender, channel};
 use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
@@ -48,9 +49,11 @@ pub fn options() -> ConsoleOptions {
         budget: None,
         rungs: built_in_ladder(),
         retry: None,
+        source: SourceKind::Probe,
         record: None,
         folder: std::env::temp_dir(),
         overlay: true,
+        bar: false,
         panels: false,
         scale: 1.0,
         exit: None,

@@ -1,0 +1,247 @@
+//! Pictures with marks: the sides of the patient on every tile, and a bar below with scale, depth, mode, time and origin. The rendered
+//! pixels between the marks stay as they are.
+
+use crate::canvas::{self, Canvas, Drawing, Drawn};
+use crate::picture::Picture;
+use crate::scene::Scene;
+use crate::scene::marks::TileMarks;
+use plotters::prelude::{BLACK, DrawingBackend, RGBColor, ShapeStyle, WHITE};
+use std::time::{SystemTime, UNIX_EPOCH};
+
+const BACKGROUND: RGBColor = RGBColor(18, 21, 26);
+const TEXT: RGBColor = RGBColor(214, 221, 229);
+/// Height of a letter's square, as a share of the picture's shorter edge, and its limits, pixels.
+const LETTER_SHARE: f64 = 0.05;
+const LETTER: [f64; 2] = [14.0, 48.0];
+/// Mean width of a character as a share of the text's height.
+const CHARACTER: f64 = 0.55;
+
+/// Date and time for a bar: `2026-11-23 20:00:00 UTC`.
+pub fn time_line(now: SystemTime) -> String {
+    // A clock before 1970 is not set.
+    let now = humantime::format_rfc3339_seconds(now.max(UNIX_EPOCH)).to_string();
+    now.replace('T', " ").replace('Z', " UTC")
+}
+
+/// A picture of the scene with its marks. `time`: when it was made, for the bar. `origin`: what it shows, such as "Demo data (phantom)".
+///
+/// # Errors
+/// One line: the picture is not of this scene's size, or the drawing failed.
+pub fn marked(picture: &Picture, scene: &Scene, time: &str, origin: Option<&str>) -> Result<Picture, String> {
+    if [picture.width, picture.height] != scene.picture_size() {
+        let [width, height] = scene.picture_size();
+        return Err(format!("a picture of {} x {} is no scene of {width} x {height}", picture.width, picture.height));
+    }
+    let marks = scene.marks();
+    let mut marked = picture.clone();
+    let square = LETTER_SHARE * f64::from(picture.width.min(picture.height));
+    let square = square.clamp(LETTER[0], LETTER[1]).round() as u32;
+    for tile in &marks {
+        mark_tile(&mut marked, tile, square)?;
+    }
+    let bar = Bar::new(scene, &marks, picture.width, time, origin);
+    let drawn = canvas::picture([picture.width, bar.height()], &bar)?;
+    marked.height += drawn.height;
+    marked.rgba.extend(drawn.rgba);
+    Ok(marked)
+}
+
+/// Draws the letters and the dot of a tile, where it has room for them.
+fn mark_tile(picture: &mut Picture, tile: &TileMarks, square: u32) -> Result<(), String> {
+    let edge = f64::from(square);
+    if tile.size.iter().any(|n| *n < 4.0 * edge) {
+        return Ok(());
+    }
+    let at = |offset: [f64; 2]| -> [i64; 2] {
+        std::array::from_fn(|a| {
+            let middle = tile.corner[a] + tile.size[a] / 2.0 - edge / 2.0;
+            (middle + offset[a] * (tile.size[a] / 2.0 - edge * 0.75)).round() as i64
+        })
+    };
+    for (side, letter) in &tile.letters {
+        let glyph = canvas::picture([square; 2], &Glyph::Letter(letter))?;
+        blend(picture, &glyph, at(side.offset()));
+    }
+    if let Some(side) = tile.probe {
+        // In the corner of the marker's side, where no letter is.
+        let [x, y] = side.offset();
+        let glyph = canvas::picture([square; 2], &Glyph::Dot)?;
+        blend(picture, &glyph, at([if x == 0.0 { -1.0 } else { x }, if y == 0.0 { -1.0 } else { y }]));
+    }
+    Ok(())
+}
+
+/// Lays white on black over the picture: white covers it, black dims it by a half.
+fn blend(picture: &mut Picture, glyph: &Picture, at: [i64; 2]) {
+    for (n, pixel) in glyph.rgba.chunks_exact(4).enumerate() {
+        let (x, y) = (at[0] + n as i64 % i64::from(glyph.width), at[1] + n as i64 / i64::from(glyph.width));
+        if x < 0 || y < 0 || x >= i64::from(picture.width) || y >= i64::from(picture.height) {
+            continue;
+        }
+        let first = 4 * (y as usize * picture.width as usize + x as usize);
+        let cover = u32::from(pixel[0]);
+        for channel in &mut picture.rgba[first..first + 3] {
+            *channel = ((u32::from(*channel) / 2 * (255 - cover) + 235 * cover) / 255) as u8;
+        }
+    }
+}
+
+/// A mark on a tile, white on black.
+enum Glyph<'a> {
+    Letter(&'a str),
+    /// The probe's marker.
+    Dot,
+}
+
+impl Drawing for Glyph<'_> {
+    fn draw<B: DrawingBackend>(&self, canvas: &Canvas<B>) -> Drawn {
+        let [width, height] = canvas.size();
+        canvas.boxed([0.0, 0.0, width, height], ShapeStyle::from(&BLACK).filled())?;
+        match self {
+            Glyph::Letter(letter) => {
+                canvas.text(letter, [width / 2.0, height / 2.0], (height * 0.85) as u32, WHITE, [1, 1])
+            }
+            Glyph::Dot => {
+                canvas.ring([width / 2.0, height / 2.0], (height * 0.3) as i32, ShapeStyle::from(&WHITE).filled())
+            }
+        }
+    }
+}
+
+/// The bar below a picture.
+struct Bar {
+    /// The scale: its length, mm and pixels, and what of the picture it is of.
+    scale: Option<(f64, f64, &'static str)>,
+    lines: Vec<String>,
+    /// Height of the text, pixels.
+    text: u32,
+}
+
+impl Bar {
+    fn new(scene: &Scene, marks: &[TileMarks], width: u32, time: &str, origin: Option<&str>) -> Bar {
+        let text = (width / 70).clamp(11, 26);
+        let scaled = marks.iter().rev().find(|tile| tile.is_rendering).or(marks.first());
+        let has_several = marks.iter().any(|tile| tile.is_rendering) && marks.len() > 1;
+        let of = if has_several { " (rendering)" } else { "" };
+        let scale = scaled.and_then(|tile| tile.bar(0.3)).map(|(mm, pixels)| (mm, pixels, of));
+        let face = scene.probe().map_or(0.0, |probe| probe.array_radius());
+        let mut items = vec![
+            scene.settings.mode.title().to_string(),
+            format!("depth {:.0} to {:.0} mm", (scene.low.y - face).max(0.0), scene.high.y - face),
+        ];
+        items.extend(origin.map(str::to_string));
+        items.extend([time.to_string(), "Echolume".into(), "not a medical device".into()]);
+        Bar { scale, lines: wrapped(&items, width, text), text }
+    }
+
+    fn line_height(&self) -> f64 {
+        f64::from(self.text) * 1.4
+    }
+
+    /// Height of the bar, pixels.
+    fn height(&self) -> u32 {
+        let rows = self.lines.len() + usize::from(self.scale.is_some());
+        (self.line_height() * rows as f64 + f64::from(self.text)).ceil() as u32
+    }
+}
+
+/// The items in lines that fit the width, pixels.
+fn wrapped(items: &[String], width: u32, text: u32) -> Vec<String> {
+    let most = ((f64::from(width) - f64::from(text)) / (CHARACTER * f64::from(text))).max(1.0) as usize;
+    let mut lines: Vec<String> = Vec::new();
+    for item in items {
+        match lines.last_mut() {
+            Some(line) if line.chars().count() + item.chars().count() + 5 <= most => {
+                line.push_str("  ·  ");
+                line.push_str(item);
+            }
+            _ => lines.push(item.clone()),
+        }
+    }
+    lines
+}
+
+impl Drawing for Bar {
+    fn draw<B: DrawingBackend>(&self, canvas: &Canvas<B>) -> Drawn {
+        let [width, height] = canvas.size();
+        canvas.boxed([0.0, 0.0, width, height], ShapeStyle::from(&BACKGROUND).filled())?;
+        let margin = f64::from(self.text) * 0.5;
+        let mut y = margin + self.line_height() / 2.0;
+        if let Some((mm, pixels, of)) = self.scale {
+            let half = f64::from(self.text) * 0.35;
+            for line in [
+                [[margin, y], [margin + pixels, y]],
+                [[margin, y - half], [margin, y + half]],
+                [[margin + pixels, y - half], [margin + pixels, y + half]],
+            ] {
+                canvas.line(&line, ShapeStyle::from(&TEXT).stroke_width(2))?;
+            }
+            canvas.text(&format!("{mm} mm{of}"), [2.0 * margin + pixels, y], self.text, TEXT, [0, 1])?;
+            y += self.line_height();
+        }
+        for line in &self.lines {
+            let line = canvas.cut(line, self.text, width - 2.0 * margin)?;
+            canvas.text(&line, [margin, y], self.text, TEXT, [0, 1])?;
+            y += self.line_height();
+        }
+        Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::probe::{Geometry, Grid};
+    use crate::scene::{Input, load::Layers};
+    use crate::source::StoredType;
+
+    fn scene(toml: &[&str]) -> Scene {
+        let mut layers = Layers::default();
+        toml.iter().for_each(|line| layers.set(line).expect(line));
+        layers.set("picture.size=[120,96]").expect("size");
+        let grid = Grid { size: [40, 30, 20], spacing: [1.0; 3], origin: [-20.0, 0.0, -10.0] };
+        let input = Input { stored: StoredType::U8, range: [0.0, 255.0] };
+        Scene::new(Geometry::Cartesian(grid), input, layers.finish().expect("settings")).expect("scene")
+    }
+
+    fn grey([width, height]: [u32; 2]) -> Picture {
+        Picture { width, height, rgba: [100, 100, 100, 255].repeat((width * height) as usize) }
+    }
+
+    /// The pixels that differ from grey in a square around a place, as shares of the picture.
+    fn is_marked(picture: &Picture, [x, y]: [f64; 2]) -> bool {
+        let (cx, cy) = ((x * 120.0) as u32, (y * 96.0) as u32);
+        let near = |c: u32, most: u32| c.saturating_sub(7)..(c + 7).min(most);
+        near(cy, 96).any(|y| near(cx, 120).any(|x| picture.rgba[4 * (y * 120 + x) as usize] != 100))
+    }
+
+    #[test]
+    fn the_bar_is_below_and_letters_and_dot_stand_at_their_edges() {
+        let scene = scene(&["mode='plane'", "marks.lateral='right-left'"]);
+        let drawn = marked(&grey([120, 96]), &scene, "2026-11-23 20:00:00 UTC", Some("Demo data")).expect("marked");
+        assert!(drawn.width == 120 && drawn.height > 96 && drawn.rgba.len() == (4 * 120 * drawn.height) as usize);
+        for (at, is) in
+            [([0.1, 0.5], true), ([0.9, 0.5], true), ([0.1, 0.1], true), ([0.5, 0.5], false), ([0.9, 0.1], false)]
+        {
+            assert_eq!(is_marked(&drawn, at), is, "{at:?}");
+        }
+        let bar = &drawn.rgba[4 * 120 * 96..];
+        let bright = bar.chunks_exact(4).filter(|p| p[0] > 180).count();
+        assert!(bright > 100, "{bright} pixels of text and scale");
+        let later = marked(&grey([120, 96]), &scene, "2026-11-23 20:00:01 UTC", Some("Demo data")).expect("marked");
+        assert_ne!(later, drawn, "the time is written");
+    }
+
+    #[test]
+    fn a_picture_of_another_size_is_refused() {
+        let fault = marked(&grey([64, 64]), &scene(&[]), "", None).expect_err("refused");
+        assert!(fault.contains("64 x 64"), "{fault}");
+    }
+
+    #[test]
+    fn items_are_wrapped_and_none_is_lost() {
+        let items: Vec<String> = ["Volume", "depth 0 to 30 mm", "Echolume"].map(String::from).to_vec();
+        assert_eq!(wrapped(&items, 1000, 14), ["Volume  ·  depth 0 to 30 mm  ·  Echolume"]);
+        assert_eq!(wrapped(&items, 64, 11), items);
+    }
+}

@@ -1,0 +1,216 @@
+//! Marks of a picture: by tile its place, its scale, the letters of the patient's sides at its edges, and the side of the probe's marker.
+//! The viewer and written pictures draw the same.
+
+use super::planes::cell;
+use super::region::depth_offset;
+use super::{Layout, Mode, ProbeMarker, Scene};
+use glam::DVec3;
+
+/// Share of an axis that must lie along an edge's normal for its letters to stand there: beyond 45 degrees another axis has them.
+const ALONG: f64 = 0.7;
+/// Lengths that a scale bar may have, mm.
+pub const BAR_LENGTHS: [f64; 9] = [0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0, 200.0];
+
+/// An edge of a tile.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Edge {
+    Left,
+    Right,
+    Top,
+    Bottom,
+}
+
+impl Edge {
+    fn opposite(self) -> Edge {
+        match self {
+            Edge::Left => Edge::Right,
+            Edge::Right => Edge::Left,
+            Edge::Top => Edge::Bottom,
+            Edge::Bottom => Edge::Top,
+        }
+    }
+
+    /// From the middle of a tile to the middle of this edge, in halves of its width and height.
+    pub fn offset(self) -> [f64; 2] {
+        match self {
+            Edge::Left => [-1.0, 0.0],
+            Edge::Right => [1.0, 0.0],
+            Edge::Top => [0.0, -1.0],
+            Edge::Bottom => [0.0, 1.0],
+        }
+    }
+}
+
+/// The marks of a tile.
+#[derive(Clone, Debug, PartialEq)]
+pub struct TileMarks {
+    /// Its upper left corner and its size, pixels of the picture.
+    pub corner: [f64; 2],
+    pub size: [f64; 2],
+    /// Size of a pixel, mm; of a rendering at the camera's target.
+    pub pixel: f64,
+    /// True for a rendering, false for a plane.
+    pub is_rendering: bool,
+    /// Depth of its upper edge below the probe's face, mm, where depth runs straight down.
+    pub depth_from: Option<f64>,
+    pub letters: Vec<(Edge, &'static str)>,
+    /// The edge of the probe's marker.
+    pub probe: Option<Edge>,
+}
+
+impl Scene {
+    /// The marks of every tile, in the order of the tiles; a rendering comes last.
+    pub fn marks(&self) -> Vec<TileMarks> {
+        let mut all = Vec::new();
+        if self.cuts_planes() {
+            let sheet = self.sheet();
+            all.extend(sheet.tiles.iter().map(|tile| {
+                let (letters, probe) = self.sides(tile.plane.right, tile.plane.down);
+                let middle = tile.plane.at.y - depth_offset(&self.geometry);
+                let is_upright = tile.plane.down.y > 0.99;
+                TileMarks {
+                    corner: tile.corner.map(f64::from),
+                    size: tile.size.map(f64::from),
+                    pixel: sheet.pixel,
+                    is_rendering: false,
+                    depth_from: is_upright.then(|| middle - sheet.pixel * f64::from(tile.size[1]) / 2.0),
+                    letters,
+                    probe,
+                }
+            }));
+        }
+        if !self.is_flat() {
+            all.push(self.marks_of_rendering());
+        }
+        all
+    }
+
+    fn marks_of_rendering(&self) -> TileMarks {
+        let size = self.picture_size();
+        let corner = match self.settings.layout {
+            Layout::Single => [0, 0],
+            Layout::Four => size.map(|n| cell(n, 1, 2)),
+            Layout::Pair => [cell(size[0], 1, 2), 0],
+        };
+        let (rays, size) = (&self.rays, [size[0] - corner[0], size[1] - corner[1]]);
+        let apart = match rays.is_perspective {
+            true => rays.direction_dx.length() * (rays.target - rays.origin).dot(rays.forward),
+            false => rays.origin_dx.length(),
+        };
+        let (letters, probe) = self.sides(rays.right, -rays.up);
+        TileMarks {
+            corner: corner.map(f64::from),
+            size: size.map(f64::from),
+            pixel: apart * f64::from(self.ray_size()[0]) / f64::from(size[0].max(1)),
+            is_rendering: true,
+            depth_from: None,
+            letters,
+            probe,
+        }
+    }
+
+    /// Letters and the marker's edge of a tile with these directions in space.
+    fn sides(&self, right: DVec3, down: DVec3) -> (Vec<(Edge, &'static str)>, Option<Edge>) {
+        let marks = &self.settings.marks;
+        let high_end = |axis: DVec3| {
+            let [across, along] = [axis.dot(right), axis.dot(down)];
+            match (across.abs() >= ALONG, along.abs() >= ALONG) {
+                (true, _) => Some(if across > 0.0 { Edge::Right } else { Edge::Left }),
+                (_, true) => Some(if along > 0.0 { Edge::Bottom } else { Edge::Top }),
+                _ => None,
+            }
+        };
+        let mut letters: Vec<(Edge, &'static str)> = Vec::new();
+        for (axis, sides) in [(DVec3::X, marks.lateral), (DVec3::Z, marks.elevation), (DVec3::Y, marks.depth)] {
+            let (Some([low, high]), Some(edge)) = (sides.letters(), high_end(axis)) else { continue };
+            if letters.iter().all(|(taken, _)| *taken != edge && *taken != edge.opposite()) {
+                letters.extend([(edge.opposite(), low), (edge, high)]);
+            }
+        }
+        let last = high_end(DVec3::X);
+        let probe = match marks.probe {
+            ProbeMarker::First => last.map(Edge::opposite),
+            ProbeMarker::Last => last,
+            ProbeMarker::Hidden => None,
+        };
+        (letters, probe)
+    }
+}
+
+impl TileMarks {
+    /// The longest scale bar of at most a share of the tile's width: its length, mm and pixels.
+    pub fn bar(&self, share: f64) -> Option<(f64, f64)> {
+        let most = self.size[0] * share * self.pixel;
+        let mm = BAR_LENGTHS.into_iter().rev().find(|mm| *mm <= most && self.pixel > 0.0 && self.pixel.is_finite())?;
+        Some((mm, mm / self.pixel))
+    }
+}
+
+impl Mode {
+    /// The name of the mode for the user.
+    pub fn title(self) -> &'static str {
+        match self {
+            Mode::Volume => "Volume",
+            Mode::Surface => "Surface",
+            Mode::Mixed => "Mixed",
+            Mode::Mip => "MIP",
+            Mode::MinIp => "MinIP",
+            Mode::Mean => "X-ray",
+            Mode::Plane => "Plane",
+            Mode::Orthogonal => "3 planes",
+            Mode::Tomography => "Slices",
+            Mode::Cube => "Cube",
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::probe::{Geometry, Grid};
+    use crate::scene::{Input, load::Layers};
+    use crate::source::StoredType;
+
+    fn scene(toml: &[&str]) -> Scene {
+        let mut layers = Layers::default();
+        toml.iter().for_each(|line| layers.set(line).expect(line));
+        layers.set("picture.size=[200,100]").expect("size");
+        let grid = Grid { size: [40, 30, 20], spacing: [1.0; 3], origin: [-20.0, 0.0, -10.0] };
+        let input = Input { stored: StoredType::U8, range: [0.0, 255.0] };
+        Scene::new(Geometry::Cartesian(grid), input, layers.finish().expect("settings")).expect("scene")
+    }
+
+    const SIDES: [&str; 2] = ["marks.lateral='right-left'", "marks.elevation='feet-head'"];
+
+    #[test]
+    fn letters_stand_where_the_axes_point() {
+        let plane = scene(&[SIDES[0], SIDES[1], "mode='plane'"]).marks();
+        assert_eq!(plane[0].letters, [(Edge::Left, "R"), (Edge::Right, "L")], "plane A: lateral to the right");
+        assert_eq!((plane[0].probe, plane[0].depth_from.is_some()), (Some(Edge::Left), true));
+        let coronal = scene(&[SIDES[0], SIDES[1], "mode='plane'", "planes.plane='c'"]).marks();
+        let expected = [(Edge::Left, "R"), (Edge::Right, "L"), (Edge::Bottom, "F"), (Edge::Top, "H")];
+        assert_eq!(coronal[0].letters, expected, "plane C: elevation up");
+        assert_eq!(coronal[0].depth_from, None);
+        let turned = scene(&[SIDES[0], "mode='plane'", "planes.azimuth=180", "marks.probe='last'"]).marks();
+        assert_eq!(turned[0].letters, [(Edge::Right, "R"), (Edge::Left, "L")], "seen from behind");
+        assert_eq!(turned[0].probe, Some(Edge::Left));
+    }
+
+    #[test]
+    fn every_tile_has_marks_and_none_has_letters_that_nobody_set() {
+        let four = scene(&["layout='four'"]).marks();
+        assert_eq!(four.len(), 4);
+        assert!(four.iter().all(|tile| tile.letters.is_empty()) && four[3].is_rendering);
+        let slices = scene(&[SIDES[0], "mode='tomography'"]).marks();
+        assert!(slices.len() == 12 && slices.iter().all(|tile| tile.letters.len() == 2 && tile.probe.is_some()));
+        let single = scene(&["camera.azimuth=45"]).marks();
+        assert_eq!((single.len(), single[0].size), (1, [200.0, 100.0]));
+    }
+
+    #[test]
+    fn a_scale_bar_has_its_length_in_pixels() {
+        let marks = scene(&["mode='plane'"]).marks();
+        let (mm, pixels) = marks[0].bar(0.3).expect("a bar");
+        assert!((mm - pixels * marks[0].pixel).abs() < 1e-9 && pixels <= 0.3 * marks[0].size[0]);
+    }
+}

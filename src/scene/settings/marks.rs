@@ -1,0 +1,69 @@
+//! Settings of marks: the sides of the patient on every tile, and the bar of a written picture. No pass reads them.
+
+use serde::{Deserialize, Serialize};
+
+/// Marks beside and on the picture. The viewer shows the sides on every tile; `render` draws them only with `bar`.
+#[derive(Clone, Debug, Default, PartialEq, Eq, Deserialize, Serialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct Marks {
+    /// The scan line at which the marker on the probe's housing is. A dot shows its side on every tile.
+    pub probe: ProbeMarker,
+    /// The patient's sides from the first scan line (-lateral) to the last (+lateral).
+    pub lateral: Sides,
+    /// The patient's sides from the probe's face down.
+    pub depth: Sides,
+    /// The patient's sides from the first slice (-elevation) to the last (+elevation).
+    pub elevation: Sides,
+    /// `render` draws the sides on the tiles, and a bar below the picture: scale, depth, mode, time and "not a medical device". The picture is
+    /// as many pixels higher. The viewer has a switch of its own for saved pictures.
+    pub bar: bool,
+}
+
+/// Where the marker of the probe is.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum ProbeMarker {
+    /// At the first scan line.
+    #[default]
+    First,
+    /// At the last scan line.
+    Last,
+    /// It is not shown.
+    Hidden,
+}
+
+/// The sides of the patient at the two ends of an axis.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Sides {
+    /// Not known: no letters.
+    #[default]
+    None,
+    /// L to R.
+    LeftRight,
+    /// R to L.
+    RightLeft,
+    /// H to F.
+    HeadFeet,
+    /// F to H.
+    FeetHead,
+    /// A (anterior) to P (posterior).
+    FrontBack,
+    /// P (posterior) to A (anterior).
+    BackFront,
+}
+
+impl Sides {
+    /// The letters at the two ends of the axis.
+    pub fn letters(self) -> Option<[&'static str; 2]> {
+        Some(match self {
+            Sides::None => return None,
+            Sides::LeftRight => ["L", "R"],
+            Sides::RightLeft => ["R", "L"],
+            Sides::HeadFeet => ["H", "F"],
+            Sides::FeetHead => ["F", "H"],
+            Sides::FrontBack => ["A", "P"],
+            Sides::BackFront => ["P", "A"],
+        })
+    }
+}

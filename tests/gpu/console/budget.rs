@@ -1,0 +1,102 @@
+//! What a frame budget leaves alone: frames that are there are never sent again, and what only changes tone or light casts no ray.
+
+use super::*;
+use echolume::gpu::TimeStamps;
+use echolume::passes::{Stage, by_name};
+
+impl Desk {
+    /// The passes that ran since the last call: stage, name and number of runs.
+    fn passes(&mut self) -> Vec<(Stage, &'static str, u32)> {
+        let statistics = self.console.stream().take_final_statistics().expect("times");
+        let ran = statistics.passes.iter().filter(|pass| pass.runs > 0);
+        ran.filter_map(|ran| Some((by_name(ran.name)?.stage, ran.name, ran.runs))).collect()
+    }
+
+    /// True if the picture shows the camera and the light of the controls.
+    fn has_drawn_all(&mut self) -> bool {
+        let wanted = self.console.controls().settings().clone();
+        let stream = self.console.stream();
+        let is_idle = stream.is_idle();
+        let drawn = &stream.scene().expect("begun").settings;
+        let place = |s: &Settings| (s.camera.clone(), s.light.direction, s.light.position);
+        is_idle && place(drawn) == place(&wanted)
+    }
+
+    /// Drags when the view has come to rest, and draws every picture on the way. Returns the settings of those pictures.
+    fn drag_slowly(&mut self, from: [f64; 2], to: [f64; 2]) -> Vec<Settings> {
+        std::thread::sleep(LATER);
+        self.console.input(&Input::Moved(from));
+        self.console.input(&Input::Button { button: Button::Left, pressed: true });
+        let mut drawn = Vec::new();
+        for n in 1..=8 {
+            let at = [0, 1].map(|a| from[a] + (to[a] - from[a]) * f64::from(n) / 8.0);
+            // The time of the input, however slow the machine is.
+            let now = Instant::now();
+            self.console.input(&Input::Moved(at));
+            let begun = Instant::now();
+            self.tick(now);
+            // Pipelines are compiled in the background.
+            while !self.has_drawn_all() {
+                assert!(begun.elapsed() < BOUND, "it is never drawn");
+                std::thread::sleep(Duration::from_millis(1));
+                self.tick(now);
+            }
+            drawn.push(self.console.stream().scene().expect("begun").settings.clone());
+        }
+        self.console.input(&Input::Button { button: Button::Left, pressed: false });
+        drawn
+    }
+}
+
+/// Prevents a tap on gain that takes as long as a new volume, and a light whose surface becomes coarse while it is dragged.
+#[test]
+fn tone_casts_no_ray_light_keeps_the_distance_map_and_no_rung_runs_stage_1() {
+    let device = Device::alone();
+    let mut settings = plain();
+    settings.light.shadow = Some(Default::default());
+    settings.distance.median = 3;
+    // With a part of the volume hidden, longer steps reach further than short ones.
+    settings.region.depth = Some([6.0, 14.0]);
+    let (budget, time_stamps) = (Some(Duration::from_nanos(1)), TimeStamps::EachPass);
+    let mut desk = Desk::new(&device, ConsoleOptions { settings, budget, time_stamps, ..options() });
+    desk.begin();
+    desk.live(0);
+    desk.press(Key::Space);
+    desk.rest();
+    assert!(desk.passes().iter().any(|(stage, ..)| *stage == Stage::Preprocess), "stage 1 is counted");
+
+    // A view that turns goes down the ladder, and up again at rest.
+    let turned = desk.drag_slowly([40.0, 36.0], [60.0, 20.0]);
+    assert!(turned.iter().any(|s| s.ray.quarter && s.ray.step.is_some()), "the ladder is not used");
+    desk.rest();
+    let ran = desk.passes();
+    assert!(ran.iter().any(|(_, name, _)| *name == "raycast_surface"), "{ran:?}");
+    assert!(ran.iter().all(|(stage, ..)| *stage != Stage::Preprocess), "a rung runs stage 1: {ran:?}");
+
+    std::thread::sleep(LATER);
+    let before = desk.console.stream().dispatches();
+    desk.press(Key::Char(']'));
+    desk.tick(Instant::now());
+    assert_eq!(desk.console.quality(), Quality::default());
+    desk.rest();
+    let ran = desk.passes();
+    assert!(!ran.is_empty() && ran.iter().all(|(stage, ..)| *stage == Stage::Postprocess), "gain: {ran:?}");
+    let runs: u32 = ran.iter().map(|(.., runs)| runs).sum();
+    assert_eq!(desk.console.stream().dispatches() - before, u64::from(runs), "one picture, in full quality at once");
+
+    desk.press(Key::Char('l'));
+    let full = desk.drawn();
+    let mut lit = desk.drag_slowly([40.0, 36.0], [50.0, 40.0]);
+    desk.rest();
+    lit.extend(desk.drag_slowly([40.0, 36.0], [30.0, 30.0]));
+    desk.rest();
+    let ran = desk.passes();
+    assert!(ran.iter().any(|(_, name, _)| *name == "light"), "{ran:?}");
+    assert!(
+        ran.iter().all(|(stage, name, _)| *stage >= Stage::Shade && !name.ends_with("_distance")),
+        "light: {ran:?}"
+    );
+    assert!(lit.iter().all(|s| s.ray == full.ray && s.distance == full.distance), "a coarse distance map");
+    assert!(lit.iter().any(|s| s.light.shadow.is_none()), "the shading has no ladder");
+    assert!(desk.picture() == headless(&device, &desk.drawn(), &body(0)), "at rest");
+}
