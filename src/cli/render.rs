@@ -1,7 +1,7 @@
 //! `echolume render`.
 
 use super::one_colour;
-use crate::args::{InputArgs, Output, check_outputs};
+use crate::args::{InputArgs, Output, PictureFile, check_outputs};
 use crate::dump;
 use crate::error_report::choose::Bound;
 use crate::error_report::command::{parse_nanoseconds, read_report};
@@ -10,7 +10,7 @@ use crate::files;
 use crate::gpu::shader_reload::ShaderFolder;
 use crate::gpu::{Bands, Context, GpuError, Renderer, RendererOptions, TimeStamps};
 use crate::passes::{PassTime, Slot, Texels};
-use crate::picture::Picture;
+use crate::picture::{Picture, PictureFormat};
 use crate::plan::Plan;
 use crate::probe::Probe;
 use crate::profile::export::pass_time_table;
@@ -26,12 +26,13 @@ use std::sync::Arc;
                         before.\n\nExamples:\n  \
                         echolume render sweep.mha --preset fetal\n  \
                         echolume render sweep.vol --mode vr --camera azimuth=30,zoom=1.5 -o view.png\n  \
-                        echolume render bone.mha --preset bone --roi depth=20:50 --explain"
+                        echolume render bone.mha --preset bone --roi depth=20:50 --explain\n  \
+                        zcat sweep.mha.gz | echolume render - -o - | display"
 )]
 pub struct Render {
     #[command(flatten)]
     input: InputArgs,
-    /// The picture to write (PNG)
+    /// The picture to write: .png, .jpg, .bmp or .ppm by its ending; - for a PNG on standard output
     #[arg(short, long, value_name = "FILE", default_value = "picture.png")]
     output: PathBuf,
     /// Print the plan without rendering: passes, bytes, and the reason for each pass
@@ -49,7 +50,7 @@ pub struct Render {
     /// The error.json that `echolume report error -o DIR` wrote for this recording on this device
     #[arg(long, value_name = "FILE", requires = "budget")]
     report: Option<PathBuf>,
-    /// Write the difference of every pixel from the picture of half the step as a map too (PNG); hatched where it exceeds
+    /// Write the difference of every pixel from the picture of half the step as a map too; hatched where it exceeds
     /// --error-tolerance
     #[arg(long, value_name = "FILE")]
     error_map: Option<PathBuf>,
@@ -70,8 +71,12 @@ pub struct Render {
 impl Render {
     pub fn run(&self) -> Result<(), Failure> {
         let options = self.options()?;
-        let targets: [Output; 2] = [("-o", Some(&self.output)), ("--error-map", self.error_map.as_deref())];
+        let output = PictureFile::new("-o", &self.output)?;
+        let targets: [Output; 2] = [("-o", output.path()), ("--error-map", self.error_map.as_deref())];
         if !self.explain {
+            if let Some(map) = &self.error_map {
+                PictureFormat::of(map).map_err(|fault| input(format!("--error-map {fault}")))?;
+            }
             // Before the report is read: what a wrong target is refused for does not depend on what the report says.
             check_outputs(&targets, self.report.as_deref())?;
         }
@@ -112,15 +117,14 @@ impl Render {
             }
         };
         let compared = finer.map(|finer| (scene, finer));
-        picture.save(&self.output).map_err(failed)?;
-        say!("picture: {}", self.output.display());
+        output.write(|format| picture.encoded(format))?;
         let measured = renderer.take_times().map_err(failed)?;
         self.judge_budget(&measured)?;
         if let Some(colour) = one_colour::of(&picture) {
             let shift = source.sample_type().shift();
             let volume = renderer.read(Slot::Volume).map_err(failed)?;
             let why = volume.map(|volume| one_colour::cause(renderer.scene(), &volume, shift));
-            remark(&one_colour::line(&self.output, colour, why.as_deref()));
+            remark(&one_colour::line(&output.name(), colour, why.as_deref()));
         }
         if self.timings {
             say!("{}", pass_time_table(&measured, renderer.scene()).trim_end());
