@@ -8,9 +8,11 @@ use clap_mangen::Man;
 use std::path::{Path, PathBuf};
 
 #[derive(clap::Args)]
-#[command(after_help = "Examples:\n  echolume completions bash >~/.local/share/bash-completion/completions/echolume\n  \
+#[command(
+    after_help = "Examples:\n  echolume completions bash >~/.local/share/bash-completion/completions/echolume\n  \
                         echolume completions zsh >~/.zfunc/_echolume\n  \
-                        echolume completions fish >~/.config/fish/completions/echolume.fish")]
+                        echolume completions fish >~/.config/fish/completions/echolume.fish"
+)]
 pub struct Completions {
     /// The shell
     #[arg(value_name = "SHELL")]

@@ -107,7 +107,10 @@ impl Filter {
         let region = self.region("--region", self.region.as_deref(), &grey)?;
         let background = self.region("--background", self.background.as_deref(), &grey)?;
         let scene = scene_of(&grey, settings).map_err(input)?;
-        check_outputs(&[("-o", output.and_then(|o| o.path())), ("--csv", self.csv.as_deref())], [self.image.as_path()])?;
+        check_outputs(
+            &[("-o", output.and_then(|o| o.path())), ("--csv", self.csv.as_deref())],
+            [self.image.as_path()],
+        )?;
 
         let context = open_device(self.device.clone(), self.validate)?;
         let bits = if grey.sixteen { 16 } else { 8 };

@@ -97,7 +97,8 @@ impl MakeMesh {
         bar.finish_and_clear();
         let in_file = threshold - shift;
         if mesh.triangles.is_empty() {
-            let fault = format!("no voxel differs from the others at --threshold {share:.3} ({in_file:.4} in the file)");
+            let fault =
+                format!("no voxel differs from the others at --threshold {share:.3} ({in_file:.4} in the file)");
             return Err(input(format!("{}: nothing is written: {fault}", self.output.display())));
         }
         format.write(&mesh, *colour, &self.output).map_err(failed)?;

@@ -17,9 +17,9 @@ mod view;
 mod view_config;
 
 use crate::kiosk::log_rotation::{self, RotatingLog};
+use crate::source::standard_input;
 use crate::terminal::{self, Failure, failed, input};
 use crate::{bounds, error_report, filter_report, profile, thesis_tables, verify};
-use crate::source::standard_input;
 use clap::{CommandFactory, Parser, Subcommand};
 use std::io::Write;
 use std::path::PathBuf;
@@ -203,7 +203,12 @@ fn start_log(
     match file {
         None => {
             let shown = filter_fn(move |event| !reports_validation || verbose > 0 || event.target() != "validation");
-            log.without_time().with_ansi(terminal::has_colours()).with_writer(std::io::stderr).finish().with(shown).init();
+            log.without_time()
+                .with_ansi(terminal::has_colours())
+                .with_writer(std::io::stderr)
+                .finish()
+                .with(shown)
+                .init();
         }
         Some(path) => {
             let file = RotatingLog::open(path, log_rotation::DEFAULT_FILE_BYTES, log_rotation::DEFAULT_FILES);

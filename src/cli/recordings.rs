@@ -88,7 +88,9 @@ pub struct Convert {
 impl Convert {
     pub fn run(&self) -> Result<(), Failure> {
         if self.output.as_os_str() == "-" {
-            return Err(input("-: a volume is written to a file, whole or not at all, and the file's ending says its format"));
+            return Err(input(
+                "-: a volume is written to a file, whole or not at all, and the file's ending says its format",
+            ));
         }
         if self.output.extension().is_some_and(|e| e.eq_ignore_ascii_case("frames")) {
             return self.record();

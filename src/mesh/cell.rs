@@ -103,8 +103,8 @@ mod tests {
         }
         for (axis, side) in (0..6).map(|face| (face / 2, face % 2)) {
             let edges = edges_of_face(axis, side);
-            for n in 0..4 {
-                let (here, next) = (corners_of(edges[n]), corners_of(edges[(n + 1) % 4]));
+            for (n, edge) in edges.into_iter().enumerate() {
+                let (here, next) = (corners_of(edge), corners_of(edges[(n + 1) % 4]));
                 assert!(here.iter().all(|corner| corner >> axis & 1 == side));
                 assert_eq!(here.iter().filter(|corner| next.contains(corner)).count(), 1, "edges {n} of {axis} {side}");
             }

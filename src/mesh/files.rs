@@ -41,15 +41,19 @@ impl MeshFile {
     pub fn write(self, mesh: &Mesh, colour: [u8; 3], path: &Path) -> Result<(), InputError> {
         let write = || {
             let mut file = Unfinished::create(path)?;
-            match self {
-                MeshFile::Stl => stl(mesh, &mut file)?,
-                MeshFile::Ply => ply(mesh, colour, &mut file)?,
-                MeshFile::Glb => glb(mesh, colour, &mut file)?,
-            }
+            self.put(mesh, colour, &mut file)?;
             file.finish()?;
             file.rename()
         };
         write().map_err(|e: io::Error| InputError::unwritable(path, &e))
+    }
+
+    fn put(self, mesh: &Mesh, colour: [u8; 3], out: &mut impl Write) -> io::Result<()> {
+        match self {
+            MeshFile::Stl => stl(mesh, out),
+            MeshFile::Ply => ply(mesh, colour, out),
+            MeshFile::Glb => glb(mesh, colour, out),
+        }
     }
 }
 
@@ -189,10 +193,10 @@ mod tests {
     }
 
     fn written(ending: &str, mesh: &Mesh) -> Vec<u8> {
-        let folder = tempfile::tempdir().expect("a folder");
-        let path = folder.path().join(format!("mesh.{ending}"));
-        MeshFile::of(&path).expect("known").write(mesh, [255, 128, 0], &path).expect("written");
-        std::fs::read(path).expect("read")
+        let format = MeshFile::of(Path::new(&format!("mesh.{ending}"))).expect("known");
+        let mut bytes = Vec::new();
+        format.put(mesh, [255, 128, 0], &mut bytes).expect("written");
+        bytes
     }
 
     #[test]

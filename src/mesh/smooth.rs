@@ -61,18 +61,19 @@ impl Smoother {
         let [along, down, _] = &self.kernels;
         let width = self.width;
         let height = slice.len() / width.max(1);
-        let pass = |source: &[f64], kernel: &[f64], stride: usize, position: fn(usize, usize) -> usize, count: usize| {
-            let mut result = vec![f64::NAN; source.len()];
-            result.par_iter_mut().enumerate().for_each(|(n, out)| {
-                if source[n].is_nan() {
-                    return;
-                }
-                let at = position(n, width);
-                let (low, high) = (at.saturating_sub(kernel.len() - 1), (at + kernel.len()).min(count));
-                *out = mean((low..high).map(|k| (source[n + k * stride - at * stride], kernel[k.abs_diff(at)])));
-            });
-            result
-        };
+        let pass =
+            |source: &[f64], kernel: &[f64], stride: usize, position: fn(usize, usize) -> usize, count: usize| {
+                let mut result = vec![f64::NAN; source.len()];
+                result.par_iter_mut().enumerate().for_each(|(n, out)| {
+                    if source[n].is_nan() {
+                        return;
+                    }
+                    let at = position(n, width);
+                    let (low, high) = (at.saturating_sub(kernel.len() - 1), (at + kernel.len()).min(count));
+                    *out = mean((low..high).map(|k| (source[n + k * stride - at * stride], kernel[k.abs_diff(at)])));
+                });
+                result
+            };
         let rows = pass(slice, along, 1, |n, width| n % width, width);
         pass(&rows, down, width, |n, width| n / width, height)
     }
@@ -81,7 +82,8 @@ impl Smoother {
 /// The weighted mean of the known values.
 fn mean(values: impl Iterator<Item = (f64, f64)>) -> f64 {
     let known = values.filter(|(value, _)| !value.is_nan());
-    let (sum, weights) = known.fold((0.0, 0.0), |(sum, weights), (value, weight)| (sum + weight * value, weights + weight));
+    let (sum, weights) =
+        known.fold((0.0, 0.0), |(sum, weights), (value, weight)| (sum + weight * value, weights + weight));
     sum / weights
 }
 
@@ -110,7 +112,9 @@ mod tests {
         let at = |[x, y, z]: [usize; 3]| out[z][y * size[0] + x];
         let top = at([20, 10, 5]);
         // One standard deviation away along each axis, and 0.
-        for (place, expected) in [([23, 10, 5], 0.5), ([20, 13, 5], 2.0), ([20, 10, 6], 8.0 / 9.0), ([0, 0, 0], f64::NAN)] {
+        for (place, expected) in
+            [([23, 10, 5], 0.5), ([20, 13, 5], 2.0), ([20, 10, 6], 8.0 / 9.0), ([0, 0, 0], f64::NAN)]
+        {
             let share: f64 = match expected {
                 e if e == 2.0 => (-2.0f64).exp(),
                 e if e == 0.5 => (-0.5f64).exp(),

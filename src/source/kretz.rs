@@ -121,8 +121,16 @@ impl<'a> Items<'a> {
         if !whole || magic != *MAGIC {
             return Err(InputError::new(path, "magic", "is not 'KRETZFILE 1.0   ', the only version that is read"));
         }
-        let mut items =
-            Items { path, small: HashMap::new(), voxels: None, wavelet: false, sequence: None, four_d: false, others: Vec::new(), no_end: false };
+        let mut items = Items {
+            path,
+            small: HashMap::new(),
+            voxels: None,
+            wavelet: false,
+            sequence: None,
+            four_d: false,
+            others: Vec::new(),
+            no_end: false,
+        };
         let mut at = MAGIC.len() as u64;
         for _ in 0..MAX_ITEMS {
             let mut head = [0; 8];

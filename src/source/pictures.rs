@@ -44,7 +44,9 @@ impl About {
 
 /// A reader for the format of a file's content, with the library's limits of memory.
 fn reader(picture: &Path) -> Result<ImageReader<io::BufReader<std::fs::File>>, String> {
-    let reader = ImageReader::open(picture).and_then(ImageReader::with_guessed_format);
+    // Not by the name of the file.
+    let file = std::fs::File::open(picture).map(|file| ImageReader::new(io::BufReader::new(file)));
+    let reader = file.and_then(ImageReader::with_guessed_format);
     let reader = reader.map_err(|e| format!("cannot be read: {e}"))?;
     match reader.format().is_some_and(|format| format.reading_enabled()) {
         true => Ok(reader),
@@ -72,7 +74,7 @@ impl PictureStream {
         let each = pictures.each.max(1) as u64;
         let next = usize::try_from(skip / each).unwrap_or(usize::MAX);
         let mut stream = PictureStream { pictures: pictures.clone(), next, pixels: io::Cursor::default() };
-        if skip % each > 0 {
+        if !skip.is_multiple_of(each) {
             stream.decode()?;
             stream.pixels.set_position(skip % each);
         }

@@ -28,8 +28,12 @@ impl PlusConfig {
     /// A file that cannot be read or is no XML, a transform whose name or matrix is wrong.
     pub fn read(path: &Path) -> Result<PlusConfig, InputError> {
         let text = files::read_text(path, MAX_BYTES, "configuration").map_err(|e| InputError::new(path, "file", e))?;
+        PlusConfig::parse(path, &text)
+    }
+
+    fn parse(path: &Path, text: &str) -> Result<PlusConfig, InputError> {
         let options = ParsingOptions { allow_dtd: false, nodes_limit: MAX_NODES };
-        let document = Document::parse_with_options(&text, options)
+        let document = Document::parse_with_options(text, options)
             .map_err(|e| InputError::new(path, "file", format!("is no XML: {e}")))?;
         let fault = |field: &str, fault: String| InputError::new(path, field, fault);
         let mut config = PlusConfig::default();
@@ -78,10 +82,7 @@ mod tests {
     use super::*;
 
     fn read(text: &str) -> Result<PlusConfig, String> {
-        let folder = tempfile::tempdir().expect("a folder");
-        let path = folder.path().join("config.xml");
-        std::fs::write(&path, text).expect("written");
-        PlusConfig::read(&path).map_err(|e| e.to_string())
+        PlusConfig::parse(Path::new("config.xml"), text).map_err(|e| e.to_string())
     }
 
     #[test]
@@ -103,7 +104,8 @@ mod tests {
 
     #[test]
     fn what_is_wrong_is_named() {
-        let transform = |attributes: &str| format!("<CoordinateDefinitions><Transform {attributes}/></CoordinateDefinitions>");
+        let transform =
+            |attributes: &str| format!("<CoordinateDefinitions><Transform {attributes}/></CoordinateDefinitions>");
         for (text, named) in [
             ("no xml".to_string(), "is no XML"),
             (transform("From='Image' To='Probe'"), "Transform ImageToProbe: has 0 numbers"),

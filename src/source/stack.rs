@@ -17,7 +17,8 @@ const ENDINGS: [&str; 7] = ["png", "jpg", "jpeg", "bmp", "pgm", "ppm", "pnm"];
 /// Most files of a folder that are looked at.
 const MAX_FILES: usize = 1 << 20;
 /// What a stack lacks that has no geometry.
-const NO_SPACING: &str = "pictures do not say how large they are: give --voxel-spacing X,Y,Z (mm), or --probe for scan lines";
+const NO_SPACING: &str =
+    "pictures do not say how large they are: give --voxel-spacing X,Y,Z (mm), or --probe for scan lines";
 
 /// True if a path stands for several pictures: it is a folder, or a pattern that is no file itself.
 pub(super) fn is_meant(path: &Path) -> bool {
@@ -44,7 +45,11 @@ pub(super) fn read(path: &Path, options: &OpenOptions) -> Result<Layout, InputEr
         let ([width, height], deep) = *size.get_or_insert((about.size, about.deep));
         if about.size != [width, height] {
             let [a, b] = about.size;
-            return Err(InputError::new(picture, "picture", format!("has {a} x {b} pixels, the first {width} x {height}")));
+            return Err(InputError::new(
+                picture,
+                "picture",
+                format!("has {a} x {b} pixels, the first {width} x {height}"),
+            ));
         }
         if about.deep != deep {
             return Err(InputError::new(picture, "picture", "has not as many bits a pixel as the first"));
@@ -69,7 +74,8 @@ pub(super) fn read(path: &Path, options: &OpenOptions) -> Result<Layout, InputEr
         }
         None => StoredGeometry::Missing(fault("spacing", NO_SPACING.into())),
     };
-    let named = |picture: Option<&PathBuf>| quoted(&picture.and_then(|p| p.file_name()).unwrap_or_default().to_string_lossy());
+    let named =
+        |picture: Option<&PathBuf>| quoted(&picture.and_then(|p| p.file_name()).unwrap_or_default().to_string_lossy());
     let remarks = vec![("pictures".into(), format!("{} to {}", named(pictures.first()), named(pictures.last())))];
     let pixel = PixelFormat { channels: if is_colour { 3 } else { 1 }, ..PixelFormat::grey(number) };
     let pictures = Pictures { files: pictures, is_colour, each: frame_size[0] * frame_size[1] * pixel.bytes() };
@@ -105,7 +111,9 @@ fn list(path: &Path) -> Result<(PathBuf, Vec<String>), InputError> {
         let name = entry.map_err(unreadable)?.file_name();
         let is_one = match &pattern {
             Some(pattern) => name.to_str().is_some_and(|name| fits(pattern.as_bytes(), name.as_bytes())),
-            None => Path::new(&name).extension().is_some_and(|e| ENDINGS.iter().any(|known| e.eq_ignore_ascii_case(known))),
+            None => {
+                Path::new(&name).extension().is_some_and(|e| ENDINGS.iter().any(|known| e.eq_ignore_ascii_case(known)))
+            }
         };
         if is_one && folder.join(&name).is_file() {
             names.extend(name.to_str().map(str::to_string));
@@ -185,7 +193,10 @@ fn order(names: &[String]) -> Result<Vec<usize>, String> {
         varying.extend((0..numbers.len()).filter(|n| numbers[*n] != other_numbers[*n]));
     }
     let place = match varying.into_iter().collect::<Vec<_>>()[..] {
-        [] if others.is_empty() => return Ok(vec![0]),
+        [] => match others.first() {
+            None => return Ok(vec![0]),
+            Some(other) => return Err(format!("{} and {} have one number", shown(first), shown(other))),
+        },
         [place] => place,
         _ => return Err("differ in more than one number; name one stack by a pattern, such as 'slice-2-*.png'".into()),
     };
@@ -223,7 +234,8 @@ mod tests {
         assert_eq!(ordered(&[]), Ok(vec![]));
         for (names, why) in [
             (&["a1.png", "a2.png", "a4.png"][..], "number 2 is followed by 4 ('a4.png'), others by a step of 1"),
-            (&["a1.png", "a01.png"], "two have the number 1"),
+            (&["a1.png", "a01.png"], "'a1.png' and 'a01.png' have one number"),
+            (&["a1.png", "a2.png", "a02.png"], "two have the number 2"),
             (&["a1.png", "b2.png"], "differ in more than a number"),
             (&["a1b1.png", "a1b2.png", "a2b1.png"], "more than one number"),
             (&["a1.png", "a.png"], "differ in more than a number"),

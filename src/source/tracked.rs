@@ -1,12 +1,12 @@
 //! Tracked pictures of a file as a freehand volume: each gets its pose by a chain of transforms, and they are compounded into a lattice.
 
-use super::{OpenOptions, describe};
 use super::frame::{Frame, Source};
 use super::freehand::{Compounder, CompoundingOptions, Lattice, Pose, TrackedFrame};
 use super::plus_config::PlusConfig;
 use super::recording::Recording;
 use super::samples::{SampleType, StoredType};
 use super::transforms::{Calibration, Chain, HOW};
+use super::{OpenOptions, describe};
 use crate::files::InputError;
 use crate::probe::{Geometry, World};
 use glam::DAffine3;
@@ -81,8 +81,12 @@ impl TrackedVolume {
             .map(|n| chain.of(n).map(|matrix| Pose { to_space: DAffine3::from_mat4(matrix), size }))
             .map(|pose| pose.filter(|pose| pose.check().is_ok()))
             .collect();
-        let compounding =
-            CompoundingOptions { clip: config.clip, spacing: config.spacing, margin: 0.0, ..CompoundingOptions::default() };
+        let compounding = CompoundingOptions {
+            clip: config.clip,
+            spacing: config.spacing,
+            margin: 0.0,
+            ..CompoundingOptions::default()
+        };
         let placed: Vec<Pose> = poses.iter().flatten().copied().collect();
         let lattice = Lattice::around(&placed, &compounding).map_err(|e| fault("poses", e))?;
         let world = world(&lattice).map_err(|e| fault("poses", e))?;
@@ -183,8 +187,11 @@ impl Source for TrackedVolume {
             self.compounder = Some(self.compound()?);
         }
         let slice = self.next;
-        let Some(bytes) = self.compounder.as_ref().and_then(|compounder| compounder.slice(slice)) else { return Ok(None) };
-        let frame = Frame { volume: 0, number: slice as u32, slice, backward: false, time: None, bytes: bytes.to_vec() };
+        let Some(bytes) = self.compounder.as_ref().and_then(|compounder| compounder.slice(slice)) else {
+            return Ok(None);
+        };
+        let frame =
+            Frame { volume: 0, number: slice as u32, slice, backward: false, time: None, bytes: bytes.to_vec() };
         self.next += 1;
         Ok(Some(frame))
     }

@@ -62,7 +62,8 @@ impl FromStr for Calibration {
 /// # Errors
 /// In words: another number of them, one that is not finite, a last row that is not 0 0 0 1, a matrix that has no inverse.
 pub(super) fn matrix(text: &str) -> Result<DMat4, String> {
-    let words: Vec<&str> = text.split(|c: char| c.is_whitespace() || c == ',').filter(|word| !word.is_empty()).collect();
+    let words: Vec<&str> =
+        text.split(|c: char| c.is_whitespace() || c == ',').filter(|word| !word.is_empty()).collect();
     let mut numbers = Vec::with_capacity(16);
     for word in &words {
         match word.parse::<f64>() {
@@ -189,9 +190,11 @@ mod tests {
 
     #[test]
     fn names_are_split_where_a_capital_follows() {
-        for (text, from, to) in
-            [("ProbeToTracker", "Probe", "Tracker"), ("ToolToTo", "Tool", "To"), ("StylusTipToStylus", "StylusTip", "Stylus")]
-        {
+        for (text, from, to) in [
+            ("ProbeToTracker", "Probe", "Tracker"),
+            ("ToolToTo", "Tool", "To"),
+            ("StylusTipToStylus", "StylusTip", "Stylus"),
+        ] {
             assert_eq!(name(text), TransformName { from: from.into(), to: to.into() });
             assert_eq!(name(text).to_string(), text);
         }

@@ -12,6 +12,7 @@ mod drivers;
 mod filter;
 mod frames;
 mod inputs;
+mod mesh;
 mod one_colour;
 mod oracle;
 mod outputs;

@@ -34,7 +34,10 @@ fn a_folder_of_pictures_is_a_volume_in_the_order_of_their_numbers() {
     }
     // Of another stack, which a pattern leaves out.
     let recording = open(&folder.0, Some(SPACING)).expect("read");
-    assert_eq!((recording.format(), recording.sample_type(), recording.volumes()), ("stack of pictures", SampleType::U8, 1));
+    assert_eq!(
+        (recording.format(), recording.sample_type(), recording.volumes()),
+        ("stack of pictures", SampleType::U8, 1)
+    );
     let Geometry::Cartesian(grid) = recording.geometry(0) else { panic!("a Cartesian volume") };
     assert_eq!((grid.size, grid.spacing, grid.origin), ([5, 4, 4], SPACING, [0.0; 3]));
     assert!(recording.files().iter().any(|file| file.ends_with("s11.png")));
@@ -73,11 +76,19 @@ fn what_is_no_even_stack_is_refused_with_its_reason() {
         grey(width, 3, sixteen, |i| i as u16).save(&folder.0.join(name)).expect("written");
     };
     let pattern = |name: &str| folder.0.join(name);
-    for (name, width, sixteen) in [("gap1.png", 4, false), ("gap2.png", 4, false), ("gap4.png", 4, false)] {
+    for (name, width, sixteen) in [
+        ("gap1.png", 4, false),
+        ("gap2.png", 4, false),
+        ("gap4.png", 4, false),
+        ("wide1.png", 4, false),
+        ("wide2.png", 5, false),
+        ("deep1.png", 4, false),
+        ("deep2.png", 4, true),
+        ("fine1.png", 4, false),
+        ("fine2.png", 4, false),
+    ] {
         save(name, width, sixteen);
     }
-    (save("wide1.png", 4, false), save("wide2.png", 5, false), save("deep1.png", 4, false), save("deep2.png", 4, true));
-    (save("fine1.png", 4, false), save("fine2.png", 4, false));
     folder.write("text1.png", "no picture");
     folder.write("cut1.png", &std::fs::read(pattern("fine1.png")).expect("a picture")[..40]);
     std::fs::create_dir(pattern("empty")).expect("a folder");

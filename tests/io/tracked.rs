@@ -22,7 +22,9 @@ fn reference_to_tracker() -> DMat4 {
 /// Pictures half a millimetre apart, as the probe moves along its normal.
 fn probe_to_tracker(n: usize) -> DMat4 {
     let turn = DMat4::from_rotation_z(0.3) * DMat4::from_rotation_x(-0.5);
-    DMat4::from_translation(DVec3::new(100.0, 50.0, -30.0)) * turn * DMat4::from_translation(DVec3::Z * PITCH * n as f64)
+    DMat4::from_translation(DVec3::new(100.0, 50.0, -30.0))
+        * turn
+        * DMat4::from_translation(DVec3::Z * PITCH * n as f64)
 }
 
 fn image_to_probe() -> DMat4 {
@@ -112,7 +114,9 @@ fn every_voxel_is_the_pixel_at_its_place_in_the_reference() {
         let plain = open_with(Path::new(&path), OpenOptions::default()).expect("pictures");
         assert_eq!((plain.volumes(), plain.frames_per_volume()), (PICTURES, 1));
         let said = description(Path::new(&path), OpenOptions::default()).expect("a description");
-        assert!(said.iter().any(|(title, text)| title == "tracking" && text.contains("ProbeToTracker, ReferenceToTracker")));
+        assert!(
+            said.iter().any(|(title, text)| title == "tracking" && text.contains("ProbeToTracker, ReferenceToTracker"))
+        );
     }
 }
 
@@ -148,7 +152,11 @@ fn what_does_not_apply_is_refused() {
         (SWEEP, config(&xml), "these are scan lines"),
         (&frames, config(&xml), "frames as they arrived"),
         (&all_lost, config(&xml), "none of 0 poses places a frame"),
-        (&path, OpenOptions { depth_axis: Some("x".parse().expect("an axis")), ..config(&xml) }, "--depth-axis are not"),
+        (
+            &path,
+            OpenOptions { depth_axis: Some("x".parse().expect("an axis")), ..config(&xml) },
+            "--depth-axis are not",
+        ),
         (&path, config("gone.xml"), "gone.xml"),
     ] {
         let said = open_with(Path::new(file), options).err().map(|e| e.to_string()).unwrap_or_default();

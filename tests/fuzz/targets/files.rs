@@ -55,7 +55,8 @@ pub fn tracked(bytes: &[u8]) -> String {
     let calibration = ["ImageToProbe=0.5 0 0 0 0 0.5 0 0 0 0 0.5 0".parse().expect("a calibration")];
     let as_pictures = OpenOptions { calibration: &calibration, ..OpenOptions::default() };
     // A pose far away makes a lattice of any size.
-    let one = |path: &Path, options| outcome(echolume::source::description(path, options).map(|rows| rows.len().to_string()));
+    let one =
+        |path: &Path, options| outcome(echolume::source::description(path, options).map(|rows| rows.len().to_string()));
     let config = written("plus.xml", bytes);
     let as_config = OpenOptions { plus_config: Some(&config), ..OpenOptions::default() };
     one(&written("input.mha", bytes), as_pictures) + &one(&written("still.mha", TRACKED), as_config)

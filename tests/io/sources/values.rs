@@ -206,7 +206,7 @@ fn volumes_in_time_of_a_kretz_file_are_all_read() {
     let odd = [&both[..still_at], &item(0xffff, 0xffff, b"")].concat();
     let cut = odd.windows(4).position(|w| w == [0x00, 0xd6, 1, 0]).unwrap();
     let odd = [&odd[..cut], &item(0xd600, 1, &voxels[1..]), &item(0xffff, 0xffff, b"")].concat();
-    let fault = total(&folder.write("odd.vol", odd)).unwrap_err();
+    let fault = total(folder.write("odd.vol", odd)).unwrap_err();
     assert!(fault.contains("D600,0001") && fault.contains("71 bytes are no whole number of volumes of 24"), "{fault}");
 }
 
