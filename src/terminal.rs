@@ -1,6 +1,7 @@
 //! What a command says to the terminal: lines on standard output, and the one line that ends a command that failed.
 
-use std::io::{ErrorKind, Write};
+use indicatif::ProgressBar;
+use std::io::{ErrorKind, IsTerminal, Write};
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicBool, Ordering};
 
@@ -11,6 +12,9 @@ const MAX_MESSAGE: usize = 600;
 static WRITE_ERROR: Mutex<Option<std::io::Error>> = Mutex::new(None);
 /// True once the reader of standard output has closed it.
 static IS_CLOSED: AtomicBool = AtomicBool::new(false);
+
+/// True once standard output carries data: lines then go to standard error.
+static IS_DATA: AtomicBool = AtomicBool::new(false);
 
 /// Prints one line on standard output. Takes the arguments of `format!`.
 macro_rules! say {
@@ -25,9 +29,9 @@ pub enum Failure {
     Input(String),
     /// The request was valid but could not be carried out: exit code 1.
     Failed(String),
-    /// `verify` found no device to test: exit code 3.
+    /// There is no Vulkan device, or not the one that was asked for: exit code 3.
     NoDevice(String),
-    /// A signal ended `verify` before all checks were run, and none of those that were has failed: exit code 4.
+    /// A signal ended the work before all of it was done, and none of what was done has failed: exit code 4.
     Interrupted(String),
 }
 
@@ -63,10 +67,31 @@ pub fn failed(error: impl std::fmt::Display) -> Failure {
 }
 
 /// Prints a line on standard output. A write error is reported when the command ends: a reader may close the pipe at any time, but a full
-/// disk is a failure.
+/// disk is a failure. Once standard output carries data ([`keep_standard_output`]), the line goes to standard error.
 pub fn print(line: std::fmt::Arguments) {
     let line = without_control_characters(&line.to_string());
-    match writeln!(std::io::stdout(), "{line}").and_then(|()| std::io::stdout().flush()) {
+    if IS_DATA.load(Ordering::Relaxed) {
+        let _ = writeln!(std::io::stderr(), "{line}");
+        return;
+    }
+    write(format!("{line}\n").as_bytes());
+}
+
+/// Keeps standard output for data: lines go to standard error from here on.
+///
+/// # Errors
+/// In words: standard output is a terminal.
+pub fn keep_standard_output() -> Result<(), &'static str> {
+    if std::io::stdout().is_terminal() {
+        return Err("standard output is a terminal; send it to a file or a pipe");
+    }
+    IS_DATA.store(true, Ordering::Relaxed);
+    Ok(())
+}
+
+/// Writes bytes to standard output as they are. An error is reported when the command ends, as by [`print`].
+pub fn write(bytes: &[u8]) {
+    match std::io::stdout().write_all(bytes).and_then(|()| std::io::stdout().flush()) {
         Ok(()) => {}
         Err(error) if error.kind() == ErrorKind::BrokenPipe => IS_CLOSED.store(true, Ordering::Relaxed),
         Err(error) => drop(WRITE_ERROR.lock().unwrap_or_else(|e| e.into_inner()).get_or_insert(error)),
@@ -85,6 +110,20 @@ pub fn print_failure(failure: &Failure) {
     | Failure::NoDevice(message)
     | Failure::Interrupted(message)) = failure;
     let _ = writeln!(std::io::stderr(), "echolume: {}", single_line(message));
+}
+
+/// True if standard error may carry colours and move its cursor: a terminal that can, of a user who did not refuse colours (NO_COLOR).
+pub fn has_colours() -> bool {
+    std::io::stderr().is_terminal() && !is_dumb() && std::env::var_os("NO_COLOR").is_none_or(|value| value.is_empty())
+}
+
+fn is_dumb() -> bool {
+    std::env::var_os("TERM").is_some_and(|name| name == "dumb")
+}
+
+/// A bar of the progress to `count` on standard error. It draws nothing unless that is a terminal that can move its cursor.
+pub fn progress_bar(count: u64) -> ProgressBar {
+    if is_dumb() { ProgressBar::hidden() } else { ProgressBar::new(count) }
 }
 
 /// True if the reader of standard output has closed it.

@@ -1,5 +1,6 @@
 //! Arguments of commands that render a recording: the recording, the settings of the scene in layers, the device, and checks of outputs.
 
+use super::picture_file::STANDARD;
 use super::pipeline_folder::pipeline_folder;
 use super::recording::{GeometryArgs, open_recording};
 use crate::files::signals;
@@ -12,14 +13,15 @@ use crate::scene::load::Layers;
 use crate::scene::{EchoHistogram, EchoLevels, Input, Scene};
 use crate::source::phantom::{self, Phantom, PhantomSource};
 use crate::source::{Frame, Source};
-use crate::terminal::{Failure, failed, input, say};
+use crate::terminal::{Failure, failed, input, progress_bar, say};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 /// The arguments of every command that renders a recording.
 #[derive(clap::Args)]
 pub struct InputArgs {
-    /// Recording: MetaImage (.mha, .mhd), NRRD (.nrrd), NIfTI (.nii), Kretz (.vol), each also as .gz, or frames (.frames). Without one, a synthetic fetal head (preset face)
+    /// Recording: MetaImage (.mha, .mhd), NRRD (.nrrd), NIfTI (.nii), Kretz (.vol), each also as .gz, or frames (.frames); a
+    /// folder or a 'pattern*.png' of numbered pictures; - for standard input, also a stream of frames. Without one, a synthetic fetal head (preset face)
     input: Option<PathBuf>,
     #[command(flatten)]
     scene: SceneArgs,
@@ -88,7 +90,11 @@ impl InputArgs {
 
     /// The recording as it was typed, or `phantom`.
     pub fn name(&self) -> String {
-        self.input.as_ref().map_or("phantom".into(), |file| file.display().to_string())
+        match &self.input {
+            None => "phantom".into(),
+            Some(file) if file.as_os_str() == STANDARD => "standard input".into(),
+            Some(file) => file.display().to_string(),
+        }
     }
 
     /// Refuses outputs that would replace an input: the files of the source or of the settings. See [`check_outputs`].
@@ -107,7 +113,7 @@ impl InputArgs {
     ) -> Result<(), Failure> {
         source.skip_to_volume(self.volume).map_err(input)?;
         let frames = source.frames_per_volume();
-        let bar = indicatif::ProgressBar::new(frames as u64).with_message("frames");
+        let bar = progress_bar(frames as u64).with_message("frames");
         let mut volume = None;
         for _ in 0..frames {
             let Some(frame) = source.next_frame().map_err(input)? else { break };
@@ -340,13 +346,20 @@ pub fn open_device_for_statistics(choice: Option<DeviceChoice>) -> Result<Arc<Co
 }
 
 fn open(options: &ContextOptions) -> Result<Arc<Context>, Failure> {
-    let context = Context::new(options).map_err(|e| match e {
-        GpuError::NoSuchDevice { .. } => input(e),
-        e => failed(e),
-    })?;
+    let context = Context::new(options).map_err(device_failure)?;
     let note = if context.candidate.is_software() { " (software: no GPU is used)" } else { "" };
     say!("device: {}{note}, {}", context.candidate.name, context.candidate.driver.trim());
     Ok(context)
+}
+
+/// The failure of opening a device or of listing them. One that is missing has an exit code of its own.
+pub fn device_failure(error: GpuError) -> Failure {
+    match error {
+        GpuError::NoLoader(_) | GpuError::NoDevice | GpuError::NoneFits(_) | GpuError::NoSuchDevice { .. } => {
+            Failure::NoDevice(error.to_string())
+        }
+        other => failed(other),
+    }
 }
 
 /// The flag that names an output, and its file if the flag was given.
@@ -358,6 +371,9 @@ pub fn check_outputs<'a>(outputs: &[Output], read: impl IntoIterator<Item = &'a 
     let outputs: Vec<(&str, &Path)> = outputs.iter().filter_map(|(flag, file)| Some((*flag, (*file)?))).collect();
     for (n, (flag, file)) in outputs.iter().enumerate() {
         let refuse = |why: String| Err(input(format!("{flag} {}: {why}; give another name", file.display())));
+        if file.as_os_str() == STANDARD {
+            return refuse("only a picture (-o of render and filter) is written to standard output".into());
+        }
         if read.iter().any(|input| is_same_file(input, file)) {
             return refuse("would replace an input".into());
         }

@@ -2,12 +2,16 @@
 
 mod input;
 mod motor;
+mod picture_file;
 mod pipeline_folder;
 mod recording;
 mod source;
 
-pub use input::{InputArgs, Output, SceneArgs, check_outputs, open_device, open_device_for_statistics, write_report};
+pub use input::{
+    InputArgs, Output, SceneArgs, check_outputs, device_failure, open_device, open_device_for_statistics, write_report,
+};
 pub use motor::{SerialArgs, motor_failure, motor_table};
+pub use picture_file::PictureFile;
 #[cfg(feature = "view")]
 pub use pipeline_folder::pipeline_folder;
 pub use recording::{GeometryArgs, open_recording};

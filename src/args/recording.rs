@@ -1,6 +1,6 @@
 //! Recordings as commands open them: the probe file that was taken is said on one line.
 
-use crate::source::{self, DepthAxis, OpenOptions, Source};
+use crate::source::{self, Calibration, DepthAxis, OpenOptions, Source};
 use crate::terminal::{Failure, input, say};
 use std::path::{Path, PathBuf};
 use std::sync::Mutex;
@@ -18,12 +18,50 @@ pub struct GeometryArgs {
     /// Stored axis of a Cartesian volume that is drawn as depth: x, y, z, -x, -y or -z [default: by the file's orientation, otherwise y]
     #[arg(long, value_name = "AXIS", allow_hyphen_values = true)]
     pub depth_axis: Option<DepthAxis>,
+    /// Distance between the columns, rows and pictures of a folder or pattern of pictures, mm
+    #[arg(long, value_name = "X,Y,Z", value_parser = three)]
+    pub voxel_spacing: Option<[f64; 3]>,
+    /// Configuration of the PLUS toolkit (XML) with the calibration of a tracked recording, which becomes a freehand volume
+    #[arg(long, value_name = "FILE")]
+    pub plus_config: Option<PathBuf>,
+    /// A constant transform of a tracked recording, such as 'ImageToProbe=0.1 0 0 0  0 0.1 0 0  0 0 0.1 0  0 0 0 1'; may be repeated
+    #[arg(long, value_name = "NAME=MATRIX")]
+    pub calibration: Vec<Calibration>,
+    /// Coordinate frame that a tracked recording is placed in [default: of the configuration; Reference, Tracker or World]
+    #[arg(long, value_name = "NAME")]
+    pub reference: Option<String>,
+}
+
+/// Three numbers with commas between them.
+fn three(text: &str) -> Result<[f64; 3], String> {
+    let numbers: Option<Vec<f64>> = text.split(',').map(|n| n.trim().parse().ok()).collect();
+    let three = numbers.and_then(|n| <[f64; 3]>::try_from(n).ok());
+    three.ok_or_else(|| "must read X,Y,Z in mm, as 0.2,0.2,0.5".into())
 }
 
 impl GeometryArgs {
+    /// The first flag that is for recordings of files only, if one was given.
+    pub fn for_files(&self) -> Option<&'static str> {
+        let given = [
+            ("--depth-axis", self.depth_axis.is_some()),
+            ("--voxel-spacing", self.voxel_spacing.is_some()),
+            ("--plus-config", self.plus_config.is_some()),
+            ("--calibration", !self.calibration.is_empty()),
+            ("--reference", self.reference.is_some()),
+        ];
+        given.iter().find(|(_, is_given)| *is_given).map(|(flag, _)| *flag)
+    }
+
     /// The same for the library.
     pub fn options(&self) -> OpenOptions<'_> {
-        OpenOptions { probe: self.probe.as_deref(), depth_axis: self.depth_axis }
+        OpenOptions {
+            probe: self.probe.as_deref(),
+            depth_axis: self.depth_axis,
+            voxel_spacing: self.voxel_spacing,
+            plus_config: self.plus_config.as_deref(),
+            calibration: &self.calibration,
+            reference: self.reference.as_deref(),
+        }
     }
 }
 

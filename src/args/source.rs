@@ -126,8 +126,8 @@ impl SourceArgs {
         let is_file = !self.is_phantom() && self.source != "-" && network.is_none();
         let fan = self.is_phantom().then_some(phantom::FAN_ANGLE_DEG);
         let sweep = self.motor.plan(self.geometry.probe.as_deref(), is_file.then(|| self.path()), fan)?;
-        if self.geometry.depth_axis.is_some() && !is_file {
-            return Err(input("--depth-axis: is for recordings of Cartesian volumes"));
+        if let Some(flag) = self.geometry.for_files().filter(|_| !is_file) {
+            return Err(input(format!("{flag}: is for recordings of files")));
         }
         if self.is_phantom() {
             return self.phantom(sweep.as_ref());

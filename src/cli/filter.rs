@@ -1,6 +1,6 @@
 //! `echolume filter`: applies the 2D slice filters to an ordinary picture.
 
-use crate::args::{check_outputs, open_device};
+use crate::args::{PictureFile, check_outputs, open_device};
 use crate::gpu::{Context, DeviceChoice, Renderer, RendererOptions, TimeStamps};
 use crate::passes::{Slot, Texels};
 use crate::picture::{self, Grey, Region};
@@ -68,7 +68,7 @@ impl NamedFilter {
 pub struct Filter {
     /// PNG, JPEG, PNM or BMP of 8 or 16 bits. Colour is converted to grey
     image: PathBuf,
-    /// The picture to write (PNG, grey; 16 bits if the input has 16)
+    /// The picture to write, grey: .png, .jpg, .bmp or .pgm by its ending, 16 bits if the input has 16; - for a PNG on standard output
     #[arg(short, long, value_name = "FILE", required_unless_present = "growth_table")]
     output: Option<PathBuf>,
     /// A filter and its settings; may be repeated for other filters
@@ -102,32 +102,35 @@ impl Filter {
     pub fn run(&self) -> Result<(), Failure> {
         let settings = self.settings(&[])?;
         let rows = if self.growth_table { self.growth_rows()? } else { Vec::new() };
+        let output = self.output.as_deref().map(|output| PictureFile::new("-o", output)).transpose()?;
         let grey = Grey::load(&self.image).map_err(input)?;
         let region = self.region("--region", self.region.as_deref(), &grey)?;
         let background = self.region("--background", self.background.as_deref(), &grey)?;
         let scene = scene_of(&grey, settings).map_err(input)?;
-        check_outputs(&[("-o", self.output.as_deref()), ("--csv", self.csv.as_deref())], [self.image.as_path()])?;
+        check_outputs(
+            &[("-o", output.and_then(|o| o.path())), ("--csv", self.csv.as_deref())],
+            [self.image.as_path()],
+        )?;
 
         let context = open_device(self.device.clone(), self.validate)?;
         let bits = if grey.sixteen { 16 } else { 8 };
         let colour = if grey.from_colour { ", converted from colour with the weights of Rec. 709" } else { "" };
         say!("input: {} x {} pixels of {bits} bits{colour}", grey.width, grey.height);
 
-        if let Some(output) = &self.output {
+        if let Some(output) = &output {
             let time_stamps = if self.timings { TimeStamps::EachPass } else { TimeStamps::None };
             let options = RendererOptions { time_stamps, ..RendererOptions::default() };
             let mut renderer = Renderer::new(&context, scene, &options).map_err(failed)?;
             renderer.frame(0, &grey.bytes(), 0).map_err(failed)?;
             let filtered = read(&mut renderer, Slot::Volume)?.values;
             let made = grey.with(&filtered);
-            made.save(output).map_err(failed)?;
-            say!("picture: {}", output.display());
+            output.write(|format| made.encoded(format))?;
             if let Some(level) = one_level(&made) {
                 let why = match one_level(&grey) {
                     Some(_) => "so is the input",
                     None => "the filters levelled all of it",
                 };
-                remark(&format!("{}: is wholly of one level, {level}: {why}", output.display()));
+                remark(&format!("{}: is wholly of one level, {level}: {why}", output.name()));
             }
             if let Some(region) = &region {
                 let table = picture::region_table(&grey.shares(), &filtered, grey.width, region, background.as_ref());

@@ -1,6 +1,6 @@
 //! `echolume devices` and `echolume support-bundle`: what this machine has.
 
-use crate::args::SourceArgs;
+use crate::args::{SourceArgs, device_failure};
 use crate::gpu::{DeviceChoice, context, device_selection};
 use crate::kiosk::bundle::Bundle;
 use crate::kiosk::config::{Config, DEFAULT_PATH};
@@ -20,7 +20,7 @@ pub struct Devices {
 
 impl Devices {
     pub fn run(&self) -> Result<(), Failure> {
-        let devices = context::list().map_err(failed)?;
+        let devices = context::list().map_err(device_failure)?;
         let picked = device_selection::choose(&devices, &DeviceChoice::Best);
         for (i, device) in devices.iter().enumerate() {
             say!(
@@ -62,7 +62,7 @@ impl Devices {
                 format!("{:#?}", device.limits).lines().for_each(|line| say!("    {line}"));
             }
         }
-        picked.map(drop).map_err(failed)
+        picked.map(drop).map_err(device_failure)
     }
 }
 

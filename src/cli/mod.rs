@@ -1,9 +1,11 @@
 //! The command line: subcommands, logging and exit codes.
 //!
-//! Exit codes: 0 done, 1 failed, 2 bad input or usage; `verify` also 3, no device, and 4, interrupted.
+//! Exit codes of every command: 0 done, 1 failed, 2 bad input or usage, 3 no Vulkan device, 4 stopped by a signal before all was done.
 
+mod about;
 mod filter;
 mod machine;
+mod mesh;
 mod one_colour;
 mod probe;
 mod recordings;
@@ -15,9 +17,10 @@ mod view;
 mod view_config;
 
 use crate::kiosk::log_rotation::{self, RotatingLog};
+use crate::source::standard_input;
 use crate::terminal::{self, Failure, failed, input};
 use crate::{bounds, error_report, filter_report, profile, thesis_tables, verify};
-use clap::{Parser, Subcommand};
+use clap::{CommandFactory, Parser, Subcommand};
 use std::io::Write;
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -30,10 +33,14 @@ use tracing_subscriber::util::SubscriberInitExt;
 #[command(
     name = "echolume",
     version,
+    propagate_version = true,
     about = "Renders sweeps of a 3D/4D ultrasound probe, on Vulkan",
     long_about = "Renders sweeps of a mechanically wobbling 3D/4D ultrasound probe, on Vulkan.\n\n\
                   Try: echolume render -o face.png\n     echolume render sweep.mha -o picture.png --preset fetal\n\
-                  Not a medical device."
+                  Not a medical device.",
+    after_long_help = "Exit codes of every command: 0 done, 1 failed, 2 bad input or usage, 3 no Vulkan device or not the one asked for, 4 \
+                       stopped by a signal before all was done (verify). Any other command ends by the signal itself. `-` as a recording \
+                       is standard input; `-o -` writes a picture to standard output, and every line to standard error."
 )]
 struct Arguments {
     #[command(subcommand)]
@@ -67,6 +74,8 @@ enum Command {
     Phantom(recordings::MakePhantom),
     /// Resample a volume to a Cartesian grid (.mha, .nrrd), or convert frames
     Convert(recordings::Convert),
+    /// Write the surface of a recording as a mesh (.stl, .ply, .glb)
+    Mesh(mesh::MakeMesh),
     /// Describe a recording, without patient fields
     Info(recordings::Info),
     /// Drive the motor of a probe: home, sweep, stop; or simulate one
@@ -75,6 +84,10 @@ enum Command {
     Devices(machine::Devices),
     /// Pack versions, devices, configuration and logs for support, without recordings, pictures or names
     SupportBundle(machine::SupportBundle),
+    /// Print a script that completes commands and flags in a shell
+    Completions(about::Completions),
+    /// Write the manual pages
+    Man(about::ManPages),
 }
 
 #[derive(clap::Args)]
@@ -128,11 +141,15 @@ pub fn run() -> ExitCode {
         Command::Report(report) => report.run(),
         Command::Phantom(phantom) => phantom.run(),
         Command::Convert(convert) => convert.run(),
+        Command::Mesh(mesh) => mesh.run(),
         Command::Info(info) => info.run(),
         Command::Probe(probe) => probe.run(),
         Command::Devices(devices) => devices.run(),
         Command::SupportBundle(bundle) => bundle.run(),
+        Command::Completions(completions) => completions.run(Arguments::command()),
+        Command::Man(pages) => pages.run(Arguments::command()),
     });
+    standard_input::forget();
     let done = done.and_then(|()| match terminal::take_write_error() {
         Some(error) => Err(failed(format!("standard output: cannot be written: {error}"))),
         None => Ok(()),
@@ -186,7 +203,12 @@ fn start_log(
     match file {
         None => {
             let shown = filter_fn(move |event| !reports_validation || verbose > 0 || event.target() != "validation");
-            log.without_time().with_writer(std::io::stderr).finish().with(shown).init();
+            log.without_time()
+                .with_ansi(terminal::has_colours())
+                .with_writer(std::io::stderr)
+                .finish()
+                .with(shown)
+                .init();
         }
         Some(path) => {
             let file = RotatingLog::open(path, log_rotation::DEFAULT_FILE_BYTES, log_rotation::DEFAULT_FILES);

@@ -6,7 +6,6 @@ use crate::passes::raycast::survey::{self, Survey, survey};
 use crate::picture::Picture;
 use crate::scene::{Mode, Scene, transfer};
 use crate::source::StoredType;
-use std::path::Path;
 
 /// The colour of a picture of two pixels and more that has only one: red, green, blue.
 pub fn of(picture: &Picture) -> Option<[u8; 3]> {
@@ -16,14 +15,14 @@ pub fn of(picture: &Picture) -> Option<[u8; 3]> {
 }
 
 /// The line for standard error.
-pub fn line(file: &Path, colour: [u8; 3], why: Option<&str>) -> String {
+pub fn line(file: &str, colour: [u8; 3], why: Option<&str>) -> String {
     let [r, g, b] = colour;
     let colour = match colour {
         [0, 0, 0] => "black".into(),
         [255, 255, 255] => "white".into(),
         _ => format!("of one colour (red {r}, green {g}, blue {b})"),
     };
-    format!("{}: is wholly {colour}: {}", file.display(), why.unwrap_or("the scene has no volume"))
+    format!("{file}: is wholly {colour}: {}", why.unwrap_or("the scene has no volume"))
 }
 
 /// The cause, in words. `volume`: the texels of the scene's volume. `shift`: stored sample minus the file's value.

@@ -9,12 +9,51 @@ use crate::source::phantom::{Body, Label, Phantom, PhantomOptions, PointSpread, 
 use crate::source::recorder::{Header, Writer};
 use crate::source::sequence::{self, Sequence};
 use crate::source::volume_file::VolumeFile;
-use crate::source::{self, Source};
-use crate::terminal::{Failure, failed, input, remark, say};
-use std::path::PathBuf;
+use crate::source::{self, Frame, Source};
+use crate::terminal::{Failure, failed, input, progress_bar, remark, say};
+use std::path::{Path, PathBuf};
 
 /// The name of the output in messages.
-const OUTPUT: &str = "output";
+pub(super) const OUTPUT: &str = "output";
+
+/// Reads one volume of a recording, and its geometry. `each` is called with every frame before it is kept. The number of frames that are
+/// there comes last.
+pub(super) fn read_volume(
+    recording: &mut dyn Source,
+    file: &Path,
+    number: usize,
+    mut each: impl FnMut(&Geometry, &Frame),
+) -> Result<(Geometry, Volume, usize), Failure> {
+    if number >= recording.volumes() {
+        let there = recording.volumes();
+        return Err(input(format!("{}: --volume {number}: there are {there}, numbered from 0", file.display())));
+    }
+    let geometry = recording.geometry(number);
+    let mut volume = Volume::new(geometry.clone(), recording.stored_type());
+    recording.skip_to_volume(number).map_err(input)?;
+    let (mut there, mut first) = (0, None);
+    while there < recording.frames_per_volume() {
+        // A .frames file may lack frames: the next one can belong to another volume.
+        let next = recording.next_frame().map_err(input)?;
+        let Some(frame) = next.filter(|frame| *first.get_or_insert(frame.volume) == frame.volume) else { break };
+        each(&geometry, &frame);
+        volume.take(frame);
+        there += 1;
+    }
+    Ok((geometry, volume, there))
+}
+
+/// The lattice of a conversion: that of the volume itself, or one of the spacing that was asked for, mm.
+pub(super) fn target_grid(geometry: &Geometry, spacing: Option<f64>) -> Result<Grid, Failure> {
+    match (geometry, spacing) {
+        // Every voxel stays what and where it is.
+        (Geometry::Cartesian(grid), None) => Ok(*grid),
+        (Geometry::Sweep(probe), None) => {
+            lattice(geometry, probe.sample_pitch).map_err(|e| input(format!("the sample spacing {e}; give --spacing")))
+        }
+        (_, Some(spacing)) => lattice(geometry, spacing).map_err(|e| input(format!("--spacing {e}"))),
+    }
+}
 
 #[derive(clap::Args)]
 #[command(after_help = "Example:\n  echolume convert sweep.mha volume.nrrd --spacing 0.5\n  \
@@ -22,7 +61,8 @@ const OUTPUT: &str = "output";
                         echolume convert sweep.frames sweep.mha --sequence    (frames of whole volumes, for other programs)\n  \
                         echolume render volume.mha --mode mip -o mip.png    (the result is a recording, too)")]
 pub struct Convert {
-    /// MetaImage (.mha, .mhd), NRRD (.nrrd), NIfTI (.nii), Kretz (.vol), each also as .gz, or .frames file
+    /// MetaImage (.mha, .mhd), NRRD (.nrrd), NIfTI (.nii), Kretz (.vol), each also as .gz, or .frames file; a folder or a 'pattern*.png' of numbered
+    /// pictures; - for standard input
     input: PathBuf,
     /// File to write: .mha, .nrrd, .nii or .nii.gz for a volume, .frames for every frame unchanged, .mha with --sequence
     output: PathBuf,
@@ -47,6 +87,11 @@ pub struct Convert {
 
 impl Convert {
     pub fn run(&self) -> Result<(), Failure> {
+        if self.output.as_os_str() == "-" {
+            return Err(input(
+                "-: a volume is written to a file, whole or not at all, and the file's ending says its format",
+            ));
+        }
         if self.output.extension().is_some_and(|e| e.eq_ignore_ascii_case("frames")) {
             return self.record();
         }
@@ -61,13 +106,7 @@ impl Convert {
             return Err(input(format!("{shown}: --volume {}: there are {there}, numbered from 0", self.volume)));
         }
         let geometry = recording.geometry(self.volume);
-        let grid = match (&geometry, self.spacing) {
-            // Every voxel stays what and where it is.
-            (Geometry::Cartesian(grid), None) => *grid,
-            (Geometry::Sweep(probe), None) => lattice(&geometry, probe.sample_pitch)
-                .map_err(|e| input(format!("the sample spacing {e}; give --spacing")))?,
-            (_, Some(spacing)) => lattice(&geometry, spacing).map_err(|e| input(format!("--spacing {e}")))?,
-        };
+        let grid = target_grid(&geometry, self.spacing)?;
         let mut target = Target::new(grid, recording.sample_type());
         if let (Some(world), Geometry::Cartesian(own)) = (recording.world(), &geometry) {
             target.world = world.on(own, &grid);
@@ -78,18 +117,9 @@ impl Convert {
             VolumeFile::of(mask).map_err(input)?;
         }
         self.check_outputs(&[(OUTPUT, Some(&self.output)), ("--mask", self.mask.as_deref())], &*recording)?;
-        let first = geometry.clone();
-        let mut volume = Volume::new(geometry, recording.stored_type());
-        recording.skip_to_volume(self.volume).map_err(input)?;
-        let (each, mut there, mut number) = (recording.frames_per_volume(), 0, None);
-        while there < each {
-            // A .frames file may lack frames: the next one can belong to another volume.
-            let next = recording.next_frame().map_err(input)?;
-            let Some(frame) = next.filter(|frame| *number.get_or_insert(frame.volume) == frame.volume) else { break };
-            volume.take(frame);
-            there += 1;
-        }
-        let bar = indicatif::ProgressBar::new(grid.size[2] as u64).with_message("slices");
+        let each = recording.frames_per_volume();
+        let (first, volume, there) = read_volume(&mut *recording, &self.input, self.volume, |_, _| ())?;
+        let bar = progress_bar(grid.size[2] as u64).with_message("slices");
         volume.write(&target, &self.output, || bar.inc(1)).map_err(failed)?;
         bar.finish_and_clear();
         if let Some(mask) = &self.mask {
@@ -123,7 +153,7 @@ impl Convert {
         self.check_outputs(&[(OUTPUT, Some(&self.output)), (OUTPUT, Some(&beside))], &*recording)?;
         let sequence = Sequence::of(&mut *recording, &self.input).map_err(input)?;
         let (frames, volumes) = (sequence.frames(), sequence.volumes());
-        let bar = indicatif::ProgressBar::new(volumes as u64).with_message("volumes");
+        let bar = progress_bar(volumes as u64).with_message("volumes");
         sequence.write(&mut *recording, &self.output, || bar.inc(1)).map_err(failed)?;
         bar.finish_and_clear();
         let left_out = match sequence.left_out() {
@@ -156,7 +186,7 @@ impl Convert {
         // A signal ends the process only after the incomplete file is deleted.
         let signals = Writing::begin();
         let mut writer = Writer::create(&self.output, header).map_err(failed)?;
-        let bar = indicatif::ProgressBar::new((recording.volumes() * recording.frames_per_volume()) as u64);
+        let bar = progress_bar((recording.volumes() * recording.frames_per_volume()) as u64);
         let mut copy = || {
             while let Some(there) = frame.take() {
                 if let Some(signal) = signals.signal() {
@@ -183,7 +213,8 @@ impl Convert {
 
 #[derive(clap::Args)]
 pub struct Info {
-    /// MetaImage (.mha, .mhd), NRRD (.nrrd), NIfTI (.nii), Kretz (.vol), each also as .gz, or .frames file
+    /// MetaImage (.mha, .mhd), NRRD (.nrrd), NIfTI (.nii), Kretz (.vol), each also as .gz, or .frames file; a folder or a 'pattern*.png' of numbered
+    /// pictures; - for standard input
     file: PathBuf,
     #[command(flatten)]
     geometry: GeometryArgs,

@@ -1,7 +1,7 @@
 //! `echolume render`.
 
 use super::one_colour;
-use crate::args::{InputArgs, Output, check_outputs};
+use crate::args::{InputArgs, Output, PictureFile, check_outputs};
 use crate::dump;
 use crate::error_report::choose::Bound;
 use crate::error_report::command::{parse_nanoseconds, read_report};
@@ -11,13 +11,14 @@ use crate::gpu::shader_reload::ShaderFolder;
 use crate::gpu::{Bands, Context, GpuError, Renderer, RendererOptions, TimeStamps};
 use crate::marked;
 use crate::passes::{PassTime, Slot, Texels};
-use crate::picture::Picture;
+use crate::picture::{Picture, PictureFormat};
 use crate::plan::Plan;
 use crate::probe::Probe;
 use crate::profile::export::pass_time_table;
 use crate::scene::{Mode, Scene};
 use crate::source::{Frame, Source};
 use crate::terminal::{Failure, failed, input, remark, say};
+use std::borrow::Cow;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::SystemTime;
@@ -28,12 +29,13 @@ use std::time::SystemTime;
                         before.\n\nExamples:\n  \
                         echolume render sweep.mha --preset fetal\n  \
                         echolume render sweep.vol --mode vr --camera azimuth=30,zoom=1.5 -o view.png\n  \
-                        echolume render bone.mha --preset bone --roi depth=20:50 --explain"
+                        echolume render bone.mha --preset bone --roi depth=20:50 --explain\n  \
+                        zcat sweep.mha.gz | echolume render - -o - | display"
 )]
 pub struct Render {
     #[command(flatten)]
     input: InputArgs,
-    /// The picture to write (PNG)
+    /// The picture to write: .png, .jpg, .bmp or .ppm by its ending; - for a PNG on standard output
     #[arg(short, long, value_name = "FILE", default_value = "picture.png")]
     output: PathBuf,
     /// Print the plan without rendering: passes, bytes, and the reason for each pass
@@ -51,7 +53,7 @@ pub struct Render {
     /// The error.json that `echolume report error -o DIR` wrote for this recording on this device
     #[arg(long, value_name = "FILE", requires = "budget")]
     report: Option<PathBuf>,
-    /// Write the difference of every pixel from the picture of half the step as a map too (PNG); hatched where it exceeds
+    /// Write the difference of every pixel from the picture of half the step as a map too; hatched where it exceeds
     /// --error-tolerance
     #[arg(long, value_name = "FILE")]
     error_map: Option<PathBuf>,
@@ -72,8 +74,12 @@ pub struct Render {
 impl Render {
     pub fn run(&self) -> Result<(), Failure> {
         let options = self.options()?;
-        let targets: [Output; 2] = [("-o", Some(&self.output)), ("--error-map", self.error_map.as_deref())];
+        let output = PictureFile::new("-o", &self.output)?;
+        let targets: [Output; 2] = [("-o", output.path()), ("--error-map", self.error_map.as_deref())];
         if !self.explain {
+            if let Some(map) = &self.error_map {
+                PictureFormat::of(map).map_err(|fault| input(format!("--error-map {fault}")))?;
+            }
             // Before the report is read: what a wrong target is refused for does not depend on what the report says.
             check_outputs(&targets, self.report.as_deref())?;
         }
@@ -114,15 +120,15 @@ impl Render {
             }
         };
         let compared = finer.map(|finer| (scene, finer));
-        self.save(&picture, renderer.scene())?;
-        say!("picture: {}", self.output.display());
+        let shown = self.with_marks(&picture, renderer.scene())?;
+        output.write(|format| shown.encoded(format))?;
         let measured = renderer.take_times().map_err(failed)?;
         self.judge_budget(&measured)?;
         if let Some(colour) = one_colour::of(&picture) {
             let shift = source.sample_type().shift();
             let volume = renderer.read(Slot::Volume).map_err(failed)?;
             let why = volume.map(|volume| one_colour::cause(renderer.scene(), &volume, shift));
-            remark(&one_colour::line(&self.output, colour, why.as_deref()));
+            remark(&one_colour::line(&output.name(), colour, why.as_deref()));
         }
         if self.timings {
             say!("{}", pass_time_table(&measured, renderer.scene()).trim_end());
@@ -141,13 +147,13 @@ impl Render {
         }
     }
 
-    /// Saves the picture, with its marks if the settings ask for them.
-    fn save(&self, picture: &Picture, scene: &Scene) -> Result<(), Failure> {
+    /// The picture as it is written: with its marks if the settings ask for them.
+    fn with_marks<'a>(&self, picture: &'a Picture, scene: &Scene) -> Result<Cow<'a, Picture>, Failure> {
         match scene.settings.marks.bar {
-            false => picture.save(&self.output).map_err(failed),
+            false => Ok(Cow::Borrowed(picture)),
             true => {
                 let marked = marked::marked(picture, scene, &marked::time_line(SystemTime::now()), None);
-                marked.and_then(|marked| marked.save(&self.output)).map_err(failed)
+                marked.map(Cow::Owned).map_err(failed)
             }
         }
     }

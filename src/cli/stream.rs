@@ -206,7 +206,7 @@ fn explain_one_colour(stream: &mut Live, shown: &FinishedPicture, file: &Path) -
     let Some(renderer) = stream.renderer() else { return Ok(false) };
     let volume = renderer.read(Slot::Volume).map_err(failed)?;
     let why = volume.map(|volume| one_colour::cause(renderer.scene(), &volume, 0.0));
-    remark(&one_colour::line(file, colour, why.as_deref()));
+    remark(&one_colour::line(&file.display().to_string(), colour, why.as_deref()));
     Ok(true)
 }
 

@@ -1,11 +1,11 @@
 //! `echolume view`.
 
 use super::view_config::{ConsoleConfig, WindowConfig, rungs};
-use crate::args::{SceneArgs, SourceArgs, StreamArgs};
+use crate::args::{SceneArgs, SourceArgs, StreamArgs, device_failure};
 use crate::error_report::command::parse_nanoseconds;
 use crate::gpu::shader_reload::ShaderFolder;
 use crate::gpu::window::{MonitorChoice, PresentMode};
-use crate::gpu::{Context, GpuError, Wake};
+use crate::gpu::{Context, Wake};
 use crate::kiosk::config::{self, Config};
 use crate::live::cine::CineLimits;
 use crate::terminal::{Failure, failed, input, say};
@@ -147,10 +147,7 @@ impl View {
             let (open, options) = wanted.options(factor, wake, startup_fault);
             Console::new(context, open, ConsoleOptions { shaders: shaders.clone(), ..options }, size)
         };
-        let ran = place.run(Box::new(make)).map_err(|e| match e {
-            GpuError::NoSuchDevice { .. } => input(e),
-            e => failed(e),
-        });
+        let ran = place.run(Box::new(make)).map_err(device_failure);
         finish(ran?)
     }
 

@@ -6,7 +6,7 @@ use crate::error_report::{self, Measure, choose, dials, export, measure, plot};
 use crate::files::read_text;
 use crate::picture::replace;
 use crate::scene::Scene;
-use crate::terminal::{Failure, failed, input, say};
+use crate::terminal::{Failure, failed, input, progress_bar, say};
 use std::path::{Path, PathBuf};
 
 /// Runs of a choice before it is printed: the 95th percentile is the second longest.
@@ -119,7 +119,7 @@ impl ErrorReport {
             reference,
         };
         let settings: usize = dials.iter().map(|d| d.settings.len() + 1).sum();
-        let bar = indicatif::ProgressBar::new((settings + 1 + measure::MAX_COMBINATIONS) as u64);
+        let bar = progress_bar((settings + 1 + measure::MAX_COMBINATIONS) as u64);
         bar.set_style(indicatif::ProgressStyle::default_bar().template("{bar:30} {pos}/{len} {msg}").map_err(failed)?);
         bar.set_message("the scene's finest picture");
         let finest = measurement.finest().map_err(failed)?;

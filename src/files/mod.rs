@@ -4,6 +4,9 @@
 //! the field and the fault. Some errors omit the file's name, because the caller adds it.
 
 pub mod signals;
+mod spool;
+
+pub(crate) use spool::Spool;
 
 use signals::Writing;
 use std::fs::{File, OpenOptions, metadata};
@@ -206,6 +209,11 @@ impl InputError {
     /// The operating system cannot write the file.
     pub(crate) fn unwritable(file: &Path, error: &io::Error) -> InputError {
         InputError::new(file, "file", format!("cannot be written: {error}"))
+    }
+
+    /// The same error of a file that the user knows by another name.
+    pub(crate) fn renamed(self, name: &str) -> InputError {
+        InputError { file: escaped(name, MAX_PART), ..self }
     }
 
     /// The field that is wrong.

@@ -7,7 +7,7 @@ use crate::args::{Output, check_outputs, open_device, open_recording, write_repo
 use crate::gpu::DeviceChoice;
 use crate::machine;
 use crate::source::OpenOptions;
-use crate::terminal::{Failure, failed, input, say};
+use crate::terminal::{Failure, failed, input, progress_bar, say};
 use std::path::{Path, PathBuf};
 
 #[derive(clap::Args)]
@@ -80,7 +80,7 @@ impl FilterReport {
         }
         let context = open_device(self.device.clone(), false)?;
         let options = MeasureOptions { only: &self.filter, pixels: self.pixels, repeats: self.repeat as usize };
-        let bar = indicatif::ProgressBar::new((names.len() * count(&self.filter)) as u64).with_message("settings");
+        let bar = progress_bar((names.len() * count(&self.filter)) as u64).with_message("settings");
         let mut subjects = vec![phantom(&context, options, &mut || bar.inc(1)).map_err(|e| fault("phantom", e))?];
         for ((source, file), areas) in sources.iter_mut().zip(&self.recordings).zip(areas) {
             let name = stem(file);

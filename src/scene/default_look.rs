@@ -44,7 +44,7 @@ pub struct Completed {
 }
 
 /// Standard deviation of the default smoothing of a volume, mm.
-fn smoothing(geometry: &Geometry) -> f64 {
+pub fn smoothing(geometry: &Geometry) -> f64 {
     let (low, high) = insonified_box(geometry);
     let [least, most] = SMOOTHING_RANGE;
     let wanted = SMOOTHING * (high - low).max_element();

@@ -150,6 +150,16 @@ impl Volume {
         Some(sum)
     }
 
+    /// Fills a slice of a grid with stored values, lateral fastest; NaN outside the insonified region.
+    pub fn slice(&self, grid: &Grid, z: usize, out: &mut [f64]) {
+        let target = Target::new(*grid, self.stored.into());
+        out.par_chunks_mut(grid.size[0].max(1)).enumerate().for_each(|(y, row)| {
+            for (x, value) in row.iter_mut().enumerate() {
+                *value = self.value(&target, [x, y, z]).unwrap_or(f64::NAN);
+            }
+        });
+    }
+
     /// True if any voxel of a grid lies in the insonified region.
     pub fn meets(&self, grid: &Grid) -> bool {
         (0..grid.size[2]).into_par_iter().any(|z| {

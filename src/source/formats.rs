@@ -2,20 +2,28 @@
 
 use super::layout::Layout;
 use super::packed::InputFile;
-use super::{kretz, metaimage, nifti, nrrd, recorder};
+use super::{OpenOptions, kretz, metaimage, nifti, nrrd, recorder, stack};
 use crate::files::InputError;
 use std::path::Path;
 
 /// Bytes that are looked at. The modality of a DICOM file usually lies within the first thousand.
 const START: u64 = 4096;
 /// What is read, for messages.
-const READ: &str = "MetaImage (.mha, .mhd), NRRD (.nrrd, .nhdr), NIfTI (.nii) and Kretz (.vol) are read, each also as .gz, and .frames";
+const READ: &str = "MetaImage (.mha, .mhd), NRRD (.nrrd, .nhdr), NIfTI (.nii) and Kretz (.vol) are read, each also as .gz, .frames, \
+                    and folders of numbered pictures";
 
-/// Reads the layout of a file with the reader for its content, or else for the extension of its name.
+/// Reads the layout of a file with the reader for its content, or else for the extension of its name; or of a stack of pictures.
 ///
 /// # Errors
-/// A file that cannot be read, is of another kind, or is damaged.
-pub(super) fn read_layout(path: &Path) -> Result<Layout, InputError> {
+/// A file that cannot be read, is of another kind, or is damaged. A voxel spacing for anything but pictures.
+pub(super) fn read_layout(path: &Path, options: &OpenOptions) -> Result<Layout, InputError> {
+    if stack::is_meant(path) {
+        return stack::read(path, options);
+    }
+    if options.voxel_spacing.is_some() {
+        let fault = "is for a folder or a pattern of pictures; other recordings state their own";
+        return Err(InputError::new(path, "--voxel-spacing", fault));
+    }
     let file = InputFile::new(path)?;
     let start = file.start(START)?;
     let name = if file.is_packed() { path.with_extension("") } else { path.to_path_buf() };

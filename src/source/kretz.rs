@@ -4,6 +4,7 @@
 use super::layout::{Cartesian, Layout, LineOrder, StoredGeometry, extent};
 use super::packed::{InputFile, Pixels};
 use super::pixel::{Number, PixelFormat};
+use super::transforms::Poses;
 use crate::files::InputError;
 use crate::probe::file::SLAB;
 use crate::probe::{Advance, Array, Axis, AxisOrder, Grid, Motion, Probe, World};
@@ -30,6 +31,10 @@ const MINUS_AXIS_DEPTH: Tag = (0xc200, 2);
 const SWEEP_ANGLES: Tag = (0xc300, 1);
 const LINE_ANGLES: Tag = (0xc300, 2);
 const VOXELS: Tag = (0xd000, 1);
+/// The voxels of all volumes in time, one after another, as the readers that are public find them.
+const SEQUENCE: Tag = (0xd600, 1);
+/// Further volumes of the same moment.
+const OTHER_VOXELS: [(Tag, &str); 2] = [((0xd000, 0x101), "colour flow"), ((0xd000, 0x201), "power Doppler")];
 const END: Tag = (0xffff, 0xffff);
 const READ_WHOLE: [Tag; 8] =
     [SAMPLES, LINES, FRAMES, RADIAL_STEP, ARRAY_RADIUS, MINUS_AXIS_DEPTH, SWEEP_ANGLES, LINE_ANGLES];
@@ -43,8 +48,12 @@ struct Items<'a> {
     /// Offset and length.
     voxels: Option<(u64, u64)>,
     wavelet: bool,
+    /// Offset and length of the volumes in time.
+    sequence: Option<(u64, u64)>,
     /// There are items of further volumes in time (4D).
     four_d: bool,
+    /// Volumes of other kinds, by name.
+    others: Vec<&'static str>,
     /// The file ends behind a whole item, without the mark.
     no_end: bool,
 }
@@ -61,22 +70,20 @@ pub(super) fn read(file: &InputFile) -> Result<Layout, InputError> {
     }
     let (samples, lines) = (items.count(SAMPLES, "samples")?, items.count(LINES, "lines")?);
     let frames = items.count(FRAMES, "frames")?;
-    let Some((offset, length)) = items.voxels else {
-        let fault = if items.four_d { "missing: a 4D file without a still volume is not read" } else { "are missing" };
-        return Err(InputError::new(path, name(VOXELS, "voxels"), fault));
-    };
     let mut remarks = Vec::new();
-    if items.four_d {
-        remarks.push(("4D".into(), "holds more volumes, which are not read: only the still one is".into()));
+    let each = samples as u64 * lines as u64 * frames as u64;
+    let (offset, length, volumes) = items.choose(each, &mut remarks)?;
+    if !items.others.is_empty() {
+        remarks.push(("more volumes".into(), format!("{}; not read", items.others.join(" and "))));
     }
-    let claimed = samples as u64 * lines as u64 * frames as u64;
+    let claimed = each * volumes as u64;
     if length > claimed {
         remarks.push(("more data".into(), format!("{} bytes behind the voxels; not read", length - claimed)));
     }
     if items.no_end {
         remarks.push(("end mark".into(), "FFFF,FFFF is missing; the items before it are whole".into()));
     }
-    let geometry = items.geometry(samples, lines, frames)?;
+    let geometry = items.geometry(samples, lines, frames, volumes)?;
     let falls = |tag, count| items.table(tag, "angles").map(|table| table.len() == count && is_falling(&table));
     let line_order = if falls(LINE_ANGLES, lines)? { LineOrder::Reversed } else { LineOrder::InOrder };
     let backward = frames > 1 && falls(SWEEP_ANGLES, frames)?;
@@ -88,12 +95,14 @@ pub(super) fn read(file: &InputFile) -> Result<Layout, InputError> {
         format: "Kretz volume",
         pixel: PixelFormat::grey(Number::U8),
         frame_size: [samples, lines],
-        frames,
+        frames: frames * volumes,
         pixels,
         line_order,
         geometry,
         backward,
+        volumes,
         states_geometry: true,
+        poses: Poses::default(),
         times: BTreeMap::new(),
         remarks,
     };
@@ -112,12 +121,20 @@ impl<'a> Items<'a> {
         if !whole || magic != *MAGIC {
             return Err(InputError::new(path, "magic", "is not 'KRETZFILE 1.0   ', the only version that is read"));
         }
-        let mut items =
-            Items { path, small: HashMap::new(), voxels: None, wavelet: false, four_d: false, no_end: false };
+        let mut items = Items {
+            path,
+            small: HashMap::new(),
+            voxels: None,
+            wavelet: false,
+            sequence: None,
+            four_d: false,
+            others: Vec::new(),
+            no_end: false,
+        };
         let mut at = MAGIC.len() as u64;
         for _ in 0..MAX_ITEMS {
             let mut head = [0; 8];
-            if at == there && !file.is_packed() && items.voxels.is_some() {
+            if at == there && !file.is_packed() && items.voxels.or(items.sequence).is_some() {
                 items.no_end = true;
                 return Ok(items);
             }
@@ -133,7 +150,7 @@ impl<'a> Items<'a> {
             }
             let left = there.saturating_sub(at);
             if length > left {
-                let field = if tag == VOXELS { "data".into() } else { name(tag, "item") };
+                let field = if tag == VOXELS || tag == SEQUENCE { "data".into() } else { name(tag, "item") };
                 let fault = format!("cut short, {left} of {length} bytes are there");
                 return Err(InputError::new(path, field, fault));
             }
@@ -142,6 +159,10 @@ impl<'a> Items<'a> {
             if tag == VOXELS && items.voxels.is_none() {
                 items.voxels = Some((at, length));
             }
+            if tag == SEQUENCE && items.sequence.is_none() {
+                items.sequence = Some((at, length));
+            }
+            items.others.extend(OTHER_VOXELS.iter().filter(|(other, _)| *other == tag).map(|(_, name)| name));
             let mut unread = length;
             if READ_WHOLE.contains(&tag) && !items.small.contains_key(&tag) {
                 if length > MAX_TABLE_BYTES {
@@ -160,6 +181,38 @@ impl<'a> Items<'a> {
             at += length;
         }
         Err(InputError::new(path, "items", format!("are more than {MAX_ITEMS}, before FFFF,FFFF")))
+    }
+
+    /// Offset and length of the voxels, and the number of volumes: all those in time if their bytes are whole volumes of `each` bytes,
+    /// otherwise the still one.
+    fn choose(&self, each: u64, remarks: &mut Vec<(String, String)>) -> Result<(u64, u64, usize), InputError> {
+        let in_time = self.sequence.filter(|(_, length)| *length >= each && length.is_multiple_of(each));
+        match (in_time, self.voxels) {
+            (Some((offset, length)), still) => {
+                let count = usize::try_from(length / each).unwrap_or(usize::MAX);
+                let beside = if still.is_some() { "; the still one beside them is not read" } else { "" };
+                remarks.push(("4D".into(), format!("{count} volumes in time{beside}")));
+                Ok((offset, length, count))
+            }
+            (None, Some((offset, length))) => {
+                if self.four_d {
+                    let text = "holds more volumes in a form that is not read: only the still one is";
+                    remarks.push(("4D".into(), text.into()));
+                }
+                Ok((offset, length, 1))
+            }
+            (None, None) => match self.sequence {
+                Some((_, length)) => self.fault(
+                    SEQUENCE,
+                    "volumes in time",
+                    format!("{length} bytes are no whole number of volumes of {each}: a compressed or unknown form, which is not read"),
+                ),
+                None if self.four_d => {
+                    self.fault(VOXELS, "voxels", "missing, and the volumes in time are in a form that is not read")
+                }
+                None => self.fault(VOXELS, "voxels", "are missing"),
+            },
+        }
     }
 
     fn fault<T>(&self, tag: Tag, title: &str, fault: impl AsRef<str>) -> Result<T, InputError> {
@@ -210,7 +263,13 @@ impl<'a> Items<'a> {
         if axis.is_valid() { Ok(axis) } else { self.fault(tag, title, "must rise or fall from each to the next") }
     }
 
-    fn geometry(&self, samples: usize, lines: usize, frames: usize) -> Result<StoredGeometry, InputError> {
+    fn geometry(
+        &self,
+        samples: usize,
+        lines: usize,
+        frames: usize,
+        volumes: usize,
+    ) -> Result<StoredGeometry, InputError> {
         let step = self.number(RADIAL_STEP, "radial step")? * 1e3;
         if !(step > 0.0 && step.is_finite()) {
             return self.fault(RADIAL_STEP, "radial step", format!("is {step} mm, must be above 0"));
@@ -219,7 +278,7 @@ impl<'a> Items<'a> {
         if tables == [false, false] {
             let size = [samples, lines, frames];
             let world = World::of(&Grid { size, spacing: [step; 3], origin: [0.0; 3] });
-            return Ok(StoredGeometry::Cartesian(Cartesian { size, volumes: 1, world, order: AxisOrder::STORED }));
+            return Ok(StoredGeometry::Cartesian(Cartesian { size, volumes, world, order: AxisOrder::STORED }));
         }
         let radius = self.number(ARRAY_RADIUS, "array radius")? * step;
         let (motion, slices) = if frames == 1 {

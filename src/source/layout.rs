@@ -2,6 +2,7 @@
 
 use super::packed::Pixels;
 use super::pixel::PixelFormat;
+use super::transforms::Poses;
 use crate::files::InputError;
 use crate::probe::{AxisOrder, Probe, World};
 use std::collections::BTreeMap;
@@ -24,8 +25,12 @@ pub(super) struct Layout {
     pub geometry: StoredGeometry,
     /// The frames of a sweep come from the last slice to the first.
     pub backward: bool,
+    /// Number of volumes of a sweep, one after another.
+    pub volumes: usize,
     /// The file states where its samples lie. If not, a `probe.toml` of the folder applies.
     pub states_geometry: bool,
+    /// Transforms of tracked frames.
+    pub poses: Poses,
     /// Time stamps by frame, s.
     pub times: BTreeMap<usize, f64>,
     /// Remarks for users: title and text. Never a patient field.

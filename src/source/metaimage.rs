@@ -3,6 +3,7 @@
 use super::layout::{Cartesian, Layout, LineOrder, StoredGeometry, extent};
 use super::packed::{Encoding, InputFile, Pixels};
 use super::pixel::{Number, PixelFormat};
+use super::transforms::{Poses, TransformName, matrix};
 use crate::files::{InputError, quoted};
 use crate::probe::file::SLAB;
 use crate::probe::{Advance, Array, Axis, AxisOrder, Motion, Probe, World};
@@ -27,7 +28,7 @@ const NUMBERS: [(&str, Number); 10] = [
 
 pub(super) fn read(file: &InputFile) -> Result<Layout, InputError> {
     let path = file.path;
-    let header = Header::read(file)?;
+    let mut header = Header::read(file)?;
     if let Some(other) = header.get("ObjectType").filter(|t| *t != "Image") {
         return header.fault("ObjectType", format!("{} is not read, only Image is", quoted(other)));
     }
@@ -65,6 +66,7 @@ pub(super) fn read(file: &InputFile) -> Result<Layout, InputError> {
     if let Some(orientation) = header.get("UltrasoundImageOrientation") {
         remarks.push(("orientation".into(), quoted(orientation)));
     }
+    remarks.extend(header.poses.remark());
     if header.not_ok > 0 {
         remarks.push(("frames not OK".into(), format!("{} by their ImageStatus; read all the same", header.not_ok)));
     }
@@ -77,7 +79,9 @@ pub(super) fn read(file: &InputFile) -> Result<Layout, InputError> {
         line_order: lines,
         geometry,
         backward: false,
+        volumes: 1,
         states_geometry,
+        poses: std::mem::take(&mut header.poses),
         times: header.times.range(..frames).map(|(k, t)| (*k, *t)).collect(),
         remarks,
     };
@@ -244,9 +248,9 @@ fn find_pixels(file: &InputFile, header: &Header, layout: &mut Layout) -> Result
     Ok(())
 }
 
-/// Longest header, bytes and lines.
-const MAX_HEADER_BYTES: u64 = 1 << 20;
-const MAX_HEADER_LINES: usize = 100_000;
+/// Longest header, bytes and lines: those of tracked sequences have some ten lines for every frame.
+const MAX_HEADER_BYTES: u64 = 32 << 20;
+const MAX_HEADER_LINES: usize = 500_000;
 
 /// The fields that are read. All others are skipped, so that no patient's name gets into a message.
 const KEYS: &[&str] = &[
@@ -290,6 +294,8 @@ struct Header<'a> {
     fields: HashMap<&'static str, String>,
     /// Time stamps by frame, s: `Seq_FrameNNNN_Timestamp`.
     times: BTreeMap<usize, f64>,
+    /// Transforms by frame: `Seq_FrameNNNN_ProbeToTrackerTransform`, those whose status is OK.
+    poses: Poses,
     /// Frames whose `Seq_FrameNNNN_ImageStatus` is not OK.
     not_ok: usize,
     /// There are `Seq_` fields: frames in time.
@@ -303,8 +309,17 @@ impl<'a> Header<'a> {
         let path = file.path;
         let stream = file.open().map_err(|e| InputError::unreadable(path, &e))?;
         let mut input = BufReader::new(stream.take(MAX_HEADER_BYTES));
-        let mut header =
-            Header { path, fields: HashMap::new(), times: BTreeMap::new(), not_ok: 0, sequence: false, length: 0 };
+        let mut header = Header {
+            path,
+            fields: HashMap::new(),
+            times: BTreeMap::new(),
+            poses: Poses::default(),
+            not_ok: 0,
+            sequence: false,
+            length: 0,
+        };
+        // Transforms whose status is not OK: the status may stand before its transform.
+        let mut invalid = Vec::new();
         let mut line = Vec::new();
         for number in 1..=MAX_HEADER_LINES {
             line.clear();
@@ -328,18 +343,24 @@ impl<'a> Header<'a> {
                 }
             } else if let Some(of_frame) = key.strip_prefix("Seq_Frame") {
                 header.sequence = true;
-                header.frame_field(of_frame, value)?;
+                header.frame_field(of_frame, value, &mut invalid)?;
             }
             // The data begin after this line.
             if key == "ElementDataFile" {
+                invalid.iter().for_each(|(name, frame)| header.poses.remove(name, *frame));
                 return Ok(header);
             }
         }
-        header.fault("ElementDataFile", "is missing, or not within the first 1 MiB and 100000 lines")
+        header.fault("ElementDataFile", "is missing, or not within the first 32 MiB and 500000 lines")
     }
 
-    /// `0012_Timestamp` and `0012_ImageStatus`; other fields of frames are skipped.
-    fn frame_field(&mut self, key: &str, value: &str) -> Result<(), InputError> {
+    /// `0012_Timestamp`, `0012_ImageStatus`, `0012_ProbeToTrackerTransform` and its `...Status`; other fields of frames are skipped.
+    fn frame_field(
+        &mut self,
+        key: &str,
+        value: &str,
+        invalid: &mut Vec<(TransformName, usize)>,
+    ) -> Result<(), InputError> {
         let Some((number, field)) = key.split_once('_') else { return Ok(()) };
         let Ok(number) = number.parse::<usize>() else { return Ok(()) };
         match field {
@@ -351,7 +372,19 @@ impl<'a> Header<'a> {
                 }
             },
             "ImageStatus" if value != "OK" => self.not_ok += 1,
-            _ => {}
+            _ => {
+                if let Some(name) = field.strip_suffix("TransformStatus").and_then(|name| name.parse().ok()) {
+                    if value != "OK" {
+                        invalid.push((name, number));
+                    }
+                } else if let Some(name) = field.strip_suffix("Transform").and_then(|name| name.parse().ok()) {
+                    match matrix(value) {
+                        Ok(matrix) => self.poses.add(name, number, matrix),
+                        // As programs write what was not tracked: no inverse, not finite.
+                        Err(_) => invalid.push((name, number)),
+                    }
+                }
+            }
         }
         Ok(())
     }

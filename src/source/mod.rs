@@ -20,12 +20,19 @@ mod nifti;
 mod nrrd;
 mod packed;
 pub mod phantom;
+mod pictures;
 pub mod piped;
+mod piped_file;
 mod pixel;
+mod plus_config;
 pub mod recorder;
 pub mod recording;
 pub mod samples;
 pub mod sequence;
+mod stack;
+pub(crate) mod standard_input;
+mod tracked;
+mod transforms;
 mod value_range;
 pub mod volume_file;
 
@@ -34,6 +41,7 @@ pub use crate::probe::{DepthAxis, Geometry, Grid};
 pub use frame::{Frame, Header, Source};
 pub use recording::Recording;
 pub use samples::{SampleType, StoredType};
+pub use transforms::Calibration;
 
 use std::fs::{self, File};
 use std::io::Read;
@@ -46,6 +54,14 @@ pub struct OpenOptions<'a> {
     pub probe: Option<&'a Path>,
     /// The stored axis of a Cartesian volume that is drawn as depth; None: that of the file's orientation, or y.
     pub depth_axis: Option<DepthAxis>,
+    /// Distance between the voxels of a stack of pictures: columns, rows, pictures, mm.
+    pub voxel_spacing: Option<[f64; 3]>,
+    /// A configuration of the PLUS toolkit (XML): tracked pictures become a freehand volume.
+    pub plus_config: Option<&'a Path>,
+    /// Constant transforms of tracked pictures, which come before those of the configuration.
+    pub calibration: &'a [Calibration],
+    /// The coordinate frame of the tracking that the volume is placed in. None: that of the configuration, or Reference, Tracker or World.
+    pub reference: Option<&'a str>,
 }
 
 /// As [`open_with`], with the stored order of axes. `probe`: the probe file to use.
@@ -53,18 +69,28 @@ pub struct OpenOptions<'a> {
 /// # Errors
 /// As [`open_with`].
 pub fn open(path: &Path, probe: Option<&Path>) -> Result<Box<dyn Source>, InputError> {
-    open_with(path, OpenOptions { probe, depth_axis: None })
+    open_with(path, OpenOptions { probe, ..OpenOptions::default() })
 }
 
-/// Opens a `.frames` file or any other recording; the content decides which.
+/// Opens a `.frames` file, a stream of frames in a file, or any other recording; the content decides which. `-` is standard input.
 ///
 /// # Errors
 /// As [`recorder::Reader::open`] and [`Recording::open_with`].
 pub fn open_with(path: &Path, options: OpenOptions) -> Result<Box<dyn Source>, InputError> {
-    match is_frames(path) {
-        true => Ok(Box::new(frames(path, options)?)),
-        false => Ok(Box::new(Recording::open_with(path, options)?)),
+    if standard_input::is_meant(path) {
+        let source = open_file(&standard_input::file()?, options).map_err(standard_input::renamed)?;
+        return Ok(Box::new(standard_input::FromInput(source)));
     }
+    open_file(path, options)
+}
+
+fn open_file(path: &Path, options: OpenOptions) -> Result<Box<dyn Source>, InputError> {
+    Ok(match Kind::of(path) {
+        Kind::Frames => Box::new(frames(path, options)?),
+        Kind::Stream => Box::new(stream(path, options)?),
+        Kind::Recording if tracked::is_asked_for(&options) => Box::new(tracked_volume(path, options)?),
+        Kind::Recording => Box::new(Recording::open_with(path, options)?),
+    })
 }
 
 /// A description of such a file for users: pairs of title and value. Never a patient's name or number.
@@ -72,26 +98,70 @@ pub fn open_with(path: &Path, options: OpenOptions) -> Result<Box<dyn Source>, I
 /// # Errors
 /// As [`open_with`]; a `.frames` file is read completely, and may fail while that is done.
 pub fn description(path: &Path, options: OpenOptions) -> Result<Vec<(String, String)>, InputError> {
-    match is_frames(path) {
-        true => frames(path, options)?.description(),
-        false => Ok(Recording::open_with(path, options)?.description()),
+    if standard_input::is_meant(path) {
+        return file_description(&standard_input::file()?, options).map_err(standard_input::renamed);
     }
+    file_description(path, options)
+}
+
+fn file_description(path: &Path, options: OpenOptions) -> Result<Vec<(String, String)>, InputError> {
+    match Kind::of(path) {
+        Kind::Frames => frames(path, options)?.description(),
+        Kind::Stream => Ok(stream(path, options)?.description()),
+        Kind::Recording if tracked::is_asked_for(&options) => Ok(tracked_volume(path, options)?.description()),
+        Kind::Recording => Ok(Recording::open_with(path, options)?.description()),
+    }
+}
+
+fn tracked_volume(path: &Path, options: OpenOptions) -> Result<tracked::TrackedVolume, InputError> {
+    // The folder's probe file is for scan lines; what was given with it is refused by the volume.
+    let pictures = Recording::open_with(path, OpenOptions { probe: None, depth_axis: None, ..options })?;
+    tracked::TrackedVolume::new(path, pictures, &options)
 }
 
 fn frames(path: &Path, options: OpenOptions) -> Result<recorder::Reader, InputError> {
-    match options.depth_axis {
-        Some(_) => {
-            Err(InputError::new(path, "--depth-axis", "is not for .frames files, whose frames are as they arrived"))
+    only_probe(path, options)?;
+    recorder::Reader::open(path)
+}
+
+fn stream(path: &Path, options: OpenOptions) -> Result<piped_file::PipedFile, InputError> {
+    only_probe(path, options)?;
+    piped_file::PipedFile::open(path, options.probe)
+}
+
+/// Refuses what does not apply to frames as they arrived.
+fn only_probe(path: &Path, options: OpenOptions) -> Result<(), InputError> {
+    let fault = "is not for frames as they arrived";
+    match (options.depth_axis, options.voxel_spacing) {
+        (Some(_), _) => Err(InputError::new(path, "--depth-axis", fault)),
+        (_, Some(_)) => Err(InputError::new(path, "--voxel-spacing", fault)),
+        _ if tracked::is_asked_for(&options) => {
+            Err(InputError::new(path, "--plus-config", "is for tracked pictures, not for frames as they arrived"))
         }
-        None => recorder::Reader::open(path),
+        (None, None) => Ok(()),
     }
 }
 
-fn is_frames(path: &Path) -> bool {
-    let mut start = Vec::new();
-    // A file that cannot be read is reported by the reader. Opening a pipe may block for ever.
-    if fs::metadata(path).is_ok_and(|m| m.is_file()) {
-        let _ = File::open(path).and_then(|file| file.take(64).read_to_end(&mut start));
+/// What a file holds, by its first bytes.
+enum Kind {
+    Frames,
+    Stream,
+    Recording,
+}
+
+impl Kind {
+    fn of(path: &Path) -> Kind {
+        let mut start = Vec::new();
+        // A file that cannot be read is reported by the reader. Opening a pipe may block for ever.
+        if fs::metadata(path).is_ok_and(|m| m.is_file()) {
+            let _ = File::open(path).and_then(|file| file.take(64).read_to_end(&mut start));
+        }
+        if recorder::Reader::is_one(&start) {
+            Kind::Frames
+        } else if piped_file::PipedFile::is_one(&start) {
+            Kind::Stream
+        } else {
+            Kind::Recording
+        }
     }
-    recorder::Reader::is_one(&start)
 }

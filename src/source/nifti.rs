@@ -4,6 +4,7 @@
 use super::layout::{Cartesian, Layout, LineOrder, StoredGeometry, extent};
 use super::packed::{Encoding, InputFile, Pixels};
 use super::pixel::{Number, PixelFormat};
+use super::transforms::Poses;
 use crate::files::InputError;
 use crate::probe::{AxisOrder, World};
 use glam::{DMat3, DVec3};
@@ -134,7 +135,9 @@ pub(super) fn read(file: &InputFile) -> Result<Layout, InputError> {
         line_order: LineOrder::InOrder,
         geometry: StoredGeometry::Cartesian(Cartesian { size, volumes, world, order: AxisOrder::STORED }),
         backward: false,
+        volumes: 1,
         states_geometry: true,
+        poses: Poses::default(),
         times: times(&header, size[2], volumes),
         remarks,
     };
@@ -194,7 +197,8 @@ fn pixels(file: &InputFile, header: &Bytes) -> Result<Pixels, InputError> {
         _ => return fault("magic", "is that of a .hdr, and there is no .img beside it".into()),
     };
     let offset = offset as u64;
-    Ok(Pixels { path, offset, length: length.saturating_sub(offset), encoding: Encoding::Raw, inside: 0 })
+    let length = length.saturating_sub(offset);
+    Ok(Pixels { path, offset, length, encoding: Encoding::Raw, inside: 0, pictures: None })
 }
 
 /// The world: that of the sform, otherwise of the qform, otherwise the spacing alone.

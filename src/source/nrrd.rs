@@ -4,6 +4,7 @@
 use super::layout::{Cartesian, Layout, LineOrder, StoredGeometry, extent};
 use super::packed::{Encoding, InputFile, Pixels};
 use super::pixel::{Number, PixelFormat};
+use super::transforms::Poses;
 use crate::files::{InputError, quoted};
 use crate::probe::{AxisOrder, World};
 use glam::DVec3;
@@ -103,7 +104,9 @@ pub(super) fn read(file: &InputFile) -> Result<Layout, InputError> {
             order: AxisOrder::STORED,
         }),
         backward: false,
+        volumes: 1,
         states_geometry,
+        poses: Poses::default(),
         times: header.times.range(..frames as usize).map(|(k, t)| (*k, *t)).collect(),
         remarks: Vec::new(),
     };

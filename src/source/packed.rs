@@ -2,6 +2,7 @@
 //!
 //! A packed file is read through its decompressor from the start, each time anew; nothing is unpacked to a disk.
 
+use super::pictures::{PictureStream, Pictures};
 use crate::files::{InputError, quoted};
 use bzip2::bufread::MultiBzDecoder;
 use flate2::bufread::MultiGzDecoder;
@@ -19,6 +20,8 @@ pub(super) enum Encoding {
     Zlib,
     Gzip,
     Bzip2,
+    /// A stack of pictures, each with its own.
+    Pictures,
 }
 
 impl Encoding {
@@ -29,16 +32,18 @@ impl Encoding {
             Encoding::Zlib => "zlib",
             Encoding::Gzip => "gzip",
             Encoding::Bzip2 => "bzip2",
+            Encoding::Pictures => "that of the pictures",
         }
     }
 
     /// Largest ratio that it can reach. Deflate: 258 bytes from two bits, so 1032 (zlib, "technical details"). Bzip2: a block of 900 kB
-    /// holds runs of 259 bytes in 5, 46 MB from about 40 bytes.
+    /// holds runs of 259 bytes in 5, 46 MB from about 40 bytes. A PNG has deflate, whose bits may be pixels of 3 bytes.
     pub fn most(self) -> u64 {
         match self {
             Encoding::Raw => 1,
             Encoding::Zlib | Encoding::Gzip => 1032,
             Encoding::Bzip2 => 1_200_000,
+            Encoding::Pictures => 1032 * 24,
         }
     }
 }
@@ -103,9 +108,13 @@ impl<'a> InputFile<'a> {
     pub fn pixels(&self, offset: u64) -> Pixels {
         let path = self.path.to_path_buf();
         match self.packed {
-            true => Pixels { path, offset: 0, length: self.bytes, encoding: Encoding::Gzip, inside: offset },
+            true => {
+                let (length, encoding) = (self.bytes, Encoding::Gzip);
+                Pixels { path, offset: 0, length, encoding, inside: offset, pictures: None }
+            }
             false => {
-                Pixels { path, offset, length: self.bytes.saturating_sub(offset), encoding: Encoding::Raw, inside: 0 }
+                let (length, encoding) = (self.bytes.saturating_sub(offset), Encoding::Raw);
+                Pixels { path, offset, length, encoding, inside: 0, pictures: None }
             }
         }
     }
@@ -122,6 +131,8 @@ pub(super) struct Pixels {
     pub encoding: Encoding,
     /// Bytes of the decompressed stream that come before the samples.
     pub inside: u64,
+    /// Of a stack, instead of a file.
+    pub pictures: Option<Pictures>,
 }
 
 /// The samples as a stream.
@@ -143,11 +154,18 @@ impl Pixels {
         let path = header.with_file_name(name);
         match fs::metadata(&path) {
             Ok(metadata) if metadata.is_file() => {
-                Ok(Pixels { path, offset: 0, length: metadata.len(), encoding: Encoding::Raw, inside: 0 })
+                let (length, encoding) = (metadata.len(), Encoding::Raw);
+                Ok(Pixels { path, offset: 0, length, encoding, inside: 0, pictures: None })
             }
             Ok(_) => Err(format!("{} is not a regular file", quoted(name))),
             Err(error) => Err(format!("{} cannot be read: {error}", quoted(name))),
         }
+    }
+
+    /// The samples of a stack. `path`: as the user named it; `length`: of all its files, bytes.
+    pub fn of_pictures(path: &Path, pictures: Pictures, length: u64) -> Pixels {
+        let (path, encoding) = (path.into(), Encoding::Pictures);
+        Pixels { path, offset: 0, length, encoding, inside: 0, pictures: Some(pictures) }
     }
 
     /// True if the samples are compressed.
@@ -157,6 +175,9 @@ impl Pixels {
 
     /// Opens the stream `skip` bytes after its beginning. A compressed stream is decompressed up to there.
     pub fn open(&self, skip: u64) -> io::Result<PixelStream> {
+        if let Some(pictures) = &self.pictures {
+            return Ok(PixelStream::Packed(Box::new(PictureStream::new(pictures, skip)?)));
+        }
         let mut file = File::open(&self.path)?;
         if !self.is_compressed() {
             file.seek(SeekFrom::Start(self.offset.saturating_add(skip)))?;

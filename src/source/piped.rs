@@ -123,14 +123,14 @@ struct Lattice {
 }
 
 /// The first line of a stream: the properties of its frames.
-struct StreamHeader {
-    header: Header,
-    sample: SampleType,
-    stamped: bool,
+pub(super) struct StreamHeader {
+    pub header: Header,
+    pub sample: SampleType,
+    pub stamped: bool,
     lines: usize,
     /// Equal to `lines` if frames are passed on as a whole.
     lines_at_once: usize,
-    volumes: Volumes,
+    pub volumes: Volumes,
 }
 
 fn fault<T>(key: &str, fault: impl AsRef<str>) -> Result<T, InputError> {
@@ -140,7 +140,7 @@ fn fault<T>(key: &str, fault: impl AsRef<str>) -> Result<T, InputError> {
 impl StreamHeader {
     /// # Errors
     /// A line that is not a header, or frames that are too large, without a geometry, or without a range. Nothing is allocated for them.
-    fn parse(line: &[u8], probe: Option<ProbeFile>) -> Result<StreamHeader, InputError> {
+    pub fn parse(line: &[u8], probe: Option<ProbeFile>) -> Result<StreamHeader, InputError> {
         let no_json = |e: serde_json::Error| InputError::new(Path::new(NAME), "header", e.to_string());
         let value: serde_json::Value = serde_json::from_slice(line).map_err(|e| {
             let fault = format!("is no line of JSON ({e}); a stream begins as that of tools/pipe_frames.py");
@@ -200,7 +200,7 @@ impl StreamHeader {
     }
 
     /// The frame at an index of the stream, from 0, without samples.
-    fn frame(&self, index: u64, time: Option<f64>) -> Frame {
+    pub fn frame(&self, index: u64, time: Option<f64>) -> Frame {
         let each = self.volumes.frames as u64;
         let (volume, number) = (index / each, (index % each) as usize);
         // The direction depends on the parity only.
@@ -285,6 +285,24 @@ fn stream_error(field: &str, fault: impl AsRef<str>) -> InputError {
     InputError::new(Path::new(NAME), field, fault)
 }
 
+/// The first line of a stream, without its end.
+///
+/// # Errors
+/// No end of line within the longest header, or a stream that cannot be read.
+pub(super) fn first_line(input: &mut impl BufRead) -> Result<Vec<u8>, InputError> {
+    let mut line = Vec::new();
+    let read = Read::take(input, MAX_HEADER_BYTES).read_until(b'\n', &mut line);
+    read.map_err(|e| stream_error("header", format!("cannot be read: {e}")))?;
+    match line.pop() {
+        Some(b'\n') => Ok(line),
+        Some(_) if line.len() as u64 + 1 == MAX_HEADER_BYTES => Err(stream_error(
+            "header",
+            format!("is longer than {MAX_HEADER_BYTES} bytes; its line must end before that"),
+        )),
+        _ => Err(stream_error("header", "the stream ends before its first line does")),
+    }
+}
+
 impl<'a, R: Read> Reader<'a, R> {
     fn new(input: R, queue: &'a Queue) -> Reader<'a, R> {
         Reader { input: BufReader::new(input), queue, replaced: Replaced::default(), proven: false }
@@ -295,7 +313,7 @@ impl<'a, R: Read> Reader<'a, R> {
     /// # Errors
     /// A first line that is not a header, an end within a frame, errors of the operating system.
     fn run(&mut self, probe: Option<ProbeFile>) -> Result<(), InputError> {
-        let stream = StreamHeader::parse(&self.first_line()?, probe)?;
+        let stream = StreamHeader::parse(&first_line(&mut self.input)?, probe)?;
         let begin = Event::Begin(Box::new(stream.header.clone()));
         let pieces = stream.lines.div_ceil(stream.lines_at_once);
         let frame = stream.header.frame_bytes().unwrap_or(0) as usize + pieces * weight(&Event::Idle);
@@ -312,20 +330,6 @@ impl<'a, R: Read> Reader<'a, R> {
             self.queue.push(Event::Fault(what));
         }
         goes_on.map(|_| ())
-    }
-
-    fn first_line(&mut self) -> Result<Vec<u8>, InputError> {
-        let mut line = Vec::new();
-        let read = Read::take(&mut self.input, MAX_HEADER_BYTES).read_until(b'\n', &mut line);
-        read.map_err(|e| stream_error("header", format!("cannot be read: {e}")))?;
-        match line.pop() {
-            Some(b'\n') => Ok(line),
-            Some(_) if line.len() as u64 + 1 == MAX_HEADER_BYTES => Err(stream_error(
-                "header",
-                format!("is longer than {MAX_HEADER_BYTES} bytes; its line must end before that"),
-            )),
-            _ => Err(stream_error("header", "the stream ends before its first line does")),
-        }
     }
 
     /// Reads the next frame, as a whole or in parts. False: there is none, or the receiver was dropped.

@@ -6,6 +6,7 @@ use super::frame::{Frame, Source};
 use super::layout::{Layout, LineOrder, StoredGeometry};
 use super::packed::PixelStream;
 use super::samples::{Replaced, SampleType, StoredType};
+use super::transforms::Poses;
 use super::value_range::ValueRange;
 use super::{OpenOptions, describe};
 use crate::files::InputError;
@@ -49,7 +50,7 @@ impl Recording {
     /// # Errors
     /// As [`Recording::open_with`].
     pub fn open(path: &Path, probe: Option<&Path>) -> Result<Recording, InputError> {
-        Recording::open_with(path, OpenOptions { probe, depth_axis: None })
+        Recording::open_with(path, OpenOptions { probe, ..OpenOptions::default() })
     }
 
     /// Opens a file. Its geometry comes from the given probe file, otherwise from `<stem>.probe.toml` in its folder, otherwise from the
@@ -60,7 +61,7 @@ impl Recording {
     /// A file that cannot be read, has an unknown format or is damaged, or a geometry that is missing or impossible. A depth axis for a
     /// recording that is not Cartesian.
     pub fn open_with(path: &Path, options: OpenOptions) -> Result<Recording, InputError> {
-        let mut layout = read_layout(path)?;
+        let mut layout = read_layout(path, &options)?;
         let probe_file = choose_probe_file(path, options.probe, &mut layout)?;
         let is_cartesian = probe_file.is_none() && matches!(layout.geometry, StoredGeometry::Cartesian(_));
         if options.depth_axis.is_some() && !is_cartesian {
@@ -79,7 +80,8 @@ impl Recording {
             }
             (None, StoredGeometry::Sweep(probe)) => {
                 probe.check().map_err(|e| geometry_error(path, &e))?;
-                let volumes = Volumes { first_backward: layout.backward, ..Volumes::forward(layout.frames, 1) };
+                let frames = layout.frames / layout.volumes.max(1);
+                let volumes = Volumes { first_backward: layout.backward, ..Volumes::forward(frames, layout.volumes) };
                 (Placement::Sweep(probe.clone()), volumes)
             }
             (None, StoredGeometry::Cartesian(file)) => {
@@ -117,7 +119,8 @@ impl Recording {
         Ok(recording)
     }
 
-    /// The file format: "MetaImage", "PLUS sequence", "MetaImage pre-scan sweep", "Kretz volume", "NRRD" or "NIfTI".
+    /// The file format: "MetaImage", "PLUS sequence", "MetaImage pre-scan sweep", "Kretz volume", "NRRD", "NIfTI" or
+    /// "stack of pictures".
     pub fn format(&self) -> &'static str {
         self.layout.format
     }
@@ -132,6 +135,11 @@ impl Recording {
         self.layout.pixel.sample().stored()
     }
 
+    /// The transforms of tracked frames, by their index in the file.
+    pub(super) fn poses(&self) -> &Poses {
+        &self.layout.poses
+    }
+
     /// Number of all frames, including those after the last complete volume.
     pub fn frames_in_file(&self) -> usize {
         self.layout.frames
@@ -139,7 +147,9 @@ impl Recording {
 
     /// The recording, the file with its samples, and its probe file.
     pub fn files(&self) -> Vec<PathBuf> {
-        [self.path.clone(), self.layout.pixels.path.clone()].into_iter().chain(self.probe_file.clone()).collect()
+        let pictures = self.layout.pixels.pictures.iter().flat_map(|pictures| pictures.files.iter().cloned());
+        let files = [self.path.clone(), self.layout.pixels.path.clone()];
+        files.into_iter().chain(pictures).chain(self.probe_file.clone()).collect()
     }
 
     /// Number of complete volumes.
@@ -420,8 +430,11 @@ impl Recording {
 /// The probe file to use. None if there is none, or if the `probe.toml` of the folder does not apply to this recording: it is for those
 /// that do not state their own geometry.
 fn choose_probe_file(path: &Path, given: Option<&Path>, layout: &mut Layout) -> Result<Option<ProbeFile>, InputError> {
-    // "sweep.mha.gz" has the probe file of "sweep.mha".
-    let named = if path.extension().is_some_and(|e| e.eq_ignore_ascii_case("gz")) {
+    // "sweep.mha.gz" has the probe file of "sweep.mha", and a stack that of its first picture.
+    let first = layout.pixels.pictures.as_ref().and_then(|pictures| pictures.files.first());
+    let named = if let Some(first) = first {
+        first.clone()
+    } else if path.extension().is_some_and(|e| e.eq_ignore_ascii_case("gz")) {
         path.with_extension("")
     } else {
         path.into()

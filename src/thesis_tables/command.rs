@@ -3,7 +3,7 @@
 use crate::args::{Output, check_outputs, open_device, write_report};
 use crate::gpu::DeviceChoice;
 use crate::picture::Grey;
-use crate::terminal::{Failure, failed, input, say};
+use crate::terminal::{Failure, failed, input, progress_bar, say};
 use crate::thesis_tables::export;
 use crate::thesis_tables::growth::growth;
 use crate::thesis_tables::measure::{TableOptions, run};
@@ -55,7 +55,7 @@ impl ThesisTables {
         let context = open_device(self.device.clone(), false)?;
 
         let options = TableOptions { quick: self.quick, repeats: self.repeat as usize, warm_up: WARM_UP };
-        let bar = indicatif::ProgressBar::new(options.volumes() as u64).with_message("volumes");
+        let bar = progress_bar(options.volumes() as u64).with_message("volumes");
         let report = run(&context, &options, &mut || bar.inc(1));
         bar.finish_and_clear();
         let mut report = report.map_err(failed)?;

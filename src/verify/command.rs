@@ -1,6 +1,6 @@
 //! `echolume verify`.
 
-use crate::args::{check_outputs, write_report};
+use crate::args::{check_outputs, device_failure, write_report};
 use crate::files::read_text;
 use crate::files::signals::Held;
 use crate::gpu::{Context, ContextOptions, DeviceChoice, GpuError};
@@ -357,7 +357,7 @@ impl Verify {
             Err(GpuError::NoValidation) => with(false),
             made => made,
         }
-        .map_err(no_device)
+        .map_err(device_failure)
         .and_then(|mut dut| {
             if dut.watched() && !dut.prove_validation().map_err(failed)? {
                 let blind = "validation sees nothing here: the layer is active and did not notice a missing barrier; its silence proves nothing";
@@ -483,17 +483,7 @@ fn announcing_signals<T>(held: &Held, what: &str, work: impl FnOnce() -> T) -> T
 }
 
 fn context(options: &ContextOptions) -> Result<Arc<Context>, Failure> {
-    Context::new(options).map_err(no_device)
-}
-
-/// A missing device has an exit code of its own.
-fn no_device(error: GpuError) -> Failure {
-    match error {
-        GpuError::NoLoader(_) | GpuError::NoDevice | GpuError::NoneFits(_) | GpuError::NoSuchDevice { .. } => {
-            Failure::NoDevice(error.to_string())
-        }
-        other => failed(other),
-    }
+    Context::new(options).map_err(device_failure)
 }
 
 /// A file name made of the letters and digits of a title, of bounded length.

@@ -2,7 +2,7 @@
 
 use super::gtest;
 use super::report::{self, CheckName, Outcome, Verdict};
-use crate::terminal::say;
+use crate::terminal::{self, say};
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use std::io::Write;
 use std::sync::Arc;
@@ -10,7 +10,7 @@ use std::time::Duration;
 
 /// The bar of a run. It draws nothing unless standard error is a terminal.
 pub fn bar() -> ProgressBar {
-    ProgressBar::new(0)
+    terminal::progress_bar(0)
 }
 
 /// Prints lines of other processes on standard error without disturbing the bar.

@@ -12,6 +12,7 @@ mod drivers;
 mod filter;
 mod frames;
 mod inputs;
+mod mesh;
 mod one_colour;
 mod oracle;
 mod outputs;
@@ -19,6 +20,7 @@ mod pipelines;
 mod service;
 mod shaders;
 mod signals;
+mod standard_streams;
 mod stream;
 mod support_bundle;
 mod verify;
@@ -169,7 +171,7 @@ fn without_a_device_the_plan_is_still_explained_and_the_rest_says_what_is_missin
     let blind =
         |arguments: &[&str]| finish(without_device(Command::new(PROGRAM).args(arguments).current_dir(&folder.0)));
     for arguments in [&["devices"][..], &["render", BONE]] {
-        refuses(arguments, &blind(arguments), 1, &["no Vulkan device", "install"]);
+        refuses(arguments, &blind(arguments), 3, &["no Vulkan device", "install"]);
     }
     let (code, plan, err) = blind(&["render", BONE, "--size", "16384x16384", "--explain"]);
     let lines = ["- scan_convert        the volume is Cartesian already", "16384 x 16384 x 1", "total"];

@@ -71,6 +71,7 @@ fn rows(folder: &Folder) -> Vec<Row> {
         row("mha", File, false, &["convert", BONE, "@", "--spacing", "4"], &[]),
         row("nrrd", File, false, &["convert", BONE, "@", "--spacing", "4"], &[]),
         row("mha", File, false, &["convert", &tape, "@", "--sequence"], &[]),
+        row("stl", File, false, &["mesh", BONE, "@", "--spacing", "4"], &[]),
         row("frames", New, false, &["convert", SWEEP, "@"], &[]),
         row("", Dir, false, &["stream", "--source", BONE, "--out", "@"], &SMALL),
         row("frames", New, false, &["stream", "--source", BONE, "--null", "--record", "@"], &SMALL),

@@ -12,3 +12,5 @@ mod piped;
 mod recorder;
 mod signals;
 mod sources;
+mod stacks;
+mod tracked;

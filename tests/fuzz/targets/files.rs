@@ -2,7 +2,7 @@
 
 use super::{told, written};
 use echolume::source::recorder::Reader;
-use echolume::source::{InputError, Recording, Source};
+use echolume::source::{InputError, OpenOptions, Recording, Source};
 use std::path::Path;
 
 /// Bytes read at most: a few bytes of zlib expand to a thousand times as many.
@@ -12,7 +12,7 @@ const MOST_READ: usize = 8 << 20;
 const PROBE: &[u8] = b"[array]\nkind = 'curved'\nradius_mm = 40\n[lines]\nsector_angle_deg = 70\n[depth]\nend_mm = 120\n\
                        [motion]\nkind = 'fan'\nwobble_radius_mm = 25\nfan_angle_deg = 60\nspeed_ratio = 0.4\nboth_ways = true\n";
 
-fn read(mut source: impl Source) -> Result<String, InputError> {
+fn read(mut source: Box<dyn Source>) -> Result<String, InputError> {
     let (volumes, mut bytes) = (source.volumes(), 0);
     let slices = source.geometry(0).slices();
     while let Some(frame) = source.next_frame()? {
@@ -28,6 +28,12 @@ fn read(mut source: impl Source) -> Result<String, InputError> {
     Ok(format!("{} volumes", volumes.min(3)))
 }
 
+/// A stream of frames in a file.
+pub fn stream(bytes: &[u8]) -> String {
+    let path = written("input.pipe", bytes);
+    outcome(echolume::source::open(&path, None).and_then(read))
+}
+
 fn outcome(result: Result<String, InputError>) -> String {
     result.unwrap_or_else(told)
 }
@@ -35,7 +41,7 @@ fn outcome(result: Result<String, InputError>) -> String {
 fn recording(path: &Path, probe: Option<&Path>) -> String {
     outcome(Recording::open(path, probe).and_then(|recording| {
         let _ = recording.description();
-        read(recording)
+        read(Box::new(recording))
     }))
 }
 
@@ -43,6 +49,22 @@ pub fn metaimage(bytes: &[u8]) -> String {
     let (path, probe) = (written("input.mha", bytes), written("fan.toml", PROBE));
     recording(&path, None) + &recording(&path, Some(&probe))
 }
+
+/// Tracked pictures, with a calibration; and the same bytes as a configuration.
+pub fn tracked(bytes: &[u8]) -> String {
+    let calibration = ["ImageToProbe=0.5 0 0 0 0 0.5 0 0 0 0 0.5 0".parse().expect("a calibration")];
+    let as_pictures = OpenOptions { calibration: &calibration, ..OpenOptions::default() };
+    // A pose far away makes a lattice of any size.
+    let one =
+        |path: &Path, options| outcome(echolume::source::description(path, options).map(|rows| rows.len().to_string()));
+    let config = written("plus.xml", bytes);
+    let as_config = OpenOptions { plus_config: Some(&config), ..OpenOptions::default() };
+    one(&written("input.mha", bytes), as_pictures) + &one(&written("still.mha", TRACKED), as_config)
+}
+
+/// One tracked picture.
+const TRACKED: &[u8] = b"ObjectType = Image\nNDims = 3\nDimSize = 2 2 1\nElementType = MET_UCHAR\n\
+                         Seq_Frame0000_ProbeToTrackerTransform = 1 0 0 0 0 1 0 0 0 0 1 0 0 0 0 1\nElementDataFile = LOCAL\nabcd";
 
 pub fn nrrd(bytes: &[u8]) -> String {
     recording(&written("input.nrrd", bytes), None)
@@ -61,7 +83,7 @@ pub fn frames(bytes: &[u8]) -> String {
     let once = |bytes: &[u8]| {
         let path = written("input.frames", bytes);
         outcome(Reader::open(&path).and_then(|replay| {
-            let whole = read(replay)?;
+            let whole = read(Box::new(replay))?;
             Reader::open(&path)?.description().map(|_| whole)
         }))
     };

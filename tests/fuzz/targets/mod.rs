@@ -43,6 +43,14 @@ pub const TARGETS: &[Target] = &[
     },
     Target { name: "pairing", run: network::pairing, text: false, memory: 16 * MIB, rounds: 75_000, also: &[] },
     Target { name: "piped", run: network::piped, text: true, memory: 64 * MIB, rounds: 3_000, also: &[] },
+    Target {
+        name: "stream",
+        run: files::stream,
+        text: true,
+        memory: 64 * MIB,
+        rounds: 3_000,
+        also: &["tests/fuzz/seeds/piped"],
+    },
     Target { name: "frames", run: files::frames, text: true, memory: 64 * MIB, rounds: 20_000, also: &[] },
     Target {
         name: "metaimage",
@@ -56,6 +64,7 @@ pub const TARGETS: &[Target] = &[
             "tests/data/ultrasonix-curvilinear/brightness.mha",
         ],
     },
+    Target { name: "tracked", run: files::tracked, text: true, memory: 64 * MIB, rounds: 3_000, also: &[] },
     Target {
         name: "kretz",
         run: files::kretz,

@@ -178,6 +178,39 @@ fn missing_parts_of_a_kretz_file_are_named() {
 }
 
 #[test]
+fn volumes_in_time_of_a_kretz_file_are_all_read() {
+    let folder = Folder::new("kretz-4d");
+    let (lines, sweep) = (&[-0.1, 0.1], &[-0.2, 0.0, 0.3]);
+    let each = 4 * 2 * 3;
+    let voxels: Vec<u8> = (0..3 * each).map(|v| 100 + v as u8).collect();
+    let both = kretz(lines, sweep, &[item(0xd600, 1, &voxels), item(0xd000, 0x101, &[0; 9])].concat());
+    let still_at = both.windows(4).position(|w| w == [0x00, 0xd0, 1, 0]).unwrap();
+    let alone = [&both[..still_at], &item(0xffff, 0xffff, b"")].concat();
+    for (name, bytes, beside) in [("both.vol", &both, true), ("alone.vol", &alone, false)] {
+        let path = folder.write(name, bytes);
+        let mut recording = open(&path);
+        assert_eq!((recording.volumes(), recording.frames_per_volume(), recording.frames_in_file()), (3, 3, 9));
+        assert_eq!(all_bytes(&path).unwrap(), voxels);
+        recording.skip_to_volume(2).unwrap();
+        let frame = recording.next_frame().unwrap().unwrap();
+        assert_eq!((frame.volume, frame.slice, &frame.bytes[..]), (2, 0, &voxels[2 * each..][..8]));
+        let said = format!("{:?}", recording.description());
+        assert!(said.contains("3 volumes in time") && said.contains("still one") == beside, "{said}");
+        assert!(said.contains("colour flow; not read"), "{said}");
+    }
+    // From the last slice to the first: each volume.
+    let path = folder.write("falling.vol", kretz(lines, &[0.3, 0.0, -0.2], &item(0xd600, 1, &voxels)));
+    let slices: Vec<usize> = all_frames(&mut open(&path)).unwrap().iter().map(|frame| frame.slice).collect();
+    assert_eq!(slices, [2, 1, 0, 2, 1, 0, 2, 1, 0]);
+    // Bytes that are no whole volumes are another form.
+    let odd = [&both[..still_at], &item(0xffff, 0xffff, b"")].concat();
+    let cut = odd.windows(4).position(|w| w == [0x00, 0xd6, 1, 0]).unwrap();
+    let odd = [&odd[..cut], &item(0xd600, 1, &voxels[1..]), &item(0xffff, 0xffff, b"")].concat();
+    let fault = total(folder.write("odd.vol", odd)).unwrap_err();
+    assert!(fault.contains("D600,0001") && fault.contains("71 bytes are no whole number of volumes of 24"), "{fault}");
+}
+
+#[test]
 fn no_patient_field_is_ever_shown() {
     let folder = Folder::new("patient");
     let whole = kretz(&[-0.1, 0.1], &[-0.1, 0.1], b"");

@@ -1,13 +1,14 @@
 //! Pictures in memory and their files: rendered pictures (RGBA), and grey pictures for the 2D filters, with signal-to-noise and
 //! contrast-to-noise ratios of rectangles of them.
 
+mod format;
+
 use crate::files;
 pub use crate::files::{check_target, replace};
 use crate::text::printable;
+pub use format::PictureFormat;
 
-use image::codecs::png::{CompressionType, FilterType, PngEncoder};
-use image::{ExtendedColorType, ImageEncoder};
-use image::{ImageFormat, ImageReader, Limits};
+use image::{ExtendedColorType, ImageFormat, ImageReader, Limits};
 use std::fmt::Write as _;
 use std::io::Cursor;
 use std::path::Path;
@@ -28,30 +29,35 @@ impl Picture {
     /// Encodes an opaque PNG; with one channel if all pixels are grey.
     ///
     /// # Errors
-    /// One line: there are no pixels, or their number does not match the size.
+    /// As [`Picture::encoded`].
     pub fn png(&self) -> Result<Vec<u8>, String> {
+        self.encoded(PictureFormat::Png)
+    }
+
+    /// Encodes an opaque picture; with one channel if all pixels are grey.
+    ///
+    /// # Errors
+    /// One line: there are no pixels, or their number does not match the size.
+    pub fn encoded(&self, format: PictureFormat) -> Result<Vec<u8>, String> {
         let pixels = self.width as usize * self.height as usize;
         if pixels == 0 || self.rgba.len() != 4 * pixels {
             let bytes = self.rgba.len();
             return Err(format!("{bytes} bytes are no picture of {} x {} pixels", self.width, self.height));
         }
-        let mut bytes = Vec::new();
-        let (compression, filter) = (CompressionType::Default, FilterType::Adaptive);
-        let encoder = PngEncoder::new_with_quality(&mut bytes, compression, filter);
         let is_grey = self.rgba.chunks_exact(4).all(|p| p[0] == p[1] && p[1] == p[2]);
         let (channels, colour) = if is_grey { (1, ExtendedColorType::L8) } else { (3, ExtendedColorType::Rgb8) };
         let texels: Vec<u8> = self.rgba.chunks_exact(4).flat_map(|p| &p[..channels]).copied().collect();
-        encoder.write_image(&texels, self.width, self.height, colour).map_err(|e| e.to_string())?;
-        Ok(bytes)
+        format.encode(&texels, [self.width, self.height], colour)
     }
 
-    /// Writes a PNG. It is written to a temporary file and renamed, so that a full disk leaves the old picture intact.
+    /// Writes a picture in the format of the file's ending. It is written to a temporary file and renamed, so that a full disk leaves the
+    /// old picture intact.
     ///
     /// # Errors
     /// One line naming the file and the fault.
     pub fn save(&self, file: &Path) -> Result<(), String> {
-        let bytes = self.png().map_err(|e| format!("{}: cannot be written: {e}", file.display()))?;
-        replace(file, &bytes)
+        let bytes = self.encoded(PictureFormat::of(file)?);
+        replace(file, &bytes.map_err(|e| format!("{}: cannot be written: {e}", file.display()))?)
     }
 
     /// Reads a PNG.
@@ -141,22 +147,26 @@ impl Grey {
         }
     }
 
-    /// Writes a grey PNG of 8 or 16 bits. It replaces an old file only when complete.
+    /// Encodes a grey picture of 8 or 16 bits.
     ///
     /// # Errors
-    /// One line naming the file and the fault.
-    pub fn save(&self, file: &Path) -> Result<(), String> {
-        let mut png = Vec::new();
-        let encoder = PngEncoder::new_with_quality(&mut png, CompressionType::Default, FilterType::Adaptive);
-        // The encoder takes 16 bits in native byte order.
+    /// In words: 16 bits in a format of 8.
+    pub fn encoded(&self, format: PictureFormat) -> Result<Vec<u8>, String> {
+        // Encoders take 16 bits in native byte order.
         let (texels, colour) = match self.sixteen {
             true => (self.values.iter().flat_map(|v| v.to_ne_bytes()).collect(), ExtendedColorType::L16),
             false => (self.bytes(), ExtendedColorType::L8),
         };
-        encoder
-            .write_image(&texels, self.width, self.height, colour)
-            .map_err(|e| format!("{}: cannot be written: {e}", file.display()))?;
-        replace(file, &png)
+        format.encode(&texels, [self.width, self.height], colour)
+    }
+
+    /// Writes a grey picture of 8 or 16 bits in the format of the file's ending. It replaces an old file only when complete.
+    ///
+    /// # Errors
+    /// One line naming the file and the fault.
+    pub fn save(&self, file: &Path) -> Result<(), String> {
+        let bytes = self.encoded(PictureFormat::of(file)?);
+        replace(file, &bytes.map_err(|e| format!("{}: cannot be written: {e}", file.display()))?)
     }
 }
 

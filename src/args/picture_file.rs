@@ -1,0 +1,59 @@
+//! Where a command writes its picture: a file, whose ending decides the format, or `-` for a PNG on standard output.
+
+use crate::files::replace;
+use crate::picture::PictureFormat;
+use crate::terminal::{self, Failure, failed, input, say};
+use std::path::Path;
+
+/// The name that stands for standard input and output.
+pub const STANDARD: &str = "-";
+
+/// The target of a picture.
+#[derive(Clone, Copy, Debug)]
+pub enum PictureFile<'a> {
+    /// A file and its format.
+    File(&'a Path, PictureFormat),
+    /// A PNG, and nothing else, on standard output.
+    StandardOutput,
+}
+
+impl<'a> PictureFile<'a> {
+    /// The target that a flag names. For standard output, lines go to standard error from here on.
+    ///
+    /// # Errors
+    /// An ending of no known format, standard output that is a terminal.
+    pub fn new(flag: &str, path: &'a Path) -> Result<PictureFile<'a>, Failure> {
+        if path.as_os_str() == STANDARD {
+            terminal::keep_standard_output().map_err(|fault| input(format!("{flag} -: {fault}")))?;
+            return Ok(PictureFile::StandardOutput);
+        }
+        let format = PictureFormat::of(path).map_err(|fault| input(format!("{flag} {fault}")))?;
+        Ok(PictureFile::File(path, format))
+    }
+
+    /// The file; None for standard output.
+    pub fn path(&self) -> Option<&'a Path> {
+        match self {
+            PictureFile::File(path, _) => Some(path),
+            PictureFile::StandardOutput => None,
+        }
+    }
+
+    /// The name for messages.
+    pub fn name(&self) -> String {
+        self.path().map_or("standard output".into(), |path| path.display().to_string())
+    }
+
+    /// Writes a picture, and says where. `encode`: the bytes of the picture in a format.
+    pub fn write(&self, encode: impl Fn(PictureFormat) -> Result<Vec<u8>, String>) -> Result<(), Failure> {
+        let unwritable = |e: String| failed(format!("{}: cannot be written: {e}", self.name()));
+        match self {
+            PictureFile::StandardOutput => terminal::write(&encode(PictureFormat::Png).map_err(unwritable)?),
+            PictureFile::File(path, format) => {
+                replace(path, &encode(*format).map_err(unwritable)?).map_err(failed)?;
+                say!("picture: {}", path.display());
+            }
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,134 @@
+//! `echolume mesh`: the surface of a recording as triangles.
+
+use super::recordings::{OUTPUT, read_volume, target_grid};
+use crate::args::{GeometryArgs, check_outputs, open_recording};
+use crate::mesh::Mesh;
+use crate::mesh::files::MeshFile;
+use crate::mesh::nets::{Surface, surface_net};
+use crate::mesh::smooth::Smoother;
+use crate::probe::{Geometry, World};
+use crate::scene::default_look::{block_edge, smoothing};
+use crate::scene::{EchoHistogram, Input};
+use crate::terminal::{self, Failure, failed, input, say};
+use std::path::PathBuf;
+
+#[derive(clap::Args)]
+#[command(
+    after_help = "The surface is where the volume, between 0 and 1 of its sample range, passes the threshold. It is closed at the border of the \
+                        volume, half a voxel outside, so that it can be printed; with --open it ends there. Coordinates are mm, those of the \
+                        world (LPS) where the recording states them. STL has neither colours nor a unit.\n\nExamples:\n  \
+                        echolume mesh sweep.mha face.stl\n  \
+                        echolume mesh bone.mha bone.glb --threshold 0.4 --spacing 0.5 --smooth 0.5 --open"
+)]
+pub struct MakeMesh {
+    /// MetaImage (.mha, .mhd), NRRD (.nrrd), NIfTI (.nii), Kretz (.vol), each also as .gz, or .frames file; a folder or a 'pattern*.png'
+    /// of numbered pictures; - for standard input
+    input: PathBuf,
+    /// File to write: .stl, .ply or .glb
+    output: PathBuf,
+    /// Value of the surface, 0..1 of the sample range as volume.threshold [default: between the darker and the brighter class of echoes]
+    #[arg(long, value_name = "SHARE", allow_negative_numbers = true)]
+    threshold: Option<f64>,
+    /// Voxel spacing along every axis, mm [default: a Cartesian volume keeps its voxels; a sweep gets the sample spacing of a scan line]
+    #[arg(long, value_name = "MM", allow_negative_numbers = true)]
+    spacing: Option<f64>,
+    /// Standard deviation of the Gaussian that smooths the volume first, mm [default: a Cartesian volume is not smoothed; a sweep as by
+    /// render without a preset]
+    #[arg(long, value_name = "MM", allow_negative_numbers = true)]
+    smooth: Option<f64>,
+    /// Leave the surface open at the border of the volume
+    #[arg(long)]
+    open: bool,
+    /// Colour of the vertices: grey or skin
+    #[arg(long, value_name = "NAME", default_value = "grey")]
+    colour: String,
+    /// Volume of the recording to use, counted from 0
+    #[arg(long, value_name = "N", default_value_t = 0)]
+    volume: usize,
+    #[command(flatten)]
+    geometry: GeometryArgs,
+}
+
+/// Colours by name, sRGB.
+const COLOURS: [(&str, [u8; 3]); 2] = [("grey", [128, 128, 128]), ("skin", [224, 172, 140])];
+/// Widest smoothing, voxels: its slices are kept in memory.
+const MAX_DEVIATION: f64 = 32.0;
+
+impl MakeMesh {
+    pub fn run(&self) -> Result<(), Failure> {
+        let format = MeshFile::of(&self.output).map_err(input)?;
+        let colour = COLOURS.iter().find(|(name, _)| self.colour.eq_ignore_ascii_case(name));
+        let (_, colour) = colour.ok_or_else(|| input(format!("--colour {}: must be grey or skin", self.colour)))?;
+        if let Some(share) = self.threshold.filter(|share| !(0.0..=1.0).contains(share)) {
+            return Err(input(format!("--threshold {share}: must lie in 0..=1")));
+        }
+        let mut recording = open_recording(&self.input, self.geometry.options())?;
+        let read = recording.files();
+        let read = read.iter().chain(&self.geometry.probe).map(PathBuf::as_path);
+        check_outputs(&[(OUTPUT, Some(&self.output))], read)?;
+        let samples = Input { stored: recording.stored_type(), range: recording.range() };
+        let (shift, world) = (recording.sample_type().shift(), recording.world());
+        let mut levels = None;
+        let (geometry, volume, _) = read_volume(&mut *recording, &self.input, self.volume, |geometry, frame| {
+            let histogram = || EchoHistogram::new(geometry, samples, block_edge(geometry));
+            levels.get_or_insert_with(histogram).take(&frame.bytes);
+        })?;
+        let grid = target_grid(&geometry, self.spacing)?;
+        let found = levels.and_then(|histogram| histogram.levels()).map(|levels| levels.threshold);
+        let Some(share) = self.threshold.or(found) else {
+            return Err(input(format!("{}: the echoes have no two classes; give --threshold", self.input.display())));
+        };
+        let [low, high] = samples.range;
+        let threshold = low + share * (high - low);
+        let world = match (&geometry, world) {
+            (Geometry::Cartesian(own), Some(world)) => world.on(own, &grid),
+            _ => World::of(&grid),
+        };
+        let deviation = self.deviation(&geometry, &grid.spacing)?;
+        let mut smoother = Smoother::new(grid.size, grid.spacing, deviation);
+        let bar = terminal::progress_bar(grid.size[2] as u64).with_message("slices");
+        let slice = |z: usize, out: &mut [f64]| {
+            smoother.slice(z, out, |z, out| volume.slice(&grid, z, out));
+            bar.inc(1);
+            Ok::<(), String>(())
+        };
+        let surface = Surface { threshold, closed: !self.open };
+        let mesh = surface_net(grid.size, surface, slice, |at| world.at(at)).map_err(failed)?;
+        bar.finish_and_clear();
+        let in_file = threshold - shift;
+        if mesh.triangles.is_empty() {
+            let fault =
+                format!("no voxel differs from the others at --threshold {share:.3} ({in_file:.4} in the file)");
+            return Err(input(format!("{}: nothing is written: {fault}", self.output.display())));
+        }
+        format.write(&mesh, *colour, &self.output).map_err(failed)?;
+        self.say(&mesh, &format!("threshold {share:.3} ({in_file:.4} in the file), smoothed by {deviation:.2} mm"));
+        Ok(())
+    }
+
+    /// Standard deviation of the smoothing, mm.
+    fn deviation(&self, geometry: &Geometry, spacing: &[f64; 3]) -> Result<f64, Failure> {
+        let deviation = match (self.smooth, geometry) {
+            (Some(mm), _) => mm,
+            (None, Geometry::Sweep(_)) => smoothing(geometry),
+            (None, Geometry::Cartesian(_)) => 0.0,
+        };
+        let most = MAX_DEVIATION * spacing.iter().copied().fold(f64::INFINITY, f64::min);
+        match (0.0..=most).contains(&deviation) {
+            true => Ok(deviation),
+            // The default is for volumes that are finer than it.
+            false if self.smooth.is_none() => Ok(most),
+            false => Err(input(format!("--smooth {deviation}: must lie in 0..={most} mm, {MAX_DEVIATION} voxels"))),
+        }
+    }
+
+    fn say(&self, mesh: &Mesh, how: &str) {
+        let (triangles, vertices) = (mesh.triangles.len(), mesh.vertices.len());
+        let area = mesh.area() / 100.0;
+        let extent = match mesh.open_edges {
+            0 => format!("closed, {:.3} ml, {area:.3} cm2", mesh.volume() / 1000.0),
+            _ => format!("open at the border, {area:.3} cm2"),
+        };
+        say!("mesh: {}, {triangles} triangles of {vertices} vertices, {extent}; {how}", self.output.display());
+    }
+}

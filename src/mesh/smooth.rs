@@ -1,0 +1,140 @@
+//! A Gaussian over the slices of a lattice as they come: normalized convolution, which leaves out what is not known.
+
+use rayon::prelude::*;
+use std::collections::VecDeque;
+
+/// Reach of the kernel, standard deviations.
+const REACH: f64 = 3.0;
+
+/// Smooths slices one after another. Memory: as many slices as the kernel is long.
+pub struct Smoother {
+    width: usize,
+    /// Half kernels along the axes: the weight of the middle, then of each distance. They are not normalized.
+    kernels: [Vec<f64>; 3],
+    depth: usize,
+    /// Slices smoothed within themselves, and the number of the first of them.
+    slices: VecDeque<Vec<f64>>,
+    first: usize,
+}
+
+impl Smoother {
+    /// For a lattice of `size` voxels that are `spacing` apart, mm. `deviation`: standard deviation of the Gaussian, mm; 0 changes nothing.
+    pub fn new(size: [usize; 3], spacing: [f64; 3], deviation: f64) -> Smoother {
+        let kernel = |axis: usize| {
+            let sigma = deviation / spacing[axis];
+            let reach = ((REACH * sigma).ceil() as usize).min(size[axis].saturating_sub(1));
+            let weight = |n: usize| if n == 0 { 1.0 } else { (-0.5 * (n as f64 / sigma).powi(2)).exp() };
+            (0..=reach).map(weight).collect()
+        };
+        let kernels = [kernel(0), kernel(1), kernel(2)];
+        Smoother { width: size[0], kernels, depth: size[2], slices: VecDeque::new(), first: 0 }
+    }
+
+    /// Fills a slice. Slices are asked for in order. `raw` fills one that is not smoothed, NaN where nothing is known; what is not known
+    /// stays so.
+    pub fn slice(&mut self, z: usize, out: &mut [f64], raw: impl Fn(usize, &mut [f64])) {
+        let reach = self.kernels[2].len() - 1;
+        let (from, to) = (z.saturating_sub(reach), (z + reach).min(self.depth.saturating_sub(1)));
+        while self.first + self.slices.len() <= to {
+            let next = self.first + self.slices.len();
+            raw(next, out);
+            self.slices.push_back(self.within(out));
+        }
+        while self.first < from {
+            self.slices.pop_front();
+            self.first += 1;
+        }
+        let (slices, kernel) = (&self.slices, &self.kernels[2]);
+        let first = self.first;
+        out.par_iter_mut().enumerate().for_each(|(n, out)| {
+            let value = |k: usize| slices.get(k.wrapping_sub(first)).map_or(f64::NAN, |slice| slice[n]);
+            if !value(z).is_nan() {
+                *out = mean((from..=to).map(|k| (value(k), kernel[k.abs_diff(z)])));
+            } else {
+                *out = f64::NAN;
+            }
+        });
+    }
+
+    /// A slice smoothed along its rows and columns.
+    fn within(&self, slice: &[f64]) -> Vec<f64> {
+        let [along, down, _] = &self.kernels;
+        let width = self.width;
+        let height = slice.len() / width.max(1);
+        let pass =
+            |source: &[f64], kernel: &[f64], stride: usize, position: fn(usize, usize) -> usize, count: usize| {
+                let mut result = vec![f64::NAN; source.len()];
+                result.par_iter_mut().enumerate().for_each(|(n, out)| {
+                    if source[n].is_nan() {
+                        return;
+                    }
+                    let at = position(n, width);
+                    let (low, high) = (at.saturating_sub(kernel.len() - 1), (at + kernel.len()).min(count));
+                    *out = mean((low..high).map(|k| (source[n + k * stride - at * stride], kernel[k.abs_diff(at)])));
+                });
+                result
+            };
+        let rows = pass(slice, along, 1, |n, width| n % width, width);
+        pass(&rows, down, width, |n, width| n / width, height)
+    }
+}
+
+/// The weighted mean of the known values.
+fn mean(values: impl Iterator<Item = (f64, f64)>) -> f64 {
+    let known = values.filter(|(value, _)| !value.is_nan());
+    let (sum, weights) =
+        known.fold((0.0, 0.0), |(sum, weights), (value, weight)| (sum + weight * value, weights + weight));
+    sum / weights
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A function of the voxel, smoothed.
+    fn smoothed(size: [usize; 3], deviation: f64, value: impl Fn([usize; 3]) -> f64) -> Vec<Vec<f64>> {
+        let mut smoother = Smoother::new(size, [0.5, 1.0, 2.0], deviation);
+        let raw = |z: usize, out: &mut [f64]| {
+            out.iter_mut().enumerate().for_each(|(n, out)| *out = value([n % size[0], n / size[0], z]));
+        };
+        let slice = |z| {
+            let mut out = vec![0.0; size[0] * size[1]];
+            smoother.slice(z, &mut out, raw);
+            out
+        };
+        (0..size[2]).map(slice).collect()
+    }
+
+    #[test]
+    fn a_point_becomes_a_gaussian_in_mm() {
+        let size = [41, 21, 11];
+        let out = smoothed(size, 1.5, |at| f64::from(u8::from(at == [20, 10, 5])));
+        let at = |[x, y, z]: [usize; 3]| out[z][y * size[0] + x];
+        let top = at([20, 10, 5]);
+        // One standard deviation away along each axis, and 0.
+        for (place, expected) in
+            [([23, 10, 5], 0.5), ([20, 13, 5], 2.0), ([20, 10, 6], 8.0 / 9.0), ([0, 0, 0], f64::NAN)]
+        {
+            let share: f64 = match expected {
+                e if e == 2.0 => (-2.0f64).exp(),
+                e if e == 0.5 => (-0.5f64).exp(),
+                e if e.is_nan() => 0.0,
+                e => (-e).exp(),
+            };
+            assert!((at(place) / top - share).abs() < 1e-12, "{place:?}: {} {share}", at(place) / top);
+        }
+    }
+
+    #[test]
+    fn constants_stay_and_the_unknown_is_left_out() {
+        let out = smoothed([7, 6, 5], 1.2, |[x, y, z]| if x + y + z == 6 { f64::NAN } else { 3.25 });
+        for (z, slice) in out.iter().enumerate() {
+            for (n, value) in slice.iter().enumerate() {
+                let is_unknown = n % 7 + n / 7 + z == 6;
+                assert!(if is_unknown { value.is_nan() } else { (value - 3.25).abs() < 1e-12 }, "{n} {z}: {value}");
+            }
+        }
+        let as_it_is = smoothed([4, 3, 2], 0.0, |[x, y, z]| (x + 4 * (y + 3 * z)) as f64);
+        assert_eq!(as_it_is.concat(), (0..24).map(f64::from).collect::<Vec<_>>());
+    }
+}

@@ -1,0 +1,120 @@
+//! Pictures of one size as a stream of samples.
+
+use crate::files::escaped;
+use image::{DynamicImage, ImageDecoder, ImageReader};
+use std::io::{self, Read};
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+/// The pictures of a stack, in their order.
+#[derive(Clone, Debug)]
+pub(super) struct Pictures {
+    pub files: Arc<[PathBuf]>,
+    /// One of them has colour: all are read with three channels.
+    pub is_colour: bool,
+    /// Samples of one of them, bytes.
+    pub each: usize,
+}
+
+/// What the header of a picture says.
+pub(super) struct About {
+    pub size: [u32; 2],
+    /// 16 bits a channel, not 8.
+    pub deep: bool,
+    pub is_colour: bool,
+    /// Length of the file, bytes.
+    pub length: u64,
+}
+
+impl About {
+    /// # Errors
+    /// In words: a file that cannot be read, or is no picture that is read.
+    pub fn of(picture: &Path) -> Result<About, String> {
+        let length = std::fs::metadata(picture).map_err(|e| format!("cannot be read: {e}"))?.len();
+        let decoder = reader(picture)?.into_decoder().map_err(unreadable)?;
+        let (colour, (width, height)) = (decoder.color_type(), decoder.dimensions());
+        let deep = match colour.bytes_per_pixel() / colour.channel_count() {
+            1 => false,
+            2 => true,
+            _ => return Err("has samples of more than 16 bits".into()),
+        };
+        Ok(About { size: [width, height], deep, is_colour: colour.has_color(), length })
+    }
+}
+
+/// A reader for the format of a file's content, with the library's limits of memory.
+fn reader(picture: &Path) -> Result<ImageReader<io::BufReader<std::fs::File>>, String> {
+    // Not by the name of the file.
+    let file = std::fs::File::open(picture).map(|file| ImageReader::new(io::BufReader::new(file)));
+    let reader = file.and_then(ImageReader::with_guessed_format);
+    let reader = reader.map_err(|e| format!("cannot be read: {e}"))?;
+    match reader.format().is_some_and(|format| format.reading_enabled()) {
+        true => Ok(reader),
+        false => Err("is no picture of a known format; PNG, JPEG, PNM and BMP are read".into()),
+    }
+}
+
+fn unreadable(error: image::ImageError) -> String {
+    format!("cannot be read: {}", escaped(&error.to_string(), 200))
+}
+
+/// The pixels of a stack as one stream of samples: picture by picture, rows from the top, little-endian.
+pub(super) struct PictureStream {
+    pictures: Pictures,
+    next: usize,
+    pixels: io::Cursor<Vec<u8>>,
+}
+
+impl PictureStream {
+    /// Begins `skip` bytes after the first sample.
+    ///
+    /// # Errors
+    /// A picture that cannot be read.
+    pub fn new(pictures: &Pictures, skip: u64) -> io::Result<PictureStream> {
+        let each = pictures.each.max(1) as u64;
+        let next = usize::try_from(skip / each).unwrap_or(usize::MAX);
+        let mut stream = PictureStream { pictures: pictures.clone(), next, pixels: io::Cursor::default() };
+        if !skip.is_multiple_of(each) {
+            stream.decode()?;
+            stream.pixels.set_position(skip % each);
+        }
+        Ok(stream)
+    }
+
+    /// Decodes the next picture; after the last there are no pixels.
+    fn decode(&mut self) -> io::Result<()> {
+        self.pixels = io::Cursor::default();
+        let Some(picture) = self.pictures.files.get(self.next) else { return Ok(()) };
+        let named = |why: String| {
+            let name = picture.file_name().unwrap_or_default().to_string_lossy();
+            io::Error::other(format!("{}: {why}", escaped(&name, 100)))
+        };
+        let image = reader(picture).and_then(|reader| reader.decode().map_err(unreadable)).map_err(named)?;
+        let samples = self.samples(image);
+        if samples.len() != self.pictures.each {
+            return Err(named("is not what it was a moment ago".into()));
+        }
+        (self.pixels, self.next) = (io::Cursor::new(samples), self.next + 1);
+        Ok(())
+    }
+
+    fn samples(&self, image: DynamicImage) -> Vec<u8> {
+        let is_deep = image.color().bytes_per_pixel() / image.color().channel_count() == 2;
+        let words = |words: Vec<u16>| words.into_iter().flat_map(u16::to_le_bytes).collect();
+        match (self.pictures.is_colour, is_deep) {
+            (false, false) => image.into_luma8().into_raw(),
+            (false, true) => words(image.into_luma16().into_raw()),
+            (true, false) => image.into_rgb8().into_raw(),
+            (true, true) => words(image.into_rgb16().into_raw()),
+        }
+    }
+}
+
+impl Read for PictureStream {
+    fn read(&mut self, out: &mut [u8]) -> io::Result<usize> {
+        if self.pixels.position() >= self.pixels.get_ref().len() as u64 {
+            self.decode()?;
+        }
+        self.pixels.read(out)
+    }
+}

@@ -1,0 +1,171 @@
+//! A stream of raw frames ([`super::piped`]) that was kept in a file: every frame has the same size, so that any can be read.
+
+use super::describe;
+use super::frame::{Frame, Header, Source};
+use super::piped::{StreamHeader, first_line};
+use super::samples::{self, SampleType, StoredType};
+use crate::files::InputError;
+use crate::probe::{Geometry, ProbeFile};
+use std::fs::File;
+use std::io::{BufReader, Read, Seek, SeekFrom};
+use std::path::{Path, PathBuf};
+
+/// Frames of a stream in a file.
+pub(super) struct PipedFile {
+    path: PathBuf,
+    probe_file: Option<PathBuf>,
+    stream: StreamHeader,
+    input: BufReader<File>,
+    /// Offset of the first frame, bytes.
+    start: u64,
+    /// Whole volumes.
+    volumes: usize,
+    /// Bytes after the last whole volume.
+    left_over: u64,
+    next: u64,
+}
+
+impl PipedFile {
+    /// True if a file begins as such a stream.
+    pub fn is_one(start: &[u8]) -> bool {
+        start.starts_with(b"{")
+    }
+
+    /// Reads the first line. `probe`: the probe file to use, in preference to the probe in the stream.
+    ///
+    /// # Errors
+    /// A file that cannot be read, a first line that is not a header, no whole volume.
+    pub fn open(path: &Path, probe: Option<&Path>) -> Result<PipedFile, InputError> {
+        let unreadable = |e: std::io::Error| InputError::unreadable(path, &e);
+        let file = File::open(path).map_err(unreadable)?;
+        let length = file.metadata().map_err(unreadable)?.len();
+        let mut input = BufReader::new(file);
+        let line = first_line(&mut input)?;
+        let start = line.len() as u64 + 1;
+        let stream = StreamHeader::parse(&line, probe.map(ProbeFile::read).transpose()?)?;
+        let samples = length.saturating_sub(start);
+        let whole = stream.volumes.frames as u64 * frame_bytes(&stream);
+        if samples < whole {
+            let fault = format!("cut short, {samples} of the {whole} bytes of a volume are there");
+            return Err(InputError::new(path, "samples", fault));
+        }
+        let volumes = usize::try_from(samples / whole).unwrap_or(usize::MAX);
+        let probe_file = probe.map(Path::to_path_buf);
+        Ok(PipedFile {
+            path: path.into(),
+            probe_file,
+            stream,
+            input,
+            start,
+            volumes,
+            left_over: samples % whole,
+            next: 0,
+        })
+    }
+
+    /// A description for users: pairs of title and value.
+    pub fn description(&self) -> Vec<(String, String)> {
+        let mut rows: Vec<(String, String)> = Vec::new();
+        let mut add = |title: &str, value: String| rows.push((title.into(), value));
+        add("format", "stream of frames".into());
+        add("samples", self.stream.sample.to_string());
+        let [first, second] = self.stream.header.forward.frame_size();
+        match self.stream.header.forward {
+            Geometry::Sweep(_) => add("frame", format!("{second} lines of {first} samples")),
+            Geometry::Cartesian(_) => add("frame", format!("{first} x {second} pixels")),
+        }
+        add(
+            "volumes",
+            describe::volumes(&crate::probe::Volumes { count: self.volumes, ..self.stream.volumes.clone() }),
+        );
+        if self.left_over > 0 {
+            add("more data", format!("{} bytes behind the last whole volume; not read", self.left_over));
+        }
+        match &self.stream.header.forward {
+            Geometry::Sweep(probe) => rows.extend(describe::probe(probe)),
+            Geometry::Cartesian(grid) => rows.extend(describe::grid(grid)),
+        }
+        let [low, high] = self.stream.header.range.map(describe::number);
+        rows.push(("value range".into(), format!("{low} .. {high}")));
+        rows
+    }
+
+    fn read(&mut self, bytes: &mut [u8]) -> Result<(), InputError> {
+        self.input.read_exact(bytes).map_err(|e| InputError::unreadable(&self.path, &e))
+    }
+}
+
+/// Size of a frame with its time stamp, bytes.
+fn frame_bytes(stream: &StreamHeader) -> u64 {
+    let stamp = if stream.stamped { size_of::<f64>() as u64 } else { 0 };
+    // A header with frames of no size was refused.
+    stream.header.frame_bytes().unwrap_or(1) + stamp
+}
+
+impl Source for PipedFile {
+    fn geometry(&self, volume: usize) -> Geometry {
+        let header = &self.stream.header;
+        if self.stream.volumes.backward(volume) { header.backward.clone() } else { header.forward.clone() }
+    }
+
+    fn stored_type(&self) -> StoredType {
+        self.stream.header.stored
+    }
+
+    fn sample_type(&self) -> SampleType {
+        self.stream.sample
+    }
+
+    fn range(&self) -> [f64; 2] {
+        self.stream.header.range
+    }
+
+    fn volumes(&self) -> usize {
+        self.volumes
+    }
+
+    fn frames_per_volume(&self) -> usize {
+        self.stream.volumes.frames
+    }
+
+    fn skip_to_volume(&mut self, volume: usize) -> Result<(), InputError> {
+        if volume >= self.volumes {
+            let fault = format!("there is no {volume}, the last is {}", self.volumes.saturating_sub(1));
+            return Err(InputError::new(&self.path, "volume", fault));
+        }
+        self.next = volume as u64 * self.stream.volumes.frames as u64;
+        let at = self.start + self.next * frame_bytes(&self.stream);
+        self.input.seek(SeekFrom::Start(at)).map_err(|e| InputError::unreadable(&self.path, &e))?;
+        Ok(())
+    }
+
+    fn next_frame(&mut self) -> Result<Option<Frame>, InputError> {
+        if self.next >= self.volumes as u64 * self.stream.volumes.frames as u64 {
+            return Ok(None);
+        }
+        let mut stamp = [0; 8];
+        if self.stream.stamped {
+            self.read(&mut stamp)?;
+        }
+        let time = Some(f64::from_le_bytes(stamp)).filter(|time| self.stream.stamped && time.is_finite());
+        let mut frame = self.stream.frame(self.next, time);
+        // The file has so many bytes.
+        frame.bytes = vec![0; self.stream.header.frame_bytes().unwrap_or(0) as usize];
+        self.read(&mut frame.bytes)?;
+        samples::store(self.stream.sample, false, &mut frame.bytes);
+        self.next += 1;
+        Ok(Some(frame))
+    }
+
+    fn header(&self) -> Header {
+        self.stream.header.clone()
+    }
+
+    fn files(&self) -> Vec<PathBuf> {
+        [self.path.clone()].into_iter().chain(self.probe_file.clone()).collect()
+    }
+
+    fn probe_file(&self) -> Option<&Path> {
+        self.probe_file.as_deref()
+    }
+}

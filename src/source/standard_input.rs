@@ -1,0 +1,115 @@
+//! Standard input as a recording: `-` in place of a file. It is kept in a temporary file, once, so that readers can go back in it.
+
+use super::frame::{Frame, Header, Source};
+use super::samples::{SampleType, StoredType};
+use crate::files::{InputError, Spool};
+use crate::probe::{Geometry, World};
+use std::io::IsTerminal;
+use std::path::{Path, PathBuf};
+use std::sync::{Mutex, MutexGuard, PoisonError};
+
+/// Its name for users.
+const NAME: &str = "standard input";
+/// Longest stream, bytes.
+const MAX_BYTES: u64 = 64 << 30;
+
+/// What was read. A recording may be opened more than once, and standard input is read once.
+static KEPT: Mutex<Option<Spool>> = Mutex::new(None);
+
+fn kept() -> MutexGuard<'static, Option<Spool>> {
+    KEPT.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+/// True if a path stands for standard input.
+pub(super) fn is_meant(path: &Path) -> bool {
+    path.as_os_str() == "-"
+}
+
+/// Removes what was kept. Sources that are still open then fail.
+pub(crate) fn forget() {
+    kept().take();
+}
+
+/// The file with the bytes of standard input, which is read to its end the first time.
+///
+/// # Errors
+/// Standard input is a terminal, cannot be read, or does not fit on the disk.
+pub(super) fn file() -> Result<PathBuf, InputError> {
+    let mut kept = kept();
+    if let Some(spool) = &*kept {
+        return Ok(spool.path().into());
+    }
+    let fault = |fault: String| InputError::new(Path::new(NAME), "file", fault);
+    let input = std::io::stdin();
+    if input.is_terminal() {
+        return Err(fault("is a terminal; send it a recording, as in: echolume render - <sweep.mha".into()));
+    }
+    let spool = Spool::of(&mut input.lock(), MAX_BYTES);
+    let spool = spool.map_err(|e| fault(format!("cannot be kept in {}: {e}", std::env::temp_dir().display())))?;
+    let path = spool.path().into();
+    *kept = Some(spool);
+    Ok(path)
+}
+
+/// An error of the file of [`file`] as one of standard input.
+pub(super) fn renamed(error: InputError) -> InputError {
+    error.renamed(NAME)
+}
+
+/// A source that reads what was kept.
+pub(super) struct FromInput(pub Box<dyn Source>);
+
+impl Source for FromInput {
+    fn geometry(&self, volume: usize) -> Geometry {
+        self.0.geometry(volume)
+    }
+
+    fn stored_type(&self) -> StoredType {
+        self.0.stored_type()
+    }
+
+    fn sample_type(&self) -> SampleType {
+        self.0.sample_type()
+    }
+
+    fn range(&self) -> [f64; 2] {
+        self.0.range()
+    }
+
+    fn volumes(&self) -> usize {
+        self.0.volumes()
+    }
+
+    fn frames_per_volume(&self) -> usize {
+        self.0.frames_per_volume()
+    }
+
+    fn skip_to_volume(&mut self, volume: usize) -> Result<(), InputError> {
+        self.0.skip_to_volume(volume).map_err(renamed)
+    }
+
+    fn next_frame(&mut self) -> Result<Option<Frame>, InputError> {
+        self.0.next_frame().map_err(renamed)
+    }
+
+    fn header(&self) -> Header {
+        self.0.header()
+    }
+
+    fn files(&self) -> Vec<PathBuf> {
+        // No output can replace what was read.
+        self.0.probe_file().map(Path::to_path_buf).into_iter().collect()
+    }
+
+    fn world(&self) -> Option<World> {
+        self.0.world()
+    }
+
+    fn probe_file(&self) -> Option<&Path> {
+        self.0.probe_file()
+    }
+
+    fn arrival(&self) -> Option<f64> {
+        self.0.arrival()
+    }
+}

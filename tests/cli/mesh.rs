@@ -1,0 +1,93 @@
+//! `echolume mesh`: a ball in a file becomes a closed surface in its place.
+
+use crate::common::program::*;
+use std::fs;
+
+const RADIUS: f64 = 6.0;
+const CENTRE: [f64; 3] = [3.0, -2.0, 11.0];
+
+/// Distances from the surface of a ball, positive within, on 21 x 19 x 18 voxels. `matrix`: directions of the axes.
+fn ball(folder: &Folder, name: &str, mirrored: bool) -> String {
+    let (size, spacing) = ([21, 19, 18], [0.8, 0.9, 1.0]);
+    let hand = if mirrored { -1.0 } else { 1.0 };
+    let origin = [CENTRE[0] - 8.0, CENTRE[1] - 8.0, CENTRE[2] - 8.4 * hand];
+    let mut samples = Vec::new();
+    for n in 0..size[0] * size[1] * size[2] {
+        let cell = [n % size[0], n / size[0] % size[1], n / (size[0] * size[1])];
+        let steps = [1.0, 1.0, hand];
+        let offset = (0..3).map(|a| origin[a] + steps[a] * spacing[a] * cell[a] as f64 - CENTRE[a]);
+        let distance = offset.map(|d| d * d).sum::<f64>().sqrt();
+        samples.extend(((RADIUS - distance) as f32).to_le_bytes());
+    }
+    let [x, y, z] = origin;
+    let header = format!(
+        "ObjectType = Image\nNDims = 3\nDimSize = 21 19 18\nElementType = MET_FLOAT\nElementSpacing = 0.8 0.9 1\nOffset = {x} {y} {z}\n\
+         TransformMatrix = 1 0 0 0 1 0 0 0 {hand}\nElementDataFile = LOCAL\n"
+    );
+    folder.write(name, [header.into_bytes(), samples].concat())
+}
+
+/// Volume by the divergence theorem, and the centre of it, of a binary STL.
+fn measured(file: &str) -> (f64, [f64; 3]) {
+    let bytes = fs::read(file).expect("a mesh");
+    let (mut volume, mut centre) = (0.0, [0.0; 3]);
+    for triangle in bytes[84..].chunks_exact(50) {
+        let number =
+            |n: usize| f64::from(f32::from_le_bytes(triangle[12 + 4 * n..16 + 4 * n].try_into().expect("four")));
+        let corner = |n: usize| [0, 1, 2].map(|axis| number(3 * n + axis) - CENTRE[axis]);
+        let [a, b, c] = [corner(0), corner(1), corner(2)];
+        let cross = [b[1] * c[2] - b[2] * c[1], b[2] * c[0] - b[0] * c[2], b[0] * c[1] - b[1] * c[0]];
+        let part = (0..3).map(|n| a[n] * cross[n]).sum::<f64>() / 6.0;
+        volume += part;
+        (0..3).for_each(|n| centre[n] += part * (a[n] + b[n] + c[n]) / 4.0);
+    }
+    (volume, centre.map(|v| v / volume))
+}
+
+#[test]
+fn a_ball_keeps_its_volume_and_place_whatever_the_hand_of_its_axes() {
+    let folder = Folder::new("mesh");
+    let exact = 4.0 / 3.0 * std::f64::consts::PI * RADIUS.powi(3);
+    for mirrored in [false, true] {
+        let (input, output) = (ball(&folder, "ball.mha", mirrored), folder.path("ball.stl"));
+        // The distance 0 as a share of the range of the samples.
+        let info = done(&["info", &input]);
+        let range = info.lines().find_map(|line| line.strip_prefix("value range")).expect("a range");
+        let ends: Vec<f64> = range.split_whitespace().filter_map(|word| word.parse().ok()).collect();
+        let share = (-ends[0] / (ends[1] - ends[0])).to_string();
+        let said = done(&["mesh", &input, &output, "--threshold", &share]);
+        assert!(said.contains("closed, 0.8"), "{said}");
+        let (volume, centre) = measured(&output);
+        // Bound as in src/mesh/nets.rs: nothing lies deeper than 2 h^2 / R, for the widest voxel.
+        let lost = 1.0 - volume / exact;
+        assert!((0.0..6.0 / (RADIUS * RADIUS)).contains(&lost), "mirrored {mirrored}: {lost}");
+        assert!(centre.iter().all(|v| v.abs() < 1e-2), "mirrored {mirrored}: {centre:?}");
+    }
+}
+
+#[test]
+fn a_mesh_that_would_be_wrong_is_not_written() {
+    let folder = Folder::new("mesh-wrong");
+    let input = ball(&folder, "ball.mha", false);
+    let (stl, obj) = (folder.path("x.stl"), folder.path("x.obj"));
+    for (arguments, named) in [
+        (&[&*input, &obj][..], ".stl, .ply or .glb"),
+        (&[&input, &stl, "--threshold", "1.5"], "--threshold 1.5"),
+        (&[&input, &stl, "--colour", "pink"], "grey or skin"),
+        (&[&input, &stl, "--smooth", "-1", "--threshold", "0.5"], "--smooth -1"),
+        (&[&input, &stl, "--spacing", "0"], "--spacing 0"),
+        (&[&input, &stl, "--volume", "1"], "--volume 1"),
+        (&[&input, &stl, "--threshold", "0"], "--threshold 0"),
+        (&[&input, "-"], ".stl, .ply or .glb"),
+    ] {
+        let all = [&["mesh"], arguments].concat();
+        // The whole volume is inside a threshold of 0: its closed surface is that of a block.
+        if named == "--threshold 0" {
+            assert!(done(&all).contains("closed"), "a block");
+            fs::remove_file(&stl).expect("the block");
+            continue;
+        }
+        refuses(&all, &run(&all), 2, &[named]);
+    }
+    assert_eq!(folder.names().len(), 1, "{:?}", folder.names());
+}
