@@ -17,6 +17,7 @@
 //! - [`reference`](mod@reference) renders on the CPU in f64, [`exact_ray`] integrates its rays without samples, [`bounds`] encloses them.
 //!   [`profile`] measures GPU times, [`error_report`] error against run time,
 //!   [`filter_report`] what filters do to speckle and edges, [`thesis_tables`] the tables of the thesis. [`verify`] tests a device and its driver.
+//! - [`batch`] renders, converts, measures or verifies many recordings, one shard of them a process.
 //! - [`files`] reads with limits and writes atomically. [`picture`] holds pictures. [`cli`] is the command line.
 //!
 //! # Render a file
@@ -170,6 +171,8 @@
 mod args;
 #[forbid(unsafe_code)]
 pub mod barriers;
+#[forbid(unsafe_code)]
+pub mod batch;
 #[forbid(unsafe_code)]
 pub mod bounds;
 #[forbid(unsafe_code)]

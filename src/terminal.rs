@@ -25,10 +25,12 @@ pub enum Failure {
     Input(String),
     /// The request was valid but could not be carried out: exit code 1.
     Failed(String),
-    /// `verify` found no device to test: exit code 3.
+    /// `verify` found no device to test, or `batch` none to draw on, or lost it: exit code 3.
     NoDevice(String),
     /// A signal ended `verify` before all checks were run, and none of those that were has failed: exit code 4.
     Interrupted(String),
+    /// Some units of a `batch` failed, and the others are done: exit code 4.
+    SomeFailed(String),
 }
 
 impl Failure {
@@ -37,7 +39,8 @@ impl Failure {
         let (Failure::Input(message)
         | Failure::Failed(message)
         | Failure::NoDevice(message)
-        | Failure::Interrupted(message)) = self;
+        | Failure::Interrupted(message)
+        | Failure::SomeFailed(message)) = self;
         message
     }
 
@@ -47,7 +50,7 @@ impl Failure {
             Failure::Failed(_) => 1,
             Failure::Input(_) => 2,
             Failure::NoDevice(_) => 3,
-            Failure::Interrupted(_) => 4,
+            Failure::Interrupted(_) | Failure::SomeFailed(_) => 4,
         }
     }
 }
@@ -83,7 +86,8 @@ pub fn print_failure(failure: &Failure) {
     let (Failure::Input(message)
     | Failure::Failed(message)
     | Failure::NoDevice(message)
-    | Failure::Interrupted(message)) = failure;
+    | Failure::Interrupted(message)
+    | Failure::SomeFailed(message)) = failure;
     let _ = writeln!(std::io::stderr(), "echolume: {}", single_line(message));
 }
 

@@ -6,7 +6,10 @@ mod pipeline_folder;
 mod recording;
 mod source;
 
-pub use input::{InputArgs, Output, SceneArgs, check_outputs, open_device, open_device_for_statistics, write_report};
+pub use input::{
+    InputArgs, Output, SceneArgs, check_outputs, check_volume, open_device, open_device_for_statistics,
+    open_device_until, scene_to_show, write_report,
+};
 pub use motor::{SerialArgs, motor_failure, motor_table};
 #[cfg(feature = "view")]
 pub use pipeline_folder::pipeline_folder;

@@ -1,7 +1,9 @@
 //! The command line: subcommands, logging and exit codes.
 //!
-//! Exit codes: 0 done, 1 failed, 2 bad input or usage; `verify` also 3, no device, and 4, interrupted.
+//! Exit codes: 0 done, 1 failed, 2 bad input or usage; `verify` also 3, no device, and 4, interrupted; `batch` also 3, no
+//! device or a lost one, and 4, some units failed.
 
+mod batch;
 mod filter;
 mod machine;
 mod one_colour;
@@ -69,6 +71,8 @@ enum Command {
     Convert(recordings::Convert),
     /// Describe a recording, without patient fields
     Info(recordings::Info),
+    /// Render, convert, measure or verify many recordings: one shard of a manifest, to be run on many machines
+    Batch(Box<batch::Batch>),
     /// Drive the motor of a probe: home, sweep, stop; or simulate one
     Probe(probe::Probe),
     /// List the Vulkan devices, their missing features, and which one would be used
@@ -129,6 +133,7 @@ pub fn run() -> ExitCode {
         Command::Phantom(phantom) => phantom.run(),
         Command::Convert(convert) => convert.run(),
         Command::Info(info) => info.run(),
+        Command::Batch(batch) => batch.run(),
         Command::Probe(probe) => probe.run(),
         Command::Devices(devices) => devices.run(),
         Command::SupportBundle(bundle) => bundle.run(),
