@@ -17,7 +17,7 @@
 //! - [`reference`](mod@reference) renders on the CPU in f64, [`exact_ray`] integrates its rays without samples, [`bounds`] encloses them.
 //!   [`profile`] measures GPU times, [`error_report`] error against run time,
 //!   [`filter_report`] what filters do to speckle and edges, [`thesis_tables`] the tables of the thesis. [`verify`] tests a device and its driver.
-//! - [`mesh`] makes triangles of a volume's surface.
+//! - [`batch`] renders, converts, measures or verifies many recordings, one shard of them a process. [`mesh`] makes triangles of a volume's surface.
 //! - [`files`] reads with limits and writes atomically. [`picture`] holds pictures, `marked` draws marks on saved ones. [`cli`] is the command line.
 //!
 //! # Render a file
@@ -171,6 +171,8 @@
 mod args;
 #[forbid(unsafe_code)]
 pub mod barriers;
+#[forbid(unsafe_code)]
+pub mod batch;
 #[forbid(unsafe_code)]
 pub mod bounds;
 #[forbid(unsafe_code)]

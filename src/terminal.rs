@@ -29,10 +29,12 @@ pub enum Failure {
     Input(String),
     /// The request was valid but could not be carried out: exit code 1.
     Failed(String),
-    /// There is no Vulkan device, or not the one that was asked for: exit code 3.
+    /// There is no Vulkan device, not the one that was asked for, or `batch` lost it: exit code 3.
     NoDevice(String),
     /// A signal ended the work before all of it was done, and none of what was done has failed: exit code 4.
     Interrupted(String),
+    /// Some units of a `batch` failed, and the others are done: exit code 4.
+    SomeFailed(String),
 }
 
 impl Failure {
@@ -41,7 +43,8 @@ impl Failure {
         let (Failure::Input(message)
         | Failure::Failed(message)
         | Failure::NoDevice(message)
-        | Failure::Interrupted(message)) = self;
+        | Failure::Interrupted(message)
+        | Failure::SomeFailed(message)) = self;
         message
     }
 
@@ -51,7 +54,7 @@ impl Failure {
             Failure::Failed(_) => 1,
             Failure::Input(_) => 2,
             Failure::NoDevice(_) => 3,
-            Failure::Interrupted(_) => 4,
+            Failure::Interrupted(_) | Failure::SomeFailed(_) => 4,
         }
     }
 }
@@ -108,7 +111,8 @@ pub fn print_failure(failure: &Failure) {
     let (Failure::Input(message)
     | Failure::Failed(message)
     | Failure::NoDevice(message)
-    | Failure::Interrupted(message)) = failure;
+    | Failure::Interrupted(message)
+    | Failure::SomeFailed(message)) = failure;
     let _ = writeln!(std::io::stderr(), "echolume: {}", single_line(message));
 }
 

@@ -10,7 +10,7 @@ use crate::gpu::{Context, ContextOptions, Deadline, DeviceChoice, GpuError, Texe
 use crate::probe::Geometry;
 use crate::scene::default_look::block_edge;
 use crate::scene::load::Layers;
-use crate::scene::{EchoHistogram, EchoLevels, Input, Scene};
+use crate::scene::{EchoHistogram, EchoLevels, Input, Scene, Settings};
 use crate::source::phantom::{self, Phantom, PhantomSource};
 use crate::source::{Frame, Source};
 use crate::terminal::{Failure, failed, input, progress_bar, say};
@@ -46,30 +46,18 @@ impl InputArgs {
 
     fn open_scene(&self, chosen: &[String], to_show: bool) -> Result<(Box<dyn Source>, Scene), Failure> {
         let mut source = self.source()?;
-        if self.volume >= source.volumes() {
-            let (wanted, count) = (self.volume, source.volumes());
-            return Err(input(format!("{}: --volume {wanted}: there are {count}, numbered from 0", self.name())));
-        }
-        let geometry = source.geometry(self.volume);
+        check_volume(&*source, self.volume, self.name())?;
         let layers = self.layers_with(chosen)?;
-        let settings = layers.clone().finish().map_err(input)?;
-        // i16 samples are stored with an offset, which the setting does not have.
-        let asked = settings.samples.range.map(|range| range.map(|value| value + source.sample_type().shift()));
-        let samples = Input { stored: source.stored_type(), range: asked.unwrap_or_else(|| source.range()) };
-        let levels = match to_show && layers.needs_levels() {
-            true => self.levels(&mut *source, &geometry, samples)?,
-            false => None,
-        };
-        // Of a volume that is all the same nothing follows, and what was set explains the picture best.
-        let (settings, found) = match to_show && (levels.is_some() || !layers.needs_levels()) {
-            true => {
-                let completed = layers.completed(&geometry, levels.as_ref()).map_err(input)?;
-                (completed.settings, completed.said)
+        let scene = match to_show {
+            true => scene_to_show(&mut *source, self.volume, &layers, |source, geometry, samples| {
+                self.levels(source, geometry, samples)
+            })?,
+            false => {
+                let settings = layers.finish().map_err(input)?;
+                let samples = samples_of(&*source, &settings);
+                Scene::new(source.geometry(self.volume), samples, settings).map_err(input)?
             }
-            false => (settings, Vec::new()),
         };
-        let mut scene = Scene::new(geometry, samples, settings).map_err(input)?;
-        scene.found = found;
         Ok((source, scene))
     }
 
@@ -280,6 +268,11 @@ impl SceneArgs {
         Ok(set)
     }
 
+    /// True if a device or a limit of its time was given.
+    pub fn has_device(&self) -> bool {
+        self.device.is_some() || self.device_timeout.is_some()
+    }
+
     /// When a device that does not finish is given up.
     pub fn deadline(&self) -> Result<Deadline, Failure> {
         match self.device_timeout.as_deref() {
@@ -304,6 +297,50 @@ impl SceneArgs {
             ..ContextOptions::default()
         })
     }
+}
+
+/// Refuses a volume that a recording, whose `name` the message has, does not hold.
+pub fn check_volume(source: &dyn Source, volume: usize, name: impl std::fmt::Display) -> Result<(), Failure> {
+    match source.volumes() {
+        count if volume >= count => {
+            Err(input(format!("{name}: --volume {volume}: there are {count}, numbered from 0")))
+        }
+        _ => Ok(()),
+    }
+}
+
+/// The samples of a recording, with the range that the settings ask for.
+fn samples_of(source: &dyn Source, settings: &Settings) -> Input {
+    // i16 samples are stored with an offset, which the setting does not have.
+    let asked = settings.samples.range.map(|range| range.map(|value| value + source.sample_type().shift()));
+    Input { stored: source.stored_type(), range: asked.unwrap_or_else(|| source.range()) }
+}
+
+/// The scene that shows a volume: settings that nobody chose follow from the recording, whose `levels` are asked for only if they matter.
+pub fn scene_to_show(
+    source: &mut dyn Source,
+    volume: usize,
+    layers: &Layers,
+    levels: impl FnOnce(&mut dyn Source, &Geometry, Input) -> Result<Option<EchoLevels>, Failure>,
+) -> Result<Scene, Failure> {
+    let geometry = source.geometry(volume);
+    let settings = layers.clone().finish().map_err(input)?;
+    let samples = samples_of(source, &settings);
+    let levels = match layers.needs_levels() {
+        true => levels(source, &geometry, samples)?,
+        false => None,
+    };
+    // Of a volume that is all the same nothing follows, and what was set explains the picture best.
+    let (settings, found) = match levels.is_some() || !layers.needs_levels() {
+        true => {
+            let completed = layers.completed(&geometry, levels.as_ref()).map_err(input)?;
+            (completed.settings, completed.said)
+        }
+        false => (settings, Vec::new()),
+    };
+    let mut scene = Scene::new(geometry, samples, settings).map_err(input)?;
+    scene.found = found;
+    Ok(scene)
 }
 
 /// Other names of modes.
@@ -334,6 +371,21 @@ pub fn open_device(choice: Option<DeviceChoice>, validation: bool) -> Result<Arc
     open(&ContextOptions {
         device: choice.unwrap_or_default(),
         validation,
+        pipeline_cache: pipeline_folder(),
+        ..ContextOptions::default()
+    })
+}
+
+/// Opens a device whose waits end when `stop` says so. Prints nothing.
+pub fn open_device_until(
+    choice: Option<DeviceChoice>,
+    deadline: Deadline,
+    stop: fn() -> bool,
+) -> Result<Arc<Context>, GpuError> {
+    Context::new(&ContextOptions {
+        device: choice.unwrap_or_default(),
+        deadline,
+        stop: Some(stop),
         pipeline_cache: pipeline_folder(),
         ..ContextOptions::default()
     })

@@ -8,7 +8,8 @@ mod recording;
 mod source;
 
 pub use input::{
-    InputArgs, Output, SceneArgs, check_outputs, device_failure, open_device, open_device_for_statistics, write_report,
+    InputArgs, Output, SceneArgs, check_outputs, check_volume, device_failure, open_device, open_device_for_statistics,
+    open_device_until, scene_to_show, write_report,
 };
 pub use motor::{SerialArgs, motor_failure, motor_table};
 pub use picture_file::PictureFile;

@@ -5,7 +5,7 @@ use crate::gpu::{DeviceChoice, context, device_selection};
 use crate::kiosk::bundle::Bundle;
 use crate::kiosk::config::{Config, DEFAULT_PATH};
 use crate::picture;
-use crate::terminal::{Failure, failed, input, say};
+use crate::terminal::{Failure, failed, input, remark, say};
 use std::io::Read;
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
@@ -20,7 +20,14 @@ pub struct Devices {
 
 impl Devices {
     pub fn run(&self) -> Result<(), Failure> {
-        let devices = context::list().map_err(device_failure)?;
+        let variable = |name: &str| std::env::var(name).ok();
+        let has_nvidia = Path::new("/proc/driver/nvidia/version").exists() || Path::new("/dev/nvidiactl").exists();
+        let hint = missing_capability(has_nvidia, variable);
+        let devices =
+            context::list().inspect_err(|_| hint.iter().for_each(|line| remark(line))).map_err(device_failure)?;
+        if let Some(line) = hint.filter(|_| devices.iter().all(|device| device.is_software())) {
+            remark(&line);
+        }
         let picked = device_selection::choose(&devices, &DeviceChoice::Best);
         for (i, device) in devices.iter().enumerate() {
             say!(
@@ -64,6 +71,18 @@ impl Devices {
         }
         picked.map(drop).map_err(device_failure)
     }
+}
+
+/// What a container lacks whose GPU has no Vulkan driver: NVIDIA's toolkit mounts it only for the capability `graphics`.
+fn missing_capability(has_nvidia: bool, variable: impl Fn(&str) -> Option<String>) -> Option<String> {
+    let visible = variable("NVIDIA_VISIBLE_DEVICES").filter(|gpus| !["", "void", "none"].contains(&gpus.as_str()));
+    let given = variable("NVIDIA_DRIVER_CAPABILITIES").unwrap_or_default();
+    let is_given = given.split(',').any(|capability| ["graphics", "all"].contains(&capability.trim()));
+    (has_nvidia && visible.is_some() && !is_given).then(|| {
+        format!(
+            "this container has an NVIDIA GPU without its Vulkan driver: NVIDIA_DRIVER_CAPABILITIES is '{given}'; start it with compute,utility,graphics"
+        )
+    })
 }
 
 /// Time-out for listing the devices. A driver that takes longer is itself a finding.
@@ -167,4 +186,30 @@ fn answer(mut child: Child) -> String {
     let _ = child.wait();
     let said = |thread: std::thread::JoinHandle<String>| thread.join().unwrap_or_default();
     format!("{}{}{end}", said(out), said(err))
+}
+
+#[cfg(test)]
+mod capability {
+    use super::missing_capability;
+
+    #[test]
+    fn a_container_without_graphics_is_told_and_no_other() {
+        let of = |has_nvidia, visible: Option<&str>, given: Option<&str>| {
+            missing_capability(has_nvidia, |name| {
+                let value = if name == "NVIDIA_VISIBLE_DEVICES" { visible } else { given };
+                value.map(str::to_string)
+            })
+        };
+        assert!(of(true, Some("all"), Some("compute,utility")).is_some_and(|line| line.contains("graphics")));
+        assert!(of(true, Some("all"), None).is_some());
+        for (has_nvidia, visible, given) in [
+            (true, Some("all"), Some("compute, graphics")),
+            (true, Some("0"), Some("all")),
+            (true, Some("void"), None),
+            (true, None, None),
+            (false, Some("all"), None),
+        ] {
+            assert_eq!(of(has_nvidia, visible, given), None);
+        }
+    }
 }

@@ -1,8 +1,10 @@
 //! The command line: subcommands, logging and exit codes.
 //!
-//! Exit codes of every command: 0 done, 1 failed, 2 bad input or usage, 3 no Vulkan device, 4 stopped by a signal before all was done.
+//! Exit codes of every command: 0 done, 1 failed, 2 bad input or usage, 3 no Vulkan device, 4 stopped by a signal before all was done. `batch` also
+//! 3, a lost device, and 4, some units failed.
 
 mod about;
+mod batch;
 mod filter;
 mod machine;
 mod mesh;
@@ -78,6 +80,8 @@ enum Command {
     Mesh(mesh::MakeMesh),
     /// Describe a recording, without patient fields
     Info(recordings::Info),
+    /// Render, convert, measure or verify many recordings: one shard of a manifest, to be run on many machines
+    Batch(Box<batch::Batch>),
     /// Drive the motor of a probe: home, sweep, stop; or simulate one
     Probe(probe::Probe),
     /// List the Vulkan devices, their missing features, and which one would be used
@@ -143,6 +147,7 @@ pub fn run() -> ExitCode {
         Command::Convert(convert) => convert.run(),
         Command::Mesh(mesh) => mesh.run(),
         Command::Info(info) => info.run(),
+        Command::Batch(batch) => batch.run(),
         Command::Probe(probe) => probe.run(),
         Command::Devices(devices) => devices.run(),
         Command::SupportBundle(bundle) => bundle.run(),

@@ -1,5 +1,6 @@
 //! The program as a user sees it: its answers to correct and wrong commands, and the files that it leaves.
 
+mod batch;
 mod bounds;
 mod budget;
 #[path = "../common/mod.rs"]

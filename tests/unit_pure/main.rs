@@ -1,7 +1,9 @@
 //! What needs neither a device nor the program: geometry, plans, references, statistics, reports, and the rules of the source tree.
 
+mod batch;
 mod bounds;
 mod bricks;
+mod cluster;
 #[path = "../common/mod.rs"]
 mod common;
 mod compositing_orders;

@@ -67,6 +67,7 @@ fn no_layer_uses_a_layer_above_it() {
         ("src/exact_ray", &["crate::gpu", "crate::plan", "crate::reference", "crate::error_report", "ash::vk"]),
         ("src/live", &["crate::profile", "crate::error_report", "crate::verify", "ash::vk"]),
         ("src/kiosk", &["crate::gpu", "crate::profile", "crate::verify", "ash::", "winit::", "egui::"]),
+        ("src/batch", &["crate::live", "crate::ui", "crate::kiosk", "crate::profile", "crate::cli", "ash::vk"]),
         ("src/cli", &["ash::vk", "use ash"]),
     ];
     let all = sources("src");

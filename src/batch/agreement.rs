@@ -1,0 +1,90 @@
+//! Pictures of one unit by two devices, held against each other: bit for bit on the same driver, within the tolerance of `verify` on others.
+
+use crate::picture::Picture;
+use crate::verify::report::Figure;
+use crate::verify::{Findings, compare_picture};
+use serde::{Deserialize, Serialize};
+
+/// A device and its driver.
+#[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Drawer {
+    pub device: String,
+    pub driver: String,
+    pub vulkan: String,
+    pub is_software: bool,
+}
+
+/// What may differ.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Class {
+    /// The same device and driver, or no device at all: the same bytes.
+    SameDriver,
+    /// Another device or driver: the tolerance of `verify` for pictures.
+    OtherDriver,
+}
+
+impl Class {
+    /// The class of two results.
+    pub fn of(a: Option<&Drawer>, b: Option<&Drawer>) -> Class {
+        if a == b { Class::SameDriver } else { Class::OtherDriver }
+    }
+
+    /// For reports.
+    pub fn sentence(self) -> &'static str {
+        match self {
+            Class::SameDriver => "same device and driver: bit for bit",
+            Class::OtherDriver => "another device or driver: within the tolerance of verify",
+        }
+    }
+}
+
+/// How a second picture of a unit compares with the one that is kept.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Agreement {
+    pub class: Class,
+    /// What drew the picture that is kept.
+    pub with: Option<Drawer>,
+    pub same_bytes: bool,
+    /// Within what the class allows.
+    pub agrees: bool,
+    /// Errors with what `verify` allows; empty if the bytes are the same.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub figures: Vec<Figure>,
+    /// One line if it does not agree.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub fault: Option<String>,
+}
+
+impl Agreement {
+    /// Compares a picture with the one that is kept. Equal pixels are equal bytes: both are encoded alike.
+    pub fn of(kept: &Picture, kept_by: Option<&Drawer>, drawn: &Picture, drawn_by: Option<&Drawer>) -> Agreement {
+        let class = Class::of(kept_by, drawn_by);
+        // A file has no transparency.
+        let mut drawn = drawn.clone();
+        drawn.rgba.chunks_exact_mut(4).for_each(|pixel| pixel[3] = u8::MAX);
+        let mut found = Agreement {
+            class,
+            with: kept_by.cloned(),
+            same_bytes: *kept == drawn,
+            agrees: true,
+            figures: Vec::new(),
+            fault: None,
+        };
+        if found.same_bytes {
+            return found;
+        }
+        let mut findings = Findings::default();
+        compare_picture(&mut findings, "picture", kept, &drawn);
+        let fault = findings.faults.first().map(|fault| fault.what.clone());
+        found.fault = match class {
+            Class::SameDriver => Some("the same device and driver drew another picture".into()),
+            Class::OtherDriver => fault,
+        };
+        found.agrees = found.fault.is_none();
+        found.figures = findings.figures;
+        found
+    }
+}

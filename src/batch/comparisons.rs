@@ -1,0 +1,51 @@
+//! All comparisons of devices that results hold, by class and pair of devices.
+
+use super::agreement::{Class, Drawer};
+use super::results::{Record, Status};
+use std::collections::BTreeMap;
+
+/// Comparisons of one pair of devices.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Pair {
+    pub compared: usize,
+    pub same_bytes: usize,
+    /// Input, work and fault of each unit that does not agree.
+    pub faults: Vec<(String, String, String)>,
+}
+
+/// All comparisons that results hold, by class and pair of devices: of units that were drawn again, and of units that two processes did, whose
+/// outputs have digests.
+pub fn pairs(records: &[Record]) -> BTreeMap<(Class, Option<Drawer>, Option<Drawer>), Pair> {
+    let mut pairs: BTreeMap<(Class, Option<Drawer>, Option<Drawer>), Pair> = BTreeMap::new();
+    let mut first: BTreeMap<&str, &Record> = BTreeMap::new();
+    for record in records.iter().filter(|r| !r.key.is_empty()) {
+        if let Some(agreement) = &record.agreement {
+            let pair = pairs.entry((agreement.class, agreement.with.clone(), record.drawer.clone())).or_default();
+            pair.add(record, agreement.same_bytes, agreement.fault.clone());
+            continue;
+        }
+        if record.status != Status::Done {
+            continue;
+        }
+        let Some(there) = first.get(record.key.as_str()) else {
+            first.insert(&record.key, record);
+            continue;
+        };
+        let class = Class::of(there.drawer.as_ref(), record.drawer.as_ref());
+        let same = there.outputs == record.outputs;
+        // Of another driver only the digest is left, which says nothing about the size of a difference.
+        if same || class == Class::SameDriver {
+            let fault = (!same).then(|| "two processes with the same device and driver made other bytes".to_string());
+            pairs.entry((class, there.drawer.clone(), record.drawer.clone())).or_default().add(record, same, fault);
+        }
+    }
+    pairs
+}
+
+impl Pair {
+    fn add(&mut self, record: &Record, same_bytes: bool, fault: Option<String>) {
+        self.compared += 1;
+        self.same_bytes += usize::from(same_bytes);
+        self.faults.extend(fault.map(|fault| (record.input.clone(), record.work.clone(), fault)));
+    }
+}

@@ -1,0 +1,127 @@
+//! Makes a manifest from files, folders and patterns: what can be read, with size, digest and expected cost.
+
+use super::digest_of;
+use super::manifest::Unit;
+use super::unit::{Kind, Work};
+use crate::args::check_volume;
+use crate::source::{self, Source};
+use crate::terminal::{Failure, input};
+use std::fs;
+use std::path::{Path, PathBuf};
+
+/// Endings of recordings in a folder. A file that is named itself may have any.
+const ENDINGS: [&str; 8] = [".mha", ".mhd", ".nrrd", ".nhdr", ".nii", ".vol", ".frames", ".gz"];
+/// Deepest folder below one that is named.
+const MAX_DEPTH: usize = 64;
+
+/// What became of a file.
+pub enum Found {
+    Unit(Box<Unit>),
+    /// The file and why it is left out.
+    LeftOut(String),
+}
+
+/// The files that `patterns` name, sorted, each once: files, folders with all recordings below them, and patterns with `*`, `?`, `**` and `[...]`.
+///
+/// # Errors
+/// A pattern that is none, or that nothing matches.
+pub fn files(patterns: &[String]) -> Result<Vec<PathBuf>, Failure> {
+    let mut found = Vec::new();
+    for pattern in patterns {
+        let before = found.len();
+        match Path::new(pattern) {
+            path if path.is_dir() => walk(path, 0, &mut found).map_err(input)?,
+            path if path.exists() => found.push(path.to_path_buf()),
+            _ => {
+                let matches = glob::glob(pattern).map_err(|e| input(format!("--make {pattern}: {e}")))?;
+                for path in matches {
+                    let path = path.map_err(|e| input(format!("--make {pattern}: {e}")))?;
+                    match path.is_dir() {
+                        true => walk(&path, 0, &mut found).map_err(input)?,
+                        false => found.push(path),
+                    }
+                }
+            }
+        }
+        if found.len() == before {
+            return Err(input(format!("--make {pattern}: no recording is there")));
+        }
+    }
+    found.sort();
+    found.dedup();
+    Ok(found)
+}
+
+fn walk(folder: &Path, depth: usize, found: &mut Vec<PathBuf>) -> Result<(), String> {
+    let fault = |e: std::io::Error| format!("{}: cannot be read: {e}", folder.display());
+    if depth > MAX_DEPTH {
+        return Err(format!("{}: is more than {MAX_DEPTH} folders deep", folder.display()));
+    }
+    for entry in fs::read_dir(folder).map_err(fault)? {
+        let entry = entry.map_err(fault)?;
+        let (path, kind) = (entry.path(), entry.file_type().map_err(fault)?);
+        let name = entry.file_name().to_string_lossy().to_ascii_lowercase();
+        if kind.is_dir() {
+            walk(&path, depth + 1, found)?;
+        } else if ENDINGS.iter().any(|ending| name.ends_with(ending)) && path.is_file() {
+            found.push(path);
+        }
+    }
+    Ok(())
+}
+
+/// The unit of a file: its absolute path, digest, length and expected cost. The file is opened and read.
+///
+/// # Errors
+/// The command is wrong, whatever the file.
+pub fn unit(file: &Path, command: &[String]) -> Result<Found, Failure> {
+    let blank = Unit {
+        input: String::new(),
+        digest: None,
+        bytes: None,
+        cost: None,
+        scene: None,
+        command: Some(command.to_vec()).filter(|words| !words.is_empty()),
+        outputs: Vec::new(),
+    };
+    let work = Work::of(&blank)?;
+    let left_out = |why: String| Ok(Found::LeftOut(why));
+    let Some(name) = std::path::absolute(file).ok().and_then(|path| path.to_str().map(str::to_string)) else {
+        return left_out(format!("{}: its name is not UTF-8, which a manifest is", file.display()));
+    };
+    let opened = source::open_with(file, work.geometry.options()).map_err(input).and_then(|source| {
+        check_volume(&*source, work.volume, file.display())?;
+        Ok(source)
+    });
+    let source = match opened {
+        Ok(source) => source,
+        Err(failure) => return left_out(failure.message()),
+    };
+    match digest_of(&source.files()) {
+        Err(why) => left_out(why),
+        Ok((digest, bytes)) => Ok(Found::Unit(Box::new(Unit {
+            input: name,
+            digest: Some(digest),
+            bytes: Some(bytes),
+            cost: Some(expected_cost(work.kind, &*source, work.volume)),
+            ..blank
+        }))),
+    }
+}
+
+/// 1 for the start of a unit, and 1 for each MiB of the volume's samples, times what the kind of work costs beside drawing. The ratios are rough:
+/// what counts is that a large recording costs more than a small one.
+fn expected_cost(kind: Kind, source: &dyn Source, volume: usize) -> f64 {
+    let geometry = source.geometry(volume);
+    let [width, height] = geometry.frame_size();
+    let samples = width as f64 * height as f64 * geometry.slices() as f64;
+    let weight = match kind {
+        Kind::Measure => 0.2,
+        Kind::Render => 1.0,
+        Kind::Convert => 4.0,
+        Kind::Verify => 50.0,
+    };
+    let cost = 1.0 + weight * samples * source.stored_type().bytes() as f64 / f64::from(1 << 20);
+    // So many digits that a line stays short.
+    (cost * 1000.0).round() / 1000.0
+}

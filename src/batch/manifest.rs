@@ -1,0 +1,152 @@
+//! The manifest: one unit of work a line, as JSON (NDJSON). Only the units of one shard are kept in memory.
+
+use serde::{Deserialize, Serialize};
+use serde_json::{Map, Value};
+use std::fs::File;
+use std::io::{BufRead, BufReader, Read};
+use std::path::Path;
+
+/// Longest line, bytes.
+const MAX_LINE: u64 = 1 << 20;
+/// Most units.
+const MAX_UNITS: usize = 1 << 27;
+/// Most outputs of a unit.
+const MAX_OUTPUTS: usize = 4;
+
+/// A line of the manifest.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Unit {
+    /// The recording. A relative path begins at the manifest's folder.
+    pub input: String,
+    /// SHA-256 of the recording, 64 hexadecimal digits; without it the recording is read to name the outputs.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub digest: Option<String>,
+    /// Length of the recording's files, bytes.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub bytes: Option<u64>,
+    /// Expected cost, in any unit that all lines share; 1 if it is not given.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub cost: Option<f64>,
+    /// Settings as in a scene file, to be rendered. Not with `command`.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub scene: Option<Map<String, Value>>,
+    /// `render`, `convert`, `measure` or `verify` with their flags; `render` if neither this nor a scene is given.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub command: Option<Vec<String>>,
+    /// Names of the files that are made, one for each that the command makes.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub outputs: Vec<String>,
+}
+
+/// A unit and the number of its line, from 1.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Numbered {
+    pub line: u64,
+    pub unit: Unit,
+}
+
+/// What dividing the manifest needs of a line.
+#[derive(Deserialize)]
+struct Cost {
+    cost: Option<f64>,
+}
+
+impl Unit {
+    /// Checks what can be checked without the recording.
+    fn check(&self) -> Result<(), String> {
+        if self.input.is_empty() {
+            return Err("input: is empty".into());
+        }
+        if let Some(digest) = &self.digest
+            && !(digest.len() == 64 && digest.bytes().all(|b| b.is_ascii_digit() || (b'a'..=b'f').contains(&b)))
+        {
+            return Err("digest: must be 64 lower-case hexadecimal digits, as sha256sum prints".into());
+        }
+        if self.scene.is_some() && self.command.is_some() {
+            return Err("scene and command: only one of them may be given".into());
+        }
+        if self.outputs.len() > MAX_OUTPUTS {
+            return Err(format!("outputs: at most {MAX_OUTPUTS}"));
+        }
+        self.outputs.iter().try_for_each(|name| check_name(name))
+    }
+}
+
+/// An output is a plain file name, which must stay in the folder of the unit on every system.
+fn check_name(name: &str) -> Result<(), String> {
+    let plain = |c: char| c.is_ascii_alphanumeric() || "._-+".contains(c);
+    match !name.is_empty() && name.len() <= 100 && !name.starts_with('.') && name.chars().all(plain) {
+        true => Ok(()),
+        false => Err("outputs: a name has at most 100 letters, digits, '.', '_', '-' and '+', and no folder".into()),
+    }
+}
+
+fn check_cost(cost: Option<f64>) -> Result<f64, String> {
+    match cost.unwrap_or(1.0) {
+        cost if cost.is_finite() && cost >= 0.0 => Ok(cost),
+        cost => Err(format!("cost: {cost} must be finite and not below 0")),
+    }
+}
+
+/// Calls `each` with the number and the text of every line that is not empty.
+fn for_each_line(file: &Path, mut each: impl FnMut(u64, &str) -> Result<(), String>) -> Result<(), String> {
+    let fault = |e: &dyn std::fmt::Display| format!("{}: cannot be read: {e}", file.display());
+    let mut reader = BufReader::new(File::open(file).map_err(|e| fault(&e))?);
+    let (mut line, mut number) = (Vec::new(), 0);
+    loop {
+        line.clear();
+        number += 1;
+        let read = reader.by_ref().take(MAX_LINE + 1).read_until(b'\n', &mut line).map_err(|e| fault(&e))?;
+        if read == 0 {
+            return Ok(());
+        }
+        let at = |e: String| format!("{}:{number}: {e}", file.display());
+        if read as u64 > MAX_LINE {
+            return Err(at(format!("the line is longer than {MAX_LINE} bytes")));
+        }
+        let text = std::str::from_utf8(&line).map_err(|_| at("is not UTF-8 text".into()))?.trim();
+        if !text.is_empty() {
+            each(number, text).map_err(at)?;
+        }
+    }
+}
+
+/// The expected cost of every unit, in the order of the manifest.
+///
+/// # Errors
+/// One line that names the file, the line and the fault.
+pub fn costs(file: &Path) -> Result<Vec<f64>, String> {
+    let mut costs = Vec::new();
+    for_each_line(file, |_, text| {
+        if costs.len() >= MAX_UNITS {
+            return Err(format!("a manifest has at most {MAX_UNITS} units; divide it"));
+        }
+        let line: Cost = serde_json::from_str(text).map_err(|e| format!("is no unit: {e}"))?;
+        costs.push(check_cost(line.cost)?);
+        Ok(())
+    })?;
+    match costs.is_empty() {
+        true => Err(format!("{}: has no unit", file.display())),
+        false => Ok(costs),
+    }
+}
+
+/// The units that `is_chosen` selects by their place (from 0), in the order of the manifest.
+///
+/// # Errors
+/// One line that names the file, the line and the fault.
+pub fn units(file: &Path, is_chosen: impl Fn(usize) -> bool) -> Result<Vec<Numbered>, String> {
+    let (mut units, mut place) = (Vec::new(), 0);
+    for_each_line(file, |line, text| {
+        place += 1;
+        if is_chosen(place - 1) {
+            let unit: Unit = serde_json::from_str(text).map_err(|e| format!("is no unit: {e}"))?;
+            check_cost(unit.cost)?;
+            unit.check()?;
+            units.push(Numbered { line, unit });
+        }
+        Ok(())
+    })?;
+    Ok(units)
+}

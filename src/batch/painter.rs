@@ -1,0 +1,114 @@
+//! Draws unit after unit with one device and, as long as whole volumes follow each other, one renderer: its pipelines stay warm.
+
+use super::agreement::Drawer;
+use crate::args::open_device_until;
+use crate::gpu::{Bands, Context, Deadline, DeviceChoice, GpuError, Renderer, RendererOptions};
+use crate::passes::{Slot, Texels};
+use crate::picture::Picture;
+use crate::scene::Scene;
+use crate::source::Frame;
+use crate::verify::Findings;
+use crate::verify::{compare_picture, render};
+use std::sync::Arc;
+
+/// How a device is opened.
+#[derive(Clone)]
+pub struct DeviceOptions {
+    pub device: Option<DeviceChoice>,
+    pub deadline: Deadline,
+    /// Ends waits for the device.
+    pub stop: fn() -> bool,
+}
+
+/// A device, and the renderer that drew the last picture.
+pub struct Painter {
+    context: Arc<Context>,
+    renderer: Option<Renderer>,
+    options: DeviceOptions,
+    /// How often the device was lost by the running unit.
+    losses: u32,
+}
+
+/// A device that is lost so often by one unit is given up: no band can become smaller.
+const MAX_LOSSES: u32 = 6;
+
+impl Painter {
+    /// # Errors
+    /// There is no such device, or it cannot be opened.
+    pub fn open(options: &DeviceOptions) -> Result<Painter, GpuError> {
+        let context = open_device_until(options.device.clone(), options.deadline, options.stop)?;
+        Ok(Painter { context, renderer: None, options: options.clone(), losses: 0 })
+    }
+
+    pub fn drawer(&self) -> Drawer {
+        let there = &self.context.candidate;
+        Drawer {
+            device: there.name.clone(),
+            driver: there.driver.trim().into(),
+            vulkan: there.api_version(),
+            is_software: there.is_software(),
+        }
+    }
+
+    /// Draws a volume. A lost device is opened again, and its work divided into smaller and smaller parts.
+    ///
+    /// # Errors
+    /// The device lacks something, has too little memory, or was lost again.
+    pub fn draw(&mut self, scene: &Scene, frames: &[Frame], is_whole: bool) -> Result<Picture, GpuError> {
+        self.losses = 0;
+        loop {
+            let drawn = self.draw_once(scene, frames, is_whole);
+            let Err(error) = drawn else { return drawn };
+            // What failed may have left anything.
+            self.renderer = None;
+            self.losses += 1;
+            if !error.is_device_lost() || error.is_given_up() || self.losses >= MAX_LOSSES {
+                return Err(error);
+            }
+            tracing::warn!("{error}; the device is reopened, and its work is divided into smaller parts");
+            self.context = open_device_until(self.options.device.clone(), self.options.deadline, self.options.stop)?;
+        }
+    }
+
+    fn draw_once(&mut self, scene: &Scene, frames: &[Frame], is_whole: bool) -> Result<Picture, GpuError> {
+        // Where frames are missing, those of the recording before must not be seen. A new renderer has none.
+        if !is_whole || self.losses > 0 {
+            self.renderer = None;
+        }
+        let renderer = match &mut self.renderer {
+            Some(there) => {
+                there.change(scene.clone())?;
+                there
+            }
+            none => {
+                let bands = if self.losses > 0 { Bands::Measured { losses: self.losses } } else { Bands::default() };
+                let options = RendererOptions { bands, ..RendererOptions::default() };
+                none.insert(Renderer::new(&self.context, scene.clone(), &options)?)
+            }
+        };
+        for frame in frames {
+            renderer.frame(frame.slice as u32, &frame.bytes, 0)?;
+        }
+        renderer.show(0)?;
+        let picture = renderer.picture()?;
+        if !is_whole {
+            self.renderer = None;
+        }
+        Ok(picture)
+    }
+}
+
+/// Holds a picture against the f64 reference, as `verify` does: what was measured, and the faults. `frames`: of every slice.
+pub fn against_reference(scene: &Scene, frames: &[Frame], picture: &Picture) -> Findings {
+    let format = Slot::Frames.format(scene);
+    let [width, height] = scene.geometry.frame_size();
+    let mut slices = vec![Texels::untouched([width, height, 1], 1); scene.geometry.slices()];
+    for frame in frames {
+        if let Some(slice) = slices.get_mut(frame.slice) {
+            *slice = Texels::decode([width, height, 1], format, &frame.bytes);
+        }
+    }
+    let mut findings = Findings::default();
+    compare_picture(&mut findings, "picture", &render::stored_reference_picture(scene, &slices), picture);
+    findings
+}

@@ -1,0 +1,208 @@
+//! What is kept of a unit: its record, which says that it is done, and a line of its shard's results.
+
+use super::agreement::{Agreement, Drawer};
+use super::shard::Shard;
+use super::unit::Key;
+use crate::files;
+use serde::{Deserialize, Serialize};
+use serde_json::{Map, Value};
+use std::collections::HashSet;
+use std::fs::{self, File, OpenOptions};
+use std::io::{BufRead, BufReader, Read, Seek, SeekFrom, Write};
+use std::path::{Path, PathBuf};
+
+/// Version of the format of records.
+pub const FORMAT: &str = "echolume-batch-1";
+/// Longest line of results, bytes, and largest record.
+const MAX_LINE: u64 = 1 << 20;
+
+/// How a unit ended.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Status {
+    Done,
+    /// The recording or the command is at fault: another try ends the same.
+    Bad,
+    /// The work failed.
+    Failed,
+    /// The device was lost while it was done.
+    Lost,
+}
+
+/// Seconds by stage, of the clock of the host.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Seconds {
+    /// Reading the recording, on the thread that reads ahead.
+    pub read: f64,
+    /// Waiting for it.
+    pub wait: f64,
+    /// Drawing, converting or comparing.
+    pub work: f64,
+    /// Writing and renaming the outputs.
+    pub write: f64,
+}
+
+/// A file that a unit made.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct OutputFile {
+    /// Below the folder of the batch.
+    pub file: String,
+    pub bytes: u64,
+    pub sha256: String,
+}
+
+/// One try of one unit.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Record {
+    /// [`FORMAT`].
+    pub format: String,
+    /// The hash that names the outputs; empty if the recording could not be read.
+    pub key: String,
+    /// Line of the manifest.
+    pub line: u64,
+    pub input: String,
+    /// The command, or the scene.
+    pub work: String,
+    pub status: Status,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub error: Option<String>,
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub outputs: Vec<OutputFile>,
+    pub seconds: Seconds,
+    /// None if no device was used.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub drawer: Option<Drawer>,
+    pub program: String,
+    pub host: String,
+    /// End of the try, RFC 3339.
+    pub date: String,
+    #[serde(default, skip_serializing_if = "Map::is_empty")]
+    pub figures: Map<String, Value>,
+    /// Set if a unit that was done was drawn again and compared.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub agreement: Option<Agreement>,
+}
+
+/// The record of a unit that is done: it is there, whole, and so are its outputs.
+pub(super) fn read_record(folder: &Path, key: &Key) -> Option<Record> {
+    let bytes = files::read(&folder.join(key.record()), MAX_LINE, "record").ok()?;
+    let record: Record = serde_json::from_slice(&bytes).ok()?;
+    let is_there = |output: &OutputFile| {
+        fs::metadata(folder.join(&output.file)).is_ok_and(|there| there.is_file() && there.len() == output.bytes)
+    };
+    let is_done = record.format == FORMAT && record.status == Status::Done && record.key == key.text();
+    (is_done && record.outputs.iter().all(is_there)).then_some(record)
+}
+
+/// The results of one shard, to which lines are added.
+pub struct Results {
+    file: File,
+    path: PathBuf,
+    /// Keys of the units that a line says are done.
+    done: HashSet<String>,
+    /// The unit of each line that says that a device was lost.
+    lost: Vec<(String, String)>,
+}
+
+impl Results {
+    /// Opens or creates `results/shard-I-of-N.ndjson`. A last line that a killed process left unfinished is ended.
+    ///
+    /// # Errors
+    /// One line that names the file.
+    pub fn open(folder: &Path, shard: Shard) -> Result<Results, String> {
+        let place = folder.join("results");
+        fs::create_dir_all(&place).map_err(|e| format!("{}: cannot be made: {e}", place.display()))?;
+        let path = place.join(format!("shard-{:04}-of-{:04}.ndjson", shard.index, shard.count));
+        let fault = |e: std::io::Error| format!("{}: cannot be written: {e}", path.display());
+        let mut file = OpenOptions::new().create(true).read(true).append(true).open(&path).map_err(fault)?;
+        let (records, _) = read_lines(&path)?;
+        let mut last = [b'\n'];
+        if file.metadata().map_err(fault)?.len() > 0 {
+            file.seek(SeekFrom::End(-1)).and_then(|_| file.read_exact(&mut last)).map_err(fault)?;
+        }
+        if last != [b'\n'] {
+            file.write_all(b"\n").map_err(fault)?;
+        }
+        let (mut done, mut lost) = (HashSet::new(), Vec::new());
+        for record in records {
+            match record.status {
+                Status::Done => drop(done.insert(record.key)),
+                Status::Lost => lost.push((record.input, record.work)),
+                Status::Bad | Status::Failed => {}
+            }
+        }
+        Ok(Results { file, path, done, lost })
+    }
+
+    /// Adds a line by one write, so that two processes do not mix theirs.
+    ///
+    /// # Errors
+    /// One line that names the file.
+    pub fn add(&mut self, record: &Record) -> Result<(), String> {
+        let fault = |e: &dyn std::fmt::Display| format!("{}: cannot be written: {e}", self.path.display());
+        let mut line = serde_json::to_vec(record).map_err(|e| fault(&e))?;
+        line.push(b'\n');
+        self.file.write_all(&line).map_err(|e| fault(&e))?;
+        if record.status == Status::Done {
+            self.done.insert(record.key.clone());
+        }
+        Ok(())
+    }
+
+    /// True if a line says that the unit is done: a process that is killed after it wrote the record adds none.
+    pub fn has(&self, record: &Record) -> bool {
+        self.done.contains(&record.key)
+    }
+
+    /// How often a device was lost by a unit.
+    pub fn losses(&self, input: &str, work: &str) -> usize {
+        self.lost.iter().filter(|(i, w)| i == input && w == work).count()
+    }
+}
+
+/// The records of a file of results, and the number of lines that are none.
+fn read_lines(path: &Path) -> Result<(Vec<Record>, usize), String> {
+    let fault = |e: std::io::Error| format!("{}: cannot be read: {e}", path.display());
+    let mut reader = BufReader::new(File::open(path).map_err(fault)?);
+    let (mut records, mut torn, mut line) = (Vec::new(), 0, Vec::new());
+    loop {
+        line.clear();
+        if reader.by_ref().take(MAX_LINE).read_until(b'\n', &mut line).map_err(fault)? == 0 {
+            return Ok((records, torn));
+        }
+        if line.trim_ascii().is_empty() {
+            continue;
+        }
+        match serde_json::from_slice::<Record>(&line) {
+            Ok(record) if record.format == FORMAT => records.push(record),
+            _ => torn += 1,
+        }
+    }
+}
+
+/// All results of a folder, and the number of lines that a killed process left unfinished.
+///
+/// # Errors
+/// One line: there are none, or they cannot be read.
+pub fn read_all(folder: &Path) -> Result<(Vec<Record>, usize), String> {
+    let place = folder.join("results");
+    let fault = |e: std::io::Error| format!("{}: cannot be read: {e}; is this the folder of a batch?", place.display());
+    let mut files = Vec::new();
+    for entry in fs::read_dir(&place).map_err(fault)? {
+        let path = entry.map_err(fault)?.path();
+        if path.extension().is_some_and(|e| e == "ndjson") {
+            files.push(path);
+        }
+    }
+    files.sort();
+    let (mut records, mut torn) = (Vec::new(), 0);
+    for file in &files {
+        let (more, broken) = read_lines(file)?;
+        records.extend(more);
+        torn += broken;
+    }
+    Ok((records, torn))
+}

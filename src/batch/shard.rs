@@ -1,0 +1,127 @@
+//! Division of a manifest into shards of about equal expected cost. Every process computes the same division by itself.
+
+use std::cmp::{Ordering, Reverse};
+use std::collections::BinaryHeap;
+use std::fmt;
+use std::str::FromStr;
+
+/// Most shards.
+const MAX_SHARDS: u32 = 1 << 20;
+
+/// One part of a manifest.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Shard {
+    /// From 0.
+    pub index: u32,
+    pub count: u32,
+}
+
+impl Shard {
+    /// # Errors
+    /// There is no such shard.
+    pub fn new(index: u32, count: u32) -> Result<Shard, String> {
+        match () {
+            _ if count == 0 || count > MAX_SHARDS => Err(format!("{count} shards: must be 1..={MAX_SHARDS}")),
+            _ if index >= count => Err(format!("shard {index} of {count}: they are numbered from 0 to {}", count - 1)),
+            _ => Ok(Shard { index, count }),
+        }
+    }
+
+    /// The shard that Slurm or Kubernetes gives this process: the task of an array, or the completion of an Indexed Job; the whole manifest
+    /// outside of them. `count` is the number of shards where it is known: Kubernetes does not tell it, and the tasks of an array that is
+    /// submitted again in part are then numbered as before.
+    ///
+    /// # Errors
+    /// One line: a number that is none, an array with gaps, or a Job without a count.
+    pub fn from_environment(count: Option<u32>, variable: impl Fn(&str) -> Option<String>) -> Result<Shard, String> {
+        let number = |name: &str| match variable(name) {
+            None => Ok(None),
+            Some(text) => {
+                let parsed = text.trim().parse::<u32>();
+                parsed.map(Some).map_err(|_| format!("{name} is '{}', which is no number", text.escape_debug()))
+            }
+        };
+        if let Some(id) = number("SLURM_ARRAY_TASK_ID")? {
+            if let Some(count) = count {
+                return Shard::new(id, count).map_err(|e| format!("SLURM_ARRAY_TASK_ID: {e}"));
+            }
+            let tasks = number("SLURM_ARRAY_TASK_COUNT")?.ok_or("SLURM_ARRAY_TASK_COUNT is not set; give --shards")?;
+            let (min, step) =
+                (number("SLURM_ARRAY_TASK_MIN")?.unwrap_or(0), number("SLURM_ARRAY_TASK_STEP")?.unwrap_or(1));
+            let max = number("SLURM_ARRAY_TASK_MAX")?;
+            let place = |id: u32| id.checked_sub(min).filter(|n| step > 0 && n % step == 0).map(|n| n / step);
+            let is_whole = max.is_none_or(|max| place(max).is_some_and(|last| last + 1 == tasks));
+            return match place(id).filter(|place| is_whole && *place < tasks) {
+                Some(index) => Shard::new(index, tasks),
+                None => Err("the array has gaps, so its tasks do not say which shard they are; give --shards N and number them 0..N-1".into()),
+            };
+        }
+        match (number("JOB_COMPLETION_INDEX")?, count) {
+            (Some(index), Some(count)) => Shard::new(index, count).map_err(|e| format!("JOB_COMPLETION_INDEX: {e}")),
+            (Some(index), None) => Err(format!(
+                "JOB_COMPLETION_INDEX says {index}, and nothing says of how many; give --shards with the Job's completions"
+            )),
+            (None, Some(1) | None) => Shard::new(0, 1),
+            (None, Some(count)) => Err(format!(
+                "--shards {count}: neither SLURM_ARRAY_TASK_ID nor JOB_COMPLETION_INDEX says which one this is; give --shard I/{count}"
+            )),
+        }
+    }
+}
+
+impl FromStr for Shard {
+    type Err = String;
+
+    /// `I/N`, I from 0.
+    fn from_str(text: &str) -> Result<Shard, String> {
+        let parts = text.split_once('/').and_then(|(i, n)| Some((i.parse().ok()?, n.parse().ok()?)));
+        let (index, count) = parts.ok_or("must read I/N, as 0/8 for the first of eight")?;
+        Shard::new(index, count)
+    }
+}
+
+impl fmt::Display for Shard {
+    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        write!(f, "{}/{}", self.index, self.count)
+    }
+}
+
+/// The cost that a shard has got so far. The least cost comes first, of equal ones the one with fewer units, then the lower number.
+#[derive(PartialEq)]
+struct Load {
+    cost: f64,
+    units: usize,
+    shard: u32,
+}
+
+impl Eq for Load {}
+
+impl Ord for Load {
+    fn cmp(&self, other: &Load) -> Ordering {
+        self.cost.total_cmp(&other.cost).then(self.units.cmp(&other.units)).then(self.shard.cmp(&other.shard))
+    }
+}
+
+impl PartialOrd for Load {
+    fn partial_cmp(&self, other: &Load) -> Option<Ordering> {
+        Some(self.cmp(other))
+    }
+}
+
+/// The shard of every unit: the dearest unit first, each to the shard that has the least cost so far (Graham's LPT rule). No shard costs more
+/// than the mean and one unit. O(n log n); the same for everyone who asks.
+pub fn assign(costs: &[f64], count: u32) -> Vec<u32> {
+    let mut order: Vec<usize> = (0..costs.len()).collect();
+    order.sort_by(|a, b| costs[*b].total_cmp(&costs[*a]).then(a.cmp(b)));
+    let mut loads: BinaryHeap<Reverse<Load>> =
+        (0..count.max(1)).map(|shard| Reverse(Load { cost: 0.0, units: 0, shard })).collect();
+    let mut shards = vec![0; costs.len()];
+    for place in order {
+        let Some(Reverse(mut load)) = loads.pop() else { break };
+        shards[place] = load.shard;
+        load.cost += costs[place];
+        load.units += 1;
+        loads.push(Reverse(load));
+    }
+    shards
+}

@@ -1,0 +1,277 @@
+//! The command of a unit, and the name of its outputs: a hash of everything that determines them.
+
+use super::manifest::Unit;
+use super::sha256_of_file;
+use crate::args::{GeometryArgs, SceneArgs};
+use crate::scene::Settings;
+use crate::scene::load::Layers;
+use crate::source::volume_file::VolumeFile;
+use crate::terminal::{Failure, input};
+use clap::{Parser, Subcommand};
+use sha2::{Digest, Sha256};
+use std::fmt;
+use std::path::{Path, PathBuf};
+use toml::Table;
+
+/// Changes whenever units of the same key would have other outputs without another version of the program.
+const SCHEME: &str = "echolume-batch-1";
+/// Characters of a key: 128 bits.
+const KEY_LENGTH: usize = 32;
+
+/// What can be done with a recording.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Kind {
+    Render,
+    Convert,
+    Measure,
+    Verify,
+}
+
+impl Kind {
+    /// As in a command.
+    pub fn word(self) -> &'static str {
+        match self {
+            Kind::Render => "render",
+            Kind::Convert => "convert",
+            Kind::Measure => "measure",
+            Kind::Verify => "verify",
+        }
+    }
+
+    /// The output if the manifest does not name it.
+    fn output(self) -> &'static str {
+        match self {
+            Kind::Render => "picture.png",
+            Kind::Convert => "volume.nrrd",
+            Kind::Measure => "figures.json",
+            Kind::Verify => "verified.json",
+        }
+    }
+
+    /// True if it is done on a device.
+    pub fn needs_device(self) -> bool {
+        matches!(self, Kind::Render | Kind::Verify)
+    }
+}
+
+impl fmt::Display for Kind {
+    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        f.write_str(self.word())
+    }
+}
+
+/// The flags of a unit, as on the command line.
+#[derive(Parser)]
+#[command(name = "unit", no_binary_name = true, disable_help_flag = true, disable_help_subcommand = true)]
+struct UnitLine {
+    #[command(subcommand)]
+    command: UnitCommand,
+}
+
+#[derive(Subcommand)]
+enum UnitCommand {
+    Render(Box<RenderUnit>),
+    Convert(ConvertUnit),
+    Measure(MeasureUnit),
+    Verify(Box<RenderUnit>),
+}
+
+#[derive(clap::Args)]
+struct RenderUnit {
+    #[command(flatten)]
+    scene: SceneArgs,
+    #[command(flatten)]
+    geometry: GeometryArgs,
+    #[arg(long, default_value_t = 0)]
+    volume: usize,
+}
+
+#[derive(clap::Args)]
+struct ConvertUnit {
+    #[command(flatten)]
+    geometry: GeometryArgs,
+    #[arg(long, default_value_t = 0)]
+    volume: usize,
+    #[arg(long, allow_negative_numbers = true)]
+    spacing: Option<f64>,
+    #[arg(long, default_value_t = 0.0, allow_negative_numbers = true)]
+    outside: f64,
+}
+
+#[derive(clap::Args)]
+struct MeasureUnit {
+    #[command(flatten)]
+    geometry: GeometryArgs,
+    #[arg(long, default_value_t = 0)]
+    volume: usize,
+}
+
+/// What is done with a recording, checked, with all its settings. Units that differ in their recording only share it.
+pub struct Work {
+    pub kind: Kind,
+    /// As in the manifest, for results.
+    pub text: String,
+    pub geometry: GeometryArgs,
+    /// Volume of the recording, from 0.
+    pub volume: usize,
+    /// Of a picture.
+    pub layers: Layers,
+    /// Voxel spacing of a converted volume, mm.
+    pub spacing: Option<f64>,
+    /// Value of a converted volume outside the sector.
+    pub outside: f64,
+    /// The name of the output.
+    pub output: String,
+    /// Hash of all of this, and of the files that settings are read from.
+    digest: Vec<u8>,
+}
+
+impl Work {
+    /// The work of a unit. Files that its flags name are read; relative ones begin at the working folder.
+    ///
+    /// # Errors
+    /// The command line is wrong, a setting is, or the output has another format than the command makes.
+    pub fn of(unit: &Unit) -> Result<Work, Failure> {
+        let text = match (&unit.scene, &unit.command) {
+            (Some(scene), _) => format!("scene {}", serde_json::to_string(scene).unwrap_or_default()),
+            (None, Some(command)) => command.join(" "),
+            (None, None) => Kind::Render.word().into(),
+        };
+        let mut work = match &unit.scene {
+            Some(scene) => {
+                let table = Table::try_from(scene).map_err(|e| input(format!("scene: {e}")))?;
+                let mut layers = Layers::default();
+                layers.table("scene", table, Path::new("")).map_err(input)?;
+                Work::new(Kind::Render, layers, GeometryArgs::default(), 0)
+            }
+            None => Work::parse(unit.command.as_deref().unwrap_or(&["render".to_string()]))?,
+        };
+        work.output = match unit.outputs.as_slice() {
+            [] => work.kind.output().into(),
+            [one] => one.clone(),
+            several => return Err(input(format!("outputs: {} makes one file, not {}", work.kind, several.len()))),
+        };
+        work.check_output()?;
+        // What is given counts, even where it is the default: the rest follows from the recording.
+        work.text = text;
+        let settings = work.layers.clone().finish().map_err(input)?;
+        work.digest = work.hash(&settings)?;
+        Ok(work)
+    }
+
+    fn new(kind: Kind, layers: Layers, geometry: GeometryArgs, volume: usize) -> Work {
+        let (text, output) = (String::new(), String::new());
+        Work { kind, text, geometry, volume, layers, spacing: None, outside: 0.0, output, digest: Vec::new() }
+    }
+
+    fn parse(command: &[String]) -> Result<Work, Failure> {
+        let line = UnitLine::try_parse_from(command).map_err(|e| {
+            let said = e.to_string();
+            let first = said.lines().next().unwrap_or_default().trim_start_matches("error: ").to_string();
+            input(format!("command: {first}; it must be render, convert, measure or verify, with their flags"))
+        })?;
+        let drawn = |kind: Kind, flags: RenderUnit| {
+            if flags.scene.has_device() {
+                return Err(input(
+                    "command: --device and --device-timeout are flags of `echolume batch`, not of a unit",
+                ));
+            }
+            let layers = flags.scene.layers(false, &[])?;
+            let mut work = Work::new(kind, layers, flags.geometry, flags.volume);
+            // A transfer function is a name or a file.
+            let files = flags.scene.files().filter(|file| file.is_file());
+            for file in files.collect::<Vec<_>>() {
+                work.digest.extend(digest_of_settings(&file)?);
+            }
+            Ok(work)
+        };
+        match line.command {
+            UnitCommand::Render(flags) => drawn(Kind::Render, *flags),
+            UnitCommand::Verify(flags) => drawn(Kind::Verify, *flags),
+            UnitCommand::Measure(flags) => {
+                Ok(Work::new(Kind::Measure, Layers::default(), flags.geometry, flags.volume))
+            }
+            UnitCommand::Convert(flags) => Ok(Work {
+                spacing: flags.spacing,
+                outside: flags.outside,
+                ..Work::new(Kind::Convert, Layers::default(), flags.geometry, flags.volume)
+            }),
+        }
+    }
+
+    fn check_output(&self) -> Result<(), Failure> {
+        let name = Path::new(&self.output);
+        let ends = |ending: &str| name.extension().is_some_and(|e| e == ending);
+        match self.kind {
+            Kind::Convert => VolumeFile::of(name).map(drop).map_err(|e| input(format!("outputs: {e}"))),
+            Kind::Render if !ends("png") => Err(input("outputs: render makes a .png")),
+            Kind::Measure | Kind::Verify if !ends("json") => {
+                Err(input(format!("outputs: {} makes a .json", self.kind)))
+            }
+            _ => Ok(()),
+        }
+    }
+
+    /// Everything but the recording that determines the output.
+    fn hash(&self, settings: &Settings) -> Result<Vec<u8>, Failure> {
+        let settings = serde_json::to_string(settings).map_err(|e| input(format!("settings: {e}")))?;
+        // Presets decide what follows from the echoes.
+        let presets = self.layers.presets().join(",");
+        let numbers = format!("{} {:?} {:?}", self.volume, self.spacing, self.outside);
+        let axis = format!("{:?}", self.geometry.depth_axis);
+        let mut hash = Sha256::new();
+        let version = env!("CARGO_PKG_VERSION");
+        let parts = [SCHEME, version, self.kind.word(), &self.text, &settings, &presets, &numbers, &axis, &self.output];
+        for part in parts {
+            hash.update((part.len() as u64).to_le_bytes());
+            hash.update(part);
+        }
+        hash.update(&self.digest);
+        Ok(hash.finalize().to_vec())
+    }
+
+    /// The name of the outputs for a recording with this digest.
+    pub fn key(&self, digest: &str) -> Key {
+        let mut hash = Sha256::new();
+        hash.update(&self.digest);
+        hash.update(digest);
+        let mut text = super::hex(&hash.finalize());
+        text.truncate(KEY_LENGTH);
+        Key(text)
+    }
+}
+
+fn digest_of_settings(file: &Path) -> Result<Vec<u8>, Failure> {
+    let (digest, _) = sha256_of_file(file).map_err(|e| input(format!("{}: cannot be read: {e}", file.display())))?;
+    Ok(digest.into_bytes())
+}
+
+/// Names the outputs of a unit: 32 hexadecimal digits.
+#[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub struct Key(String);
+
+impl Key {
+    pub fn text(&self) -> &str {
+        &self.0
+    }
+
+    /// The folder of its files below that of the batch: 65536 folders at most, so that a million units are some tens of files in each.
+    pub fn folder(&self) -> PathBuf {
+        Path::new("units").join(&self.0[..2]).join(&self.0[2..4])
+    }
+
+    /// The record that says that the unit is done, below the folder of the batch.
+    pub fn record(&self) -> PathBuf {
+        self.folder().join(format!("{}.json", self.0))
+    }
+
+    /// An output, below the folder of the batch.
+    pub fn output(&self, name: &str) -> PathBuf {
+        self.folder().join(format!("{}-{name}", self.0))
+    }
+
+    /// A share of all keys, 0..=1, evenly spread: those below a limit are a fair sample of units.
+    pub fn share(&self) -> f64 {
+        u32::from_str_radix(&self.0[4..12], 16).map_or(0.0, |n| f64::from(n) / f64::from(u32::MAX))
+    }
+}
