@@ -101,8 +101,8 @@ pub(super) fn read_record(folder: &Path, key: &Key) -> Option<Record> {
 pub struct Results {
     file: File,
     path: PathBuf,
-    /// Keys of the units that a line says are done.
-    done: HashSet<String>,
+    /// Keys and recordings of the units that a line says are done.
+    done: HashSet<(String, String)>,
     /// The unit of each line that says that a device was lost.
     lost: Vec<(String, String)>,
 }
@@ -129,7 +129,7 @@ impl Results {
         let (mut done, mut lost) = (HashSet::new(), Vec::new());
         for record in records {
             match record.status {
-                Status::Done => drop(done.insert(record.key)),
+                Status::Done => drop(done.insert((record.key, record.input))),
                 Status::Lost => lost.push((record.input, record.work)),
                 Status::Bad | Status::Failed => {}
             }
@@ -147,14 +147,14 @@ impl Results {
         line.push(b'\n');
         self.file.write_all(&line).map_err(|e| fault(&e))?;
         if record.status == Status::Done {
-            self.done.insert(record.key.clone());
+            self.done.insert((record.key.clone(), record.input.clone()));
         }
         Ok(())
     }
 
     /// True if a line says that the unit is done: a process that is killed after it wrote the record adds none.
     pub fn has(&self, record: &Record) -> bool {
-        self.done.contains(&record.key)
+        self.done.contains(&(record.key.clone(), record.input.clone()))
     }
 
     /// How often a device was lost by a unit.

@@ -115,7 +115,9 @@ impl Job<'_> {
                 let Ok(read) = receiver.recv() else { return Ok(()) };
                 let waited = waited.elapsed().as_secs_f64();
                 let (task, key, read_in, done) = match read {
-                    Read::Finished(task, record) => {
+                    Read::Finished(task, mut record) => {
+                        // Another recording with the same content may have made it.
+                        (record.input, record.line) = (task.numbered.unit.input.clone(), task.numbered.line);
                         // The process that did it was ended before it added its line.
                         if !results.has(&record) {
                             results.add(&record).map_err(failed)?;
