@@ -107,9 +107,12 @@ mod tests {
             assert!(read.len() == expected.len() && worst <= Some(most), "{ending}: {worst:?}");
         }
         let deep = Grey { width: 2, height: 1, sixteen: true, values: vec![7, 65535], from_colour: false };
-        for (format, is_written) in
-            [(PictureFormat::Png, true), (PictureFormat::Pnm, true), (PictureFormat::Jpeg, false), (PictureFormat::Bmp, false)]
-        {
+        for (format, is_written) in [
+            (PictureFormat::Png, true),
+            (PictureFormat::Pnm, true),
+            (PictureFormat::Jpeg, false),
+            (PictureFormat::Bmp, false),
+        ] {
             let read = deep.encoded(format).ok().and_then(|bytes| image::load_from_memory(&bytes).ok());
             assert_eq!(read.map(|read| read.into_luma16().into_raw()), is_written.then(|| deep.values.clone()));
         }
