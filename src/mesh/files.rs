@@ -236,7 +236,7 @@ mod tests {
         let length = word(&bytes, 12);
         let scene: serde_json::Value = serde_json::from_slice(&bytes[20..20 + length]).expect("JSON");
         let (binary, size) = (20 + length + 8, word(&bytes, 20 + length));
-        assert!(length % 4 == 0 && &bytes[16..20] == b"JSON" && &bytes[20 + length + 4..binary] == b"BIN\0");
+        assert!(length.is_multiple_of(4) && &bytes[16..20] == b"JSON" && &bytes[20 + length + 4..binary] == b"BIN\0");
         assert_eq!((size, bytes.len()), (4 * 28 + 12 * 4, binary + size));
         assert_eq!(scene["accessors"][0]["max"], json!([1.0, 1.0, 1.0]));
         assert_eq!(scene["accessors"][0]["min"], json!([0.0, 0.0, 0.0]));

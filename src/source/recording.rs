@@ -430,6 +430,9 @@ impl Recording {
 /// The probe file to use. None if there is none, or if the `probe.toml` of the folder does not apply to this recording: it is for those
 /// that do not state their own geometry.
 fn choose_probe_file(path: &Path, given: Option<&Path>, layout: &mut Layout) -> Result<Option<ProbeFile>, InputError> {
+    if layout.pixels.pictures.is_some() && layout.states_geometry {
+        return Ok(None);
+    }
     // "sweep.mha.gz" has the probe file of "sweep.mha", and a stack that of its first picture.
     let first = layout.pixels.pictures.as_ref().and_then(|pictures| pictures.files.first());
     let named = if let Some(first) = first {

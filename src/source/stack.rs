@@ -1,13 +1,14 @@
 //! Numbered pictures of one size as the slices of a Cartesian volume: those of a folder, or those that a pattern such as `slice-*.png` names.
 
-use super::OpenOptions;
 use super::layout::{Cartesian, Layout, LineOrder, StoredGeometry, extent};
 use super::packed::Pixels;
 use super::pictures::{About, Pictures};
 use super::pixel::{Number, PixelFormat};
 use super::transforms::Poses;
-use crate::files::{InputError, escaped, quoted};
+use super::{OpenOptions, describe};
+use crate::files::{self, InputError, escaped, quoted};
 use crate::probe::{AxisOrder, Grid, World};
+use serde::Deserialize;
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -16,6 +17,8 @@ use std::sync::Arc;
 const ENDINGS: [&str; 7] = ["png", "jpg", "jpeg", "bmp", "pgm", "ppm", "pnm"];
 /// Most files of a folder that are looked at.
 const MAX_FILES: usize = 1 << 20;
+/// Largest probe file, bytes.
+const MAX_PROBE_BYTES: u64 = 1 << 20;
 /// What a stack lacks that has no geometry.
 const NO_SPACING: &str =
     "pictures do not say how large they are: give --voxel-spacing X,Y,Z (mm), or --probe for scan lines";
@@ -62,21 +65,34 @@ pub(super) fn read(path: &Path, options: &OpenOptions) -> Result<Layout, InputEr
     let side = |which: &str, n: u32| extent(path, "picture", which, n.into());
     let frame_size = [side("width ", width)?, side("height ", height)?];
     let frames = extent(path, "pictures", "number ", pictures.len() as u64)?;
-    let geometry = match options.voxel_spacing {
-        Some(_) if options.probe.is_some() => {
+    let mut remarks = Vec::new();
+    let spacing = match (options.voxel_spacing, options.probe) {
+        (Some(_), Some(_)) => {
             return Err(fault("--voxel-spacing", "and --probe say different things; give one".into()));
         }
+        (Some(spacing), None) => Some(spacing),
+        (None, probe) => {
+            let beside = pictures.first().map(|first| first.with_file_name("probe.toml")).filter(|file| file.is_file());
+            let found =
+                probe.map(Path::to_path_buf).or(beside).map(|file| stated_spacing(&file).map(|found| (file, found)));
+            let (file, spacing) = found.transpose()?.unwrap_or_default();
+            remarks.extend(spacing.map(|_| ("spacing from".to_string(), describe::path(&file))));
+            spacing
+        }
+    };
+    let states_geometry = spacing.is_some();
+    let geometry = match spacing {
         Some(spacing) => {
             let size = [frame_size[0], frame_size[1], frames];
             let grid = Grid { size, spacing, origin: [0.0; 3] };
-            grid.check().map_err(|e| fault("--voxel-spacing", format!("{} {}", e.field, e.fault)))?;
+            grid.check().map_err(|e| fault("voxel spacing", format!("{} {}", e.field, e.fault)))?;
             StoredGeometry::Cartesian(Cartesian { size, volumes: 1, world: World::of(&grid), order: AxisOrder::STORED })
         }
         None => StoredGeometry::Missing(fault("spacing", NO_SPACING.into())),
     };
     let named =
         |picture: Option<&PathBuf>| quoted(&picture.and_then(|p| p.file_name()).unwrap_or_default().to_string_lossy());
-    let remarks = vec![("pictures".into(), format!("{} to {}", named(pictures.first()), named(pictures.last())))];
+    remarks.push(("pictures".into(), format!("{} to {}", named(pictures.first()), named(pictures.last()))));
     let pixel = PixelFormat { channels: if is_colour { 3 } else { 1 }, ..PixelFormat::grey(number) };
     let pictures = Pictures { files: pictures, is_colour, each: frame_size[0] * frame_size[1] * pixel.bytes() };
     let layout = Layout {
@@ -89,13 +105,39 @@ pub(super) fn read(path: &Path, options: &OpenOptions) -> Result<Layout, InputEr
         geometry,
         backward: false,
         volumes: 1,
-        states_geometry: options.voxel_spacing.is_some(),
+        states_geometry,
         poses: Poses::default(),
         times: BTreeMap::new(),
         remarks,
     };
     layout.check(path, "pictures")?;
     Ok(layout)
+}
+
+/// A probe file of a stack of slices: nothing but their spacing.
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct StackFile {
+    voxels: Voxels,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Voxels {
+    spacing_mm: [f64; 3],
+}
+
+/// The spacing that a probe file states, mm; None for one of scan lines.
+fn stated_spacing(file: &Path) -> Result<Option<[f64; 3]>, InputError> {
+    let text = files::read_text(file, MAX_PROBE_BYTES, "probe file").map_err(|e| InputError::new(file, "file", e))?;
+    let has_voxels = toml::from_str::<toml::Table>(&text).is_ok_and(|table| table.contains_key("voxels"));
+    if !has_voxels {
+        // What is wrong with it is said by its own reader.
+        return Ok(None);
+    }
+    let read = toml::from_str::<StackFile>(&text);
+    let read = read.map_err(|e| InputError::new(file, "voxels", e.message().trim().replace('\n', ", ")))?;
+    Ok(Some(read.voxels.spacing_mm))
 }
 
 /// The folder of a stack, and the names of the pictures in it.

@@ -98,7 +98,7 @@ fn what_is_no_even_stack_is_refused_with_its_reason() {
         ("deep*.png", Some(SPACING), "deep2.png"),
         ("text*.png", Some(SPACING), "PNG, JPEG, PNM and BMP are read"),
         ("fine*.png", None, "--voxel-spacing X,Y,Z"),
-        ("fine*.png", Some([0.2, -1.0, 1.0]), "--voxel-spacing: spacing"),
+        ("fine*.png", Some([0.2, -1.0, 1.0]), "voxel spacing: spacing"),
         ("none*.png", Some(SPACING), "no file has such a name"),
         ("empty", Some(SPACING), "is a folder without pictures"),
         ("gone", Some(SPACING), "--voxel-spacing: is for a folder or a pattern"),
@@ -127,6 +127,18 @@ fn pictures_of_scan_lines_take_a_probe_file() {
     assert_eq!((found.samples, found.lines.len(), found.slices.len()), (6, 4, 3));
     // A stated spacing is the recording's own geometry.
     assert!(matches!(open(&folder.0, Some(SPACING)).expect("read").geometry(0), Geometry::Cartesian(_)));
+    // A file may state a spacing instead of scan lines.
+    folder.write("probe.toml", "[voxels]\nspacing_mm = [0.2, 0.3, 0.5]\n");
+    for probe in [None, Some(folder.0.join("probe.toml"))] {
+        let options = OpenOptions { probe: probe.as_deref(), ..OpenOptions::default() };
+        let recording = Recording::open_with(&folder.0, options).expect("read");
+        assert!(matches!(recording.geometry(0), Geometry::Cartesian(grid) if grid.spacing == SPACING));
+        assert!(
+            recording.description().iter().any(|(title, text)| title == "spacing from" && text.ends_with("probe.toml"))
+        );
+    }
+    folder.write("probe.toml", "[voxels]\nspacing_mm = [0.2, 0.3]\n");
+    assert!(fault(&folder.0, None).contains("probe.toml: voxels: "), "{}", fault(&folder.0, None));
     let both = OpenOptions {
         probe: Some(&folder.0.join("probe.toml")),
         voxel_spacing: Some(SPACING),
