@@ -9,13 +9,13 @@ use crate::probe::Geometry;
 use crate::source::Source;
 use crate::source::freehand;
 use crate::source::igtl::{Network, NetworkOptions, Poses};
+#[cfg(feature = "view")]
+use crate::source::live::SourceKind;
 use crate::source::live::{Live, Playback, PlaybackSource};
 use crate::source::motor_tracking::FreeRunning;
 use crate::source::phantom::{self, CachedPhantom, Phantom};
 use crate::source::piped::Piped;
 use crate::terminal::{Failure, failed, input};
-#[cfg(feature = "view")]
-use crate::ui::source_supervisor::SourceKind;
 use clap::Parser;
 use std::path::Path;
 

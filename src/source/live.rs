@@ -3,6 +3,20 @@
 use super::frame::{Frame, Header, Source};
 use std::time::{Duration, Instant};
 
+/// Where frames come from, for messages.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum SourceKind {
+    /// The built-in phantom.
+    Demo,
+    /// A file.
+    Recording,
+    /// Standard input.
+    Pipe,
+    /// A probe, or a server with one.
+    #[default]
+    Probe,
+}
+
 /// An event of a live source.
 #[derive(Clone, Debug)]
 pub enum Event {

@@ -160,7 +160,7 @@ impl FrameBudget {
     }
 
     /// Records that the view moved.
-    pub(super) fn view_moved(&mut self, now: Instant) {
+    fn view_moved(&mut self, now: Instant) {
         self.moved = Some(now);
     }
 

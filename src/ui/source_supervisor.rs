@@ -2,7 +2,7 @@
 
 use crate::gpu::Wake;
 use crate::live::Feed;
-use crate::source::live::Live;
+use crate::source::live::{Live, SourceKind};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::mpsc::{Receiver, TryRecvError, channel};
@@ -10,20 +10,6 @@ use std::time::{Duration, Instant};
 
 /// Opens a source, or returns the reason in one line.
 pub type OpenSource = Arc<dyn Fn() -> Result<Box<dyn Live>, String> + Send + Sync>;
-
-/// Where frames come from, for messages.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum SourceKind {
-    /// The built-in phantom.
-    Demo,
-    /// A file.
-    Recording,
-    /// Standard input.
-    Pipe,
-    /// A probe, or a server with one.
-    #[default]
-    Probe,
-}
 
 /// A message about a source: its title, its text, and whether it is a fault.
 pub(super) type SourceNotice = (&'static str, String, bool);

@@ -36,7 +36,7 @@ const TOOLS: [(Tool, &str); 5] = [
 const PLANES: [(PlaneName, &str); 3] = [(PlaneName::A, "A"), (PlaneName::B, "B"), (PlaneName::C, "C")];
 
 /// The controls in front: their names, and the sliders of which the first that the mode has is meant.
-pub(super) const FRONT: [(&str, &[&str]); 6] = [
+const FRONT: [(&str, &[&str]); 6] = [
     ("Threshold", &["Threshold"]),
     ("Gain", &["Gain"]),
     ("Smooth", &["Smoothing"]),
