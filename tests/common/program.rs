@@ -9,9 +9,14 @@ pub const PROGRAM: &str = env!("CARGO_BIN_EXE_echolume");
 impl Folder {
     /// A refused rendering keeps the old picture and writes no other file.
     pub fn refuses(&self, arguments: &[&str], named: &[&str]) {
+        self.refuses_with(2, arguments, named);
+    }
+
+    /// The same with another exit code.
+    pub fn refuses_with(&self, code: i32, arguments: &[&str], named: &[&str]) {
         let old = self.write("old.png", "old");
         let (all, before) = ([&["render"], arguments, &["-o", &old]].concat(), self.names());
-        refuses(&all, &run(&all), 2, named);
+        refuses(&all, &run(&all), code, named);
         assert_eq!(fs::read(&old).expect("the old picture is still there"), b"old", "{all:?}");
         assert_eq!(self.names(), before, "{all:?}");
     }

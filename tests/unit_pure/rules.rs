@@ -141,6 +141,18 @@ fn unsafe_code_is_forbidden_in_every_module_but_one_and_has_its_reasons_there() 
 
 /// The crate that `tools/mutants` makes is complete: no file in it names a module that is not copied.
 /// A wait for a queue waits for the picture in flight too, which may take seconds. egui-ash-renderer's own uploads of textures do that.
+/// The gate is compiled without debug assertions: what is worth an assertion is checked in every build.
+#[test]
+fn no_assertion_is_for_debug_builds_alone() {
+    for (path, text) in sources("src") {
+        let code = code(&text);
+        assert!(
+            !["debug_assert!", "debug_assert_eq!", "debug_assert_ne!"].iter().any(|name| code.contains(name)),
+            "{path}"
+        );
+    }
+}
+
 #[test]
 fn nothing_waits_for_a_whole_queue() {
     for (path, text) in sources("src") {
