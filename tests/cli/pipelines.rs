@@ -88,7 +88,7 @@ fn what_cannot_be_compared_is_refused_and_files_are_checked() {
 fn drivers_of_other_vendors_tell_registers_occupancy_and_spills() {
     let folder = Folder::new("vendors");
     let file = folder.path("p.json");
-    let arguments = ["profile", "--pipelines", "--size", "64x64", "--json", &file];
+    let arguments = ["profile", "--pipelines", "--preset", "face-classic", "--size", "64x64", "--json", &file];
     on_drivers_of_other_vendors(&arguments, |driver, out| {
         assert_eq!(json(&file)["has_statistics"], true, "{driver}");
         let rows: Vec<Vec<&str>> = out.lines().map(|line| line.split_whitespace().collect()).collect();

@@ -87,7 +87,11 @@ fn a_lost_device_costs_a_volume_and_not_the_stream() {
     use echolume::gpu::faults::InjectionPoint;
     let mut incomplete = 0;
     let mut last = None;
-    for submission in 1..=4 {
+    // Whether frames were on their way with that submission depends on how fast they came.
+    for submission in 1..=16 {
+        if submission > 4 && incomplete > 0 {
+            break;
+        }
         let (device, other) = (Device::alone(), Device::alone());
         let options = live::StreamOptions::default();
         let events = events(header(0.3), (0..6).flat_map(stamped));
@@ -117,7 +121,7 @@ fn a_lost_device_costs_a_volume_and_not_the_stream() {
         last = Some((stream, other, device));
     }
     assert!(incomplete >= 1, "no frame was lost");
-    let (mut stream, _other, _device) = last.expect("four of them");
+    let (mut stream, _other, _device) = last.expect("four at least");
     // It may have been lost to a watchdog: from then on pictures of 512 x 512 are drawn in bands, also where none were needed before.
     let renderer = stream.renderer().expect("begun");
     let mut scene = renderer.scene().clone();
