@@ -41,7 +41,7 @@ use tracing_subscriber::util::SubscriberInitExt;
                   Try: echolume render -o face.png\n     echolume render sweep.mha -o picture.png --preset fetal\n\
                   Not a medical device.",
     after_long_help = "Exit codes of every command: 0 done, 1 failed, 2 bad input or usage, 3 no Vulkan device or not the one asked for, 4 \
-                       stopped by a signal before all was done (verify). Any other command ends by the signal itself. `-` as a recording \
+                       stopped by a signal before all was done (verify). `batch`: also 3, device lost, and 4, some units failed. Any other command ends by the signal itself. `-` as a recording \
                        is standard input; `-o -` writes a picture to standard output, and every line to standard error."
 )]
 struct Arguments {

@@ -107,6 +107,20 @@ pub enum Mode {
 }
 
 impl Mode {
+    /// All modes, in the order of their keys in the view.
+    pub const ALL: [Mode; 10] = [
+        Mode::Surface,
+        Mode::Volume,
+        Mode::Mixed,
+        Mode::Mip,
+        Mode::MinIp,
+        Mode::Mean,
+        Mode::Plane,
+        Mode::Orthogonal,
+        Mode::Tomography,
+        Mode::Cube,
+    ];
+
     /// True for modes that cut planes and cast no rays.
     pub fn is_flat(self) -> bool {
         matches!(self, Mode::Plane | Mode::Orthogonal | Mode::Tomography)

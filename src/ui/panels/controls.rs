@@ -11,20 +11,6 @@ use egui::{
     StrokeKind, Ui, WidgetInfo, WidgetType, pos2, vec2,
 };
 
-/// All modes, in the order of their keys.
-const MODES: [Mode; 10] = [
-    Mode::Surface,
-    Mode::Volume,
-    Mode::Mixed,
-    Mode::Mip,
-    Mode::MinIp,
-    Mode::Mean,
-    Mode::Plane,
-    Mode::Orthogonal,
-    Mode::Tomography,
-    Mode::Cube,
-];
-
 const TOOLS: [(Tool, &str); 5] = [
     (Tool::Rotate, "Turn"),
     (Tool::Light, "Light"),
@@ -53,7 +39,7 @@ pub(super) fn show_modes(ui: &mut Ui, state: &PanelState, width: f32, execute: &
             let row = Row { width, height: TOUCH_SIZE * 0.92 };
             ui.add_space(6.0);
             heading(ui, "Mode");
-            let modes = MODES.map(|mode| (mode, mode.title()));
+            let modes = Mode::ALL.map(|mode| (mode, mode.title()));
             row.show(ui, &modes, 2, |m| settings.mode == m, hints::of_mode, |m| execute(Command::Mode(m)));
             heading(ui, "Layout");
             let layouts = [(Layout::Single, "Single"), (Layout::Four, "4-up"), (Layout::Pair, "VR | SR")];
@@ -398,7 +384,7 @@ mod tests {
 
     #[test]
     fn every_mode_has_the_controls_in_front_that_it_can_have() {
-        for mode in MODES {
+        for mode in Mode::ALL {
             let mut settings = Layers::default().finish().expect("settings");
             settings.set_mode(mode);
             let names: Vec<&str> = FRONT

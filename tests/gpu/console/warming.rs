@@ -36,19 +36,7 @@ fn after_a_rest_no_mode_layout_or_preset_compiles_anything() {
     let warmed = desk.warm_up(&device);
     assert!(warmed > 30, "only {warmed} pipelines were compiled in advance");
     let count = compiled(&device);
-    let modes = [
-        Mode::Surface,
-        Mode::Volume,
-        Mode::Mixed,
-        Mode::Mip,
-        Mode::MinIp,
-        Mode::Mean,
-        Mode::Plane,
-        Mode::Orthogonal,
-        Mode::Tomography,
-        Mode::Cube,
-    ];
-    for mode in modes {
+    for mode in Mode::ALL {
         desk.console.execute(&Command::Mode(mode), Instant::now());
         desk.rest();
         assert_eq!(desk.console.controls().settings().mode, mode);
