@@ -1,8 +1,5 @@
-// Rays, the map from space to the sweep, and sampling of the volume: shared by all ray casters. Variants:
-//   plain               Cartesian or a single frame: no table
-//   SWEPT               fan or translated: the sweep look-up table
-//   INTRA_FRAME_MOTION  the motor moves while a frame is acquired: the line look-up table
-//   NON_UNIFORM         slices at non-uniform positions or of mixed directions: the slice table
+// Rays, the map from space to the sweep, and sampling of the volume: shared by all ray casters. Tables that a geometry does not need are
+// not bound; the constants keep them from being read.
 
 layout(constant_id = 0) const int SWEEP = 1;    // 0 Cartesian, 1 fan, 2 translated, 3 still
 layout(constant_id = 1) const int ARRAY = 1;    // 0 linear, 1 curved, 2 curved with lines 90 degrees or more off the axis
@@ -11,20 +8,18 @@ layout(constant_id = 2) const int SAMPLING = 0; // 0 the device's filter, 1 eigh
 layout(constant_id = 19) const int ELEVATION = 0; // between slices: 0 linear, 1 the uniform cubic B-spline
 layout(constant_id = 20) const int CLIPS = 0;   // clip planes
 layout(constant_id = 21) const int SPREAD = 0;  // 1: steps grow with the range, as the sample spacing of a convex sweep does
+layout(constant_id = 36) const int INTRA_FRAME_MOTION = 0; // 1: the motor moves while a frame is acquired
+layout(constant_id = 37) const int NON_UNIFORM = 0; // 1: slices at non-uniform positions or of mixed directions
 layout(constant_id = 22) const int SLIDING = 0; // 3 or 5: edge of the Gaussian that slides along the ray
 
 #include "stored_volume.glsl"
 uniform sampler3D volume;
 uniform utexture3D packed_neighbours;
-#ifdef SWEPT
-readonly buffer SweepLut { float entry[]; } sweep_lut;
-#endif
-#ifdef INTRA_FRAME_MOTION
-readonly buffer LineLut { float entry[]; } line_lut;
-#endif
-#ifdef NON_UNIFORM
-readonly buffer SliceTable { vec2 entry[]; } slice_table; // position and advance, in mean pitches
-#endif
+readonly buffer SweepLut { float entry[]; } sweep_lut;      // of SWEPT
+readonly buffer LineLut { float entry[]; } line_lut;        // of INTRA_FRAME_MOTION
+readonly buffer SliceTable { vec2 entry[]; } slice_table;   // of NON_UNIFORM: position and advance, in mean pitches
+
+const bool SWEPT = SWEEP == 1 || SWEEP == 2; // fan or translated
 
 // Queried once, because every sample needs it.
 ivec3 last_stored = first_stored + textureSize(volume, 0) - 1;
@@ -130,14 +125,10 @@ struct Sector {
 
 Sector sector() {
     float entries = 0.0, slices = 0.0;
-#ifdef SWEPT
-    entries = float(sweep_lut.entry.length() - 1);
-#ifdef NON_UNIFORM
-    slices = float(slice_table.entry.length() - 1);
-#else
-    slices = last_slice;
-#endif
-#endif
+    if (SWEPT) {
+        entries = float(sweep_lut.entry.length() - 1);
+        slices = NON_UNIFORM == 1 ? float(slice_table.entry.length() - 1) : last_slice;
+    }
     return Sector(vec4(range_low, line_low, 0.0, -1e-4), vec4(range_high, line_high, entries, slices + 1e-4));
 }
 
@@ -176,32 +167,31 @@ bool locate(vec3 p, out vec3 texel, out vec4 place) {
         line = line_at(x, y, range);
     }
     float e = 0.0, k = 0.0;
-#ifdef SWEPT
-    e = (position - sweep_low) * sweep_density;
-    int last = sweep_lut.entry.length() - 1;
-    int i = clamp(int(e), 0, last - 1);
-    k = mix(sweep_lut.entry[i], sweep_lut.entry[i + 1], clamp(e - float(i), 0.0, 1.0));
-#ifdef INTRA_FRAME_MOTION
-    // Share of the frame's lines that fired before this one.
-    float l = clamp((line - line_low) * line_density, 0.0, float(line_lut.entry.length() - 1));
-    int j = clamp(int(l), 0, line_lut.entry.length() - 2);
-    float share = mix(line_lut.entry[j], line_lut.entry[j + 1], l - float(j));
-#else
-    const float share = 0.0;
-#endif
-#ifdef NON_UNIFORM
-    // Bracketing: positions increase from slice to slice for every line, and the uniform guess is rarely off by more than one.
-    int slices = slice_table.entry.length();
-    int s = clamp(int(k), 0, slices - 2);
-    while (s > 0 && slice_table.entry[s].x + slice_table.entry[s].y * share > k) --s;
-    while (s + 2 < slices && slice_table.entry[s + 1].x + slice_table.entry[s + 1].y * share <= k) ++s;
-    float here = slice_table.entry[s].x + slice_table.entry[s].y * share;
-    float next = slice_table.entry[s + 1].x + slice_table.entry[s + 1].y * share;
-    k = float(s) + (k - here) / (next - here);
-#else
-    k -= advance * share;
-#endif
-#endif
+    if (SWEPT) {
+        e = (position - sweep_low) * sweep_density;
+        int last = sweep_lut.entry.length() - 1;
+        int i = clamp(int(e), 0, last - 1);
+        k = mix(sweep_lut.entry[i], sweep_lut.entry[i + 1], clamp(e - float(i), 0.0, 1.0));
+        // Share of the frame's lines that fired before this one.
+        float share = 0.0;
+        if (INTRA_FRAME_MOTION == 1) {
+            float l = clamp((line - line_low) * line_density, 0.0, float(line_lut.entry.length() - 1));
+            int j = clamp(int(l), 0, line_lut.entry.length() - 2);
+            share = mix(line_lut.entry[j], line_lut.entry[j + 1], l - float(j));
+        }
+        if (NON_UNIFORM == 1) {
+            // Bracketing: positions increase from slice to slice for every line, and the uniform guess is rarely off by more than one.
+            int slices = slice_table.entry.length();
+            int s = clamp(int(k), 0, slices - 2);
+            while (s > 0 && slice_table.entry[s].x + slice_table.entry[s].y * share > k) --s;
+            while (s + 2 < slices && slice_table.entry[s + 1].x + slice_table.entry[s + 1].y * share <= k) ++s;
+            float here = slice_table.entry[s].x + slice_table.entry[s].y * share;
+            float next = slice_table.entry[s + 1].x + slice_table.entry[s + 1].y * share;
+            k = float(s) + (k - here) / (next - here);
+        } else if (INTRA_FRAME_MOTION == 1) {
+            k -= advance * share;
+        }
+    }
     texel = vec3((vec2(x, y) - grid_origin) * grid_density, k);
     place = vec4(range, line, e, k);
     Sector limits = sector();

@@ -1,6 +1,6 @@
 // The volume as a solid block: each ray shows the sample where it enters the block. Where that is outside the insonified
 // region, the ray continues until it is inside: the sector's border is then a face.
-// variants: plain; uniform SWEPT; intra_frame_motion SWEPT INTRA_FRAME_MOTION; non_uniform SWEPT NON_UNIFORM; non_uniform_intra_frame_motion SWEPT NON_UNIFORM INTRA_FRAME_MOTION
+// variants: plain
 #version 460
 #include "common.glsl"
 layout(constant_id = 3) const int EDGES = 1; // lines where two faces meet
@@ -24,11 +24,7 @@ const float EDGE_WIDTH = 1.5;
 // Cosine of the least angle between faces that meet at an edge, 8 degrees: where a plane touches an arc there is none.
 const float SAME_FACE = 0.99;
 
-#ifdef SWEPT
-const int BORDERS = 6;
-#else
-const int BORDERS = SWEEP == 0 ? 0 : 4;
-#endif
+const int BORDERS = SWEPT ? 6 : SWEEP == 0 ? 0 : 4;
 
 // Outward normal of one of the sector's borders near a point, and in w the distance from the point to the border, mm: first
 // and last range, line and slice. `slice` is the point's slice index. The motor's motion during a frame rotates the slices by
@@ -54,11 +50,11 @@ vec4 border(int n, vec3 p, float slice) {
     vec3 sweep = SWEEP == 1 ? vec3(0.0, -p.z / rho, beyond / rho) : vec3(0.0, 0.0, 1.0);
     // In mean pitches from the first slice.
     float position = slice, last = last_slice;
-#ifdef NON_UNIFORM
-    int s = clamp(int(slice), 0, slice_table.entry.length() - 2);
-    position = mix(slice_table.entry[s].x, slice_table.entry[s + 1].x, slice - float(s));
-    last = slice_table.entry[slice_table.entry.length() - 1].x;
-#endif
+    if (NON_UNIFORM == 1) {
+        int s = clamp(int(slice), 0, slice_table.entry.length() - 2);
+        position = mix(slice_table.entry[s].x, slice_table.entry[s + 1].x, slice - float(s));
+        last = slice_table.entry[slice_table.entry.length() - 1].x;
+    }
     float pitch = slice_pitch * rho;
     return n == 4 ? vec4(-sweep, position * pitch) : vec4(sweep, (last - position) * pitch);
 }
@@ -96,12 +92,12 @@ float distance_to_sector(vec3 p) {
     float range = ARRAY != 0 ? length(vec2(x, y)) : y;
     distance = max(distance, max(range - range_high, range_low - range));
     distance = max(distance, ARRAY != 0 ? distance_to_lines(vec2(x, y)) : max(x - line_high, line_low - x));
-#ifdef SWEPT
-    float sweep_high = sweep_low + float(sweep_lut.entry.length() - 1) / sweep_density;
-    vec2 q = vec2(p.z, p.y - axis_depth);
-    distance = max(distance, SWEEP == 1 ? max(beyond_angle(q, sweep_high), -beyond_angle(q, sweep_low))
-                                : max(p.z - sweep_high, sweep_low - p.z));
-#endif
+    if (SWEPT) {
+        float sweep_high = sweep_low + float(sweep_lut.entry.length() - 1) / sweep_density;
+        vec2 q = vec2(p.z, p.y - axis_depth);
+        distance = max(distance, SWEEP == 1 ? max(beyond_angle(q, sweep_high), -beyond_angle(q, sweep_low))
+                                            : max(p.z - sweep_high, sweep_low - p.z));
+    }
     return distance;
 }
 

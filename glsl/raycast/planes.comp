@@ -1,6 +1,6 @@
 // MPR: each pixel shows a point of its tile's plane, or the mean, largest or smallest value of a slab around it. No ray is cast.
 // TONED: writes the final 8 bits directly, where stage 4 only tones.
-// variants: plain; uniform SWEPT; intra_frame_motion SWEPT INTRA_FRAME_MOTION; non_uniform SWEPT NON_UNIFORM; non_uniform_intra_frame_motion SWEPT NON_UNIFORM INTRA_FRAME_MOTION; toned_plain TONED LINES; toned_uniform TONED LINES SWEPT; toned_intra_frame_motion TONED LINES SWEPT INTRA_FRAME_MOTION; toned_non_uniform TONED LINES SWEPT NON_UNIFORM; toned_non_uniform_intra_frame_motion TONED LINES SWEPT NON_UNIFORM INTRA_FRAME_MOTION
+// variants: plain; toned TONED LINES
 #version 460
 #include "common.glsl"
 layout(constant_id = 3) const int SAMPLES = 1; // through the slab

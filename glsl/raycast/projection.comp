@@ -1,5 +1,5 @@
 // The largest, the smallest, or the mean of the samples of each ray in the insonified region.
-// variants: plain; uniform SWEPT; intra_frame_motion SWEPT INTRA_FRAME_MOTION; non_uniform SWEPT NON_UNIFORM; non_uniform_intra_frame_motion SWEPT NON_UNIFORM INTRA_FRAME_MOTION
+// variants: plain
 #version 460
 #include "common.glsl"
 layout(constant_id = 3) const int KEPT = 0; // 0 largest, 1 smallest, 2 mean

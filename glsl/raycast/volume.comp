@@ -1,29 +1,24 @@
-// VR: emission and absorption, front to back (thesis 4-1, 4-2). Variants add to those of the sweep:
-//   LAYER  the ray ends at the surface; the result is a layer in front of it
-//   BEHIND the ray begins at the surface and ends at a depth behind it; the result is the surface's colour
-//   HIT    the position where the ray becomes opaque enough is stored, to be lit
-// variants: plain; uniform SWEPT; intra_frame_motion SWEPT INTRA_FRAME_MOTION; non_uniform SWEPT NON_UNIFORM; non_uniform_intra_frame_motion SWEPT NON_UNIFORM INTRA_FRAME_MOTION; layer_plain LAYER; layer_uniform LAYER SWEPT; layer_intra_frame_motion LAYER SWEPT INTRA_FRAME_MOTION; layer_non_uniform LAYER SWEPT NON_UNIFORM; layer_non_uniform_intra_frame_motion LAYER SWEPT NON_UNIFORM INTRA_FRAME_MOTION; behind_plain BEHIND; behind_uniform BEHIND SWEPT; behind_intra_frame_motion BEHIND SWEPT INTRA_FRAME_MOTION; behind_non_uniform BEHIND SWEPT NON_UNIFORM; behind_non_uniform_intra_frame_motion BEHIND SWEPT NON_UNIFORM INTRA_FRAME_MOTION; hit_plain HIT; hit_uniform HIT SWEPT; hit_intra_frame_motion HIT SWEPT INTRA_FRAME_MOTION; hit_non_uniform HIT SWEPT NON_UNIFORM; hit_non_uniform_intra_frame_motion HIT SWEPT NON_UNIFORM INTRA_FRAME_MOTION
+// VR: emission and absorption, front to back (thesis 4-1, 4-2).
+// variants: plain
 #version 460
 #include "common.glsl"
+const int LAYER = 1;  // the ray ends at the surface; the result is a layer in front of it
+const int BEHIND = 2; // the ray begins at the surface and ends at a depth behind it; the result is the surface's colour
+const int HIT = 3;    // the position where the ray becomes opaque enough is stored, to be lit
+layout(constant_id = 3) const int PART = 0; // 0: the whole ray, or one of the above
 layout(scalar) uniform Params {
 #include "ray_params.glsl"
 #include "compositing_params.glsl"
     float hit_opacity;      // a hit is recorded at this opacity
-#ifdef BEHIND
-    float colour_depth; // behind the surface, mm
-#endif
+    float colour_depth;     // behind the surface, mm
 };
 #include "ray.glsl"
 #include "sliding.glsl"
 #include "empty_space.glsl"
 #include "compositing.glsl"
 uniform writeonly image2D picture;
-#if defined(LAYER) || defined(BEHIND)
-uniform texture2D distance_map;
-#endif
-#ifdef HIT
-uniform writeonly image2D distance_map;
-#endif
+uniform texture2D distance_map;         // of LAYER and BEHIND
+uniform writeonly image2D hit_distance; // of HIT
 
 vec4 looked_up_between(float front, float back) {
     vec2 e = vec2(front, back) * float(ENTRIES - 1);
@@ -56,15 +51,14 @@ void main() {
     ivec2 pixel = ivec2(gl_GlobalInvocationID.xy);
     if (any(greaterThanEqual(pixel, imageSize(picture)))) return;
     Ray ray = ray_of(pixel);
-#ifdef LAYER
-    ray.leave = min(ray.leave, texelFetch(distance_map, pixel, 0).x);
-#endif
-#ifdef BEHIND
-    // A miss is farther away than any box.
-    float surface = texelFetch(distance_map, pixel, 0).x;
-    ray.enter = max(ray.enter, surface);
-    ray.leave = min(ray.leave, surface + colour_depth);
-#endif
+    if (PART == LAYER) {
+        ray.leave = min(ray.leave, texelFetch(distance_map, pixel, 0).x);
+    } else if (PART == BEHIND) {
+        // A miss is farther away than any box.
+        float surface = texelFetch(distance_map, pixel, 0).x;
+        ray.enter = max(ray.enter, surface);
+        ray.leave = min(ray.leave, surface + colour_depth);
+    }
     float path = ray.leave - ray.enter;
     vec3 colour = vec3(0.0);
     float opacity = 0.0;
@@ -140,12 +134,10 @@ void main() {
                 }
                 float before = opacity;
                 add_step(entry, length, p, ray.direction, colour, opacity);
-#ifdef HIT
                 // Interpolated between two samples, so that the surface has no terraces.
-                if (hit == MISS && opacity >= hit_opacity) {
+                if (PART == HIT && hit == MISS && opacity >= hit_opacity) {
                     hit = ray.enter + from + length * clamp((hit_opacity - before) / max(opacity - before, 1e-12), 0.0, 1.0);
                 }
-#endif
                 if (EARLY_END == 1 && opacity >= opaque_enough) complete = stop = -1;
             }
             // What is skipped next ends with a sample that this ray has not taken yet.
@@ -153,7 +145,5 @@ void main() {
         }
     }
     imageStore(picture, pixel, developed(colour, opacity, pixel, imageSize(picture)));
-#ifdef HIT
-    imageStore(distance_map, pixel, vec4(hit, 0.0, 0.0, 0.0));
-#endif
+    if (PART == HIT) imageStore(hit_distance, pixel, vec4(hit, 0.0, 0.0, 0.0));
 }

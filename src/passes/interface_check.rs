@@ -9,11 +9,25 @@ use crate::spirv::strip_bindings::strip_bindings;
 use crate::spirv::texture_to_storage::{ImageFormat, texture_to_storage};
 use crate::spirv::{self, Access, Dimension, Kind, Member, Module};
 
-/// Textures that a shader declares and a pass may not bind: bricks, packed neighbours, the light volume, and the echo at a surface. Specialization
-/// constants say whether they are read or written.
-const OPTIONAL: [&str; 6] = ["bricks", "light_normals", "light_shade", "packed_neighbours", "surface", "volume_bricks"];
+/// Textures and tables that a shader declares and a pass may not bind. Specialization constants say whether they are read or written.
+const OPTIONAL: [&str; 14] = [
+    "bricks",
+    "distance_map",
+    "hit_distance",
+    "light_normals",
+    "light_shade",
+    "line_lut",
+    "occlusion",
+    "packed_neighbours",
+    "shadow",
+    "slice_table",
+    "surface",
+    "sweep_lut",
+    "volume_bricks",
+    "volume_layer",
+];
 
-/// A pass's shader without the textures that this scene does not have.
+/// A pass's shader without the textures and tables that this scene does not have.
 ///
 /// # Errors
 /// A module that breaks the format.

@@ -56,7 +56,7 @@ pub const MATTER: Pass = Pass {
     stage: Stage::Raycast,
     frequency: Frequency::Picture,
     link: Link::None,
-    shader: |s, _| ray::variant!(s, "light_volume/matter"),
+    shader: |_, _| "light_volume/matter.plain",
     needed: need,
     reads: |s, _| {
         let mut reads = ray::reads(s);
@@ -75,7 +75,7 @@ pub const MATTER: Pass = Pass {
     },
     constants: |s, _| {
         let mut constants = ray::constants(s);
-        constants.retain(|(name, _)| matches!(*name, "SWEEP" | "ARRAY" | "SAMPLING" | "ELEVATION" | "CLIPS"));
+        constants.retain(|(name, _)| *name != "SPREAD");
         constants.push(("ENTRIES", s.transfer_entries() as i32));
         constants.push(("TAPS", light_of(s).taps as i32));
         constants

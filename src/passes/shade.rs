@@ -11,27 +11,7 @@ pub const LIGHT: Pass = Pass {
     stage: Stage::Shade,
     frequency: Frequency::Picture,
     link: Link::Observer(Chain::Distances),
-    shader: |s, _| {
-        let arrives = (casts_shadow(s), is_occluded(s));
-        match (lit_thing(s), arrives) {
-            (Lit::Surface, (false, false)) => "shade/light.plain",
-            (Lit::Surface, (true, false)) => "shade/light.shadowed",
-            (Lit::Surface, (false, true)) => "shade/light.occluded",
-            (Lit::Surface, (true, true)) => "shade/light.shadowed_occluded",
-            (Lit::BehindLayer, (false, false)) => "shade/light.behind_layer_plain",
-            (Lit::BehindLayer, (true, false)) => "shade/light.behind_layer_shadowed",
-            (Lit::BehindLayer, (false, true)) => "shade/light.behind_layer_occluded",
-            (Lit::BehindLayer, (true, true)) => "shade/light.behind_layer_shadowed_occluded",
-            (Lit::Composited, (false, false)) => "shade/light.composited_plain",
-            (Lit::Composited, (true, false)) => "shade/light.composited_shadowed",
-            (Lit::Composited, (false, true)) => "shade/light.composited_occluded",
-            (Lit::Composited, (true, true)) => "shade/light.composited_shadowed_occluded",
-            (Lit::Coloured, (false, false)) => "shade/light.coloured_plain",
-            (Lit::Coloured, (true, false)) => "shade/light.coloured_shadowed",
-            (Lit::Coloured, (false, true)) => "shade/light.coloured_occluded",
-            (Lit::Coloured, (true, true)) => "shade/light.coloured_shadowed_occluded",
-        }
-    },
+    shader: |_, _| "shade/light.plain",
     needed: |s| match (s.has_distance(), s.lights_volume()) {
         (true, false) => Ok("a surface is lit"),
         (true, true) => Ok("the volume is lit where rays hit it first"),
@@ -67,15 +47,22 @@ pub const LIGHT: Pass = Pass {
     constants: |s, _| {
         let light = &s.settings.light;
         let dims_pixel = light.shadow.is_some_and(|shadow| shadow.dims == Dims::Pixel);
-        let mut constants = vec![("POINT", light.position.is_some() as i32), ("SKIN", s.skin().is_some() as i32)];
-        constants.extend(casts_shadow(s).then_some(("DIMS_PIXEL", dims_pixel as i32)));
-        if lit_thing(s) != Lit::Composited {
-            constants.push(("ECHO", s.lights_by_echo() as i32));
-        }
-        if lit_thing(s) == Lit::Coloured {
-            constants.push(("AMBIENT_ONLY", (s.settings.surface.colour == SurfaceColour::Rendered) as i32));
-        }
-        constants
+        let subject = match lit_thing(s) {
+            Lit::Surface => 0,
+            Lit::BehindLayer => 1,
+            Lit::Composited => 2,
+            Lit::Coloured => 3,
+        };
+        vec![
+            ("POINT", light.position.is_some() as i32),
+            ("SKIN", s.skin().is_some() as i32),
+            ("DIMS_PIXEL", dims_pixel as i32),
+            ("AMBIENT_ONLY", (s.settings.surface.colour == SurfaceColour::Rendered) as i32),
+            ("ECHO", s.lights_by_echo() as i32),
+            ("SUBJECT", subject),
+            ("SHADOWED", casts_shadow(s) as i32),
+            ("OCCLUDED", is_occluded(s) as i32),
+        ]
     },
     tolerance: Tolerance {
         absolute: 6e-3,

@@ -143,14 +143,14 @@ mod tests {
             let same = old.iter().filter(kept).zip(new.iter().filter(kept));
             assert!(same.clone().count() > 0 && same.into_iter().all(|(o, n)| o.operands == n.operands), "{name}");
         }
-        let (early, late) = count_loads(&words(embedded("raycast/projection.uniform").unwrap()));
+        let (early, late) = count_loads(&words(embedded("raycast/projection.plain").unwrap()));
         assert!(early + late > 40, "ray casting has that many uniform numbers");
     }
 
     #[test]
     fn a_malformed_module_is_an_error() {
         // A small ray caster: the time is that of its square.
-        let intact = words(embedded("raycast/planes.non_uniform").unwrap());
+        let intact = words(embedded("raycast/planes.plain").unwrap());
         for cut in 1..intact.len() {
             let _ = hoist_uniforms(&intact[..cut]);
         }

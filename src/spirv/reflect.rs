@@ -315,7 +315,7 @@ mod tests {
     #[test]
     fn a_malformed_module_is_an_error_and_not_a_panic() {
         // A small ray caster: the time is that of its square.
-        let intact = words(embedded("raycast/planes.intra_frame_motion").unwrap());
+        let intact = words(embedded("raycast/planes.plain").unwrap());
         assert!(reflect(&[]).is_err());
         for cut in 1..intact.len() {
             let _ = reflect(&intact[..cut]);

@@ -239,7 +239,7 @@ mod tests {
 
     #[test]
     fn tables_become_texel_buffers_and_nothing_else_changes() {
-        let before = words(embedded("raycast/volume.non_uniform_intra_frame_motion").unwrap());
+        let before = words(embedded("raycast/volume.plain").unwrap());
         let mut names = table_names(&before);
         names.sort();
         assert_eq!(names, ["line_lut", "slice_table", "sweep_lut", "transfer"]);
@@ -272,7 +272,7 @@ mod tests {
     #[test]
     fn a_malformed_module_is_an_error() {
         // A small ray caster: the time is that of its square.
-        let intact = words(embedded("raycast/planes.non_uniform").unwrap());
+        let intact = words(embedded("raycast/planes.plain").unwrap());
         for cut in 1..intact.len() {
             let _ = storage_to_texel_buffer(&intact[..cut], |_| true);
         }

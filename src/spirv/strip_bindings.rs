@@ -1,15 +1,15 @@
-//! Removes bindings of textures that a module declares but a scene does not have. Specialization constants keep such
-//! textures from being read or written. Without this rewrite either a dummy texture would be bound or each combination would need a
-//! shader variant of its own.
+//! Removes bindings of textures and tables that a module declares but a scene does not have. Specialization constants keep them from
+//! being read or written. Without this rewrite either a dummy would be bound or each combination would need a shader variant of its own.
 
 use super::module::{HEADER_WORDS, Instruction, SpirvError, decode, encode, error, op, storage_class, text};
 use std::collections::HashSet;
 
-/// The module without the textures of these names. Texels fetched and samples taken from them become undefined values, so no code that runs
-/// may use one; texels stored to them are left out. Names that the module does not have are ignored.
+/// The module without the textures and storage buffers of these names. Texels fetched, samples taken, numbers loaded and lengths become
+/// undefined values, so no code that runs may use one; texels stored are left out. Names that the module does not have are ignored.
 ///
 /// # Errors
-/// A module that breaks the format, or a texture that is used other than by fetches, samples of a given level, stores of texels and size queries.
+/// A module that breaks the format, a texture that is used other than by fetches, samples of a given level, stores of texels and size queries, or a
+/// buffer that is used other than by loads and queries of its length.
 pub fn strip_bindings(words: &[u32], names: &[&str]) -> Result<Vec<u32>, SpirvError> {
     let instructions = decode(words)?;
     let stripped = Stripped::find(&instructions, names);
@@ -27,8 +27,10 @@ pub fn strip_bindings(words: &[u32], names: &[&str]) -> Result<Vec<u32>, SpirvEr
 #[derive(Default)]
 struct Stripped {
     variables: HashSet<u32>,
-    /// Images loaded from these variables.
-    images: HashSet<u32>,
+    /// Images loaded from these variables, and pointers into them.
+    parts: HashSet<u32>,
+    /// The pointers among them.
+    pointers: HashSet<u32>,
 }
 
 impl Stripped {
@@ -38,15 +40,23 @@ impl Stripped {
         for i in instructions {
             match (i.opcode, i.operands) {
                 (op::NAME, [id, name @ ..]) if names.contains(&text(name).as_str()) => drop(named.insert(*id)),
-                (op::VARIABLE, [_, id, storage_class::UNIFORM_CONSTANT, ..]) if named.contains(id) => {
+                (op::VARIABLE, [_, id, storage_class::UNIFORM_CONSTANT | storage_class::STORAGE_BUFFER, ..])
+                    if named.contains(id) =>
+                {
                     stripped.variables.insert(*id);
                 }
                 (op::LOAD, [_, id, from, ..]) if stripped.variables.contains(from) => {
-                    stripped.images.insert(*id);
+                    stripped.parts.insert(*id);
+                }
+                (op::ACCESS_CHAIN | op::IN_BOUNDS_ACCESS_CHAIN, [_, id, from, ..])
+                    if stripped.variables.contains(from) =>
+                {
+                    stripped.parts.insert(*id);
+                    stripped.pointers.insert(*id);
                 }
                 // The image of a texture that is also sampled.
-                (op::IMAGE, [_, id, from]) if stripped.images.contains(from) => {
-                    stripped.images.insert(*id);
+                (op::IMAGE, [_, id, from]) if stripped.parts.contains(from) => {
+                    stripped.parts.insert(*id);
                 }
                 _ => {}
             }
@@ -56,10 +66,17 @@ impl Stripped {
 
     fn rewrite(&self, i: &Instruction, out: &mut Vec<u32>) -> Result<(), SpirvError> {
         let a = i.operands;
-        let is_stripped = |id: &u32| self.variables.contains(id) || self.images.contains(id);
+        let is_stripped = |id: &u32| self.variables.contains(id) || self.parts.contains(id);
         match (i.opcode, a) {
-            (op::NAME | op::DECORATE, [id, ..]) | (op::VARIABLE | op::LOAD | op::IMAGE, [_, id, ..])
+            (op::NAME | op::DECORATE, [id, ..])
+            | (op::VARIABLE | op::LOAD | op::IMAGE | op::ACCESS_CHAIN | op::IN_BOUNDS_ACCESS_CHAIN, [_, id, ..])
                 if is_stripped(id) => {}
+            (op::LOAD, [of, result, from, ..]) if self.pointers.contains(from) => {
+                out.extend(encode(op::UNDEF, &[*of, *result]));
+            }
+            (op::ARRAY_LENGTH, [of, result, from, ..]) if self.variables.contains(from) => {
+                out.extend(encode(op::UNDEF, &[*of, *result]));
+            }
             // Operands: execution model, function, name, and the variables of its interface.
             (op::ENTRY_POINT, [_, _, named @ ..]) => {
                 let ends = |word: &u32| word.to_le_bytes().contains(&0);
@@ -74,7 +91,7 @@ impl Stripped {
                 out.extend(encode(op::UNDEF, &[*of, *result]));
             }
             (op::IMAGE_WRITE, [image, ..]) if is_stripped(image) => {}
-            // Any other use of an image: calls, stores, copies, samples, selections.
+            // Any other use: calls, stores, copies, samples, selections.
             (
                 op::FUNCTION_CALL
                 | op::STORE..=op::PTR_ACCESS_CHAIN
@@ -83,8 +100,8 @@ impl Stripped {
                 | op::SELECT
                 | op::PHI,
                 _,
-            ) if a.iter().skip(2).any(is_stripped) => {
-                return error(format!("operation {} uses a texture that is to be removed", i.opcode));
+            ) if a.iter().skip(if i.opcode == op::STORE { 0 } else { 2 }).any(is_stripped) => {
+                return error(format!("operation {} uses a texture or a table that is to be removed", i.opcode));
             }
             _ => out.extend(encode(i.opcode, a)),
         }
@@ -100,12 +117,12 @@ mod tests {
 
     #[test]
     fn only_the_named_bindings_are_removed() {
-        let before = words(embedded("raycast/surface.intra_frame_motion").unwrap());
-        let after = strip_bindings(&before, &["bricks", "packed_neighbours", "nothing"]).unwrap();
+        let removed = ["bricks", "packed_neighbours", "line_lut", "slice_table"];
+        let before = words(embedded("raycast/surface.plain").unwrap());
+        let after = strip_bindings(&before, &[&removed[..], &["nothing"]].concat()).unwrap();
         let (old, new) = (reflect(&before).unwrap(), reflect(&after).unwrap());
-        let kept: Vec<_> =
-            old.bindings.iter().filter(|b| !["bricks", "packed_neighbours"].contains(&b.name.as_str())).collect();
-        assert_eq!(old.bindings.len(), kept.len() + 2);
+        let kept: Vec<_> = old.bindings.iter().filter(|b| !removed.contains(&b.name.as_str())).collect();
+        assert_eq!(old.bindings.len(), kept.len() + removed.len());
         assert_eq!(new.bindings.iter().collect::<Vec<_>>(), kept);
         assert_eq!((old.params, old.constants, old.local_size), (new.params, new.constants, new.local_size));
         assert_eq!(strip_bindings(&before, &["nothing"]).unwrap(), before);
@@ -113,11 +130,11 @@ mod tests {
 
     #[test]
     fn a_sampled_texture_is_removed_and_a_malformed_module_is_an_error() {
-        let intact = words(embedded("raycast/surface.intra_frame_motion").unwrap());
+        let intact = words(embedded("raycast/surface.plain").unwrap());
         let without = reflect(&strip_bindings(&intact, &["volume"]).unwrap()).unwrap();
         assert!(without.bindings.iter().all(|b| b.name != "volume"), "it is read with a filter and without");
         // A small ray caster: the time is that of its square.
-        let intact = words(embedded("raycast/planes.intra_frame_motion").unwrap());
+        let intact = words(embedded("raycast/planes.plain").unwrap());
         for cut in 1..intact.len() {
             let _ = strip_bindings(&intact[..cut], &["volume", "sweep_lut"]);
         }

@@ -17,7 +17,7 @@ pub const PASS: Pass = Pass {
     stage: Stage::Raycast,
     frequency: Frequency::Picture,
     link: Link::None,
-    shader: |s, _| ray::variant!(s, "raycast/cube"),
+    shader: |_, _| "raycast/cube.plain",
     needed: |s| match s.settings.mode {
         Mode::Cube => Ok("the volume is a solid block"),
         _ => Err("no block in this mode"),
@@ -41,7 +41,7 @@ pub const PASS: Pass = Pass {
     constants: |s, _| {
         let mut constants = ray::constants(s);
         // Clip planes are half-spaces of the block.
-        constants.retain(|(name, _)| matches!(*name, "SWEEP" | "ARRAY" | "SAMPLING" | "ELEVATION"));
+        constants.retain(|(name, _)| !matches!(*name, "CLIPS" | "SPREAD"));
         constants.push(("EDGES", s.settings.cube.edges as i32));
         constants
     },

@@ -13,7 +13,7 @@ pub const PASS: Pass = Pass {
     stage: Stage::Raycast,
     frequency: Frequency::Picture,
     link: Link::None,
-    shader: |s, _| ray::variant!(s, "raycast/planes"),
+    shader: |_, _| "raycast/planes.plain",
     needed: |s| match (s.is_flat(), s.cuts_planes()) {
         (true, _) if s.tones_planes() => Err("planes are cut straight to 8 bits"),
         (true, _) => Ok("planes are cut"),
@@ -48,7 +48,7 @@ pub const PASS: Pass = Pass {
 /// The same, toned and in 8 bits.
 pub const TONED: Pass = Pass {
     name: "raycast_planes_toned",
-    shader: |s, _| ray::variant!(s, "raycast/planes", "toned_"),
+    shader: |_, _| "raycast/planes.toned",
     needed: |s| match (s.is_flat(), s.tones_planes()) {
         (true, true) => Ok("planes are cut and nothing is done to them but toning"),
         (true, false) => Err("the picture of planes is filtered, or wanted in floats"),
@@ -92,7 +92,7 @@ fn params(scene: &Scene) -> Params {
 
 fn constants(scene: &Scene) -> Vec<(&'static str, i32)> {
     let mut constants = ray::constants(scene);
-    constants.retain(|(name, _)| matches!(*name, "SWEEP" | "ARRAY" | "SAMPLING" | "ELEVATION" | "CLIPS"));
+    constants.retain(|(name, _)| *name != "SPREAD");
     constants.push(("SAMPLES", scene.slab_samples() as i32));
     constants.push(("SLAB", scene.settings.planes.slab.number()));
     constants.push(("ONE_TILE", (scene.tile_count() == 1) as i32));

@@ -8,26 +8,9 @@ use crate::probe::{Advance, Array, Geometry, Motion, Probe};
 use crate::scene::{MAX_CLIPS, Scene, View};
 use glam::DVec3;
 
-/// Picks the variant that has the tables this geometry needs, and no other.
-macro_rules! variant {
-    ($scene:expr, $shader:literal) => {
-        crate::passes::raycast::ray::variant!($scene, $shader, "")
-    };
-    ($scene:expr, $shader:literal, $kind:literal) => {
-        match crate::passes::raycast::ray::tables($scene) {
-            (false, _, _) => concat!($shader, ".", $kind, "plain"),
-            (true, false, false) => concat!($shader, ".", $kind, "uniform"),
-            (true, false, true) => concat!($shader, ".", $kind, "intra_frame_motion"),
-            (true, true, false) => concat!($shader, ".", $kind, "non_uniform"),
-            (true, true, true) => concat!($shader, ".", $kind, "non_uniform_intra_frame_motion"),
-        }
-    };
-}
-pub(in crate::passes) use variant;
-
 /// Whether the sweep look-up table, the table of slices (non-uniform sweep), and the line look-up table (intra-frame motion) are
 /// needed.
-pub(in crate::passes) fn tables(scene: &Scene) -> (bool, bool, bool) {
+fn tables(scene: &Scene) -> (bool, bool, bool) {
     match &scene.geometry {
         Geometry::Sweep(probe) => {
             let swept = !matches!(probe.motion, Motion::Still { .. });
@@ -75,11 +58,14 @@ pub(in crate::passes) fn constants(scene: &Scene) -> Vec<(&'static str, i32)> {
             },
         ),
     };
+    let (_, non_uniform, moving) = tables(scene);
     vec![
         ("SWEEP", sweep),
         ("ARRAY", array),
         ("SAMPLING", !scene.filters_in_hardware() as i32),
         ("ELEVATION", scene.takes_bspline() as i32),
+        ("INTRA_FRAME_MOTION", moving as i32),
+        ("NON_UNIFORM", non_uniform as i32),
         ("CLIPS", scene.settings.clip.len() as i32),
         ("SPREAD", scene.spreads() as i32),
     ]

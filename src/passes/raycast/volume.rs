@@ -13,12 +13,7 @@ pub const PASS: Pass = Pass {
     stage: Stage::Raycast,
     frequency: Frequency::Picture,
     link: Link::None,
-    shader: |s, _| match kind(s) {
-        Kind::Alone | Kind::Colour => ray::variant!(s, "raycast/volume", ""),
-        Kind::Behind => ray::variant!(s, "raycast/volume", "behind_"),
-        Kind::Layer => ray::variant!(s, "raycast/volume", "layer_"),
-        Kind::Hit => ray::variant!(s, "raycast/volume", "hit_"),
-    },
+    shader: |_, _| "raycast/volume.plain",
     needed: |s| match (s.composites(), s.marches_once()) {
         (false, _) => Err("nothing is composited in this mode"),
         (true, Ok(_)) if kind(s) == Kind::Colour => Err("composited in the march that finds the surface"),
@@ -39,21 +34,26 @@ pub const PASS: Pass = Pass {
     writes: |s, _| match kind(s) {
         Kind::Alone => vec![whole("picture", rendered(s))],
         Kind::Layer | Kind::Colour | Kind::Behind => vec![whole("picture", Slot::VolumeLayer)],
-        Kind::Hit => vec![whole("picture", Slot::VolumeLayer), whole("distance_map", Slot::Distance)],
+        Kind::Hit => vec![whole("picture", Slot::VolumeLayer), whole("hit_distance", Slot::Distance)],
     },
     extent: ray_extent,
     repeat: once,
     params: |s, _| {
         let params = ray::params(s, s.volume_view(), s.step);
-        let params = compositing_params(s, params, s.step).f32("hit_opacity", s.settings.volume.hit);
-        match kind(s) {
-            Kind::Behind => params.f32("colour_depth", s.settings.surface.colour_depth),
-            _ => params,
-        }
+        compositing_params(s, params, s.step)
+            .f32("hit_opacity", s.settings.volume.hit)
+            .f32("colour_depth", s.settings.surface.colour_depth)
     },
     constants: |s, _| {
         let mut constants = ray::marching_constants(s, empty_space::volume_skipping(s));
         constants.extend(compositing_constants(s, kind(s) == Kind::Alone));
+        let part = match kind(s) {
+            Kind::Alone | Kind::Colour => 0,
+            Kind::Layer => 1,
+            Kind::Behind => 2,
+            Kind::Hit => 3,
+        };
+        constants.push(("PART", part));
         constants
     },
     tolerance: Tolerance {
@@ -85,7 +85,7 @@ pub const PASS: Pass = Pass {
                 let colour = light_volume::developed(scene, kind(scene) == Kind::Alone, light, [x, y]);
                 writes.get_mut("picture").set([x, y, 0], &colour);
                 if kind(scene) == Kind::Hit {
-                    writes.get_mut("distance_map").set([x, y, 0], &[hit]);
+                    writes.get_mut("hit_distance").set([x, y, 0], &[hit]);
                 }
             }
         }
