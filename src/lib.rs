@@ -18,7 +18,7 @@
 //!   [`profile`] measures GPU times, [`error_report`] error against run time,
 //!   [`filter_report`] what filters do to speckle and edges, [`thesis_tables`] the tables of the thesis. [`verify`] tests a device and its driver.
 //! - [`batch`] renders, converts, measures or verifies many recordings, one shard of them a process. [`mesh`] makes triangles of a volume's surface.
-//! - [`files`] reads with limits and writes atomically. [`picture`] holds pictures, `marked` draws marks on saved ones. [`cli`] is the command line.
+//! - [`metrics`] is what Prometheus is told. [`files`] reads with limits and writes atomically. [`picture`] holds pictures, `marked` draws marks on saved ones. [`cli`] is the command line.
 //!
 //! # Render a file
 //!
@@ -201,6 +201,8 @@ pub mod machine;
 mod marked;
 #[forbid(unsafe_code)]
 pub mod mesh;
+#[forbid(unsafe_code)]
+pub mod metrics;
 #[forbid(unsafe_code)]
 pub mod passes;
 #[forbid(unsafe_code)]
