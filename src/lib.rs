@@ -192,6 +192,8 @@ pub mod filter_report;
 #[allow(unsafe_code)]
 pub mod gpu;
 #[forbid(unsafe_code)]
+mod html_page;
+#[forbid(unsafe_code)]
 pub mod kiosk;
 #[forbid(unsafe_code)]
 pub mod live;
