@@ -178,7 +178,7 @@ impl Stream {
                 _ => String::new(),
             }
         );
-        if let (Some(file), lacks @ 1..) = (&self.record, stream.unrecorded()) {
+        if let (Some(file), lacks @ 1..) = (&self.record, stream.feed_counts().unrecorded) {
             return Err(failed(format!("--record {}: {lacks} frames could not be written", file.display())));
         }
         match end {

@@ -250,7 +250,7 @@ impl View {
 /// Prints the summary. Fails on lost recordings and on validation messages.
 fn finish((mut console, context): (Console, Arc<Context>)) -> Result<(), Failure> {
     let line = console.summary();
-    let unrecorded = console.stream().unrecorded();
+    let unrecorded = console.stream().feed_counts().unrecorded;
     drop(console);
     say!("{line}");
     if unrecorded > 0 {
