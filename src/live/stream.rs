@@ -300,8 +300,12 @@ impl Stream {
                 }
                 return result;
             }
-            Event::Fault(fault) => return Ok(Step::Fault(fault)),
+            Event::Fault(fault) => {
+                self.statistics.faults.reported += 1;
+                return Ok(Step::Fault(fault));
+            }
             Event::End(why) => {
+                self.statistics.faults.ended += u64::from(why.is_some());
                 self.session.iter_mut().for_each(|session| session.pool.end());
                 self.end = Some(why);
             }
@@ -557,6 +561,11 @@ impl Stream {
         self.session.as_ref().is_some_and(|session| session.phase.is_drawing())
     }
 
+    /// True while frames may arrive: the source has not ended, and is connected.
+    pub fn is_connected(&self) -> bool {
+        self.end.is_none() && self.feed.disconnected().is_none()
+    }
+
     /// Why the source is not connected at the moment, on one line; None while it is.
     pub fn disconnected(&self) -> Option<String> {
         self.feed.disconnected()
@@ -591,7 +600,9 @@ impl Stream {
     /// Statistics since the stream was created. Latencies and pass times are those since they were last taken.
     pub fn statistics(&mut self) -> Result<Statistics, StreamError> {
         self.statistics.time = self.began.elapsed();
-        self.statistics.lost = self.feed_counts().lost;
+        let FeedCounts { lost, unrecorded, disconnected } = self.feed_counts();
+        (self.statistics.lost, self.statistics.unrecorded) = (lost, unrecorded);
+        self.statistics.faults.disconnected = disconnected;
         self.statistics.passes = self.session.as_mut().map_or(Vec::new(), |session| session.renderer.times_so_far());
         self.statistics.untimed = self.session.as_mut().map_or(0, |session| session.renderer.take_untimed());
         self.statistics.volumes = self.pool().map_or(VolumeCounts::default(), VolumePool::counts);
@@ -602,7 +613,7 @@ impl Stream {
     pub fn take_statistics(&mut self) -> Result<Statistics, StreamError> {
         let total = self.statistics()?;
         let since = total.since(&self.reported);
-        self.statistics.latency.reset();
+        self.statistics.reset_latencies();
         self.reported = total;
         Ok(since)
     }

@@ -1,6 +1,7 @@
 //! Prometheus' text format, for the textfile collector of its node exporter.
 
 use super::Metric;
+use super::histogram::Histogram;
 use crate::text::escaped;
 use std::fmt::Write as _;
 
@@ -22,6 +23,28 @@ impl Exposition {
                 self.head(metric);
             }
             self.sample(metric.name, metric.labels, &labels, value);
+        }
+    }
+
+    /// Adds a metric of the kind [`Kind::Histogram`](super::Kind::Histogram).
+    pub fn histogram(&mut self, metric: &Metric, values: &Histogram) {
+        self.head(metric);
+        let name = metric.name;
+        for (limit, count) in values.cumulative() {
+            self.sample(&format!("{name}_bucket"), &["le"], &[number(limit)], count as f64);
+        }
+        self.sample(&format!("{name}_sum"), &[], &[], values.sum());
+        self.sample(&format!("{name}_count"), &[], &[], values.count() as f64);
+    }
+
+    /// Adds a metric of the kind [`Kind::Summary`](super::Kind::Summary): for each sample its labels, the sum and the number of values.
+    pub fn summary(&mut self, metric: &Metric, samples: impl IntoIterator<Item = (Vec<String>, f64, u64)>) {
+        for (n, (labels, sum, count)) in samples.into_iter().enumerate() {
+            if n == 0 {
+                self.head(metric);
+            }
+            self.sample(&format!("{}_sum", metric.name), metric.labels, &labels, sum);
+            self.sample(&format!("{}_count", metric.name), metric.labels, &labels, count as f64);
         }
     }
 

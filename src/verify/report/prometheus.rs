@@ -1,12 +1,13 @@
 //! A run as metrics of Prometheus, one file on each machine of a fleet. Counts are gauges, because each run begins at zero.
 
+use super::baseline::BaselineComparison;
 use super::{Run, Unit, Verdict};
 use crate::metrics::table;
 use crate::metrics::text_format::Exposition;
 use std::time::UNIX_EPOCH;
 
-/// The file.
-pub fn prometheus(run: &Run) -> String {
+/// The file. `compared`: the run's comparison with its baseline, if it has one.
+pub fn prometheus(run: &Run, compared: Option<&BaselineComparison>) -> String {
     let device = &run.device;
     let conditions = [
         &device.name,
@@ -34,6 +35,7 @@ pub fn prometheus(run: &Run) -> String {
     text.numbers(&table::VERIFY_INFO, [(conditions.map(String::clone).to_vec(), 1.0)]);
     text.numbers(&table::VERIFY_CHECKS, words.map(|(verdict, word)| (vec![word.into()], run.count(verdict) as f64)));
     text.numbers(&table::VERIFY_CHECK_FAILED, failed);
+    text.numbers(&table::VERIFY_CHECKS_WORSE, compared.map(|compared| (Vec::new(), compared.worse_checks() as f64)));
     text.numbers(&table::VERIFY_PASS_SECONDS, times);
     text.number(&table::VERIFY_DURATION, run.seconds);
     text.numbers(&table::VERIFY_TIMESTAMP, at.map(|at| (Vec::new(), at.as_secs_f64())));

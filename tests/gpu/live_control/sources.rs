@@ -156,6 +156,7 @@ fn what_a_source_counted_is_kept_when_another_follows() {
             assert!(begun.elapsed() < BOUND, "source {sources}: {:?}", stream.feed_counts());
             std::thread::sleep(Duration::from_millis(1));
         }
+        assert_eq!(stream.take_statistics().expect("statistics").faults.disconnected, 1, "source {sources}");
         stream.replace_source(feed());
     }
 }
