@@ -1,5 +1,7 @@
-//! What Prometheus is told: the text format, read back by a parser that takes no more than it allows.
+//! What Prometheus is told: the text format, read back by a parser that takes no more than it allows; and the rules and the dashboard of
+//! tools/fleet, which name what the program exports.
 
+mod fleet;
 mod live;
 
 use echolume::metrics::{Kind, Metric, table};
