@@ -18,7 +18,7 @@
 //!   [`profile`] measures GPU times, [`error_report`] error against run time,
 //!   [`filter_report`] what filters do to speckle and edges, [`thesis_tables`] the tables of the thesis. [`verify`] tests a device and its driver.
 //! - [`batch`] renders, converts, measures or verifies many recordings, one shard of them a process. [`mesh`] makes triangles of a volume's surface.
-//! - [`files`] reads with limits and writes atomically. [`picture`] holds pictures, `marked` draws marks on saved ones. [`cli`] is the command line.
+//! - [`metrics`] is what Prometheus is told. [`files`] reads with limits and writes atomically. [`picture`] holds pictures, `marked` draws marks on saved ones. [`cli`] is the command line.
 //!
 //! # Render a file
 //!
@@ -192,6 +192,8 @@ pub mod filter_report;
 #[allow(unsafe_code)]
 pub mod gpu;
 #[forbid(unsafe_code)]
+mod html_page;
+#[forbid(unsafe_code)]
 pub mod kiosk;
 #[forbid(unsafe_code)]
 pub mod live;
@@ -201,6 +203,8 @@ pub mod machine;
 mod marked;
 #[forbid(unsafe_code)]
 pub mod mesh;
+#[forbid(unsafe_code)]
+pub mod metrics;
 #[forbid(unsafe_code)]
 pub mod passes;
 #[forbid(unsafe_code)]

@@ -37,6 +37,14 @@ pub fn program() -> String {
     format!("{} {} ({build})", env!("CARGO_PKG_NAME"), env!("CARGO_PKG_VERSION"))
 }
 
+/// Resident memory of this process, bytes. None if the system does not report it.
+pub fn resident_bytes() -> Option<u64> {
+    let statm = std::fs::read_to_string("/proc/self/statm").ok()?;
+    let pages: u64 = statm.split_whitespace().nth(1)?.parse().ok()?;
+    // Pages have 4 KiB on every supported system that has this file.
+    Some(pages * 4096)
+}
+
 /// Describes the device of a context.
 pub fn device(context: &Context) -> Device {
     let candidate = &context.candidate;

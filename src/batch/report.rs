@@ -4,11 +4,12 @@
 use super::agreement::{Class, Drawer};
 use super::comparisons::{Pair, pairs};
 use super::results::{Record, Status};
+use crate::html_page::page;
 use crate::picture::Picture;
 use crate::text::escaped;
 use base64::Engine as _;
 use base64::prelude::BASE64_STANDARD;
-use maud::{DOCTYPE, Markup, PreEscaped, html};
+use maud::{Markup, html};
 use std::collections::BTreeMap;
 use std::path::Path;
 
@@ -66,41 +67,27 @@ pub fn html(records: &[Record], torn: usize, folder: &Path) -> String {
         (n, _) => format!("{n} of {units} units failed"),
     };
     let class = if failures + disagree > 0 { "failed" } else { "passed" };
-    let page = html! {
-        (DOCTYPE)
-        html lang="en" {
-            head {
-                meta charset="utf-8";
-                meta name="viewport" content="width=device-width, initial-scale=1";
-                meta http-equiv="Content-Security-Policy" content="default-src 'none'; img-src data:; style-src 'unsafe-inline'";
-                meta name="color-scheme" content="light dark";
-                link rel="icon" href="data:,";
-                title { "echolume batch: " (verdict) }
-                style { (PreEscaped(include_str!("../verify/report/style.css"))) (PreEscaped(STYLE)) }
-            }
-            body {
-                header class=(class) {
-                    p class="program" { "echolume batch" }
-                    h1 { (verdict) }
-                    ul class="counts" {
-                        li { strong { (units - failures) } " done" }
-                        li { strong { (failures) } " failed" }
-                        li { strong { (tries(records)) } " tries" }
-                        @if torn > 0 { li { strong { (torn) } " lines cut short by killed processes" } }
-                    }
-                }
-                main {
-                    @if failures > 0 { (failed(&merged)) }
-                    @if !pairs.is_empty() { (agreements(&pairs)) }
-                    (devices(&merged))
-                    (works(&merged))
-                    (contact_sheet(&merged, folder))
-                }
-                footer { p { "Written by " (escaped(&crate::machine::program())) "." } }
+    let body = html! {
+        header class=(class) {
+            p class="program" { "echolume batch" }
+            h1 { (verdict) }
+            ul class="counts" {
+                li { strong { (units - failures) } " done" }
+                li { strong { (failures) } " failed" }
+                li { strong { (tries(records)) } " tries" }
+                @if torn > 0 { li { strong { (torn) } " lines cut short by killed processes" } }
             }
         }
+        main {
+            @if failures > 0 { (failed(&merged)) }
+            @if !pairs.is_empty() { (agreements(&pairs)) }
+            (devices(&merged))
+            (works(&merged))
+            (contact_sheet(&merged, folder))
+        }
+        footer { p { "Written by " (escaped(&crate::machine::program())) "." } }
     };
-    page.into_string()
+    page(&format!("echolume batch: {verdict}"), STYLE, &body)
 }
 
 fn tries(records: &[Record]) -> usize {

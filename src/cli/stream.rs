@@ -1,10 +1,12 @@
 //! `echolume stream`.
 
 use super::one_colour;
-use crate::args::{SceneArgs, SourceArgs, StreamArgs};
+use crate::args::{SceneArgs, SourceArgs, StreamArgs, check_outputs};
 use crate::files::signals::Held;
 use crate::gpu::{Context, GpuError};
+use crate::live::metrics::{LiveMetrics, SourceStatus};
 use crate::live::{Feed, FinishedPicture, Statistics, Step, Stream as Live, StreamError, StreamOptions, Update};
+use crate::machine::resident_bytes;
 use crate::passes::Slot;
 use crate::picture;
 use crate::terminal::{Failure, failed, input, is_closed, remark, say};
@@ -47,6 +49,10 @@ pub struct Stream {
     /// Write every frame that arrives to this file (.frames)
     #[arg(long, value_name = "FILE")]
     record: Option<PathBuf>,
+    /// Write metrics in Prometheus' text format every 15 s and at the end, for the textfile collector of its node exporter (name it
+    /// *.prom)
+    #[arg(long, value_name = "FILE")]
+    prometheus: Option<PathBuf>,
     /// End after this number of volumes
     #[arg(long, value_name = "N")]
     volumes: Option<u64>,
@@ -70,6 +76,7 @@ impl Stream {
         if let Some(file) = &self.record {
             check_record(file, self.source.path())?;
         }
+        check_outputs(&[("--prometheus", self.prometheus.as_deref())], [self.source.path()])?;
         let source = self.source.open()?;
         let mut context = self.scene.open_device(self.validate)?;
         let feed = Feed::new(source, self.record.as_deref())
@@ -78,7 +85,9 @@ impl Stream {
         let options =
             StreamOptions { update, images, queues, time_stamps, chosen: Some(layers), ..StreamOptions::default() };
         let mut stream = Live::new(&context, feed, settings, options);
-        let done = self.run_stream(&mut stream, update, &mut context);
+        let metrics = self.prometheus.as_deref().map(|file| LiveMetrics::new(file, "stream"));
+        let metrics = metrics.transpose().map_err(failed)?;
+        let done = self.run_stream(&mut stream, update, &mut context, metrics);
         drop(stream);
         done?;
         match context.messages().first() {
@@ -88,7 +97,13 @@ impl Stream {
     }
 
     /// Runs the stream to its end. `context` is replaced when its device is lost.
-    fn run_stream(&self, stream: &mut Live, update: Update, context: &mut Arc<Context>) -> Result<(), Failure> {
+    fn run_stream(
+        &self,
+        stream: &mut Live,
+        update: Update,
+        context: &mut Arc<Context>,
+        mut metrics: Option<LiveMetrics>,
+    ) -> Result<(), Failure> {
         // A signal ends the stream normally, so that the recording gets its index. A second signal ends the process at once.
         let signals = Held::first();
         let began = Instant::now();
@@ -110,6 +125,7 @@ impl Stream {
                         }
                     }
                     losses += 1;
+                    metrics.iter_mut().for_each(|metrics| metrics.device_lost(&lost));
                     *context = self.scene.open_device(self.validate)?;
                     stream.revive(context).map_err(fault)?;
                     continue;
@@ -139,10 +155,16 @@ impl Stream {
                     say!("{at:>6.1} s  stalled: the device has finished nothing for {busy:.1} s");
                 }
                 all.add(&since);
+                metrics.iter_mut().for_each(|metrics| metrics.add(&since));
                 // After a few seconds all buffers are allocated.
                 if memory.is_none() && began.elapsed() > 5 * INTERVAL {
                     memory = resident();
                 }
+            }
+            let now = Instant::now();
+            if let Some(metrics) = metrics.as_mut().filter(|metrics| now >= metrics.due()) {
+                let source = SourceStatus { is_connected: stream.is_connected(), ..SourceStatus::default() };
+                metrics.write(now, stream, context, source);
             }
             // A volume counts when its picture begins; with rolling updates when its last frame arrived, which the next picture may show.
             if self.volumes.is_some_and(|n| stream.volumes_shown() >= n) {
@@ -159,11 +181,16 @@ impl Stream {
                 break None;
             }
         };
-        all.add(&match stream.take_final_statistics() {
+        let last = match stream.take_final_statistics() {
             // Without the times of the work that is not done.
             Err(StreamError::Gpu(GpuError::Stopped { .. })) => stream.take_statistics().map_err(fault)?,
             taken => taken.map_err(fault)?,
-        });
+        };
+        all.add(&last);
+        if let Some(mut metrics) = metrics {
+            metrics.add(&last);
+            metrics.end(stream, context);
+        }
         say!("in all    {}", all.line(stream.acquisition_time()));
         let counts = all.volumes;
         say!(
@@ -178,7 +205,7 @@ impl Stream {
                 _ => String::new(),
             }
         );
-        if let (Some(file), lacks @ 1..) = (&self.record, stream.unrecorded()) {
+        if let (Some(file), lacks @ 1..) = (&self.record, stream.feed_counts().unrecorded) {
             return Err(failed(format!("--record {}: {lacks} frames could not be written", file.display())));
         }
         match end {
@@ -235,8 +262,5 @@ fn fault(error: StreamError) -> Failure {
 
 /// Resident memory of this process, MiB. None if the system does not report it.
 fn resident() -> Option<u64> {
-    let statm = std::fs::read_to_string("/proc/self/statm").ok()?;
-    let pages: u64 = statm.split_whitespace().nth(1)?.parse().ok()?;
-    // Pages have 4 KiB on every supported system that has this file.
-    Some((pages * 4096) >> 20)
+    resident_bytes().map(|bytes| bytes >> 20)
 }

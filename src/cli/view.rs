@@ -1,7 +1,7 @@
 //! `echolume view`.
 
 use super::view_config::{ConsoleConfig, WindowConfig, rungs};
-use crate::args::{SceneArgs, SourceArgs, StreamArgs, device_failure};
+use crate::args::{SceneArgs, SourceArgs, StreamArgs, check_outputs, device_failure};
 use crate::error_report::command::parse_nanoseconds;
 use crate::gpu::shader_reload::ShaderFolder;
 use crate::gpu::window::{MonitorChoice, PresentMode};
@@ -78,6 +78,10 @@ pub struct View {
     /// Write every frame that arrives to this file (.frames)
     #[arg(long, value_name = "FILE")]
     record: Option<PathBuf>,
+    /// Write metrics in Prometheus' text format every 15 s and at the end, for the textfile collector of its node exporter (name it
+    /// *.prom; before `prometheus` of the configuration)
+    #[arg(long, value_name = "FILE")]
+    prometheus: Option<PathBuf>,
     /// Folder for saved pictures and loops
     #[arg(long, value_name = "DIR", default_value = ".")]
     save_to: PathBuf,
@@ -107,6 +111,11 @@ impl View {
             }));
         }
         let (kiosk, device) = (self.kiosk, self.scene.device.clone());
+        if !kiosk {
+            // A kiosk shows its pictures without metrics too, and tries again.
+            let read = self.config.is_none().then(|| self.source.path());
+            check_outputs(&[("--prometheus", self.prometheus.as_deref())], read)?;
+        }
         let deadline = self.scene.deadline()?;
         let mut place = match self.config() {
             None => self.place()?,
@@ -141,7 +150,9 @@ impl View {
                 Err(failure) => {
                     let why = failure.message();
                     tracing::error!("{why}");
-                    (ConsoleConfig::nothing(), Some(view.startup_fault(why)))
+                    let mut nothing = ConsoleConfig::nothing();
+                    nothing.options.prometheus = view.prometheus.clone();
+                    (nothing, Some(view.startup_fault(why)))
                 }
             };
             let (open, options) = wanted.options(factor, wake, startup_fault);
@@ -177,6 +188,7 @@ impl View {
         // Only a kiosk reopens a source that ends.
         options.retry = options.retry.or(Some(usual.live.retry)).filter(|_| self.kiosk);
         options.overlay = !self.no_ui;
+        options.prometheus = self.prometheus.clone().or(options.prometheus.take());
         (options.images, options.queues) = (self.stream.images, self.stream.queues());
         options.time_stamps = self.stream.time_stamps();
         Ok(wanted)
@@ -249,8 +261,9 @@ impl View {
 
 /// Prints the summary. Fails on lost recordings and on validation messages.
 fn finish((mut console, context): (Console, Arc<Context>)) -> Result<(), Failure> {
+    console.end_metrics();
     let line = console.summary();
-    let unrecorded = console.stream().unrecorded();
+    let unrecorded = console.stream().feed_counts().unrecorded;
     drop(console);
     say!("{line}");
     if unrecorded > 0 {

@@ -124,6 +124,7 @@ impl ConsoleConfig {
             retry: Some(live.retry),
             record,
             folder: files.pictures.clone().unwrap_or(".".into()),
+            prometheus: files.prometheus.clone(),
             panels: display.panels,
             scale: display.scale as f32,
             ..ConsoleOptions::default()

@@ -48,6 +48,19 @@ pub fn read_text(path: &Path, max_bytes: u64, what: &str) -> Result<String, Stri
 /// # Errors
 /// One line that names the file and the fault.
 pub fn replace(file: &Path, bytes: &[u8]) -> Result<(), String> {
+    replace_file(file, bytes, false)
+}
+
+/// Like [`replace`], and every user may read the file, whatever the umask says: for what tells nothing about patients, and is read by
+/// another service.
+///
+/// # Errors
+/// As for [`replace`].
+pub fn replace_for_all(file: &Path, bytes: &[u8]) -> Result<(), String> {
+    replace_file(file, bytes, true)
+}
+
+fn replace_file(file: &Path, bytes: &[u8], for_all: bool) -> Result<(), String> {
     let cannot = |e: &dyn std::fmt::Display| format!("{}: cannot be written: {e}", file.display());
     if is_special(file) {
         // Write to a device or a pipe directly: renaming would replace it.
@@ -56,8 +69,9 @@ pub fn replace(file: &Path, bytes: &[u8]) -> Result<(), String> {
     }
     check_place(file)?;
     let mut unfinished = Unfinished::create(file).map_err(|e| cannot(&e))?;
-    unfinished
-        .write_all(bytes)
+    let readable = if for_all { unfinished.make_readable() } else { Ok(()) };
+    readable
+        .and_then(|()| unfinished.write_all(bytes))
         .and_then(|()| unfinished.finish())
         .and_then(|()| unfinished.rename())
         .map_err(|e| cannot(&e))
@@ -129,6 +143,16 @@ impl Unfinished {
         let signals = Writing::begin();
         let file = named.tempfile_in(folder)?;
         Ok(Unfinished { file: BufWriter::new(Part { file, signals }), target })
+    }
+
+    /// Lets every user read the file.
+    fn make_readable(&self) -> io::Result<()> {
+        #[cfg(unix)]
+        {
+            use std::os::unix::fs::PermissionsExt;
+            self.file.get_ref().file.as_file().set_permissions(std::fs::Permissions::from_mode(0o644))?;
+        }
+        Ok(())
     }
 
     /// Flushes everything to the disk.

@@ -27,6 +27,28 @@ pub struct Arrived {
     pub at: Instant,
 }
 
+/// What a feed counted.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct FeedCounts {
+    /// Frames, or parts of frames that arrive line by line, that were lost because the queue was full.
+    pub lost: u64,
+    /// Frames that could not be recorded, and other failures of the recording.
+    pub unrecorded: u64,
+    /// How often the source was disconnected.
+    pub disconnected: u64,
+}
+
+impl FeedCounts {
+    /// Both together.
+    pub(super) fn plus(self, other: FeedCounts) -> FeedCounts {
+        FeedCounts {
+            lost: self.lost + other.lost,
+            unrecorded: self.unrecorded + other.unrecorded,
+            disconnected: self.disconnected + other.disconnected,
+        }
+    }
+}
+
 /// A source that is listened to, or none.
 pub struct Feed {
     shared: Arc<Shared>,
@@ -42,6 +64,7 @@ struct Shared {
     stop: AtomicBool,
     lost: AtomicU64,
     unrecorded: AtomicU64,
+    disconnections: AtomicU64,
     wake: Option<Wake>,
 }
 
@@ -72,6 +95,9 @@ impl Shared {
     fn set_disconnected(&self, why: Option<String>) {
         let mut queue = self.lock();
         if queue.disconnected != why {
+            if queue.disconnected.is_none() {
+                self.disconnections.fetch_add(1, Ordering::Relaxed);
+            }
             queue.disconnected = why;
             drop(queue);
             self.wake.iter().for_each(|wake| wake());
@@ -162,19 +188,17 @@ impl Feed {
         self.shared.lock().disconnected.clone()
     }
 
-    /// Number of frames that could not be recorded, and of other failures of the recording.
-    pub fn unrecorded(&self) -> u64 {
-        self.shared.unrecorded.load(Ordering::Relaxed)
-    }
-
     /// True if a complete volume has arrived after this one and the source cannot wait: then this one need not be drawn.
     pub(crate) fn is_behind(&self, volume: u32) -> bool {
         !self.can_wait && self.shared.lock().newest.is_some_and(|newest| newest > volume.saturating_add(1))
     }
 
-    /// Number of frames, or of parts of frames that arrive line by line, that were lost because the queue was full.
-    pub fn lost(&self) -> u64 {
-        self.shared.lost.load(Ordering::Relaxed)
+    /// What was counted so far.
+    pub fn counts(&self) -> FeedCounts {
+        let Shared { lost, unrecorded, disconnections, .. } = &*self.shared;
+        let [lost, unrecorded, disconnected] =
+            [lost, unrecorded, disconnections].map(|count| count.load(Ordering::Relaxed));
+        FeedCounts { lost, unrecorded, disconnected }
     }
 }
 
@@ -381,7 +405,7 @@ mod tests {
         let source = FastSource { next: 0, frames: 30, bytes: MAX_BYTES / 4, waits: true };
         let feed = Feed::new(Box::new(source), None).expect("thread");
         assert_eq!(all(&feed, Duration::from_millis(1)), (0..30).collect::<Vec<_>>());
-        assert_eq!(feed.lost(), 0);
+        assert_eq!(feed.counts(), FeedCounts::default());
     }
 
     #[test]
@@ -391,7 +415,7 @@ mod tests {
         std::thread::sleep(Duration::from_millis(300));
         assert!(feed.shared.lock().bytes <= MAX_BYTES);
         let came = all(&feed, Duration::ZERO);
-        assert_eq!(came.len() as u64 + feed.lost(), 30);
+        assert_eq!(came.len() as u64 + feed.counts().lost, 30);
         for pair in came.windows(2).filter(|w| w[0] + 1 != w[1]) {
             assert_eq!(pair[1] % 3, 0, "what follows a gap begins a volume: {came:?}");
         }

@@ -2,12 +2,13 @@
 //!
 //! One thread listens to the source ([`feed`]), another one drives the device ([`Stream::step`]). [`volume_pool`] assigns volume images,
 //! `session` holds everything that depends on the geometry of the frames, `phase` its state, [`statistics`] the counts and latencies,
-//! and [`cine`] the last volumes for looking back. After the first frame of a geometry nothing allocates, compiles or waits for the
+//! [`metrics`] what Prometheus is told, and [`cine`] the last volumes for looking back. After the first frame of a geometry nothing allocates, compiles or waits for the
 //! whole device.
 
 pub mod cine;
 pub mod feed;
 mod first_volume;
+pub mod metrics;
 mod phase;
 mod session;
 pub mod statistics;

@@ -1,6 +1,7 @@
 //! Counts of a stream, and the latency from the arrival of a frame to the pixels that show it.
 
 use super::volume_pool::VolumeCounts;
+use crate::metrics::histogram;
 use crate::passes::PassTime;
 use hdrhistogram::Histogram;
 use std::fmt::Write as _;
@@ -8,6 +9,21 @@ use std::time::Duration;
 
 /// Largest latency that is distinguished, us: a minute. Latencies have three significant digits.
 const MAX_LATENCY: u64 = 60_000_000;
+
+/// Limits of [`Statistics::latencies`], s: from a picture at the rate of a monitor to a sweep that stands still.
+const LATENCY_LIMITS: &[f64] =
+    &[0.005, 0.01, 0.02, 0.035, 0.05, 0.075, 0.1, 0.15, 0.2, 0.3, 0.5, 0.75, 1.0, 1.5, 2.0, 3.0, 5.0, 10.0, 30.0];
+
+/// Faults of a source, by kind.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct SourceFaults {
+    /// Something was left out, and the source went on.
+    pub reported: u64,
+    /// It ended unexpectedly.
+    pub ended: u64,
+    /// Its connection was lost or refused.
+    pub disconnected: u64,
+}
 
 /// Statistics of a stream since it began, or since they were last taken.
 #[derive(Clone, Debug)]
@@ -20,10 +36,15 @@ pub struct Statistics {
     pub lost: u64,
     /// Frames that the renderer refused, for example of the wrong size.
     pub refused: u64,
+    /// Frames that could not be recorded, and other failures of the recording.
+    pub unrecorded: u64,
+    pub faults: SourceFaults,
     pub pictures: u64,
     pub volumes: VolumeCounts,
     /// From the arrival of each frame to the end of the first picture that shows it, us.
     pub latency: Histogram<u64>,
+    /// The same latencies, s, exactly by fixed limits.
+    pub latencies: histogram::Histogram,
     pub passes: Vec<PassTime>,
     /// Passes and copies that could not be timed.
     pub untimed: u64,
@@ -38,9 +59,12 @@ impl Default for Statistics {
             frames: 0,
             lost: 0,
             refused: 0,
+            unrecorded: 0,
+            faults: SourceFaults::default(),
             pictures: 0,
             volumes: VolumeCounts::default(),
             latency,
+            latencies: histogram::Histogram::new(LATENCY_LIMITS),
             passes: Vec::new(),
             untimed: 0,
         }
@@ -50,6 +74,13 @@ impl Default for Statistics {
 impl Statistics {
     pub(super) fn record_latency(&mut self, latency: Duration) {
         self.latency.saturating_record((latency.as_micros() as u64).max(1));
+        self.latencies.record(latency.as_secs_f64());
+    }
+
+    /// Forgets the latencies.
+    pub(super) fn reset_latencies(&mut self) {
+        self.latency.reset();
+        self.latencies.reset();
     }
 
     /// Quantile `share` (0..=1) of the latencies, ms.
@@ -70,6 +101,12 @@ impl Statistics {
             frames: self.frames.saturating_sub(before.frames),
             lost: self.lost.saturating_sub(before.lost),
             refused: self.refused.saturating_sub(before.refused),
+            unrecorded: self.unrecorded.saturating_sub(before.unrecorded),
+            faults: SourceFaults {
+                reported: self.faults.reported.saturating_sub(before.faults.reported),
+                ended: self.faults.ended.saturating_sub(before.faults.ended),
+                disconnected: self.faults.disconnected.saturating_sub(before.faults.disconnected),
+            },
             pictures: self.pictures.saturating_sub(before.pictures),
             volumes: counts(self.volumes, before.volumes),
             ..self.clone()
@@ -82,6 +119,10 @@ impl Statistics {
         self.frames += later.frames;
         self.lost += later.lost;
         self.refused += later.refused;
+        self.unrecorded += later.unrecorded;
+        self.faults.reported += later.faults.reported;
+        self.faults.ended += later.faults.ended;
+        self.faults.disconnected += later.faults.disconnected;
         self.pictures += later.pictures;
         self.volumes.shown += later.volumes.shown;
         self.volumes.dropped += later.volumes.dropped;
@@ -89,6 +130,7 @@ impl Statistics {
         self.volumes.left_out += later.volumes.left_out;
         // Cannot fail: both histograms have the same bounds.
         let _ = self.latency.add(&later.latency);
+        self.latencies.add(&later.latencies);
         self.untimed += later.untimed;
         for pass in &later.passes {
             match self.passes.iter_mut().find(|p| p.name == pass.name) {
@@ -170,6 +212,9 @@ mod tests {
         ] {
             assert!(line.contains(part), "{part}: {line}");
         }
+        let mut twice = statistics.clone();
+        twice.add(&statistics);
+        assert_eq!((statistics.latencies.count(), twice.latencies.count()), (100, 200));
         assert!(!line.contains("lost") && !line.contains("not timed") && !line.contains('\n'), "{line}");
         let mut all = statistics.clone();
         all.untimed = 3;

@@ -1,7 +1,7 @@
 //! The loop between a feed and a renderer, one step at a time.
 
 use super::cine::{Cine, CineLimits};
-use super::feed::{Arrived, Feed};
+use super::feed::{Arrived, Feed, FeedCounts};
 use super::first_volume::FirstVolume;
 use super::phase::{Pending, Phase};
 use super::session::{Begun, FinishedPicture, Session, Views};
@@ -95,6 +95,8 @@ pub enum StreamError {
 pub struct Stream {
     context: Arc<Context>,
     feed: Feed,
+    /// What the feeds before it counted.
+    earlier_feeds: FeedCounts,
     settings: Settings,
     /// The settings at full quality, if [`Stream::settings`] are lowered ones.
     full: Option<Settings>,
@@ -133,6 +135,7 @@ impl Stream {
         Stream {
             context: context.clone(),
             feed,
+            earlier_feeds: FeedCounts::default(),
             settings,
             full: None,
             first_volume: options.chosen.clone().map(FirstVolume::new),
@@ -297,8 +300,12 @@ impl Stream {
                 }
                 return result;
             }
-            Event::Fault(fault) => return Ok(Step::Fault(fault)),
+            Event::Fault(fault) => {
+                self.statistics.faults.reported += 1;
+                return Ok(Step::Fault(fault));
+            }
             Event::End(why) => {
+                self.statistics.faults.ended += u64::from(why.is_some());
                 self.session.iter_mut().for_each(|session| session.pool.end());
                 self.end = Some(why);
             }
@@ -495,6 +502,7 @@ impl Stream {
     /// Continues with another source. Its volumes are numbered on from those before. The display stays until the new source has a
     /// volume to show.
     pub fn replace_source(&mut self, feed: Feed) {
+        self.earlier_feeds = self.feed_counts();
         (self.feed, self.end) = (feed, None);
         self.cine.discard_partial();
         // Two volumes with one number could not be distinguished in the cine loop.
@@ -553,6 +561,11 @@ impl Stream {
         self.session.as_ref().is_some_and(|session| session.phase.is_drawing())
     }
 
+    /// True while frames may arrive: the source has not ended, and is connected.
+    pub fn is_connected(&self) -> bool {
+        self.end.is_none() && self.feed.disconnected().is_none()
+    }
+
     /// Why the source is not connected at the moment, on one line; None while it is.
     pub fn disconnected(&self) -> Option<String> {
         self.feed.disconnected()
@@ -587,7 +600,9 @@ impl Stream {
     /// Statistics since the stream was created. Latencies and pass times are those since they were last taken.
     pub fn statistics(&mut self) -> Result<Statistics, StreamError> {
         self.statistics.time = self.began.elapsed();
-        self.statistics.lost = self.feed.lost();
+        let FeedCounts { lost, unrecorded, disconnected } = self.feed_counts();
+        (self.statistics.lost, self.statistics.unrecorded) = (lost, unrecorded);
+        self.statistics.faults.disconnected = disconnected;
         self.statistics.passes = self.session.as_mut().map_or(Vec::new(), |session| session.renderer.times_so_far());
         self.statistics.untimed = self.session.as_mut().map_or(0, |session| session.renderer.take_untimed());
         self.statistics.volumes = self.pool().map_or(VolumeCounts::default(), VolumePool::counts);
@@ -598,7 +613,7 @@ impl Stream {
     pub fn take_statistics(&mut self) -> Result<Statistics, StreamError> {
         let total = self.statistics()?;
         let since = total.since(&self.reported);
-        self.statistics.latency.reset();
+        self.statistics.reset_latencies();
         self.reported = total;
         Ok(since)
     }
@@ -630,9 +645,9 @@ impl Stream {
         self.statistics.frames
     }
 
-    /// Number of frames that could not be recorded, and of other failures of the recording.
-    pub fn unrecorded(&self) -> u64 {
-        self.feed.unrecorded()
+    /// What the feeds of all sources so far counted.
+    pub fn feed_counts(&self) -> FeedCounts {
+        self.earlier_feeds.plus(self.feed.counts())
     }
 
     /// Time that sound needs for a volume, s. None before the first frame, and for Cartesian volumes.

@@ -79,6 +79,8 @@ pub(super) struct SourceSupervisor {
     state: SourceState,
     opening: Option<Receiver<Result<Box<dyn Live>, String>>>,
     next_attempt: Option<Instant>,
+    /// How often the source could not be opened.
+    not_opened: u64,
 }
 
 impl SourceSupervisor {
@@ -97,7 +99,13 @@ impl SourceSupervisor {
             state: SourceState::Opening,
             opening: None,
             next_attempt: Some(Instant::now()),
+            not_opened: 0,
         }
+    }
+
+    /// How often the source could not be opened.
+    pub(super) fn not_opened(&self) -> u64 {
+        self.not_opened
     }
 
     pub(super) fn state(&self) -> &SourceState {
@@ -133,6 +141,7 @@ impl SourceSupervisor {
                 Some(feed)
             }
             Err(why) => {
+                self.not_opened += 1;
                 self.ended(Some(why), now);
                 None
             }
@@ -160,7 +169,10 @@ impl SourceSupervisor {
         };
         match std::thread::Builder::new().name("opening".into()).spawn(work) {
             Ok(_) => self.opening = Some(opening),
-            Err(e) => self.ended(Some(format!("a thread cannot be started: {e}")), now),
+            Err(e) => {
+                self.not_opened += 1;
+                self.ended(Some(format!("a thread cannot be started: {e}")), now);
+            }
         }
         // The reason stays visible until the source is open.
         if !matches!(self.state, SourceState::Retrying(_)) {
@@ -224,13 +236,14 @@ mod tests {
         assert_eq!(supervisor.state(), &SourceState::Retrying("no probe".into()));
         // Not before the interval has passed.
         assert!(!poll(&mut supervisor, Duration::ZERO));
-        assert_eq!(tries.load(Ordering::Relaxed), 1);
+        assert_eq!((tries.load(Ordering::Relaxed), supervisor.not_opened()), (1, 1));
         assert!(!poll(&mut supervisor, Duration::from_secs(6)));
         assert!(poll(&mut supervisor, Duration::from_secs(12)));
         assert_eq!(supervisor.state(), &SourceState::Open);
         supervisor.ended(None, Instant::now());
         assert_eq!(supervisor.state(), &SourceState::Retrying("the source ended".into()));
         assert!(poll(&mut supervisor, Duration::from_secs(6)));
+        assert_eq!(supervisor.not_opened(), 2);
     }
 
     #[test]

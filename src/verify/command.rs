@@ -1,8 +1,8 @@
 //! `echolume verify`.
 
 use crate::args::{check_outputs, device_failure, write_report};
-use crate::files::read_text;
 use crate::files::signals::Held;
+use crate::files::{read_text, replace_for_all};
 use crate::gpu::{Context, ContextOptions, DeviceChoice, GpuError};
 use crate::machine;
 use crate::terminal::{Failure, failed, input, say};
@@ -417,7 +417,11 @@ impl Verify {
         put(&self.json, || report::to_json(run).map_err(|e| e.to_string()))?;
         put(&self.junit, || junit::junit(run, compared))?;
         put(&self.html, || html::html(run, compared))?;
-        put(&self.prometheus, || Ok(prometheus(run)))
+        let Some(file) = &self.prometheus else { return Ok(()) };
+        // Written like those of a live run: node_exporter runs as another user.
+        replace_for_all(file, prometheus(run, compared).as_bytes()).map_err(failed)?;
+        say!("written: {}", file.display());
+        Ok(())
     }
 
     fn judge(&self, run: &Run, compared: Option<&BaselineComparison>, stopped: Option<&str>) -> Result<(), Failure> {

@@ -57,7 +57,22 @@ fn a_pipe_is_drawn_to_its_last_complete_volume_and_its_faults_are_reported() {
     let folder = Folder::new("pipe");
     let out = folder.path("out");
     let stream = ["stream", "--source", "-", "--mode", "mip", "--size", "24x24", "--out", &out];
-    let (code, said, err) = fed(&stream, &piped(7, 0));
+    let file = folder.path("stream.prom");
+    let (code, said, err) = fed(&[&stream[..], &["--prometheus", &file]].concat(), &piped(7, 0));
+    let metrics = fs::read_to_string(&file).expect("metrics");
+    for line in [
+        "echolume_running 0",
+        "echolume_frames_total 7",
+        "echolume_volumes_total{result=\"shown\"} 3",
+        "echolume_volumes_total{result=\"incomplete\"} 1",
+        "echolume_pictures_total 3",
+        "echolume_latency_seconds_count 6",
+        "echolume_pass_seconds_count{pass=\"frame\"} 7",
+        "echolume_source_faults_total{kind=\"ended\"} 0",
+    ] {
+        assert!(metrics.lines().any(|told| told == line), "{line}: {metrics}");
+    }
+    assert!(metrics.contains("echolume_info{command=\"stream\",version=\""), "{metrics}");
     assert_eq!((code, err.as_str()), (Some(0), ""), "{said}");
     assert!(said.contains("7 frames, 3 volumes shown, 0 dropped, 1 incomplete, 3 pictures"), "{said}");
     assert!(fs::exists(format!("{out}/volume-000002.png")).expect("look"));
@@ -91,6 +106,7 @@ fn a_stream_that_cannot_begin_says_why_and_writes_nothing() {
         (&["--null", "--queues", "0"], "--queues"),
         (&["--null", "--record", "tape.mha"], ".frames"),
         (&["--null", "--record", "none/tape.frames"], "none/tape.frames"),
+        (&["--null", "--prometheus", "none/a.prom"], "none/a.prom"),
         (&["--null", "--source", "igtl://"], "igtl://HOST"),
         (&["--null", "--source", "igtl://localhost", "--clip", "1,2"], "--clip 1,2"),
         (&["--null", "--source", "igtl://localhost", "--spacing", "0"], "--spacing"),

@@ -12,6 +12,7 @@ mod error_report;
 mod exact_ray;
 mod freehand;
 mod geometry;
+mod metrics;
 mod module_cycles;
 mod named_profiles;
 mod phantom;

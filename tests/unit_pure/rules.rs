@@ -47,6 +47,7 @@ fn no_layer_uses_a_layer_above_it() {
         ("src/probe", &["crate::gpu", "crate::passes", "crate::plan", "crate::scene", "ash::vk"]),
         ("src/source", &["crate::gpu", "crate::passes", "crate::plan", "crate::scene", "ash::vk"]),
         ("src/mesh", &["crate::gpu", "crate::passes", "crate::plan", "crate::scene", "crate::source", "ash::vk"]),
+        ("src/metrics", &["crate::gpu", "crate::live", "crate::verify", "ash::vk"]),
         ("src/plan", &["crate::gpu", "ash::vk"]),
         ("src/barriers", &["crate::gpu", "ash::vk"]),
         ("src/queues", &["crate::gpu", "ash::vk"]),

@@ -169,6 +169,8 @@ pub struct Files {
     pub log_size_mb: u32,
     /// Number of log files, including the current one, 1 to 100. Default: 5.
     pub log_files: u32,
+    /// File for metrics of Prometheus, rewritten every 15 s. Default: none.
+    pub prometheus: Option<PathBuf>,
 }
 
 impl Default for Config {
@@ -228,7 +230,7 @@ impl Default for Live {
 
 impl Default for Files {
     fn default() -> Files {
-        Files { pictures: None, log: None, log_size_mb: 10, log_files: 5 }
+        Files { pictures: None, log: None, log_size_mb: 10, log_files: 5, prometheus: None }
     }
 }
 
@@ -292,7 +294,7 @@ impl Config {
                 joined.map_err(|_| self.locations.error_at("source", "is in a folder whose name is not UTF-8"))?;
         }
         let files = [&mut self.probe, &mut self.display.report, &mut self.live.record, &mut self.files.pictures];
-        for file in files.into_iter().chain([&mut self.files.log]).flatten() {
+        for file in files.into_iter().chain([&mut self.files.log, &mut self.files.prometheus]).flatten() {
             *file = folder.join(&*file);
         }
         Ok(())
@@ -690,6 +692,7 @@ const ALLOWED: &[(&str, &str)] = &[
     ("files.log", "a file"),
     ("files.log_size_mb", "1 to 1024 MiB"),
     ("files.log_files", "1 to 100"),
+    ("files.prometheus", "a file"),
 ];
 
 /// The allowed values of a key.

@@ -3,6 +3,7 @@
 use super::{Console, ConsoleError, FAULT_CHECK_INTERVAL, LoopRequest};
 use crate::gpu;
 use crate::gpu::window::PresentOutcome;
+use crate::live::metrics::{LiveMetrics, SourceStatus};
 use crate::live::{Feed, FinishedPicture, Step, StreamError};
 use crate::ui::frame_budget;
 use crate::ui::panels::{Banner, PanelState};
@@ -37,6 +38,14 @@ impl Console {
     /// # Errors
     /// The device or the screen is lost.
     pub fn update(&mut self, now: Instant) -> Result<LoopRequest, ConsoleError> {
+        let updated = self.advance(now);
+        if let (Err(ConsoleError::DeviceLost(why)), Some(metrics)) = (&updated, &mut self.metrics) {
+            metrics.device_lost(why);
+        }
+        updated
+    }
+
+    fn advance(&mut self, now: Instant) -> Result<LoopRequest, ConsoleError> {
         let begun = Instant::now();
         let busy = self.busy_since.take().map_or(Duration::ZERO, |since| now.saturating_duration_since(since));
         self.last_arrival += busy;
@@ -78,6 +87,7 @@ impl Console {
         let stall_ends = self.stall_shown_until.take_if(|until| *until <= now).is_some();
         self.needs_redraw |= self.notes.len() != before || stall_ends || self.repaint_at.is_some_and(|at| at <= now);
         self.present(now)?;
+        self.write_metrics(now);
         // What takes long here keeps no frame from coming, but from being taken.
         self.last_arrival += Some(begun.elapsed()).filter(|took| *took >= LONG_UPDATE).unwrap_or_default();
         let is_busy = self.stream.is_drawing() || !self.stream.is_idle();
@@ -186,7 +196,28 @@ impl Console {
                 tracing::debug!("{}", statistics.line(acquisition_time));
             }
             self.times.add(&statistics, acquisition_time);
+            self.metrics.iter_mut().for_each(|metrics| metrics.add(&statistics));
         }
+    }
+
+    /// Writes the metrics if they are due.
+    fn write_metrics(&mut self, now: Instant) {
+        let Some(metrics) = self.metrics.as_mut().filter(|metrics| now >= metrics.due()) else { return };
+        let source = SourceStatus {
+            is_connected: matches!(self.source.state(), SourceState::Open) && self.stream.is_connected(),
+            is_frozen: self.stream.is_frozen(),
+            not_opened: self.source.not_opened(),
+        };
+        metrics.write(now, &self.stream, &self.context, source);
+    }
+
+    /// Writes the metrics for the last time: the program ends in order.
+    pub fn end_metrics(&mut self) {
+        let Some(mut metrics) = self.metrics.take() else { return };
+        if let Ok(statistics) = self.stream.take_statistics() {
+            metrics.add(&statistics);
+        }
+        metrics.end(&self.stream, &self.context);
     }
 
     /// When to update again without an event.
@@ -213,6 +244,7 @@ impl Console {
             self.repaint_at,
             self.next_cine_step,
             self.stall_shown_until,
+            self.metrics.as_ref().map(LiveMetrics::due),
             self.warms_at(now),
             silence,
             statistics,

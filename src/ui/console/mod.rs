@@ -18,6 +18,7 @@ use crate::gpu::window::Screen;
 use crate::gpu::{Context, GpuError, TimeStamps, Wake};
 use crate::kiosk::chord::Chord;
 use crate::live::cine::CineLimits;
+use crate::live::metrics::LiveMetrics;
 use crate::live::{self, Feed, Stream, StreamError, Update};
 use crate::marked;
 use crate::plan::Work;
@@ -65,6 +66,8 @@ pub struct ConsoleOptions {
     pub source: SourceKind,
     /// A file for all frames that arrive.
     pub record: Option<PathBuf>,
+    /// A file for metrics of Prometheus, which is rewritten at intervals.
+    pub prometheus: Option<PathBuf>,
     /// The folder for saved pictures and loops.
     pub folder: PathBuf,
     /// Draws panels, notes and marks over the picture.
@@ -104,6 +107,7 @@ impl Default for ConsoleOptions {
             retry: None,
             source: SourceKind::default(),
             record: None,
+            prometheus: None,
             folder: ".".into(),
             overlay: true,
             bar: true,
@@ -213,6 +217,7 @@ pub struct Console {
     /// Since when the program is busy with what came: silence is not counted meanwhile.
     busy_since: Option<Instant>,
     frames: u64,
+    metrics: Option<LiveMetrics>,
     /// Faults of the device since the last picture.
     device_faults: u32,
     /// The device did not finish and was opened again; a banner says so until then.
@@ -273,6 +278,8 @@ impl Console {
             Ok(watch) => (watch, None),
             Err(fault) => (None, Some(fault)),
         };
+        let metrics = options.prometheus.as_deref().map(|file| LiveMetrics::new(file, "view")).transpose();
+        let (metrics, metrics_fault) = metrics.map_or_else(|fault| (None, Some(fault)), |metrics| (metrics, None));
         let mut console = Console {
             screen: None,
             stream: Stream::new(context, Feed::none(), controls.settings().clone(), stream_options),
@@ -323,6 +330,7 @@ impl Console {
             disconnected: None,
             busy_since: None,
             frames: 0,
+            metrics,
             device_faults: 0,
             stall_shown_until: None,
             blank_since: None,
@@ -334,7 +342,7 @@ impl Console {
             shader_fault: None,
             _shader_watch: shader_watch,
         };
-        if let Some(fault) = watch_fault {
+        for fault in watch_fault.into_iter().chain(metrics_fault) {
             console.notify(&fault, true);
         }
         console

@@ -4,13 +4,14 @@ use super::baseline::{BaselineComparison, Class};
 use super::{
     Figure, Outcome, PictureComparison, Run, Unit, Verdict, amount, fault_items, percent, seconds, value_of_limit,
 };
+use crate::html_page::page;
 use crate::picture::Picture;
 use crate::profile::LEVEL;
 use crate::profile::statistics::Sample;
 use crate::text::escaped;
 use base64::Engine as _;
 use base64::prelude::BASE64_STANDARD;
-use maud::{DOCTYPE, Markup, PreEscaped, html};
+use maud::{Markup, html};
 
 /// Maximum number of checks of a group that is expanded by default.
 const MAX_OPEN: usize = 40;
@@ -29,43 +30,29 @@ pub fn html(run: &Run, compared: Option<&BaselineComparison>) -> Result<String, 
         Verdict::Interrupted => "interrupted",
         Verdict::Passed | Verdict::LeftOut => "passed",
     };
-    let title = format!("echolume verify: {result}, {}", escaped(&run.device.name));
-    let page = html! {
-        (DOCTYPE)
-        html lang="en" {
-            head {
-                meta charset="utf-8";
-                meta name="viewport" content="width=device-width, initial-scale=1";
-                meta http-equiv="Content-Security-Policy" content="default-src 'none'; img-src data:; style-src 'unsafe-inline'";
-                meta name="color-scheme" content="light dark";
-                link rel="icon" href="data:,";
-                title { (title) }
-                style { (PreEscaped(include_str!("style.css"))) }
-            }
-            body {
-                (head(run, compared))
-                main {
-                    @if let Some(compared) = compared { (baseline(compared)) }
-                    @if !failures.is_empty() {
-                        section id="failures" {
-                            h2 { "Failures" }
-                            @for outcome in &failures { (failure(outcome, &mut embedded)) }
-                        }
-                    }
-                    @for (at, (group, outcomes)) in run.groups().into_iter().enumerate() {
-                        (group_section(at, group, &outcomes, &mut embedded))
-                    }
-                    (times_section(run))
-                    (notes(run))
-                }
-                footer {
-                    @if let Some(note) = embedded.note() { p { (note) } }
-                    p { "Written by " (escaped(&run.program)) "." }
+    let title = format!("echolume verify: {result}, {}", run.device.name);
+    let body = html! {
+        (head(run, compared))
+        main {
+            @if let Some(compared) = compared { (baseline(compared)) }
+            @if !failures.is_empty() {
+                section id="failures" {
+                    h2 { "Failures" }
+                    @for outcome in &failures { (failure(outcome, &mut embedded)) }
                 }
             }
+            @for (at, (group, outcomes)) in run.groups().into_iter().enumerate() {
+                (group_section(at, group, &outcomes, &mut embedded))
+            }
+            (times_section(run))
+            (notes(run))
+        }
+        footer {
+            @if let Some(note) = embedded.note() { p { (note) } }
+            p { "Written by " (escaped(&run.program)) "." }
         }
     };
-    Ok(page.into_string())
+    Ok(page(&title, "", &body))
 }
 
 /// The verdict of the page. A run without passed checks says nothing about the device.

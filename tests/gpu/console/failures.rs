@@ -99,7 +99,9 @@ fn a_lost_device_is_reported_and_the_next_one_shows_the_same() {
 #[test]
 fn a_hung_device_is_given_up_and_the_next_one_shows_the_same() {
     let (device, other) = (Device::impatient(), Device::alone());
-    let mut desk = Desk::new(&device, options());
+    let folder = Folder::new("stall");
+    let file = folder.path("a.prom");
+    let mut desk = Desk::new(&device, ConsoleOptions { prometheus: Some(file.clone().into()), ..options() });
     desk.begin();
     let seen: Vec<_> = (0..2).map(|number| desk.live(number)).collect();
     desk.press(Key::Space);
@@ -111,6 +113,13 @@ fn a_hung_device_is_given_up_and_the_next_one_shows_the_same() {
     desk.console.revive(&other, None).expect("made anew");
     desk.rest();
     assert!(desk.picture() == seen[1] && device.is_given_up());
+    desk.console.end_metrics();
+    let told = std::fs::read_to_string(&file).expect("metrics");
+    for line in
+        ["echolume_device_losses_total 1", "echolume_device_stalls_total 1", "echolume_frozen 0", "echolume_running 0"]
+    {
+        assert!(told.lines().any(|told| told == line), "{line}: {told}");
+    }
 }
 
 /// Prevents a console that stays black because memory ran out at the wrong moment.

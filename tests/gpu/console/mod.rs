@@ -4,6 +4,7 @@ mod budget;
 mod failures;
 mod gestures;
 mod idle;
+mod metrics;
 mod monkey;
 mod shaders;
 mod warming;
@@ -52,6 +53,7 @@ pub fn options() -> ConsoleOptions {
         retry: None,
         source: SourceKind::Probe,
         record: None,
+        prometheus: None,
         folder: std::env::temp_dir(),
         overlay: true,
         bar: false,

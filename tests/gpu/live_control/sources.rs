@@ -128,3 +128,35 @@ fn an_idle_stream_reports_it_and_does_nothing() {
         bench.settle();
     }
 }
+
+/// Prevents counts of a source from vanishing when it is opened again, as a kiosk does for as long as it runs.
+#[test]
+fn what_a_source_counted_is_kept_when_another_follows() {
+    struct Unreachable;
+    impl Live for Unreachable {
+        fn next(&mut self, patience: Duration) -> Event {
+            std::thread::sleep(patience.min(Duration::from_millis(1)));
+            Event::Idle
+        }
+
+        fn can_wait(&self) -> bool {
+            true
+        }
+
+        fn disconnected(&self) -> Option<String> {
+            Some("no server listens".into())
+        }
+    }
+    let device = Device::alone();
+    let feed = || Feed::new(Box::new(Unreachable), None).expect("thread");
+    let mut stream = Stream::new(&device, feed(), settings("mode = 'mip'"), live::StreamOptions::default());
+    for sources in 1..=3 {
+        let begun = Instant::now();
+        while stream.feed_counts().disconnected < sources {
+            assert!(begun.elapsed() < BOUND, "source {sources}: {:?}", stream.feed_counts());
+            std::thread::sleep(Duration::from_millis(1));
+        }
+        assert_eq!(stream.take_statistics().expect("statistics").faults.disconnected, 1, "source {sources}");
+        stream.replace_source(feed());
+    }
+}

@@ -1,0 +1,77 @@
+//! A histogram as Prometheus has it: counts of values by fixed limits, and their sum.
+
+/// Counts of values. It takes the same memory however many there are.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Histogram {
+    /// Rising. A value belongs to the first limit that it does not exceed.
+    limits: &'static [f64],
+    /// By limit; the last one is of the values beyond all limits.
+    counts: Vec<u64>,
+    sum: f64,
+}
+
+impl Histogram {
+    /// An empty histogram. `limits`: rising and finite.
+    pub fn new(limits: &'static [f64]) -> Histogram {
+        Histogram { limits, counts: vec![0; limits.len() + 1], sum: 0.0 }
+    }
+
+    /// Counts a value. One that is not finite is left out.
+    pub fn record(&mut self, value: f64) {
+        if value.is_finite() {
+            self.counts[self.limits.partition_point(|limit| *limit < value)] += 1;
+            self.sum += value;
+        }
+    }
+
+    /// Adds the values of another histogram, which has the same limits.
+    pub fn add(&mut self, other: &Histogram) {
+        self.counts.iter_mut().zip(&other.counts).for_each(|(sum, count)| *sum += count);
+        self.sum += other.sum;
+    }
+
+    /// Forgets all values.
+    pub fn reset(&mut self) {
+        self.counts.fill(0);
+        self.sum = 0.0;
+    }
+
+    /// For each limit, and at last for infinity, the number of values that do not exceed it.
+    pub(super) fn cumulative(&self) -> impl Iterator<Item = (f64, u64)> + '_ {
+        let limits = self.limits.iter().copied().chain([f64::INFINITY]);
+        limits.zip(self.counts.iter().scan(0, |sum, count| {
+            *sum += count;
+            Some(*sum)
+        }))
+    }
+
+    pub(super) fn sum(&self) -> f64 {
+        self.sum
+    }
+
+    /// Number of values.
+    pub fn count(&self) -> u64 {
+        self.counts.iter().sum()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_value_belongs_to_the_first_limit_that_it_does_not_exceed() {
+        let mut histogram = Histogram::new(&[0.1, 1.0]);
+        for value in [0.0, 0.1, 0.100001, 1.0, 1.5, f64::NAN, f64::INFINITY] {
+            histogram.record(value);
+        }
+        let limits: Vec<_> = histogram.cumulative().collect();
+        assert_eq!(limits, [(0.1, 2), (1.0, 4), (f64::INFINITY, 5)]);
+        assert!((histogram.sum() - 2.700001).abs() < 1e-12);
+        let mut twice = histogram.clone();
+        twice.add(&histogram);
+        assert_eq!((twice.count(), twice.sum()), (10, 2.0 * histogram.sum()));
+        twice.reset();
+        assert_eq!(twice, Histogram::new(&[0.1, 1.0]));
+    }
+}

@@ -1,0 +1,180 @@
+//! A file of metrics that is replaced again and again while the program runs. A thread of its own writes it, so that a slow disk delays
+//! nothing else.
+
+use crate::files;
+use std::path::Path;
+use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::{Arc, Condvar, Mutex, MutexGuard};
+use std::time::Duration;
+
+/// Longest wait for the last text at the end.
+const PATIENCE: Duration = Duration::from_secs(2);
+
+/// The file. When it is dropped, what was put last is written.
+pub struct Textfile {
+    shared: Arc<Shared>,
+}
+
+#[derive(Default)]
+struct Shared {
+    slot: Mutex<Slot>,
+    /// Signalled when the slot changes.
+    changed: Condvar,
+    failures: AtomicU64,
+}
+
+#[derive(Default)]
+struct Slot {
+    /// The newest text that is not yet written.
+    text: Option<String>,
+    /// Nothing will follow.
+    is_closed: bool,
+    /// The thread has ended.
+    is_done: bool,
+}
+
+impl Textfile {
+    /// Starts the thread. Nothing is written before the first [`Textfile::put`].
+    ///
+    /// # Errors
+    /// One line: the thread cannot be started.
+    pub fn new(file: &Path) -> Result<Textfile, String> {
+        let shared: Arc<Shared> = Arc::default();
+        let (theirs, path) = (shared.clone(), file.to_path_buf());
+        let thread = std::thread::Builder::new().name("metrics".into()).spawn(move || write_all(&path, &theirs));
+        match thread {
+            Ok(_) => Ok(Textfile { shared }),
+            Err(e) => Err(format!("{}: a thread that writes it cannot be started: {e}", file.display())),
+        }
+    }
+
+    /// Replaces the content of the file, soon. A text that waits to be written is dropped for the newer one. A file that cannot be written
+    /// is said once, until it can be written again.
+    pub fn put(&self, text: String) {
+        self.shared.lock().text = Some(text);
+        self.shared.changed.notify_all();
+    }
+
+    /// How often the file could not be written.
+    pub fn failures(&self) -> u64 {
+        self.shared.failures.load(Ordering::Relaxed)
+    }
+}
+
+impl Drop for Textfile {
+    /// Waits until the last text is written, but not for a disk that hangs.
+    fn drop(&mut self) {
+        let mut slot = self.shared.lock();
+        slot.is_closed = true;
+        self.shared.changed.notify_all();
+        let waited = self.shared.changed.wait_timeout_while(slot, PATIENCE, |slot| !slot.is_done);
+        if !waited.unwrap_or_else(|e| e.into_inner()).0.is_done {
+            tracing::warn!("metrics: the last ones are not written yet; they are not waited for");
+        }
+    }
+}
+
+impl Shared {
+    fn lock(&self) -> MutexGuard<'_, Slot> {
+        self.slot.lock().unwrap_or_else(|e| e.into_inner())
+    }
+
+    /// Waits for the next text; none at the end.
+    fn next(&self) -> Option<String> {
+        let slot = self.lock();
+        let waited = self.changed.wait_while(slot, |slot| slot.text.is_none() && !slot.is_closed);
+        waited.unwrap_or_else(|e| e.into_inner()).text.take()
+    }
+}
+
+/// Writes each text that comes.
+fn write_all(file: &Path, shared: &Shared) {
+    // Also if this thread panics.
+    let _ended = Ended(shared);
+    let mut is_failing = false;
+    while let Some(text) = shared.next() {
+        match files::replace_for_all(file, text.as_bytes()) {
+            Ok(()) if is_failing => {
+                tracing::info!("metrics: {} is written again", file.display());
+                is_failing = false;
+            }
+            Ok(()) => {}
+            Err(fault) => {
+                shared.failures.fetch_add(1, Ordering::Relaxed);
+                if !std::mem::replace(&mut is_failing, true) {
+                    tracing::warn!("metrics: {fault}; going on without, and trying again");
+                }
+            }
+        }
+    }
+}
+
+struct Ended<'a>(&'a Shared);
+
+impl Drop for Ended<'_> {
+    fn drop(&mut self) {
+        self.0.lock().is_done = true;
+        self.0.changed.notify_all();
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::path::PathBuf;
+    use std::time::Instant;
+
+    /// A folder of this test alone.
+    fn folder(name: &str) -> PathBuf {
+        let folder = std::env::temp_dir().join(format!("echolume-textfile-{}-{name}", std::process::id()));
+        std::fs::create_dir_all(&folder).expect("a folder");
+        folder
+    }
+
+    fn wait(until: impl Fn() -> bool) {
+        let begun = Instant::now();
+        while !until() {
+            assert!(begun.elapsed() < Duration::from_secs(60), "it does not come");
+            std::thread::sleep(Duration::from_millis(1));
+        }
+    }
+
+    #[test]
+    fn the_file_holds_the_last_text_and_nothing_is_left_beside_it() {
+        let folder = folder("last");
+        let file = folder.join("a.prom");
+        let textfile = Textfile::new(&file).expect("a thread");
+        for n in 0..50 {
+            textfile.put(format!("a {n}\n"));
+        }
+        drop(textfile);
+        assert_eq!(std::fs::read_to_string(&file).expect("written"), "a 49\n");
+        assert_eq!(std::fs::read_dir(&folder).expect("listed").count(), 1);
+        #[cfg(unix)]
+        {
+            use std::os::unix::fs::PermissionsExt;
+            let mode = std::fs::metadata(&file).expect("there").permissions().mode();
+            assert_eq!(mode & 0o777, 0o644, "node_exporter runs as another user");
+        }
+        std::fs::remove_dir_all(&folder).expect("removed");
+    }
+
+    #[test]
+    fn a_file_that_cannot_be_written_is_counted_and_written_as_soon_as_it_can_be() {
+        let folder = folder("failing");
+        let below = folder.join("below");
+        let file = below.join("a.prom");
+        let textfile = Textfile::new(&file).expect("a thread");
+        for n in 1..=3 {
+            textfile.put(format!("a {n}\n"));
+            wait(|| textfile.failures() == n);
+        }
+        std::fs::create_dir(&below).expect("a folder");
+        textfile.put("a 4\n".into());
+        wait(|| file.exists());
+        assert_eq!(textfile.failures(), 3);
+        drop(textfile);
+        assert_eq!(std::fs::read_to_string(&file).expect("written"), "a 4\n");
+        std::fs::remove_dir_all(&folder).expect("removed");
+    }
+}
