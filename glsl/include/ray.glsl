@@ -10,12 +10,13 @@ layout(constant_id = 20) const int CLIPS = 0;   // clip planes
 layout(constant_id = 21) const int SPREAD = 0;  // 1: steps grow with the range, as the sample spacing of a convex sweep does
 layout(constant_id = 36) const int INTRA_FRAME_MOTION = 0; // 1: the motor moves while a frame is acquired
 layout(constant_id = 37) const int NON_UNIFORM = 0; // 1: slices at non-uniform positions or of mixed directions
+layout(constant_id = 38) const int SWEEP_TERMS = 0; // of the polynomial from a sweep position to a slice; 0: the look-up table
 layout(constant_id = 22) const int SLIDING = 0; // 3 or 5: edge of the Gaussian that slides along the ray
 
 #include "stored_volume.glsl"
 uniform sampler3D volume;
 uniform utexture3D packed_neighbours;
-readonly buffer SweepLut { float entry[]; } sweep_lut;      // of SWEPT
+readonly buffer SweepLut { float entry[]; } sweep_lut;      // of SWEPT without a polynomial
 readonly buffer LineLut { float entry[]; } line_lut;        // of INTRA_FRAME_MOTION
 readonly buffer SliceTable { vec2 entry[]; } slice_table;   // of NON_UNIFORM: position and advance, in mean pitches
 
@@ -126,7 +127,7 @@ struct Sector {
 Sector sector() {
     float entries = 0.0, slices = 0.0;
     if (SWEPT) {
-        entries = float(sweep_lut.entry.length() - 1);
+        if (SWEEP_TERMS == 0) entries = float(sweep_lut.entry.length() - 1);
         slices = NON_UNIFORM == 1 ? float(slice_table.entry.length() - 1) : last_slice;
     }
     return Sector(vec4(range_low, line_low, 0.0, -1e-4), vec4(range_high, line_high, entries, slices + 1e-4));
@@ -146,61 +147,99 @@ float line_at(float x, float y, float range) {
     return ARRAY == 2 ? quarter_tangent(x, y, range) : x / max(range + y, 1e-20);
 }
 
-// Texture indices (column, row, slice) of a point in space, and its coordinates in the sector; false outside the insonified
-// region. No trigonometry: the look-up table takes the tangent of half the angle about the wobble axis, z / (rho + y).
-bool locate(vec3 p, out vec3 texel, out vec4 place) {
-    place = vec4(0.0);
-    if (SWEEP == 0) {
-        texel = vec3((p.xy - grid_origin) * grid_density, (p.z - slice_origin) * slice_density);
-        return true;
+// Slice index at a position of the sweep: mm, or of a fan the tangent of half the angle about the wobble axis. `line` is the line's
+// parameter. `e` is the entry of the look-up table, and 0 where a polynomial takes its place. No trigonometry either way.
+float slice_at(float position, float line, out float e) {
+    float k;
+    e = 0.0;
+    if (SWEEP_TERMS > 0) {
+        // Odd in the position. What is beyond the limits is outside, and the polynomial is not meant for it.
+        float t = clamp(position, sweep_low, sweep_high), square = t * t, sum = 0.0;
+        if (SWEEP_TERMS > 9) sum = fma(sum, square, sweep_terms_2.y);
+        if (SWEEP_TERMS > 8) sum = fma(sum, square, sweep_terms_2.x);
+        if (SWEEP_TERMS > 7) sum = fma(sum, square, sweep_terms_1.w);
+        if (SWEEP_TERMS > 6) sum = fma(sum, square, sweep_terms_1.z);
+        if (SWEEP_TERMS > 5) sum = fma(sum, square, sweep_terms_1.y);
+        if (SWEEP_TERMS > 4) sum = fma(sum, square, sweep_terms_1.x);
+        if (SWEEP_TERMS > 3) sum = fma(sum, square, sweep_terms_0.w);
+        if (SWEEP_TERMS > 2) sum = fma(sum, square, sweep_terms_0.z);
+        if (SWEEP_TERMS > 1) sum = fma(sum, square, sweep_terms_0.y);
+        k = fma(t, fma(sum, square, sweep_terms_0.x), sweep_offset);
+    } else {
+        e = (position - sweep_low) * sweep_density;
+        int last = sweep_lut.entry.length() - 1;
+        int i = clamp(int(e), 0, last - 1);
+        k = mix(sweep_lut.entry[i], sweep_lut.entry[i + 1], clamp(e - float(i), 0.0, 1.0));
     }
-    float x = p.x, y = p.y, position = p.z;
+    // Share of the frame's lines that fired before this one.
+    float share = 0.0;
+    if (INTRA_FRAME_MOTION == 1) {
+        float l = clamp((line - line_low) * line_density, 0.0, float(line_lut.entry.length() - 1));
+        int j = clamp(int(l), 0, line_lut.entry.length() - 2);
+        share = mix(line_lut.entry[j], line_lut.entry[j + 1], l - float(j));
+    }
+    if (NON_UNIFORM == 1) {
+        // Bracketing: positions increase from slice to slice for every line, and the uniform guess is rarely off by more than one.
+        int slices = slice_table.entry.length();
+        int s = clamp(int(k), 0, slices - 2);
+        while (s > 0 && slice_table.entry[s].x + slice_table.entry[s].y * share > k) --s;
+        while (s + 2 < slices && slice_table.entry[s + 1].x + slice_table.entry[s + 1].y * share <= k) ++s;
+        float here = slice_table.entry[s].x + slice_table.entry[s].y * share;
+        float next = slice_table.entry[s + 1].x + slice_table.entry[s + 1].y * share;
+        k = float(s) + (k - here) / (next - here);
+    } else if (INTRA_FRAME_MOTION == 1) {
+        k -= advance * share;
+    }
+    return k;
+}
+
+// A point's depth in the plane of its frame, and the position of that frame in the sweep.
+void in_frame(vec3 p, out float y, out float position) {
+    y = p.y;
+    position = p.z;
     if (SWEEP == 1) {
         float beyond = p.y - axis_depth;
         float rho = sqrt(beyond * beyond + p.z * p.z);
         y = rho + axis_depth;
         position = p.z / max(rho + beyond, 1e-20);
     }
+}
+
+// Texture indices (column, row, slice) of a point in space, and its coordinates in the sector; false outside the insonified region.
+bool locate(vec3 p, out vec3 texel, out vec4 place) {
+    place = vec4(0.0);
+    if (SWEEP == 0) {
+        texel = vec3((p.xy - grid_origin) * grid_density, (p.z - slice_origin) * slice_density);
+        return true;
+    }
+    float x = p.x, y, position;
+    in_frame(p, y, position);
     float range = y, line = x;
     if (ARRAY != 0) {
         range = sqrt(x * x + y * y);
         line = line_at(x, y, range);
     }
     float e = 0.0, k = 0.0;
-    if (SWEPT) {
-        e = (position - sweep_low) * sweep_density;
-        int last = sweep_lut.entry.length() - 1;
-        int i = clamp(int(e), 0, last - 1);
-        k = mix(sweep_lut.entry[i], sweep_lut.entry[i + 1], clamp(e - float(i), 0.0, 1.0));
-        // Share of the frame's lines that fired before this one.
-        float share = 0.0;
-        if (INTRA_FRAME_MOTION == 1) {
-            float l = clamp((line - line_low) * line_density, 0.0, float(line_lut.entry.length() - 1));
-            int j = clamp(int(l), 0, line_lut.entry.length() - 2);
-            share = mix(line_lut.entry[j], line_lut.entry[j + 1], l - float(j));
-        }
-        if (NON_UNIFORM == 1) {
-            // Bracketing: positions increase from slice to slice for every line, and the uniform guess is rarely off by more than one.
-            int slices = slice_table.entry.length();
-            int s = clamp(int(k), 0, slices - 2);
-            while (s > 0 && slice_table.entry[s].x + slice_table.entry[s].y * share > k) --s;
-            while (s + 2 < slices && slice_table.entry[s + 1].x + slice_table.entry[s + 1].y * share <= k) ++s;
-            float here = slice_table.entry[s].x + slice_table.entry[s].y * share;
-            float next = slice_table.entry[s + 1].x + slice_table.entry[s + 1].y * share;
-            k = float(s) + (k - here) / (next - here);
-        } else if (INTRA_FRAME_MOTION == 1) {
-            k -= advance * share;
-        }
-    }
+    if (SWEPT) k = slice_at(position, line, e);
     texel = vec3((vec2(x, y) - grid_origin) * grid_density, k);
     place = vec4(range, line, e, k);
     Sector limits = sector();
     return all(greaterThanEqual(place, limits.low)) && all(lessThanEqual(place, limits.high));
 }
 
+// The same without the coordinates. Between lines less than 90 degrees off the axis, squares of ranges and the sides of the first and the
+// last line need neither a root nor a quotient.
 bool locate(vec3 p, out vec3 texel) {
     vec4 place;
-    return locate(p, texel, place);
+    if (SWEEP == 0 || ARRAY != 1 || SWEEP_TERMS == 0 || INTRA_FRAME_MOTION == 1) return locate(p, texel, place);
+    float y, position, e;
+    in_frame(p, y, position);
+    vec2 at = vec2(p.x, y);
+    float k = slice_at(position, 0.0, e), square = dot(at, at);
+    texel = vec3((at - grid_origin) * grid_density, k);
+    float last = NON_UNIFORM == 1 ? float(slice_table.entry.length() - 1) : last_slice;
+    return square >= range_low * range_low && square <= range_high * range_high && dot(at, first_line) >= 0.0 && dot(at, last_line) >= 0.0
+        && k >= -1e-4 && k <= last + 1e-4;
 }
 
 // Share of a step that is inside the sector, between the coordinates of an end inside and of one outside: along a step each

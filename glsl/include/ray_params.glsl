@@ -29,8 +29,15 @@
     float line_low;
     float line_high;
     float axis_depth; // Y of the wobble axis, mm
-    // The sweep look-up table: slice position, as half tangent (fan) or mm, to slice index.
+    vec2 first_line; // in-plane normals of the first and the last line, towards the others
+    vec2 last_line;
+    // Slice position, as half tangent (fan) or mm, to slice index: by a polynomial, or by a look-up table.
     float sweep_low;
-    float sweep_density;
+    float sweep_high;
+    float sweep_density; // entries of the table
+    float sweep_offset;
+    vec4 sweep_terms_0;
+    vec4 sweep_terms_1;
+    vec2 sweep_terms_2;
     float line_density; // entries of the line look-up table
     float advance;      // slices that the motor travels over the lines of a frame

@@ -93,7 +93,6 @@ float distance_to_sector(vec3 p) {
     distance = max(distance, max(range - range_high, range_low - range));
     distance = max(distance, ARRAY != 0 ? distance_to_lines(vec2(x, y)) : max(x - line_high, line_low - x));
     if (SWEPT) {
-        float sweep_high = sweep_low + float(sweep_lut.entry.length() - 1) / sweep_density;
         vec2 q = vec2(p.z, p.y - axis_depth);
         distance = max(distance, SWEEP == 1 ? max(beyond_angle(q, sweep_high), -beyond_angle(q, sweep_low))
                                             : max(p.z - sweep_high, sweep_low - p.z));

@@ -109,7 +109,7 @@ void main() {
                 vec3 p = place_at(ray, between ? from + length : middle_of(ray, i, length, i < complete));
                 vec3 texel;
                 vec4 place;
-                bool inside = locate(p, texel, place);
+                bool inside = between ? locate(p, texel, place) : locate(p, texel);
                 if (length <= 0.0) continue;
                 vec4 entry;
                 if (between) {

@@ -81,7 +81,7 @@ impl Scene {
         let casts = self.composites() || self.detects_surface() || self.projects();
         let swept = self.probe().is_some_and(|p| !matches!(p.motion, Motion::Still { .. }));
         let is_wanted = self.settings.ray.brick.map_or(self.bricks_pay, |edge| edge > 0);
-        if !casts || !is_wanted || (swept && self.settings.ray.entries < MIN_ENTRIES) {
+        if !casts || !is_wanted || (swept && self.slice_terms() == 0 && self.settings.ray.entries < MIN_ENTRIES) {
             return false;
         }
         // No skipping where f32 cannot resolve positions to a brick's margin, as with a camera kilometres away.

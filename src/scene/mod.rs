@@ -15,6 +15,7 @@ mod region;
 pub mod self_attenuation;
 pub mod settings;
 mod sizes;
+mod slice_index;
 pub mod transfer;
 pub mod variants;
 pub mod visible_bounds;

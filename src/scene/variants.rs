@@ -34,7 +34,7 @@ const MODES: [(Mode, &str); 10] = [
 const SAMPLINGS: [&str; 3] = ["hardware", "exact", "quads"];
 
 /// Filters, lights and other choices that are structure: each line is a table of a scene file.
-const CHOICES: [&str; 42] = [
+const CHOICES: [&str; 43] = [
     "slices.median = true",
     "slices.sigma = {}",
     "slices.enhanced_sigma = { window = 5, largest = 19, sigma = 0.1 }",
@@ -70,6 +70,7 @@ const CHOICES: [&str; 42] = [
     "ray.quarter = true",
     "ray.rays = 2",
     "ray.elevation = 'bspline'",
+    "ray.slice_index = 'table'",
     "ray.elevation = 'bspline-sharp'",
     "mode = 'vr'\nvolume.compositing = 'pre-integrated'",
     "mode = 'vr'\nlight.volume = {}",

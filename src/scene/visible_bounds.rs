@@ -347,6 +347,7 @@ fn slices(scene: &Scene, probe: &Probe, position: Span) -> Span {
     let slack = match probe.motion {
         Motion::Still { .. } => return Span(0.0, 0.0),
         Motion::Translated => 0.0,
+        Motion::Fan { .. } if scene.slice_terms() > 0 => super::slice_index::MAX_ERROR * probe.slices.pitch(),
         // The ray casters interpolate a table over the half tangent t. The error is at most h^2/8 of (2 atan t)''.
         Motion::Fan { .. } => {
             let h = ((last / 2.0).tan() - (first / 2.0).tan()) / f64::from(scene.settings.ray.entries - 1);

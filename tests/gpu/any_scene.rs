@@ -72,6 +72,7 @@ const SETTINGS: &[(&str, &[&str])] = &[
     ("ray.spread", &["0.5", "1"]),
     ("ray.sliding", &["3", "5"]),
     ("ray.entries", &["2", "65536"]),
+    ("ray.slice_index", &["auto", "table"]),
     ("ray.brick", &["0", "4", "8", "64"]),
     ("ray.early_end", &["0", "1"]),
     ("planes.plane", &["a", "b", "c"]),

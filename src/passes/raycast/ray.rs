@@ -28,7 +28,7 @@ fn tables(scene: &Scene) -> (bool, bool, bool) {
 pub(in crate::passes) fn reads(scene: &Scene) -> Vec<Bind> {
     let (swept, non_uniform, moving) = tables(scene);
     let mut reads = vec![Bind { filtered: scene.filters_in_hardware(), ..whole("volume", Slot::Volume) }];
-    reads.extend(swept.then_some(whole("sweep_lut", Slot::SweepLut)));
+    reads.extend((swept && scene.slice_terms() == 0).then_some(whole("sweep_lut", Slot::SweepLut)));
     reads.extend(moving.then_some(whole("line_lut", Slot::LineLut)));
     reads.extend(non_uniform.then_some(whole("slice_table", Slot::SliceTable)));
     reads
@@ -66,6 +66,7 @@ pub(in crate::passes) fn constants(scene: &Scene) -> Vec<(&'static str, i32)> {
         ("ELEVATION", scene.takes_bspline() as i32),
         ("INTRA_FRAME_MOTION", moving as i32),
         ("NON_UNIFORM", non_uniform as i32),
+        ("SWEEP_TERMS", scene.slice_terms() as i32),
         ("CLIPS", scene.settings.clip.len() as i32),
         ("SPREAD", scene.spreads() as i32),
     ]
@@ -112,7 +113,7 @@ pub(super) fn params(scene: &Scene, view: View, step: f64) -> Params {
     }
     let [clip_0, clip_1, clip_2, clip_3] = clips;
     let bricks = scene.bricks();
-    let params = ray_params(scene)
+    let params = sweep_params(ray_params(scene), scene)
         .vec3("brick_low", scene.to_local(bricks.low))
         .vec3("brick_density", bricks.edge.recip())
         .f32("spread", scene.settings.ray.spread)
@@ -135,14 +136,11 @@ pub(super) fn params(scene: &Scene, view: View, step: f64) -> Params {
             .f32("slice_origin", volume.origin[2] - local.z)
             .f32("slice_density", 1.0 / volume.spacing[2])
             .f32("axis_depth", 0.0)
-            .f32("sweep_low", 0.0)
-            .f32("sweep_density", 0.0)
             .f32("line_density", 0.0)
             .f32("advance", 0.0),
         Geometry::Sweep(probe) => {
             let low = line_parameter(probe, probe.lines.first());
             let high = line_parameter(probe, probe.lines.last());
-            let (sweep_low, sweep_high) = sweep_span(probe);
             let entries = f64::from(scene.settings.ray.entries - 1);
             let advance = match &probe.advance {
                 Advance::Same(a) => a / probe.slices.pitch(),
@@ -153,12 +151,41 @@ pub(super) fn params(scene: &Scene, view: View, step: f64) -> Params {
                 .f32("slice_origin", 0.0)
                 .f32("slice_density", 0.0)
                 .f32("axis_depth", probe.axis_depth())
-                .f32("sweep_low", if swept { sweep_low } else { 0.0 })
-                .f32("sweep_density", if swept { entries / (sweep_high - sweep_low) } else { 0.0 })
                 .f32("line_density", entries / (high - low))
                 .f32("advance", if swept { advance } else { 0.0 })
         }
     }
+}
+
+/// From the position in a sweep to the slice index, and the borders of the lines.
+fn sweep_params(params: Params, scene: &Scene) -> Params {
+    let probe = scene.probe();
+    let table = || {
+        let swept = probe.filter(|_| tables(scene).0)?;
+        let (low, high) = sweep_span(swept);
+        Some(([low, high], f64::from(scene.settings.ray.entries - 1) / (high - low)))
+    };
+    let polynomial = scene.slice_polynomial();
+    let ([low, high], density) = match &polynomial {
+        Some(polynomial) => (polynomial.limits, 0.0),
+        None => table().unwrap_or_default(),
+    };
+    let term = |i: usize| polynomial.as_ref().and_then(|p| p.terms.get(i)).copied().unwrap_or(0.0);
+    let four = |first: usize| std::array::from_fn(|i| term(first + i));
+    // Towards larger angles from the first line, towards smaller ones from the last.
+    let side = |angle: f64, towards: f64| [towards * angle.cos(), -towards * angle.sin()];
+    let curved = probe.filter(|p| matches!(p.array, Array::Curved { .. }));
+    let [first, last] = curved.map_or([0.0; 2], |p| [p.lines.first(), p.lines.last()]);
+    params
+        .vec2("first_line", side(first, 1.0))
+        .vec2("last_line", side(last, -1.0))
+        .f32("sweep_low", low)
+        .f32("sweep_high", high)
+        .f32("sweep_density", density)
+        .f32("sweep_offset", polynomial.as_ref().map_or(0.0, |p| p.offset))
+        .vec4("sweep_terms_0", four(0))
+        .vec4("sweep_terms_1", four(4))
+        .vec2("sweep_terms_2", [term(8), term(9)])
 }
 
 fn sector(params: Params, [range_low, range_high, line_low, line_high]: [f64; 4]) -> Params {

@@ -47,7 +47,9 @@ pub struct Ray {
     /// The 3D filter of the thesis (4.3): a Gaussian of 3 or 5 samples along each axis, applied at every sample while the ray is
     /// cast; 0 for none.
     pub sliding: u32,
-    /// Entries of the look-up tables of the sweep and the lines, 2..=65536. The error of linear interpolation is h^2/8 times the second
+    /// How the slice index at a position of the sweep is computed.
+    pub slice_index: SliceIndex,
+    /// Entries of the look-up tables of the sweep (where it has one) and the lines, 2..=65536. The error of linear interpolation is h^2/8 times the second
     /// derivative of the half tangent: with 1025 entries under 1e-6 slices for a sweep of 142 frames over 85 deg.
     pub entries: u32,
     /// Rays per pixel along each axis, 1..=4: the picture is rendered larger and averaged.
@@ -84,6 +86,7 @@ impl Default for Ray {
             elevation: Elevation::Linear,
             spread: 0.0,
             sliding: 0,
+            slice_index: SliceIndex::Auto,
             entries: 1025,
             rays: 1,
             brick: None,
@@ -121,6 +124,17 @@ impl Sampling {
             Sampling::PackedNeighbours => "two texels of four neighbours each, interpolated in f32",
         }
     }
+}
+
+/// How the slice index at a position of the sweep is computed.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum SliceIndex {
+    /// By a polynomial of up to 10 terms with an error of at most 1e-6 slices; a fan wider than 180 degrees takes the table.
+    #[default]
+    Auto,
+    /// By a look-up table of `entries` entries.
+    Table,
 }
 
 /// How a sample is interpolated between slices. Within a slice it is bilinear.
