@@ -5,6 +5,7 @@ use serde_json::{Map, Value};
 use std::fs::File;
 use std::io::{BufRead, BufReader, Read};
 use std::path::Path;
+use std::sync::Arc;
 
 /// Longest line, bytes.
 const MAX_LINE: u64 = 1 << 20;
@@ -43,7 +44,7 @@ pub struct Unit {
 #[derive(Clone, Debug, PartialEq)]
 pub struct Numbered {
     pub line: u64,
-    pub unit: Unit,
+    pub unit: Arc<Unit>,
 }
 
 /// What dividing the manifest needs of a line.
@@ -144,7 +145,7 @@ pub fn units(file: &Path, is_chosen: impl Fn(usize) -> bool) -> Result<Vec<Numbe
             let unit: Unit = serde_json::from_str(text).map_err(|e| format!("is no unit: {e}"))?;
             check_cost(unit.cost)?;
             unit.check()?;
-            units.push(Numbered { line, unit });
+            units.push(Numbered { line, unit: Arc::new(unit) });
         }
         Ok(())
     })?;

@@ -24,6 +24,11 @@ const MAX_FAILURES: usize = 2000;
 const STYLE: &str = ".sheet { display: flex; flex-wrap: wrap; gap: .75rem; } .sheet figure { margin: 0; width: 8rem; font-size: .75rem; } \
                      .sheet img { display: block; max-width: 8rem; max-height: 8rem; background: #000; }";
 
+/// Of two results of a unit the greater one counts.
+fn rank(record: &Record) -> (bool, bool, &str) {
+    (record.status == Status::Done, record.agreement.is_none(), &record.date)
+}
+
 /// The results of all shards, one for each unit.
 #[derive(Default)]
 pub struct Merged<'a> {
@@ -35,7 +40,6 @@ impl<'a> Merged<'a> {
     pub fn of(records: &'a [Record]) -> Merged<'a> {
         let mut units: BTreeMap<(&str, &str), &Record> = BTreeMap::new();
         for record in records {
-            let rank = |r: &Record| (r.status == Status::Done, r.agreement.is_none(), r.date.clone());
             let kept = units.entry((&record.input, &record.work)).or_insert(record);
             if rank(record) > rank(kept) {
                 *kept = record;

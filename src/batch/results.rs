@@ -6,7 +6,7 @@ use super::unit::Key;
 use crate::files;
 use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value};
-use std::collections::HashSet;
+use std::collections::{HashMap, HashSet};
 use std::fs::{self, File, OpenOptions};
 use std::io::{BufRead, BufReader, Read, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
@@ -103,8 +103,8 @@ pub struct Results {
     path: PathBuf,
     /// Keys and recordings of the units that a line says are done.
     done: HashSet<(String, String)>,
-    /// The unit of each line that says that a device was lost.
-    lost: Vec<(String, String)>,
+    /// By recording and work: lines that say that a device was lost.
+    lost: HashMap<(String, String), usize>,
 }
 
 impl Results {
@@ -118,7 +118,6 @@ impl Results {
         let path = place.join(format!("shard-{:04}-of-{:04}.ndjson", shard.index, shard.count));
         let fault = |e: std::io::Error| format!("{}: cannot be written: {e}", path.display());
         let mut file = OpenOptions::new().create(true).read(true).append(true).open(&path).map_err(fault)?;
-        let (records, _) = read_lines(&path)?;
         let mut last = [b'\n'];
         if file.metadata().map_err(fault)?.len() > 0 {
             file.seek(SeekFrom::End(-1)).and_then(|_| file.read_exact(&mut last)).map_err(fault)?;
@@ -126,14 +125,13 @@ impl Results {
         if last != [b'\n'] {
             file.write_all(b"\n").map_err(fault)?;
         }
-        let (mut done, mut lost) = (HashSet::new(), Vec::new());
-        for record in records {
-            match record.status {
-                Status::Done => drop(done.insert((record.key, record.input))),
-                Status::Lost => lost.push((record.input, record.work)),
-                Status::Bad | Status::Failed => {}
-            }
-        }
+        let (mut done, mut lost) = (HashSet::new(), HashMap::new());
+        // Of a million lines only what is asked for is kept.
+        for_each_record(&path, |record| match record.status {
+            Status::Done => drop(done.insert((record.key, record.input))),
+            Status::Lost => *lost.entry((record.input, record.work)).or_insert(0) += 1,
+            Status::Bad | Status::Failed => {}
+        })?;
         Ok(Results { file, path, done, lost })
     }
 
@@ -159,31 +157,34 @@ impl Results {
 
     /// How often a device was lost by a unit.
     pub fn losses(&self, input: &str, work: &str) -> usize {
-        self.lost.iter().filter(|(i, w)| i == input && w == work).count()
+        // Nearly always empty, and a key has to be copied.
+        let is_known = !self.lost.is_empty();
+        let found = is_known.then(|| self.lost.get(&(input.to_string(), work.to_string())));
+        found.flatten().copied().unwrap_or(0)
     }
 }
 
-/// The records of a file of results, and the number of lines that are none.
-fn read_lines(path: &Path) -> Result<(Vec<Record>, usize), String> {
+/// Calls `each` with the records of a file of results. Returns the number of lines that are none.
+fn for_each_record(path: &Path, mut each: impl FnMut(Record)) -> Result<usize, String> {
     let fault = |e: std::io::Error| format!("{}: cannot be read: {e}", path.display());
     let mut reader = BufReader::new(File::open(path).map_err(fault)?);
-    let (mut records, mut torn, mut line) = (Vec::new(), 0, Vec::new());
+    let (mut torn, mut line) = (0, Vec::new());
     loop {
         line.clear();
         if reader.by_ref().take(MAX_LINE).read_until(b'\n', &mut line).map_err(fault)? == 0 {
-            return Ok((records, torn));
+            return Ok(torn);
         }
         if line.trim_ascii().is_empty() {
             continue;
         }
         match serde_json::from_slice::<Record>(&line) {
-            Ok(record) if record.format == FORMAT => records.push(record),
+            Ok(record) if record.format == FORMAT => each(record),
             _ => torn += 1,
         }
     }
 }
 
-/// All results of a folder, and the number of lines that a killed process left unfinished.
+/// All results of a folder without their figures, and the number of lines that a killed process left unfinished.
 ///
 /// # Errors
 /// One line: there are none, or they cannot be read.
@@ -200,9 +201,10 @@ pub fn read_all(folder: &Path) -> Result<(Vec<Record>, usize), String> {
     files.sort();
     let (mut records, mut torn) = (Vec::new(), 0);
     for file in &files {
-        let (more, broken) = read_lines(file)?;
-        records.extend(more);
-        torn += broken;
+        torn += for_each_record(file, |record| {
+            // Figures are the larger part of a record.
+            records.push(Record { figures: Map::new(), ..record });
+        })?;
     }
     Ok((records, torn))
 }

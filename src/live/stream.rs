@@ -626,6 +626,11 @@ impl Stream {
         Ok(since)
     }
 
+    /// The counts since the stream was created, as they were when the statistics were last taken.
+    pub fn totals(&self) -> String {
+        self.reported.totals()
+    }
+
     /// Number of volumes that were shown.
     pub fn volumes_shown(&self) -> u64 {
         self.pool().map_or(0, |pool| pool.counts().shown)

@@ -21,6 +21,7 @@ mod pipelines;
 mod service;
 mod shaders;
 mod signals;
+mod snakemake;
 mod standard_streams;
 mod stream;
 mod support_bundle;

@@ -65,9 +65,18 @@ fn the_jobs_use_values_that_the_api_knows_and_exit_codes_that_the_program_has() 
     }
 }
 
+/// The image's packages have these drivers: Debian 13 no longer has the architecture in their names.
+#[test]
+fn the_job_for_software_names_the_driver_of_the_image() {
+    let (job, image) = (read("job-lavapipe.yaml"), read("Containerfile"));
+    assert!(image.contains("debian:trixie-slim") && image.contains("mesa-vulkan-drivers"));
+    let driver = pairs(&job).into_iter().find(|(_, value)| value.ends_with(".json")).map(|(_, value)| value);
+    assert_eq!(driver.as_deref(), Some("/usr/share/vulkan/icd.d/lvp_icd.json"));
+}
+
 #[test]
 fn the_scripts_are_bash() {
-    for name in ["batch.sbatch", "test-slurm"] {
+    for name in ["batch.sbatch", "test-slurm", "test-snakemake", "test-jobs"] {
         let checked =
             Command::new("bash").arg("-n").arg(repository("tools/cluster").join(name)).output().expect("bash");
         assert!(checked.status.success(), "{name}: {}", String::from_utf8_lossy(&checked.stderr));

@@ -22,5 +22,6 @@ mod references;
 mod rules;
 mod sampling;
 mod sizes_in_mm;
+mod soak;
 mod supply;
 mod verify_report;

@@ -5,6 +5,8 @@
 //   ECHOLUME_LAYER_LOG=FILE          appends every begin, bind, dispatch, barrier, time stamp and submission
 //   ECHOLUME_LAYER_HANG=N            the Nth submission of a device and all later ones never complete; only the first device that gets there.
 //                                    SIGALRM ends a program that is still running 45 s later, so that a missing deadline fails a test
+//   ECHOLUME_LAYER_FAULT=FILE        while the program runs: FILE that begins with l loses, and with h hangs, the device that submits next; it is
+//                                    deleted by that. A program that is hung in this way is not ended
 //   ECHOLUME_LAYER_DROP_BARRIERS=N   memory barriers are dropped from the Nth of a device on
 //   ECHOLUME_LAYER_DROP_WAITS=1      submissions do not wait for semaphores
 //   ECHOLUME_LAYER_MAX_GROUPS=N      a submission with a dispatch of more than N workgroups loses the device, as a watchdog would
@@ -532,6 +534,16 @@ static int largest_groups(Device *d, uint32_t n, const VkSubmitInfo2 *s, uint64_
     return 0;
 }
 
+// The first letter of the file that asks for a fault now, 0 without one. It is taken once.
+static int asked(void) {
+    const char *path = getenv("ECHOLUME_LAYER_FAULT");
+    FILE *file = path ? fopen(path, "r") : NULL;
+    if (!file) return 0;
+    int letter = fgetc(file);
+    fclose(file);
+    return unlink(path) == 0 ? letter : 0;
+}
+
 static VKAPI_ATTR VkResult VKAPI_CALL Submit2(VkQueue q, uint32_t n, const VkSubmitInfo2 *s, VkFence f) {
     Device *d = device_of(q);
     uint64_t hang = number("ECHOLUME_LAYER_HANG"), most = number("ECHOLUME_LAYER_MAX_GROUPS");
@@ -543,6 +555,9 @@ static VKAPI_ATTR VkResult VKAPI_CALL Submit2(VkQueue q, uint32_t n, const VkSub
         d->hangs = is_hung_once = 1;
         alarm(45);
     }
+    int fault = asked();
+    if (fault == 'l') d->lost = 1;
+    if (fault == 'h') d->hangs = 1;
     int swallowed = d->hangs;
     d->swallowed += swallowed ? n : 0;
     if (!swallowed && number("ECHOLUME_LAYER_COMPLETE"))
@@ -623,6 +638,13 @@ static VKAPI_ATTR VkResult VKAPI_CALL DeviceWaitIdle(VkDevice h) {
 static VKAPI_ATTR VkResult VKAPI_CALL QueueWaitIdle(VkQueue q) {
     VkResult result = idle(device_of(q));
     return result == VK_SUCCESS ? NEXT(device_of(q), vkQueueWaitIdle)(q) : result;
+}
+
+// A picture that waits for work that hangs stays in the queue. lavapipe would wait in the call until that work is submitted.
+static VKAPI_ATTR VkResult VKAPI_CALL QueuePresent(VkQueue q, const VkPresentInfoKHR *i) {
+    if (!is_hung(device_of(q))) return NEXT(device_of(q), vkQueuePresentKHR)(q, i);
+    for (uint32_t j = 0; i->pResults && j < i->swapchainCount; j++) i->pResults[j] = VK_SUCCESS;
+    return VK_SUCCESS;
 }
 
 // ---- Instance and device ----
@@ -753,6 +775,7 @@ static const struct {
     {"vkMapMemory", IS(Map)},
     {"vkQueueSubmit2", IS(Submit2)},
     {"vkQueueWaitIdle", IS(QueueWaitIdle)},
+    {"vkQueuePresentKHR", IS(QueuePresent)},
     {"vkSetDebugUtilsObjectNameEXT", IS(SetName)},
     {"vkUnmapMemory", IS(Unmap)},
     {"vkWaitSemaphores", IS(WaitSemaphores)},

@@ -4,6 +4,7 @@ use super::{Console, ConsoleError, FAULT_CHECK_INTERVAL, LoopRequest};
 use crate::gpu;
 use crate::gpu::window::PresentOutcome;
 use crate::live::metrics::{LiveMetrics, SourceStatus};
+use crate::live::volume_pool::VolumeCounts;
 use crate::live::{Feed, FinishedPicture, Step, StreamError};
 use crate::ui::frame_budget;
 use crate::ui::panels::{Banner, PanelState};
@@ -192,8 +193,9 @@ impl Console {
         if let Ok(statistics) = self.stream.take_statistics() {
             let is_active = statistics.pictures > 0 || statistics.frames > 0;
             self.needs_redraw |= self.shows_times && is_active;
-            if is_active {
-                tracing::debug!("{}", statistics.line(acquisition_time));
+            // A volume may also end while nothing arrives.
+            if is_active || statistics.volumes != VolumeCounts::default() {
+                tracing::debug!("{}; {}", statistics.line(acquisition_time), self.stream.totals());
             }
             self.times.add(&statistics, acquisition_time);
             self.metrics.iter_mut().for_each(|metrics| metrics.add(&statistics));
