@@ -111,7 +111,7 @@ fn header_numbers_that_cannot_be_true_are_refused_by_name() {
     assert!(total(folder.write("n.mha", endless)).unwrap_err().contains("ElementDataFile"));
     assert!(total(folder.write("n.png", b"\x89PNG")).unwrap_err().contains("MetaImage"));
     let of_folder = total(&folder.0).unwrap_err();
-    assert!(of_folder.contains("n.png: picture: is no picture of a known format"), "{of_folder}");
+    assert!(of_folder.contains("n.png: file: is no picture of a known format"), "{of_folder}");
     assert!(total(folder.join("absent.mha")).unwrap_err().contains("absent.mha"));
 }
 
