@@ -429,7 +429,7 @@ mod tests {
 
     #[test]
     fn decimals_are_short_and_near() {
-        for (value, text) in [(0.25, "0.25"), (-0.0, "0"), (127.5, "127.5"), (-3.0, "-3"), (1e-9, "1e-9")] {
+        for (value, text) in [(0.25, "0.25"), (-0.0, "0"), (127.5, "127.5"), (-3.0, "-3"), (1e-9, "0.000000001")] {
             assert_eq!(decimal(value), text);
         }
         for value in [1.0 / 3.0, -1e5 / 7.0, -std::f64::consts::PI * 1e-6, 0.0123456789012345, -0.999_999_999_999_999_9]
