@@ -20,7 +20,7 @@ use std::sync::Arc;
 /// The arguments of every command that renders a recording.
 #[derive(clap::Args)]
 pub struct InputArgs {
-    /// Recording: MetaImage (.mha, .mhd), NRRD (.nrrd), NIfTI (.nii), Kretz (.vol), each also as .gz, or frames (.frames); a
+    /// Recording: MetaImage (.mha, .mhd), NRRD (.nrrd), NIfTI (.nii), DICOM (.dcm), Kretz (.vol), each also as .gz, or frames (.frames); a
     /// folder or a 'pattern*.png' of numbered pictures; - for standard input, also a stream of frames. Without one, a synthetic fetal head (preset face)
     input: Option<PathBuf>,
     #[command(flatten)]

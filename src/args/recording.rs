@@ -18,7 +18,7 @@ pub struct GeometryArgs {
     /// Stored axis of a Cartesian volume that is drawn as depth: x, y, z, -x, -y or -z [default: by the file's orientation, otherwise y]
     #[arg(long, value_name = "AXIS", allow_hyphen_values = true)]
     pub depth_axis: Option<DepthAxis>,
-    /// Distance between the columns, rows and pictures of a folder or pattern of pictures, mm
+    /// Distance between the columns, rows and pictures of a folder or pattern of pictures, or of DICOM pictures that state none, mm
     #[arg(long, value_name = "X,Y,Z", value_parser = three)]
     pub voxel_spacing: Option<[f64; 3]>,
     /// Configuration of the PLUS toolkit (XML) with the calibration of a tracked recording, which becomes a freehand volume

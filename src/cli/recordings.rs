@@ -61,10 +61,10 @@ pub(super) fn target_grid(geometry: &Geometry, spacing: Option<f64>) -> Result<G
                         echolume convert sweep.frames sweep.mha --sequence    (frames of whole volumes, for other programs)\n  \
                         echolume render volume.mha --mode mip -o mip.png    (the result is a recording, too)")]
 pub struct Convert {
-    /// MetaImage (.mha, .mhd), NRRD (.nrrd), NIfTI (.nii), Kretz (.vol), each also as .gz, or .frames file; a folder or a 'pattern*.png' of numbered
+    /// MetaImage (.mha, .mhd), NRRD (.nrrd), NIfTI (.nii), DICOM (.dcm), Kretz (.vol), each also as .gz, or .frames file; a folder or a 'pattern*.png' of numbered
     /// pictures; - for standard input
     input: PathBuf,
-    /// File to write: .mha, .nrrd, .nii or .nii.gz for a volume, .frames for every frame unchanged, .mha with --sequence
+    /// File to write: .mha, .nrrd, .nii, .nii.gz or .dcm (Enhanced US Volume) for a volume, .frames for every frame unchanged, .mha with --sequence
     output: PathBuf,
     /// Voxel spacing along every axis, mm [default: a Cartesian volume keeps its voxels; a sweep gets the sample spacing of a scan line]
     #[arg(long, value_name = "MM", allow_negative_numbers = true)]
@@ -80,6 +80,9 @@ pub struct Convert {
     /// Also write a volume of 1 inside the sector and 0 outside
     #[arg(long, value_name = "FILE")]
     mask: Option<PathBuf>,
+    /// Write .dcm as a secondary capture: slices of 8 bits, from the range that is shown, without the place in the world
+    #[arg(long, conflicts_with = "sequence")]
+    secondary_capture: bool,
     /// Write the frames of all complete volumes as a PLUS sequence, and their geometry to NAME.probe.toml next to it
     #[arg(long, conflicts_with_all = ["spacing", "volume", "outside", "mask"])]
     sequence: bool,
@@ -112,6 +115,13 @@ impl Convert {
             target.world = world.on(own, &grid);
         }
         target.outside = self.outside;
+        if self.secondary_capture {
+            target = target.captured(recording.range());
+            if target.world != World::of(&grid) {
+                let kept = "a secondary capture does not keep the place in the world";
+                remark(&format!("{}: {kept}", self.output.display()));
+            }
+        }
         target.check(&self.output).map_err(input)?;
         if let Some(mask) = &self.mask {
             VolumeFile::of(mask).map_err(input)?;
@@ -166,9 +176,10 @@ impl Convert {
 
     /// Writes every frame of every volume unchanged, as .frames.
     fn record(&self) -> Result<(), Failure> {
-        if self.spacing.is_some() || self.volume != 0 || self.sequence || self.outside != 0.0 || self.mask.is_some() {
+        let is_of_volumes = self.spacing.is_some() || self.volume != 0 || self.outside != 0.0 || self.mask.is_some();
+        if is_of_volumes || self.sequence || self.secondary_capture {
             return Err(input(
-                "--spacing, --volume, --outside, --mask and --sequence apply to volumes; .frames holds every frame unchanged",
+                "--spacing, --volume, --outside, --mask, --secondary-capture and --sequence apply to volumes; .frames holds every frame unchanged",
             ));
         }
         let mut recording = open_recording(&self.input, self.geometry.options())?;
@@ -213,7 +224,7 @@ impl Convert {
 
 #[derive(clap::Args)]
 pub struct Info {
-    /// MetaImage (.mha, .mhd), NRRD (.nrrd), NIfTI (.nii), Kretz (.vol), each also as .gz, or .frames file; a folder or a 'pattern*.png' of numbered
+    /// MetaImage (.mha, .mhd), NRRD (.nrrd), NIfTI (.nii), DICOM (.dcm), Kretz (.vol), each also as .gz, or .frames file; a folder or a 'pattern*.png' of numbered
     /// pictures; - for standard input
     file: PathBuf,
     #[command(flatten)]

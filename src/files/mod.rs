@@ -10,7 +10,7 @@ pub(crate) use spool::Spool;
 
 use signals::Writing;
 use std::fs::{File, OpenOptions, metadata};
-use std::io::{self, BufWriter, Read, Write};
+use std::io::{self, BufWriter, Read, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
 use tempfile::NamedTempFile;
 
@@ -153,6 +153,18 @@ impl Unfinished {
             self.file.get_ref().file.as_file().set_permissions(std::fs::Permissions::from_mode(0o644))?;
         }
         Ok(())
+    }
+
+    /// Replaces bytes that were written before, `at` bytes after the beginning.
+    ///
+    /// # Errors
+    /// The disk is full, or a signal arrived.
+    pub fn patch(&mut self, at: u64, bytes: &[u8]) -> io::Result<()> {
+        self.file.flush()?;
+        let mut file = self.file.get_ref().file.as_file();
+        file.seek(SeekFrom::Start(at))?;
+        file.write_all(bytes)?;
+        file.seek(SeekFrom::End(0)).map(drop)
     }
 
     /// Flushes everything to the disk.

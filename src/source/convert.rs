@@ -24,12 +24,28 @@ pub struct Target {
     pub sample: SampleType,
     /// In the units of the file.
     pub outside: f64,
+    /// Write a DICOM secondary capture: stored values that become 0 and 255. None: a volume with the values of the file.
+    pub capture: Option<[f64; 2]>,
 }
 
 impl Target {
     /// A lattice whose axes are those of the world, with 0 outside.
     pub fn new(grid: Grid, sample: SampleType) -> Target {
-        Target { grid, world: World::of(&grid), sample, outside: 0.0 }
+        Target { grid, world: World::of(&grid), sample, outside: 0.0, capture: None }
+    }
+
+    /// As a DICOM secondary capture of 8 bits. `shown`: the stored values that become 0 and 255.
+    pub fn captured(self, shown: [f64; 2]) -> Target {
+        Target { sample: SampleType::U8, capture: Some(shown), ..self }
+    }
+
+    /// The format of a file name, with the form that is asked for.
+    fn format(&self, path: &Path) -> Result<VolumeFile, InputError> {
+        match (VolumeFile::of(path)?, self.capture) {
+            (VolumeFile::Dicom { .. }, Some(_)) => Ok(VolumeFile::Dicom { capture: true }),
+            (_, Some(_)) => Err(InputError::new(path, "--secondary-capture", "is for .dcm")),
+            (format, None) => Ok(format),
+        }
     }
 
     /// Checks that a file can hold it, before any work is done.
@@ -38,11 +54,13 @@ impl Target {
     /// An extension that is not a format, an axis that is too long for the format, an outside value that the type of the samples does not
     /// have.
     pub fn check(&self, path: &Path) -> Result<(), InputError> {
-        let most = VolumeFile::of(path)?.most_along_axis();
+        let format = self.format(path)?;
+        let most = format.most_along_axis();
         if let Some(long) = self.grid.size.iter().find(|n| **n > most) {
             let fault = format!("would have {long} voxels along an axis, the format holds {most}");
             return Err(InputError::new(path, "file", fault));
         }
+        format.check(self.grid.size, self.sample).map_err(|why| InputError::new(path, "file", why))?;
         let [low, high] = match self.sample {
             SampleType::U8 => [0.0, 255.0],
             SampleType::U16 => [0.0, 65535.0],
@@ -195,7 +213,7 @@ impl Volume {
     /// # Errors
     /// As [`Volume::write`].
     pub fn write_mask(&self, target: &Target, path: &Path) -> Result<(), InputError> {
-        let mask = Target { sample: SampleType::U8, outside: 0.0, ..*target };
+        let mask = Target { sample: SampleType::U8, outside: 0.0, capture: None, ..*target };
         write_voxels(&mask, path, |voxel| self.value(target, voxel).map(|_| 1.0), || ())
     }
 }
@@ -223,12 +241,16 @@ fn write_voxels(
     target.check(path)?;
     let Target { grid, sample, outside, .. } = *target;
     let written = |e| InputError::unwritable(path, &e);
-    let mut file = VolumeFile::of(path)?.create(path, grid.size, &target.world, sample).map_err(written)?;
+    let mut file = target.format(path)?.create(path, grid.size, &target.world, sample).map_err(written)?;
+    let shown = |value: f64| match target.capture {
+        Some([low, high]) => (255.0 * (value - low) / (high - low)).clamp(0.0, 255.0),
+        None => value - sample.shift(),
+    };
     let mut slice = vec![0; grid.size[0] * grid.size[1] * sample.bytes()];
     for z in 0..grid.size[2] {
         slice.par_chunks_mut(grid.size[0] * sample.bytes()).enumerate().for_each(|(y, row)| {
             for (x, voxel) in row.chunks_exact_mut(sample.bytes()).enumerate() {
-                store(sample, value([x, y, z]).map_or(outside, |value| value - sample.shift()), voxel);
+                store(sample, value([x, y, z]).map_or(outside, shown), voxel);
             }
         });
         file.write_all(&slice).map_err(written)?;

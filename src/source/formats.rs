@@ -2,30 +2,36 @@
 
 use super::layout::Layout;
 use super::packed::InputFile;
-use super::{OpenOptions, kretz, metaimage, nifti, nrrd, recorder, stack};
+use super::{OpenOptions, dicom, kretz, metaimage, nifti, nrrd, recorder, stack};
 use crate::files::InputError;
 use std::path::Path;
 
-/// Bytes that are looked at. The modality of a DICOM file usually lies within the first thousand.
-const START: u64 = 4096;
+/// Bytes that are looked at.
+const START: u64 = 1024;
 /// What is read, for messages.
-const READ: &str = "MetaImage (.mha, .mhd), NRRD (.nrrd, .nhdr), NIfTI (.nii) and Kretz (.vol) are read, each also as .gz, .frames, \
-                    and folders of numbered pictures";
+const READ: &str = "MetaImage (.mha, .mhd), NRRD (.nrrd, .nhdr), NIfTI (.nii), DICOM (.dcm) and Kretz (.vol) are read, each also as .gz, \
+                    .frames, and folders of DICOM files or numbered pictures";
 
 /// Reads the layout of a file with the reader for its content, or else for the extension of its name; or of a stack of pictures.
 ///
 /// # Errors
 /// A file that cannot be read, is of another kind, or is damaged. A voxel spacing for anything but pictures.
 pub(super) fn read_layout(path: &Path, options: &OpenOptions) -> Result<Layout, InputError> {
+    if path.is_dir() && dicom::is_series(path) {
+        return dicom::read_series(path, options);
+    }
     if stack::is_meant(path) {
         return stack::read(path, options);
     }
-    if options.voxel_spacing.is_some() {
-        let fault = "is for a folder or a pattern of pictures; other recordings state their own";
-        return Err(InputError::new(path, "--voxel-spacing", fault));
-    }
     let file = InputFile::new(path)?;
     let start = file.start(START)?;
+    if dicom::is_one(&start) {
+        return dicom::read(&file, options);
+    }
+    if options.voxel_spacing.is_some() {
+        let fault = "is for pictures; other recordings state their own";
+        return Err(InputError::new(path, "--voxel-spacing", fault));
+    }
     let name = if file.is_packed() { path.with_extension("") } else { path.to_path_buf() };
     let ending = name.extension().and_then(|e| e.to_str()).unwrap_or("").to_ascii_lowercase();
     if start.starts_with(b"KRETZFILE") {
@@ -76,21 +82,8 @@ const OTHER_KINDS: [(usize, &[u8], &str); 23] = [
 
 /// The kind of a file that is not read, by its first bytes.
 fn other_kind(start: &[u8]) -> Option<String> {
-    if start.get(128..132) == Some(b"DICM") {
-        return Some(match modality(start) {
-            Some(modality) => format!("a DICOM file (modality {modality}), which is not read yet"),
-            None => "a DICOM file, which is not read yet".into(),
-        });
-    }
     let is_there = |(at, mark, _): &&(usize, &[u8], &str)| start.get(*at..).is_some_and(|rest| rest.starts_with(mark));
     OTHER_KINDS.iter().find(is_there).map(|(_, _, name)| (*name).to_string())
-}
-
-/// The modality (0008,0060) of a DICOM file in the usual little-endian syntax with value types: two capital letters.
-fn modality(start: &[u8]) -> Option<String> {
-    let at = start.windows(6).position(|w| w == b"\x08\0\x60\0CS")?;
-    let value = start.get(at + 8..at + 10)?;
-    value.iter().all(u8::is_ascii_uppercase).then(|| String::from_utf8_lossy(value).into_owned())
 }
 
 #[cfg(test)]
@@ -99,11 +92,6 @@ mod tests {
 
     #[test]
     fn files_of_other_kinds_are_named() {
-        let mut dicom = vec![0; 128];
-        dicom.extend(b"DICM\x02\0\0\0UL\x04\0\xc0\0\0\0\x08\0\x60\0CS\x02\0CT\x08\0");
-        assert_eq!(other_kind(&dicom).as_deref(), Some("a DICOM file (modality CT), which is not read yet"));
-        dicom.truncate(140);
-        assert_eq!(other_kind(&dicom).as_deref(), Some("a DICOM file, which is not read yet"));
         assert_eq!(other_kind(b"RIFF\0\0\0\0AVI LIST").as_deref(), Some("an AVI video"));
         assert_eq!(other_kind(b""), None);
         assert_eq!(other_kind(b"ObjectType = Image"), None);

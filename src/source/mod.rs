@@ -6,6 +6,7 @@
 
 pub mod convert;
 mod describe;
+mod dicom;
 mod drawn;
 mod formats;
 mod frame;

@@ -2,6 +2,7 @@
 //!
 //! A packed file is read through its decompressor from the start, each time anew; nothing is unpacked to a disk.
 
+use super::dicom::{Coding, FrameStream, Frames};
 use super::pictures::{PictureStream, Pictures};
 use crate::files::{InputError, quoted};
 use bzip2::bufread::MultiBzDecoder;
@@ -22,25 +23,32 @@ pub(super) enum Encoding {
     Bzip2,
     /// A stack of pictures, each with its own.
     Pictures,
+    /// Frames of DICOM files.
+    Dicom(Coding),
 }
 
 impl Encoding {
     /// Its name for users.
     pub fn name(self) -> &'static str {
         match self {
-            Encoding::Raw => "none",
+            Encoding::Raw | Encoding::Dicom(Coding::Native) => "none",
             Encoding::Zlib => "zlib",
             Encoding::Gzip => "gzip",
             Encoding::Bzip2 => "bzip2",
             Encoding::Pictures => "that of the pictures",
+            Encoding::Dicom(Coding::Rle) => "RLE",
+            Encoding::Dicom(Coding::Jpeg) => "JPEG",
         }
     }
 
     /// Largest ratio that it can reach. Deflate: 258 bytes from two bits, so 1032 (zlib, "technical details"). Bzip2: a block of 900 kB
-    /// holds runs of 259 bytes in 5, 46 MB from about 40 bytes. A PNG has deflate, whose bits may be pixels of 3 bytes.
+    /// holds runs of 259 bytes in 5, 46 MB from about 40 bytes. A PNG has deflate, whose bits may be pixels of 3 bytes. RLE makes 128 bytes
+    /// of 2. JPEG: one bit for a block of 64 pixels; with shared colours 6 for 256 pixels of 3 bytes.
     pub fn most(self) -> u64 {
         match self {
-            Encoding::Raw => 1,
+            Encoding::Raw | Encoding::Dicom(Coding::Native) => 1,
+            Encoding::Dicom(Coding::Rle) => 64,
+            Encoding::Dicom(Coding::Jpeg) => 1024,
             Encoding::Zlib | Encoding::Gzip => 1032,
             Encoding::Bzip2 => 1_200_000,
             Encoding::Pictures => 1032 * 24,
@@ -52,7 +60,10 @@ impl Encoding {
 pub(super) struct InputFile<'a> {
     pub path: &'a Path,
     packed: bool,
+    /// Length on the disk, or of the part.
     bytes: u64,
+    /// The part of the unpacked file that is meant: first byte and length. None: all.
+    part: Option<(u64, u64)>,
 }
 
 impl<'a> InputFile<'a> {
@@ -69,7 +80,12 @@ impl<'a> InputFile<'a> {
         }
         let mut start = Vec::new();
         File::open(path).and_then(|file| file.take(2).read_to_end(&mut start)).map_err(unreadable)?;
-        Ok(InputFile { path, packed: start == GZIP, bytes: metadata.len() })
+        Ok(InputFile { path, packed: start == GZIP, bytes: metadata.len(), part: None })
+    }
+
+    /// A part of this file as one of its own. It must lie in the file.
+    pub fn window(&self, offset: u64, length: u64) -> InputFile<'a> {
+        InputFile { part: Some((offset, length)), ..*self }
     }
 
     /// True if the whole file is packed.
@@ -98,25 +114,23 @@ impl<'a> InputFile<'a> {
 
     /// Most bytes that the file can hold unpacked.
     pub fn most_bytes(&self) -> u64 {
-        match self.packed {
-            true => self.bytes.saturating_mul(Encoding::Gzip.most()).saturating_add(1024),
-            false => self.bytes,
+        match (self.part, self.packed) {
+            (Some((_, length)), _) => length,
+            (None, true) => self.bytes.saturating_mul(Encoding::Gzip.most()).saturating_add(1024),
+            (None, false) => self.bytes,
         }
     }
 
     /// Samples in this file `offset` bytes after its start, unpacked, up to its end.
     pub fn pixels(&self, offset: u64) -> Pixels {
         let path = self.path.to_path_buf();
-        match self.packed {
-            true => {
-                let (length, encoding) = (self.bytes, Encoding::Gzip);
-                Pixels { path, offset: 0, length, encoding, inside: offset, pictures: None }
-            }
-            false => {
-                let (length, encoding) = (self.bytes.saturating_sub(offset), Encoding::Raw);
-                Pixels { path, offset, length, encoding, inside: 0, pictures: None }
-            }
-        }
+        let (begin, there) = self.part.unwrap_or((0, self.bytes));
+        let at = begin.saturating_add(offset);
+        let (offset, length, encoding, inside) = match self.packed {
+            true => (0, self.bytes, Encoding::Gzip, at),
+            false => (at, there.saturating_sub(offset), Encoding::Raw, 0),
+        };
+        Pixels { path, offset, length, encoding, inside, pictures: None, frames: None }
     }
 }
 
@@ -133,6 +147,8 @@ pub(super) struct Pixels {
     pub inside: u64,
     /// Of a stack, instead of a file.
     pub pictures: Option<Pictures>,
+    /// Of DICOM, instead of a file.
+    pub frames: Option<Frames>,
 }
 
 /// The samples as a stream.
@@ -155,7 +171,7 @@ impl Pixels {
         match fs::metadata(&path) {
             Ok(metadata) if metadata.is_file() => {
                 let (length, encoding) = (metadata.len(), Encoding::Raw);
-                Ok(Pixels { path, offset: 0, length, encoding, inside: 0, pictures: None })
+                Ok(Pixels { path, offset: 0, length, encoding, inside: 0, pictures: None, frames: None })
             }
             Ok(_) => Err(format!("{} is not a regular file", quoted(name))),
             Err(error) => Err(format!("{} cannot be read: {error}", quoted(name))),
@@ -165,7 +181,13 @@ impl Pixels {
     /// The samples of a stack. `path`: as the user named it; `length`: of all its files, bytes.
     pub fn of_pictures(path: &Path, pictures: Pictures, length: u64) -> Pixels {
         let (path, encoding) = (path.into(), Encoding::Pictures);
-        Pixels { path, offset: 0, length, encoding, inside: 0, pictures: Some(pictures) }
+        Pixels { path, offset: 0, length, encoding, inside: 0, pictures: Some(pictures), frames: None }
+    }
+
+    /// The frames of DICOM files. `path`: as the user named it; `length`: of all pixels in the files, bytes.
+    pub fn of_frames(path: &Path, frames: Frames, length: u64) -> Pixels {
+        let (path, encoding) = (path.into(), Encoding::Dicom(frames.coding()));
+        Pixels { path, offset: 0, length, encoding, inside: 0, pictures: None, frames: Some(frames) }
     }
 
     /// True if the samples are compressed.
@@ -177,6 +199,9 @@ impl Pixels {
     pub fn open(&self, skip: u64) -> io::Result<PixelStream> {
         if let Some(pictures) = &self.pictures {
             return Ok(PixelStream::Packed(Box::new(PictureStream::new(pictures, skip)?)));
+        }
+        if let Some(frames) = &self.frames {
+            return Ok(PixelStream::Packed(Box::new(FrameStream::new(frames, skip)?)));
         }
         let mut file = File::open(&self.path)?;
         if !self.is_compressed() {

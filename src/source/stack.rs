@@ -44,7 +44,7 @@ pub(super) fn read(path: &Path, options: &OpenOptions) -> Result<Layout, InputEr
     let pictures: Arc<[PathBuf]> = order.into_iter().map(|n| folder.join(&names[n])).collect();
     let (mut size, mut is_colour, mut length) = (None, false, 0);
     for picture in pictures.iter() {
-        let about = About::of(picture).map_err(|why| InputError::new(picture, "picture", why))?;
+        let about = About::of(picture).map_err(|why| InputError::new(picture, "file", why))?;
         let ([width, height], deep) = *size.get_or_insert((about.size, about.deep));
         if about.size != [width, height] {
             let [a, b] = about.size;

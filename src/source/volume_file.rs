@@ -1,5 +1,6 @@
-//! Volume files that are written: MetaImage, NRRD and NIfTI-1, each with its voxel-to-world matrix. A file is whole or does not exist.
+//! Volume files that are written: MetaImage, NRRD, NIfTI-1 and DICOM, each with its voxel-to-world matrix. A file is whole or does not exist.
 
+use super::dicom::{DicomWriter, Form, MOST_BYTES};
 use super::samples::SampleType;
 use crate::files::{InputError, Unfinished};
 use crate::probe::World;
@@ -18,6 +19,8 @@ pub enum VolumeFile {
     Nrrd,
     /// NIfTI-1 with header and samples in one file (.nii), or the same packed by gzip (.nii.gz).
     Nifti { packed: bool },
+    /// DICOM (.dcm): an Enhanced US Volume, or a secondary capture of slices of 8 bits.
+    Dicom { capture: bool },
 }
 
 /// Bytes before the samples of a NIfTI-1 file: the header, and four zeros for "no extension".
@@ -35,10 +38,11 @@ impl VolumeFile {
             (".nrrd", VolumeFile::Nrrd),
             (".nii", VolumeFile::Nifti { packed: false }),
             (".nii.gz", VolumeFile::Nifti { packed: true }),
+            (".dcm", VolumeFile::Dicom { capture: false }),
         ];
         match formats.iter().find(|(ending, _)| name.ends_with(ending)) {
             Some((_, format)) => Ok(*format),
-            None => Err(InputError::new(path, "file", "must end in .mha, .nrrd, .nii or .nii.gz")),
+            None => Err(InputError::new(path, "file", "must end in .mha, .nrrd, .nii, .nii.gz or .dcm")),
         }
     }
 
@@ -46,8 +50,31 @@ impl VolumeFile {
     pub(super) fn most_along_axis(self) -> usize {
         match self {
             VolumeFile::Nifti { .. } => i16::MAX as usize,
+            VolumeFile::Dicom { .. } => u16::MAX as usize,
             _ => 65_536,
         }
+    }
+
+    /// Checks that the format holds so many samples of this type.
+    ///
+    /// # Errors
+    /// In words: samples or a length that DICOM does not hold.
+    pub(super) fn check(self, size: [usize; 3], sample: SampleType) -> Result<(), String> {
+        let VolumeFile::Dicom { capture } = self else { return Ok(()) };
+        let bytes = size.iter().fold(sample.bytes() as u64, |all, n| all.saturating_mul(*n as u64));
+        match sample {
+            SampleType::U8 => {}
+            SampleType::U16 if !capture => {}
+            _ => {
+                return Err(format!(
+                    "DICOM volumes hold u8 and u16, these are {sample}: write .nrrd, or 8 bits with --secondary-capture"
+                ));
+            }
+        }
+        if bytes > MOST_BYTES {
+            return Err(format!("would have {bytes} bytes of samples, DICOM holds {MOST_BYTES}"));
+        }
+        Ok(())
     }
 
     /// Begins a file: its header.
@@ -59,6 +86,10 @@ impl VolumeFile {
         sample: SampleType,
     ) -> io::Result<VolumeWriter> {
         let file = Unfinished::create(path)?;
+        if let VolumeFile::Dicom { capture } = self {
+            let form = Form { capture, width: sample.bytes() };
+            return Ok(VolumeWriter::Dicom(Box::new(DicomWriter::create(file, size, world, form)?)));
+        }
         let mut writer = match self {
             VolumeFile::Nifti { packed: true } => {
                 VolumeWriter::Packed(Box::new(GzEncoder::new(file, Compression::default())))
@@ -74,6 +105,8 @@ impl VolumeFile {
             VolumeFile::MetaImage => metaimage(size, world, sample).into_bytes(),
             VolumeFile::Nrrd => nrrd(size, world, sample).into_bytes(),
             VolumeFile::Nifti { .. } => nifti(size, world, sample),
+            // Its writer makes it.
+            VolumeFile::Dicom { .. } => Vec::new(),
         }
     }
 }
@@ -158,6 +191,7 @@ fn nifti(size: [usize; 3], world: &World, sample: SampleType) -> Vec<u8> {
 pub(super) enum VolumeWriter {
     Plain(Unfinished),
     Packed(Box<GzEncoder<Unfinished>>),
+    Dicom(Box<DicomWriter>),
 }
 
 impl VolumeWriter {
@@ -166,6 +200,7 @@ impl VolumeWriter {
         let mut file = match self {
             VolumeWriter::Plain(file) => file,
             VolumeWriter::Packed(packed) => packed.finish()?,
+            VolumeWriter::Dicom(dicom) => return dicom.finish(),
         };
         file.finish()?;
         file.rename()
@@ -177,6 +212,7 @@ impl Write for VolumeWriter {
         match self {
             VolumeWriter::Plain(file) => file.write(bytes),
             VolumeWriter::Packed(packed) => packed.write(bytes),
+            VolumeWriter::Dicom(dicom) => dicom.write(bytes),
         }
     }
 
@@ -184,6 +220,7 @@ impl Write for VolumeWriter {
         match self {
             VolumeWriter::Plain(file) => file.flush(),
             VolumeWriter::Packed(packed) => packed.flush(),
+            VolumeWriter::Dicom(dicom) => dicom.flush(),
         }
     }
 }

@@ -3,6 +3,7 @@
 #[path = "../common/mod.rs"]
 mod common;
 mod convert;
+mod dicom;
 mod formats;
 mod igtl;
 mod interrupted;

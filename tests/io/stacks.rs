@@ -101,7 +101,7 @@ fn what_is_no_even_stack_is_refused_with_its_reason() {
         ("fine*.png", Some([0.2, -1.0, 1.0]), "voxel spacing: spacing"),
         ("none*.png", Some(SPACING), "no file has such a name"),
         ("empty", Some(SPACING), "is a folder without pictures"),
-        ("gone", Some(SPACING), "--voxel-spacing: is for a folder or a pattern"),
+        ("gone", Some(SPACING), "gone: file: cannot be read"),
     ] {
         let said = fault(&pattern(name), spacing);
         assert!(said.contains(named) && said.lines().count() == 1, "{name}: {said}");

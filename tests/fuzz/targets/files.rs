@@ -74,6 +74,18 @@ pub fn nifti(bytes: &[u8]) -> String {
     recording(&written("input.nii", bytes), None)
 }
 
+/// As a file, and as one of a folder of two.
+pub fn dicom(bytes: &[u8]) -> String {
+    let folder = super::folder().join("series");
+    std::fs::create_dir_all(&folder).expect("a folder for inputs");
+    written("series/one.dcm", bytes);
+    written("series/two.dcm", SLICE);
+    recording(&written("input.dcm", bytes), None) + &recording(&folder, None)
+}
+
+/// One slice of a series.
+const SLICE: &[u8] = include_bytes!("../../data/dicom/series/0.dcm");
+
 pub fn kretz(bytes: &[u8]) -> String {
     recording(&written("input.vol", bytes), None)
 }

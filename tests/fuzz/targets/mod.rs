@@ -74,6 +74,23 @@ pub const TARGETS: &[Target] = &[
         also: &["tests/data/wobbler-4dc7/sweep.vol"],
     },
     Target {
+        name: "dicom",
+        run: files::dicom,
+        text: false,
+        memory: 64 * MIB,
+        rounds: 8_000,
+        also: &[
+            "tests/data/dicom/enhanced.dcm",
+            "tests/data/dicom/enhanced-rle.dcm",
+            "tests/data/dicom/image.dcm",
+            "tests/data/dicom/kretz.dcm",
+            "tests/data/dicom/multiframe-fragments.dcm",
+            "tests/data/dicom/palette.dcm",
+            "tests/data/dicom/philips.dcm",
+            "tests/data/dicom/series",
+        ],
+    },
+    Target {
         name: "nrrd",
         run: files::nrrd,
         text: true,

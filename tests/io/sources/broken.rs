@@ -21,6 +21,11 @@ fn a_file_cut_off_anywhere_is_one_line_and_no_panic() {
         ("one.nii", fs::read(stored("formats/oblique.nii")).unwrap()),
         ("two.nii", fs::read(stored("formats/big-endian-4d.nii")).unwrap()),
         ("one.nii.gz", fs::read(stored("formats/mirrored.nii.gz")).unwrap()),
+        ("frames.dcm", fs::read(stored("dicom/palette.dcm")).unwrap()),
+        ("planes.dcm", fs::read(stored("dicom/enhanced-flow.dcm")).unwrap()),
+        ("rle.dcm", fs::read(stored("dicom/colours-rle.dcm")).unwrap()),
+        ("jpeg.dcm", fs::read(stored("dicom/colours-jpeg.dcm")).unwrap()),
+        ("kretz.dcm", fs::read(stored("dicom/kretz.dcm")).unwrap()),
         ("packed.mha.gz", fs::read(stored("formats/packed.mha.gz")).unwrap()),
     ];
     for (name, whole) in &small {
@@ -106,7 +111,7 @@ fn header_numbers_that_cannot_be_true_are_refused_by_name() {
     assert!(total(folder.write("n.mha", endless)).unwrap_err().contains("ElementDataFile"));
     assert!(total(folder.write("n.png", b"\x89PNG")).unwrap_err().contains("MetaImage"));
     let of_folder = total(&folder.0).unwrap_err();
-    assert!(of_folder.contains("n.png: picture: is no picture of a known format"), "{of_folder}");
+    assert!(of_folder.contains("n.png: file: is no picture of a known format"), "{of_folder}");
     assert!(total(folder.join("absent.mha")).unwrap_err().contains("absent.mha"));
 }
 

@@ -1,0 +1,97 @@
+//! Names of what DICOM files are: the classes of objects, and the transfer syntaxes.
+
+/// The object that a file holds.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Class {
+    /// Pictures, each with its own regions.
+    Pictures,
+    /// Planes of volumes, each with its place.
+    EnhancedVolume,
+    /// Philips' volumes in the form that QLAB exports.
+    Philips,
+    /// Ultrasound only if the modality says so.
+    Capture,
+    Other,
+}
+
+const STORAGE: &str = "1.2.840.10008.5.1.4.1.1.";
+/// Endings after [`STORAGE`].
+const CLASSES: [(&str, Class, &str); 30] = [
+    ("6.1", Class::Pictures, "ultrasound image"),
+    ("6", Class::Pictures, "ultrasound image (retired class)"),
+    ("3.1", Class::Pictures, "ultrasound multi-frame image"),
+    ("3", Class::Pictures, "ultrasound multi-frame image (retired class)"),
+    ("6.2", Class::EnhancedVolume, "enhanced ultrasound volume"),
+    ("7", Class::Capture, "secondary capture image"),
+    ("7.2", Class::Capture, "multi-frame grayscale byte secondary capture image"),
+    ("7.3", Class::Capture, "multi-frame grayscale word secondary capture image"),
+    ("7.4", Class::Capture, "multi-frame true color secondary capture image"),
+    ("1", Class::Other, "computed radiography image"),
+    ("1.1", Class::Other, "digital X-ray image"),
+    ("1.2", Class::Other, "mammography image"),
+    ("2", Class::Other, "CT image"),
+    ("2.1", Class::Other, "enhanced CT image"),
+    ("4", Class::Other, "MR image"),
+    ("4.1", Class::Other, "enhanced MR image"),
+    ("7.1", Class::Other, "multi-frame single bit secondary capture image"),
+    ("9.1.1", Class::Other, "12-lead ECG"),
+    ("11.1", Class::Other, "presentation state"),
+    ("12.1", Class::Other, "X-ray angiographic image"),
+    ("12.2", Class::Other, "X-ray radiofluoroscopic image"),
+    ("20", Class::Other, "nuclear medicine image"),
+    ("66.4", Class::Other, "segmentation"),
+    ("77.1.4.1", Class::Other, "video photographic image"),
+    ("88.11", Class::Other, "structured report"),
+    ("88.33", Class::Other, "structured report"),
+    ("104.1", Class::Other, "encapsulated PDF"),
+    ("128", Class::Other, "PET image"),
+    ("481.1", Class::Other, "RT image"),
+    ("481.3", Class::Other, "RT structure set"),
+];
+const DIRECTORY: &str = "1.2.840.10008.1.3.10";
+const PHILIPS: &str = "1.2.840.113543.6.6.1.3.10002";
+
+/// What a class of objects is, and its name for users.
+pub(super) fn class(uid: &str) -> (Class, &'static str) {
+    let known = uid.strip_prefix(STORAGE).and_then(|end| CLASSES.iter().find(|(ending, ..)| *ending == end));
+    match (known, uid) {
+        (Some((_, class, name)), _) => (*class, name),
+        (None, PHILIPS) => (Class::Philips, "Philips private 3D volume"),
+        (None, DIRECTORY) => (Class::Other, "directory (DICOMDIR)"),
+        (None, _) => (Class::Other, "object of a class that is not known"),
+    }
+}
+
+/// Transfer syntaxes below 1.2.840.10008.1.2 that are known by name, and whether they are read.
+const SYNTAXES: [(&str, &str, bool); 24] = [
+    ("", "implicit little-endian", true),
+    (".1", "explicit little-endian", true),
+    (".2", "explicit big-endian", true),
+    (".5", "RLE", true),
+    (".4.50", "JPEG baseline", true),
+    (".4.51", "JPEG extended", true),
+    (".4.57", "JPEG lossless", false),
+    (".4.70", "JPEG lossless", false),
+    (".4.80", "JPEG-LS lossless", false),
+    (".4.81", "JPEG-LS near-lossless", false),
+    (".4.90", "JPEG 2000 lossless", false),
+    (".4.91", "JPEG 2000", false),
+    (".4.92", "JPEG 2000 part 2 lossless", false),
+    (".4.93", "JPEG 2000 part 2", false),
+    (".4.100", "MPEG-2 video", false),
+    (".4.101", "MPEG-2 video", false),
+    (".4.102", "H.264 video", false),
+    (".4.103", "H.264 video", false),
+    (".4.104", "H.264 video", false),
+    (".4.107", "H.265 video", false),
+    (".4.108", "H.265 video", false),
+    (".4.201", "High-Throughput JPEG 2000 lossless", false),
+    (".4.202", "High-Throughput JPEG 2000 lossless", false),
+    (".4.203", "High-Throughput JPEG 2000", false),
+];
+
+/// The name of a transfer syntax, and whether its pixels are read.
+pub(super) fn syntax(uid: &str) -> (&'static str, bool) {
+    let known = uid.strip_prefix("1.2.840.10008.1.2").and_then(|end| SYNTAXES.iter().find(|(known, ..)| *known == end));
+    known.map_or(("unknown", false), |(_, name, is_read)| (name, *is_read))
+}

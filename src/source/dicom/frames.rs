@@ -1,0 +1,314 @@
+//! The frames of DICOM files as one stream of samples: native, RLE (PS3.5 annex G) or JPEG, in any order, cut to a part of the picture.
+
+use crate::files::escaped;
+use image::{DynamicImage, ImageDecoder, ImageFormat, ImageReader};
+use std::fs::File;
+use std::io::{self, Cursor, Read, Seek, SeekFrom};
+use std::path::PathBuf;
+use std::sync::Arc;
+
+/// How frames are compressed.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(in super::super) enum Coding {
+    Native,
+    Rle,
+    Jpeg,
+}
+
+/// How the numbers of a frame stand after it is decompressed.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) enum Arrangement {
+    /// As they are drawn.
+    Plain,
+    /// All of the first channel, then all of the next.
+    Planes,
+    /// Luminance and two differences of colour for each pixel: the luminance is taken.
+    Luma,
+    /// Two luminances and the two differences that they share.
+    LumaPairs,
+    /// Indices of a palette, whose luminances these are.
+    Palette(Arc<[u8]>),
+}
+
+/// Where the bytes of a frame are: a file, and some of the fragments.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Place {
+    pub file: usize,
+    /// The first of its parts, and their number.
+    pub first: usize,
+    pub count: usize,
+}
+
+/// The frames of one or more files, in the order in which they are read.
+#[derive(Clone, Debug)]
+pub(in super::super) struct Frames {
+    pub(super) files: Arc<[PathBuf]>,
+    pub(super) places: Arc<[Place]>,
+    /// Offset and length of each fragment, or of each native frame.
+    pub(super) parts: Arc<[(u64, u64)]>,
+    pub(super) coding: Coding,
+    pub(super) arrangement: Arrangement,
+    /// Columns and rows as they are stored.
+    pub(super) stored: [usize; 2],
+    /// The part that is read: first column and row, columns and rows.
+    pub(super) part: [usize; 4],
+    /// Bytes of a number in the file.
+    pub(super) width: usize,
+    /// Numbers of a pixel that are read.
+    pub(super) channels: usize,
+}
+
+impl Frames {
+    pub fn files(&self) -> &[PathBuf] {
+        &self.files
+    }
+
+    pub fn coding(&self) -> Coding {
+        self.coding
+    }
+
+    /// Bytes of a frame that is read.
+    fn each(&self) -> usize {
+        self.part[2] * self.part[3] * self.width * self.channels
+    }
+
+    /// Numbers of a pixel as they are stored.
+    fn stored_channels(&self) -> usize {
+        match self.arrangement {
+            Arrangement::Luma => 3,
+            Arrangement::LumaPairs => 2,
+            Arrangement::Palette(_) => 1,
+            _ => self.channels,
+        }
+    }
+
+    /// Bytes of a frame in the file, if it is native.
+    fn stored_bytes(&self) -> u64 {
+        (self.stored[0] * self.stored[1] * self.width * self.stored_channels()) as u64
+    }
+
+    fn frame(&self, number: usize) -> io::Result<Vec<u8>> {
+        let Some(place) = self.places.get(number) else { return Ok(Vec::new()) };
+        let (Some(path), Some(parts)) =
+            (self.files.get(place.file), self.parts.get(place.first..place.first + place.count))
+        else {
+            return Ok(Vec::new());
+        };
+        let mut file = File::open(path)?;
+        let mut bytes = Vec::new();
+        for (offset, length) in parts {
+            file.seek(SeekFrom::Start(*offset))?;
+            (&mut file).take(*length).read_to_end(&mut bytes)?;
+        }
+        let wrong = |why: &str| io::Error::new(io::ErrorKind::InvalidData, format!("frame {number} {why}"));
+        let numbers = match self.coding {
+            Coding::Native => bytes,
+            Coding::Rle => {
+                let pixels = self.stored[0] * self.stored[1];
+                unpacked(&bytes, pixels, self.width, self.stored_channels()).map_err(|why| wrong(&why))?
+            }
+            Coding::Jpeg => self.jpeg(&bytes).map_err(|why| wrong(&why))?,
+        };
+        if numbers.len() as u64 != self.stored_bytes() {
+            return Err(io::ErrorKind::UnexpectedEof.into());
+        }
+        Ok(self.cut(&self.arranged(numbers)))
+    }
+
+    /// The samples of a JPEG picture of the right size.
+    fn jpeg(&self, bytes: &[u8]) -> Result<Vec<u8>, String> {
+        let unreadable = |e: image::ImageError| format!("is no JPEG that is read: {}", escaped(&e.to_string(), 200));
+        // The decoder makes up what is missing at the end.
+        let end = bytes.iter().rposition(|b| *b != 0).unwrap_or(0);
+        if bytes.get(end.saturating_sub(1)..=end) != Some(&[0xff, 0xd9]) {
+            return Err("is cut short: the end mark of its JPEG is missing".into());
+        }
+        let reader = ImageReader::with_format(Cursor::new(bytes), ImageFormat::Jpeg);
+        let decoder = reader.into_decoder().map_err(unreadable)?;
+        let (columns, rows) = decoder.dimensions();
+        if [columns as usize, rows as usize] != self.stored {
+            return Err(format!("is a JPEG of {columns} x {rows} pixels, not {} x {}", self.stored[0], self.stored[1]));
+        }
+        let image = DynamicImage::from_decoder(decoder).map_err(unreadable)?;
+        Ok(match self.channels {
+            1 => image.into_luma8().into_raw(),
+            _ => image.into_rgb8().into_raw(),
+        })
+    }
+
+    fn arranged(&self, numbers: Vec<u8>) -> Vec<u8> {
+        match &self.arrangement {
+            Arrangement::Plain => numbers,
+            Arrangement::Luma => numbers.chunks_exact(3).map(|pixel| pixel[0]).collect(),
+            Arrangement::LumaPairs => numbers.chunks_exact(4).flat_map(|pair| [pair[0], pair[1]]).collect(),
+            Arrangement::Palette(greys) => {
+                numbers.iter().map(|n| greys.get(usize::from(*n)).or(greys.last()).copied().unwrap_or(0)).collect()
+            }
+            Arrangement::Planes => {
+                let plane = numbers.len() / self.channels.max(1);
+                let mut pixels = Vec::with_capacity(numbers.len());
+                for at in (0..plane).step_by(self.width.max(1)) {
+                    for channel in 0..self.channels {
+                        let from = channel * plane + at;
+                        pixels.extend_from_slice(numbers.get(from..from + self.width).unwrap_or_default());
+                    }
+                }
+                pixels
+            }
+        }
+    }
+
+    fn cut(&self, pixels: &[u8]) -> Vec<u8> {
+        let [x, y, columns, rows] = self.part;
+        let width = self.width * self.channels;
+        let line = self.stored[0] * width;
+        let lines = pixels.chunks_exact(line.max(1)).skip(y).take(rows);
+        lines.flat_map(|line| line.get(x * width..(x + columns) * width).unwrap_or_default()).copied().collect()
+    }
+}
+
+/// RLE: 64 bytes say where up to 15 segments begin, one for each byte of a number, the highest first, channel after channel. Returns the
+/// numbers in little-endian order, pixel by pixel.
+fn unpacked(bytes: &[u8], pixels: usize, width: usize, channels: usize) -> Result<Vec<u8>, String> {
+    let Some(head) = bytes.first_chunk::<64>() else {
+        return Err("is cut short: its table of segments is missing".into());
+    };
+    let head: Vec<usize> = head.as_chunks::<4>().0.iter().map(|b| u32::from_le_bytes(*b) as usize).collect();
+    let count = width * channels;
+    if head[0] != count {
+        return Err(format!("has {} segments, must have {count}", head[0]));
+    }
+    let mut out = vec![0; pixels * count];
+    for segment in 0..count {
+        let from = head[segment + 1];
+        let to = if segment + 1 < count { head[segment + 2] } else { bytes.len() };
+        let Some(packed) = bytes.get(from..to) else { return Err(format!("has no segment {segment}")) };
+        let (channel, byte) = (segment / width, width - 1 - segment % width);
+        let places = out.iter_mut().skip(channel * width + byte).step_by(count);
+        let filled = places.zip(PackBits { bytes: packed, copies: 0, same: None }).map(|(place, value)| *place = value);
+        if filled.count() != pixels {
+            return Err(format!("is cut short in segment {segment}"));
+        }
+    }
+    Ok(out)
+}
+
+/// The bytes of a PackBits stream.
+struct PackBits<'a> {
+    bytes: &'a [u8],
+    /// Bytes of the present run that are still to come.
+    copies: usize,
+    /// The byte that is repeated; None if each is its own.
+    same: Option<u8>,
+}
+
+impl Iterator for PackBits<'_> {
+    type Item = u8;
+
+    fn next(&mut self) -> Option<u8> {
+        while self.copies == 0 {
+            let (code, rest) = self.bytes.split_first()?;
+            self.bytes = rest;
+            match *code {
+                128 => {}
+                literal @ 0..128 => (self.copies, self.same) = (usize::from(literal) + 1, None),
+                run => {
+                    let (value, rest) = self.bytes.split_first()?;
+                    (self.bytes, self.copies, self.same) = (rest, 257 - usize::from(run), Some(*value));
+                }
+            }
+        }
+        self.copies -= 1;
+        self.same.or_else(|| {
+            let (value, rest) = self.bytes.split_first()?;
+            self.bytes = rest;
+            Some(*value)
+        })
+    }
+}
+
+/// The frames as one stream.
+pub(in super::super) struct FrameStream {
+    frames: Frames,
+    next: usize,
+    pixels: Cursor<Vec<u8>>,
+}
+
+impl FrameStream {
+    /// Begins `skip` bytes after the first sample.
+    ///
+    /// # Errors
+    /// A frame that cannot be read.
+    pub fn new(frames: &Frames, skip: u64) -> io::Result<FrameStream> {
+        let each = frames.each().max(1) as u64;
+        let next = usize::try_from(skip / each).unwrap_or(usize::MAX);
+        let mut stream = FrameStream { frames: frames.clone(), next, pixels: Cursor::default() };
+        if !skip.is_multiple_of(each) {
+            stream.decode()?;
+            stream.pixels.set_position(skip % each);
+        }
+        Ok(stream)
+    }
+
+    /// Decodes the next frame; after the last there are no samples.
+    fn decode(&mut self) -> io::Result<()> {
+        self.pixels = Cursor::new(self.frames.frame(self.next)?);
+        self.next = self.next.saturating_add(1);
+        Ok(())
+    }
+}
+
+impl Read for FrameStream {
+    fn read(&mut self, out: &mut [u8]) -> io::Result<usize> {
+        if self.pixels.position() >= self.pixels.get_ref().len() as u64 {
+            self.decode()?;
+        }
+        self.pixels.read(out)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn runs_and_literals_of_every_length_are_unpacked() {
+        let packed = [2, 7, 8, 9, 128, 254, 5, 0, 1, 129, 3];
+        let all: Vec<u8> = PackBits { bytes: &packed, copies: 0, same: None }.collect();
+        assert_eq!(all, [vec![7, 8, 9, 5, 5, 5, 1], vec![3; 128]].concat());
+        let cut: Vec<u8> = PackBits { bytes: &[5, 1, 2], copies: 0, same: None }.collect();
+        assert_eq!(cut, [1, 2]);
+        assert_eq!(PackBits { bytes: &[200], copies: 0, same: None }.count(), 0);
+    }
+
+    #[test]
+    fn segments_are_put_together_byte_by_byte() {
+        // Two pixels of 16 bits: the high bytes come first.
+        let mut bytes = [2u32, 64, 67].map(u32::to_le_bytes).concat();
+        bytes.resize(64, 0);
+        bytes.extend([1, 1, 2, 1, 3, 4]);
+        assert_eq!(unpacked(&bytes, 2, 2, 1).expect("whole"), [3, 1, 4, 2]);
+        assert!(unpacked(&bytes, 3, 2, 1).is_err_and(|why| why.contains("segment 0")));
+        assert!(unpacked(&bytes, 2, 1, 3).is_err_and(|why| why.contains("must have 3")));
+        assert!(unpacked(&bytes[..60], 2, 2, 1).is_err());
+    }
+
+    #[test]
+    fn a_part_of_a_picture_is_cut_out() {
+        let frames = Frames {
+            files: Arc::new([]),
+            places: Arc::new([]),
+            parts: Arc::new([]),
+            coding: Coding::Native,
+            arrangement: Arrangement::Planes,
+            stored: [3, 2],
+            part: [1, 0, 2, 2],
+            width: 1,
+            channels: 3,
+        };
+        let planes = [[0, 1, 2, 3, 4, 5], [10, 11, 12, 13, 14, 15], [20, 21, 22, 23, 24, 25]].concat();
+        let pixels = frames.cut(&frames.arranged(planes));
+        assert_eq!(pixels, [1, 11, 21, 2, 12, 22, 4, 14, 24, 5, 15, 25]);
+        assert_eq!((frames.each(), frames.stored_bytes()), (12, 18));
+    }
+}

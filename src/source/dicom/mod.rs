@@ -1,0 +1,24 @@
+//! DICOM: ultrasound images of one or many frames, Enhanced US Volumes, Kretz files in GE's private elements, Philips' Cartesian volumes,
+//! and folders of files as one series. Enhanced US Volumes and secondary captures are written.
+//!
+//! The elements are read here and not by the crate `dicom-parser` (0.9.1): it panics on an item delimiter in a sequence without an item,
+//! and reserves whatever a length field claims.
+
+mod about;
+mod classes;
+mod elements;
+mod file;
+mod frames;
+mod image;
+mod placed;
+mod planes;
+mod regions;
+mod series;
+mod volume;
+mod write;
+
+pub(super) use elements::is_one;
+pub(super) use file::read;
+pub(super) use frames::{Coding, FrameStream, Frames};
+pub(super) use series::{is_series, read_series};
+pub(super) use write::{DicomWriter, Form, MOST_BYTES};

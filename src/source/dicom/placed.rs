@@ -1,0 +1,81 @@
+//! Where the frames of DICOM files lie, and the layout that follows from it.
+
+use super::super::layout::{Layout, LineOrder, StoredGeometry};
+use super::super::packed::Pixels;
+use super::super::transforms::Poses;
+use super::frames::Frames;
+use super::image::Image;
+use crate::files::InputError;
+use std::collections::BTreeMap;
+use std::path::PathBuf;
+
+/// Where the frames of a file lie, and in which order they are read.
+pub(super) struct Placed {
+    pub format: &'static str,
+    pub geometry: StoredGeometry,
+    /// The frames of the file that are read.
+    pub order: Vec<usize>,
+    /// The part of each picture: first column and row, columns and rows.
+    pub part: [usize; 4],
+    /// The file states the distance of its pixels.
+    pub has_spacing: bool,
+    /// By place in `order`, s.
+    pub times: BTreeMap<usize, f64>,
+    pub remarks: Vec<(String, String)>,
+}
+
+/// The layout of frames. `direct`: the samples, if they stand in a file as they are read.
+pub(super) fn layout(
+    files: Vec<PathBuf>,
+    path: PathBuf,
+    image: Image,
+    placed: Placed,
+    direct: Option<Pixels>,
+) -> Result<Layout, InputError> {
+    let Placed { format, geometry, order, part, has_spacing, times, mut remarks } = placed;
+    if image.from_colour {
+        remarks.push(("colours".into(), "read as their luminance".into()));
+    }
+    let [_, _, columns, rows] = part;
+    let places = order.iter().filter_map(|n| image.places.get(*n).copied()).collect();
+    let length = image.parts.iter().fold(0u64, |all, (_, length)| all.saturating_add(*length));
+    let frames = Frames {
+        files: files.into(),
+        places,
+        parts: image.parts.into(),
+        coding: image.coding,
+        arrangement: image.arrangement,
+        stored: image.size,
+        part,
+        width: image.pixel.number.bytes(),
+        channels: image.pixel.channels,
+    };
+    let mut layout = Layout {
+        format,
+        pixel: image.pixel,
+        frame_size: [columns, rows],
+        frames: order.len(),
+        pixels: Pixels::of_frames(&path, frames, length),
+        line_order: LineOrder::InOrder,
+        geometry,
+        backward: false,
+        volumes: 1,
+        states_geometry: has_spacing,
+        poses: Poses::default(),
+        times,
+        remarks,
+    };
+    if let Some(direct) = direct {
+        layout.pixels = direct;
+        if !layout.pixels.is_compressed() {
+            layout.pixels.length = layout.pixels.length.min(layout.frame_bytes() * layout.frames as u64);
+        }
+    }
+    layout.check(&path, "frames (0028,0008)")?;
+    Ok(layout)
+}
+
+/// All frames of a file, in its order.
+pub(super) fn in_order(image: &Image) -> Vec<usize> {
+    (0..image.places.len()).collect()
+}

@@ -1,0 +1,175 @@
+//! A folder of DICOM files of one frame each: slices of a volume by their places in the patient or by a stated distance, otherwise pictures
+//! in time by their numbers.
+
+use super::super::OpenOptions;
+use super::super::layout::{Cartesian, Layout, StoredGeometry};
+use super::super::packed::InputFile;
+use super::about::{about, accept};
+use super::elements::{self as tags, Elements, is_one};
+use super::file::read;
+use super::frames::Place;
+use super::image::Image;
+use super::placed::{Placed, layout};
+use super::planes::{Plane, sorted};
+use super::regions::{Flat, flat, in_patient, of_pictures, spacing_text};
+use crate::files::InputError;
+use crate::probe::{AxisOrder, World};
+use glam::DVec3;
+use std::collections::{BTreeMap, BTreeSet};
+use std::fs::{self, File};
+use std::io::Read;
+use std::path::{Path, PathBuf};
+
+/// Most files of a folder that are looked at.
+const MAX_FILES: usize = 1 << 16;
+/// A file that lists others, in the folders of exported discs.
+const DIRECTORY: &str = "1.2.840.10008.1.3.10";
+
+/// True if a folder holds a DICOM file.
+pub(in super::super) fn is_series(folder: &Path) -> bool {
+    let Ok(entries) = fs::read_dir(folder) else { return false };
+    entries.take(MAX_FILES).flatten().any(|entry| is_file(&entry.path()))
+}
+
+fn is_file(path: &Path) -> bool {
+    let mut start = Vec::new();
+    let is_regular = fs::metadata(path).is_ok_and(|about| about.is_file());
+    is_regular && File::open(path).and_then(|file| file.take(132).read_to_end(&mut start)).is_ok() && is_one(&start)
+}
+
+/// One file of a series.
+struct Slice {
+    path: PathBuf,
+    image: Image,
+    elements: Elements,
+}
+
+/// Reads the files of a folder as one recording.
+///
+/// # Errors
+/// Files of several series, sizes or kinds, a file that cannot be read, slices that are not evenly spaced.
+pub(in super::super) fn read_series(folder: &Path, options: &OpenOptions) -> Result<Layout, InputError> {
+    let fault = |fault: String| Err(InputError::new(folder, "folder", fault));
+    let entries = fs::read_dir(folder).map_err(|e| InputError::unreadable(folder, &e))?;
+    let mut paths: Vec<PathBuf> = entries.take(MAX_FILES).flatten().map(|e| e.path()).filter(|p| is_file(p)).collect();
+    // The order of a folder is any.
+    paths.sort();
+    let mut slices = Vec::new();
+    for path in paths {
+        let elements = Elements::read(&InputFile::new(&path)?)?;
+        if elements.class == DIRECTORY {
+            continue;
+        }
+        slices.push((path, elements));
+    }
+    if let [(path, _)] = &slices[..] {
+        return read(&InputFile::new(path)?, options);
+    }
+    let series: BTreeSet<String> = slices.iter().map(|(_, elements)| elements.root.text(tags::SERIES)).collect();
+    if series.len() > 1 {
+        return fault(format!(
+            "holds files of {} series: put those of one into a folder, or give a file",
+            series.len()
+        ));
+    }
+    let mut all = Vec::new();
+    for (path, elements) in slices {
+        accept(&path, &elements)?;
+        let image = Image::of(&path, &elements, 1)?;
+        if image.places.len() != 1 || elements.kretz.is_some() {
+            return fault(format!("holds {} with several frames, and other files: give that file", name(&path)));
+        }
+        all.push(Slice { path, image, elements });
+    }
+    all.sort_by_key(|slice| slice.elements.root.text(tags::INSTANCE_NUMBER).parse::<i64>().unwrap_or(i64::MAX));
+    let Some(first) = all.first() else { return fault("holds no image".into()) };
+    let plane = flat(&first.elements.root, first.image.size);
+    let is_same = |slice: &Slice| {
+        let (a, b) = (&slice.image, &first.image);
+        let other = flat(&slice.elements.root, a.size);
+        (a.size, a.pixel, a.coding, &a.arrangement) == (b.size, b.pixel, b.coding, &b.arrangement)
+            && (other.part, other.spacing) == (plane.part, plane.spacing)
+    };
+    if let Some(other) = all.iter().find(|slice| !is_same(slice)) {
+        return fault(format!("{} differs from {} in size, region or pixels", name(&other.path), name(&first.path)));
+    }
+    let placed = placed(folder, &all, plane, options)?;
+    if options.voxel_spacing.is_some() && placed.has_spacing {
+        let why = "is for pictures without a spacing; these state their own";
+        return Err(InputError::new(folder, "--voxel-spacing", why));
+    }
+    let files = all.iter().map(|slice| slice.path.clone()).collect();
+    let mut images = all.into_iter().map(|slice| slice.image);
+    let Some(mut image) = images.next() else { return fault("holds no image".into()) };
+    for (n, next) in images.enumerate() {
+        let before = image.parts.len();
+        let moved = |place: &Place| Place { file: n + 1, first: place.first + before, count: place.count };
+        image.places.extend(next.places.iter().map(moved));
+        image.parts.extend(next.parts);
+    }
+    layout(files, folder.into(), image, placed, None)
+}
+
+fn name(path: &Path) -> String {
+    path.file_name().unwrap_or_default().to_string_lossy().into_owned()
+}
+
+fn placed(folder: &Path, all: &[Slice], plane: Flat, options: &OpenOptions) -> Result<Placed, InputError> {
+    let fault = |field: &str, fault: String| InputError::new(folder, field, fault);
+    let root = &all[0].elements.root;
+    let mut remarks = about(&all[0].elements);
+    remarks.extend(plane.remarks.iter().cloned());
+    remarks.push(("files".into(), all.len().to_string()));
+    let part = plane.part;
+    let place = |slice: &Slice| in_patient(&slice.elements.root, &plane);
+    let places: Option<Vec<(DVec3, [DVec3; 2])>> = all.iter().map(place).collect();
+    if let (Some(places), Some([dx, dy])) = (places, plane.spacing) {
+        let planes: Vec<Plane> = places
+            .into_iter()
+            .map(|(position, [row, column])| Plane { position, row, column, index: None, time: None })
+            .collect();
+        let found = sorted(&planes).map_err(|why| fault("slices", why))?;
+        let (Some(first), Some(step)) = (found.order.first().map(|n| planes[*n]), found.step) else {
+            return pictures_in_time(folder, all, plane, remarks, options);
+        };
+        let axes = [first.row * dx, first.column * dy, step];
+        let world = World::new(axes, first.position).map_err(|why| fault("slices", why))?;
+        let size = [part[2], part[3], found.slices];
+        let geometry =
+            StoredGeometry::Cartesian(Cartesian { size, volumes: found.volumes, world, order: AxisOrder::STORED });
+        let (order, times) = (found.order, BTreeMap::new());
+        return Ok(Placed { format: "DICOM series", geometry, order, part, has_spacing: true, times, remarks });
+    }
+    let distance = root.decimal(tags::SPACING_BETWEEN_SLICES).filter(|mm| *mm > 0.0);
+    let spacing = match (plane.spacing, distance, options.voxel_spacing) {
+        (Some([x, y]), Some(z), _) => Some(([x, y, z], true)),
+        (None, _, Some(spacing)) => Some((spacing, false)),
+        _ => None,
+    };
+    let Some((spacing, has_spacing)) = spacing else { return pictures_in_time(folder, all, plane, remarks, options) };
+    remarks.push(("order".into(), "by the numbers of the images; they state no places".into()));
+    let axes = [DVec3::X * spacing[0], DVec3::Y * spacing[1], DVec3::Z * spacing[2]];
+    let origin = DVec3::new(plane.origin[0], plane.origin[1], 0.0);
+    let world = World::new(axes, origin).map_err(|why| fault("spacing", why))?;
+    let size = [part[2], part[3], all.len()];
+    let geometry = StoredGeometry::Cartesian(Cartesian { size, volumes: 1, world, order: AxisOrder::STORED });
+    let order = (0..all.len()).collect();
+    Ok(Placed { format: "DICOM series", geometry, order, part, has_spacing, times: BTreeMap::new(), remarks })
+}
+
+/// Pictures that have no distance from each other: they are frames in time.
+fn pictures_in_time(
+    folder: &Path,
+    all: &[Slice],
+    plane: Flat,
+    mut remarks: Vec<(String, String)>,
+    options: &OpenOptions,
+) -> Result<Placed, InputError> {
+    let geometry = of_pictures(folder, &all[0].elements.root, &plane, all.len(), options)?;
+    if let Some(spacing) = plane.spacing {
+        let text = format!("pictures of {} in time, by their numbers; they state no distance", spacing_text(spacing));
+        remarks.push(("order".into(), text));
+    }
+    let (order, part, has_spacing) = ((0..all.len()).collect(), plane.part, plane.spacing.is_some());
+    Ok(Placed { format: "DICOM series", geometry, order, part, has_spacing, times: BTreeMap::new(), remarks })
+}
