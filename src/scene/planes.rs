@@ -200,6 +200,22 @@ impl Sheet {
         tile.plane.at + tile.plane.right * from_middle(x, 0) + tile.plane.down * from_middle(y, 1)
     }
 
+    /// The point of a tile's plane that a position on the picture shows, mm in space.
+    pub fn point(&self, tile: &Tile, at: [f64; 2]) -> DVec3 {
+        let [x, y]: [f64; 2] =
+            std::array::from_fn(|a| at[a] - f64::from(tile.corner[a]) - f64::from(tile.size[a]) / 2.0);
+        tile.plane.at + (tile.plane.right * x + tile.plane.down * y) * self.pixel
+    }
+
+    /// Where a point in space lies on a tile: its position on the picture, and its distance from the plane along its normal, mm.
+    pub fn project(&self, tile: &Tile, point: DVec3) -> ([f64; 2], f64) {
+        let from = point - tile.plane.at;
+        let along = [from.dot(tile.plane.right), from.dot(tile.plane.down)];
+        let at =
+            std::array::from_fn(|a| f64::from(tile.corner[a]) + f64::from(tile.size[a]) / 2.0 + along[a] / self.pixel);
+        (at, from.dot(tile.plane.normal))
+    }
+
     /// The upper left corner of a tile in space, and the vectors of one pixel right, of one down, and through the slab, mm.
     pub fn vectors(&self, tile: &Tile, thickness: f64) -> [DVec3; 4] {
         let Plane { at, right, down, normal } = tile.plane;

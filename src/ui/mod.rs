@@ -20,6 +20,7 @@ pub mod frame_budget;
 mod gestures;
 mod hints;
 pub mod input;
+mod open_list;
 pub mod panels;
 mod picking;
 mod recovery;

@@ -2,7 +2,11 @@
 //! time and a screen (which may be missing) are passed in, so that everything a window can do is tested without one.
 
 mod frame;
+mod measuring;
+mod opening;
 
+use self::measuring::Counting;
+use self::opening::Opening;
 use super::command::{Command, HeldKeys, Tool};
 use super::controls::{Change, Controls};
 use super::export::Exporter;
@@ -24,7 +28,9 @@ use crate::plan::Work;
 use crate::scene::load::Layers;
 use crate::scene::{Layout, Scene, Settings, variants};
 use crate::source::live::SourceKind;
-use std::path::PathBuf;
+use crate::workspace::Origin;
+use glam::DVec3;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::{Duration, Instant, SystemTime};
 
@@ -40,6 +46,8 @@ const MAX_NOTES: usize = 4;
 const REST_BEFORE_WARMING: Duration = Duration::from_secs(1);
 /// Longest text that the help is searched for, characters.
 const MAX_SEARCH: usize = 40;
+/// A pause after which the same drag or key is another step for undo.
+const STEP_PAUSE: Duration = Duration::from_millis(500);
 /// Time between two volumes of a cine loop.
 const CINE_INTERVAL: Duration = Duration::from_millis(200);
 
@@ -78,6 +86,14 @@ pub struct ConsoleOptions {
     /// The keys that end a kiosk, if any.
     pub exit: Option<Chord>,
     pub is_kiosk: bool,
+    /// What a workspace keeps of the source. None: it cannot be saved.
+    pub origin: Option<Origin>,
+    /// The volumes of the source are numbered as in its recording.
+    pub plays_once: bool,
+    /// How another recording or workspace is opened. None: none is.
+    pub open_file: Option<OpenFile>,
+    /// The file with the list of recent files.
+    pub recent: Option<PathBuf>,
     /// Called when [`Console::update`] has something to do.
     pub wake: Wake,
     /// A fault that prevents the view: only its message is shown.
@@ -111,6 +127,10 @@ impl Default for ConsoleOptions {
             scale: 1.0,
             exit: None,
             is_kiosk: false,
+            origin: None,
+            plays_once: false,
+            open_file: None,
+            recent: None,
             wake: Arc::new(|| ()),
             startup_fault: None,
             shaders: None,
@@ -118,6 +138,10 @@ impl Default for ConsoleOptions {
         }
     }
 }
+
+/// Opens a recording or a workspace in place of what is shown, which the console asks to be replaced for; or returns the reason in one line. It
+/// may take long.
+pub type OpenFile = Arc<dyn Fn(&Path) -> Result<(), String> + Send + Sync>;
 
 /// A fault that prevents the view, such as a wrong configuration, and how to find out that it is resolved.
 pub struct StartupFault {
@@ -181,11 +205,11 @@ pub struct Console {
     shows_help: bool,
     shows_times: bool,
     shows_panels: bool,
-    /// Asks whether to save the loop before leaving.
     /// Saves pictures with a bar.
     saves_bar: bool,
     /// What the help is searched for; none while it is not.
     help_search: Option<String>,
+    /// Asks whether to save the loop before leaving.
     asks_to_leave: bool,
     leaves_when_saved: bool,
     is_full_screen: bool,
@@ -200,8 +224,9 @@ pub struct Console {
     unsent_input: Option<Instant>,
     /// The first input that no picture shows yet, and when its settings were given to the stream.
     unshown_input: Option<(Instant, Instant)>,
-    /// When the user acted last.
+    /// When the user acted last, and changed something last.
     last_input: Instant,
+    last_change: Instant,
     /// The settings around which pipelines were compiled in advance last.
     warmed: Option<Settings>,
     /// When statistics were taken last.
@@ -226,6 +251,12 @@ pub struct Console {
     /// The startup fault, and when to check it next.
     startup_fault: Option<(StartupFault, Instant)>,
     request: LoopRequest,
+    /// What can be opened, and what is being opened.
+    opening: Opening,
+    /// Counts voxels in the background.
+    counting: Counting,
+    /// Where the first end of a distance on the surface was picked.
+    surface_from: Option<DVec3>,
     shaders: Option<Arc<ShaderFolder>>,
     /// Why the picture is not drawn with the shaders as they are in their folder now.
     shader_fault: Option<String>,
@@ -242,6 +273,9 @@ struct FixedOptions {
     source: SourceKind,
     /// Everything that arrives is recorded to a file.
     records: bool,
+    /// What a workspace keeps of the source.
+    origin: Option<Origin>,
+    plays_once: bool,
 }
 
 impl Console {
@@ -281,6 +315,9 @@ impl Console {
             controls,
             gestures: Gestures::default(),
             keys: HeldKeys::default(),
+            opening: Opening::new(options.open_file, options.recent, options.wake.clone()),
+            counting: Counting::new(options.wake.clone()),
+            surface_from: None,
             exporter: Exporter::new(options.folder, options.wake),
             pace: Pace::new(options.budget, &rungs),
             rungs,
@@ -293,6 +330,8 @@ impl Console {
                 warms: options.warms,
                 source: options.source,
                 records,
+                origin: options.origin,
+                plays_once: options.plays_once,
             },
             size,
             started: now,
@@ -317,6 +356,7 @@ impl Console {
             unsent_input: None,
             unshown_input: None,
             last_input: now,
+            last_change: now,
             warmed: None,
             statistics_at: now,
             last_arrival: now,
@@ -426,7 +466,12 @@ impl Console {
             self.request.exit = true;
         }
         let is_search = self.search_help(input);
-        if let Some(command) = self.keys.input(input).filter(|_| !is_search) {
+        let typed = self.typed(input);
+        if typed.is_some() {
+            // The keys go on to be held, and give nothing else.
+            self.keys.input(input);
+            typed.iter().flatten().for_each(|command| self.execute(command, now));
+        } else if let Some(command) = self.keys.input(input).filter(|_| !is_search) {
             let command = if self.asks_to_leave { answer(input) } else { Some(command) };
             command.iter().for_each(|command| self.execute(command, now));
         }
@@ -435,11 +480,14 @@ impl Console {
             Input::Moved(at) | Input::Touch { at, .. } => Some(*at),
             _ => None,
         };
+        let measures = self.controls.measures().to_vec();
         let is_over_panel = at.or(self.gestures.pointer()).is_some_and(|at| self.panels.covers(at));
         let on = Viewport {
             corner: area.0.map(f64::from),
             size: area.1.map(f64::from),
             scene: self.stream.scene(),
+            measures: &measures,
+            has_work: self.controls.work().is_some(),
             is_covered: self.asks_to_leave || (is_over_panel && self.fixed.overlay),
             now: now.saturating_duration_since(self.started),
         };
@@ -511,12 +559,18 @@ impl Console {
         tracing::debug!("{command:?}");
         self.user_acts(now);
         let before = is_of_tone(command).then(|| self.controls.settings().clone());
+        if now.saturating_duration_since(self.last_change) > STEP_PAUSE {
+            self.controls.seal();
+        }
         match self.controls.apply(command, self.stream.scene()) {
             Change::Nothing => return,
-            Change::Tool => {}
+            Change::Tool => self.surface_from = None,
+            Change::Marks => self.last_change = now,
+            Change::Refused(why) => self.notify(why, true),
             Change::Settings => {
+                self.last_change = now;
                 self.unsent_input.get_or_insert(now);
-                if is_continuous(command) {
+                if command.is_continuous() {
                     let work = before.map_or(Work::Rays, |before| self.work_since(before));
                     self.pace.moved(work, now);
                 } else {
@@ -574,6 +628,13 @@ impl Console {
                 self.resize_picture();
             }
             Command::ToggleFullScreen => self.request.toggle_full_screen |= !self.fixed.is_kiosk,
+            Command::PickSurface(at) => self.pick_surface(at),
+            Command::CountVoxels => self.count_voxels(),
+            Command::CopyMeasures => self.copy_measures(),
+            Command::SaveMeasures => self.save_measures(),
+            Command::SaveWorkspace => self.save_workspace(),
+            Command::OpenFiles => self.toggle_files(),
+            Command::OpenFile(n) => self.open_entry(n),
             Command::Back => self.go_back(),
             // A kiosk ends only with its exit keys: a sleeve may press Escape.
             Command::Exit if self.fixed.is_kiosk => {}
@@ -608,7 +669,11 @@ impl Console {
     fn save_picture(&mut self) {
         let picture = match self.stream.renderer().filter(|renderer| renderer.has_drawn()) {
             Some(renderer) => match renderer.end_picture() {
-                Ok(picture) => Ok((picture, renderer.scene().clone())),
+                Ok(picture) => {
+                    let mut scene = renderer.scene().clone();
+                    scene.settings.measure = self.controls.measures().to_vec();
+                    Ok((picture, scene))
+                }
                 Err(fault) => Err(fault.to_string()),
             },
             None => Err("there is no picture yet".into()),
@@ -618,7 +683,7 @@ impl Console {
         let saved = picture.and_then(|(picture, scene)| {
             self.exporter.picture(move || match has_bar {
                 true => marked::marked(&picture, &scene, &time, origin),
-                false => Ok(picture),
+                false => marked::measured(&picture, &scene),
             })
         });
         if let Err(fault) = saved {
@@ -630,6 +695,9 @@ impl Console {
     fn go_back(&mut self) {
         if self.asks_to_leave {
             self.asks_to_leave = false;
+        } else if self.opening.is_shown() {
+            self.toggle_files();
+        } else if self.leave_measuring() {
         } else if self.help_search.is_some() {
             self.help_search = None;
         } else if self.shows_help {
@@ -720,7 +788,8 @@ impl Console {
 
     /// The settings of a view at rest.
     fn full_settings(&self) -> Settings {
-        let mut full = self.controls.settings().clone();
+        // Measurements are drawn over the picture.
+        let mut full = Settings { measure: Vec::new(), ..self.controls.settings().clone() };
         // A region that grows and a plane that moves show slices that were left out. With all of them processed, dragging needs no frame
         // again.
         let cuts_planes = full.mode.is_flat() || full.layout == Layout::Four;
@@ -755,23 +824,4 @@ fn answer(input: &Input) -> Option<Command> {
 fn is_of_tone(command: &Command) -> bool {
     use Command::{MoveCrossing, MoveLight, RotatePlanes, SetSlider, StepPlane, StepSlider};
     matches!(command, MoveLight(_) | StepPlane(_) | MoveCrossing(_) | RotatePlanes(_) | SetSlider(..) | StepSlider(..))
-}
-
-/// True for commands that a drag or a held key gives repeatedly.
-fn is_continuous(command: &Command) -> bool {
-    matches!(
-        command,
-        Command::Rotate(_)
-            | Command::Roll(_)
-            | Command::Zoom(_)
-            | Command::Pan(_)
-            | Command::MoveLight(_)
-            | Command::MoveFace(..)
-            | Command::MoveClip(_)
-            | Command::StepPlane(_)
-            | Command::MoveCrossing(_)
-            | Command::RotatePlanes(_)
-            | Command::SetSlider(..)
-            | Command::StepSlider(..)
-    )
 }

@@ -70,6 +70,12 @@ fn sides(painter: &Painter, area: Rect, tile: &TileMarks) {
         painter.circle_filled(place, 7.0, Color32::from_black_alpha(160));
         painter.circle_filled(place, 5.0, ACCENT);
     }
+    if let Some((letter, colour)) = tile.plane {
+        let [r, g, b] = colour.map(|c| (c * 255.0).round() as u8);
+        let place = Rect::from_center_size(at(tile.plane_corner()), vec2(20.0, 20.0));
+        painter.rect_filled(place, 3.0, Color32::from_rgb(r, g, b));
+        painter.text(place.center(), Align2::CENTER_CENTER, letter, FontId::proportional(SMALL_TEXT), Color32::BLACK);
+    }
 }
 
 fn line(painter: &Painter, from: Pos2, to: Pos2) {
