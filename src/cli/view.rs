@@ -208,6 +208,8 @@ impl View {
         }
         let is_complete = workspace.is_some();
         let layers = match workspace {
+            // The flags are about what the program was started with.
+            Some(layers) if self.opened.is_some() => layers,
             Some(layers) => self.scene.layers_over(layers, &[])?,
             None => self.scene.layers(source.is_phantom(), &[])?,
         };

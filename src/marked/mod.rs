@@ -48,13 +48,14 @@ pub fn marked(picture: &Picture, scene: &Scene, time: &str, origin: Option<&str>
     Ok(marked)
 }
 
-/// A picture of the scene with its measurements and annotations.
+/// A picture of the scene with its measurements and annotations, and the lines of its reference tile.
 ///
 /// # Errors
 /// One line: the drawing failed.
 pub fn measured(picture: &Picture, scene: &Scene) -> Result<Picture, String> {
     let mut measured = picture.clone();
     if [picture.width, picture.height] == scene.picture_size() {
+        strokes::slices(&mut measured, scene)?;
         strokes::draw(&mut measured, scene)?;
     }
     Ok(measured)

@@ -49,6 +49,26 @@ pub(super) fn draw(picture: &mut Picture, scene: &Scene) -> Result<(), String> {
     Ok(())
 }
 
+/// Draws where the slices are on the reference tile of a tomography, and their distance.
+///
+/// # Errors
+/// One line: the drawing of the label failed.
+pub(super) fn slices(picture: &mut Picture, scene: &Scene) -> Result<(), String> {
+    if !scene.has_reference() {
+        return Ok(());
+    }
+    let sheet = scene.sheet();
+    let Some(first) = sheet.tiles.first() else { return Ok(()) };
+    let tile = [first.corner, first.size].map(|corner| corner.map(f64::from));
+    sheet.slice_lines().iter().for_each(|ends| stroke(picture, tile, *ends, 0.5, LINE));
+    let text = overlay::spacing_label(&sheet);
+    let width = canvas::text_width(&text, TEXT)?.min(tile[1][0]).ceil() as u32 + 6;
+    let label = canvas::picture([width, TEXT + 6], &Label(&text))?;
+    let bottom = tile[0][1] + tile[1][1] - f64::from(TEXT + 8);
+    blend(picture, &label, [tile[0][0].round() as i64 + 2, bottom.round() as i64]);
+    Ok(())
+}
+
 /// Draws a line with smooth borders, within a tile.
 fn stroke(picture: &mut Picture, tile: [[f64; 2]; 2], ends: [[f64; 2]; 2], half: f64, colour: [u8; 3]) {
     let size = [f64::from(picture.width), f64::from(picture.height)];

@@ -12,7 +12,7 @@ use std::fmt::Write as _;
 pub struct Quantity {
     pub name: &'static str,
     pub value: f64,
-    /// mm, cm^2, cm^3 or deg.
+    /// mm, cm2, cm3, deg, or nothing for an echo of 0..=255.
     pub unit: &'static str,
 }
 
@@ -28,7 +28,9 @@ impl Quantity {
             "mm" => format!("{value:.1} mm"),
             "deg" => format!("{value:.1}°"),
             "cm2" => format!("{value:.2} cm²"),
-            _ => format!("{value:.2} cm³"),
+            "cm3" => format!("{value:.2} cm³"),
+            // An echo of 0..=255, as the colour bar has it.
+            _ => format!("{value:.0}"),
         }
     }
 }
@@ -78,7 +80,9 @@ pub fn quantities(measured: &Measurement) -> Result<Vec<Quantity>, &'static str>
         }
         (MeasureKind::Threshold, _) => {
             let counted = measured.counted.ok_or("no voxels were counted")?;
-            vec![Quantity::of("volume by threshold", counted / 1000.0, "cm3")]
+            let volume = Quantity::of("volume by threshold", counted / 1000.0, "cm3");
+            let threshold = measured.threshold.map(|share| Quantity::of("threshold", share * 255.0, ""));
+            [volume].into_iter().chain(threshold).collect()
         }
         (MeasureKind::Text | MeasureKind::Arrow, _) => Vec::new(),
         _ => return Err("points are missing"),

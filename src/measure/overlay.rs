@@ -78,6 +78,14 @@ pub fn preview(scene: &Scene, number: usize, work: &Measurement, hover: Option<[
     found
 }
 
+/// The distance of the slices of a tomography, for its reference tile.
+pub fn spacing_label(sheet: &Sheet) -> String {
+    match &sheet.tiles[..] {
+        [_, first, second, ..] => format!("every {:.1} mm", second.plane.at.distance(first.plane.at)),
+        _ => String::new(),
+    }
+}
+
 /// The two strokes of an arrow's head, pixels. `head`: the tip, and where the shaft comes from.
 pub fn arrow_head([tip, tail]: [[f64; 2]; 2], length: f64) -> Vec<[[f64; 2]; 2]> {
     let (x, y) = (tail[0] - tip[0], tail[1] - tip[1]);
@@ -223,6 +231,28 @@ mod tests {
         assert!(drawn(&stepped, std::slice::from_ref(&across)).is_empty(), "the plane was stepped away");
         let slab = scene(&["mode='plane'", "planes.position=[0,15,3]", "planes.thickness=8"]);
         assert_eq!(drawn(&slab, &[across]).len(), 1, "the slab holds it");
+    }
+
+    #[test]
+    fn the_lines_of_a_reference_are_where_its_slices_are() {
+        for plane in ["a", "b", "c"] {
+            let plane = format!("planes.plane='{plane}'");
+            let scene =
+                scene(&["mode='tomography'", "planes.reference=true", "planes.spacing=3", "planes.azimuth=20", &plane]);
+            let sheet = scene.sheet();
+            let (reference, lines) = (&sheet.tiles[0], sheet.slice_lines());
+            assert_eq!((sheet.tiles.len(), lines.len()), (12, 11));
+            assert!(reference.plane.normal.dot(sheet.tiles[1].plane.normal).abs() < 1e-12, "across the slices");
+            for (slice, ends) in sheet.tiles[1..].iter().zip(&lines) {
+                for end in ends {
+                    // Each end is a point of both planes.
+                    let off = sheet.project(slice, sheet.point(reference, *end)).1;
+                    assert!(off.abs() < 1e-9, "{plane}: {off} mm");
+                }
+            }
+            assert_eq!(spacing_label(&sheet), "every 3.0 mm");
+        }
+        assert!(!scene(&["mode='tomography'"]).has_reference(), "only if asked for");
     }
 
     #[test]

@@ -54,6 +54,8 @@ pub enum Command {
     Redo,
     /// Moves the point where the planes cross to the middle of the region.
     Recentre,
+    /// Shows the plane across the slices of a tomography, with their lines, or not.
+    Reference(bool),
     /// Sets a point of the tool's measurement: lateral, depth, elevation, mm; and whether it was picked on the rendered surface.
     Point([f64; 3], bool),
     /// Picks the point of the surface under this pixel of the picture.

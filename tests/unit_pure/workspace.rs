@@ -32,7 +32,8 @@ fn what_is_saved_is_read_again_exactly() {
                 ..Measurement::default()
             },
         ];
-        let origin = Origin { volume: 3, ..Origin::of(Some("sweep.mha".into())) };
+        let mut origin = Origin::of(Some("sweep.mha".into()));
+        origin.volume = 3;
         let (folder, file) = kept("workspace-exact", &text(&settings, &origin).expect("text"));
         let read = Workspace::read(&file).expect("a workspace");
         assert_eq!(read.layers.clone().finish().expect("settings"), settings, "{preset}");

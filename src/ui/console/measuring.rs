@@ -85,7 +85,9 @@ impl Console {
         if matches!(kind, MeasureKind::Trace | MeasureKind::Volume | MeasureKind::Ellipse) {
             return Err("Outlines are traced on a plane: choose Plane, 3 planes or 4-up".into());
         }
-        let from = self.surface_from;
+        // Undo may have taken the first end back.
+        let is_begun = self.controls.work().is_some_and(|work| work.kind == MeasureKind::Surface);
+        let from = self.surface_from.filter(|_| is_begun);
         let no_surface = "Points on a rendering need its surface: choose the mode Surface or Mixed";
         let renderer = self.stream.renderer().filter(|r| r.has_drawn()).ok_or("There is no picture yet")?;
         let slot = match renderer.scene().has_distance() {
@@ -151,7 +153,9 @@ impl Console {
         let is_backward = frames.first().is_some_and(|frame| frame.backward);
         let geometry = if is_backward { header.backward.clone() } else { header.forward.clone() };
         let (stored, [low, high]) = (header.stored, header.range);
-        let threshold = threshold(scene);
+        let found = self.controls.found_threshold();
+        let threshold =
+            threshold(scene).or(found).ok_or("The threshold is 0: choose Surface or Volume and raise it")?;
         let (least, most) = insonified_box(&scene.geometry);
         let corners = [scene.low.max(least), scene.high.min(most)];
         let points = corners.map(|corner| scene.point_of(corner)).to_vec();
@@ -181,11 +185,14 @@ impl Console {
 
     /// Copies the results as CSV.
     pub(super) fn copy_measures(&mut self) {
-        match self.controls.measures().is_empty() {
-            true => self.notify("There are no measurements yet", true),
-            false => {
-                self.panels.copy_text(outcome::csv(self.controls.measures()));
-                self.notify("The results are copied as CSV", false);
+        if self.controls.measures().is_empty() {
+            return self.notify("There are no measurements yet", true);
+        }
+        match self.clipboard.copy(outcome::csv(self.controls.measures())) {
+            Ok(()) => self.notify("The results are copied as CSV", false),
+            Err(fault) => {
+                self.notify(&format!("There is no clipboard ({fault}): the results are saved instead"), true);
+                self.save_measures();
             }
         }
     }
@@ -261,14 +268,15 @@ impl Console {
     }
 }
 
-/// The threshold of the mode, as a share of the sample range.
-fn threshold(scene: &Scene) -> f64 {
+/// The threshold of the mode, as a share of the sample range; none if there is none.
+fn threshold(scene: &Scene) -> Option<f64> {
     let settings = &scene.settings;
     let (share, [low, high]) = match settings.mode {
         Mode::Surface => (settings.surface.threshold, settings.surface.window),
-        _ => (settings.volume.threshold, settings.volume.window),
+        Mode::Volume | Mode::Mixed => (settings.volume.threshold, settings.volume.window),
+        _ => return None,
     };
-    (low + share * (high - low)).clamp(0.0, 1.0)
+    (share > 0.0).then(|| (low + share * (high - low)).clamp(0.0, 1.0))
 }
 
 #[cfg(test)]

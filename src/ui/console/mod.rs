@@ -4,9 +4,11 @@
 mod frame;
 mod measuring;
 mod opening;
+mod saving;
 
 use self::measuring::Counting;
 use self::opening::Opening;
+use super::clipboard::Clipboard;
 use super::command::{Command, HeldKeys, Tool};
 use super::controls::{Change, Controls};
 use super::export::Exporter;
@@ -23,7 +25,6 @@ use crate::gpu::{Context, GpuError, TimeStamps, Wake};
 use crate::kiosk::chord::Chord;
 use crate::live::cine::CineLimits;
 use crate::live::{self, Feed, Stream, StreamError, Update};
-use crate::marked;
 use crate::plan::Work;
 use crate::scene::load::Layers;
 use crate::scene::{Layout, Scene, Settings, variants};
@@ -32,7 +33,7 @@ use crate::workspace::Origin;
 use glam::DVec3;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
-use std::time::{Duration, Instant, SystemTime};
+use std::time::{Duration, Instant};
 
 /// How long a note is shown.
 const NOTE_TIME: Duration = Duration::from_secs(5);
@@ -253,6 +254,7 @@ pub struct Console {
     request: LoopRequest,
     /// What can be opened, and what is being opened.
     opening: Opening,
+    clipboard: Clipboard,
     /// Counts voxels in the background.
     counting: Counting,
     /// Where the first end of a distance on the surface was picked.
@@ -316,6 +318,7 @@ impl Console {
             gestures: Gestures::default(),
             keys: HeldKeys::default(),
             opening: Opening::new(options.open_file, options.recent, options.wake.clone()),
+            clipboard: Clipboard::default(),
             counting: Counting::new(options.wake.clone()),
             surface_from: None,
             exporter: Exporter::new(options.folder, options.wake),
@@ -666,44 +669,20 @@ impl Console {
         }
     }
 
-    fn save_picture(&mut self) {
-        let picture = match self.stream.renderer().filter(|renderer| renderer.has_drawn()) {
-            Some(renderer) => match renderer.end_picture() {
-                Ok(picture) => {
-                    let mut scene = renderer.scene().clone();
-                    scene.settings.measure = self.controls.measures().to_vec();
-                    Ok((picture, scene))
-                }
-                Err(fault) => Err(fault.to_string()),
-            },
-            None => Err("there is no picture yet".into()),
-        };
-        let (has_bar, time) = (self.saves_bar, marked::time_line(SystemTime::now()));
-        let origin = self.fixed.source.origin();
-        let saved = picture.and_then(|(picture, scene)| {
-            self.exporter.picture(move || match has_bar {
-                true => marked::marked(&picture, &scene, &time, origin),
-                false => marked::measured(&picture, &scene),
-            })
-        });
-        if let Err(fault) = saved {
-            self.notify(&format!("The picture was not saved: {fault}"), true);
-        }
-    }
-
     /// Closes the uppermost of what is open; else leaves full screen; else leaves the program.
     fn go_back(&mut self) {
         if self.asks_to_leave {
             self.asks_to_leave = false;
         } else if self.opening.is_shown() {
             self.toggle_files();
-        } else if self.leave_measuring() {
         } else if self.help_search.is_some() {
             self.help_search = None;
         } else if self.shows_help {
             self.shows_help = false;
         } else if self.shows_times {
             self.shows_times = false;
+        } else if self.leave_measuring() {
+            self.needs_redraw = true;
         } else if self.is_full_screen && !self.fixed.is_kiosk {
             self.request.toggle_full_screen = true;
         } else {
@@ -735,23 +714,6 @@ impl Console {
     /// True while the console asks whether to save the loop before it leaves.
     pub fn asks_to_leave(&self) -> bool {
         self.asks_to_leave
-    }
-
-    /// Saves the cine loop. False if it cannot be.
-    fn save_loop(&mut self) -> bool {
-        let volumes: Vec<_> = self.stream.cine().volumes().iter().cloned().collect();
-        let saved = match self.stream.header() {
-            Some(header) if !volumes.is_empty() => {
-                let header = header.clone();
-                self.exporter.volumes(header, volumes)
-            }
-            _ => Err("there are no volumes yet".into()),
-        };
-        self.saving_volume = self.stream.cine().volumes().back().map(|kept| kept.volume).filter(|_| saved.is_ok());
-        if let Err(fault) = &saved {
-            self.notify(&format!("The loop was not saved: {fault}"), true);
-        }
-        saved.is_ok()
     }
 
     /// Leaves the processor to what the user asks for.

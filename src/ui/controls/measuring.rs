@@ -25,6 +25,11 @@ impl Controls {
         self.typing
     }
 
+    /// The threshold between the darker and the brighter echoes of the source, as a share of the sample range; none before its first volume.
+    pub(in crate::ui) fn found_threshold(&self) -> Option<f64> {
+        self.defaults.as_ref()?.levels.as_ref().map(|levels| levels.threshold)
+    }
+
     /// Adds a measurement that is complete.
     pub(in crate::ui) fn add_measure(&mut self, measured: Measurement) -> Change {
         if self.is_full(measured.count()) {

@@ -301,6 +301,7 @@ impl Controls {
             Command::MoveCrossing(point) if finite(&point) => {
                 new.planes.position = Some(view::clamp_crossing(now, point))
             }
+            Command::Reference(on) if now.settings.mode == Mode::Tomography => new.planes.reference = on,
             Command::Recentre if now.cuts_planes() => new.planes.position = None,
             Command::RotatePlanes(by) if finite(&by) => {
                 new.planes.azimuth = view::wrap_degrees(new.planes.azimuth + by[0]);

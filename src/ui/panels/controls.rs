@@ -216,6 +216,13 @@ pub(super) fn show_controls(ui: &mut Ui, state: &PanelState, width: f32, execute
                     execute(Command::Shadow(on));
                 }
             }
+            if settings.mode == Mode::Tomography {
+                let mut on = settings.planes.reference;
+                let hint = "The first tile shows the plane across the slices, and where each of them is.";
+                if switch(ui, &mut on, "Reference picture", hint) {
+                    execute(Command::Reference(on));
+                }
+            }
             let mut saves_bar = state.saves_bar;
             let hint = "Saved pictures carry the patient's sides, and a bar with scale, depth, mode and time.";
             if switch(ui, &mut saves_bar, "Bar on saved pictures", hint) {

@@ -75,16 +75,21 @@ pub(super) fn show_results(ui: &mut Ui, state: &PanelState, width: f32, execute:
         ui.horizontal(|ui| {
             let found = outcome::quantities(measured).unwrap_or_default();
             let main = found.first().map_or(String::new(), Quantity::shown);
-            let name = if measured.text.is_empty() { measured.kind.title() } else { &measured.text };
+            let name = match (measured.kind, measured.text.is_empty()) {
+                (_, false) => &measured.text,
+                (MeasureKind::Threshold, true) => "Echoes",
+                (kind, true) => kind.title(),
+            };
             let typing = if state.controls.typing() == Some(n) { "_" } else { "" };
-            let text = RichText::new(format!("{}  {name}{typing}", n + 1)).size(SMALL_TEXT + 1.0);
-            let row = vec2((width - 38.0).max(40.0), TOUCH_SIZE * 0.6);
+            let text = RichText::new(format!("{} {name}{typing}", n + 1)).size(SMALL_TEXT);
+            ui.spacing_mut().item_spacing.x = 4.0;
+            let row = vec2((width - 26.0).max(40.0), TOUCH_SIZE * 0.6);
             ui.allocate_ui_with_layout(row, egui::Layout::left_to_right(egui::Align::Center), |ui| {
                 ui.set_min_width(row.x);
                 let rest = found.iter().map(|q| format!("{}: {}", q.name, q.shown()));
                 let hint: Vec<String> = rest.chain(["Click to type a text for it.".to_string()]).collect();
                 ui.with_layout(egui::Layout::right_to_left(egui::Align::Center), |ui| {
-                    ui.label(RichText::new(main).color(LINE).size(SMALL_TEXT + 1.0));
+                    ui.label(RichText::new(main).color(LINE).size(SMALL_TEXT));
                     ui.with_layout(egui::Layout::left_to_right(egui::Align::Center), |ui| {
                         let label = ui.add(Label::new(text).truncate().sense(egui::Sense::click()));
                         if label.on_hover_text(hint.join("\n")).clicked() {
@@ -93,7 +98,8 @@ pub(super) fn show_results(ui: &mut Ui, state: &PanelState, width: f32, execute:
                     });
                 });
             });
-            let delete = Button::new("x").min_size(vec2(28.0, TOUCH_SIZE * 0.55));
+            ui.spacing_mut().button_padding.x = 3.0;
+            let delete = Button::new("x").min_size(vec2(22.0, TOUCH_SIZE * 0.55));
             if ui.add(delete).on_hover_text("Deletes it (undo brings it back).").clicked() {
                 execute(Command::DeleteMeasure(n));
             }

@@ -50,11 +50,6 @@ impl Panels {
         self.scale
     }
 
-    /// Copies a text with the next layout.
-    pub(super) fn copy_text(&self, text: String) {
-        self.context.copy_text(text);
-    }
-
     /// Starts again after the device with the textures was lost: all textures are sent again.
     pub(super) fn reset(&mut self) {
         *self = Panels::new(self.scale);
