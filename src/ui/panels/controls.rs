@@ -2,7 +2,7 @@
 //! every examination needs are in front; the others are below them, by stage.
 
 use super::measures;
-use super::{ACCENT, BUTTON, PanelState, SMALL_TEXT, TEXT, TEXT_SIZE, TOUCH_SIZE, WARNING, WEAK_TEXT};
+use super::{ACCENT, BUTTON, PanelState, TEXT, TEXT_SIZE, TOUCH_SIZE, WARNING, WEAK_TEXT, heading};
 use crate::scene::{ColourMap, Layout, Mode, PlaneName, Settings, Transfer, TransferName};
 use crate::ui::command::{Command, Tool};
 use crate::ui::hints;
@@ -100,10 +100,6 @@ fn undo_and_redo(ui: &mut Ui, state: &PanelState, row: &Row, execute: &mut dyn F
             }
         }
     });
-}
-
-pub(super) fn heading(ui: &mut Ui, text: &str) {
-    ui.label(RichText::new(text).size(SMALL_TEXT).color(WEAK_TEXT));
 }
 
 /// Rows of buttons of which one is chosen.

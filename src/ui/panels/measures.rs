@@ -1,7 +1,6 @@
 //! Measuring: its tools, the list of results, and what is drawn of both over the picture.
 
-use super::controls::heading;
-use super::{ACCENT, PanelState, SMALL_TEXT, TEXT, TEXT_SIZE, TOUCH_SIZE, WARNING, picture_rect};
+use super::{ACCENT, PanelState, SMALL_TEXT, TEXT, TEXT_SIZE, TOUCH_SIZE, WARNING, heading, picture_rect};
 use crate::measure::outcome::{self, Quantity};
 use crate::measure::overlay::{self, Drawn};
 use crate::scene::{MeasureKind, Scene};

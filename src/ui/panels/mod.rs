@@ -314,6 +314,11 @@ pub(super) fn has_column(size: [u32; 2], scale: f32, shows_panels: bool) -> bool
     Edges::of(size.map(|n| n as f32 / scale), shows_panels).right > 0.0
 }
 
+/// A small heading above a group of controls.
+fn heading(ui: &mut egui::Ui, text: &str) {
+    ui.label(egui::RichText::new(text).size(SMALL_TEXT).color(WEAK_TEXT));
+}
+
 /// The area of the picture in points.
 fn picture_rect(state: &PanelState, scale: f32) -> Rect {
     let ([x, y], [w, h]) = state.picture;
