@@ -173,6 +173,16 @@ pub(crate) fn picture(size: [u32; 2], drawing: &impl Drawing) -> Result<Picture,
     Ok(Picture { width, height, rgba: averaged(&rgb, size, PIXELS.scale as usize) })
 }
 
+/// Width of a text in a picture, pixels.
+///
+/// # Errors
+/// One line: the embedded font cannot be read.
+pub(crate) fn text_width(text: &str, size: u32) -> Result<f64, String> {
+    let mut rgb = [255; 3 * 9];
+    let area = BitMapBackend::with_buffer(&mut rgb, (3, 3)).into_drawing_area();
+    Ok(Canvas::new(&area, PIXELS)?.measure(text, size)?[0])
+}
+
 /// Downsamples by averaging squares of `edge` pixels; opaque.
 fn averaged(rgb: &[u8], [width, height]: [u32; 2], edge: usize) -> Vec<u8> {
     let (width, height) = (width as usize, height as usize);

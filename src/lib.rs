@@ -18,7 +18,9 @@
 //!   [`profile`] measures GPU times, [`error_report`] error against run time,
 //!   [`filter_report`] what filters do to speckle and edges, [`thesis_tables`] the tables of the thesis. [`verify`] tests a device and its driver.
 //! - [`batch`] renders, converts, measures or verifies many recordings, one shard of them a process. [`mesh`] makes triangles of a volume's surface.
-//! - [`metrics`] is what Prometheus is told. [`files`] reads with limits and writes atomically. [`picture`] holds pictures, `marked` draws marks on saved ones. [`cli`] is the command line.
+//! - [`metrics`] is what Prometheus is told.
+//! - [`measure`] has the geometry and the results of calipers, contours and volumes; [`workspace`] keeps them with settings and recording.
+//! - [`files`] reads with limits and writes atomically. [`picture`] holds pictures, `marked` draws marks on saved ones. [`cli`] is the command line.
 //!
 //! # Render a file
 //!
@@ -202,6 +204,8 @@ pub mod machine;
 #[forbid(unsafe_code)]
 mod marked;
 #[forbid(unsafe_code)]
+pub mod measure;
+#[forbid(unsafe_code)]
 pub mod mesh;
 #[forbid(unsafe_code)]
 pub mod metrics;
@@ -243,6 +247,8 @@ pub mod thesis_tables;
 pub mod ui;
 #[forbid(unsafe_code)]
 pub mod verify;
+#[forbid(unsafe_code)]
+pub mod workspace;
 
 pub use gpu::{Context, ContextOptions, DeviceChoice, Renderer, RendererOptions};
 pub use live::{Stream, StreamOptions};

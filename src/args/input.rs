@@ -14,6 +14,7 @@ use crate::scene::{EchoHistogram, EchoLevels, Input, Scene, Settings};
 use crate::source::phantom::{self, Phantom, PhantomSource};
 use crate::source::{Frame, Source};
 use crate::terminal::{Failure, failed, input, progress_bar, say};
+use crate::workspace::{self, Workspace};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
@@ -21,7 +22,8 @@ use std::sync::Arc;
 #[derive(clap::Args)]
 pub struct InputArgs {
     /// Recording: MetaImage (.mha, .mhd), NRRD (.nrrd), NIfTI (.nii), DICOM (.dcm), Kretz (.vol), each also as .gz, or frames (.frames); a
-    /// folder or a 'pattern*.png' of numbered pictures; - for standard input, also a stream of frames. Without one, a synthetic fetal head (preset face)
+    /// folder or a 'pattern*.png' of numbered pictures; - for standard input, also a stream of frames; or a workspace (.toml) that the viewer saved.
+    /// Without one, a synthetic fetal head (preset face)
     input: Option<PathBuf>,
     #[command(flatten)]
     scene: SceneArgs,
@@ -46,16 +48,18 @@ impl InputArgs {
 
     fn open_scene(&self, chosen: &[String], to_show: bool) -> Result<(Box<dyn Source>, Scene), Failure> {
         let mut source = self.source()?;
-        check_volume(&*source, self.volume, self.name())?;
+        let volume = self.volume()?;
+        check_volume(&*source, volume, self.name())?;
         let layers = self.layers_with(chosen)?;
-        let scene = match to_show {
-            true => scene_to_show(&mut *source, self.volume, &layers, |source, geometry, samples| {
+        // The settings of a workspace are complete.
+        let scene = match to_show && self.workspace()?.is_none() {
+            true => scene_to_show(&mut *source, volume, &layers, |source, geometry, samples| {
                 self.levels(source, geometry, samples)
             })?,
             false => {
                 let settings = layers.finish().map_err(input)?;
                 let samples = samples_of(&*source, &settings);
-                Scene::new(source.geometry(self.volume), samples, settings).map_err(input)?
+                Scene::new(source.geometry(volume), samples, settings).map_err(input)?
             }
         };
         Ok((source, scene))
@@ -76,6 +80,20 @@ impl InputArgs {
         Ok(histogram.levels())
     }
 
+    /// The workspace, if one was given in place of a recording, and its file.
+    fn workspace(&self) -> Result<Option<(&Path, Workspace)>, Failure> {
+        let file = self.input.as_deref().filter(|file| workspace::is_named(file));
+        file.map(|file| Ok((file, Workspace::read(file).map_err(input)?))).transpose()
+    }
+
+    /// The number of the volume to use.
+    fn volume(&self) -> Result<usize, Failure> {
+        Ok(match (self.volume, self.workspace()?) {
+            (0, Some((_, workspace))) => workspace.origin.volume,
+            (volume, _) => volume,
+        })
+    }
+
     /// The recording as it was typed, or `phantom`.
     pub fn name(&self) -> String {
         match &self.input {
@@ -89,6 +107,7 @@ impl InputArgs {
     pub fn check_outputs(&self, outputs: &[Output], source: &dyn Source) -> Result<(), Failure> {
         let mut read = source.files();
         read.extend(self.geometry.probe.clone());
+        read.extend(self.input.clone().filter(|file| workspace::is_named(file)));
         read.extend(self.scene.files());
         check_outputs(outputs, read.iter().map(PathBuf::as_path))
     }
@@ -99,7 +118,7 @@ impl InputArgs {
         source: &mut dyn Source,
         mut each: impl FnMut(Frame) -> Result<(), Failure>,
     ) -> Result<(), Failure> {
-        source.skip_to_volume(self.volume).map_err(input)?;
+        source.skip_to_volume(self.volume()?).map_err(input)?;
         let frames = source.frames_per_volume();
         let bar = progress_bar(frames as u64).with_message("frames");
         let mut volume = None;
@@ -131,9 +150,16 @@ impl InputArgs {
     }
 
     fn source(&self) -> Result<Box<dyn Source>, Failure> {
-        match &self.input {
-            Some(file) => open_recording(file, self.geometry.options()),
-            None => Ok(Box::new(PhantomSource::new(Phantom::new(phantom::PhantomOptions::default()).map_err(input)?))),
+        let phantom = || -> Result<Box<dyn Source>, Failure> {
+            Ok(Box::new(PhantomSource::new(Phantom::new(phantom::PhantomOptions::default()).map_err(input)?)))
+        };
+        match (self.workspace()?, &self.input) {
+            (Some((file, workspace)), _) => match workspace.recording(file).map_err(input)? {
+                recording if recording.as_os_str() == workspace::PHANTOM => phantom(),
+                recording => open_recording(recording, self.geometry.or(&workspace.origin)?.options()),
+            },
+            (None, Some(file)) => open_recording(file, self.geometry.options()),
+            (None, None) => phantom(),
         }
     }
 
@@ -148,7 +174,10 @@ impl InputArgs {
     }
 
     fn layers_with(&self, chosen: &[String]) -> Result<Layers, Failure> {
-        self.scene.layers(self.input.is_none(), chosen)
+        match self.workspace()? {
+            Some((_, workspace)) => self.scene.layers_over(workspace.layers, chosen),
+            None => self.scene.layers(self.input.is_none(), chosen),
+        }
     }
 }
 

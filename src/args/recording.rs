@@ -2,6 +2,7 @@
 
 use crate::source::{self, Calibration, DepthAxis, OpenOptions, Source};
 use crate::terminal::{Failure, input, say};
+use crate::workspace::Origin;
 use std::path::{Path, PathBuf};
 use std::sync::Mutex;
 
@@ -50,6 +51,32 @@ impl GeometryArgs {
             ("--reference", self.reference.is_some()),
         ];
         given.iter().find(|(_, is_given)| *is_given).map(|(flag, _)| *flag)
+    }
+
+    /// What a workspace keeps of a recording with this geometry.
+    #[cfg(feature = "view")]
+    pub fn origin(&self, recording: Option<PathBuf>) -> Origin {
+        let absolute = |path: &PathBuf| std::path::absolute(path).unwrap_or_else(|_| path.clone());
+        let mut origin = Origin::of(recording.as_ref().map(absolute));
+        origin.probe = self.probe.as_ref().map(absolute);
+        origin.depth_axis = self.depth_axis.map(|axis| axis.to_string());
+        origin.voxel_spacing = self.voxel_spacing;
+        origin
+    }
+
+    /// These arguments, with those of a workspace where none is given.
+    ///
+    /// # Errors
+    /// An axis that is none.
+    pub fn or(&self, origin: &Origin) -> Result<GeometryArgs, Failure> {
+        let kept = origin.depth_axis.as_deref().map(str::parse).transpose();
+        let kept = kept.map_err(|e: String| input(format!("workspace.depth_axis: {e}")))?;
+        Ok(GeometryArgs {
+            probe: self.probe.clone().or_else(|| origin.probe.clone()),
+            depth_axis: self.depth_axis.or(kept),
+            voxel_spacing: self.voxel_spacing.or(origin.voxel_spacing),
+            ..self.clone()
+        })
     }
 
     /// The same for the library.

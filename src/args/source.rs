@@ -16,6 +16,8 @@ use crate::source::motor_tracking::FreeRunning;
 use crate::source::phantom::{self, CachedPhantom, Phantom};
 use crate::source::piped::Piped;
 use crate::terminal::{Failure, failed, input};
+#[cfg(feature = "view")]
+use crate::workspace::{Origin, PHANTOM, Workspace};
 use clap::Parser;
 use std::path::Path;
 
@@ -29,7 +31,7 @@ const NETWORK: &str = "igtl://";
 /// The source of live frames.
 #[derive(Clone, clap::Args)]
 pub struct SourceArgs {
-    /// phantom; a recording (.mha, .mhd, .nrrd, .nii, .vol, each also as .gz, .frames); - for standard input (a line of JSON, then raw frames, as
+    /// phantom; a recording (.mha, .mhd, .nrrd, .nii, .vol, each also as .gz, .frames) or, for view, a workspace (.toml); - for standard input (a line of JSON, then raw frames, as
     /// tools/pipe_frames.py writes them); igtl://HOST[:PORT] for OpenIGTLink
     #[arg(long, value_name = "SOURCE", default_value = "phantom")]
     source: String,
@@ -89,6 +91,44 @@ impl SourceArgs {
         self.playback(self.rate)?;
         self.network()?;
         self.motor.check()
+    }
+
+    /// The same arguments, with the geometry of the flags, for a file.
+    #[cfg(feature = "view")]
+    pub fn at_file(&self, file: &Path) -> SourceArgs {
+        SourceArgs { source: file.to_string_lossy().into_owned(), ..self.clone() }
+    }
+
+    /// The same arguments for another file, whose geometry follows from it alone.
+    #[cfg(feature = "view")]
+    pub fn of_file(&self, file: &Path) -> SourceArgs {
+        SourceArgs { geometry: GeometryArgs::default(), ..self.at_file(file) }
+    }
+
+    /// The same arguments with the recording of a workspace.
+    ///
+    /// # Errors
+    /// The workspace names none.
+    #[cfg(feature = "view")]
+    pub fn of_workspace(&self, file: &Path, workspace: &Workspace) -> Result<SourceArgs, Failure> {
+        let source = workspace.recording(file).map_err(input)?.to_string_lossy().into_owned();
+        Ok(SourceArgs { source, geometry: self.geometry.or(&workspace.origin)?, ..self.clone() })
+    }
+
+    /// What a workspace keeps of the source.
+    #[cfg(feature = "view")]
+    pub fn origin(&self) -> Origin {
+        match self.kind() {
+            SourceKind::Demo => Origin::of(Some(PHANTOM.into())),
+            SourceKind::Recording => self.geometry.origin(Some(self.source.clone().into())),
+            SourceKind::Pipe | SourceKind::Probe => Origin::of(None),
+        }
+    }
+
+    /// True if the volumes are numbered as in the recording: it is played once.
+    #[cfg(feature = "view")]
+    pub fn plays_once(&self) -> bool {
+        self.rounds <= 1
     }
 
     /// True if the source is the built-in phantom.

@@ -17,6 +17,8 @@ mod stream;
 mod view;
 #[cfg(feature = "view")]
 mod view_config;
+#[cfg(feature = "view")]
+mod view_open;
 
 use crate::kiosk::log_rotation::{self, RotatingLog};
 use crate::source::standard_input;

@@ -147,10 +147,11 @@ impl Render {
         }
     }
 
-    /// The picture as it is written: with its marks if the settings ask for them.
+    /// The picture as it is written: with its measurements, and its marks if the settings ask for them.
     fn with_marks<'a>(&self, picture: &'a Picture, scene: &Scene) -> Result<Cow<'a, Picture>, Failure> {
         match scene.settings.marks.bar {
-            false => Ok(Cow::Borrowed(picture)),
+            false if scene.settings.measure.is_empty() && !scene.has_reference() => Ok(Cow::Borrowed(picture)),
+            false => marked::measured(picture, scene).map(Cow::Owned).map_err(failed),
             true => {
                 let marked = marked::marked(picture, scene, &marked::time_line(SystemTime::now()), None);
                 marked.map(Cow::Owned).map_err(failed)

@@ -1,6 +1,7 @@
 //! `echolume view`.
 
 use super::view_config::{ConsoleConfig, WindowConfig, rungs};
+use super::view_open::{Opened, Shown, recent_list};
 use crate::args::{SceneArgs, SourceArgs, StreamArgs, check_outputs, device_failure};
 use crate::error_report::command::parse_nanoseconds;
 use crate::gpu::shader_reload::ShaderFolder;
@@ -9,7 +10,7 @@ use crate::gpu::{Context, Wake};
 use crate::kiosk::config::{self, Config};
 use crate::live::cine::CineLimits;
 use crate::terminal::{Failure, failed, input, say};
-use crate::ui::console::{Console, ConsoleOptions, StartupFault};
+use crate::ui::console::{Console, ConsoleOptions, OpenFile, StartupFault};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::Duration;
@@ -19,6 +20,7 @@ use std::time::Duration;
     after_help = "Drag rotates the view, the wheel zooms, H lists every key. Settings come in layers: defaults, --preset, --scene, then flags and \
                   --set, each overriding the one before.\n\nExamples:\n  \
                   echolume view\n  \
+                  echolume view echolume-20261123-2312-1.toml    (a workspace that was saved with Ctrl+S)\n  \
                   echolume view --source sweep.frames --real-time --rounds 100\n  \
                   echolume view --source igtl://localhost:18944 --full-screen\n  \
                   echolume view --source phantom --rate 3 --budget 16ms --report error.json\n  \
@@ -26,10 +28,16 @@ use std::time::Duration;
                   echolume view --kiosk --config /etc/echolume/echolume.toml"
 )]
 pub struct View {
+    /// A recording, or a workspace (.toml) that was saved in the view; as --source
+    #[arg(conflicts_with_all = ["source", "config"])]
+    file: Option<PathBuf>,
     #[command(flatten)]
     source: SourceArgs,
     #[command(flatten)]
     scene: SceneArgs,
+    /// What was opened in the window since.
+    #[arg(skip)]
+    opened: Opened,
     /// Kiosk mode: only the configured keys (Ctrl+Alt+Q) end it. A failing source or configuration is shown and retried for ever
     #[arg(long)]
     kiosk: bool,
@@ -156,7 +164,8 @@ impl View {
                 }
             };
             let (open, options) = wanted.options(factor, wake, startup_fault);
-            Console::new(context, open, ConsoleOptions { shaders: shaders.clone(), ..options }, size)
+            let open_file = Some(view.open_file()).filter(|_| !view.kiosk);
+            Console::new(context, open, ConsoleOptions { shaders: shaders.clone(), open_file, ..options }, size)
         };
         let ran = place.run(Box::new(make)).map_err(device_failure);
         finish(ran?)
@@ -175,7 +184,7 @@ impl View {
     /// The configuration of the console, read anew from the file and the flags.
     fn console_config(&self) -> Result<ConsoleConfig, Failure> {
         let usual = Config::default();
-        let (mut wanted, exit) = match self.config() {
+        let (mut wanted, exit) = match self.config().filter(|_| !self.opened.is_some()) {
             Some(config) => {
                 let config = config.map_err(input)?;
                 (ConsoleConfig::configured(&config, &self.scene)?, config.keys.exit)
@@ -194,15 +203,35 @@ impl View {
         Ok(wanted)
     }
 
+    /// Opens a file for the next console.
+    fn open_file(self: &Arc<View>) -> OpenFile {
+        let view = self.clone();
+        Arc::new(move |file| view.opened.open(&view.source, file).map_err(Failure::message))
+    }
+
     /// The configuration of the console from the flags alone.
     fn config_from_flags(&self) -> Result<ConsoleConfig, Failure> {
+        let Shown { source, workspace } = match self.opened.shown() {
+            Some(shown) => shown,
+            None => Shown::of(&self.source, self.file.as_deref())?,
+        };
         if let Some(file) = &self.record {
-            super::stream::check_record(file, self.source.path())?;
+            super::stream::check_record(file, source.path())?;
         }
-        let layers = self.scene.layers(self.source.is_phantom(), &[])?;
+        let is_complete = workspace.is_some();
+        let layers = match workspace {
+            // The flags are about what the program was started with.
+            Some(layers) if self.opened.is_some() => layers,
+            Some(layers) => self.scene.layers_over(layers, &[])?,
+            None => self.scene.layers(source.is_phantom(), &[])?,
+        };
         let options = ConsoleOptions {
             settings: layers.clone().finish().map_err(input)?,
-            chosen: Some(layers),
+            // The settings of a workspace are complete.
+            chosen: Some(layers).filter(|_| !is_complete),
+            origin: Some(source.origin()),
+            plays_once: source.plays_once(),
+            recent: recent_list().filter(|_| !self.kiosk),
             update: self.stream.update()?,
             cine: CineLimits { volumes: self.cine as usize, bytes: (self.cine_memory as usize) << 20 },
             budget: self.budget()?,
@@ -213,7 +242,7 @@ impl View {
             scale: self.scale,
             ..ConsoleOptions::default()
         };
-        Ok(ConsoleConfig { source: Some(self.source.clone()), first: None, options })
+        Ok(ConsoleConfig { source: Some(source), first: self.opened.take_source(), options })
     }
 
     fn place(&self) -> Result<WindowConfig, Failure> {

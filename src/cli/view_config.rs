@@ -137,7 +137,9 @@ impl ConsoleConfig {
     /// # Errors
     /// The source cannot be opened.
     pub fn opened(mut self) -> Result<ConsoleConfig, Failure> {
-        self.first = self.source.as_ref().map(SourceArgs::open).transpose()?;
+        if self.first.is_none() {
+            self.first = self.source.as_ref().map(SourceArgs::open).transpose()?;
+        }
         Ok(self)
     }
 

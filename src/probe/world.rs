@@ -143,6 +143,13 @@ pub struct DepthAxis {
     reversed: bool,
 }
 
+impl std::fmt::Display for DepthAxis {
+    fn fmt(&self, f: &mut std::fmt::Formatter) -> std::fmt::Result {
+        let sign = if self.reversed { "-" } else { "" };
+        write!(f, "{sign}{}", ["x", "y", "z"][self.axis.min(2)])
+    }
+}
+
 impl std::str::FromStr for DepthAxis {
     type Err = String;
 

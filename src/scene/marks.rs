@@ -1,9 +1,9 @@
 //! Marks of a picture: by tile its place, its scale, the letters of the patient's sides at its edges, and the side of the probe's marker.
 //! The viewer and written pictures draw the same.
 
-use super::planes::cell;
+use super::planes::{cell, colour};
 use super::region::depth_offset;
-use super::{Layout, Mode, ProbeMarker, Scene};
+use super::{Layout, Mode, PlaneName, ProbeMarker, Scene};
 use glam::DVec3;
 
 /// Share of an axis that must lie along an edge's normal for its letters to stand there: beyond 45 degrees another axis has them.
@@ -56,6 +56,8 @@ pub struct TileMarks {
     pub letters: Vec<(Edge, &'static str)>,
     /// The edge of the probe's marker.
     pub probe: Option<Edge>,
+    /// The letter of the plane and its colour, where several planes are shown.
+    pub plane: Option<(&'static str, [f64; 3])>,
 }
 
 impl Scene {
@@ -64,7 +66,8 @@ impl Scene {
         let mut all = Vec::new();
         if self.cuts_planes() {
             let sheet = self.sheet();
-            all.extend(sheet.tiles.iter().map(|tile| {
+            let three = [PlaneName::A, PlaneName::B, PlaneName::C].map(|name| (name.letter(), colour(name)));
+            all.extend(sheet.tiles.iter().enumerate().map(|(n, tile)| {
                 let (letters, probe) = self.sides(tile.plane.right, tile.plane.down);
                 let middle = tile.plane.at.y - depth_offset(&self.geometry);
                 let is_upright = tile.plane.down.y > 0.99;
@@ -76,6 +79,7 @@ impl Scene {
                     depth_from: is_upright.then(|| middle - sheet.pixel * f64::from(tile.size[1]) / 2.0),
                     letters,
                     probe,
+                    plane: three.get(n).copied().filter(|_| self.shows_three()),
                 }
             }));
         }
@@ -106,6 +110,7 @@ impl Scene {
             depth_from: None,
             letters,
             probe,
+            plane: None,
         }
     }
 
@@ -137,7 +142,26 @@ impl Scene {
     }
 }
 
+impl PlaneName {
+    /// Its letter.
+    pub fn letter(self) -> &'static str {
+        match self {
+            PlaneName::A => "A",
+            PlaneName::B => "B",
+            PlaneName::C => "C",
+        }
+    }
+}
+
 impl TileMarks {
+    /// The corner of the plane's letter, from the middle in halves of width and height: next to an upper edge, away from the probe's marker.
+    pub fn plane_corner(&self) -> [f64; 2] {
+        match self.probe {
+            Some(Edge::Right) => [-1.0, -1.0],
+            _ => [1.0, -1.0],
+        }
+    }
+
     /// The longest scale bar of at most a share of the tile's width: its length, mm and pixels.
     pub fn bar(&self, share: f64) -> Option<(f64, f64)> {
         let most = self.size[0] * share * self.pixel;

@@ -4,12 +4,14 @@
 mod bricks;
 pub mod camera;
 mod check;
+mod check_measures;
 pub mod cube;
 pub mod default_look;
 mod echo_levels;
 mod light_lattice;
 pub mod load;
 pub mod marks;
+pub mod picker;
 pub mod planes;
 mod region;
 pub mod self_attenuation;
@@ -203,6 +205,7 @@ impl Settings {
     /// Names the first setting that is invalid for every geometry, and its limits.
     pub fn check(&self) -> Result<(), SceneError> {
         check::check(self)?;
+        check_measures::check_measures(&self.measure)?;
         check::check_planes(self)
     }
 }
@@ -342,6 +345,16 @@ impl Scene {
             Geometry::Sweep(probe) => Some(probe),
             Geometry::Cartesian(_) => None,
         }
+    }
+
+    /// The place in space of a point of the settings, whose depth counts from the probe's face, mm.
+    pub fn place_of(&self, [lateral, depth, elevation]: [f64; 3]) -> DVec3 {
+        DVec3::new(lateral, depth + depth_offset(&self.geometry), elevation)
+    }
+
+    /// A place in space, mm, as a point of the settings: the opposite of [`Scene::place_of`].
+    pub fn point_of(&self, place: DVec3) -> [f64; 3] {
+        (place - DVec3::Y * depth_offset(&self.geometry)).to_array()
     }
 
     pub fn slices(&self) -> u32 {

@@ -138,6 +138,10 @@ impl Scene {
         let three = [PlaneName::A, PlaneName::B, PlaneName::C];
         let planes: Vec<Plane> = match self.shows_three() {
             true => three.map(|name| self.plane(name)).to_vec(),
+            false if self.has_reference() => {
+                let slices = self.stepped(columns * rows - 1);
+                std::iter::once(self.plane(self.reference_name())).chain(slices).collect()
+            }
             false => self.stepped(columns * rows),
         };
         let half = (self.high - self.low) / 2.0;
@@ -168,6 +172,18 @@ impl Scene {
         Sheet { columns, rows, pixel, tiles: (0..).zip(&planes).map(tile).collect() }
     }
 
+    /// True if the first tile of tomography is the plane across its slices.
+    pub fn has_reference(&self) -> bool {
+        let [columns, rows] = self.tile_grid();
+        let is_asked = self.settings.planes.reference && self.settings.mode == Mode::Tomography;
+        is_asked && !self.shows_three() && columns.saturating_mul(rows) > 1
+    }
+
+    /// The plane across the slices of tomography.
+    fn reference_name(&self) -> PlaneName {
+        if self.settings.planes.plane == PlaneName::A { PlaneName::B } else { PlaneName::A }
+    }
+
     /// `count` parallel planes centred on the position.
     fn stepped(&self, count: u32) -> Vec<Plane> {
         let settings = &self.settings.planes;
@@ -180,6 +196,23 @@ impl Scene {
 }
 
 impl Sheet {
+    /// Where the planes of the other tiles cut the first one, which is perpendicular to them: the ends of a line for each, pixels of the picture.
+    /// They reach beyond the tile.
+    pub fn slice_lines(&self) -> Vec<[[f64; 2]; 2]> {
+        let Some((reference, slices)) = self.tiles.split_first() else { return Vec::new() };
+        let middle: [f64; 2] =
+            std::array::from_fn(|a| f64::from(reference.corner[a]) + f64::from(reference.size[a]) / 2.0);
+        let reach = f64::from(reference.size[0] + reference.size[1]);
+        let line = |slice: &Tile| {
+            let normal = slice.plane.normal;
+            let [x, y] = [normal.dot(reference.plane.right), normal.dot(reference.plane.down)];
+            let away = normal.dot(slice.plane.at - reference.plane.at) / self.pixel;
+            let end = |side: f64| [middle[0] + x * away - y * side * reach, middle[1] + y * away + x * side * reach];
+            [end(-1.0), end(1.0)]
+        };
+        slices.iter().map(line).collect()
+    }
+
     /// The tile that holds a pixel; none where the grid has more cells than tiles.
     pub fn tile_at(&self, x: usize, y: usize) -> Option<&Tile> {
         self.tiles.iter().find(|tile| {
@@ -198,6 +231,22 @@ impl Sheet {
             (at as f64 + 0.5 - middle) * self.pixel
         };
         tile.plane.at + tile.plane.right * from_middle(x, 0) + tile.plane.down * from_middle(y, 1)
+    }
+
+    /// The point of a tile's plane that a position on the picture shows, mm in space.
+    pub fn point(&self, tile: &Tile, at: [f64; 2]) -> DVec3 {
+        let [x, y]: [f64; 2] =
+            std::array::from_fn(|a| at[a] - f64::from(tile.corner[a]) - f64::from(tile.size[a]) / 2.0);
+        tile.plane.at + (tile.plane.right * x + tile.plane.down * y) * self.pixel
+    }
+
+    /// Where a point in space lies on a tile: its position on the picture, and its distance from the plane along its normal, mm.
+    pub fn project(&self, tile: &Tile, point: DVec3) -> ([f64; 2], f64) {
+        let from = point - tile.plane.at;
+        let along = [from.dot(tile.plane.right), from.dot(tile.plane.down)];
+        let at =
+            std::array::from_fn(|a| f64::from(tile.corner[a]) + f64::from(tile.size[a]) / 2.0 + along[a] / self.pixel);
+        (at, from.dot(tile.plane.normal))
     }
 
     /// The upper left corner of a tile in space, and the vectors of one pixel right, of one down, and through the slab, mm.

@@ -215,7 +215,11 @@ mod tests {
         assert_eq!((old.params, old.constants, old.local_size), (new.params, new.constants, new.local_size));
         let count = |words: &[u32], opcode| decode(words).unwrap().iter().filter(|i| i.opcode == opcode).count();
         assert_eq!(count(&before, op::IMAGE_FETCH), count(&after, op::IMAGE_FETCH) + count(&after, op::IMAGE_READ));
-        assert_eq!(count(&after, op::IMAGE_FETCH), 1, "the surface stays a texture");
+        assert_eq!(
+            count(&after, op::IMAGE_FETCH),
+            5,
+            "surface, composited volume (three times) and occlusion stay textures"
+        );
     }
 
     #[test]

@@ -5,7 +5,7 @@ pub use super::view::Face;
 
 use super::input::{Input, Key, Modifiers};
 use super::sliders::{GAIN, THRESHOLD};
-use crate::scene::{ColourMap, Layout, Mode, PlaneName, TransferName};
+use crate::scene::{ColourMap, Layout, MeasureKind, Mode, PlaneName, TransferName};
 use Key::{Char, Function};
 
 /// One command.
@@ -46,8 +46,46 @@ pub enum Command {
     Transfer(TransferName),
     ColourMap(ColourMap),
     Shadow(bool),
-    /// Restores all settings of the start. A frozen picture stays frozen.
+    /// Restores all settings of the start. A frozen picture stays frozen, and measurements stay.
     Reset,
+    /// Takes the last change back: of settings, planes, region or measurements.
+    Undo,
+    /// Does again what was undone.
+    Redo,
+    /// Moves the point where the planes cross to the middle of the region.
+    Recentre,
+    /// Shows the plane across the slices of a tomography, with their lines, or not.
+    Reference(bool),
+    /// Sets a point of the tool's measurement: lateral, depth, elevation, mm; and whether it was picked on the rendered surface.
+    Point([f64; 3], bool),
+    /// Picks the point of the surface under this pixel of the picture.
+    PickSurface([f64; 2]),
+    /// Closes the contour in work, or ends the volume in work.
+    EndMeasure,
+    /// Leaves the measurement in work.
+    CancelMeasure,
+    /// Moves a point: index of the measurement, index of its point, mm.
+    MovePoint(usize, usize, [f64; 3]),
+    /// Deletes the measurement with this index, or the last one.
+    DeleteMeasure(usize),
+    ClearMeasures,
+    /// Begins to type the text of the measurement with this index.
+    LabelMeasure(usize),
+    Type(char),
+    Untype,
+    EndTyping,
+    /// Counts the voxels of the region whose echo reaches the threshold.
+    CountVoxels,
+    /// Copies the results as CSV.
+    CopyMeasures,
+    /// Saves the results as a CSV file.
+    SaveMeasures,
+    /// Saves settings, recording and measurements as a workspace file.
+    SaveWorkspace,
+    /// Shows or hides the list of files to open.
+    OpenFiles,
+    /// Opens the n-th entry of that list.
+    OpenFile(usize),
     /// Freezes or unfreezes the live picture.
     Freeze,
     /// Steps so many volumes back (negative) or forward, and freezes.
@@ -91,6 +129,46 @@ pub enum Tool {
     Clip,
     /// Moves the planes of sections.
     Plane,
+    /// Sets the points of a measurement.
+    Measure(MeasureKind),
+}
+
+impl Command {
+    /// True for commands that a drag or a held key gives repeatedly.
+    pub(super) fn is_continuous(&self) -> bool {
+        matches!(
+            self,
+            Command::Rotate(_)
+                | Command::Roll(_)
+                | Command::Zoom(_)
+                | Command::Pan(_)
+                | Command::MoveLight(_)
+                | Command::MoveFace(..)
+                | Command::MoveClip(_)
+                | Command::StepPlane(_)
+                | Command::MoveCrossing(_)
+                | Command::RotatePlanes(_)
+                | Command::SetSlider(..)
+                | Command::StepSlider(..)
+        )
+    }
+
+    /// True if this command goes on with what `last` began, so that both are one step for undo.
+    pub(super) fn continues(&self, last: &Command) -> bool {
+        match (self, last) {
+            (Command::SetSlider(a, _), Command::SetSlider(b, _)) => a == b,
+            (Command::StepSlider(a, _), Command::StepSlider(b, _)) => a == b,
+            (Command::MoveFace(a, _), Command::MoveFace(b, _)) => a == b,
+            (Command::MovePoint(a, point, _), Command::MovePoint(b, other, _)) => (a, point) == (b, other),
+            (Command::Type(_) | Command::Untype, Command::Type(_) | Command::Untype) => true,
+            // Fingers move, turn and zoom at once.
+            (
+                Command::Zoom(_) | Command::Roll(_) | Command::Pan(_),
+                Command::Zoom(_) | Command::Roll(_) | Command::Pan(_),
+            ) => true,
+            _ => self.is_continuous() && std::mem::discriminant(self) == std::mem::discriminant(last),
+        }
+    }
 }
 
 /// A key and its command.
@@ -109,6 +187,11 @@ const SHIFT: Modifiers = Modifiers { shift: true, ..NONE };
 
 const fn on(key: Key, description: &'static str, command: Command) -> Binding {
     Binding { key, modifiers: NONE, description, command, repeats: false }
+}
+
+/// With control.
+const fn control(key: Key, description: &'static str, command: Command) -> Binding {
+    Binding { modifiers: Modifiers { control: true, ..NONE }, ..on(key, description, command) }
 }
 
 /// With shift.
@@ -160,6 +243,9 @@ pub const KEY_BINDINGS: &[Binding] = &[
     on(Char('='), "closer", Command::Zoom(1.1)).repeating(),
     on(Char('-'), "farther", Command::Zoom(1.0 / 1.1)).repeating(),
     on(Key::Backspace, "reset all settings", Command::Reset),
+    control(Char('z'), "undo", Command::Undo),
+    control(Char('y'), "redo", Command::Redo),
+    Binding { modifiers: Modifiers { control: true, shift: true, alt: false }, ..on(Char('z'), "redo", Command::Redo) },
     // Planes.
     on(Char('a'), "plane A: the scan plane", Command::Plane(PlaneName::A)),
     on(Char('b'), "plane B: across the frames", Command::Plane(PlaneName::B)),
@@ -168,6 +254,19 @@ pub const KEY_BINDINGS: &[Binding] = &[
     on(Key::PageDown, "plane by 1 mm", Command::StepPlane(1.0)).repeating(),
     shift(Key::PageUp, "plane by 5 mm", Command::StepPlane(-5.0)).repeating(),
     shift(Key::PageDown, "plane by 5 mm", Command::StepPlane(5.0)).repeating(),
+    on(Char('j'), "planes to the middle", Command::Recentre),
+    // Measuring.
+    on(Char('m'), "caliper: distance", Command::Tool(Tool::Measure(MeasureKind::Distance))),
+    on(Char('n'), "angle", Command::Tool(Tool::Measure(MeasureKind::Angle))),
+    on(Char('e'), "ellipse", Command::Tool(Tool::Measure(MeasureKind::Ellipse))),
+    on(Char('o'), "trace: area", Command::Tool(Tool::Measure(MeasureKind::Trace))),
+    on(Char('u'), "distance on the surface", Command::Tool(Tool::Measure(MeasureKind::Surface))),
+    on(Char('w'), "volume by contours", Command::Tool(Tool::Measure(MeasureKind::Volume))),
+    on(Char('k'), "volume by threshold, in the region", Command::CountVoxels),
+    on(Char('i'), "text", Command::Tool(Tool::Measure(MeasureKind::Text))),
+    on(Char('y'), "arrow", Command::Tool(Tool::Measure(MeasureKind::Arrow))),
+    on(Key::Delete, "delete the last measurement", Command::DeleteMeasure(usize::MAX)),
+    control(Char('c'), "copy the results (CSV)", Command::CopyMeasures),
     // The look.
     on(Key::Up, "threshold", Command::StepSlider(THRESHOLD, 1)).repeating(),
     on(Key::Down, "threshold", Command::StepSlider(THRESHOLD, -1)).repeating(),
@@ -195,6 +294,8 @@ pub const KEY_BINDINGS: &[Binding] = &[
     on(Key::Enter, "play the cine loop", Command::PlayCine),
     on(Char('p'), "save the picture", Command::SavePicture),
     on(Char('r'), "save the recording", Command::SaveLoop),
+    control(Char('s'), "save the workspace", Command::SaveWorkspace),
+    control(Char('o'), "open a recording or a workspace", Command::OpenFiles),
     // The screen.
     on(Char('h'), "this help", Command::ToggleHelp),
     on(Function(1), "this help", Command::ToggleHelp),

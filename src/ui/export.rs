@@ -1,5 +1,6 @@
 //! Saves pictures and recordings of the view in background threads. File names contain the time and nothing about the patient.
 
+use crate::files;
 use crate::gpu::Wake;
 use crate::live::cine::CineVolume;
 use crate::picture::Picture;
@@ -44,6 +45,19 @@ impl Exporter {
         make: impl FnOnce() -> Result<Picture, String> + Send + 'static,
     ) -> Result<(), String> {
         self.save("png", move |file| make()?.save(file))
+    }
+
+    /// Saves a text under a name with this ending.
+    ///
+    /// # Errors
+    /// As for [`Exporter::picture`].
+    pub(super) fn text(&mut self, ending: &'static str, text: String) -> Result<(), String> {
+        self.save(ending, move |file| files::replace(file, text.as_bytes()))
+    }
+
+    /// The folder of saved files.
+    pub(super) fn folder(&self) -> &Path {
+        &self.folder
     }
 
     /// Saves volumes as a recording of frames.

@@ -6,7 +6,8 @@ use super::input::{Button, Input, Modifiers, Phase};
 use super::picking::{Pane, Picker, Viewport, closest_along};
 use super::sliders::PLANES_ZOOM;
 use super::view;
-use crate::scene::{Layout, Mode};
+use crate::scene::{Layout, MeasureKind, Mode, PlaneName};
+use glam::DVec3;
 use std::time::Duration;
 
 /// A press that moves less than this is a click, pixels of the window. A finger needs more: it may wear a glove.
@@ -23,6 +24,11 @@ const MAX_FINGERS: usize = 10;
 /// Rotation of a drag across the height of the picture, degrees. A rate of 115 would keep the front of a volume that fills the picture
 /// under the pointer; 200 needs fewer strokes and is still slow enough to stop where intended.
 pub(super) const DEGREES_PER_HEIGHT: f64 = 200.0;
+/// A point of a measurement and the centre of the cross-lines are grabbed from so far, and a cross-line, pixels of the window.
+const GRAB: f64 = 12.0;
+const GRAB_LINE: f64 = 7.0;
+/// Distance between two points of a contour that is drawn by a drag, pixels of the window.
+const TRACE_STEP: f64 = 4.0;
 /// Fingers that are closer to each other only pan, pixels: their scale and angle are noise.
 const MIN_PINCH: f64 = 24.0;
 
@@ -196,12 +202,17 @@ impl Gestures {
 
     /// Ends a press. It was a click if it did not move.
     fn release(&mut self, press: &Press, viewport: &Viewport, tool: Tool, slop: f64) -> Vec<Command> {
-        let Some((at, pane)) = press.click() else { return Vec::new() };
+        let Some((at, pane)) = press.click() else { return press.end(viewport) };
         let is_second = self.last_click.take().is_some_and(|first| {
             (at[0] - first.at[0]).hypot(at[1] - first.at[1]) < 2.0 * slop
                 && viewport.now.saturating_sub(first.time) <= DOUBLE_CLICK
         });
         if is_second {
+            match (tool, viewport.scene) {
+                (Tool::Measure(_), _) => return vec![Command::EndMeasure],
+                (Tool::Plane, Some(scene)) if scene.shows_three() => return vec![Command::Recentre],
+                _ => {}
+            }
             return self.double_click(pane, viewport);
         }
         self.last_click = Some(Click { at, time: viewport.now });
@@ -209,6 +220,13 @@ impl Gestures {
             (Pane::Plane(tile), Some(scene)) if tool == Tool::Plane => {
                 let point = viewport.point_on_plane(tile, at).map(|point| view::below_face(scene, point).to_array());
                 point.map(Command::MoveCrossing).into_iter().collect()
+            }
+            (Pane::Plane(tile), _) if matches!(tool, Tool::Measure(_)) => {
+                point_on(viewport, tile, at).map(|point| Command::Point(point, false)).into_iter().collect()
+            }
+            (Pane::Rendering, _) if matches!(tool, Tool::Measure(_)) => {
+                let pixel = viewport.pixel_at(at).map(|(_, [x, y])| [x + viewport.columns_to_surface(at), y]);
+                pixel.map(Command::PickSurface).into_iter().collect()
             }
             _ => Vec::new(),
         }
@@ -243,10 +261,28 @@ enum Drag {
     /// A face of the region.
     Face(Face),
     RotatePlanes,
-    /// The point where three planes cross, dragged on one of their tiles.
-    Crossing(usize),
+    /// The point where three planes cross, dragged on one of their tiles. It is grabbed where it is: `way` from the pointer; `along`: only
+    /// along the normal of the plane whose line was grabbed.
+    Crossing {
+        tile: usize,
+        way: DVec3,
+        along: Option<DVec3>,
+    },
     /// A stack of planes.
     Step,
+    /// A point of a measurement on a tile: index of the measurement, index of the point.
+    Point {
+        tile: usize,
+        index: usize,
+        point: usize,
+    },
+    /// A new distance from the press to the release, on a tile; its first point is set already, or not.
+    Caliper {
+        tile: usize,
+        has_first: bool,
+    },
+    /// A contour along the drag, on a tile.
+    Trace(usize),
 }
 
 /// A button or a finger that is down.
@@ -290,13 +326,22 @@ impl Press {
                     Drag::Rotate
                 }
             }
+            (Pane::Rendering, Tool::Measure(_)) => Drag::Rotate,
             (Pane::Plane(_), _) if !is_plain => Drag::Nothing,
-            (Pane::Plane(_), Tool::Rotate) => Drag::RotatePlanes,
-            (Pane::Plane(n), Tool::Plane) => {
-                if scene.shows_three() {
-                    Drag::Crossing(n)
-                } else {
-                    Drag::Step
+            (Pane::Plane(tile), Tool::Measure(kind)) => match (viewport.measure_point_at(tile, at, GRAB), kind) {
+                (Some((index, point)), _) => Drag::Point { tile, index, point },
+                (None, MeasureKind::Trace | MeasureKind::Volume) => Drag::Trace(tile),
+                (None, MeasureKind::Distance | MeasureKind::Arrow) => {
+                    Drag::Caliper { tile, has_first: viewport.has_work }
+                }
+                (None, _) => Drag::Nothing,
+            },
+            (Pane::Plane(tile), _) if tool == Tool::Plane || tool == Tool::Rotate => {
+                match (viewport.cross_at(tile, at, [GRAB_LINE, GRAB]), tool) {
+                    (Some((way, along)), _) => Drag::Crossing { tile, way, along },
+                    (None, Tool::Rotate) => Drag::RotatePlanes,
+                    (None, _) if scene.shows_three() => Drag::Crossing { tile, way: DVec3::ZERO, along: None },
+                    (None, _) => Drag::Step,
                 }
             }
             (Pane::Plane(_), _) => Drag::Nothing,
@@ -332,9 +377,33 @@ impl Press {
             // The drag starts where the slop ends, so that nothing jumps.
             self.is_drag = true;
             self.last = [self.start[0] + x / distance * self.slop, self.start[1] + y / distance * self.slop];
+            match self.drag {
+                Drag::Caliper { has_first: true, .. } => {}
+                Drag::Caliper { tile, .. } | Drag::Trace(tile) => {
+                    self.last = self.start;
+                    return point_on(viewport, tile, self.start).map(|point| Command::Point(point, false));
+                }
+                _ => {}
+            }
+        }
+        if let Drag::Trace(_) = self.drag
+            && (to[0] - self.last[0]).hypot(to[1] - self.last[1]) < TRACE_STEP
+        {
+            return None;
         }
         let from = std::mem::replace(&mut self.last, to);
         if from == to { None } else { self.dragged(from, to, viewport) }
+    }
+
+    /// The commands at the end of a drag.
+    fn end(&self, viewport: &Viewport) -> Vec<Command> {
+        match self.drag {
+            Drag::Caliper { tile, .. } => {
+                point_on(viewport, tile, self.last).map(|point| Command::Point(point, false)).into_iter().collect()
+            }
+            Drag::Trace(_) => vec![Command::EndMeasure],
+            _ => Vec::new(),
+        }
     }
 
     fn dragged(&mut self, from: [f64; 2], to: [f64; 2], viewport: &Viewport) -> Option<Command> {
@@ -356,9 +425,15 @@ impl Press {
             // Dragging up moves away from the viewer, further into the volume.
             Drag::Clip => Command::MoveClip(-y * viewport.scale() * Picker::of(scene).mm_per_pixel()),
             Drag::Step => Command::StepPlane(-y * viewport.scale() * scene.sheet().pixel),
-            Drag::Crossing(tile) => {
-                Command::MoveCrossing(view::below_face(scene, viewport.point_on_plane(tile, to)?).to_array())
+            Drag::Crossing { tile, way, along } => {
+                let to = viewport.point_on_plane(tile, to)? + way;
+                let common = scene.plane(PlaneName::A).at;
+                let to = along.map_or(to, |normal| common + normal * (to - common).dot(normal));
+                Command::MoveCrossing(view::below_face(scene, to).to_array())
             }
+            Drag::Point { tile, index, point } => Command::MovePoint(index, point, point_on(viewport, tile, to)?),
+            Drag::Caliper { .. } => return None,
+            Drag::Trace(tile) => Command::Point(point_on(viewport, tile, to)?, false),
             Drag::Face(face) => {
                 let picker = Picker::of(scene);
                 let line = view::face_axis(scene, face);
@@ -378,6 +453,11 @@ impl Press {
         };
         Some(command)
     }
+}
+
+/// The point of the settings that a tile shows at a position in the window, mm.
+fn point_on(viewport: &Viewport, tile: usize, at: [f64; 2]) -> Option<[f64; 3]> {
+    Some(view::below_face(viewport.scene?, viewport.point_on_plane(tile, at)?).to_array())
 }
 
 /// The commands for two fingers that moved from `old` to `new` positions in the window: what is under them stays under them. `pane` is

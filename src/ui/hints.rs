@@ -1,7 +1,7 @@
 //! What each control does, in one or two sentences: the tooltips of the view.
 
 use super::command::Tool;
-use crate::scene::{Layout, Mode};
+use crate::scene::{Layout, MeasureKind, Mode};
 
 /// By name of a slider: what it does.
 const SLIDERS: [(&str, &str); 49] = [
@@ -94,6 +94,26 @@ pub(super) fn of_tool(tool: Tool) -> &'static str {
         Tool::Region => "Drag moves the nearest face of the region.",
         Tool::Clip => "Drag up cuts away what is nearer to you.",
         Tool::Plane => "Drag or click moves the planes.",
+        Tool::Measure(kind) => of_measure(kind),
+    }
+}
+
+/// How something is measured.
+pub(super) fn of_measure(kind: MeasureKind) -> &'static str {
+    match kind {
+        MeasureKind::Distance => {
+            "Distance in mm: click both ends, or drag. On a rendering: from surface to surface. (M)"
+        }
+        MeasureKind::Angle => "Angle: click the end of a leg, the vertex, the end of the other leg. (N)",
+        MeasureKind::Ellipse => "Ellipse: click both ends of one axis, then the end of the other. (E)",
+        MeasureKind::Trace => "Area in cm²: drag round the outline, or click its points and press Enter. (O)",
+        MeasureKind::Surface => "Length along the surface of a rendering: click both ends. (U)",
+        MeasureKind::Volume => {
+            "Volume in cm³: trace the outline, step or turn the plane, trace again; Enter ends it. (W)"
+        }
+        MeasureKind::Threshold => "Volume of all echoes in the region from the threshold on, in cm³. (K)",
+        MeasureKind::Text => "Text: click its place, then type; Enter ends it. (I)",
+        MeasureKind::Arrow => "Arrow: click what it points to, then its other end, then type. (Y)",
     }
 }
 

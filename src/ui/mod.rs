@@ -8,6 +8,7 @@
 //! - [`window`] shows the console in a window. Without a windowing system, `direct` shows it on a monitor and `devices` reads
 //!   input devices from the kernel.
 
+mod clipboard;
 pub mod command;
 pub mod console;
 mod controls;
@@ -20,6 +21,7 @@ pub mod frame_budget;
 mod gestures;
 mod hints;
 pub mod input;
+mod open_list;
 pub mod panels;
 mod picking;
 mod recovery;

@@ -1,80 +1,11 @@
-//! Picking: projects points of space onto the picture and finds what is under a pixel of the window.
+//! Picking: finds what is under a pixel of the window.
 
-use crate::scene::planes::{Tile, cell};
-use crate::scene::{Layout, PlaneName, Rays, Scene};
+pub(super) use crate::scene::picker::Picker;
+
+use crate::measure::overlay;
+use crate::scene::{Measurement, PlaneName, Scene};
 use glam::DVec3;
 use std::time::Duration;
-
-/// The projection of the rendered part of the picture. Positions are in pixels of the picture from its upper left corner.
-pub(super) struct Picker<'a> {
-    rays: &'a Rays,
-    /// Columns and rows of the picture before the rendered part; in a pair, the surface.
-    corner: [f64; 2],
-    size: [f64; 2],
-    /// Rays along each edge of a pixel; 0.5 at half resolution.
-    rays_per_pixel: f64,
-}
-
-impl<'a> Picker<'a> {
-    pub(super) fn of(scene: &'a Scene) -> Picker<'a> {
-        let size = scene.picture_size();
-        let corner = match scene.settings.layout {
-            Layout::Single => [0, 0],
-            Layout::Four => size.map(|n| cell(n, 1, 2)),
-            Layout::Pair => [cell(size[0], 1, 2), 0],
-        };
-        let ray = &scene.settings.ray;
-        Picker {
-            rays: &scene.rays,
-            corner: corner.map(f64::from),
-            size: std::array::from_fn(|a| f64::from(size[a] - corner[a])),
-            rays_per_pixel: f64::from(ray.rays) / f64::from(ray.apart()),
-        }
-    }
-
-    /// Width and height of the rendered part, pixels.
-    pub(super) fn size(&self) -> [f64; 2] {
-        self.size
-    }
-
-    /// The centre of the rendered part, where the camera's target is.
-    pub(super) fn centre(&self) -> [f64; 2] {
-        std::array::from_fn(|a| self.corner[a] + self.size[a] / 2.0)
-    }
-
-    /// Origin and unit direction of the ray through a position on the picture.
-    pub(super) fn ray(&self, at: [f64; 2]) -> (DVec3, DVec3) {
-        let [x, y]: [f64; 2] = std::array::from_fn(|a| (at[a] - self.corner[a]) * self.rays_per_pixel);
-        self.rays.at(x, y)
-    }
-
-    /// The position on the picture of a point in space; none behind the camera.
-    pub(super) fn project(&self, point: DVec3) -> Option<[f64; 2]> {
-        let r = self.rays;
-        let from = point - r.origin;
-        let away = from.dot(r.forward);
-        if r.is_perspective && away <= 0.0 {
-            return None;
-        }
-        let (dx, dy) = (r.origin_dx + r.direction_dx * away, r.origin_dy + r.direction_dy * away);
-        let across = from - r.direction * away;
-        let [x, y] = [across.dot(dx) / dx.length_squared(), across.dot(dy) / dy.length_squared()];
-        let at = [x / self.rays_per_pixel + self.corner[0], y / self.rays_per_pixel + self.corner[1]];
-        at.iter().all(|v| v.is_finite()).then_some(at)
-    }
-
-    /// Size of a pixel at the distance of the camera's target, mm.
-    pub(super) fn mm_per_pixel(&self) -> f64 {
-        let away = (self.rays.target - self.rays.origin).dot(self.rays.forward);
-        (self.rays.origin_dx + self.rays.direction_dx * away).length() * self.rays_per_pixel
-    }
-}
-
-/// The point of a tile's plane that a position on the picture shows. `pixel`: size of a pixel of the sheet, mm.
-fn point_on_tile(tile: &Tile, pixel: f64, at: [f64; 2]) -> DVec3 {
-    let [x, y]: [f64; 2] = std::array::from_fn(|a| at[a] - f64::from(tile.corner[a]) - f64::from(tile.size[a]) / 2.0);
-    tile.plane.at + (tile.plane.right * x + tile.plane.down * y) * pixel
-}
 
 /// Where along a straight line (a point and a unit vector) a ray comes closest to it, mm; none if both are parallel.
 pub(super) fn closest_along(line: (DVec3, DVec3), ray: (DVec3, DVec3)) -> Option<f64> {
@@ -93,6 +24,10 @@ pub(super) struct Viewport<'a> {
     pub(super) size: [f64; 2],
     /// The scene that it shows; without one nothing can be dragged.
     pub(super) scene: Option<&'a Scene>,
+    /// The measurements that are drawn over it.
+    pub(super) measures: &'a [Measurement],
+    /// The points of a measurement are being set.
+    pub(super) has_work: bool,
     /// The pointer is over a panel: a press there does not reach the picture.
     pub(super) is_covered: bool,
     /// The current time, since any fixed moment; it distinguishes a double click from two clicks.
@@ -125,7 +60,9 @@ impl<'a> Viewport<'a> {
     /// Both halves show the same rays: what is pressed on the volume acts as if it were pressed on the surface.
     pub(super) fn columns_to_surface(&self, at: [f64; 2]) -> f64 {
         match self.pixel_at(at) {
-            Some((scene, [x, _])) if scene.is_pair() && x < Picker::of(scene).corner[0] => Picker::of(scene).corner[0],
+            Some((scene, [x, _])) if scene.is_pair() && x < Picker::of(scene).corner()[0] => {
+                Picker::of(scene).corner()[0]
+            }
             _ => 0.0,
         }
     }
@@ -152,7 +89,37 @@ impl<'a> Viewport<'a> {
     pub(super) fn point_on_plane(&self, tile: usize, at: [f64; 2]) -> Option<DVec3> {
         let (scene, pixel) = self.pixel_at(at)?;
         let sheet = scene.sheet();
-        Some(point_on_tile(sheet.tiles.get(tile)?, sheet.pixel, pixel))
+        Some(sheet.point(sheet.tiles.get(tile)?, pixel))
+    }
+
+    /// The point of a measurement that is drawn within `reach` pixels of the window of a position on a tile of planes: index of the
+    /// measurement, index of its point.
+    pub(super) fn measure_point_at(&self, tile: usize, at: [f64; 2], reach: f64) -> Option<(usize, usize)> {
+        let (scene, pixel) = self.pixel_at(at)?;
+        let sheet = scene.sheet();
+        let corner = sheet.tiles.get(tile)?.corner.map(f64::from);
+        let reach = reach * self.scale();
+        let on_tile = overlay::drawn(scene, self.measures).into_iter().filter(|drawn| drawn.tile[0] == corner);
+        let near = on_tile.flat_map(|drawn| drawn.points.into_iter().map(move |(point, at)| (drawn.index, point, at)));
+        let near = near.map(|(index, point, [x, y])| (index, point, (x - pixel[0]).hypot(y - pixel[1])));
+        near.filter(|near| near.2 <= reach).min_by(|a, b| a.2.total_cmp(&b.2)).map(|near| (near.0, near.1))
+    }
+
+    /// What of the cross-lines of three planes is near a position on one of their tiles: the way from there to the common point of the planes,
+    /// and along which normal alone it is to be moved; none of these at the centre. `reach`: of a line and of the centre, pixels of the window.
+    pub(super) fn cross_at(&self, tile: usize, at: [f64; 2], reach: [f64; 2]) -> Option<(DVec3, Option<DVec3>)> {
+        let (scene, pixel) = self.pixel_at(at)?;
+        let sheet = scene.sheet();
+        let shown = sheet.tiles.get(tile).filter(|_| scene.shows_three() && scene.draws_lines())?;
+        let way = scene.plane(PlaneName::A).at - sheet.point(shown, pixel);
+        let others = sheet.tiles.iter().enumerate().filter(|(n, _)| *n != tile).map(|(_, other)| other.plane.normal);
+        let away: Vec<(DVec3, f64)> = others.map(|normal| (normal, way.dot(normal).abs() / sheet.pixel)).collect();
+        let [of_line, of_centre] = reach.map(|reach| reach * self.scale());
+        if away.iter().all(|(_, pixels)| *pixels <= of_centre) {
+            return Some((way, None));
+        }
+        let nearest = away.into_iter().min_by(|a, b| a.1.total_cmp(&b.1))?;
+        (nearest.1 <= of_line).then_some((way, Some(nearest.0)))
     }
 
     /// Pixels of the picture per pixel of the window.

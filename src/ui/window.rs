@@ -243,6 +243,9 @@ impl ApplicationHandler<()> for WindowLoop<'_> {
             WindowEvent::RedrawRequested | WindowEvent::Occluded(false) => console.redraw(),
             _ => {}
         }
+        if let WindowEvent::DroppedFile(file) = &event {
+            console.open_path(file);
+        }
         if let Some(input) = input(&event) {
             console.input(&input);
         }

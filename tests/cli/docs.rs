@@ -205,7 +205,8 @@ fn described_types() -> BTreeMap<String, Described> {
                     let keys = fields.named.into_iter().map(|field| {
                         let arguments = serde_arguments(&field.attrs);
                         for (name, _) in &arguments {
-                            assert_eq!(name, "default", "{file}: an argument of serde that is not known here");
+                            let is_known = ["default", "skip_serializing_if"].contains(&name.as_str());
+                            assert!(is_known, "{file}: {name}: an argument of serde that is not known here");
                         }
                         Key {
                             name: field.ident.expect("a name").to_string(),
@@ -275,6 +276,7 @@ fn type_words(of: &Type, types: &BTreeMap<String, Described>) -> String {
         ("u32", None) => "whole number".to_string(),
         ("f64", None) => "number".to_string(),
         ("DVec3", None) => "3 x number".to_string(),
+        ("String", None) => "text".to_string(),
         (name, None) if types.contains_key(name) => format!("[{name}](#{})", slug(name)),
         (name, _) => panic!("a setting of type {name} cannot be described: add it to tests/docs.rs"),
     }
@@ -371,12 +373,12 @@ impl SettingsPage<'_> {
                 let defaults = if is_element { Value::Null } else { defaults(path, Value::Object(required)) };
                 self.text += "| key | type | default | |\n|---|---|---|---|\n";
                 for key in keys {
-                    assert!(!is_element || key.is_required, "{name}: an element with defaults is not known here");
                     let below: Vec<String> = path.iter().cloned().chain([key.name.clone()]).collect();
                     self.meet(&key.of, &below, is_element);
                     let value = &defaults[key.name.as_str()];
                     let value = match (key.is_required, value) {
                         (true, _) => "required".to_string(),
+                        (false, _) if is_element => "optional".to_string(),
                         // It has a table of its own.
                         (false, Value::Object(_)) => String::new(),
                         (false, value) => value_words(value),

@@ -88,6 +88,7 @@ impl Desk {
     pub fn view(&self, arguments: &[&str]) -> View<'_> {
         let mut command = Command::new(PROGRAM);
         command.args(["view", "--validate"]).args(arguments).env("DISPLAY", &self.display);
+        command.env("ECHOLUME_RECENT", "none");
         command.env_remove("WAYLAND_DISPLAY").stdin(Stdio::null()).stdout(Stdio::piped()).stderr(Stdio::piped());
         let mut program = command.spawn().expect("start the program");
         let window = until("a window", || {

@@ -1,7 +1,10 @@
 //! Panels: buttons and drags act on the picture, which equals the headless one where nothing is drawn over it.
 
 use crate::desktop::*;
+use echolume::measure::outcome;
 use echolume::picture::Picture;
+use echolume::scene::{Input, Scene};
+use echolume::workspace::Workspace;
 
 /// The window of these tests, and the size of the picture between the panels, from `ui::panels::place`.
 const WINDOW: [u32; 2] = [1000, 700];
@@ -30,12 +33,16 @@ fn buttons_act_on_the_picture_and_reset_takes_it_all_back() {
     let (_, size) = picture();
     let start = headless(size, &[]);
     shows(&view, &start, "the start");
-    // The second button of the first row of modes, and the second of the layouts.
-    view.click(155, 52);
+    // The second button of the first row of modes, below undo and redo.
+    view.click(155, 104);
     shows(&view, &headless(size, &["--mode", "vr"]), "volume");
-    // Reset, by its key: Backspace.
+    // Reset, by its key: Backspace; undo and redo by their buttons.
     desk.tap(0xff08_u32);
     shows(&view, &start, "reset");
+    view.click(54, 28);
+    shows(&view, &headless(size, &["--mode", "vr"]), "what was before the reset");
+    view.click(155, 28);
+    shows(&view, &start, "reset again");
     view.leave();
 }
 
@@ -105,5 +112,42 @@ fn saved_pictures_and_loops_have_names_without_patient_data() {
     assert!(saved.width == start.width && saved.height > start.height);
     let (from, middle) = (size.map(|n| n / 4), size.map(|n| n / 2));
     assert_eq!(crop(&saved, from, middle), crop(&start, from, middle), "without panels");
+    measure_on_a_plane(&desk, &view, &folder);
     view.leave();
+}
+
+/// A caliper of 100 pixels and an angle on plane A, whose workspace renders with them. Requirement: 0.1 mm.
+fn measure_on_a_plane(desk: &Desk, view: &View, folder: &Folder) {
+    let (corner, size) = picture();
+    desk.tap('7');
+    shows(view, &headless(size, &["--mode", "mpr"]), "the plane");
+    let at = |x: i16, y: i16| view.click(corner[0] as i16 + x, corner[1] as i16 + y);
+    desk.tap('m');
+    at(200, 60);
+    at(300, 60);
+    desk.tap('n');
+    [(200, 80), (200, 180), (300, 180)].iter().for_each(|(x, y)| at(*x, *y));
+    desk.press(CONTROL, true);
+    desk.tap('s');
+    desk.press(CONTROL, false);
+    let file = until("the workspace", || {
+        let entries = std::fs::read_dir(folder.path("kept")).into_iter().flatten().flatten();
+        entries.map(|entry| entry.path()).find(|path| path.extension().is_some_and(|end| end == "toml"))
+    });
+    let workspace = until("the whole workspace", || Workspace::read(&file).ok());
+    let settings = workspace.layers.clone().finish().expect("settings");
+    let recording = echolume::source::open(workspace.recording(&file).expect("a recording"), None).expect("it opens");
+    let input = Input { stored: recording.stored_type(), range: recording.range() };
+    let scene = Scene::new(recording.geometry(0), input, settings.clone()).expect("a scene");
+    let found: Vec<f64> = settings.measure.iter().map(|m| outcome::quantities(m).expect("results")[0].value).collect();
+    assert!(found.len() == 2 && (found[0] - 100.0 * scene.sheet().pixel).abs() < 0.1, "{found:?}");
+    assert!((found[1] - 90.0).abs() < 0.1, "{found:?}");
+    // `render` draws them: the middle of the caliper is bright.
+    let png = folder.path("measured.png");
+    let run = std::process::Command::new(PROGRAM).args(["render", &file.to_string_lossy(), "-o", &png]).output();
+    let run = run.expect("the program runs");
+    assert!(run.status.success(), "{}", String::from_utf8_lossy(&run.stderr));
+    let drawn = Picture::load(png.as_ref()).expect("a picture");
+    let pixel = 4 * (60 * drawn.width + 250) as usize;
+    assert!(drawn.rgba[pixel] > 200 && drawn.rgba[pixel + 2] < 150, "{:?}", &drawn.rgba[pixel..pixel + 3]);
 }

@@ -2,12 +2,14 @@
 //! opacities in 0..1. Every struct refuses unknown keys, so that a typing error does not silently become a default.
 
 mod marks;
+mod measure;
 mod planes;
 mod preprocess;
 mod raycast;
 mod shading;
 
 pub use marks::*;
+pub use measure::*;
 pub use planes::*;
 pub use preprocess::*;
 pub use raycast::*;
@@ -57,6 +59,8 @@ pub struct Settings {
     pub post: Post,
     /// Marks beside the picture.
     pub marks: Marks,
+    /// Measurements and annotations, at most 64. The viewer makes them; `render` draws them.
+    pub measure: Vec<Measurement>,
 }
 
 impl Settings {

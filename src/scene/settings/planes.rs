@@ -34,6 +34,9 @@ pub struct Planes {
     /// Distance between the planes of neighbouring tiles, mm. The middle tile is at `position`. A moves towards +elevation, B towards
     /// +lateral, C along depth. Absent: the planes divide the region evenly.
     pub spacing: Option<f64>,
+    /// The first tile of tomography is a reference: the plane across the slices, with a line where each of them is. The viewer and `render` draw the
+    /// lines.
+    pub reference: bool,
     /// Draws cross-lines where the other planes cut a tile, and a frame in the plane's colour: A yellow, B magenta, C cyan. Tomography has
     /// thin grey lines between tiles.
     pub lines: bool,
@@ -54,6 +57,7 @@ impl Default for Planes {
             columns: 4,
             rows: 3,
             spacing: None,
+            reference: false,
             lines: true,
         }
     }

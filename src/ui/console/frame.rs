@@ -7,7 +7,7 @@ use crate::live::metrics::{LiveMetrics, SourceStatus};
 use crate::live::volume_pool::VolumeCounts;
 use crate::live::{Feed, FinishedPicture, Step, StreamError};
 use crate::ui::frame_budget;
-use crate::ui::panels::{Banner, PanelState};
+use crate::ui::panels::{self, Banner, PanelState};
 use crate::ui::source_supervisor::SourceState;
 use crate::ui::times::RecentTimes;
 use std::time::{Duration, Instant};
@@ -75,6 +75,8 @@ impl Console {
                 }
             }
         }
+        self.poll_opening();
+        self.poll_counting();
         self.advance_cine(now);
         self.send_settings(now);
         self.run_stream(now)?;
@@ -349,6 +351,8 @@ impl Console {
             times: &self.times,
             picture: self.picture_area(),
             shows_panels: self.shows_panels,
+            has_column: panels::has_column(self.size, self.panels.scale(), self.shows_panels),
+            files: self.opening.shown(),
             // egui panics if a list has a negative height.
             shows_help: self.shows_help && self.size[1] as f32 > MIN_HELP_HEIGHT * self.panels.scale(),
             shows_times: self.shows_times,

@@ -2,7 +2,13 @@
 //! time and a screen (which may be missing) are passed in, so that everything a window can do is tested without one.
 
 mod frame;
+mod measuring;
+mod opening;
+mod saving;
 
+use self::measuring::Counting;
+use self::opening::Opening;
+use super::clipboard::Clipboard;
 use super::command::{Command, HeldKeys, Tool};
 use super::controls::{Change, Controls};
 use super::export::Exporter;
@@ -20,14 +26,15 @@ use crate::kiosk::chord::Chord;
 use crate::live::cine::CineLimits;
 use crate::live::metrics::LiveMetrics;
 use crate::live::{self, Feed, Stream, StreamError, Update};
-use crate::marked;
 use crate::plan::Work;
 use crate::scene::load::Layers;
 use crate::scene::{Layout, Scene, Settings, variants};
 use crate::source::live::SourceKind;
-use std::path::PathBuf;
+use crate::workspace::Origin;
+use glam::DVec3;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
-use std::time::{Duration, Instant, SystemTime};
+use std::time::{Duration, Instant};
 
 /// How long a note is shown.
 const NOTE_TIME: Duration = Duration::from_secs(5);
@@ -41,6 +48,8 @@ const MAX_NOTES: usize = 4;
 const REST_BEFORE_WARMING: Duration = Duration::from_secs(1);
 /// Longest text that the help is searched for, characters.
 const MAX_SEARCH: usize = 40;
+/// A pause after which the same drag or key is another step for undo.
+const STEP_PAUSE: Duration = Duration::from_millis(500);
 /// Time between two volumes of a cine loop.
 const CINE_INTERVAL: Duration = Duration::from_millis(200);
 
@@ -81,6 +90,14 @@ pub struct ConsoleOptions {
     /// The keys that end a kiosk, if any.
     pub exit: Option<Chord>,
     pub is_kiosk: bool,
+    /// What a workspace keeps of the source. None: it cannot be saved.
+    pub origin: Option<Origin>,
+    /// The volumes of the source are numbered as in its recording.
+    pub plays_once: bool,
+    /// How another recording or workspace is opened. None: none is.
+    pub open_file: Option<OpenFile>,
+    /// The file with the list of recent files.
+    pub recent: Option<PathBuf>,
     /// Called when [`Console::update`] has something to do.
     pub wake: Wake,
     /// A fault that prevents the view: only its message is shown.
@@ -115,6 +132,10 @@ impl Default for ConsoleOptions {
             scale: 1.0,
             exit: None,
             is_kiosk: false,
+            origin: None,
+            plays_once: false,
+            open_file: None,
+            recent: None,
             wake: Arc::new(|| ()),
             startup_fault: None,
             shaders: None,
@@ -122,6 +143,10 @@ impl Default for ConsoleOptions {
         }
     }
 }
+
+/// Opens a recording or a workspace in place of what is shown, which the console asks to be replaced for; or returns the reason in one line. It
+/// may take long.
+pub type OpenFile = Arc<dyn Fn(&Path) -> Result<(), String> + Send + Sync>;
 
 /// A fault that prevents the view, such as a wrong configuration, and how to find out that it is resolved.
 pub struct StartupFault {
@@ -185,11 +210,11 @@ pub struct Console {
     shows_help: bool,
     shows_times: bool,
     shows_panels: bool,
-    /// Asks whether to save the loop before leaving.
     /// Saves pictures with a bar.
     saves_bar: bool,
     /// What the help is searched for; none while it is not.
     help_search: Option<String>,
+    /// Asks whether to save the loop before leaving.
     asks_to_leave: bool,
     leaves_when_saved: bool,
     is_full_screen: bool,
@@ -204,8 +229,9 @@ pub struct Console {
     unsent_input: Option<Instant>,
     /// The first input that no picture shows yet, and when its settings were given to the stream.
     unshown_input: Option<(Instant, Instant)>,
-    /// When the user acted last.
+    /// When the user acted last, and changed something last.
     last_input: Instant,
+    last_change: Instant,
     /// The settings around which pipelines were compiled in advance last.
     warmed: Option<Settings>,
     /// When statistics were taken last.
@@ -231,6 +257,13 @@ pub struct Console {
     /// The startup fault, and when to check it next.
     startup_fault: Option<(StartupFault, Instant)>,
     request: LoopRequest,
+    /// What can be opened, and what is being opened.
+    opening: Opening,
+    clipboard: Clipboard,
+    /// Counts voxels in the background.
+    counting: Counting,
+    /// Where the first end of a distance on the surface was picked.
+    surface_from: Option<DVec3>,
     shaders: Option<Arc<ShaderFolder>>,
     /// Why the picture is not drawn with the shaders as they are in their folder now.
     shader_fault: Option<String>,
@@ -247,6 +280,9 @@ struct FixedOptions {
     source: SourceKind,
     /// Everything that arrives is recorded to a file.
     records: bool,
+    /// What a workspace keeps of the source.
+    origin: Option<Origin>,
+    plays_once: bool,
 }
 
 impl Console {
@@ -288,6 +324,10 @@ impl Console {
             controls,
             gestures: Gestures::default(),
             keys: HeldKeys::default(),
+            opening: Opening::new(options.open_file, options.recent, options.wake.clone()),
+            clipboard: Clipboard::default(),
+            counting: Counting::new(options.wake.clone()),
+            surface_from: None,
             exporter: Exporter::new(options.folder, options.wake),
             pace: Pace::new(options.budget, &rungs),
             rungs,
@@ -300,6 +340,8 @@ impl Console {
                 warms: options.warms,
                 source: options.source,
                 records,
+                origin: options.origin,
+                plays_once: options.plays_once,
             },
             size,
             started: now,
@@ -324,6 +366,7 @@ impl Console {
             unsent_input: None,
             unshown_input: None,
             last_input: now,
+            last_change: now,
             warmed: None,
             statistics_at: now,
             last_arrival: now,
@@ -434,7 +477,12 @@ impl Console {
             self.request.exit = true;
         }
         let is_search = self.search_help(input);
-        if let Some(command) = self.keys.input(input).filter(|_| !is_search) {
+        let typed = self.typed(input);
+        if typed.is_some() {
+            // The keys go on to be held, and give nothing else.
+            self.keys.input(input);
+            typed.iter().flatten().for_each(|command| self.execute(command, now));
+        } else if let Some(command) = self.keys.input(input).filter(|_| !is_search) {
             let command = if self.asks_to_leave { answer(input) } else { Some(command) };
             command.iter().for_each(|command| self.execute(command, now));
         }
@@ -443,11 +491,14 @@ impl Console {
             Input::Moved(at) | Input::Touch { at, .. } => Some(*at),
             _ => None,
         };
+        let measures = self.controls.measures().to_vec();
         let is_over_panel = at.or(self.gestures.pointer()).is_some_and(|at| self.panels.covers(at));
         let on = Viewport {
             corner: area.0.map(f64::from),
             size: area.1.map(f64::from),
             scene: self.stream.scene(),
+            measures: &measures,
+            has_work: self.controls.work().is_some(),
             is_covered: self.asks_to_leave || (is_over_panel && self.fixed.overlay),
             now: now.saturating_duration_since(self.started),
         };
@@ -519,12 +570,18 @@ impl Console {
         tracing::debug!("{command:?}");
         self.user_acts(now);
         let before = is_of_tone(command).then(|| self.controls.settings().clone());
+        if now.saturating_duration_since(self.last_change) > STEP_PAUSE {
+            self.controls.seal();
+        }
         match self.controls.apply(command, self.stream.scene()) {
             Change::Nothing => return,
-            Change::Tool => {}
+            Change::Tool => self.surface_from = None,
+            Change::Marks => self.last_change = now,
+            Change::Refused(why) => self.notify(why, true),
             Change::Settings => {
+                self.last_change = now;
                 self.unsent_input.get_or_insert(now);
-                if is_continuous(command) {
+                if command.is_continuous() {
                     let work = before.map_or(Work::Rays, |before| self.work_since(before));
                     self.pace.moved(work, now);
                 } else {
@@ -582,6 +639,13 @@ impl Console {
                 self.resize_picture();
             }
             Command::ToggleFullScreen => self.request.toggle_full_screen |= !self.fixed.is_kiosk,
+            Command::PickSurface(at) => self.pick_surface(at),
+            Command::CountVoxels => self.count_voxels(),
+            Command::CopyMeasures => self.copy_measures(),
+            Command::SaveMeasures => self.save_measures(),
+            Command::SaveWorkspace => self.save_workspace(),
+            Command::OpenFiles => self.toggle_files(),
+            Command::OpenFile(n) => self.open_entry(n),
             Command::Back => self.go_back(),
             // A kiosk ends only with its exit keys: a sleeve may press Escape.
             Command::Exit if self.fixed.is_kiosk => {}
@@ -613,37 +677,20 @@ impl Console {
         }
     }
 
-    fn save_picture(&mut self) {
-        let picture = match self.stream.renderer().filter(|renderer| renderer.has_drawn()) {
-            Some(renderer) => match renderer.end_picture() {
-                Ok(picture) => Ok((picture, renderer.scene().clone())),
-                Err(fault) => Err(fault.to_string()),
-            },
-            None => Err("there is no picture yet".into()),
-        };
-        let (has_bar, time) = (self.saves_bar, marked::time_line(SystemTime::now()));
-        let origin = self.fixed.source.origin();
-        let saved = picture.and_then(|(picture, scene)| {
-            self.exporter.picture(move || match has_bar {
-                true => marked::marked(&picture, &scene, &time, origin),
-                false => Ok(picture),
-            })
-        });
-        if let Err(fault) = saved {
-            self.notify(&format!("The picture was not saved: {fault}"), true);
-        }
-    }
-
     /// Closes the uppermost of what is open; else leaves full screen; else leaves the program.
     fn go_back(&mut self) {
         if self.asks_to_leave {
             self.asks_to_leave = false;
+        } else if self.opening.is_shown() {
+            self.toggle_files();
         } else if self.help_search.is_some() {
             self.help_search = None;
         } else if self.shows_help {
             self.shows_help = false;
         } else if self.shows_times {
             self.shows_times = false;
+        } else if self.leave_measuring() {
+            self.needs_redraw = true;
         } else if self.is_full_screen && !self.fixed.is_kiosk {
             self.request.toggle_full_screen = true;
         } else {
@@ -675,23 +722,6 @@ impl Console {
     /// True while the console asks whether to save the loop before it leaves.
     pub fn asks_to_leave(&self) -> bool {
         self.asks_to_leave
-    }
-
-    /// Saves the cine loop. False if it cannot be.
-    fn save_loop(&mut self) -> bool {
-        let volumes: Vec<_> = self.stream.cine().volumes().iter().cloned().collect();
-        let saved = match self.stream.header() {
-            Some(header) if !volumes.is_empty() => {
-                let header = header.clone();
-                self.exporter.volumes(header, volumes)
-            }
-            _ => Err("there are no volumes yet".into()),
-        };
-        self.saving_volume = self.stream.cine().volumes().back().map(|kept| kept.volume).filter(|_| saved.is_ok());
-        if let Err(fault) = &saved {
-            self.notify(&format!("The loop was not saved: {fault}"), true);
-        }
-        saved.is_ok()
     }
 
     /// Leaves the processor to what the user asks for.
@@ -728,7 +758,8 @@ impl Console {
 
     /// The settings of a view at rest.
     fn full_settings(&self) -> Settings {
-        let mut full = self.controls.settings().clone();
+        // Measurements are drawn over the picture.
+        let mut full = Settings { measure: Vec::new(), ..self.controls.settings().clone() };
         // A region that grows and a plane that moves show slices that were left out. With all of them processed, dragging needs no frame
         // again.
         let cuts_planes = full.mode.is_flat() || full.layout == Layout::Four;
@@ -763,23 +794,4 @@ fn answer(input: &Input) -> Option<Command> {
 fn is_of_tone(command: &Command) -> bool {
     use Command::{MoveCrossing, MoveLight, RotatePlanes, SetSlider, StepPlane, StepSlider};
     matches!(command, MoveLight(_) | StepPlane(_) | MoveCrossing(_) | RotatePlanes(_) | SetSlider(..) | StepSlider(..))
-}
-
-/// True for commands that a drag or a held key gives repeatedly.
-fn is_continuous(command: &Command) -> bool {
-    matches!(
-        command,
-        Command::Rotate(_)
-            | Command::Roll(_)
-            | Command::Zoom(_)
-            | Command::Pan(_)
-            | Command::MoveLight(_)
-            | Command::MoveFace(..)
-            | Command::MoveClip(_)
-            | Command::StepPlane(_)
-            | Command::MoveCrossing(_)
-            | Command::RotatePlanes(_)
-            | Command::SetSlider(..)
-            | Command::StepSlider(..)
-    )
 }

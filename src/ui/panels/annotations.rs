@@ -2,6 +2,7 @@
 //! bar.
 
 use super::{ACCENT, PanelState, SMALL_TEXT, TEXT, WARNING, WEAK_TEXT, picture_rect};
+use crate::measure::overlay;
 use crate::passes::postprocess;
 use crate::scene::marks::{BAR_LENGTHS, TileMarks};
 use crate::scene::{Layout, Mode, Scene, transfer};
@@ -37,6 +38,9 @@ pub(super) fn paint(ui: &Ui, state: &PanelState, scale: f32) {
             Some(top) => ruler(&painter, area, top, tile.pixel * f64::from(scale)),
             None => bar(&painter, area, tile.pixel * f64::from(scale)),
         }
+        if n == 0 && scene.has_reference() {
+            slices(&painter, picture.min, area, scene, scale);
+        }
         if tile.is_rendering && area.width().min(area.height()) >= MIN_FOR_AXES {
             axes(&painter, area, scene);
         }
@@ -69,6 +73,12 @@ fn sides(painter: &Painter, area: Rect, tile: &TileMarks) {
         let place = at([if x == 0.0 { -1.0 } else { x }, if y == 0.0 { -1.0 } else { y }]);
         painter.circle_filled(place, 7.0, Color32::from_black_alpha(160));
         painter.circle_filled(place, 5.0, ACCENT);
+    }
+    if let Some((letter, colour)) = tile.plane {
+        let [r, g, b] = colour.map(|c| (c * 255.0).round() as u8);
+        let place = Rect::from_center_size(at(tile.plane_corner()), vec2(20.0, 20.0));
+        painter.rect_filled(place, 3.0, Color32::from_rgb(r, g, b));
+        painter.text(place.center(), Align2::CENTER_CENTER, letter, FontId::proportional(SMALL_TEXT), Color32::BLACK);
     }
 }
 
@@ -122,6 +132,18 @@ fn bar(painter: &Painter, area: Rect, per_point: f64) {
         line(painter, end - vec2(0.0, 5.0), end + vec2(0.0, 5.0));
     }
     text(painter, left + vec2(width / 2.0, -8.0), Align2::CENTER_BOTTOM, &format!("{mm} mm"), TEXT);
+}
+
+/// Where the slices of a tomography are, on its reference tile, and their distance.
+fn slices(painter: &Painter, origin: Pos2, area: Rect, scene: &Scene, scale: f32) {
+    let sheet = scene.sheet();
+    let painter = painter.with_clip_rect(area);
+    for ends in sheet.slice_lines() {
+        let ends = ends.map(|[x, y]| origin + vec2(x as f32, y as f32) / scale);
+        painter.line_segment(ends, Stroke::new(1.0, Color32::from_rgb(255, 214, 64)));
+    }
+    let at = area.center_bottom() - vec2(0.0, 6.0);
+    text(&painter, at, Align2::CENTER_BOTTOM, &overlay::spacing_label(&sheet), TEXT);
 }
 
 /// The axes of the volume in camera view, in the lower left corner.

@@ -1,7 +1,8 @@
 //! The panels with buttons and sliders: modes and tools on the left, controls on the right, the cine loop below. The six controls that
 //! every examination needs are in front; the others are below them, by stage.
 
-use super::{ACCENT, BUTTON, PanelState, SMALL_TEXT, TEXT, TEXT_SIZE, TOUCH_SIZE, WARNING, WEAK_TEXT};
+use super::measures;
+use super::{ACCENT, BUTTON, PanelState, TEXT, TEXT_SIZE, TOUCH_SIZE, WARNING, WEAK_TEXT, heading};
 use crate::scene::{ColourMap, Layout, Mode, PlaneName, Settings, Transfer, TransferName};
 use crate::ui::command::{Command, Tool};
 use crate::ui::hints;
@@ -38,6 +39,7 @@ pub(super) fn show_modes(ui: &mut Ui, state: &PanelState, width: f32, execute: &
             let settings = state.controls.settings();
             let row = Row { width, height: TOUCH_SIZE * 0.92 };
             ui.add_space(6.0);
+            undo_and_redo(ui, state, &row, execute);
             heading(ui, "Mode");
             let modes = Mode::ALL.map(|mode| (mode, mode.title()));
             row.show(ui, &modes, 2, |m| settings.mode == m, hints::of_mode, |m| execute(Command::Mode(m)));
@@ -51,12 +53,53 @@ pub(super) fn show_modes(ui: &mut Ui, state: &PanelState, width: f32, execute: &
                 let hint = |_| "The plane that is shown and moved.";
                 row.show(ui, &PLANES, 3, |p| settings.planes.plane == p, hint, |p| execute(Command::Plane(p)));
             }
+            if settings.mode.is_flat() || settings.layout == Layout::Four {
+                let hint = "Moves the point where the planes cross to the middle (J; double click with Planes).";
+                let button = Button::new("Recentre planes").min_size(vec2(width - 16.0, TOUCH_SIZE * 0.75));
+                if ui.add(button).on_hover_text(hint).clicked() {
+                    execute(Command::Recentre);
+                }
+            }
+            heading(ui, "Measure");
+            measures::show_tools(ui, state, width - 16.0, execute);
+            if !state.has_column {
+                measures::show_results(ui, state, width - 24.0, execute);
+            }
+            heading(ui, "Workspace");
+            let files = [
+                (
+                    Command::OpenFiles,
+                    "Open",
+                    "Opens a recording or a workspace (Ctrl+O), or drop a file on the window.",
+                ),
+                (Command::SaveWorkspace, "Save", "Saves settings, recording and measurements together (Ctrl+S)."),
+            ];
+            let half = vec2((width - 16.0 - ui.spacing().item_spacing.x) / 2.0, TOUCH_SIZE * 0.75);
+            ui.horizontal(|ui| {
+                for (command, name, hint) in files {
+                    if ui.add(Button::new(name).min_size(half)).on_hover_text(hint).clicked() {
+                        execute(command);
+                    }
+                }
+            });
         });
     });
 }
 
-fn heading(ui: &mut Ui, text: &str) {
-    ui.label(RichText::new(text).size(SMALL_TEXT).color(WEAK_TEXT));
+fn undo_and_redo(ui: &mut Ui, state: &PanelState, row: &Row, execute: &mut dyn FnMut(Command)) {
+    let [can_undo, can_redo] = state.controls.can_undo();
+    let size = vec2((row.width - 16.0 - ui.spacing().item_spacing.x) / 2.0, TOUCH_SIZE * 0.75);
+    ui.horizontal(|ui| {
+        for (command, name, is_there, hint) in [
+            (Command::Undo, "Undo", can_undo, "Takes the last change back (Ctrl+Z)."),
+            (Command::Redo, "Redo", can_redo, "Does it again (Ctrl+Y)."),
+        ] {
+            let button = ui.add_enabled(is_there, Button::new(name).min_size(size));
+            if button.on_hover_text(hint).on_disabled_hover_text(hint).clicked() {
+                execute(command);
+            }
+        }
+    });
 }
 
 /// Rows of buttons of which one is chosen.
@@ -134,6 +177,7 @@ pub(super) fn show_controls(ui: &mut Ui, state: &PanelState, width: f32, execute
             // Leaves room for the scroll bar, which covers the edge.
             ui.set_max_width(width - 32.0);
             ui.add_space(6.0);
+            measures::show_results(ui, state, width - 40.0, execute);
             heading(ui, "Controls");
             let in_front = FRONT.map(|(name, sliders)| (name, front(sliders, settings)));
             for (name, number) in in_front {
@@ -166,6 +210,13 @@ pub(super) fn show_controls(ui: &mut Ui, state: &PanelState, width: f32, execute
                 let mut on = settings.light.shadow.is_some_and(|shadow| shadow.strength > 0.0);
                 if switch(ui, &mut on, "Cast shadows", "The lamp casts shadows on the surface.") {
                     execute(Command::Shadow(on));
+                }
+            }
+            if settings.mode == Mode::Tomography {
+                let mut on = settings.planes.reference;
+                let hint = "The first tile shows the plane across the slices, and where each of them is.";
+                if switch(ui, &mut on, "Reference picture", hint) {
+                    execute(Command::Reference(on));
                 }
             }
             let mut saves_bar = state.saves_bar;

@@ -5,6 +5,8 @@
 
 mod annotations;
 mod controls;
+mod files;
+mod measures;
 mod overlays;
 
 use super::command::Command;
@@ -103,12 +105,18 @@ impl Panels {
             if state.has_drawn && state.shows_panels {
                 annotations::paint(ui, state, self.scale);
             }
+            if state.has_drawn {
+                measures::paint(ui, state, self.scale);
+            }
             if state.shows_times {
                 overlays::show_times(ui, state, self.scale);
             }
             overlays::show_notes(ui, state, self.scale);
             if state.shows_help {
                 overlays::show_help(ui, state, execute);
+            }
+            if let Some(files) = state.files {
+                files::show(ui, files, execute);
             }
             if state.asks_to_leave {
                 overlays::ask_to_leave(ui, execute);
@@ -248,6 +256,8 @@ pub(super) struct PanelState<'a> {
     /// Upper left corner and size of the picture, pixels.
     pub(super) picture: ([u32; 2], [u32; 2]),
     pub(super) shows_panels: bool,
+    /// There is a column of controls on the right.
+    pub(super) has_column: bool,
     pub(super) shows_help: bool,
     pub(super) shows_times: bool,
     /// What the help is searched for, while it is.
@@ -258,6 +268,8 @@ pub(super) struct PanelState<'a> {
     pub(super) origin: Option<&'a str>,
     /// Asks whether to save the loop before leaving.
     pub(super) asks_to_leave: bool,
+    /// The list of files to open, while it is shown: its title and its entries.
+    pub(super) files: Option<(&'a str, &'a [String])>,
     pub(super) is_frozen: bool,
     pub(super) is_playing: bool,
     /// Number of volumes in the cine loop, and the index of the one that is shown.
@@ -295,6 +307,16 @@ pub fn picture_area(size: [u32; 2], scale: f32, shows_panels: bool) -> ([u32; 2]
     let Edges { left, right, below } = Edges::of(size.map(|n| n as f32 / scale), shows_panels);
     let [left, right, below] = [left, right, below].map(|edge| (edge * scale).round() as u32);
     ([left, 0], [size[0].saturating_sub(left + right).max(1), size[1].saturating_sub(below).max(1)])
+}
+
+/// True if a window of this size has a column of controls on the right.
+pub(super) fn has_column(size: [u32; 2], scale: f32, shows_panels: bool) -> bool {
+    Edges::of(size.map(|n| n as f32 / scale), shows_panels).right > 0.0
+}
+
+/// A small heading above a group of controls.
+fn heading(ui: &mut egui::Ui, text: &str) {
+    ui.label(egui::RichText::new(text).size(SMALL_TEXT).color(WEAK_TEXT));
 }
 
 /// The area of the picture in points.

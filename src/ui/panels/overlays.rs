@@ -38,7 +38,7 @@ pub(super) fn show_notes(ui: &mut Ui, state: &PanelState, scale: f32) {
         return;
     }
     let at = picture.center_bottom() - vec2(0.0, 14.0);
-    Area::new(Id::new("notes"))
+    let shown = Area::new(Id::new("notes"))
         .order(Order::Middle)
         .pivot(Align2::CENTER_BOTTOM)
         .fixed_pos(at)
@@ -51,6 +51,10 @@ pub(super) fn show_notes(ui: &mut Ui, state: &PanelState, scale: f32) {
                 });
             }
         });
+    // An area is placed by its size of the layout before: one more note would reach over the bar.
+    if shown.response.rect.bottom() > at.y + 1.0 {
+        ui.ctx().request_repaint();
+    }
 }
 
 fn message_frame(edge: Color32) -> Frame {

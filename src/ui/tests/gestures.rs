@@ -232,7 +232,15 @@ fn a_press_outside_of_the_picture_and_a_lost_focus_drag_nothing() {
     window.input(Input::Moved(window.at([300.0, 300.0])));
     assert_eq!(window.controls.settings(), &start, "lost");
     let scene = window.scene();
-    let on = Viewport { corner: [0.0; 2], size: [512.0; 2], scene: Some(&scene), is_covered: true, now: window.now };
+    let on = Viewport {
+        corner: [0.0; 2],
+        size: [512.0; 2],
+        scene: Some(&scene),
+        measures: &[],
+        has_work: false,
+        is_covered: true,
+        now: window.now,
+    };
     for input in [
         Input::Moved([50.0; 2]),
         Input::Button { button: Button::Left, pressed: true },

@@ -2,6 +2,7 @@
 
 mod budget;
 mod gestures;
+mod measuring;
 mod sequences;
 
 use super::command::{Command, Face, Tool};
@@ -116,7 +117,9 @@ impl TestWindow {
     fn input(&mut self, input: Input) -> Vec<Command> {
         let scene = self.scene();
         let size = scene.picture_size().map(|n| f64::from(n) * self.enlarged);
-        let on = Viewport { corner: self.corner, size, scene: Some(&scene), is_covered: false, now: self.now };
+        let (measures, has_work) = (self.controls.measures().to_vec(), self.controls.work().is_some());
+        let (corner, scene_shown, now) = (self.corner, Some(&scene), self.now);
+        let on = Viewport { corner, size, scene: scene_shown, measures: &measures, has_work, is_covered: false, now };
         let commands = self.gestures.input(&input, &on, self.controls.tool(), self.held);
         for command in &commands {
             self.controls.apply(command, Some(&scene));

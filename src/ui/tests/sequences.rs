@@ -140,7 +140,9 @@ proptest! {
                 for (input, tool, follows) in &inputs {
                     now += Duration::from_millis(30);
                     let scene = Some(&shown).filter(|_| now.as_millis() % 11 != 0);
-                    let on = Viewport { corner: [60.0, 5.0], size, scene, is_covered: !follows, now };
+                    let measures = controls.measures().to_vec();
+                    let (corner, has_work) = ([60.0, 5.0], controls.work().is_some());
+                    let on = Viewport { corner, size, scene, measures: &measures, has_work, is_covered: !follows, now };
                     let mut commands = gestures.input(input, &on, *tool, keys.modifiers());
                     commands.extend(keys.input(input));
                     for command in commands {

@@ -62,6 +62,10 @@ pub fn options() -> ConsoleOptions {
         exit: None,
         is_kiosk: false,
         wake: Arc::new(|| ()),
+        origin: None,
+        plays_once: false,
+        open_file: None,
+        recent: None,
         startup_fault: None,
         shaders: None,
         warms: false,
@@ -129,7 +133,9 @@ impl Desk {
 
     /// The settings of the idle picture.
     pub fn drawn(&self) -> Settings {
-        let mut settings = self.console.controls().settings().clone();
+        // Measurements are drawn over the picture.
+        let shown = self.console.controls().settings().clone();
+        let mut settings = Settings { measure: Vec::new(), ..shown };
         let cuts_planes = settings.mode.is_flat() || settings.layout == Layout::Four;
         settings.slices.everything |=
             cuts_planes || matches!(self.console.controls().tool(), Tool::Region | Tool::Clip);

@@ -1,6 +1,8 @@
 //! Pictures with marks: the sides of the patient on every tile, and a bar below with scale, depth, mode, time and origin. The rendered
 //! pixels between the marks stay as they are.
 
+mod strokes;
+
 use crate::canvas::{self, Canvas, Drawing, Drawn};
 use crate::picture::Picture;
 use crate::scene::Scene;
@@ -33,7 +35,7 @@ pub fn marked(picture: &Picture, scene: &Scene, time: &str, origin: Option<&str>
         return Err(format!("a picture of {} x {} is no scene of {width} x {height}", picture.width, picture.height));
     }
     let marks = scene.marks();
-    let mut marked = picture.clone();
+    let mut marked = measured(picture, scene)?;
     let square = LETTER_SHARE * f64::from(picture.width.min(picture.height));
     let square = square.clamp(LETTER[0], LETTER[1]).round() as u32;
     for tile in &marks {
@@ -44,6 +46,19 @@ pub fn marked(picture: &Picture, scene: &Scene, time: &str, origin: Option<&str>
     marked.height += drawn.height;
     marked.rgba.extend(drawn.rgba);
     Ok(marked)
+}
+
+/// A picture of the scene with its measurements and annotations, and the lines of its reference tile.
+///
+/// # Errors
+/// One line: the drawing failed.
+pub fn measured(picture: &Picture, scene: &Scene) -> Result<Picture, String> {
+    let mut measured = picture.clone();
+    if [picture.width, picture.height] == scene.picture_size() {
+        strokes::slices(&mut measured, scene)?;
+        strokes::draw(&mut measured, scene)?;
+    }
+    Ok(measured)
 }
 
 /// Draws the letters and the dot of a tile, where it has room for them.
@@ -68,6 +83,10 @@ fn mark_tile(picture: &mut Picture, tile: &TileMarks, square: u32) -> Result<(),
         let glyph = canvas::picture([square; 2], &Glyph::Dot)?;
         blend(picture, &glyph, at([if x == 0.0 { -1.0 } else { x }, if y == 0.0 { -1.0 } else { y }]));
     }
+    if let Some((plane, _)) = tile.plane {
+        let glyph = canvas::picture([square; 2], &Glyph::Plane(plane))?;
+        blend(picture, &glyph, at(tile.plane_corner()));
+    }
     Ok(())
 }
 
@@ -91,6 +110,8 @@ enum Glyph<'a> {
     Letter(&'a str),
     /// The probe's marker.
     Dot,
+    /// The letter of a plane, in a frame: it is no side of the patient.
+    Plane(&'a str),
 }
 
 impl Drawing for Glyph<'_> {
@@ -100,6 +121,10 @@ impl Drawing for Glyph<'_> {
         match self {
             Glyph::Letter(letter) => {
                 canvas.text(letter, [width / 2.0, height / 2.0], (height * 0.85) as u32, WHITE, [1, 1])
+            }
+            Glyph::Plane(letter) => {
+                canvas.boxed([1.0, 1.0, width - 2.0, height - 2.0], ShapeStyle::from(&WHITE).stroke_width(1))?;
+                canvas.text(letter, [width / 2.0, height / 2.0], (height * 0.7) as u32, WHITE, [1, 1])
             }
             Glyph::Dot => {
                 canvas.ring([width / 2.0, height / 2.0], (height * 0.3) as i32, ShapeStyle::from(&WHITE).filled())
@@ -230,6 +255,21 @@ mod tests {
         assert!(bright > 100, "{bright} pixels of text and scale");
         let later = marked(&grey([120, 96]), &scene, "2026-11-23 20:00:01 UTC", Some("Demo data")).expect("marked");
         assert_ne!(later, drawn, "the time is written");
+    }
+
+    #[test]
+    fn measurements_are_drawn_where_they_lie_and_without_a_bar_too() {
+        let caliper = "measure=[{ kind = 'distance', points = [[-5, 14.5, 0], [5, 14.5, 0]] }]";
+        let scene = scene(&["mode='plane'", caliper]);
+        let drawn = measured(&grey([120, 96]), &scene).expect("drawn");
+        assert_eq!((drawn.width, drawn.height), (120, 96));
+        // The middle of the line is in the middle of the plane.
+        let middle = 4 * (48 * 120 + 60) as usize;
+        let pixel = |at: usize| [drawn.rgba[at], drawn.rgba[at + 1], drawn.rgba[at + 2]];
+        assert!(pixel(middle)[0] > 200 && pixel(middle)[2] < 120, "{:?}", pixel(middle));
+        assert_eq!(pixel(0), [100; 3], "nothing elsewhere");
+        let bright = drawn.rgba.chunks_exact(4).filter(|p| p[2] > 200).count();
+        assert!(bright > 20, "{bright} pixels of the label");
     }
 
     #[test]

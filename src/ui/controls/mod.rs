@@ -1,12 +1,18 @@
 //! The settings of the view, and how commands change them. After any command the settings can be drawn with the current volume.
 
+mod history;
+mod measuring;
+
 use super::command::{Command, Tool};
 use super::sliders::SLIDERS;
 use super::view;
 use crate::scene::default_look::Defaults;
 use crate::scene::load;
 use crate::scene::planes::MAX_TILES;
-use crate::scene::{Camera, Cube, Inset, Layout, MAX_PICTURE, Mode, Planes, Scene, Settings, Shadow, Tilt, Transfer};
+use crate::scene::{
+    Camera, Cube, Inset, Layout, MAX_PICTURE, Measurement, Mode, Planes, Scene, Settings, Shadow, Tilt, Transfer,
+};
+use history::History;
 use std::borrow::Cow;
 
 /// The effect of a command.
@@ -17,6 +23,10 @@ pub(super) enum Change {
     /// The tool of drags changed.
     Tool,
     Settings,
+    /// Measurements or annotations changed, nothing of the picture itself.
+    Marks,
+    /// It cannot be done, and why.
+    Refused(&'static str),
     /// The command does not concern settings: the caller executes it.
     Caller(Command),
 }
@@ -31,13 +41,27 @@ pub struct Controls {
     rendered: Mode,
     /// What settings that nobody chose follow from. None: they are complete.
     defaults: Option<Defaults>,
+    history: History,
+    /// The measurement whose points are being set.
+    work: Option<Measurement>,
+    /// The measurement whose text is being typed.
+    typing: Option<usize>,
 }
 
 impl Controls {
     /// `settings`: the start, which [`Command::Reset`] restores.
     pub(super) fn new(settings: Settings) -> Controls {
         let rendered = if settings.mode.is_flat() { Mode::default() } else { settings.mode };
-        Controls { start: settings.clone(), settings, tool: Tool::default(), rendered, defaults: None }
+        Controls {
+            start: settings.clone(),
+            settings,
+            tool: Tool::default(),
+            rendered,
+            defaults: None,
+            history: History::default(),
+            work: None,
+            typing: None,
+        }
     }
 
     pub fn settings(&self) -> &Settings {
@@ -48,14 +72,52 @@ impl Controls {
         self.tool
     }
 
-    /// Restores the settings of the start, except for the size of the picture.
+    /// Restores the settings of the start, except for the size of the picture and the measurements.
     pub(super) fn reset(&mut self) {
-        let picture = self.settings.picture.clone();
-        let mut again = Controls::new(self.start.clone());
-        again.settings.picture = picture;
-        again.defaults = self.defaults.take();
-        again.start = std::mem::take(&mut self.start);
-        *self = again;
+        let again = Settings {
+            picture: self.settings.picture.clone(),
+            measure: self.settings.measure.clone(),
+            ..self.start.clone()
+        };
+        let before = std::mem::replace(&mut self.settings, again);
+        if before != self.settings {
+            self.history.record(before, &Command::Reset);
+        }
+        (self.tool, self.rendered) = (Tool::default(), Controls::new(self.start.clone()).rendered);
+        (self.work, self.typing) = (None, None);
+    }
+
+    /// Whether there is something to undo, and to redo.
+    pub fn can_undo(&self) -> [bool; 2] {
+        let [past, future] = self.history.has();
+        [past || self.work.is_some(), future]
+    }
+
+    /// The next change is a step of its own for undo.
+    pub(super) fn seal(&mut self) {
+        self.history.seal();
+    }
+
+    /// Goes a step back, or forth again. The size of the picture stays. A step that this volume cannot show is left out.
+    fn travel(&mut self, back: bool, scene: Option<&Scene>) -> Change {
+        self.typing = None;
+        if back && self.undo_point() {
+            return Change::Marks;
+        }
+        loop {
+            let step = if back { self.history.undo(&self.settings) } else { self.history.redo(&self.settings) };
+            let Some(step) = step else { return Change::Nothing };
+            let settings = Settings { picture: self.settings.picture.clone(), ..step };
+            if settings == self.settings || scene.is_some_and(|now| !can_draw(now, &settings)) {
+                continue;
+            }
+            let is_marks = Settings { measure: self.settings.measure.clone(), ..settings.clone() } == self.settings;
+            if !settings.mode.is_flat() {
+                self.rendered = settings.mode;
+            }
+            self.settings = settings;
+            return if is_marks { Change::Marks } else { Change::Settings };
+        }
     }
 
     /// Takes what was found from a source. Settings that were changed since the start stay.
@@ -72,7 +134,11 @@ impl Controls {
             }
         };
         if let Some(settings) = load::rebase(&self.settings, &earlier, &later) {
-            self.settings = Settings { picture, ..settings };
+            let settings = Settings { picture, ..settings };
+            if settings != self.settings {
+                self.history.clear();
+            }
+            self.settings = settings;
         }
         self.start = start;
         self.defaults = Some(found);
@@ -112,6 +178,9 @@ impl Controls {
         match command {
             Command::Tool(tool) => {
                 let changed = *tool != self.tool;
+                if changed {
+                    (self.work, self.typing) = (None, None);
+                }
                 self.tool = *tool;
                 return if changed { Change::Tool } else { Change::Nothing };
             }
@@ -119,6 +188,8 @@ impl Controls {
                 self.reset();
                 return Change::Settings;
             }
+            Command::Undo => return self.travel(true, scene),
+            Command::Redo => return self.travel(false, scene),
             Command::Freeze
             | Command::StepCine(_)
             | Command::SeekCine(_)
@@ -134,8 +205,18 @@ impl Controls {
             | Command::Back
             | Command::Exit
             | Command::SaveAndExit
-            | Command::Discard => return Change::Caller(*command),
+            | Command::Discard
+            | Command::PickSurface(_)
+            | Command::CountVoxels
+            | Command::CopyMeasures
+            | Command::SaveMeasures
+            | Command::SaveWorkspace
+            | Command::OpenFiles
+            | Command::OpenFile(_) => return Change::Caller(*command),
             _ => {}
+        }
+        if let Some(change) = self.measure(command) {
+            return change;
         }
         // The scene lags behind if several commands come between two pictures: each one builds on the settings of the one before.
         let Some(now) = scene.and_then(|scene| self.current(scene)) else { return Change::Nothing };
@@ -144,7 +225,8 @@ impl Controls {
                 if !settings.mode.is_flat() {
                     self.rendered = settings.mode;
                 }
-                self.settings = settings;
+                let before = std::mem::replace(&mut self.settings, settings);
+                self.history.record(before, command);
                 Change::Settings
             }
             _ => Change::Nothing,
@@ -155,6 +237,10 @@ impl Controls {
     fn current<'a>(&self, scene: &'a Scene) -> Option<Cow<'a, Scene>> {
         if scene.settings == self.settings {
             return Some(Cow::Borrowed(scene));
+        }
+        // The picture knows nothing of measurements.
+        if (Settings { measure: scene.settings.measure.clone(), ..self.settings.clone() }) == scene.settings {
+            return Some(Cow::Owned(Scene { settings: self.settings.clone(), ..scene.clone() }));
         }
         Scene::new(scene.geometry.clone(), scene.input, self.settings.clone()).ok().map(Cow::Owned)
     }
@@ -215,6 +301,8 @@ impl Controls {
             Command::MoveCrossing(point) if finite(&point) => {
                 new.planes.position = Some(view::clamp_crossing(now, point))
             }
+            Command::Reference(on) if now.settings.mode == Mode::Tomography => new.planes.reference = on,
+            Command::Recentre if now.cuts_planes() => new.planes.position = None,
             Command::RotatePlanes(by) if finite(&by) => {
                 new.planes.azimuth = view::wrap_degrees(new.planes.azimuth + by[0]);
                 new.planes.tilt = view::wrap_degrees(new.planes.tilt + by[1]);
@@ -266,8 +354,7 @@ fn set_slider(settings: &mut Settings, now: &Scene, index: usize, value: f64) ->
 /// The settings if they can be drawn. If the mode or the layout changed, values that only the new mode uses and that do not fit the
 /// region are reset: they were set for another mode or region, and must not block the key that selects the mode.
 fn drawable(now: &Scene, settings: Settings) -> Option<Settings> {
-    let can_draw = |s: &Settings| Scene::new(now.geometry.clone(), now.input, s.clone()).is_ok();
-    if can_draw(&settings) {
+    if can_draw(now, &settings) {
         return Some(settings);
     }
     if settings.mode == now.settings.mode && settings.layout == now.settings.layout {
@@ -280,5 +367,10 @@ fn drawable(now: &Scene, settings: Settings) -> Option<Settings> {
     relaxed.cube = Cube { inset: Inset::default(), tilt: Tilt::default(), ..relaxed.cube };
     relaxed.planes =
         Planes { columns: default_planes.columns, rows: default_planes.rows, thickness: 0.0, ..relaxed.planes };
-    can_draw(&relaxed).then_some(relaxed)
+    can_draw(now, &relaxed).then_some(relaxed)
+}
+
+/// Whether settings can be drawn with the volume of a scene.
+fn can_draw(now: &Scene, settings: &Settings) -> bool {
+    Scene::new(now.geometry.clone(), now.input, settings.clone()).is_ok()
 }

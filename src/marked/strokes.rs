@@ -1,0 +1,110 @@
+//! Measurements on a saved picture: smooth lines with a dark edge, crosses at their points, heads of arrows, and labels.
+
+use super::blend;
+use crate::canvas::{self, Canvas, Drawing, Drawn};
+use crate::measure::overlay;
+use crate::picture::Picture;
+use crate::scene::Scene;
+use plotters::prelude::{BLACK, DrawingBackend, ShapeStyle, WHITE};
+
+/// Colour of lines: yellow, which no tissue has.
+const LINE: [u8; 3] = [255, 214, 64];
+const EDGE: [u8; 3] = [0, 0, 0];
+/// Half the width of a line, and of its dark edge, pixels.
+const HALF: f64 = 0.8;
+const HALF_EDGE: f64 = 2.0;
+/// Half the size of a cross, and length of an arrow's head, pixels.
+const CROSS: f64 = 5.0;
+const HEAD: f64 = 12.0;
+/// Height of a label's text, pixels.
+const TEXT: u32 = 14;
+/// Widest label, pixels.
+const WIDEST: f64 = 600.0;
+
+/// Draws the measurements of a scene into its picture.
+///
+/// # Errors
+/// One line: the drawing of a label failed.
+pub(super) fn draw(picture: &mut Picture, scene: &Scene) -> Result<(), String> {
+    for drawn in overlay::drawn(scene, &scene.settings.measure) {
+        let mut strokes: Vec<[[f64; 2]; 2]> = Vec::new();
+        for line in &drawn.lines {
+            strokes.extend(line.windows(2).map(|ends| [ends[0], ends[1]]));
+        }
+        for (_, [x, y]) in &drawn.points {
+            strokes.push([[x - CROSS, *y], [x + CROSS, *y]]);
+            strokes.push([[*x, y - CROSS], [*x, y + CROSS]]);
+        }
+        strokes.extend(drawn.head.iter().flat_map(|head| overlay::arrow_head(*head, HEAD)));
+        for (half, colour) in [(HALF_EDGE, EDGE), (HALF, LINE)] {
+            strokes.iter().for_each(|ends| stroke(picture, drawn.tile, *ends, half, colour));
+        }
+        if !drawn.label.is_empty() {
+            let width = canvas::text_width(&drawn.label, TEXT)?.min(WIDEST).ceil() as u32 + 6;
+            let label = canvas::picture([width, TEXT + 6], &Label(&drawn.label))?;
+            let at = overlay::label_corner(&drawn, [f64::from(width), f64::from(TEXT + 6)]);
+            blend(picture, &label, at.map(|n| n.round() as i64));
+        }
+    }
+    Ok(())
+}
+
+/// Draws where the slices are on the reference tile of a tomography, and their distance.
+///
+/// # Errors
+/// One line: the drawing of the label failed.
+pub(super) fn slices(picture: &mut Picture, scene: &Scene) -> Result<(), String> {
+    if !scene.has_reference() {
+        return Ok(());
+    }
+    let sheet = scene.sheet();
+    let Some(first) = sheet.tiles.first() else { return Ok(()) };
+    let tile = [first.corner, first.size].map(|corner| corner.map(f64::from));
+    sheet.slice_lines().iter().for_each(|ends| stroke(picture, tile, *ends, 0.5, LINE));
+    let text = overlay::spacing_label(&sheet);
+    let width = canvas::text_width(&text, TEXT)?.min(tile[1][0]).ceil() as u32 + 6;
+    let label = canvas::picture([width, TEXT + 6], &Label(&text))?;
+    let bottom = tile[0][1] + tile[1][1] - f64::from(TEXT + 8);
+    blend(picture, &label, [tile[0][0].round() as i64 + 2, bottom.round() as i64]);
+    Ok(())
+}
+
+/// Draws a line with smooth borders, within a tile.
+fn stroke(picture: &mut Picture, tile: [[f64; 2]; 2], ends: [[f64; 2]; 2], half: f64, colour: [u8; 3]) {
+    let size = [f64::from(picture.width), f64::from(picture.height)];
+    // The pixels that it may touch: a part of the picture, wherever its ends are.
+    let range = |a: usize| {
+        let most = (tile[0][a] + tile[1][a]).min(size[a]);
+        let clamp = |v: f64| v.clamp(tile[0][a].max(0.0), most.max(0.0));
+        let low = ends[0][a].min(ends[1][a]) - half - 1.0;
+        let high = ends[0][a].max(ends[1][a]) + half + 1.0;
+        clamp(low.floor()) as u32..clamp(high.ceil()) as u32
+    };
+    let along = [ends[1][0] - ends[0][0], ends[1][1] - ends[0][1]];
+    let squared = along[0] * along[0] + along[1] * along[1];
+    for (y, x) in range(1).flat_map(|y| range(0).map(move |x| (y, x))) {
+        let from = [f64::from(x) + 0.5 - ends[0][0], f64::from(y) + 0.5 - ends[0][1]];
+        let share =
+            if squared > 0.0 { ((from[0] * along[0] + from[1] * along[1]) / squared).clamp(0.0, 1.0) } else { 0.0 };
+        let off = (from[0] - along[0] * share).hypot(from[1] - along[1] * share);
+        let cover = (half + 0.5 - off).clamp(0.0, 1.0);
+        if cover > 0.0 {
+            let first = 4 * (y as usize * picture.width as usize + x as usize);
+            for (channel, new) in picture.rgba[first..first + 3].iter_mut().zip(colour) {
+                *channel = (f64::from(*channel) * (1.0 - cover) + f64::from(new) * cover).round() as u8;
+            }
+        }
+    }
+}
+
+/// A label, white on black.
+struct Label<'a>(&'a str);
+
+impl Drawing for Label<'_> {
+    fn draw<B: DrawingBackend>(&self, canvas: &Canvas<B>) -> Drawn {
+        let [width, height] = canvas.size();
+        canvas.boxed([0.0, 0.0, width, height], ShapeStyle::from(&BLACK).filled())?;
+        let text = canvas.cut(self.0, TEXT, width - 4.0)?;
+        canvas.text(&text, [3.0, height / 2.0], TEXT, WHITE, [0, 1])
+    }
+}

@@ -1,0 +1,248 @@
+//! The volume of a body from contours of its sections: parallel planes by Cavalieri's principle, planes through one axis by Pappus' theorem (as
+//! rotated contours of an ultrasound system).
+
+use super::shapes::{centroid, vector_area};
+use glam::{DMat3, DVec3};
+use std::f64::consts::PI;
+
+/// Planes whose normals are closer than this are parallel: sine of the angle, 1 degree.
+const PARALLEL: f64 = 0.0175;
+/// Contours of parallel planes that are closer than this lie in one plane, mm.
+const SAME_PLANE: f64 = 0.05;
+/// Contours whose planes are turned by less than this lie in one plane, radians.
+const SAME_ANGLE: f64 = 0.002;
+/// Largest distance of the common axis from a plane that is turned about it, mm.
+const OFF_AXIS: f64 = 1.0;
+
+/// How the planes of contours lie.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Stack {
+    Parallel,
+    /// Turned about an axis that all of them contain.
+    Rotated,
+}
+
+/// The volume that contours enclose, mm^3, and how their planes lie.
+///
+/// In parallel planes each area counts from halfway to the plane before to halfway to the one after; the outermost reach as far out as in. In
+/// planes through an axis each half of a contour is turned about the axis by its share of half a turn.
+///
+/// # Errors
+/// In words: fewer than two planes, contours without an area, or planes that are neither.
+pub fn volume(contours: &[Vec<DVec3>]) -> Result<(f64, Stack), &'static str> {
+    let areas: Vec<DVec3> = contours.iter().map(|contour| vector_area(contour)).collect();
+    if areas.len() < 2 {
+        return Err("a volume needs contours in two planes or more");
+    }
+    if areas.iter().any(|area| !area.is_finite() || area.length() < 1e-9) {
+        return Err("a contour encloses no area");
+    }
+    let planes: Vec<Plane> = contours.iter().zip(&areas).map(|(contour, area)| Plane::of(contour, *area)).collect();
+    let first = planes[0].normal;
+    if planes.iter().all(|plane| plane.normal.cross(first).length() < PARALLEL) {
+        return parallel(&planes, first).map(|mm3| (mm3, Stack::Parallel));
+    }
+    rotated(contours, &planes).map(|mm3| (mm3, Stack::Rotated))
+}
+
+/// The plane of a contour.
+struct Plane {
+    at: DVec3,
+    normal: DVec3,
+    /// mm^2.
+    area: f64,
+}
+
+impl Plane {
+    fn of(contour: &[DVec3], area: DVec3) -> Plane {
+        Plane { at: centroid(contour), normal: area.normalize(), area: area.length() }
+    }
+}
+
+fn parallel(planes: &[Plane], normal: DVec3) -> Result<f64, &'static str> {
+    let mut sections: Vec<(f64, f64)> = planes.iter().map(|plane| (plane.at.dot(normal), plane.area)).collect();
+    sections.sort_by(|a, b| a.0.total_cmp(&b.0));
+    // Several parts in one plane are one section.
+    sections.dedup_by(|later, earlier| {
+        let is_same = later.0 - earlier.0 < SAME_PLANE;
+        earlier.1 += if is_same { later.1 } else { 0.0 };
+        is_same
+    });
+    let [(low, first), .., (high, last)] = sections[..] else {
+        return Err("all contours lie in one plane: step the plane between them");
+    };
+    let ends = first * (sections[1].0 - low) + last * (high - sections[sections.len() - 2].0);
+    let between: f64 = sections.windows(2).map(|pair| (pair[1].0 - pair[0].0) * (pair[0].1 + pair[1].1)).sum();
+    Ok((ends + between) / 2.0)
+}
+
+fn rotated(contours: &[Vec<DVec3>], planes: &[Plane]) -> Result<f64, &'static str> {
+    const NEITHER: &str = "the contours lie neither in parallel planes nor in planes through one axis";
+    // The axis is perpendicular to all normals: the sum of their products, with one sense.
+    let mut axis = DVec3::ZERO;
+    for (n, plane) in planes.iter().enumerate() {
+        for other in &planes[n + 1..] {
+            let across = plane.normal.cross(other.normal);
+            axis += if across.dot(axis) < 0.0 { -across } else { across };
+        }
+    }
+    let axis = axis.normalize_or_zero();
+    let middle = centroid(&planes.iter().map(|plane| plane.at).collect::<Vec<_>>());
+    // The point on the axis nearest to all planes, next to their middle.
+    let (mut sums, mut right) = (outer(axis), axis * axis.dot(middle));
+    for plane in planes {
+        sums += outer(plane.normal);
+        right += plane.normal * plane.normal.dot(plane.at);
+    }
+    let through = sums.inverse() * right;
+    let is_through = |plane: &Plane| {
+        plane.normal.dot(axis).abs() < PARALLEL && plane.normal.dot(through - plane.at).abs() <= OFF_AXIS
+    };
+    if axis == DVec3::ZERO || !through.is_finite() || !planes.iter().all(is_through) {
+        return Err(NEITHER);
+    }
+    let reference = planes[0].normal;
+    let mut sections: Vec<(f64, f64)> = contours
+        .iter()
+        .zip(planes)
+        .map(|(contour, plane)| {
+            let outwards = plane.normal.cross(axis).normalize();
+            let turned = plane.normal.cross(reference).dot(axis).atan2(plane.normal.dot(reference)).rem_euclid(PI);
+            // A plane at the angle 0 may be a rounding below half a turn.
+            let turned = if turned > PI - SAME_ANGLE { turned - PI } else { turned };
+            (turned, moment(contour, through, outwards, axis))
+        })
+        .collect();
+    sections.sort_by(|a, b| a.0.total_cmp(&b.0));
+    sections.dedup_by(|later, earlier| {
+        let is_same = later.0 - earlier.0 < SAME_ANGLE;
+        earlier.1 += if is_same { later.1 } else { 0.0 };
+        is_same
+    });
+    let count = sections.len();
+    let gap = |n: usize| match n + 1 == count {
+        true => sections[0].0 + PI - sections[n].0,
+        false => sections[n + 1].0 - sections[n].0,
+    };
+    Ok((0..count).map(|n| sections[n].1 * (gap(n) + gap((n + count - 1) % count)) / 2.0).sum())
+}
+
+fn outer(v: DVec3) -> DMat3 {
+    DMat3::from_cols(v * v.x, v * v.y, v * v.z)
+}
+
+/// The integral of the distance from the axis over the area of a contour, mm^3: what it sweeps in a turn of one radian, of both sides.
+fn moment(contour: &[DVec3], through: DVec3, outwards: DVec3, axis: DVec3) -> f64 {
+    let flat: Vec<[f64; 2]> =
+        contour.iter().map(|p| [(*p - through).dot(outwards), (*p - through).dot(axis)]).collect();
+    let side = |sense: f64| -> f64 {
+        let kept = clipped(&flat, sense);
+        let ends = kept.iter().zip(kept.iter().cycle().skip(1));
+        let sum: f64 = ends.map(|([x, y], [u, v])| (x + u) * (x * v - u * y)).sum();
+        (sum / 6.0).abs()
+    };
+    side(1.0) + side(-1.0)
+}
+
+/// The part of a polygon on one side of the axis (Sutherland and Hodgman).
+fn clipped(polygon: &[[f64; 2]], sense: f64) -> Vec<[f64; 2]> {
+    let mut kept = Vec::new();
+    for (from, to) in polygon.iter().zip(polygon.iter().cycle().skip(1)) {
+        let (a, b) = (from[0] * sense, to[0] * sense);
+        if a >= 0.0 {
+            kept.push(*from);
+        }
+        if (a >= 0.0) != (b >= 0.0) {
+            let share = a / (a - b);
+            kept.push([0.0, from[1] + (to[1] - from[1]) * share]);
+        }
+    }
+    kept
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::measure::shapes::Ellipse;
+
+    const CENTRE: DVec3 = DVec3::new(4.0, 62.0, -3.0);
+
+    /// The section of a ball of 20 mm by a plane, `off` its middle.
+    fn section(normal: DVec3, off: f64) -> Option<Vec<DVec3>> {
+        let radius = (400.0 - off * off).max(0.0).sqrt();
+        let right = normal.any_orthonormal_vector();
+        let (at, up) = (CENTRE + normal * off, normal.cross(right));
+        let ring = Ellipse::of([at - right * radius, at + right * radius, at + up * radius])?;
+        Some(ring.outline(180).collect())
+    }
+
+    const BALL: f64 = 4.0 / 3.0 * PI * 8000.0;
+
+    #[test]
+    fn parallel_contours_of_a_ball_give_its_volume_to_one_percent() {
+        let normal = DVec3::new(0.2, 1.0, -0.4).normalize();
+        for count in [8, 12, 20] {
+            let step = 40.0 / f64::from(count);
+            let stack: Vec<_> =
+                (0..count).filter_map(|n| section(normal, (f64::from(n) + 0.5) * step - 20.0)).collect();
+            let (found, how) = volume(&stack).expect("a volume");
+            assert!(how == Stack::Parallel && (found / BALL - 1.0).abs() < 0.01, "{count}: {found} of {BALL}");
+            // In any order, and whatever the sense of a contour.
+            let mut mixed = stack.clone();
+            mixed.reverse();
+            mixed[0].reverse();
+            assert!((volume(&mixed).expect("a volume").0 - found).abs() < 1e-6 * found);
+        }
+    }
+
+    #[test]
+    fn rotated_contours_of_a_ball_give_its_volume_to_one_percent() {
+        for count in [2, 3, 6] {
+            let axis = DVec3::new(0.1, 1.0, 0.3).normalize();
+            let first = axis.any_orthonormal_vector();
+            let planes = (0..count).map(|n| {
+                let (sin, cos) = (PI * f64::from(n) / f64::from(count)).sin_cos();
+                first * cos + axis.cross(first) * sin
+            });
+            let turned: Vec<_> = planes.filter_map(|normal| section(normal, 0.0)).collect();
+            let (found, how) = volume(&turned).expect("a volume");
+            assert!(how == Stack::Rotated && (found / BALL - 1.0).abs() < 0.002, "{count}: {found} of {BALL}");
+        }
+    }
+
+    /// An ellipsoid with semi-axes 10, 15 and 25 mm, turned about the longest: its sections there are not alike.
+    #[test]
+    fn rotated_contours_follow_a_body_that_is_not_round() {
+        let turned: Vec<Vec<DVec3>> = (0..6)
+            .map(|n| {
+                let (sin, cos) = (PI * f64::from(n) / 6.0).sin_cos();
+                let radius = 1.0 / (cos * cos / 100.0 + sin * sin / 225.0).sqrt();
+                let out = DVec3::new(cos, 0.0, sin) * radius;
+                Ellipse::of([-out, out, DVec3::Y * 25.0]).expect("one").outline(180).collect()
+            })
+            .collect();
+        let (found, truth) = (volume(&turned).expect("a volume").0, 4.0 / 3.0 * PI * 10.0 * 15.0 * 25.0);
+        assert!((found / truth - 1.0).abs() < 0.01, "{found} of {truth}");
+    }
+
+    #[test]
+    fn a_box_by_its_sections_is_exact_and_parts_of_a_plane_are_added() {
+        let square = |x: f64, z: f64| {
+            [[0.0, 0.0], [4.0, 0.0], [4.0, 5.0], [0.0, 5.0]].map(|[u, v]| DVec3::new(x + u, v, z)).to_vec()
+        };
+        let stack = vec![square(0.0, 1.0), square(10.0, 1.0), square(0.0, 3.0), square(10.0, 3.0)];
+        let (found, _) = volume(&stack).expect("a volume");
+        assert!((found - 2.0 * 20.0 * 4.0).abs() < 1e-9, "{found}");
+    }
+
+    #[test]
+    fn contours_that_make_no_volume_are_refused() {
+        let ring = section(DVec3::Y, 0.0).expect("a ring");
+        assert!(volume(std::slice::from_ref(&ring)).is_err());
+        assert!(volume(&[ring.clone(), ring.clone()]).is_err_and(|why| why.contains("one plane")));
+        assert!(volume(&[ring.clone(), vec![DVec3::ONE; 3]]).is_err_and(|why| why.contains("area")));
+        let far: Vec<DVec3> = section(DVec3::X, 0.0).expect("a ring").iter().map(|p| *p + DVec3::X * 50.0).collect();
+        let turned = section(DVec3::new(1.0, 1.0, 1.0).normalize(), 10.0).expect("a ring");
+        assert!(volume(&[ring, far, turned]).is_err_and(|why| why.contains("neither")));
+    }
+}

@@ -1,0 +1,166 @@
+//! The results of measurements: their quantities with units, a label, and all of them as CSV.
+
+use super::contours::{self, Stack};
+use super::shapes::{self, Ellipse};
+use crate::scene::{MeasureKind, Measurement};
+use crate::text::csv_quoted;
+use glam::DVec3;
+use std::fmt::Write as _;
+
+/// A quantity that was measured.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Quantity {
+    pub name: &'static str,
+    pub value: f64,
+    /// mm, cm2, cm3, deg, or nothing for an echo of 0..=255.
+    pub unit: &'static str,
+}
+
+impl Quantity {
+    fn of(name: &'static str, value: f64, unit: &'static str) -> Quantity {
+        Quantity { name, value, unit }
+    }
+
+    /// Value and unit for the user: mm and degrees to a tenth, cm^2 and cm^3 to a hundredth.
+    pub fn shown(&self) -> String {
+        let value = self.value;
+        match self.unit {
+            "mm" => format!("{value:.1} mm"),
+            "deg" => format!("{value:.1}°"),
+            "cm2" => format!("{value:.2} cm²"),
+            "cm3" => format!("{value:.2} cm³"),
+            // An echo of 0..=255, as the colour bar has it.
+            _ => format!("{value:.0}"),
+        }
+    }
+}
+
+fn places(points: &[[f64; 3]]) -> Vec<DVec3> {
+    points.iter().map(|point| DVec3::from(*point)).collect()
+}
+
+/// What a measurement has found, the most important first; nothing for a text and an arrow.
+///
+/// # Errors
+/// In words: why its points measure nothing.
+pub fn quantities(measured: &Measurement) -> Result<Vec<Quantity>, &'static str> {
+    let points = places(&measured.points);
+    Ok(match (measured.kind, &points[..]) {
+        (MeasureKind::Distance, [from, to]) => vec![Quantity::of("distance", from.distance(*to), "mm")],
+        (MeasureKind::Angle, [leg, vertex, other]) => {
+            let angle = shapes::angle(*leg, *vertex, *other).ok_or("a leg of the angle has no length")?;
+            vec![Quantity::of("angle", angle, "deg")]
+        }
+        (MeasureKind::Ellipse, [from, to, side]) => {
+            let ellipse = Ellipse::of([*from, *to, *side]).ok_or("an axis of the ellipse has no length")?;
+            let [long, short] = ellipse.axes();
+            vec![
+                Quantity::of("area", ellipse.area() / 100.0, "cm2"),
+                Quantity::of("circumference", ellipse.circumference(), "mm"),
+                Quantity::of("long axis", long, "mm"),
+                Quantity::of("short axis", short, "mm"),
+            ]
+        }
+        (MeasureKind::Trace, [_, _, _, ..]) => vec![
+            Quantity::of("area", shapes::area(&points) / 100.0, "cm2"),
+            Quantity::of("circumference", shapes::perimeter(&points), "mm"),
+        ],
+        (MeasureKind::Surface, [from, .., to]) => vec![
+            Quantity::of("along the surface", shapes::length(&points), "mm"),
+            Quantity::of("straight", from.distance(*to), "mm"),
+        ],
+        (MeasureKind::Volume, _) => {
+            let contours: Vec<Vec<DVec3>> = measured.contours.iter().map(|contour| places(contour)).collect();
+            let (mm3, how) = contours::volume(&contours)?;
+            let name = match how {
+                Stack::Parallel => "volume by parallel contours",
+                Stack::Rotated => "volume by rotated contours",
+            };
+            vec![Quantity::of(name, mm3 / 1000.0, "cm3")]
+        }
+        (MeasureKind::Threshold, _) => {
+            let counted = measured.counted.ok_or("no voxels were counted")?;
+            let volume = Quantity::of("volume by threshold", counted / 1000.0, "cm3");
+            let threshold = measured.threshold.map(|share| Quantity::of("threshold", share * 255.0, ""));
+            [volume].into_iter().chain(threshold).collect()
+        }
+        (MeasureKind::Text | MeasureKind::Arrow, _) => Vec::new(),
+        _ => return Err("points are missing"),
+    })
+}
+
+/// The label of a measurement on the picture: its number, its text and what it found first. A text and an arrow have their text alone.
+pub fn label(number: usize, measured: &Measurement) -> String {
+    if matches!(measured.kind, MeasureKind::Text | MeasureKind::Arrow) {
+        return measured.text.clone();
+    }
+    let found = match quantities(measured) {
+        Ok(found) => found.first().map_or(String::new(), Quantity::shown),
+        Err(_) => "-".into(),
+    };
+    match measured.text.is_empty() {
+        true => format!("{number}: {found}"),
+        false => format!("{number}: {} {found}", measured.text),
+    }
+}
+
+/// All results as CSV: a line for each quantity. Numbers have a point and four digits behind it.
+pub fn csv(all: &[Measurement]) -> String {
+    let mut text = String::from("number,measurement,text,quantity,value,unit\n");
+    for (n, measured) in all.iter().enumerate() {
+        for Quantity { name, value, unit } in quantities(measured).unwrap_or_default() {
+            let (kind, label) = (measured.kind.title(), csv_quoted(&measured.text));
+            let _ = writeln!(text, "{},{kind},{label},{name},{value:.4},{unit}", n + 1);
+        }
+    }
+    text
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn of(kind: MeasureKind, points: &[[f64; 3]]) -> Measurement {
+        Measurement { kind, points: points.to_vec(), ..Measurement::default() }
+    }
+
+    fn shown(measured: &Measurement) -> Vec<String> {
+        quantities(measured).expect("results").iter().map(Quantity::shown).collect()
+    }
+
+    #[test]
+    fn every_kind_has_its_results_in_the_units_of_the_field() {
+        let points = [[0.0, 10.0, 0.0], [30.0, 10.0, 0.0], [30.0, 30.0, 0.0]];
+        assert_eq!(shown(&of(MeasureKind::Distance, &points[..2])), ["30.0 mm"]);
+        assert_eq!(shown(&of(MeasureKind::Angle, &points)), ["90.0°"]);
+        assert_eq!(shown(&of(MeasureKind::Trace, &points)), ["3.00 cm²", "86.1 mm"]);
+        assert_eq!(shown(&of(MeasureKind::Surface, &points)), ["50.0 mm", "36.1 mm"]);
+        let round = [[-10.0, 0.0, 0.0], [10.0, 0.0, 0.0], [0.0, 0.0, 10.0]];
+        assert_eq!(shown(&of(MeasureKind::Ellipse, &round)), ["3.14 cm²", "62.8 mm", "20.0 mm", "20.0 mm"]);
+        let square =
+            |depth: f64| [[0.0, 0.0], [10.0, 0.0], [10.0, 10.0], [0.0, 10.0]].map(|[x, z]| [x, depth, z]).to_vec();
+        let contours = vec![square(5.0), square(10.0)];
+        let volume = Measurement { kind: MeasureKind::Volume, contours, ..Measurement::default() };
+        assert_eq!(shown(&volume), ["1.00 cm³"]);
+        let counted = Measurement { counted: Some(1234.0), ..of(MeasureKind::Threshold, &points[..2]) };
+        assert_eq!(shown(&counted), ["1.23 cm³"]);
+        assert!(shown(&of(MeasureKind::Text, &points[..1])).is_empty());
+        assert!(quantities(&of(MeasureKind::Angle, &points[..2])).is_err());
+    }
+
+    #[test]
+    fn labels_and_csv_have_the_numbers_of_the_list() {
+        let nose = Measurement {
+            text: "nose, \"long\"".into(),
+            ..of(MeasureKind::Distance, &[[0.0; 3], [0.0, 12.3456, 0.0]])
+        };
+        let note = Measurement { text: "cord".into(), ..of(MeasureKind::Text, &[[0.0; 3]]) };
+        assert_eq!(label(1, &nose), "1: nose, \"long\" 12.3 mm");
+        assert_eq!(label(2, &note), "cord");
+        assert_eq!(label(3, &of(MeasureKind::Distance, &[])), "3: -");
+        assert_eq!(
+            csv(&[note, nose]),
+            "number,measurement,text,quantity,value,unit\n2,Caliper,\"nose, \"\"long\"\"\",distance,12.3456,mm\n"
+        );
+    }
+}

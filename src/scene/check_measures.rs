@@ -1,0 +1,83 @@
+//! Checks of measurements and annotations: their numbers of points, and that every number is one.
+
+use super::check::within;
+use super::{
+    MAX_ALL_POINTS, MAX_CONTOURS, MAX_MEASURES, MAX_POINTS, MAX_TEXT, MeasureKind, Measurement, SceneError, refuse,
+};
+
+/// Farthest place of a point, mm.
+const FARTHEST: f64 = 1e6;
+
+pub(super) fn check_measures(all: &[Measurement]) -> Result<(), SceneError> {
+    if all.len() > MAX_MEASURES {
+        return refuse("measure", format!("has {} entries, at most {MAX_MEASURES}", all.len()));
+    }
+    let count: usize = all.iter().map(Measurement::count).sum();
+    if count > MAX_ALL_POINTS {
+        return refuse("measure", format!("has {count} points in all, at most {MAX_ALL_POINTS}"));
+    }
+    all.iter().enumerate().try_for_each(|(n, measured)| check(n + 1, measured))
+}
+
+fn check(number: usize, measured: &Measurement) -> Result<(), SceneError> {
+    let Measurement { kind, points, contours, text, .. } = measured;
+    let allowed = match (kind.complete_at(), kind) {
+        (Some(count), _) => count..=count,
+        (None, MeasureKind::Volume) => 0..=0,
+        (None, MeasureKind::Trace) => 3..=MAX_POINTS,
+        (None, _) => 2..=MAX_POINTS,
+    };
+    let limits = |what: &str, count: usize, [least, most]: [usize; 2]| {
+        let allowed = if least == most { format!("{least}") } else { format!("{least} to {most}") };
+        refuse("measure", format!("entry {number} ({}): has {count} {what}, must have {allowed}", kind.title()))
+    };
+    if !allowed.contains(&points.len()) {
+        return limits("points", points.len(), [*allowed.start(), *allowed.end()]);
+    }
+    let wanted = if *kind == MeasureKind::Volume { 2..=MAX_CONTOURS } else { 0..=0 };
+    if !wanted.contains(&contours.len()) {
+        return limits("contours", contours.len(), [*wanted.start(), *wanted.end()]);
+    }
+    if let Some(contour) = contours.iter().find(|contour| !(3..=MAX_POINTS).contains(&contour.len())) {
+        return limits("points in a contour", contour.len(), [3, MAX_POINTS]);
+    }
+    for value in points.iter().chain(contours.iter().flatten()).flatten() {
+        within("measure.points", *value, -FARTHEST, FARTHEST)?;
+    }
+    let letters = text.chars().count();
+    if letters > MAX_TEXT || text.chars().any(char::is_control) {
+        let fault = format!("entry {number}: must be one line of at most {MAX_TEXT} characters, has {letters}");
+        return refuse("measure.text", fault);
+    }
+    within("measure.threshold", measured.threshold.unwrap_or(0.0), 0.0, 1.0)?;
+    within("measure.counted", measured.counted.unwrap_or(0.0), 0.0, 1e18)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn of(kind: MeasureKind, count: usize) -> Measurement {
+        Measurement { kind, points: vec![[1.0, 2.0, 3.0]; count], ..Measurement::default() }
+    }
+
+    #[test]
+    fn wrong_measurements_are_refused_in_one_line_that_names_them() {
+        for kind in MeasureKind::ALL {
+            let right = match kind {
+                MeasureKind::Volume => {
+                    Measurement { contours: vec![vec![[0.0; 3]; 3]; 2], ..of(MeasureKind::Volume, 0) }
+                }
+                kind => of(kind, kind.complete_at().unwrap_or(3)),
+            };
+            assert!(check_measures(std::slice::from_ref(&right)).is_ok(), "{kind:?}");
+            let fault = check_measures(&[right, of(kind, 1000)]).expect_err("too many points").to_string();
+            assert!(fault.contains("entry 2") && fault.contains("1000"), "{fault}");
+        }
+        let far = Measurement { points: vec![[f64::NAN, 0.0, 0.0], [0.0; 3]], ..Measurement::default() };
+        assert!(check_measures(&[far]).is_err());
+        let long = Measurement { text: "a\nb".into(), ..of(MeasureKind::Text, 1) };
+        assert!(check_measures(&[long]).is_err());
+        assert!(check_measures(&vec![of(MeasureKind::Text, 1); 65]).is_err());
+    }
+}

@@ -1,0 +1,88 @@
+//! The projection of the rendered part of a picture: from points in space to pixels, and from pixels to rays.
+
+use super::planes::cell;
+use super::{Layout, Rays, Scene};
+use glam::DVec3;
+
+/// The projection of the rendered part of the picture. Positions are in pixels of the picture from its upper left corner.
+pub struct Picker<'a> {
+    rays: &'a Rays,
+    /// Columns and rows of the picture before the rendered part; in a pair, the surface.
+    corner: [f64; 2],
+    size: [f64; 2],
+    /// Rays along each edge of a pixel; 0.5 at half resolution.
+    rays_per_pixel: f64,
+}
+
+impl<'a> Picker<'a> {
+    pub fn of(scene: &'a Scene) -> Picker<'a> {
+        let size = scene.picture_size();
+        let corner = match scene.settings.layout {
+            Layout::Single => [0, 0],
+            Layout::Four => size.map(|n| cell(n, 1, 2)),
+            Layout::Pair => [cell(size[0], 1, 2), 0],
+        };
+        let ray = &scene.settings.ray;
+        Picker {
+            rays: &scene.rays,
+            corner: corner.map(f64::from),
+            size: std::array::from_fn(|a| f64::from(size[a] - corner[a])),
+            rays_per_pixel: f64::from(ray.rays) / f64::from(ray.apart()),
+        }
+    }
+
+    /// Columns and rows of the picture before the rendered part; in a pair, the surface.
+    pub fn corner(&self) -> [f64; 2] {
+        self.corner
+    }
+
+    /// Width and height of the rendered part, pixels.
+    pub fn size(&self) -> [f64; 2] {
+        self.size
+    }
+
+    /// The centre of the rendered part, where the camera's target is.
+    pub fn centre(&self) -> [f64; 2] {
+        std::array::from_fn(|a| self.corner[a] + self.size[a] / 2.0)
+    }
+
+    /// Origin and unit direction of the ray through a position on the picture.
+    pub fn ray(&self, at: [f64; 2]) -> (DVec3, DVec3) {
+        let [x, y] = self.in_rays(at);
+        self.rays.at(x, y)
+    }
+
+    /// A position on the picture in rays from the first.
+    fn in_rays(&self, at: [f64; 2]) -> [f64; 2] {
+        std::array::from_fn(|a| (at[a] - self.corner[a]) * self.rays_per_pixel)
+    }
+
+    /// The column and row of the ray nearest to a position on the picture, and that ray; none beside the rendered part. `rays`: their number
+    /// along each axis.
+    pub fn nearest_ray(&self, at: [f64; 2], rays: [u32; 2]) -> Option<([usize; 2], (DVec3, DVec3))> {
+        let place = self.in_rays(at).map(f64::floor);
+        let is_in = (0..2).all(|a| place[a] >= 0.0 && place[a] < f64::from(rays[a]));
+        is_in.then(|| (place.map(|n| n as usize), self.rays.at(place[0] + 0.5, place[1] + 0.5)))
+    }
+
+    /// The position on the picture of a point in space; none behind the camera.
+    pub fn project(&self, point: DVec3) -> Option<[f64; 2]> {
+        let r = self.rays;
+        let from = point - r.origin;
+        let away = from.dot(r.forward);
+        if r.is_perspective && away <= 0.0 {
+            return None;
+        }
+        let (dx, dy) = (r.origin_dx + r.direction_dx * away, r.origin_dy + r.direction_dy * away);
+        let across = from - r.direction * away;
+        let [x, y] = [across.dot(dx) / dx.length_squared(), across.dot(dy) / dy.length_squared()];
+        let at = [x / self.rays_per_pixel + self.corner[0], y / self.rays_per_pixel + self.corner[1]];
+        at.iter().all(|v| v.is_finite()).then_some(at)
+    }
+
+    /// Size of a pixel at the distance of the camera's target, mm.
+    pub fn mm_per_pixel(&self) -> f64 {
+        let away = (self.rays.target - self.rays.origin).dot(self.rays.forward);
+        (self.rays.origin_dx + self.rays.direction_dx * away).length() * self.rays_per_pixel
+    }
+}

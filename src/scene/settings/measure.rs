@@ -1,0 +1,115 @@
+//! Settings of measurements and annotations: calipers, contours, texts and arrows in the space of the volume. No pass reads them: the viewer
+//! draws them over the picture, and `render` into the picture that it writes.
+
+use serde::{Deserialize, Serialize};
+
+/// Most measurements and annotations of a scene.
+pub const MAX_MEASURES: usize = 64;
+/// Most points of a measurement, or of one of its contours.
+pub const MAX_POINTS: usize = 512;
+/// Most points of all measurements of a scene.
+pub const MAX_ALL_POINTS: usize = 20_000;
+/// Most contours of a volume.
+pub const MAX_CONTOURS: usize = 64;
+/// Longest text of a measurement, characters.
+pub const MAX_TEXT: usize = 80;
+
+/// A measurement or an annotation. It keeps its place in the volume whatever the view.
+#[derive(Clone, Debug, Default, PartialEq, Deserialize, Serialize)]
+#[serde(deny_unknown_fields)]
+pub struct Measurement {
+    /// What is measured.
+    pub kind: MeasureKind,
+    /// Its points in mm: lateral, depth (from the probe's face), elevation. A distance and an arrow (tip first) have 2, an angle has 3 (its vertex is
+    /// the second), an ellipse has 3 (the ends of one axis and one of the other), a text has 1, a threshold volume has 2 corners of its box; a
+    /// trace and a distance on the surface have 2 to 512.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub points: Vec<[f64; 3]>,
+    /// Of a volume: its contours, each of 3 to 512 points in mm, in parallel planes or in planes through one axis. At most 64.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub contours: Vec<Vec<[f64; 3]>>,
+    /// Text beside it, at most 80 characters.
+    #[serde(default, skip_serializing_if = "String::is_empty")]
+    pub text: String,
+    /// Of a threshold volume: the echo from which on a voxel counts, 0..=1 of the sample range.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub threshold: Option<f64>,
+    /// Of a threshold volume: what was counted, mm^3. It belongs to the volume that was shown then.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub counted: Option<f64>,
+    /// Its points were picked on the rendered surface: it is drawn on renderings. Others are drawn on the planes that they lie in.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub on_surface: bool,
+}
+
+/// What is measured or marked.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum MeasureKind {
+    /// Caliper: the straight distance of two points.
+    #[default]
+    Distance,
+    /// The angle between two legs.
+    Angle,
+    /// Area and circumference of an ellipse.
+    Ellipse,
+    /// Area and circumference of a closed contour.
+    Trace,
+    /// Length along the rendered surface.
+    Surface,
+    /// Volume by contours: area times distance, or turned about an axis.
+    Volume,
+    /// Volume of the voxels of a box whose echo reaches a threshold.
+    Threshold,
+    /// A text at a point.
+    Text,
+    /// An arrow with a text at its tail.
+    Arrow,
+}
+
+impl Measurement {
+    /// Number of its points, those of its contours included.
+    pub fn count(&self) -> usize {
+        self.points.len() + self.contours.iter().map(Vec::len).sum::<usize>()
+    }
+}
+
+impl MeasureKind {
+    /// All kinds, in the order of their buttons.
+    pub const ALL: [MeasureKind; 9] = [
+        MeasureKind::Distance,
+        MeasureKind::Angle,
+        MeasureKind::Ellipse,
+        MeasureKind::Trace,
+        MeasureKind::Surface,
+        MeasureKind::Volume,
+        MeasureKind::Threshold,
+        MeasureKind::Text,
+        MeasureKind::Arrow,
+    ];
+
+    /// Its name for the user.
+    pub fn title(self) -> &'static str {
+        match self {
+            MeasureKind::Distance => "Caliper",
+            MeasureKind::Angle => "Angle",
+            MeasureKind::Ellipse => "Ellipse",
+            MeasureKind::Trace => "Trace",
+            MeasureKind::Surface => "Surface",
+            MeasureKind::Volume => "Volume",
+            MeasureKind::Threshold => "Threshold volume",
+            MeasureKind::Text => "Text",
+            MeasureKind::Arrow => "Arrow",
+        }
+    }
+
+    /// How many points complete it; none for those that the user ends.
+    pub fn complete_at(self) -> Option<usize> {
+        match self {
+            MeasureKind::Text => Some(1),
+            MeasureKind::Distance | MeasureKind::Arrow | MeasureKind::Threshold => Some(2),
+            MeasureKind::Angle | MeasureKind::Ellipse => Some(3),
+            MeasureKind::Trace | MeasureKind::Surface | MeasureKind::Volume => None,
+        }
+    }
+}

@@ -1,0 +1,323 @@
+//! Measuring in the console: points of the rendered surface, counted voxels, typed texts, and results that leave the program.
+
+use super::Console;
+use crate::gpu::Wake;
+use crate::measure::{outcome, voxels};
+use crate::passes::chain;
+use crate::scene::picker::Picker;
+use crate::scene::{MeasureKind, Measurement, Mode, Scene, insonified_box};
+use crate::source::Frame;
+use crate::source::convert::Volume;
+use crate::ui::command::{Command, Tool};
+use crate::ui::input::{Input, Key};
+use crate::workspace;
+use glam::DVec3;
+use std::sync::Arc;
+use std::sync::mpsc::{Receiver, TryRecvError, channel};
+use std::time::Instant;
+
+/// Distances along a ray from here on mean that it met no surface, mm.
+const MISSED: f64 = 1e30;
+/// Distance between the points of a path along the surface, mm: less would follow the noise of the surface.
+const PATH_STEP: f64 = 1.0;
+/// Most points of such a path.
+const PATH_POINTS: usize = 256;
+/// Edge of the voxels that are counted, mm.
+const VOXEL: f64 = 0.5;
+
+/// Counts voxels in a thread.
+pub(super) struct Counting {
+    wake: Wake,
+    counted: Option<Receiver<Option<Measurement>>>,
+}
+
+impl Counting {
+    pub(super) fn new(wake: Wake) -> Counting {
+        Counting { wake, counted: None }
+    }
+}
+
+/// The points of the rendered surface.
+struct SurfaceMap<'a> {
+    picker: Picker<'a>,
+    size: [u32; 2],
+    distances: crate::passes::Texels,
+}
+
+impl SurfaceMap<'_> {
+    /// The point under a pixel of the picture; none where no surface is.
+    fn at(&self, pixel: [f64; 2]) -> Option<DVec3> {
+        let ([x, y], (origin, direction)) = self.picker.nearest_ray(pixel, self.size)?;
+        let away = self.distances.one(x, y, 0);
+        (away < MISSED && away > -MISSED).then(|| origin + direction * away)
+    }
+
+    /// The points of the surface along a straight line on the picture between two points on it.
+    fn path(&self, from: DVec3, to: DVec3) -> Option<Vec<DVec3>> {
+        let (a, b) = (self.picker.project(from)?, self.picker.project(to)?);
+        let pixels = (b[0] - a[0]).hypot(b[1] - a[1]);
+        let count = (pixels * self.picker.mm_per_pixel() / PATH_STEP).ceil().clamp(1.0, PATH_POINTS as f64) as usize;
+        let share = |n: usize| n as f64 / count as f64;
+        let between = (1..count).filter_map(|n| self.at([0, 1].map(|i| a[i] + (b[i] - a[i]) * share(n))));
+        Some([from].into_iter().chain(between).chain([to]).collect())
+    }
+}
+
+impl Console {
+    /// Picks the point of the surface under a pixel of the picture, for the tool in use.
+    pub(super) fn pick_surface(&mut self, pixel: [f64; 2]) {
+        let Tool::Measure(kind) = self.controls.tool() else { return };
+        match self.picked(kind, pixel) {
+            Ok(Some(measured)) => {
+                let change = self.controls.add_measure(measured);
+                if let crate::ui::controls::Change::Refused(why) = change {
+                    self.notify(why, true);
+                }
+                self.last_change = Instant::now();
+            }
+            Ok(None) => {}
+            Err(why) => self.notify(&why, true),
+        }
+    }
+
+    /// Handles a picked pixel: a complete distance along the surface, or a point of another measurement, which is set at once.
+    fn picked(&mut self, kind: MeasureKind, pixel: [f64; 2]) -> Result<Option<Measurement>, String> {
+        if matches!(kind, MeasureKind::Trace | MeasureKind::Volume | MeasureKind::Ellipse) {
+            return Err("Outlines are traced on a plane: choose Plane, 3 planes or 4-up".into());
+        }
+        // Undo may have taken the first end back.
+        let is_begun = self.controls.work().is_some_and(|work| work.kind == MeasureKind::Surface);
+        let from = self.surface_from.filter(|_| is_begun);
+        let no_surface = "Points on a rendering need its surface: choose the mode Surface or Mixed";
+        let renderer = self.stream.renderer().filter(|r| r.has_drawn()).ok_or("There is no picture yet")?;
+        let slot = match renderer.scene().has_distance() {
+            true => chain::distance_end(renderer.scene()),
+            false => return Err(no_surface.into()),
+        };
+        let distances = renderer.read(slot).map_err(|e| e.to_string())?.ok_or(no_surface)?;
+        let scene = renderer.scene();
+        let map = SurfaceMap { picker: Picker::of(scene), size: scene.ray_size(), distances };
+        let place = map.at(pixel).ok_or("There is no surface at this place")?;
+        let point = scene.point_of(place);
+        if kind != MeasureKind::Surface {
+            let now = Instant::now();
+            self.execute(&Command::Point(point, true), now);
+            return Ok(None);
+        }
+        let Some(from) = from else {
+            self.surface_from = Some(place);
+            let now = Instant::now();
+            self.execute(&Command::Point(point, true), now);
+            return Ok(None);
+        };
+        let path = map.path(from, place).ok_or("The first end is behind the camera: turn the view back")?;
+        let points = path.into_iter().map(|place| scene.point_of(place)).collect();
+        self.surface_from = None;
+        self.controls.leave_work();
+        Ok(Some(Measurement { kind, points, on_surface: true, ..Measurement::default() }))
+    }
+
+    /// Begins to count the voxels of the region whose echo reaches the threshold of the mode.
+    pub(super) fn count_voxels(&mut self) {
+        match self.voxels_to_count() {
+            Ok(count) => {
+                let (sender, receiver) = channel();
+                let wake = self.counting.wake.clone();
+                let work = move || {
+                    let _ = sender.send(count());
+                    wake();
+                };
+                match std::thread::Builder::new().name("counting".into()).spawn(work) {
+                    Ok(_) => {
+                        self.counting.counted = Some(receiver);
+                        self.notify("Counting the voxels of the region", false);
+                    }
+                    Err(e) => self.notify(&format!("No voxels are counted: {e}"), true),
+                }
+            }
+            Err(why) => self.notify(why, true),
+        }
+    }
+
+    /// What counts the voxels of the volume that is shown.
+    fn voxels_to_count(&self) -> Result<impl FnOnce() -> Option<Measurement> + Send + 'static, &'static str> {
+        if self.counting.counted.is_some() {
+            return Err("Voxels are being counted: wait a moment");
+        }
+        let (Some(scene), Some(header)) = (self.stream.scene(), self.stream.header()) else {
+            return Err("There is no volume yet");
+        };
+        let volumes = self.stream.cine().volumes();
+        let shown = self.stream.cine_position().and_then(|at| volumes.get(at)).or(volumes.back());
+        let frames = shown.map(|kept| kept.frames.clone()).ok_or("No volume is in the cine loop: --cine keeps some")?;
+        let is_backward = frames.first().is_some_and(|frame| frame.backward);
+        let geometry = if is_backward { header.backward.clone() } else { header.forward.clone() };
+        let (stored, [low, high]) = (header.stored, header.range);
+        let found = self.controls.found_threshold();
+        let threshold =
+            threshold(scene).or(found).ok_or("The threshold is 0: choose Surface or Volume and raise it")?;
+        let (least, most) = insonified_box(&scene.geometry);
+        let corners = [scene.low.max(least), scene.high.min(most)];
+        let points = corners.map(|corner| scene.point_of(corner)).to_vec();
+        Ok(move || {
+            let mut volume = Volume::new(geometry, stored);
+            frames.iter().for_each(|frame: &Arc<Frame>| volume.take((**frame).clone()));
+            let counted = voxels::count(&volume, corners, VOXEL, low + threshold * (high - low))?;
+            let (kind, counted) = (MeasureKind::Threshold, Some(counted.volume));
+            Some(Measurement { kind, points, threshold: Some(threshold), counted, ..Measurement::default() })
+        })
+    }
+
+    /// Takes what was counted.
+    pub(super) fn poll_counting(&mut self) {
+        let counted = match self.counting.counted.as_ref().map(Receiver::try_recv) {
+            None | Some(Err(TryRecvError::Empty)) => return,
+            Some(Ok(counted)) => counted,
+            Some(Err(TryRecvError::Disconnected)) => None,
+        };
+        (self.counting.counted, self.needs_redraw) = (None, true);
+        match counted.map(|measured| self.controls.add_measure(measured)) {
+            Some(crate::ui::controls::Change::Refused(why)) => self.notify(why, true),
+            Some(_) => self.last_change = Instant::now(),
+            None => self.notify("The voxels cannot be counted: the region is empty", true),
+        }
+    }
+
+    /// Copies the results as CSV.
+    pub(super) fn copy_measures(&mut self) {
+        if self.controls.measures().is_empty() {
+            return self.notify("There are no measurements yet", true);
+        }
+        match self.clipboard.copy(outcome::csv(self.controls.measures())) {
+            Ok(()) => self.notify("The results are copied as CSV", false),
+            Err(fault) => {
+                self.notify(&format!("There is no clipboard ({fault}): the results are saved instead"), true);
+                self.save_measures();
+            }
+        }
+    }
+
+    /// Saves the results as a CSV file.
+    pub(super) fn save_measures(&mut self) {
+        let saved = match self.controls.measures().is_empty() {
+            true => Err("there are no measurements yet".into()),
+            false => self.exporter.text("csv", outcome::csv(self.controls.measures())),
+        };
+        if let Err(fault) = saved {
+            self.notify(&format!("The results were not saved: {fault}"), true);
+        }
+    }
+
+    /// Saves settings, recording and measurements as a workspace.
+    pub(super) fn save_workspace(&mut self) {
+        let origin = self.fixed.origin.clone().ok_or_else(|| "this view has none".to_string());
+        let saved = origin.and_then(|mut origin| {
+            let volumes = self.stream.cine().volumes();
+            let shown = self.stream.cine_position().and_then(|at| volumes.get(at)).filter(|_| self.fixed.plays_once);
+            origin.volume = shown.map_or(0, |kept| kept.volume as usize);
+            let is_live = origin.recording.is_none();
+            let text = workspace::text(self.controls.settings(), &origin)?;
+            self.exporter.text("toml", text).map(|()| is_live)
+        });
+        match saved {
+            Ok(false) => {}
+            Ok(true) => self.notify("The volumes are live and in no file: save the loop too (R)", false),
+            Err(fault) => self.notify(&format!("The workspace was not saved: {fault}"), true),
+        }
+    }
+
+    /// Leaves what is being measured, or typed, or the tool. False if nothing is.
+    pub(super) fn leave_measuring(&mut self) -> bool {
+        self.surface_from = None;
+        if self.controls.work().is_some() || self.controls.typing().is_some() {
+            self.execute(&Command::CancelMeasure, Instant::now());
+            return true;
+        }
+        let is_measuring = matches!(self.controls.tool(), Tool::Measure(_));
+        if is_measuring {
+            self.execute(&Command::Tool(Tool::default()), Instant::now());
+        }
+        is_measuring
+    }
+
+    /// The commands of a key that is typed into a text, ends a contour, or chooses a file. None if the key is one of the view's own.
+    pub(super) fn typed(&mut self, input: &Input) -> Option<Vec<Command>> {
+        let Input::Key { key, pressed: true } = *input else { return None };
+        let modifiers = self.keys.modifiers();
+        if modifiers.control || modifiers.alt || self.asks_to_leave {
+            return None;
+        }
+        if self.opening.is_shown() {
+            return match key {
+                Key::Char(digit @ '1'..='9') => Some(vec![Command::OpenFile(digit as usize - '1' as usize)]),
+                Key::Escape => None,
+                _ => Some(Vec::new()),
+            };
+        }
+        if self.controls.typing().is_some() {
+            return Some(match key {
+                Key::Char(letter) if modifiers.shift => letter.to_uppercase().map(Command::Type).collect(),
+                Key::Char(letter) => vec![Command::Type(letter)],
+                Key::Space => vec![Command::Type(' ')],
+                Key::Backspace => vec![Command::Untype],
+                Key::Enter | Key::Escape => vec![Command::EndTyping],
+                _ => Vec::new(),
+            });
+        }
+        (key == Key::Enter && self.controls.work().is_some()).then(|| vec![Command::EndMeasure])
+    }
+}
+
+/// The threshold of the mode, as a share of the sample range; none if there is none.
+fn threshold(scene: &Scene) -> Option<f64> {
+    let settings = &scene.settings;
+    let (share, [low, high]) = match settings.mode {
+        Mode::Surface => (settings.surface.threshold, settings.surface.window),
+        Mode::Volume | Mode::Mixed => (settings.volume.threshold, settings.volume.window),
+        _ => return None,
+    };
+    (share > 0.0).then(|| (low + share * (high - low)).clamp(0.0, 1.0))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::measure::shapes;
+    use crate::passes::Texels;
+    use crate::probe::{Geometry, Grid};
+    use crate::scene::{Input as Samples, load::Layers};
+    use crate::source::StoredType;
+
+    /// A ball of 15 mm, as a distance map shows it: the path along it is an arc of known length.
+    #[test]
+    fn a_path_along_a_ball_has_the_length_of_its_arc() {
+        for toml in [&["picture.size=[300,240]"][..], &["picture.size=[301,240]", "layout='four'", "camera.azimuth=30"]]
+        {
+            let mut layers = Layers::default();
+            toml.iter().for_each(|line| layers.set(line).expect(line));
+            let grid = Grid { size: [41, 41, 41], spacing: [1.0; 3], origin: [-20.0, 0.0, -20.0] };
+            let input = Samples { stored: StoredType::U8, range: [0.0, 255.0] };
+            let scene =
+                Scene::new(Geometry::Cartesian(grid), input, layers.finish().expect("settings")).expect("scene");
+            let (centre, radius) = (scene.rays.target, 15.0);
+            let size = scene.ray_size();
+            let distances = Texels::from_fn([size[0] as usize, size[1] as usize, 1], 1, |[x, y, _], _| {
+                let (origin, direction) = scene.rays.at(x as f64 + 0.5, y as f64 + 0.5);
+                let middle = (centre - origin).dot(direction);
+                let off = (origin + direction * middle - centre).length_squared();
+                if off < radius * radius { middle - (radius * radius - off).sqrt() } else { f64::from(f32::MAX) }
+            });
+            let map = SurfaceMap { picker: Picker::of(&scene), size, distances };
+            let on_ball = |angle: f64| {
+                let place = centre + (scene.rays.right * angle.sin() - scene.rays.forward * angle.cos()) * radius;
+                let pixel = map.picker.project(place).expect("in front");
+                map.at(pixel).expect("on the ball")
+            };
+            let ends = [on_ball(-0.6), on_ball(0.7)];
+            let path = map.path(ends[0], ends[1]).expect("a path");
+            let (found, truth) = (shapes::length(&path), 1.3 * radius);
+            assert!((found / truth - 1.0).abs() < 0.01, "{found} of {truth}");
+            assert!(map.at([0.5, 0.5]).is_none(), "beside the ball");
+        }
+    }
+}

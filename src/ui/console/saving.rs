@@ -1,0 +1,50 @@
+//! Saving what is shown: the picture, and the cine loop.
+
+use super::Console;
+use crate::marked;
+use std::time::SystemTime;
+
+impl Console {
+    /// Saves the picture that is shown, with its measurements, and its bar if that is switched on.
+    pub(super) fn save_picture(&mut self) {
+        let picture = match self.stream.renderer().filter(|renderer| renderer.has_drawn()) {
+            Some(renderer) => match renderer.end_picture() {
+                Ok(picture) => {
+                    let mut scene = renderer.scene().clone();
+                    scene.settings.measure = self.controls.measures().to_vec();
+                    Ok((picture, scene))
+                }
+                Err(fault) => Err(fault.to_string()),
+            },
+            None => Err("there is no picture yet".into()),
+        };
+        let (has_bar, time) = (self.saves_bar, marked::time_line(SystemTime::now()));
+        let origin = self.fixed.source.origin();
+        let saved = picture.and_then(|(picture, scene)| {
+            self.exporter.picture(move || match has_bar {
+                true => marked::marked(&picture, &scene, &time, origin),
+                false => marked::measured(&picture, &scene),
+            })
+        });
+        if let Err(fault) = saved {
+            self.notify(&format!("The picture was not saved: {fault}"), true);
+        }
+    }
+
+    /// Saves the cine loop. False if it cannot be.
+    pub(super) fn save_loop(&mut self) -> bool {
+        let volumes: Vec<_> = self.stream.cine().volumes().iter().cloned().collect();
+        let saved = match self.stream.header() {
+            Some(header) if !volumes.is_empty() => {
+                let header = header.clone();
+                self.exporter.volumes(header, volumes)
+            }
+            _ => Err("there are no volumes yet".into()),
+        };
+        self.saving_volume = self.stream.cine().volumes().back().map(|kept| kept.volume).filter(|_| saved.is_ok());
+        if let Err(fault) = &saved {
+            self.notify(&format!("The loop was not saved: {fault}"), true);
+        }
+        saved.is_ok()
+    }
+}

@@ -1,0 +1,63 @@
+//! Undo and redo: the settings before each change. A drag or a held key is one step.
+
+use crate::scene::Settings;
+use crate::ui::command::Command;
+
+/// Most steps that can be undone.
+const MAX_STEPS: usize = 100;
+
+/// The settings of earlier and of undone steps.
+#[derive(Clone, Debug, Default)]
+pub(super) struct History {
+    past: Vec<Settings>,
+    future: Vec<Settings>,
+    /// The command of the last step while it may go on.
+    last: Option<Command>,
+}
+
+impl History {
+    /// Records the settings before a change by a command. What was undone before is gone.
+    pub(super) fn record(&mut self, before: Settings, command: &Command) {
+        self.future.clear();
+        let goes_on = self.last.as_ref().is_some_and(|last| command.continues(last));
+        self.last = Some(*command);
+        if goes_on {
+            return;
+        }
+        if self.past.len() == MAX_STEPS {
+            self.past.remove(0);
+        }
+        self.past.push(before);
+    }
+
+    /// The next change is a step of its own, even by the same command.
+    pub(super) fn seal(&mut self) {
+        self.last = None;
+    }
+
+    /// The settings before the last step; `now` can be restored by [`History::redo`].
+    pub(super) fn undo(&mut self, now: &Settings) -> Option<Settings> {
+        self.last = None;
+        let before = self.past.pop()?;
+        self.future.push(now.clone());
+        Some(before)
+    }
+
+    /// The settings after the step that was undone last.
+    pub(super) fn redo(&mut self, now: &Settings) -> Option<Settings> {
+        self.last = None;
+        let after = self.future.pop()?;
+        self.past.push(now.clone());
+        Some(after)
+    }
+
+    /// Whether there is something to undo, and to redo.
+    pub(super) fn has(&self) -> [bool; 2] {
+        [!self.past.is_empty(), !self.future.is_empty()]
+    }
+
+    /// Forgets everything: the settings follow from another source.
+    pub(super) fn clear(&mut self) {
+        *self = History::default();
+    }
+}

@@ -1,0 +1,207 @@
+//! Measurements and annotations: points make them, one at a time, and commands bend, label and delete them.
+
+use super::{Change, Controls};
+use crate::measure::outcome;
+use crate::scene::{MAX_ALL_POINTS, MAX_CONTOURS, MAX_MEASURES, MAX_POINTS, MAX_TEXT, MeasureKind, Measurement};
+use crate::ui::command::{Command, Tool};
+
+/// Farthest place of a point, mm.
+const FARTHEST: f64 = 1e6;
+const FULL: &str = "There are as many measurements as a scene can have: delete one first.";
+
+impl Controls {
+    /// The measurements and annotations, in the order of their numbers.
+    pub fn measures(&self) -> &[Measurement] {
+        &self.settings.measure
+    }
+
+    /// The measurement whose points are being set.
+    pub fn work(&self) -> Option<&Measurement> {
+        self.work.as_ref()
+    }
+
+    /// The index of the measurement whose text is being typed.
+    pub fn typing(&self) -> Option<usize> {
+        self.typing
+    }
+
+    /// The threshold between the darker and the brighter echoes of the source, as a share of the sample range; none before its first volume.
+    pub(in crate::ui) fn found_threshold(&self) -> Option<f64> {
+        self.defaults.as_ref()?.levels.as_ref().map(|levels| levels.threshold)
+    }
+
+    /// Adds a measurement that is complete.
+    pub(in crate::ui) fn add_measure(&mut self, measured: Measurement) -> Change {
+        if self.is_full(measured.count()) {
+            return Change::Refused(FULL);
+        }
+        if let Err(why) = outcome::quantities(&measured) {
+            return Change::Refused(why);
+        }
+        let has_text = matches!(measured.kind, MeasureKind::Text | MeasureKind::Arrow);
+        self.change_measures(&Command::EndMeasure, |all| all.push(measured));
+        self.typing = has_text.then(|| self.settings.measure.len() - 1);
+        Change::Marks
+    }
+
+    /// Applies a command about measurements; none if it is about something else.
+    pub(super) fn measure(&mut self, command: &Command) -> Option<Change> {
+        Some(match *command {
+            Command::Point(point, on_surface) => self.add_point(point, on_surface),
+            Command::EndMeasure => self.end_work(),
+            Command::CancelMeasure => match (self.work.take(), self.typing.take()) {
+                (None, None) => Change::Nothing,
+                _ => Change::Marks,
+            },
+            Command::MovePoint(index, point, to) if is_place(to) => {
+                let there = self.settings.measure.get(index).filter(|measured| measured.kind != MeasureKind::Surface);
+                match there.and_then(|measured| measured.points.get(point)) {
+                    Some(was) if *was != to => self.change_measures(command, |all| all[index].points[point] = to),
+                    _ => Change::Nothing,
+                }
+            }
+            Command::DeleteMeasure(index) => {
+                let last = self.settings.measure.len().checked_sub(1)?;
+                self.typing = None;
+                self.change_measures(command, |all| _ = all.remove(index.min(last)))
+            }
+            Command::ClearMeasures if !self.settings.measure.is_empty() => {
+                self.typing = None;
+                self.change_measures(command, Vec::clear)
+            }
+            Command::LabelMeasure(index) if index < self.settings.measure.len() => {
+                self.history.seal();
+                self.typing = Some(index);
+                Change::Marks
+            }
+            Command::Type(letter) if !letter.is_control() => self.change_text(command, |text| {
+                if text.chars().count() < MAX_TEXT {
+                    text.push(letter);
+                }
+            }),
+            Command::Untype => self.change_text(command, |text| _ = text.pop()),
+            Command::EndTyping => match self.typing.take() {
+                // A text that says nothing is none.
+                Some(index) if self.settings.measure.get(index).is_some_and(is_empty_text) => {
+                    self.change_measures(command, |all| _ = all.remove(index))
+                }
+                Some(_) => Change::Marks,
+                None => Change::Nothing,
+            },
+            Command::MovePoint(..) | Command::ClearMeasures | Command::LabelMeasure(_) | Command::Type(_) => {
+                Change::Nothing
+            }
+            _ => return None,
+        })
+    }
+
+    /// Leaves the measurement in work.
+    pub(in crate::ui) fn leave_work(&mut self) {
+        self.work = None;
+    }
+
+    /// Takes back the last point of the measurement in work. False if there is none.
+    pub(super) fn undo_point(&mut self) -> bool {
+        let Some(work) = &mut self.work else { return false };
+        if work.points.pop().is_none() {
+            work.contours.pop();
+        }
+        if work.points.is_empty() && work.contours.is_empty() {
+            self.work = None;
+        }
+        true
+    }
+
+    /// Changes the list as a step that can be undone.
+    fn change_measures(&mut self, command: &Command, change: impl FnOnce(&mut Vec<Measurement>)) -> Change {
+        let before = self.settings.clone();
+        change(&mut self.settings.measure);
+        self.history.record(before, command);
+        Change::Marks
+    }
+
+    /// True if so many more points are too many.
+    fn is_full(&self, more: usize) -> bool {
+        let there: usize = self.settings.measure.iter().map(Measurement::count).sum();
+        self.settings.measure.len() >= MAX_MEASURES || there + more > MAX_ALL_POINTS
+    }
+
+    fn change_text(&mut self, command: &Command, change: impl FnOnce(&mut String)) -> Change {
+        match self.typing.filter(|index| *index < self.settings.measure.len()) {
+            Some(index) => self.change_measures(command, |all| change(&mut all[index].text)),
+            None => Change::Nothing,
+        }
+    }
+
+    fn add_point(&mut self, point: [f64; 3], on_surface: bool) -> Change {
+        let Tool::Measure(kind) = self.tool else { return Change::Nothing };
+        if !is_place(point) || kind == MeasureKind::Threshold {
+            return Change::Nothing;
+        }
+        if self.work.is_none() && self.is_full(1) {
+            return Change::Refused(FULL);
+        }
+        let fits = |work: &Measurement| work.kind == kind && work.on_surface == on_surface;
+        let new = || Measurement { kind, on_surface, ..Measurement::default() };
+        let mut work = self.work.take().filter(fits).unwrap_or_else(new);
+        self.typing = None;
+        // A tenth of a micrometre: files stay short.
+        let point = point.map(|mm| (mm * 1e4).round() / 1e4);
+        if work.points.len() < MAX_POINTS && work.points.last() != Some(&point) {
+            work.points.push(point);
+        }
+        if kind.complete_at() != Some(work.points.len()) {
+            self.work = Some(work);
+            return Change::Marks;
+        }
+        match self.add_measure(work.clone()) {
+            Change::Refused(why) => {
+                // The last point was set where it measures nothing.
+                work.points.pop();
+                self.work = Some(work);
+                Change::Refused(why)
+            }
+            change => change,
+        }
+    }
+
+    /// Closes the contour in work; of a volume without one, ends the volume.
+    fn end_work(&mut self) -> Change {
+        let Some(mut work) = self.work.take() else { return Change::Nothing };
+        match work.kind {
+            MeasureKind::Trace | MeasureKind::Surface | MeasureKind::Volume => {}
+            // Others end by their number of points.
+            _ => {
+                self.work = Some(work);
+                return Change::Nothing;
+            }
+        }
+        if work.kind == MeasureKind::Volume && !work.points.is_empty() {
+            if work.points.len() < 3 || work.contours.len() >= MAX_CONTOURS {
+                work.points.clear();
+                self.work = Some(work).filter(|work| !work.contours.is_empty());
+                return Change::Refused("A contour needs three points or more; a volume has at most 64.");
+            }
+            let contour = std::mem::take(&mut work.points);
+            work.contours.push(contour);
+            self.work = Some(work);
+            return Change::Marks;
+        }
+        match self.add_measure(work.clone()) {
+            Change::Refused(why) => {
+                // More contours may be added to a volume.
+                self.work = Some(work).filter(|work| work.kind == MeasureKind::Volume);
+                Change::Refused(why)
+            }
+            change => change,
+        }
+    }
+}
+
+fn is_place(point: [f64; 3]) -> bool {
+    point.iter().all(|mm| mm.abs() <= FARTHEST)
+}
+
+fn is_empty_text(measured: &Measurement) -> bool {
+    measured.kind == MeasureKind::Text && measured.text.trim().is_empty()
+}

@@ -1,0 +1,233 @@
+//! Measuring: its tools, the list of results, and what is drawn of both over the picture.
+
+use super::{ACCENT, PanelState, SMALL_TEXT, TEXT, TEXT_SIZE, TOUCH_SIZE, WARNING, heading, picture_rect};
+use crate::measure::outcome::{self, Quantity};
+use crate::measure::overlay::{self, Drawn};
+use crate::scene::{MeasureKind, Scene};
+use crate::ui::command::{Command, Tool};
+use crate::ui::hints;
+use egui::{Button, Color32, FontId, Label, Painter, Pos2, Rect, RichText, Stroke, StrokeKind, Ui, pos2, vec2};
+
+/// The tools of the rail and their names there.
+const TOOLS: [(MeasureKind, &str); 9] = [
+    (MeasureKind::Distance, "Caliper"),
+    (MeasureKind::Angle, "Angle"),
+    (MeasureKind::Ellipse, "Ellipse"),
+    (MeasureKind::Trace, "Trace"),
+    (MeasureKind::Surface, "Surface"),
+    (MeasureKind::Volume, "Volume"),
+    (MeasureKind::Threshold, "Vol. by threshold"),
+    (MeasureKind::Text, "Text"),
+    (MeasureKind::Arrow, "Arrow"),
+];
+
+/// Colour of measurements: yellow, which no tissue has and every kind of colour vision sees on grey.
+const LINE: Color32 = Color32::from_rgb(255, 214, 64);
+/// Half the size of a cross, and the length of an arrow's head, points.
+const CROSS: f32 = 5.0;
+const HEAD: f64 = 12.0;
+
+/// The buttons of the tools in this width, points.
+pub(super) fn show_tools(ui: &mut Ui, state: &PanelState, width: f32, execute: &mut dyn FnMut(Command)) {
+    let gap = ui.spacing().item_spacing.x;
+    let half = (width - gap) / 2.0;
+    let button = |ui: &mut Ui, kind: MeasureKind, name: &str, width: f32, execute: &mut dyn FnMut(Command)| {
+        let (command, is_on) = match kind {
+            MeasureKind::Threshold => (Command::CountVoxels, false),
+            kind => (Command::Tool(Tool::Measure(kind)), state.controls.tool() == Tool::Measure(kind)),
+        };
+        let button = Button::selectable(is_on, name).frame_when_inactive(true).min_size(vec2(width, TOUCH_SIZE * 0.75));
+        if ui.add(button).on_hover_text(hints::of_measure(kind)).clicked() {
+            // A second click leaves the tool.
+            execute(if is_on { Command::Tool(Tool::default()) } else { command });
+        }
+    };
+    let (wide, paired): (Vec<_>, Vec<_>) = TOOLS.iter().partition(|(kind, _)| *kind == MeasureKind::Threshold);
+    for pair in paired.chunks(2) {
+        ui.horizontal(|ui| pair.iter().for_each(|(kind, name)| button(ui, *kind, name, half, execute)));
+    }
+    for (kind, name) in wide {
+        button(ui, kind, name, width, execute);
+    }
+}
+
+/// The list of results in this width, points; nothing while there is none.
+pub(super) fn show_results(ui: &mut Ui, state: &PanelState, width: f32, execute: &mut dyn FnMut(Command)) {
+    let measures = state.controls.measures();
+    let is_measuring = matches!(state.controls.tool(), Tool::Measure(_));
+    if measures.is_empty() && state.controls.work().is_none() && !is_measuring {
+        return;
+    }
+    heading(ui, "Measurements");
+    if let Tool::Measure(kind) = state.controls.tool() {
+        ui.add(Label::new(RichText::new(next_step(state, kind)).size(SMALL_TEXT).color(ACCENT)).wrap());
+    }
+    if let Some(work) = state.controls.work().filter(|work| work.kind.complete_at().is_none()) {
+        let name =
+            if work.kind == MeasureKind::Volume && work.points.is_empty() { "End volume" } else { "Close contour" };
+        let button = Button::new(name).fill(ACCENT.gamma_multiply(0.45)).min_size(vec2(width, TOUCH_SIZE * 0.65));
+        if ui.add(button).on_hover_text("Ends what is being traced (Enter).").clicked() {
+            execute(Command::EndMeasure);
+        }
+    }
+    for (n, measured) in measures.iter().enumerate() {
+        ui.horizontal(|ui| {
+            let found = outcome::quantities(measured).unwrap_or_default();
+            let main = found.first().map_or(String::new(), Quantity::shown);
+            let name = match (measured.kind, measured.text.is_empty()) {
+                (_, false) => &measured.text,
+                (MeasureKind::Threshold, true) => "Echoes",
+                (kind, true) => kind.title(),
+            };
+            let typing = if state.controls.typing() == Some(n) { "_" } else { "" };
+            let text = RichText::new(format!("{} {name}{typing}", n + 1)).size(SMALL_TEXT);
+            ui.spacing_mut().item_spacing.x = 4.0;
+            let row = vec2((width - 26.0).max(40.0), TOUCH_SIZE * 0.6);
+            ui.allocate_ui_with_layout(row, egui::Layout::left_to_right(egui::Align::Center), |ui| {
+                ui.set_min_width(row.x);
+                let rest = found.iter().map(|q| format!("{}: {}", q.name, q.shown()));
+                let hint: Vec<String> = rest.chain(["Click to type a text for it.".to_string()]).collect();
+                ui.with_layout(egui::Layout::right_to_left(egui::Align::Center), |ui| {
+                    ui.label(RichText::new(main).color(LINE).size(SMALL_TEXT));
+                    ui.with_layout(egui::Layout::left_to_right(egui::Align::Center), |ui| {
+                        let label = ui.add(Label::new(text).truncate().sense(egui::Sense::click()));
+                        if label.on_hover_text(hint.join("\n")).clicked() {
+                            execute(Command::LabelMeasure(n));
+                        }
+                    });
+                });
+            });
+            ui.spacing_mut().button_padding.x = 3.0;
+            let delete = Button::new("x").min_size(vec2(22.0, TOUCH_SIZE * 0.55));
+            if ui.add(delete).on_hover_text("Deletes it (undo brings it back).").clicked() {
+                execute(Command::DeleteMeasure(n));
+            }
+        });
+    }
+    if !measures.is_empty() {
+        let gap = ui.spacing().item_spacing.x;
+        let third = vec2((width - 2.0 * gap) / 3.0, TOUCH_SIZE * 0.65);
+        ui.horizontal(|ui| {
+            for (command, name, hint) in [
+                (Command::CopyMeasures, "Copy", "Copies all results as CSV (Ctrl+C)."),
+                (Command::SaveMeasures, "Save", "Saves all results as a CSV file."),
+                (Command::ClearMeasures, "Clear", "Deletes all (undo brings them back)."),
+            ] {
+                let button = Button::new(RichText::new(name).size(SMALL_TEXT + 1.0)).min_size(third);
+                if ui.add(button).on_hover_text(hint).clicked() {
+                    execute(command);
+                }
+            }
+        });
+    }
+}
+
+/// What to do next with a tool.
+fn next_step(state: &PanelState, kind: MeasureKind) -> &'static str {
+    if state.controls.typing().is_some() {
+        return "Type, then Enter.";
+    }
+    let work = state.controls.work().filter(|work| work.kind == kind);
+    let set = work.map_or(0, |work| work.points.len());
+    let has_contours = work.is_some_and(|work| !work.contours.is_empty());
+    match (kind, set) {
+        (MeasureKind::Distance | MeasureKind::Surface, 0) => "Click the first end.",
+        (MeasureKind::Distance | MeasureKind::Surface, _) => "Click the other end.",
+        (MeasureKind::Angle, 0) => "Click the end of a leg.",
+        (MeasureKind::Angle, 1) => "Click the vertex.",
+        (MeasureKind::Angle, _) => "Click the end of the other leg.",
+        (MeasureKind::Ellipse, 0) => "Click one end of the long axis.",
+        (MeasureKind::Ellipse, 1) => "Click its other end.",
+        (MeasureKind::Ellipse, _) => "Click the end of the short axis.",
+        (MeasureKind::Volume, 0) if has_contours => "Step or turn the plane and trace again, or press Enter.",
+        (MeasureKind::Trace | MeasureKind::Volume, 0) => "Drag round the outline on a plane.",
+        (MeasureKind::Trace | MeasureKind::Volume, _) => "Enter closes the outline.",
+        (MeasureKind::Text, _) => "Click the place of the text.",
+        (MeasureKind::Arrow, 0) => "Click what the arrow points to.",
+        (MeasureKind::Arrow, _) => "Click its other end.",
+        (MeasureKind::Threshold, _) => "",
+    }
+}
+
+/// Draws measurements and annotations over the picture.
+pub(super) fn paint(ui: &Ui, state: &PanelState, scale: f32) {
+    let Some(scene) = state.scene else { return };
+    let measures = state.controls.measures();
+    if (measures.is_empty() && state.controls.work().is_none()) || scene.picture_size() != state.picture.1 {
+        return;
+    }
+    let picture = picture_rect(state, scale);
+    let painter = ui.ctx().layer_painter(egui::LayerId::background()).with_clip_rect(picture);
+    let canvas = Canvas { painter, origin: picture.min, scale };
+    for mut drawn in overlay::drawn(scene, measures) {
+        if state.controls.typing() == Some(drawn.index) {
+            drawn.label.push('_');
+        }
+        canvas.draw(&drawn);
+    }
+    if let Some(work) = state.controls.work() {
+        let hover = ui.ctx().pointer_hover_pos().filter(|at| picture.contains(*at));
+        let hover = hover.and_then(|at| place_at(scene, ((at - picture.min) * scale).into()));
+        let hover = hover.filter(|_| !work.on_surface);
+        overlay::preview(scene, measures.len() + 1, work, hover).iter().for_each(|drawn| canvas.draw(drawn));
+    }
+}
+
+/// The point of the settings that a plane shows at a position on the picture, mm.
+fn place_at(scene: &Scene, at: [f32; 2]) -> Option<[f64; 3]> {
+    if !scene.cuts_planes() {
+        return None;
+    }
+    let sheet = scene.sheet();
+    let at = at.map(f64::from);
+    let tile = sheet.tile_at(at[0].max(0.0) as usize, at[1].max(0.0) as usize)?;
+    Some(scene.point_of(sheet.point(tile, at)))
+}
+
+struct Canvas {
+    painter: Painter,
+    /// Upper left corner of the picture, points.
+    origin: Pos2,
+    /// Pixels per point.
+    scale: f32,
+}
+
+impl Canvas {
+    fn at(&self, [x, y]: [f64; 2]) -> Pos2 {
+        // Far outside of the picture a coordinate of any size would do.
+        let near = |v: f64| (v / f64::from(self.scale)).clamp(-1e5, 1e5) as f32;
+        self.origin + vec2(near(x), near(y))
+    }
+
+    fn draw(&self, drawn: &Drawn) {
+        let [corner, size] = drawn.tile;
+        let end = [corner[0] + size[0], corner[1] + size[1]];
+        let painter = self.painter.with_clip_rect(Rect::from_min_max(self.at(corner), self.at(end)));
+        let mut strokes: Vec<[Pos2; 2]> = Vec::new();
+        for line in &drawn.lines {
+            strokes.extend(line.windows(2).map(|ends| [self.at(ends[0]), self.at(ends[1])]));
+        }
+        for (_, at) in &drawn.points {
+            let at = self.at(*at);
+            strokes.push([at - vec2(CROSS, 0.0), at + vec2(CROSS, 0.0)]);
+            strokes.push([at - vec2(0.0, CROSS), at + vec2(0.0, CROSS)]);
+        }
+        let heads = drawn.head.iter().flat_map(|head| overlay::arrow_head(*head, HEAD * f64::from(self.scale)));
+        strokes.extend(heads.map(|ends| ends.map(|at| self.at(at))));
+        // A dark edge along the bright line is visible on any picture.
+        for stroke in [Stroke::new(3.5, Color32::from_black_alpha(170)), Stroke::new(1.5, LINE)] {
+            strokes.iter().for_each(|ends| _ = painter.line_segment(*ends, stroke));
+        }
+        if drawn.label.is_empty() {
+            return;
+        }
+        let colour = if drawn.label == "_" { WARNING } else { TEXT };
+        let galley = painter.layout_no_wrap(drawn.label.clone(), FontId::proportional(TEXT_SIZE - 2.0), colour);
+        let size = (galley.size() + vec2(8.0, 2.0)) * self.scale;
+        let corner = self.at(overlay::label_corner(drawn, [f64::from(size.x), f64::from(size.y)]));
+        let area = Rect::from_min_size(corner, size / self.scale);
+        painter.rect_filled(area, 3.0, Color32::from_black_alpha(170));
+        painter.rect_stroke(area, 3.0, Stroke::new(1.0, LINE.gamma_multiply(0.5)), StrokeKind::Inside);
+        painter.galley(pos2(area.left() + 4.0, area.center().y - galley.size().y / 2.0), galley, colour);
+    }
+}

@@ -1,0 +1,143 @@
+//! Workspaces: a scene file that also names the recording which it shows. The settings, with measurements and annotations, are those of a scene
+//! file; the table `[workspace]` says where the volumes are. `view` and `render` open it in place of a recording.
+
+use crate::files;
+use crate::scene::Settings;
+use crate::scene::load::Layers;
+use crate::text::printable;
+use serde::{Deserialize, Serialize};
+use std::io::Read;
+use std::path::{Path, PathBuf};
+use toml::{Table, Value};
+
+/// Maximum size of a workspace, bytes.
+const MAX_BYTES: u64 = 4 << 20;
+/// The version of the table that this program writes and reads.
+const VERSION: u32 = 1;
+/// The table that tells a workspace from a scene file.
+const TABLE: &str = "workspace";
+/// The name of the built-in phantom in place of a recording.
+pub const PHANTOM: &str = "phantom";
+/// Bytes at the start of a file in which the table must be, to be listed as a workspace.
+const HEAD: u64 = 4096;
+
+/// Where the volumes of a workspace are.
+#[derive(Clone, Debug, Default, PartialEq, Deserialize, Serialize)]
+#[serde(deny_unknown_fields)]
+pub struct Origin {
+    version: u32,
+    /// The recording, or [`PHANTOM`]. None: the volumes were live and are in no file.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub recording: Option<PathBuf>,
+    /// Number of the volume that was shown, from 0.
+    #[serde(default)]
+    pub volume: usize,
+    /// The flags of the recording's geometry, where they were given.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub probe: Option<PathBuf>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub depth_axis: Option<String>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub voxel_spacing: Option<[f64; 3]>,
+}
+
+impl Origin {
+    /// Of this recording, with no more known about it.
+    pub fn of(recording: Option<PathBuf>) -> Origin {
+        Origin { version: VERSION, recording, ..Origin::default() }
+    }
+}
+
+/// A workspace that was read.
+#[derive(Clone, Debug)]
+pub struct Workspace {
+    pub origin: Origin,
+    /// All of its settings as one layer.
+    pub layers: Layers,
+}
+
+/// True if a path is named like a workspace, which no recording is.
+pub fn is_named(path: &Path) -> bool {
+    path.extension().is_some_and(|end| end.eq_ignore_ascii_case("toml"))
+}
+
+/// True if a file is named like a workspace and begins like one. Reads at most 4 KiB.
+pub fn is_workspace(path: &Path) -> bool {
+    if !(is_named(path) && std::fs::metadata(path).is_ok_and(|about| about.is_file())) {
+        return false;
+    }
+    let mut head = Vec::new();
+    let read = std::fs::File::open(path).and_then(|file| file.take(HEAD).read_to_end(&mut head));
+    read.is_ok() && String::from_utf8_lossy(&head).contains(&format!("[{TABLE}]"))
+}
+
+impl Workspace {
+    /// Reads a workspace. Paths in it are relative to its folder.
+    ///
+    /// # Errors
+    /// One line that names the file: it cannot be read, is no workspace, or has a setting that is not allowed.
+    pub fn read(path: &Path) -> Result<Workspace, String> {
+        let fault = |fault: &str| format!("{}: {}", path.display(), printable(fault));
+        let text = files::read_text(path, MAX_BYTES, TABLE).map_err(|e| fault(&e))?;
+        let line = |e: &toml::de::Error| match e.span() {
+            Some(span) => format!("line {}: {}", crate::scene::load::line_of(&text, span.start), e.message()),
+            None => e.message().to_string(),
+        };
+        let mut table = toml::from_str::<Table>(&text).map_err(|e| fault(&line(&e)))?;
+        let Some(origin) = table.remove(TABLE) else {
+            return Err(fault("has no table [workspace]: a file of settings alone is given with --scene"));
+        };
+        let mut origin = Origin::deserialize(origin).map_err(|e| fault(&format!("[workspace]: {}", e.message())))?;
+        if origin.version != VERSION {
+            let version = origin.version;
+            return Err(fault(&format!("[workspace] is of version {version}, this program reads version {VERSION}")));
+        }
+        let folder = path.parent().unwrap_or(Path::new(""));
+        for file in [&mut origin.recording, &mut origin.probe].into_iter().flatten() {
+            if file.as_os_str() != PHANTOM {
+                *file = folder.join(&*file);
+            }
+        }
+        let mut layers = Layers::default();
+        layers.table(&path.display().to_string(), table, folder).map_err(|e| e.to_string())?;
+        let settings = layers.clone().finish().map_err(|e| e.to_string())?;
+        settings.check().map_err(|e| fault(&e.to_string()))?;
+        Ok(Workspace { origin, layers })
+    }
+
+    /// The recording to open.
+    ///
+    /// # Errors
+    /// One line: the workspace was saved of live volumes.
+    pub fn recording(&self, path: &Path) -> Result<&Path, String> {
+        let fault = || {
+            format!(
+                "{}: names no recording, since its volumes were live; save the loop and set workspace.recording",
+                path.display()
+            )
+        };
+        self.origin.recording.as_deref().ok_or_else(fault)
+    }
+}
+
+/// The text of a workspace file with all settings.
+///
+/// # Errors
+/// One line: the settings cannot be written as TOML.
+pub fn text(settings: &Settings, origin: &Origin) -> Result<String, String> {
+    let fault = |e: &dyn std::fmt::Display| format!("a workspace cannot be written: {e}");
+    let head = Table::from_iter([(TABLE.to_string(), Value::try_from(origin).map_err(|e| fault(&e))?)]);
+    let (head, settings) = (toml::to_string(&head), toml::to_string(settings));
+    let (head, settings) = (head.map_err(|e| fault(&e))?, settings.map_err(|e| fault(&e))?);
+    // The settings begin with values that belong to no table, which the table follows.
+    let (values, tables) = match settings.find("\n[") {
+        Some(at) => settings.split_at(at + 1),
+        None => (settings.as_str(), ""),
+    };
+    let about = "# Echolume workspace: `echolume view FILE` and `echolume render FILE` open it.";
+    let text = format!("{about}\n{values}\n{head}\n{tables}");
+    match text.len() as u64 <= MAX_BYTES {
+        true => Ok(text),
+        false => Err(fault(&format!("it would be longer than {} MiB", MAX_BYTES >> 20))),
+    }
+}
