@@ -117,7 +117,7 @@ Ray ray_of(ivec2 pixel) {
     return ray;
 }
 
-// Limits of a place's coordinates in the sector: range, line, entry of the sweep table, slice. An index that rounding puts just
+// Limits of a place's coordinates in the sector: range, line, entry of the sweep table or position in the sweep, slice. An index that rounding puts just
 // beyond the outermost frame is still inside.
 struct Sector {
     vec4 low;
@@ -125,12 +125,13 @@ struct Sector {
 };
 
 Sector sector() {
-    float entries = 0.0, slices = 0.0;
+    vec2 sweep = vec2(0.0);
+    float slices = 0.0;
     if (SWEPT) {
-        if (SWEEP_TERMS == 0) entries = float(sweep_lut.entry.length() - 1);
+        sweep = SWEEP_TERMS > 0 ? vec2(sweep_first, sweep_last) : vec2(0.0, float(sweep_lut.entry.length() - 1));
         slices = NON_UNIFORM == 1 ? float(slice_table.entry.length() - 1) : last_slice;
     }
-    return Sector(vec4(range_low, line_low, 0.0, -1e-4), vec4(range_high, line_high, entries, slices + 1e-4));
+    return Sector(vec4(range_low, line_low, sweep.x, -1e-4), vec4(range_high, line_high, sweep.y, slices + 1e-4));
 }
 
 // Tangent of a quarter of the angle off the depth axis, for angles up to 180 degrees: that of half the angle has no bound. Of the sine
@@ -148,11 +149,11 @@ float line_at(float x, float y, float range) {
 }
 
 // Slice index at a position of the sweep: mm, or of a fan the tangent of half the angle about the wobble axis. `line` is the line's
-// parameter. `e` is the entry of the look-up table, and 0 where a polynomial takes its place. No trigonometry either way.
+// parameter. `e` is the entry of the look-up table, or the position where a polynomial takes its place. No trigonometry either way.
 float slice_at(float position, float line, out float e) {
     float k;
-    e = 0.0;
     if (SWEEP_TERMS > 0) {
+        e = position;
         // Odd in the position. What is beyond the limits is outside, and the polynomial is not meant for it.
         float t = clamp(position, sweep_low, sweep_high), square = t * t, sum = 0.0;
         if (SWEEP_TERMS > 9) sum = fma(sum, square, sweep_terms_2.y);

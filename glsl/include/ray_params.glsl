@@ -32,7 +32,9 @@
     vec2 first_line; // in-plane normals of the first and the last line, towards the others
     vec2 last_line;
     // Slice position, as half tangent (fan) or mm, to slice index: by a polynomial, or by a look-up table.
-    float sweep_low;
+    float sweep_first; // exact limits of the sweep
+    float sweep_last;
+    float sweep_low;   // the same, or for a polynomial a little beyond
     float sweep_high;
     float sweep_density; // entries of the table
     float sweep_offset;

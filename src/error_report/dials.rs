@@ -302,16 +302,16 @@ pub fn dial(name: &str, scene: &Scene) -> Result<Dial, String> {
         "lut" => {
             need(scene.probe().is_some(), "has no sweep")?;
             let now = s.ray.entries;
-            let others = [3, 5, 9, 17, 33, 65, 129, 257, 1025, 4097].into_iter().filter(|n| *n != now);
-            let others = others.map(|n| at(n.to_string(), &[format!("ray.entries={n}")], f64::from(n)));
-            made(
-                "lut",
-                "entries",
-                is(now.to_string(), f64::from(now)),
-                others.collect(),
-                &["ray.entries=65536".into()],
-                &["ray.entries=16385".into()],
-            )
+            let with = |n: u32| ["ray.slice_index='table'".to_string(), format!("ray.entries={n}")];
+            let others = [3, 5, 9, 17, 33, 65, 129, 257, 1025, 4097].into_iter();
+            let others = others.filter(|n| scene.slice_terms() > 0 || *n != now);
+            let others = others.map(|n| at(n.to_string(), &with(n), f64::from(n)));
+            // A polynomial has no entries.
+            let default = match scene.slice_terms() {
+                0 => is(now.to_string(), f64::from(now)),
+                terms => is(format!("polynomial of {terms} terms"), 0.0),
+            };
+            made("lut", "entries", default, others.collect(), &with(65536), &with(16385))
         }
         "brick" => {
             need(marches, "leaps over nothing")?;

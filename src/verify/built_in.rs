@@ -319,9 +319,7 @@ fn ray_scenes() -> Vec<SceneSpec> {
         }
     };
     let sweep = Geometry::Sweep(wobbler());
-    // By the look-up table, which otherwise only fans wider than 180 degrees take.
-    let by_table = ALL_FILTERS.replace("sampling = 'exact'", "sampling = 'exact', slice_index = 'table'");
-    add("fan with every filter", &sweep, BYTES, &by_table);
+    add("fan with every filter", &sweep, BYTES, ALL_FILTERS);
     let each = (0..9).map(|k| if k < 4 { 0.02 } else { -0.02 }).collect();
     let geometries = [
         ("fan, motor moving", Geometry::Sweep(moved(wobbler(), 0.7))),
@@ -340,8 +338,15 @@ fn ray_scenes() -> Vec<SceneSpec> {
             camera = { azimuth = -30, elevation = 25 }
             surface.edge = 1.8
             ray = { step = 0.45, sampling = 'exact' }";
-        add(name, geometry, BYTES, toml);
+        // Otherwise only fans wider than 180 degrees use the look-up table.
+        let by_table = toml.replace("sampling =", "slice_index = 'table', sampling =");
+        add(name, geometry, BYTES, if *name == "fan, uneven" { &by_table } else { toml });
     }
+    // So many slices that the digits of the table show.
+    let many = Probe { slices: Axis::centred(1.2 / 200.0, 201), ..wobbler() };
+    let toml = "mode = 'vr'\nslices = { pixels = 33 }\npicture = { size = [19, 33] }\nvolume = { shading = 'first-hit' }\ncamera = { azimuth = -30, elevation = 25 }
+        ray = { step = 0.45, slice_index = 'table', sampling = 'exact' }";
+    add("fan of 201 slices by the table", &Geometry::Sweep(many), BYTES, toml);
     // Bytes that are not scaled: the first filter reads them as they are.
     for (format, filters) in [
         ("r8", "median = true"),

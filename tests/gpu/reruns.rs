@@ -111,7 +111,7 @@ fn a_scene_has_the_passes_and_slots_it_needs_and_no_others() {
     );
     assert_eq!(
         slots,
-        "frames scan_lut volume tile_ranges brick_table brick_ranges brick_kinds brick_distances_x brick_distances_xy volume_brick_distances opaque_before sweep_lut transfer picture screen"
+        "frames scan_lut volume tile_ranges brick_table brick_ranges brick_kinds brick_distances_x brick_distances_xy volume_brick_distances opaque_before transfer picture screen"
     );
     let (passes, slots) = names("mode = 'sr'\ndistance = { bilateral = { pixels = 1.0, distance = 1.0, repeat = 3 } }");
     assert_eq!(
@@ -120,7 +120,7 @@ fn a_scene_has_the_passes_and_slots_it_needs_and_no_others() {
     );
     assert_eq!(
         slots,
-        "frames scan_lut volume tile_ranges brick_table brick_ranges brick_kinds brick_distances_x brick_distances_xy surface_brick_distances sweep_lut distance_map distance_a distance_b picture screen"
+        "frames scan_lut volume tile_ranges brick_table brick_ranges brick_kinds brick_distances_x brick_distances_xy surface_brick_distances distance_map distance_a distance_b picture screen"
     );
     // Texture and translucent skin take the echo at the surface, and nothing else does.
     for (light, is_read) in [

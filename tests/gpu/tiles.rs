@@ -110,7 +110,7 @@ fn flat_modes_have_no_ray_no_transfer_and_no_distance_map() {
         let slots: Vec<_> = plan.slots.iter().map(|s| s.name()).collect();
         (passes.join(" "), slots.join(" "))
     };
-    let flat = "frames scan_lut volume sweep_lut tiles screen";
+    let flat = "frames scan_lut volume tiles screen";
     for mode in ["plane", "orthogonal", "tomography"] {
         let (passes, slots) =
             plan(&format!("mode = '{mode}'\nlight = {{ shadow = {{}} }}\ndistance = {{ median = 3 }}"));
@@ -118,7 +118,7 @@ fn flat_modes_have_no_ray_no_transfer_and_no_distance_map() {
     }
     let (passes, slots) = plan("mode = 'cube'");
     assert_eq!(passes, "scan_convert raycast_cube tone");
-    assert_eq!(slots, "frames scan_lut volume sweep_lut block picture screen");
+    assert_eq!(slots, "frames scan_lut volume block picture screen");
     let (passes, slots) = plan("mode = 'vr'");
     assert!(!passes.contains("planes") && !slots.contains("tiles") && !slots.contains("block"));
     let (passes, slots) = plan("mode = 'vr'\nlayout = 'four'");

@@ -160,15 +160,12 @@ pub(super) fn params(scene: &Scene, view: View, step: f64) -> Params {
 /// From the position in a sweep to the slice index, and the borders of the lines.
 fn sweep_params(params: Params, scene: &Scene) -> Params {
     let probe = scene.probe();
-    let table = || {
-        let swept = probe.filter(|_| tables(scene).0)?;
-        let (low, high) = sweep_span(swept);
-        Some(([low, high], f64::from(scene.settings.ray.entries - 1) / (high - low)))
-    };
+    let (first_position, last_position) = probe.filter(|_| tables(scene).0).map_or((0.0, 0.0), sweep_span);
     let polynomial = scene.slice_polynomial();
-    let ([low, high], density) = match &polynomial {
-        Some(polynomial) => (polynomial.limits, 0.0),
-        None => table().unwrap_or_default(),
+    let [low, high] = polynomial.as_ref().map_or([first_position, last_position], |polynomial| polynomial.limits);
+    let density = match polynomial.is_none() && last_position > first_position {
+        true => f64::from(scene.settings.ray.entries - 1) / (last_position - first_position),
+        false => 0.0,
     };
     let term = |i: usize| polynomial.as_ref().and_then(|p| p.terms.get(i)).copied().unwrap_or(0.0);
     let four = |first: usize| std::array::from_fn(|i| term(first + i));
@@ -179,6 +176,8 @@ fn sweep_params(params: Params, scene: &Scene) -> Params {
     params
         .vec2("first_line", side(first, 1.0))
         .vec2("last_line", side(last, -1.0))
+        .f32("sweep_first", first_position)
+        .f32("sweep_last", last_position)
         .f32("sweep_low", low)
         .f32("sweep_high", high)
         .f32("sweep_density", density)

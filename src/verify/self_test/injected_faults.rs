@@ -218,6 +218,20 @@ pub(super) const FAULTS: &[InjectedFault] = &[
         change: Change::Table { slot: Slot::SweepLut, by: |_, values| rounded_to_half(values) },
     },
     InjectedFault {
+        name: "coefficient of a polynomial",
+        what: "the slice index is 0.1 % off",
+        change: Change::Numbers {
+            pass: "raycast_",
+            by: |_, params| {
+                number(params, "sweep_terms_0", |value| {
+                    if let Value::Vec4(terms) = value {
+                        terms[0] *= 1.001;
+                    }
+                });
+            },
+        },
+    },
+    InjectedFault {
         name: "absorption in half precision",
         what: "small absorption is lost with its digits",
         change: Change::Table { slot: Slot::Transfer, by: |_, values| rounded_to_half(values) },
