@@ -16,8 +16,6 @@ use std::time::{Duration, Instant};
 const STREAM_SLICE: Duration = Duration::from_millis(4);
 /// The device is opened again after so many faults without a picture in between.
 const MAX_DEVICE_FAULTS: u32 = 5;
-/// Interval of the statistics.
-const STATISTICS_INTERVAL: Duration = Duration::from_secs(1);
 /// A warning is shown if no frame comes for so long.
 const SILENCE: Duration = Duration::from_secs(3);
 /// An update that takes so long does not count as silence of the source.
@@ -184,9 +182,9 @@ impl Console {
         self.times.pictures.add(picture.took);
     }
 
-    /// Takes the statistics of the last second.
+    /// Takes the statistics of the last interval.
     fn take_statistics(&mut self, now: Instant) {
-        if now.saturating_duration_since(self.statistics_at) < STATISTICS_INTERVAL {
+        if now.saturating_duration_since(self.statistics_at) < self.statistics_interval {
             return;
         }
         self.statistics_at = now;
@@ -238,7 +236,8 @@ impl Console {
         let is_listening = matches!(self.source.state(), SourceState::Open) && !self.stream.is_frozen();
         let silence = Some(self.last_arrival + SILENCE).filter(|at| is_listening && *at > now);
         let has_pictures = self.times.pictures.newest().is_some();
-        let statistics = self.shows_times.then_some(self.statistics_at + STATISTICS_INTERVAL).filter(|_| has_pictures);
+        let statistics =
+            self.shows_times.then_some(self.statistics_at + self.statistics_interval).filter(|_| has_pictures);
         let fault_check = self.startup_fault.as_ref().map(|(_, at)| *at);
         [
             fault_check,

@@ -64,6 +64,8 @@ pub struct ConsoleOptions {
     pub queues: Option<usize>,
     /// What the display of times shows of the device.
     pub time_stamps: TimeStamps,
+    /// Interval of the statistics in the log and in the display of times.
+    pub statistics_interval: Duration,
     pub cine: CineLimits,
     /// The frame budget: longest time of a picture while the view moves.
     pub budget: Option<Duration>,
@@ -118,6 +120,7 @@ impl Default for ConsoleOptions {
             images: 3,
             queues: None,
             time_stamps: TimeStamps::default(),
+            statistics_interval: Duration::from_secs(1),
             cine: CineLimits::default(),
             budget: None,
             rungs: built_in_ladder(),
@@ -236,6 +239,7 @@ pub struct Console {
     warmed: Option<Settings>,
     /// When statistics were taken last.
     statistics_at: Instant,
+    statistics_interval: Duration,
     /// When a frame or a source came last.
     last_arrival: Instant,
     /// Why the source is not connected, as it was shown last.
@@ -369,6 +373,7 @@ impl Console {
             last_change: now,
             warmed: None,
             statistics_at: now,
+            statistics_interval: options.statistics_interval,
             last_arrival: now,
             disconnected: None,
             busy_since: None,

@@ -47,6 +47,7 @@ pub fn options() -> ConsoleOptions {
         images: 3,
         queues: None,
         time_stamps: echolume::gpu::TimeStamps::default(),
+        statistics_interval: Duration::from_secs(1),
         cine: ROOM,
         budget: None,
         rungs: built_in_ladder(),
