@@ -10,6 +10,7 @@ use crate::passes::slots::{Format, Shape};
 use crate::passes::{DispatchArgs, Pass, Slot, interface_check};
 use crate::plan::Plan;
 use crate::scene::Scene;
+use crate::spirv::specialize::specialize;
 use crate::spirv::{self, Kind, Module};
 use ash::vk;
 use rayon::prelude::*;
@@ -274,7 +275,7 @@ impl Pipeline {
         prepared: Prepared,
         how: Compile,
     ) -> Result<Pipeline, GpuError> {
-        let Prepared { words, module, constants } = prepared;
+        let Prepared { mut words, module, constants } = prepared;
         let device = &context.device;
         let operation = || format!("create pipeline '{name}'");
         let bindings: Vec<_> = module
@@ -312,13 +313,17 @@ impl Pipeline {
         pipeline.layout = unsafe { device.create_pipeline_layout(&create, None) }.context(operation)?;
         context.name(set_layout, name);
         context.name(pipeline.layout, name);
+        let mut values: Vec<(u32, i32)> = (pipeline.module.constants.iter())
+            .filter_map(|c| constants.iter().find(|(name, _)| *name == c.name).map(|(_, value)| (c.id, *value)))
+            .collect();
+        if context.specializes {
+            words = specialize(&words, &values).map_err(|e| GpuError::Broken(format!("{}: {e}", operation())))?;
+            values.clear();
+        }
         // SAFETY: the words were reflected, so they are a module; the driver checks the rest.
         let shader = unsafe { device.create_shader_module(&vk::ShaderModuleCreateInfo::default().code(&words), None) }
             .context(operation)?;
         context.name(shader, name);
-        let values: Vec<(u32, i32)> = (pipeline.module.constants.iter())
-            .filter_map(|c| constants.iter().find(|(name, _)| *name == c.name).map(|(_, value)| (c.id, *value)))
-            .collect();
         let entries: Vec<_> = values
             .iter()
             .enumerate()

@@ -149,9 +149,9 @@ mod tests {
 
     #[test]
     fn a_malformed_module_is_an_error() {
-        // A small ray caster: the time is that of its square.
+        // A small ray caster, cut at every seventh word: the time is that of its square.
         let intact = words(embedded("raycast/planes.plain").unwrap());
-        for cut in 1..intact.len() {
+        for cut in (1..intact.len()).step_by(7) {
             let _ = hoist_uniforms(&intact[..cut]);
         }
         for at in 3..intact.len() {

@@ -1,11 +1,12 @@
 //! The shaders as SPIR-V: [`reflect()`] reads the interface that a module declares. The other modules rewrite a shader when its
 //! pipeline is made: for a scene (`strip_bindings`), for a software device (`hoist_uniforms`, `texture_to_storage`,
-//! `storage_to_texel_buffer`), and for fault injection (`mutate`).
+//! `storage_to_texel_buffer`), for a validation layer (`specialize`), and for fault injection (`mutate`).
 
 pub(crate) mod hoist_uniforms;
 mod module;
 pub(crate) mod mutate;
 mod reflect;
+pub(crate) mod specialize;
 pub(crate) mod storage_to_texel_buffer;
 pub(crate) mod strip_bindings;
 pub(crate) mod texture_to_storage;

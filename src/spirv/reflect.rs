@@ -314,10 +314,10 @@ mod tests {
 
     #[test]
     fn a_malformed_module_is_an_error_and_not_a_panic() {
-        // A small ray caster: the time is that of its square.
+        // A small ray caster, cut at every seventh word: the time is that of its square.
         let intact = words(embedded("raycast/planes.plain").unwrap());
         assert!(reflect(&[]).is_err());
-        for cut in 1..intact.len() {
+        for cut in (1..intact.len()).step_by(7) {
             let _ = reflect(&intact[..cut]);
         }
         for at in 5..intact.len() {

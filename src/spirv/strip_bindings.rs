@@ -133,9 +133,9 @@ mod tests {
         let intact = words(embedded("raycast/surface.plain").unwrap());
         let without = reflect(&strip_bindings(&intact, &["volume"]).unwrap()).unwrap();
         assert!(without.bindings.iter().all(|b| b.name != "volume"), "it is read with a filter and without");
-        // A small ray caster: the time is that of its square.
+        // A small ray caster, cut at every seventh word: the time is that of its square.
         let intact = words(embedded("raycast/planes.plain").unwrap());
-        for cut in 1..intact.len() {
+        for cut in (1..intact.len()).step_by(7) {
             let _ = strip_bindings(&intact[..cut], &["volume", "sweep_lut"]);
         }
         for at in 3..intact.len() {

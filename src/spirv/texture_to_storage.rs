@@ -236,9 +236,9 @@ mod tests {
         for name in ["distance_map", "sweep_lut", "Params", "nothing"] {
             assert!(texture_to_storage(&intact, &[(name, ImageFormat::R8)]).is_err(), "{name}");
         }
-        // A small ray caster: the time is that of its square.
+        // A small ray caster, cut at every seventh word: the time is that of its square.
         let intact = words(embedded("raycast/planes.plain").unwrap());
-        for cut in 1..intact.len() {
+        for cut in (1..intact.len()).step_by(7) {
             let _ = texture_to_storage(&intact[..cut], &[("volume", ImageFormat::R8)]);
         }
         for at in 3..intact.len() {

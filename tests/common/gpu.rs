@@ -42,7 +42,9 @@ impl Device {
         if let Some((context, runner)) = idle {
             return Device { context, provoked: false, runner: Some(runner) };
         }
-        let mut device = Device::alone();
+        // The driver specializes the shaders of `alone` and of the program.
+        let mut device =
+            Device::opened(ContextOptions { validation: true, specialize: true, ..ContextOptions::default() });
         device.runner = Some(PassRunner::new(&device).expect("a runner of passes"));
         device
     }
@@ -54,16 +56,18 @@ impl Device {
 
     /// `validation` false switches the layers off: they keep some memory for every object ever created.
     pub fn watched(validation: bool) -> Device {
-        let context = Context::new(&ContextOptions { device: chosen(), validation, ..ContextOptions::default() })
-            .expect("a Vulkan device");
+        Device::opened(ContextOptions { validation, ..ContextOptions::default() })
+    }
+
+    fn opened(options: ContextOptions) -> Device {
+        let context = Context::new(&ContextOptions { device: chosen(), ..options }).expect("a Vulkan device");
         Device { context, provoked: false, runner: None }
     }
 
     /// One that is given up if it does not finish within two seconds, also in software. That is far more than a small picture takes.
     pub fn impatient() -> Device {
         let deadline = Deadline::After(Duration::from_secs(2));
-        let options = ContextOptions { device: chosen(), validation: true, deadline, ..ContextOptions::default() };
-        Device { context: Context::new(&options).expect("a Vulkan device"), provoked: false, runner: None }
+        Device::opened(ContextOptions { validation: true, deadline, ..ContextOptions::default() })
     }
 
     /// The device and driver, for output with `--nocapture`.

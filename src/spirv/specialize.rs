@@ -1,0 +1,158 @@
+//! Makes specialization constants of a module constants. A validation layer specializes and validates a module again for each of its
+//! pipelines; without specialization constants it validates the module once, and remembers it.
+
+use super::module::{HEADER_WORDS, SpirvError, decode, decoration, encode, error, op};
+use std::collections::HashMap;
+
+/// A constant that is known.
+#[derive(Clone, Copy)]
+enum Value {
+    Bool(bool),
+    /// A number of 32 bits.
+    Word(u32),
+}
+
+/// The module with the values of its specialization constants, by `SpecId`: constants that are not named keep their defaults. Expressions
+/// of constants are evaluated.
+///
+/// # Errors
+/// A module that breaks the format, or an expression that no shader of this project has.
+pub fn specialize(words: &[u32], values: &[(u32, i32)]) -> Result<Vec<u32>, SpirvError> {
+    let instructions = decode(words)?;
+    let (mut given, mut known) = (HashMap::new(), HashMap::new());
+    let mut out = words[..HEADER_WORDS].to_vec();
+    for i in &instructions {
+        match (i.opcode, i.operands) {
+            (op::DECORATE, [id, decoration::SPEC_ID, constant]) => {
+                if let Some((_, value)) = values.iter().find(|(of, _)| of == constant) {
+                    given.insert(*id, *value as u32);
+                }
+                continue;
+            }
+            (op::CONSTANT_TRUE | op::CONSTANT_FALSE, [_, id]) => {
+                known.insert(*id, Value::Bool(i.opcode == op::CONSTANT_TRUE));
+            }
+            (op::CONSTANT, [_, id, value]) => drop(known.insert(*id, Value::Word(*value))),
+            (op::SPEC_CONSTANT, [of, id, default]) => {
+                let value = given.get(id).copied().unwrap_or(*default);
+                known.insert(*id, Value::Word(value));
+                out.extend(encode(op::CONSTANT, &[*of, *id, value]));
+                continue;
+            }
+            (op::SPEC_CONSTANT_OP, [of, id, operation, operands @ ..]) => {
+                let operands: Option<Vec<Value>> = operands.iter().map(|o| known.get(o).copied()).collect();
+                let Some(value) = operands.and_then(|operands| evaluate(*operation, &operands)) else {
+                    return error(format!("no value of an expression with operation {operation}"));
+                };
+                known.insert(*id, value);
+                out.extend(match value {
+                    Value::Bool(true) => encode(op::CONSTANT_TRUE, &[*of, *id]),
+                    Value::Bool(false) => encode(op::CONSTANT_FALSE, &[*of, *id]),
+                    Value::Word(word) => encode(op::CONSTANT, &[*of, *id, word]),
+                });
+                continue;
+            }
+            (op::SPEC_CONSTANT_COMPOSITE, parts) => {
+                out.extend(encode(op::CONSTANT_COMPOSITE, parts));
+                continue;
+            }
+            _ => {}
+        }
+        out.extend(encode(i.opcode, i.operands));
+    }
+    Ok(out)
+}
+
+/// The value of an expression. None: an operation or kinds of operands that are not known here, or a division by zero.
+fn evaluate(operation: u32, operands: &[Value]) -> Option<Value> {
+    use Value::{Bool, Word};
+    let word = |value: i32| Word(value as u32);
+    Some(match (operation, operands) {
+        (op::S_NEGATE, [Word(a)]) => Word(a.wrapping_neg()),
+        (op::LOGICAL_NOT, [Bool(a)]) => Bool(!a),
+        (op::LOGICAL_OR, [Bool(a), Bool(b)]) => Bool(*a || *b),
+        (op::LOGICAL_AND, [Bool(a), Bool(b)]) => Bool(*a && *b),
+        (op::SELECT, [Bool(which), yes, no]) => *(if *which { yes } else { no }),
+        (_, [Word(a), Word(b)]) => {
+            let (a, b) = (*a as i32, *b as i32);
+            match operation {
+                op::I_ADD => word(a.wrapping_add(b)),
+                op::I_SUB => word(a.wrapping_sub(b)),
+                op::I_MUL => word(a.wrapping_mul(b)),
+                op::S_DIV => word(a.checked_div(b)?),
+                op::I_EQUAL => Bool(a == b),
+                op::I_NOT_EQUAL => Bool(a != b),
+                op::S_GREATER_THAN => Bool(a > b),
+                op::S_GREATER_THAN_EQUAL => Bool(a >= b),
+                op::S_LESS_THAN => Bool(a < b),
+                op::S_LESS_THAN_EQUAL => Bool(a <= b),
+                _ => return None,
+            }
+        }
+        _ => return None,
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::spirv::module::{EMBEDDED, words};
+    use crate::spirv::reflect::reflect;
+
+    /// Every embedded shader, with the value 7 for every constant of an even number.
+    #[test]
+    fn no_shader_keeps_a_specialization_constant_and_all_values_arrive() {
+        for (name, bytes) in EMBEDDED {
+            let before = words(bytes);
+            let module = reflect(&before).unwrap();
+            let values: Vec<_> = (0..64).step_by(2).map(|id| (id, 7)).collect();
+            let after = specialize(&before, &values).unwrap();
+            assert_eq!(reflect(&after).unwrap().constants, [], "{name}");
+            let instructions = decode(&after).unwrap();
+            let is_special = |opcode| (op::SPEC_CONSTANT..=op::SPEC_CONSTANT_OP).contains(&opcode);
+            assert!(instructions.iter().all(|i| !is_special(i.opcode)), "{name}");
+            let ids: Vec<(u32, u32)> = decode(&before)
+                .unwrap()
+                .iter()
+                .filter(|i| i.opcode == op::DECORATE && i.operands[1] == decoration::SPEC_ID)
+                .map(|i| (i.operands[0], i.operands[2]))
+                .collect();
+            assert_eq!(ids.len(), module.constants.len(), "{name}");
+            for (id, constant) in ids {
+                let made =
+                    instructions.iter().find(|i| i.opcode == op::CONSTANT && i.operands[1] == id).expect("constant");
+                assert_eq!(made.operands[2] == 7, constant % 2 == 0 || made.operands[2] == 7, "{name}: {constant}");
+            }
+        }
+    }
+
+    /// Of numbers and their order, of truth values, and of a choice.
+    #[test]
+    fn expressions_have_the_values_of_their_operations() {
+        use Value::{Bool, Word};
+        let number = |operation, a: i32, b: i32| match evaluate(operation, &[Word(a as u32), Word(b as u32)]) {
+            Some(Word(value)) => Some(value as i32),
+            Some(Bool(value)) => Some(i32::from(value)),
+            None => None,
+        };
+        let binary = [op::I_ADD, op::I_SUB, op::I_MUL, op::S_DIV];
+        assert_eq!(binary.map(|of| number(of, -7, 2)), [Some(-5), Some(-9), Some(-14), Some(-3)]);
+        let order = [op::S_LESS_THAN, op::S_LESS_THAN_EQUAL, op::S_GREATER_THAN, op::S_GREATER_THAN_EQUAL];
+        assert_eq!(order.map(|of| number(of, -1, 1)), [Some(1), Some(1), Some(0), Some(0)]);
+        assert_eq!(order.map(|of| number(of, 3, 3)), [Some(0), Some(1), Some(0), Some(1)]);
+        assert_eq!([op::I_EQUAL, op::I_NOT_EQUAL].map(|of| number(of, 4, 4)), [Some(1), Some(0)]);
+        assert_eq!((number(op::S_DIV, 1, 0), number(op::SELECT, 1, 2)), (None, None));
+        assert!(matches!(evaluate(op::S_NEGATE, &[Word(5)]), Some(Word(0xffff_fffb))));
+        assert!(matches!(evaluate(op::LOGICAL_OR, &[Bool(false), Bool(true)]), Some(Bool(true))));
+        assert!(matches!(evaluate(op::LOGICAL_AND, &[Bool(false), Bool(true)]), Some(Bool(false))));
+        assert!(matches!(evaluate(op::LOGICAL_NOT, &[Bool(false)]), Some(Bool(true))));
+        assert!(matches!(evaluate(op::SELECT, &[Bool(false), Word(1), Word(2)]), Some(Word(2))));
+    }
+
+    #[test]
+    fn a_malformed_module_is_an_error() {
+        assert!(specialize(&[1, 2, 3], &[]).is_err());
+        let intact = words(EMBEDDED[0].1);
+        assert!(specialize(&intact[..intact.len() - 1], &[]).is_err());
+    }
+}
