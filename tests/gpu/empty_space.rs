@@ -141,8 +141,8 @@ fn empty_space_skipping_changes_no_bit_in_any_mode() {
     let (mut tried, mut leapt_far) = (0, 0);
     for (g, (name, geometry)) in geometries().iter().enumerate() {
         for (m, mode) in MODES.iter().enumerate() {
-            // Every mode has every sixth geometry, and a fan in any case; rays and cameras alternate.
-            if g > 0 && (g + m) % 6 != 1 {
+            // Every mode has every ninth geometry, and a fan in any case; rays and cameras alternate.
+            if g > 0 && (g + m) % 9 != 1 {
                 continue;
             }
             // Exponential steps, and those of a surface with the volume behind it in the same march, have one length.

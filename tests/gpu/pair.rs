@@ -162,8 +162,9 @@ fn one_ray_caster_runs_and_writes_what_two_do() {
 #[test]
 fn the_colours_of_whole_rays_are_those_of_volume_rendering() {
     let device = Device::new();
-    for (name, geometry) in geometries() {
-        for settings in LOOKS {
+    for (g, (name, geometry)) in geometries().into_iter().enumerate() {
+        // Every look in half of the geometries: those that the test above leaves out.
+        for (_, settings) in LOOKS.into_iter().enumerate().filter(|(n, _)| (g + n) % 2 == 0) {
             let whole = |mode: &str, size| with_step_of_ring(look(&geometry, mode, settings, size));
             let scene = whole("mode = 'sr'\nlayout = 'pair'", [48, 21]);
             let frames = body_frames(&scene, body);
