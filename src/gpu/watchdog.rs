@@ -38,6 +38,34 @@ impl Deadline {
     }
 }
 
+/// A program that did not look at the clock for so long while the device was busy was stopped, or its machine was: the threads of a software device
+/// were, too.
+const PAUSE: Duration = Duration::from_secs(1);
+
+/// When the deadline was looked at, and from when it counts.
+#[derive(Debug, Default)]
+struct Looks {
+    last: Option<Instant>,
+    /// After a pause: since when the device had been busy, and when the program ran again.
+    resumed: Option<(Instant, Instant)>,
+}
+
+impl Looks {
+    /// True if a device that has been busy since `since` is late. After a pause it gets the full time again, once.
+    fn is_late(&mut self, since: Instant, now: Instant, deadline: Duration) -> bool {
+        let pause = self.last.replace(now).map_or(Duration::ZERO, |last| now.saturating_duration_since(last));
+        let resumed = self.resumed.filter(|(of, _)| *of == since).map(|(_, at)| at);
+        if now.saturating_duration_since(resumed.unwrap_or(since)) <= deadline {
+            return false;
+        }
+        let is_forgiven = pause > PAUSE && resumed.is_none();
+        if is_forgiven {
+            self.resumed = Some((since, now));
+        }
+        !is_forgiven
+    }
+}
+
 /// Why a device was given up.
 #[derive(Clone, Copy, Debug)]
 enum GivenUp {
@@ -62,11 +90,12 @@ pub struct Watchdog {
     /// True once the program is to end.
     stop: Option<fn() -> bool>,
     given_up: Mutex<Option<GivenUp>>,
+    looks: Mutex<Looks>,
 }
 
 impl Watchdog {
     pub fn new(deadline: Option<Duration>, stop: Option<fn() -> bool>) -> Watchdog {
-        Watchdog { deadline, stop, given_up: Mutex::default() }
+        Watchdog { deadline, stop, given_up: Mutex::default(), looks: Mutex::default() }
     }
 
     /// True once the device was given up.
@@ -89,12 +118,14 @@ impl Watchdog {
         self.given_up().map_or(Ok(()), |why| Err(why.error(operation())))
     }
 
-    /// Gives the device up if it has been busy since `since` for longer than the deadline.
+    /// Gives the device up if it has been busy since `since` for longer than the deadline. Time for which the program was stopped does
+    /// not count.
     ///
     /// # Errors
     /// The device is given up.
     pub fn check_deadline(&self, since: Instant, operation: impl FnOnce() -> String) -> Result<(), GpuError> {
-        match self.deadline.filter(|deadline| since.elapsed() > *deadline) {
+        let mut looks = self.looks.lock().unwrap_or_else(|e| e.into_inner());
+        match self.deadline.filter(|deadline| looks.is_late(since, Instant::now(), *deadline)) {
             Some(deadline) => Err(self.give_up(GivenUp::Late(deadline), operation)),
             None => Ok(()),
         }
@@ -185,6 +216,24 @@ mod tests {
         assert_eq!(queue.busy_since(), None);
         queue.submitted(4, start + 9 * second);
         assert_eq!(queue.busy_since(), Some(start + 9 * second), "an idle queue is not late");
+    }
+
+    /// Prevents a working software device that is given up, with its memory and its threads, because the program was stopped by a signal.
+    #[test]
+    fn time_for_which_the_program_was_stopped_does_not_count_once() {
+        let (start, second) = (Instant::now(), Duration::from_secs(1));
+        let at = |n: u32| start + n * second / 10;
+        let is_late = |looks: &mut Looks, n: u32| looks.is_late(start, at(n), 5 * second);
+        let mut looks = Looks::default();
+        assert!((0..=50).all(|n| !is_late(&mut looks, n)));
+        assert!(is_late(&mut looks, 51), "it was looked at all the time");
+        let mut looks = Looks::default();
+        assert!((0..=10).all(|n| !is_late(&mut looks, n)));
+        assert!((700..=750).all(|n| !is_late(&mut looks, n)), "the full time after a pause of a minute");
+        assert!(is_late(&mut looks, 751));
+        // Looked at every two seconds.
+        let mut looks = Looks::default();
+        assert_eq!((0..).find(|n| is_late(&mut looks, 20 * n)), Some(6), "a device that hangs is found nevertheless");
     }
 
     #[test]
