@@ -1,8 +1,8 @@
 //! Arguments of commands that render a recording: the recording, the settings of the scene in layers, the device, and checks of outputs.
 
 use super::picture_file::STANDARD;
-use super::pipeline_folder::pipeline_folder;
 use super::recording::{GeometryArgs, open_recording};
+use super::user_files::pipeline_folder;
 use crate::files::signals;
 use crate::files::{check_target, replace};
 use crate::gpu::context::list;

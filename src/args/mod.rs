@@ -3,9 +3,9 @@
 mod input;
 mod motor;
 mod picture_file;
-mod pipeline_folder;
 mod recording;
 mod source;
+mod user_files;
 
 pub use input::{
     InputArgs, Output, SceneArgs, check_outputs, check_volume, device_failure, open_device, open_device_for_statistics,
@@ -13,7 +13,7 @@ pub use input::{
 };
 pub use motor::{SerialArgs, motor_failure, motor_table};
 pub use picture_file::PictureFile;
-#[cfg(feature = "view")]
-pub use pipeline_folder::pipeline_folder;
 pub use recording::{GeometryArgs, open_recording};
 pub use source::{SourceArgs, StreamArgs};
+#[cfg(feature = "view")]
+pub use user_files::{pipeline_folder, recent_list};

@@ -1,8 +1,8 @@
 //! `echolume view`.
 
 use super::view_config::{ConsoleConfig, WindowConfig, rungs};
-use super::view_open::{Opened, Shown, recent_list};
-use crate::args::{SceneArgs, SourceArgs, StreamArgs, check_outputs, device_failure};
+use super::view_open::{Opened, Shown};
+use crate::args::{SceneArgs, SourceArgs, StreamArgs, check_outputs, device_failure, recent_list};
 use crate::error_report::command::parse_nanoseconds;
 use crate::gpu::shader_reload::ShaderFolder;
 use crate::gpu::window::{MonitorChoice, PresentMode};

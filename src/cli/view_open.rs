@@ -5,12 +5,8 @@ use crate::scene::load::Layers;
 use crate::source::live::Live;
 use crate::terminal::{Failure, input};
 use crate::workspace::{self, Workspace};
-use std::ffi::OsString;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::sync::{Mutex, MutexGuard};
-
-/// Names another file for the list of recent files, or `none`.
-const VARIABLE: &str = "ECHOLUME_RECENT";
 
 /// A source, and the settings of the workspace that named it.
 #[derive(Clone)]
@@ -66,42 +62,5 @@ impl Opened {
     /// The source of what was opened last, once.
     pub fn take_source(&self) -> Option<Box<dyn Live>> {
         locked(&self.source).take()
-    }
-}
-
-/// The list of recent files: `recent` in the user's folder of state, or what ECHOLUME_RECENT names instead; none if that is `none` or empty, or if
-/// the system names no such folder.
-pub fn recent_list() -> Option<PathBuf> {
-    chosen(|name| std::env::var_os(name))
-}
-
-fn chosen(variable: impl Fn(&str) -> Option<OsString>) -> Option<PathBuf> {
-    if let Some(asked) = variable(VARIABLE) {
-        return (!asked.is_empty() && asked != "none").then(|| asked.into());
-    }
-    // A relative path is to be ignored (XDG Base Directory Specification).
-    let absolute = |name: &str| variable(name).map(PathBuf::from).filter(|path| path.is_absolute());
-    let state = match cfg!(windows) {
-        true => absolute("LOCALAPPDATA"),
-        false => absolute("XDG_STATE_HOME").or_else(|| absolute("HOME").map(|home| home.join(".local").join("state"))),
-    };
-    state.map(|folder| folder.join("echolume").join("recent"))
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[cfg(unix)]
-    #[test]
-    fn the_list_is_in_the_users_state_unless_another_is_named_or_none() {
-        let of = |set: &[(&str, &str)]| chosen(|name| set.iter().find(|(n, _)| *n == name).map(|(_, v)| v.into()));
-        let home = ("HOME", "/home/a");
-        assert_eq!(of(&[home]).as_deref(), Some(Path::new("/home/a/.local/state/echolume/recent")));
-        assert_eq!(of(&[home, ("XDG_STATE_HOME", "/s")]).as_deref(), Some(Path::new("/s/echolume/recent")));
-        assert_eq!(of(&[home, (VARIABLE, "/else")]).as_deref(), Some(Path::new("/else")));
-        for none in [&[home, (VARIABLE, "none")][..], &[home, (VARIABLE, "")], &[]] {
-            assert_eq!(of(none), None);
-        }
     }
 }

@@ -1,0 +1,73 @@
+//! What the program keeps for a user between runs: compiled pipelines, and the list of recent files.
+
+use std::ffi::OsString;
+use std::path::PathBuf;
+
+/// A place in one of the user's folders.
+struct Place {
+    /// The variable of the environment that names another place, or `none`.
+    variable: &'static str,
+    /// The variable of the XDG Base Directory Specification that names the folder, and the folder below HOME where it is not set.
+    xdg: (&'static str, &'static str),
+    /// In the program's own folder.
+    name: &'static str,
+}
+
+const PIPELINES: Place =
+    Place { variable: "ECHOLUME_PIPELINE_CACHE", xdg: ("XDG_CACHE_HOME", ".cache"), name: "pipelines" };
+#[cfg(feature = "view")]
+const RECENT: Place = Place { variable: "ECHOLUME_RECENT", xdg: ("XDG_STATE_HOME", ".local/state"), name: "recent" };
+
+/// The folder of compiled pipelines: `pipelines` in the user's cache folder, or what ECHOLUME_PIPELINE_CACHE names instead; none if that is
+/// `none` or empty, or if the system names no such folder.
+pub fn pipeline_folder() -> Option<PathBuf> {
+    PIPELINES.path(|name| std::env::var_os(name))
+}
+
+/// The list of recent files: `recent` in the user's folder of state, or what ECHOLUME_RECENT names instead; none if that is `none` or empty, or if
+/// the system names no such folder.
+#[cfg(feature = "view")]
+pub fn recent_list() -> Option<PathBuf> {
+    RECENT.path(|name| std::env::var_os(name))
+}
+
+impl Place {
+    fn path(&self, variable: impl Fn(&str) -> Option<OsString>) -> Option<PathBuf> {
+        if let Some(asked) = variable(self.variable) {
+            return (!asked.is_empty() && asked != "none").then(|| asked.into());
+        }
+        // A relative path is to be ignored (XDG Base Directory Specification).
+        let absolute = |name: &str| variable(name).map(PathBuf::from).filter(|path| path.is_absolute());
+        let (named, below_home) = self.xdg;
+        let folder = match cfg!(windows) {
+            true => absolute("LOCALAPPDATA"),
+            false => absolute(named).or_else(|| absolute("HOME").map(|home| home.join(below_home))),
+        };
+        folder.map(|folder| folder.join("echolume").join(self.name))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::path::Path;
+
+    #[cfg(all(unix, feature = "view"))]
+    #[test]
+    fn a_place_is_in_the_users_folder_unless_another_is_named_or_none() {
+        for (place, standard) in
+            [(PIPELINES, "/home/a/.cache/echolume/pipelines"), (RECENT, "/home/a/.local/state/echolume/recent")]
+        {
+            let of =
+                |set: &[(&str, &str)]| place.path(|name| set.iter().find(|(n, _)| *n == name).map(|(_, v)| v.into()));
+            let (home, (xdg, _)) = (("HOME", "/home/a"), place.xdg);
+            assert_eq!(of(&[home]).as_deref(), Some(Path::new(standard)));
+            assert_eq!(of(&[home, (xdg, "/c")]), Some(Path::new("/c/echolume").join(place.name)));
+            assert_eq!(of(&[home, (xdg, "c")]).as_deref(), Some(Path::new(standard)), "a relative path");
+            assert_eq!(of(&[home, (place.variable, "/else")]).as_deref(), Some(Path::new("/else")));
+            for none in [&[home, (place.variable, "none")][..], &[home, (place.variable, "")], &[]] {
+                assert_eq!(of(none), None);
+            }
+        }
+    }
+}
