@@ -4,15 +4,17 @@
 mod frame;
 mod measuring;
 mod opening;
+mod options;
 mod saving;
 
 use self::measuring::Counting;
 use self::opening::Opening;
+pub use self::options::{ConsoleOptions, OpenFile, StartupFault};
 use super::clipboard::Clipboard;
 use super::command::{Command, HeldKeys, Tool};
 use super::controls::{Change, Controls};
 use super::export::Exporter;
-use super::frame_budget::{self, Pace, Quality, Rung, built_in_ladder};
+use super::frame_budget::{self, Pace, Quality, Rung};
 use super::gestures::Gestures;
 use super::input::{Input, Key};
 use super::panels::{self, Note, Panels};
@@ -21,18 +23,15 @@ use super::source_supervisor::{OpenSource, SourceSupervisor};
 use super::times::Times;
 use crate::gpu::shader_reload::{ShaderFolder, Watch};
 use crate::gpu::window::Screen;
-use crate::gpu::{Context, GpuError, TimeStamps, Wake};
+use crate::gpu::{Context, GpuError};
 use crate::kiosk::chord::Chord;
-use crate::live::cine::CineLimits;
 use crate::live::metrics::LiveMetrics;
-use crate::live::{self, Feed, Stream, StreamError, Update};
+use crate::live::{self, Feed, Stream, StreamError};
 use crate::plan::Work;
-use crate::scene::load::Layers;
 use crate::scene::{Layout, Scene, Settings, variants};
 use crate::source::live::SourceKind;
 use crate::workspace::Origin;
 use glam::DVec3;
-use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
@@ -52,112 +51,6 @@ const MAX_SEARCH: usize = 40;
 const STEP_PAUSE: Duration = Duration::from_millis(500);
 /// Time between two volumes of a cine loop.
 const CINE_INTERVAL: Duration = Duration::from_millis(200);
-
-/// What a console is created with.
-pub struct ConsoleOptions {
-    pub settings: Settings,
-    /// What was chosen of them: the rest follows from the source. None: the settings are complete.
-    pub chosen: Option<Layers>,
-    pub update: Update,
-    /// Number of volume images, 2 or 3.
-    pub images: u32,
-    pub queues: Option<usize>,
-    /// What the display of times shows of the device.
-    pub time_stamps: TimeStamps,
-    /// Interval of the statistics in the log and in the display of times.
-    pub statistics_interval: Duration,
-    pub cine: CineLimits,
-    /// The frame budget: longest time of a picture while the view moves.
-    pub budget: Option<Duration>,
-    /// The quality ladder, from full quality down.
-    pub rungs: Vec<Rung>,
-    /// How long to wait before a source that ended is opened again. None: the end of the source is final.
-    pub retry: Option<Duration>,
-    /// Where the frames come from, for messages.
-    pub source: SourceKind,
-    /// A file for all frames that arrive.
-    pub record: Option<PathBuf>,
-    /// A file for metrics of Prometheus, which is rewritten at intervals.
-    pub prometheus: Option<PathBuf>,
-    /// The folder for saved pictures and loops.
-    pub folder: PathBuf,
-    /// Draws panels, notes and marks over the picture.
-    pub overlay: bool,
-    /// Saves pictures with the patient's sides and a bar: scale, depth, mode, time.
-    pub bar: bool,
-    /// Shows sliders and buttons at the start.
-    pub panels: bool,
-    /// Pixels per point.
-    pub scale: f32,
-    /// The keys that end a kiosk, if any.
-    pub exit: Option<Chord>,
-    pub is_kiosk: bool,
-    /// What a workspace keeps of the source. None: it cannot be saved.
-    pub origin: Option<Origin>,
-    /// The volumes of the source are numbered as in its recording.
-    pub plays_once: bool,
-    /// How another recording or workspace is opened. None: none is.
-    pub open_file: Option<OpenFile>,
-    /// The file with the list of recent files.
-    pub recent: Option<PathBuf>,
-    /// Called when [`Console::update`] has something to do.
-    pub wake: Wake,
-    /// A fault that prevents the view: only its message is shown.
-    pub startup_fault: Option<StartupFault>,
-    /// Shaders to use instead of the embedded ones. The folder is watched, and shaders that change are loaded again.
-    pub shaders: Option<Arc<ShaderFolder>>,
-    /// Compiles the pipelines of every mode, layout and preset in advance while the user rests.
-    pub warms: bool,
-}
-
-impl Default for ConsoleOptions {
-    /// An interactive window at full quality, without recording. `wake` does nothing.
-    fn default() -> ConsoleOptions {
-        ConsoleOptions {
-            settings: Settings::default(),
-            chosen: None,
-            update: Update::Whole,
-            images: 3,
-            queues: None,
-            time_stamps: TimeStamps::default(),
-            statistics_interval: Duration::from_secs(1),
-            cine: CineLimits::default(),
-            budget: None,
-            rungs: built_in_ladder(),
-            retry: None,
-            source: SourceKind::default(),
-            record: None,
-            prometheus: None,
-            folder: ".".into(),
-            overlay: true,
-            bar: true,
-            panels: true,
-            scale: 1.0,
-            exit: None,
-            is_kiosk: false,
-            origin: None,
-            plays_once: false,
-            open_file: None,
-            recent: None,
-            wake: Arc::new(|| ()),
-            startup_fault: None,
-            shaders: None,
-            warms: true,
-        }
-    }
-}
-
-/// Opens a recording or a workspace in place of what is shown, which the console asks to be replaced for; or returns the reason in one line. It
-/// may take long.
-pub type OpenFile = Arc<dyn Fn(&Path) -> Result<(), String> + Send + Sync>;
-
-/// A fault that prevents the view, such as a wrong configuration, and how to find out that it is resolved.
-pub struct StartupFault {
-    pub title: String,
-    pub why: String,
-    /// Called every two seconds. When it returns true, the console asks to be replaced.
-    pub is_resolved: Box<dyn Fn() -> bool>,
-}
 
 /// What the event loop does after an update of the console.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
