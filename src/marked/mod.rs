@@ -216,17 +216,10 @@ impl Drawing for Bar {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::probe::{Geometry, Grid};
-    use crate::scene::{Input, load::Layers};
-    use crate::source::StoredType;
+    use crate::scene::load::block;
 
-    fn scene(toml: &[&str]) -> Scene {
-        let mut layers = Layers::default();
-        toml.iter().for_each(|line| layers.set(line).expect(line));
-        layers.set("picture.size=[120,96]").expect("size");
-        let grid = Grid { size: [40, 30, 20], spacing: [1.0; 3], origin: [-20.0, 0.0, -10.0] };
-        let input = Input { stored: StoredType::U8, range: [0.0, 255.0] };
-        Scene::new(Geometry::Cartesian(grid), input, layers.finish().expect("settings")).expect("scene")
+    fn scene(lines: &[&str]) -> Scene {
+        block(&[&["picture.size=[120,96]"], lines].concat(), [40, 30, 20])
     }
 
     fn grey([width, height]: [u32; 2]) -> Picture {

@@ -339,6 +339,17 @@ pub(crate) fn line_of(text: &str, byte: usize) -> usize {
     text.bytes().take(byte).filter(|b| *b == b'\n').count() + 1
 }
 
+/// For unit tests: the scene of settings `key=value` and a Cartesian volume of bytes, of `size` voxels of 1 mm from (-20, 0, -10) on.
+#[cfg(test)]
+pub(crate) fn block(lines: &[&str], size: [usize; 3]) -> super::Scene {
+    use crate::probe::{Geometry, Grid};
+    let mut layers = Layers::default();
+    lines.iter().for_each(|line| layers.set(line).expect(line));
+    let grid = Grid { size, spacing: [1.0; 3], origin: [-20.0, 0.0, -10.0] };
+    let input = super::Input { stored: crate::source::StoredType::U8, range: [0.0, 255.0] };
+    super::Scene::new(Geometry::Cartesian(grid), input, layers.finish().expect("settings")).expect("scene")
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -191,17 +191,10 @@ impl Mode {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::probe::{Geometry, Grid};
-    use crate::scene::{Input, load::Layers};
-    use crate::source::StoredType;
+    use crate::scene::load::block;
 
-    fn scene(toml: &[&str]) -> Scene {
-        let mut layers = Layers::default();
-        toml.iter().for_each(|line| layers.set(line).expect(line));
-        layers.set("picture.size=[200,100]").expect("size");
-        let grid = Grid { size: [40, 30, 20], spacing: [1.0; 3], origin: [-20.0, 0.0, -10.0] };
-        let input = Input { stored: StoredType::U8, range: [0.0, 255.0] };
-        Scene::new(Geometry::Cartesian(grid), input, layers.finish().expect("settings")).expect("scene")
+    fn scene(lines: &[&str]) -> Scene {
+        block(&[&["picture.size=[200,100]"], lines].concat(), [40, 30, 20])
     }
 
     const SIDES: [&str; 2] = ["marks.lateral='right-left'", "marks.elevation='feet-head'"];
