@@ -244,7 +244,12 @@ impl Pipelines {
         self.context.faults.words(pass.name, &mut words).map_err(at_fault)?;
         let module = spirv::reflect(&words).map_err(|e| at_fault(e.to_string()))?;
         interface_check::check(pass, scene, args, &module).map_err(|e| at_fault(format!("{}: {e}", pass.name)))?;
-        Ok(Prepared { words, module, constants: self.context.faults.constants(pass.name, &key.1) })
+        let constants = self.context.faults.constants(pass.name, &key.1);
+        if self.context.specializes {
+            // The driver ignores values of constants that the module does not have.
+            words = specialize(&words, &by_id(&module, &constants)).map_err(|e| at_fault(e.to_string()))?;
+        }
+        Ok(Prepared { words, module, constants })
     }
 
     /// Compiles a pipeline without keeping it.
@@ -254,6 +259,12 @@ impl Pipelines {
     pub fn compile(&self, name: &'static str, prepared: Prepared, how: Compile) -> Result<Pipeline, GpuError> {
         Pipeline::new(&self.context, self.sampler, name, prepared, how)
     }
+}
+
+/// The values of specialization constants by `SpecId`.
+fn by_id(module: &Module, constants: &[(&'static str, i32)]) -> Vec<(u32, i32)> {
+    let value = |name: &str| constants.iter().find(|(of, _)| *of == name).map(|(_, value)| *value);
+    module.constants.iter().filter_map(|c| Some((c.id, value(&c.name)?))).collect()
 }
 
 impl Drop for Pipelines {
@@ -275,7 +286,7 @@ impl Pipeline {
         prepared: Prepared,
         how: Compile,
     ) -> Result<Pipeline, GpuError> {
-        let Prepared { mut words, module, constants } = prepared;
+        let Prepared { words, module, constants } = prepared;
         let device = &context.device;
         let operation = || format!("create pipeline '{name}'");
         let bindings: Vec<_> = module
@@ -313,17 +324,11 @@ impl Pipeline {
         pipeline.layout = unsafe { device.create_pipeline_layout(&create, None) }.context(operation)?;
         context.name(set_layout, name);
         context.name(pipeline.layout, name);
-        let mut values: Vec<(u32, i32)> = (pipeline.module.constants.iter())
-            .filter_map(|c| constants.iter().find(|(name, _)| *name == c.name).map(|(_, value)| (c.id, *value)))
-            .collect();
-        if context.specializes {
-            words = specialize(&words, &values).map_err(|e| GpuError::Broken(format!("{}: {e}", operation())))?;
-            values.clear();
-        }
         // SAFETY: the words were reflected, so they are a module; the driver checks the rest.
         let shader = unsafe { device.create_shader_module(&vk::ShaderModuleCreateInfo::default().code(&words), None) }
             .context(operation)?;
         context.name(shader, name);
+        let values = by_id(&pipeline.module, &constants);
         let entries: Vec<_> = values
             .iter()
             .enumerate()

@@ -38,8 +38,8 @@ impl Deadline {
     }
 }
 
-/// A program that did not look at the clock for so long while the device was busy was stopped, or its machine was: the threads of a software device
-/// were, too.
+/// A busy device is looked at every few milliseconds. If nothing looked for so long, the program or its machine was stopped, and with it the
+/// threads of a software device.
 const PAUSE: Duration = Duration::from_secs(1);
 
 /// When the deadline was looked at, and from when it counts.
@@ -118,8 +118,8 @@ impl Watchdog {
         self.given_up().map_or(Ok(()), |why| Err(why.error(operation())))
     }
 
-    /// Gives the device up if it has been busy since `since` for longer than the deadline. Time for which the program was stopped does
-    /// not count.
+    /// Gives the device up if it has been busy since `since` for longer than the deadline. If the program was stopped meanwhile, the time
+    /// begins again when it goes on, once.
     ///
     /// # Errors
     /// The device is given up.

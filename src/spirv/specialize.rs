@@ -111,17 +111,18 @@ mod tests {
             let instructions = decode(&after).unwrap();
             let is_special = |opcode| (op::SPEC_CONSTANT..=op::SPEC_CONSTANT_OP).contains(&opcode);
             assert!(instructions.iter().all(|i| !is_special(i.opcode)), "{name}");
-            let ids: Vec<(u32, u32)> = decode(&before)
-                .unwrap()
-                .iter()
-                .filter(|i| i.opcode == op::DECORATE && i.operands[1] == decoration::SPEC_ID)
-                .map(|i| (i.operands[0], i.operands[2]))
-                .collect();
-            assert_eq!(ids.len(), module.constants.len(), "{name}");
-            for (id, constant) in ids {
-                let made =
-                    instructions.iter().find(|i| i.opcode == op::CONSTANT && i.operands[1] == id).expect("constant");
-                assert_eq!(made.operands[2] == 7, constant % 2 == 0 || made.operands[2] == 7, "{name}: {constant}");
+            let of = |opcode: u32, words: &[u32]| -> HashMap<u32, u32> {
+                let all = decode(words).unwrap();
+                all.iter().filter(|i| i.opcode == opcode).map(|i| (i.operands[1], i.operands[2])).collect()
+            };
+            let (defaults, made) = (of(op::SPEC_CONSTANT, &before), of(op::CONSTANT, &after));
+            let special = decode(&before).unwrap();
+            let special = special.iter().filter(|i| i.opcode == op::DECORATE && i.operands[1] == decoration::SPEC_ID);
+            let special: Vec<_> = special.map(|i| (i.operands[0], i.operands[2])).collect();
+            assert_eq!(special.len(), module.constants.len(), "{name}");
+            for (id, constant) in special {
+                let expected = if constant % 2 == 0 { 7 } else { defaults[&id] };
+                assert_eq!(made[&id], expected, "{name}: {constant}");
             }
         }
     }
