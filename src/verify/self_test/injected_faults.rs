@@ -18,10 +18,10 @@ fn number(params: &mut Params, name: &str, by: impl FnOnce(&mut Value)) {
 }
 
 fn times(params: &mut Params, name: &str, factor: f32) {
-    number(params, name, |value| {
-        if let Value::F32(v) = value {
-            *v *= factor;
-        }
+    number(params, name, |value| match value {
+        Value::F32(v) => *v *= factor,
+        Value::Vec4(v) => *v = v.map(|v| v * factor),
+        _ => {}
     });
 }
 
@@ -220,16 +220,7 @@ pub(super) const FAULTS: &[InjectedFault] = &[
     InjectedFault {
         name: "coefficient of a polynomial",
         what: "the slice index is 0.1 % off",
-        change: Change::Numbers {
-            pass: "raycast_",
-            by: |_, params| {
-                number(params, "sweep_terms_0", |value| {
-                    if let Value::Vec4(terms) = value {
-                        terms[0] *= 1.001;
-                    }
-                });
-            },
-        },
+        change: Change::Numbers { pass: "raycast_", by: |_, params| times(params, "sweep_terms_0", 1.001) },
     },
     InjectedFault {
         name: "absorption in half precision",
@@ -320,16 +311,7 @@ pub(super) const FAULTS: &[InjectedFault] = &[
     InjectedFault {
         name: "clip plane's sign",
         what: "a clip plane keeps what it should cut",
-        change: Change::Numbers {
-            pass: "raycast_",
-            by: |_, params| {
-                number(params, "clip_0", |value| {
-                    if let Value::Vec4(v) = value {
-                        *v = v.map(|v| -v);
-                    }
-                });
-            },
-        },
+        change: Change::Numbers { pass: "raycast_", by: |_, params| times(params, "clip_0", -1.0) },
     },
     InjectedFault {
         name: "wrong volume image",
