@@ -28,6 +28,7 @@ mod pipeline_cache;
 mod pipeline_compiler;
 pub mod pipeline_measure;
 mod pipelines;
+mod recently_used;
 mod recorder;
 mod renderer;
 pub mod resources;

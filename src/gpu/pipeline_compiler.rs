@@ -3,7 +3,7 @@
 
 use super::error::GpuError;
 use super::formats::{self, TexelAccess};
-use super::pipelines::{Key, Pipelines};
+use super::pipelines::{Key, Pipeline, Pipelines};
 use crate::passes::{DispatchArgs, Pass};
 use crate::plan::Plan;
 use crate::scene::Scene;
@@ -19,8 +19,6 @@ pub type Wake = Arc<dyn Fn() + Send + Sync>;
 /// Makes a scene that may come next; none where these settings cannot be drawn.
 pub type SceneMaker = Box<dyn FnOnce() -> Option<Scene> + Send>;
 
-/// Most pipelines that are compiled in advance: an eighth of a GiB where a driver keeps 256 KiB for one.
-const MAX_WARMED: usize = 512;
 /// Longest pause after a pipeline that nobody waits for.
 const MAX_PAUSE: Duration = Duration::from_millis(200);
 
@@ -36,6 +34,8 @@ struct Job {
 struct Queue {
     /// What drawing waits for.
     asked: VecDeque<Job>,
+    /// The keys of `asked`, and of the pipeline in the making. A pipeline that was compiled and forgotten can be asked for again.
+    pending: HashSet<Key>,
     /// Scenes that may come next, and the pipelines of the one that was taken last.
     scenes: VecDeque<SceneMaker>,
     in_advance: VecDeque<Job>,
@@ -95,8 +95,9 @@ impl Shared {
 pub struct AsyncPipelineCompiler {
     shared: Arc<Shared>,
     pipelines: Arc<Pipelines>,
+    /// Those of the plan that was asked for last: none is forgotten before all of them are compiled.
+    held: Vec<Arc<Pipeline>>,
     thread: Option<JoinHandle<()>>,
-    asked: HashSet<Key>,
 }
 
 impl AsyncPipelineCompiler {
@@ -114,7 +115,7 @@ impl AsyncPipelineCompiler {
         let thread = std::thread::Builder::new().name("pipelines".into()).spawn(move || worker.run());
         let thread =
             thread.map_err(|e| GpuError::Memory { operation: "start a thread".into(), fault: e.to_string() })?;
-        Ok(AsyncPipelineCompiler { shared, pipelines: pipelines.clone(), thread: Some(thread), asked: HashSet::new() })
+        Ok(AsyncPipelineCompiler { shared, pipelines: pipelines.clone(), held: Vec::new(), thread: Some(thread) })
     }
 
     /// True if every pipeline of a plan is compiled; requests those that are not.
@@ -126,22 +127,26 @@ impl AsyncPipelineCompiler {
         let is_alive = self.thread.as_ref().is_some_and(|thread| !thread.is_finished());
         let mut shared = None;
         let mut is_ready = true;
+        let mut held = Vec::new();
         for step in &plan.steps {
             let args = step.args();
             let key = Pipelines::key(step.pass, scene, &args);
-            if self.pipelines.cached(&key).is_some() {
+            if let Some(pipeline) = self.pipelines.cached(&key) {
+                held.push(pipeline);
                 continue;
             }
             if let Some(fault) = self.shared.faults().get(&key) {
                 return Err(GpuError::Shader { shader: key.0.into(), fault: fault.clone() });
             }
             is_ready &= !is_alive;
-            if self.asked.insert(key.clone()) {
+            let mut queue = self.shared.queue();
+            if queue.pending.insert(key.clone()) {
                 let scene = shared.get_or_insert_with(|| Arc::new(scene.clone())).clone();
-                self.shared.queue().asked.push_back(Job { key, pass: step.pass, scene, args });
+                queue.asked.push_back(Job { key, pass: step.pass, scene, args });
                 self.shared.changed.notify_one();
             }
         }
+        self.held = held;
         Ok(is_ready)
     }
 
@@ -207,8 +212,9 @@ impl Worker {
             match work {
                 Work::Asked(job) => {
                     if let Err(fault) = self.compile(&job) {
-                        self.shared.faults().insert(job.key, fault.to_string());
+                        self.shared.faults().insert(job.key.clone(), fault.to_string());
                     }
+                    self.shared.queue().pending.remove(&job.key);
                     has_compiled = true;
                     if let Some(wake) = &self.wake {
                         wake();
@@ -257,7 +263,8 @@ impl Worker {
         let mut queue = self.shared.queue();
         // Meanwhile the user may have acted, and warming ended.
         if queue.is_warming {
-            let room = MAX_WARMED.saturating_sub(queue.warmed);
+            // Fewer than are kept, so that none of them is forgotten for another.
+            let room = (context.max_unused_pipelines / 2).saturating_sub(queue.warmed);
             queue.warmed += missing.len().min(room);
             queue.in_advance.extend(missing.into_iter().take(room));
         }

@@ -6,6 +6,7 @@ use super::buffers::has_texels;
 use super::context::Context;
 use super::error::{ErrorContext, GpuError};
 use super::formats::{self, TexelAccess};
+use super::recently_used::RecentlyUsed;
 use crate::passes::slots::{Format, Shape};
 use crate::passes::{DispatchArgs, Pass, Slot, interface_check};
 use crate::plan::Plan;
@@ -16,7 +17,7 @@ use ash::vk;
 use rayon::prelude::*;
 use std::collections::{HashMap, HashSet};
 use std::sync::atomic::Ordering;
-use std::sync::{Arc, LazyLock, Mutex, Weak};
+use std::sync::{Arc, LazyLock, Mutex, MutexGuard, Weak};
 use std::time::{Duration, Instant};
 
 /// A compute pipeline and its layout.
@@ -54,10 +55,11 @@ pub struct Compile {
 /// Returns the SPIR-V words of a shader by name.
 pub type Shaders = dyn Fn(&str) -> Result<Vec<u32>, String> + Send + Sync;
 
-/// A cache of all pipelines made so far: going back to an earlier setting compiles nothing.
+/// A cache of pipelines: going back to an earlier setting compiles nothing. Of those that no plan uses, the latest
+/// [`ContextOptions::max_unused_pipelines`](super::ContextOptions::max_unused_pipelines) are kept.
 pub struct Pipelines {
     context: Arc<Context>,
-    made: Mutex<HashMap<Key, Arc<Pipeline>>>,
+    made: Mutex<RecentlyUsed<Key, Pipeline>>,
     shaders: Arc<Shaders>,
     texel_access: TexelAccess,
     sampler: vk::Sampler,
@@ -128,7 +130,8 @@ impl Pipelines {
         // SAFETY: the create structure is complete.
         let sampler = unsafe { context.device.create_sampler(&create, None) }.context(|| "create sampler".into())?;
         context.name(sampler, "trilinear");
-        Ok(Pipelines { context: context.clone(), made: Mutex::default(), shaders, texel_access, sampler })
+        let made = Mutex::new(RecentlyUsed::new(context.max_unused_pipelines));
+        Ok(Pipelines { context: context.clone(), made, shaders, texel_access, sampler })
     }
 
     /// What tells the pipeline of a pass in a scene from others.
@@ -139,7 +142,17 @@ impl Pipelines {
 
     /// The pipeline of a key, if it is compiled.
     pub fn cached(&self, key: &Key) -> Option<Arc<Pipeline>> {
-        self.made.lock().unwrap_or_else(|e| e.into_inner()).get(key).cloned()
+        self.made().get(key)
+    }
+
+    fn made(&self) -> MutexGuard<'_, RecentlyUsed<Key, Pipeline>> {
+        self.made.lock().unwrap_or_else(|e| e.into_inner())
+    }
+
+    /// Keeps a pipeline. What is forgotten for it is destroyed without the lock: some drivers take their time.
+    fn keep(&self, key: Key, pipeline: Arc<Pipeline>) {
+        let forgotten = self.made().insert(key, pipeline);
+        drop(forgotten);
     }
 
     pub fn context(&self) -> &Arc<Context> {
@@ -157,7 +170,7 @@ impl Pipelines {
         }
         let pipeline = self.make(&key, pass, scene, args)?;
         // Another thread may have made the same pipeline meanwhile; either can be used.
-        self.made.lock().unwrap_or_else(|e| e.into_inner()).insert(key, pipeline.clone());
+        self.keep(key, pipeline.clone());
         Ok(pipeline)
     }
 
@@ -166,10 +179,8 @@ impl Pipelines {
     /// # Errors
     /// As of [`Pipelines::get`]: the first of the plan that fails. Those that were compiled are kept.
     pub fn of_plan(&self, plan: &Plan, scene: &Scene) -> Result<Vec<Arc<Pipeline>>, GpuError> {
-        let mut made = self.made.lock().unwrap_or_else(|e| e.into_inner()).clone();
-        let steps = self.complete(&mut made, plan, scene);
-        // The background compiler may have added others meanwhile.
-        self.made.lock().unwrap_or_else(|e| e.into_inner()).extend(made);
+        let (steps, compiled) = self.complete(plan, scene, |key| self.cached(key));
+        compiled.into_iter().for_each(|(key, pipeline)| self.keep(key, pipeline));
         steps
     }
 
@@ -184,37 +195,49 @@ impl Pipelines {
         plan: &Plan,
         scene: &Scene,
     ) -> Result<Vec<Arc<Pipeline>>, GpuError> {
-        let mut made = self.made.lock().unwrap_or_else(|e| e.into_inner()).clone();
-        made.retain(|key, _| !shaders.contains(key.0));
-        let steps = self.complete(&mut made, plan, scene)?;
-        *self.made.lock().unwrap_or_else(|e| e.into_inner()) = made;
+        let is_current = |key: &Key| !shaders.contains(key.0);
+        let current = |key: &Key| is_current(key).then(|| self.cached(key)).flatten();
+        let (steps, compiled) = self.complete(plan, scene, current);
+        let steps = steps?;
+        self.made().retain(is_current);
+        compiled.into_iter().for_each(|(key, pipeline)| self.keep(key, pipeline));
         Ok(steps)
     }
 
-    /// Adds the pipelines of a plan to `made`, and returns them by step.
+    /// The pipelines of a plan by step, or the first fault, and those that `cached` did not have and that were compiled.
     fn complete(
         &self,
-        made: &mut HashMap<Key, Arc<Pipeline>>,
         plan: &Plan,
         scene: &Scene,
-    ) -> Result<Vec<Arc<Pipeline>>, GpuError> {
+        cached: impl Fn(&Key) -> Option<Arc<Pipeline>>,
+    ) -> (Result<Vec<Arc<Pipeline>>, GpuError>, Vec<(Key, Arc<Pipeline>)>) {
         let keys: Vec<Key> = plan.steps.iter().map(|step| Pipelines::key(step.pass, scene, &step.args())).collect();
-        let mut asked = HashSet::new();
-        let missing: Vec<usize> =
-            (0..keys.len()).filter(|i| !made.contains_key(&keys[*i]) && asked.insert(&keys[*i])).collect();
+        let mut found: HashMap<&Key, Arc<Pipeline>> = HashMap::new();
+        let mut missing: Vec<usize> = Vec::new();
+        let mut seen = HashSet::new();
+        for (i, key) in keys.iter().enumerate().filter(|(_, key)| seen.insert(*key)) {
+            match cached(key) {
+                Some(pipeline) => drop(found.insert(key, pipeline)),
+                None => missing.push(i),
+            }
+        }
         let compile = |&i: &usize| self.make(&keys[i], plan.steps[i].pass, scene, &plan.steps[i].args());
-        let compiled: Vec<Result<_, GpuError>> = missing.par_iter().map(compile).collect();
-        let mut fault = None;
-        for (i, pipeline) in missing.into_iter().zip(compiled) {
-            match pipeline {
-                Ok(pipeline) => drop(made.insert(keys[i].clone(), pipeline)),
+        let results: Vec<Result<_, GpuError>> = missing.par_iter().map(compile).collect();
+        let (mut compiled, mut fault) = (Vec::new(), None);
+        for (i, result) in missing.into_iter().zip(results) {
+            match result {
+                Ok(pipeline) => {
+                    found.insert(&keys[i], pipeline.clone());
+                    compiled.push((keys[i].clone(), pipeline));
+                }
                 Err(error) => drop(fault.get_or_insert(error)),
             }
         }
-        match fault {
+        let steps = match fault {
             Some(error) => Err(error),
-            None => Ok(keys.iter().filter_map(|key| made.get(key).cloned()).collect()),
-        }
+            None => Ok(keys.iter().filter_map(|key| found.get(key).cloned()).collect()),
+        };
+        (steps, compiled)
     }
 
     fn make(&self, key: &Key, pass: &Pass, scene: &Scene, args: &DispatchArgs) -> Result<Arc<Pipeline>, GpuError> {
@@ -269,7 +292,7 @@ fn by_id(module: &Module, constants: &[(&'static str, i32)]) -> Vec<(u32, i32)> 
 
 impl Drop for Pipelines {
     fn drop(&mut self) {
-        self.made.lock().unwrap_or_else(|e| e.into_inner()).clear();
+        self.made().clear();
         if self.context.is_given_up() {
             return;
         }

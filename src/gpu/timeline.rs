@@ -83,6 +83,9 @@ impl Timeline {
         let done = self.context.watchdog.wait(&operation, || self.busy_since(), attempt);
         done.map_err(|error| self.context.explain(error))?;
         self.progress(|progress| progress.reached(value, Instant::now()));
+        if value == self.submitted {
+            self.context.show_layer_an_idle_queue().context(operation)?;
+        }
         Ok(())
     }
 

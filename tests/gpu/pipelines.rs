@@ -1,7 +1,7 @@
 //! How the pipelines of a scene are made: at the same time, and each once.
 
 use crate::common::gpu::*;
-use echolume::gpu::{GpuError, Renderer, RendererOptions, Shaders};
+use echolume::gpu::{ContextOptions, GpuError, Renderer, RendererOptions, Shaders};
 use echolume::plan::Plan;
 use echolume::spirv;
 use std::collections::BTreeSet;
@@ -89,5 +89,66 @@ fn of_several_shaders_that_fail_the_first_of_the_plan_is_named() {
         let shaders: Arc<Shaders> = Arc::new(|name| Err(format!("{name} is missing")));
         let error = Renderer::new(&device, scene.clone(), &options(shaders)).err().expect("no shader");
         assert!(matches!(&error, GpuError::Shader { shader, .. } if shader == first), "{error}");
+    }
+}
+
+const MODES: [&str; 4] = [
+    "mode = 'sr'\ndistance.median = 3",
+    "mode = 'vr'\nslices.median = true",
+    "mode = 'mip'\nray.slice_index = 'table'",
+    "mode = 'orthogonal'",
+];
+
+fn in_mode(mode: &str) -> echolume::scene::Scene {
+    let settings = format!("{mode}\nslices.pixels = 24\npicture.size = [32, 32]");
+    scene(echolume::probe::Geometry::Sweep(wobbler()), BYTES, &settings)
+}
+
+/// Prevents memory that grows with every change of a kiosk's settings, and pipelines destroyed while they are used or asked for.
+#[test]
+fn forgotten_pipelines_are_compiled_again_and_draw_the_same() {
+    // None is kept but the one compiled last: fewer than any plan has.
+    let device = Device::watched_with(ContextOptions { max_unused_pipelines: 0, ..ContextOptions::default() });
+    let made = || device.counts.pipelines.load(Ordering::Relaxed);
+    let frames = body_frames(&in_mode(MODES[0]), |p| 0.5 + 0.4 * (0.3 * p.y).sin());
+    let expected: Vec<_> = MODES
+        .iter()
+        .map(|mode| rendered(&Device::new(), in_mode(mode), &frames).picture().expect("a picture").rgba)
+        .collect();
+    let mut renderer = Renderer::new(&device, in_mode(MODES[0]), &RendererOptions::default()).expect("renderer");
+    let mut compiled = Vec::new();
+    for round in 0..3 {
+        let before = made();
+        for (mode, expected) in MODES.iter().zip(&expected) {
+            // In the second round by the compiler in the background, and in the third by it again, which has been asked for all of them before.
+            let begun = std::time::Instant::now();
+            while round > 0 && !renderer.prepare(&in_mode(mode)).expect("pipelines") {
+                assert!(begun.elapsed() < BOUND, "{mode} is never compiled");
+                std::thread::sleep(Duration::from_millis(1));
+            }
+            renderer.change(in_mode(mode)).expect("a change");
+            send(&mut renderer, &frames, 0);
+            assert!(renderer.picture().expect("a picture").rgba == *expected, "{mode} in round {round}");
+        }
+        compiled.push(made() - before);
+    }
+    assert!(compiled[1] > 6 && compiled[2] > 6, "what was compiled is kept: {compiled:?}");
+}
+
+/// Prevents a shortcut of the tests that hides what the program does: modules with values written into them draw the bits that modules
+/// specialized by the driver draw.
+#[test]
+fn modules_specialized_here_draw_what_those_of_the_driver_draw() {
+    let drawn = |specialize: bool| {
+        let device = Device::watched_with(ContextOptions { specialize, ..ContextOptions::default() });
+        MODES.map(|mode| {
+            let frames = body_frames(&in_mode(mode), |p| 0.5 + 0.4 * (0.3 * p.y).sin());
+            rendered(&device, in_mode(mode), &frames).picture().expect("a picture").rgba
+        })
+    };
+    let (here, by_driver) = (drawn(true), drawn(false));
+    for (mode, (here, by_driver)) in MODES.iter().zip(here.iter().zip(&by_driver)) {
+        assert!(here == by_driver, "{mode}");
+        assert!(here.chunks(4).any(|pixel| pixel[..3] != here[..3]), "{mode}: one colour");
     }
 }
