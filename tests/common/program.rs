@@ -2,7 +2,9 @@
 
 pub use super::files::*;
 use std::fs;
+use std::io::Read;
 use std::process::{Command, Stdio};
+use std::time::{Duration, Instant};
 
 pub const PROGRAM: &str = env!("CARGO_BIN_EXE_echolume");
 
@@ -41,10 +43,33 @@ pub fn without_device(command: &mut Command) -> &mut Command {
 /// Exit code, standard output and standard error.
 pub type Ran = (Option<i32>, String, String);
 
+/// Time after which a program hangs: the longest takes a minute and a half alone.
+const HANGS: Duration = Duration::from_secs(900);
+
+/// Runs a program to its end. One that hangs is killed and fails the test, instead of keeping all of them for ever.
 pub fn finish(command: &mut Command) -> Ran {
-    let output = command.stdin(Stdio::null()).output().expect("start the program");
-    let text = |bytes: Vec<u8>| String::from_utf8_lossy(&bytes).into_owned();
-    (output.status.code(), text(output.stdout), text(output.stderr))
+    fn read(mut from: impl Read + Send + 'static) -> std::thread::JoinHandle<String> {
+        std::thread::spawn(move || {
+            let mut bytes = Vec::new();
+            from.read_to_end(&mut bytes).expect("read what it printed");
+            String::from_utf8_lossy(&bytes).into_owned()
+        })
+    }
+    let started = command.stdin(Stdio::null()).stdout(Stdio::piped()).stderr(Stdio::piped()).spawn();
+    let mut child = started.expect("start the program");
+    let (out, err) = (read(child.stdout.take().expect("piped")), read(child.stderr.take().expect("piped")));
+    let begun = Instant::now();
+    let status = loop {
+        if let Some(status) = child.try_wait().expect("wait for the program") {
+            break status;
+        }
+        if begun.elapsed() > HANGS {
+            child.kill().expect("kill the program");
+            panic!("does not end within {HANGS:?}: {command:?}");
+        }
+        std::thread::sleep(Duration::from_millis(5));
+    };
+    (status.code(), out.join().expect("text"), err.join().expect("text"))
 }
 
 pub fn run(arguments: &[&str]) -> Ran {

@@ -86,7 +86,11 @@ impl Desk {
 
     /// Starts `echolume view` with these arguments and waits for its window.
     pub fn view(&self, arguments: &[&str]) -> View<'_> {
-        let mut command = Command::new(PROGRAM);
+        self.view_by(&mut Command::new(PROGRAM), arguments)
+    }
+
+    /// The same by a command with an environment of its own.
+    pub fn view_by(&self, command: &mut Command, arguments: &[&str]) -> View<'_> {
         command.args(["view", "--validate"]).args(arguments).env("DISPLAY", &self.display);
         command.env("ECHOLUME_RECENT", "none");
         command.env_remove("WAYLAND_DISPLAY").stdin(Stdio::null()).stdout(Stdio::piped()).stderr(Stdio::piped());

@@ -1,7 +1,9 @@
 //! A kiosk reports what is missing, retries, and continues by itself once it is there.
 
+use crate::common::layer::under_layer;
 use crate::desktop::*;
 use std::fs;
+use std::process::Command;
 
 /// True if a banner of a fault is shown: its red frame.
 fn is_amiss(view: &View) -> bool {
@@ -42,5 +44,28 @@ fn a_missing_source_is_reported_and_shown_when_it_appears() {
     fs::copy(SWEEP, &later).expect("copy");
     let full = headless([1024, 768], &[]);
     view.shows_part(&full, [256, 192], [512, 384], "the source that came");
+    leave(view);
+}
+
+/// Prevents a picture that stands still without a word: a device that hangs is opened again, and a banner says so for a while.
+#[test]
+fn a_device_that_hangs_is_opened_again_under_a_banner() {
+    let (desk, folder) = (Desk::new(true), Folder::new("hang"));
+    let (file, fault) = (folder.path("cart.toml"), folder.path("fault"));
+    fs::write(&file, format!("source = '{SWEEP}'\nloop = true\n[display]\npanels = false\n")).expect("write");
+    let mut program = Command::new(PROGRAM);
+    let arguments = ["--kiosk", "--config", &file, "--device-timeout", "12s"];
+    let mut view = desk.view_by(under_layer(&mut program, &[("FAULT", &fault)]), &arguments);
+    let hung = view.window;
+    let full = headless([1024, 768], &[]);
+    let is_shown = |view: &View| view.shows_part(&full, [256, 192], [512, 384], "the source");
+    is_shown(&view);
+    fs::write(&fault, "h").expect("write");
+    // The window of a device that is given up is left alone.
+    view.window = until("another window", || desk.window(desk.root).filter(|window| *window != hung));
+    assert!(!fs::exists(&fault).expect("look"), "the layer took the request");
+    until("the banner", || is_amiss(&view).then_some(()));
+    until("the end of the banner", || (!is_amiss(&view)).then_some(()));
+    is_shown(&view);
     leave(view);
 }
