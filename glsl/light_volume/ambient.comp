@@ -2,6 +2,7 @@
 // With it the back light, which has its own propagation. Red, green, blue, and the ambient share alone.
 // variants: plain; back BACK
 #version 460
+#extension GL_EXT_control_flow_attributes : require
 #include "common.glsl"
 layout(scalar) uniform Params {
     float absorption; // 1/mm in matter of density 1
@@ -34,7 +35,8 @@ void main() {
     // Where no matter is near nothing is lit.
     if (texelFetch(pyramid_2, min(at / 2, textureSize(pyramid_2, 0) - 1), 0).x > 0.0) {
         open = 0.0;
-        for (int n = 0; n < 7; ++n) {
+        // One cone at a time: with the texels of all of them on the way at once a processor holds less than half of its threads.
+        [[dont_unroll]] for (int n = 0; n < 7; ++n) {
             float matter = 0.0;
             for (int level = 0; level < 4; ++level) {
                 vec3 place = vec3(at) + 0.5 + CONES[n] * REACH[level] * density;

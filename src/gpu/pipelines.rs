@@ -55,6 +55,9 @@ pub struct Compile {
 /// Returns the SPIR-V words of a shader by name.
 pub type Shaders = dyn Fn(&str) -> Result<Vec<u32>, String> + Send + Sync;
 
+/// A pipeline that was compiled just now.
+type Compiled = (Key, Arc<Pipeline>);
+
 /// A cache of pipelines: going back to an earlier setting compiles nothing. Of those that no plan uses, the latest
 /// [`ContextOptions::max_unused_pipelines`](super::ContextOptions::max_unused_pipelines) are kept.
 pub struct Pipelines {
@@ -210,7 +213,7 @@ impl Pipelines {
         plan: &Plan,
         scene: &Scene,
         cached: impl Fn(&Key) -> Option<Arc<Pipeline>>,
-    ) -> (Result<Vec<Arc<Pipeline>>, GpuError>, Vec<(Key, Arc<Pipeline>)>) {
+    ) -> (Result<Vec<Arc<Pipeline>>, GpuError>, Vec<Compiled>) {
         let keys: Vec<Key> = plan.steps.iter().map(|step| Pipelines::key(step.pass, scene, &step.args())).collect();
         let mut found: HashMap<&Key, Arc<Pipeline>> = HashMap::new();
         let mut missing: Vec<usize> = Vec::new();
