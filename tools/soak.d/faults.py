@@ -215,10 +215,10 @@ class Faults:
         return self.screen.window
 
     def stopped(self):
-        """SIGSTOP for some seconds, as a debugger or a suspended session does."""
+        """SIGSTOP for some seconds, as a debugger or a suspended session does; also for longer than the deadline of a device."""
         self.kiosk.signal(signal.SIGSTOP)
         try:
-            time.sleep(self.random.uniform(2, 8))
+            time.sleep(self.random.uniform(2, 20))
             state = (Path("/proc") / str(self.kiosk.process.pid) / "stat").read_text().rsplit(")", 1)[1].split()[0]
         finally:
             self.kiosk.signal(signal.SIGCONT)
