@@ -151,3 +151,14 @@ pub fn units(file: &Path, is_chosen: impl Fn(usize) -> bool) -> Result<Vec<Numbe
     })?;
     Ok(units)
 }
+
+/// Calls `each` with every unit, keeping none.
+///
+/// # Errors
+/// As of [`units`].
+pub fn for_each_unit(file: &Path, mut each: impl FnMut(&Unit)) -> Result<(), String> {
+    for_each_line(file, |_, text| {
+        each(&serde_json::from_str(text).map_err(|e| format!("is no unit: {e}"))?);
+        Ok(())
+    })
+}

@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value};
 use std::collections::{HashMap, HashSet};
 use std::fs::{self, File, OpenOptions};
-use std::io::{BufRead, BufReader, Read, Seek, SeekFrom, Write};
+use std::io::{self, BufRead, BufReader, Read, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
 
 /// Version of the format of records.
@@ -116,7 +116,7 @@ impl Results {
         let place = folder.join("results");
         fs::create_dir_all(&place).map_err(|e| format!("{}: cannot be made: {e}", place.display()))?;
         let path = place.join(format!("shard-{:04}-of-{:04}.ndjson", shard.index, shard.count));
-        let fault = |e: std::io::Error| format!("{}: cannot be written: {e}", path.display());
+        let fault = |e: io::Error| format!("{}: cannot be written: {e}", path.display());
         let mut file = OpenOptions::new().create(true).read(true).append(true).open(&path).map_err(fault)?;
         let mut last = [b'\n'];
         if file.metadata().map_err(fault)?.len() > 0 {
@@ -166,7 +166,7 @@ impl Results {
 
 /// Calls `each` with the records of a file of results. Returns the number of lines that are none.
 fn for_each_record(path: &Path, mut each: impl FnMut(Record)) -> Result<usize, String> {
-    let fault = |e: std::io::Error| format!("{}: cannot be read: {e}", path.display());
+    let fault = |e: io::Error| format!("{}: cannot be read: {e}", path.display());
     let mut reader = BufReader::new(File::open(path).map_err(fault)?);
     let (mut torn, mut line) = (0, Vec::new());
     loop {
@@ -184,13 +184,10 @@ fn for_each_record(path: &Path, mut each: impl FnMut(Record)) -> Result<usize, S
     }
 }
 
-/// All results of a folder without their figures, and the number of lines that a killed process left unfinished.
-///
-/// # Errors
-/// One line: there are none, or they cannot be read.
-pub fn read_all(folder: &Path) -> Result<(Vec<Record>, usize), String> {
+/// The files of results of a folder, sorted; otherwise what cannot be read.
+fn files_of(folder: &Path) -> Result<Vec<PathBuf>, (PathBuf, io::Error)> {
     let place = folder.join("results");
-    let fault = |e: std::io::Error| format!("{}: cannot be read: {e}; is this the folder of a batch?", place.display());
+    let fault = |e: io::Error| (place.clone(), e);
     let mut files = Vec::new();
     for entry in fs::read_dir(&place).map_err(fault)? {
         let path = entry.map_err(fault)?.path();
@@ -199,6 +196,52 @@ pub fn read_all(folder: &Path) -> Result<(Vec<Record>, usize), String> {
         }
     }
     files.sort();
+    Ok(files)
+}
+
+/// What a folder holds of earlier processes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Earlier {
+    /// No process began a batch there.
+    Nothing,
+    /// One began, and was ended before any unit ended.
+    Begun,
+    /// Units of other manifests alone.
+    OfOthers,
+    /// At least one unit that was asked for.
+    OfThese,
+}
+
+/// What a folder holds of the units that `is_asked` selects by their recording and work. Reading ends with the first file that has one.
+///
+/// # Errors
+/// One line that names the file.
+pub fn earlier(folder: &Path, is_asked: impl Fn(&str, &str) -> bool) -> Result<Earlier, String> {
+    let files = match files_of(folder) {
+        Err((_, e)) if e.kind() == io::ErrorKind::NotFound => return Ok(Earlier::Nothing),
+        files => files.map_err(|(place, e)| format!("{}: cannot be read: {e}", place.display()))?,
+    };
+    let mut found = Earlier::Begun;
+    for file in &files {
+        for_each_record(file, |record| {
+            if found != Earlier::OfThese {
+                found = if is_asked(&record.input, &record.work) { Earlier::OfThese } else { Earlier::OfOthers };
+            }
+        })?;
+        if found == Earlier::OfThese {
+            break;
+        }
+    }
+    Ok(found)
+}
+
+/// All results of a folder without their figures, and the number of lines that a killed process left unfinished.
+///
+/// # Errors
+/// One line: there are none, or they cannot be read.
+pub fn read_all(folder: &Path) -> Result<(Vec<Record>, usize), String> {
+    let files = files_of(folder)
+        .map_err(|(place, e)| format!("{}: cannot be read: {e}; is this the folder of a batch?", place.display()))?;
     let (mut records, mut torn) = (Vec::new(), 0);
     for file in &files {
         torn += for_each_record(file, |record| {

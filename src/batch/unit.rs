@@ -126,17 +126,22 @@ pub struct Work {
     digest: Vec<u8>,
 }
 
+/// What is done with the recording, as results name it.
+pub fn text(unit: &Unit) -> String {
+    match (&unit.scene, &unit.command) {
+        (Some(scene), _) => format!("scene {}", serde_json::to_string(scene).unwrap_or_default()),
+        (None, Some(command)) => command.join(" "),
+        (None, None) => Kind::Render.word().into(),
+    }
+}
+
 impl Work {
     /// The work of a unit. Files that its flags name are read; relative ones begin at the working folder.
     ///
     /// # Errors
     /// The command line is wrong, a setting is, or the output has another format than the command makes.
     pub fn of(unit: &Unit) -> Result<Work, Failure> {
-        let text = match (&unit.scene, &unit.command) {
-            (Some(scene), _) => format!("scene {}", serde_json::to_string(scene).unwrap_or_default()),
-            (None, Some(command)) => command.join(" "),
-            (None, None) => Kind::Render.word().into(),
-        };
+        let text = text(unit);
         let mut work = match &unit.scene {
             Some(scene) => {
                 let table = Table::try_from(scene).map_err(|e| input(format!("scene: {e}")))?;

@@ -5,7 +5,7 @@ use super::manifest::Numbered;
 use super::painter::{DeviceOptions, Painter, against_reference};
 use super::progress::Progress;
 use super::reading::{Contents, Read, Task, read, shown};
-use super::results::{FORMAT, OutputFile, Record, Results, Seconds, Status};
+use super::results::{FORMAT, OutputFile, Record, Results, Seconds, Status, read_record};
 use super::shard::Shard;
 use super::unit::{Key, Kind, Work};
 use super::{sha256, sha256_of_file};
@@ -38,6 +38,8 @@ pub struct Job<'a> {
     pub device: DeviceOptions,
     /// Share of the finished pictures that are drawn again and compared, 0..=1.
     pub recheck: f64,
+    /// Says first how many of the units are done.
+    pub resumes: bool,
     /// True once no further unit is to be begun.
     pub stops: &'a dyn Fn() -> bool,
 }
@@ -88,6 +90,9 @@ impl Job<'_> {
     pub fn run(&self) -> Result<Ended, Failure> {
         let mut results = Results::open(self.folder, self.shard).map_err(failed)?;
         let tasks = self.tasks(&results)?;
+        if self.resumes {
+            say!("{}", self.earlier(&tasks));
+        }
         let cost = |task: &Task| task.numbered.unit.cost.unwrap_or(1.0);
         let mut progress = Progress::new(tasks.len(), tasks.iter().map(cost).sum());
         let mut worker = Worker { job: self, painter: None };
@@ -190,6 +195,23 @@ impl Job<'_> {
         });
         say!("{}", progress.finish());
         outcome.map(|()| ended)
+    }
+
+    /// How many units are done, as far as that is known without reading their recordings.
+    fn earlier(&self, tasks: &[Task]) -> String {
+        let (known, rest): (Vec<_>, Vec<_>) = tasks.iter().partition(|task| task.numbered.unit.digest.is_some());
+        let is_done = |task: &&&Task| {
+            let key = task.numbered.unit.digest.as_ref().map(|digest| task.work.key(digest));
+            key.is_some_and(|key| read_record(self.folder, &key).is_some())
+        };
+        let done = known.iter().filter(is_done).count();
+        match rest.len() {
+            0 => format!("resume: {done} of {} units are done", known.len()),
+            n => format!(
+                "resume: {done} of {} units are done; of {n} more that is known when they are read, for want of a digest",
+                known.len()
+            ),
+        }
     }
 
     /// The units with their work, those last by which a device was lost before: the rest gets done first.

@@ -8,7 +8,7 @@
 //!   descriptors.
 //! - `recorder` records command buffers with their barriers and the time stamps of `timing`; `timeline` says when a submission is done,
 //!   and `watchdog` gives up a device that does not finish. `bands` divides dispatches that a driver's watchdog might end.
-//! - `lost_device` reports why a device was lost, `budget` how much memory it has left.
+//! - `lost_device` reports why a device was lost, `budget` how much memory it has left; `host_memory` returns what drivers freed.
 //! - `renderer` runs the four stages, `pass_runner` a single pass for tests and benchmarks.
 //! - `window` presents pictures.
 
@@ -21,6 +21,7 @@ pub(crate) mod device_selection;
 pub(crate) mod error;
 pub mod faults;
 pub(crate) mod formats;
+pub(crate) mod host_memory;
 pub mod lost_device;
 mod memory;
 pub mod pass_runner;

@@ -3,6 +3,7 @@
 
 use super::error::GpuError;
 use super::formats::{self, TexelAccess};
+use super::host_memory;
 use super::pipelines::{Key, Pipeline, Pipelines};
 use crate::passes::{DispatchArgs, Pass};
 use crate::plan::Plan;
@@ -203,6 +204,8 @@ impl Worker {
                     drop(queue);
                     let context = self.pipelines.context();
                     context.pipeline_cache.store(&context.device);
+                    // Compilers of drivers need much memory for a short time.
+                    host_memory::give_back();
                     continue;
                 }
                 drop(self.shared.changed.wait(queue));

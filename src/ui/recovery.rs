@@ -2,7 +2,7 @@
 
 use super::console::{Console, ConsoleError};
 use crate::gpu::window::{PresentMode, Screen, Target};
-use crate::gpu::{Context, ContextOptions, GpuError};
+use crate::gpu::{Context, ContextOptions, GpuError, host_memory};
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
@@ -108,6 +108,8 @@ impl Output<'_> {
         match lost {
             Lost::Device => {
                 console.revive(context, Some(screen)).unwrap_or_else(|e| console.notify(&e.to_string(), true));
+                // All of the old device is gone.
+                host_memory::give_back();
                 if has_stalled {
                     console.show_stall(Instant::now());
                 }

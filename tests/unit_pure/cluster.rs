@@ -76,7 +76,7 @@ fn the_job_for_software_names_the_driver_of_the_image() {
 
 #[test]
 fn the_scripts_are_bash() {
-    for name in ["batch.sbatch", "test-slurm", "test-snakemake", "test-jobs"] {
+    for name in ["batch.sbatch", "test-slurm", "test-snakemake", "test-jobs", "test-image", "test-devices"] {
         let checked =
             Command::new("bash").arg("-n").arg(repository("tools/cluster").join(name)).output().expect("bash");
         assert!(checked.status.success(), "{name}: {}", String::from_utf8_lossy(&checked.stderr));

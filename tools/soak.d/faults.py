@@ -8,18 +8,11 @@ import struct
 import time
 from pathlib import Path
 
+from kiosk import Stopwatch
+
 
 class NoEffect(Exception):
     """What should have failed did not: the fault proves nothing."""
-
-
-def wait(until, seconds, what):
-    """Waits for it, and says what did not come."""
-    begun = time.monotonic()
-    while not until():
-        if time.monotonic() - begun > seconds:
-            raise NoEffect(f"{what}: not within {seconds:g} s")
-        time.sleep(0.1)
 
 
 def at_once():
@@ -45,6 +38,20 @@ class Faults:
     def run(self, kind):
         return getattr(self, kind)()
 
+    def wait(self, until, seconds, what):
+        """Waits for it, and says what did not come."""
+        watch = Stopwatch(self.kiosk)
+        while not until():
+            if watch.seconds() > seconds:
+                raise NoEffect(f"{what}: not within {seconds:g} s")
+            time.sleep(0.1)
+
+    def rest(self, seconds):
+        """Leaves the program that much time."""
+        watch = Stopwatch(self.kiosk)
+        while watch.seconds() < seconds:
+            time.sleep(0.1)
+
     # The source.
 
     def source_gone(self):
@@ -52,7 +59,7 @@ class Faults:
         begun = time.monotonic()
         self.sender.leave()
         try:
-            wait(lambda: self.log.said("connection lost", begun), 10, "'connection lost' in the log")
+            self.wait(lambda: self.log.said("connection lost", begun), 10, "'connection lost' in the log")
             time.sleep(self.random.uniform(1, 7))
         finally:
             self.sender.listen()
@@ -62,14 +69,14 @@ class Faults:
         """The connection breaks within a message."""
         begun = time.monotonic()
         self.sender.do_next("cut")
-        wait(lambda: self.log.said("connection lost", begun), 10, "'connection lost' in the log")
+        self.wait(lambda: self.log.said("connection lost", begun), 10, "'connection lost' in the log")
         return at_once
 
     def source_damaged(self):
         """A bit of a message changes."""
         before = self.log.counts["damaged"]
         self.sender.do_next("damage")
-        wait(lambda: self.log.counts["damaged"] > before, 10, "a wrong checksum in the log")
+        self.wait(lambda: self.log.counts["damaged"] > before, 10, "a wrong checksum in the log")
         return at_once
 
     def source_silent(self):
@@ -79,7 +86,7 @@ class Faults:
         self.sender.silent = True
         try:
             # An idle program says its last counts when it has noticed the silence.
-            time.sleep(5)
+            self.rest(5)
             frames = self.log.totals["frames"]
             time.sleep(30 if is_long else self.random.uniform(1, 6))
             if self.log.totals["frames"] != frames:
@@ -103,8 +110,8 @@ class Faults:
         written = Path(str(self.trigger) + ".new")
         written.write_text(letter, encoding="utf-8")
         written.rename(self.trigger)
-        wait(lambda: not self.trigger.exists(), 15, "a submission")
-        wait(lambda: self.log.said("; trying again", begun), 15, "the loss in the log")
+        self.wait(lambda: not self.trigger.exists(), 15, "a submission")
+        self.wait(lambda: self.log.said("; trying again", begun), 30, "the loss in the log")
         return at_once
 
     # The disk.
@@ -127,7 +134,7 @@ class Faults:
         try:
             begun = time.monotonic()
             self.screen.press(self.random.choice(["p", "r"]))
-            wait(lambda: self.log.said("Not saved", begun), 15, "'Not saved' in the log")
+            self.wait(lambda: self.log.said("Not saved", begun), 15, "'Not saved' in the log")
         finally:
             filler.unlink()
         left = [file.name for file in Path(self.disk).iterdir()]
@@ -157,11 +164,12 @@ class Faults:
         filler = self.fill(self.log_disk)
         try:
             size = grown = None
+            watch = Stopwatch(self.kiosk)
             # What is left of the last page takes some lines.
-            while grown is None or time.monotonic() - grown < 5:
+            while grown is None or watch.seconds() - grown < 5:
                 if self.log.path.stat().st_size != size:
-                    size, grown = self.log.path.stat().st_size, time.monotonic()
-                if time.monotonic() - begun > 60:
+                    size, grown = self.log.path.stat().st_size, watch.seconds()
+                if watch.seconds() > 60:
                     raise NoEffect("the log grows on a full disk")
                 time.sleep(0.2)
         finally:
@@ -184,7 +192,7 @@ class Faults:
             logged = time.mktime(time.strptime(stamp + " UTC", "%Y-%m-%dT%H:%M:%S %Z")) - time.timezone
             return abs(logged - (time.time() - (time.monotonic() - at)) - self.offset) < 5
 
-        wait(jumped, 15, "the new time in the log")
+        self.wait(jumped, 15, "the new time in the log")
         return at_once
 
     def window_resized(self):
@@ -192,7 +200,7 @@ class Faults:
         for _ in range(self.random.randint(2, 5)):
             size = (self.random.randint(40, 640), self.random.randint(40, 480))
             self.screen.do("windowsize", self.screen.window() or 0, *size)
-            wait(lambda: self.screen.size() == size, 10, f"a window of {size[0]} x {size[1]}")
+            self.wait(lambda: self.screen.size() == size, 10, f"a window of {size[0]} x {size[1]}")
             time.sleep(self.random.uniform(0.05, 1))
         self.screen.do("windowsize", self.screen.window() or 0, 320, 240)
         return lambda: self.screen.size() == (320, 240)
@@ -203,14 +211,14 @@ class Faults:
         if not window:
             raise NoEffect("there is no window to destroy")
         self.screen.destroy(window)
-        wait(lambda: self.screen.window() != window, 10, "the end of the window")
+        self.wait(lambda: self.screen.window() != window, 10, "the end of the window")
         return self.screen.window
 
     def stopped(self):
-        """SIGSTOP for some seconds, as a debugger or a suspended session does."""
+        """SIGSTOP for some seconds, as a debugger or a suspended session does; also for longer than the deadline of a device."""
         self.kiosk.signal(signal.SIGSTOP)
         try:
-            time.sleep(self.random.uniform(2, 8))
+            time.sleep(self.random.uniform(2, 20))
             state = (Path("/proc") / str(self.kiosk.process.pid) / "stat").read_text().rsplit(")", 1)[1].split()[0]
         finally:
             self.kiosk.signal(signal.SIGCONT)
@@ -235,7 +243,7 @@ class Faults:
         for key in ["F2", "F2", "h", "h", "BackSpace"]:
             self.screen.press(key)
             time.sleep(0.2)
-        wait(lambda: self.log.totals["pictures"] > begun, 20, "a picture")
+        self.wait(lambda: self.log.totals["pictures"] > begun, 20, "a picture")
         return at_once
 
 

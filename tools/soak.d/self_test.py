@@ -3,13 +3,28 @@ import copy
 
 import figures
 from faults import KINDS
-from kiosk import LATENCY, NAMES, TOTALS
+from kiosk import LATENCY, NAMES, Stopwatch, TOTALS
 from sender import crc64
 
 LIMITS = {"memory": 32, "handles": 4, "threads": 2}
 # What the program logs.
 LINE = ("frames 32.0/s  volumes 2.00/s  pictures 2.0/s  dropped 0  latency ms p50 30.5 p95 41.0 p99 41.0 max 41.1  load_slice 0.10 ms x 32; "
         "in all: 160 frames, 0 lost, 0 refused, 3 left out; volumes: 9 shown, 1 dropped, 0 incomplete; 12 pictures")
+
+
+class Waiting:
+    """A program whose threads say how long they waited for a processor."""
+
+    def __init__(self):
+        self.now, self.times = 100.0, {"1": 5.0}
+
+    def passes(self, seconds, waits):
+        self.now += seconds
+        for thread, wait in waits.items():
+            self.times[thread] = self.times.get(thread, 0.0) + wait
+
+    def waits(self):
+        return dict(self.times)
 
 
 def series(growth=0.0):
@@ -23,7 +38,7 @@ def clean():
     totals = dict(zip(NAMES, [160, 0, 0, 0, 9, 1, 0, 12]))
     return {**found, "faults": faults, "sent": {"whole": 12, "damaged": 1, "cut": 1, "refused": 0, "connections": 3}, "totals": totals,
             "counts": {"damaged": 1, "overtaken": 2}, "accounts": [], "ends": [], "left_out": {}, "seconds": 3600, "seed": 1,
-            "program": "echolume", "processor": 0.2}
+            "program": "echolume", "processor": 0.2, "waited": 3.0}
 
 
 def accounted(result):
@@ -63,6 +78,14 @@ def run(line):
     for name in metrics:
         wrong = figures.exported({**metrics, name: 7}, clean()["totals"], clean()["faults"])
         assert wrong == [f"the metrics have 7 {name}, not {metrics[name]}"], wrong
+    # Time that a program waits for a processor does not count, up to nine tenths; all other time does.
+    program = Waiting()
+    watch = Stopwatch(program, lambda: program.now)
+    for waits, counts in (({"1": 0}, 10), ({"1": 6}, 4), ({"1": 4, "2": 3}, 3), ({"1": 9, "2": 9}, 1)):
+        before = watch.seconds()
+        program.passes(10, waits)
+        assert abs(watch.seconds() - before - counts) < 1e-9, (waits, watch.counted - before)
+    assert watch.waited == 31
     # What is within the bound passes, and what grew in the first third only.
     result = clean()
     result["memory"] = figures.of_series(series(31), 3600)
