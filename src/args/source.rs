@@ -174,7 +174,8 @@ impl SourceArgs {
         }
         let source: Box<dyn Live> = if self.source == "-" {
             say_probe_file(self.geometry.probe.as_deref());
-            Box::new(Piped::new(std::io::stdin(), self.geometry.probe.as_deref()).map_err(input)?)
+            let piped = Piped::new(std::io::stdin(), self.geometry.probe.as_deref()).map_err(input)?;
+            Box::new(piped.compounded(self.network()?.freehand))
         } else if let Some(address) = network {
             if address.is_empty() {
                 return Err(input(format!("--source {}: must read igtl://HOST or igtl://HOST:PORT", self.source)));

@@ -184,22 +184,19 @@ impl Convert {
         }
         let mut recording = open_recording(&self.input, self.geometry.options())?;
         let first = recording.geometry(0);
-        if let (Some(world), Geometry::Cartesian(grid)) = (recording.world(), &first)
-            && world != World::of(grid)
-        {
-            remark(&format!("{}: a .frames file does not keep the orientation in the world", self.output.display()));
-        }
+        let (pose, posed) = (recording.pose(), recording.header().posed);
         let second = if recording.volumes() > 1 { recording.geometry(1) } else { first.clone() };
         let mut frame = recording.next_frame().map_err(input)?;
         let is_backward = frame.as_ref().is_some_and(|frame| frame.backward);
         let (forward, backward) = if is_backward { (second, first) } else { (first, second) };
-        let header = Header { forward, backward, stored: recording.stored_type(), range: recording.range() };
+        let header = Header { forward, backward, stored: recording.stored_type(), range: recording.range(), posed };
         // A signal ends the process only after the incomplete file is deleted.
         let signals = Writing::begin();
         let mut writer = Writer::create(&self.output, header).map_err(failed)?;
         let bar = progress_bar((recording.volumes() * recording.frames_per_volume()) as u64);
         let mut copy = || {
-            while let Some(there) = frame.take() {
+            while let Some(mut there) = frame.take() {
+                there.pose = there.pose.or(pose);
                 if let Some(signal) = signals.signal() {
                     return Err(failed(format!("{}: stopped by {signal}", self.output.display())));
                 }

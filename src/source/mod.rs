@@ -26,6 +26,7 @@ pub mod piped;
 mod piped_file;
 mod pixel;
 mod plus_config;
+pub mod posed;
 pub mod recorder;
 pub mod recording;
 pub mod samples;
@@ -87,8 +88,8 @@ pub fn open_with(path: &Path, options: OpenOptions) -> Result<Box<dyn Source>, I
 
 fn open_file(path: &Path, options: OpenOptions) -> Result<Box<dyn Source>, InputError> {
     Ok(match Kind::of(path) {
-        Kind::Frames => Box::new(frames(path, options)?),
-        Kind::Stream => Box::new(stream(path, options)?),
+        Kind::Frames => posed::PosedVolume::of(path, Box::new(frames(path, options)?))?,
+        Kind::Stream => posed::PosedVolume::of(path, Box::new(stream(path, options)?))?,
         Kind::Recording if tracked::is_asked_for(&options) => Box::new(tracked_volume(path, options)?),
         Kind::Recording => Box::new(Recording::open_with(path, options)?),
     })

@@ -10,6 +10,7 @@ mod interrupted;
 #[cfg(target_os = "linux")]
 mod motor;
 mod piped;
+mod posed;
 mod recorder;
 mod signals;
 mod sources;

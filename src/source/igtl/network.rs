@@ -6,10 +6,10 @@
 
 use super::client::{Client, ClientOptions, ClientStatistics};
 use super::codec::BODY_LIMIT;
-use super::message::{Image, Message, Scalar};
+use super::message::{Coordinates, Image, Message, Scalar};
 use super::pairing::Pairing;
 use crate::files::escaped;
-use crate::probe::{AxisOrder, Geometry, Grid};
+use crate::probe::{AxisOrder, Geometry, Grid, World, is_rigid};
 use crate::source::frame::{Frame, Header};
 use crate::source::freehand::{self, Compounder, Lattice, Pose, TrackedFrame};
 use crate::source::live::{Event, Live};
@@ -96,6 +96,7 @@ struct VolumeOutput {
     volume: u32,
     next: usize,
     time: Option<f64>,
+    pose: Option<DAffine3>,
 }
 
 impl Network {
@@ -164,14 +165,19 @@ impl Network {
 
     /// Starts to emit a volume.
     fn start_output(&mut self, of_sweep: bool, time: Option<f64>) {
-        let header = if of_sweep { self.sweep.header() } else { self.whole.as_ref().map(CartesianVolume::header) };
+        let (header, pose) = match of_sweep {
+            true => (self.sweep.header(), self.sweep.pose()),
+            false => {
+                (self.whole.as_ref().map(CartesianVolume::header), self.whole.as_ref().and_then(|whole| whole.pose))
+            }
+        };
         let Some(header) = header else { return };
         if let Err((field, fault)) = header.check() {
             return self.faults.note(FaultKind::Image, 1, &format!("{field} {fault}"));
         }
         let begin = self.begun.as_ref() != Some(&header);
         self.begun = Some(header);
-        self.output = Some(VolumeOutput { of_sweep, begin, volume: self.volumes, next: 0, time });
+        self.output = Some(VolumeOutput { of_sweep, begin, volume: self.volumes, next: 0, time, pose });
         self.volumes = self.volumes.wrapping_add(1);
     }
 
@@ -192,7 +198,15 @@ impl Network {
             return None;
         };
         let (volume, time, bytes) = (output.volume, output.time, slice.to_vec());
-        Some(Event::Frame(Frame { volume, number: k as u32, slice: k, backward: false, time, bytes }))
+        Some(Event::Frame(Frame {
+            volume,
+            number: k as u32,
+            slice: k,
+            backward: false,
+            time,
+            pose: output.pose,
+            bytes,
+        }))
     }
 }
 
@@ -253,6 +267,8 @@ struct FreehandSweep {
     /// Sample type of all frames. A different type begins a new sweep.
     stored: StoredType,
     range: [f64; 2],
+    /// The frames are placed in LPS: by matrices of their own that say so.
+    is_lps: bool,
     buffered: Vec<BufferedFrame>,
     buffered_bytes: usize,
     compounder: Option<Compounder>,
@@ -274,6 +290,7 @@ impl FreehandSweep {
             pairing,
             stored: StoredType::U8,
             range: [0.0, 255.0],
+            is_lps: false,
             buffered: Vec::new(),
             buffered_bytes: 0,
             compounder: None,
@@ -304,6 +321,7 @@ impl FreehandSweep {
             let why = format!("a part of {columns} x {rows} of {i} x {j} pixels; whole frames are taken only");
             return faults.note(FaultKind::Image, 1, &why);
         }
+        self.is_lps = self.options.poses == Poses::Image && image.coordinates == Coordinates::Lps;
         let own = DAffine3::from_mat4(image.index_to_mm(image.coordinates));
         let pose = Pose { to_space: pose * own, size: [usize::from(columns), usize::from(rows)] };
         let (stored, time) = (stored(image.scalar), (image.time > 0.0).then_some(image.time));
@@ -372,7 +390,20 @@ impl FreehandSweep {
     /// None before the volume is placed.
     fn header(&self) -> Option<Header> {
         let geometry = Geometry::Cartesian(self.compounder.as_ref()?.lattice().grid);
-        Some(Header { forward: geometry.clone(), backward: geometry, stored: self.stored, range: self.range })
+        Some(Header {
+            forward: geometry.clone(),
+            backward: geometry,
+            stored: self.stored,
+            range: self.range,
+            posed: true,
+        })
+    }
+
+    /// Where the volume lies (LPS). The space of trackers is RAS in this protocol, that of images is stated.
+    fn pose(&self) -> Option<DAffine3> {
+        let back = self.compounder.as_ref()?.lattice().to_volume.inverse();
+        let pose = if self.is_lps { back } else { other_coordinates() * back };
+        is_rigid(&pose).then_some(pose)
     }
 
     /// A slice; None beyond the last.
@@ -400,6 +431,8 @@ struct CartesianVolume {
     grid: Grid,
     /// The image's axes are left-handed: its rows are read from last pixel to first, so that it is not shown mirrored.
     mirrored: bool,
+    /// Where the volume is as of the last message; None if its axes are not perpendicular.
+    pose: Option<DAffine3>,
     range: [f64; 2],
     bytes: Vec<u8>,
 }
@@ -429,6 +462,7 @@ impl CartesianVolume {
             return Err(format!("a volume of {x} x {y} x {z} voxels; at most {max_bytes} bytes are taken"));
         };
         let mirrored = is_left_handed(&image);
+        let pose = pose(&image, &grid, mirrored);
         let (mut brought, replaced) = samples(image)?;
         if mirrored {
             let rows = AxisOrder { reversed: [true, false, false], ..AxisOrder::STORED };
@@ -455,11 +489,13 @@ impl CartesianVolume {
                     stored,
                     grid,
                     mirrored,
+                    pose,
                     range,
                     bytes: vec![0; all],
                 })
             }
         };
+        whole.pose = pose;
         let at = usize::from(first) * slice;
         match whole.bytes.get_mut(at..at + usize::from(slices) * slice).filter(|part| part.len() == brought.len()) {
             Some(part) => part.copy_from_slice(&brought),
@@ -474,7 +510,7 @@ impl CartesianVolume {
 
     fn header(&self) -> Header {
         let geometry = Geometry::Cartesian(self.grid);
-        Header { forward: geometry.clone(), backward: geometry, stored: self.stored, range: self.range }
+        Header { forward: geometry.clone(), backward: geometry, stored: self.stored, range: self.range, posed: true }
     }
 
     /// A slice; None beyond the last.
@@ -482,6 +518,24 @@ impl CartesianVolume {
         let [x, y, _] = self.grid.size;
         self.bytes.chunks_exact(x * y * self.stored.bytes()).nth(k)
     }
+}
+
+/// From RAS to LPS, and back.
+pub(super) fn other_coordinates() -> DAffine3 {
+    DAffine3::from_scale(DVec3::new(-1.0, -1.0, 1.0))
+}
+
+/// The pose of an image whose voxels are drawn on `grid`, with reversed rows if it is mirrored.
+fn pose(image: &Image, grid: &Grid, mirrored: bool) -> Option<DAffine3> {
+    let to_lps = image.index_to_mm(Coordinates::Lps);
+    let axes = [0, 1, 2].map(|n| to_lps.col(n).truncate());
+    let mut world = World::new(axes, to_lps.w_axis.truncate()).ok()?;
+    if mirrored {
+        let rows = AxisOrder { reversed: [true, false, false], ..AxisOrder::STORED };
+        world = world.reordered(&rows, grid.size);
+    }
+    let pose = world.pose(grid);
+    is_rigid(&pose).then_some(pose)
 }
 
 /// True if i, j and k are left-handed. Both coordinate systems of images are right-handed.
@@ -676,7 +730,7 @@ fn range_of(stored: StoredType, values: ValueRange) -> [f64; 2] {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::source::igtl::message::{Coordinates, Region};
+    use crate::source::igtl::message::Region;
 
     fn image(scalar: Scalar, components: u8, bytes: Vec<u8>) -> Image {
         Image {

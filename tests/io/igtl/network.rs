@@ -2,11 +2,12 @@
 
 use super::client::*;
 use super::messages::*;
-use echolume::probe::{Geometry, Grid};
+use echolume::probe::{Geometry, Grid, World};
 use echolume::source::freehand;
 use echolume::source::live::{Event, Live};
 use echolume::source::recorder::Header;
 use echolume::source::{Frame, StoredType};
+use glam::DVec3;
 use std::thread;
 
 fn options() -> NetworkOptions {
@@ -224,6 +225,31 @@ fn frames_without_a_pose_are_reported_and_do_not_wait_for_ever() {
     let started = Instant::now();
     assert!(matches!(network.next(Duration::from_millis(50)), Event::Idle));
     assert!((50..5000).contains(&started.elapsed().as_millis()), "{:?}", started.elapsed());
+}
+
+/// A volume's place is that of its message, also of one whose rows are reversed.
+#[test]
+fn volumes_have_the_place_of_their_message() {
+    let plain = image(1.0, [4, 3, 2]);
+    let [i, j, k] = plain.axes;
+    let oblique = [[0.3, 0.4, 0.0], [-0.2, 0.15, 0.0], [0.0, 0.0, 1.0]];
+    for (axes, coordinates) in [
+        ([i, j, k], Coordinates::Lps),
+        (oblique, Coordinates::Ras),
+        ([oblique[0].map(|v| -v), oblique[1], oblique[2]], Coordinates::Lps),
+    ] {
+        let sent = Image { axes, coordinates, centre: [10.0, -20.0, 30.0], ..plain.clone() };
+        let (header, frames) = volume(&mut connect(bytes(&Message::Image(sent.clone())), options()), 2);
+        let (grid, to_world) = (grid(header), sent.index_to_mm(Coordinates::Lps));
+        let world = World::posed(&frames[0].pose.expect("a place"), &grid).expect("rigid");
+        for (n, value) in all(&frames).into_iter().enumerate() {
+            // The samples of the message are their own numbers.
+            let stored = usize::from(value);
+            let cell = |n: usize| DVec3::from([n % 4, n / 4 % 3, n / 12].map(|n| n as f64));
+            let (there, here) = (to_world.transform_point3(cell(stored)), world.at(cell(n)));
+            assert!(there.distance(here) < 1e-5, "{coordinates:?} voxel {n}: {there} {here}");
+        }
+    }
 }
 
 #[test]
