@@ -49,6 +49,9 @@ pub struct SourceArgs {
     /// OpenIGTLink: the device (TRANSFORM) or tool (TDATA) that tracks 2D frames; "image": the matrix of each IMAGE [default: any TRANSFORM]
     #[arg(long, value_name = "NAME")]
     tool: Option<String>,
+    /// OpenIGTLink: the device whose images are taken, where there are several [default: all]
+    #[arg(long, value_name = "NAME")]
+    device_name: Option<String>,
     /// The rectangle of each tracked frame that holds ultrasound, pixels
     #[arg(long, value_name = "X,Y,W,H")]
     clip: Option<String>,
@@ -235,7 +238,7 @@ impl SourceArgs {
     }
 
     fn network(&self) -> Result<NetworkOptions, Failure> {
-        let mut options = NetworkOptions::default();
+        let mut options = NetworkOptions { device: self.device_name.clone(), ..NetworkOptions::default() };
         match (&mut options.poses, self.tool.as_deref()) {
             (poses, Some("image")) => *poses = Poses::Image,
             (Poses::Messages { device, .. }, tool) => *device = tool.map(str::to_string),

@@ -8,7 +8,7 @@ use super::client::{Client, ClientOptions, ClientStatistics};
 use super::codec::BODY_LIMIT;
 use super::message::{Coordinates, Image, Message, Scalar};
 use super::pairing::Pairing;
-use crate::files::escaped;
+use crate::files::{escaped, quoted};
 use crate::probe::{AxisOrder, Geometry, Grid, World, is_rigid};
 use crate::source::frame::{Frame, Header};
 use crate::source::freehand::{self, Compounder, Lattice, Pose, TrackedFrame};
@@ -16,6 +16,7 @@ use crate::source::live::{Event, Live};
 use crate::source::samples::{Replaced, SampleType, StoredType, store};
 use crate::source::value_range::ValueRange;
 use glam::{DAffine3, DVec3};
+use std::collections::BTreeSet;
 use std::io;
 use std::time::{Duration, Instant};
 
@@ -32,6 +33,8 @@ pub enum Poses {
 #[derive(Clone, Debug)]
 pub struct NetworkOptions {
     pub client: ClientOptions,
+    /// The device whose images are taken; None: all.
+    pub device: Option<String>,
     pub poses: Poses,
     pub freehand: freehand::CompoundingOptions,
     /// The volume of a sweep is placed around so many first frames, or those of ten seconds or of 256 MiB.
@@ -48,6 +51,7 @@ impl Default for NetworkOptions {
     fn default() -> NetworkOptions {
         NetworkOptions {
             client: ClientOptions::default(),
+            device: None,
             poses: Poses::Messages { device: None, tolerance: 0.1, patience: 1.0 },
             freehand: freehand::CompoundingOptions { margin: 20.0, ..freehand::CompoundingOptions::default() },
             first: 100,
@@ -58,6 +62,8 @@ impl Default for NetworkOptions {
     }
 }
 
+/// Most devices of images that are listed.
+const MAX_DEVICES: usize = 16;
 /// How often the statistics are checked while nothing arrives.
 const POLL: Duration = Duration::from_millis(100);
 /// Messages that are processed even if no time is left, so that a caller with zero patience makes progress.
@@ -83,6 +89,9 @@ pub struct Network {
     whole: Option<CartesianVolume>,
     sweep: FreehandSweep,
     volume_bytes: usize,
+    device: Option<String>,
+    /// Devices of images that came.
+    devices: BTreeSet<String>,
     /// Header of the last `Begin`.
     begun: Option<Header>,
     output: Option<VolumeOutput>,
@@ -114,6 +123,8 @@ impl Network {
             faults: Faults::new(address),
             whole: None,
             volume_bytes: options.volume_bytes,
+            device: options.device.clone(),
+            devices: BTreeSet::new(),
             sweep: FreehandSweep::new(options),
             begun: None,
             output: None,
@@ -147,8 +158,30 @@ impl Network {
         (self.known, self.last_error, self.lost) = (now, error, lost);
     }
 
+    /// True if an image is of the device that was chosen. The names of the devices are reported where they decide something.
+    fn is_chosen(&mut self, image: &Image) -> bool {
+        let is_new = self.devices.len() < MAX_DEVICES && self.devices.insert(image.device.clone());
+        let names = |devices: &BTreeSet<String>| devices.iter().map(|name| quoted(name)).collect::<Vec<_>>().join(", ");
+        match &self.device {
+            None if is_new && self.devices.len() > 1 => {
+                let why = format!("{}; --device-name takes one of them", names(&self.devices));
+                self.faults.note(FaultKind::Devices, 1, &why);
+            }
+            Some(device) if image.device != *device => {
+                if !self.devices.contains(device) {
+                    let why = format!("no image of {} came; there are {}", quoted(device), names(&self.devices));
+                    self.faults.note(FaultKind::Image, 1, &why);
+                }
+                return false;
+            }
+            _ => {}
+        }
+        true
+    }
+
     fn take(&mut self, message: Message) {
         match message {
+            Message::Image(image) if !self.is_chosen(&image) => {}
             Message::Image(image) if image.size[2] > 1 => {
                 let time = (image.time > 0.0).then_some(image.time);
                 match CartesianVolume::take(&mut self.whole, image, self.volume_bytes) {
@@ -310,7 +343,9 @@ impl FreehandSweep {
                     self.frame(paired.image, paired.pose, faults);
                 }
                 let dropped = self.pairing.counts().dropped - before;
-                faults.note(FaultKind::Unpaired, dropped, "no pose came near their time");
+                if dropped > 0 {
+                    faults.note(FaultKind::Unpaired, dropped, &self.pairing.why_unpaired());
+                }
             }
         }
     }
@@ -652,6 +687,8 @@ enum FaultKind {
     Dropped,
     /// An image that is neither a volume nor a frame.
     Image,
+    /// Images of several devices, which show different things.
+    Devices,
     Samples,
     /// A frame without a pose.
     Unpaired,
@@ -660,7 +697,7 @@ enum FaultKind {
     Volume,
 }
 
-const KINDS: [(FaultKind, &str); 12] = [
+const KINDS: [(FaultKind, &str); 13] = [
     (FaultKind::Unreachable, "not connected"),
     (FaultKind::Lost, "connection lost"),
     (FaultKind::Again, "connected again"),
@@ -668,6 +705,7 @@ const KINDS: [(FaultKind, &str); 12] = [
     (FaultKind::Malformed, "malformed messages passed over"),
     (FaultKind::Dropped, "messages dropped"),
     (FaultKind::Image, "images passed over"),
+    (FaultKind::Devices, "images of several devices"),
     (FaultKind::Samples, "samples that are not finite or are denormal"),
     (FaultKind::Unpaired, "frames without a pose left out"),
     (FaultKind::Pose, "frames refused"),
