@@ -8,7 +8,7 @@ use std::time::Instant;
 /// Prefix of addresses.
 const PREFIX: &str = "igtl://";
 /// The address without a value: other machines cannot reach it.
-pub const LOOPBACK: &str = "igtl://127.0.0.1:18944";
+const LOOPBACK: &str = "igtl://127.0.0.1:18944";
 
 /// The arguments of a server.
 #[derive(clap::Args)]

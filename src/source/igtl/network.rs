@@ -556,7 +556,7 @@ impl CartesianVolume {
 }
 
 /// From RAS to LPS, and back.
-pub(super) fn other_coordinates() -> DAffine3 {
+fn other_coordinates() -> DAffine3 {
     DAffine3::from_scale(DVec3::new(-1.0, -1.0, 1.0))
 }
 
