@@ -31,7 +31,7 @@ const NETWORK: &str = "igtl://";
 /// The source of live frames.
 #[derive(Clone, clap::Args)]
 pub struct SourceArgs {
-    /// phantom; a recording (.mha, .mhd, .nrrd, .nii, .vol, each also as .gz, .frames) or, for view, a workspace (.toml); - for standard input (a line of JSON, then raw frames, as
+    /// phantom; a recording (.mha, .mhd, .nrrd, .nii, .vol, each also as .gz, .uff, .frames) or, for view, a workspace (.toml); - for standard input (a line of JSON, then raw frames, as
     /// tools/pipe_frames.py writes them); igtl://HOST[:PORT] for OpenIGTLink
     #[arg(long, value_name = "SOURCE", default_value = "phantom")]
     source: String,

@@ -61,7 +61,7 @@ pub(super) fn target_grid(geometry: &Geometry, spacing: Option<f64>) -> Result<G
                         echolume convert sweep.frames sweep.mha --sequence    (frames of whole volumes, for other programs)\n  \
                         echolume render volume.mha --mode mip -o mip.png    (the result is a recording, too)")]
 pub struct Convert {
-    /// MetaImage (.mha, .mhd), NRRD (.nrrd), NIfTI (.nii), DICOM (.dcm), Kretz (.vol), each also as .gz, or .frames file; a folder or a 'pattern*.png' of numbered
+    /// MetaImage (.mha, .mhd), NRRD (.nrrd), NIfTI (.nii), DICOM (.dcm), Kretz (.vol), each also as .gz, UFF (.uff) or .frames file; a folder or a 'pattern*.png' of numbered
     /// pictures; - for standard input
     input: PathBuf,
     /// File to write: .mha, .nrrd, .nii, .nii.gz or .dcm (Enhanced US Volume) for a volume, .frames for every frame unchanged, .mha with --sequence
@@ -221,7 +221,7 @@ impl Convert {
 
 #[derive(clap::Args)]
 pub struct Info {
-    /// MetaImage (.mha, .mhd), NRRD (.nrrd), NIfTI (.nii), DICOM (.dcm), Kretz (.vol), each also as .gz, or .frames file; a folder or a 'pattern*.png' of numbered
+    /// MetaImage (.mha, .mhd), NRRD (.nrrd), NIfTI (.nii), DICOM (.dcm), Kretz (.vol), each also as .gz, UFF (.uff) or .frames file; a folder or a 'pattern*.png' of numbered
     /// pictures; - for standard input
     file: PathBuf,
     #[command(flatten)]

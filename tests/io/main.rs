@@ -16,3 +16,4 @@ mod signals;
 mod sources;
 mod stacks;
 mod tracked;
+mod uff;

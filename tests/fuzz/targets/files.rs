@@ -91,6 +91,11 @@ pub fn dicom(bytes: &[u8]) -> String {
 /// One slice of a series.
 const SLICE: &[u8] = include_bytes!("../../data/dicom/series/0.dcm");
 
+/// An HDF5 file of USTB.
+pub fn uff(bytes: &[u8]) -> String {
+    outcome(echolume::source::open(&written("input.uff", bytes), None).and_then(read))
+}
+
 pub fn kretz(bytes: &[u8]) -> String {
     recording(&written("input.vol", bytes), None)
 }
@@ -116,13 +121,13 @@ fn mend(bytes: &mut [u8]) -> Option<()> {
     let length = frame.checked_sub(20)?;
     bytes.get_mut(12..16)?.copy_from_slice(&(length as u32).to_le_bytes());
     let mut at = sum(bytes, 0, 16 + length)?;
+    let is_posed = bytes[16..16 + length].windows(12).any(|w| w == b"\"posed\":true");
+    let before = if is_posed { 136 } else { 40usize };
     while bytes.get(at..at + 4)? == b"FRAM" {
         let length = u32::from_le_bytes(bytes.get(at + 20..at + 24)?.try_into().ok()?) as usize;
         at = sum(bytes, at, at.checked_add(before)?.checked_add(length)?)?;
     }
     None
-    let is_posed = bytes[16..16 + length].windows(12).any(|w| w == b"\"posed\":true");
-    let before = if is_posed { 136 } else { 40usize };
 }
 
 /// Writes the CRC-32 of a range after it. Returns where the checksum ends.
