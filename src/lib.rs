@@ -75,12 +75,13 @@
 //!             1 => {
 //!                 let grid = Grid { size: [16, 16, 8], spacing: [1.0; 3], origin: [0.0; 3] };
 //!                 let (forward, backward) = (Geometry::Cartesian(grid), Geometry::Cartesian(grid));
-//!                 Event::Begin(Box::new(Header { forward, backward, stored: StoredType::U8, range: [0.0, 255.0] }))
+//!                 let (stored, range) = (StoredType::U8, [0.0, 255.0]);
+//!                 Event::Begin(Box::new(Header { forward, backward, stored, range, posed: false }))
 //!             }
 //!             n @ 2..10 => {
 //!                 let slice = n - 2;
 //!                 let (number, bytes) = (slice as u32, vec![30 * slice as u8; 16 * 16]);
-//!                 Event::Frame(Frame { volume: 0, number, slice, backward: false, time: None, bytes })
+//!                 Event::Frame(Frame { volume: 0, number, slice, backward: false, time: None, pose: None, bytes })
 //!             }
 //!             _ => Event::End(None),
 //!         }

@@ -21,7 +21,7 @@ use std::sync::Arc;
 /// The arguments of every command that renders a recording.
 #[derive(clap::Args)]
 pub struct InputArgs {
-    /// Recording: MetaImage (.mha, .mhd), NRRD (.nrrd), NIfTI (.nii), DICOM (.dcm), Kretz (.vol), each also as .gz, or frames (.frames); a
+    /// Recording: MetaImage (.mha, .mhd), NRRD (.nrrd), NIfTI (.nii), DICOM (.dcm), Kretz (.vol), each also as .gz, UFF (.uff) or frames (.frames); a
     /// folder or a 'pattern*.png' of numbered pictures; - for standard input, also a stream of frames; or a workspace (.toml) that the viewer saved.
     /// Without one, a synthetic fetal head (preset face)
     input: Option<PathBuf>,

@@ -31,7 +31,7 @@ const NETWORK: &str = "igtl://";
 /// The source of live frames.
 #[derive(Clone, clap::Args)]
 pub struct SourceArgs {
-    /// phantom; a recording (.mha, .mhd, .nrrd, .nii, .vol, each also as .gz, .frames) or, for view, a workspace (.toml); - for standard input (a line of JSON, then raw frames, as
+    /// phantom; a recording (.mha, .mhd, .nrrd, .nii, .vol, each also as .gz, .uff, .frames) or, for view, a workspace (.toml); - for standard input (a line of JSON, then raw frames, as
     /// tools/pipe_frames.py writes them); igtl://HOST[:PORT] for OpenIGTLink
     #[arg(long, value_name = "SOURCE", default_value = "phantom")]
     source: String,
@@ -49,6 +49,9 @@ pub struct SourceArgs {
     /// OpenIGTLink: the device (TRANSFORM) or tool (TDATA) that tracks 2D frames; "image": the matrix of each IMAGE [default: any TRANSFORM]
     #[arg(long, value_name = "NAME")]
     tool: Option<String>,
+    /// OpenIGTLink: the device whose images are taken, where there are several [default: all]
+    #[arg(long, value_name = "NAME")]
+    device_name: Option<String>,
     /// The rectangle of each tracked frame that holds ultrasound, pixels
     #[arg(long, value_name = "X,Y,W,H")]
     clip: Option<String>,
@@ -174,7 +177,8 @@ impl SourceArgs {
         }
         let source: Box<dyn Live> = if self.source == "-" {
             say_probe_file(self.geometry.probe.as_deref());
-            Box::new(Piped::new(std::io::stdin(), self.geometry.probe.as_deref()).map_err(input)?)
+            let piped = Piped::new(std::io::stdin(), self.geometry.probe.as_deref()).map_err(input)?;
+            Box::new(piped.compounded(self.network()?.freehand))
         } else if let Some(address) = network {
             if address.is_empty() {
                 return Err(input(format!("--source {}: must read igtl://HOST or igtl://HOST:PORT", self.source)));
@@ -234,7 +238,7 @@ impl SourceArgs {
     }
 
     fn network(&self) -> Result<NetworkOptions, Failure> {
-        let mut options = NetworkOptions::default();
+        let mut options = NetworkOptions { device: self.device_name.clone(), ..NetworkOptions::default() };
         match (&mut options.poses, self.tool.as_deref()) {
             (poses, Some("image")) => *poses = Poses::Image,
             (Poses::Messages { device, .. }, tool) => *device = tool.map(str::to_string),

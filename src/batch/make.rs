@@ -10,7 +10,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 /// Endings of recordings in a folder. A file that is named itself may have any.
-const ENDINGS: [&str; 9] = [".dcm", ".mha", ".mhd", ".nrrd", ".nhdr", ".nii", ".vol", ".frames", ".gz"];
+const ENDINGS: [&str; 10] = [".dcm", ".mha", ".mhd", ".nrrd", ".nhdr", ".nii", ".vol", ".uff", ".frames", ".gz"];
 /// Deepest folder below one that is named.
 const MAX_DEPTH: usize = 64;
 

@@ -21,7 +21,7 @@ use std::path::PathBuf;
                         echolume mesh bone.mha bone.glb --threshold 0.4 --spacing 0.5 --smooth 0.5 --open"
 )]
 pub struct MakeMesh {
-    /// MetaImage (.mha, .mhd), NRRD (.nrrd), NIfTI (.nii), DICOM (.dcm), Kretz (.vol), each also as .gz, or .frames file; a folder or a 'pattern*.png'
+    /// MetaImage (.mha, .mhd), NRRD (.nrrd), NIfTI (.nii), DICOM (.dcm), Kretz (.vol), each also as .gz, UFF (.uff) or .frames file; a folder or a 'pattern*.png'
     /// of numbered pictures; - for standard input
     input: PathBuf,
     /// File to write: .stl, .ply or .glb

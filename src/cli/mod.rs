@@ -12,6 +12,7 @@ mod one_colour;
 mod probe;
 mod recordings;
 mod render;
+mod serve;
 mod stream;
 #[cfg(feature = "view")]
 mod view;

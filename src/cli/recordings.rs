@@ -61,7 +61,7 @@ pub(super) fn target_grid(geometry: &Geometry, spacing: Option<f64>) -> Result<G
                         echolume convert sweep.frames sweep.mha --sequence    (frames of whole volumes, for other programs)\n  \
                         echolume render volume.mha --mode mip -o mip.png    (the result is a recording, too)")]
 pub struct Convert {
-    /// MetaImage (.mha, .mhd), NRRD (.nrrd), NIfTI (.nii), DICOM (.dcm), Kretz (.vol), each also as .gz, or .frames file; a folder or a 'pattern*.png' of numbered
+    /// MetaImage (.mha, .mhd), NRRD (.nrrd), NIfTI (.nii), DICOM (.dcm), Kretz (.vol), each also as .gz, UFF (.uff) or .frames file; a folder or a 'pattern*.png' of numbered
     /// pictures; - for standard input
     input: PathBuf,
     /// File to write: .mha, .nrrd, .nii, .nii.gz or .dcm (Enhanced US Volume) for a volume, .frames for every frame unchanged, .mha with --sequence
@@ -184,22 +184,19 @@ impl Convert {
         }
         let mut recording = open_recording(&self.input, self.geometry.options())?;
         let first = recording.geometry(0);
-        if let (Some(world), Geometry::Cartesian(grid)) = (recording.world(), &first)
-            && world != World::of(grid)
-        {
-            remark(&format!("{}: a .frames file does not keep the orientation in the world", self.output.display()));
-        }
+        let (pose, posed) = (recording.pose(), recording.header().posed);
         let second = if recording.volumes() > 1 { recording.geometry(1) } else { first.clone() };
         let mut frame = recording.next_frame().map_err(input)?;
         let is_backward = frame.as_ref().is_some_and(|frame| frame.backward);
         let (forward, backward) = if is_backward { (second, first) } else { (first, second) };
-        let header = Header { forward, backward, stored: recording.stored_type(), range: recording.range() };
+        let header = Header { forward, backward, stored: recording.stored_type(), range: recording.range(), posed };
         // A signal ends the process only after the incomplete file is deleted.
         let signals = Writing::begin();
         let mut writer = Writer::create(&self.output, header).map_err(failed)?;
         let bar = progress_bar((recording.volumes() * recording.frames_per_volume()) as u64);
         let mut copy = || {
-            while let Some(there) = frame.take() {
+            while let Some(mut there) = frame.take() {
+                there.pose = there.pose.or(pose);
                 if let Some(signal) = signals.signal() {
                     return Err(failed(format!("{}: stopped by {signal}", self.output.display())));
                 }
@@ -224,7 +221,7 @@ impl Convert {
 
 #[derive(clap::Args)]
 pub struct Info {
-    /// MetaImage (.mha, .mhd), NRRD (.nrrd), NIfTI (.nii), DICOM (.dcm), Kretz (.vol), each also as .gz, or .frames file; a folder or a 'pattern*.png' of numbered
+    /// MetaImage (.mha, .mhd), NRRD (.nrrd), NIfTI (.nii), DICOM (.dcm), Kretz (.vol), each also as .gz, UFF (.uff) or .frames file; a folder or a 'pattern*.png' of numbered
     /// pictures; - for standard input
     file: PathBuf,
     #[command(flatten)]

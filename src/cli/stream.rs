@@ -1,9 +1,11 @@
 //! `echolume stream`.
 
 use super::one_colour;
+use super::serve::{ServeArgs, Serving};
 use crate::args::{SceneArgs, SourceArgs, StreamArgs, check_outputs};
 use crate::files::signals::Held;
 use crate::gpu::{Context, GpuError};
+use crate::live::feed::Observer;
 use crate::live::metrics::{LiveMetrics, SourceStatus};
 use crate::live::{Feed, FinishedPicture, Statistics, Step, Stream as Live, StreamError, StreamOptions, Update};
 use crate::machine::resident_bytes;
@@ -30,6 +32,7 @@ const INTERVAL: Duration = Duration::from_secs(1);
                         echolume stream --source sweep.frames --real-time --out pictures\n  \
                         tools/pipe_frames.py | echolume stream --source - --null\n  \
                         echolume stream --source igtl://localhost:18944 --record exam.frames --null\n  \
+                        echolume stream --serve --null    (3D Slicer connects to localhost)\n  \
                         echolume stream --source phantom --rate 5 --update rolling --null --for 10s\n  \
                         echolume stream --motor /dev/ttyUSB0 --sweeps 1 --probe probe.toml --source - --out pictures"
 )]
@@ -49,6 +52,8 @@ pub struct Stream {
     /// Write every frame that arrives to this file (.frames)
     #[arg(long, value_name = "FILE")]
     record: Option<PathBuf>,
+    #[command(flatten)]
+    serve: ServeArgs,
     /// Write metrics in Prometheus' text format every 15 s and at the end, for the textfile collector of its node exporter (name it
     /// *.prom)
     #[arg(long, value_name = "FILE")]
@@ -78,8 +83,10 @@ impl Stream {
         }
         check_outputs(&[("--prometheus", self.prometheus.as_deref())], [self.source.path()])?;
         let source = self.source.open()?;
+        let mut serving = self.serve.start()?;
         let mut context = self.scene.open_device(self.validate)?;
-        let feed = Feed::new(source, self.record.as_deref())
+        let observer = serving.as_ref().map(|serving| Box::new(serving.publisher.listener()) as Observer);
+        let feed = Feed::observed(source, self.record.as_deref(), None, observer)
             .map_err(|e| failed(format!("a thread for the source cannot be started: {e}")))?;
         let (images, queues, time_stamps) = (self.stream.images, self.stream.queues(), self.stream.time_stamps());
         let options =
@@ -87,8 +94,9 @@ impl Stream {
         let mut stream = Live::new(&context, feed, settings, options);
         let metrics = self.prometheus.as_deref().map(|file| LiveMetrics::new(file, "stream"));
         let metrics = metrics.transpose().map_err(failed)?;
-        let done = self.run_stream(&mut stream, update, &mut context, metrics);
+        let done = self.run_stream(&mut stream, update, &mut context, metrics, &mut serving);
         drop(stream);
+        serving.into_iter().for_each(Serving::end);
         done?;
         match context.messages().first() {
             None => Ok(()),
@@ -103,6 +111,7 @@ impl Stream {
         update: Update,
         context: &mut Arc<Context>,
         mut metrics: Option<LiveMetrics>,
+        serving: &mut Option<Serving>,
     ) -> Result<(), Failure> {
         // A signal ends the stream normally, so that the recording gets its index. A second signal ends the process at once.
         let signals = Held::first();
@@ -139,6 +148,9 @@ impl Stream {
                     if !explained && let Some(file) = file {
                         explained = explain_one_colour(stream, &shown, &file)?;
                     }
+                    if let (Some(serving), Some(picture)) = (&*serving, shown.picture) {
+                        serving.publisher.picture([picture.width, picture.height], picture.rgba);
+                    }
                     pictures += 1;
                     losses = 0;
                 }
@@ -154,6 +166,7 @@ impl Stream {
                     let (at, busy) = (began.elapsed().as_secs_f64(), busy.as_secs_f64());
                     say!("{at:>6.1} s  stalled: the device has finished nothing for {busy:.1} s");
                 }
+                serving.iter_mut().for_each(|serving| serving.say(began));
                 all.add(&since);
                 metrics.iter_mut().for_each(|metrics| metrics.add(&since));
                 // After a few seconds all buffers are allocated.
@@ -176,7 +189,7 @@ impl Stream {
                 break None;
             }
             // Nobody reads the lines, and nothing else is written.
-            let has_no_output = self.null && self.record.is_none() && is_closed();
+            let has_no_output = self.null && self.record.is_none() && !self.serve.is_asked_for() && is_closed();
             if has_no_output || signals.signal().is_some() {
                 break None;
             }

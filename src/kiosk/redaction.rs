@@ -15,8 +15,8 @@ use std::path::Path;
 
 /// File extensions of recordings and pictures.
 const EXTENSIONS: &[&str] = &[
-    "mha", "mhd", "vol", "frames", "png", "dcm", "raw", "zraw", "nrrd", "nhdr", "nii", "img", "jpg", "jpeg", "bmp",
-    "tif", "tiff", "pgm", "ppm", "gif", "avi", "mp4", "mov", "mkv",
+    "mha", "mhd", "vol", "uff", "frames", "png", "dcm", "raw", "zraw", "nrrd", "nhdr", "nii", "img", "jpg", "jpeg",
+    "bmp", "tif", "tiff", "pgm", "ppm", "gif", "avi", "mp4", "mov", "mkv",
 ];
 /// System folders: paths inside of them are kept.
 const SYSTEM_FOLDERS: &[&str] = &[

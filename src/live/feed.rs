@@ -4,6 +4,7 @@
 use crate::gpu::Wake;
 use crate::source::Frame;
 use crate::source::live::{Event, Live};
+use crate::source::posed::Posed;
 use crate::source::recorder::{Header, Writer};
 use std::collections::VecDeque;
 use std::io;
@@ -26,6 +27,9 @@ pub struct Arrived {
     pub event: Event,
     pub at: Instant,
 }
+
+/// Sees every event of a feed.
+pub type Observer = Box<dyn FnMut(&Event) + Send>;
 
 /// What a feed counted.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -152,10 +156,24 @@ impl Feed {
     /// # Errors
     /// The thread cannot be started.
     pub fn waking(source: Box<dyn Live>, record: Option<&Path>, wake: Option<Wake>) -> io::Result<Feed> {
+        Feed::observed(source, record, wake, None)
+    }
+
+    /// As [`Feed::waking`]. `observer` sees every event before it is queued, on the thread of the source.
+    ///
+    /// # Errors
+    /// The thread cannot be started.
+    pub fn observed(
+        source: Box<dyn Live>,
+        record: Option<&Path>,
+        wake: Option<Wake>,
+        observer: Option<Observer>,
+    ) -> io::Result<Feed> {
         let (shared, can_wait) = (Arc::new(Shared { wake, ..Shared::default() }), source.can_wait());
         let theirs = shared.clone();
         let tap = record.map(RecordingTap::new);
-        let thread = std::thread::Builder::new().name("source".into()).spawn(move || listen(source, tap, &theirs))?;
+        let thread =
+            std::thread::Builder::new().name("source".into()).spawn(move || listen(source, tap, observer, &theirs))?;
         Ok(Feed { shared, can_wait, thread: Some(thread) })
     }
 
@@ -213,8 +231,10 @@ impl Drop for Feed {
     }
 }
 
-fn listen(mut source: Box<dyn Live>, mut tap: Option<RecordingTap>, shared: &Shared) {
+fn listen(mut source: Box<dyn Live>, mut tap: Option<RecordingTap>, mut observer: Option<Observer>, shared: &Shared) {
     let (can_wait, records) = (source.can_wait(), tap.is_some());
+    // After the recording: that has the pictures themselves.
+    let mut posed = source.compounding().map(Posed::new);
     let _guard = EndOnPanic(shared);
     while !shared.stop.load(Ordering::Relaxed) {
         let event = source.next(PATIENCE);
@@ -242,7 +262,12 @@ fn listen(mut source: Box<dyn Live>, mut tap: Option<RecordingTap>, shared: &Sha
         if ends && let Some(Err(fault)) = tap.take().map(RecordingTap::finish) {
             shared.put(Arrived { event: Event::Fault(format!("the recording has no index: {fault}")), at }, can_wait);
         }
-        if !matches!(event, Event::Idle) {
+        let events = match &mut posed {
+            Some(posed) => posed.take(event),
+            None => vec![event],
+        };
+        for event in events.into_iter().filter(|event| !matches!(event, Event::Idle)) {
+            observer.iter_mut().for_each(|observer| observer(&event));
             shared.put(Arrived { event, at }, can_wait);
         }
         if ends {
@@ -379,6 +404,7 @@ mod tests {
                 slice: (number % 3) as usize,
                 backward: false,
                 time: None,
+                pose: None,
                 bytes: vec![0; self.bytes],
             })
         }

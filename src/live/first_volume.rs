@@ -110,12 +110,12 @@ mod tests {
 
     fn header() -> Header {
         let grid = Geometry::Cartesian(Grid { origin: [0.0; 3], spacing: [1.0; 3], size: [32, 32, 2] });
-        Header { forward: grid.clone(), backward: grid, stored: StoredType::U8, range: [0.0, 255.0] }
+        Header { forward: grid.clone(), backward: grid, stored: StoredType::U8, range: [0.0, 255.0], posed: false }
     }
 
     fn frame(volume: u32, slice: usize, tissue: u8) -> Frame {
         let bytes = (0..32 * 32).map(|n| if n % 32 < 12 { 20 } else { tissue }).collect();
-        Frame { volume, number: slice as u32, slice, backward: false, time: None, bytes }
+        Frame { volume, number: slice as u32, slice, backward: false, time: None, pose: None, bytes }
     }
 
     #[test]

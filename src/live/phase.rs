@@ -182,7 +182,7 @@ mod tests {
 
     fn replay(volume: u32) -> Replay {
         let mut cine = Cine::new(CineLimits { volumes: 1, bytes: 100 }, 1);
-        cine.frame(Frame { volume, number: 0, slice: 0, backward: false, time: None, bytes: vec![0] });
+        cine.frame(Frame { volume, number: 0, slice: 0, backward: false, time: None, pose: None, bytes: vec![0] });
         Replay { volume: cine.volumes()[0].clone(), sent: 0, image: 1 }
     }
 

@@ -12,4 +12,4 @@ pub use axis::Axis;
 pub use file::ProbeFile;
 pub use geometry::{Advance, Array, GeometryError, Indices, Motion, Probe, Volumes};
 pub use grid::{Geometry, Grid};
-pub use world::{AxisOrder, DepthAxis, World};
+pub use world::{AxisOrder, DepthAxis, World, is_rigid};

@@ -5,7 +5,7 @@
 //! left-handed in the world (a mirrored one) is drawn with one axis reversed.
 
 use super::grid::Grid;
-use glam::{DMat3, DMat4, DVec3};
+use glam::{DAffine3, DMat3, DMat4, DVec3};
 
 /// Largest cosine of the angle between two axes that counts as perpendicular: 0.06 degrees, as files round their matrices.
 const MAX_COSINE: f64 = 1e-3;
@@ -107,6 +107,16 @@ impl World {
         World { voxel_to_world: self.voxel_to_world * lattice(of).inverse() * lattice(other) }
     }
 
+    /// The rigid map from the drawn space of a lattice, mm, to the world. `of`: the lattice whose voxels these are.
+    pub fn pose(&self, of: &Grid) -> DAffine3 {
+        DAffine3::from_mat4(self.voxel_to_world * lattice(of).inverse())
+    }
+
+    /// The world of a lattice whose drawn space has this pose; None if the pose is not rigid ([`is_rigid`]).
+    pub fn posed(pose: &DAffine3, of: &Grid) -> Option<World> {
+        is_rigid(pose).then(|| World { voxel_to_world: DMat4::from(*pose) * lattice(of) })
+    }
+
     /// The direction of the world that each axis points to most, in words.
     pub fn nearest(&self) -> [&'static str; 3] {
         [0, 1, 2].map(|n| {
@@ -115,6 +125,19 @@ impl World {
             LETTERS[main][usize::from(step[main] < 0.0)]
         })
     }
+}
+
+/// Largest entry of R^T R - 1 for which a matrix counts as a rotation: poses come as rounded numbers.
+const RIGID_TOLERANCE: f64 = 1e-3;
+/// Farthest place of a pose, mm.
+const MAX_DISTANCE: f64 = 1e6;
+
+/// True if a map turns and moves and does nothing else: a rotation to 0.06 degrees and 0.1 %, and a place within 1 km.
+pub fn is_rigid(pose: &DAffine3) -> bool {
+    let turn = pose.matrix3;
+    let off = (turn.transpose() * turn - DMat3::IDENTITY).to_cols_array();
+    let is_turn = turn.determinant() > 0.0 && off.iter().all(|v| v.abs() <= RIGID_TOLERANCE);
+    is_turn && pose.translation.is_finite() && pose.translation.abs().max_element() <= MAX_DISTANCE
 }
 
 /// Voxel indices to the drawn space of a grid, mm.
@@ -323,6 +346,24 @@ mod tests {
             assert!(at(bad).is_err(), "{bad}");
         }
         assert!(World::new([DVec3::X, DVec3::Y, DVec3::Z], DVec3::INFINITY).is_err());
+    }
+
+    #[test]
+    fn a_pose_is_the_world_without_its_lattice_and_nothing_but_rigid() {
+        let turned = DMat3::from_euler(glam::EulerRot::XYZ, 0.3, -1.1, 2.0);
+        let world = World::new([turned.x_axis, turned.y_axis * 0.4, turned.z_axis], DVec3::new(5.0, 6.0, 7.0)).unwrap();
+        let grid = Grid { origin: [1.0, -2.0, 30.0], ..world.grid([9, 9, 9]) };
+        let pose = world.pose(&grid);
+        let back = World::posed(&pose, &grid).expect("rigid");
+        for voxel in [DVec3::ZERO, DVec3::new(8.0, 3.0, 5.0)] {
+            assert!(back.at(voxel).distance(world.at(voxel)) < 1e-9);
+        }
+        assert_eq!(World::of(&GRID).pose(&GRID), DAffine3::IDENTITY);
+        let scaled = DAffine3::from_scale(DVec3::splat(1.01));
+        let mirrored = DAffine3::from_scale(DVec3::new(-1.0, 1.0, 1.0));
+        for wrong in [scaled, mirrored, DAffine3::NAN, DAffine3::from_translation(DVec3::splat(1e9))] {
+            assert_eq!(World::posed(&wrong, &grid), None, "{wrong:?}");
+        }
     }
 
     #[test]

@@ -10,7 +10,7 @@ use std::path::Path;
 const START: u64 = 1024;
 /// What is read, for messages.
 const READ: &str = "MetaImage (.mha, .mhd), NRRD (.nrrd, .nhdr), NIfTI (.nii), DICOM (.dcm) and Kretz (.vol) are read, each also as .gz, \
-                    .frames, and folders of DICOM files or numbered pictures";
+                    USTB's UFF (.uff), .frames, and folders of DICOM files or numbered pictures";
 
 /// Reads the layout of a file with the reader for its content, or else for the extension of its name; or of a stack of pictures.
 ///

@@ -2,7 +2,8 @@
 
 use super::samples::{SampleType, StoredType};
 use crate::files::InputError;
-use crate::probe::{Advance, Geometry, World};
+use crate::probe::{Advance, Geometry, World, is_rigid};
+use glam::{DAffine3, DMat4, DVec3};
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
 
@@ -24,6 +25,8 @@ pub struct Frame {
     pub backward: bool,
     /// Time stamp, s, on the clock of the device that acquired it.
     pub time: Option<f64>,
+    /// From the space of the geometry, mm, to the world (LPS) or the space of a tracker: rigid. Of a volume the pose of its first frame counts.
+    pub pose: Option<DAffine3>,
     /// Samples of the stored type ([`Header::stored`]), little-endian, line by line (samples fastest).
     pub bytes: Vec<u8>,
 }
@@ -39,6 +42,33 @@ pub struct Header {
     pub stored: StoredType,
     /// Stored values that are shown as 0 and 1; finite, the second above the first.
     pub range: [f64; 2],
+    /// Frames may have poses.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub posed: bool,
+}
+
+/// Size of a pose as it is stored, bytes: the upper three rows of a 4 x 4 matrix, row by row, f64.
+pub(super) const POSE_BYTES: usize = 96;
+
+/// A stored pose. None if it is not finite or not rigid.
+pub(super) fn read_pose(bytes: &[u8; POSE_BYTES]) -> Option<DAffine3> {
+    let mut rows = [0.0; 12];
+    for (value, word) in rows.iter_mut().zip(bytes.as_chunks::<8>().0) {
+        *value = f64::from_le_bytes(*word);
+    }
+    let column = |c: usize| DVec3::new(rows[c], rows[4 + c], rows[8 + c]);
+    let pose = DAffine3::from_cols(column(0), column(1), column(2), column(3));
+    is_rigid(&pose).then_some(pose)
+}
+
+/// The bytes of a pose; NaN for none.
+pub(super) fn stored_pose(pose: Option<&DAffine3>) -> [u8; POSE_BYTES] {
+    let matrix = DMat4::from(pose.copied().unwrap_or(DAffine3::NAN)).transpose().to_cols_array();
+    let mut bytes = [0; POSE_BYTES];
+    for (word, value) in bytes.as_chunks_mut::<8>().0.iter_mut().zip(matrix) {
+        *word = value.to_le_bytes();
+    }
+    bytes
 }
 
 impl Header {
@@ -120,6 +150,12 @@ pub trait Source: Send {
     fn world(&self) -> Option<World> {
         None
     }
+    /// The pose of all frames that have none of their own; None where the axes of the volume are those of the world.
+    fn pose(&self) -> Option<DAffine3> {
+        let Geometry::Cartesian(grid) = self.geometry(0) else { return None };
+        let world = self.world().filter(|world| *world != World::of(&grid))?;
+        Some(world.pose(&grid))
+    }
     /// The probe file that the geometry is from; None if the source states it itself.
     fn probe_file(&self) -> Option<&Path> {
         None
@@ -135,7 +171,8 @@ fn header_of<S: Source + ?Sized>(source: &S) -> Header {
     let forward = source.geometry(0);
     let second = if source.volumes() > 1 { source.geometry(1) } else { forward.clone() };
     let (forward, backward) = if goes_back(&forward) { (second, forward) } else { (forward, second) };
-    Header { forward, backward, stored: source.stored_type(), range: source.range() }
+    let posed = source.pose().is_some();
+    Header { forward, backward, stored: source.stored_type(), range: source.range(), posed }
 }
 
 /// True if this geometry is of a backward sweep.

@@ -1,6 +1,8 @@
 //! Live sources: the trait that all of them implement, and recordings that are played back as if they were live.
 
 use super::frame::{Frame, Header, Source};
+use super::freehand::CompoundingOptions;
+use glam::DAffine3;
 use std::time::{Duration, Instant};
 
 /// Where frames come from, for messages.
@@ -46,6 +48,11 @@ pub trait Live: Send {
     /// instead when the caller is slow.
     fn can_wait(&self) -> bool;
 
+    /// How pictures with poses become a volume ([`Posed`](super::posed::Posed)); None: they do not.
+    fn compounding(&self) -> Option<CompoundingOptions> {
+        None
+    }
+
     /// Why nothing can arrive at the moment, on one line, such as a connection that was refused. None while the source is connected.
     fn disconnected(&self) -> Option<String> {
         None
@@ -75,6 +82,8 @@ pub struct PlaybackSource {
     highest: u32,
     begun: Option<(Instant, f64)>,
     header: Option<Header>,
+    /// Of all frames without one of their own.
+    pose: Option<DAffine3>,
     /// A frame that is not due yet, and when it is.
     waiting: Option<(Instant, Frame)>,
     frames: u64,
@@ -92,6 +101,7 @@ impl PlaybackSource {
             highest: 0,
             begun: None,
             header: None,
+            pose: None,
             waiting: None,
             frames: 0,
         }
@@ -117,6 +127,7 @@ impl PlaybackSource {
             }
         };
         frame.volume = frame.volume.wrapping_add(self.base);
+        frame.pose = frame.pose.or(self.pose);
         self.highest = frame.volume;
         let stamp = match self.playback {
             Playback::Fast => 0.0,
@@ -138,6 +149,7 @@ impl Live for PlaybackSource {
     fn next(&mut self, patience: Duration) -> Event {
         if self.header.is_none() {
             let header = self.source.header();
+            self.pose = self.source.pose();
             self.header = Some(header.clone());
             return Event::Begin(Box::new(header));
         }

@@ -26,6 +26,7 @@ pub mod piped;
 mod piped_file;
 mod pixel;
 mod plus_config;
+pub mod posed;
 pub mod recorder;
 pub mod recording;
 pub mod samples;
@@ -34,6 +35,7 @@ mod stack;
 pub(crate) mod standard_input;
 mod tracked;
 mod transforms;
+mod uff;
 mod value_range;
 pub mod volume_file;
 
@@ -87,8 +89,9 @@ pub fn open_with(path: &Path, options: OpenOptions) -> Result<Box<dyn Source>, I
 
 fn open_file(path: &Path, options: OpenOptions) -> Result<Box<dyn Source>, InputError> {
     Ok(match Kind::of(path) {
-        Kind::Frames => Box::new(frames(path, options)?),
-        Kind::Stream => Box::new(stream(path, options)?),
+        Kind::Frames => posed::PosedVolume::of(path, Box::new(frames(path, options)?))?,
+        Kind::Stream => posed::PosedVolume::of(path, Box::new(stream(path, options)?))?,
+        Kind::Uff => Box::new(uff(path, options)?),
         Kind::Recording if tracked::is_asked_for(&options) => Box::new(tracked_volume(path, options)?),
         Kind::Recording => Box::new(Recording::open_with(path, options)?),
     })
@@ -109,6 +112,7 @@ fn file_description(path: &Path, options: OpenOptions) -> Result<Vec<(String, St
     match Kind::of(path) {
         Kind::Frames => frames(path, options)?.description(),
         Kind::Stream => Ok(stream(path, options)?.description()),
+        Kind::Uff => Ok(uff(path, options)?.description()),
         Kind::Recording if tracked::is_asked_for(&options) => Ok(tracked_volume(path, options)?.description()),
         Kind::Recording => Ok(Recording::open_with(path, options)?.description()),
     }
@@ -130,6 +134,17 @@ fn stream(path: &Path, options: OpenOptions) -> Result<piped_file::PipedFile, In
     piped_file::PipedFile::open(path, options.probe)
 }
 
+fn uff(path: &Path, options: OpenOptions) -> Result<uff::Beamformed, InputError> {
+    let fault = |flag: &str| Err(InputError::new(path, flag, "is not for UFF, which states its own geometry"));
+    match options {
+        OpenOptions { probe: Some(_), .. } => fault("--probe"),
+        OpenOptions { depth_axis: Some(_), .. } => fault("--depth-axis"),
+        OpenOptions { voxel_spacing: Some(_), .. } => fault("--voxel-spacing"),
+        _ if tracked::is_asked_for(&options) => fault("--plus-config"),
+        _ => uff::Beamformed::open(path),
+    }
+}
+
 /// Refuses what does not apply to frames as they arrived.
 fn only_probe(path: &Path, options: OpenOptions) -> Result<(), InputError> {
     let fault = "is not for frames as they arrived";
@@ -147,6 +162,7 @@ fn only_probe(path: &Path, options: OpenOptions) -> Result<(), InputError> {
 enum Kind {
     Frames,
     Stream,
+    Uff,
     Recording,
 }
 
@@ -161,6 +177,8 @@ impl Kind {
             Kind::Frames
         } else if piped_file::PipedFile::is_one(&start) {
             Kind::Stream
+        } else if uff::is_one(&start) {
+            Kind::Uff
         } else {
             Kind::Recording
         }

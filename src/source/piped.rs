@@ -4,13 +4,14 @@
 //!
 //! | key | meaning |
 //! |---|---|
-//! | `echolume` | 1, the version of this format |
+//! | `echolume` | 1 or 2, the version of this format; 2 has `posed` |
 //! | `samples`, `lines`, `frames` | samples a line, lines a frame, frames a volume; each 1 to 65536 |
 //! | `type` | `"u8"`, `"u16"` or `"f32"`, little-endian |
 //! | `range` | the two values that are shown as 0 and 1; otherwise `samples.range` of the probe, otherwise all of an integer type. f32 needs one |
 //! | `both_ways` | every second volume is swept backwards; otherwise that of the probe |
 //! | `speed_ratio` | fraction of the distance to the next frame that the motor travels during one, 0..=1; otherwise that of the probe |
 //! | `stamped` | `true`: each frame is preceded by its time stamp, an f64 in s. A value that is not finite means none |
+//! | `posed` | `true`: each frame is preceded by its pose, after its time stamp: 12 f64, the upper three rows of a 4 x 4 matrix, row by row. It takes mm in the space of the probe or the lattice to those of a tracker or the world (LPS), and must be rigid. NaN means none. Frames of a lattice of one slice become a freehand volume |
 //! | `lines_at_once` | frames are passed on in parts of so many lines |
 //! | `probe` | the tables of a probe file as objects: `{"array": {"kind": "curved", ...}, ...}`. A probe file given by the user takes precedence |
 //! | `cartesian` | instead of a probe: `{"size": [x, y, z], "spacing": [x, y, z], "origin": [x, y, z]}`, mm; `samples`, `lines` and `frames` may then be left out |
@@ -18,7 +19,8 @@
 //! The frames follow in order of acquisition, line by line (samples fastest), with nothing between them but their time stamps. The
 //! stream may end after any frame. `tools/pipe_frames.py` writes such a stream.
 
-use super::frame::{Frame, Header};
+use super::frame::{Frame, Header, POSE_BYTES, read_pose};
+use super::freehand::CompoundingOptions;
 use super::live::{Event, Live};
 use super::samples::{self, Replaced, SampleType};
 use crate::files::InputError;
@@ -44,6 +46,7 @@ const MAX_WAITING_FRAMES: usize = 4;
 /// the first complete frame, no more than twice the bytes that arrived.
 pub struct Piped {
     queue: Arc<Queue>,
+    compounding: CompoundingOptions,
 }
 
 impl Piped {
@@ -60,7 +63,14 @@ impl Piped {
             theirs.0.end(end.err().map(|error| error.to_string()));
         });
         started.map_err(|e| InputError::unreadable(Path::new(NAME), &e))?;
-        Ok(Piped { queue })
+        let compounding = CompoundingOptions { margin: MARGIN, ..CompoundingOptions::default() };
+        Ok(Piped { queue, compounding })
+    }
+
+    /// The same, with other options for pictures that have poses.
+    pub fn compounded(mut self, compounding: CompoundingOptions) -> Piped {
+        self.compounding = compounding;
+        self
     }
 }
 
@@ -71,6 +81,10 @@ impl Live for Piped {
 
     fn can_wait(&self) -> bool {
         true
+    }
+
+    fn compounding(&self) -> Option<CompoundingOptions> {
+        Some(self.compounding.clone())
     }
 }
 
@@ -83,13 +97,16 @@ impl Drop for Piped {
 
 /// Most samples, lines and frames.
 const MAX_EXTENT: usize = 1 << 16;
-const VERSION: u64 = 1;
+/// The versions that are read. The second one has `posed`.
+const VERSIONS: [u64; 2] = [1, 2];
+/// Margin of a freehand volume around its first pictures, mm: more come.
+const MARGIN: f64 = 20.0;
 
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Keys {
     #[serde(rename = "echolume")]
-    _version: u64,
+    version: u64,
     samples: Option<usize>,
     lines: Option<usize>,
     frames: Option<usize>,
@@ -100,6 +117,8 @@ struct Keys {
     speed_ratio: Option<f64>,
     #[serde(default)]
     stamped: bool,
+    #[serde(default)]
+    posed: bool,
     lines_at_once: Option<usize>,
     probe: Option<serde_json::Value>,
     cartesian: Option<Lattice>,
@@ -148,12 +167,15 @@ impl StreamHeader {
         })?;
         // Checked before the keys: another version may have other keys.
         match value.get("echolume").map(serde_json::Value::as_u64) {
-            Some(Some(VERSION)) => {}
-            Some(_) => return fault("echolume", format!("must be {VERSION}, the version that this program reads")),
+            Some(Some(version)) if VERSIONS.contains(&version) => {}
+            Some(_) => return fault("echolume", "must be 1 or 2, the versions that this program reads"),
             None => return fault("header", "has no key \"echolume\": this is no stream of frames"),
         }
         let keys: Keys = serde_json::from_slice(line).map_err(no_json)?;
-        let size = keys.size()?;
+        if keys.posed && keys.version < 2 {
+            return fault("posed", "needs version 2: \"echolume\": 2");
+        }
+        let (size, posed) = (keys.size()?, keys.posed);
         let sample = match keys.sample {
             Sample::U8 => SampleType::U8,
             Sample::U16 => SampleType::U16,
@@ -189,7 +211,7 @@ impl StreamHeader {
             (None, SampleType::U16 | SampleType::I16) => [0.0, 65535.0],
             (None, SampleType::F32) => return fault("range", "is missing: f32 needs the values that are 0 and 1"),
         };
-        let header = Header { forward, backward, stored: sample.stored(), range };
+        let header = Header { forward, backward, stored: sample.stored(), range, posed };
         header.check().or_else(|(key, wrong)| fault(key, wrong))?;
         let lines = size[1];
         let lines_at_once = match keys.lines_at_once {
@@ -197,6 +219,12 @@ impl StreamHeader {
             given => given.unwrap_or(lines).min(lines),
         };
         Ok(StreamHeader { header, sample, stamped: keys.stamped, lines, lines_at_once, volumes })
+    }
+
+    /// Size of what precedes the samples of a frame, bytes.
+    pub fn before(&self) -> usize {
+        let stamp = if self.stamped { size_of::<f64>() } else { 0 };
+        stamp + if self.header.posed { POSE_BYTES } else { 0 }
     }
 
     /// The frame at an index of the stream, from 0, without samples.
@@ -211,6 +239,7 @@ impl StreamHeader {
             slice: if backward { self.volumes.frames - 1 - number } else { number },
             backward,
             time,
+            pose: None,
             bytes: Vec::new(),
         }
     }
@@ -279,6 +308,8 @@ struct Reader<'a, R> {
     replaced: Replaced,
     /// A complete part has arrived, so that the next one may be allocated at once.
     proven: bool,
+    /// A pose was reported as none.
+    refused_pose: bool,
 }
 
 fn stream_error(field: &str, fault: impl AsRef<str>) -> InputError {
@@ -305,7 +336,13 @@ pub(super) fn first_line(input: &mut impl BufRead) -> Result<Vec<u8>, InputError
 
 impl<'a, R: Read> Reader<'a, R> {
     fn new(input: R, queue: &'a Queue) -> Reader<'a, R> {
-        Reader { input: BufReader::new(input), queue, replaced: Replaced::default(), proven: false }
+        Reader {
+            input: BufReader::new(input),
+            queue,
+            replaced: Replaced::default(),
+            proven: false,
+            refused_pose: false,
+        }
     }
 
     /// Reads until the stream ends or the receiver is dropped.
@@ -336,13 +373,14 @@ impl<'a, R: Read> Reader<'a, R> {
     fn frame(&mut self, stream: &StreamHeader, index: u64) -> Result<bool, InputError> {
         let whole = stream.header.frame_bytes().unwrap_or(0) as usize;
         let (line, stamp) = (whole / stream.lines, if stream.stamped { size_of::<f64>() } else { 0 });
+        let before = stream.before();
         let mut came = 0;
         // An end between two frames is the regular end of the stream.
         let cut = |error: io::Error, came: usize| match error.kind() {
             io::ErrorKind::UnexpectedEof if came == 0 => Ok(false),
             io::ErrorKind::UnexpectedEof => {
                 let Frame { volume, number, .. } = stream.frame(index, None);
-                let there = format!("{came} of {} bytes of frame {number} of volume {volume} came", whole + stamp);
+                let there = format!("{came} of {} bytes of frame {number} of volume {volume} came", whole + before);
                 Err(stream_error("samples", format!("cut short, {there} (both numbered from 0)")))
             }
             _ => Err(stream_error("samples", format!("cannot be read: {error}"))),
@@ -355,10 +393,25 @@ impl<'a, R: Read> Reader<'a, R> {
             }
             time = bytes.first_chunk().map(|b| f64::from_le_bytes(*b)).filter(|t| t.is_finite());
         }
+        let mut pose = None;
+        if stream.header.posed {
+            let mut bytes = Vec::with_capacity(POSE_BYTES);
+            if let Err(error) = self.fill(POSE_BYTES, &mut bytes, &mut came) {
+                return cut(error, came);
+            }
+            pose = bytes.first_chunk().and_then(read_pose);
+            // All NaN is a frame that states that it has none.
+            let is_stated = bytes.as_chunks::<8>().0.iter().any(|word| !f64::from_le_bytes(*word).is_nan());
+            if pose.is_none() && is_stated && !std::mem::replace(&mut self.refused_pose, true) {
+                let Frame { volume, number, .. } = stream.frame(index, None);
+                let what = "has a pose that is not rigid and finite; it and others like it count as none";
+                self.queue.push(Event::Fault(format!("{NAME}: frame {number} of volume {volume} {what}")));
+            }
+        }
         let mut first = 0;
         while first < stream.lines {
             let lines = stream.lines_at_once.min(stream.lines - first);
-            let mut frame = stream.frame(index, time);
+            let mut frame = Frame { pose, ..stream.frame(index, time) };
             if let Err(error) = self.fill(lines * line, &mut frame.bytes, &mut came) {
                 return cut(error, came);
             }
@@ -398,8 +451,8 @@ impl<'a, R: Read> Reader<'a, R> {
             }
             left -= step;
         }
-        // A time stamp proves nothing about the samples.
-        self.proven |= count > size_of::<f64>();
+        // A time stamp and a pose prove nothing about the samples.
+        self.proven |= count > POSE_BYTES;
         Ok(())
     }
 }

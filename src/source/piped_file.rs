@@ -1,11 +1,12 @@
 //! A stream of raw frames ([`super::piped`]) that was kept in a file: every frame has the same size, so that any can be read.
 
 use super::describe;
-use super::frame::{Frame, Header, Source};
+use super::frame::{Frame, Header, POSE_BYTES, Source, read_pose};
 use super::piped::{StreamHeader, first_line};
 use super::samples::{self, SampleType, StoredType};
 use crate::files::InputError;
-use crate::probe::{Geometry, ProbeFile};
+use crate::probe::{Geometry, ProbeFile, World};
+use glam::DAffine3;
 use std::fs::File;
 use std::io::{BufReader, Read, Seek, SeekFrom};
 use std::path::{Path, PathBuf};
@@ -90,16 +91,24 @@ impl PipedFile {
         rows
     }
 
+    /// The pose of the first frame, read without moving the position.
+    fn first_pose(&self) -> Option<DAffine3> {
+        let (mut pose, stamp) = ([0; POSE_BYTES], if self.stream.stamped { size_of::<f64>() as u64 } else { 0 });
+        let mut file = File::open(&self.path).ok().filter(|_| self.stream.header.posed)?;
+        file.seek(SeekFrom::Start(self.start + stamp)).ok()?;
+        file.read_exact(&mut pose).ok()?;
+        read_pose(&pose)
+    }
+
     fn read(&mut self, bytes: &mut [u8]) -> Result<(), InputError> {
         self.input.read_exact(bytes).map_err(|e| InputError::unreadable(&self.path, &e))
     }
 }
 
-/// Size of a frame with its time stamp, bytes.
+/// Size of a frame with its time stamp and pose, bytes.
 fn frame_bytes(stream: &StreamHeader) -> u64 {
-    let stamp = if stream.stamped { size_of::<f64>() as u64 } else { 0 };
     // A header with frames of no size was refused.
-    stream.header.frame_bytes().unwrap_or(1) + stamp
+    stream.header.frame_bytes().unwrap_or(1) + stream.before() as u64
 }
 
 impl Source for PipedFile {
@@ -148,7 +157,12 @@ impl Source for PipedFile {
             self.read(&mut stamp)?;
         }
         let time = Some(f64::from_le_bytes(stamp)).filter(|time| self.stream.stamped && time.is_finite());
-        let mut frame = self.stream.frame(self.next, time);
+        let mut pose = [0; POSE_BYTES];
+        if self.stream.header.posed {
+            self.read(&mut pose)?;
+        }
+        let pose = read_pose(&pose).filter(|_| self.stream.header.posed);
+        let mut frame = Frame { pose, ..self.stream.frame(self.next, time) };
         // The file has so many bytes.
         frame.bytes = vec![0; self.stream.header.frame_bytes().unwrap_or(0) as usize];
         self.read(&mut frame.bytes)?;
@@ -159,6 +173,11 @@ impl Source for PipedFile {
 
     fn header(&self) -> Header {
         self.stream.header.clone()
+    }
+
+    fn world(&self) -> Option<World> {
+        let Geometry::Cartesian(grid) = &self.stream.header.forward else { return None };
+        self.first_pose().and_then(|pose| World::posed(&pose, grid))
     }
 
     fn files(&self) -> Vec<PathBuf> {

@@ -49,7 +49,9 @@ impl PlusConfig {
             let matrix = matrix(numbers).map_err(|e| fault(&format!("Transform {name}"), e))?;
             config.fixed.push(Calibration { name, matrix });
         }
-        let Some(node) = named("VolumeReconstructor").next() else { return Ok(config) };
+        // Configurations before version 2.2 have the other name.
+        let node = named("VolumeReconstructor").chain(named("VolumeReconstruction")).next();
+        let Some(node) = node else { return Ok(config) };
         config.image = node.attribute("ImageCoordinateFrame").map(str::to_string);
         config.reference = node.attribute("ReferenceCoordinateFrame").map(str::to_string);
         let corner = numbers::<2>(&node, "ClipRectangleOrigin").map_err(|e| fault("VolumeReconstructor", e))?;
@@ -99,6 +101,8 @@ mod tests {
         assert_eq!(config.fixed[0].matrix.transform_point3(glam::DVec3::ONE), glam::DVec3::new(1.1, 2.2, 3.1));
         assert_eq!((config.image.as_deref(), config.reference.as_deref()), (Some("Image"), Some("Tracker")));
         assert_eq!((config.clip, config.spacing), (Some([3, 4, 100, 80]), Some(0.5)));
+        let old = read("<a><VolumeReconstruction OutputSpacing='1 1 0.5'/></a>").unwrap();
+        assert_eq!(old.spacing, Some(0.5));
         assert_eq!(read("<a/>").unwrap(), PlusConfig::default());
     }
 

@@ -8,8 +8,11 @@
 //! | 4 | length n of what follows, at most 16 MiB |
 //! | n | JSON of [`Header`]: geometry of forward and backward sweeps, stored type, stored values shown as 0 and 1 |
 //! | 4 | CRC-32 (ISO-HDLC, zlib's) of everything so far |
-//! | ... | frames, each `FRAM`, volume, number, slice, flags (bit 0 backward, bit 1 stamped), length m (six words of 4 in all), time stamp and time of arrival in s (two f64), m bytes of samples, CRC-32 of all preceding bytes of the frame |
+//! | ... | frames, each `FRAM`, volume, number, slice, flags (bit 0 backward, bit 1 stamped), length m (six words of 4 in all), time stamp and time of arrival in s (two f64), a pose if the header says `posed`, m bytes of samples, CRC-32 of all preceding bytes of the frame |
 //! | ... | at a clean end: `INDX`, count (4), for each frame its offset (8) and volume (4), CRC-32 of the index, offset of `INDX` (8), `XEND` |
+//!
+//! A pose is the upper three rows of a 4 x 4 matrix, row by row (12 f64; NaN for none): from the space of the geometry, mm, to the world or the
+//! space of a tracker. Files without poses are the same as before there were any; a program of that time refuses the others by their header.
 //!
 //! If the index is missing or damaged, all frames are read once. A frame with a wrong checksum is left out and counted. Frames after a
 //! gap of 1 GiB without a valid one are lost.
@@ -17,11 +20,12 @@
 pub use super::frame::Header;
 
 use super::describe::{self, number};
-use super::frame::{Frame, Source};
+use super::frame::{Frame, POSE_BYTES, Source, read_pose, stored_pose};
 use super::samples::{SampleType, StoredType};
 use crate::files::InputError;
-use crate::probe::Geometry;
+use crate::probe::{Geometry, World};
 use crc::{CRC_32_ISO_HDLC, Crc, Table};
+use glam::{DAffine3, DQuat};
 use std::fs::{File, OpenOptions};
 use std::io::{Read, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
@@ -31,7 +35,7 @@ const VERSION: u32 = 1;
 const FRAME: &[u8; 4] = b"FRAM";
 const INDEX: &[u8; 4] = b"INDX";
 const END: &[u8; 4] = b"XEND";
-/// Length of a frame before its samples, bytes.
+/// Length of a frame before its pose, or else its samples, bytes.
 const FRAME_HEAD: usize = 40;
 /// Longest header, bytes. It may have tables of lines and slices.
 const MAX_HEADER_BYTES: u32 = 16 << 20;
@@ -113,7 +117,10 @@ impl Writer {
         for time in [frame.time.unwrap_or(0.0), arrived] {
             self.frame.extend(time.to_le_bytes());
         }
-        assert_eq!(self.frame.len(), FRAME_HEAD);
+        if self.header.posed {
+            self.frame.extend(stored_pose(frame.pose.as_ref()));
+        }
+        assert_eq!(self.frame.len(), head_bytes(&self.header));
         self.frame.extend(&frame.bytes);
         self.frame.extend(CRC.checksum(&self.frame).to_le_bytes());
         let offset = self.at;
@@ -296,7 +303,7 @@ impl Reader {
     }
 
     fn record_bytes(&self) -> u64 {
-        FRAME_HEAD as u64 + self.header.frame_bytes().unwrap_or(0) + 4
+        head_bytes(&self.header) as u64 + self.header.frame_bytes().unwrap_or(0) + 4
     }
 
     /// The index at the end of the file, if it is valid.
@@ -343,7 +350,7 @@ impl Reader {
             if bytes.starts_with(INDEX) {
                 break;
             }
-            match parsed(&bytes) {
+            match parsed(&bytes, self.header.posed) {
                 Some((frame, _)) if self.index.last().is_none_or(|(_, volume)| frame.volume >= *volume) => {
                     self.index.push((at, frame.volume));
                     empty_from = at + record;
@@ -364,19 +371,27 @@ impl Reader {
         let read = self.file.seek(SeekFrom::Start(self.index[n].0)).and_then(|_| self.file.read_exact(&mut bytes));
         read.map_err(|e| InputError::unreadable(&self.path, &e))?;
         let slices = self.header.forward.slices();
-        Ok(parsed(&bytes).filter(|(frame, _)| frame.slice < slices))
+        Ok(parsed(&bytes, self.header.posed).filter(|(frame, _)| frame.slice < slices))
     }
 }
 
+/// Length of a frame before its samples, bytes.
+fn head_bytes(header: &Header) -> usize {
+    FRAME_HEAD + if header.posed { POSE_BYTES } else { 0 }
+}
+
 /// Parses a frame and its time of arrival; None if its checksum or a field is wrong.
-fn parsed(record: &[u8]) -> Option<(Frame, f64)> {
+fn parsed(record: &[u8], posed: bool) -> Option<(Frame, f64)> {
     let (body, sum) = record.split_at_checked(record.len().checked_sub(4)?)?;
     let word = |n: usize| body.get(4 * n..4 * n + 4).map(|b| u32::from_le_bytes([b[0], b[1], b[2], b[3]]));
     let time = |at: usize| body.get(at..at + 8)?.try_into().ok().map(f64::from_le_bytes);
     if !body.starts_with(FRAME) || CRC.checksum(body).to_le_bytes() != sum {
         return None;
     }
-    let samples = body.get(FRAME_HEAD..)?;
+    let (pose, samples) = match (posed, body.get(FRAME_HEAD..)?) {
+        (false, samples) => (None, samples),
+        (true, rest) => rest.split_first_chunk().map(|(pose, samples)| (read_pose(pose), samples))?,
+    };
     if word(5)? as usize != samples.len() {
         return None;
     }
@@ -387,6 +402,7 @@ fn parsed(record: &[u8]) -> Option<(Frame, f64)> {
         slice: word(3)? as usize,
         backward: flags & 1 != 0,
         time: if flags & 2 != 0 { Some(time(24)?) } else { None },
+        pose,
         bytes: samples.to_vec(),
     };
     Some((frame, time(32)?))
@@ -446,6 +462,11 @@ impl Source for Reader {
     fn arrival(&self) -> Option<f64> {
         Some(self.arrived)
     }
+
+    fn world(&self) -> Option<World> {
+        let Geometry::Cartesian(grid) = &self.header.forward else { return None };
+        self.first_pose().and_then(|pose| World::posed(&pose, grid))
+    }
 }
 
 impl Reader {
@@ -457,6 +478,16 @@ impl Reader {
             file.read_exact(&mut flags)
         });
         read.is_ok() && flags[0] & 1 != 0
+    }
+
+    /// The pose of the first frame, read without moving the position.
+    fn first_pose(&self) -> Option<DAffine3> {
+        let (offset, _) = self.index.first().filter(|_| self.header.posed)?;
+        let mut pose = [0; POSE_BYTES];
+        let mut file = File::open(&self.path).ok()?;
+        file.seek(SeekFrom::Start(offset + FRAME_HEAD as u64)).ok()?;
+        file.read_exact(&mut pose).ok()?;
+        read_pose(&pose)
     }
 }
 
@@ -485,6 +516,7 @@ impl Reader {
             Geometry::Sweep(probe) => rows.extend(describe::probe(probe)),
             Geometry::Cartesian(grid) => rows.extend(describe::grid(grid)),
         }
+        rows.extend(summary.place());
         let mut add = |title: &str, value: String| rows.push((title.into(), value));
         let [low, high] = self.header().range.map(number);
         add("value range", format!("{low} .. {high}"));
@@ -520,6 +552,10 @@ impl Reader {
                 summary.backward += usize::from(frame.backward);
             }
             of_volume += 1;
+            if let Some(pose) = frame.pose {
+                summary.poses += 1;
+                summary.moved |= *summary.first_pose.get_or_insert(pose) != pose;
+            }
             summary.whole += usize::from(of_volume == each);
             if let Some(time) = frame.time.filter(|t| t.is_finite()) {
                 summary.stamped += 1;
@@ -551,6 +587,23 @@ struct Summary {
     arrivals: Option<[f64; 2]>,
     /// Longest time between the arrivals of two frames, s.
     gap: f64,
+    /// Frames with a pose, the first of the poses, and whether there is another.
+    poses: usize,
+    first_pose: Option<DAffine3>,
+    moved: bool,
+}
+
+impl Summary {
+    /// Where the frames are, for users: nothing without poses.
+    fn place(&self) -> Option<(String, String)> {
+        let pose = self.first_pose?;
+        let [x, y, z] = pose.translation.to_array().map(number);
+        let (axis, angle) = DQuat::from_mat3(&pose.matrix3).normalize().to_axis_angle();
+        let [u, v, w] = axis.to_array().map(number);
+        let each = if self.moved { "differ from frame to frame; the first is" } else { "are all" };
+        let turn = format!("{} deg about {u}, {v}, {w}", number(angle.to_degrees()));
+        Some(("poses".into(), format!("{} frames have one; they {each} {x}, {y}, {z} mm, turned {turn}", self.poses)))
+    }
 }
 
 fn widen(span: &mut Option<[f64; 2]>, time: f64) {

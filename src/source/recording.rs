@@ -233,6 +233,7 @@ impl Recording {
             slice,
             backward,
             time: self.layout.times.get(&index).copied(),
+            pose: None,
             bytes,
         }))
     }
@@ -284,6 +285,7 @@ impl Recording {
             slice: number,
             backward: false,
             time: self.layout.times.get(&(volume * stored[2])).copied(),
+            pose: None,
             bytes,
         }))
     }

@@ -89,7 +89,7 @@ impl TrackedVolume {
         };
         let placed: Vec<Pose> = poses.iter().flatten().copied().collect();
         let lattice = Lattice::around(&placed, &compounding).map_err(|e| fault("poses", e))?;
-        let world = world(&lattice).map_err(|e| fault("poses", e))?;
+        let world = world_of(&lattice).map_err(|e| fault("poses", e))?;
         let without = poses.len() - placed.len();
         if without > 0 {
             tracing::warn!(file = %describe::path(path), "{without} of {} pictures have no valid pose; left out", poses.len());
@@ -142,7 +142,7 @@ impl TrackedVolume {
 }
 
 /// Where the voxels of a lattice are in the space of the tracker.
-fn world(lattice: &Lattice) -> Result<World, String> {
+pub(super) fn world_of(lattice: &Lattice) -> Result<World, String> {
     let back = lattice.to_volume.inverse();
     let (spacing, origin) = (lattice.grid.spacing, lattice.grid.origin.into());
     let axes = [back.matrix3.x_axis * spacing[0], back.matrix3.y_axis * spacing[1], back.matrix3.z_axis * spacing[2]];
@@ -190,8 +190,15 @@ impl Source for TrackedVolume {
         let Some(bytes) = self.compounder.as_ref().and_then(|compounder| compounder.slice(slice)) else {
             return Ok(None);
         };
-        let frame =
-            Frame { volume: 0, number: slice as u32, slice, backward: false, time: None, bytes: bytes.to_vec() };
+        let frame = Frame {
+            volume: 0,
+            number: slice as u32,
+            slice,
+            backward: false,
+            time: None,
+            pose: None,
+            bytes: bytes.to_vec(),
+        };
         self.next += 1;
         Ok(Some(frame))
     }

@@ -111,6 +111,9 @@ fn a_stream_that_cannot_begin_says_why_and_writes_nothing() {
         (&["--null", "--source", "igtl://localhost", "--clip", "1,2"], "--clip 1,2"),
         (&["--null", "--source", "igtl://localhost", "--spacing", "0"], "--spacing"),
         (&["--null", "--mode", "sideways"], "sideways"),
+        (&["--null", "--serve", "localhost"], "igtl://HOST"),
+        (&["--null", "--serve", "--serve-spacing", "0"], "--serve-spacing 0"),
+        (&["--null", "--serve-spacing", "1"], "--serve"),
         (&["--null", "--for", "tomorrow"], "--for"),
         (&[], "--out"),
         (&["--null", "--out", "x"], "--null"),
@@ -185,4 +188,48 @@ fn a_recording_that_cannot_be_made_is_a_failure() {
     let (code, said, err) = finish(Command::new("bash").args(["-c", &limited]));
     assert!(code == Some(1) && err.contains("could not be written"), "{code:?} {said} {err}");
     assert!(said.contains("31 frames, 1 volumes shown"), "what cannot be recorded is shown all the same: {said}");
+}
+
+/// A client of the program's server gets its pictures and its volumes, and the server ends with the stream.
+#[test]
+fn clients_of_the_server_get_pictures_and_volumes() {
+    use echolume::source::igtl::{Client, ClientOptions, Message, PICTURE, VOLUME};
+    use std::io::{BufRead, BufReader};
+    use std::time::Duration;
+
+    let mut child = with_default_signals()
+        .args(["stream", "--null", "--rate", "4", "--serve", "igtl://127.0.0.1:0", "--serve-spacing", "3"])
+        .args(SMALL)
+        .stdin(Stdio::null())
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped())
+        .spawn()
+        .expect("start the program");
+    let mut lines = BufReader::new(child.stdout.take().expect("its output")).lines().map_while(Result::ok);
+    let served = lines.find_map(|line| line.strip_prefix("serving: igtl://").map(str::to_string)).expect("an address");
+    assert!(served.starts_with("127.0.0.1:"), "{served}");
+    let (code, _, err) = run(&["stream", "--null", "--serve", &format!("igtl://{served}")]);
+    assert!(code == Some(1) && err.lines().count() == 1 && err.contains("the port is in use"), "{code:?} {err}");
+    let client = Client::connect(&served, ClientOptions::default()).expect("a thread");
+    let (mut picture, mut volume) = (None, None);
+    while picture.is_none() || volume.is_none() {
+        match client.next(Duration::from_secs(60)).expect("a message").message {
+            Message::Image(image) if image.device == PICTURE => picture = Some(image),
+            Message::Image(image) if image.device == VOLUME => volume = Some(image),
+            other => panic!("{other:?}"),
+        }
+    }
+    let (picture, volume) = (picture.expect("a picture"), volume.expect("a volume"));
+    assert_eq!((picture.size, picture.components), ([48, 40, 1], 3));
+    assert!(picture.bytes.iter().any(|v| *v > 40), "it shows something");
+    assert!(volume.spacing().iter().all(|mm| (mm - 3.0).abs() < 1e-5), "{:?}", volume.spacing());
+    assert!(volume.bytes.iter().any(|v| *v > 40), "it holds something");
+    #[cfg(target_os = "linux")]
+    {
+        use rustix::process::{Pid, Signal, kill_process};
+        kill_process(Pid::from_child(&child), Signal::INT).expect("send a signal");
+    }
+    let rest: Vec<String> = lines.collect();
+    assert!(rest.iter().any(|line| line.starts_with("served    ") && line.contains(" of 1, ")), "{rest:?}");
+    assert_eq!(child.wait().expect("the program ends").code(), Some(0));
 }

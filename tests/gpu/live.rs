@@ -65,6 +65,7 @@ pub fn header(share: f64) -> Header {
         backward: Geometry::Sweep(moving(-share)),
         stored: StoredType::U8,
         range: [0.0, 255.0],
+        posed: false,
     }
 }
 
@@ -83,7 +84,7 @@ pub fn volume(number: u32, value: impl Fn(usize, usize) -> u8) -> Vec<Frame> {
         let backward = number % 2 == 1;
         let slice = if backward { slices - 1 - n } else { n } as usize;
         let bytes = (0..bytes).map(|i| value(slice, i)).collect();
-        Frame { volume: number, number: n, slice, backward, time: None, bytes }
+        Frame { volume: number, number: n, slice, backward, time: None, pose: None, bytes }
     };
     (0..slices).map(frame).collect()
 }

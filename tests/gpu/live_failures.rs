@@ -36,8 +36,15 @@ fn faulty_frames_are_reported_and_left_out() {
     // Another geometry, with frames of another size.
     let other = Geometry::Sweep(linear());
     events.push(Event::Begin(Box::new(Header { forward: other.clone(), backward: other, ..header(0.0) })));
-    let frame =
-        |n| Frame { volume: 4, number: n, slice: n as usize, backward: false, time: None, bytes: vec![45; 48 * 20] };
+    let frame = |n| Frame {
+        volume: 4,
+        number: n,
+        slice: n as usize,
+        backward: false,
+        time: None,
+        pose: None,
+        bytes: vec![45; 48 * 20],
+    };
     events.extend((0..7).map(|n| Event::Frame(frame(n))));
     let mut stream = stream(&device, events, settings("mode = 'mip'"), live::StreamOptions::default());
     let mut shown = Vec::new();

@@ -10,8 +10,10 @@ mod interrupted;
 #[cfg(target_os = "linux")]
 mod motor;
 mod piped;
+mod posed;
 mod recorder;
 mod signals;
 mod sources;
 mod stacks;
 mod tracked;
+mod uff;

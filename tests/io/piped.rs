@@ -180,7 +180,7 @@ fn wrong_first_lines_are_refused_by_name() {
         (json!({"colour": true}), "unknown field `colour`"),
         (json!({"probe": unknown}), "unknown field `radus_mm`"),
         (json!({"cartesian": {"size": [1, 1, 1], "spacing": [1, 1, 1], "orgin": [0, 0, 0]}}), "unknown field `orgin`"),
-        (json!({"echolume": 2}), "echolume: must be 1"),
+        (json!({"echolume": 3}), "echolume: must be 1 or 2"),
         (json!({"echolume": null}), "no stream of frames"),
         (json!({"samples": huge}), "samples: is 1152921504606846976, must be 1 to 65536"),
         (json!({"lines": 0}), "lines: is 0"),

@@ -26,6 +26,7 @@ fn header() -> Header {
         backward: Geometry::Sweep(probe(-0.01)),
         stored: StoredType::U16,
         range: [3.0, 60_000.0],
+        posed: false,
     }
 }
 
@@ -38,7 +39,7 @@ fn frames() -> Vec<(Frame, f64)> {
             (0..16 * 6 * 2u32).map(|i| (i.wrapping_mul(2_654_435_761).wrapping_add(n * 977) >> 24) as u8).collect();
         let slice = if backward { 4 - number } else { number } as usize;
         let time = (!n.is_multiple_of(3)).then_some(0.01 * f64::from(n) + 1e9);
-        (Frame { volume, number, slice, backward, time, bytes }, 0.011 * f64::from(n))
+        (Frame { volume, number, slice, backward, time, pose: None, bytes }, 0.011 * f64::from(n))
     };
     (0..15).map(frame).collect()
 }

@@ -1,7 +1,7 @@
 //! Tracked pictures of the PLUS toolkit in a file become a freehand volume in its place.
 
-use crate::common::files::{BONE, Folder, SWEEP};
-use echolume::probe::Geometry;
+use crate::common::files::{BONE, Folder, SWEEP, data};
+use echolume::probe::{Geometry, Grid};
 use echolume::source::{Calibration, OpenOptions, Source, description, open_with};
 use glam::{DMat4, DVec3};
 use std::path::Path;
@@ -161,5 +161,92 @@ fn what_does_not_apply_is_refused() {
     ] {
         let said = open_with(Path::new(file), options).err().map(|e| e.to_string()).unwrap_or_default();
         assert!(said.contains(named) && said.lines().count() == 1, "{file}: {said}, not {named}");
+    }
+}
+
+/// A volume with its place, for any place in it.
+struct Volume {
+    grid: Grid,
+    to_voxel: DMat4,
+    voxels: Vec<u8>,
+}
+
+impl Volume {
+    fn of(mut source: Box<dyn Source>) -> Volume {
+        let (world, Geometry::Cartesian(grid)) = (source.world().expect("a place"), source.geometry(0)) else {
+            panic!("a Cartesian volume")
+        };
+        let [x, y, z] = [0, 1, 2].map(|n| world.axis(n).extend(0.0));
+        let to_voxel = DMat4::from_cols(x, y, z, world.origin().extend(1.0)).inverse();
+        let frames = std::iter::from_fn(|| source.next_frame().expect("a frame"));
+        let voxels = frames.flat_map(|frame| frame.bytes).collect();
+        Volume { grid, to_voxel, voxels }
+    }
+
+    fn cell(&self, n: usize) -> DVec3 {
+        let [x, y, _] = self.grid.size;
+        DVec3::from([n % x, n / x % y, n / (x * y)].map(|n| n as f64))
+    }
+
+    /// The trilinear mean of the voxels around a place that a pixel reached; None if those have less than half of the weight.
+    fn at(&self, place: DVec3) -> Option<f64> {
+        let voxel = self.to_voxel.transform_point3(place);
+        let (mut sum, mut weights) = (0.0, 0.0);
+        for corner in 0..8usize {
+            let there = voxel.floor() + DVec3::from([corner & 1, corner >> 1 & 1, corner >> 2].map(|n| n as f64));
+            let [x, y, z] = self.grid.size;
+            let size = DVec3::from([x, y, z].map(|n| n as f64));
+            if there.cmplt(DVec3::ZERO).any() || there.cmpge(size).any() {
+                continue;
+            }
+            let weight = (DVec3::ONE - (voxel - there).abs()).element_product();
+            let [i, j, k] = there.to_array().map(|v| v as usize);
+            let value = self.voxels[(k * y + j) * x + i];
+            if value > 0 {
+                (sum, weights) = (sum + weight * f64::from(value), weights + weight);
+            }
+        }
+        (weights > 0.5).then(|| sum / weights)
+    }
+}
+
+fn correlation(pairs: &[(f64, f64)]) -> f64 {
+    let n = pairs.len() as f64;
+    let mean = |of: fn(&(f64, f64)) -> f64| pairs.iter().map(of).sum::<f64>() / n;
+    let (a, b) = (mean(|p| p.0), mean(|p| p.1));
+    let (ab, aa, bb) = pairs.iter().fold((0.0, 0.0, 0.0), |(ab, aa, bb), (x, y)| {
+        (ab + (x - a) * (y - b), aa + (x - a).powi(2), bb + (y - b).powi(2))
+    });
+    ab / (aa * bb).sqrt()
+}
+
+/// The toolkit's own reconstruction of a sweep over wires: the same place, and the same voxels as far as two lattices that are turned
+/// against each other allow.
+#[test]
+fn a_sweep_is_where_the_plus_toolkit_has_it() {
+    let (sweep, config) = (data("plus/sweep.mha"), data("plus/config.xml"));
+    let options = OpenOptions { plus_config: Some(&config), ..OpenOptions::default() };
+    let ours = Volume::of(open_with(&sweep, options).expect("a freehand volume"));
+    assert_eq!(ours.grid.spacing, [0.5; 3], "the configuration's");
+    let theirs = Volume::of(open_with(&data("plus/reconstructed.mha"), OpenOptions::default()).expect("a volume"));
+    let to_world = theirs.to_voxel.inverse();
+    let reached = |n: &usize| theirs.voxels[*n] > 0;
+    let places: Vec<(DVec3, f64)> = (0..theirs.voxels.len())
+        .filter(reached)
+        .map(|n| (to_world.transform_point3(theirs.cell(n)), f64::from(theirs.voxels[n])))
+        .collect();
+    let compared = |shift: DVec3| -> Vec<(f64, f64)> {
+        places.iter().filter_map(|(place, value)| Some((ours.at(*place + shift)?, *value))).collect()
+    };
+    let here = compared(DVec3::ZERO);
+    // Half a voxel thick: the wires of a sweep without overlaps.
+    assert!(places.len() > 10_000 && here.len() as f64 > 0.75 * places.len() as f64, "{} {}", places.len(), here.len());
+    let found = correlation(&here);
+    assert!(found > 0.94, "{found}");
+    for axis in [DVec3::X, DVec3::Y, DVec3::Z] {
+        for shift in [-0.25, 0.25] {
+            let shifted = correlation(&compared(axis * shift));
+            assert!(shifted < found - 0.01, "{shifted} at {shift} along {axis}, {found} here");
+        }
     }
 }

@@ -46,6 +46,8 @@ pub struct Config {
     pub forever: bool,
     /// OpenIGTLink: the TRANSFORM or the tool of TDATA that places 2D frames; `image`: their own matrix. Default: any TRANSFORM.
     pub tool: Option<String>,
+    /// OpenIGTLink: the device whose images are taken, where there are several. Default: all.
+    pub device_name: Option<String>,
     /// The part of each tracked frame that is ultrasound, pixels: x, y, width, height. Default: all of it.
     pub clip: Option<[u32; 4]>,
     /// Distance between the voxels that tracked frames are compounded into, 0.01 to 1000 mm. Default: between the frames' pixels.
@@ -183,6 +185,7 @@ impl Default for Config {
             rounds: None,
             forever: false,
             tool: None,
+            device_name: None,
             clip: None,
             spacing: None,
             hole: None,
@@ -426,6 +429,7 @@ const SOURCE_KEYS: &[&str] = &[
     "real_time",
     "rounds",
     "tool",
+    "device_name",
     "clip",
     "spacing",
     "hole",
@@ -466,6 +470,7 @@ impl Config {
             ("rate", text(self.rate)),
             ("rounds", text(rounds)),
             ("tool", self.tool.clone()),
+            ("device_name", self.device_name.clone()),
             ("clip", clip),
             ("spacing", text(self.spacing)),
             ("hole", text(self.hole)),
@@ -652,6 +657,7 @@ const ALLOWED: &[(&str, &str)] = &[
     ("rounds", "a whole number of times, 1 or more"),
     ("loop", "true or false"),
     ("tool", "the name of a TRANSFORM or tool, or \"image\""),
+    ("device_name", "the name of an IMAGE device, as \"Image_Reference\""),
     ("clip", "[x, y, width, height] in pixels"),
     ("spacing", "0.01 to 1000 mm"),
     ("hole", "0 to 1000 mm"),

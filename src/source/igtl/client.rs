@@ -347,7 +347,7 @@ fn clear(bytes: &mut Vec<u8>) {
 }
 
 /// The address, with [`PORT`] if it has no port.
-fn with_port(address: &str) -> String {
+pub fn with_port(address: &str) -> String {
     match address.parse::<IpAddr>() {
         Ok(IpAddr::V6(number)) => format!("[{number}]:{PORT}"),
         Err(_) if address.contains(':') && !address.ends_with(']') => address.to_string(),

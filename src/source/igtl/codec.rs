@@ -131,19 +131,35 @@ pub fn encode(message: &Message, version: Version) -> Result<Vec<u8>, MessageErr
     let error = |fault| MessageError::new(message.kind(), message.device(), fault);
     let mut bytes = vec![0; HEADER];
     write(message, version, &mut bytes).map_err(error)?;
-    let (whole, fraction) = stamp(message.time()).ok_or_else(|| {
-        error(Fault::new("time stamp", format!("is {} s, must be at least 0 and below 2^32", message.time())))
-    })?;
+    finish(&mut bytes, message.kind(), message.device(), message.time(), version).map_err(error)?;
+    Ok(bytes)
+}
+
+/// A message of any kind and body, in version 1.
+///
+/// # Errors
+/// As for [`encode`].
+pub(super) fn packed(kind: &str, device: &str, time: f64, body: &[u8]) -> Result<Vec<u8>, MessageError> {
+    let mut bytes = vec![0; HEADER];
+    bytes.extend_from_slice(body);
+    finish(&mut bytes, kind, device, time, Version::V1).map_err(|fault| MessageError::new(kind, device, fault))?;
+    Ok(bytes)
+}
+
+/// Writes the header of a message before its body, which is there.
+fn finish(bytes: &mut [u8], kind: &str, device: &str, time: f64, version: Version) -> Result<(), Fault> {
+    let (whole, fraction) = stamp(time)
+        .ok_or_else(|| Fault::new("time stamp", format!("is {time} s, must be at least 0 and below 2^32")))?;
     let number: u16 = if version == Version::V1 { 1 } else { 2 };
     let mut head = number.to_be_bytes().to_vec();
-    name(&mut head, "type", message.kind(), 12).map_err(error)?;
-    name(&mut head, "device", message.device(), 20).map_err(error)?;
+    name(&mut head, "type", kind, 12)?;
+    name(&mut head, "device", device, 20)?;
     head.extend(whole.to_be_bytes());
     head.extend(fraction.to_be_bytes());
     head.extend(((bytes.len() - HEADER) as u64).to_be_bytes());
     head.extend(crc64(&bytes[HEADER..]).to_be_bytes());
     bytes[..HEADER].copy_from_slice(&head);
-    Ok(bytes)
+    Ok(())
 }
 
 fn write(message: &Message, version: Version, body: &mut Vec<u8>) -> Result<(), Fault> {

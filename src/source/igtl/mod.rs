@@ -11,11 +11,15 @@ mod codec;
 mod message;
 mod network;
 mod pairing;
+mod publish;
+mod server;
 
-pub use client::{Client, ClientOptions, ClientStatistics, PORT, Received};
+pub use client::{Client, ClientOptions, ClientStatistics, PORT, Received, with_port};
 pub use codec::{BODY_LIMIT, DecodeError, Decoded, HEADER, MessageError, Version, crc64, decode, encode};
 pub use message::{
     Coordinates, Image, Message, Other, Region, Scalar, Status, Text, Tool, ToolKind, TrackingData, Transform,
 };
 pub use network::{Network, NetworkOptions, Poses};
 pub use pairing::{PairedFrame, Pairing, PairingCounts};
+pub use publish::{PICTURE, Publisher, PublisherStatistics, VOLUME};
+pub use server::{Server, ServerOptions, ServerStatistics, query};

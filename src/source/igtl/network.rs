@@ -6,16 +6,17 @@
 
 use super::client::{Client, ClientOptions, ClientStatistics};
 use super::codec::BODY_LIMIT;
-use super::message::{Image, Message, Scalar};
+use super::message::{Coordinates, Image, Message, Scalar};
 use super::pairing::Pairing;
-use crate::files::escaped;
-use crate::probe::{AxisOrder, Geometry, Grid};
+use crate::files::{escaped, quoted};
+use crate::probe::{AxisOrder, Geometry, Grid, World, is_rigid};
 use crate::source::frame::{Frame, Header};
 use crate::source::freehand::{self, Compounder, Lattice, Pose, TrackedFrame};
 use crate::source::live::{Event, Live};
 use crate::source::samples::{Replaced, SampleType, StoredType, store};
 use crate::source::value_range::ValueRange;
 use glam::{DAffine3, DVec3};
+use std::collections::BTreeSet;
 use std::io;
 use std::time::{Duration, Instant};
 
@@ -32,6 +33,8 @@ pub enum Poses {
 #[derive(Clone, Debug)]
 pub struct NetworkOptions {
     pub client: ClientOptions,
+    /// The device whose images are taken; None: all.
+    pub device: Option<String>,
     pub poses: Poses,
     pub freehand: freehand::CompoundingOptions,
     /// The volume of a sweep is placed around so many first frames, or those of ten seconds or of 256 MiB.
@@ -48,6 +51,7 @@ impl Default for NetworkOptions {
     fn default() -> NetworkOptions {
         NetworkOptions {
             client: ClientOptions::default(),
+            device: None,
             poses: Poses::Messages { device: None, tolerance: 0.1, patience: 1.0 },
             freehand: freehand::CompoundingOptions { margin: 20.0, ..freehand::CompoundingOptions::default() },
             first: 100,
@@ -58,6 +62,8 @@ impl Default for NetworkOptions {
     }
 }
 
+/// Most devices of images that are listed.
+const MAX_DEVICES: usize = 16;
 /// How often the statistics are checked while nothing arrives.
 const POLL: Duration = Duration::from_millis(100);
 /// Messages that are processed even if no time is left, so that a caller with zero patience makes progress.
@@ -83,6 +89,9 @@ pub struct Network {
     whole: Option<CartesianVolume>,
     sweep: FreehandSweep,
     volume_bytes: usize,
+    device: Option<String>,
+    /// Devices of images that came.
+    devices: BTreeSet<String>,
     /// Header of the last `Begin`.
     begun: Option<Header>,
     output: Option<VolumeOutput>,
@@ -96,6 +105,7 @@ struct VolumeOutput {
     volume: u32,
     next: usize,
     time: Option<f64>,
+    pose: Option<DAffine3>,
 }
 
 impl Network {
@@ -113,6 +123,8 @@ impl Network {
             faults: Faults::new(address),
             whole: None,
             volume_bytes: options.volume_bytes,
+            device: options.device.clone(),
+            devices: BTreeSet::new(),
             sweep: FreehandSweep::new(options),
             begun: None,
             output: None,
@@ -146,8 +158,30 @@ impl Network {
         (self.known, self.last_error, self.lost) = (now, error, lost);
     }
 
+    /// True if an image is of the device that was chosen. The names of the devices are reported where they decide something.
+    fn is_chosen(&mut self, image: &Image) -> bool {
+        let is_new = self.devices.len() < MAX_DEVICES && self.devices.insert(image.device.clone());
+        let names = |devices: &BTreeSet<String>| devices.iter().map(|name| quoted(name)).collect::<Vec<_>>().join(", ");
+        match &self.device {
+            None if is_new && self.devices.len() > 1 => {
+                let why = format!("{}; --device-name takes one of them", names(&self.devices));
+                self.faults.note(FaultKind::Devices, 1, &why);
+            }
+            Some(device) if image.device != *device => {
+                if !self.devices.contains(device) {
+                    let why = format!("no image of {} came; there are {}", quoted(device), names(&self.devices));
+                    self.faults.note(FaultKind::Image, 1, &why);
+                }
+                return false;
+            }
+            _ => {}
+        }
+        true
+    }
+
     fn take(&mut self, message: Message) {
         match message {
+            Message::Image(image) if !self.is_chosen(&image) => {}
             Message::Image(image) if image.size[2] > 1 => {
                 let time = (image.time > 0.0).then_some(image.time);
                 match CartesianVolume::take(&mut self.whole, image, self.volume_bytes) {
@@ -164,14 +198,19 @@ impl Network {
 
     /// Starts to emit a volume.
     fn start_output(&mut self, of_sweep: bool, time: Option<f64>) {
-        let header = if of_sweep { self.sweep.header() } else { self.whole.as_ref().map(CartesianVolume::header) };
+        let (header, pose) = match of_sweep {
+            true => (self.sweep.header(), self.sweep.pose()),
+            false => {
+                (self.whole.as_ref().map(CartesianVolume::header), self.whole.as_ref().and_then(|whole| whole.pose))
+            }
+        };
         let Some(header) = header else { return };
         if let Err((field, fault)) = header.check() {
             return self.faults.note(FaultKind::Image, 1, &format!("{field} {fault}"));
         }
         let begin = self.begun.as_ref() != Some(&header);
         self.begun = Some(header);
-        self.output = Some(VolumeOutput { of_sweep, begin, volume: self.volumes, next: 0, time });
+        self.output = Some(VolumeOutput { of_sweep, begin, volume: self.volumes, next: 0, time, pose });
         self.volumes = self.volumes.wrapping_add(1);
     }
 
@@ -192,7 +231,15 @@ impl Network {
             return None;
         };
         let (volume, time, bytes) = (output.volume, output.time, slice.to_vec());
-        Some(Event::Frame(Frame { volume, number: k as u32, slice: k, backward: false, time, bytes }))
+        Some(Event::Frame(Frame {
+            volume,
+            number: k as u32,
+            slice: k,
+            backward: false,
+            time,
+            pose: output.pose,
+            bytes,
+        }))
     }
 }
 
@@ -253,6 +300,8 @@ struct FreehandSweep {
     /// Sample type of all frames. A different type begins a new sweep.
     stored: StoredType,
     range: [f64; 2],
+    /// The frames are placed in LPS: by matrices of their own that say so.
+    is_lps: bool,
     buffered: Vec<BufferedFrame>,
     buffered_bytes: usize,
     compounder: Option<Compounder>,
@@ -274,6 +323,7 @@ impl FreehandSweep {
             pairing,
             stored: StoredType::U8,
             range: [0.0, 255.0],
+            is_lps: false,
             buffered: Vec::new(),
             buffered_bytes: 0,
             compounder: None,
@@ -293,7 +343,9 @@ impl FreehandSweep {
                     self.frame(paired.image, paired.pose, faults);
                 }
                 let dropped = self.pairing.counts().dropped - before;
-                faults.note(FaultKind::Unpaired, dropped, "no pose came near their time");
+                if dropped > 0 {
+                    faults.note(FaultKind::Unpaired, dropped, &self.pairing.why_unpaired());
+                }
             }
         }
     }
@@ -304,6 +356,7 @@ impl FreehandSweep {
             let why = format!("a part of {columns} x {rows} of {i} x {j} pixels; whole frames are taken only");
             return faults.note(FaultKind::Image, 1, &why);
         }
+        self.is_lps = self.options.poses == Poses::Image && image.coordinates == Coordinates::Lps;
         let own = DAffine3::from_mat4(image.index_to_mm(image.coordinates));
         let pose = Pose { to_space: pose * own, size: [usize::from(columns), usize::from(rows)] };
         let (stored, time) = (stored(image.scalar), (image.time > 0.0).then_some(image.time));
@@ -372,7 +425,20 @@ impl FreehandSweep {
     /// None before the volume is placed.
     fn header(&self) -> Option<Header> {
         let geometry = Geometry::Cartesian(self.compounder.as_ref()?.lattice().grid);
-        Some(Header { forward: geometry.clone(), backward: geometry, stored: self.stored, range: self.range })
+        Some(Header {
+            forward: geometry.clone(),
+            backward: geometry,
+            stored: self.stored,
+            range: self.range,
+            posed: true,
+        })
+    }
+
+    /// Where the volume lies (LPS). The space of trackers is RAS in this protocol, that of images is stated.
+    fn pose(&self) -> Option<DAffine3> {
+        let back = self.compounder.as_ref()?.lattice().to_volume.inverse();
+        let pose = if self.is_lps { back } else { other_coordinates() * back };
+        is_rigid(&pose).then_some(pose)
     }
 
     /// A slice; None beyond the last.
@@ -400,6 +466,8 @@ struct CartesianVolume {
     grid: Grid,
     /// The image's axes are left-handed: its rows are read from last pixel to first, so that it is not shown mirrored.
     mirrored: bool,
+    /// Where the volume is as of the last message; None if its axes are not perpendicular.
+    pose: Option<DAffine3>,
     range: [f64; 2],
     bytes: Vec<u8>,
 }
@@ -429,6 +497,7 @@ impl CartesianVolume {
             return Err(format!("a volume of {x} x {y} x {z} voxels; at most {max_bytes} bytes are taken"));
         };
         let mirrored = is_left_handed(&image);
+        let pose = pose(&image, &grid, mirrored);
         let (mut brought, replaced) = samples(image)?;
         if mirrored {
             let rows = AxisOrder { reversed: [true, false, false], ..AxisOrder::STORED };
@@ -455,11 +524,13 @@ impl CartesianVolume {
                     stored,
                     grid,
                     mirrored,
+                    pose,
                     range,
                     bytes: vec![0; all],
                 })
             }
         };
+        whole.pose = pose;
         let at = usize::from(first) * slice;
         match whole.bytes.get_mut(at..at + usize::from(slices) * slice).filter(|part| part.len() == brought.len()) {
             Some(part) => part.copy_from_slice(&brought),
@@ -474,7 +545,7 @@ impl CartesianVolume {
 
     fn header(&self) -> Header {
         let geometry = Geometry::Cartesian(self.grid);
-        Header { forward: geometry.clone(), backward: geometry, stored: self.stored, range: self.range }
+        Header { forward: geometry.clone(), backward: geometry, stored: self.stored, range: self.range, posed: true }
     }
 
     /// A slice; None beyond the last.
@@ -482,6 +553,24 @@ impl CartesianVolume {
         let [x, y, _] = self.grid.size;
         self.bytes.chunks_exact(x * y * self.stored.bytes()).nth(k)
     }
+}
+
+/// From RAS to LPS, and back.
+fn other_coordinates() -> DAffine3 {
+    DAffine3::from_scale(DVec3::new(-1.0, -1.0, 1.0))
+}
+
+/// The pose of an image whose voxels are drawn on `grid`, with reversed rows if it is mirrored.
+fn pose(image: &Image, grid: &Grid, mirrored: bool) -> Option<DAffine3> {
+    let to_lps = image.index_to_mm(Coordinates::Lps);
+    let axes = [0, 1, 2].map(|n| to_lps.col(n).truncate());
+    let mut world = World::new(axes, to_lps.w_axis.truncate()).ok()?;
+    if mirrored {
+        let rows = AxisOrder { reversed: [true, false, false], ..AxisOrder::STORED };
+        world = world.reordered(&rows, grid.size);
+    }
+    let pose = world.pose(grid);
+    is_rigid(&pose).then_some(pose)
 }
 
 /// True if i, j and k are left-handed. Both coordinate systems of images are right-handed.
@@ -598,6 +687,8 @@ enum FaultKind {
     Dropped,
     /// An image that is neither a volume nor a frame.
     Image,
+    /// Images of several devices, which show different things.
+    Devices,
     Samples,
     /// A frame without a pose.
     Unpaired,
@@ -606,7 +697,7 @@ enum FaultKind {
     Volume,
 }
 
-const KINDS: [(FaultKind, &str); 12] = [
+const KINDS: [(FaultKind, &str); 13] = [
     (FaultKind::Unreachable, "not connected"),
     (FaultKind::Lost, "connection lost"),
     (FaultKind::Again, "connected again"),
@@ -614,6 +705,7 @@ const KINDS: [(FaultKind, &str); 12] = [
     (FaultKind::Malformed, "malformed messages passed over"),
     (FaultKind::Dropped, "messages dropped"),
     (FaultKind::Image, "images passed over"),
+    (FaultKind::Devices, "images of several devices"),
     (FaultKind::Samples, "samples that are not finite or are denormal"),
     (FaultKind::Unpaired, "frames without a pose left out"),
     (FaultKind::Pose, "frames refused"),
@@ -676,7 +768,7 @@ fn range_of(stored: StoredType, values: ValueRange) -> [f64; 2] {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::source::igtl::message::{Coordinates, Region};
+    use crate::source::igtl::message::Region;
 
     fn image(scalar: Scalar, components: u8, bytes: Vec<u8>) -> Image {
         Image {

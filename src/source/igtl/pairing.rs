@@ -1,9 +1,12 @@
 //! Poses of 2D frames: an IMAGE has the positions of its pixels in the frame, a TRANSFORM the pose of the frame at a time.
 
 use super::message::{Image, Message};
+use crate::files::quoted;
 use glam::{DAffine3, DMat3, DQuat, DVec3};
-use std::collections::VecDeque;
+use std::collections::{BTreeSet, VecDeque};
 
+/// Most names of transforms that are listed.
+const MAX_NAMES: usize = 16;
 /// Most poses that are kept.
 const MAX_POSES: usize = 1024;
 /// Most frames that wait for a later pose, and their bytes.
@@ -25,6 +28,8 @@ pub struct Pairing {
     frames: VecDeque<Image>,
     frame_bytes: usize,
     counts: PairingCounts,
+    /// Names of TRANSFORM devices and TDATA tools that came, also those that are not selected.
+    seen: BTreeSet<String>,
 }
 
 /// A frame and its pose.
@@ -71,12 +76,14 @@ impl Pairing {
             frames: VecDeque::new(),
             frame_bytes: 0,
             counts: PairingCounts::default(),
+            seen: BTreeSet::new(),
         }
     }
 
     /// Takes a message and returns the frames that are paired by it, possibly none.
     pub fn push(&mut self, message: Message) -> Vec<PairedFrame> {
         let selected = self.device.clone();
+        self.note(&message);
         match message {
             Message::Transform(m) if selected.as_ref().is_none_or(|w| *w == m.device) => {
                 self.pose(m.device, m.time, &m.matrix)
@@ -98,6 +105,38 @@ impl Pairing {
     /// Pairs the waiting frames with the poses so far.
     pub fn finish(&mut self) -> Vec<PairedFrame> {
         self.settle(true)
+    }
+
+    /// Remembers the names of transforms.
+    fn note(&mut self, message: &Message) {
+        let mut add = |name: &str| {
+            if self.seen.len() < MAX_NAMES && !self.seen.contains(name) {
+                self.seen.insert(name.to_string());
+            }
+        };
+        match message {
+            Message::Transform(m) => add(&m.device),
+            Message::TrackingData(m) => m.tools.iter().for_each(|tool| add(&tool.name)),
+            _ => {}
+        }
+    }
+
+    /// Why frames get no pose, for users: which transforms came.
+    pub fn why_unpaired(&self) -> String {
+        if self.seen.is_empty() {
+            return "no transform came; --tool image takes the matrix of each image".into();
+        }
+        let names = self.seen.iter().map(|name| quoted(name)).collect::<Vec<_>>().join(", ");
+        match &self.device {
+            Some(device) if !self.seen.contains(device) => {
+                format!("no transform of {} came; --tool takes one of {names}", quoted(device))
+            }
+            None if self.poses.is_empty() => format!("no TRANSFORM came; --tool takes one of the tools {names}"),
+            _ => {
+                let near = self.tolerance;
+                format!("no pose came within {near} s of their time; the transforms are {names}")
+            }
+        }
     }
 
     /// Counts so far.

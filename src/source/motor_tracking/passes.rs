@@ -260,7 +260,7 @@ mod tests {
     }
 
     fn frame(tag: u8) -> Frame {
-        Frame { volume: 9, number: 9, slice: 9, backward: false, time: None, bytes: vec![tag] }
+        Frame { volume: 9, number: 9, slice: 9, backward: false, time: None, pose: None, bytes: vec![tag] }
     }
 
     /// Passes of these angles, deg, every second one backwards; frames are tagged by their index in the list.

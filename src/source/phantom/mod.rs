@@ -226,6 +226,7 @@ impl Phantom {
                 slice,
                 backward,
                 time: Some(self.line_time(volume, slice, 0)),
+                pose: None,
                 bytes,
             })
             .collect();

@@ -2,7 +2,7 @@
 
 use super::{told, written};
 use echolume::source::recorder::Reader;
-use echolume::source::{InputError, OpenOptions, Recording, Source};
+use echolume::source::{Geometry, InputError, OpenOptions, Recording, Source};
 use std::path::Path;
 
 /// Bytes read at most: a few bytes of zlib expand to a thousand times as many.
@@ -31,7 +31,12 @@ fn read(mut source: Box<dyn Source>) -> Result<String, InputError> {
 /// A stream of frames in a file.
 pub fn stream(bytes: &[u8]) -> String {
     let path = written("input.pipe", bytes);
-    outcome(echolume::source::open(&path, None).and_then(read))
+    outcome(echolume::source::open(&path, None).and_then(|source| {
+        // Poses far apart make a lattice of any size.
+        let is_large =
+            matches!(source.geometry(0), Geometry::Cartesian(grid) if grid.size.iter().product::<usize>() > 1 << 20);
+        if is_large { Ok("large".into()) } else { read(source) }
+    }))
 }
 
 fn outcome(result: Result<String, InputError>) -> String {
@@ -86,6 +91,11 @@ pub fn dicom(bytes: &[u8]) -> String {
 /// One slice of a series.
 const SLICE: &[u8] = include_bytes!("../../data/dicom/series/0.dcm");
 
+/// An HDF5 file of USTB.
+pub fn uff(bytes: &[u8]) -> String {
+    outcome(echolume::source::open(&written("input.uff", bytes), None).and_then(read))
+}
+
 pub fn kretz(bytes: &[u8]) -> String {
     recording(&written("input.vol", bytes), None)
 }
@@ -111,9 +121,11 @@ fn mend(bytes: &mut [u8]) -> Option<()> {
     let length = frame.checked_sub(20)?;
     bytes.get_mut(12..16)?.copy_from_slice(&(length as u32).to_le_bytes());
     let mut at = sum(bytes, 0, 16 + length)?;
+    let is_posed = bytes[16..16 + length].windows(12).any(|w| w == b"\"posed\":true");
+    let before = if is_posed { 136 } else { 40usize };
     while bytes.get(at..at + 4)? == b"FRAM" {
         let length = u32::from_le_bytes(bytes.get(at + 20..at + 24)?.try_into().ok()?) as usize;
-        at = sum(bytes, at, at.checked_add(40)?.checked_add(length)?)?;
+        at = sum(bytes, at, at.checked_add(before)?.checked_add(length)?)?;
     }
     None
 }

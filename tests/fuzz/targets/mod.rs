@@ -73,6 +73,8 @@ pub const TARGETS: &[Target] = &[
         rounds: 50_000,
         also: &["tests/data/wobbler-4dc7/sweep.vol"],
     },
+    // A chunk may be deflated a thousand times.
+    Target { name: "uff", run: files::uff, text: false, memory: 512 * MIB, rounds: 6_000, also: &[] },
     Target {
         name: "dicom",
         run: files::dicom,
@@ -81,12 +83,18 @@ pub const TARGETS: &[Target] = &[
         rounds: 8_000,
         also: &[
             "tests/data/dicom/enhanced.dcm",
+            "tests/data/dicom/enhanced-big.dcm",
+            "tests/data/dicom/enhanced-depth-z.dcm",
+            "tests/data/dicom/enhanced-flow.dcm",
             "tests/data/dicom/enhanced-rle.dcm",
             "tests/data/dicom/image.dcm",
             "tests/data/dicom/kretz.dcm",
             "tests/data/dicom/multiframe-fragments.dcm",
+            "tests/data/dicom/multiframe-jpeg.dcm",
             "tests/data/dicom/palette.dcm",
             "tests/data/dicom/philips.dcm",
+            "tests/data/dicom/planes.dcm",
+            "tests/data/dicom/ybr-422.dcm",
             "tests/data/dicom/series",
         ],
     },

@@ -70,7 +70,7 @@ fn settings_too_large_for_the_device_are_reported_and_the_picture_stays() {
     let many = Header { forward: geometry.clone(), backward: geometry.clone(), ..header(0.0) };
     let frame = |n: u32, volume: u32| {
         let bytes = (0..24 * 64).map(|i| (i * 7 + n * 13 + volume * 90) as u8).collect();
-        Frame { volume, number: n, slice: n as usize, backward: false, time: None, bytes }
+        Frame { volume, number: n, slice: n as usize, backward: false, time: None, pose: None, bytes }
     };
     let volume = |number| (0..90).map(|n| frame(n, number)).collect::<Vec<_>>();
     let expected = [0, 1].map(|number| fresh(&other, toml, &many, Update::Whole, &volume(number)));

@@ -8,7 +8,7 @@ fn other() -> (Header, Vec<Frame>) {
     let geometry = Geometry::Sweep(linear());
     let frame = |n: u32| {
         let bytes = (0..48 * 20).map(|i| (i * 5 + n * 40) as u8).collect();
-        Frame { volume: 9, number: n, slice: n as usize, backward: false, time: None, bytes }
+        Frame { volume: 9, number: n, slice: n as usize, backward: false, time: None, pose: None, bytes }
     };
     (Header { forward: geometry.clone(), backward: geometry, ..header(0.0) }, (0..7).map(frame).collect())
 }

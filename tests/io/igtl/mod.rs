@@ -7,4 +7,5 @@ mod messages;
 mod network;
 mod pairing;
 mod round_trip;
+mod server;
 mod stored;

@@ -2,11 +2,12 @@
 
 use super::client::*;
 use super::messages::*;
-use echolume::probe::{Geometry, Grid};
+use echolume::probe::{Geometry, Grid, World};
 use echolume::source::freehand;
 use echolume::source::live::{Event, Live};
 use echolume::source::recorder::Header;
 use echolume::source::{Frame, StoredType};
+use glam::DVec3;
 use std::thread;
 
 fn options() -> NetworkOptions {
@@ -220,10 +221,66 @@ fn frames_without_a_pose_are_reported_and_do_not_wait_for_ever() {
     let messages = [early(1), early(20), bytes(&moved(20)), early(30), bytes(&moved(30)), bytes(&moved(31))].concat();
     // Two have a pose, four are awaited.
     let mut network = connect(messages, sweep_options());
-    until(&mut network, is_fault("frames without a pose left out: no pose came near their time"));
+    until(&mut network, is_fault("frames without a pose left out: no transform came; --tool image"));
     let started = Instant::now();
     assert!(matches!(network.next(Duration::from_millis(50)), Event::Idle));
     assert!((50..5000).contains(&started.elapsed().as_millis()), "{:?}", started.elapsed());
+}
+
+#[test]
+fn transforms_that_came_are_listed_where_none_fits() {
+    let frame = |k: u8| bytes(&Message::Image(tracked(k)));
+    let named = |device: &str| bytes(&transform(device, 1.0, 0.0));
+    for (tool, said) in [
+        (Some("Needle"), "no transform of 'Needle' came; --tool takes one of 'Probe', 'Stylus'"),
+        (Some("Probe"), "no pose came within 0.1 s of their time; the transforms are 'Probe', 'Stylus'"),
+    ] {
+        let messages = [named("Probe"), named("Stylus"), frame(20), frame(200)].concat();
+        let poses = Poses::Messages { device: tool.map(str::to_string), tolerance: 0.1, patience: 0.1 };
+        let mut network = connect(messages, NetworkOptions { poses, ..options() });
+        until(&mut network, is_fault(said));
+    }
+}
+
+#[test]
+fn one_device_of_several_is_picked_and_the_others_are_named() {
+    let of = |device: &str, value: u8| {
+        let image = Image { device: device.into(), bytes: vec![value; 24], ..image(f64::from(value), [4, 3, 2]) };
+        bytes(&Message::Image(image))
+    };
+    let messages = || [of("Left", 1), of("Right", 2), of("Left", 3)].concat();
+    let mut network = connect(messages(), NetworkOptions { device: Some("Right".into()), ..options() });
+    let events = until(&mut network, |e| matches!(e, Event::Frame(frame) if frame.slice == 1));
+    assert!(events.iter().all(|e| !matches!(e, Event::Frame(frame) if frame.bytes != [2; 12])), "{events:?}");
+    let mut network = connect(messages(), options());
+    until(&mut network, is_fault("images of several devices: 'Left', 'Right'; --device-name takes one of them"));
+    let mut network = connect(messages(), NetworkOptions { device: Some("Middle".into()), ..options() });
+    until(&mut network, is_fault("no image of 'Middle' came; there are 'Left'"));
+}
+
+/// A volume's place is that of its message, also of one whose rows are reversed.
+#[test]
+fn volumes_have_the_place_of_their_message() {
+    let plain = image(1.0, [4, 3, 2]);
+    let [i, j, k] = plain.axes;
+    let oblique = [[0.3, 0.4, 0.0], [-0.2, 0.15, 0.0], [0.0, 0.0, 1.0]];
+    for (axes, coordinates) in [
+        ([i, j, k], Coordinates::Lps),
+        (oblique, Coordinates::Ras),
+        ([oblique[0].map(|v| -v), oblique[1], oblique[2]], Coordinates::Lps),
+    ] {
+        let sent = Image { axes, coordinates, centre: [10.0, -20.0, 30.0], ..plain.clone() };
+        let (header, frames) = volume(&mut connect(bytes(&Message::Image(sent.clone())), options()), 2);
+        let (grid, to_world) = (grid(header), sent.index_to_mm(Coordinates::Lps));
+        let world = World::posed(&frames[0].pose.expect("a place"), &grid).expect("rigid");
+        for (n, value) in all(&frames).into_iter().enumerate() {
+            // The samples of the message are their own numbers.
+            let stored = usize::from(value);
+            let cell = |n: usize| DVec3::from([n % 4, n / 4 % 3, n / 12].map(|n| n as f64));
+            let (there, here) = (to_world.transform_point3(cell(stored)), world.at(cell(n)));
+            assert!(there.distance(here) < 1e-5, "{coordinates:?} voxel {n}: {there} {here}");
+        }
+    }
 }
 
 #[test]

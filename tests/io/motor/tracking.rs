@@ -36,7 +36,7 @@ fn probe() -> Probe {
 
 fn header(probe: Probe) -> Header {
     let forward = Geometry::Sweep(probe);
-    Header { backward: forward.clone(), forward, stored: StoredType::U8, range: [0.0, 255.0] }
+    Header { backward: forward.clone(), forward, stored: StoredType::U8, range: [0.0, 255.0], posed: false }
 }
 
 /// A free-running probe on the simulated array.
@@ -76,7 +76,7 @@ impl Live for Free {
         let mut bytes = vec![0; 4 * LINES];
         bytes[..8].copy_from_slice(&angle.to_le_bytes());
         let time = stamp.duration_since(UNIX_EPOCH).ok().map(|t| t.as_secs_f64());
-        let mut frame = Frame { volume: self.frames, number: 0, slice: 0, backward: false, time, bytes };
+        let mut frame = Frame { volume: self.frames, number: 0, slice: 0, backward: false, time, pose: None, bytes };
         (self.taking, self.frames) = (None, self.frames + 1);
         if self.pieces {
             let bytes = frame.bytes.split_off(2 * LINES);

@@ -1,0 +1,110 @@
+//! `--serve` of `echolume stream`: what it says of the clients.
+
+use crate::source::igtl::{Publisher, PublisherStatistics, ServerOptions, with_port};
+use crate::terminal::{Failure, failed, input, remark, say};
+use std::io::ErrorKind;
+use std::time::Instant;
+
+/// Prefix of addresses.
+const PREFIX: &str = "igtl://";
+/// The address without a value: other machines cannot reach it.
+const LOOPBACK: &str = "igtl://127.0.0.1:18944";
+
+/// The arguments of a server.
+#[derive(clap::Args)]
+pub struct ServeArgs {
+    /// Send pictures and whole volumes to OpenIGTLink clients such as 3D Slicer: igtl://HOST[:PORT]; port 0 takes a free one, 0.0.0.0 lets other
+    /// machines in [without a value: igtl://127.0.0.1:18944]
+    #[arg(long, value_name = "ADDRESS", num_args = 0..=1, default_missing_value = LOOPBACK)]
+    serve: Option<String>,
+    /// Distance between the voxels of the volumes that are sent, mm [default: those of a Cartesian volume; a sweep: 1]
+    #[arg(long, value_name = "MM", requires = "serve")]
+    serve_spacing: Option<f64>,
+}
+
+impl ServeArgs {
+    /// Begins to listen, if that was asked for, and says where.
+    ///
+    /// # Errors
+    /// An address that is none, a port that is in use, a spacing that is no length.
+    pub fn start(&self) -> Result<Option<Serving>, Failure> {
+        let Some(given) = &self.serve else { return Ok(None) };
+        let place = given.strip_prefix(PREFIX).filter(|place| !place.is_empty());
+        let Some(place) = place else {
+            return Err(input(format!("--serve {given}: must read igtl://HOST or igtl://HOST:PORT")));
+        };
+        if let Some(mm) = self.serve_spacing.filter(|mm| !(0.01..=1000.0).contains(mm)) {
+            return Err(input(format!("--serve-spacing {mm}: must lie in 0.01..=1000 mm")));
+        }
+        let publisher = Publisher::bind(&with_port(place), self.serve_spacing, ServerOptions::default());
+        let publisher = publisher.map_err(|error| {
+            let why = match error.kind() {
+                ErrorKind::AddrInUse => "the port is in use; give another one, or 0 for any".to_string(),
+                ErrorKind::AddrNotAvailable => "no network of this machine has this address".to_string(),
+                ErrorKind::PermissionDenied => "this user may not open the port; give one above 1023".to_string(),
+                _ => error.to_string(),
+            };
+            failed(format!("--serve {given}: cannot be opened: {why}"))
+        })?;
+        let address = publisher.address();
+        say!("serving: {PREFIX}{address}");
+        if !address.ip().is_loopback() {
+            let warning = "whoever reaches this machine can see the pictures; OpenIGTLink has no password";
+            remark(&format!("--serve {given}: {warning}"));
+        }
+        Ok(Some(Serving { publisher, said: PublisherStatistics::default() }))
+    }
+
+    /// True if a server was asked for.
+    pub fn is_asked_for(&self) -> bool {
+        self.serve.is_some()
+    }
+}
+
+/// A server, and what was said of it.
+pub struct Serving {
+    pub publisher: Publisher,
+    said: PublisherStatistics,
+}
+
+impl Serving {
+    /// Says on one line what changed: clients that came or went, and what slow ones did not get.
+    pub fn say(&mut self, began: Instant) {
+        let now = self.publisher.statistics();
+        let (server, said) = (&now.server, &self.said.server);
+        let is_news = (server.connections, server.clients, server.dropped, server.refused)
+            != (said.connections, said.clients, said.dropped, said.refused);
+        if is_news || now.replaced != self.said.replaced {
+            say!("{:>6.1} s  serving: {}", began.elapsed().as_secs_f64(), line(&now));
+        }
+        if let Some(fault) = now.fault.as_ref().filter(|fault| self.said.fault.as_ref() != Some(fault)) {
+            tracing::warn!("--serve: {fault}");
+        }
+        self.said = now;
+    }
+
+    /// Ends the connections after what waits was sent, and says what there was in all.
+    pub fn end(self) {
+        let statistics = self.publisher.finish();
+        say!("served    {}", line(&statistics));
+    }
+}
+
+fn line(now: &PublisherStatistics) -> String {
+    let PublisherStatistics { server, pictures, volumes, replaced, .. } = now;
+    let mut text = format!(
+        "{} clients of {}, {pictures} pictures and {volumes} volumes, {} messages sent",
+        server.clients, server.connections, server.sent
+    );
+    for (count, what) in [
+        (server.dropped, "dropped for clients that read too slowly"),
+        (*replaced, "replaced by newer ones before they were converted"),
+        (server.disconnected, "clients disconnected that read nothing or spoke another protocol"),
+        (server.refused, "clients refused, too many"),
+    ] {
+        if count > 0 {
+            text += &format!(", {count} {what}");
+        }
+    }
+    text
+}

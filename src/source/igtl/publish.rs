@@ -1,0 +1,324 @@
+//! What a stream shows, sent to the clients of a [`Server`]: each picture, and each volume that is whole, as a Cartesian lattice in its place.
+//!
+//! A thread of its own converts volumes and encodes messages, so that the stream only hands them over. What it cannot keep up with is
+//! replaced by what is newer, and counted.
+
+use super::message::{Coordinates, Image, Message, Region, Scalar};
+use super::server::{Server, ServerOptions, ServerStatistics, now};
+use crate::probe::{Geometry, Grid, World};
+use crate::source::convert::{Volume, lattice};
+use crate::source::frame::{Frame, Header};
+use crate::source::live::Event;
+use glam::{DAffine3, DVec3};
+use std::io;
+use std::net::SocketAddr;
+use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
+use std::thread::{self, JoinHandle};
+
+/// Devices of the messages.
+pub const PICTURE: &str = "EcholumePicture";
+pub const VOLUME: &str = "EcholumeVolume";
+/// Most voxels of a volume: 256 MiB, as much as clients take in one message.
+const MAX_VOXELS: f64 = (255u64 << 20) as f64;
+/// Longest axis of an image on the wire.
+const MAX_EDGE: usize = 65_535;
+
+/// Counts since the publisher was started.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct PublisherStatistics {
+    pub server: ServerStatistics,
+    /// Pictures and volumes that were handed to the server.
+    pub pictures: u64,
+    pub volumes: u64,
+    /// Pictures and volumes that were replaced by newer ones before they were converted.
+    pub replaced: u64,
+    /// Why a volume or picture could not be sent, the last time.
+    pub fault: Option<String>,
+}
+
+/// Sends pictures and volumes. Dropping it sends what waits in the server, and ends all connections.
+///
+/// Memory: a volume that is collected, one that waits, one that is converted, its voxels, and that of the [`Server`].
+pub struct Publisher {
+    shared: Arc<Shared>,
+    server: Arc<Server>,
+    thread: Option<JoinHandle<()>>,
+}
+
+struct Shared {
+    mail: Mutex<Mail>,
+    changed: Condvar,
+    /// Distance between the voxels of a sweep, mm.
+    spacing: Option<f64>,
+}
+
+/// What waits for the thread, the newest of each kind.
+#[derive(Default)]
+struct Mail {
+    picture: Option<Rgba>,
+    volume: Option<Whole>,
+    pictures: u64,
+    volumes: u64,
+    replaced: u64,
+    fault: Option<String>,
+    stop: bool,
+}
+
+struct Rgba {
+    size: [u32; 2],
+    pixels: Vec<u8>,
+}
+
+/// A volume whose frames have all arrived.
+struct Whole {
+    volume: Volume,
+    geometry: Geometry,
+    /// Stored values that become 0 and 255.
+    range: [f64; 2],
+    pose: Option<DAffine3>,
+}
+
+impl Publisher {
+    /// Listens as [`Server::bind`]. `spacing`: distance of the voxels that are sent, mm; None: those of a Cartesian volume, and 1 mm for
+    /// a sweep.
+    ///
+    /// # Errors
+    /// As for [`Server::bind`].
+    pub fn bind(address: &str, spacing: Option<f64>, options: ServerOptions) -> io::Result<Publisher> {
+        let server = Arc::new(Server::bind(address, options)?);
+        let shared = Arc::new(Shared { mail: Mutex::default(), changed: Condvar::new(), spacing });
+        let (theirs, sends) = (shared.clone(), server.clone());
+        let thread = thread::Builder::new().name("igtl publisher".into()).spawn(move || theirs.run(&sends))?;
+        Ok(Publisher { shared, server, thread: Some(thread) })
+    }
+
+    /// The address that it listens at.
+    pub fn address(&self) -> SocketAddr {
+        self.server.address()
+    }
+
+    /// Counts since the publisher was started.
+    pub fn statistics(&self) -> PublisherStatistics {
+        let mail = self.shared.lock();
+        let (pictures, volumes, replaced, fault) = (mail.pictures, mail.volumes, mail.replaced, mail.fault.clone());
+        drop(mail);
+        PublisherStatistics { server: self.server.statistics(), pictures, volumes, replaced, fault }
+    }
+
+    /// Hands over a picture of 8-bit red, green, blue, alpha, rows from the top.
+    pub fn picture(&self, size: [u32; 2], pixels: Vec<u8>) {
+        if self.server.has_clients() {
+            let mut mail = self.shared.lock();
+            mail.replaced += u64::from(mail.picture.replace(Rgba { size, pixels }).is_some());
+            drop(mail);
+            self.shared.changed.notify_all();
+        }
+    }
+
+    /// Sends what waits, ends all connections, and returns the counts.
+    pub fn finish(mut self) -> PublisherStatistics {
+        self.stop();
+        self.server.finish();
+        self.statistics()
+    }
+
+    fn stop(&mut self) {
+        self.shared.lock().stop = true;
+        self.shared.changed.notify_all();
+        if let Some(thread) = self.thread.take() {
+            let _ = thread.join();
+        }
+    }
+
+    /// What is to see every event of a source: it hands over each volume that is whole.
+    pub fn listener(&self) -> impl FnMut(&Event) + Send + use<> {
+        let (shared, server) = (self.shared.clone(), self.server.clone());
+        let mut listener = Listener { shared, server, header: None, filling: None, partial: None };
+        move |event| listener.look_at(event)
+    }
+}
+
+impl Drop for Publisher {
+    /// Sends what waits.
+    fn drop(&mut self) {
+        self.stop();
+    }
+}
+
+impl Shared {
+    fn lock(&self) -> MutexGuard<'_, Mail> {
+        // Nothing panics while it holds the lock.
+        self.mail.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// Converts and sends what is handed over. What waits when the publisher is dropped is still sent.
+    fn run(&self, server: &Server) {
+        loop {
+            let mut mail = self.lock();
+            while !mail.stop && mail.picture.is_none() && mail.volume.is_none() {
+                mail = self.changed.wait(mail).unwrap_or_else(PoisonError::into_inner);
+            }
+            // A picture is sent before a volume that is being converted holds it up.
+            let (picture, volume) = match mail.picture.take() {
+                Some(picture) => (Some(picture), None),
+                None => (None, mail.volume.take()),
+            };
+            drop(mail);
+            let (is_picture, image) = match (picture, volume) {
+                (Some(picture), _) => (true, picture.image()),
+                (None, Some(whole)) => (false, whole.image(self.spacing)),
+                (None, None) => return,
+            };
+            let sent = image.and_then(|image| server.send(&Message::Image(image)).map_err(|e| e.to_string()));
+            let mut mail = self.lock();
+            match sent {
+                Ok(()) if is_picture => mail.pictures += 1,
+                Ok(()) => mail.volumes += 1,
+                Err(fault) => mail.fault = Some(fault),
+            }
+        }
+    }
+}
+
+impl Rgba {
+    /// One pixel is 1 mm: a picture has no place in the world.
+    fn image(&self) -> Result<Image, String> {
+        let [width, height] = self.size;
+        let (Ok(columns), Ok(rows)) = (u16::try_from(width), u16::try_from(height)) else {
+            return Err(format!("a picture of {width} x {height} pixels; OpenIGTLink holds {MAX_EDGE} along an axis"));
+        };
+        let size = [columns, rows, 1];
+        let rgb = self.pixels.chunks_exact(4).flat_map(|pixel| [pixel[0], pixel[1], pixel[2]]).collect();
+        let grid = Grid { size: size.map(usize::from), spacing: [1.0; 3], origin: [0.0; 3] };
+        // Columns to the left of the patient and rows to posterior: an axial view shows the picture as it is.
+        Ok(image(PICTURE, size, 3, &World::of(&grid), rgb))
+    }
+}
+
+impl Whole {
+    /// The volume on a Cartesian lattice, 8 bits, 0 outside of the insonified region.
+    fn image(&self, spacing: Option<f64>) -> Result<Image, String> {
+        let grid = match (&self.geometry, spacing) {
+            (Geometry::Cartesian(own), None) => *own,
+            (geometry, spacing) => {
+                lattice(geometry, spacing.unwrap_or(1.0)).map_err(|why| format!("voxels of {why}"))?
+            }
+        };
+        let [x, y, z] = grid.size;
+        let voxels = x as f64 * y as f64 * z as f64;
+        if voxels > MAX_VOXELS || grid.size.iter().any(|n| *n > MAX_EDGE) {
+            return Err(format!(
+                "a volume of {x} x {y} x {z} voxels; OpenIGTLink holds {MAX_VOXELS} of them: take a larger --serve-spacing"
+            ));
+        }
+        let [low, high] = self.range;
+        let mut slice = vec![0.0; x * y];
+        let mut bytes = Vec::with_capacity(x * y * z);
+        for k in 0..z {
+            self.volume.slice(&grid, k, &mut slice);
+            let grey = |value: &f64| (255.0 * (value - low) / (high - low)).round().clamp(0.0, 255.0);
+            // Outside it is NaN, which becomes 0.
+            bytes.extend(slice.iter().map(|value| grey(value) as u8));
+        }
+        let world = self.pose.and_then(|pose| World::posed(&pose, &grid)).unwrap_or_else(|| World::of(&grid));
+        Ok(image(VOLUME, grid.size.map(|n| n as u16), 1, &world, bytes))
+    }
+}
+
+/// An image of 8 bits in its place, in RAS: receivers take it for that, whatever a message says.
+fn image(device: &str, size: [u16; 3], components: u8, world: &World, bytes: Vec<u8>) -> Image {
+    let ras = |v: DVec3| [-v.x, -v.y, v.z].map(|v| (v + 0.0) as f32);
+    let middle = size.map(|n| (f64::from(n) - 1.0) / 2.0);
+    Image {
+        device: device.into(),
+        time: now(),
+        size,
+        region: Region { offset: [0; 3], size },
+        scalar: Scalar::U8,
+        components,
+        coordinates: Coordinates::Ras,
+        axes: [0, 1, 2].map(|n| ras(world.axis(n))),
+        centre: ras(world.at(middle.into())),
+        bytes,
+    }
+}
+
+/// Collects the volumes of a source and hands them over.
+struct Listener {
+    shared: Arc<Shared>,
+    server: Arc<Server>,
+    header: Option<Header>,
+    filling: Option<Filling>,
+    /// A frame whose lines are arriving.
+    partial: Option<Frame>,
+}
+
+/// A volume that is being collected.
+struct Filling {
+    number: u32,
+    backward: bool,
+    frames: Vec<Option<Vec<u8>>>,
+    /// Frames that have arrived.
+    there: usize,
+    pose: Option<DAffine3>,
+}
+
+impl Listener {
+    fn look_at(&mut self, event: &Event) {
+        match event {
+            Event::Begin(header) => {
+                (self.header, self.filling, self.partial) = (Some((**header).clone()), None, None);
+            }
+            _ if !self.server.has_clients() => (self.filling, self.partial) = (None, None),
+            Event::Frame(frame) => self.frame(frame.clone()),
+            Event::Lines { frame, first } => {
+                let whole = self.header.as_ref().and_then(Header::frame_bytes).unwrap_or(0);
+                let is_next = |partial: &Frame| {
+                    *first > 0
+                        && (partial.volume, partial.slice) == (frame.volume, frame.slice)
+                        && partial.bytes.len() as u64 <= whole
+                };
+                match self.partial.as_mut().filter(|partial| is_next(partial)) {
+                    Some(partial) => partial.bytes.extend(&frame.bytes),
+                    None => self.partial = (*first == 0).then(|| frame.clone()),
+                }
+                if let Some(frame) = self.partial.take_if(|partial| partial.bytes.len() as u64 >= whole) {
+                    self.frame(frame);
+                }
+            }
+            _ => {}
+        }
+    }
+
+    fn frame(&mut self, frame: Frame) {
+        let Some(header) = &self.header else { return };
+        let slices = header.forward.slices();
+        let is_other = self.filling.as_ref().is_none_or(|filling| filling.number != frame.volume);
+        if is_other {
+            let frames = vec![None; slices];
+            let (number, backward, pose) = (frame.volume, frame.backward, frame.pose);
+            self.filling = Some(Filling { number, backward, frames, there: 0, pose });
+        }
+        let Some(filling) = &mut self.filling else { return };
+        if Some(frame.bytes.len() as u64) == header.frame_bytes()
+            && let Some(place) = filling.frames.get_mut(frame.slice)
+        {
+            filling.there += usize::from(place.replace(frame.bytes).is_none());
+        }
+        if filling.there < slices {
+            return;
+        }
+        let Some(filling) = self.filling.take() else { return };
+        let geometry = if filling.backward { &header.backward } else { &header.forward };
+        let mut volume = Volume::new(geometry.clone(), header.stored);
+        for (slice, bytes) in filling.frames.into_iter().enumerate() {
+            let (number, bytes) = (slice as u32, bytes.unwrap_or_default());
+            volume.take(Frame { volume: 0, number, slice, backward: false, time: None, pose: None, bytes });
+        }
+        let whole = Whole { volume, geometry: geometry.clone(), range: header.range, pose: filling.pose };
+        let mut mail = self.shared.lock();
+        mail.replaced += u64::from(mail.volume.replace(whole).is_some());
+        drop(mail);
+        self.shared.changed.notify_all();
+    }
+}

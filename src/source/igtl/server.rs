@@ -1,0 +1,494 @@
+//! A server on threads of its own: messages go to every client that is connected, and a slow client loses the oldest of its own.
+
+use super::codec::{self, BODY_LIMIT, DecodeError, Decoded, MessageError, Version, decode, encode};
+use super::message::{Message, Status, Text};
+use std::collections::{BTreeMap, VecDeque};
+use std::io::{self, ErrorKind, Read, Write};
+use std::net::{Shutdown, SocketAddr, TcpListener, TcpStream, ToSocketAddrs};
+use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
+use std::thread::{self, JoinHandle};
+use std::time::{Duration, Instant};
+
+/// How often waiting threads check whether they are to stop.
+const POLL: Duration = Duration::from_millis(50);
+/// Largest body of a message from a client, bytes: queries are short, and nothing else is asked for.
+const QUERY_LIMIT: usize = 1 << 20;
+/// Most answers that wait for a client. One that asks and does not read is disconnected.
+const MAX_ANSWERS: usize = 64;
+/// What the server can send, as the answer to GET_CAPABIL.
+const CAPABILITIES: [&str; 4] = ["IMAGE", "STATUS", "STRING", "CAPABILITY"];
+/// Result of a query, in an RTS_ message.
+const SUCCESS: u8 = 0;
+const ERROR: u8 = 1;
+
+/// Options of a [`Server`].
+#[derive(Clone, Debug)]
+pub struct ServerOptions {
+    /// Most clients at a time. Others are disconnected at once.
+    pub clients: usize,
+    /// Most messages of each device that wait for a client; the oldest are dropped for newer ones.
+    pub queue_messages: usize,
+    /// Most bytes that wait for a client. The newest message is always kept.
+    pub queue_bytes: usize,
+    /// A client that reads nothing for so long is disconnected.
+    pub stall_timeout: Duration,
+    /// How long dropping the server waits until its last messages are sent.
+    pub last: Duration,
+    /// Who answers queries of the status, and text of its STRING.
+    pub name: String,
+}
+
+impl Default for ServerOptions {
+    fn default() -> ServerOptions {
+        ServerOptions {
+            clients: 16,
+            queue_messages: 2,
+            queue_bytes: BODY_LIMIT,
+            stall_timeout: Duration::from_secs(10),
+            last: Duration::from_secs(2),
+            name: "Echolume".into(),
+        }
+    }
+}
+
+/// Counts since the server was started.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct ServerStatistics {
+    /// Clients that are connected.
+    pub clients: usize,
+    /// Clients that were, and are.
+    pub connections: u64,
+    /// Clients beyond the most, disconnected at once.
+    pub refused: u64,
+    /// Messages that were sent whole, to all clients.
+    pub sent: u64,
+    /// Messages that were dropped from a client's queue for newer ones.
+    pub dropped: u64,
+    /// Clients that were disconnected because they read nothing, or sent what is no message.
+    pub disconnected: u64,
+}
+
+/// An OpenIGTLink server. Dropping it sends what waits, for [`ServerOptions::last`] at most, and ends all connections.
+///
+/// Memory: the last message of each device, and [`ServerOptions::queue_bytes`] a client; messages are shared among clients.
+pub struct Server {
+    shared: Arc<Shared>,
+    address: SocketAddr,
+    thread: Mutex<Option<JoinHandle<()>>>,
+}
+
+struct Shared {
+    state: Mutex<State>,
+    /// Signalled when a message is queued, a client leaves, or the server is dropped.
+    changed: Condvar,
+    options: ServerOptions,
+}
+
+#[derive(Default)]
+struct State {
+    clients: BTreeMap<u64, Queue>,
+    /// The last message of each device, for those who ask.
+    last: BTreeMap<String, Packet>,
+    statistics: ServerStatistics,
+    /// Send what waits, then end.
+    stop: bool,
+    /// End at once.
+    abort: bool,
+}
+
+/// An encoded message.
+#[derive(Clone)]
+struct Packet {
+    /// None: an answer, which is never dropped.
+    device: Option<String>,
+    bytes: Arc<[u8]>,
+}
+
+/// What waits for a client.
+#[derive(Default)]
+struct Queue {
+    waiting: VecDeque<Packet>,
+    bytes: usize,
+    /// It asked for no images, by STP_IMAGE.
+    is_paused: bool,
+    answers: usize,
+}
+
+impl Queue {
+    /// Adds a message. Returns how many older ones were dropped.
+    fn push(&mut self, packet: Packet, options: &ServerOptions) -> u64 {
+        let mut dropped = 0;
+        if packet.device.is_some() {
+            let alike = |there: &Packet| there.device == packet.device;
+            while self.waiting.iter().filter(|there| alike(there)).count() >= options.queue_messages.max(1) {
+                dropped += u64::from(self.remove(alike));
+            }
+            let is_image = |there: &Packet| there.device.is_some();
+            while self.bytes + packet.bytes.len() > options.queue_bytes && self.remove(is_image) {
+                dropped += 1;
+            }
+        } else {
+            self.answers += 1;
+        }
+        self.bytes += packet.bytes.len();
+        self.waiting.push_back(packet);
+        dropped
+    }
+
+    /// Removes the oldest message of a kind. False if there is none.
+    fn remove(&mut self, is_it: impl Fn(&Packet) -> bool) -> bool {
+        let Some(at) = self.waiting.iter().position(is_it) else { return false };
+        if let Some(removed) = self.waiting.remove(at) {
+            self.bytes -= removed.bytes.len();
+        }
+        true
+    }
+
+    fn pop(&mut self) -> Option<Packet> {
+        let packet = self.waiting.pop_front()?;
+        self.bytes -= packet.bytes.len();
+        self.answers -= usize::from(packet.device.is_none());
+        Some(packet)
+    }
+}
+
+impl Server {
+    /// Listens at `address`, a name or a number with a port; port 0 takes a free one.
+    ///
+    /// # Errors
+    /// An address that is not of this machine, a port that is in use or not allowed, a thread that cannot be started.
+    pub fn bind(address: &str, options: ServerOptions) -> io::Result<Server> {
+        let addresses: Vec<SocketAddr> = address.to_socket_addrs()?.collect();
+        let listener = TcpListener::bind(&addresses[..])?;
+        // `accept` must not block: the thread is to end with the server.
+        listener.set_nonblocking(true)?;
+        let address = listener.local_addr()?;
+        let shared = Arc::new(Shared { state: Mutex::default(), changed: Condvar::new(), options });
+        let theirs = shared.clone();
+        let thread = thread::Builder::new().name("igtl server".into()).spawn(move || theirs.listen(&listener))?;
+        Ok(Server { shared, address, thread: Mutex::new(Some(thread)) })
+    }
+
+    /// The address that it listens at.
+    pub fn address(&self) -> SocketAddr {
+        self.address
+    }
+
+    /// True if someone would get a message.
+    pub fn has_clients(&self) -> bool {
+        self.shared.lock().statistics.clients > 0
+    }
+
+    /// Queues a message for every client, and returns at once.
+    ///
+    /// # Errors
+    /// A message that the format cannot hold.
+    pub fn send(&self, message: &Message) -> Result<(), MessageError> {
+        let bytes: Arc<[u8]> = encode(message, Version::V1)?.into();
+        let device = message.device().to_string();
+        let packet = Packet { device: Some(device.clone()), bytes };
+        let mut state = self.shared.lock();
+        let State { clients, last, statistics, .. } = &mut *state;
+        for queue in clients.values_mut().filter(|queue| !queue.is_paused) {
+            statistics.dropped += queue.push(packet.clone(), &self.shared.options);
+        }
+        last.insert(device, packet);
+        drop(state);
+        self.shared.changed.notify_all();
+        Ok(())
+    }
+
+    /// Counts since the server was started.
+    pub fn statistics(&self) -> ServerStatistics {
+        self.shared.lock().statistics.clone()
+    }
+}
+
+impl Server {
+    /// Sends what waits, for [`ServerOptions::last`] at most, and ends all connections. The counts stay.
+    pub fn finish(&self) {
+        let mut state = self.shared.lock();
+        state.stop = true;
+        self.shared.changed.notify_all();
+        let asked = Instant::now();
+        while !state.clients.is_empty() && asked.elapsed() < self.shared.options.last {
+            state = self.shared.wait(state, POLL);
+        }
+        state.abort = true;
+        drop(state);
+        self.shared.changed.notify_all();
+        let thread = self.thread.lock().unwrap_or_else(PoisonError::into_inner).take();
+        if let Some(thread) = thread {
+            let _ = thread.join();
+        }
+    }
+}
+
+impl Drop for Server {
+    fn drop(&mut self) {
+        self.finish();
+    }
+}
+
+impl Shared {
+    fn lock(&self) -> MutexGuard<'_, State> {
+        // Nothing panics while it holds the lock.
+        self.state.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    fn wait<'a>(&self, state: MutexGuard<'a, State>, most: Duration) -> MutexGuard<'a, State> {
+        self.changed.wait_timeout(state, most).unwrap_or_else(PoisonError::into_inner).0
+    }
+
+    /// Accepts clients until the server is dropped, and waits for their threads.
+    fn listen(self: &Arc<Self>, listener: &TcpListener) {
+        let mut threads: Vec<JoinHandle<()>> = Vec::new();
+        let mut number = 0;
+        loop {
+            threads.retain(|thread| !thread.is_finished());
+            let state = self.lock();
+            if state.stop {
+                break;
+            }
+            let is_full = state.clients.len() >= self.options.clients;
+            drop(state);
+            match listener.accept() {
+                Ok((stream, peer)) if is_full => {
+                    tracing::warn!("OpenIGTLink: {peer} is refused, {} clients are connected", self.options.clients);
+                    self.lock().statistics.refused += 1;
+                    drop(stream);
+                }
+                Ok((stream, peer)) => {
+                    number += 1;
+                    match self.clone().start(stream, peer, number) {
+                        Ok(started) => threads.extend(started),
+                        Err(e) => tracing::warn!("OpenIGTLink: {peer} cannot be served: {e}"),
+                    }
+                }
+                // No client, or one that went away at once.
+                Err(_) => thread::sleep(POLL),
+            }
+        }
+        for thread in threads {
+            let _ = thread.join();
+        }
+    }
+
+    /// Starts the two threads of a client.
+    fn start(self: Arc<Self>, stream: TcpStream, peer: SocketAddr, number: u64) -> io::Result<[JoinHandle<()>; 2]> {
+        stream.set_nonblocking(false)?;
+        stream.set_nodelay(true)?;
+        stream.set_read_timeout(Some(POLL))?;
+        stream.set_write_timeout(Some(POLL))?;
+        let theirs = stream.try_clone()?;
+        let mut state = self.lock();
+        state.clients.insert(number, Queue::default());
+        state.statistics.connections += 1;
+        state.statistics.clients = state.clients.len();
+        drop(state);
+        tracing::info!("OpenIGTLink: {peer} is connected");
+        let (reads, writes) = (self.clone(), self.clone());
+        let reader = thread::Builder::new().name("igtl reader".into()).spawn(move || reads.read(&theirs, number));
+        let writer = thread::Builder::new().name("igtl writer".into()).spawn(move || {
+            let why = writes.write(&stream, number);
+            tracing::info!("OpenIGTLink: {peer} is disconnected: {why}");
+            // Also ends the other thread.
+            let _ = stream.shutdown(Shutdown::Both);
+            writes.leave(number);
+        });
+        if reader.is_err() || writer.is_err() {
+            self.leave(number);
+        }
+        Ok([reader?, writer?])
+    }
+
+    fn leave(&self, number: u64) {
+        let mut state = self.lock();
+        state.clients.remove(&number);
+        state.statistics.clients = state.clients.len();
+        drop(state);
+        self.changed.notify_all();
+    }
+
+    /// Sends what is queued for a client, until it leaves or the server ends. Returns the reason.
+    fn write(&self, mut stream: &TcpStream, number: u64) -> String {
+        loop {
+            let mut state = self.lock();
+            let packet = loop {
+                if state.abort {
+                    return "the server ends".into();
+                }
+                let stop = state.stop;
+                let Some(queue) = state.clients.get_mut(&number) else { return "the client left".into() };
+                match queue.pop() {
+                    Some(packet) => break packet,
+                    None if stop => return "the server ends".into(),
+                    None => state = self.wait(state, POLL),
+                }
+            };
+            drop(state);
+            let (mut rest, mut moved) = (&packet.bytes[..], Instant::now());
+            while !rest.is_empty() {
+                match stream.write(rest) {
+                    Ok(0) => return "it is closed".into(),
+                    Ok(n) => (rest, moved) = (&rest[n..], Instant::now()),
+                    Err(e) if matches!(e.kind(), ErrorKind::WouldBlock | ErrorKind::TimedOut) => {}
+                    Err(e) if e.kind() == ErrorKind::Interrupted => {}
+                    Err(e) => return e.to_string(),
+                }
+                let mut state = self.lock();
+                if state.abort || !state.clients.contains_key(&number) {
+                    return "the server ends, or the client left".into();
+                }
+                if moved.elapsed() > self.options.stall_timeout {
+                    state.statistics.disconnected += 1;
+                    return format!("it read nothing for {} ms", self.options.stall_timeout.as_millis());
+                }
+            }
+            self.lock().statistics.sent += 1;
+        }
+    }
+
+    /// Reads queries of a client and answers them, until it leaves.
+    fn read(&self, mut stream: &TcpStream, number: u64) {
+        let mut bytes = Vec::new();
+        let mut block = [0; 4096];
+        loop {
+            let skipped = match decode(&bytes, QUERY_LIMIT) {
+                Ok(Decoded::Need(_)) => 0,
+                Ok(Decoded::Message { message, length }) => {
+                    if !self.answer(&message, number) {
+                        self.refuse(number);
+                        return;
+                    }
+                    length
+                }
+                Err(DecodeError::Checksum { length, .. } | DecodeError::Content { length, .. }) => length,
+                // Something else than a client.
+                Err(DecodeError::Framing { .. }) => {
+                    self.refuse(number);
+                    return;
+                }
+            };
+            if skipped > 0 {
+                bytes.drain(..skipped);
+                continue;
+            }
+            match stream.read(&mut block) {
+                // It has closed the connection.
+                Ok(0) => return self.leave(number),
+                Ok(n) => bytes.extend_from_slice(&block[..n]),
+                Err(e) if matches!(e.kind(), ErrorKind::WouldBlock | ErrorKind::TimedOut | ErrorKind::Interrupted) => {}
+                Err(_) => return self.leave(number),
+            }
+            let state = self.lock();
+            if state.abort || !state.clients.contains_key(&number) {
+                return;
+            }
+        }
+    }
+
+    /// Disconnects a client that is none.
+    fn refuse(&self, number: u64) {
+        self.lock().statistics.disconnected += 1;
+        self.leave(number);
+    }
+
+    /// Answers a query. False if too many answers wait.
+    fn answer(&self, query: &Message, number: u64) -> bool {
+        let Some((what, kind)) = query.kind().split_once('_') else { return true };
+        let mut state = self.lock();
+        let State { clients, last, .. } = &mut *state;
+        let Some(queue) = clients.get_mut(&number) else { return true };
+        let name = query.device();
+        let found = || match last.get(name) {
+            Some(packet) => Some(packet.clone()),
+            None if name.is_empty() => last.values().next().cloned(),
+            None => None,
+        };
+        let answer = match (what, kind) {
+            ("GET", "CAPABIL" | "CAPABILITY") => self.capabilities(),
+            ("GET", "STATUS") => self.status(),
+            ("GET", "STRING") => self.text(),
+            // The image itself, as an answer that is not dropped.
+            ("GET", "IMAGE") => match found() {
+                Some(packet) => Some(packet.bytes),
+                None => self.result("RTS_IMAGE", ERROR),
+            },
+            ("STT", "IMAGE") => {
+                queue.is_paused = false;
+                self.result("RTS_IMAGE", SUCCESS)
+            }
+            ("STP", "IMAGE") => {
+                queue.is_paused = true;
+                self.result("RTS_IMAGE", SUCCESS)
+            }
+            ("GET" | "STT" | "STP", other) => self.result(&format!("RTS_{other}"), ERROR),
+            _ => return true,
+        };
+        // A type whose name leaves no room for RTS_ is not of this protocol.
+        let Some(bytes) = answer else { return true };
+        queue.push(Packet { device: None, bytes }, &self.options);
+        let is_bearable = queue.answers <= MAX_ANSWERS;
+        drop(state);
+        self.changed.notify_all();
+        is_bearable
+    }
+
+    fn capabilities(&self) -> Option<Arc<[u8]>> {
+        let names = CAPABILITIES.map(|name| {
+            let mut field = [0; 12];
+            field[..name.len()].copy_from_slice(name.as_bytes());
+            field
+        });
+        codec::packed("CAPABILITY", &self.options.name, now(), &names.concat()).ok().map(Arc::from)
+    }
+
+    fn result(&self, kind: &str, result: u8) -> Option<Arc<[u8]>> {
+        codec::packed(kind, &self.options.name, now(), &[result]).ok().map(Arc::from)
+    }
+
+    fn status(&self) -> Option<Arc<[u8]>> {
+        let (device, name) = (self.options.name.clone(), String::new());
+        let status = Status { device, time: now(), code: 1, subcode: 0, name, text: "sending pictures".into() };
+        encode(&Message::Status(status), Version::V1).ok().map(Arc::from)
+    }
+
+    fn text(&self) -> Option<Arc<[u8]>> {
+        let text = Text { device: self.options.name.clone(), time: now(), text: self.options.name.clone() };
+        encode(&Message::Text(text), Version::V1).ok().map(Arc::from)
+    }
+}
+
+/// The time, s since 1970, for a stamp; 0, which is none, for a clock before that.
+pub(super) fn now() -> f64 {
+    std::time::SystemTime::now().duration_since(std::time::UNIX_EPOCH).map_or(0.0, |t| t.as_secs_f64())
+}
+
+/// A query, as clients send it: the kind and no body.
+pub fn query(kind: &str, device: &str) -> Result<Vec<u8>, MessageError> {
+    codec::packed(kind, device, 0.0, &[])
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn packet(device: Option<&str>, bytes: usize) -> Packet {
+        Packet { device: device.map(str::to_string), bytes: vec![0; bytes].into() }
+    }
+
+    #[test]
+    fn the_oldest_of_a_device_go_and_answers_stay() {
+        let options = ServerOptions { queue_messages: 2, queue_bytes: 1000, ..ServerOptions::default() };
+        let mut queue = Queue::default();
+        assert_eq!(queue.push(packet(None, 10), &options), 0);
+        let pushed =
+            [("a", 100), ("b", 100), ("a", 200), ("a", 300)].map(|(d, n)| queue.push(packet(Some(d), n), &options));
+        assert_eq!(pushed, [0, 0, 0, 1]);
+        // What is too large for the queue is kept alone, with the answers.
+        assert_eq!(queue.push(packet(Some("c"), 5000), &options), 3);
+        let left: Vec<_> = std::iter::from_fn(|| queue.pop()).map(|packet| packet.bytes.len()).collect();
+        assert_eq!((left, queue.bytes, queue.answers), (vec![10, 5000], 0, 0));
+    }
+}

@@ -1,0 +1,270 @@
+//! Frames with poses: through a pipe, in `.frames` files, and as freehand volumes of both.
+
+use crate::common::files::{Folder, repository};
+use echolume::live::Feed;
+use echolume::probe::{Geometry, Grid, World};
+use echolume::source::live::{Event, Live, Playback, PlaybackSource};
+use echolume::source::piped::Piped;
+use echolume::source::recorder::{Header, Reader, Writer};
+use echolume::source::{Frame, Source, StoredType, open};
+use glam::{DAffine3, DQuat, DVec3};
+use serde_json::json;
+use std::io::Cursor;
+use std::process::Command;
+use std::time::Duration;
+
+const SIZE: [usize; 2] = [9, 7];
+const SPACING: [f64; 2] = [0.5, 0.4];
+const ORIGIN: [f64; 3] = [-2.0, 3.0, 0.0];
+const PICTURES: usize = 8;
+
+/// A place in the tracker's space as a value.
+fn value(place: DVec3) -> f64 {
+    3.0 * place.x - 2.0 * place.y + 1.5 * place.z + 400.0
+}
+
+/// The probe moves along its normal.
+fn pose(n: usize) -> DAffine3 {
+    let turn = DQuat::from_rotation_z(0.3) * DQuat::from_rotation_x(-0.5);
+    let moved = DAffine3::from_translation(DVec3::Z * 0.5 * n as f64);
+    DAffine3::from_rotation_translation(turn, DVec3::new(100.0, 50.0, -30.0)) * moved
+}
+
+fn rows(pose: &DAffine3) -> Vec<u8> {
+    let row = |n: usize| [pose.matrix3.row(n).to_array().to_vec(), vec![pose.translation[n]]].concat();
+    [0, 1, 2].map(row).concat().iter().flat_map(|v| v.to_le_bytes()).collect()
+}
+
+fn samples(n: usize) -> Vec<u8> {
+    let place = |k: usize| {
+        let (column, row) = ((k % SIZE[0]) as f64, (k / SIZE[0]) as f64);
+        DVec3::from(ORIGIN) + DVec3::new(column * SPACING[0], row * SPACING[1], 0.0)
+    };
+    (0..SIZE[0] * SIZE[1]).flat_map(|k| (value(pose(n).transform_point3(place(k))) as f32).to_le_bytes()).collect()
+}
+
+/// The stream of all pictures; those of `without` have no pose, and that of `skewed` is none.
+fn stream(version: u32, without: &[usize], skewed: &[usize]) -> Vec<u8> {
+    let [x, y] = SIZE;
+    let cartesian = json!({"size": [x, y, 1], "spacing": [SPACING[0], SPACING[1], 1.0], "origin": ORIGIN});
+    let keys = json!({"echolume": version, "type": "f32", "range": [0, 900], "stamped": true, "posed": true, "cartesian": cartesian});
+    let mut bytes = format!("{keys}\n").into_bytes();
+    for n in 0..PICTURES {
+        bytes.extend((1e9 + n as f64).to_le_bytes());
+        let mut matrix = rows(&pose(n));
+        if without.contains(&n) {
+            matrix = f64::NAN.to_le_bytes().repeat(12);
+        }
+        if skewed.contains(&n) {
+            matrix[..8].copy_from_slice(&7.5f64.to_le_bytes());
+        }
+        bytes.extend(matrix);
+        bytes.extend(samples(n));
+    }
+    bytes
+}
+
+fn all(mut next: impl FnMut() -> Option<Event>) -> (Vec<Event>, Option<String>) {
+    let mut events = Vec::new();
+    loop {
+        match next().expect("an event in time") {
+            Event::End(why) => return (events, why),
+            event => events.push(event),
+        }
+    }
+}
+
+fn frames(events: &[Event]) -> Vec<&Frame> {
+    events.iter().filter_map(|e| if let Event::Frame(frame) = e { Some(frame) } else { None }).collect()
+}
+
+fn faults(events: &[Event]) -> Vec<&str> {
+    events.iter().filter_map(|e| if let Event::Fault(fault) = e { Some(fault.as_str()) } else { None }).collect()
+}
+
+/// Every voxel that is filled has the value of its place. Returns how many are.
+fn hold_the_field<'a>(grid: &Grid, world: &World, slices: impl Iterator<Item = (usize, &'a [u8])>) -> usize {
+    let (mut filled, mut off) = (0u32, 0.0);
+    for (slice, bytes) in slices {
+        for (n, bytes) in bytes.as_chunks::<4>().0.iter().enumerate() {
+            let stored = f64::from(f32::from_le_bytes(*bytes));
+            if stored != 0.0 {
+                let cell = [n % grid.size[0], n / grid.size[0], slice].map(|n| n as f64);
+                let meant = value(world.at(DVec3::from_array(cell)));
+                // A pixel at the border goes to voxels as far as a voxel's diagonal, 0.9 mm, of a slope of 3.9 a mm. Within, that cancels.
+                assert!((stored - meant).abs() < 3.5, "{cell:?}: {stored}, {meant}");
+                off += (stored - meant).abs();
+                filled += 1;
+            }
+        }
+    }
+    assert!(off / f64::from(filled) < 0.7, "{off} of {filled}");
+    filled as usize
+}
+
+#[test]
+fn poses_of_a_pipe_are_those_of_its_frames() {
+    let mut piped = Piped::new(Cursor::new(stream(2, &[3], &[5, 6])), None).expect("a thread");
+    let (events, why) = all(|| Some(piped.next(Duration::from_secs(10))));
+    assert_eq!(why, None);
+    for (n, frame) in frames(&events).into_iter().enumerate() {
+        let expected = (![3, 5, 6].contains(&n)).then(|| pose(n));
+        assert_eq!((frame.time, frame.pose, &frame.bytes), (Some(1e9 + n as f64), expected, &samples(n)), "{n}");
+    }
+    let [fault] = faults(&events)[..] else { panic!("{events:?}") };
+    assert!(fault.contains("frame 0 of volume 5") && fault.contains("rigid"), "{fault}");
+    // An old stream has no poses, and says so if it claims them.
+    let mut old = Piped::new(Cursor::new(stream(1, &[], &[])), None).expect("a thread");
+    let (events, why) = all(|| Some(old.next(Duration::from_secs(10))));
+    assert!(events.is_empty() && why.as_deref().is_some_and(|why| why.contains("posed: needs version 2")), "{why:?}");
+    // Cut within a pose.
+    let whole = stream(2, &[], &[]);
+    let header = whole.iter().position(|b| *b == b'\n').expect("a line") + 1;
+    let mut cut = Piped::new(Cursor::new(whole[..header + 20].to_vec()), None).expect("a thread");
+    let (_, why) = all(|| Some(cut.next(Duration::from_secs(10))));
+    assert!(why.as_deref().is_some_and(|why| why.contains("20 of 356 bytes")), "{why:?}");
+}
+
+/// Live from a pipe, from the stream kept in a file, and from the recording of the stream: the same volume in the same place.
+#[test]
+fn pictures_with_poses_become_a_volume_in_the_tracker_s_space() {
+    let folder = Folder::new("posed");
+    let tape = folder.join("tape.frames");
+    let piped = Piped::new(Cursor::new(stream(2, &[3], &[])), None).expect("a thread");
+    let feed = Feed::new(Box::new(piped), Some(&tape)).expect("a thread");
+    let (events, why) = all(|| feed.next(Duration::from_secs(20)).map(|arrived| arrived.event));
+    drop(feed);
+    assert_eq!((why, faults(&events)), (None, vec!["1 pictures without a valid pose are left out"]));
+    let Some(Event::Begin(header)) = events.iter().find(|e| matches!(e, Event::Begin(_))) else { panic!("{events:?}") };
+    let Geometry::Cartesian(grid) = header.forward else { panic!("a lattice") };
+    let slices = frames(&events);
+    assert_eq!((slices.len(), header.range, header.posed), (grid.size[2], [0.0, 900.0], true));
+    let world = World::posed(&slices[0].pose.expect("a pose"), &grid).expect("rigid");
+    let filled = hold_the_field(&grid, &world, slices.iter().map(|frame| (frame.slice, &frame.bytes[..])));
+    assert!(filled >= SIZE[0] * SIZE[1] * (PICTURES - 1), "{filled}");
+    // The recording holds the pictures and their poses, bit for bit.
+    let mut reader = Reader::open(&tape).expect("a recording");
+    let mut kept = Vec::new();
+    while let Some(frame) = reader.next_frame().expect("a frame") {
+        kept.push((frame.pose, frame.bytes));
+    }
+    let sent = (0..PICTURES).map(|n| ((n != 3).then(|| pose(n)), samples(n)));
+    assert_eq!(kept, sent.collect::<Vec<_>>());
+    let stored = folder.write("stream", stream(2, &[3], &[]));
+    for file in [tape.as_path(), stored.as_ref()] {
+        let mut source = open(file, None).expect("a volume");
+        let Geometry::Cartesian(grid) = source.geometry(0) else { panic!("a lattice") };
+        let world = source.world().expect("a place");
+        let mut slices = Vec::new();
+        while let Some(frame) = source.next_frame().expect("a slice") {
+            slices.push((frame.slice, frame.bytes));
+        }
+        let there = hold_the_field(&grid, &world, slices.iter().map(|(slice, bytes)| (*slice, &bytes[..])));
+        assert!(there >= SIZE[0] * SIZE[1] * (PICTURES - 1) && source.volumes() == 1, "{}: {there}", file.display());
+    }
+}
+
+fn header(posed: bool) -> Header {
+    let geometry = Geometry::Cartesian(Grid { size: [4, 3, 2], spacing: [1.0; 3], origin: [0.0, 5.0, 0.0] });
+    Header { forward: geometry.clone(), backward: geometry, stored: StoredType::U8, range: [0.0, 255.0], posed }
+}
+
+/// A file without poses has the bytes that it had before there were any, and a damaged frame hides none of those with poses.
+#[test]
+fn files_of_frames_keep_poses_and_without_them_are_as_before() {
+    let folder = Folder::new("poses");
+    for posed in [false, true] {
+        let path = folder.join(format!("{posed}.frames"));
+        let frame = |n: u32| Frame {
+            volume: n / 2,
+            number: n % 2,
+            slice: n as usize % 2,
+            backward: false,
+            time: None,
+            pose: (posed && n != 2).then(|| pose(n as usize)),
+            bytes: vec![n as u8; 12],
+        };
+        let mut writer = Writer::create(&path, header(posed)).expect("created");
+        (0..6).for_each(|n| writer.frame(&frame(n), f64::from(n)).expect("written"));
+        writer.finish().expect("finished");
+        let mut bytes = std::fs::read(&path).expect("read");
+        let text = String::from_utf8_lossy(&bytes[16..]).into_owned();
+        assert_eq!(text.contains("posed"), posed, "the header");
+        let first = bytes.windows(4).position(|w| w == b"FRAM").expect("a frame");
+        let second = first + 4 + bytes[first + 4..].windows(4).position(|w| w == b"FRAM").expect("a frame");
+        assert_eq!(second - first, 40 + if posed { 96 } else { 0 } + 12 + 4);
+        let mut reader = Reader::open(&path).expect("opened");
+        let world = Source::world(&reader);
+        assert_eq!(world.is_some(), posed, "that of the first frame");
+        let read: Vec<Frame> = std::iter::from_fn(|| reader.next_frame().expect("a frame")).collect();
+        assert_eq!(read, (0..6).map(frame).collect::<Vec<_>>());
+        // Without an index, and with a damaged frame.
+        bytes.truncate(bytes.len() - 10);
+        bytes[second + 45] ^= 1;
+        std::fs::write(&path, bytes).expect("written");
+        let mut reader = Reader::open(&path).expect("opened");
+        assert_eq!((reader.rebuilt(), reader.damaged()), (true, 1));
+        let read: Vec<Frame> = std::iter::from_fn(|| reader.next_frame().expect("a frame")).collect();
+        assert_eq!(read, [0, 2, 3, 4, 5].map(frame));
+    }
+}
+
+/// The orientation of a volume survives `.frames`, and what plays it back.
+#[test]
+fn a_volume_keeps_its_orientation_through_frames() {
+    let folder = Folder::new("oriented");
+    let stored = repository("tests/data/formats/raw-ras.nrrd");
+    let (tape, back) = (folder.path("tape.frames"), folder.path("back.nrrd"));
+    let program = crate::common::program::run;
+    for (from, to) in [(stored.to_str().expect("a plain name"), &tape), (tape.as_str(), &back)] {
+        let (code, _, said) = program(&["convert", from, to]);
+        assert_eq!(code, Some(0), "{said}");
+    }
+    let all = |path: &str| {
+        let mut source = open(path.as_ref(), None).expect("a volume");
+        let Geometry::Cartesian(grid) = source.geometry(0) else { panic!("a lattice") };
+        let frames: Vec<Vec<u8>> =
+            std::iter::from_fn(|| source.next_frame().expect("a slice")).map(|f| f.bytes).collect();
+        (source.world().expect("a place"), grid, frames)
+    };
+    let ((world, grid, samples), (read, _, again)) = (all(stored.to_str().expect("a plain name")), all(&back));
+    assert_eq!(samples, again);
+    assert!(world != World::of(&grid), "it is turned");
+    for cell in [DVec3::ZERO, DVec3::from_array(grid.size.map(|n| n as f64 - 1.0))] {
+        let (here, there) = (world.at(cell), read.at(cell));
+        assert!(here.distance(there) < 1e-6, "{here} {there}");
+    }
+    let source = open(tape.as_ref(), None).expect("a volume");
+    let mut live = PlaybackSource::new(source, Playback::Fast, 1);
+    let (events, _) = crate::posed::all(|| Some(live.next(Duration::from_secs(10))));
+    assert!(frames(&events).iter().all(|frame| frame.pose.is_some()));
+}
+
+/// The example program sends pictures of a ball of 12 mm around a known place, as a probe that is tilted and moved would see it.
+#[test]
+fn the_example_s_sweep_is_a_ball_where_it_says() {
+    let output =
+        Command::new("python3").arg(repository("tools/pipe_frames.py")).args(["--freehand", "2000", "60"]).output();
+    let output = output.expect("python3");
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    let folder = Folder::new("ball");
+    let stored = folder.write("sweep", &output.stdout);
+    let mut source = open(stored.as_ref(), None).expect("a volume");
+    let (world, Geometry::Cartesian(grid)) = (source.world().expect("a place"), source.geometry(0)) else {
+        panic!("a lattice")
+    };
+    let (mut sum, mut weight, mut radii) = (DVec3::ZERO, 0.0, Vec::new());
+    while let Some(frame) = source.next_frame().expect("a slice") {
+        for (n, sample) in frame.bytes.iter().enumerate().filter(|(_, sample)| **sample > 128) {
+            let cell = [n % grid.size[0], n / grid.size[0], frame.slice].map(|n| n as f64);
+            let place = world.at(DVec3::from_array(cell));
+            sum += place * f64::from(*sample);
+            weight += f64::from(*sample);
+            radii.push(place);
+        }
+    }
+    let centre = sum / weight;
+    assert!(centre.distance(DVec3::new(110.0, -40.0, 65.0)) < 0.5, "{centre}");
+    let mean = radii.iter().map(|place| place.distance(centre)).sum::<f64>() / radii.len() as f64;
+    assert!((mean - 12.0).abs() < 0.3, "{mean}");
+}
