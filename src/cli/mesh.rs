@@ -1,14 +1,14 @@
 //! `echolume mesh`: the surface of a recording as triangles.
 
-use super::recordings::{OUTPUT, read_volume, target_grid};
+use super::recordings::{OUTPUT, read_with_threshold, share_of, target_grid};
 use crate::args::{GeometryArgs, check_outputs, open_recording};
 use crate::mesh::Mesh;
 use crate::mesh::files::MeshFile;
 use crate::mesh::nets::{Surface, surface_net};
 use crate::mesh::smooth::Smoother;
 use crate::probe::{Geometry, World};
-use crate::scene::default_look::{block_edge, smoothing};
-use crate::scene::{EchoHistogram, Input};
+use crate::scene::Input;
+use crate::scene::default_look::smoothing;
 use crate::terminal::{self, Failure, failed, input, say};
 use std::path::PathBuf;
 
@@ -68,16 +68,9 @@ impl MakeMesh {
         check_outputs(&[(OUTPUT, Some(&self.output))], read)?;
         let samples = Input { stored: recording.stored_type(), range: recording.range() };
         let (shift, world) = (recording.sample_type().shift(), recording.world());
-        let mut levels = None;
-        let (geometry, volume, _) = read_volume(&mut *recording, &self.input, self.volume, |geometry, frame| {
-            let histogram = || EchoHistogram::new(geometry, samples, block_edge(geometry));
-            levels.get_or_insert_with(histogram).take(&frame.bytes);
-        })?;
+        let (geometry, volume, found) = read_with_threshold(&mut *recording, &self.input, self.volume, samples)?;
         let grid = target_grid(&geometry, self.spacing)?;
-        let found = levels.and_then(|histogram| histogram.levels()).map(|levels| levels.threshold);
-        let Some(share) = self.threshold.or(found) else {
-            return Err(input(format!("{}: the echoes have no two classes; give --threshold", self.input.display())));
-        };
+        let share = share_of(self.threshold, found, &self.input)?;
         let [low, high] = samples.range;
         let threshold = low + share * (high - low);
         let world = match (&geometry, world) {

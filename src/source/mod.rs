@@ -29,6 +29,7 @@ mod plus_config;
 pub mod recorder;
 pub mod recording;
 pub mod samples;
+pub mod segmentation;
 pub mod sequence;
 mod stack;
 pub(crate) mod standard_input;
