@@ -58,10 +58,19 @@ fn a_ball_keeps_its_volume_and_place_whatever_the_hand_of_its_axes() {
         let said = done(&["mesh", &input, &output, "--threshold", &share]);
         assert!(said.contains("closed, 0.8"), "{said}");
         let (volume, centre) = measured(&output);
+        let net = fs::metadata(&output).expect("a mesh").len();
         // Bound as in src/mesh/nets.rs: nothing lies deeper than 2 h^2 / R, for the widest voxel.
         let lost = 1.0 - volume / exact;
         assert!((0.0..6.0 / (RADIUS * RADIUS)).contains(&lost), "mirrored {mirrored}: {lost}");
         assert!(centre.iter().all(|v| v.abs() < 1e-2), "mirrored {mirrored}: {centre:?}");
+        // Fewer triangles: at most 0.1 mm times the area is lost or won.
+        let said = done(&["mesh", &input, &output, "--threshold", &share, "--simplify", "0.1"]);
+        assert!(said.contains("closed, 0.") && said.contains(" triangles, at most 0."), "{said}");
+        let (simple, _) = measured(&output);
+        let most = 0.1 * 4.0 * std::f64::consts::PI * RADIUS * RADIUS;
+        assert!((simple - volume).abs() < most, "mirrored {mirrored}: {simple} of {volume}");
+        let left = fs::metadata(&output).expect("a mesh").len();
+        assert!(2 * left < net, "{left} of {net} bytes");
     }
 }
 
@@ -77,6 +86,7 @@ fn a_mesh_that_would_be_wrong_is_not_written() {
         (&[&input, &stl, "--smooth", "-1", "--threshold", "0.5"], "--smooth -1"),
         (&[&input, &stl, "--spacing", "0"], "--spacing 0"),
         (&[&input, &stl, "--volume", "1"], "--volume 1"),
+        (&[&input, &stl, "--simplify", "0"], "--simplify 0"),
         (&[&input, &stl, "--threshold", "0"], "--threshold 0"),
         (&[&input, "-"], ".stl, .ply or .glb"),
     ] {
