@@ -5,6 +5,7 @@
 
 mod about;
 mod batch;
+mod drawing;
 mod filter;
 mod machine;
 mod mesh;
@@ -12,6 +13,7 @@ mod one_colour;
 mod probe;
 mod recordings;
 mod render;
+mod series;
 mod stream;
 #[cfg(feature = "view")]
 mod view;
