@@ -15,6 +15,7 @@ use crate::source::phantom::{self, Phantom, PhantomSource};
 use crate::source::{Frame, Source};
 use crate::terminal::{Failure, failed, input, progress_bar, say};
 use crate::workspace::{self, Workspace};
+use std::collections::HashSet;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
@@ -37,24 +38,35 @@ pub struct InputArgs {
 impl InputArgs {
     /// Opens the recording and builds the scene of the chosen volume.
     pub fn open(&self) -> Result<(Box<dyn Source>, Scene), Failure> {
-        self.open_scene(&[], false)
+        self.open_scene(&[], false, None)
     }
 
     /// Like [`InputArgs::open`], to show a picture: settings that nobody chose follow from the recording. What measures takes the settings as
     /// they are. `chosen` assignments are a layer below the flags and `--set`.
     pub fn open_to_show(&self, chosen: &[String]) -> Result<(Box<dyn Source>, Scene), Failure> {
-        self.open_scene(chosen, true)
+        self.open_scene(chosen, true, None)
     }
 
-    fn open_scene(&self, chosen: &[String], to_show: bool) -> Result<(Box<dyn Source>, Scene), Failure> {
+    /// Like [`InputArgs::open_to_show`], for the first of several volumes that are shown.
+    pub fn open_volumes(&self, first: usize) -> Result<(Box<dyn Source>, Scene), Failure> {
+        self.open_scene(&[], true, Some(first))
+    }
+
+    /// `asked`: the volume, if the arguments do not say it.
+    fn open_scene(
+        &self,
+        chosen: &[String],
+        to_show: bool,
+        asked: Option<usize>,
+    ) -> Result<(Box<dyn Source>, Scene), Failure> {
         let mut source = self.source()?;
-        let volume = self.volume()?;
+        let volume = asked.map_or_else(|| self.volume(), Ok)?;
         check_volume(&*source, volume, self.name())?;
         let layers = self.layers_with(chosen)?;
         // The settings of a workspace are complete.
         let scene = match to_show && self.workspace()?.is_none() {
             true => scene_to_show(&mut *source, volume, &layers, |source, geometry, samples| {
-                self.levels(source, geometry, samples)
+                self.levels(source, volume, geometry, samples)
             })?,
             false => {
                 let settings = layers.finish().map_err(input)?;
@@ -69,14 +81,18 @@ impl InputArgs {
     fn levels(
         &self,
         source: &mut dyn Source,
+        volume: usize,
         geometry: &Geometry,
         samples: Input,
     ) -> Result<Option<EchoLevels>, Failure> {
         let mut histogram = EchoHistogram::new(geometry, samples, block_edge(geometry));
-        self.for_each_frame(source, |frame| {
+        let bar = progress_bar(source.frames_per_volume() as u64).with_message("frames");
+        frames_of(source, volume, |frame| {
             histogram.take(&frame.bytes);
+            bar.inc(1);
             Ok(())
         })?;
+        bar.finish_and_clear();
         Ok(histogram.levels())
     }
 
@@ -87,7 +103,7 @@ impl InputArgs {
     }
 
     /// The number of the volume to use.
-    fn volume(&self) -> Result<usize, Failure> {
+    pub fn volume(&self) -> Result<usize, Failure> {
         Ok(match (self.volume, self.workspace()?) {
             (0, Some((_, workspace))) => workspace.origin.volume,
             (volume, _) => volume,
@@ -105,11 +121,16 @@ impl InputArgs {
 
     /// Refuses outputs that would replace an input: the files of the source or of the settings. See [`check_outputs`].
     pub fn check_outputs(&self, outputs: &[Output], source: &dyn Source) -> Result<(), Failure> {
+        check_outputs(outputs, self.read_files(source).iter().map(PathBuf::as_path))
+    }
+
+    /// Every file that is read: of the source and of the settings.
+    pub fn read_files(&self, source: &dyn Source) -> Vec<PathBuf> {
         let mut read = source.files();
         read.extend(self.geometry.probe.clone());
         read.extend(self.input.clone().filter(|file| workspace::is_named(file)));
         read.extend(self.scene.files());
-        check_outputs(outputs, read.iter().map(PathBuf::as_path))
+        read
     }
 
     /// Calls `each` with every frame of the volume, in the order of the recording, and shows a progress bar.
@@ -118,19 +139,12 @@ impl InputArgs {
         source: &mut dyn Source,
         mut each: impl FnMut(Frame) -> Result<(), Failure>,
     ) -> Result<(), Failure> {
-        source.skip_to_volume(self.volume()?).map_err(input)?;
-        let frames = source.frames_per_volume();
-        let bar = progress_bar(frames as u64).with_message("frames");
-        let mut volume = None;
-        for _ in 0..frames {
-            let Some(frame) = source.next_frame().map_err(input)? else { break };
-            // An incomplete volume has fewer frames: the next one then begins earlier.
-            if *volume.get_or_insert(frame.volume) != frame.volume {
-                break;
-            }
+        let bar = progress_bar(source.frames_per_volume() as u64).with_message("frames");
+        frames_of(source, self.volume()?, |frame| {
             each(frame)?;
             bar.inc(1);
-        }
+            Ok(())
+        })?;
         bar.finish_and_clear();
         Ok(())
     }
@@ -328,6 +342,25 @@ impl SceneArgs {
     }
 }
 
+/// Calls `each` with every frame of a volume, in the order of the recording.
+pub fn frames_of(
+    source: &mut dyn Source,
+    volume: usize,
+    mut each: impl FnMut(Frame) -> Result<(), Failure>,
+) -> Result<(), Failure> {
+    source.skip_to_volume(volume).map_err(input)?;
+    let mut number = None;
+    for _ in 0..source.frames_per_volume() {
+        let Some(frame) = source.next_frame().map_err(input)? else { break };
+        // An incomplete volume has fewer frames: the next one then begins earlier.
+        if *number.get_or_insert(frame.volume) != frame.volume {
+            break;
+        }
+        each(frame)?;
+    }
+    Ok(())
+}
+
 /// Refuses a volume that a recording, whose `name` the message has, does not hold.
 pub fn check_volume(source: &dyn Source, volume: usize, name: impl std::fmt::Display) -> Result<(), Failure> {
     match source.volumes() {
@@ -471,6 +504,15 @@ pub fn write_report(file: &Path, text: &str) -> Result<(), Failure> {
     replace(file, text.as_bytes()).map_err(failed)?;
     say!("written: {}", file.display());
     Ok(())
+}
+
+/// Refuses files that would replace an input (`read`).
+pub(super) fn check_inputs(flag: &str, files: &[PathBuf], read: &[PathBuf]) -> Result<(), Failure> {
+    let inputs: HashSet<PathBuf> = read.iter().filter_map(|file| file.canonicalize().ok()).collect();
+    match files.iter().find(|file| file.canonicalize().is_ok_and(|there| inputs.contains(&there))) {
+        Some(file) => Err(input(format!("{flag} {}: would replace an input; give another name", file.display()))),
+        None => Ok(()),
+    }
 }
 
 /// True if both paths name the same regular file. A device may be written to more than once.

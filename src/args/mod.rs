@@ -3,16 +3,18 @@
 mod input;
 mod motor;
 mod picture_file;
+mod picture_series;
 mod recording;
 mod source;
 mod user_files;
 
 pub use input::{
-    InputArgs, Output, SceneArgs, check_outputs, check_volume, device_failure, open_device, open_device_for_statistics,
-    open_device_until, scene_to_show, write_report,
+    InputArgs, Output, SceneArgs, check_outputs, check_volume, device_failure, frames_of, open_device,
+    open_device_for_statistics, open_device_until, scene_to_show, write_report,
 };
 pub use motor::{SerialArgs, motor_failure, motor_table};
 pub use picture_file::PictureFile;
+pub use picture_series::{PictureSeries, SeriesTarget};
 pub use recording::{GeometryArgs, open_recording};
 pub use source::{SourceArgs, StreamArgs};
 #[cfg(feature = "view")]

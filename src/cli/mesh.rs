@@ -1,14 +1,15 @@
 //! `echolume mesh`: the surface of a recording as triangles.
 
-use super::recordings::{OUTPUT, read_volume, target_grid};
+use super::recordings::{OUTPUT, read_with_threshold, share_of, target_grid};
 use crate::args::{GeometryArgs, check_outputs, open_recording};
 use crate::mesh::Mesh;
 use crate::mesh::files::MeshFile;
 use crate::mesh::nets::{Surface, surface_net};
+use crate::mesh::simplify::simplified;
 use crate::mesh::smooth::Smoother;
 use crate::probe::{Geometry, World};
-use crate::scene::default_look::{block_edge, smoothing};
-use crate::scene::{EchoHistogram, Input};
+use crate::scene::Input;
+use crate::scene::default_look::smoothing;
 use crate::terminal::{self, Failure, failed, input, say};
 use std::path::PathBuf;
 
@@ -18,6 +19,7 @@ use std::path::PathBuf;
                         volume, half a voxel outside, so that it can be printed; with --open it ends there. Coordinates are mm, those of the \
                         world (LPS) where the recording states them. STL has neither colours nor a unit.\n\nExamples:\n  \
                         echolume mesh sweep.mha face.stl\n  \
+                        echolume mesh sweep.mha face.stl --simplify 0.1\n  \
                         echolume mesh bone.mha bone.glb --threshold 0.4 --spacing 0.5 --smooth 0.5 --open"
 )]
 pub struct MakeMesh {
@@ -36,6 +38,9 @@ pub struct MakeMesh {
     /// render without a preset]
     #[arg(long, value_name = "MM", allow_negative_numbers = true)]
     smooth: Option<f64>,
+    /// Take away triangles as long as no point of the surface moves by more than this, mm; closed stays closed
+    #[arg(long, value_name = "MM", allow_negative_numbers = true)]
+    simplify: Option<f64>,
     /// Leave the surface open at the border of the volume
     #[arg(long)]
     open: bool,
@@ -62,22 +67,18 @@ impl MakeMesh {
         if let Some(share) = self.threshold.filter(|share| !(0.0..=1.0).contains(share)) {
             return Err(input(format!("--threshold {share}: must lie in 0..=1")));
         }
+        if let Some(mm) = self.simplify.filter(|mm| !(mm.is_finite() && *mm > 0.0)) {
+            return Err(input(format!("--simplify {mm}: must be a length above 0 mm")));
+        }
         let mut recording = open_recording(&self.input, self.geometry.options())?;
         let read = recording.files();
         let read = read.iter().chain(&self.geometry.probe).map(PathBuf::as_path);
         check_outputs(&[(OUTPUT, Some(&self.output))], read)?;
         let samples = Input { stored: recording.stored_type(), range: recording.range() };
         let (shift, world) = (recording.sample_type().shift(), recording.world());
-        let mut levels = None;
-        let (geometry, volume, _) = read_volume(&mut *recording, &self.input, self.volume, |geometry, frame| {
-            let histogram = || EchoHistogram::new(geometry, samples, block_edge(geometry));
-            levels.get_or_insert_with(histogram).take(&frame.bytes);
-        })?;
+        let (geometry, volume, found) = read_with_threshold(&mut *recording, &self.input, self.volume, samples)?;
         let grid = target_grid(&geometry, self.spacing)?;
-        let found = levels.and_then(|histogram| histogram.levels()).map(|levels| levels.threshold);
-        let Some(share) = self.threshold.or(found) else {
-            return Err(input(format!("{}: the echoes have no two classes; give --threshold", self.input.display())));
-        };
+        let share = share_of(self.threshold, found, &self.input)?;
         let [low, high] = samples.range;
         let threshold = low + share * (high - low);
         let world = match (&geometry, world) {
@@ -101,8 +102,17 @@ impl MakeMesh {
                 format!("no voxel differs from the others at --threshold {share:.3} ({in_file:.4} in the file)");
             return Err(input(format!("{}: nothing is written: {fault}", self.output.display())));
         }
+        let mut how = format!("threshold {share:.3} ({in_file:.4} in the file), smoothed by {deviation:.2} mm");
+        let mesh = match self.simplify {
+            None => mesh,
+            Some(mm) => {
+                let (simple, bound) = simplified(&mesh, mm);
+                how += &format!(", simplified from {} triangles, at most {bound:.4} mm off", mesh.triangles.len());
+                simple
+            }
+        };
         format.write(&mesh, *colour, &self.output).map_err(failed)?;
-        self.say(&mesh, &format!("threshold {share:.3} ({in_file:.4} in the file), smoothed by {deviation:.2} mm"));
+        self.say(&mesh, &how);
         Ok(())
     }
 

@@ -5,6 +5,7 @@
 
 mod about;
 mod batch;
+mod drawing;
 mod filter;
 mod machine;
 mod mesh;
@@ -13,6 +14,7 @@ mod probe;
 mod recordings;
 mod render;
 mod serve;
+mod series;
 mod stream;
 #[cfg(feature = "view")]
 mod view;

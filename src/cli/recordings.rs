@@ -3,10 +3,12 @@
 use crate::args::{GeometryArgs, Output, check_outputs, open_recording};
 use crate::files::signals::Writing;
 use crate::probe::{Geometry, Grid, World};
-use crate::scene::insonified_box;
+use crate::scene::default_look::block_edge;
+use crate::scene::{EchoHistogram, Input, insonified_box};
 use crate::source::convert::{Target, Volume, lattice};
 use crate::source::phantom::{Body, Label, Phantom, PhantomOptions, PointSpread, Sampling, Speckle, distance_path};
 use crate::source::recorder::{Header, Writer};
+use crate::source::segmentation;
 use crate::source::sequence::{self, Sequence};
 use crate::source::volume_file::VolumeFile;
 use crate::source::{self, Frame, Source};
@@ -18,7 +20,7 @@ pub(super) const OUTPUT: &str = "output";
 
 /// Reads one volume of a recording, and its geometry. `each` is called with every frame before it is kept. The number of frames that are
 /// there comes last.
-pub(super) fn read_volume(
+fn read_volume(
     recording: &mut dyn Source,
     file: &Path,
     number: usize,
@@ -43,6 +45,28 @@ pub(super) fn read_volume(
     Ok((geometry, volume, there))
 }
 
+/// Like [`read_volume`], with the share of the range between the darker and the brighter class of echoes, if there are two.
+pub(super) fn read_with_threshold(
+    recording: &mut dyn Source,
+    file: &Path,
+    number: usize,
+    samples: Input,
+) -> Result<(Geometry, Volume, Option<f64>), Failure> {
+    let mut levels = None;
+    let (geometry, volume, _) = read_volume(recording, file, number, |geometry, frame| {
+        let histogram = || EchoHistogram::new(geometry, samples, block_edge(geometry));
+        levels.get_or_insert_with(histogram).take(&frame.bytes);
+    })?;
+    let found = levels.and_then(|histogram| histogram.levels()).map(|levels| levels.threshold);
+    Ok((geometry, volume, found))
+}
+
+/// The threshold that was asked for, or the one that was found.
+pub(super) fn share_of(asked: Option<f64>, found: Option<f64>, file: &Path) -> Result<f64, Failure> {
+    let none = || input(format!("{}: the echoes have no two classes; give --threshold", file.display()));
+    asked.or(found).ok_or_else(none)
+}
+
 /// The lattice of a conversion: that of the volume itself, or one of the spacing that was asked for, mm.
 pub(super) fn target_grid(geometry: &Geometry, spacing: Option<f64>) -> Result<Grid, Failure> {
     match (geometry, spacing) {
@@ -58,13 +82,15 @@ pub(super) fn target_grid(geometry: &Geometry, spacing: Option<f64>) -> Result<G
 #[derive(clap::Args)]
 #[command(after_help = "Example:\n  echolume convert sweep.mha volume.nrrd --spacing 0.5\n  \
                         echolume convert sweep.mha sweep.frames    (checksummed, appended frame by frame; a file that is there is not replaced)\n  \
+                        echolume convert sweep.mha tissue.seg.nrrd    (for 3D Slicer)\n  \
                         echolume convert sweep.frames sweep.mha --sequence    (frames of whole volumes, for other programs)\n  \
                         echolume render volume.mha --mode mip -o mip.png    (the result is a recording, too)")]
 pub struct Convert {
     /// MetaImage (.mha, .mhd), NRRD (.nrrd), NIfTI (.nii), DICOM (.dcm), Kretz (.vol), each also as .gz, UFF (.uff) or .frames file; a folder or a 'pattern*.png' of numbered
     /// pictures; - for standard input
     input: PathBuf,
-    /// File to write: .mha, .nrrd, .nii, .nii.gz or .dcm (Enhanced US Volume) for a volume, .frames for every frame unchanged, .mha with --sequence
+    /// File to write: .mha, .nrrd, .nii, .nii.gz or .dcm (Enhanced US Volume) for a volume, .seg.nrrd for the voxels above --threshold as a
+    /// segmentation, .frames for every frame unchanged, .mha with --sequence
     output: PathBuf,
     /// Voxel spacing along every axis, mm [default: a Cartesian volume keeps its voxels; a sweep gets the sample spacing of a scan line]
     #[arg(long, value_name = "MM", allow_negative_numbers = true)]
@@ -77,9 +103,13 @@ pub struct Convert {
     /// Value of voxels outside the sector, in the file's own units
     #[arg(long, value_name = "VALUE", default_value_t = 0.0, allow_negative_numbers = true)]
     outside: f64,
-    /// Also write a volume of 1 inside the sector and 0 outside
+    /// Also write a volume of 1 inside the sector and 0 outside; .seg.nrrd: as a segmentation
     #[arg(long, value_name = "FILE")]
     mask: Option<PathBuf>,
+    /// With .seg.nrrd: least value of tissue, 0..1 of the sample range as volume.threshold [default: between the darker and the brighter
+    /// class of echoes]
+    #[arg(long, value_name = "SHARE", allow_negative_numbers = true)]
+    threshold: Option<f64>,
     /// Write .dcm as a secondary capture: slices of 8 bits, from the range that is shown, without the place in the world
     #[arg(long, conflicts_with = "sequence")]
     secondary_capture: bool,
@@ -95,11 +125,19 @@ impl Convert {
                 "-: a volume is written to a file, whole or not at all, and the file's ending says its format",
             ));
         }
+        let is_segmented = segmentation::is_one(&self.output);
+        if let Some(share) = self.threshold.filter(|share| !is_segmented || !(0.0..=1.0).contains(share)) {
+            let fault = if is_segmented { "must lie in 0..=1" } else { "is for .seg.nrrd" };
+            return Err(input(format!("--threshold {share}: {fault}")));
+        }
         if self.output.extension().is_some_and(|e| e.eq_ignore_ascii_case("frames")) {
             return self.record();
         }
         if self.sequence {
             return self.sequence();
+        }
+        if is_segmented {
+            return self.segment();
         }
         VolumeFile::of(&self.output).map_err(input)?;
         let mut recording = open_recording(&self.input, self.geometry.options())?;
@@ -145,6 +183,40 @@ impl Convert {
         } else if let Some(left) = self.spacing.and_then(|mm| what_is_left(mm, &grid, &first)) {
             remark(&format!("{}: {left}", self.output.display()));
         }
+        Ok(())
+    }
+
+    /// Writes the voxels above a threshold as a segmentation.
+    fn segment(&self) -> Result<(), Failure> {
+        if self.secondary_capture || self.outside != 0.0 {
+            let shown = self.output.display();
+            return Err(input(format!("{shown}: --secondary-capture and --outside are for volumes of samples")));
+        }
+        let mut recording = open_recording(&self.input, self.geometry.options())?;
+        self.check_outputs(&[(OUTPUT, Some(&self.output)), ("--mask", self.mask.as_deref())], &*recording)?;
+        let samples = Input { stored: recording.stored_type(), range: recording.range() };
+        let (shift, sample, world) = (recording.sample_type().shift(), recording.sample_type(), recording.world());
+        let (geometry, volume, found) = read_with_threshold(&mut *recording, &self.input, self.volume, samples)?;
+        let grid = target_grid(&geometry, self.spacing)?;
+        let share = share_of(self.threshold, found, &self.input)?;
+        let threshold = samples.range[0] + share * (samples.range[1] - samples.range[0]);
+        let mut target = Target::new(grid, sample);
+        if let (Some(world), Geometry::Cartesian(own)) = (world, &geometry) {
+            target.world = world.on(own, &grid);
+        }
+        let bar = progress_bar(grid.size[2] as u64).with_message("slices");
+        volume.write_tissue(&target, threshold, &self.output, || bar.inc(1)).map_err(failed)?;
+        bar.finish_and_clear();
+        if let Some(mask) = &self.mask {
+            volume.write_mask(&target, mask).map_err(failed)?;
+            say!("mask: {}, 1 inside and 0 outside", mask.display());
+        }
+        let [x, y, z] = grid.size;
+        let in_file = threshold - shift;
+        let shown = self.output.display();
+        say!(
+            "segmentation: {shown}, {x} x {y} x {z} voxels, 1 tissue; threshold {share:.3} ({in_file:.4} in the file)"
+        );
         Ok(())
     }
 
@@ -287,7 +359,7 @@ pub struct MakePhantom {
     /// The head does not move
     #[arg(long)]
     still: bool,
-    /// Also write what is where in the first volume of the head: labels to this file (.mha), and the signed distance from the
+    /// Also write what is where in the first volume of the head: labels to this file (.mha, or .seg.nrrd with their names for 3D Slicer), and the signed distance from the
     /// skin, mm, to NAME.distance.mha. 0 fluid, 1 skin, 2 hand, 3 cord, 4 skull, 5 brain, 6 choroid plexus, 7 ventricle, 8 falx, 9 uterus
     #[arg(long, value_name = "FILE")]
     truth: Option<PathBuf>,

@@ -1,6 +1,8 @@
 //! `echolume render`.
 
+use super::drawing::{DrawFault, MAX_LOSSES, with_marks};
 use super::one_colour;
+use super::series::{Job, SeriesArgs};
 use crate::args::{InputArgs, Output, PictureFile, check_outputs};
 use crate::dump;
 use crate::error_report::choose::Bound;
@@ -9,7 +11,6 @@ use crate::error_report::{Measure, choose, map};
 use crate::files;
 use crate::gpu::shader_reload::ShaderFolder;
 use crate::gpu::{Bands, Context, GpuError, Renderer, RendererOptions, TimeStamps};
-use crate::marked;
 use crate::passes::{PassTime, Slot, Texels};
 use crate::picture::{Picture, PictureFormat};
 use crate::plan::Plan;
@@ -18,10 +19,8 @@ use crate::profile::export::pass_time_table;
 use crate::scene::{Mode, Scene};
 use crate::source::{Frame, Source};
 use crate::terminal::{Failure, failed, input, remark, say};
-use std::borrow::Cow;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
-use std::time::SystemTime;
 
 #[derive(clap::Args)]
 #[command(
@@ -30,6 +29,8 @@ use std::time::SystemTime;
                         echolume render sweep.mha --preset fetal\n  \
                         echolume render sweep.vol --mode vr --camera azimuth=30,zoom=1.5 -o view.png\n  \
                         echolume render bone.mha --preset bone --roi depth=20:50 --explain\n  \
+                        echolume render sweep.mha --turntable 120 -o turn/\n  \
+                        echolume render loop.mha --volumes all -o loop-%03d.png\n  \
                         zcat sweep.mha.gz | echolume render - -o - | display"
 )]
 pub struct Render {
@@ -38,6 +39,8 @@ pub struct Render {
     /// The picture to write: .png, .jpg, .bmp or .ppm by its ending; - for a PNG on standard output
     #[arg(short, long, value_name = "FILE", default_value = "picture.png")]
     output: PathBuf,
+    #[command(flatten)]
+    series: SeriesArgs,
     /// Print the plan without rendering: passes, bytes, and the reason for each pass
     #[arg(long)]
     explain: bool,
@@ -74,6 +77,24 @@ pub struct Render {
 impl Render {
     pub fn run(&self) -> Result<(), Failure> {
         let options = self.options()?;
+        if self.series.is_given() && !self.explain {
+            let alone = [
+                ("--dump", self.dump.is_some()),
+                ("--error-map", self.error_map.is_some()),
+                ("--budget", self.budget.is_some()),
+            ];
+            if let Some((flag, _)) = alone.iter().find(|(_, is_given)| *is_given) {
+                return Err(input(format!("{flag}: is for one picture; leave --turntable and --volumes out")));
+            }
+            return self.series.run(&Job {
+                input: &self.input,
+                output: &self.output,
+                options,
+                validate: self.validate,
+                timings: self.timings,
+                own_shaders: self.glsl.is_some(),
+            });
+        }
         let output = PictureFile::new("-o", &self.output)?;
         let targets: [Output; 2] = [("-o", output.path()), ("--error-map", self.error_map.as_deref())];
         if !self.explain {
@@ -120,7 +141,7 @@ impl Render {
             }
         };
         let compared = finer.map(|finer| (scene, finer));
-        let shown = self.with_marks(&picture, renderer.scene())?;
+        let shown = with_marks(&picture, renderer.scene())?;
         output.write(|format| shown.encoded(format))?;
         let measured = renderer.take_times().map_err(failed)?;
         self.judge_budget(&measured)?;
@@ -144,18 +165,6 @@ impl Render {
         match context.messages().first() {
             None => Ok(()),
             Some(first) => Err(failed(format!("validation: {first}"))),
-        }
-    }
-
-    /// The picture as it is written: with its measurements, and its marks if the settings ask for them.
-    fn with_marks<'a>(&self, picture: &'a Picture, scene: &Scene) -> Result<Cow<'a, Picture>, Failure> {
-        match scene.settings.marks.bar {
-            false if scene.settings.measure.is_empty() && !scene.has_reference() => Ok(Cow::Borrowed(picture)),
-            false => marked::measured(picture, scene).map(Cow::Owned).map_err(failed),
-            true => {
-                let marked = marked::marked(picture, scene, &marked::time_line(SystemTime::now()), None);
-                marked.map(Cow::Owned).map_err(failed)
-            }
         }
     }
 
@@ -291,26 +300,11 @@ impl Render {
     }
 }
 
-/// A device that was lost so often is given up: no band can become smaller.
-const MAX_LOSSES: u32 = 6;
-
 /// A picture, the renderer that drew it, and the frames that it shows, if they are needed again.
 struct Drawn {
     renderer: Renderer,
     picture: Picture,
     kept: Vec<Frame>,
-}
-
-/// Why a picture could not be drawn.
-enum DrawFault {
-    Gpu(GpuError),
-    Source(Failure),
-}
-
-impl From<GpuError> for DrawFault {
-    fn from(error: GpuError) -> DrawFault {
-        DrawFault::Gpu(error)
-    }
 }
 
 /// The picture before the tone mapping of stage 4.

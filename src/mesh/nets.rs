@@ -324,12 +324,12 @@ fn arc(start: [usize; 3], inside: u8, normal: usize, side: usize, edge: usize) -
 }
 
 #[cfg(test)]
-mod tests {
+pub(super) mod tests {
     use super::*;
     use proptest::prelude::*;
 
     /// The net of a function of the voxel, with voxels `h` apart.
-    fn net(size: [usize; 3], threshold: f64, closed: bool, h: f64, value: impl Fn(DVec3) -> f64) -> Mesh {
+    pub fn net(size: [usize; 3], threshold: f64, closed: bool, h: f64, value: impl Fn(DVec3) -> f64) -> Mesh {
         let slice = |z: usize, out: &mut [f64]| {
             for (n, out) in out.iter_mut().enumerate() {
                 *out = value(DVec3::new((n % size[0]) as f64, (n / size[0]) as f64, z as f64));
@@ -341,7 +341,7 @@ mod tests {
 
     /// Checks that every edge belongs to two triangles that run along it in opposite directions, that the triangles around each vertex are one
     /// fan, and that no triangle has a vertex twice. Returns the Euler characteristic.
-    fn closed_manifold(mesh: &Mesh) -> i64 {
+    pub fn closed_manifold(mesh: &Mesh) -> i64 {
         let mut edges: HashMap<(u32, u32), u32> = HashMap::new();
         let mut next: HashMap<(u32, u32), u32> = HashMap::new();
         for [a, b, c] in mesh.triangles.iter().copied() {
@@ -371,7 +371,7 @@ mod tests {
     }
 
     /// Distances from the surface of a ball, positive within, of a lattice of n^3 voxels.
-    fn ball(n: usize, radius: f64) -> (Mesh, f64, DVec3) {
+    pub fn ball(n: usize, radius: f64) -> (Mesh, f64, DVec3) {
         let h = 2.0 / (n - 1) as f64;
         let centre = DVec3::new(0.97, 1.02, 1.01);
         let mesh = net([n; 3], 0.0, true, h, |at| radius - (at * h).distance(centre));

@@ -19,6 +19,7 @@ pub mod settings;
 mod sizes;
 mod slice_index;
 pub mod transfer;
+mod turntable;
 pub mod variants;
 pub mod visible_bounds;
 

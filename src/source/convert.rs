@@ -3,6 +3,7 @@
 
 use super::frame::Frame;
 use super::samples::{SampleType, StoredType};
+use super::segmentation::{self, Segment};
 use super::volume_file::VolumeFile;
 use crate::files::InputError;
 use crate::probe::{Geometry, Grid, Probe, World};
@@ -208,14 +209,52 @@ impl Volume {
         write_voxels(target, path, |voxel| self.value(target, voxel), each)
     }
 
-    /// Writes 1 for voxels inside the insonified region and 0 for those outside, on the same lattice.
+    /// Writes 1 for voxels inside the insonified region and 0 for those outside, on the same lattice; as a segmentation if the file's name
+    /// asks for one.
     ///
     /// # Errors
     /// As [`Volume::write`].
     pub fn write_mask(&self, target: &Target, path: &Path) -> Result<(), InputError> {
+        if segmentation::is_one(path) {
+            let segment = Segment { label: 1, name: "insonified", colour: [0.4, 0.6, 0.8] };
+            let label = |voxel| u8::from(self.value(target, voxel).is_some());
+            return segmentation::write(path, &target.grid, &target.world, &[segment], label, || ());
+        }
         let mask = Target { sample: SampleType::U8, outside: 0.0, capture: None, ..*target };
         write_voxels(&mask, path, |voxel| self.value(target, voxel).map(|_| 1.0), || ())
     }
+}
+
+impl Volume {
+    /// Writes a segmentation on the lattice of `target`: 1, "tissue", for voxels with a stored value of `threshold` and above. `each` is
+    /// called after every slice.
+    ///
+    /// # Errors
+    /// As [`Volume::write`].
+    pub fn write_tissue(
+        &self,
+        target: &Target,
+        threshold: f64,
+        path: &Path,
+        each: impl Fn(),
+    ) -> Result<(), InputError> {
+        let segment = Segment { label: 1, name: "tissue", colour: [0.88, 0.67, 0.55] };
+        let label = |voxel| u8::from(self.value(target, voxel).is_some_and(|value| value >= threshold));
+        segmentation::write(path, &target.grid, &target.world, &[segment], label, each)
+    }
+}
+
+/// Writes labels as a function of space, mm, on a grid along the axes of the world.
+///
+/// # Errors
+/// As [`Volume::write`].
+pub(super) fn write_labels(
+    grid: &Grid,
+    segments: &[Segment],
+    path: &Path,
+    label: impl Fn(DVec3) -> u8 + Sync,
+) -> Result<(), InputError> {
+    segmentation::write(path, grid, &World::of(grid), segments, |voxel| label(place_of(grid, voxel)), || ())
 }
 
 /// Writes a function of space, mm, on a grid; None is zero. `each` is called after every slice.

@@ -30,6 +30,7 @@ pub mod posed;
 pub mod recorder;
 pub mod recording;
 pub mod samples;
+pub mod segmentation;
 pub mod sequence;
 mod stack;
 pub(crate) mod standard_input;

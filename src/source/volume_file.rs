@@ -112,7 +112,7 @@ impl VolumeFile {
 }
 
 /// Three numbers, without negative zeros.
-fn three(v: DVec3, between: &str) -> String {
+pub(super) fn three(v: DVec3, between: &str) -> String {
     v.to_array().map(|n| (n + 0.0).to_string()).join(between)
 }
 
@@ -129,20 +129,27 @@ fn metaimage([x, y, z]: [usize; 3], world: &World, sample: SampleType) -> String
     )
 }
 
-fn nrrd([x, y, z]: [usize; 3], world: &World, sample: SampleType) -> String {
+fn nrrd(size: [usize; 3], world: &World, sample: SampleType) -> String {
     let kind = match sample {
         SampleType::U8 => "uint8",
         SampleType::U16 => "uint16",
         SampleType::I16 => "int16",
         SampleType::F32 => "float",
     };
+    format!(
+        "NRRD0004\n# The axes are lateral, depth and elevation of an ultrasound probe.\ntype: {kind}\ndimension: 3\n{}\
+         endian: little\nencoding: raw\n\n",
+        nrrd_axes(size, world)
+    )
+}
+
+/// The fields of an NRRD header that say where the voxels are.
+pub(super) fn nrrd_axes([x, y, z]: [usize; 3], world: &World) -> String {
     let directions = [0, 1, 2].map(|n| format!("({})", three(world.axis(n), ","))).join(" ");
     let origin = three(world.origin(), ",");
     format!(
-        "NRRD0004\n# The axes are lateral, depth and elevation of an ultrasound probe.\ntype: {kind}\ndimension: 3\n\
-         space: left-posterior-superior\nsizes: {x} {y} {z}\nspace directions: {directions}\n\
-         kinds: domain domain domain\nspace units: \"mm\" \"mm\" \"mm\"\nspace origin: ({origin})\n\
-         endian: little\nencoding: raw\n\n"
+        "space: left-posterior-superior\nsizes: {x} {y} {z}\nspace directions: {directions}\n\
+         kinds: domain domain domain\nspace units: \"mm\" \"mm\" \"mm\"\nspace origin: ({origin})\n"
     )
 }
 

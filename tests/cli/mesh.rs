@@ -1,4 +1,4 @@
-//! `echolume mesh`: a ball in a file becomes a closed surface in its place.
+//! `echolume mesh`: a ball in a file becomes a closed surface in its place. `echolume convert` labels its voxels.
 
 use crate::common::program::*;
 use std::fs;
@@ -58,10 +58,19 @@ fn a_ball_keeps_its_volume_and_place_whatever_the_hand_of_its_axes() {
         let said = done(&["mesh", &input, &output, "--threshold", &share]);
         assert!(said.contains("closed, 0.8"), "{said}");
         let (volume, centre) = measured(&output);
+        let net = fs::metadata(&output).expect("a mesh").len();
         // Bound as in src/mesh/nets.rs: nothing lies deeper than 2 h^2 / R, for the widest voxel.
         let lost = 1.0 - volume / exact;
         assert!((0.0..6.0 / (RADIUS * RADIUS)).contains(&lost), "mirrored {mirrored}: {lost}");
         assert!(centre.iter().all(|v| v.abs() < 1e-2), "mirrored {mirrored}: {centre:?}");
+        // Fewer triangles: at most 0.1 mm times the area is lost or won.
+        let said = done(&["mesh", &input, &output, "--threshold", &share, "--simplify", "0.1"]);
+        assert!(said.contains("closed, 0.") && said.contains(" triangles, at most 0."), "{said}");
+        let (simple, _) = measured(&output);
+        let most = 0.1 * 4.0 * std::f64::consts::PI * RADIUS * RADIUS;
+        assert!((simple - volume).abs() < most, "mirrored {mirrored}: {simple} of {volume}");
+        let left = fs::metadata(&output).expect("a mesh").len();
+        assert!(2 * left < net, "{left} of {net} bytes");
     }
 }
 
@@ -77,6 +86,7 @@ fn a_mesh_that_would_be_wrong_is_not_written() {
         (&[&input, &stl, "--smooth", "-1", "--threshold", "0.5"], "--smooth -1"),
         (&[&input, &stl, "--spacing", "0"], "--spacing 0"),
         (&[&input, &stl, "--volume", "1"], "--volume 1"),
+        (&[&input, &stl, "--simplify", "0"], "--simplify 0"),
         (&[&input, &stl, "--threshold", "0"], "--threshold 0"),
         (&[&input, "-"], ".stl, .ply or .glb"),
     ] {
@@ -90,4 +100,43 @@ fn a_mesh_that_would_be_wrong_is_not_written() {
         refuses(&all, &run(&all), 2, &[named]);
     }
     assert_eq!(folder.names().len(), 1, "{:?}", folder.names());
+}
+
+#[test]
+fn a_segmentation_labels_the_voxels_from_the_threshold_on() {
+    let folder = Folder::new("segmentation");
+    let input = ball(&folder, "ball.mha", false);
+    let [labels, mask] = ["ball.seg.nrrd", "all.SEG.nrrd"].map(|name| folder.path(name));
+    let info = done(&["info", &input]);
+    let range = info.lines().find_map(|line| line.strip_prefix("value range")).expect("a range");
+    let ends: Vec<f64> = range.split_whitespace().filter_map(|word| word.parse().ok()).collect();
+    // A distance between those of two voxels: in the file, 0.0371.
+    let share = ((0.0371 - ends[0]) / (ends[1] - ends[0])).to_string();
+    let said = done(&["convert", &input, &labels, "--threshold", &share, "--mask", &mask]);
+    assert!(said.contains("21 x 19 x 18 voxels, 1 tissue") && said.contains("(0.0371 in the file)"), "{said}");
+    // Each as a plain volume again, by the reader.
+    let plain = |path: &str| {
+        let out = folder.path("plain.mha");
+        done(&["convert", path, &out]);
+        let bytes = fs::read(&out).expect("a volume");
+        bytes[bytes.len() - 21 * 19 * 18..].to_vec()
+    };
+    let samples = fs::read(&input).expect("the ball");
+    let samples = samples[samples.len() - 4 * 21 * 19 * 18..].chunks_exact(4);
+    let values = samples.map(|four| f32::from_le_bytes(four.try_into().expect("four")));
+    let expected: Vec<u8> = values.map(|value| u8::from(value >= 0.0371)).collect();
+    assert!(expected.contains(&1) && plain(&labels) == expected);
+    assert!(plain(&mask).iter().all(|label| *label == 1));
+    let header = fs::read(&labels).expect("a segmentation");
+    let header = String::from_utf8_lossy(&header[..800]).into_owned();
+    assert!(header.contains("Segment0_Name:=tissue\n") && header.contains("space origin: (-5,-10,2.5"), "{header}");
+    let other = folder.path("x.nrrd");
+    for (arguments, named) in [
+        (&[&*other, "--threshold", "0.5"][..], "is for .seg.nrrd"),
+        (&[&labels, "--threshold", "2"], "--threshold 2: must lie in 0..=1"),
+        (&[&labels, "--outside", "1"], "are for volumes of samples"),
+    ] {
+        let all = [&["convert", &input], arguments].concat();
+        refuses(&all, &run(&all), 2, &[named]);
+    }
 }

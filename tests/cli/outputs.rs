@@ -47,6 +47,7 @@ fn rows(folder: &Folder) -> Vec<Row> {
         row("png", File, false, &["render", BONE, "-o", "@"], &SMALL),
         row("", Dir, false, &["render", BONE, "-o", "/dev/null", "--dump", "@"], &SMALL),
         row("png", File, false, &["render", BONE, "-o", "/dev/null", "--error-map", "@"], &SMALL),
+        row("", Dir, false, &["render", BONE, "--turntable", "2", "-o", "@"], &SMALL),
         row("", Dir, false, &["report", "bounds", BONE, "-o", "@"], &["--size", "8x8", "--mode", "vr"]),
         row("png", File, false, &["filter", &picture, "--filter", "median", "-o", "@"], &[]),
         row(

@@ -79,6 +79,29 @@ fn a_signal_ends_what_only_computes_at_once_and_nothing_is_left() {
     }
 }
 
+/// Every picture that is there is whole, and no other file is left.
+#[test]
+fn a_signal_ends_a_series_after_a_whole_picture() {
+    let folder = Folder::new("series-stopped");
+    let turn = folder.path("turn");
+    let row = ["render", BONE, "--preset", "bone", "--size", "64x48", "--turntable", "3600", "-o", &turn];
+    let mut child = start(with_default_signals().args(row));
+    let second = folder.join("turn/picture-000001.png");
+    assert!(eventually(|| second.exists()), "no pictures come");
+    signal(&child, Signal::INT);
+    let mut error = String::new();
+    child.stderr.take().expect("its errors").read_to_string(&mut error).expect("text");
+    assert_eq!(child.wait().expect("it ends").signal(), Some(Signal::INT.as_raw()), "{error}");
+    assert!(error.contains("stopped by SIGINT after ") && error.contains(" of 3600 pictures"), "{error}");
+    let there = Folder(turn.into());
+    let names = there.names();
+    assert!((2..3600).contains(&names.len()), "{}", names.len());
+    for name in names {
+        let read = echolume::picture::Picture::load(&there.join(&name));
+        assert!(read.is_ok_and(|picture| picture.width == 64), "{name}");
+    }
+}
+
 /// Results so far are written, and missing checks do not count as passed.
 #[test]
 fn a_signal_ends_verify_with_what_it_found() {

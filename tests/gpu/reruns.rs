@@ -5,7 +5,7 @@ use echolume::gpu::Renderer;
 use echolume::passes::{PASSES, Stage};
 use echolume::plan::{Plan, Rerun};
 use echolume::probe::Geometry;
-use echolume::scene::Scene;
+use echolume::scene::{Scene, Settings};
 
 const SETTINGS: &str = "mode = 'sr'
     picture = { size = [24, 24] }
@@ -70,6 +70,27 @@ fn a_change_reruns_only_the_affected_passes() {
     let scene = scene(Geometry::Sweep(wobbler()), BYTES, &tone);
     let names = renderer.dispatched_passes(|r| r.change(scene).and_then(|_| r.picture())).expect("picture");
     assert_eq!(names, ["tone"]);
+}
+
+/// Prevents a turntable that sends its volume again for every picture.
+#[test]
+fn a_turn_casts_rays_of_one_volume_only() {
+    let device = Device::alone();
+    let mut renderer = drawn(&device);
+    let scene = renderer.scene().clone();
+    for camera in scene.turntable(5).expect("cameras").into_iter().skip(1) {
+        let settings = Settings { camera, ..scene.settings.clone() };
+        let turned = Scene::new(scene.geometry.clone(), scene.input, settings).expect("a scene");
+        let names = renderer
+            .dispatched_passes(|r| {
+                let rerun = r.change(turned)?;
+                assert!(matches!(rerun, Rerun::Steps { .. }), "frames are sent again: {rerun:?}");
+                r.picture()
+            })
+            .expect("picture");
+        let stages: Vec<_> = PASSES.iter().filter(|p| names.contains(&p.name)).map(|p| p.stage).collect();
+        assert!(stages.contains(&Stage::Raycast) && !stages.contains(&Stage::Preprocess), "{names:?}");
+    }
 }
 
 #[test]

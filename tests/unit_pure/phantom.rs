@@ -450,7 +450,7 @@ fn the_written_truth_reads_back_and_has_every_label() {
     let grid = made.truth_grid(2.0).unwrap();
     made.write_truth(&path, &grid).unwrap();
     assert_eq!(distance_path(&path), folder.join("truth.distance.mha"));
-    let read = |path| {
+    let read = |path: &std::path::Path| {
         let mut recording = Recording::open(path, None).unwrap();
         let Geometry::Cartesian(read) = recording.geometry(0) else { panic!("is a volume") };
         assert_eq!(read.size, grid.size);
@@ -478,4 +478,11 @@ fn the_written_truth_reads_back_and_has_every_label() {
         assert!(made.truth_grid(spacing).unwrap_err().to_string().contains("truth_spacing"), "{spacing}");
     }
     assert!(made.write_truth(&folder.join("truth.nrrd"), &grid).is_err());
+
+    // The same as a segmentation.
+    let path = folder.join("named.seg.nrrd");
+    made.write_truth(&path, &grid).unwrap();
+    assert_eq!(distance_path(&path), folder.join("named.distance.mha"));
+    let named = read(&path);
+    assert!(named.iter().zip(&labels).all(|(a, b)| a.bytes == b.bytes) && named.len() == labels.len());
 }

@@ -97,6 +97,7 @@ fn no_layer_uses_a_layer_above_it() {
         ("rustix::", &[motor, "src/ui/devices/"]),
         ("evdev::", &["src/ui/devices/"]),
         ("arboard::", &["src/ui/clipboard.rs"]),
+        ("rav1e::", &["src/picture/film.rs"]),
         ("winit::", &["src/ui/window.rs"]),
         ("egui::", &["src/ui/panels/", "src/gpu/window/"]),
     ];

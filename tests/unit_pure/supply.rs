@@ -58,7 +58,7 @@ fn packages() -> Vec<Package> {
 
 #[test]
 fn every_crate_is_from_one_registry_and_its_bytes_are_known() {
-    for lock in ["Cargo.lock", "tools/fuzz/Cargo.lock", "tools/shaders/Cargo.lock"] {
+    for lock in ["Cargo.lock", "tools/fuzz/Cargo.lock", "tools/python/Cargo.lock", "tools/shaders/Cargo.lock"] {
         let locked: Lock = toml(lock);
         assert!(locked.package.len() > 10, "{lock}");
         for Locked { name, source, checksum } in locked.package {

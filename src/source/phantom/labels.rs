@@ -49,4 +49,20 @@ impl Label {
             Label::Uterus => "uterus",
         }
     }
+
+    /// The colour of a segmentation: red, green, blue, 0..=1.
+    pub fn colour(self) -> [f64; 3] {
+        match self {
+            Label::Fluid => [0.0; 3],
+            Label::Skin => [0.88, 0.67, 0.55],
+            Label::Hand => [0.78, 0.55, 0.42],
+            Label::Cord => [0.75, 0.35, 0.45],
+            Label::Skull => [0.95, 0.84, 0.57],
+            Label::Brain => [0.98, 0.98, 0.88],
+            Label::ChoroidPlexus => [0.85, 0.4, 0.31],
+            Label::Ventricle => [0.35, 0.65, 0.9],
+            Label::Falx => [0.6, 0.75, 0.45],
+            Label::Uterus => [0.6, 0.45, 0.65],
+        }
+    }
 }

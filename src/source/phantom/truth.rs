@@ -6,15 +6,19 @@ use super::head::Head;
 use super::labels::Label;
 use crate::files::InputError;
 use crate::probe::{Geometry, Grid};
-use crate::source::convert::{lattice, write_grid};
+use crate::source::convert::{lattice, write_grid, write_labels};
 use crate::source::samples::SampleType;
+use crate::source::segmentation::{self, Segment};
 use crate::source::volume_file::VolumeFile;
 use glam::DVec3;
 use std::path::{Path, PathBuf};
 
-/// Where the signed distance goes that belongs to a label volume: `truth.mha` gives `truth.distance.mha`.
+/// Where the signed distance goes that belongs to a label volume: `truth.mha` and `truth.seg.nrrd` give `truth.distance.mha`.
 pub fn distance_path(labels: &Path) -> PathBuf {
-    labels.with_extension("distance.mha")
+    match segmentation::stem(labels) {
+        Some(stem) => labels.with_file_name(format!("{stem}.distance.mha")),
+        None => labels.with_extension("distance.mha"),
+    }
 }
 
 impl Phantom {
@@ -46,18 +50,25 @@ impl Phantom {
         lattice(&Geometry::Sweep(self.probe(0)), spacing).map_err(|fault| refusal("truth_spacing", fault))
     }
 
-    /// Writes the truth of the first volume as two MetaImages on a grid: labels (u8, [`Label`]) to `path`, distances (f32, mm, as
-    /// [`Phantom::distance`]) to [`distance_path`]. Both have values outside the sector, too.
+    /// Writes the truth of the first volume on a grid: labels (u8, [`Label`]) to `path`, a MetaImage or a segmentation with the labels'
+    /// names, distances (f32, mm, as [`Phantom::distance`]) to [`distance_path`], a MetaImage. Both have values outside the sector, too.
     ///
     /// # Errors
-    /// A body other than the head, a path that does not end in .mha, a file that cannot be written. A file that is there is complete.
+    /// A body other than the head, a path that does not end in .mha or .seg.nrrd, a file that cannot be written. A file that is there is
+    /// complete.
     pub fn write_truth(&self, path: &Path, grid: &Grid) -> Result<(), InputError> {
         self.head()?;
-        if VolumeFile::of(path)? != VolumeFile::MetaImage {
-            return Err(InputError::new(path, "file", "must end in .mha"));
+        let label = |place| self.label(0, place).ok().map(|label| label as u8);
+        if segmentation::is_one(path) {
+            // Fluid is 0: no segment.
+            let segments = Label::ALL.iter().filter(|label| **label as u8 > 0);
+            let segments = segments.map(|l| Segment { label: *l as u8, name: l.name(), colour: l.colour() });
+            write_labels(grid, &segments.collect::<Vec<_>>(), path, |place| label(place).unwrap_or(0))?;
+        } else if VolumeFile::of(path).is_ok_and(|format| format == VolumeFile::MetaImage) {
+            write_grid(grid, SampleType::U8, path, |place| label(place).map(f64::from), || ())?;
+        } else {
+            return Err(InputError::new(path, "file", "must end in .mha or .seg.nrrd"));
         }
-        let label = |place| self.label(0, place).ok().map(|label| f64::from(label as u8));
-        write_grid(grid, SampleType::U8, path, label, || ())?;
         write_grid(grid, SampleType::F32, &distance_path(path), |place| self.distance(0, place).ok(), || ())
     }
 

@@ -1,0 +1,175 @@
+//! Where a command writes several pictures: a folder, names with a number, or a film (.mp4).
+
+use super::input::check_inputs;
+use super::picture_file::STANDARD;
+use crate::picture::{Picture, PictureFormat, check_target, replace};
+use crate::terminal::{Failure, failed, input};
+use std::path::{Path, PathBuf};
+
+#[cfg(feature = "video")]
+use crate::picture::film::FilmWriter;
+
+/// Most digits of a number in a pattern.
+const MAX_DIGITS: usize = 9;
+
+/// The target of a series of pictures.
+#[derive(Clone, Debug, PartialEq)]
+pub enum SeriesTarget {
+    /// Numbered files: what stands before and after the number, its least number of digits, and the folder to make, if one was named.
+    Files { before: String, digits: usize, after: String, format: PictureFormat, folder: Option<PathBuf> },
+    /// A film in one file.
+    Film(PathBuf),
+}
+
+impl SeriesTarget {
+    /// The target that `-o` names. `name`: of the pictures in a folder, as in `picture-000000.png`.
+    ///
+    /// # Errors
+    /// One line: a name for a single picture, a pattern of another kind, an ending of no known format, a film in a program without them.
+    pub fn of(path: &Path, name: &str) -> Result<SeriesTarget, Failure> {
+        let text = path.to_string_lossy();
+        let refuse = |why: &str| Err(input(format!("-o {text}: {why}")));
+        if text == STANDARD {
+            return refuse("several pictures are written to files: give a folder (face/) or a pattern (face-%03d.png)");
+        }
+        let has_ending = path.extension().is_some_and(|ending| !ending.is_empty());
+        let is_folder = text.ends_with(std::path::is_separator) || path.is_dir();
+        if is_folder || !(has_ending || text.contains('%')) {
+            let before = path.join(format!("{name}-")).to_string_lossy().into_owned();
+            let (after, format, folder) = (".png".into(), PictureFormat::Png, Some(path.into()));
+            return Ok(SeriesTarget::Files { before, digits: 6, after, format, folder });
+        }
+        if path.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("mp4")) {
+            return match cfg!(feature = "video") {
+                true => Ok(SeriesTarget::Film(path.into())),
+                false => refuse(
+                    "this program was built without films; build it with `cargo build --release --features video`, or give a folder (face/) \
+                     or a pattern (face-%03d.png)",
+                ),
+            };
+        }
+        let file = path.file_name().unwrap_or_default().to_string_lossy();
+        let Some((first, rest)) = file.split_once('%') else {
+            return refuse(
+                "several pictures are written: give a folder (face/), a pattern (face-%03d.png) or a film (face.mp4)",
+            );
+        };
+        let pattern = "the number in a pattern is written %d, or %03d for three digits, once and in the file name";
+        let Some((width, after)) = rest.split_once('d').filter(|(_, after)| !after.contains('%')) else {
+            return refuse(pattern);
+        };
+        let digits = if width.is_empty() { Some(1) } else { width.strip_prefix('0').and_then(|n| n.parse().ok()) };
+        let Some(digits) = digits.filter(|n| (1..=MAX_DIGITS).contains(n)) else { return refuse(pattern) };
+        let folder = path.parent().unwrap_or(Path::new(""));
+        if folder.to_string_lossy().contains('%') {
+            return refuse(pattern);
+        }
+        let format = PictureFormat::of(path).map_err(|fault| input(format!("-o {fault}")))?;
+        let before = folder.join(first).to_string_lossy().into_owned();
+        Ok(SeriesTarget::Files { before, digits, after: after.into(), format, folder: None })
+    }
+
+    /// The file of a picture.
+    pub fn file(&self, number: usize) -> PathBuf {
+        match self {
+            SeriesTarget::Files { before, digits, after, .. } => format!("{before}{number:0digits$}{after}").into(),
+            SeriesTarget::Film(path) => path.clone(),
+        }
+    }
+
+    /// Refuses targets that cannot be written or would replace an input (`read`), and makes the folder that was named.
+    pub fn check(&self, numbers: impl Iterator<Item = usize>, read: &[PathBuf]) -> Result<(), Failure> {
+        let files: Vec<PathBuf> = match self {
+            SeriesTarget::Files { .. } => numbers.map(|n| self.file(n)).collect(),
+            SeriesTarget::Film(path) => vec![path.clone()],
+        };
+        check_inputs("-o", &files, read)?;
+        if let SeriesTarget::Files { folder: Some(folder), .. } = self {
+            std::fs::create_dir_all(folder)
+                .map_err(|e| failed(format!("{}: cannot be written: {e}", folder.display())))?;
+        }
+        files.first().map_or(Ok(()), |first| check_target(first).map_err(failed))
+    }
+}
+
+/// A series of pictures that is being written. Each file is whole or does not exist.
+pub struct PictureSeries<'a> {
+    target: &'a SeriesTarget,
+    /// Pictures of a film in a second.
+    #[cfg_attr(not(feature = "video"), allow(dead_code))]
+    rate: f64,
+    #[cfg(feature = "video")]
+    film: Option<FilmWriter>,
+}
+
+impl<'a> PictureSeries<'a> {
+    pub fn new(target: &'a SeriesTarget, rate: f64) -> PictureSeries<'a> {
+        PictureSeries {
+            target,
+            rate,
+            #[cfg(feature = "video")]
+            film: None,
+        }
+    }
+
+    /// Writes a picture: to its file, or to the end of the film.
+    pub fn write(&mut self, number: usize, picture: &Picture) -> Result<(), Failure> {
+        let file = self.target.file(number);
+        let unwritable = |e: String| failed(format!("{}: cannot be written: {e}", file.display()));
+        match self.target {
+            SeriesTarget::Files { format, .. } => {
+                replace(&file, &picture.encoded(*format).map_err(unwritable)?).map_err(failed)
+            }
+            SeriesTarget::Film(path) => self.add(path, picture).map_err(unwritable),
+        }
+    }
+
+    #[cfg(feature = "video")]
+    fn add(&mut self, path: &Path, picture: &Picture) -> Result<(), String> {
+        if self.film.is_none() {
+            self.film = Some(FilmWriter::create(path, [picture.width, picture.height], self.rate)?);
+        }
+        self.film.as_mut().map_or(Ok(()), |film| film.picture(picture))
+    }
+
+    #[cfg(not(feature = "video"))]
+    fn add(&mut self, _: &Path, _: &Picture) -> Result<(), String> {
+        Err("this program was built without films".into())
+    }
+
+    /// Ends the series: a film is put in its place.
+    pub fn finish(self) -> Result<(), Failure> {
+        #[cfg(feature = "video")]
+        if let Some(film) = self.film {
+            let unwritable = |e: String| failed(format!("{}: cannot be written: {e}", self.target.file(0).display()));
+            return film.finish().map_err(unwritable);
+        }
+        Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_folder_a_pattern_and_a_film_are_told_apart_and_all_else_is_refused() {
+        let of = |text: &str| SeriesTarget::of(Path::new(text), "picture");
+        let third = |text: &str| of(text).expect(text).file(3).to_string_lossy().into_owned();
+        assert_eq!(third("a/b/"), "a/b/picture-000003.png");
+        assert_eq!(third("a/face-%03d.png"), "a/face-003.png");
+        assert_eq!(third("%d.JPG"), "3.JPG");
+        assert_eq!(third("face-%02d"), "face-03");
+        assert_eq!(third("turn"), "turn/picture-000003.png");
+        for wrong in ["face.png", "-", "%x.png", "%3d.png", "%d-%d.png", "%00d.png", "%010d.png", "f%d/a.png", "%d.gif"]
+        {
+            let fault = of(wrong).expect_err(wrong).message();
+            assert!(fault.starts_with(&format!("-o {wrong}: ")), "{wrong}: {fault}");
+        }
+        match of("face.MP4") {
+            Ok(SeriesTarget::Film(path)) => assert!(cfg!(feature = "video") && path == Path::new("face.MP4")),
+            Ok(other) => panic!("{other:?}"),
+            Err(fault) => assert!(!cfg!(feature = "video") && fault.message().contains("--features video")),
+        }
+    }
+}

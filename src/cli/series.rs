@@ -1,0 +1,321 @@
+//! `echolume render --turntable` and `--volumes`: several pictures of one recording, drawn on one device.
+
+use super::drawing::{DrawFault, MAX_LOSSES, with_marks};
+use super::one_colour;
+use crate::args::{InputArgs, PictureSeries, SeriesTarget, check_volume, frames_of};
+use crate::files::signals::Writing;
+use crate::gpu::{Bands, Context, GpuError, Renderer, RendererOptions};
+use crate::passes::Slot;
+use crate::plan::Rerun;
+use crate::profile::export::pass_time_table;
+use crate::scene::{Scene, Settings};
+use crate::source::Source;
+use crate::terminal::{Failure, failed, input, progress_bar, remark, say};
+use indicatif::ProgressBar;
+use std::collections::BTreeSet;
+use std::ops::RangeInclusive;
+use std::path::Path;
+use std::str::FromStr;
+use std::sync::Arc;
+
+/// The flags that ask for several pictures.
+#[derive(clap::Args)]
+pub struct SeriesArgs {
+    /// Draw N pictures of one turn about the vertical axis of the view, at one scale; the last is followed by the first. -o is a folder
+    /// (face/), a pattern (face-%03d.png) or, in a program with films, face.mp4
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(2..=3600), conflicts_with = "volumes")]
+    turntable: Option<u32>,
+    /// Draw a picture of each of these volumes in time: FIRST:LAST, counted from 0, or all. -o as with --turntable
+    #[arg(long, value_name = "FIRST:LAST")]
+    volumes: Option<Volumes>,
+    /// Pictures of a film in a second, 0.1..=240
+    #[arg(long, value_name = "N", default_value_t = 25.0, value_parser = rate)]
+    rate: f64,
+}
+
+/// The volumes that are shown.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Volumes {
+    All,
+    Range(usize, usize),
+}
+
+impl FromStr for Volumes {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Volumes, String> {
+        if text.eq_ignore_ascii_case("all") {
+            return Ok(Volumes::All);
+        }
+        let ends = text.split_once(':').and_then(|(a, b)| Some((a.trim().parse().ok()?, b.trim().parse().ok()?)));
+        match ends {
+            Some((first, last)) if first <= last => Ok(Volumes::Range(first, last)),
+            _ => Err("must read FIRST:LAST, such as 0:9, or all".into()),
+        }
+    }
+}
+
+fn rate(text: &str) -> Result<f64, String> {
+    let number = text.trim().parse::<f64>().ok().filter(|rate| (0.1..=240.0).contains(rate));
+    number.ok_or_else(|| "must lie in 0.1..=240 pictures a second".into())
+}
+
+/// How the pictures are drawn and where they go.
+pub struct Job<'a> {
+    pub input: &'a InputArgs,
+    pub output: &'a Path,
+    pub options: RendererOptions,
+    pub validate: bool,
+    pub timings: bool,
+    /// Shaders come from a folder of the user.
+    pub own_shaders: bool,
+}
+
+/// What differs from picture to picture.
+enum Views {
+    /// Settings of each picture of one volume.
+    Turn(Vec<Settings>),
+    /// The same settings for each of these volumes.
+    Time(RangeInclusive<usize>),
+}
+
+impl Views {
+    fn count(&self) -> usize {
+        match self {
+            Views::Turn(settings) => settings.len(),
+            Views::Time(volumes) => volumes.end() + 1 - volumes.start(),
+        }
+    }
+
+    /// The number of a picture in the name of its file.
+    fn number(&self, n: usize) -> usize {
+        match self {
+            Views::Turn(_) => n,
+            Views::Time(volumes) => volumes.start() + n,
+        }
+    }
+}
+
+impl SeriesArgs {
+    /// True if several pictures are asked for.
+    pub fn is_given(&self) -> bool {
+        self.turntable.is_some() || self.volumes.is_some()
+    }
+
+    /// Draws and writes the pictures. A signal ends the command after the file that is being written.
+    pub fn run(&self, job: &Job) -> Result<(), Failure> {
+        let name = if self.volumes.is_some() { "volume" } else { "picture" };
+        let target = SeriesTarget::of(job.output, name)?;
+        if self.volumes.is_some() && job.input.volume()? != 0 {
+            return Err(input("--volume and --volumes: give one of them"));
+        }
+        // Dropped last: after everything is in order, a signal that arrived ends the process.
+        let signals = Writing::begin();
+        let mut context = None;
+        let result = self.draw_all(job, &target, &signals, &mut context);
+        result?;
+        match context.as_ref().and_then(|context: &Arc<Context>| context.messages().into_iter().next()) {
+            None => Ok(()),
+            Some(first) => Err(failed(format!("validation: {first}"))),
+        }
+    }
+
+    fn draw_all(
+        &self,
+        job: &Job,
+        target: &SeriesTarget,
+        signals: &Writing,
+        opened: &mut Option<Arc<Context>>,
+    ) -> Result<(), Failure> {
+        let (mut source, scene) = self.open(job)?;
+        let views = self.views(&*source, &scene, job)?;
+        let numbers = (0..views.count()).map(|n| views.number(n));
+        target.check(numbers, &job.input.read_files(&*source))?;
+        let context = opened.insert(job.input.open_device(job.validate)?);
+        let mut options = job.options.clone();
+        let bar = progress_bar(views.count() as u64).with_message("pictures");
+        let (chosen, written) = (job.input.volume()?, PictureSeries::new(target, self.rate));
+        let mut series = Series { views, scene, chosen, signals, bar, next: 0, written, times: String::new() };
+        let mut losses = 0;
+        loop {
+            let done = series.draw(context, &mut *source, &options);
+            if let Some(signal) = signals.signal() {
+                series.bar.finish_and_clear();
+                let (next, count) = (series.next, series.views.count());
+                let kept = if matches!(target, SeriesTarget::Film(_)) { "; the film is not kept" } else { "" };
+                remark(&format!("stopped by {signal} after {next} of {count} pictures{kept}"));
+                return Err(failed(format!("stopped by {signal}")));
+            }
+            match done {
+                Ok(()) => break,
+                Err(DrawFault::Gpu(lost)) if lost.is_device_lost() && !lost.is_given_up() && losses < MAX_LOSSES => {
+                    tracing::warn!("{lost}; the device is reopened, and its work is divided into smaller parts");
+                    losses += 1;
+                    options.bands = Bands::Measured { losses };
+                    *context = job.input.open_device(job.validate)?;
+                    source = self.open(job)?.0;
+                }
+                Err(DrawFault::Gpu(e @ GpuError::Shader { .. })) if job.own_shaders => return Err(input(e)),
+                Err(DrawFault::Gpu(e)) => return Err(failed(e)),
+                Err(DrawFault::Source(failure)) => return Err(failure),
+            }
+        }
+        let Series { views, bar, written, times, .. } = series;
+        written.finish()?;
+        bar.finish_and_clear();
+        let count = views.count();
+        match target {
+            SeriesTarget::Film(file) => say!("film: {}, {count} pictures, {} a second", file.display(), self.rate),
+            SeriesTarget::Files { .. } => {
+                let [first, last] = [0, count - 1].map(|n| target.file(views.number(n)).display().to_string());
+                say!("pictures: {first} to {last}, {count}");
+            }
+        }
+        if job.timings {
+            say!("{}", times.trim_end());
+        }
+        Ok(())
+    }
+
+    /// The recording, and the scene of its first picture.
+    fn open(&self, job: &Job) -> Result<(Box<dyn Source>, Scene), Failure> {
+        match self.volumes {
+            Some(Volumes::Range(first, _)) => job.input.open_volumes(first),
+            Some(Volumes::All) => job.input.open_volumes(0),
+            None => job.input.open_to_show(&[]),
+        }
+    }
+
+    fn views(&self, source: &dyn Source, scene: &Scene, job: &Job) -> Result<Views, Failure> {
+        let last = source.volumes().saturating_sub(1);
+        match (self.turntable, self.volumes) {
+            (Some(count), _) => {
+                if scene.is_flat() {
+                    return Err(input("--turntable: this mode shows planes, which do not turn with the view"));
+                }
+                let cameras = scene.turntable(count).map_err(input)?;
+                let with = |camera| Settings { camera, ..scene.settings.clone() };
+                Ok(Views::Turn(cameras.into_iter().map(with).collect()))
+            }
+            (None, Some(Volumes::Range(first, end))) => {
+                check_volume(source, end, job.input.name())?;
+                Ok(Views::Time(first..=end))
+            }
+            (None, _) => Ok(Views::Time(0..=last)),
+        }
+    }
+}
+
+/// A series as it is drawn.
+struct Series<'a> {
+    views: Views,
+    /// Of the first picture.
+    scene: Scene,
+    /// The volume of a turn.
+    chosen: usize,
+    signals: &'a Writing,
+    bar: ProgressBar,
+    /// The picture that is drawn next: those before are written.
+    next: usize,
+    written: PictureSeries<'a>,
+    /// The table of times so far.
+    times: String,
+}
+
+impl Series<'_> {
+    /// Draws and writes what is left.
+    fn draw(
+        &mut self,
+        context: &Arc<Context>,
+        source: &mut dyn Source,
+        options: &RendererOptions,
+    ) -> Result<(), DrawFault> {
+        let mut renderer = Renderer::new(context, self.scene_of(self.next, source)?, options)?;
+        let volume = |series: &Self, n: usize| match &series.views {
+            Views::Turn(_) => None,
+            Views::Time(volumes) => Some(volumes.start() + n),
+        };
+        let mut is_empty = true;
+        while self.next < self.views.count() {
+            let n = self.next;
+            if self.signals.signal().is_some() {
+                return Ok(());
+            }
+            let scene = self.scene_of(n, source)?;
+            let rerun = renderer.change(scene.clone())?;
+            if is_empty || volume(self, n).is_some() || !matches!(rerun, Rerun::Steps { .. }) {
+                let is_whole = self.send(&mut renderer, source, volume(self, n))?;
+                // What is missing of a volume is not to be filled by the one before.
+                if !is_whole && !is_empty {
+                    renderer = Renderer::new(context, scene, options)?;
+                    self.send(&mut renderer, source, volume(self, n))?;
+                }
+                is_empty = false;
+                renderer.show(0)?;
+            }
+            let picture = renderer.picture()?;
+            let shown = with_marks(&picture, renderer.scene()).map_err(DrawFault::Source)?;
+            self.written.write(self.views.number(n), &shown).map_err(DrawFault::Source)?;
+            if n == 0
+                && let Some(colour) = one_colour::of(&picture)
+            {
+                let volume = renderer.read(Slot::Volume)?;
+                let why = volume.map(|v| one_colour::cause(renderer.scene(), &v, source.sample_type().shift()));
+                remark(&one_colour::line("the first picture", colour, why.as_deref()));
+            }
+            self.next += 1;
+            self.bar.inc(1);
+        }
+        let times = renderer.take_times()?;
+        self.times = pass_time_table(&times, renderer.scene());
+        Ok(())
+    }
+
+    fn scene_of(&self, n: usize, source: &dyn Source) -> Result<Scene, DrawFault> {
+        let (geometry, settings) = match &self.views {
+            Views::Turn(settings) => (self.scene.geometry.clone(), settings[n].clone()),
+            Views::Time(volumes) => (source.geometry(volumes.start() + n), self.scene.settings.clone()),
+        };
+        Scene::new(geometry, self.scene.input, settings).map_err(|e| DrawFault::Source(input(e)))
+    }
+
+    /// Sends the frames of a volume; of the one that the arguments choose, if there is no other. True if none is missing.
+    fn send(&self, renderer: &mut Renderer, source: &mut dyn Source, volume: Option<usize>) -> Result<bool, DrawFault> {
+        let (mut fault, mut slices) = (None, BTreeSet::new());
+        let sent = frames_of(source, volume.unwrap_or(self.chosen), |frame| {
+            if let Some(signal) = self.signals.signal() {
+                return Err(failed(format!("stopped by {signal}")));
+            }
+            slices.insert(frame.slice);
+            renderer.frame(frame.slice as u32, &frame.bytes, 0).map_err(|e| {
+                let failure = failed(&e);
+                fault = Some(e);
+                failure
+            })
+        });
+        match fault {
+            Some(fault) => return Err(DrawFault::Gpu(fault)),
+            None => sent.map_err(DrawFault::Source)?,
+        }
+        Ok(slices.len() >= source.frames_per_volume())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn volumes_and_rates_are_read_or_refused() {
+        assert_eq!("ALL".parse(), Ok(Volumes::All));
+        assert_eq!("2:5".parse(), Ok(Volumes::Range(2, 5)));
+        assert_eq!("3:3".parse(), Ok(Volumes::Range(3, 3)));
+        for wrong in ["", "3", "5:2", "-1:2", "a:b", "1:2:3", ":"] {
+            assert!(wrong.parse::<Volumes>().is_err(), "{wrong}");
+        }
+        assert_eq!((rate("25"), rate("0.1")), (Ok(25.0), Ok(0.1)));
+        for wrong in ["0", "nan", "-5", "inf", "241", "x"] {
+            assert!(rate(wrong).is_err(), "{wrong}");
+        }
+    }
+}
