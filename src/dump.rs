@@ -126,6 +126,8 @@ fn meaning(slot: Slot) -> (&'static [&'static str], &'static str) {
         | Slot::SliceStageB
         | Slot::SliceStageC
         | Slot::SharpVolume
+        | Slot::SharpSectionVolume
+        | Slot::SectionVolume
         | Slot::Volume => (GREY, SHARE_OF_RANGE),
         Slot::TileRanges | Slot::BrickRanges => (&["smallest", "largest"], SHARE_OF_RANGE),
         Slot::Tgc => (GREY, "gain of a sample: a factor, or an addend where samples are log-compressed"),

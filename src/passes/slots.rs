@@ -157,6 +157,9 @@ slots! {
     SharpVolume = D::image("sharp_volume", volume, volume_format).multibuffered().clear().across_queues();
     /// The 3D texture that rays are cast through: the part that is visible.
     Volume = D::image("volume", volume, volume_format).multibuffered().clear().across_queues();
+    /// The volume that the planes beside a rendering are cut from, before smoothing across slices, and after.
+    SharpSectionVolume = D::image("sharp_section_volume", volume, volume_format).multibuffered().clear().across_queues();
+    SectionVolume = D::image("section_volume", volume, volume_format).multibuffered().clear().across_queues();
     /// Each texel of the volume with its neighbours one column and one row on, as their bits.
     PackedNeighbours = D::image("packed_neighbours", volume, four_texels).multibuffered();
     /// Smallest and largest value of every tile of every slice.
@@ -424,10 +427,16 @@ impl Slot {
         }
     }
 
+    /// True if the slot is a volume that stage 1 fills, slice by slice.
+    pub fn is_volume(self) -> bool {
+        matches!(self, Slot::Volume | Slot::SharpVolume | Slot::SectionVolume | Slot::SharpSectionVolume)
+    }
+
     /// The texel of the whole volume that the image begins with; 0 of a slot that is no part of it.
     pub fn first_texel(self, scene: &Scene) -> [u32; 3] {
         match self {
-            Slot::Volume | Slot::SharpVolume | Slot::PackedNeighbours => scene.stored_bounds().low,
+            Slot::PackedNeighbours => scene.stored_bounds().low,
+            _ if self.is_volume() => scene.stored_bounds().low,
             _ => [0; 3],
         }
     }
@@ -436,7 +445,7 @@ impl Slot {
     /// coordinates.
     pub fn array_size(self, scene: &Scene) -> [usize; 3] {
         match self {
-            Slot::Volume | Slot::SharpVolume => scene.volume_size().map(|n| n as usize),
+            _ if self.is_volume() => scene.volume_size().map(|n| n as usize),
             _ => self.shape(scene).size(),
         }
     }

@@ -252,6 +252,8 @@ fn plane_scenes() -> Vec<SceneSpec> {
         "mode = 'plane'\nplanes = { position = [900, 20, 0], plane = 'b' }\npicture = { size = [9, 9] }".into(),
         format!("mode = 'plane'\nplanes = {{ {TURNED} }}\npicture = {{ size = [30, 30] }}\nclip = [{{ at = [0, 25, 0], normal = [0.3, -1, 0.2] }}, {{ at = [5, 0, 0], normal = [1, 0, 0] }}]"),
         "mode = 'vr'\nlayout = 'four'\npicture = { size = [27, 31] }".into(),
+        "mode = 'vr'\nlayout = 'four'\npicture = { size = [27, 31] }\nregion = { depth = [9, 20], lateral = [-4, 9] }
+         clip = [{ at = [0, 15, 0], normal = [1, 0, 0.3] }]\nplanes.smooth = { lateral = 1.5, depth = 1, elevation = 1.2 }".into(),
         "mode = 'cube'\npicture = { size = [40, 30] }\ncamera = { azimuth = -140, elevation = 25, field_of_view = 40 }
          cube = { shading = 0.8, inset = { left = 9, near = 8, top = 2.5, far = 12 }, tilt = { near = [20, -10], top = [-5, 12] } }
          clip = [{ at = [0, 40, 0], normal = [0.5, 0.5, -0.3] }]".into(),
@@ -260,6 +262,13 @@ fn plane_scenes() -> Vec<SceneSpec> {
     ] {
         scenes.push(SceneSpec::new(&toml.replace('\n', ", "), &Geometry::Sweep(wobbler()), BYTES, format!("{toml}\n{base}")));
     }
+    let toml = "mode = 'vr'\nlayout = 'four'\nplanes.smooth = {}\npicture.size = [27, 31]\nray.sampling = 'exact'";
+    scenes.push(SceneSpec::new(
+        "Cartesian, 4-up, planes of all samples",
+        &cartesian([17, 23, 9]),
+        BYTES,
+        toml.into(),
+    ));
     for (mode, size) in [("orthogonal", "[41, 33]"), ("cube", "[40, 30]")] {
         let toml = format!(
             "mode = '{mode}'\nslices.pixels = 33\nray = {{ sampling = 'exact', elevation = 'bspline' }}\npicture.size = {size}\n\

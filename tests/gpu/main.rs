@@ -42,6 +42,7 @@ mod recordings;
 mod reproduce;
 mod reruns;
 mod sampling;
+mod sections;
 mod sector;
 mod self_test;
 mod shading;
