@@ -46,6 +46,7 @@ pub(super) fn check(settings: &Settings) -> Result<(), SceneError> {
     if settings.layout == Layout::Pair && settings.mode != Mode::Surface {
         return refuse("layout", "pair shows a volume and the surface found in the same march: set mode=surface");
     }
+    within("floating", settings.floating, 0.0, 1e9)?;
     let s = &settings.slices;
     within("slices.pixels", f64::from(s.pixels), 2.0, 4096.0)?;
     check_smooth(

@@ -8,6 +8,7 @@ mod check_measures;
 pub mod cube;
 pub mod default_look;
 mod echo_levels;
+mod floating;
 mod light_lattice;
 pub mod load;
 pub mod marks;
@@ -328,6 +329,7 @@ impl Scene {
             );
         }
         scene.apron = 2.0 + scene.filter_reach();
+        floating::check_floating(&scene)?;
         check::check_planes_resolved(&scene)?;
         scene.visible_bounds = visible_bounds::of(&scene);
         Ok(scene)
@@ -606,6 +608,11 @@ impl Scene {
         }
         let [lateral, depth, elevation] = self.section_smoothing().map(gaussian_radius);
         [lateral, depth, if self.sharpens() { 1 } else { elevation }]
+    }
+
+    /// Frames on either side that change a slice of the volume that rays are cast through: all of them where parts that float are dropped.
+    pub fn reach_to_frames(&self) -> u32 {
+        if self.drops_floating() { self.slices() } else { self.smoothing_radius()[2] }
     }
 
     /// Neighbours on either side that a filtered slice is made of, in the volume with the most.

@@ -262,13 +262,20 @@ fn plane_scenes() -> Vec<SceneSpec> {
     ] {
         scenes.push(SceneSpec::new(&toml.replace('\n', ", "), &Geometry::Sweep(wobbler()), BYTES, format!("{toml}\n{base}")));
     }
-    let toml = "mode = 'vr'\nlayout = 'four'\nplanes.smooth = {}\npicture.size = [27, 31]\nray.sampling = 'exact'";
-    scenes.push(SceneSpec::new(
-        "Cartesian, 4-up, planes of all samples",
-        &cartesian([17, 23, 9]),
-        BYTES,
-        toml.into(),
-    ));
+    let voxels = cartesian([17, 23, 9]);
+    for (name, geometry, toml) in [
+        ("Cartesian, 4-up, planes of all samples", &voxels, "mode = 'vr'\nlayout = 'four'\nplanes.smooth = {}"),
+        ("fan, parts that float", &Geometry::Sweep(wobbler()), "mode = 'vr'\nfloating = 30"),
+        (
+            "Cartesian, parts that float",
+            &voxels,
+            "mode = 'sr'\nsurface.edge = 2\nfloating = 3\nslices = { format = 'r8', smooth = { elevation = 0.8 } }",
+        ),
+    ] {
+        let toml = format!("{toml}\npicture.size = [27, 31]\nray.sampling = 'exact'");
+        let toml = if toml.contains("slices") { toml } else { format!("{toml}\nslices.pixels = 33") };
+        scenes.push(SceneSpec::new(name, geometry, BYTES, toml));
+    }
     for (mode, size) in [("orthogonal", "[41, 33]"), ("cube", "[40, 30]")] {
         let toml = format!(
             "mode = '{mode}'\nslices.pixels = 33\nray = {{ sampling = 'exact', elevation = 'bspline' }}\npicture.size = {size}\n\

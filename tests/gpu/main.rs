@@ -21,6 +21,7 @@ mod extreme_geometry;
 mod extremes;
 mod far_and_tiny;
 mod filters;
+mod floating;
 mod goldens;
 mod growth;
 mod half_resolution;

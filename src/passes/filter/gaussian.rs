@@ -65,7 +65,10 @@ pub const ELEVATION: Pass = Pass {
         let part = Part::Around(s.smoothing_radius()[2]);
         vec![Bind { part, ..whole("source", Slot::SharpVolume) }]
     },
-    writes: |_, _| vec![Bind { part: Part::Around(0), ..whole("target", Slot::Volume) }],
+    writes: |s, _| {
+        let target = if s.drops_floating() { Slot::WholeVolume } else { Slot::Volume };
+        vec![Bind { part: Part::Around(0), ..whole("target", target) }]
+    },
     extent: |s, t| in_runs([s.grid.size[0], s.grid.size[1], t.slices], 2),
     repeat: once,
     params: |s, t| params(RENDERED, s, 2, t).i32("slices", t.slices),
