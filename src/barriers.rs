@@ -79,7 +79,8 @@ impl Access {
             return false;
         }
         let overlap = self.parts.start < later.parts.end && later.parts.start < self.parts.end;
-        let is_volume = matches!(self.resource, Resource::Slot(Slot::Volume | Slot::SharpVolume | Slot::TileRanges, _));
+        let is_volume =
+            matches!(self.resource, Resource::Slot(slot, _) if slot.is_volume() || slot == Slot::TileRanges);
         overlap || (is_volume && self.write != later.write)
     }
 }

@@ -126,7 +126,11 @@ fn meaning(slot: Slot) -> (&'static [&'static str], &'static str) {
         | Slot::SliceStageB
         | Slot::SliceStageC
         | Slot::SharpVolume
+        | Slot::SharpSectionVolume
+        | Slot::WholeVolume
+        | Slot::SectionVolume
         | Slot::Volume => (GREY, SHARE_OF_RANGE),
+        Slot::Floating => (GREY, "1 in parts of the volume that float"),
         Slot::TileRanges | Slot::BrickRanges => (&["smallest", "largest"], SHARE_OF_RANGE),
         Slot::Tgc => (GREY, "gain of a sample: a factor, or an addend where samples are log-compressed"),
         Slot::ScanLut => (&["sample", "line"], "index from 0; -1 outside the sector"),

@@ -137,6 +137,24 @@ pub const SCENES: &[Stated] = &[
     ),
     sweep("pair, two rays", &["layout=pair", "ray.rays=2"], &["raycast_surface_and_volume", "assemble"]),
     sweep("4-up, two rays", &["layout=four", "ray.rays=2"], &["assemble"]),
+    sweep(
+        "4-up, planes of their own volume",
+        &["layout=four", "planes.smooth={ lateral = 1, depth = 1, elevation = 1 }"],
+        &["section_scan_convert", "section_lateral", "section_depth", "section_elevation"],
+    ),
+    sweep("parts that float", &["mode=volume", "floating=50"], &["drop_floating"]),
+    Stated {
+        name: "Cartesian, 4-up, planes of their own volume",
+        set: &[
+            "layout=four",
+            "planes.smooth={}",
+            "region.lateral=[-1e3, 1e3]",
+            "region.depth=[-1e3, 1e3]",
+            "region.elevation=[-1e3, 1e3]",
+        ],
+        passes: &["section_load_slice"],
+        cartesian: true,
+    },
     Stated {
         name: "Cartesian",
         // The preset's region is the sweep's. A filter would read the samples as they are, and 8 bits would be copied.

@@ -13,7 +13,7 @@ impl Chain {
     /// What the first link reads.
     fn first(self) -> Slot {
         match self {
-            Chain::Slices => Slot::Frames,
+            Chain::Slices | Chain::Sections => Slot::Frames,
             Chain::Distances => Slot::Distance,
             Chain::Pictures => Slot::Picture,
         }
@@ -22,7 +22,8 @@ impl Chain {
     /// What the links between write, in turn.
     fn spare(self) -> [Slot; 2] {
         match self {
-            Chain::Slices => [Slot::SliceA, Slot::SliceB],
+            // The chains of a frame run one after the other.
+            Chain::Slices | Chain::Sections => [Slot::SliceA, Slot::SliceB],
             Chain::Distances => [Slot::DistanceA, Slot::DistanceB],
             Chain::Pictures => [Slot::SmoothPicture, Slot::SmoothPictureB],
         }
@@ -30,8 +31,19 @@ impl Chain {
 
     /// What the last link writes; none: the next spare slot.
     fn last(self, scene: &Scene) -> Option<Slot> {
-        let slices = if scene.filters_across_slices() { Slot::SharpVolume } else { Slot::Volume };
-        (self == Chain::Slices).then_some(slices)
+        match self {
+            Chain::Slices if scene.filters_across_slices() => Some(Slot::SharpVolume),
+            Chain::Slices if scene.drops_floating() => Some(Slot::WholeVolume),
+            Chain::Slices => Some(Slot::Volume),
+            Chain::Sections if scene.section_smoothing_radius()[2] > 0 => Some(Slot::SharpSectionVolume),
+            Chain::Sections => Some(Slot::SectionVolume),
+            Chain::Distances | Chain::Pictures => None,
+        }
+    }
+
+    /// True if frames go through it to a volume.
+    fn is_of_frames(self) -> bool {
+        matches!(self, Chain::Slices | Chain::Sections)
     }
 
     /// The filters that a scene asks for, in order.
@@ -93,8 +105,11 @@ pub fn picture_end(scene: &Scene) -> Slot {
 }
 
 /// The slot that frames are copied into as they arrive, if nothing is done to them: the chain of slices is one link that would store
-/// what it reads without loss.
+/// what it reads without loss, and nothing else reads them.
 pub fn copied(scene: &Scene) -> Option<Slot> {
+    if scene.has_sections() {
+        return None;
+    }
     let mut requested = Chain::Slices.requested(scene);
     let (_, filter) = requested.next()?;
     if requested.next().is_none() && (filter.copies)(scene) { Chain::Slices.last(scene) } else { None }
@@ -117,11 +132,11 @@ impl Pass {
     /// Whether a scene needs the pass, and why or why not.
     pub fn needed(&self, scene: &Scene) -> Need {
         match self.link {
-            Link::Filter(filter) if filter.chain == Chain::Slices => match (self.needed)(scene) {
-                Ok(_) if copied(scene).is_some() => {
+            Link::Filter(filter) if filter.chain.is_of_frames() => match (self.needed)(scene) {
+                Ok(_) if filter.chain == Chain::Slices && copied(scene).is_some() => {
                     Err("the volume stores a frame's values without loss: it is copied there")
                 }
-                Ok(_) if (filter.is_identity)(scene) && Chain::Slices.omits_first(scene) => {
+                Ok(_) if (filter.is_identity)(scene) && filter.chain.omits_first(scene) => {
                     Err("the first filter reads frames as they are")
                 }
                 need => need,
@@ -206,11 +221,12 @@ impl Pass {
         match self.link {
             Link::Observer(Chain::Slices) => return Some(all),
             Link::AfterSlices => {}
-            Link::Filter(filter) if filter.chain == Chain::Slices => {
+            Link::Filter(filter) if filter.chain.is_of_frames() => {
+                let chain = filter.chain;
                 (filter.reach)(scene)?;
-                let done = Chain::Slices.position(scene, self).0 + args.iteration / (filter.dispatches)(scene) + 1;
+                let done = chain.position(scene, self).0 + args.iteration / (filter.dispatches)(scene) + 1;
                 let mut before = 0;
-                for (_, filter, links) in Chain::Slices.filters(scene) {
+                for (_, filter, links) in chain.filters(scene) {
                     let after = (before + links).saturating_sub(done.max(before));
                     before += links;
                     match (filter.reach)(scene) {
@@ -241,8 +257,8 @@ impl Pass {
             params = params.i32("first_column", r.first[0]).i32("first_row", r.first[1]);
         }
         let of_slices = match self.link {
-            Link::Filter(filter) => filter.chain == Chain::Slices,
-            Link::Observer(chain) => chain == Chain::Slices,
+            Link::Filter(filter) => filter.chain.is_of_frames(),
+            Link::Observer(chain) => chain.is_of_frames(),
             Link::AfterSlices => true,
             Link::None => false,
         };
@@ -260,8 +276,7 @@ impl Pass {
         for bind in self.writes(scene, args) {
             let (kept, target) = (before.get(bind.name), writes.get_mut(bind.name));
             // What is made beyond the stored part of the volume is dropped.
-            let is_volume = matches!(bind.slot, Slot::Volume | Slot::SharpVolume);
-            let Some(r) = made.or(is_volume.then(|| stored_rectangle(scene))) else { continue };
+            let Some(r) = made.or(bind.slot.is_volume().then(|| stored_rectangle(scene))) else { continue };
             let size = [kept.size[0], kept.size[1]];
             if size == r.size.map(|n| n as usize) {
                 continue;

@@ -77,7 +77,7 @@ pub const TILE_RANGES: Pass = Pass {
     shader: |_, _| "empty_space/tile_ranges.plain",
     needed: need,
     // A slice changes with the frames that are smoothed into it.
-    reads: |s, _| vec![Bind { part: Part::Around(s.smoothing_radius()[2]), ..whole("volume", Slot::Volume) }],
+    reads: |s, _| vec![Bind { part: Part::Around(s.reach_to_frames()), ..whole("volume", Slot::Volume) }],
     writes: |_, _| vec![Bind { part: Part::Around(0), ..whole("tile_ranges", Slot::TileRanges) }],
     extent: |s, t| {
         let [width, height, _] = s.tile_counts();
@@ -119,7 +119,7 @@ pub const BRICK_RANGES: Pass = Pass {
     shader: |_, _| "empty_space/brick_ranges.plain",
     needed: need,
     reads: |s, _| {
-        let part = Part::Around(s.smoothing_radius()[2]);
+        let part = Part::Around(s.reach_to_frames());
         vec![whole("brick_table", Slot::BrickTable), Bind { part, ..whole("tile_ranges", Slot::TileRanges) }]
     },
     writes: |_, _| vec![whole("brick_ranges", Slot::BrickRanges)],

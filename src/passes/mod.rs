@@ -2,7 +2,9 @@
 //! which they run, in [`PASSES`]. Everything else (bindings, barriers, time stamps, labels, tests) follows from these.
 
 pub mod chain;
+pub mod components;
 pub mod fault_injection;
+pub mod floating;
 pub mod interface_check;
 pub mod lookup_tables;
 pub mod measure;
@@ -58,7 +60,13 @@ pub const PASSES: &[Pass] = &[
     filter::rkl1::SLICE,
     filter::gaussian::LATERAL,
     filter::gaussian::DEPTH,
+    preprocess::SECTION_LOAD_SLICE,
+    preprocess::SECTION_SCAN_CONVERT,
+    filter::gaussian::SECTION_LATERAL,
+    filter::gaussian::SECTION_DEPTH,
     filter::gaussian::ELEVATION,
+    filter::gaussian::SECTION_ELEVATION,
+    floating::DROP,
     preprocess::PACKED_NEIGHBOURS,
     empty_space::TILE_RANGES,
     empty_space::BRICK_RANGES,

@@ -96,7 +96,7 @@ impl<'a> Dispatch<'a> {
 
     /// True if this link writes into the 3D texture: it is the last of its chain.
     pub(super) fn writes_volume(&self) -> bool {
-        matches!(self.target(), Slot::Volume | Slot::SharpVolume)
+        self.target().is_volume()
     }
 
     fn link(&self) -> (Slot, Slot) {
@@ -170,6 +170,8 @@ pub(super) fn writes_target(_: &Scene, dispatch: &Dispatch) -> Vec<Bind> {
 pub enum Chain {
     /// The slices of stage 1, from the frame to the 3D texture.
     Slices,
+    /// The slices of the volume that planes beside a rendering are cut from.
+    Sections,
     /// The distance maps of stage 3.
     Distances,
     /// The pictures of stage 4.

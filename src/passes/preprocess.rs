@@ -1,6 +1,7 @@
 //! Stage 1: frames become slices of the volume. Polar frames are conditioned and scan converted, slices of a Cartesian volume scaled;
 //! texels are packed with their neighbours where that makes rays faster.
 
+use crate::passes::filter::gaussian::of_sections;
 use crate::passes::lookup_tables::scan_index;
 use crate::passes::pass::*;
 use crate::passes::slots::Format;
@@ -61,6 +62,21 @@ pub const SCAN_CONVERT: Pass = Pass {
             }
         }
     },
+};
+
+/// The same for the volume that planes beside a rendering are cut from: scan conversion again, since a filter may have overwritten the first.
+pub const SECTION_SCAN_CONVERT: Pass = Pass {
+    name: "section_scan_convert",
+    link: Link::Filter(Filter::of(Chain::Sections)),
+    needed: |s| of_sections(s, (SCAN_CONVERT.needed)(s)),
+    ..SCAN_CONVERT
+};
+
+pub const SECTION_LOAD_SLICE: Pass = Pass {
+    name: "section_load_slice",
+    link: Link::Filter(Filter { is_identity: is_unscaled, ..Filter::of(Chain::Sections) }),
+    needed: |s| of_sections(s, (LOAD_SLICE.needed)(s)),
+    ..LOAD_SLICE
 };
 
 fn bilinear(frames: &Texels, sample: f64, line: f64) -> f64 {
@@ -250,7 +266,7 @@ pub const PACKED_NEIGHBOURS: Pass = Pass {
         false => Err("no ray is cast, or samples are taken in another way"),
     },
     // A slice changes with the frames that are smoothed into it.
-    reads: |s, _| vec![Bind { part: Part::Around(s.smoothing_radius()[2]), ..whole("volume", Slot::Volume) }],
+    reads: |s, _| vec![Bind { part: Part::Around(s.reach_to_frames()), ..whole("volume", Slot::Volume) }],
     writes: |_, _| vec![Bind { part: Part::Around(0), ..whole("packed_neighbours", Slot::PackedNeighbours) }],
     extent: |s, t| in_runs([s.grid.size[0], s.grid.size[1], t.slices], 0),
     repeat: once,

@@ -51,6 +51,8 @@ pub enum Initializer {
     ByFrames,
     /// Made from the scene by the CPU, in f64, stored as f32.
     ByScene(fn(&Scene) -> Vec<f32>),
+    /// Found by the CPU in a volume, when that is complete.
+    ByVolume,
 }
 
 /// How to tell that two scenes make different content of a slot.
@@ -93,6 +95,11 @@ impl Descriptor {
 
     const fn by_scene(self, make: fn(&Scene) -> Vec<f32>, differs: Differs) -> Descriptor {
         Descriptor { initializer: Initializer::ByScene(make), differs, ..self }
+    }
+
+    /// `differs`: whether two scenes find other content in the same volume.
+    const fn by_volume(self, differs: fn(&Scene, &Scene) -> bool) -> Descriptor {
+        Descriptor { initializer: Initializer::ByVolume, differs: Differs::By(differs), ..self }
     }
 
     const fn multibuffered(self) -> Descriptor {
@@ -155,8 +162,16 @@ slots! {
     SliceStageC = D::image("slice_stage_c", slices, |_| Format::R32f).across_queues();
     /// The volume before smoothing across slices.
     SharpVolume = D::image("sharp_volume", volume, volume_format).multibuffered().clear().across_queues();
+    /// The volume before parts that float are dropped.
+    WholeVolume = D::image("whole_volume", volume, volume_format).multibuffered().clear().across_queues();
+    /// 1 in parts of a volume that float.
+    Floating = D::image("floating", volume, |_| Format::R8)
+        .by_volume(|a, b| a.floating_basis() != b.floating_basis());
     /// The 3D texture that rays are cast through: the part that is visible.
     Volume = D::image("volume", volume, volume_format).multibuffered().clear().across_queues();
+    /// The volume that the planes beside a rendering are cut from, before smoothing across slices, and after.
+    SharpSectionVolume = D::image("sharp_section_volume", volume, volume_format).multibuffered().clear().across_queues();
+    SectionVolume = D::image("section_volume", volume, volume_format).multibuffered().clear().across_queues();
     /// Each texel of the volume with its neighbours one column and one row on, as their bits.
     PackedNeighbours = D::image("packed_neighbours", volume, four_texels).multibuffered();
     /// Smallest and largest value of every tile of every slice.
@@ -415,19 +430,26 @@ impl Slot {
         self.descriptor().crosses_queues
     }
 
-    /// True if the CPU makes the slot's content from the scene, and makes it differently of these two.
+    /// True if the CPU makes the slot's content from the scene, or finds it in a volume, and makes it differently of these two.
     pub fn differs(self, old: &Scene, new: &Scene) -> bool {
         match (self.initializer(), self.descriptor().differs) {
             (Initializer::ByScene(make), ByContent) => make(old) != make(new),
-            (Initializer::ByScene(_), By(differs)) => differs(old, new),
+            (Initializer::ByScene(_) | Initializer::ByVolume, By(differs)) => differs(old, new),
             _ => false,
         }
+    }
+
+    /// True if the slot has a texel for each of the volume, of which the visible part is stored.
+    pub fn is_volume(self) -> bool {
+        let of_rays = matches!(self, Slot::Volume | Slot::SharpVolume | Slot::WholeVolume | Slot::Floating);
+        of_rays || matches!(self, Slot::SectionVolume | Slot::SharpSectionVolume)
     }
 
     /// The texel of the whole volume that the image begins with; 0 of a slot that is no part of it.
     pub fn first_texel(self, scene: &Scene) -> [u32; 3] {
         match self {
-            Slot::Volume | Slot::SharpVolume | Slot::PackedNeighbours => scene.stored_bounds().low,
+            Slot::PackedNeighbours => scene.stored_bounds().low,
+            _ if self.is_volume() => scene.stored_bounds().low,
             _ => [0; 3],
         }
     }
@@ -436,7 +458,7 @@ impl Slot {
     /// coordinates.
     pub fn array_size(self, scene: &Scene) -> [usize; 3] {
         match self {
-            Slot::Volume | Slot::SharpVolume => scene.volume_size().map(|n| n as usize),
+            _ if self.is_volume() => scene.volume_size().map(|n| n as usize),
             _ => self.shape(scene).size(),
         }
     }

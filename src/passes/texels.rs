@@ -89,9 +89,7 @@ impl Texels {
     /// The part of a slot's array ([`Slot::array_size`]) that the device stores.
     pub fn stored_part(&self, slot: Slot, scene: &Scene) -> Texels {
         match slot {
-            Slot::Volume | Slot::SharpVolume => {
-                self.part(slot.first_texel(scene).map(|n| n as usize), slot.shape(scene).size())
-            }
+            _ if slot.is_volume() => self.part(slot.first_texel(scene).map(|n| n as usize), slot.shape(scene).size()),
             _ => self.clone(),
         }
     }

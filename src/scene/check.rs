@@ -4,7 +4,7 @@ use super::planes::{MAX_SLAB, MAX_TILES};
 use super::{
     Bilateral, Clip, Compositing, Conditioning, Distance, Edge, Elevation, EnhancedSigma, Layout, Light, MAX_CLIPS,
     MAX_DEVIATION, MAX_PICTURE, MAX_WINDOW, Mode, Noise, PeronaMalik, Scene, SceneError, Scheme, Settings, Sigma,
-    refuse, transfer,
+    Smooth, refuse, transfer,
 };
 use crate::probe::Geometry;
 use glam::DVec3;
@@ -46,26 +46,19 @@ pub(super) fn check(settings: &Settings) -> Result<(), SceneError> {
     if settings.layout == Layout::Pair && settings.mode != Mode::Surface {
         return refuse("layout", "pair shows a volume and the surface found in the same march: set mode=surface");
     }
+    within("floating", settings.floating, 0.0, 1e9)?;
     let s = &settings.slices;
     within("slices.pixels", f64::from(s.pixels), 2.0, 4096.0)?;
-    if let Some(smooth) = s.smooth {
-        within("slices.smooth.lateral", smooth.lateral, 0.0, 1000.0)?;
-        within("slices.smooth.depth", smooth.depth, 0.0, 1000.0)?;
-        within("slices.smooth.elevation", smooth.elevation, 0.0, 1000.0)?;
-        let elevation_mm = smooth.elevation_mm.unwrap_or(0.0);
-        within("slices.smooth.elevation_mm", elevation_mm, 0.0, 1000.0)?;
-        if let Some(kernel) = smooth.kernel {
-            if kernel != 3 && kernel != 5 {
-                return refuse("slices.smooth.kernel", format!("is {kernel}, must be 3 or 5"));
-            }
-            if smooth.lateral != 0.0 || smooth.depth != 0.0 || smooth.elevation != 0.0 || elevation_mm != 0.0 {
-                return refuse(
-                    "slices.smooth.kernel",
-                    "stands instead of lateral, depth and elevation: set it, or them",
-                );
-            }
-        }
-    }
+    check_smooth(
+        s.smooth,
+        [
+            "slices.smooth.lateral",
+            "slices.smooth.depth",
+            "slices.smooth.elevation",
+            "slices.smooth.elevation_mm",
+            "slices.smooth.kernel",
+        ],
+    )?;
     let smooths =
         s.smooth.is_some_and(|smooth| smooth.elevation_mm.unwrap_or(smooth.elevation) > 0.0 || smooth.kernel.is_some());
     if settings.ray.elevation == Elevation::BsplineSharp && smooths {
@@ -418,6 +411,26 @@ fn check_edge(field: &'static str, edge: f64) -> Result<(), SceneError> {
     }
 }
 
+/// `fields`: the names of its settings.
+fn check_smooth(smooth: Option<Smooth>, fields: [&'static str; 5]) -> Result<(), SceneError> {
+    let Some(smooth) = smooth else { return Ok(()) };
+    let [lateral, depth, elevation, elevation_mm, kernel] = fields;
+    let deviations = [
+        (lateral, smooth.lateral),
+        (depth, smooth.depth),
+        (elevation, smooth.elevation),
+        (elevation_mm, smooth.elevation_mm.unwrap_or(0.0)),
+    ];
+    deviations.iter().try_for_each(|(field, deviation)| within(field, *deviation, 0.0, 1000.0))?;
+    match smooth.kernel {
+        Some(taps) if taps != 3 && taps != 5 => refuse(kernel, format!("is {taps}, must be 3 or 5")),
+        Some(_) if deviations.iter().any(|(_, deviation)| *deviation != 0.0) => {
+            refuse(kernel, "stands instead of lateral, depth and elevation: set it, or them")
+        }
+        _ => Ok(()),
+    }
+}
+
 /// Checks of planes, tiles and the block that need no geometry.
 pub(super) fn check_planes(settings: &Settings) -> Result<(), SceneError> {
     let p = &settings.planes;
@@ -427,6 +440,16 @@ pub(super) fn check_planes(settings: &Settings) -> Result<(), SceneError> {
     for (field, value) in [("planes.azimuth", p.azimuth), ("planes.tilt", p.tilt), ("planes.roll", p.roll)] {
         within(field, value, -360.0, 360.0)?;
     }
+    check_smooth(
+        p.smooth,
+        [
+            "planes.smooth.lateral",
+            "planes.smooth.depth",
+            "planes.smooth.elevation",
+            "planes.smooth.elevation_mm",
+            "planes.smooth.kernel",
+        ],
+    )?;
     within("planes.thickness", p.thickness, 0.0, 1e6)?;
     within("planes.zoom", p.zoom, 1e-3, 1e3)?;
     within("planes.columns", f64::from(p.columns), 1.0, f64::from(MAX_TILES))?;

@@ -4,6 +4,7 @@
 //!   volume rendering under light, with a ramp between the threshold and the brighter class.
 //! - A single frame is shown as a plane.
 //! - Planes and the solid block are cut from a lightly filtered volume over the full sector, whatever a preset of a rendering crops and smooths.
+//! - So are the planes beside a rendering, which has its own filters and region.
 //! - The solid block is turned and cut. The minimum projection takes a slab: over the whole depth every ray meets fluid or shadow somewhere.
 //!
 //! What a user sets wins, key by key; a window and what is drawn through it belong together, and one of them that is set keeps both.
@@ -18,6 +19,8 @@ use toml::{Table, Value};
 
 /// Presets that smooth and crop the volume for a rendering of the built-in phantom.
 const RENDERINGS: [&str; 5] = ["face", "face-classic", "glass", "skeleton", "vessel"];
+/// Presets whose planes are those of their filters, also beside a rendering.
+const AS_THEY_ARE: [&str; 2] = ["bmode", "thesis"];
 /// Share of the volume's longest edge that the smoothing has as its standard deviation: 1.1 mm of 120.
 const SMOOTHING: f64 = 0.009;
 /// Limits of it, mm: below is speckle, above lids and lips go.
@@ -125,6 +128,9 @@ impl Layers {
         if mode == Mode::Cube {
             found.cube(geometry);
         }
+        if chosen.layout == Layout::Four && !mode.is_flat() {
+            found.planes_beside_rendering(geometry);
+        }
         if mode == Mode::MinIp {
             found.slab(geometry, &chosen);
         }
@@ -169,9 +175,20 @@ impl Found<'_> {
         mode
     }
 
+    /// The planes of a 4-up picture have a lightly filtered volume over the full sector: the rendering has its own filters and region.
+    fn planes_beside_rendering(&mut self, geometry: &Geometry) {
+        let is_as_it_is = self.layers.presets().iter().any(|preset| AS_THEY_ARE.contains(&preset.as_str()));
+        if is_as_it_is || self.layers.has("planes.smooth") {
+            return;
+        }
+        let deviation = rounded(LIGHT * smoothing(geometry));
+        put(&mut self.over, "planes.smooth", light(deviation).into());
+        self.said.push(format!("planes.smooth: {deviation} mm: planes beside a rendering have a volume of their own"));
+    }
+
     /// A lightly filtered volume over the full sector.
     fn section(&mut self, geometry: &Geometry) {
-        let deviation = LIGHT * smoothing(geometry);
+        let deviation = rounded(LIGHT * smoothing(geometry));
         let is_preset = !self.layers.presets().is_empty();
         if !self.layers.gives("region") && is_preset {
             for side in ["lateral", "depth", "elevation"] {
@@ -185,11 +202,8 @@ impl Found<'_> {
                 put(&mut self.over, &format!("slices.{filter}"), "none".into());
             }
             put(&mut self.over, "slices.median", false.into());
-            let smooth = Table::from_iter(
-                ["lateral", "depth", "elevation_mm"].map(|axis| (axis.to_string(), Value::from(rounded(deviation)))),
-            );
-            put(&mut self.over, "slices.smooth", smooth.into());
-            self.said.push(format!("slices.smooth: {} mm, light, for sections", rounded(deviation)));
+            put(&mut self.over, "slices.smooth", light(deviation).into());
+            self.said.push(format!("slices.smooth: {deviation} mm, light, for sections"));
         }
     }
 
@@ -332,6 +346,11 @@ fn ramp(from: f64, to: f64) -> Value {
     let (first, last) = (points.first().map_or(0.0, |p| p.at), points.last().map_or(1.0, |p| p.at));
     let moved = points.iter().map(|p| TransferPoint { at: from + (to - from) * (p.at - first) / (last - first), ..*p });
     Value::try_from(moved.collect::<Vec<_>>()).unwrap_or(Value::Array(Vec::new()))
+}
+
+/// A Gaussian with this deviation along every axis, mm.
+fn light(deviation: f64) -> Table {
+    Table::from_iter(["lateral", "depth", "elevation_mm"].map(|axis| (axis.to_string(), Value::from(deviation))))
 }
 
 /// Sets `key.path` in a table.

@@ -8,6 +8,7 @@ mod check_measures;
 pub mod cube;
 pub mod default_look;
 mod echo_levels;
+mod floating;
 mod light_lattice;
 pub mod load;
 pub mod marks;
@@ -98,6 +99,8 @@ pub struct View {
     pub window: [f64; 2],
     /// Lower corner of the region, cut at the start depth, mm in space.
     pub low: DVec3,
+    /// Upper corner of the region.
+    pub high: DVec3,
 }
 
 /// The samples that the surface detector compares at a place: a ring of two halves, each as long as an edge.
@@ -174,6 +177,8 @@ pub struct Scene {
     pub conditioning: Conditioning,
     /// Filters of slices, sizes in slice pixels; the Gaussian's as set along lateral and depth, and in slices across them.
     pub slice_filters: Slices,
+    /// The Gaussian of the planes' own volume, in the same units.
+    pub section_smooth: Option<Smooth>,
     /// Filters of the distance map, sizes in rays.
     pub distance: Distance,
     /// What became of sizes in mm, for `--explain`.
@@ -262,6 +267,9 @@ impl Scene {
         let mut resolver = Resolver { pitches, resolved: Vec::new() };
         let conditioning = resolver.conditioning(&settings.conditioning);
         let slice_filters = resolver.slices(&settings.slices);
+        let is_four = settings.layout == Layout::Four;
+        let section_smooth = settings.planes.smooth.filter(|_| is_four);
+        let section_smooth = section_smooth.map(|smooth| resolver.smooth("planes.smooth.elevation_mm", smooth));
         let distance = resolver.distance(&settings.distance);
         let distance = match settings.ray.apart() {
             4 => distance.halved().halved(),
@@ -286,6 +294,7 @@ impl Scene {
             apron: 0.0,
             conditioning,
             slice_filters,
+            section_smooth,
             distance,
             resolved_sizes: resolver.resolved,
             found: Vec::new(),
@@ -293,10 +302,14 @@ impl Scene {
             kept_bounds: VisibleBounds::default(),
             shared: None,
         };
-        for (axis, field) in
-            ["slices.smooth.lateral", "slices.smooth.depth", "slices.smooth.elevation"].iter().enumerate()
+        let fields = [
+            ["slices.smooth.lateral", "slices.smooth.depth", "slices.smooth.elevation"],
+            ["planes.smooth.lateral", "planes.smooth.depth", "planes.smooth.elevation"],
+        ];
+        let deviations = [scene.smoothing(), scene.section_smoothing()];
+        for (axis, field, deviation) in
+            (0..2).flat_map(|n| (0..3).map(move |axis| (axis, fields[n][axis], deviations[n][axis])))
         {
-            let deviation = scene.smoothing()[axis];
             if deviation > MAX_DEVIATION {
                 let unit = if axis < 2 { "slice pixels" } else { "slices" };
                 return refuse(field, format!("is {deviation:.1} {unit}, at most {MAX_DEVIATION} can be filtered"));
@@ -317,6 +330,7 @@ impl Scene {
             );
         }
         scene.apron = 2.0 + scene.filter_reach();
+        floating::check_floating(&scene)?;
         check::check_planes_resolved(&scene)?;
         scene.visible_bounds = visible_bounds::of(&scene);
         Ok(scene)
@@ -448,7 +462,7 @@ impl Scene {
 
     fn view(&self, window: [f64; 2], start: Option<f64>) -> View {
         let start = start.map_or(self.low.y, |s| s + depth_offset(&self.geometry));
-        View { window, low: self.low.with_y(self.low.y.max(start)) }
+        View { window, low: self.low.with_y(self.low.y.max(start)), high: self.high }
     }
 
     /// Clip planes (n, w) in space. Points p with dot(n, p) > w are removed.
@@ -531,14 +545,23 @@ impl Scene {
     /// Standard deviations of the 3D Gaussian in slice pixels, slice pixels and slices. Across slices it is less than the setting where
     /// the interpolation between slices smooths more than linear interpolation.
     pub fn smoothing(&self) -> [f64; 3] {
-        let smooth = self.slice_filters.smooth.unwrap_or_default();
+        let [lateral, depth, elevation] = self.deviations(self.slice_filters.smooth.unwrap_or_default());
+        if self.blurs() {
+            return [binomial_deviation(3), binomial_deviation(3), elevation];
+        }
+        [lateral, depth, elevation]
+    }
+
+    /// The same of the volume that planes beside a rendering are cut from.
+    pub fn section_smoothing(&self) -> [f64; 3] {
+        self.deviations(self.section_smooth.unwrap_or_default())
+    }
+
+    fn deviations(&self, smooth: Smooth) -> [f64; 3] {
         if let Some(taps) = smooth.kernel {
             return [binomial_deviation(taps); 3];
         }
         let elevation = self.left_to_smooth(smooth.elevation);
-        if self.blurs() {
-            return [binomial_deviation(3), binomial_deviation(3), elevation];
-        }
         [smooth.lateral / self.grid.pitch[0], smooth.depth / self.grid.pitch[1], elevation]
     }
 
@@ -577,6 +600,26 @@ impl Scene {
         let [lateral, depth, elevation] = self.smoothing().map(gaussian_radius);
         let elevation = if self.sharpens() { 1 } else { elevation };
         if self.blurs() { [1, 1, elevation] } else { [lateral, depth, elevation] }
+    }
+
+    /// Taps on one side of the Gaussian of the volume that planes beside a rendering are cut from.
+    pub fn section_smoothing_radius(&self) -> [u32; 3] {
+        if let Some(taps) = self.section_smooth.and_then(|s| s.kernel) {
+            return [taps / 2; 3];
+        }
+        let [lateral, depth, elevation] = self.section_smoothing().map(gaussian_radius);
+        [lateral, depth, if self.sharpens() { 1 } else { elevation }]
+    }
+
+    /// Frames on either side that change a slice of the volume that rays are cast through: all of them where parts that float are dropped.
+    pub fn reach_to_frames(&self) -> u32 {
+        if self.drops_floating() { self.slices() } else { self.smoothing_radius()[2] }
+    }
+
+    /// Neighbours on either side that a filtered slice is made of, in the volume with the most.
+    pub fn reach_across_slices(&self) -> u32 {
+        let sections = if self.has_sections() { self.section_smoothing_radius()[2] } else { 0 };
+        self.smoothing_radius()[2].max(sections)
     }
 
     /// True if slices get the slight blur against wood grain: it is set, and no smoothing blurs them in their plane.
@@ -640,7 +683,10 @@ impl Scene {
         let diffusion = slices.perona_malik.map_or(0.0, |p| p.reach());
         // The reach of a chain of square windows extends to their corners.
         let gaussian = lateral.hypot(depth);
-        std::f64::consts::SQRT_2 * (median + estimator + sigma + enhanced) + diffusion + gaussian
+        let [lateral, depth, _] = self.section_smoothing_radius().map(f64::from);
+        let sections = if self.has_sections() { lateral.hypot(depth) } else { 0.0 };
+        let slices = std::f64::consts::SQRT_2 * (median + estimator + sigma + enhanced) + diffusion + gaussian;
+        slices.max(sections)
     }
 }
 

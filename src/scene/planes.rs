@@ -1,6 +1,6 @@
 //! Planes through the volume, resolved to the tiles of a picture: which pixel shows which point in space.
 
-use super::{Layout, Mode, PlaneName, Scene, Slab};
+use super::{Layout, Mode, PlaneName, Scene, Slab, View, insonified_box};
 use glam::{DMat3, DVec3};
 
 /// Maximum number of tiles of a picture.
@@ -71,6 +71,28 @@ pub fn cell(edge: u32, n: u32, count: u32) -> u32 {
 }
 
 impl Scene {
+    /// True if the planes beside a rendering are cut from a volume of their own: all of the sector, whatever is rendered.
+    pub fn has_sections(&self) -> bool {
+        self.settings.layout == Layout::Four && !self.is_flat() && self.section_smooth.is_some()
+    }
+
+    /// Corners of the box that planes show, mm in space.
+    fn planes_box(&self) -> (DVec3, DVec3) {
+        if self.has_sections() { insonified_box(&self.geometry) } else { (self.low, self.high) }
+    }
+
+    /// The box and the window of planes.
+    pub fn planes_view(&self) -> View {
+        let (low, high) = self.planes_box();
+        View { window: self.settings.planes.window, low, high }
+    }
+
+    /// The clip planes that cut planes: (n, w) in space.
+    pub fn planes_clips(&self) -> impl Iterator<Item = (DVec3, f64)> {
+        let is_cut = !self.has_sections();
+        self.clips().filter(move |_| is_cut)
+    }
+
     /// Number of columns and rows of tiles.
     pub fn tile_grid(&self) -> [u32; 2] {
         match (self.settings.layout, self.settings.mode) {
@@ -144,14 +166,15 @@ impl Scene {
             }
             false => self.stepped(columns * rows),
         };
-        let half = (self.high - self.low) / 2.0;
+        let (low, high) = self.planes_box();
+        let half = (high - low) / 2.0;
         let extent = |axis: DVec3| 2.0 * axis.abs().dot(half);
         let fit = |p: &Plane| {
             let across = extent(p.right) * f64::from(columns) / f64::from(width);
             across.max(extent(p.down) * f64::from(rows) / f64::from(height))
         };
         let pixel = planes.iter().map(fit).fold(0.0, f64::max) / self.settings.planes.zoom;
-        let middle = (self.low + self.high) / 2.0;
+        let middle = (low + high) / 2.0;
         let tile = |(n, plane): (u32, &Plane)| {
             let (column, row) = (n % columns, n / columns);
             let corner = [cell(width, column, columns), cell(height, row, rows)];

@@ -166,16 +166,16 @@ impl Resolver {
         Conditioning { low_pass, low_pass_mm: None, ..c.clone() }
     }
 
+    /// A Gaussian with its deviation across slices in slices.
+    pub fn smooth(&mut self, key: &'static str, smooth: Smooth) -> Smooth {
+        let Some(mm) = smooth.elevation_mm else { return smooth };
+        let elevation = self.length(key, mm, Unit(self.pitches.slice, "slices"), MAX_DEVIATION);
+        Smooth { elevation, elevation_mm: None, ..smooth }
+    }
+
     pub fn slices(&mut self, s: &Slices) -> Slices {
         let unit = self.of_slices();
-        let across = Unit(self.pitches.slice, "slices");
-        let smooth = s.smooth.map(|smooth| match smooth.elevation_mm {
-            Some(mm) => {
-                let elevation = self.length("slices.smooth.elevation_mm", mm, across, MAX_DEVIATION);
-                Smooth { elevation, elevation_mm: None, ..smooth }
-            }
-            None => smooth,
-        });
+        let smooth = s.smooth.map(|smooth| self.smooth("slices.smooth.elevation_mm", smooth));
         Slices {
             sigma: self.sigma("slices.sigma.window_mm", s.sigma, unit),
             enhanced_sigma: self.enhanced_sigma(

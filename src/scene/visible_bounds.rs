@@ -90,7 +90,7 @@ impl Scene {
 
     /// The frames that stage 1 needs: those of the visible slices, and the neighbours within reach of smoothing across slices.
     pub fn visible_frames(&self) -> Range<u32> {
-        let reach = self.smoothing_radius()[2];
+        let reach = self.reach_across_slices();
         let Range { start, end } = self.visible_bounds.slices();
         if self.visible_bounds.is_empty() {
             0..0
@@ -160,7 +160,8 @@ impl Scene {
 /// The visible bounds of a scene.
 pub(super) fn of(scene: &Scene) -> VisibleBounds {
     let counts_growth = scene.settings.slices.enhanced_sigma.is_some_and(|e| e.growth);
-    if scene.settings.slices.everything || counts_growth {
+    // A part is as large as it is in all of the sector.
+    if scene.settings.slices.everything || counts_growth || scene.drops_floating() {
         return VisibleBounds::all(scene.volume_size());
     }
     looks(scene).iter().filter_map(|look| touched(scene, look)).fold(VisibleBounds::default(), VisibleBounds::with)
@@ -178,10 +179,11 @@ pub(super) fn marched_box(scene: &Scene) -> Option<(DVec3, DVec3)> {
 fn looks(scene: &Scene) -> Vec<Look> {
     let mut looks = looks_of_rays(scene);
     if scene.cuts_planes() {
-        let (clips, sheet): (Vec<_>, _) = (scene.clips().collect(), scene.sheet());
+        let (clips, sheet): (Vec<_>, _) = (scene.planes_clips().collect(), scene.sheet());
+        let view = scene.planes_view();
         looks.extend(sheet.tiles.iter().map(|tile| {
             let planes = [clips.as_slice(), &tile_faces(scene, tile, sheet.pixel)].concat();
-            Look { low: scene.low, high: scene.high, planes, reach: 0.0 }
+            Look { low: view.low, high: view.high, planes, reach: 0.0 }
         }));
     }
     looks

@@ -252,6 +252,8 @@ fn plane_scenes() -> Vec<SceneSpec> {
         "mode = 'plane'\nplanes = { position = [900, 20, 0], plane = 'b' }\npicture = { size = [9, 9] }".into(),
         format!("mode = 'plane'\nplanes = {{ {TURNED} }}\npicture = {{ size = [30, 30] }}\nclip = [{{ at = [0, 25, 0], normal = [0.3, -1, 0.2] }}, {{ at = [5, 0, 0], normal = [1, 0, 0] }}]"),
         "mode = 'vr'\nlayout = 'four'\npicture = { size = [27, 31] }".into(),
+        "mode = 'vr'\nlayout = 'four'\npicture = { size = [27, 31] }\nregion = { depth = [9, 20], lateral = [-4, 9] }
+         clip = [{ at = [0, 15, 0], normal = [1, 0, 0.3] }]\nplanes.smooth = { lateral = 1.5, depth = 1, elevation = 1.2 }".into(),
         "mode = 'cube'\npicture = { size = [40, 30] }\ncamera = { azimuth = -140, elevation = 25, field_of_view = 40 }
          cube = { shading = 0.8, inset = { left = 9, near = 8, top = 2.5, far = 12 }, tilt = { near = [20, -10], top = [-5, 12] } }
          clip = [{ at = [0, 40, 0], normal = [0.5, 0.5, -0.3] }]".into(),
@@ -259,6 +261,20 @@ fn plane_scenes() -> Vec<SceneSpec> {
         "mode = 'cube'\npicture = { size = [23, 25] }\ncamera = { field_of_view = 70, zoom = 20 }\ncube = { inset = { near = 10 } }".into(),
     ] {
         scenes.push(SceneSpec::new(&toml.replace('\n', ", "), &Geometry::Sweep(wobbler()), BYTES, format!("{toml}\n{base}")));
+    }
+    let voxels = cartesian([17, 23, 9]);
+    for (name, geometry, toml) in [
+        ("Cartesian, 4-up, planes of all samples", &voxels, "mode = 'vr'\nlayout = 'four'\nplanes.smooth = {}"),
+        ("fan, parts that float", &Geometry::Sweep(wobbler()), "mode = 'vr'\nfloating = 30"),
+        (
+            "Cartesian, parts that float",
+            &voxels,
+            "mode = 'sr'\nsurface.edge = 2\nfloating = 3\nslices = { format = 'r8', smooth = { elevation = 0.8 } }",
+        ),
+    ] {
+        let toml = format!("{toml}\npicture.size = [27, 31]\nray.sampling = 'exact'");
+        let toml = if toml.contains("slices") { toml } else { format!("{toml}\nslices.pixels = 33") };
+        scenes.push(SceneSpec::new(name, geometry, BYTES, toml));
     }
     for (mode, size) in [("orthogonal", "[41, 33]"), ("cube", "[40, 30]")] {
         let toml = format!(

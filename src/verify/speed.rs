@@ -11,7 +11,7 @@ use crate::verify::report::{Figure, Level};
 
 /// Scenes that together need every pass, with pictures as large as a tile of a small display. A pass is timed in the first scene that
 /// needs it.
-const SCENES: [&str; 16] = [
+const SCENES: [&str; 17] = [
     "mode = 'sr'",
     "mode = 'vr'",
     "mode = 'vr'\nlight = { volume = {} }",
@@ -19,7 +19,8 @@ const SCENES: [&str; 16] = [
     "mode = 'orthogonal'",
     "mode = 'orthogonal'\npost = { floats = true }",
     "mode = 'cube'",
-    "mode = 'mixed'\nlayout = 'four'",
+    "mode = 'mixed'\nlayout = 'four'\nplanes = { smooth = { lateral = 1.0, depth = 1.0, elevation = 1.0 } }",
+    "mode = 'vr'\nfloating = 50",
     "mode = 'sr'\nlayout = 'pair'",
     "mode = 'sr'\nlight = { shadow = {}, occlusion = {}, skin = {} }\nslices = { blur = true, smooth = { lateral = 1.0, depth = 1.0, elevation = 1.0 } }\nray = { sampling = 'quads' }",
     "mode = 'vr'\nconditioning = { samples = 120, low_pass = 1.0, dynamic_range = 50 }\nslices = { estimator = 'median' }",
@@ -38,8 +39,9 @@ fn probe() -> Probe {
 
 fn scenes() -> Result<Vec<Scene>, String> {
     let sweeps = SCENES.iter().map(|toml| (Geometry::Sweep(probe()), *toml));
-    // A Cartesian volume needs a pass of its own.
-    let all = sweeps.chain([(cartesian([96, 96, 33]), "mode = 'mip'")]);
+    // A Cartesian volume needs passes of its own.
+    let voxels = ["mode = 'mip'", "mode = 'vr'\nlayout = 'four'\nplanes = { smooth = {} }"];
+    let all = sweeps.chain(voxels.map(|toml| (cartesian([96, 96, 33]), toml)));
     let one = |(geometry, toml)| {
         let mut scene = scene(geometry, BYTES, toml)?;
         scene.settings.picture.size = [192, 192];

@@ -3,7 +3,7 @@
 use echolume::probe::{Advance, Array, Axis, Geometry, Grid, Motion, Probe};
 use echolume::scene::default_look::Defaults;
 use echolume::scene::load::{Layers, PRESETS, rebase};
-use echolume::scene::{Camera, ColourMap, EchoHistogram, EchoLevels, Input, Mode, Settings, Slices, transfer};
+use echolume::scene::{Camera, ColourMap, EchoHistogram, EchoLevels, Input, Layout, Mode, Settings, Slices, transfer};
 use echolume::source::StoredType;
 use std::path::Path;
 
@@ -207,6 +207,31 @@ fn sections_show_the_whole_sector_hardly_filtered() {
         let set = ["mode=plane"];
         assert_eq!(completed(&fan(), &[preset], &set), layers(&[preset], &set).finish().expect("settings"));
     }
+}
+
+#[test]
+fn planes_beside_a_rendering_have_a_volume_of_their_own() {
+    for preset in [&[][..], &["face"], &["fetal"], &["bone"]] {
+        let [alone, four] =
+            ["layout=single", "layout=4up"].map(|layout| completed(&fan(), preset, &["mode=vr", layout]));
+        let smooth = four.planes.smooth.expect("light");
+        assert!(smooth.lateral < 0.5 && smooth.lateral == smooth.depth && smooth.elevation_mm == Some(smooth.depth));
+        assert_eq!(
+            (alone.planes.smooth, &alone.slices, &alone.region),
+            (None, &four.slices, &four.region),
+            "{preset:?}"
+        );
+    }
+    let set = |set: &str| completed(&fan(), &["face"], &["layout=4up", set]).planes.smooth;
+    assert_eq!(set("planes.smooth=none"), None);
+    assert_eq!(set("planes.smooth={lateral=1}").map(|s| (s.lateral, s.depth)), Some((1.0, 0.0)));
+    assert_eq!(completed(&fan(), &["thesis"], &["layout=4up"]).planes.smooth, None);
+    // A window that changes to 4-up and back.
+    let defaults = Defaults { layers: layers(&["face"], &[]), geometry: fan(), levels: None };
+    let start = defaults.settings().expect("settings");
+    let four = defaults.switched(&start, Settings { layout: Layout::Four, ..start.clone() });
+    assert!(four.planes.smooth.is_some() && four.slices == start.slices);
+    assert_eq!(defaults.switched(&four, Settings { layout: Layout::Single, ..four.clone() }), start);
 }
 
 #[test]

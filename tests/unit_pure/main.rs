@@ -10,6 +10,7 @@ mod compositing_orders;
 mod default_look;
 mod error_report;
 mod exact_ray;
+mod floating;
 mod freehand;
 mod geometry;
 mod measure;

@@ -259,6 +259,8 @@ fn scenes() -> Vec<Scene> {
                 "'mixed'",
                 "'vr'\nvolume = { shading = 'first-hit' }",
                 "'vr'\nlayout = 'four'",
+                "'vr'\nfloating = 20",
+                "'vr'\nlayout = 'four'\nplanes = { smooth = { lateral = 1.0, depth = 1.0, elevation = 1.0 } }",
                 "'sr'\nlayout = 'pair'",
             ] {
                 scenes.push(scene(geometry.clone(), BYTES, &format!("mode = {mode}\n{filters}")));

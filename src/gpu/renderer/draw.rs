@@ -4,6 +4,7 @@
 use super::*;
 #[cfg(feature = "view")]
 use crate::gpu::window::screen::{Drawn, Panels, PresentOutcome, Screen};
+use crate::passes::floating;
 use crate::plan::Work;
 
 impl Renderer {
@@ -127,10 +128,11 @@ impl Renderer {
         self.drawn_work = self.plan.work(&self.scene, stale.map(|(i, _)| i));
         self.picture.collect(&self.timelines, &mut self.timings)?;
         self.picture.begin(&mut self.barriers, &self.timelines)?;
-        let unprocessed = &self.unprocessed[self.shown as usize];
         let steps = self.plan.steps_of(Frequency::Volume).chain(self.plan.steps_of(Frequency::Picture));
-        for (i, step) in steps.filter(|(i, _)| self.stale[*i]) {
-            let (slots, pipeline, scene) = (&self.slots, &*self.steps[i], &self.scene);
+        let stale: Vec<_> = steps.filter(|(i, _)| self.stale[*i]).map(|(i, step)| (i, *step)).collect();
+        for (i, step) in stale {
+            let unprocessed = &self.unprocessed[self.shown as usize];
+            let scene = &self.scene;
             let runs: Vec<_> = match step.pass.frequency {
                 Frequency::Volume => {
                     let (low, high) = (scene.visible_bounds.low[2], scene.visible_bounds.high[2]);
@@ -141,7 +143,11 @@ impl Renderer {
             };
             if step.pass.frequency == Frequency::Volume && !runs.is_empty() {
                 self.filtered_bounds = scene.visible_bounds;
+                if step.reads(scene).contains(&Slot::Floating) {
+                    self.find_floating()?;
+                }
             }
+            let (slots, pipeline, scene) = (&self.slots, &*self.steps[i], &self.scene);
             for slices in runs {
                 let (slice, slices) = (slices.start, slices.end - slices.start);
                 let args = DispatchArgs { image: self.shown, slice, slices, ..step.args() };
@@ -168,6 +174,20 @@ impl Renderer {
         }
         self.stale.iter_mut().for_each(|stale| *stale = false);
         Ok(())
+    }
+}
+
+impl Renderer {
+    /// Finds the parts that float in the volume that is shown. What was recorded before is done first; the recorder is open afterwards.
+    fn find_floating(&mut self) -> Result<(), GpuError> {
+        self.picture.submit(&mut self.barriers, &mut self.timelines)?;
+        if let Some((readback, ..)) = self.bring_back(Slot::WholeVolume)? {
+            let (scene, bytes) = (&self.scene, readback.bytes()?);
+            let found = self.timings.host("floating", || floating::find(scene, &bytes));
+            self.upload(Slot::Floating, 0, &found)?;
+        }
+        self.picture.collect(&self.timelines, &mut self.timings)?;
+        self.picture.begin(&mut self.barriers, &self.timelines)
     }
 }
 

@@ -412,7 +412,7 @@ impl Renderer {
         let kept: Vec<_> = self.plan.steps.iter().zip(&self.stale).filter(|s| *s.1).map(|s| s.0.id()).collect();
         self.stale = plan.steps.iter().map(|s| kept.contains(&s.id())).collect();
         // Of frames that were not sent, none may be counted on where smoothing across slices reaches further than it did for them.
-        if sends_frames || scene.smoothing_radius() != self.scene.smoothing_radius() {
+        if sends_frames || scene.reach_across_slices() != self.scene.reach_across_slices() {
             self.filtered_bounds = scene.visible_bounds;
         }
         // Rays of smaller steps take longer than the last ones did.

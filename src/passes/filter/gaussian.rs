@@ -4,6 +4,18 @@
 use crate::passes::pass::*;
 use crate::scene::Scene;
 
+/// The volume that is smoothed: deviations in pixels, pixels and slices, and taps on one side.
+#[derive(Clone, Copy)]
+struct Volume {
+    deviations: fn(&Scene) -> [f64; 3],
+    radius: fn(&Scene) -> [u32; 3],
+}
+
+/// The volume that rays are cast through.
+const RENDERED: Volume = Volume { deviations: Scene::smoothing, radius: Scene::smoothing_radius };
+/// The volume that planes beside a rendering are cut from.
+const SECTIONS: Volume = Volume { deviations: Scene::section_smoothing, radius: Scene::section_smoothing_radius };
+
 const WHY: &str = "at most 63 weighted values in f32, exp to 3 ulp; R16F stores 1 to 4.9e-4";
 const TOLERANCE: Tolerance = Tolerance { absolute: 6e-4, relative: 0.0, outliers: 0.0, why: WHY };
 
@@ -15,15 +27,15 @@ pub const LATERAL: Pass = Pass {
     shader: |_, t| {
         if t.writes_volume() { "filter/gaussian.slice" } else { "filter/gaussian.plane" }
     },
-    needed: |s| need(s, 0),
+    needed: |s| need(RENDERED, s, 0),
     reads: reads_source,
     writes: writes_target,
     extent: |s, t| in_runs(slice_extent(s, t), 0),
     repeat: once,
-    params: |s, t| params(s, 0, t),
-    constants: |s, _| constants(s, 0),
+    params: |s, t| params(RENDERED, s, 0, t),
+    constants: |s, _| constants(RENDERED, s, 0),
     tolerance: TOLERANCE,
-    reference: |s, t, reads, writes| reference(s, 0, t, reads, writes),
+    reference: |s, t, reads, writes| reference(RENDERED, s, 0, t, reads, writes),
 };
 
 pub const DEPTH: Pass = Pass {
@@ -32,13 +44,13 @@ pub const DEPTH: Pass = Pass {
     shader: |_, t| {
         if t.writes_volume() { "filter/gaussian.slice" } else { "filter/gaussian.plane" }
     },
-    needed: |s| need(s, 1),
+    needed: |s| need(RENDERED, s, 1),
     reads: reads_source,
     writes: writes_target,
     extent: |s, t| in_runs(slice_extent(s, t), 1),
-    params: |s, t| params(s, 1, t),
-    constants: |s, _| constants(s, 1),
-    reference: |s, t, reads, writes| reference(s, 1, t, reads, writes),
+    params: |s, t| params(RENDERED, s, 1, t),
+    constants: |s, _| constants(RENDERED, s, 1),
+    reference: |s, t, reads, writes| reference(RENDERED, s, 1, t, reads, writes),
     ..LATERAL
 };
 
@@ -48,37 +60,85 @@ pub const ELEVATION: Pass = Pass {
     frequency: Frequency::Volume,
     link: Link::AfterSlices,
     shader: |_, _| "filter/gaussian.volume",
-    needed: |s| if s.sharpens() { Ok("the cubic B-spline is to meet the slices") } else { need(s, 2) },
+    needed: |s| if s.sharpens() { Ok(SHARPENED) } else { need(RENDERED, s, 2) },
     reads: |s, _| {
         let part = Part::Around(s.smoothing_radius()[2]);
         vec![Bind { part, ..whole("source", Slot::SharpVolume) }]
     },
-    writes: |_, _| vec![Bind { part: Part::Around(0), ..whole("target", Slot::Volume) }],
+    writes: |s, _| {
+        let target = if s.drops_floating() { Slot::WholeVolume } else { Slot::Volume };
+        vec![Bind { part: Part::Around(0), ..whole("target", target) }]
+    },
     extent: |s, t| in_runs([s.grid.size[0], s.grid.size[1], t.slices], 2),
     repeat: once,
-    params: |s, t| params(s, 2, t).i32("slices", t.slices),
-    constants: |s, _| constants(s, 2),
+    params: |s, t| params(RENDERED, s, 2, t).i32("slices", t.slices),
+    constants: |s, _| constants(RENDERED, s, 2),
     tolerance: TOLERANCE,
     reference: |s, t, reads, writes| match s.sharpens() {
         true => sharpened(t, reads, writes),
-        false => reference(s, 2, t, reads, writes),
+        false => reference(RENDERED, s, 2, t, reads, writes),
     },
 };
 
-fn need(scene: &Scene, axis: usize) -> Need {
-    if scene.smoothing()[axis] > 0.0 { Ok("asked for") } else { Err("not asked for") }
+/// The same for the volume of the planes beside a rendering.
+pub const SECTION_LATERAL: Pass = Pass {
+    name: "section_lateral",
+    link: Link::Filter(Filter { reach: |s| Some([s.section_smoothing_radius()[0], 0]), ..Filter::of(Chain::Sections) }),
+    needed: |s| of_sections(s, need(SECTIONS, s, 0)),
+    params: |s, t| params(SECTIONS, s, 0, t),
+    constants: |s, _| constants(SECTIONS, s, 0),
+    reference: |s, t, reads, writes| reference(SECTIONS, s, 0, t, reads, writes),
+    ..LATERAL
+};
+
+pub const SECTION_DEPTH: Pass = Pass {
+    name: "section_depth",
+    link: Link::Filter(Filter { reach: |s| Some([0, s.section_smoothing_radius()[1]]), ..Filter::of(Chain::Sections) }),
+    needed: |s| of_sections(s, need(SECTIONS, s, 1)),
+    params: |s, t| params(SECTIONS, s, 1, t),
+    constants: |s, _| constants(SECTIONS, s, 1),
+    reference: |s, t, reads, writes| reference(SECTIONS, s, 1, t, reads, writes),
+    ..DEPTH
+};
+
+pub const SECTION_ELEVATION: Pass = Pass {
+    name: "section_elevation",
+    needed: |s| of_sections(s, if s.sharpens() { Ok(SHARPENED) } else { need(SECTIONS, s, 2) }),
+    reads: |s, _| {
+        let part = Part::Around(s.section_smoothing_radius()[2]);
+        vec![Bind { part, ..whole("source", Slot::SharpSectionVolume) }]
+    },
+    writes: |_, _| vec![Bind { part: Part::Around(0), ..whole("target", Slot::SectionVolume) }],
+    params: |s, t| params(SECTIONS, s, 2, t).i32("slices", t.slices),
+    constants: |s, _| constants(SECTIONS, s, 2),
+    reference: |s, t, reads, writes| match s.sharpens() {
+        true => sharpened(t, reads, writes),
+        false => reference(SECTIONS, s, 2, t, reads, writes),
+    },
+    ..ELEVATION
+};
+
+const SHARPENED: &str = "the cubic B-spline is to meet the slices";
+
+/// The need of a pass of the volume that planes beside a rendering are cut from.
+pub(in crate::passes) fn of_sections(scene: &Scene, need: Need) -> Need {
+    if scene.has_sections() { need } else { Err("no planes are cut from a volume of their own") }
 }
 
-fn params(scene: &Scene, axis: usize, args: &DispatchArgs) -> Params {
-    let deviation = scene.smoothing()[axis];
+fn need(volume: Volume, scene: &Scene, axis: usize) -> Need {
+    if (volume.deviations)(scene)[axis] > 0.0 { Ok("asked for") } else { Err("not asked for") }
+}
+
+fn params(volume: Volume, scene: &Scene, axis: usize, args: &DispatchArgs) -> Params {
+    let deviation = (volume.deviations)(scene)[axis];
     // Without a Gaussian the shader has other weights, and no use for this one.
     let narrowness = if deviation > 0.0 { 0.5 / (deviation * deviation) } else { 0.0 };
     Params::default().f32("narrowness", narrowness).i32("slice", args.slice)
 }
 
-fn constants(scene: &Scene, axis: usize) -> Vec<(&'static str, i32)> {
+fn constants(volume: Volume, scene: &Scene, axis: usize) -> Vec<(&'static str, i32)> {
     let sharpens = axis == 2 && scene.sharpens();
-    vec![("RADIUS", scene.smoothing_radius()[axis] as i32), ("AXIS", axis as i32), ("SHARPENS", sharpens as i32)]
+    vec![("RADIUS", (volume.radius)(scene)[axis] as i32), ("AXIS", axis as i32), ("SHARPENS", sharpens as i32)]
 }
 
 /// (-1, 8, -1)/6 across slices, the border repeated. The cubic B-spline passes 1 - w^2/6 of a slow wave of w radians a slice; this kernel
@@ -94,11 +154,11 @@ fn sharpened(args: &DispatchArgs, reads: &Arrays, writes: &mut Arrays) {
     }
 }
 
-fn reference(scene: &Scene, axis: usize, args: &DispatchArgs, reads: &Arrays, writes: &mut Arrays) {
+fn reference(volume: Volume, scene: &Scene, axis: usize, args: &DispatchArgs, reads: &Arrays, writes: &mut Arrays) {
     let source = reads.get("source");
     let target = writes.get_mut("target");
-    let deviation = scene.smoothing()[axis];
-    let radius = i64::from(scene.smoothing_radius()[axis]);
+    let deviation = (volume.deviations)(scene)[axis];
+    let radius = i64::from((volume.radius)(scene)[axis]);
     let slices = if axis < 2 { 0..1 } else { args.slice as usize..(args.slice + args.slices) as usize };
     for z in slices {
         for y in 0..source.size[1] {

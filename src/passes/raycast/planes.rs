@@ -78,6 +78,9 @@ pub const TONED: Pass = Pass {
 
 fn reads(scene: &Scene) -> Vec<Bind> {
     let mut reads = ray::reads(scene);
+    if scene.has_sections() {
+        reads.iter_mut().filter(|b| b.slot == Slot::Volume).for_each(|b| b.slot = Slot::SectionVolume);
+    }
     reads.push(whole("tiles", Slot::Tiles));
     reads
 }
@@ -86,13 +89,14 @@ fn reads(scene: &Scene) -> Vec<Bind> {
 fn params(scene: &Scene) -> Params {
     let [columns, rows] = scene.tile_grid();
     let still = unmoved(scene);
-    let params = ray::params(&still, scene.whole_view(scene.settings.planes.window), still.step);
+    let params = ray::params(&still, scene.planes_view(), still.step);
     params.i32("columns", columns).i32("rows", rows)
 }
 
 fn constants(scene: &Scene) -> Vec<(&'static str, i32)> {
     let mut constants = ray::constants(scene);
-    constants.retain(|(name, _)| *name != "SPREAD");
+    constants.retain(|(name, _)| !["SPREAD", "CLIPS"].contains(name));
+    constants.push(("CLIPS", scene.planes_clips().count() as i32));
     constants.push(("SAMPLES", scene.slab_samples() as i32));
     constants.push(("SLAB", scene.settings.planes.slab.number()));
     constants.push(("ONE_TILE", (scene.tile_count() == 1) as i32));
@@ -114,7 +118,11 @@ fn unmoved(scene: &Scene) -> Scene {
         [tile] => sheet.vectors(tile, scene.settings.planes.thickness),
         _ => [zero, zero, zero, DVec3::Y],
     };
-    ray::unmoved(scene, vectors)
+    let mut still = ray::unmoved(scene, vectors);
+    if scene.has_sections() {
+        still.settings.clip.clear();
+    }
+    still
 }
 
 /// The value of a slab around a point; none where all of it is cut away or not insonified.
@@ -139,8 +147,9 @@ fn slab(scene: &Scene, volume: &Texels, place: DVec3, normal: DVec3) -> Option<f
 
 /// The windowed sample at a place; none outside the region, beyond a clip plane, and outside the insonified region.
 fn value(scene: &Scene, volume: &Texels, place: DVec3) -> Option<f64> {
-    let within = (0..3).all(|axis| place[axis] >= scene.low[axis] && place[axis] <= scene.high[axis]);
-    if !within || scene.clips().any(|(normal, limit)| normal.dot(place) > limit) {
+    let view = scene.planes_view();
+    let within = (0..3).all(|axis| place[axis] >= view.low[axis] && place[axis] <= view.high[axis]);
+    if !within || scene.planes_clips().any(|(normal, limit)| normal.dot(place) > limit) {
         return None;
     }
     let [low, high] = scene.settings.planes.window;

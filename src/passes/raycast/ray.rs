@@ -123,7 +123,7 @@ pub(super) fn params(scene: &Scene, view: View, step: f64) -> Params {
         .vec4("clip_2", clip_2)
         .vec4("clip_3", clip_3)
         .vec3("box_low", scene.to_local(view.low))
-        .vec3("box_high", scene.to_local(scene.high))
+        .vec3("box_high", scene.to_local(view.high))
         .f32("step_length", step)
         .first_stored(scene)
         .f32("last_slice", f64::from(scene.slices() - 1))
@@ -333,7 +333,7 @@ fn spread_range(probe: &Probe) -> f64 {
 pub(crate) fn span(scene: &Scene, view: View, origin: DVec3, direction: DVec3) -> (f64, f64) {
     let (mut enter, mut leave) = (0.0f64, f64::MAX);
     for axis in 0..3 {
-        let (low, high) = (view.low[axis] - origin[axis], scene.high[axis] - origin[axis]);
+        let (low, high) = (view.low[axis] - origin[axis], view.high[axis] - origin[axis]);
         if direction[axis] == 0.0 {
             if low > 0.0 || high < 0.0 {
                 return (0.0, -1.0);

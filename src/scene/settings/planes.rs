@@ -1,5 +1,6 @@
 //! Settings of the modes that show sections: planes, and the volume as a solid block.
 
+use super::Smooth;
 use serde::{Deserialize, Serialize};
 
 /// Modes plane, orthogonal and tomography, and the planes of a 4-up picture. A position and three angles define one coordinate frame for
@@ -40,6 +41,10 @@ pub struct Planes {
     /// Draws cross-lines where the other planes cut a tile, and a frame in the plane's colour: A yellow, B magenta, C cyan. Tomography has
     /// thin grey lines between tiles.
     pub lines: bool,
+    /// 4-up: Gaussian of a volume of their own that the planes are cut from. It is filtered by nothing else and has all of the sector: region, clip
+    /// planes and filters of the rendering are the rendering's. Absent: the planes are cut from what is rendered. It takes a second volume's
+    /// memory, and scan conversion and this Gaussian once more for each frame.
+    pub smooth: Option<Smooth>,
 }
 
 impl Default for Planes {
@@ -59,6 +64,7 @@ impl Default for Planes {
             spacing: None,
             reference: false,
             lines: true,
+            smooth: None,
         }
     }
 }

@@ -1,0 +1,93 @@
+//! Connected components of a volume: which of its texels float, in parts below a size. Integers throughout, so that the result is exact and does
+//! not depend on an order. Runs of set texels along the rows are joined by union-find (Tarjan 1975, path halving): its root is always the first
+//! run of a part.
+
+use std::ops::Range;
+
+/// The texels that belong together, and the size of each.
+pub struct Lattice<'a> {
+    /// Columns, rows, slices.
+    pub size: [usize; 3],
+    /// Two set texels at most this many slices apart, and one column and one row, belong together: as far as a sample of the volume reaches.
+    pub slices: usize,
+    /// Size of a texel by row, then slice: entry `slice * rows + row`.
+    pub sizes: &'a [u64],
+}
+
+/// Consecutive set texels of a row.
+struct Run {
+    columns: Range<u32>,
+    row: u32,
+    slice: u32,
+}
+
+impl Lattice<'_> {
+    /// By texel, the column fastest: true in a part whose size is below `least`. `is_set` holds for the texels of parts.
+    pub fn floating(&self, is_set: impl Fn(usize) -> bool, least: u64) -> Vec<bool> {
+        let [columns, rows, slices] = self.size;
+        let mut runs: Vec<Run> = Vec::new();
+        // The runs of each row, by slice and row.
+        let mut of_row: Vec<Range<usize>> = Vec::with_capacity(rows * slices);
+        let mut parents: Vec<usize> = Vec::new();
+        for (slice, row) in (0..slices).flat_map(|slice| (0..rows).map(move |row| (slice, row))) {
+            let first = runs.len();
+            let begin = (slice * rows + row) * columns;
+            let mut column = 0;
+            while column < columns {
+                if !is_set(begin + column) {
+                    column += 1;
+                    continue;
+                }
+                let start = column;
+                while column < columns && is_set(begin + column) {
+                    column += 1;
+                }
+                runs.push(Run { columns: start as u32..column as u32, row: row as u32, slice: slice as u32 });
+            }
+            parents.extend(first..runs.len());
+            of_row.push(first..runs.len());
+            for near in slice.saturating_sub(self.slices)..=slice {
+                let last = if near == slice { row } else { (row + 2).min(rows) };
+                for other in row.saturating_sub(1)..last {
+                    join(&runs, &mut parents, of_row[near * rows + other].clone(), first..runs.len());
+                }
+            }
+        }
+        let mut sizes = vec![0u64; runs.len()];
+        for (n, run) in runs.iter().enumerate() {
+            let texel = self.sizes[run.slice as usize * rows + run.row as usize];
+            let root = root(&mut parents, n);
+            sizes[root] = sizes[root].saturating_add(texel.saturating_mul(run.columns.len() as u64));
+        }
+        let mut floats = vec![false; columns * rows * slices];
+        for (n, run) in runs.iter().enumerate() {
+            if sizes[root(&mut parents, n)] < least {
+                let begin = (run.slice as usize * rows + run.row as usize) * columns;
+                floats[begin + run.columns.start as usize..begin + run.columns.end as usize].fill(true);
+            }
+        }
+        floats
+    }
+}
+
+/// Joins the runs of two rows that touch, also diagonally. Both are sorted.
+fn join(runs: &[Run], parents: &mut [usize], above: Range<usize>, below: Range<usize>) {
+    let (mut a, mut b) = (above.start, below.start);
+    while a < above.end && b < below.end {
+        let (upper, lower) = (&runs[a].columns, &runs[b].columns);
+        if upper.start <= lower.end && lower.start <= upper.end {
+            let (one, other) = (root(parents, a), root(parents, b));
+            parents[one.max(other)] = one.min(other);
+        }
+        if upper.end < lower.end { a += 1 } else { b += 1 }
+    }
+}
+
+/// The first run of a part. What is passed on the way is brought nearer to it.
+fn root(parents: &mut [usize], mut n: usize) -> usize {
+    while parents[n] != n {
+        parents[n] = parents[parents[n]];
+        n = parents[n];
+    }
+    n
+}

@@ -1,0 +1,85 @@
+//! What floats: parts of a volume that touch nothing else that is drawn, and are small.
+
+use super::{Scene, SceneError, Sign, refuse, transfer};
+use crate::probe::{Geometry, Motion};
+
+/// Sizes of parts are integers of this many a mm^3: their sums are exact.
+const PER_MM3: f64 = 1e6;
+
+impl Scene {
+    /// True if parts that float are dropped: a size is set, and something is drawn from a volume of several slices.
+    pub fn drops_floating(&self) -> bool {
+        let is_still = self.probe().is_some_and(|probe| matches!(probe.motion, Motion::Still { .. }));
+        self.settings.floating > 0.0 && (self.composites() || self.detects_surface()) && self.slices() > 1 && !is_still
+    }
+
+    /// The largest sample of which nothing is drawn: below it the transfer function is transparent, and no edge has the height of the
+    /// detector's threshold. None if dark samples are drawn.
+    pub fn floating_level(&self) -> Option<f64> {
+        let (volume, surface) = (&self.settings.volume, &self.settings.surface);
+        let sample = |[low, high]: [f64; 2], share: f64| low + (high - low) * share;
+        let of_volume = || {
+            let table = transfer::table_of(volume, self.reference_length(), self.transfer_entries());
+            // Between two entries the table is linear.
+            let last = match table.iter().position(|entry| entry[3] > 0.0) {
+                Some(first) => first.checked_sub(1)?,
+                None => table.len() - 1,
+            };
+            Some(sample(volume.window, last as f64 / (table.len() - 1) as f64))
+        };
+        let of_surface = || (surface.sign == Sign::Bright).then(|| sample(surface.window, surface.threshold));
+        match (self.composites(), self.detects_surface()) {
+            (true, true) => Some(of_volume()?.min(of_surface()?)),
+            (true, false) => of_volume(),
+            _ => of_surface(),
+        }
+    }
+
+    /// The size below which a part is dropped.
+    pub fn least_part(&self) -> u64 {
+        (self.settings.floating * PER_MM3).ceil() as u64
+    }
+
+    /// Slices from one texel to another that one sample may touch both.
+    pub fn part_reach(&self) -> usize {
+        if self.takes_bspline() { 3 } else { 1 }
+    }
+
+    /// The size of a texel by row, then slice: entry `slice * rows + row`. Along a fan's sweep a texel is as long as its arc.
+    pub fn texel_sizes(&self) -> Vec<u64> {
+        let [across, down] = self.grid.pitch;
+        let size = |along: f64| (across * down * along * PER_MM3).round().max(0.0) as u64;
+        let rows = self.grid.size[1];
+        let each = |slice: u32, row: u32| match &self.geometry {
+            Geometry::Cartesian(grid) => size(grid.spacing[2]),
+            Geometry::Sweep(probe) => {
+                let at = f64::from(slice);
+                let pitch = probe.slices.at(at + 0.5) - probe.slices.at(at - 0.5);
+                let radius = match probe.motion {
+                    Motion::Fan { .. } => self.grid.place(0.0, f64::from(row)).1 - probe.axis_depth(),
+                    Motion::Translated | Motion::Still { .. } => 1.0,
+                };
+                size(pitch * radius)
+            }
+        };
+        (0..self.slices()).flat_map(|slice| (0..rows).map(move |row| (slice, row))).map(|(s, r)| each(s, r)).collect()
+    }
+
+    /// What decides which parts float, besides the volume.
+    pub(crate) fn floating_basis(&self) -> impl PartialEq + use<> {
+        (self.least_part(), self.floating_level(), self.part_reach())
+    }
+}
+
+/// # Errors
+/// Something dark is drawn, of which the outside of everything is made.
+pub(super) fn check_floating(scene: &Scene) -> Result<(), SceneError> {
+    match scene.drops_floating() && scene.floating_level().is_none() {
+        true => refuse(
+            "floating",
+            "drops bright parts in the dark, and here what is dark is drawn (surface.sign=dark, or a transfer function that is opaque at 0): \
+             set floating=0",
+        ),
+        false => Ok(()),
+    }
+}
