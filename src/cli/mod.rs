@@ -13,8 +13,8 @@ mod one_colour;
 mod probe;
 mod recordings;
 mod render;
-mod serve;
 mod series;
+mod serve;
 mod stream;
 #[cfg(feature = "view")]
 mod view;

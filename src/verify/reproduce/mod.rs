@@ -17,6 +17,9 @@ use serde_json::json;
 use std::fmt::Write as _;
 use std::path::Path;
 
+/// Name of the file of the shader in the folder of a reproduction.
+const SHADER: &str = "shader.spv";
+
 /// Minimum number of texels of the outputs of a dispatch that does not fail: fewer say little.
 const MIN_TEXELS: u64 = 64;
 
@@ -244,7 +247,7 @@ fn write(case: &Case, device: &machine::Device, folder: &Path) -> Result<(Vec<St
         files::replace(&folder.join(name), bytes)
     };
     let of_f64 = |values: &[f64]| values.iter().flat_map(|v| v.to_le_bytes()).collect::<Vec<u8>>();
-    put("shader.spv", &case.words.iter().flat_map(|w| w.to_le_bytes()).collect::<Vec<u8>>())?;
+    put(SHADER, &case.words.iter().flat_map(|w| w.to_le_bytes()).collect::<Vec<u8>>())?;
     put("params.raw", &case.params)?;
     for array in &case.arrays {
         put(&array.file(), &array.bytes)?;
