@@ -5,8 +5,8 @@ use crate::common::files::repository;
 use crate::common::program::*;
 use std::process::Command;
 
-/// Installing Snakemake by pip takes a minute and a half, once, and needs a network: ECHOLUME_SNAKEMAKE=1 allows it. Where it is installed,
-/// the test always runs.
+/// Installing Snakemake by pip takes a minute and a half, once, and needs a network: the gate does it while it compiles, and
+/// ECHOLUME_SNAKEMAKE=1 allows this test to. Where it is installed, the test always runs.
 #[test]
 fn snakemake_does_twelve_units_once_each() {
     let mut command = Command::new(repository("tools/cluster/test-snakemake"));
