@@ -15,14 +15,14 @@ const INVOCATIONS: u64 = 64;
 /// Together they need every pass, each with several rows of workgroups.
 const SCENES: [&str; 13] = [
     ALL_FILTERS,
-    "mode = 'vr'\nray = { brick = 4 }",
+    "mode = 'vr'\nray = { brick = 4 }\nfloating = 5.0",
     "mode = 'sr'\nray = { brick = 4 }",
     "mode = 'vr'\nlight = { volume = { cell = 3 } }",
     "mode = 'mip'",
     "mode = 'orthogonal'",
     "mode = 'orthogonal'\npost = { floats = true }",
     "mode = 'cube'",
-    "mode = 'mixed'\nlayout = 'four'",
+    "mode = 'mixed'\nlayout = 'four'\nplanes = { smooth = { lateral = 1.0, depth = 1.0, elevation = 1.0 } }",
     "mode = 'sr'\nlayout = 'pair'",
     "mode = 'sr'\nlight = { shadow = {}, occlusion = {}, skin = {} }\nslices = { smooth = { elevation = 1.0 } }\n\
      ray = { sampling = 'quads' }",
