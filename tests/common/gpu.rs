@@ -65,7 +65,8 @@ impl Device {
         Device::opened(ContextOptions { validation: true, ..options })
     }
 
-    fn opened(options: ContextOptions) -> Device {
+    /// One of its own, with these options.
+    pub fn opened(options: ContextOptions) -> Device {
         let context = Context::new(&ContextOptions { device: chosen(), ..options }).expect("a Vulkan device");
         Device { context, provoked: false, runner: None }
     }

@@ -5,6 +5,7 @@ mod random_source;
 use super::*;
 use crate::common::own_process;
 use ash::vk;
+use echolume::gpu::ContextOptions;
 use echolume::gpu::faults::InjectionPoint;
 use echolume::ui::command::KEY_BINDINGS;
 use echolume::ui::input::Phase;
@@ -61,8 +62,7 @@ struct Monkey {
 
 impl Monkey {
     fn new(seed: u64, watched: bool) -> Monkey {
-        let (device, calm, folder) =
-            (Device::watched(watched), Arc::new(AtomicBool::new(false)), Folder::new("monkey"));
+        let (device, calm, folder) = (opened(watched), Arc::new(AtomicBool::new(false)), Folder::new("monkey"));
         let last: Arc<Mutex<Vec<Receiver<Event>>>> = Arc::default();
         let (is_calm, sources, opened) = (calm.clone(), last.clone(), std::sync::atomic::AtomicU64::new(seed));
         let open: OpenSource = Arc::new(move || {
@@ -190,7 +190,7 @@ impl Monkey {
             Err(ConsoleError::Screen(fault)) => panic!("there is no screen: {fault}"),
             Err(ConsoleError::DeviceLost(_)) => {
                 self.lost += 1;
-                let other = Device::watched(self.watched);
+                let other = opened(self.watched);
                 // Settings that do not fit now apply to the geometry of the next source.
                 let _ = self.desk.console.revive(&other, None);
                 // Its messages are checked here.
@@ -245,6 +245,11 @@ impl Monkey {
             assert!(begun.elapsed() < BOUND, "the picture at the end is not saved");
         }
     }
+}
+
+/// With few pipelines that nothing uses: 256 of them would be what the process may grow by.
+fn opened(validation: bool) -> Device {
+    Device::opened(ContextOptions { validation, max_unused_pipelines: 8, ..ContextOptions::default() })
 }
 
 /// Resident memory of this process, bytes.
