@@ -125,7 +125,7 @@ mod tests {
     use super::*;
 
     fn frame(volume: u32, slice: usize, bytes: Vec<u8>) -> Frame {
-        Frame { volume, number: slice as u32, slice, backward: false, time: None, pose: None, bytes }
+        Frame::of_slice(volume, slice, bytes)
     }
 
     fn numbers(cine: &Cine) -> Vec<u32> {

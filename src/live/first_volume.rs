@@ -115,7 +115,7 @@ mod tests {
 
     fn frame(volume: u32, slice: usize, tissue: u8) -> Frame {
         let bytes = (0..32 * 32).map(|n| if n % 32 < 12 { 20 } else { tissue }).collect();
-        Frame { volume, number: slice as u32, slice, backward: false, time: None, pose: None, bytes }
+        Frame::of_slice(volume, slice, bytes)
     }
 
     #[test]

@@ -63,15 +63,7 @@ mod tests {
                 (255.0 * (12.0 - at.length() + 0.5).clamp(0.0, 1.0)).round() as u8
             };
             let bytes = (0..31 * 31).map(echo).collect();
-            volume.take(Frame {
-                volume: 0,
-                number: slice as u32,
-                slice,
-                backward: false,
-                time: None,
-                pose: None,
-                bytes,
-            });
+            volume.take(Frame::of_slice(0, slice, bytes));
         }
         volume
     }

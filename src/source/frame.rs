@@ -31,6 +31,13 @@ pub struct Frame {
     pub bytes: Vec<u8>,
 }
 
+impl Frame {
+    /// Slice `slice` of a volume that was swept forwards, without time and pose.
+    pub fn of_slice(volume: u32, slice: usize, bytes: Vec<u8>) -> Frame {
+        Frame { volume, number: slice as u32, slice, backward: false, time: None, pose: None, bytes }
+    }
+}
+
 /// What all frames of a file or of a live source have in common.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]

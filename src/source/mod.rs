@@ -90,8 +90,8 @@ pub fn open_with(path: &Path, options: OpenOptions) -> Result<Box<dyn Source>, I
 
 fn open_file(path: &Path, options: OpenOptions) -> Result<Box<dyn Source>, InputError> {
     Ok(match Kind::of(path) {
-        Kind::Frames => posed::PosedVolume::of(path, Box::new(frames(path, options)?))?,
-        Kind::Stream => posed::PosedVolume::of(path, Box::new(stream(path, options)?))?,
+        Kind::Frames => posed::as_volume(path, Box::new(frames(path, options)?))?,
+        Kind::Stream => posed::as_volume(path, Box::new(stream(path, options)?))?,
         Kind::Uff => Box::new(uff(path, options)?),
         Kind::Recording if tracked::is_asked_for(&options) => Box::new(tracked_volume(path, options)?),
         Kind::Recording => Box::new(Recording::open_with(path, options)?),

@@ -463,7 +463,7 @@ impl Source for Beamformed {
             _ => values.into_iter().flat_map(|value| stored(value).to_le_bytes()).collect(),
         };
         let (volume, slice) = ((number / each) as u32, number % each);
-        Ok(Some(Frame { volume, number: slice as u32, slice, backward: false, time: None, pose: None, bytes }))
+        Ok(Some(Frame::of_slice(volume, slice, bytes)))
     }
 
     fn files(&self) -> Vec<PathBuf> {

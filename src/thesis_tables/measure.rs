@@ -240,7 +240,7 @@ pub fn sweep_frames(frames: usize, lines: usize) -> Vec<Frame> {
         .map(|slice| {
             let places = (0..lines).flat_map(|line| (0..SAMPLES).map(move |i| (line, i)));
             let bytes = places.map(|(line, i)| sample(slice, line, i)).collect();
-            Frame { volume: 0, number: slice as u32, slice, backward: false, time: None, pose: None, bytes }
+            Frame::of_slice(0, slice, bytes)
         })
         .collect()
 }

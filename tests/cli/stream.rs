@@ -148,16 +148,13 @@ fn a_motor_sweeps_the_phantom_until_a_signal_stops_both() {
     let folder = Folder::new("motor");
     let tape = folder.path("exam.frames");
     let simulator = simulated(None);
-    let mut child = with_default_signals()
-        .args(["stream", "--null", "--probe", MOTOR_PROBE, "--sweeps", "1", "--timeout", "2000", "--record", &tape])
-        .args(SMALL)
-        .arg("--motor")
-        .arg(simulator.path())
-        .stdin(Stdio::null())
-        .stdout(Stdio::piped())
-        .stderr(Stdio::piped())
-        .spawn()
-        .expect("start the program");
+    let mut child = start(
+        with_default_signals()
+            .args(["stream", "--null", "--probe", MOTOR_PROBE, "--sweeps", "1", "--timeout", "2000", "--record", &tape])
+            .args(SMALL)
+            .arg("--motor")
+            .arg(simulator.path()),
+    );
     let mut lines = BufReader::new(child.stdout.take().expect("its output")).lines().map_while(Result::ok);
     let shown = lines.find(|line| line.contains(" s  frames ") && !line.contains("volumes 0.00/s"));
     assert!(shown.is_some(), "no volume was shown");
@@ -197,14 +194,11 @@ fn clients_of_the_server_get_pictures_and_volumes() {
     use std::io::{BufRead, BufReader};
     use std::time::Duration;
 
-    let mut child = with_default_signals()
-        .args(["stream", "--null", "--rate", "4", "--serve", "igtl://127.0.0.1:0", "--serve-spacing", "3"])
-        .args(SMALL)
-        .stdin(Stdio::null())
-        .stdout(Stdio::piped())
-        .stderr(Stdio::piped())
-        .spawn()
-        .expect("start the program");
+    let mut child = start(
+        with_default_signals()
+            .args(["stream", "--null", "--rate", "4", "--serve", "igtl://127.0.0.1:0", "--serve-spacing", "3"])
+            .args(SMALL),
+    );
     let mut lines = BufReader::new(child.stdout.take().expect("its output")).lines().map_while(Result::ok);
     let served = lines.find_map(|line| line.strip_prefix("serving: igtl://").map(str::to_string)).expect("an address");
     assert!(served.starts_with("127.0.0.1:"), "{served}");

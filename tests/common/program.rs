@@ -3,7 +3,7 @@
 pub use super::files::*;
 use std::fs;
 use std::io::Read;
-use std::process::{Command, Stdio};
+use std::process::{Child, Command, Stdio};
 use std::time::{Duration, Instant};
 
 pub const PROGRAM: &str = env!("CARGO_BIN_EXE_echolume");
@@ -46,6 +46,12 @@ pub type Ran = (Option<i32>, String, String);
 /// Time after which a program hangs: the longest takes a minute and a half alone.
 const HANGS: Duration = Duration::from_secs(900);
 
+/// Starts a program without an input, and with its output in pipes.
+pub fn start(command: &mut Command) -> Child {
+    let piped = command.stdin(Stdio::null()).stdout(Stdio::piped()).stderr(Stdio::piped());
+    piped.spawn().expect("start the program")
+}
+
 /// Runs a program to its end. One that hangs is killed and fails the test, instead of keeping all of them for ever.
 pub fn finish(command: &mut Command) -> Ran {
     fn read(mut from: impl Read + Send + 'static) -> std::thread::JoinHandle<String> {
@@ -55,8 +61,7 @@ pub fn finish(command: &mut Command) -> Ran {
             String::from_utf8_lossy(&bytes).into_owned()
         })
     }
-    let started = command.stdin(Stdio::null()).stdout(Stdio::piped()).stderr(Stdio::piped()).spawn();
-    let mut child = started.expect("start the program");
+    let mut child = start(command);
     let (out, err) = (read(child.stdout.take().expect("piped")), read(child.stderr.take().expect("piped")));
     let begun = Instant::now();
     let status = loop {

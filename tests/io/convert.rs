@@ -34,7 +34,7 @@ fn filled(probe: &Probe) -> Volume {
         };
         let lines = 0..probe.lines.len();
         let bytes = lines.flat_map(|j| (0..probe.samples).flat_map(move |i| value(i, j).to_le_bytes())).collect();
-        volume.take(Frame { volume: 0, number: k as u32, slice: k, backward: false, time: None, pose: None, bytes });
+        volume.take(Frame::of_slice(0, k, bytes));
     }
     volume
 }

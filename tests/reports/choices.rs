@@ -155,7 +155,7 @@ fn voxels(grid: &Grid, rough: [f64; 2], tilt: f64) -> Vec<Frame> {
 }
 
 fn numbered(slice: usize, bytes: Vec<u8>) -> Frame {
-    Frame { volume: 0, number: slice as u32, slice, backward: false, time: None, pose: None, bytes }
+    Frame::of_slice(0, slice, bytes)
 }
 
 /// What came of a bound.

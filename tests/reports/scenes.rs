@@ -51,7 +51,7 @@ pub fn frames() -> Vec<Frame> {
         .map(|slice| {
             let lines = (0..60).flat_map(|line| (0..128).map(move |sample| (sample, line)));
             let bytes = lines.flat_map(|(sample, line)| value(sample, line, slice).to_le_bytes()).collect();
-            Frame { volume: 0, number: slice as u32, slice, backward: false, time: None, pose: None, bytes }
+            Frame::of_slice(0, slice, bytes)
         })
         .collect()
 }

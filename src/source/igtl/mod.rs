@@ -6,11 +6,14 @@
 //! The format is OpenIGTLink's protocol 3 (its repository's Documents/Protocol). Where that document and the bytes of
 //! the reference library differ, this module follows the bytes: the document's extended header has 8 or 14 bytes, the library's 12.
 
+mod cartesian;
 mod client;
 mod codec;
+mod faults;
 mod message;
 mod network;
 mod pairing;
+mod pixels;
 mod publish;
 mod server;
 

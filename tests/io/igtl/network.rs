@@ -3,7 +3,7 @@
 use super::client::*;
 use super::messages::*;
 use echolume::probe::{Geometry, Grid, World};
-use echolume::source::freehand;
+use echolume::source::freehand::{self, Schedule};
 use echolume::source::live::{Event, Live};
 use echolume::source::recorder::Header;
 use echolume::source::{Frame, StoredType};
@@ -171,7 +171,8 @@ fn moved(k: u8) -> Message {
 fn sweep_options() -> NetworkOptions {
     let freehand =
         freehand::CompoundingOptions { margin: 1.0, spacing: Some(0.5), ..freehand::CompoundingOptions::default() };
-    NetworkOptions { freehand, first: 4, update: 0.2, frames: 2, ..options() }
+    let schedule = Schedule { first: 4, interval: Duration::from_millis(200), pictures: 2 };
+    NetworkOptions { freehand, schedule, ..options() }
 }
 
 /// The values in the middle of each slice.
@@ -366,7 +367,7 @@ proptest! {
         };
         let end = Message::Image(Image { bytes: vec![7; 3 * 3 * 3], ..image(2.0, [3, 3, 3]) });
         let messages = [bytes(&transform("P", 1.0, 0.0)), bytes(&Message::Image(any)), bytes(&transform("P", 3.0, 0.0)), bytes(&end)];
-        let mut network = connect(messages.concat(), NetworkOptions { first: 1, frames: 1, ..options() });
+        let mut network = connect(messages.concat(), NetworkOptions { schedule: Schedule { first: 1, pictures: 1, ..Schedule::default() }, ..options() });
         until(&mut network, |e| matches!(e, Event::Frame(frame) if frame.bytes == [7; 9] && frame.slice == 2));
     }
 }

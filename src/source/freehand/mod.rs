@@ -7,8 +7,14 @@
 //! reached voxels on both sides (Vaughan et al., *Hole filling with oriented sticks in ultrasound volume reconstruction*, J. Med. Imaging
 //! 2 (2015)): holes up to a width are closed, wider ones stay 0, and nothing is added beyond the border of the swept region.
 
+mod file;
+mod sweep;
+
+pub(super) use file::{FreehandFile, PlacedPictures};
+pub use sweep::{Refusal, Schedule, Sweep};
+
 use super::samples::StoredType;
-use crate::probe::Grid;
+use crate::probe::{Grid, World};
 use glam::{DAffine3, DMat3, DVec3};
 use rayon::prelude::*;
 
@@ -337,6 +343,18 @@ pub struct Lattice {
 }
 
 impl Lattice {
+    /// Where the voxels are in the space of the tracker.
+    ///
+    /// # Errors
+    /// In words, a lattice that has no place.
+    pub fn world(&self) -> Result<World, String> {
+        let back = self.to_volume.inverse();
+        let (spacing, origin) = (self.grid.spacing, self.grid.origin.into());
+        let axes =
+            [back.matrix3.x_axis * spacing[0], back.matrix3.y_axis * spacing[1], back.matrix3.z_axis * spacing[2]];
+        World::new(axes, back.transform_point3(origin))
+    }
+
     /// A lattice along the axes of the tracker.
     pub fn straight(grid: Grid) -> Lattice {
         Lattice { grid, to_volume: DAffine3::IDENTITY }

@@ -1,0 +1,139 @@
+//! Pictures of a file with places in space, as one freehand volume.
+
+use super::{Compounder, CompoundingOptions, Lattice, Pose, TrackedFrame};
+use crate::files::InputError;
+use crate::probe::{Geometry, World};
+use crate::source::frame::{Frame, Source};
+use crate::source::samples::{SampleType, StoredType};
+use std::path::{Path, PathBuf};
+
+/// Pictures and their places. They can be read again from the first on.
+pub(in crate::source) trait PlacedPictures: Send {
+    /// The pictures themselves.
+    fn pictures(&self) -> &dyn Source;
+    /// # Errors
+    /// Data that cannot be read.
+    fn rewind(&mut self) -> Result<(), InputError>;
+    /// The next picture, and where it is if that is known. None after the last.
+    ///
+    /// # Errors
+    /// Data that cannot be read.
+    fn next(&mut self) -> Result<Option<(Option<Pose>, Vec<u8>)>, InputError>;
+    /// Every file that is read.
+    fn files(&self) -> Vec<PathBuf> {
+        self.pictures().files()
+    }
+}
+
+/// A freehand volume. Its pictures are compounded when the first slice is read.
+///
+/// Memory: that of a [`Compounder`], from the first slice on.
+pub(in crate::source) struct FreehandFile<P> {
+    path: PathBuf,
+    placed: P,
+    lattice: Lattice,
+    world: World,
+    options: CompoundingOptions,
+    compounder: Option<Compounder>,
+    next: usize,
+}
+
+impl<P: PlacedPictures> FreehandFile<P> {
+    /// A volume around these places of the pictures; None where one is not known. It says how many are left out.
+    ///
+    /// # Errors
+    /// No picture with a place; a volume that is too large.
+    pub fn around(
+        path: &Path,
+        placed: P,
+        poses: &[Option<Pose>],
+        options: CompoundingOptions,
+    ) -> Result<FreehandFile<P>, InputError> {
+        let fault = |fault: String| InputError::new(path, "poses", fault);
+        let known: Vec<Pose> = poses.iter().flatten().copied().collect();
+        let lattice = Lattice::around(&known, &options).map_err(fault)?;
+        let world = lattice.world().map_err(fault)?;
+        let (all, without) = (poses.len(), poses.len() - known.len());
+        if without > 0 {
+            let file = crate::source::describe::path(path);
+            tracing::warn!(%file, "{without} of {all} pictures have no valid pose; left out");
+        }
+        Ok(FreehandFile { path: path.into(), placed, lattice, world, options, compounder: None, next: 0 })
+    }
+
+    pub fn placed(&self) -> &P {
+        &self.placed
+    }
+
+    pub fn lattice(&self) -> &Lattice {
+        &self.lattice
+    }
+
+    fn compound(&mut self) -> Result<Compounder, InputError> {
+        let fault = |fault: String| InputError::new(&self.path, "frames", fault);
+        let stored = self.placed.pictures().stored_type();
+        let mut compounder = Compounder::new(self.lattice, stored, self.options.clone()).map_err(fault)?;
+        self.placed.rewind()?;
+        while let Some((pose, bytes)) = self.placed.next()? {
+            let Some(pose) = pose else { continue };
+            compounder.push(&TrackedFrame { pose, stored, bytes: &bytes }).map_err(fault)?;
+        }
+        compounder.changed_slices();
+        Ok(compounder)
+    }
+}
+
+impl<P: PlacedPictures> Source for FreehandFile<P> {
+    fn geometry(&self, _: usize) -> Geometry {
+        Geometry::Cartesian(self.lattice.grid)
+    }
+
+    fn stored_type(&self) -> StoredType {
+        self.placed.pictures().stored_type()
+    }
+
+    fn sample_type(&self) -> SampleType {
+        self.placed.pictures().sample_type()
+    }
+
+    fn range(&self) -> [f64; 2] {
+        self.placed.pictures().range()
+    }
+
+    fn volumes(&self) -> usize {
+        1
+    }
+
+    fn frames_per_volume(&self) -> usize {
+        self.lattice.grid.size[2]
+    }
+
+    fn skip_to_volume(&mut self, volume: usize) -> Result<(), InputError> {
+        if volume > 0 {
+            return Err(InputError::new(&self.path, "volume", format!("there is no {volume}, the last is 0")));
+        }
+        self.next = 0;
+        Ok(())
+    }
+
+    fn next_frame(&mut self) -> Result<Option<Frame>, InputError> {
+        if self.compounder.is_none() {
+            self.compounder = Some(self.compound()?);
+        }
+        let slice = self.next;
+        let Some(bytes) = self.compounder.as_ref().and_then(|compounder| compounder.slice(slice)) else {
+            return Ok(None);
+        };
+        let bytes = bytes.to_vec();
+        self.next += 1;
+        Ok(Some(Frame::of_slice(0, slice, bytes)))
+    }
+
+    fn files(&self) -> Vec<PathBuf> {
+        self.placed.files()
+    }
+
+    fn world(&self) -> Option<World> {
+        Some(self.world)
+    }
+}

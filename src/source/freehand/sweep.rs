@@ -1,0 +1,154 @@
+//! A freehand volume of pictures that arrive: the first are kept until the volume can be placed around them, later ones are compounded as
+//! they come.
+
+use super::{Compounder, CompoundingOptions, Lattice, Pose, TrackedFrame};
+use crate::source::samples::StoredType;
+use std::time::{Duration, Instant};
+
+/// Longest wait for the first pictures, and most bytes of them.
+const MAX_FIRST_WAIT: Duration = Duration::from_secs(10);
+const MAX_FIRST_BYTES: usize = 256 << 20;
+
+/// When the volume of a [`Sweep`] is placed and emitted.
+#[derive(Clone, Debug)]
+pub struct Schedule {
+    /// It is placed around so many first pictures, or those of ten seconds or of 256 MiB.
+    pub first: usize,
+    /// It is emitted at this interval while pictures arrive ...
+    pub interval: Duration,
+    /// ... or after this number of pictures.
+    pub pictures: usize,
+}
+
+impl Default for Schedule {
+    fn default() -> Schedule {
+        Schedule { first: 100, interval: Duration::from_millis(500), pictures: 64 }
+    }
+}
+
+/// Why a picture, or all of them, are in no volume.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Refusal {
+    /// The picture lies outside of the volume, which was placed around the first ones.
+    Outside,
+    /// The picture cannot be compounded, in words.
+    Picture(String),
+    /// No volume can be placed around the first pictures, in words.
+    Volume(String),
+}
+
+/// Compounds pictures as they arrive.
+///
+/// Memory: the first pictures (256 MiB), then that of a [`Compounder`].
+pub struct Sweep {
+    options: CompoundingOptions,
+    schedule: Schedule,
+    stored: StoredType,
+    buffered: Vec<(Pose, Vec<u8>)>,
+    buffered_bytes: usize,
+    compounder: Option<Compounder>,
+    /// When the first picture arrived that was not emitted yet, and how many have since.
+    since: Option<Instant>,
+    pictures: usize,
+}
+
+impl Sweep {
+    /// `stored`: the type of the samples of all pictures.
+    pub fn new(options: CompoundingOptions, schedule: Schedule, stored: StoredType) -> Sweep {
+        Sweep {
+            options,
+            schedule,
+            stored,
+            buffered: Vec::new(),
+            buffered_bytes: 0,
+            compounder: None,
+            since: None,
+            pictures: 0,
+        }
+    }
+
+    pub fn stored(&self) -> StoredType {
+        self.stored
+    }
+
+    /// True once the volume has its place.
+    pub fn is_placed(&self) -> bool {
+        self.compounder.is_some()
+    }
+
+    /// Adds a picture: one sample a pixel, column fastest.
+    ///
+    /// # Errors
+    /// Why it is in no volume.
+    pub fn push(&mut self, pose: Pose, bytes: Vec<u8>) -> Result<(), Refusal> {
+        if bytes.len() != pose.size[0] * pose.size[1] * self.stored.bytes() {
+            return Err(Refusal::Picture("it has another number of samples than its size".into()));
+        }
+        self.since.get_or_insert_with(Instant::now);
+        self.pictures += 1;
+        match &mut self.compounder {
+            Some(compounder) => add(compounder, pose, &bytes),
+            None => {
+                self.buffered_bytes += bytes.len();
+                self.buffered.push((pose, bytes));
+                Ok(())
+            }
+        }
+    }
+
+    /// None before the volume is to be emitted again, then true if a slice changed. Places the volume first if it has no place yet, and hands
+    /// what goes wrong with that to `refuse`. `at_once`: no more pictures come.
+    pub fn update(&mut self, at_once: bool, mut refuse: impl FnMut(Refusal)) -> Option<bool> {
+        let waited = self.since?.elapsed();
+        let is_placed = self.is_placed();
+        let is_time = match is_placed {
+            true => self.pictures >= self.schedule.pictures || waited >= self.schedule.interval,
+            false => {
+                let is_full = self.buffered_bytes >= MAX_FIRST_BYTES || waited >= MAX_FIRST_WAIT;
+                is_full || self.buffered.len() >= self.schedule.first.max(1)
+            }
+        };
+        if !is_time && !at_once {
+            return None;
+        }
+        (self.since, self.pictures) = (None, 0);
+        if !is_placed && let Err(fault) = self.place(&mut refuse) {
+            refuse(Refusal::Volume(fault));
+        }
+        Some(self.compounder.as_mut().is_some_and(|compounder| !compounder.changed_slices().is_empty()))
+    }
+
+    /// Places the volume around the first pictures and compounds them.
+    fn place(&mut self, refuse: &mut impl FnMut(Refusal)) -> Result<(), String> {
+        let buffered = std::mem::take(&mut self.buffered);
+        self.buffered_bytes = 0;
+        let poses: Vec<Pose> = buffered.iter().map(|(pose, _)| *pose).collect();
+        let lattice = Lattice::around(&poses, &self.options)?;
+        let mut compounder = Compounder::new(lattice, self.stored, self.options.clone())?;
+        for (pose, bytes) in &buffered {
+            if let Err(refusal) = add(&mut compounder, *pose, bytes) {
+                refuse(refusal);
+            }
+        }
+        self.compounder = Some(compounder);
+        Ok(())
+    }
+
+    /// None before the volume has its place.
+    pub fn lattice(&self) -> Option<&Lattice> {
+        Some(self.compounder.as_ref()?.lattice())
+    }
+
+    /// A slice; None beyond the last.
+    pub fn slice(&self, k: usize) -> Option<&[u8]> {
+        self.compounder.as_ref()?.slice(k)
+    }
+}
+
+fn add(compounder: &mut Compounder, pose: Pose, bytes: &[u8]) -> Result<(), Refusal> {
+    match compounder.push(&TrackedFrame { pose, stored: compounder.stored(), bytes }) {
+        Ok(0) => Err(Refusal::Outside),
+        Ok(_) => Ok(()),
+        Err(fault) => Err(Refusal::Picture(fault)),
+    }
+}

@@ -1,0 +1,146 @@
+//! Images of several slices: Cartesian volumes, whole or slice by slice, and where they are.
+
+use super::message::{Coordinates, Image, Scalar};
+use super::pixels::{range_of, samples, stored};
+use crate::probe::{AxisOrder, Geometry, Grid, World, is_rigid};
+use crate::source::frame::Header;
+use crate::source::samples::StoredType;
+use crate::source::value_range::ValueRange;
+use glam::{DAffine3, DVec3};
+
+/// Relative difference of spacings that count as equal: the spacing of a rotated volume is computed again in f32.
+const SPACING_TOLERANCE: f64 = 1e-5;
+
+/// A Cartesian volume, as of the last message.
+pub(super) struct CartesianVolume {
+    scalar: Scalar,
+    components: u8,
+    stored: StoredType,
+    grid: Grid,
+    /// The image's axes are left-handed: its rows are read from last pixel to first, so that it is not shown mirrored.
+    mirrored: bool,
+    /// Where the volume is as of the last message; None if its axes are not perpendicular.
+    pub(super) pose: Option<DAffine3>,
+    range: [f64; 2],
+    bytes: Vec<u8>,
+}
+
+impl CartesianVolume {
+    /// Stores the slices of an image. If it does not belong to the present volume, a new one is begun, whose missing slices are 0. Returns
+    /// the number of samples that read as 0 because they are not finite or denormal.
+    ///
+    /// Lateral is the image's i, depth its j, elevation its k. Lateral and elevation are centred, depth begins at 0. Of the matrix the
+    /// handedness is used: rows of a left-handed image are reversed. The values shown as 0 and 1 are 0 and 255 for 8 bits, otherwise the smallest and largest of the first message.
+    ///
+    /// # Errors
+    /// In words, an image that cannot be used. The volume is not changed.
+    pub(super) fn take(volume: &mut Option<CartesianVolume>, image: Image, max_bytes: usize) -> Result<u64, String> {
+        let [i, j, _] = image.size;
+        let ([x, y, first], [columns, rows, slices]) = (image.region.offset, image.region.size);
+        if (x, y, columns, rows) != (0, 0, i, j) {
+            return Err(format!("a part of {columns} x {rows} of {i} x {j} pixels; whole slices are taken only"));
+        }
+        let (grid, scalar, components) = (grid(&image), image.scalar, image.components);
+        grid.check().map_err(|e| format!("{} {}", e.field, e.fault))?;
+        let stored = stored(scalar);
+        let slice = usize::from(i) * usize::from(j) * stored.bytes();
+        let all = slice.checked_mul(grid.size[2]).filter(|all| *all <= max_bytes);
+        let Some(all) = all else {
+            let [x, y, z] = grid.size;
+            return Err(format!("a volume of {x} x {y} x {z} voxels; at most {max_bytes} bytes are taken"));
+        };
+        let mirrored = is_left_handed(&image);
+        let pose = pose(&image, &grid, mirrored);
+        let (mut brought, replaced) = samples(image)?;
+        if mirrored {
+            let rows = AxisOrder { reversed: [true, false, false], ..AxisOrder::STORED };
+            brought = rows.reorder(&brought, [usize::from(i), usize::from(j), usize::from(slices)], stored.bytes());
+        }
+        let is_same = |w: &&mut CartesianVolume| {
+            let is_like = w.scalar == scalar && w.components == components && w.mirrored == mirrored;
+            is_like && w.grid.size == grid.size && w.is_at(&grid)
+        };
+        let whole = match volume.as_mut().filter(is_same) {
+            Some(whole) => whole,
+            None => {
+                let mut values = ValueRange::new(stored);
+                values.take(&brought);
+                let range = range_of(stored, values);
+                if mirrored {
+                    tracing::warn!(
+                        "the axes of the image are left-handed: its rows are reversed, so that it is not shown mirrored"
+                    );
+                }
+                volume.insert(CartesianVolume {
+                    scalar,
+                    components,
+                    stored,
+                    grid,
+                    mirrored,
+                    pose,
+                    range,
+                    bytes: vec![0; all],
+                })
+            }
+        };
+        whole.pose = pose;
+        let at = usize::from(first) * slice;
+        match whole.bytes.get_mut(at..at + usize::from(slices) * slice).filter(|part| part.len() == brought.len()) {
+            Some(part) => part.copy_from_slice(&brought),
+            None => return Err(format!("{slices} slices from {first} on, which are not all there")),
+        }
+        Ok(replaced)
+    }
+
+    fn is_at(&self, grid: &Grid) -> bool {
+        self.grid.spacing.iter().zip(grid.spacing).all(|(a, b)| (a - b).abs() <= SPACING_TOLERANCE * a.max(b))
+    }
+
+    pub(super) fn header(&self) -> Header {
+        let geometry = Geometry::Cartesian(self.grid);
+        Header { forward: geometry.clone(), backward: geometry, stored: self.stored, range: self.range, posed: true }
+    }
+
+    /// A slice; None beyond the last.
+    pub(super) fn slice(&self, k: usize) -> Option<&[u8]> {
+        let [x, y, _] = self.grid.size;
+        self.bytes.chunks_exact(x * y * self.stored.bytes()).nth(k)
+    }
+}
+
+/// From RAS to LPS, and back.
+pub(super) fn other_coordinates() -> DAffine3 {
+    DAffine3::from_scale(DVec3::new(-1.0, -1.0, 1.0))
+}
+
+/// The pose of an image whose voxels are drawn on `grid`, with reversed rows if it is mirrored.
+fn pose(image: &Image, grid: &Grid, mirrored: bool) -> Option<DAffine3> {
+    let to_lps = image.index_to_mm(Coordinates::Lps);
+    let axes = [0, 1, 2].map(|n| to_lps.col(n).truncate());
+    let mut world = World::new(axes, to_lps.w_axis.truncate()).ok()?;
+    if mirrored {
+        let rows = AxisOrder { reversed: [true, false, false], ..AxisOrder::STORED };
+        world = world.reordered(&rows, grid.size);
+    }
+    let pose = world.pose(grid);
+    is_rigid(&pose).then_some(pose)
+}
+
+/// True if i, j and k are left-handed. Both coordinate systems of images are right-handed.
+fn is_left_handed(image: &Image) -> bool {
+    let [i, j, k] = image.axes.map(|axis| DVec3::from(axis.map(f64::from)));
+    i.cross(j).dot(k) < 0.0
+}
+
+/// The grid of an image. An axis of one pixel may have any spacing, or none.
+fn grid(image: &Image) -> Grid {
+    let size = image.size.map(usize::from);
+    let mut spacing = image.spacing();
+    for axis in 0..3 {
+        if size[axis] == 1 && spacing[axis] == 0.0 {
+            spacing[axis] = 1.0;
+        }
+    }
+    let half = |axis: usize| -spacing[axis] * (size[axis] as f64 - 1.0) / 2.0;
+    Grid { size, spacing, origin: [half(0), 0.0, half(2)] }
+}

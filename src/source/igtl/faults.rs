@@ -1,0 +1,127 @@
+//! What goes wrong with a live source, one line a second for each kind, with its count.
+
+use crate::files::escaped;
+use std::time::{Duration, Instant};
+
+/// Shortest time between two reports of one kind.
+const REPORT_INTERVAL: Duration = Duration::from_secs(1);
+/// Longest reason, characters.
+const MAX_REASON: usize = 400;
+
+/// The kinds of faults.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum FaultKind {
+    Unreachable,
+    Lost,
+    Again,
+    Checksum,
+    Malformed,
+    Dropped,
+    /// An image that is neither a volume nor a frame.
+    Image,
+    /// Images of several devices, which show different things.
+    Devices,
+    Samples,
+    /// A frame without a pose.
+    Unpaired,
+    Pose,
+    Outside,
+    Volume,
+}
+
+const KINDS: [(FaultKind, &str); 13] = [
+    (FaultKind::Unreachable, "not connected"),
+    (FaultKind::Lost, "connection lost"),
+    (FaultKind::Again, "connected again"),
+    (FaultKind::Checksum, "messages with a wrong checksum passed over"),
+    (FaultKind::Malformed, "malformed messages passed over"),
+    (FaultKind::Dropped, "messages dropped"),
+    (FaultKind::Image, "images passed over"),
+    (FaultKind::Devices, "images of several devices"),
+    (FaultKind::Samples, "samples that are not finite or are denormal"),
+    (FaultKind::Unpaired, "frames without a pose left out"),
+    (FaultKind::Pose, "frames refused"),
+    (FaultKind::Outside, "frames outside of the volume"),
+    (FaultKind::Volume, "no volume for the sweep"),
+];
+
+#[derive(Clone, Default)]
+struct Fault {
+    count: u64,
+    /// Reason of the last one.
+    why: String,
+    reported: Option<Instant>,
+}
+
+/// The faults of the source. Each kind is reported at most once a second, with its count.
+pub(super) struct Faults {
+    address: String,
+    faults: [Fault; KINDS.len()],
+}
+
+impl Faults {
+    pub(super) fn new(address: &str) -> Faults {
+        Faults { address: escaped(address, MAX_REASON), faults: Default::default() }
+    }
+
+    pub(super) fn note(&mut self, kind: FaultKind, count: u64, why: &str) {
+        let place = KINDS.iter().position(|(k, _)| *k == kind).and_then(|n| self.faults.get_mut(n));
+        if let Some(fault) = place.filter(|_| count > 0) {
+            fault.count = fault.count.saturating_add(count);
+            fault.why = escaped(why, MAX_REASON);
+        }
+    }
+
+    /// A fault whose kind was not reported within the last second.
+    pub(super) fn due(&mut self) -> Option<String> {
+        let waited = |fault: &Fault| fault.reported.is_none_or(|reported| reported.elapsed() >= REPORT_INTERVAL);
+        let mut faults = self.faults.iter_mut().zip(KINDS);
+        let (fault, (_, what)) = faults.find(|(fault, _)| fault.count > 0 && waited(fault))?;
+        let count = std::mem::take(&mut fault.count);
+        fault.reported = Some(Instant::now());
+        let times = if count == 1 { String::new() } else { format!(" ({count})") };
+        let why = if fault.why.is_empty() { String::new() } else { format!(": {}", fault.why) };
+        Some(format!("OpenIGTLink from {}: {what}{times}{why}", self.address))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_flood_of_faults_is_one_line_a_second_and_none_is_forgotten() {
+        let mut faults = Faults::new("host\n:1");
+        assert_eq!(faults.due(), None);
+        faults.note(FaultKind::Lost, 1, "gone");
+        faults.note(FaultKind::Dropped, 3, "");
+        faults.note(FaultKind::Image, 0, "never");
+        assert_eq!(faults.due().as_deref(), Some("OpenIGTLink from host\\n:1: connection lost: gone"));
+        assert_eq!(faults.due().as_deref(), Some("OpenIGTLink from host\\n:1: messages dropped (3)"));
+        for n in 0..1000 {
+            faults.note(FaultKind::Dropped, 2, &format!("the {n}th\u{1b}[2J"));
+            assert_eq!(faults.due(), None);
+        }
+        for fault in &mut faults.faults {
+            fault.reported = fault.reported.and_then(|reported| reported.checked_sub(REPORT_INTERVAL));
+        }
+        let reported = faults.due().unwrap();
+        assert!(reported.contains("messages dropped (2000): the 999th") && !reported.contains('\u{1b}'), "{reported}");
+    }
+
+    #[test]
+    fn every_kind_has_its_words() {
+        for kind in [
+            FaultKind::Unreachable,
+            FaultKind::Again,
+            FaultKind::Checksum,
+            FaultKind::Samples,
+            FaultKind::Unpaired,
+            FaultKind::Volume,
+        ] {
+            let mut faults = Faults::new("host");
+            faults.note(kind, 1, "");
+            assert!(faults.due().is_some(), "{kind:?}");
+        }
+    }
+}

@@ -1,0 +1,152 @@
+//! The samples of images: their stored types, colours as luminance, and the values that are shown as 0 and 1.
+
+use super::message::{Image, Scalar};
+use crate::source::samples::{Replaced, SampleType, StoredType, store};
+use crate::source::value_range::ValueRange;
+
+/// Weights of red, green and blue in luminance (ITU-R BT.601).
+const LUMINANCE: [f64; 3] = [0.299, 0.587, 0.114];
+/// Added to an i8 to store it as u8.
+const I8_SHIFT: f64 = 128.0;
+
+/// The stored type of a scalar: 8 and 16 bits unchanged, signed ones shifted to begin at 0, all others f32.
+pub(super) fn stored(scalar: Scalar) -> StoredType {
+    match scalar {
+        Scalar::I8 | Scalar::U8 => StoredType::U8,
+        Scalar::I16 | Scalar::U16 => StoredType::U16,
+        Scalar::I32 | Scalar::U32 | Scalar::F32 | Scalar::F64 => StoredType::F32,
+    }
+}
+
+/// One sample a pixel, little-endian, in the order of the image, and the number of samples that were replaced by 0.
+///
+/// Pixels of 3 or 4 components (red, green, blue, and any fourth) become their luminance.
+///
+/// # Errors
+/// Pixels with another number of components.
+pub(super) fn samples(mut image: Image) -> Result<(Vec<u8>, u64), String> {
+    let scalar = image.scalar;
+    let mut bytes = match (image.components, scalar) {
+        (1, Scalar::I8) => {
+            // Adding 128 to an i8 flips its top bit.
+            image.bytes.iter_mut().for_each(|byte| *byte ^= 0x80);
+            image.bytes
+        }
+        (1, Scalar::U8 | Scalar::U16 | Scalar::I16 | Scalar::F32) => image.bytes,
+        (1, _) => {
+            let values = image.bytes.chunks_exact(scalar.bytes()).map(|v| value(scalar, v) as f32);
+            values.flat_map(f32::to_le_bytes).collect()
+        }
+        (components @ 3..=4, _) => {
+            let mut bytes = Vec::with_capacity(image.bytes.len() / usize::from(components));
+            for pixel in image.bytes.chunks_exact(usize::from(components) * scalar.bytes()) {
+                let colours = pixel.chunks_exact(scalar.bytes()).zip(LUMINANCE);
+                put(&mut bytes, scalar, colours.map(|(colour, share)| share * value(scalar, colour)).sum());
+            }
+            bytes
+        }
+        (components, _) => return Err(format!("pixels have {components} components, must have 1, 3 or 4")),
+    };
+    let sample = match scalar {
+        Scalar::I8 | Scalar::U8 => SampleType::U8,
+        Scalar::I16 => SampleType::I16,
+        Scalar::U16 => SampleType::U16,
+        Scalar::I32 | Scalar::U32 | Scalar::F32 | Scalar::F64 => SampleType::F32,
+    };
+    let Replaced { not_finite, denormal } = store(sample, false, &mut bytes);
+    Ok((bytes, not_finite + denormal))
+}
+
+/// The value of little-endian bytes. A number beyond f32 becomes infinite later, and then 0.
+fn value(scalar: Scalar, bytes: &[u8]) -> f64 {
+    match (scalar, bytes) {
+        (Scalar::U8, [a]) => f64::from(*a),
+        (Scalar::I8, [a]) => f64::from(a.cast_signed()),
+        (Scalar::U16, [a, b]) => f64::from(u16::from_le_bytes([*a, *b])),
+        (Scalar::I16, [a, b]) => f64::from(i16::from_le_bytes([*a, *b])),
+        (Scalar::U32, [a, b, c, d]) => f64::from(u32::from_le_bytes([*a, *b, *c, *d])),
+        (Scalar::I32, [a, b, c, d]) => f64::from(i32::from_le_bytes([*a, *b, *c, *d])),
+        (Scalar::F32, [a, b, c, d]) => f64::from(f32::from_le_bytes([*a, *b, *c, *d])),
+        (Scalar::F64, _) => bytes.first_chunk().map_or(0.0, |b| f64::from_le_bytes(*b)),
+        _ => 0.0,
+    }
+}
+
+/// Stores a luminance in the type of the image. An i16 is shifted later, with all samples.
+fn put(bytes: &mut Vec<u8>, scalar: Scalar, value: f64) {
+    match scalar {
+        Scalar::U8 => bytes.push(value.round() as u8),
+        Scalar::I8 => bytes.push((value + I8_SHIFT).round() as u8),
+        Scalar::U16 => bytes.extend((value.round() as u16).to_le_bytes()),
+        Scalar::I16 => bytes.extend((value.round() as i16).to_le_bytes()),
+        Scalar::I32 | Scalar::U32 | Scalar::F32 | Scalar::F64 => bytes.extend((value as f32).to_le_bytes()),
+    }
+}
+
+/// The values that become 0 and 1: all that 8 bits hold, or those of the first samples that came.
+pub(super) fn range_of(stored: StoredType, values: ValueRange) -> [f64; 2] {
+    if stored == StoredType::U8 {
+        return [0.0, 255.0];
+    }
+    let measured = values.measured();
+    if let Some(remark) = measured.remark() {
+        tracing::warn!("{remark}");
+    }
+    measured.range
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::source::igtl::message::{Coordinates, Region};
+
+    fn image(scalar: Scalar, components: u8, bytes: Vec<u8>) -> Image {
+        Image {
+            device: String::new(),
+            time: 0.0,
+            size: [1; 3],
+            region: Region { offset: [0; 3], size: [1; 3] },
+            scalar,
+            components,
+            coordinates: Coordinates::Ras,
+            axes: [[1.0; 3]; 3],
+            centre: [0.0; 3],
+            bytes,
+        }
+    }
+
+    #[test]
+    fn the_order_of_values_survives_every_type() {
+        let floats = |v: &[f32]| v.iter().flat_map(|v| v.to_le_bytes()).collect::<Vec<u8>>();
+        let words = |v: &[u16]| v.iter().flat_map(|v| v.to_le_bytes()).collect::<Vec<u8>>();
+        for (scalar, bytes, expected, replaced) in [
+            (Scalar::U8, vec![0, 7, 255], vec![0, 7, 255], 0),
+            (Scalar::I8, vec![0x80, 0xff, 0, 127], vec![0, 127, 128, 255], 0),
+            (Scalar::U16, words(&[0, 500]), words(&[0, 500]), 0),
+            (Scalar::I16, words(&[0x8000, 0xffff, 5]), words(&[0, 32767, 32773]), 0),
+            (Scalar::I32, (-3i32).to_le_bytes().to_vec(), floats(&[-3.0]), 0),
+            (Scalar::U32, 4_000_000_000u32.to_le_bytes().to_vec(), floats(&[4e9]), 0),
+            (Scalar::F32, floats(&[1.5, f32::NAN, 1e-40]), floats(&[1.5, 0.0, 0.0]), 2),
+            (Scalar::F64, [0.25f64, 1e300].iter().flat_map(|v| v.to_le_bytes()).collect(), floats(&[0.25, 0.0]), 1),
+        ] {
+            assert_eq!(samples(image(scalar, 1, bytes)), Ok((expected, replaced)), "{scalar:?}");
+        }
+    }
+
+    #[test]
+    fn colours_become_their_luminance_and_nothing_else_passes() {
+        for (components, pixel) in [(3, vec![10, 20, 30]), (4, vec![10, 20, 30, 255])] {
+            // 2.99 + 11.74 + 3.42.
+            assert_eq!(samples(image(Scalar::U8, components, pixel.clone())), Ok((vec![18], 0)));
+            let signed: Vec<u8> = pixel.iter().map(|v| v ^ 0x80).collect();
+            assert_eq!(samples(image(Scalar::I8, components, signed)), Ok((vec![18], 0)));
+            let words: Vec<u8> = pixel.iter().flat_map(|v| (i16::from(*v) * 100).to_le_bytes()).collect();
+            let expected = (1815u16 + 32768).to_le_bytes().to_vec();
+            assert_eq!(samples(image(Scalar::I16, components, words)), Ok((expected, 0)));
+        }
+        for components in [2, 5, 255] {
+            let refused = samples(image(Scalar::U8, components, vec![0; usize::from(components)])).unwrap_err();
+            assert!(refused.contains(&format!("{components} components")), "{refused}");
+        }
+    }
+}
