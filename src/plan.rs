@@ -56,7 +56,9 @@ impl Work {
 impl Plan {
     /// How much of a picture these steps draw, by their index in [`Plan::steps`].
     pub fn work(&self, scene: &Scene, steps: impl IntoIterator<Item = usize>) -> Work {
+        let of_planes = |slot: &Slot| matches!(slot, Slot::SharpSectionVolume | Slot::SectionVolume);
         let work_of = |step: &Step| match step.pass.stage {
+            Stage::Preprocess if step.writes(scene).iter().all(of_planes) => Work::Tone,
             Stage::Raycast if step.pass.name.starts_with("raycast_planes") && !scene.is_flat() => Work::Tone,
             Stage::Preprocess | Stage::Raycast => Work::Rays,
             Stage::Shade => Work::Shading,

@@ -467,14 +467,15 @@ impl Context {
 
     /// Older layers do not see that a timeline is waited for: they keep what every submission read and wrote until they see an idle
     /// queue, which was 1 GiB after some minutes of verification. To be called after a wait for the last submission of a timeline.
-    pub(super) fn show_layer_an_idle_queue(&self) -> Result<(), vk::Result> {
+    ///
+    /// # Errors
+    /// A device that fails or is given up.
+    pub(super) fn show_layer_an_idle_queue(&self) -> Result<(), GpuError> {
         let is_needed = self.messenger.is_some() && !self.layer_knows_timelines && self.queues.len() == 1;
         if !is_needed || !self.unseen_waits.fetch_add(1, Ordering::Relaxed).is_multiple_of(UNSEEN_WAITS) {
             return Ok(());
         }
-        let queue = self.queues[0].lock().unwrap_or_else(|e| e.into_inner());
-        // SAFETY: the lock keeps the queue to this thread.
-        unsafe { self.device.queue_wait_idle(*queue) }
+        self.wait_queue(0)
     }
 
     /// Waits until a queue has done what was submitted to it so far.

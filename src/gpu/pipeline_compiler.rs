@@ -155,6 +155,7 @@ impl AsyncPipelineCompiler {
     pub fn warm(&self, scenes: Vec<SceneMaker>) {
         let mut queue = self.shared.queue();
         queue.stop_warming();
+        queue.warmed = 0;
         queue.scenes.extend(scenes);
         self.shared.changed.notify_one();
     }

@@ -189,7 +189,7 @@ impl Recorder {
     }
 
     /// Ends the recording here and continues it in another command buffer, which is submitted on its own.
-    fn cut(&mut self, barriers: &mut BarrierRecorder, timelines: &mut Timelines) -> Result<(), GpuError> {
+    pub fn cut(&mut self, barriers: &mut BarrierRecorder, timelines: &mut Timelines) -> Result<(), GpuError> {
         self.submit(barriers, timelines)?;
         // Where each pass is timed, that of a band is a run of its own.
         if let Some(stamps) = self.stamps.as_mut().filter(|_| self.time_stamps == TimeStamps::Ends) {

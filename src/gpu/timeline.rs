@@ -84,7 +84,7 @@ impl Timeline {
         done.map_err(|error| self.context.explain(error))?;
         self.progress(|progress| progress.reached(value, Instant::now()));
         if value == self.submitted {
-            self.context.show_layer_an_idle_queue().context(operation)?;
+            self.context.show_layer_an_idle_queue()?;
         }
         Ok(())
     }

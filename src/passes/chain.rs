@@ -33,11 +33,8 @@ impl Chain {
     fn last(self, scene: &Scene) -> Option<Slot> {
         match self {
             Chain::Slices if scene.filters_across_slices() => Some(Slot::SharpVolume),
-            Chain::Slices if scene.drops_floating() => Some(Slot::WholeVolume),
-            Chain::Slices => Some(Slot::Volume),
             Chain::Sections if scene.section_smoothing_radius()[2] > 0 => Some(Slot::SharpSectionVolume),
-            Chain::Sections => Some(Slot::SectionVolume),
-            Chain::Distances | Chain::Pictures => None,
+            _ => self.volume(scene),
         }
     }
 

@@ -16,9 +16,9 @@ pub struct Lattice<'a> {
 
 /// Consecutive set texels of a row.
 struct Run {
-    columns: Range<u32>,
+    columns: [u32; 2],
+    /// `slice * rows + row`.
     row: u32,
-    slice: u32,
 }
 
 impl Lattice<'_> {
@@ -42,7 +42,7 @@ impl Lattice<'_> {
                 while column < columns && is_set(begin + column) {
                     column += 1;
                 }
-                runs.push(Run { columns: start as u32..column as u32, row: row as u32, slice: slice as u32 });
+                runs.push(Run { columns: [start as u32, column as u32], row: (slice * rows + row) as u32 });
             }
             parents.extend(first..runs.len());
             of_row.push(first..runs.len());
@@ -55,15 +55,16 @@ impl Lattice<'_> {
         }
         let mut sizes = vec![0u64; runs.len()];
         for (n, run) in runs.iter().enumerate() {
-            let texel = self.sizes[run.slice as usize * rows + run.row as usize];
+            let [start, end] = run.columns;
             let root = root(&mut parents, n);
-            sizes[root] = sizes[root].saturating_add(texel.saturating_mul(run.columns.len() as u64));
+            sizes[root] =
+                sizes[root].saturating_add(self.sizes[run.row as usize].saturating_mul(u64::from(end - start)));
         }
         let mut floats = vec![false; columns * rows * slices];
         for (n, run) in runs.iter().enumerate() {
             if sizes[root(&mut parents, n)] < least {
-                let begin = (run.slice as usize * rows + run.row as usize) * columns;
-                floats[begin + run.columns.start as usize..begin + run.columns.end as usize].fill(true);
+                let [start, end] = run.columns.map(|column| run.row as usize * columns + column as usize);
+                floats[start..end].fill(true);
             }
         }
         floats
@@ -74,12 +75,12 @@ impl Lattice<'_> {
 fn join(runs: &[Run], parents: &mut [usize], above: Range<usize>, below: Range<usize>) {
     let (mut a, mut b) = (above.start, below.start);
     while a < above.end && b < below.end {
-        let (upper, lower) = (&runs[a].columns, &runs[b].columns);
-        if upper.start <= lower.end && lower.start <= upper.end {
+        let (upper, lower) = (runs[a].columns, runs[b].columns);
+        if upper[0] <= lower[1] && lower[0] <= upper[1] {
             let (one, other) = (root(parents, a), root(parents, b));
             parents[one.max(other)] = one.min(other);
         }
-        if upper.end < lower.end { a += 1 } else { b += 1 }
+        if upper[1] < lower[1] { a += 1 } else { b += 1 }
     }
 }
 

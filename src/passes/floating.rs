@@ -104,7 +104,7 @@ pub fn reference(scene: &Scene, volume: &Texels) -> Texels {
                 }
             }
         }
-        let size: u64 = part.iter().map(|[_, y, z]| sizes[z * rows + y]).sum();
+        let size = part.iter().fold(0u64, |sum, [_, y, z]| sum.saturating_add(sizes[z * rows + y]));
         if size < scene.least_part() {
             part.iter().for_each(|at| floating.set(*at, &[1.0]));
         }

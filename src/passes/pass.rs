@@ -178,6 +178,23 @@ pub enum Chain {
     Pictures,
 }
 
+impl Chain {
+    /// The volume that frames go to by this chain, smoothed; none of the others.
+    pub(super) fn volume(self, scene: &Scene) -> Option<Slot> {
+        match self {
+            Chain::Slices if scene.drops_floating() => Some(Slot::WholeVolume),
+            Chain::Slices => Some(Slot::Volume),
+            Chain::Sections => Some(Slot::SectionVolume),
+            Chain::Distances | Chain::Pictures => None,
+        }
+    }
+}
+
+/// The need of a pass of the volume that planes beside a rendering are cut from.
+pub(super) fn of_sections(scene: &Scene, need: Need) -> Need {
+    if scene.has_sections() { need } else { Err("no planes are cut from a volume of their own") }
+}
+
 /// How a pass takes part in a filter chain. Its slots and the part of a slice that it makes follow from this.
 #[derive(Clone, Copy)]
 pub enum Link {

@@ -1,7 +1,6 @@
 //! Stage 1: frames become slices of the volume. Polar frames are conditioned and scan converted, slices of a Cartesian volume scaled;
 //! texels are packed with their neighbours where that makes rays faster.
 
-use crate::passes::filter::gaussian::of_sections;
 use crate::passes::lookup_tables::scan_index;
 use crate::passes::pass::*;
 use crate::passes::slots::Format;

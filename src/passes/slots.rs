@@ -445,6 +445,16 @@ impl Slot {
         of_rays || matches!(self, Slot::SectionVolume | Slot::SharpSectionVolume)
     }
 
+    /// The volume that planes are cut from: their own beside a rendering if they have one, otherwise that of the rays, with what is dropped
+    /// for these alone.
+    pub fn of_planes(scene: &Scene) -> Slot {
+        match (scene.has_sections(), scene.drops_floating()) {
+            (true, _) => Slot::SectionVolume,
+            (false, true) => Slot::WholeVolume,
+            (false, false) => Slot::Volume,
+        }
+    }
+
     /// The texel of the whole volume that the image begins with; 0 of a slot that is no part of it.
     pub fn first_texel(self, scene: &Scene) -> [u32; 3] {
         match self {

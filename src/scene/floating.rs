@@ -4,7 +4,7 @@ use super::{Scene, SceneError, Sign, refuse, transfer};
 use crate::probe::{Geometry, Motion};
 
 /// Sizes of parts are integers of this many a mm^3: their sums are exact.
-const PER_MM3: f64 = 1e6;
+const PER_MM3: f64 = 1e9;
 
 impl Scene {
     /// True if parts that float are dropped: a size is set, and something is drawn from a volume of several slices.
@@ -48,7 +48,8 @@ impl Scene {
     /// The size of a texel by row, then slice: entry `slice * rows + row`. Along a fan's sweep a texel is as long as its arc.
     pub fn texel_sizes(&self) -> Vec<u64> {
         let [across, down] = self.grid.pitch;
-        let size = |along: f64| (across * down * along * PER_MM3).round().max(0.0) as u64;
+        // Above the axis of a fan, radii are negative.
+        let size = |along: f64| (across * down * along * PER_MM3).abs().round() as u64;
         let rows = self.grid.size[1];
         let each = |slice: u32, row: u32| match &self.geometry {
             Geometry::Cartesian(grid) => size(grid.spacing[2]),

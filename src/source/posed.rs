@@ -1,7 +1,9 @@
 //! Pictures that each carry a pose, as a freehand volume: while they arrive ([`Posed`]), and from a file ([`as_volume`]).
 
 use super::frame::{Frame, Header, Source};
-use super::freehand::{CompoundingOptions, FreehandFile, PlacedPictures, Pose, Refusal, Schedule, Sweep};
+use super::freehand::{
+    CompoundingOptions, FreehandFile, PlacedPicture, PlacedPictures, Pose, Refusal, Schedule, Sweep,
+};
 use super::live::Event;
 use crate::files::InputError;
 use crate::probe::{Geometry, Grid};
@@ -143,7 +145,7 @@ impl PlacedPictures for PosedPictures {
         self.pictures.skip_to_volume(0)
     }
 
-    fn next(&mut self) -> Result<Option<(Option<Pose>, Vec<u8>)>, InputError> {
+    fn next(&mut self) -> Result<Option<PlacedPicture>, InputError> {
         let frame = self.pictures.next_frame()?;
         Ok(frame.map(|frame| (frame.pose.map(|pose| placed(&self.grid, &pose)), frame.bytes)))
     }

@@ -1,7 +1,7 @@
 //! Tracked pictures of a file as a freehand volume: each gets its pose by a chain of transforms, and they are compounded into a lattice.
 
 use super::frame::Source;
-use super::freehand::{CompoundingOptions, FreehandFile, PlacedPictures, Pose};
+use super::freehand::{CompoundingOptions, FreehandFile, PlacedPicture, PlacedPictures, Pose};
 use super::plus_config::PlusConfig;
 use super::recording::Recording;
 use super::transforms::{Calibration, Chain, HOW};
@@ -117,7 +117,7 @@ impl PlacedPictures for Tracked {
         Ok(())
     }
 
-    fn next(&mut self) -> Result<Option<(Option<Pose>, Vec<u8>)>, InputError> {
+    fn next(&mut self) -> Result<Option<PlacedPicture>, InputError> {
         let frame = self.pictures.next_frame()?;
         Ok(frame.map(|frame| (self.poses.get(frame.volume as usize).copied().flatten(), frame.bytes)))
     }

@@ -248,7 +248,7 @@ fn input(scene: &Scene, bind: &Bind, slices: u32, kind: &str, noise: &mut Noise)
     if bind.slot == Slot::Surface {
         texels.values.chunks_exact_mut(2).for_each(|p| p[1] = p[1].round());
     }
-    if matches!(bind.slot, Slot::Volume | Slot::SectionVolume) && kind == "noise" {
+    if [Slot::Volume, Slot::of_planes(scene)].contains(&bind.slot) && kind == "noise" {
         texels = blurred(&texels);
     }
     // Both the device and the reference get values that the format can store.

@@ -128,6 +128,8 @@ impl Renderer {
         self.drawn_work = self.plan.work(&self.scene, stale.map(|(i, _)| i));
         self.picture.collect(&self.timelines, &mut self.timings)?;
         self.picture.begin(&mut self.barriers, &self.timelines)?;
+        // Those of the last picture, which is done.
+        self.uploads.clear();
         let steps = self.plan.steps_of(Frequency::Volume).chain(self.plan.steps_of(Frequency::Picture));
         let stale: Vec<_> = steps.filter(|(i, _)| self.stale[*i]).map(|(i, step)| (i, *step)).collect();
         for (i, step) in stale {
@@ -178,16 +180,26 @@ impl Renderer {
 }
 
 impl Renderer {
-    /// Finds the parts that float in the volume that is shown. What was recorded before is done first; the recorder is open afterwards.
+    /// Finds the parts that float in the volume that is shown. What was recorded before is done first; the recording goes on afterwards.
     fn find_floating(&mut self) -> Result<(), GpuError> {
-        self.picture.submit(&mut self.barriers, &mut self.timelines)?;
-        if let Some((readback, ..)) = self.bring_back(Slot::WholeVolume)? {
-            let (scene, bytes) = (&self.scene, readback.bytes()?);
-            let found = self.timings.host("floating", || floating::find(scene, &bytes));
-            self.upload(Slot::Floating, 0, &found)?;
+        let (source, target) = (Slot::WholeVolume, Slot::Floating);
+        let Some(volume) = self.slots.image(source, self.shown) else { return Ok(()) };
+        let readback = Readback::new(&self.context, "floating", volume.shape, volume.format.texel_bytes())?;
+        self.picture.copy_out(&mut self.barriers, volume, source, self.shown, &readback);
+        let done = self.picture.cut(&mut self.barriers, &mut self.timelines).and_then(|()| self.timelines.wait_all());
+        if done.is_err() {
+            // The copy may still be running: the buffer must outlive it.
+            self.unread.push(readback);
+            return done;
         }
-        self.picture.collect(&self.timelines, &mut self.timings)?;
-        self.picture.begin(&mut self.barriers, &self.timelines)
+        let (scene, bytes) = (&self.scene, readback.bytes()?);
+        let found = self.timings.host("floating", || floating::find(scene, &bytes));
+        let Some(image) = self.slots.image(target, 0) else { return Ok(()) };
+        let place = SlotParts { slot: target, copy: 0, parts: 0..image.shape.parts() };
+        let upload = Upload::new(&self.context, "floating", image.layout(), place.parts.clone(), &found)?;
+        self.picture.upload(&mut self.barriers, &upload, image, place);
+        self.uploads.push(upload);
+        Ok(())
     }
 }
 

@@ -13,9 +13,8 @@ struct Volume {
     radius: fn(&Scene) -> [u32; 3],
     /// What its passes need besides.
     needed: fn(&Scene, Need) -> Need,
-    /// Smoothed within the slices, and wholly.
+    /// Smoothed within the slices only.
     sharp: Slot,
-    smooth: fn(&Scene) -> Slot,
 }
 
 /// The volume that rays are cast through, and that which planes beside a rendering are cut from. A pass refers to its volume by number,
@@ -27,7 +26,6 @@ const VOLUMES: [Volume; 2] = [
         radius: Scene::smoothing_radius,
         needed: |_, need| need,
         sharp: Slot::SharpVolume,
-        smooth: |s| if s.drops_floating() { Slot::WholeVolume } else { Slot::Volume },
     },
     Volume {
         chain: Chain::Sections,
@@ -35,7 +33,6 @@ const VOLUMES: [Volume; 2] = [
         radius: Scene::section_smoothing_radius,
         needed: of_sections,
         sharp: Slot::SharpSectionVolume,
-        smooth: |_| Slot::SectionVolume,
     },
 ];
 const RENDERED: usize = 0;
@@ -96,7 +93,10 @@ const fn across_slices<const VOLUME: usize>(name: &'static str) -> Pass {
             let part = Part::Around((VOLUMES[VOLUME].radius)(s)[2]);
             vec![Bind { part, ..whole("source", VOLUMES[VOLUME].sharp) }]
         },
-        writes: |s, _| vec![Bind { part: Part::Around(0), ..whole("target", (VOLUMES[VOLUME].smooth)(s)) }],
+        writes: |s, _| {
+            let target = VOLUMES[VOLUME].chain.volume(s).into_iter();
+            target.map(|slot| Bind { part: Part::Around(0), ..whole("target", slot) }).collect()
+        },
         extent: |s, t| in_runs([s.grid.size[0], s.grid.size[1], t.slices], 2),
         repeat: once,
         params: |s, t| params(VOLUME, s, 2, t).i32("slices", t.slices),
@@ -107,11 +107,6 @@ const fn across_slices<const VOLUME: usize>(name: &'static str) -> Pass {
             false => reference(VOLUME, s, 2, t, reads, writes),
         },
     }
-}
-
-/// The need of a pass of the volume that planes beside a rendering are cut from.
-pub(in crate::passes) fn of_sections(scene: &Scene, need: Need) -> Need {
-    if scene.has_sections() { need } else { Err("no planes are cut from a volume of their own") }
 }
 
 fn need(volume: usize, scene: &Scene, axis: usize) -> Need {

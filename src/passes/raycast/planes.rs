@@ -78,9 +78,7 @@ pub const TONED: Pass = Pass {
 
 fn reads(scene: &Scene) -> Vec<Bind> {
     let mut reads = ray::reads(scene);
-    if scene.has_sections() {
-        reads.iter_mut().filter(|b| b.slot == Slot::Volume).for_each(|b| b.slot = Slot::SectionVolume);
-    }
+    reads.iter_mut().filter(|b| b.slot == Slot::Volume).for_each(|b| b.slot = Slot::of_planes(scene));
     reads.push(whole("tiles", Slot::Tiles));
     reads
 }

@@ -7,6 +7,9 @@ use crate::source::frame::{Frame, Source};
 use crate::source::samples::{SampleType, StoredType};
 use std::path::{Path, PathBuf};
 
+/// A picture's place, if it is known, and its samples.
+pub(in crate::source) type PlacedPicture = (Option<Pose>, Vec<u8>);
+
 /// Pictures and their places. They can be read again from the first on.
 pub(in crate::source) trait PlacedPictures: Send {
     /// The pictures themselves.
@@ -18,7 +21,7 @@ pub(in crate::source) trait PlacedPictures: Send {
     ///
     /// # Errors
     /// Data that cannot be read.
-    fn next(&mut self) -> Result<Option<(Option<Pose>, Vec<u8>)>, InputError>;
+    fn next(&mut self) -> Result<Option<PlacedPicture>, InputError>;
     /// Every file that is read.
     fn files(&self) -> Vec<PathBuf> {
         self.pictures().files()

@@ -10,7 +10,7 @@
 mod file;
 mod sweep;
 
-pub(super) use file::{FreehandFile, PlacedPictures};
+pub(super) use file::{FreehandFile, PlacedPicture, PlacedPictures};
 pub use sweep::{Refusal, Schedule, Sweep};
 
 use super::samples::StoredType;
