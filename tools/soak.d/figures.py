@@ -108,5 +108,5 @@ def table(result):
               f"Passed over as damaged: {counts['damaged']}; dropped before they were taken: {counts['overtaken']}.",
               f"Frames: {totals['frames']} arrived, {totals['lost']} lost, {totals['refused']} refused, {totals['left_out']} of volumes that were over.",
               f"Volumes: {totals['shown']} shown, {totals['dropped']} dropped, {totals['incomplete']} incomplete. Pictures: {totals['pictures']}.",
-              f"Processor time: {result['processor']:.2f} of a core. Its threads waited {result['waited']:.0f} s in all for a processor."]
+              f"Processor time: {result['processor']:.2f} of a core. The thread that waited longest waited {result['waited']:.0f} s for a processor."]
     return "\n".join(lines)

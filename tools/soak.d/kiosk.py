@@ -161,22 +161,33 @@ class Log(threading.Thread):
         return len(later) > 1 and later[-1][0] > later[0][0] and later[-1][1] > later[0][1]
 
 
+# Most seconds that one watch forgives.
+FORGIVEN = 15.0
+
+
 class Stopwatch:
-    """Time in which the program could run. On a machine that is busy with other things its threads are ready to run and wait for a processor;
-    that time does not count, up to nine tenths of the whole, so that no program has more than ten times its time. A program that sleeps or
-    blocks does not wait for a processor."""
+    """Time in which the program could run. On a machine that is busy with other things its threads are ready to run and wait for a processor.
+    What the one thread waited that waited longest does not count: at most half of the time since the start, and at most 15 s. So a limit of
+    30 s is one of 45 s of the wall clock at most. Waits are not added over threads: fifteen threads that each wait a fifteenth of the time
+    would make all of it free. A program that sleeps or blocks does not wait for a processor."""
 
     def __init__(self, kiosk, clock=time.monotonic):
         self.kiosk, self.clock = kiosk, clock
-        self.last, self.before = clock(), kiosk.waits()
-        self.counted = self.waited = 0.0
+        self.begun, self.before = clock(), kiosk.waits()
+        # Of each thread since the start; threads that have ended stay.
+        self.threads, self.counted = {}, 0.0
+
+    @property
+    def waited(self):
+        """Seconds that the thread has waited that waited longest."""
+        return max(self.threads.values(), default=0.0)
 
     def seconds(self):
-        now, waits = self.clock(), self.kiosk.waits()
-        passed, waited = now - self.last, sum(max(0.0, wait - self.before.get(thread, 0.0)) for thread, wait in waits.items())
-        self.last, self.before = now, waits
-        self.waited += waited
-        self.counted += max(passed - waited, passed / 10)
+        for thread, wait in self.kiosk.waits().items():
+            self.threads[thread] = max(self.threads.get(thread, 0.0), wait - self.before.get(thread, 0.0))
+        passed = self.clock() - self.begun
+        # A clock does not run backwards.
+        self.counted = max(self.counted, passed - min(self.waited, passed / 2, FORGIVEN))
         return self.counted
 
 

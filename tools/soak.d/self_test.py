@@ -21,6 +21,9 @@ class Waiting:
     def passes(self, seconds, waits):
         self.now += seconds
         for thread, wait in waits.items():
+            if thread.startswith("-"):
+                del self.times[thread[1:]]
+                continue
             self.times[thread] = self.times.get(thread, 0.0) + wait
 
     def waits(self):
@@ -78,14 +81,25 @@ def run(line):
     for name in metrics:
         wrong = figures.exported({**metrics, name: 7}, clean()["totals"], clean()["faults"])
         assert wrong == [f"the metrics have 7 {name}, not {metrics[name]}"], wrong
-    # Time that a program waits for a processor does not count, up to nine tenths; all other time does.
+    # What the thread waits that waits longest does not count, up to half of the time and 15 s; all other time does.
+    for steps, counts in (([(10, {"1": 0})], 10), ([(10, {"1": 4})], 6), ([(10, {"1": 4, "2": 3})], 6), ([(10, {"1": 9})], 5),
+                          # Fifteen threads, one after the other: each waited 2 s of 30.
+                          ([(2, {str(thread): 2}) for thread in range(15)], 28),
+                          # A thread that was there before its wait, and one that began later and has ended.
+                          ([(10, {"1": 1}), (10, {"new": 6}), (10, {"-new": 0})], 24),
+                          ([(30, {"1": 30})], 15), ([(300, {"1": 300})], 285)):
+        program = Waiting()
+        watch = Stopwatch(program, lambda: program.now)
+        for seconds, waits in steps:
+            program.passes(seconds, waits)
+            found = watch.seconds()
+        assert abs(found - counts) < 1e-9, (steps, found)
+    # A limit of 30 s is over after 45 s of the wall clock, whatever waits, as often as it is asked.
     program = Waiting()
     watch = Stopwatch(program, lambda: program.now)
-    for waits, counts in (({"1": 0}, 10), ({"1": 6}, 4), ({"1": 4, "2": 3}, 3), ({"1": 9, "2": 9}, 1)):
-        before = watch.seconds()
-        program.passes(10, waits)
-        assert abs(watch.seconds() - before - counts) < 1e-9, (waits, watch.counted - before)
-    assert watch.waited == 31
+    while watch.seconds() <= 30:
+        program.passes(0.5, {str(thread): 0.5 for thread in range(15)})
+    assert program.now - 100 == 45.5, program.now
     # What is within the bound passes, and what grew in the first third only.
     result = clean()
     result["memory"] = figures.of_series(series(31), 3600)
