@@ -38,20 +38,25 @@ impl Encoding {
             Encoding::Pictures => "that of the pictures",
             Encoding::Dicom(Coding::Rle) => "RLE",
             Encoding::Dicom(Coding::Jpeg) => "JPEG",
+            Encoding::Dicom(Coding::JpegLossless) => "lossless JPEG",
+            Encoding::Dicom(Coding::Jpeg2000) => "JPEG 2000",
         }
     }
 
     /// Largest ratio that it can reach. Deflate: 258 bytes from two bits, so 1032 (zlib, "technical details"). Bzip2: a block of 900 kB
     /// holds runs of 259 bytes in 5, 46 MB from about 40 bytes. A PNG has deflate, whose bits may be pixels of 3 bytes. RLE makes 128 bytes
-    /// of 2. JPEG: one bit for a block of 64 pixels; with shared colours 6 for 256 pixels of 3 bytes.
+    /// of 2. JPEG: one bit for a block of 64 pixels; with shared colours 6 for 256 pixels of 3 bytes;
+    /// lossless, one bit for a number of 2 bytes. JPEG 2000 has no limit, as a few bytes state that a whole picture is 0: what real data do not reach
+    /// is refused.
     pub fn most(self) -> u64 {
         match self {
             Encoding::Raw | Encoding::Dicom(Coding::Native) => 1,
             Encoding::Dicom(Coding::Rle) => 64,
             Encoding::Dicom(Coding::Jpeg) => 1024,
+            Encoding::Dicom(Coding::JpegLossless) => 16,
             Encoding::Zlib | Encoding::Gzip => 1032,
             Encoding::Bzip2 => 1_200_000,
-            Encoding::Pictures => 1032 * 24,
+            Encoding::Pictures | Encoding::Dicom(Coding::Jpeg2000) => 1032 * 24,
         }
     }
 }

@@ -1,7 +1,6 @@
-//! The frames of DICOM files as one stream of samples: native, RLE (PS3.5 annex G) or JPEG, in any order, cut to a part of the picture.
+//! The frames of DICOM files as one stream of samples: native, RLE (PS3.5 annex G) or one of the JPEGs, in any order, cut to a part of the picture.
 
-use crate::files::escaped;
-use image::{DynamicImage, ImageDecoder, ImageFormat, ImageReader};
+use super::jpeg::{self, Expected};
 use std::fs::File;
 use std::io::{self, Cursor, Read, Seek, SeekFrom};
 use std::path::PathBuf;
@@ -12,7 +11,10 @@ use std::sync::Arc;
 pub(in super::super) enum Coding {
     Native,
     Rle,
+    /// Baseline or extended, 8 bits.
     Jpeg,
+    JpegLossless,
+    Jpeg2000,
 }
 
 /// How the numbers of a frame stand after it is decompressed.
@@ -107,7 +109,9 @@ impl Frames {
                 let pixels = self.stored[0] * self.stored[1];
                 unpacked(&bytes, pixels, self.width, self.stored_channels()).map_err(|why| wrong(&why))?
             }
-            Coding::Jpeg => self.jpeg(&bytes).map_err(|why| wrong(&why))?,
+            Coding::Jpeg => jpeg::baseline(&bytes, self.expected()).map_err(|why| wrong(&why))?,
+            Coding::JpegLossless => jpeg::lossless(&bytes, self.expected()).map_err(|why| wrong(&why))?,
+            Coding::Jpeg2000 => jpeg::jpeg_2000(&bytes, self.expected()).map_err(|why| wrong(&why))?,
         };
         if numbers.len() as u64 != self.stored_bytes() {
             return Err(io::ErrorKind::UnexpectedEof.into());
@@ -115,25 +119,8 @@ impl Frames {
         Ok(self.cut(&self.arranged(numbers)))
     }
 
-    /// The samples of a JPEG picture of the right size.
-    fn jpeg(&self, bytes: &[u8]) -> Result<Vec<u8>, String> {
-        let unreadable = |e: image::ImageError| format!("is no JPEG that is read: {}", escaped(&e.to_string(), 200));
-        // The decoder makes up what is missing at the end.
-        let end = bytes.iter().rposition(|b| *b != 0).unwrap_or(0);
-        if bytes.get(end.saturating_sub(1)..=end) != Some(&[0xff, 0xd9]) {
-            return Err("is cut short: the end mark of its JPEG is missing".into());
-        }
-        let reader = ImageReader::with_format(Cursor::new(bytes), ImageFormat::Jpeg);
-        let decoder = reader.into_decoder().map_err(unreadable)?;
-        let (columns, rows) = decoder.dimensions();
-        if [columns as usize, rows as usize] != self.stored {
-            return Err(format!("is a JPEG of {columns} x {rows} pixels, not {} x {}", self.stored[0], self.stored[1]));
-        }
-        let image = DynamicImage::from_decoder(decoder).map_err(unreadable)?;
-        Ok(match self.channels {
-            1 => image.into_luma8().into_raw(),
-            _ => image.into_rgb8().into_raw(),
-        })
+    fn expected(&self) -> Expected {
+        Expected { size: self.stored, channels: self.stored_channels(), width: self.width }
     }
 
     fn arranged(&self, numbers: Vec<u8>) -> Vec<u8> {

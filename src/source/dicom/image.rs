@@ -13,6 +13,8 @@ use std::sync::Arc;
 const MAX_FRAMES: u64 = 1 << 20;
 /// Most bytes of a frame.
 const MAX_FRAME_BYTES: u64 = 1 << 30;
+/// The same of JPEG 2000, whose decoder takes some 30 bytes for each number.
+const MAX_JPEG_2000_BYTES: u64 = 1 << 26;
 /// Red, green and blue in luminance (ITU-R BT.601).
 const LUMINANCE: [f64; 3] = [0.299, 0.587, 0.114];
 
@@ -43,7 +45,7 @@ impl Image {
             let uid = quoted(&elements.syntax);
             return fault(
                 "transfer syntax",
-                format!("{name} ({uid}) is not read: uncompressed, RLE and JPEG baseline are"),
+                format!("{name} ({uid}) is not read: uncompressed, RLE, JPEG and JPEG 2000 are"),
             );
         }
         let side = |field: &str, tag| match root.word(tag) {
@@ -62,13 +64,16 @@ impl Image {
         let (coding, pixels) = match (elements.syntax.as_str(), &elements.pixels) {
             (_, None) => return fault("pixel data (7FE0,0010)", "is missing".into()),
             ("1.2.840.10008.1.2.5", Some(pixels)) => (Coding::Rle, pixels),
+            ("1.2.840.10008.1.2.4.57" | "1.2.840.10008.1.2.4.70", Some(pixels)) => (Coding::JpegLossless, pixels),
+            ("1.2.840.10008.1.2.4.90" | "1.2.840.10008.1.2.4.91", Some(pixels)) => (Coding::Jpeg2000, pixels),
             (uid, Some(pixels)) if uid.starts_with("1.2.840.10008.1.2.4.") => (Coding::Jpeg, pixels),
             (_, Some(pixels)) => (Coding::Native, pixels),
         };
         let (pixel, arrangement, stored) = format(path, elements, coding)?;
         let each = size[0] as u64 * size[1] as u64 * stored as u64;
-        if each > MAX_FRAME_BYTES {
-            return fault("rows and columns", format!("make frames of {each} bytes, at most 1 GiB is read"));
+        let most = if coding == Coding::Jpeg2000 { MAX_JPEG_2000_BYTES } else { MAX_FRAME_BYTES };
+        if each > most {
+            return fault("rows and columns", format!("make frames of {each} bytes, at most {most} are read"));
         }
         let all = frames.saturating_mul(slices.into());
         let holds_all = match pixels {
@@ -88,7 +93,10 @@ impl Image {
                 let parts = (0..frames).map(|n| (offset + n * each, each)).collect();
                 ((0..frames as usize).map(|n| Place { file: 0, first: n, count: 1 }).collect(), parts)
             }
-            (Coding::Rle | Coding::Jpeg, PixelData::Encapsulated(table, fragments)) => {
+            (
+                Coding::Rle | Coding::Jpeg | Coding::JpegLossless | Coding::Jpeg2000,
+                PixelData::Encapsulated(table, fragments),
+            ) => {
                 let there = fragments.iter().fold(0u64, |all, (_, length)| all.saturating_add(*length));
                 let most = there.saturating_mul(Encoding::Dicom(coding).most()).saturating_add(1024);
                 let claimed = each.saturating_mul(frames);
@@ -149,8 +157,14 @@ fn format(path: &Path, elements: &Elements, coding: Coding) -> Result<(PixelForm
     if stored_bits == 0 || stored_bits > bits || high + 1 != stored_bits || (signed && stored_bits != bits) {
         return fault("bits stored (0028,0101)", format!("{stored_bits} of {bits}, up to bit {high}, are not read"));
     }
-    if coding == Coding::Jpeg && bits != 8 {
-        return fault("bits allocated (0028,0100)", format!("is {bits}: of JPEG, 8 are read"));
+    let (most, name) = match coding {
+        Coding::Native | Coding::Rle => (32, ""),
+        Coding::Jpeg => (8, "JPEG, 8"),
+        Coding::JpegLossless => (16, "lossless JPEG, 8 and 16"),
+        Coding::Jpeg2000 => (16, "JPEG 2000, 8 and 16"),
+    };
+    if bits > most {
+        return fault("bits allocated (0028,0100)", format!("is {bits}: of {name} are read"));
     }
     let photometric = root.text(tags::PHOTOMETRIC);
     let planar = root.word(tags::PLANAR).unwrap_or(0) == 1 && coding == Coding::Native;
@@ -164,10 +178,12 @@ fn format(path: &Path, elements: &Elements, coding: Coding) -> Result<(PixelForm
             scale = [-slope, slope * most + intercept];
             (1, Arrangement::Plain, 1)
         }
-        ("PALETTE COLOR", 1, Coding::Native | Coding::Rle) if number == Number::U8 => {
+        ("PALETTE COLOR", 1, Coding::Native | Coding::Rle | Coding::JpegLossless) if number == Number::U8 => {
             (1, Arrangement::Palette(palette(path, elements)?), 1)
         }
         ("RGB" | "YBR_FULL" | "YBR_FULL_422", 3, Coding::Jpeg) => (3, Arrangement::Plain, 3),
+        // The decoder undoes the transform of the colours.
+        ("YBR_RCT" | "YBR_ICT", 3, Coding::Jpeg2000) => (3, Arrangement::Plain, 3),
         ("RGB", 3, _) if planar => (3, Arrangement::Planes, 3),
         ("RGB", 3, _) => (3, Arrangement::Plain, 3),
         ("YBR_FULL", 3, _) if number == Number::U8 && !planar => (1, Arrangement::Luma, 3),
@@ -181,7 +197,7 @@ fn format(path: &Path, elements: &Elements, coding: Coding) -> Result<(PixelForm
         }
     };
     let is_scaled = scale != [1.0, 0.0] && scale.iter().all(|v| v.is_finite()) && scale[0] != 0.0;
-    // RLE is put together in little-endian order.
+    // What is decompressed is in little-endian order.
     let big_endian = elements.big_endian && coding == Coding::Native;
     let pixel = PixelFormat { number, channels, big_endian, scale: is_scaled.then_some(scale) };
     Ok((pixel, arrangement, stored * bytes))

@@ -10,6 +10,7 @@ mod elements;
 mod file;
 mod frames;
 mod image;
+mod jpeg;
 mod placed;
 mod planes;
 mod regions;

@@ -1,6 +1,6 @@
 """Makes the DICOM files of this folder and expected.json: what is where in them, as pydicom 3 and numpy say.
 
-Needs pydicom, numpy and pillow, and dcmcrle and dcmcjpeg of dcmtk. No patient, no scanner: the pictures are formulas.
+Needs pydicom, numpy and pillow, dcmcrle and dcmcjpeg of dcmtk, and opj_compress and opj_decompress of OpenJPEG. No patient, no scanner: the pictures are formulas.
 Run in this folder: python3 make.py
 """
 
@@ -13,7 +13,7 @@ import pydicom
 from pydicom.dataset import Dataset, FileMetaDataset
 from pydicom.encaps import encapsulate
 from pydicom.sequence import Sequence
-from pydicom.uid import ExplicitVRBigEndian, ExplicitVRLittleEndian, ImplicitVRLittleEndian, JPEGLSLossless
+from pydicom.uid import ExplicitVRBigEndian, ExplicitVRLittleEndian, ImplicitVRLittleEndian, JPEG2000, JPEG2000Lossless, JPEGLSLossless
 
 STORAGE = "1.2.840.10008.5.1.4.1.1."
 expected = {}
@@ -176,6 +176,50 @@ for colour, name in enumerate(["Red", "Green", "Blue"]):
 write("palette.dcm", palette)
 expect_region("palette.dcm", luminance(table)[grey[:2]])
 
+
+
+def jpeg_2000(name, source, array, *more, photometric=None, syntax=JPEG2000Lossless):
+    """Packs frames with OpenJPEG. array: frames, rows, columns and channels. Returns the frames as OpenJPEG reads them again."""
+    ds, frames, read = pydicom.dcmread(source), [], []
+    rows, columns = array.shape[1:3]
+    channels = array.shape[3] if array.ndim == 4 else 1
+    bits = array.dtype.itemsize * 8
+    for frame in array:
+        # Raw pixels, channel after channel, in big-endian order.
+        planes = frame.reshape(rows, columns, channels).transpose(2, 0, 1)
+        Path("frame.raw").write_bytes(planes.astype(planes.dtype.newbyteorder(">")).tobytes())
+        form = f"{columns},{rows},{channels},{bits},u"
+        subprocess.run(["opj_compress", "-i", "frame.raw", "-o", "frame.j2c", "-F", form, "-n", "2", *more], check=True, capture_output=True)
+        frames.append(Path("frame.j2c").read_bytes())
+        subprocess.run(["opj_decompress", "-i", "frame.j2c", "-o", "back.rawl"], check=True, capture_output=True)
+        back = np.frombuffer(Path("back.rawl").read_bytes(), array.dtype.newbyteorder("<"))
+        read.append(back.reshape(channels, rows, columns).transpose(1, 2, 0).reshape(frame.shape))
+    for path in ["frame.raw", "frame.j2c", "back.rawl"]:
+        Path(path).unlink()
+    ds.file_meta.TransferSyntaxUID = syntax
+    ds.PixelData = encapsulate(frames)
+    ds["PixelData"].VR = "OB"
+    ds["PixelData"].is_undefined_length = True
+    if photometric:
+        ds.PhotometricInterpretation = photometric
+    write(name, ds)
+    return np.stack(read).astype(array.dtype)
+
+
+# Without loss: any predictor, and the first; of 8 bits, of colours, and of 16 bits below.
+subprocess.run(["dcmcjpeg", "+el", "+sv", "5", "multiframe.dcm", "multiframe-lossless.dcm"], check=True)
+expect_region("multiframe-lossless.dcm", grey)
+colours = multiframe("colours.dcm", rgb, "RGB")
+subprocess.run(["dcmcjpeg", "+e1", "colours.dcm", "colours-lossless.dcm"], check=True)
+expect_region("colours-lossless.dcm", luminance(rgb))
+assert (jpeg_2000("multiframe-j2k.dcm", "multiframe.dcm", grey) == grey).all()
+expect_region("multiframe-j2k.dcm", grey)
+assert (jpeg_2000("colours-j2k.dcm", "colours.dcm", rgb, photometric="YBR_RCT") == rgb).all()
+expect_region("colours-j2k.dcm", luminance(rgb))
+lossy = jpeg_2000("multiframe-j2k-lossy.dcm", "multiframe.dcm", grey, "-I", "-r", "3", syntax=JPEG2000)
+assert 0 < np.abs(lossy.astype(int) - grey).max() < 40
+expect_region("multiframe-j2k-lossy.dcm", lossy, 1)
+
 # One picture of 16 bits without regions, in implicit order, placed in the patient.
 single = new("image.dcm", STORAGE + "6.1", ImplicitVRLittleEndian)
 words = formula(1, 6, 7, dtype=np.uint16)
@@ -183,7 +227,12 @@ pixels(single, words)
 single.PixelSpacing, single.SliceThickness = ["0.31", "0.29"], "1.5"
 single.ImageOrientationPatient, single.ImagePositionPatient = ["0", "1", "0", "0", "0", "-1"], ["10", "-20.5", "30.25"]
 write("image.dcm", single)
-expect("image.dcm", affine([0, 0.29, 0], [0, 0, -0.31], [-1.5, 0, 0], [10, -20.5, 30.25]), words[None])
+placed = affine([0, 0.29, 0], [0, 0, -0.31], [-1.5, 0, 0], [10, -20.5, 30.25])
+expect("image.dcm", placed, words[None])
+subprocess.run(["dcmcjpeg", "+e1", "image.dcm", "image-lossless.dcm"], check=True)
+expect("image-lossless.dcm", placed, words[None])
+assert (jpeg_2000("image-j2k.dcm", "image.dcm", words) == words).all()
+expect("image-j2k.dcm", placed, words[None])
 plain = new("plain.dcm", STORAGE + "6.1")
 pixels(plain, formula(1, 6, 7))
 write("plain.dcm", plain)
