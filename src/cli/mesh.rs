@@ -3,13 +3,14 @@
 use super::recordings::{OUTPUT, read_with_threshold, share_of, target_grid};
 use crate::args::{GeometryArgs, check_outputs, open_recording};
 use crate::mesh::Mesh;
+use crate::mesh::base::Base;
 use crate::mesh::files::MeshFile;
 use crate::mesh::nets::{Surface, surface_net};
 use crate::mesh::simplify::simplified;
 use crate::mesh::smooth::Smoother;
 use crate::probe::{Geometry, World};
-use crate::scene::Input;
 use crate::scene::default_look::smoothing;
+use crate::scene::{Input, depth_offset};
 use crate::terminal::{self, Failure, failed, input, say};
 use std::path::PathBuf;
 
@@ -20,6 +21,7 @@ use std::path::PathBuf;
                         world (LPS) where the recording states them. STL has neither colours nor a unit.\n\nExamples:\n  \
                         echolume mesh sweep.mha face.stl\n  \
                         echolume mesh sweep.mha face.stl --simplify 0.1\n  \
+                        echolume mesh sweep.mha relief.stl --base 3\n  \
                         echolume mesh bone.mha bone.glb --threshold 0.4 --spacing 0.5 --smooth 0.5 --open"
 )]
 pub struct MakeMesh {
@@ -41,6 +43,14 @@ pub struct MakeMesh {
     /// Take away triangles as long as no point of the surface moves by more than this, mm; closed stays closed
     #[arg(long, value_name = "MM", allow_negative_numbers = true)]
     simplify: Option<f64>,
+    /// Fill everything behind the surface, as the probe sees it, down to a flat base this far below the deepest place of the surface, mm:
+    /// a relief to print
+    #[arg(long, value_name = "MM", conflicts_with = "open", allow_negative_numbers = true)]
+    base: Option<f64>,
+    /// Leave out what lies above this depth, mm as region.depth [default: nothing; with --base a bright layer next to the probe, as by render
+    /// without a preset]
+    #[arg(long, value_name = "MM", allow_negative_numbers = true)]
+    start: Option<f64>,
     /// Leave the surface open at the border of the volume
     #[arg(long)]
     open: bool,
@@ -56,6 +66,8 @@ pub struct MakeMesh {
 
 /// Colours by name, sRGB.
 const COLOURS: [(&str, [u8; 3]); 2] = [("grey", [128, 128, 128]), ("skin", [224, 172, 140])];
+/// Thickest base, mm.
+const MAX_BASE: f64 = 1000.0;
 /// Widest smoothing, voxels: its slices are kept in memory.
 const MAX_DEVIATION: f64 = 32.0;
 
@@ -70,6 +82,12 @@ impl MakeMesh {
         if let Some(mm) = self.simplify.filter(|mm| !(mm.is_finite() && *mm > 0.0)) {
             return Err(input(format!("--simplify {mm}: must be a length above 0 mm")));
         }
+        if let Some(mm) = self.base.filter(|mm| !(*mm > 0.0 && *mm <= MAX_BASE)) {
+            return Err(input(format!("--base {mm}: must be a length above 0 and up to {MAX_BASE} mm")));
+        }
+        if let Some(mm) = self.start.filter(|mm| !mm.is_finite()) {
+            return Err(input(format!("--start {mm}: must be a depth, mm")));
+        }
         let mut recording = open_recording(&self.input, self.geometry.options())?;
         let read = recording.files();
         let read = read.iter().chain(&self.geometry.probe).map(PathBuf::as_path);
@@ -78,7 +96,7 @@ impl MakeMesh {
         let (shift, world) = (recording.sample_type().shift(), recording.world());
         let (geometry, volume, found) = read_with_threshold(&mut *recording, &self.input, self.volume, samples)?;
         let grid = target_grid(&geometry, self.spacing)?;
-        let share = share_of(self.threshold, found, &self.input)?;
+        let share = share_of(self.threshold, found.as_ref(), &self.input)?;
         let [low, high] = samples.range;
         let threshold = low + share * (high - low);
         let world = match (&geometry, world) {
@@ -86,15 +104,51 @@ impl MakeMesh {
             _ => World::of(&grid),
         };
         let deviation = self.deviation(&geometry, &grid.spacing)?;
-        let mut smoother = Smoother::new(grid.size, grid.spacing, deviation);
         let bar = terminal::progress_bar(grid.size[2] as u64).with_message("slices");
+        let start = self.start.or(self.base.and(found.as_ref()).and_then(|levels| levels.start));
+        // Depths are stated below the probe's face.
+        let face = depth_offset(&geometry);
+        // Voxels of a slice that are left out.
+        let rows = start.map_or(0.0, |depth| ((depth + face - grid.origin[1]) / grid.spacing[1]).ceil());
+        let above = rows.clamp(0.0, grid.size[1] as f64) as usize * grid.size[0];
+        let reader = || {
+            let mut smoother = Smoother::new(grid.size, grid.spacing, deviation);
+            let (volume, grid, bar) = (&volume, &grid, &bar);
+            move |z: usize, out: &mut [f64]| {
+                smoother.slice(z, out, |z, out| {
+                    volume.slice(grid, z, out);
+                    out.iter_mut().take(above).for_each(|value| *value = f64::NAN);
+                });
+                bar.inc(1);
+            }
+        };
+        let mut size = grid.size;
+        let mut base = None;
+        let mut own = vec![0.0; size[0] * size[1]];
+        if let Some(mm) = self.base {
+            bar.set_length(2 * size[2] as u64);
+            let (mut found, mut read) = (Base::new(size[0], threshold), reader());
+            for z in 0..size[2] {
+                read(z, &mut own);
+                found.survey(&own);
+            }
+            let rows = (mm / grid.spacing[1]).ceil() as usize;
+            size[1] = found.rows(rows).unwrap_or(size[1]);
+            base = Some(found);
+        }
+        let mut read = reader();
         let slice = |z: usize, out: &mut [f64]| {
-            smoother.slice(z, out, |z, out| volume.slice(&grid, z, out));
-            bar.inc(1);
+            match &base {
+                None => read(z, out),
+                Some(base) => {
+                    read(z, &mut own);
+                    base.fill(&own, out);
+                }
+            }
             Ok::<(), String>(())
         };
         let surface = Surface { threshold, closed: !self.open };
-        let mesh = surface_net(grid.size, surface, slice, |at| world.at(at)).map_err(failed)?;
+        let mesh = surface_net(size, surface, slice, |at| world.at(at)).map_err(failed)?;
         bar.finish_and_clear();
         let in_file = threshold - shift;
         if mesh.triangles.is_empty() {
@@ -103,6 +157,14 @@ impl MakeMesh {
             return Err(input(format!("{}: nothing is written: {fault}", self.output.display())));
         }
         let mut how = format!("threshold {share:.3} ({in_file:.4} in the file), smoothed by {deviation:.2} mm");
+        if let Some(depth) = start {
+            how += &format!(", from a depth of {depth:.2} mm");
+        }
+        if self.base.is_some() {
+            // Half a voxel below the last row.
+            let depth = grid.origin[1] - face + (size[1] as f64 - 0.5) * grid.spacing[1];
+            how += &format!(", filled down to a base at a depth of {depth:.2} mm");
+        }
         let mesh = match self.simplify {
             None => mesh,
             Some(mm) => {

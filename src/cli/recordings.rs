@@ -4,7 +4,7 @@ use crate::args::{GeometryArgs, Output, check_outputs, open_recording};
 use crate::files::signals::Writing;
 use crate::probe::{Geometry, Grid, World};
 use crate::scene::default_look::block_edge;
-use crate::scene::{EchoHistogram, Input, insonified_box};
+use crate::scene::{EchoHistogram, EchoLevels, Input, insonified_box};
 use crate::source::convert::{Target, Volume, lattice};
 use crate::source::phantom::{Body, Label, Phantom, PhantomOptions, PointSpread, Sampling, Speckle, distance_path};
 use crate::source::recorder::{Header, Writer};
@@ -51,20 +51,20 @@ pub(super) fn read_with_threshold(
     file: &Path,
     number: usize,
     samples: Input,
-) -> Result<(Geometry, Volume, Option<f64>), Failure> {
+) -> Result<(Geometry, Volume, Option<EchoLevels>), Failure> {
     let mut levels = None;
     let (geometry, volume, _) = read_volume(recording, file, number, |geometry, frame| {
         let histogram = || EchoHistogram::new(geometry, samples, block_edge(geometry));
         levels.get_or_insert_with(histogram).take(&frame.bytes);
     })?;
-    let found = levels.and_then(|histogram| histogram.levels()).map(|levels| levels.threshold);
+    let found = levels.and_then(|histogram| histogram.levels());
     Ok((geometry, volume, found))
 }
 
 /// The threshold that was asked for, or the one that was found.
-pub(super) fn share_of(asked: Option<f64>, found: Option<f64>, file: &Path) -> Result<f64, Failure> {
+pub(super) fn share_of(asked: Option<f64>, found: Option<&EchoLevels>, file: &Path) -> Result<f64, Failure> {
     let none = || input(format!("{}: the echoes have no two classes; give --threshold", file.display()));
-    asked.or(found).ok_or_else(none)
+    asked.or(found.map(|levels| levels.threshold)).ok_or_else(none)
 }
 
 /// The lattice of a conversion: that of the volume itself, or one of the spacing that was asked for, mm.
@@ -198,7 +198,7 @@ impl Convert {
         let (shift, sample, world) = (recording.sample_type().shift(), recording.sample_type(), recording.world());
         let (geometry, volume, found) = read_with_threshold(&mut *recording, &self.input, self.volume, samples)?;
         let grid = target_grid(&geometry, self.spacing)?;
-        let share = share_of(self.threshold, found, &self.input)?;
+        let share = share_of(self.threshold, found.as_ref(), &self.input)?;
         let threshold = samples.range[0] + share * (samples.range[1] - samples.range[0]);
         let mut target = Target::new(grid, sample);
         if let (Some(world), Geometry::Cartesian(own)) = (world, &geometry) {

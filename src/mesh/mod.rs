@@ -1,9 +1,10 @@
 //! Triangle meshes of a threshold's surface, on the CPU in f64: surface nets of a lattice ([`nets`]) that may be smoothed
-//! ([`smooth`]), meshes of fewer triangles ([`simplify`]), and files of them ([`files`]).
+//! ([`smooth`]) or filled to a solid with a flat base ([`base`]), meshes of fewer triangles ([`simplify`]), and files of them ([`files`]).
 //!
 //! A mesh is welded: triangles share vertices by their index. One without open edges is a closed manifold: every edge belongs to exactly two
 //! triangles, which run along it in opposite directions.
 
+pub mod base;
 mod cell;
 pub mod files;
 pub mod nets;

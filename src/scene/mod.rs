@@ -35,7 +35,8 @@ pub use visible_bounds::{Rectangle, Shared, VisibleBounds};
 use crate::probe::{Array, Geometry, Probe};
 use crate::source::StoredType;
 use glam::DVec3;
-use region::{depth_offset, framed_low, is_still, slice_grid, visible_box};
+pub(crate) use region::depth_offset;
+use region::{framed_low, is_still, slice_grid, visible_box};
 use sizes::{Pitches, ResolvedSize, Resolver};
 
 /// Maximum width and height of a picture, pixels.

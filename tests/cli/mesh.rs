@@ -50,6 +50,7 @@ fn a_ball_keeps_its_volume_and_place_whatever_the_hand_of_its_axes() {
     let exact = 4.0 / 3.0 * std::f64::consts::PI * RADIUS.powi(3);
     for mirrored in [false, true] {
         let (input, output) = (ball(&folder, "ball.mha", mirrored), folder.path("ball.stl"));
+        let relief = folder.path("relief.stl");
         // The distance 0 as a share of the range of the samples.
         let info = done(&["info", &input]);
         let range = info.lines().find_map(|line| line.strip_prefix("value range")).expect("a range");
@@ -70,6 +71,18 @@ fn a_ball_keeps_its_volume_and_place_whatever_the_hand_of_its_axes() {
         let most = 0.1 * 4.0 * std::f64::consts::PI * RADIUS * RADIUS;
         assert!((simple - volume).abs() < most, "mirrored {mirrored}: {simple} of {volume}");
         let left = fs::metadata(&output).expect("a mesh").len();
+        // Half of the ball on a cylinder that ends 2 mm below its deepest row, at most a voxel and a half more.
+        let said = done(&["mesh", &input, &relief, "--threshold", &share, "--base", "2"]);
+        assert!(said.contains("closed, 0.") && said.contains(", filled down to a base at a depth of "), "{said}");
+        let (solid, centre) = measured(&relief);
+        let with = |cylinder: f64| exact / 2.0 + std::f64::consts::PI * RADIUS * RADIUS * cylinder;
+        assert!((with(0.95 * 2.0)..with(2.0 + 1.5 * 0.9)).contains(&solid), "{solid}");
+        // The centre of half a ball is 3/8 of its radius above its middle.
+        let (half, length) = (exact / 2.0, (solid - exact / 2.0) / (std::f64::consts::PI * RADIUS * RADIUS));
+        let below = (length / 2.0 * (solid - half) - 0.375 * RADIUS * half) / solid;
+        let off = [centre[0], centre[1] - below, centre[2]];
+        // The net of so coarse a ball lacks up to a sixth of it.
+        assert!(off.iter().all(|v| v.abs() < 0.15), "mirrored {mirrored}: {centre:?}, {below}");
         assert!(2 * left < net, "{left} of {net} bytes");
     }
 }
@@ -87,6 +100,8 @@ fn a_mesh_that_would_be_wrong_is_not_written() {
         (&[&input, &stl, "--spacing", "0"], "--spacing 0"),
         (&[&input, &stl, "--volume", "1"], "--volume 1"),
         (&[&input, &stl, "--simplify", "0"], "--simplify 0"),
+        (&[&input, &stl, "--base", "0"], "--base 0"),
+        (&[&input, &stl, "--start", "inf"], "--start inf"),
         (&[&input, &stl, "--threshold", "0"], "--threshold 0"),
         (&[&input, "-"], ".stl, .ply or .glb"),
     ] {

@@ -96,6 +96,41 @@ pub fn uff(bytes: &[u8]) -> String {
     outcome(echolume::source::open(&written("input.uff", bytes), None).and_then(read))
 }
 
+/// A stack of two pictures; names of pictures, a line each; and a file that states their spacing.
+pub fn stack(bytes: &[u8]) -> String {
+    let spaced = OpenOptions { voxel_spacing: Some([0.5, 0.25, 1.0]), ..OpenOptions::default() };
+    let one = |name: &str, options| {
+        outcome(Recording::open_with(&super::folder().join(name), options).and_then(|recording| {
+            let _ = recording.description();
+            read(Box::new(recording))
+        }))
+    };
+    let new = |name: &str| {
+        let folder = super::folder().join(name);
+        let _ = std::fs::remove_dir_all(&folder);
+        std::fs::create_dir_all(&folder).expect("a folder for inputs");
+    };
+    new("stack");
+    for name in ["stack/slice-1.png", "stack/slice-2.png"] {
+        written(name, bytes);
+    }
+    let pictures = one("stack", spaced);
+    new("names");
+    let is_plain = |c: &char| c.is_alphanumeric() || "-_. ".contains(*c);
+    for line in String::from_utf8_lossy(bytes).lines().take(6) {
+        let name: String = line.chars().filter(is_plain).take(40).collect();
+        written(&format!("names/{name}.pgm"), PGM);
+    }
+    let names = one("names", spaced);
+    new("spacing");
+    written("spacing/slice-1.pgm", PGM);
+    written("spacing/probe.toml", bytes);
+    pictures + &names + &one("spacing", OpenOptions::default())
+}
+
+/// A picture of two pixels.
+const PGM: &[u8] = b"P5 2 1 255 ab";
+
 pub fn kretz(bytes: &[u8]) -> String {
     recording(&written("input.vol", bytes), None)
 }

@@ -174,6 +174,15 @@ pub const TARGETS: &[Target] = &[
     Target { name: "report", run: reports::error_report, text: true, memory: 64 * MIB, rounds: 30_000, also: &[] },
     Target { name: "profile", run: reports::profile, text: true, memory: 64 * MIB, rounds: 50_000, also: &[] },
     // A header of some bytes may claim 512 MiB, which the system provides when they are written.
+    // The pictures of a stack may be as large as others.
+    Target {
+        name: "stack",
+        run: files::stack,
+        text: true,
+        memory: 2048 * MIB,
+        rounds: 1_500,
+        also: &["tests/fuzz/seeds/picture", "tests/fuzz/seeds/probe"],
+    },
     Target { name: "picture", run: reports::picture, text: false, memory: 2048 * MIB, rounds: 2_500, also: &[] },
     Target { name: "compounder", run: voxels::compounder, text: false, memory: 64 * MIB, rounds: 6_000, also: &[] },
 ];
