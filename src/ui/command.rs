@@ -86,6 +86,12 @@ pub enum Command {
     OpenFiles,
     /// Opens the n-th entry of that list.
     OpenFile(usize),
+    /// Shows or hides the menu of exports.
+    Exports,
+    /// Exports the volume that is shown in the n-th format of that menu.
+    Export(usize),
+    /// Ends the export in work.
+    CancelExport,
     /// Freezes or unfreezes the live picture.
     Freeze,
     /// Steps so many volumes back (negative) or forward, and freezes.
@@ -296,6 +302,7 @@ pub const KEY_BINDINGS: &[Binding] = &[
     on(Char('r'), "save the recording", Command::SaveLoop),
     control(Char('s'), "save the workspace", Command::SaveWorkspace),
     control(Char('o'), "open a recording or a workspace", Command::OpenFiles),
+    control(Char('e'), "export the volume", Command::Exports),
     // The screen.
     on(Char('h'), "this help", Command::ToggleHelp),
     on(Function(1), "this help", Command::ToggleHelp),

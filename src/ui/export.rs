@@ -1,12 +1,15 @@
-//! Saves pictures and recordings of the view in background threads. File names contain the time and nothing about the patient.
+//! Saves pictures, recordings and exports of the view in background threads. File names contain the time and nothing about the patient.
 
+use super::volume_export::{Export, Job};
 use crate::files;
 use crate::gpu::Wake;
 use crate::live::cine::CineVolume;
 use crate::picture::Picture;
 use crate::source::recorder::{Header, Writer};
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 use std::sync::mpsc::{Receiver, Sender, channel};
+use std::thread::JoinHandle;
 use std::time::{SystemTime, UNIX_EPOCH};
 
 /// Largest number of files that are being saved: a key that is held must not fill the disk.
@@ -20,13 +23,15 @@ pub(super) struct Exporter {
     pending: usize,
     number: u32,
     wake: Wake,
+    /// The export that was begun last: its name and its thread.
+    export: Option<(&'static str, Arc<Export>, JoinHandle<()>)>,
 }
 
 impl Exporter {
     /// `folder`: where files are saved; it is created with the first one. `wake` is called when a file is done.
     pub(super) fn new(folder: PathBuf, wake: Wake) -> Exporter {
         let (sender, receiver) = channel();
-        Exporter { folder, sender, receiver, pending: 0, number: 0, wake }
+        Exporter { folder, sender, receiver, pending: 0, number: 0, wake, export: None }
     }
 
     /// The next file that was saved since the last call, or why it was not.
@@ -44,7 +49,7 @@ impl Exporter {
         &mut self,
         make: impl FnOnce() -> Result<Picture, String> + Send + 'static,
     ) -> Result<(), String> {
-        self.save("png", move |file| make()?.save(file))
+        self.save("png", move |file| make()?.save(file)).map(|_| ())
     }
 
     /// Saves a text under a name with this ending.
@@ -52,7 +57,7 @@ impl Exporter {
     /// # Errors
     /// As for [`Exporter::picture`].
     pub(super) fn text(&mut self, ending: &'static str, text: String) -> Result<(), String> {
-        self.save(ending, move |file| files::replace(file, text.as_bytes()))
+        self.save(ending, move |file| files::replace(file, text.as_bytes())).map(|_| ())
     }
 
     /// The folder of saved files.
@@ -65,24 +70,45 @@ impl Exporter {
     /// # Errors
     /// As for [`Exporter::picture`].
     pub(super) fn volumes(&mut self, header: Header, volumes: Vec<CineVolume>) -> Result<(), String> {
-        self.save("frames", move |file| {
-            let mut writer = Writer::create(file, header).map_err(|e| e.to_string())?;
-            let mut frames = volumes.iter().flat_map(|volume| &volume.frames);
-            match frames.try_for_each(|frame| writer.frame(frame, frame.time.unwrap_or(0.0))) {
-                Ok(()) => writer.finish().map_err(|e| e.to_string()),
-                Err(e) => {
-                    writer.discard();
-                    Err(e.to_string())
-                }
-            }
-        })
+        self.save("frames", move |file| write_frames(file, header, &volumes)).map(|_| ())
+    }
+
+    /// Exports a volume. One export runs at a time.
+    ///
+    /// # Errors
+    /// Another one is in work; as for [`Exporter::picture`].
+    pub(super) fn export(&mut self, job: Job) -> Result<(), String> {
+        if let Some(name) = self.exporting() {
+            return Err(format!("{name} is still being exported"));
+        }
+        let export = Arc::new(Export::default());
+        let (own, name) = (export.clone(), job.format.name);
+        let thread = self.save(job.format.ending, move |file| {
+            let done = own.run(&job, file);
+            own.finish();
+            done
+        })?;
+        self.export = Some((name, export, thread));
+        Ok(())
+    }
+
+    /// The name of the export in work.
+    pub(super) fn exporting(&self) -> Option<&'static str> {
+        self.export.as_ref().filter(|(_, export, _)| !export.is_finished()).map(|(name, ..)| *name)
+    }
+
+    /// Ends the export in work, if there is one.
+    pub(super) fn cancel_export(&self) {
+        if let Some((_, export, _)) = &self.export {
+            export.cancel();
+        }
     }
 
     fn save(
         &mut self,
         extension: &'static str,
         write: impl FnOnce(&Path) -> Result<(), String> + Send + 'static,
-    ) -> Result<(), String> {
+    ) -> Result<JoinHandle<()>, String> {
         if self.pending >= MAX_PENDING {
             return Err(format!("{MAX_PENDING} files are still being saved: wait a moment"));
         }
@@ -99,7 +125,35 @@ impl Exporter {
             wake();
         };
         let started = std::thread::Builder::new().name("saving".into()).spawn(work);
-        started.map(|_| self.pending += 1).map_err(|e| format!("a thread cannot be started: {e}"))
+        let started = started.map_err(|e| format!("a thread cannot be started: {e}"))?;
+        self.pending += 1;
+        Ok(started)
+    }
+}
+
+/// Nothing of an export stays when the view ends.
+impl Drop for Exporter {
+    fn drop(&mut self) {
+        self.cancel_export();
+        if let Some((.., thread)) = self.export.take() {
+            let _ = thread.join();
+        }
+    }
+}
+
+/// Writes volumes as a recording, whole or not at all.
+///
+/// # Errors
+/// One line: a file that cannot be written.
+pub(super) fn write_frames(file: &Path, header: Header, volumes: &[CineVolume]) -> Result<(), String> {
+    let mut writer = Writer::create(file, header).map_err(|e| e.to_string())?;
+    let mut frames = volumes.iter().flat_map(|volume| &volume.frames);
+    match frames.try_for_each(|frame| writer.frame(frame, frame.time.unwrap_or(0.0))) {
+        Ok(()) => writer.finish().map_err(|e| e.to_string()),
+        Err(e) => {
+            writer.discard();
+            Err(e.to_string())
+        }
     }
 }
 

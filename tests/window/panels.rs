@@ -151,3 +151,46 @@ fn measure_on_a_plane(desk: &Desk, view: &View, folder: &Folder) {
     let pixel = 4 * (60 * drawn.width + 250) as usize;
     assert!(drawn.rgba[pixel] > 200 && drawn.rgba[pixel + 2] < 150, "{:?}", &drawn.rgba[pixel..pixel + 3]);
 }
+
+/// Exports are those of the commands; one that is not finished when the view ends leaves nothing.
+#[test]
+fn the_volume_is_exported_as_the_commands_do() {
+    let desk = Desk::new(false);
+    let folder = Folder::new("exports");
+    let samples: Vec<u8> = (0..24usize.pow(3))
+        .map(|n| {
+            let at = [n % 24, n / 24 % 24, n / 576].map(|k| k as f64 - 11.5);
+            if at.iter().map(|d| d * d).sum::<f64>() < 64.0 { 200 } else { 20 + (n % 7) as u8 }
+        })
+        .collect();
+    let header = "ObjectType = Image\nNDims = 3\nDimSize = 24 24 24\nElementType = MET_UCHAR\nElementSpacing = 1 1 1\nElementDataFile = LOCAL\n";
+    let ball = folder.write("ball.mha", [header.as_bytes(), &samples].concat());
+    let view = desk.view(&["--size", "700x500", "--source", &ball, "--save-to", &folder.path("kept"), "--mode", "mip"]);
+    until("a picture", || {
+        let seen = view.look()?;
+        let is_bright = |pixel: &[u8]| pixel[..3].iter().all(|c| *c > 150);
+        (seen.rgba.chunks(4).filter(|pixel| is_bright(pixel)).count() > 5000).then_some(())
+    });
+    let export = |format: char| {
+        desk.press(CONTROL, true);
+        desk.tap('e');
+        desk.press(CONTROL, false);
+        desk.tap(format);
+    };
+    let all = || std::fs::read_dir(folder.path("kept")).into_iter().flatten().flatten().map(|entry| entry.path());
+    for (format, ending, command) in [('1', "nrrd", &["convert"][..]), ('7', "stl", &["mesh", "--base", "3"])] {
+        export(format);
+        let file = until("the export", || all().find(|path| path.extension().is_some_and(|end| end == ending)));
+        let wanted = folder.path(&format!("wanted.{ending}"));
+        let run = std::process::Command::new(PROGRAM).args(command).args([&ball, &wanted]).output();
+        let run = run.expect("the program runs");
+        assert!(run.status.success(), "{}", String::from_utf8_lossy(&run.stderr));
+        let [got, wanted] = [file, wanted.into()].map(|file| std::fs::read(file).expect("a file"));
+        assert!(got == wanted, "{ending}: {} and {} bytes", got.len(), wanted.len());
+    }
+    export('8');
+    until("a turntable in work", || all().find(|path| path.to_string_lossy().contains(".echolume-export-")));
+    view.leave();
+    let left: Vec<_> = all().map(|path| path.display().to_string()).collect();
+    assert!(left.len() == 2 && left.iter().all(|path| !path.contains(".echolume-export-")), "{left:?}");
+}

@@ -352,6 +352,8 @@ impl Console {
             shows_panels: self.shows_panels,
             has_column: panels::has_column(self.size, self.panels.scale(), self.shows_panels),
             files: self.opening.shown(),
+            shows_exports: self.shows_exports,
+            exporting: self.exporter.exporting(),
             // egui panics if a list has a negative height.
             shows_help: self.shows_help && self.size[1] as f32 > MIN_HELP_HEIGHT * self.panels.scale(),
             shows_times: self.shows_times,

@@ -240,16 +240,17 @@ impl Console {
         is_measuring
     }
 
-    /// The commands of a key that is typed into a text, ends a contour, or chooses a file. None if the key is one of the view's own.
+    /// The commands of a key that is typed into a text, ends a contour, or chooses a file or a format. None if the key is one of the view's own.
     pub(super) fn typed(&mut self, input: &Input) -> Option<Vec<Command>> {
         let Input::Key { key, pressed: true } = *input else { return None };
         let modifiers = self.keys.modifiers();
         if modifiers.control || modifiers.alt || self.asks_to_leave {
             return None;
         }
-        if self.opening.is_shown() {
+        if self.opening.is_shown() || self.shows_exports {
+            let choose = if self.opening.is_shown() { Command::OpenFile } else { Command::Export };
             return match key {
-                Key::Char(digit @ '1'..='9') => Some(vec![Command::OpenFile(digit as usize - '1' as usize)]),
+                Key::Char(digit @ '1'..='9') => Some(vec![choose(digit as usize - '1' as usize)]),
                 Key::Escape => None,
                 _ => Some(Vec::new()),
             };

@@ -110,6 +110,7 @@ pub struct Console {
     saves_bar: bool,
     /// What the help is searched for; none while it is not.
     help_search: Option<String>,
+    shows_exports: bool,
     /// Asks whether to save the loop before leaving.
     asks_to_leave: bool,
     leaves_when_saved: bool,
@@ -253,6 +254,7 @@ impl Console {
             shows_panels,
             saves_bar: options.bar,
             help_search: None,
+            shows_exports: false,
             asks_to_leave: false,
             leaves_when_saved: false,
             is_full_screen: false,
@@ -544,6 +546,9 @@ impl Console {
             Command::SaveWorkspace => self.save_workspace(),
             Command::OpenFiles => self.toggle_files(),
             Command::OpenFile(n) => self.open_entry(n),
+            Command::Exports => self.shows_exports = !self.shows_exports,
+            Command::Export(n) => self.export_volume(n),
+            Command::CancelExport => self.exporter.cancel_export(),
             Command::Back => self.go_back(),
             // A kiosk ends only with its exit keys: a sleeve may press Escape.
             Command::Exit if self.fixed.is_kiosk => {}
@@ -581,6 +586,8 @@ impl Console {
             self.asks_to_leave = false;
         } else if self.opening.is_shown() {
             self.toggle_files();
+        } else if self.shows_exports {
+            self.shows_exports = false;
         } else if self.help_search.is_some() {
             self.help_search = None;
         } else if self.shows_help {

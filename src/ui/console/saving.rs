@@ -1,7 +1,8 @@
-//! Saving what is shown: the picture, and the cine loop.
+//! Saving what is shown: the picture, the cine loop, and the volume in the formats of other programs.
 
 use super::Console;
 use crate::marked;
+use crate::ui::volume_export::{FORMATS, Job};
 use std::time::SystemTime;
 
 impl Console {
@@ -46,5 +47,25 @@ impl Console {
             self.notify(&format!("The loop was not saved: {fault}"), true);
         }
         saved.is_ok()
+    }
+
+    /// Exports the volume that is shown, or else the newest, in the n-th format of the menu.
+    pub(super) fn export_volume(&mut self, n: usize) {
+        let Some(format) = FORMATS.get(n).copied() else { return };
+        self.shows_exports = false;
+        let volumes = self.stream.cine().volumes();
+        let shown = self.stream.cine_position().and_then(|at| volumes.get(at)).or(volumes.back()).cloned();
+        let begun = match (self.stream.header().cloned(), shown) {
+            (Some(header), Some(volume)) => {
+                let mut settings = self.controls.settings().clone();
+                settings.marks.bar = self.saves_bar;
+                self.exporter.export(Job { format, header, volume, settings })
+            }
+            _ => Err("there is no volume yet".into()),
+        };
+        match begun {
+            Ok(()) => self.notify(&format!("Exporting: {}", format.name), false),
+            Err(fault) => self.notify(&format!("Not exported: {fault}"), true),
+        }
     }
 }

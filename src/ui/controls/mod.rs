@@ -212,7 +212,10 @@ impl Controls {
             | Command::SaveMeasures
             | Command::SaveWorkspace
             | Command::OpenFiles
-            | Command::OpenFile(_) => return Change::Caller(*command),
+            | Command::OpenFile(_)
+            | Command::Exports
+            | Command::Export(_)
+            | Command::CancelExport => return Change::Caller(*command),
             _ => {}
         }
         if let Some(change) = self.measure(command) {

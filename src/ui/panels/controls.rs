@@ -82,6 +82,11 @@ pub(super) fn show_modes(ui: &mut Ui, state: &PanelState, width: f32, execute: &
                     }
                 }
             });
+            let hint = "Exports the volume that is shown: as a volume, a surface to print, or a turntable (Ctrl+E).";
+            let whole = vec2(width - 16.0, TOUCH_SIZE * 0.75);
+            if ui.add(Button::new("Export").min_size(whole)).on_hover_text(hint).clicked() {
+                execute(Command::Exports);
+            }
         });
     });
 }

@@ -5,7 +5,7 @@
 
 mod annotations;
 mod controls;
-mod files;
+mod lists;
 mod measures;
 mod overlays;
 
@@ -116,7 +116,10 @@ impl Panels {
                 overlays::show_help(ui, state, execute);
             }
             if let Some(files) = state.files {
-                files::show(ui, files, execute);
+                lists::show_files(ui, files, execute);
+            }
+            if state.shows_exports {
+                lists::show_exports(ui, state.exporting, execute);
             }
             if state.asks_to_leave {
                 overlays::ask_to_leave(ui, execute);
@@ -270,6 +273,9 @@ pub(super) struct PanelState<'a> {
     pub(super) asks_to_leave: bool,
     /// The list of files to open, while it is shown: its title and its entries.
     pub(super) files: Option<(&'a str, &'a [String])>,
+    pub(super) shows_exports: bool,
+    /// The name of the export in work.
+    pub(super) exporting: Option<&'a str>,
     pub(super) is_frozen: bool,
     pub(super) is_playing: bool,
     /// Number of volumes in the cine loop, and the index of the one that is shown.

@@ -1,0 +1,88 @@
+//! Lists over the window of which an entry is chosen: the files to open, and the formats of an export.
+
+use super::{ACCENT, PANEL, SMALL_TEXT, TOUCH_SIZE, WEAK_TEXT};
+use crate::ui::command::Command;
+use crate::ui::volume_export::FORMATS;
+use egui::{Align2, Area, Button, Frame, Id, Margin, Order, RichText, ScrollArea, Stroke, Ui, vec2};
+
+struct List<'a> {
+    title: &'a str,
+    about: &'a str,
+    /// The tooltip of closing it, and what does so.
+    close: (&'a str, Command),
+    /// What an empty list says.
+    empty: &'a str,
+}
+
+/// Shows the files to open. `files`: where they are, and their names.
+pub(super) fn show_files(ui: &Ui, files: (&str, &[String]), execute: &mut dyn FnMut(Command)) {
+    let list = List {
+        title: "Open",
+        about: files.0,
+        close: ("Opens nothing.", Command::OpenFiles),
+        empty: "There is no recording and no workspace here.",
+    };
+    let entries = files.1.iter().map(|name| (name.as_str(), name.as_str()));
+    list.show(ui, entries, |n, execute| execute(Command::OpenFile(n)), |_, _| {}, execute);
+}
+
+/// Shows the formats of an export. `running`: the name of the one in work.
+pub(super) fn show_exports(ui: &Ui, running: Option<&str>, execute: &mut dyn FnMut(Command)) {
+    let about = running.map_or("The volume that is shown".into(), |name| format!("{name} is being exported"));
+    let list = List { title: "Export", about: &about, close: ("Exports nothing more.", Command::Exports), empty: "" };
+    let entries = FORMATS.iter().map(|format| (format.name, format.hint));
+    let cancel = |ui: &mut Ui, execute: &mut dyn FnMut(Command)| {
+        let hint = "Ends the export in work; nothing of it stays.";
+        if running.is_some() && ui.button("Cancel the export").on_hover_text(hint).clicked() {
+            execute(Command::CancelExport);
+        }
+    };
+    list.show(ui, entries, |n, execute| execute(Command::Export(n)), cancel, execute);
+}
+
+impl List<'_> {
+    /// `entries`: names and tooltips. `more` is drawn below the list's title.
+    fn show<'a>(
+        &self,
+        ui: &Ui,
+        entries: impl ExactSizeIterator<Item = (&'a str, &'a str)>,
+        choose: impl Fn(usize, &mut dyn FnMut(Command)),
+        more: impl Fn(&mut Ui, &mut dyn FnMut(Command)),
+        execute: &mut dyn FnMut(Command),
+    ) {
+        let screen = ui.ctx().content_rect();
+        let area =
+            Area::new(Id::new(self.title)).order(Order::Foreground).anchor(Align2::CENTER_CENTER, vec2(0.0, 0.0));
+        area.show(ui.ctx(), |ui| {
+            let frame = Frame::new().fill(PANEL).inner_margin(Margin::same(16)).corner_radius(10);
+            frame.stroke(Stroke::new(2.0, ACCENT)).show(ui, |ui| {
+                let width = (screen.width() - 80.0).clamp(120.0, 720.0);
+                ui.set_width(width);
+                ui.horizontal(|ui| {
+                    ui.heading(self.title);
+                    ui.with_layout(egui::Layout::right_to_left(egui::Align::Center), |ui| {
+                        if ui.button("Close  (Esc)").on_hover_text(self.close.0).clicked() {
+                            execute(self.close.1);
+                        }
+                    });
+                });
+                ui.label(RichText::new(self.about).size(SMALL_TEXT).color(WEAK_TEXT));
+                more(ui, execute);
+                let height = (screen.height() - 200.0).max(60.0);
+                ScrollArea::vertical().max_height(height).show(ui, |ui| {
+                    if entries.len() == 0 {
+                        ui.label(self.empty);
+                    }
+                    for (n, (name, hint)) in entries.enumerate() {
+                        let key = if n < 9 { format!("{}   ", n + 1) } else { "     ".into() };
+                        let button = Button::new(format!("{key}{name}")).truncate();
+                        let button = button.min_size(vec2(width - 20.0, TOUCH_SIZE * 0.7));
+                        if ui.add(button).on_hover_text(hint).clicked() {
+                            choose(n, execute);
+                        }
+                    }
+                });
+            });
+        });
+    }
+}

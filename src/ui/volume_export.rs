@@ -1,0 +1,229 @@
+//! Exports of the volume that is shown, as other programs read it: a volume, a surface or a turntable. `convert`, `mesh` or `render` of this
+//! program does the work in a process of its own: a long one does not stop the view, and one that fails does not end it.
+
+use super::export;
+use crate::live::cine::CineVolume;
+use crate::source::recorder::Header;
+use crate::text::printable;
+use crate::workspace::{self, Origin};
+use std::io::Read;
+use std::path::{Path, PathBuf};
+use std::process::{Child, Command, Stdio};
+use std::sync::{Mutex, MutexGuard, PoisonError};
+
+/// Most of what the process says of a fault, bytes.
+const MAX_MESSAGE: u64 = 1 << 16;
+/// Pictures of a turntable: one every five degrees.
+const TURNTABLE: &str = "72";
+/// Thickness of the base of a relief, mm.
+const BASE: &str = "3";
+
+/// What can be exported.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Format {
+    pub name: &'static str,
+    pub hint: &'static str,
+    /// The ending of the file; a folder of pictures has its own.
+    pub(super) ending: &'static str,
+    work: Work,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Work {
+    Convert,
+    Mesh,
+    Relief,
+    Turntable,
+}
+
+const fn format(name: &'static str, ending: &'static str, work: Work, hint: &'static str) -> Format {
+    Format { name, hint, ending, work }
+}
+
+/// All of them, in the order of the menu.
+pub const FORMATS: &[Format] = &[
+    format("Volume, NRRD", "nrrd", Work::Convert, "The scan-converted volume in its place, for 3D Slicer and ITK."),
+    format(
+        "Volume, NIfTI",
+        "nii.gz",
+        Work::Convert,
+        "The scan-converted volume in its place, for tools of imaging research.",
+    ),
+    format("Volume, MetaImage", "mha", Work::Convert, "The scan-converted volume in its place, for ITK and PLUS."),
+    format("Volume, DICOM", "dcm", Work::Convert, "An Enhanced US Volume without a patient's name."),
+    format(
+        "Surface, STL",
+        "stl",
+        Work::Mesh,
+        "The surface between darker and brighter echoes as closed triangles, mm.",
+    ),
+    format("Surface, glTF", "glb", Work::Mesh, "The same with a colour, for viewers and slides."),
+    format(
+        "Relief to print, STL",
+        "stl",
+        Work::Relief,
+        "The surface as the probe sees it, filled down to a flat base.",
+    ),
+    format(
+        "Turntable, pictures",
+        "turntable",
+        Work::Turntable,
+        "A folder of 72 PNG files: one turn of the rendering as it is shown.",
+    ),
+    #[cfg(feature = "video")]
+    format("Turntable, film", "mp4", Work::Turntable, "One turn of the rendering as it is shown, as AV1 in MP4."),
+];
+
+/// An export in work.
+#[derive(Debug, Default)]
+pub(super) struct Export {
+    state: Mutex<State>,
+}
+
+#[derive(Debug, Default)]
+struct State {
+    child: Option<Child>,
+    is_cancelled: bool,
+    is_finished: bool,
+}
+
+impl Export {
+    fn lock(&self) -> MutexGuard<'_, State> {
+        self.state.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// Ends the work; nothing of it stays.
+    pub(super) fn cancel(&self) {
+        let mut state = self.lock();
+        state.is_cancelled = true;
+        if let Some(child) = &mut state.child {
+            // It may have ended by itself.
+            let _ = child.kill();
+        }
+    }
+
+    pub(super) fn finish(&self) {
+        self.lock().is_finished = true;
+    }
+
+    pub(super) fn is_finished(&self) -> bool {
+        self.lock().is_finished
+    }
+
+    /// Writes a volume to `file`, which does not exist before, whole or not at all. `settings`: the scene of a turntable as TOML.
+    ///
+    /// # Errors
+    /// One line: a disk that is full, what the process said of its fault, or that it was cancelled.
+    pub(super) fn run(&self, job: &Job, file: &Path) -> Result<(), String> {
+        let beside = file.parent().unwrap_or(Path::new("."));
+        let folder = tempfile::Builder::new().prefix(".echolume-export-").tempdir_in(beside);
+        let folder = folder.map_err(|e| format!("{}: {e}", beside.display()))?;
+        let recording = folder.path().join("volume.frames");
+        export::write_frames(&recording, job.header.clone(), std::slice::from_ref(&job.volume))?;
+        let made = folder.path().join(format!("out.{}", job.format.ending));
+        self.process(&mut job.command(&recording, &made)?)?;
+        std::fs::rename(&made, file).map_err(|e| format!("{}: {e}", file.display()))
+    }
+
+    fn process(&self, command: &mut Command) -> Result<(), String> {
+        let mut said = String::new();
+        let mut messages = {
+            let mut state = self.lock();
+            if state.is_cancelled {
+                return Err("cancelled".into());
+            }
+            command.stdin(Stdio::null()).stdout(Stdio::null()).stderr(Stdio::piped());
+            let mut child = command.spawn().map_err(|e| format!("the export cannot be started: {e}"))?;
+            let messages = child.stderr.take();
+            state.child = Some(child);
+            messages
+        };
+        if let Some(messages) = &mut messages {
+            let mut bytes = Vec::new();
+            let _ = messages.take(MAX_MESSAGE).read_to_end(&mut bytes);
+            // What is beyond must not block it.
+            let _ = std::io::copy(messages, &mut std::io::sink());
+            said = String::from_utf8_lossy(&bytes).into_owned();
+        }
+        // Its messages have ended, and so has it, or it is about to.
+        let child = self.lock().child.take();
+        let status = child.map(|mut child| child.wait()).transpose();
+        let status = status.map_err(|e| format!("the export was lost: {e}"))?;
+        if self.lock().is_cancelled {
+            return Err("cancelled".into());
+        }
+        match status {
+            Some(status) if status.success() => Ok(()),
+            _ => {
+                let last = said.lines().map(str::trim).rfind(|line| !line.is_empty()).unwrap_or("it ended early");
+                Err(printable(last.trim_start_matches("error: ")))
+            }
+        }
+    }
+}
+
+/// What is exported, and as what.
+pub(super) struct Job {
+    pub(super) format: Format,
+    pub(super) header: Header,
+    pub(super) volume: CineVolume,
+    pub(super) settings: crate::scene::Settings,
+}
+
+impl Job {
+    /// The command that makes `made` of a recording of one volume. A workspace for it goes beside the recording.
+    fn command(&self, recording: &Path, made: &Path) -> Result<Command, String> {
+        let program = std::env::current_exe().map_err(|e| format!("this program's file is not known: {e}"))?;
+        let mut command = Command::new(program);
+        match self.format.work {
+            Work::Convert => command.arg("convert").args([recording, made]),
+            Work::Mesh => command.arg("mesh").args([recording, made]),
+            Work::Relief => command.arg("mesh").args([recording, made]).args(["--base", BASE]),
+            Work::Turntable => {
+                let scene = self.workspace(recording)?;
+                // A folder of pictures has to end like one.
+                let made = if self.format.ending == "turntable" { made.join("") } else { made.to_path_buf() };
+                command.arg("render").arg(scene).args(["--turntable", TURNTABLE, "-o"]).arg(made)
+            }
+        };
+        Ok(command)
+    }
+
+    fn workspace(&self, recording: &Path) -> Result<PathBuf, String> {
+        let file = recording.with_file_name("scene.toml");
+        let text = workspace::text(&self.settings, &Origin::of(Some("volume.frames".into())))?;
+        std::fs::write(&file, text).map_err(|e| format!("{}: {e}", file.display()))?;
+        Ok(file)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_the_process_says_of_its_fault_is_reported() {
+        let run = |script: &str| Export::default().process(Command::new("sh").args(["-c", script]));
+        assert_eq!(run("exit 0"), Ok(()));
+        assert_eq!(run("echo warning >&2; echo 'error: no room' >&2; exit 1"), Err("no room".into()));
+        assert_eq!(run("exit 3"), Err("it ended early".into()));
+        // More than a pipe holds.
+        assert_eq!(run("yes abc | head -c 400000 >&2; exit 0"), Ok(()));
+        let gone = Export::default().process(&mut Command::new("/no/such/program"));
+        assert!(gone.is_err_and(|fault| fault.contains("cannot be started")));
+    }
+
+    #[test]
+    fn an_export_that_is_cancelled_ends_at_once() {
+        let export = Export::default();
+        std::thread::scope(|scope| {
+            let running = scope.spawn(|| export.process(Command::new("sleep").arg("600")));
+            while export.lock().child.is_none() {
+                std::thread::yield_now();
+            }
+            export.cancel();
+            assert_eq!(running.join().expect("no panic"), Err("cancelled".into()));
+        });
+        assert_eq!(export.process(&mut Command::new("true")), Err("cancelled".into()));
+    }
+}
