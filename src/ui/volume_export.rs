@@ -2,17 +2,22 @@
 //! program does the work in a process of its own: a long one does not stop the view, and one that fails does not end it.
 
 use super::export;
+use crate::files::signals::Writing;
 use crate::live::cine::CineVolume;
 use crate::source::recorder::Header;
 use crate::text::printable;
 use crate::workspace::{self, Origin};
 use std::io::Read;
 use std::path::{Path, PathBuf};
-use std::process::{Child, Command, Stdio};
+use std::process::{Command, Stdio};
 use std::sync::{Mutex, MutexGuard, PoisonError};
+use std::thread;
+use std::time::Duration;
 
 /// Most of what the process says of a fault, bytes.
 const MAX_MESSAGE: u64 = 1 << 16;
+/// How often it is checked whether the process has ended.
+const POLL: Duration = Duration::from_millis(20);
 /// Pictures of a turntable: one every five degrees.
 const TURNTABLE: &str = "72";
 /// Thickness of the base of a relief, mm.
@@ -82,7 +87,6 @@ pub(super) struct Export {
 
 #[derive(Debug, Default)]
 struct State {
-    child: Option<Child>,
     is_cancelled: bool,
     is_finished: bool,
 }
@@ -94,12 +98,7 @@ impl Export {
 
     /// Ends the work; nothing of it stays.
     pub(super) fn cancel(&self) {
-        let mut state = self.lock();
-        state.is_cancelled = true;
-        if let Some(child) = &mut state.child {
-            // It may have ended by itself.
-            let _ = child.kill();
-        }
+        self.lock().is_cancelled = true;
     }
 
     pub(super) fn finish(&self) {
@@ -115,51 +114,56 @@ impl Export {
     /// # Errors
     /// One line: a disk that is full, what the process said of its fault, or that it was cancelled.
     pub(super) fn run(&self, job: &Job, file: &Path) -> Result<(), String> {
+        // A signal that ends this program waits until nothing unfinished is left. Dropped last.
+        let signals = Writing::begin();
         let beside = file.parent().unwrap_or(Path::new("."));
         let folder = tempfile::Builder::new().prefix(".echolume-export-").tempdir_in(beside);
         let folder = folder.map_err(|e| format!("{}: {e}", beside.display()))?;
         let recording = folder.path().join("volume.frames");
         export::write_frames(&recording, job.header.clone(), std::slice::from_ref(&job.volume))?;
         let made = folder.path().join(format!("out.{}", job.format.ending));
-        self.process(&mut job.command(&recording, &made)?)?;
+        self.process(&mut job.command(&recording, &made)?, &|| signals.signal().is_some())?;
         std::fs::rename(&made, file).map_err(|e| format!("{}: {e}", file.display()))
     }
 
-    fn process(&self, command: &mut Command) -> Result<(), String> {
-        let mut said = String::new();
-        let mut messages = {
-            let mut state = self.lock();
-            if state.is_cancelled {
+    /// `must_stop`: true if the work is to end early.
+    fn process(&self, command: &mut Command, must_stop: &dyn Fn() -> bool) -> Result<(), String> {
+        command.stdin(Stdio::null()).stdout(Stdio::null()).stderr(Stdio::piped());
+        let child = command.spawn().map_err(|e| format!("the export cannot be started: {e}"));
+        let mut child = child?;
+        let messages = child.stderr.take();
+        let said = thread::spawn(move || messages.map_or_else(String::new, last_words));
+        let status = loop {
+            if self.lock().is_cancelled || must_stop() {
+                // It may have ended by itself.
+                let _ = child.kill();
+                let _ = child.wait();
                 return Err("cancelled".into());
             }
-            command.stdin(Stdio::null()).stdout(Stdio::null()).stderr(Stdio::piped());
-            let mut child = command.spawn().map_err(|e| format!("the export cannot be started: {e}"))?;
-            let messages = child.stderr.take();
-            state.child = Some(child);
-            messages
+            match child.try_wait() {
+                Ok(Some(status)) => break status,
+                Ok(None) => thread::sleep(POLL),
+                Err(e) => return Err(format!("the export was lost: {e}")),
+            }
         };
-        if let Some(messages) = &mut messages {
-            let mut bytes = Vec::new();
-            let _ = messages.take(MAX_MESSAGE).read_to_end(&mut bytes);
-            // What is beyond must not block it.
-            let _ = std::io::copy(messages, &mut std::io::sink());
-            said = String::from_utf8_lossy(&bytes).into_owned();
-        }
-        // Its messages have ended, and so has it, or it is about to.
-        let child = self.lock().child.take();
-        let status = child.map(|mut child| child.wait()).transpose();
-        let status = status.map_err(|e| format!("the export was lost: {e}"))?;
-        if self.lock().is_cancelled {
-            return Err("cancelled".into());
-        }
-        match status {
-            Some(status) if status.success() => Ok(()),
-            _ => {
+        let said = said.join().unwrap_or_default();
+        match status.success() {
+            true => Ok(()),
+            false => {
                 let last = said.lines().map(str::trim).rfind(|line| !line.is_empty()).unwrap_or("it ended early");
                 Err(printable(last.trim_start_matches("error: ")))
             }
         }
     }
+}
+
+/// What a process says, up to a limit.
+fn last_words(mut messages: impl Read) -> String {
+    let mut bytes = Vec::new();
+    let _ = (&mut messages).take(MAX_MESSAGE).read_to_end(&mut bytes);
+    // A full pipe would block it.
+    let _ = std::io::copy(&mut messages, &mut std::io::sink());
+    String::from_utf8_lossy(&bytes).into_owned()
 }
 
 /// What is exported, and as what.
@@ -203,27 +207,29 @@ mod tests {
 
     #[test]
     fn what_the_process_says_of_its_fault_is_reported() {
-        let run = |script: &str| Export::default().process(Command::new("sh").args(["-c", script]));
+        let process = |command: &mut Command| Export::default().process(command, &|| false);
+        let run = |script: &str| process(Command::new("sh").args(["-c", script]));
         assert_eq!(run("exit 0"), Ok(()));
         assert_eq!(run("echo warning >&2; echo 'error: no room' >&2; exit 1"), Err("no room".into()));
         assert_eq!(run("exit 3"), Err("it ended early".into()));
         // More than a pipe holds.
         assert_eq!(run("yes abc | head -c 400000 >&2; exit 0"), Ok(()));
-        let gone = Export::default().process(&mut Command::new("/no/such/program"));
+        let gone = process(&mut Command::new("/no/such/program"));
         assert!(gone.is_err_and(|fault| fault.contains("cannot be started")));
     }
 
     #[test]
     fn an_export_that_is_cancelled_ends_at_once() {
         let export = Export::default();
-        std::thread::scope(|scope| {
-            let running = scope.spawn(|| export.process(Command::new("sleep").arg("600")));
-            while export.lock().child.is_none() {
-                std::thread::yield_now();
-            }
+        let sleep = || export.process(Command::new("sleep").arg("600"), &|| false);
+        thread::scope(|scope| {
+            let running = scope.spawn(sleep);
+            thread::sleep(3 * POLL);
             export.cancel();
             assert_eq!(running.join().expect("no panic"), Err("cancelled".into()));
         });
-        assert_eq!(export.process(&mut Command::new("true")), Err("cancelled".into()));
+        assert_eq!(sleep(), Err("cancelled".into()));
+        let signalled = Export::default().process(Command::new("sleep").arg("600"), &|| true);
+        assert_eq!(signalled, Err("cancelled".into()));
     }
 }

@@ -266,6 +266,14 @@ impl View<'_> {
         said
     }
 
+    /// Ends it by SIGTERM.
+    pub fn terminate(mut self) {
+        let mut program = self.program.take().expect("it ends once");
+        let process = rustix::process::Pid::from_child(&program);
+        rustix::process::kill_process(process, rustix::process::Signal::TERM).expect("a signal");
+        until("the end", || program.try_wait().expect("look after the program"));
+    }
+
     /// Ends it by its key.
     pub fn leave(self) -> String {
         self.desk.tap('q');

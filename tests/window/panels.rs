@@ -165,12 +165,17 @@ fn the_volume_is_exported_as_the_commands_do() {
         .collect();
     let header = "ObjectType = Image\nNDims = 3\nDimSize = 24 24 24\nElementType = MET_UCHAR\nElementSpacing = 1 1 1\nElementDataFile = LOCAL\n";
     let ball = folder.write("ball.mha", [header.as_bytes(), &samples].concat());
-    let view = desk.view(&["--size", "700x500", "--source", &ball, "--save-to", &folder.path("kept"), "--mode", "mip"]);
-    until("a picture", || {
-        let seen = view.look()?;
-        let is_bright = |pixel: &[u8]| pixel[..3].iter().all(|c| *c > 150);
-        (seen.rgba.chunks(4).filter(|pixel| is_bright(pixel)).count() > 5000).then_some(())
-    });
+    let kept = folder.path("kept");
+    let open = || {
+        let view = desk.view(&["--size", "700x500", "--source", &ball, "--save-to", &kept, "--mode", "mip"]);
+        until("a picture", || {
+            let seen = view.look()?;
+            let is_bright = |pixel: &[u8]| pixel[..3].iter().all(|c| *c > 150);
+            (seen.rgba.chunks(4).filter(|pixel| is_bright(pixel)).count() > 5000).then_some(())
+        });
+        view
+    };
+    let view = open();
     let export = |format: char| {
         desk.press(CONTROL, true);
         desk.tap('e');
@@ -188,9 +193,19 @@ fn the_volume_is_exported_as_the_commands_do() {
         let [got, wanted] = [file, wanted.into()].map(|file| std::fs::read(file).expect("a file"));
         assert!(got == wanted, "{ending}: {} and {} bytes", got.len(), wanted.len());
     }
-    export('8');
-    until("a turntable in work", || all().find(|path| path.to_string_lossy().contains(".echolume-export-")));
+    let begins_turntable = || {
+        export('8');
+        until("a turntable in work", || all().find(|path| path.to_string_lossy().contains(".echolume-export-")));
+    };
+    let is_clean = || {
+        let left: Vec<_> = all().map(|path| path.display().to_string()).collect();
+        assert!(left.len() == 2 && left.iter().all(|path| !path.contains(".echolume-export-")), "{left:?}");
+    };
+    begins_turntable();
     view.leave();
-    let left: Vec<_> = all().map(|path| path.display().to_string()).collect();
-    assert!(left.len() == 2 && left.iter().all(|path| !path.contains(".echolume-export-")), "{left:?}");
+    is_clean();
+    let view = open();
+    begins_turntable();
+    view.terminate();
+    is_clean();
 }
