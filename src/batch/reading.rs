@@ -181,7 +181,7 @@ fn convertible(task: &Task, source: &mut dyn Source) -> Result<Contents, Failure
         (_, Some(spacing)) => lattice(&geometry, spacing).map_err(|e| input(format!("{name}: --spacing {e}")))?,
     };
     let mut target = Target::new(grid, source.sample_type());
-    if let (Some(world), Geometry::Cartesian(own)) = (source.world(), &geometry) {
+    if let (Some(world), Geometry::Cartesian(own)) = (source.world_of(work.volume), &geometry) {
         target.world = World::on(&world, own, &grid);
     }
     target.outside = work.outside;

@@ -93,7 +93,7 @@ impl MakeMesh {
         let read = read.iter().chain(&self.geometry.probe).map(PathBuf::as_path);
         check_outputs(&[(OUTPUT, Some(&self.output))], read)?;
         let samples = Input { stored: recording.stored_type(), range: recording.range() };
-        let (shift, world) = (recording.sample_type().shift(), recording.world());
+        let (shift, world) = (recording.sample_type().shift(), recording.world_of(self.volume));
         let (geometry, volume, found) = read_with_threshold(&mut *recording, &self.input, self.volume, samples)?;
         let grid = target_grid(&geometry, self.spacing)?;
         let share = share_of(self.threshold, found.as_ref(), &self.input)?;

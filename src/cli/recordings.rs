@@ -149,7 +149,7 @@ impl Convert {
         let geometry = recording.geometry(self.volume);
         let grid = target_grid(&geometry, self.spacing)?;
         let mut target = Target::new(grid, recording.sample_type());
-        if let (Some(world), Geometry::Cartesian(own)) = (recording.world(), &geometry) {
+        if let (Some(world), Geometry::Cartesian(own)) = (recording.world_of(self.volume), &geometry) {
             target.world = world.on(own, &grid);
         }
         target.outside = self.outside;
@@ -195,7 +195,7 @@ impl Convert {
         let mut recording = open_recording(&self.input, self.geometry.options())?;
         self.check_outputs(&[(OUTPUT, Some(&self.output)), ("--mask", self.mask.as_deref())], &*recording)?;
         let samples = Input { stored: recording.stored_type(), range: recording.range() };
-        let (shift, sample, world) = (recording.sample_type().shift(), recording.sample_type(), recording.world());
+        let (sample, world) = (recording.sample_type(), recording.world_of(self.volume));
         let (geometry, volume, found) = read_with_threshold(&mut *recording, &self.input, self.volume, samples)?;
         let grid = target_grid(&geometry, self.spacing)?;
         let share = share_of(self.threshold, found.as_ref(), &self.input)?;
@@ -212,7 +212,7 @@ impl Convert {
             say!("mask: {}, 1 inside and 0 outside", mask.display());
         }
         let [x, y, z] = grid.size;
-        let in_file = threshold - shift;
+        let in_file = threshold - sample.shift();
         let shown = self.output.display();
         say!(
             "segmentation: {shown}, {x} x {y} x {z} voxels, 1 tissue; threshold {share:.3} ({in_file:.4} in the file)"

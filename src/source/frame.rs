@@ -25,7 +25,8 @@ pub struct Frame {
     pub backward: bool,
     /// Time stamp, s, on the clock of the device that acquired it.
     pub time: Option<f64>,
-    /// From the space of the geometry, mm, to the world (LPS) or the space of a tracker: rigid. Of a volume the pose of its first frame counts.
+    /// From the space of the geometry, mm, to the world (LPS) or the space of a tracker: rigid. Of a volume the
+    /// pose of its first frame that has one counts.
     pub pose: Option<DAffine3>,
     /// Samples of the stored type ([`Header::stored`]), little-endian, line by line (samples fastest).
     pub bytes: Vec<u8>,
@@ -153,11 +154,17 @@ pub trait Source: Send {
     fn files(&self) -> Vec<PathBuf> {
         Vec::new()
     }
-    /// Where the voxels of Cartesian volumes are in the world; None where the source does not say, and for sweeps.
+    /// Where the voxels of Cartesian volumes are in the world; None where the source does not say, and for sweeps. Of volumes that move
+    /// the place of the first that has one.
     fn world(&self) -> Option<World> {
         None
     }
-    /// The pose of all frames that have none of their own; None where the axes of the volume are those of the world.
+    /// Where the voxels of one Cartesian volume are: [`Source::world`], unless volumes have places of their own.
+    fn world_of(&self, _volume: usize) -> Option<World> {
+        self.world()
+    }
+    /// The pose of all frames that have none of their own; None where the axes of the volume are those of the world, and where each frame
+    /// states whether it has one.
     fn pose(&self) -> Option<DAffine3> {
         let Geometry::Cartesian(grid) = self.geometry(0) else { return None };
         let world = self.world().filter(|world| *world != World::of(&grid))?;

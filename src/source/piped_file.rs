@@ -9,6 +9,7 @@ use crate::probe::{Geometry, ProbeFile, World};
 use glam::DAffine3;
 use std::fs::File;
 use std::io::{BufReader, Read, Seek, SeekFrom};
+use std::ops::Range;
 use std::path::{Path, PathBuf};
 
 /// Frames of a stream in a file.
@@ -91,13 +92,31 @@ impl PipedFile {
         rows
     }
 
-    /// The pose of the first frame, read without moving the position.
-    fn first_pose(&self) -> Option<DAffine3> {
-        let (mut pose, stamp) = ([0; POSE_BYTES], if self.stream.stamped { size_of::<f64>() as u64 } else { 0 });
+    /// Where the first frame of these volumes that has a pose places the lattice.
+    fn world_within(&self, volumes: Range<usize>) -> Option<World> {
+        let Geometry::Cartesian(grid) = &self.stream.header.forward else { return None };
+        self.first_pose(volumes).and_then(|pose| World::posed(&pose, grid))
+    }
+
+    /// The first pose of the frames of these volumes, read without moving the position.
+    fn first_pose(&self, volumes: Range<usize>) -> Option<DAffine3> {
+        let stamp = if self.stream.stamped { size_of::<f64>() as u64 } else { 0 };
+        let [first, end] = [volumes.start, volumes.end].map(|n| n.min(self.volumes) as u64 * self.frames());
         let mut file = File::open(&self.path).ok().filter(|_| self.stream.header.posed)?;
-        file.seek(SeekFrom::Start(self.start + stamp)).ok()?;
-        file.read_exact(&mut pose).ok()?;
-        read_pose(&pose)
+        for n in first..end {
+            let mut pose = [0; POSE_BYTES];
+            file.seek(SeekFrom::Start(self.start + n * frame_bytes(&self.stream) + stamp)).ok()?;
+            file.read_exact(&mut pose).ok()?;
+            if let Some(pose) = read_pose(&pose) {
+                return Some(pose);
+            }
+        }
+        None
+    }
+
+    /// Frames a volume.
+    fn frames(&self) -> u64 {
+        self.stream.volumes.frames as u64
     }
 
     fn read(&mut self, bytes: &mut [u8]) -> Result<(), InputError> {
@@ -142,14 +161,14 @@ impl Source for PipedFile {
             let fault = format!("there is no {volume}, the last is {}", self.volumes.saturating_sub(1));
             return Err(InputError::new(&self.path, "volume", fault));
         }
-        self.next = volume as u64 * self.stream.volumes.frames as u64;
+        self.next = volume as u64 * self.frames();
         let at = self.start + self.next * frame_bytes(&self.stream);
         self.input.seek(SeekFrom::Start(at)).map_err(|e| InputError::unreadable(&self.path, &e))?;
         Ok(())
     }
 
     fn next_frame(&mut self) -> Result<Option<Frame>, InputError> {
-        if self.next >= self.volumes as u64 * self.stream.volumes.frames as u64 {
+        if self.next >= self.volumes as u64 * self.frames() {
             return Ok(None);
         }
         let mut stamp = [0; 8];
@@ -176,8 +195,16 @@ impl Source for PipedFile {
     }
 
     fn world(&self) -> Option<World> {
-        let Geometry::Cartesian(grid) = &self.stream.header.forward else { return None };
-        self.first_pose().and_then(|pose| World::posed(&pose, grid))
+        self.world_within(0..self.volumes)
+    }
+
+    fn world_of(&self, volume: usize) -> Option<World> {
+        self.world_within(volume..volume.saturating_add(1)).or_else(|| self.world())
+    }
+
+    /// Each frame states its pose, or that it has none.
+    fn pose(&self) -> Option<DAffine3> {
+        None
     }
 
     fn files(&self) -> Vec<PathBuf> {

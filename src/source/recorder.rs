@@ -28,6 +28,7 @@ use crc::{CRC_32_ISO_HDLC, Crc, Table};
 use glam::{DAffine3, DQuat};
 use std::fs::{File, OpenOptions};
 use std::io::{Read, Seek, SeekFrom, Write};
+use std::ops::Range;
 use std::path::{Path, PathBuf};
 
 const MAGIC: &[u8; 8] = b"ECHOFRMS";
@@ -464,8 +465,18 @@ impl Source for Reader {
     }
 
     fn world(&self) -> Option<World> {
-        let Geometry::Cartesian(grid) = &self.header.forward else { return None };
-        self.first_pose().and_then(|pose| World::posed(&pose, grid))
+        self.world_within(0..self.index.len())
+    }
+
+    fn world_of(&self, volume: usize) -> Option<World> {
+        let first = self.volumes.get(volume).copied().unwrap_or(self.index.len());
+        let end = self.volumes.get(volume + 1).copied().unwrap_or(self.index.len());
+        self.world_within(first..end).or_else(|| self.world())
+    }
+
+    /// Each frame states its pose, or that it has none.
+    fn pose(&self) -> Option<DAffine3> {
+        None
     }
 }
 
@@ -480,14 +491,32 @@ impl Reader {
         read.is_ok() && flags[0] & 1 != 0
     }
 
-    /// The pose of the first frame, read without moving the position.
-    fn first_pose(&self) -> Option<DAffine3> {
-        let (offset, _) = self.index.first().filter(|_| self.header.posed)?;
-        let mut pose = [0; POSE_BYTES];
+    /// Where the first of these frames that has a pose places the lattice.
+    fn world_within(&self, frames: Range<usize>) -> Option<World> {
+        let Geometry::Cartesian(grid) = &self.header.forward else { return None };
+        self.first_pose(frames).and_then(|pose| World::posed(&pose, grid))
+    }
+
+    /// The first pose of these frames, read without moving the position.
+    fn first_pose(&self, frames: Range<usize>) -> Option<DAffine3> {
+        let frames = self.index.get(frames).filter(|_| self.header.posed)?;
         let mut file = File::open(&self.path).ok()?;
-        file.seek(SeekFrom::Start(offset + FRAME_HEAD as u64)).ok()?;
-        file.read_exact(&mut pose).ok()?;
-        read_pose(&pose)
+        let mut read =
+            |at: u64, bytes: &mut [u8]| file.seek(SeekFrom::Start(at)).and_then(|_| file.read_exact(bytes)).ok();
+        for (offset, _) in frames {
+            let mut pose = [0; POSE_BYTES];
+            read(offset + FRAME_HEAD as u64, &mut pose)?;
+            if read_pose(&pose).is_none() {
+                continue;
+            }
+            // A damaged frame is left out, and its pose with it.
+            let mut record = vec![0; self.record_bytes() as usize];
+            read(*offset, &mut record)?;
+            if let Some((Frame { pose: Some(pose), .. }, _)) = parsed(&record, true) {
+                return Some(pose);
+            }
+        }
+        None
     }
 }
 

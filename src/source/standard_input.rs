@@ -4,6 +4,7 @@ use super::frame::{Frame, Header, Source};
 use super::samples::{SampleType, StoredType};
 use crate::files::{InputError, Spool};
 use crate::probe::{Geometry, World};
+use glam::DAffine3;
 use std::io::IsTerminal;
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, MutexGuard, PoisonError};
@@ -103,6 +104,14 @@ impl Source for FromInput {
 
     fn world(&self) -> Option<World> {
         self.0.world()
+    }
+
+    fn world_of(&self, volume: usize) -> Option<World> {
+        self.0.world_of(volume)
+    }
+
+    fn pose(&self) -> Option<DAffine3> {
+        self.0.pose()
     }
 
     fn probe_file(&self) -> Option<&Path> {

@@ -209,6 +209,55 @@ fn files_of_frames_keep_poses_and_without_them_are_as_before() {
     }
 }
 
+/// A volume that was moved while it was recorded lies where each of its own frames says, also if its first frame has no pose.
+#[test]
+fn every_volume_of_a_recording_lies_where_its_own_frames_say() {
+    let folder = Folder::new("moved");
+    let Geometry::Cartesian(grid) = header(true).forward else { panic!("a lattice") };
+    // Volumes of two frames: a pose each, the second frame only, none, a pose each.
+    let posed = |n: usize| [0, 1, 3, 6, 7].contains(&n);
+    let places = [Some(0), Some(3), None, Some(6)];
+    let tape = folder.join("moved.frames");
+    let mut writer = Writer::create(&tape, header(true)).expect("created");
+    let keys = json!({"echolume": 2, "type": "u8", "posed": true, "cartesian": {"size": grid.size, "spacing": grid.spacing, "origin": grid.origin}});
+    let mut stream = format!("{keys}\n").into_bytes();
+    for n in 0..8 {
+        let own = posed(n).then(|| pose(n));
+        let frame = Frame { pose: own, ..Frame::of_slice(n as u32 / 2, n % 2, vec![n as u8; 12]) };
+        writer.frame(&frame, n as f64).expect("written");
+        stream.extend(own.map_or(f64::NAN.to_le_bytes().repeat(12), |pose| rows(&pose)));
+        stream.extend([n as u8; 12]);
+    }
+    writer.finish().expect("finished");
+    let stored = folder.path("moved");
+    std::fs::write(&stored, stream).expect("written");
+    for file in [tape.to_str().expect("a plain name"), &stored] {
+        let source = open(file.as_ref(), None).expect("volumes");
+        assert_eq!(source.world(), World::posed(&pose(0), &grid), "{file}");
+        for (volume, first) in places.into_iter().enumerate() {
+            // Without a place of its own, that of the recording.
+            let meant = World::posed(&pose(first.unwrap_or(0)), &grid).expect("rigid");
+            assert_eq!(source.world_of(volume), Some(meant), "{file}: volume {volume}");
+            let back = folder.path(&format!("{volume}.nrrd"));
+            let (code, _, said) =
+                crate::common::program::run(&["convert", file, &back, "--volume", &volume.to_string()]);
+            assert_eq!(code, Some(0), "{said}");
+            let read = open(back.as_ref(), None).expect("a volume").world().expect("a place");
+            for cell in [DVec3::ZERO, DVec3::new(3.0, 2.0, 1.0)] {
+                assert!(read.at(cell).distance(meant.at(cell)) < 1e-6, "{file}: volume {volume}");
+            }
+        }
+        // A frame without a pose stays one.
+        let copy = folder.path("copy.frames");
+        let _ = std::fs::remove_file(&copy);
+        let (code, _, said) = crate::common::program::run(&["convert", file, &copy]);
+        assert_eq!(code, Some(0), "{said}");
+        let mut copied = Reader::open(copy.as_ref()).expect("a recording");
+        let poses: Vec<_> = std::iter::from_fn(|| copied.next_frame().expect("a frame")).map(|f| f.pose).collect();
+        assert_eq!(poses, (0..8).map(|n| posed(n).then(|| pose(n))).collect::<Vec<_>>(), "{file}");
+    }
+}
+
 /// The orientation of a volume survives `.frames`, and what plays it back.
 #[test]
 fn a_volume_keeps_its_orientation_through_frames() {
