@@ -151,7 +151,8 @@ impl PlacedPictures for PosedPictures {
     }
 }
 
-/// Posed pictures of a file as one freehand volume; other frames unchanged. All pictures are read once for their poses.
+/// Posed pictures of a file as one freehand volume; other frames unchanged. Pictures of one place are no sweep but a series in time, and stay
+/// what they are. All pictures are read once for their poses.
 ///
 /// # Errors
 /// A file that cannot be read, no picture with a pose.
@@ -161,9 +162,14 @@ pub(super) fn as_volume(path: &Path, mut pictures: Box<dyn Source>) -> Result<Bo
         Geometry::Cartesian(grid) if is_posed(&header) => *grid,
         _ => return Ok(pictures),
     };
-    let mut poses = Vec::new();
+    let (mut poses, mut first, mut is_moved) = (Vec::new(), None, false);
     while let Some(frame) = pictures.next_frame()? {
+        is_moved |= frame.pose.is_some_and(|pose| *first.get_or_insert(pose) != pose);
         poses.push(frame.pose.map(|pose| placed(&grid, &pose)));
+    }
+    if first.is_some() && !is_moved {
+        pictures.skip_to_volume(0)?;
+        return Ok(pictures);
     }
     let options = CompoundingOptions { margin: 0.0, ..CompoundingOptions::default() };
     Ok(Box::new(FreehandFile::around(path, PosedPictures { pictures, grid }, &poses, options)?))

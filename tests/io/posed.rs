@@ -258,6 +258,35 @@ fn every_volume_of_a_recording_lies_where_its_own_frames_say() {
     }
 }
 
+/// Pictures in time of one place are no sweep: they come back from `.frames` as they were, in their place.
+#[test]
+fn an_oriented_series_of_pictures_stays_one_through_frames() {
+    let folder = Folder::new("series");
+    let header = "NRRD0005\ntype: uint8\ndimension: 4\nspace: left-posterior-superior\nsizes: 4 3 1 5\n\
+                  space directions: (0.3,0.4,0) (-0.2,0.15,0) (0,0,0.5) none\nkinds: domain domain domain time\n\
+                  endian: little\nencoding: raw\nspace origin: (10,-20,30)\n\n";
+    let samples: Vec<u8> = (0..60).map(|n| n * 4).collect();
+    let stored = folder.write("series.nrrd", [header.as_bytes(), &samples].concat());
+    let all = |file: &str| {
+        let mut source = open(file.as_ref(), None).expect("pictures");
+        let Geometry::Cartesian(grid) = source.geometry(0) else { panic!("a lattice") };
+        let (volumes, world) = (source.volumes(), source.world_of(4).expect("a place"));
+        let frames: Vec<_> = std::iter::from_fn(|| source.next_frame().expect("a picture")).collect();
+        (volumes, grid, world, frames.into_iter().map(|f| (f.volume, f.slice, f.bytes)).collect::<Vec<_>>())
+    };
+    let (volumes, grid, world, pictures) = all(&stored);
+    assert_eq!((volumes, grid.size, pictures.len()), (5, [4, 3, 1], 5));
+    assert!(world != World::of(&grid), "it is turned");
+    let tape = folder.path("series.frames");
+    let (code, _, said) = crate::common::program::run(&["convert", &stored, &tape]);
+    assert_eq!(code, Some(0), "{said}");
+    let (read, same, place, again) = all(&tape);
+    assert_eq!((read, same, again), (volumes, grid, pictures));
+    for cell in [DVec3::ZERO, DVec3::new(3.0, 2.0, 0.0)] {
+        assert!(place.at(cell).distance(world.at(cell)) < 1e-6, "{cell}");
+    }
+}
+
 /// The orientation of a volume survives `.frames`, and what plays it back.
 #[test]
 fn a_volume_keeps_its_orientation_through_frames() {
