@@ -9,6 +9,10 @@ use crate::files::InputError;
 use crate::probe::{Geometry, Grid};
 use glam::{DAffine3, DMat3, DVec3};
 use std::path::Path;
+use std::time::{Duration, Instant};
+
+/// What is left out is reported at most so often.
+const REPORT_INTERVAL: Duration = Duration::from_secs(1);
 
 /// True if the frames are single pictures with poses.
 pub fn is_posed(header: &Header) -> bool {
@@ -34,14 +38,70 @@ pub struct Posed {
     volumes: u32,
     /// The header of the volume was emitted.
     begun: bool,
-    /// Pictures left out since the last report: without a pose, and outside of the volume.
+    left_out: LeftOut,
+    /// Parts of pictures were refused.
+    has_refused_lines: bool,
+}
+
+/// Pictures that were left out since the last report.
+#[derive(Default)]
+struct LeftOut {
+    /// When the first of them was.
+    since: Option<Instant>,
     without: u64,
     outside: u64,
+    refused: u64,
+    /// Why the last picture was refused.
+    why: String,
+    /// Why no volume could be placed.
+    unplaced: Option<String>,
+}
+
+impl LeftOut {
+    fn without_pose(&mut self) {
+        self.since.get_or_insert_with(Instant::now);
+        self.without += 1;
+    }
+
+    fn refused(&mut self, refusal: Refusal) {
+        self.since.get_or_insert_with(Instant::now);
+        match refusal {
+            Refusal::Outside => self.outside += 1,
+            Refusal::Picture(why) => (self.refused, self.why) = (self.refused + 1, why),
+            Refusal::Volume(why) => self.unplaced = Some(why),
+        }
+    }
+
+    /// Reports them if that is due. `at_once`: no more pictures come.
+    fn report(&mut self, at_once: bool, events: &mut Vec<Event>) {
+        if !self.since.is_some_and(|since| at_once || since.elapsed() >= REPORT_INTERVAL) {
+            return;
+        }
+        let LeftOut { without, outside, refused, why, unplaced, .. } = std::mem::take(self);
+        for (count, what) in [
+            (without, "pictures without a valid pose are left out".to_string()),
+            (outside, "pictures lie outside of the volume, which is around the first ones".to_string()),
+            (refused, format!("pictures are refused, the last: {why}")),
+        ] {
+            if count > 0 {
+                events.push(Event::Fault(format!("{count} {what}")));
+            }
+        }
+        events.extend(unplaced.map(|why| Event::Fault(format!("no volume for the pictures: {why}"))));
+    }
 }
 
 impl Posed {
     pub fn new(options: CompoundingOptions) -> Posed {
-        Posed { options, sweep: None, time: None, volumes: 0, begun: false, without: 0, outside: 0 }
+        Posed {
+            options,
+            sweep: None,
+            time: None,
+            volumes: 0,
+            begun: false,
+            left_out: LeftOut::default(),
+            has_refused_lines: false,
+        }
     }
 
     /// What becomes of an event: itself, or volumes of the pictures so far. A volume is emitted by an event after its interval, of any kind.
@@ -60,11 +120,14 @@ impl Posed {
                 }
             }
             Event::Frame(frame) if self.sweep.is_some() => {
-                self.picture(frame, &mut events);
+                self.picture(frame);
                 self.emit(false, &mut events);
             }
             Event::Lines { .. } if self.sweep.is_some() => {
-                events.push(Event::Fault("posed pictures must come whole, not in parts of lines".into()));
+                if !std::mem::replace(&mut self.has_refused_lines, true) {
+                    events.push(Event::Fault("posed pictures must come whole, not in parts of lines".into()));
+                }
+                self.emit(false, &mut events);
             }
             Event::End(why) => {
                 self.emit(true, &mut events);
@@ -78,33 +141,22 @@ impl Posed {
         events
     }
 
-    fn picture(&mut self, frame: Frame, events: &mut Vec<Event>) {
+    fn picture(&mut self, frame: Frame) {
         let Some((Header { forward: Geometry::Cartesian(grid), .. }, sweep)) = &mut self.sweep else { return };
         let Some(pose) = frame.pose else {
-            self.without += 1;
-            return;
+            return self.left_out.without_pose();
         };
         self.time = frame.time;
         if let Err(refusal) = sweep.push(placed(grid, &pose), frame.bytes) {
-            note(refusal, &mut self.outside, events);
+            self.left_out.refused(refusal);
         }
     }
 
     /// Emits the volume if that is due. `at_once`: no more pictures come.
     fn emit(&mut self, at_once: bool, events: &mut Vec<Event>) {
         let Some((pictures, sweep)) = &mut self.sweep else { return };
-        let changed = sweep.update(at_once, |refusal| note(refusal, &mut self.outside, events));
-        if changed.is_none() && !at_once {
-            return;
-        }
-        for (count, why) in [
-            (std::mem::take(&mut self.without), "pictures without a valid pose are left out"),
-            (std::mem::take(&mut self.outside), "pictures lie outside of the volume, which is around the first ones"),
-        ] {
-            if count > 0 {
-                events.push(Event::Fault(format!("{count} {why}")));
-            }
-        }
+        let changed = sweep.update(at_once, |refusal| self.left_out.refused(refusal));
+        self.left_out.report(at_once, events);
         let Some(lattice) = sweep.lattice().filter(|_| changed == Some(true)) else { return };
         if !std::mem::replace(&mut self.begun, true) {
             let geometry = Geometry::Cartesian(lattice.grid);
@@ -118,15 +170,6 @@ impl Posed {
             let bytes = sweep.slice(slice).unwrap_or_default().to_vec();
             events.push(Event::Frame(Frame { time, pose, ..Frame::of_slice(volume, slice, bytes) }));
         }
-    }
-}
-
-/// Counts a picture outside of the volume, and reports every other one that is refused.
-fn note(refusal: Refusal, outside: &mut u64, events: &mut Vec<Event>) {
-    match refusal {
-        Refusal::Outside => *outside += 1,
-        Refusal::Picture(fault) => events.push(Event::Fault(format!("a picture is refused: {fault}"))),
-        Refusal::Volume(fault) => events.push(Event::Fault(format!("no volume for the pictures: {fault}"))),
     }
 }
 

@@ -3,8 +3,10 @@
 use crate::common::files::{Folder, repository};
 use echolume::live::Feed;
 use echolume::probe::{Geometry, Grid, World};
+use echolume::source::freehand::CompoundingOptions;
 use echolume::source::live::{Event, Live, Playback, PlaybackSource};
 use echolume::source::piped::Piped;
+use echolume::source::posed::Posed;
 use echolume::source::recorder::{Header, Reader, Writer};
 use echolume::source::{Frame, Source, StoredType, open};
 use glam::{DAffine3, DQuat, DVec3};
@@ -285,6 +287,40 @@ fn an_oriented_series_of_pictures_stays_one_through_frames() {
     for cell in [DVec3::ZERO, DVec3::new(3.0, 2.0, 0.0)] {
         assert!(place.at(cell).distance(world.at(cell)) < 1e-6, "{cell}");
     }
+}
+
+/// What a live stream says of pictures that it leaves out: all of them counted, on few lines, also if no volume is ever emitted.
+#[test]
+fn pictures_that_are_left_out_are_counted_on_few_lines() {
+    let [x, y] = SIZE;
+    let grid = Grid { size: [x, y, 1], spacing: [SPACING[0], SPACING[1], 1.0], origin: ORIGIN };
+    let (forward, backward) = (Geometry::Cartesian(grid), Geometry::Cartesian(grid));
+    let header = Header { forward, backward, stored: StoredType::F32, range: [0.0, 900.0], posed: true };
+    let begun = || {
+        let mut stream = Posed::new(CompoundingOptions::default());
+        assert!(stream.take(Event::Begin(Box::new(header.clone()))).is_empty());
+        stream
+    };
+    let frame = |n: usize, pose, bytes| Frame { pose, ..Frame::of_slice(n as u32, 0, bytes) };
+    // No picture has a pose: said while the stream goes on, and once.
+    let mut stream = begun();
+    let take =
+        |stream: &mut Posed, event: Event| -> Vec<Event> { (0..50).flat_map(|_| stream.take(event.clone())).collect() };
+    assert!(take(&mut stream, Event::Frame(frame(0, None, samples(0)))).is_empty());
+    std::thread::sleep(Duration::from_millis(1050));
+    let said = take(&mut stream, Event::Idle);
+    assert_eq!(faults(&said), ["50 pictures without a valid pose are left out"]);
+    // Pictures that cannot be compounded.
+    let mut stream = begun();
+    let short = Event::Frame(frame(0, Some(pose(0)), vec![0; 4]));
+    let said = [take(&mut stream, short), stream.take(Event::End(None))].concat();
+    let [fault] = faults(&said)[..] else { panic!("{said:?}") };
+    assert!(fault.starts_with("50 pictures are refused, the last: ") && fault.contains("samples"), "{fault}");
+    // Parts of pictures.
+    let mut stream = begun();
+    let part = Event::Lines { frame: frame(0, Some(pose(0)), vec![0; 4 * x]), first: 0 };
+    let said = [take(&mut stream, part), stream.take(Event::End(None))].concat();
+    assert_eq!(faults(&said).len(), 1, "{said:?}");
 }
 
 /// The orientation of a volume survives `.frames`, and what plays it back.
