@@ -11,6 +11,7 @@ mod client;
 mod codec;
 mod faults;
 mod message;
+mod names;
 mod network;
 mod pairing;
 mod pixels;

@@ -9,6 +9,7 @@ use super::client::{Client, ClientOptions, ClientStatistics};
 use super::codec::BODY_LIMIT;
 use super::faults::{FaultKind, Faults};
 use super::message::{Coordinates, Image, Message};
+use super::names::Names;
 use super::pairing::Pairing;
 use super::pixels::{range_of, samples, stored};
 use crate::files::quoted;
@@ -19,7 +20,6 @@ use crate::source::live::{Event, Live};
 use crate::source::samples::StoredType;
 use crate::source::value_range::ValueRange;
 use glam::DAffine3;
-use std::collections::BTreeSet;
 use std::io;
 use std::time::{Duration, Instant};
 
@@ -59,8 +59,6 @@ impl Default for NetworkOptions {
     }
 }
 
-/// Most devices of images that are listed.
-const MAX_DEVICES: usize = 16;
 /// How often the statistics are checked while nothing arrives.
 const POLL: Duration = Duration::from_millis(100);
 /// Messages that are processed even if no time is left, so that a caller with zero patience makes progress.
@@ -88,7 +86,7 @@ pub struct Network {
     volume_bytes: usize,
     device: Option<String>,
     /// Devices of images that came.
-    devices: BTreeSet<String>,
+    devices: Names,
     /// Header of the last `Begin`.
     begun: Option<Header>,
     output: Option<VolumeOutput>,
@@ -121,7 +119,7 @@ impl Network {
             whole: None,
             volume_bytes: options.volume_bytes,
             device: options.device.clone(),
-            devices: BTreeSet::new(),
+            devices: Names::new(options.device.clone()),
             sweep: TrackedImages::new(options),
             begun: None,
             output: None,
@@ -157,16 +155,15 @@ impl Network {
 
     /// True if an image is of the device that was chosen. The names of the devices are reported where they decide something.
     fn is_chosen(&mut self, image: &Image) -> bool {
-        let is_new = self.devices.len() < MAX_DEVICES && self.devices.insert(image.device.clone());
-        let names = |devices: &BTreeSet<String>| devices.iter().map(|name| quoted(name)).collect::<Vec<_>>().join(", ");
+        let is_new = self.devices.add(&image.device);
         match &self.device {
-            None if is_new && self.devices.len() > 1 => {
-                let why = format!("{}; --device-name takes one of them", names(&self.devices));
+            None if is_new && self.devices.count() > 1 => {
+                let why = format!("{}; --device-name takes one of them", self.devices.list());
                 self.faults.note(FaultKind::Devices, 1, &why);
             }
             Some(device) if image.device != *device => {
                 if !self.devices.contains(device) {
-                    let why = format!("no image of {} came; there are {}", quoted(device), names(&self.devices));
+                    let why = format!("no image of {} came; there are {}", quoted(device), self.devices.list());
                     self.faults.note(FaultKind::Image, 1, &why);
                 }
                 return false;

@@ -1,12 +1,11 @@
 //! Poses of 2D frames: an IMAGE has the positions of its pixels in the frame, a TRANSFORM the pose of the frame at a time.
 
 use super::message::{Image, Message};
+use super::names::Names;
 use crate::files::quoted;
 use glam::{DAffine3, DMat3, DQuat, DVec3};
-use std::collections::{BTreeSet, VecDeque};
+use std::collections::VecDeque;
 
-/// Most names of transforms that are listed.
-const MAX_NAMES: usize = 16;
 /// Most poses that are kept.
 const MAX_POSES: usize = 1024;
 /// Most frames that wait for a later pose, and their bytes.
@@ -29,7 +28,7 @@ pub struct Pairing {
     frame_bytes: usize,
     counts: PairingCounts,
     /// Names of TRANSFORM devices and TDATA tools that came, also those that are not selected.
-    seen: BTreeSet<String>,
+    seen: Names,
 }
 
 /// A frame and its pose.
@@ -69,6 +68,7 @@ impl Pairing {
     /// Negative values and NaN count as 0.
     pub fn new(device: Option<String>, tolerance: f64, patience: f64) -> Pairing {
         Pairing {
+            seen: Names::new(device.clone()),
             device,
             tolerance: tolerance.max(0.0),
             patience: patience.max(0.0),
@@ -76,7 +76,6 @@ impl Pairing {
             frames: VecDeque::new(),
             frame_bytes: 0,
             counts: PairingCounts::default(),
-            seen: BTreeSet::new(),
         }
     }
 
@@ -109,24 +108,19 @@ impl Pairing {
 
     /// Remembers the names of transforms.
     fn note(&mut self, message: &Message) {
-        let mut add = |name: &str| {
-            if self.seen.len() < MAX_NAMES && !self.seen.contains(name) {
-                self.seen.insert(name.to_string());
-            }
-        };
         match message {
-            Message::Transform(m) => add(&m.device),
-            Message::TrackingData(m) => m.tools.iter().for_each(|tool| add(&tool.name)),
+            Message::Transform(m) => _ = self.seen.add(&m.device),
+            Message::TrackingData(m) => m.tools.iter().for_each(|tool| _ = self.seen.add(&tool.name)),
             _ => {}
         }
     }
 
     /// Why frames get no pose, for users: which transforms came.
     pub fn why_unpaired(&self) -> String {
-        if self.seen.is_empty() {
+        if self.seen.count() == 0 {
             return "no transform came; --tool image takes the matrix of each image".into();
         }
-        let names = self.seen.iter().map(|name| quoted(name)).collect::<Vec<_>>().join(", ");
+        let names = self.seen.list();
         match &self.device {
             Some(device) if !self.seen.contains(device) => {
                 format!("no transform of {} came; --tool takes one of {names}", quoted(device))
