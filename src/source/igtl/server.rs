@@ -99,7 +99,7 @@ struct State {
 /// An encoded message.
 #[derive(Clone)]
 struct Packet {
-    /// None: an answer, which is never dropped.
+    /// None: a short answer, which is never dropped.
     device: Option<String>,
     bytes: Arc<[u8]>,
 }
@@ -319,7 +319,7 @@ impl Shared {
                     return "the server ends".into();
                 }
                 let stop = state.stop;
-                let Some(queue) = state.clients.get_mut(&number) else { return "the client left".into() };
+                let Some(queue) = state.clients.get_mut(&number) else { return "it left or was refused".into() };
                 match queue.pop() {
                     Some(packet) => break packet,
                     None if stop => return "the server ends".into(),
@@ -338,7 +338,7 @@ impl Shared {
                 }
                 let mut state = self.lock();
                 if state.abort || !state.clients.contains_key(&number) {
-                    return "the server ends, or the client left".into();
+                    return "the server ends, or it left or was refused".into();
                 }
                 if moved.elapsed() > self.options.stall_timeout {
                     state.statistics.disconnected += 1;
@@ -358,16 +358,14 @@ impl Shared {
                 Ok(Decoded::Need(_)) => 0,
                 Ok(Decoded::Message { message, length }) => {
                     if !self.answer(&message, number) {
-                        self.refuse(number);
-                        return;
+                        return self.refuse(stream, number, "it asks and does not read");
                     }
                     length
                 }
                 Err(DecodeError::Checksum { length, .. } | DecodeError::Content { length, .. }) => length,
                 // Something else than a client.
                 Err(DecodeError::Framing { .. }) => {
-                    self.refuse(number);
-                    return;
+                    return self.refuse(stream, number, "it speaks another protocol");
                 }
             };
             if skipped > 0 {
@@ -388,8 +386,10 @@ impl Shared {
         }
     }
 
-    /// Disconnects a client that is none.
-    fn refuse(&self, number: u64) {
+    /// Disconnects a client that is none, and says why.
+    fn refuse(&self, stream: &TcpStream, number: u64, why: &str) {
+        let peer = stream.peer_addr().map_or_else(|_| "a client".to_string(), |peer| peer.to_string());
+        tracing::warn!("OpenIGTLink: {peer} is refused: {why}");
         self.lock().statistics.disconnected += 1;
         self.leave(number);
     }
@@ -398,7 +398,7 @@ impl Shared {
     fn answer(&self, query: &Message, number: u64) -> bool {
         let Some((what, kind)) = query.kind().split_once('_') else { return true };
         let mut state = self.lock();
-        let State { clients, last, .. } = &mut *state;
+        let State { clients, last, statistics, .. } = &mut *state;
         let Some(queue) = clients.get_mut(&number) else { return true };
         let name = query.device();
         let found = || match last.get(name) {
@@ -406,29 +406,27 @@ impl Shared {
             None if name.is_empty() => last.values().next().cloned(),
             None => None,
         };
+        let short = |bytes: Option<Arc<[u8]>>| bytes.map(|bytes| Packet { device: None, bytes });
         let answer = match (what, kind) {
-            ("GET", "CAPABIL" | "CAPABILITY") => self.capabilities(),
-            ("GET", "STATUS") => self.status(),
-            ("GET", "STRING") => self.text(),
-            // The image itself, as an answer that is not dropped.
-            ("GET", "IMAGE") => match found() {
-                Some(packet) => Some(packet.bytes),
-                None => self.result("RTS_IMAGE", ERROR),
-            },
+            ("GET", "CAPABIL" | "CAPABILITY") => short(self.capabilities()),
+            ("GET", "STATUS") => short(self.status()),
+            ("GET", "STRING") => short(self.text()),
+            // The image itself, queued as if it were new: a client that asks faster than it reads loses the oldest.
+            ("GET", "IMAGE") => found().or_else(|| short(self.result("RTS_IMAGE", ERROR))),
             ("STT", "IMAGE") => {
                 queue.is_paused = false;
-                self.result("RTS_IMAGE", SUCCESS)
+                short(self.result("RTS_IMAGE", SUCCESS))
             }
             ("STP", "IMAGE") => {
                 queue.is_paused = true;
-                self.result("RTS_IMAGE", SUCCESS)
+                short(self.result("RTS_IMAGE", SUCCESS))
             }
-            ("GET" | "STT" | "STP", other) => self.result(&format!("RTS_{other}"), ERROR),
+            ("GET" | "STT" | "STP", other) => short(self.result(&format!("RTS_{other}"), ERROR)),
             _ => return true,
         };
-        // A type whose name leaves no room for RTS_ is not of this protocol.
-        let Some(bytes) = answer else { return true };
-        queue.push(Packet { device: None, bytes }, &self.options);
+        // RTS_ is as long as what it replaces, so that only a name of this server that no message holds leaves a query without an answer.
+        let Some(packet) = answer else { return true };
+        statistics.dropped += queue.push(packet, &self.options);
         let is_bearable = queue.answers <= MAX_ANSWERS;
         drop(state);
         self.changed.notify_all();
@@ -476,6 +474,31 @@ mod tests {
 
     fn packet(device: Option<&str>, bytes: usize) -> Packet {
         Packet { device: device.map(str::to_string), bytes: vec![0; bytes].into() }
+    }
+
+    /// Prevents that a client which asks for the last image again and again, and reads slowly, pins a copy of each that there was.
+    #[test]
+    fn images_that_are_asked_for_are_bounded_as_others_are() {
+        let options = ServerOptions { queue_messages: 2, queue_bytes: 1000, ..ServerOptions::default() };
+        let shared = Shared { state: Mutex::default(), changed: Condvar::new(), options };
+        shared.lock().clients.insert(1, Queue::default());
+        let ask = |kind: &str, device: &str| {
+            let bytes = query(kind, device).expect("a query");
+            let Ok(Decoded::Message { message, .. }) = decode(&bytes, QUERY_LIMIT) else { panic!("a query") };
+            shared.answer(&message, 1)
+        };
+        for n in 0..500 {
+            // A new image each time, so that none of the bytes are shared.
+            let device = ["a", "b", "c"][n % 3];
+            shared.lock().last.insert(device.into(), packet(Some(device), 400));
+            assert!(ask("GET_IMAGE", device), "{n}");
+            assert!(shared.lock().clients[&1].bytes <= 1000, "{n}");
+        }
+        let dropped = shared.lock().statistics.dropped;
+        let held = shared.lock().clients[&1].waiting.len();
+        assert_eq!((dropped + held as u64, held), (500, 2), "what is lost is counted");
+        // Short answers are bounded by their number.
+        assert_eq!((0..500).take_while(|_| ask("GET_STATUS", "")).count(), MAX_ANSWERS);
     }
 
     #[test]
