@@ -18,7 +18,7 @@ use std::thread::{self, JoinHandle};
 /// Devices of the messages.
 pub const PICTURE: &str = "EcholumePicture";
 pub const VOLUME: &str = "EcholumeVolume";
-/// Most voxels of a volume: 256 MiB, as much as clients take in one message.
+/// Most voxels of a volume, one byte each: 255 MiB. Clients take 256 MiB in one message, with its headers.
 const MAX_VOXELS: f64 = (255u64 << 20) as f64;
 /// Longest axis of an image on the wire.
 const MAX_EDGE: usize = 65_535;
@@ -56,12 +56,28 @@ struct Shared {
 #[derive(Default)]
 struct Mail {
     picture: Option<Rgba>,
-    volume: Option<Whole>,
+    volume: Option<Box<Whole>>,
     pictures: u64,
     volumes: u64,
     replaced: u64,
     fault: Option<String>,
     stop: bool,
+}
+
+/// One of what waits.
+enum Letter {
+    Picture(Rgba),
+    Volume(Box<Whole>),
+}
+
+impl Mail {
+    /// Takes what is sent next: a picture and a volume in turn where both wait, so that neither holds up the other for ever.
+    fn next(&mut self, was_picture: bool) -> Option<Letter> {
+        match self.volume.take_if(|_| was_picture || self.picture.is_none()) {
+            Some(whole) => Some(Letter::Volume(whole)),
+            None => self.picture.take().map(Letter::Picture),
+        }
+    }
 }
 
 struct Rgba {
@@ -153,21 +169,21 @@ impl Shared {
 
     /// Converts and sends what is handed over. What waits when the publisher is dropped is still sent.
     fn run(&self, server: &Server) {
+        let mut is_picture = false;
         loop {
             let mut mail = self.lock();
-            while !mail.stop && mail.picture.is_none() && mail.volume.is_none() {
-                mail = self.changed.wait(mail).unwrap_or_else(PoisonError::into_inner);
-            }
-            // A picture is sent before a volume that is being converted holds it up.
-            let (picture, volume) = match mail.picture.take() {
-                Some(picture) => (Some(picture), None),
-                None => (None, mail.volume.take()),
+            let letter = loop {
+                match mail.next(is_picture) {
+                    Some(letter) => break letter,
+                    None if mail.stop => return,
+                    None => mail = self.changed.wait(mail).unwrap_or_else(PoisonError::into_inner),
+                }
             };
             drop(mail);
-            let (is_picture, image) = match (picture, volume) {
-                (Some(picture), _) => (true, picture.image()),
-                (None, Some(whole)) => (false, whole.image(self.spacing)),
-                (None, None) => return,
+            is_picture = matches!(letter, Letter::Picture(_));
+            let image = match letter {
+                Letter::Picture(picture) => picture.image(),
+                Letter::Volume(whole) => whole.image(self.spacing),
             };
             let sent = image.and_then(|image| server.send(&Message::Image(image)).map_err(|e| e.to_string()));
             let mut mail = self.lock();
@@ -206,9 +222,13 @@ impl Whole {
         };
         let [x, y, z] = grid.size;
         let voxels = x as f64 * y as f64 * z as f64;
+        let most = match grid.size.iter().any(|n| *n > MAX_EDGE) {
+            true => format!("{MAX_EDGE} along an axis"),
+            false => format!("{MAX_VOXELS} of them"),
+        };
         if voxels > MAX_VOXELS || grid.size.iter().any(|n| *n > MAX_EDGE) {
             return Err(format!(
-                "a volume of {x} x {y} x {z} voxels; OpenIGTLink holds {MAX_VOXELS} of them: take a larger --serve-spacing"
+                "a volume of {x} x {y} x {z} voxels; OpenIGTLink holds {most}: take a larger --serve-spacing"
             ));
         }
         let [low, high] = self.range;
@@ -315,10 +335,39 @@ impl Listener {
             let (number, bytes) = (slice as u32, bytes.unwrap_or_default());
             volume.take(Frame { volume: 0, number, slice, backward: false, time: None, pose: None, bytes });
         }
-        let whole = Whole { volume, geometry: geometry.clone(), range: header.range, pose: filling.pose };
+        let whole = Box::new(Whole { volume, geometry: geometry.clone(), range: header.range, pose: filling.pose });
         let mut mail = self.shared.lock();
         mail.replaced += u64::from(mail.volume.replace(whole).is_some());
         drop(mail);
         self.shared.changed.notify_all();
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::source::StoredType;
+
+    /// Prevents that pictures, which come faster than they are sent, hold up volumes for ever.
+    #[test]
+    fn pictures_and_volumes_are_sent_in_turn() {
+        let grid = Grid { size: [2, 2, 2], spacing: [1.0; 3], origin: [0.0; 3] };
+        let geometry = Geometry::Cartesian(grid);
+        let mut mail = Mail::default();
+        let (mut was_picture, mut sent) = (false, String::new());
+        for _ in 0..6 {
+            // Both are there again before the next is taken.
+            mail.picture = Some(Rgba { size: [1, 1], pixels: vec![0; 4] });
+            let volume = Volume::new(geometry.clone(), StoredType::U8);
+            let whole = Whole { volume, geometry: geometry.clone(), range: [0.0, 255.0], pose: None };
+            mail.volume = Some(Box::new(whole));
+            let letter = mail.next(was_picture).expect("something waits");
+            was_picture = matches!(letter, Letter::Picture(_));
+            sent.push(if was_picture { 'p' } else { 'v' });
+        }
+        assert_eq!(sent, "pvpvpv");
+        // One kind alone is not held up.
+        (mail.picture, was_picture) = (None, false);
+        assert!(matches!(mail.next(was_picture), Some(Letter::Volume(_))) && mail.next(was_picture).is_none());
     }
 }
