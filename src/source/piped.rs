@@ -388,7 +388,7 @@ impl<'a, R: Read> Reader<'a, R> {
         let mut time = None;
         if stream.stamped {
             let mut bytes = Vec::with_capacity(stamp);
-            if let Err(error) = self.fill(stamp, &mut bytes, &mut came) {
+            if let Err(error) = self.fill(stamp, &mut bytes, &mut came, false) {
                 return cut(error, came);
             }
             time = bytes.first_chunk().map(|b| f64::from_le_bytes(*b)).filter(|t| t.is_finite());
@@ -396,7 +396,7 @@ impl<'a, R: Read> Reader<'a, R> {
         let mut pose = None;
         if stream.header.posed {
             let mut bytes = Vec::with_capacity(POSE_BYTES);
-            if let Err(error) = self.fill(POSE_BYTES, &mut bytes, &mut came) {
+            if let Err(error) = self.fill(POSE_BYTES, &mut bytes, &mut came, false) {
                 return cut(error, came);
             }
             pose = bytes.first_chunk().and_then(read_pose);
@@ -412,7 +412,7 @@ impl<'a, R: Read> Reader<'a, R> {
         while first < stream.lines {
             let lines = stream.lines_at_once.min(stream.lines - first);
             let mut frame = Frame { pose, ..stream.frame(index, time) };
-            if let Err(error) = self.fill(lines * line, &mut frame.bytes, &mut came) {
+            if let Err(error) = self.fill(lines * line, &mut frame.bytes, &mut came, true) {
                 return cut(error, came);
             }
             let known = self.replaced == Replaced::default();
@@ -434,8 +434,9 @@ impl<'a, R: Read> Reader<'a, R> {
         Ok(true)
     }
 
-    /// Appends `count` bytes. `came` counts the bytes that arrived, also if some are missing.
-    fn fill(&mut self, count: usize, bytes: &mut Vec<u8>, came: &mut usize) -> io::Result<()> {
+    /// Appends `count` bytes. `came` counts the bytes that arrived, also if some are missing. `are_samples`: a complete part of a frame, after
+    /// which the next may be allocated at once; a time stamp and a pose prove nothing about the samples.
+    fn fill(&mut self, count: usize, bytes: &mut Vec<u8>, came: &mut usize, are_samples: bool) -> io::Result<()> {
         if self.proven {
             bytes.reserve_exact(count);
         }
@@ -451,8 +452,7 @@ impl<'a, R: Read> Reader<'a, R> {
             }
             left -= step;
         }
-        // A time stamp and a pose prove nothing about the samples.
-        self.proven |= count > POSE_BYTES;
+        self.proven |= are_samples;
         Ok(())
     }
 }
