@@ -1,14 +1,12 @@
 //! `--serve` of `echolume stream`: what it says of the clients.
 
-use crate::source::igtl::{Publisher, PublisherStatistics, ServerOptions, with_port};
+use crate::source::igtl::{Publisher, PublisherStatistics, SCHEME, ServerOptions, with_port};
 use crate::terminal::{Failure, failed, input, remark, say};
 use std::io::ErrorKind;
 use std::time::Instant;
 
-/// Prefix of addresses.
-const PREFIX: &str = "igtl://";
-/// The address without a value: other machines cannot reach it.
-const LOOPBACK: &str = "igtl://127.0.0.1:18944";
+/// The address without a value, with the default port: other machines cannot reach it.
+const LOOPBACK: &str = "igtl://127.0.0.1";
 
 /// The arguments of a server.
 #[derive(clap::Args)]
@@ -29,7 +27,7 @@ impl ServeArgs {
     /// An address that is none, a port that is in use, a spacing that is no length.
     pub fn start(&self) -> Result<Option<Serving>, Failure> {
         let Some(given) = &self.serve else { return Ok(None) };
-        let place = given.strip_prefix(PREFIX).filter(|place| !place.is_empty());
+        let place = given.strip_prefix(SCHEME).filter(|place| !place.is_empty());
         let Some(place) = place else {
             return Err(input(format!("--serve {given}: must read igtl://HOST or igtl://HOST:PORT")));
         };
@@ -47,7 +45,7 @@ impl ServeArgs {
             failed(format!("--serve {given}: cannot be opened: {why}"))
         })?;
         let address = publisher.address();
-        say!("serving: {PREFIX}{address}");
+        say!("serving: {SCHEME}{address}");
         if !address.ip().is_loopback() {
             let warning = "whoever reaches this machine can see the pictures; OpenIGTLink has no password";
             remark(&format!("--serve {given}: {warning}"));
@@ -107,4 +105,21 @@ fn line(now: &PublisherStatistics) -> String {
         }
     }
     text
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::source::igtl::PORT;
+
+    /// The help states the address that `--serve` takes without a value.
+    #[test]
+    fn without_a_value_the_server_is_of_this_machine_at_the_usual_port() {
+        let place = LOOPBACK.strip_prefix(SCHEME).expect("an address");
+        assert_eq!(with_port(place), format!("127.0.0.1:{PORT}"));
+        let command = <ServeArgs as clap::Args>::augment_args(clap::Command::new("stream"));
+        let help = command.get_arguments().find(|arg| arg.get_id() == "serve").and_then(|arg| arg.get_help());
+        let stated = format!("[without a value: {SCHEME}{}]", with_port(place));
+        assert!(help.is_some_and(|help| help.to_string().contains(&stated)), "{help:?}");
+    }
 }

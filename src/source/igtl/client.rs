@@ -10,6 +10,8 @@ use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::thread::{self, JoinHandle};
 use std::time::{Duration, Instant};
 
+/// Prefix of addresses that users give.
+pub const SCHEME: &str = "igtl://";
 /// Default TCP port of OpenIGTLink servers.
 pub const PORT: u16 = 18944;
 /// How often the waiting thread checks whether it is to stop.

@@ -18,7 +18,7 @@ mod pixels;
 mod publish;
 mod server;
 
-pub use client::{Client, ClientOptions, ClientStatistics, PORT, Received, with_port};
+pub use client::{Client, ClientOptions, ClientStatistics, PORT, Received, SCHEME, with_port};
 pub use codec::{BODY_LIMIT, DecodeError, Decoded, HEADER, MessageError, Version, crc64, decode, encode};
 pub use message::{
     Coordinates, Image, Message, Other, Region, Scalar, Status, Text, Tool, ToolKind, TrackingData, Transform,
@@ -26,4 +26,4 @@ pub use message::{
 pub use network::{Network, NetworkOptions, Poses};
 pub use pairing::{PairedFrame, Pairing, PairingCounts};
 pub use publish::{PICTURE, Publisher, PublisherStatistics, VOLUME};
-pub use server::{Server, ServerOptions, ServerStatistics, query};
+pub use server::{Server, ServerOptions, ServerStatistics};

@@ -463,11 +463,6 @@ pub(super) fn now() -> f64 {
     std::time::SystemTime::now().duration_since(std::time::UNIX_EPOCH).map_or(0.0, |t| t.as_secs_f64())
 }
 
-/// A query, as clients send it: the kind and no body.
-pub fn query(kind: &str, device: &str) -> Result<Vec<u8>, MessageError> {
-    codec::packed(kind, device, 0.0, &[])
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -483,7 +478,7 @@ mod tests {
         let shared = Shared { state: Mutex::default(), changed: Condvar::new(), options };
         shared.lock().clients.insert(1, Queue::default());
         let ask = |kind: &str, device: &str| {
-            let bytes = query(kind, device).expect("a query");
+            let bytes = codec::packed(kind, device, 0.0, &[]).expect("a query");
             let Ok(Decoded::Message { message, .. }) = decode(&bytes, QUERY_LIMIT) else { panic!("a query") };
             shared.answer(&message, 1)
         };

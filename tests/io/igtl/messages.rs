@@ -24,6 +24,14 @@ pub fn raw(version: u16, kind: &str, body: &[u8]) -> Vec<u8> {
     bytes
 }
 
+/// A query of a client: a kind and no body.
+pub fn query(kind: &str, device: &str) -> Vec<u8> {
+    let mut bytes = raw(1, kind, &[]);
+    bytes[14..34].fill(0);
+    bytes[14..14 + device.len()].copy_from_slice(device.as_bytes());
+    bytes
+}
+
 /// The same message with a changed body and a correct checksum.
 pub fn changed(message: &[u8], change: impl FnOnce(&mut Vec<u8>)) -> Vec<u8> {
     let mut body = message[HEADER..].to_vec();

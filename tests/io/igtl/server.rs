@@ -100,7 +100,7 @@ fn queries_are_answered() {
     let server = server(ServerOptions::default());
     let mut stream = by_hand(&server);
     let ask = |stream: &mut TcpStream, kind: &str, device: &str| {
-        stream.write_all(&igtl::query(kind, device).expect("a query")).expect("sent");
+        stream.write_all(&query(kind, device)).expect("sent");
         read(stream)
     };
     let (kind, body) = ask(&mut stream, "GET_CAPABIL", "");
@@ -129,7 +129,7 @@ fn queries_are_answered() {
     assert_eq!(ask(&mut stream, "GET_TDATA", ""), ("RTS_TDATA".into(), vec![1]));
     // A message that asks for nothing, and one that is damaged, are passed over.
     let transform = encode(&transform("Stylus", 1.0, 2.0), Version::V1).expect("a transform");
-    let mut damaged = igtl::query("GET_STATUS", "").expect("a query");
+    let mut damaged = query("GET_STATUS", "");
     damaged[50] ^= 1;
     stream.write_all(&[transform, damaged].concat()).expect("sent");
     assert_eq!(ask(&mut stream, "GET_STATUS", "").0, "STATUS");
