@@ -2,6 +2,8 @@
 //! still be changed. Bounded in volumes and bytes. Pure.
 
 use crate::source::Frame;
+use crate::source::parts::FrameParts;
+use std::borrow::Cow;
 use std::collections::VecDeque;
 use std::sync::Arc;
 
@@ -36,14 +38,14 @@ pub struct Cine {
     volumes: VecDeque<CineVolume>,
     filling: Option<Filling>,
     /// A frame whose lines are arriving.
-    partial: Option<Frame>,
+    partial: FrameParts,
     bytes: usize,
 }
 
 impl Cine {
     /// An empty loop of volumes of `slices` frames.
     pub fn new(limits: CineLimits, slices: usize) -> Cine {
-        Cine { limits, slices, volumes: VecDeque::new(), filling: None, partial: None, bytes: 0 }
+        Cine { limits, slices, volumes: VecDeque::new(), filling: None, partial: FrameParts::default(), bytes: 0 }
     }
 
     /// True if the volumes have so many frames.
@@ -68,7 +70,7 @@ impl Cine {
 
     /// Removes the volume that is being filled: its remaining frames will not come.
     pub(crate) fn discard_partial(&mut self) {
-        (self.filling, self.partial) = (None, None);
+        (self.filling, self.partial) = (None, FrameParts::default());
     }
 
     /// Adds lines of a frame of `total` bytes, `at` bytes into it. Lines that do not continue those before are discarded.
@@ -76,19 +78,7 @@ impl Cine {
         if self.limits.volumes == 0 {
             return;
         }
-        match &mut self.partial {
-            Some(partial) if at > 0 => {
-                let follows =
-                    partial.bytes.len() == at && (partial.volume, partial.slice) == (frame.volume, frame.slice);
-                match follows && at + frame.bytes.len() <= total {
-                    true => partial.bytes.extend(frame.bytes),
-                    false => self.partial = None,
-                }
-            }
-            None if at > 0 => {}
-            partial => *partial = Some(frame),
-        }
-        if let Some(frame) = self.partial.take_if(|partial| partial.bytes.len() == total) {
+        if let Some(frame) = self.partial.add(Cow::Owned(frame), at, total) {
             self.frame(frame);
         }
     }

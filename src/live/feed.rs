@@ -4,8 +4,10 @@
 use crate::gpu::Wake;
 use crate::source::Frame;
 use crate::source::live::{Event, Live};
+use crate::source::parts::FrameParts;
 use crate::source::posed::Posed;
 use crate::source::recorder::{Header, Writer};
+use std::borrow::Cow;
 use std::collections::VecDeque;
 use std::io;
 use std::path::{Path, PathBuf};
@@ -299,14 +301,21 @@ struct RecordingTap {
     writer: Option<Writer>,
     header: Option<Header>,
     /// A frame whose lines are arriving.
-    partial: Option<Frame>,
+    partial: FrameParts,
     /// The last frame could not be written.
     is_failing: bool,
 }
 
 impl RecordingTap {
     fn new(path: &Path) -> RecordingTap {
-        RecordingTap { path: path.into(), files: 0, writer: None, header: None, partial: None, is_failing: false }
+        RecordingTap {
+            path: path.into(),
+            files: 0,
+            writer: None,
+            header: None,
+            partial: FrameParts::default(),
+            is_failing: false,
+        }
     }
 
     /// Writes a frame, or collects lines until their frame is complete.
@@ -320,7 +329,7 @@ impl RecordingTap {
         match event {
             Event::Begin(header) if self.header.as_ref() != Some(header) => {
                 self.finish_file()?;
-                self.partial = None;
+                self.partial = FrameParts::default();
                 let path = self.free_name();
                 self.writer = Some(Writer::create(&path, (**header).clone()).map_err(|e| e.to_string())?);
                 self.header = Some((**header).clone());
@@ -328,14 +337,8 @@ impl RecordingTap {
             }
             Event::Frame(frame) => self.frame(frame, seconds),
             Event::Lines { frame, first } => {
-                match &mut self.partial {
-                    Some(partial) if follows(partial, frame, *first, self.header.as_ref()) => {
-                        partial.bytes.extend(&frame.bytes);
-                    }
-                    partial => *partial = Some(frame.clone()),
-                }
-                let total = self.header.as_ref().and_then(Header::frame_bytes);
-                match self.partial.take_if(|partial| Some(partial.bytes.len() as u64) == total) {
+                let Some((line, total)) = self.header.as_ref().map(Header::line_and_frame) else { return Ok(()) };
+                match self.partial.add(Cow::Borrowed(frame), first * line, total) {
                     Some(frame) => self.frame(&frame, seconds),
                     None => Ok(()),
                 }
@@ -371,12 +374,6 @@ impl RecordingTap {
     fn finish(mut self) -> Result<(), String> {
         self.finish_file()
     }
-}
-
-/// True if lines from `first` on continue the partial frame.
-fn follows(partial: &Frame, frame: &Frame, first: usize, header: Option<&Header>) -> bool {
-    let line = header.map_or(0, |h| h.forward.frame_size()[0] * h.stored.bytes());
-    first > 0 && partial.bytes.len() == first * line && (partial.volume, partial.slice) == (frame.volume, frame.slice)
 }
 
 #[cfg(test)]

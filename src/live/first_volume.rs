@@ -5,7 +5,9 @@ use crate::scene::default_look::{Defaults, block_edge};
 use crate::scene::load::Layers;
 use crate::scene::{EchoHistogram, EchoLevels, Input};
 use crate::source::Frame;
+use crate::source::parts::FrameParts;
 use crate::source::recorder::Header;
+use std::borrow::Cow;
 
 /// The search for the levels of a stream's echoes.
 pub(super) struct FirstVolume {
@@ -22,7 +24,7 @@ struct Collected {
     /// By slice: it was taken.
     seen: Vec<bool>,
     /// A frame that arrives in pieces.
-    partial: Vec<u8>,
+    partial: FrameParts,
 }
 
 impl FirstVolume {
@@ -47,18 +49,12 @@ impl FirstVolume {
     /// Takes a frame, or lines of it from `first` on. What settings follow from, if it makes the first volume whole.
     pub fn frame(&mut self, frame: &Frame, first: Option<usize>) -> Option<Defaults> {
         let (header, collected) = (self.header.as_ref()?, self.collected.as_mut()?);
-        let [width, lines] = header.forward.frame_size();
-        let line = width * header.stored.bytes();
         let is_whole = match first {
-            None => collected.take(header, frame, &frame.bytes),
+            None => collected.take(header, frame),
             Some(first) => {
-                collected.partial.resize(line * lines, 0);
-                let place = collected.partial.get_mut(first * line..)?.get_mut(..frame.bytes.len())?;
-                place.copy_from_slice(&frame.bytes);
-                first * line + frame.bytes.len() == line * lines && {
-                    let complete = std::mem::take(&mut collected.partial);
-                    collected.take(header, frame, &complete)
-                }
+                let (line, total) = header.line_and_frame();
+                let complete = collected.partial.add(Cow::Borrowed(frame), first * line, total);
+                complete.is_some_and(|frame| collected.take(header, &frame))
             }
         };
         if !is_whole {
@@ -82,12 +78,12 @@ impl Collected {
             histogram: EchoHistogram::new(&header.forward, input, block_edge(&header.forward)),
             volume: None,
             seen: vec![false; header.forward.slices()],
-            partial: Vec::new(),
+            partial: FrameParts::default(),
         }
     }
 
     /// Takes a complete frame. True if all of its volume were taken.
-    fn take(&mut self, header: &Header, frame: &Frame, bytes: &[u8]) -> bool {
+    fn take(&mut self, header: &Header, frame: &Frame) -> bool {
         if self.volume.replace(frame.volume) != Some(frame.volume) {
             // The volume before was not whole.
             *self = Collected { volume: Some(frame.volume), ..Collected::new(header) };
@@ -96,7 +92,7 @@ impl Collected {
             Some(seen) if !*seen => *seen = true,
             _ => return false,
         }
-        self.histogram.take(bytes);
+        self.histogram.take(&frame.bytes);
         self.seen.iter().all(|seen| *seen)
     }
 }
@@ -141,9 +137,16 @@ mod tests {
     fn frames_in_pieces_count_when_they_are_complete() {
         let mut first = FirstVolume::new(Layers::default());
         first.begin(&header());
-        let mut found = None;
+        // Ten lines in the middle were lost: no volume.
         for slice in 0..2 {
             let whole = frame(0, slice, 120);
+            for (line, bytes) in [(0, &whole.bytes[..320]), (20, &whole.bytes[640..])] {
+                assert!(first.frame(&Frame { bytes: bytes.to_vec(), ..whole.clone() }, Some(line)).is_none());
+            }
+        }
+        let mut found = None;
+        for slice in 0..2 {
+            let whole = frame(1, slice, 120);
             for (line, bytes) in [(0, &whole.bytes[..320]), (10, &whole.bytes[320..])] {
                 assert!(found.is_none());
                 found = first.frame(&Frame { bytes: bytes.to_vec(), ..whole.clone() }, Some(line));

@@ -130,6 +130,15 @@ impl Volume {
         }
     }
 
+    pub fn geometry(&self) -> &Geometry {
+        &self.geometry
+    }
+
+    /// True if every frame is there.
+    pub fn is_whole(&self) -> bool {
+        self.frames.iter().all(|frame| !frame.is_empty())
+    }
+
     fn sample(&self, at: [usize; 3]) -> f64 {
         let n = (at[1] * self.size[0] + at[0]) * self.stored.bytes();
         let bytes = self.frames[at[2]].get(n..n + self.stored.bytes());

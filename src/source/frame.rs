@@ -87,6 +87,12 @@ impl Header {
         samples.checked_mul(self.stored.bytes() as u64).filter(|n| *n > 0 && *n <= MAX_FRAME_BYTES)
     }
 
+    /// Sizes of a line and of a frame, bytes; 0 where [`Header::frame_bytes`] is None.
+    pub(crate) fn line_and_frame(&self) -> (usize, usize) {
+        let frame = self.frame_bytes().unwrap_or(0) as usize;
+        (frame / self.forward.frame_size()[1].max(1), frame)
+    }
+
     /// Checks that frames with this header are possible.
     ///
     /// # Errors

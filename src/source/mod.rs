@@ -20,6 +20,7 @@ pub mod motor_tracking;
 mod nifti;
 mod nrrd;
 mod packed;
+pub(crate) mod parts;
 pub mod phantom;
 mod pictures;
 pub mod piped;

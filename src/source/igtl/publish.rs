@@ -9,7 +9,9 @@ use crate::probe::{Geometry, Grid, World};
 use crate::source::convert::{Volume, lattice};
 use crate::source::frame::{Frame, Header};
 use crate::source::live::Event;
+use crate::source::parts::FrameParts;
 use glam::{DAffine3, DVec3};
+use std::borrow::Cow;
 use std::io;
 use std::net::SocketAddr;
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
@@ -85,10 +87,9 @@ struct Rgba {
     pixels: Vec<u8>,
 }
 
-/// A volume whose frames have all arrived.
+/// A volume, to be sent when all of its frames have arrived.
 struct Whole {
     volume: Volume,
-    geometry: Geometry,
     /// Stored values that become 0 and 255.
     range: [f64; 2],
     pose: Option<DAffine3>,
@@ -149,7 +150,7 @@ impl Publisher {
     /// What is to see every event of a source: it hands over each volume that is whole.
     pub fn listener(&self) -> impl FnMut(&Event) + Send + use<> {
         let (shared, server) = (self.shared.clone(), self.server.clone());
-        let mut listener = Listener { shared, server, header: None, filling: None, partial: None };
+        let mut listener = Listener { shared, server, header: None, filling: None, partial: FrameParts::default() };
         move |event| listener.look_at(event)
     }
 }
@@ -201,7 +202,9 @@ impl Rgba {
     fn image(&self) -> Result<Image, String> {
         let [width, height] = self.size;
         let (Ok(columns), Ok(rows)) = (u16::try_from(width), u16::try_from(height)) else {
-            return Err(format!("a picture of {width} x {height} pixels; OpenIGTLink holds {MAX_EDGE} along an axis"));
+            return Err(format!(
+                "a picture of {width} x {height} pixels; OpenIGTLink holds {MAX_EDGE} along an axis: take a smaller --size"
+            ));
         };
         let size = [columns, rows, 1];
         let rgb = self.pixels.chunks_exact(4).flat_map(|pixel| [pixel[0], pixel[1], pixel[2]]).collect();
@@ -214,10 +217,10 @@ impl Rgba {
 impl Whole {
     /// The volume on a Cartesian lattice, 8 bits, 0 outside of the insonified region.
     fn image(&self, spacing: Option<f64>) -> Result<Image, String> {
-        let grid = match (&self.geometry, spacing) {
+        let grid = match (self.volume.geometry(), spacing) {
             (Geometry::Cartesian(own), None) => *own,
             (geometry, spacing) => {
-                lattice(geometry, spacing.unwrap_or(1.0)).map_err(|why| format!("voxels of {why}"))?
+                lattice(geometry, spacing.unwrap_or(1.0)).map_err(|why| format!("--serve-spacing {why}"))?
             }
         };
         let [x, y, z] = grid.size;
@@ -268,41 +271,23 @@ struct Listener {
     shared: Arc<Shared>,
     server: Arc<Server>,
     header: Option<Header>,
-    filling: Option<Filling>,
-    /// A frame whose lines are arriving.
-    partial: Option<Frame>,
-}
-
-/// A volume that is being collected.
-struct Filling {
-    number: u32,
-    backward: bool,
-    frames: Vec<Option<Vec<u8>>>,
-    /// Frames that have arrived.
-    there: usize,
-    pose: Option<DAffine3>,
+    /// The volume that is being collected, and its number.
+    filling: Option<(u32, Box<Whole>)>,
+    partial: FrameParts,
 }
 
 impl Listener {
     fn look_at(&mut self, event: &Event) {
         match event {
             Event::Begin(header) => {
-                (self.header, self.filling, self.partial) = (Some((**header).clone()), None, None);
+                self.header = Some((**header).clone());
+                self.begin_again();
             }
-            _ if !self.server.has_clients() => (self.filling, self.partial) = (None, None),
+            _ if !self.server.has_clients() => self.begin_again(),
             Event::Frame(frame) => self.frame(frame.clone()),
             Event::Lines { frame, first } => {
-                let whole = self.header.as_ref().and_then(Header::frame_bytes).unwrap_or(0);
-                let is_next = |partial: &Frame| {
-                    *first > 0
-                        && (partial.volume, partial.slice) == (frame.volume, frame.slice)
-                        && partial.bytes.len() as u64 <= whole
-                };
-                match self.partial.as_mut().filter(|partial| is_next(partial)) {
-                    Some(partial) => partial.bytes.extend(&frame.bytes),
-                    None => self.partial = (*first == 0).then(|| frame.clone()),
-                }
-                if let Some(frame) = self.partial.take_if(|partial| partial.bytes.len() as u64 >= whole) {
+                let Some((line, total)) = self.header.as_ref().map(Header::line_and_frame) else { return };
+                if let Some(frame) = self.partial.add(Cow::Borrowed(frame), first * line, total) {
                     self.frame(frame);
                 }
             }
@@ -310,32 +295,22 @@ impl Listener {
         }
     }
 
+    /// Forgets the volume and the frame that are not whole.
+    fn begin_again(&mut self) {
+        (self.filling, self.partial) = (None, FrameParts::default());
+    }
+
     fn frame(&mut self, frame: Frame) {
         let Some(header) = &self.header else { return };
-        let slices = header.forward.slices();
-        let is_other = self.filling.as_ref().is_none_or(|filling| filling.number != frame.volume);
-        if is_other {
-            let frames = vec![None; slices];
-            let (number, backward, pose) = (frame.volume, frame.backward, frame.pose);
-            self.filling = Some(Filling { number, backward, frames, there: 0, pose });
+        if self.filling.as_ref().is_none_or(|(number, _)| *number != frame.volume) {
+            let geometry = if frame.backward { &header.backward } else { &header.forward };
+            let volume = Volume::new(geometry.clone(), header.stored);
+            self.filling = Some((frame.volume, Box::new(Whole { volume, range: header.range, pose: None })));
         }
-        let Some(filling) = &mut self.filling else { return };
-        if Some(frame.bytes.len() as u64) == header.frame_bytes()
-            && let Some(place) = filling.frames.get_mut(frame.slice)
-        {
-            filling.there += usize::from(place.replace(frame.bytes).is_none());
-        }
-        if filling.there < slices {
-            return;
-        }
-        let Some(filling) = self.filling.take() else { return };
-        let geometry = if filling.backward { &header.backward } else { &header.forward };
-        let mut volume = Volume::new(geometry.clone(), header.stored);
-        for (slice, bytes) in filling.frames.into_iter().enumerate() {
-            let (number, bytes) = (slice as u32, bytes.unwrap_or_default());
-            volume.take(Frame { volume: 0, number, slice, backward: false, time: None, pose: None, bytes });
-        }
-        let whole = Box::new(Whole { volume, geometry: geometry.clone(), range: header.range, pose: filling.pose });
+        let Some((_, filling)) = &mut self.filling else { return };
+        filling.pose = filling.pose.or(frame.pose);
+        filling.volume.take(frame);
+        let Some((_, whole)) = self.filling.take_if(|(_, filling)| filling.volume.is_whole()) else { return };
         let mut mail = self.shared.lock();
         mail.replaced += u64::from(mail.volume.replace(whole).is_some());
         drop(mail);
@@ -353,21 +328,23 @@ mod tests {
     fn pictures_and_volumes_are_sent_in_turn() {
         let grid = Grid { size: [2, 2, 2], spacing: [1.0; 3], origin: [0.0; 3] };
         let geometry = Geometry::Cartesian(grid);
+        let volume = || {
+            let volume = Volume::new(geometry.clone(), StoredType::U8);
+            Some(Box::new(Whole { volume, range: [0.0, 255.0], pose: None }))
+        };
         let mut mail = Mail::default();
         let (mut was_picture, mut sent) = (false, String::new());
         for _ in 0..6 {
             // Both are there again before the next is taken.
             mail.picture = Some(Rgba { size: [1, 1], pixels: vec![0; 4] });
-            let volume = Volume::new(geometry.clone(), StoredType::U8);
-            let whole = Whole { volume, geometry: geometry.clone(), range: [0.0, 255.0], pose: None };
-            mail.volume = Some(Box::new(whole));
+            mail.volume = volume();
             let letter = mail.next(was_picture).expect("something waits");
             was_picture = matches!(letter, Letter::Picture(_));
             sent.push(if was_picture { 'p' } else { 'v' });
         }
         assert_eq!(sent, "pvpvpv");
         // One kind alone is not held up.
-        (mail.picture, was_picture) = (None, false);
+        (mail.picture, mail.volume, was_picture) = (None, volume(), false);
         assert!(matches!(mail.next(was_picture), Some(Letter::Volume(_))) && mail.next(was_picture).is_none());
     }
 }

@@ -19,11 +19,13 @@ pub use passes::TrackingCounts;
 
 use super::frame::{Frame, Header, Source};
 use super::live::{Event, Live};
+use super::parts::FrameParts;
 use super::phantom::{Phantom, PhantomOptions, PhantomSource};
 use crate::files::InputError;
 use crate::probe::motor::{ArrayState, BackgroundSweep, PositionLog};
 use crate::probe::{Advance, Axis, Geometry, Motion, Probe};
 use passes::{MAX_FILLED, Passes};
+use std::borrow::Cow;
 use std::collections::VecDeque;
 use std::time::{Duration, Instant};
 
@@ -65,7 +67,7 @@ pub struct MotorTracked {
     /// Frames that are not placed yet: the time of the first line on the motor's clock, until when they wait, and the frame.
     waiting: VecDeque<(f64, Instant, Frame)>,
     /// A frame whose lines are arriving.
-    lines: Option<Frame>,
+    lines: FrameParts,
     out: VecDeque<Event>,
     /// Why the source ended.
     ended: Option<Option<String>>,
@@ -80,7 +82,8 @@ struct Tracking {
     passes: Passes,
     /// Time that sound needs for a frame, s.
     frame_time: f64,
-    frame_bytes: usize,
+    /// Of a line and of a frame, bytes.
+    sizes: (usize, usize),
 }
 
 impl MotorTracked {
@@ -92,7 +95,7 @@ impl MotorTracked {
             options,
             tracking: None,
             waiting: VecDeque::new(),
-            lines: None,
+            lines: FrameParts::default(),
             out: VecDeque::new(),
             ended: None,
             counts: TrackingCounts::default(),
@@ -120,14 +123,8 @@ impl MotorTracked {
 
     /// A frame that arrives in parts is placed when it is complete.
     fn lines(&mut self, frame: Frame, first: usize) {
-        match &mut self.lines {
-            Some(partial) if first > 0 && (partial.volume, partial.slice) == (frame.volume, frame.slice) => {
-                partial.bytes.extend(&frame.bytes);
-            }
-            lines => *lines = Some(frame),
-        }
-        let total = self.tracking.as_ref().map(|tracking| tracking.frame_bytes);
-        if let Some(frame) = self.lines.take_if(|lines| Some(lines.bytes.len()) >= total) {
+        let Some(Tracking { sizes: (line, total), .. }) = self.tracking else { return };
+        if let Some(frame) = self.lines.add(Cow::Owned(frame), first * line, total) {
             self.arrived(frame);
         }
     }
@@ -137,13 +134,13 @@ impl MotorTracked {
         if let Some(mut tracking) = self.tracking.take() {
             tracking.passes.end(&mut self.counts, &mut self.out);
         }
-        self.lines = None;
+        self.lines = FrameParts::default();
         match motor_header(header, self.motor.speed()) {
             Ok((header, slices, frame_time)) => {
-                let frame_bytes = header.frame_bytes().unwrap_or(0) as usize;
+                let sizes = header.line_and_frame();
                 self.out.push_back(Event::Begin(Box::new(header)));
                 self.warn_of_edges(&slices);
-                self.tracking = Some(Tracking { passes: Passes::new(slices), frame_time, frame_bytes });
+                self.tracking = Some(Tracking { passes: Passes::new(slices), frame_time, sizes });
             }
             Err(fault) => self.ended = Some(Some(fault)),
         }
