@@ -88,6 +88,7 @@ impl GeometryArgs {
             plus_config: self.plus_config.as_deref(),
             calibration: &self.calibration,
             reference: self.reference.as_deref(),
+            ..OpenOptions::default()
         }
     }
 }

@@ -6,15 +6,15 @@ use crate::gpu::TimeStamps;
 use crate::kiosk::config::Config;
 use crate::live::Update;
 use crate::probe::Geometry;
-use crate::source::Source;
-use crate::source::freehand;
-use crate::source::igtl::{Network, NetworkOptions, Poses};
+use crate::source::freehand::FreehandArguments;
+use crate::source::igtl::{Network, NetworkOptions, Poses, SCHEME};
 #[cfg(feature = "view")]
 use crate::source::live::SourceKind;
 use crate::source::live::{Live, Playback, PlaybackSource};
 use crate::source::motor_tracking::FreeRunning;
 use crate::source::phantom::{self, CachedPhantom, Phantom};
 use crate::source::piped::Piped;
+use crate::source::{OpenOptions, Source};
 use crate::terminal::{Failure, failed, input};
 #[cfg(feature = "view")]
 use crate::workspace::{Origin, PHANTOM, Workspace};
@@ -25,8 +25,6 @@ use std::path::Path;
 const PHANTOM_VOLUMES: usize = 4;
 /// Default rate of the phantom, volumes per second.
 const PHANTOM_RATE: f64 = 1.0;
-/// Prefix of OpenIGTLink addresses.
-const NETWORK: &str = "igtl://";
 
 /// The source of live frames.
 #[derive(Clone, clap::Args)]
@@ -58,9 +56,9 @@ pub struct SourceArgs {
     /// Voxel spacing of the volume that tracked frames are compounded into, mm [default: the frames' pixel spacing]
     #[arg(long, value_name = "MM")]
     spacing: Option<f64>,
-    /// Widest gap between tracked frames that is filled, mm
-    #[arg(long, value_name = "MM", default_value_t = 2.0)]
-    hole: f64,
+    /// Widest gap between tracked frames that is filled, mm [default: 2]
+    #[arg(long, value_name = "MM")]
+    hole: Option<f64>,
     #[command(flatten)]
     motor: MotorArgs,
 }
@@ -105,7 +103,8 @@ impl SourceArgs {
     /// The same arguments for another file, whose geometry follows from it alone.
     #[cfg(feature = "view")]
     pub fn of_file(&self, file: &Path) -> SourceArgs {
-        SourceArgs { geometry: GeometryArgs::default(), ..self.at_file(file) }
+        let geometry = GeometryArgs::default();
+        SourceArgs { geometry, clip: None, spacing: None, hole: None, ..self.at_file(file) }
     }
 
     /// The same arguments with the recording of a workspace.
@@ -145,7 +144,7 @@ impl SourceArgs {
         match self.source.as_str() {
             _ if self.is_phantom() => SourceKind::Demo,
             "-" => SourceKind::Pipe,
-            source if source.starts_with(NETWORK) => SourceKind::Probe,
+            source if source.starts_with(SCHEME) => SourceKind::Probe,
             _ => SourceKind::Recording,
         }
     }
@@ -165,7 +164,7 @@ impl SourceArgs {
 
     /// Opens the source. With a motor, also opens its port and starts it.
     pub fn open(&self) -> Result<Box<dyn Live>, Failure> {
-        let network = self.source.strip_prefix(NETWORK);
+        let network = self.source.strip_prefix(SCHEME);
         let is_file = !self.is_phantom() && self.source != "-" && network.is_none();
         let fan = self.is_phantom().then_some(phantom::FAN_ANGLE_DEG);
         let sweep = self.motor.plan(self.geometry.probe.as_deref(), is_file.then(|| self.path()), fan)?;
@@ -173,6 +172,9 @@ impl SourceArgs {
             return Err(input(format!("{flag}: is for recordings of files")));
         }
         if self.is_phantom() {
+            if let Some(flag) = self.freehand()?.flag() {
+                return Err(input(format!("{flag}: is for frames with poses; the phantom has none")));
+            }
             return self.phantom(sweep.as_ref());
         }
         let source: Box<dyn Live> = if self.source == "-" {
@@ -192,7 +194,8 @@ impl SourceArgs {
             let network = Network::connect(address, self.network()?);
             Box::new(network.map_err(|e| failed(format!("{}: {e}", self.source)))?)
         } else {
-            let recording = open_recording(self.path(), self.geometry.options())?;
+            let options = OpenOptions { freehand: self.freehand()?, ..self.geometry.options() };
+            let recording = open_recording(self.path(), options)?;
             // The frame rate of a free-running probe is limited by the speed of sound.
             let rate = self.rate.or(sweep.as_ref().and_then(|_| acoustic_rate(&*recording)));
             Box::new(PlaybackSource::new(recording, self.playback(rate)?, self.rounds))
@@ -244,14 +247,21 @@ impl SourceArgs {
             (Poses::Messages { device, .. }, tool) => *device = tool.map(str::to_string),
             (Poses::Image, _) => {}
         }
-        let positive = |flag: &str, mm: f64, least: f64| match mm >= least && mm <= 1000.0 {
-            true => Ok(mm),
-            false => Err(input(format!("{flag} {mm}: must lie in {least}..=1000 mm"))),
-        };
-        let spacing = self.spacing.map(|mm| positive("--spacing", mm, 0.01)).transpose()?;
-        let max_hole = positive("--hole", self.hole, 0.0)?;
-        options.freehand = freehand::CompoundingOptions { spacing, max_hole, clip: self.clip()?, ..options.freehand };
+        options.freehand = self.freehand()?.over(options.freehand);
         Ok(options)
+    }
+
+    /// What is said of the volume that pictures with poses are compounded into.
+    fn freehand(&self) -> Result<FreehandArguments, Failure> {
+        let length = |flag: &str, given: Option<f64>, least: f64| match given {
+            Some(mm) if !(least..=1000.0).contains(&mm) => {
+                Err(input(format!("{flag} {mm}: must lie in {least}..=1000 mm")))
+            }
+            given => Ok(given),
+        };
+        let spacing = length("--spacing", self.spacing, 0.01)?;
+        let max_hole = length("--hole", self.hole, 0.0)?;
+        Ok(FreehandArguments { clip: self.clip()?, spacing, max_hole })
     }
 
     fn clip(&self) -> Result<Option<[usize; 4]>, Failure> {

@@ -67,6 +67,8 @@ pub struct OpenOptions<'a> {
     pub calibration: &'a [Calibration],
     /// The coordinate frame of the tracking that the volume is placed in. None: that of the configuration, or Reference, Tracker or World.
     pub reference: Option<&'a str>,
+    /// Of pictures with poses, which become a freehand volume.
+    pub freehand: freehand::FreehandArguments,
 }
 
 /// As [`open_with`], with the stored order of axes. `probe`: the probe file to use.
@@ -91,11 +93,11 @@ pub fn open_with(path: &Path, options: OpenOptions) -> Result<Box<dyn Source>, I
 
 fn open_file(path: &Path, options: OpenOptions) -> Result<Box<dyn Source>, InputError> {
     Ok(match Kind::of(path) {
-        Kind::Frames => posed::as_volume(path, Box::new(frames(path, options)?))?,
-        Kind::Stream => posed::as_volume(path, Box::new(stream(path, options)?))?,
+        Kind::Frames => posed::Opened::new(path, Box::new(frames(path, options)?), options.freehand)?.source(),
+        Kind::Stream => posed::Opened::new(path, Box::new(stream(path, options)?), options.freehand)?.source(),
         Kind::Uff => Box::new(uff(path, options)?),
         Kind::Recording if tracked::is_asked_for(&options) => Box::new(tracked_volume(path, options)?),
-        Kind::Recording => Box::new(Recording::open_with(path, options)?),
+        Kind::Recording => Box::new(recording(path, options)?),
     })
 }
 
@@ -112,12 +114,23 @@ pub fn description(path: &Path, options: OpenOptions) -> Result<Vec<(String, Str
 
 fn file_description(path: &Path, options: OpenOptions) -> Result<Vec<(String, String)>, InputError> {
     match Kind::of(path) {
-        Kind::Frames => frames(path, options)?.description(),
-        Kind::Stream => Ok(stream(path, options)?.description()),
+        Kind::Frames => {
+            let opened = posed::Opened::new(path, Box::new(frames(path, options)?), options.freehand)?;
+            Ok(opened.description(frames(path, options)?.description()?))
+        }
+        Kind::Stream => {
+            let opened = posed::Opened::new(path, Box::new(stream(path, options)?), options.freehand)?;
+            Ok(opened.description(stream(path, options)?.description()))
+        }
         Kind::Uff => Ok(uff(path, options)?.description()),
         Kind::Recording if tracked::is_asked_for(&options) => Ok(tracked_volume(path, options)?.description()),
-        Kind::Recording => Ok(Recording::open_with(path, options)?.description()),
+        Kind::Recording => Ok(recording(path, options)?.description()),
     }
+}
+
+fn recording(path: &Path, options: OpenOptions) -> Result<Recording, InputError> {
+    options.freehand.refused(path)?;
+    Recording::open_with(path, options)
 }
 
 fn tracked_volume(path: &Path, options: OpenOptions) -> Result<tracked::TrackedVolume, InputError> {
@@ -143,7 +156,10 @@ fn uff(path: &Path, options: OpenOptions) -> Result<uff::Beamformed, InputError>
         OpenOptions { depth_axis: Some(_), .. } => fault("--depth-axis"),
         OpenOptions { voxel_spacing: Some(_), .. } => fault("--voxel-spacing"),
         _ if tracked::is_asked_for(&options) => fault("--plus-config"),
-        _ => uff::Beamformed::open(path),
+        _ => {
+            options.freehand.refused(path)?;
+            uff::Beamformed::open(path)
+        }
     }
 }
 

@@ -1,8 +1,8 @@
-//! Pictures that each carry a pose, as a freehand volume: while they arrive ([`Posed`]), and from a file ([`as_volume`]).
+//! Pictures that each carry a pose, as a freehand volume: while they arrive ([`Posed`]), and from a file ([`Opened`]).
 
 use super::frame::{Frame, Header, Source};
 use super::freehand::{
-    CompoundingOptions, FreehandFile, PlacedPicture, PlacedPictures, Pose, Refusal, Schedule, Sweep,
+    CompoundingOptions, FreehandArguments, FreehandFile, PlacedPicture, PlacedPictures, Pose, Refusal, Schedule, Sweep,
 };
 use super::live::Event;
 use crate::files::InputError;
@@ -174,7 +174,7 @@ impl Posed {
 }
 
 /// Posed pictures of a file.
-struct PosedPictures {
+pub(super) struct PosedPictures {
     pictures: Box<dyn Source>,
     grid: Grid,
 }
@@ -194,26 +194,64 @@ impl PlacedPictures for PosedPictures {
     }
 }
 
-/// Posed pictures of a file as one freehand volume; other frames unchanged. Pictures of one place are no sweep but a series in time, and stay
-/// what they are. All pictures are read once for their poses.
-///
-/// # Errors
-/// A file that cannot be read, no picture with a pose.
-pub(super) fn as_volume(path: &Path, mut pictures: Box<dyn Source>) -> Result<Box<dyn Source>, InputError> {
-    let header = pictures.header();
-    let grid = match &header.forward {
-        Geometry::Cartesian(grid) if is_posed(&header) => *grid,
-        _ => return Ok(pictures),
-    };
-    let (mut poses, mut first, mut is_moved) = (Vec::new(), None, false);
-    while let Some(frame) = pictures.next_frame()? {
-        is_moved |= frame.pose.is_some_and(|pose| *first.get_or_insert(pose) != pose);
-        poses.push(frame.pose.map(|pose| placed(&grid, &pose)));
+/// A freehand volume of posed pictures.
+pub(super) type PosedVolume = FreehandFile<PosedPictures>;
+
+/// What the frames of a file are.
+pub(super) enum Opened {
+    Volume(Box<PosedVolume>),
+    Frames(Box<dyn Source>),
+}
+
+impl Opened {
+    /// Posed pictures as one freehand volume; other frames unchanged. Pictures of one place are no sweep but a series in time, and stay what
+    /// they are. All pictures are read once for their poses.
+    ///
+    /// # Errors
+    /// A file that cannot be read, no picture with a pose, arguments for a freehand volume where there is none.
+    pub fn new(path: &Path, mut frames: Box<dyn Source>, said: FreehandArguments) -> Result<Opened, InputError> {
+        let header = frames.header();
+        let grid = match &header.forward {
+            Geometry::Cartesian(grid) if is_posed(&header) => *grid,
+            _ => return Opened::unchanged(path, frames, said),
+        };
+        let (mut poses, mut first, mut is_moved) = (Vec::new(), None, false);
+        while let Some(frame) = frames.next_frame()? {
+            is_moved |= frame.pose.is_some_and(|pose| *first.get_or_insert(pose) != pose);
+            poses.push(frame.pose.map(|pose| placed(&grid, &pose)));
+        }
+        if first.is_some() && !is_moved {
+            frames.skip_to_volume(0)?;
+            return Opened::unchanged(path, frames, said);
+        }
+        let options = said.over(CompoundingOptions { margin: 0.0, ..CompoundingOptions::default() });
+        let pictures = PosedPictures { pictures: frames, grid };
+        Ok(Opened::Volume(Box::new(FreehandFile::around(path, pictures, &poses, options)?)))
     }
-    if first.is_some() && !is_moved {
-        pictures.skip_to_volume(0)?;
-        return Ok(pictures);
+
+    fn unchanged(path: &Path, frames: Box<dyn Source>, said: FreehandArguments) -> Result<Opened, InputError> {
+        said.refused(path)?;
+        Ok(Opened::Frames(frames))
     }
-    let options = CompoundingOptions { margin: 0.0, ..CompoundingOptions::default() };
-    Ok(Box::new(FreehandFile::around(path, PosedPictures { pictures, grid }, &poses, options)?))
+
+    pub fn source(self) -> Box<dyn Source> {
+        match self {
+            Opened::Volume(volume) => volume,
+            Opened::Frames(frames) => frames,
+        }
+    }
+
+    /// A description for users. `of_frames`: that of the frames.
+    pub fn description(&self, of_frames: Vec<(String, String)>) -> Vec<(String, String)> {
+        let Opened::Volume(volume) = self else { return of_frames };
+        let format = of_frames.iter().find(|(title, _)| title == "format").map_or("frames", |(_, format)| format);
+        let placed = vec![("placed".into(), "by the pose of each picture, in the tracker's space".into())];
+        let mut rows = volume.describe(format, placed, "the tracker's space");
+        // What the volume has too is that of the volume.
+        let of_pictures = ["frame", "frames", "volumes"];
+        let is_of_file = |title: &str| !of_pictures.contains(&title) && rows.iter().all(|(there, _)| there != title);
+        let of_file: Vec<_> = of_frames.into_iter().filter(|(title, _)| is_of_file(title)).collect();
+        rows.extend(of_file);
+        rows
+    }
 }

@@ -1,11 +1,11 @@
 //! Tracked pictures of a file as a freehand volume: each gets its pose by a chain of transforms, and they are compounded into a lattice.
 
+use super::OpenOptions;
 use super::frame::Source;
 use super::freehand::{CompoundingOptions, FreehandFile, PlacedPicture, PlacedPictures, Pose};
 use super::plus_config::PlusConfig;
 use super::recording::Recording;
 use super::transforms::{Calibration, Chain, HOW};
-use super::{OpenOptions, describe};
 use crate::files::InputError;
 use crate::probe::Geometry;
 use glam::DAffine3;
@@ -75,7 +75,7 @@ impl TrackedVolume {
             .map(|n| chain.of(n).map(|matrix| Pose { to_space: DAffine3::from_mat4(matrix), size }))
             .map(|pose| pose.filter(|pose| pose.check().is_ok()))
             .collect();
-        let compounding = CompoundingOptions {
+        let of_file = CompoundingOptions {
             clip: config.clip,
             spacing: config.spacing,
             margin: 0.0,
@@ -84,26 +84,15 @@ impl TrackedVolume {
         let between = [image.to_string(), reference.to_string()];
         let config = options.plus_config.map(Path::to_path_buf);
         let tracked = Tracked { pictures, config, poses: poses.clone(), between };
-        FreehandFile::around(path, tracked, &poses, compounding)
+        FreehandFile::around(path, tracked, &poses, options.freehand.over(of_file))
     }
 
     /// A description for users: pairs of title and value.
     pub fn description(&self) -> Vec<(String, String)> {
-        let Tracked { pictures, poses, between, .. } = self.placed();
-        let mut rows: Vec<(String, String)> = Vec::new();
-        let mut add = |title: &str, value: String| rows.push((title.into(), value));
-        add("format", format!("{}, freehand", pictures.format()));
-        add("samples", self.sample_type().to_string());
-        add("pictures", format!("{}, {} with a valid pose", poses.len(), poses.iter().flatten().count()));
-        add("tracking", pictures.poses().names());
-        let [from, to] = between;
-        add("placed", format!("from {from} to {to}"));
-        rows.extend(describe::grid(&self.lattice().grid));
-        if let Some(world) = self.world() {
-            let [u, v, w] = world.origin().to_array().map(describe::number);
-            rows.push(("position".into(), format!("the first voxel is at {u}, {v}, {w} mm in {to}")));
-        }
-        rows
+        let Tracked { pictures, between: [from, to], .. } = self.placed();
+        let placed = [("tracking", pictures.poses().names()), ("placed", format!("from {from} to {to}"))];
+        let placed = placed.map(|(title, value)| (title.to_string(), value)).to_vec();
+        self.describe(pictures.format(), placed, to)
     }
 }
 

@@ -110,6 +110,7 @@ fn a_stream_that_cannot_begin_says_why_and_writes_nothing() {
         (&["--null", "--source", "igtl://"], "igtl://HOST"),
         (&["--null", "--source", "igtl://localhost", "--clip", "1,2"], "--clip 1,2"),
         (&["--null", "--source", "igtl://localhost", "--spacing", "0"], "--spacing"),
+        (&["--null", "--clip", "1,2,3,4"], "--clip: is for frames with poses"),
         (&["--null", "--mode", "sideways"], "sideways"),
         (&["--null", "--serve", "localhost"], "igtl://HOST"),
         (&["--null", "--serve", "--serve-spacing", "0"], "--serve-spacing 0"),

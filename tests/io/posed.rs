@@ -3,12 +3,12 @@
 use crate::common::files::{Folder, repository};
 use echolume::live::Feed;
 use echolume::probe::{Geometry, Grid, World};
-use echolume::source::freehand::CompoundingOptions;
+use echolume::source::freehand::{CompoundingOptions, FreehandArguments};
 use echolume::source::live::{Event, Live, Playback, PlaybackSource};
 use echolume::source::piped::Piped;
 use echolume::source::posed::Posed;
 use echolume::source::recorder::{Header, Reader, Writer};
-use echolume::source::{Frame, Source, StoredType, open};
+use echolume::source::{Frame, InputError, OpenOptions, Source, StoredType, description, open, open_with};
 use glam::{DAffine3, DQuat, DVec3};
 use serde_json::json;
 use std::io::Cursor;
@@ -321,6 +321,119 @@ fn pictures_that_are_left_out_are_counted_on_few_lines() {
     let part = Event::Lines { frame: frame(0, Some(pose(0)), vec![0; 4 * x]), first: 0 };
     let said = [take(&mut stream, part), stream.take(Event::End(None))].concat();
     assert_eq!(faults(&said).len(), 1, "{said:?}");
+}
+
+/// A recording of the stream, and the stream itself in a file.
+fn stored(folder: &Folder, bytes: &[u8]) -> [String; 2] {
+    let stream = folder.write("stream", bytes);
+    let tape = folder.path("tape.frames");
+    let piped = Piped::new(Cursor::new(bytes.to_vec()), None).expect("a thread");
+    let feed = Feed::new(Box::new(piped), Some(tape.as_ref())).expect("a thread");
+    let (_, why) = all(|| feed.next(Duration::from_secs(20)).map(|arrived| arrived.event));
+    assert_eq!(why, None);
+    [tape, stream]
+}
+
+/// Clip, spacing and holes apply to the volume of a file as to a live one, or are refused: never ignored.
+#[test]
+fn what_is_said_of_a_freehand_volume_applies_to_files() {
+    let folder = Folder::new("said");
+    let opened = |file: &str, freehand: FreehandArguments| {
+        let options = OpenOptions { freehand, ..OpenOptions::default() };
+        let mut source = open_with(file.as_ref(), options)?;
+        let Geometry::Cartesian(grid) = source.geometry(0) else { panic!("a lattice") };
+        let slices: Vec<_> = std::iter::from_fn(|| source.next_frame().expect("a slice")).collect();
+        let world = source.world().expect("a place");
+        let filled = hold_the_field(&grid, &world, slices.iter().map(|frame| (frame.slice, &frame.bytes[..])));
+        Ok::<_, InputError>((grid, filled))
+    };
+    let none = FreehandArguments::default();
+    let [x, y] = SIZE;
+    for file in stored(&folder, &stream(2, &[3], &[])) {
+        // The pictures are 0.5 mm apart, and the one without a pose leaves a gap that is bridged.
+        let (grid, filled) = opened(&file, none).expect("a volume");
+        assert_eq!((grid.size, filled), ([x, y, PICTURES], x * y * PICTURES), "{file}");
+        let (grid, filled) = opened(&file, FreehandArguments { max_hole: Some(0.0), ..none }).expect("a volume");
+        assert_eq!((grid.size, filled), ([x, y, PICTURES], x * y * (PICTURES - 1)), "{file}");
+        let (grid, _) = opened(&file, FreehandArguments { clip: Some([2, 1, 4, 3]), ..none }).expect("a volume");
+        assert_eq!(grid.size, [4, 3, PICTURES], "{file}");
+        let (grid, _) = opened(&file, FreehandArguments { spacing: Some(0.45), ..none }).expect("a volume");
+        assert_eq!(grid.spacing, [0.45; 3], "{file}");
+        let outside = FreehandArguments { clip: Some([100, 0, 3, 3]), ..none };
+        let error = opened(&file, outside).expect_err("refused").to_string();
+        assert!(error.contains("leaves nothing of 9 x 7"), "{error}");
+        // The flags of a command are the same.
+        let (code, _, said) =
+            crate::common::program::run(&["stream", "--null", "--source", &file, "--clip", "100,0,3,3"]);
+        assert!(code == Some(2) && said.contains("leaves nothing of 9 x 7"), "{code:?} {said}");
+    }
+    // Frames of a volume, a recording, UFF.
+    let tape = folder.path("volume.frames");
+    let mut writer = Writer::create(tape.as_ref(), header(true)).expect("created");
+    let frame = |n: usize| Frame { pose: Some(pose(0)), ..Frame::of_slice(0, n, vec![0; 12]) };
+    (0..2).for_each(|n| writer.frame(&frame(n), 0.0).expect("written"));
+    writer.finish().expect("finished");
+    let data = |name: &str| crate::common::files::data(name).to_string_lossy().into_owned();
+    for file in [tape, data("formats/oblique.nii"), data("uff/sector.uff")] {
+        for (said, flag) in [
+            (FreehandArguments { clip: Some([0, 0, 2, 2]), ..none }, "--clip"),
+            (FreehandArguments { spacing: Some(1.0), ..none }, "--spacing"),
+            (FreehandArguments { max_hole: Some(1.0), ..none }, "--hole"),
+        ] {
+            let options = OpenOptions { freehand: said, ..OpenOptions::default() };
+            let error = open_with(file.as_ref(), options).err().expect("refused").to_string();
+            assert!(error.contains(&format!("{flag}: is for pictures with poses")), "{error}");
+        }
+    }
+}
+
+/// What `info` says of pictures with poses is what is shown: their volume.
+#[test]
+fn the_description_of_posed_pictures_is_that_of_their_volume() {
+    let folder = Folder::new("described");
+    for (file, format) in
+        stored(&folder, &stream(2, &[3], &[])).into_iter().zip(["frames as they arrived", "stream of frames"])
+    {
+        let said = description(file.as_ref(), OpenOptions::default()).expect("a description");
+        let row = |title: &str| -> Vec<&str> {
+            said.iter().filter(|(there, _)| there == title).map(|(_, value)| value.as_str()).collect()
+        };
+        assert_eq!(row("format"), [format!("{format}, freehand")]);
+        assert_eq!(row("pictures"), ["8, 7 with a valid pose"]);
+        assert_eq!(row("geometry"), ["Cartesian, 9 x 7 x 8 voxels of 0.5 x 0.4 x 0.5 mm"]);
+        assert_eq!((row("placed").len(), row("position").len(), row("value range").len()), (1, 1, 1), "{said:?}");
+        assert_eq!((row("frame").len(), row("volumes").len()), (0, 0), "of the pictures: {said:?}");
+        assert_eq!(row("damaged").len(), usize::from(format.starts_with("frames")), "of the file: {said:?}");
+    }
+}
+
+/// A picture whose pose is rigid and finite, but beyond all trackers, is left out and counted; the others make the volume.
+#[test]
+fn a_picture_that_is_refused_does_not_take_the_others_with_it() {
+    let folder = Folder::new("refused");
+    let mut bytes = stream(2, &[], &[]);
+    let header = bytes.iter().position(|b| *b == b'\n').expect("a line") + 1;
+    let each = 8 + 96 + 4 * SIZE[0] * SIZE[1];
+    // The translation along x of the sixth picture.
+    let at = header + 5 * each + 8 + 3 * 8;
+    bytes[at..at + 8].copy_from_slice(&1e9f64.to_le_bytes());
+    for file in stored(&folder, &bytes) {
+        let out = format!("{file}.nrrd");
+        let (code, _, said) = crate::common::program::run(&["convert", &file, &out]);
+        assert_eq!(code, Some(0), "{said}");
+        assert!(said.contains("1 of 8 pictures have no valid pose; left out"), "{said}");
+        let mut source = open(out.as_ref(), None).expect("a volume");
+        let Geometry::Cartesian(grid) = source.geometry(0) else { panic!("a lattice") };
+        assert_eq!(grid.size, [SIZE[0], SIZE[1], PICTURES]);
+        let world = source.world().expect("a place");
+        let slices: Vec<_> = std::iter::from_fn(|| source.next_frame().expect("a slice")).collect();
+        let filled = hold_the_field(&grid, &world, slices.iter().map(|frame| (frame.slice, &frame.bytes[..])));
+        assert_eq!(filled, SIZE[0] * SIZE[1] * PICTURES, "the gap is bridged");
+    }
+    // None is left: one line says so.
+    let all_out = folder.write("none", stream(2, &(0..PICTURES).collect::<Vec<_>>(), &[]));
+    let error = open(all_out.as_ref(), None).err().expect("refused").to_string();
+    assert!(error.contains("poses: none of 8 pictures has a valid one"), "{error}");
 }
 
 /// The orientation of a volume survives `.frames`, and what plays it back.

@@ -151,7 +151,7 @@ fn what_does_not_apply_is_refused() {
         (BONE, config(&xml), "this recording has no poses"),
         (SWEEP, config(&xml), "these are scan lines"),
         (&frames, config(&xml), "frames as they arrived"),
-        (&all_lost, config(&xml), "none of 0 poses places a frame"),
+        (&all_lost, config(&xml), "none of 6 pictures has a valid one"),
         (
             &path,
             OpenOptions { depth_axis: Some("x".parse().expect("an axis")), ..config(&xml) },

@@ -3,6 +3,7 @@
 use super::{Compounder, CompoundingOptions, Lattice, Pose, TrackedFrame};
 use crate::files::InputError;
 use crate::probe::{Geometry, World};
+use crate::source::describe;
 use crate::source::frame::{Frame, Source};
 use crate::source::samples::{SampleType, StoredType};
 use std::path::{Path, PathBuf};
@@ -39,6 +40,8 @@ pub(in crate::source) struct FreehandFile<P> {
     options: CompoundingOptions,
     compounder: Option<Compounder>,
     next: usize,
+    /// All pictures, and those with a valid pose.
+    counts: [usize; 2],
 }
 
 impl<P: PlacedPictures> FreehandFile<P> {
@@ -53,23 +56,47 @@ impl<P: PlacedPictures> FreehandFile<P> {
         options: CompoundingOptions,
     ) -> Result<FreehandFile<P>, InputError> {
         let fault = |fault: String| InputError::new(path, "poses", fault);
-        let known: Vec<Pose> = poses.iter().flatten().copied().collect();
+        let known: Vec<Pose> = poses.iter().flatten().filter(|pose| pose.check().is_ok()).copied().collect();
+        let (all, without) = (poses.len(), poses.len() - known.len());
+        if known.is_empty() {
+            return Err(fault(format!("none of {all} pictures has a valid one")));
+        }
         let lattice = Lattice::around(&known, &options).map_err(fault)?;
         let world = lattice.world().map_err(fault)?;
-        let (all, without) = (poses.len(), poses.len() - known.len());
         if without > 0 {
-            let file = crate::source::describe::path(path);
+            let file = describe::path(path);
             tracing::warn!(%file, "{without} of {all} pictures have no valid pose; left out");
         }
-        Ok(FreehandFile { path: path.into(), placed, lattice, world, options, compounder: None, next: 0 })
+        Ok(FreehandFile {
+            path: path.into(),
+            placed,
+            lattice,
+            world,
+            options,
+            compounder: None,
+            next: 0,
+            counts: [all, known.len()],
+        })
     }
 
     pub fn placed(&self) -> &P {
         &self.placed
     }
 
-    pub fn lattice(&self) -> &Lattice {
-        &self.lattice
+    /// A description for users: pairs of title and value. `format`: of the pictures; `placed`: by what they are placed; `space`: where they then
+    /// are.
+    pub fn describe(&self, format: &str, placed: Vec<(String, String)>, space: &str) -> Vec<(String, String)> {
+        let [all, valid] = self.counts;
+        let mut rows: Vec<(String, String)> = Vec::new();
+        let mut add = |title: &str, value: String| rows.push((title.into(), value));
+        add("format", format!("{format}, freehand"));
+        add("samples", self.sample_type().to_string());
+        add("pictures", format!("{all}, {valid} with a valid pose"));
+        rows.extend(placed);
+        rows.extend(describe::grid(&self.lattice.grid));
+        let [u, v, w] = self.world.origin().to_array().map(describe::number);
+        rows.push(("position".into(), format!("the first voxel is at {u}, {v}, {w} mm in {space}")));
+        rows
     }
 
     fn compound(&mut self) -> Result<Compounder, InputError> {
@@ -77,9 +104,14 @@ impl<P: PlacedPictures> FreehandFile<P> {
         let stored = self.placed.pictures().stored_type();
         let mut compounder = Compounder::new(self.lattice, stored, self.options.clone()).map_err(fault)?;
         self.placed.rewind()?;
+        let mut refused = None;
         while let Some((pose, bytes)) = self.placed.next()? {
-            let Some(pose) = pose else { continue };
-            compounder.push(&TrackedFrame { pose, stored, bytes: &bytes }).map_err(fault)?;
+            let Some(pose) = pose.filter(|pose| pose.check().is_ok()) else { continue };
+            refused = compounder.push(&TrackedFrame { pose, stored, bytes: &bytes }).err().or(refused);
+        }
+        if let Some(why) = refused {
+            let (file, count) = (describe::path(&self.path), compounder.counts().refused);
+            tracing::warn!(%file, "{count} of {} pictures are refused, the last: {why}; left out", self.counts[0]);
         }
         compounder.changed_slices();
         Ok(compounder)

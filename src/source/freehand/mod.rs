@@ -8,9 +8,11 @@
 //! 2 (2015)): holes up to a width are closed, wider ones stay 0, and nothing is added beyond the border of the swept region.
 
 mod file;
+mod given;
 mod sweep;
 
 pub(super) use file::{FreehandFile, PlacedPicture, PlacedPictures};
+pub use given::FreehandArguments;
 pub use sweep::{Refusal, Schedule, Sweep};
 
 use super::samples::StoredType;
@@ -383,7 +385,9 @@ impl Lattice {
             .filter_map(|pose| pose.clipped(options.clip).ok().map(|clip| (pose, clip)))
             .collect();
         let Some((first, _)) = placed.first() else {
-            return Err(format!("none of {} poses places a frame", poses.len()));
+            let why = |pose: &Pose| pose.check().err().or_else(|| pose.clipped(options.clip).err());
+            let why = poses.first().and_then(why).map_or(String::new(), |why| format!(", the first: {why}"));
+            return Err(format!("none of {} poses places a frame{why}", poses.len()));
         };
         let mean = |of: &dyn Fn(&Pose, PixelRange) -> DVec3| {
             placed.iter().map(|(pose, clip)| of(pose, *clip)).sum::<DVec3>() / placed.len() as f64

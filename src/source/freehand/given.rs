@@ -1,0 +1,44 @@
+//! What a user says about a freehand volume.
+
+use super::CompoundingOptions;
+use crate::files::InputError;
+use std::path::Path;
+
+/// What a user says about a freehand volume; None: what the file says, otherwise the default.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct FreehandArguments {
+    /// As [`CompoundingOptions::clip`].
+    pub clip: Option<[usize; 4]>,
+    /// As [`CompoundingOptions::spacing`], mm.
+    pub spacing: Option<f64>,
+    /// As [`CompoundingOptions::max_hole`], mm.
+    pub max_hole: Option<f64>,
+}
+
+impl FreehandArguments {
+    /// These options with what was said.
+    pub fn over(&self, options: CompoundingOptions) -> CompoundingOptions {
+        CompoundingOptions {
+            clip: self.clip.or(options.clip),
+            spacing: self.spacing.or(options.spacing),
+            max_hole: self.max_hole.unwrap_or(options.max_hole),
+            ..options
+        }
+    }
+
+    /// Refuses what was said of a file that is no freehand volume.
+    ///
+    /// # Errors
+    /// Anything was said.
+    pub(in crate::source) fn refused(&self, path: &Path) -> Result<(), InputError> {
+        let fault = "is for pictures with poses that differ, which become a freehand volume";
+        self.flag().map_or(Ok(()), |flag| Err(InputError::new(path, flag, fault)))
+    }
+
+    /// The flag of the first that was said.
+    pub fn flag(&self) -> Option<&'static str> {
+        let FreehandArguments { clip, spacing, max_hole } = self;
+        let said = [("--clip", clip.is_some()), ("--spacing", spacing.is_some()), ("--hole", max_hole.is_some())];
+        said.iter().find(|(_, is_said)| *is_said).map(|(flag, _)| *flag)
+    }
+}
