@@ -13,7 +13,7 @@ use crate::files::{InputError, quoted};
 use crate::probe::file::SLAB;
 use crate::probe::{Advance, Array, Axis, Geometry, Motion, Probe};
 use hdf5_reader::group::Group;
-use hdf5_reader::{Dataset, Hdf5File, OpenOptions, SliceInfo, SliceInfoElem};
+use hdf5_reader::{DEFAULT_CHUNK_CACHE_SLOTS, Dataset, Hdf5File, OpenOptions, SliceInfo, SliceInfoElem};
 use std::path::{Path, PathBuf};
 
 /// Most samples, lines, slices or volumes.
@@ -23,9 +23,10 @@ const MAX_FRAME_BYTES: u64 = 1 << 30;
 /// Most bytes that deflate makes of one, and what small files may take besides.
 const INFLATION: u64 = 1032;
 const LEAST_BYTES: u64 = 1 << 20;
-/// Largest chunk and cache of chunks, bytes. MATLAB writes a dataset as one chunk.
+/// Largest chunk, bytes. MATLAB writes a dataset as one chunk.
 const MAX_CHUNK_BYTES: u64 = 1 << 30;
-const CACHE_BYTES: usize = 64 << 20;
+/// The cache of unpacked chunks: it holds those that later frames need again, so that no chunk is unpacked twice in one pass.
+const CACHE: CacheLimits = CacheLimits { usual: 64 << 20, most: 2 << 30, most_chunks: 1 << 20 };
 /// Farthest that a sample may be from its place on an even axis, m.
 const TOLERANCE: f64 = 5e-7;
 /// What is shown, dB; USTB's own range.
@@ -40,7 +41,8 @@ pub(super) fn is_one(start: &[u8]) -> bool {
 
 /// Beamformed data as volumes.
 ///
-/// Memory: a frame, twice; one chunk of the file and a cache of chunks (at most 1 GiB and 64 MiB).
+/// Memory: a frame, twice; a chunk, three times while it is unpacked (at most 1 GiB each); and a cache of chunks (64 MiB, or what a pass over
+/// the frames needs, at most 2 GiB).
 pub(super) struct Beamformed {
     path: PathBuf,
     probe: Probe,
@@ -55,6 +57,35 @@ pub(super) struct Beamformed {
 enum Data {
     Real(Box<Dataset>),
     Complex(Box<[Dataset; 2]>),
+}
+
+impl Data {
+    fn parts(&self) -> &[Dataset] {
+        match self {
+            Data::Real(set) => std::slice::from_ref(set),
+            Data::Complex(parts) => &parts[..],
+        }
+    }
+}
+
+/// Bytes of the cache of chunks: as a rule, and at most; and most chunks in it.
+#[derive(Clone, Copy)]
+struct CacheLimits {
+    usual: u64,
+    most: u64,
+    most_chunks: u64,
+}
+
+/// What a pass over the frames, one after the other, unpacks.
+#[derive(Default)]
+struct Chunks {
+    /// The size of a chunk, numbers along each axis; empty where there are none.
+    chunk: Vec<u64>,
+    /// Bytes of all chunks.
+    all: u64,
+    /// Bytes and number of the chunks that must be kept so that none is unpacked twice.
+    kept: u64,
+    count: u64,
 }
 
 /// What the numbers are, and what is stored of them.
@@ -72,24 +103,57 @@ impl Beamformed {
     /// Opens a file and reads its numbers once, for the largest.
     ///
     /// # Errors
-    /// A file that cannot be read, holds no beamformed data, or holds data that are not of one scan of a kind that is read.
+    /// A file that cannot be read, holds no beamformed data, or holds data that are not of one scan of a kind that is read; data of more bytes
+    /// than the file can hold; chunks that are too large.
     pub fn open(path: &Path) -> Result<Beamformed, InputError> {
+        Beamformed::open_within(path, CACHE)
+    }
+
+    fn open_within(path: &Path, cache: CacheLimits) -> Result<Beamformed, InputError> {
         let length = std::fs::metadata(path).map_err(|e| InputError::unreadable(path, &e))?.len();
-        let most = length.saturating_mul(INFLATION).saturating_add(LEAST_BYTES).min(MAX_CHUNK_BYTES) as usize;
-        let options = OpenOptions::default()
-            .with_chunk_cache_bytes(CACHE_BYTES.min(most))
-            .with_max_chunk_bytes(most)
-            .with_max_read_bytes(most)
-            .with_max_object_header_bytes(most.min(16 << 20));
+        let most = length.saturating_mul(INFLATION).saturating_add(LEAST_BYTES);
         let file = File { path };
-        let hdf5 = Hdf5File::open_with_options(path, options).map_err(|e| file.broken("file", &e))?;
-        let root = hdf5.root_group().map_err(|e| file.broken("file", &e))?;
-        let group = file.beamformed(&root)?;
-        let scan = group.group("scan").map_err(|e| file.broken("scan", &e))?;
+        let group = |bytes: u64, chunks: u64| {
+            let at_once = most.min(MAX_CHUNK_BYTES) as usize;
+            let options = OpenOptions::default()
+                .with_chunk_cache_bytes(bytes as usize)
+                .with_chunk_cache_slots(DEFAULT_CHUNK_CACHE_SLOTS.max(chunks as usize))
+                .with_max_chunk_bytes(at_once)
+                .with_max_read_bytes(at_once)
+                .with_max_object_header_bytes(at_once.min(16 << 20));
+            let hdf5 = Hdf5File::open_with_options(path, options).map_err(|e| file.broken("file", &e))?;
+            file.beamformed(&hdf5.root_group().map_err(|e| file.broken("file", &e))?)
+        };
+        let opened = group(cache.usual.min(most), 0)?;
+        let scan = opened.group("scan").map_err(|e| file.broken("scan", &e))?;
         let (probe, class) = file.probe(&scan)?;
-        let data = file.data(&group)?;
+        let mut data = file.data(&opened)?;
         let pixels = (probe.samples * probe.lines.len() * probe.slices.len()) as u64;
         let volumes = file.volumes(&data, pixels)?;
+        let needed = file.chunks(&data, pixels / probe.slices.len() as u64)?;
+        if needed.all > most {
+            let shown = shown(data.parts()[0].shape());
+            let fault = format!(
+                "has the shape {shown}, {} bytes; a file of {length} bytes holds at most {most}, even packed",
+                needed.all
+            );
+            return file.fault("data", fault);
+        }
+        if needed.kept > cache.most || needed.count > cache.most_chunks {
+            let fault = format!(
+                "is in chunks of {}: {} of them, {} bytes, must be in memory at once, at most {} and {}; write it again in chunks of one \
+                 frame, as with h5repack -l DATASET:CHUNK=...",
+                shown(&needed.chunk),
+                needed.count,
+                needed.kept,
+                cache.most_chunks,
+                cache.most
+            );
+            return file.fault("data", fault);
+        }
+        if needed.kept > cache.usual || needed.count > DEFAULT_CHUNK_CACHE_SLOTS as u64 {
+            data = file.data(&group(needed.kept.max(cache.usual.min(most)), needed.count)?)?;
+        }
         let mut read =
             Beamformed { path: path.into(), probe, scan: class, data, scale: Scale::Decibels, volumes, next: 0 };
         read.scale = read.measure()?;
@@ -205,6 +269,11 @@ fn axis_of(values: &[f64], unit: f64) -> Axis {
         true => Axis::Even { first: first * unit, pitch: pitch * unit, count },
         false => Axis::from_table(values.iter().map(|value| value * unit).collect()),
     }
+}
+
+/// A shape for users.
+fn shown(shape: &[u64]) -> String {
+    shape.iter().map(u64::to_string).collect::<Vec<_>>().join(" x ")
 }
 
 /// A file, for messages.
@@ -387,11 +456,8 @@ impl File<'_> {
 
     /// The number of volumes of data whose shape is frame, wave, channel, pixel.
     fn volumes(&self, data: &Data, pixels: u64) -> Result<usize, InputError> {
-        let shape = match data {
-            Data::Real(set) => set.shape(),
-            Data::Complex(parts) => parts[0].shape(),
-        };
-        let shown = shape.iter().map(u64::to_string).collect::<Vec<_>>().join(" x ");
+        let shape = data.parts()[0].shape();
+        let shown = shown(shape);
         let [frames, others @ .., last] = shape else {
             return self.fault("data", format!("has the shape {shown}, must have two axes or more"));
         };
@@ -407,6 +473,34 @@ impl File<'_> {
             1..=MAX_EXTENT => Ok(frames as usize),
             _ => self.fault("data", format!("has {frames} frames, must have 1 to {MAX_EXTENT}")),
         }
+    }
+
+    /// What a pass over the frames of data of a checked shape unpacks. `each`: pixels of a frame.
+    fn chunks(&self, data: &Data, each: u64) -> Result<Chunks, InputError> {
+        let mut sum = Chunks::default();
+        for set in data.parts() {
+            let product = |numbers: &[u64]| numbers.iter().fold(1, |all: u64, n| all.saturating_mul(*n));
+            let size = set.raw_element_size().map_err(|e| self.broken("data", &e))? as u64;
+            let shape = set.shape();
+            let Some(chunk) = set.chunks().filter(|chunk| chunk.len() == shape.len()) else {
+                sum.all = sum.all.saturating_add(product(shape).saturating_mul(size));
+                continue;
+            };
+            // The reader refuses chunks of no size.
+            let chunk: Vec<u64> = chunk.into_iter().map(|n| u64::from(n).max(1)).collect();
+            let along: Vec<u64> = shape.iter().zip(&chunk).map(|(n, of)| n.div_ceil(*of)).collect();
+            let bytes = product(&chunk).saturating_mul(size);
+            let (last, holds) = (along.last().copied().unwrap_or(1), chunk.last().copied().unwrap_or(1));
+            let several_volumes = shape.len() == 4 && shape[0] > 1 && chunk[0] > 1;
+            // Chunks of several volumes are needed again for the next volume. Otherwise only the one between two frames is: twice the chunks
+            // of a frame hold it, in whatever order a frame's chunks are read.
+            let count = if several_volumes { last } else { product(&along).min(2 * (each.div_ceil(holds) + 1)) };
+            sum.all = sum.all.saturating_add(product(&along).saturating_mul(bytes));
+            sum.kept = sum.kept.saturating_add(count.saturating_mul(bytes));
+            sum.count = sum.count.saturating_add(count);
+            sum.chunk = chunk;
+        }
+        Ok(sum)
     }
 }
 
@@ -468,5 +562,38 @@ impl Source for Beamformed {
 
     fn files(&self) -> Vec<PathBuf> {
         vec![self.path.clone()]
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn file(name: &str) -> PathBuf {
+        Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/data/uff").join(name)
+    }
+
+    fn frames(source: &mut Beamformed) -> Vec<Frame> {
+        source.skip_to_volume(0).expect("the first volume");
+        std::iter::from_fn(|| source.next_frame().expect("a frame")).collect()
+    }
+
+    /// Prevents that a chunk which is larger than the cache, or spans several volumes, is unpacked for every frame.
+    #[test]
+    fn each_chunk_is_unpacked_once_in_a_pass() {
+        // One chunk each of real and imaginary parts; chunks of two volumes and 50 pixels.
+        for (name, chunks) in [("sector-3d.uff", 2), ("chunked.uff", 18)] {
+            let usual = frames(&mut Beamformed::open(&file(name)).expect("data"));
+            let small = CacheLimits { usual: 256, ..CACHE };
+            let mut source = Beamformed::open_within(&file(name), small).expect("data");
+            let unpacked = |source: &Beamformed| source.data.parts()[0].chunk_cache_stats().misses;
+            assert_eq!(unpacked(&source), chunks, "{name}: one pass");
+            assert_eq!(frames(&mut source), usual, "{name}");
+            assert!(unpacked(&source) <= 2 * chunks, "{name}: two passes, {}", unpacked(&source));
+            // A cache that may not be as large is refused, rather than slow.
+            let none = CacheLimits { usual: 256, most: 1024, ..CACHE };
+            let error = Beamformed::open_within(&file(name), none).err().expect("refused").to_string();
+            assert!(error.contains("must be in memory at once") && error.lines().count() == 1, "{error}");
+        }
     }
 }

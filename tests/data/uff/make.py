@@ -14,11 +14,11 @@ here = pathlib.Path(__file__).parent
 expected = {}
 
 
-def put(group, name, values, kind="single"):
+def put(group, name, values, kind="single", **layout):
     # MATLAB's axes are the other way round in the file, a vector is a column, and a dataset is one chunk.
     values = np.asarray(values)
     stored = values.T if values.ndim > 1 else values.reshape(1, -1)
-    made = group.create_dataset(name, data=stored.astype(np.float32 if kind == "single" else kind), chunks=stored.shape)
+    made = group.create_dataset(name, data=stored.astype(np.float32 if kind == "single" else kind), **{"chunks": stored.shape, **layout})
     for key, value in {"class": "single", "name": name}.items():
         made.attrs[key] = np.bytes_(value)
     made.attrs["complex"] = np.int32(0)
@@ -80,6 +80,11 @@ def file(name, kind, axes, volumes, form):
             put(group, "data", columns(db), "u1")
         elif form == "rf":
             put(group, "data", columns(envelope * np.cos(0.7 * np.arange(shape[0]))[:, None, None, None]))
+        elif form == "chunked":
+            put(group, "data", columns(envelope), chunks=(2, 1, 1, 50), compression="gzip", shuffle=True)
+        elif form == "hollow":
+            # Chunks that are stated and not there.
+            group.create_dataset("data", (65536, 1, 1, int(np.prod(shape))), np.float32, chunks=(1, 1, 1, int(np.prod(shape))))
         elif form == "channels":
             put(group, "data", np.ones([int(np.prod(shape)), 4, 1, 1]))
         elif form == "wrong":
@@ -103,11 +108,13 @@ file("linear-3d", "uff.linear_scan_3D", [line(0, 30e-3, 16), line(-10e-3, 11e-3,
 file("sector", "uff.sector_scan", [line(2e-3, 80e-3, 40), line(-0.6, 0.55, 12)], 1, "complex")
 file("sector-3d", "uff.sector_scan", [line(10e-3, 90e-3, 21), line(-0.5, 0.5, 6), line(-0.3, 0.35, 5)], 2, "complex")
 file("decibels", "uff.sector_scan_3D", [line(10e-3, 90e-3, 9), line(-0.5, 0.5, 4), line(-0.3, 0.3, 3)], 1, "decibels")
+file("chunked", "uff.sector_scan", [line(10e-3, 90e-3, 21), line(-0.5, 0.5, 6), line(-0.3, 0.35, 2)], 5, "chunked")
+file("hollow", "uff.linear_scan", [line(5e-3, 41e-3, 64), line(-19e-3, 19e-3, 64)], 1, "hollow")
 file("rf", "uff.linear_scan", [line(5e-3, 41e-3, 9), line(-19e-3, 19e-3, 4)], 1, "rf")
 file("channels", "uff.linear_scan", [line(5e-3, 41e-3, 9), line(-19e-3, 19e-3, 4)], 1, "channels")
 file("wrong", "uff.linear_scan", [line(5e-3, 41e-3, 9), line(-19e-3, 19e-3, 4)], 1, "wrong")
 file("uneven", "uff.linear_scan", [[5e-3, 6e-3, 8e-3], line(-19e-3, 19e-3, 4)], 1, "envelope")
-for name in ["rf", "channels", "wrong", "uneven"]:
+for name in ["hollow", "rf", "channels", "wrong", "uneven"]:
     del expected[name]
 with h5py.File(here / "channel-data.uff", "w", libver="earliest") as made:
     structure(made, "channel_data", "uff.channel_data")
