@@ -169,7 +169,11 @@ impl MakeMesh {
             None => mesh,
             Some(mm) => {
                 let (simple, bound) = simplified(&mesh, mm);
-                how += &format!(", simplified from {} triangles, at most {bound:.4} mm off", mesh.triangles.len());
+                how += &format!(
+                    ", simplified from {} triangles, at most {} mm off",
+                    mesh.triangles.len(),
+                    rounded_up(bound)
+                );
                 simple
             }
         };
@@ -202,5 +206,47 @@ impl MakeMesh {
             _ => format!("open at the border, {area:.3} cm2"),
         };
         say!("mesh: {}, {triangles} triangles of {vertices} vertices, {extent}; {how}", self.output.display());
+    }
+}
+
+/// A bound with four decimals or, if it is small, two digits. It is rounded up: a bound that is printed smaller than it is would be none.
+fn rounded_up(bound: f64) -> String {
+    let digits = if bound > 0.0 { (1.0 - bound.log10().floor()).clamp(4.0, 15.0) as usize } else { 4 };
+    let scale = 10f64.powi(digits as i32);
+    let mut steps = (bound * scale).ceil();
+    // The product may have been rounded down to a whole number.
+    if steps / scale < bound {
+        steps += 1.0;
+    }
+    format!("{:.digits$}", steps / scale)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_bound_is_never_printed_smaller_than_it_is() {
+        for (bound, printed) in [
+            (0.0, "0.0000"),
+            (0.1, "0.1000"),
+            (0.12344, "0.1235"),
+            (0.123_400_01, "0.1235"),
+            (12.000_04, "12.0001"),
+            (2.04e-5, "0.000021"),
+            (1e-9, "0.0000000010"),
+        ] {
+            assert_eq!(rounded_up(bound), printed, "{bound}");
+        }
+        // By a rule of its own: the printed number, read back, is no smaller and at most a step larger.
+        let mut bound: f64 = 1e-12;
+        while bound < 100.0 {
+            let printed: f64 = rounded_up(bound).parse().expect("a number");
+            assert!(
+                printed >= bound && printed <= bound + 1.01e-4f64.min(0.11 * bound).max(1.01e-15),
+                "{bound}: {printed}"
+            );
+            bound *= 1.037;
+        }
     }
 }
