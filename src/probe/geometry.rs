@@ -214,7 +214,7 @@ impl Probe {
     }
 
     /// Corners (low, high) of the smallest in-plane rectangle (x, y) that contains every sample that is drawn, mm. What lies before the
-    /// wobble axis is not: a point of space beyond the axis would be there twice.
+    /// wobble axis is not ([`Probe::folded_share`]).
     pub fn plane_bounds(&self) -> ([f64; 2], [f64; 2]) {
         let (mut low, mut high) = self.sector_bounds();
         let axis = self.axis_depth();
@@ -236,7 +236,9 @@ impl Probe {
         (low, high)
     }
 
-    /// Share of a frame's samples that lie before the wobble axis, 0..=1. They are not drawn.
+    /// Share of a frame's samples that lie before the wobble axis (at a smaller y), 0..=1. They are not drawn. While a frame turns about the
+    /// axis they move the opposite way, so that they sweep a second fan, mirrored at the axis. A point of space is found in the frames by its
+    /// distance from the axis and its angle ([`Probe::inverse_sweep_map`]), and these describe the fan beyond the axis only.
     pub fn folded_share(&self) -> f64 {
         let (axis, count) = (self.axis_depth(), self.lines.len());
         if !matches!(self.motion, Motion::Fan { .. }) {
@@ -265,7 +267,10 @@ impl Probe {
         let share = 100.0 * self.folded_share();
         (share > 0.0).then(|| {
             let axis = self.axis_depth();
-            format!("{share:.2} % of each frame lies before the wobble axis, at y = {axis:.2} mm, and is not drawn")
+            format!(
+                "{share:.2} % of each frame is not drawn: it lies before the wobble axis, at y = {axis:.2} mm, where the sweep turns the \
+                 other way"
+            )
         })
     }
 

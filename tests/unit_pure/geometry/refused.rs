@@ -107,7 +107,8 @@ fn what_lies_before_the_wobble_axis_is_cut_and_a_sector_of_which_nothing_is_beyo
         let probe = probe(wobble_radius);
         taken(&probe);
         assert_eq!(probe.folded_share() > 0.0, is_cut, "{wobble_radius}");
-        assert_eq!(probe.folded().is_some(), is_cut);
+        let said = probe.folded().unwrap_or_default();
+        assert_eq!(said.contains("% of each frame is not drawn: it lies before the wobble axis"), is_cut, "{said}");
         let low = if is_cut { probe.axis_depth() } else { 16.0 };
         assert!((probe.plane_bounds().0[1] - low).abs() < 1e-9, "{:?}", probe.plane_bounds());
     }
