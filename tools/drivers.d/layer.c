@@ -7,6 +7,7 @@
 //                                    SIGALRM ends a program that is still running 45 s later, so that a missing deadline fails a test
 //   ECHOLUME_LAYER_FAULT=FILE        while the program runs: FILE that begins with l loses, and with h hangs, the device that submits next; it is
 //                                    deleted by that. A program that is hung in this way is not ended
+//   ECHOLUME_LAYER_LOSE_WAIT=N       the Nth wait of a device loses it; only the first device that gets there
 //   ECHOLUME_LAYER_DROP_BARRIERS=N   memory barriers are dropped from the Nth of a device on
 //   ECHOLUME_LAYER_DROP_WAITS=1      submissions do not wait for semaphores
 //   ECHOLUME_LAYER_MAX_GROUPS=N      a submission with a dispatch of more than N workgroups loses the device, as a watchdog would
@@ -86,7 +87,7 @@ typedef struct {
     VkPhysicalDeviceMemoryProperties memory;
     char name[VK_MAX_PHYSICAL_DEVICE_NAME_SIZE];
     uint64_t dispatches, groups, largest, barriers, dropped, submissions, swallowed, pipelines, allocations, invalidations, flushes, stamps, too_large;
-    uint64_t idle_while_hung, destroyed_while_hung;
+    uint64_t idle_while_hung, destroyed_while_hung, waits;
     double pipeline_ms, submit_ms;
     int hangs, lost;
     uint64_t bytes[VK_MAX_MEMORY_TYPES], count[VK_MAX_MEMORY_TYPES];
@@ -102,7 +103,7 @@ typedef struct {
 static pthread_mutex_t lock = PTHREAD_MUTEX_INITIALIZER;
 static Instance instances[64];
 static Device *devices[256];
-static int is_hung_once;
+static int is_hung_once, is_lost_once;
 
 static void *key_of(const void *handle) { return *(void **)handle; }
 
@@ -182,7 +183,7 @@ static void report(Device *d) {
             d->swallowed, d->submit_ms, d->pipelines, d->pipeline_ms, d->stamps);
     fprintf(o, "\"allocations\":%lu,\"invalidations\":%lu,\"flushes\":%lu,\"refused_buffers\":%lu,", d->allocations, d->invalidations, d->flushes,
             d->too_large);
-    fprintf(o, "\"hung\":%s,\"lost\":%s,\"idle_while_hung\":%lu,\"destroyed_while_hung\":%lu,\"memory\":[", d->hangs ? "true" : "false",
+    fprintf(o, "\"waits\":%lu,\"hung\":%s,\"lost\":%s,\"idle_while_hung\":%lu,\"destroyed_while_hung\":%lu,\"memory\":[", d->waits, d->hangs ? "true" : "false",
             d->lost ? "true" : "false", d->idle_while_hung, d->destroyed_while_hung);
     int first = 1;
     for (uint32_t i = 0; i < d->memory.memoryTypeCount; i++) {
@@ -602,6 +603,13 @@ static VKAPI_ATTR VkResult VKAPI_CALL Counter(VkDevice h, VkSemaphore s, uint64_
 
 static VKAPI_ATTR VkResult VKAPI_CALL WaitSemaphores(VkDevice h, const VkSemaphoreWaitInfo *w, uint64_t timeout) {
     Device *d = device_of(h);
+    uint64_t last = number("ECHOLUME_LAYER_LOSE_WAIT");
+    pthread_mutex_lock(&lock);
+    int is_last = ++d->waits == last && !is_lost_once;
+    if (is_last) d->lost = is_lost_once = 1;
+    pthread_mutex_unlock(&lock);
+    // As in a submission: the program may destroy what earlier ones use.
+    if (is_last) NEXT(d, vkDeviceWaitIdle)(h);
     if (d->lost) return VK_ERROR_DEVICE_LOST;
     if (!number("ECHOLUME_LAYER_COMPLETE")) return NEXT(d, vkWaitSemaphores)(h, w, timeout);
     double begin = now_ms();
