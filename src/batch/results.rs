@@ -3,11 +3,12 @@
 use super::agreement::{Agreement, Drawer};
 use super::shard::Shard;
 use super::unit::Key;
-use crate::files;
+use crate::{files, machine};
 use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value};
 use std::collections::{HashMap, HashSet};
 use std::fs::{self, File, OpenOptions};
+use std::hash::{DefaultHasher, Hash, Hasher};
 use std::io::{self, BufRead, BufReader, Read, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
 
@@ -97,25 +98,105 @@ pub(super) fn read_record(folder: &Path, key: &Key) -> Option<Record> {
     (is_done && record.outputs.iter().all(is_there)).then_some(record)
 }
 
+/// A unit by its recording and its work: what is kept of a million units.
+fn hash_of(input: &str, work: &str) -> u64 {
+    let mut hasher = DefaultHasher::new();
+    (input, work).hash(&mut hasher);
+    hasher.finish()
+}
+
+/// The units of a manifest, as hashes: a million are 16 MiB.
+#[derive(Default)]
+pub struct Asked(HashSet<u64>);
+
+impl Asked {
+    pub fn add(&mut self, input: &str, work: &str) {
+        self.0.insert(hash_of(input, work));
+    }
+}
+
+/// What earlier processes wrote into the results of a folder.
+#[derive(Debug, Default)]
+pub struct Earlier {
+    /// Results of a batch are there, maybe without a line.
+    pub is_begun: bool,
+    /// There is a line.
+    pub has_lines: bool,
+    /// There is a line of a unit that was asked for.
+    pub is_of_these: bool,
+    /// Of this shard: keys and recordings of the units that a line says are done.
+    done: HashSet<(String, String)>,
+    /// Of this shard, by recording and work: lines that say that a device was lost.
+    lost: HashMap<(String, String), usize>,
+    /// Of all shards: units that were asked for, and that a line of this version of the program says are done.
+    done_anywhere: HashSet<u64>,
+}
+
+impl Earlier {
+    /// Reads the results of a shard; for units that are `asked` for those of all shards, whatever their number. Each file is read once, and
+    /// nothing is made.
+    ///
+    /// # Errors
+    /// One line that names the file.
+    pub fn read(folder: &Path, shard: Shard, asked: Option<&Asked>) -> Result<Earlier, String> {
+        let mut found = Earlier::default();
+        let own = file_of(folder, shard);
+        let files = match files_of(folder) {
+            Err((_, e)) if e.kind() == io::ErrorKind::NotFound => return Ok(found),
+            files => files.map_err(|(place, e)| format!("{}: cannot be read: {e}", place.display()))?,
+        };
+        found.is_begun = true;
+        let program = machine::program();
+        for file in files.iter().filter(|file| asked.is_some() || **file == own) {
+            for_each_record(file, |record| {
+                found.has_lines = true;
+                let hash = hash_of(&record.input, &record.work);
+                if asked.is_some_and(|asked| asked.0.contains(&hash)) {
+                    found.is_of_these = true;
+                    if record.status == Status::Done && record.program == program {
+                        found.done_anywhere.insert(hash);
+                    }
+                }
+                if *file != own {
+                    return;
+                }
+                match record.status {
+                    Status::Done => drop(found.done.insert((record.key, record.input))),
+                    Status::Lost => *found.lost.entry((record.input, record.work)).or_insert(0) += 1,
+                    Status::Bad | Status::Failed => {}
+                }
+            })?;
+        }
+        Ok(found)
+    }
+
+    /// True if a line says that a unit that was asked for is done, by any shard.
+    pub fn says_done(&self, input: &str, work: &str) -> bool {
+        self.done_anywhere.contains(&hash_of(input, work))
+    }
+}
+
+fn file_of(folder: &Path, shard: Shard) -> PathBuf {
+    folder.join("results").join(format!("shard-{:04}-of-{:04}.ndjson", shard.index, shard.count))
+}
+
 /// The results of one shard, to which lines are added.
 pub struct Results {
     file: File,
     path: PathBuf,
-    /// Keys and recordings of the units that a line says are done.
-    done: HashSet<(String, String)>,
-    /// By recording and work: lines that say that a device was lost.
-    lost: HashMap<(String, String), usize>,
+    earlier: Earlier,
 }
 
 impl Results {
-    /// Opens or creates `results/shard-I-of-N.ndjson`. A last line that a killed process left unfinished is ended.
+    /// Opens or creates `results/shard-I-of-N.ndjson`. A last line that a killed process left unfinished is ended. `earlier`: what was read of
+    /// this shard.
     ///
     /// # Errors
     /// One line that names the file.
-    pub fn open(folder: &Path, shard: Shard) -> Result<Results, String> {
+    pub fn open(folder: &Path, shard: Shard, earlier: Earlier) -> Result<Results, String> {
         let place = folder.join("results");
         fs::create_dir_all(&place).map_err(|e| format!("{}: cannot be made: {e}", place.display()))?;
-        let path = place.join(format!("shard-{:04}-of-{:04}.ndjson", shard.index, shard.count));
+        let path = file_of(folder, shard);
         let fault = |e: io::Error| format!("{}: cannot be written: {e}", path.display());
         let mut file = OpenOptions::new().create(true).read(true).append(true).open(&path).map_err(fault)?;
         let mut last = [b'\n'];
@@ -125,14 +206,11 @@ impl Results {
         if last != [b'\n'] {
             file.write_all(b"\n").map_err(fault)?;
         }
-        let (mut done, mut lost) = (HashSet::new(), HashMap::new());
-        // Of a million lines only what is asked for is kept.
-        for_each_record(&path, |record| match record.status {
-            Status::Done => drop(done.insert((record.key, record.input))),
-            Status::Lost => *lost.entry((record.input, record.work)).or_insert(0) += 1,
-            Status::Bad | Status::Failed => {}
-        })?;
-        Ok(Results { file, path, done, lost })
+        Ok(Results { file, path, earlier })
+    }
+
+    pub fn earlier(&self) -> &Earlier {
+        &self.earlier
     }
 
     /// Adds a line by one write, so that two processes do not mix theirs.
@@ -145,21 +223,21 @@ impl Results {
         line.push(b'\n');
         self.file.write_all(&line).map_err(|e| fault(&e))?;
         if record.status == Status::Done {
-            self.done.insert((record.key.clone(), record.input.clone()));
+            self.earlier.done.insert((record.key.clone(), record.input.clone()));
         }
         Ok(())
     }
 
     /// True if a line says that the unit is done: a process that is killed after it wrote the record adds none.
     pub fn has(&self, record: &Record) -> bool {
-        self.done.contains(&(record.key.clone(), record.input.clone()))
+        self.earlier.done.contains(&(record.key.clone(), record.input.clone()))
     }
 
     /// How often a device was lost by a unit.
     pub fn losses(&self, input: &str, work: &str) -> usize {
         // Nearly always empty, and a key has to be copied.
-        let is_known = !self.lost.is_empty();
-        let found = is_known.then(|| self.lost.get(&(input.to_string(), work.to_string())));
+        let is_known = !self.earlier.lost.is_empty();
+        let found = is_known.then(|| self.earlier.lost.get(&(input.to_string(), work.to_string())));
         found.flatten().copied().unwrap_or(0)
     }
 }
@@ -197,42 +275,6 @@ fn files_of(folder: &Path) -> Result<Vec<PathBuf>, (PathBuf, io::Error)> {
     }
     files.sort();
     Ok(files)
-}
-
-/// What a folder holds of earlier processes.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Earlier {
-    /// No process began a batch there.
-    Nothing,
-    /// One began, and was ended before any unit ended.
-    Begun,
-    /// Units of other manifests alone.
-    OfOthers,
-    /// At least one unit that was asked for.
-    OfThese,
-}
-
-/// What a folder holds of the units that `is_asked` selects by their recording and work. Reading ends with the first file that has one.
-///
-/// # Errors
-/// One line that names the file.
-pub fn earlier(folder: &Path, is_asked: impl Fn(&str, &str) -> bool) -> Result<Earlier, String> {
-    let files = match files_of(folder) {
-        Err((_, e)) if e.kind() == io::ErrorKind::NotFound => return Ok(Earlier::Nothing),
-        files => files.map_err(|(place, e)| format!("{}: cannot be read: {e}", place.display()))?,
-    };
-    let mut found = Earlier::Begun;
-    for file in &files {
-        for_each_record(file, |record| {
-            if found != Earlier::OfThese {
-                found = if is_asked(&record.input, &record.work) { Earlier::OfThese } else { Earlier::OfOthers };
-            }
-        })?;
-        if found == Earlier::OfThese {
-            break;
-        }
-    }
-    Ok(found)
 }
 
 /// All results of a folder without their figures, and the number of lines that a killed process left unfinished.

@@ -5,7 +5,7 @@ use super::manifest::Numbered;
 use super::painter::{DeviceOptions, Painter, against_reference};
 use super::progress::Progress;
 use super::reading::{Contents, Read, Task, read, shown};
-use super::results::{FORMAT, OutputFile, Record, Results, Seconds, Status, read_record};
+use super::results::{Earlier, FORMAT, OutputFile, Record, Results, Seconds, Status};
 use super::shard::Shard;
 use super::unit::{Key, Kind, Work};
 use super::{sha256, sha256_of_file};
@@ -22,8 +22,8 @@ use std::sync::Arc;
 use std::sync::mpsc::sync_channel;
 use std::time::{Duration, Instant, SystemTime};
 
-/// A unit that lost a device so often is not tried again.
-const MAX_LOSSES: usize = 3;
+/// A unit by which so many processes lost the device is not tried again. Each of them tried it several times, with smaller and smaller parts.
+const MAX_TRIES: usize = 3;
 /// Age at which a file that somebody began to write is taken to be abandoned. Whoever still writes it makes it younger.
 const ABANDONED: Duration = Duration::from_secs(3600);
 
@@ -38,7 +38,9 @@ pub struct Job<'a> {
     pub device: DeviceOptions,
     /// Share of the finished pictures that are drawn again and compared, 0..=1.
     pub recheck: f64,
-    /// Says first how many of the units are done.
+    /// What earlier processes wrote of this shard. Taken by the run.
+    pub earlier: Earlier,
+    /// Says first how many of the units were done before.
     pub resumes: bool,
     /// True once no further unit is to be begun.
     pub stops: &'a dyn Fn() -> bool,
@@ -87,15 +89,18 @@ impl Job<'_> {
     /// # Errors
     /// A unit's command is wrong ([`Failure::Input`], before any work); there is no device, or it is lost ([`Failure::NoDevice`]); nothing can
     /// be written ([`Failure::Failed`]).
-    pub fn run(&self) -> Result<Ended, Failure> {
-        let mut results = Results::open(self.folder, self.shard).map_err(failed)?;
+    pub fn run(mut self) -> Result<Ended, Failure> {
+        let mut results = Results::open(self.folder, self.shard, std::mem::take(&mut self.earlier)).map_err(failed)?;
         let tasks = self.tasks(&results)?;
         if self.resumes {
-            say!("{}", self.earlier(&tasks));
+            let earlier = results.earlier();
+            let done =
+                tasks.iter().filter(|task| earlier.says_done(&task.numbered.unit.input, &task.work.text)).count();
+            say!("resume: {done} of {} units were done before", tasks.len());
         }
         let cost = |task: &Task| task.numbered.unit.cost.unwrap_or(1.0);
         let mut progress = Progress::new(tasks.len(), tasks.iter().map(cost).sum());
-        let mut worker = Worker { job: self, painter: None };
+        let mut worker = Worker { job: &self, painter: None };
         let mut ended = Ended { units: tasks.len(), ..Ended::default() };
         let folder = self.folder;
         let recheck = self.recheck;
@@ -138,9 +143,9 @@ impl Job<'_> {
                         (task, key, seconds, Err(fault))
                     }
                     Read::Ready { task, key, .. }
-                        if results.losses(&task.numbered.unit.input, &task.work.text) >= MAX_LOSSES =>
+                        if results.losses(&task.numbered.unit.input, &task.work.text) >= MAX_TRIES =>
                     {
-                        let why = format!("the device was lost by it {MAX_LOSSES} times; it is not tried again");
+                        let why = format!("the device was lost by it {MAX_TRIES} times; it is not tried again");
                         (task, Some(key), 0.0, Err(Fault::Failed(why)))
                     }
                     Read::Ready { task, key, contents, seconds, earlier } => {
@@ -195,23 +200,6 @@ impl Job<'_> {
         });
         say!("{}", progress.finish());
         outcome.map(|()| ended)
-    }
-
-    /// How many units are done, as far as that is known without reading their recordings.
-    fn earlier(&self, tasks: &[Task]) -> String {
-        let (known, rest): (Vec<_>, Vec<_>) = tasks.iter().partition(|task| task.numbered.unit.digest.is_some());
-        let is_done = |task: &&&Task| {
-            let key = task.numbered.unit.digest.as_ref().map(|digest| task.work.key(digest));
-            key.is_some_and(|key| read_record(self.folder, &key).is_some())
-        };
-        let done = known.iter().filter(is_done).count();
-        match rest.len() {
-            0 => format!("resume: {done} of {} units are done", known.len()),
-            n => format!(
-                "resume: {done} of {} units are done; of {n} more that is known when they are read, for want of a digest",
-                known.len()
-            ),
-        }
     }
 
     /// The units with their work, those last by which a device was lost before: the rest gets done first.

@@ -2,18 +2,15 @@
 
 use crate::args::write_report;
 use crate::batch::make::{self, Found};
-use crate::batch::manifest::Unit;
 use crate::batch::painter::DeviceOptions;
 use crate::batch::report::{self, Merged};
-use crate::batch::results::Earlier;
+use crate::batch::results::{Asked, Earlier};
 use crate::batch::shard::{Shard, assign};
 use crate::batch::work::Job;
 use crate::batch::{manifest, results, unit};
 use crate::files::signals::{self, Held};
 use crate::gpu::{Deadline, DeviceChoice};
 use crate::terminal::{Failure, failed, input, remark, say};
-use std::collections::HashSet;
-use std::hash::{DefaultHasher, Hash, Hasher};
 use std::path::{Path, PathBuf};
 use std::sync::OnceLock;
 use std::sync::atomic::{AtomicU64, Ordering};
@@ -68,8 +65,8 @@ pub struct Batch {
     /// Merge the results of all shards of this folder into one HTML page
     #[arg(long, value_name = "DIR", conflicts_with_all = ["shard", "shards"])]
     report: Option<PathBuf>,
-    /// Only go on: refuse a folder that holds no earlier results of this manifest, and say how many units are done. The same command goes on
-    /// without it, too, but begins in any folder
+    /// Continue an earlier batch: say first how many units of the shard were done before, and refuse a folder without results of this manifest,
+    /// such as a mistyped one. Without this flag finished units are skipped as well, and a folder without results is where a new batch begins
     #[arg(long, conflicts_with_all = ["make", "report"])]
     resume: bool,
     /// Draw this share of the finished pictures again and compare: bit for bit on the same device and driver, within the tolerance of
@@ -137,9 +134,7 @@ impl Batch {
             None => Shard::from_environment(self.shards, variable).map_err(input)?,
         };
         let costs = manifest::costs(manifest).map_err(input)?;
-        if self.resume {
-            check_earlier(manifest, folder)?;
-        }
+        let earlier = self.earlier(manifest, folder, shard)?;
         let shards = assign(&costs, shard.count);
         let units = manifest::units(manifest, |place| shards.get(place) == Some(&shard.index)).map_err(input)?;
         say!("shard {shard}: {} of {} units", units.len(), costs.len());
@@ -154,6 +149,7 @@ impl Batch {
             shard,
             device: DeviceOptions { device: self.device.clone(), deadline: Deadline::ByDevice, stop: is_grace_over },
             recheck: self.recheck,
+            earlier,
             resumes: self.resume,
             stops: &|| held.signal().is_some(),
         };
@@ -168,6 +164,25 @@ impl Batch {
         }
     }
 
+    /// What earlier processes left in the folder. With `--resume` a folder without results of this manifest is refused, and nothing is made in
+    /// it: it is another one than was meant, where everything would be done again.
+    fn earlier(&self, manifest: &Path, folder: &Path, shard: Shard) -> Result<Earlier, Failure> {
+        if !self.resume {
+            return Earlier::read(folder, shard, None).map_err(failed);
+        }
+        let mut asked = Asked::default();
+        manifest::for_each_unit(manifest, |unit| asked.add(&unit.input, &unit::text(unit))).map_err(input)?;
+        let earlier = Earlier::read(folder, shard, Some(&asked)).map_err(failed)?;
+        let why = match &earlier {
+            Earlier { is_begun: false, .. } => "it holds no results of a batch".to_string(),
+            Earlier { has_lines: true, is_of_these: false, .. } => {
+                format!("its results are of other units than those of {}", manifest.display())
+            }
+            _ => return Ok(earlier),
+        };
+        Err(input(format!("--resume: {}: {why}; to begin a batch there, leave --resume out", folder.display())))
+    }
+
     fn write_page(&self, folder: &Path) -> Result<(), Failure> {
         let (records, torn) = results::read_all(folder).map_err(input)?;
         let file = self.output.clone().unwrap_or_else(|| folder.join("report.html"));
@@ -177,25 +192,6 @@ impl Batch {
         say!("{} units: {} done, {failures} failed", merged.units.len(), merged.done().count());
         Ok(())
     }
-}
-
-/// With `--resume`: a folder that holds nothing of the manifest is another one than was meant, where everything would be done again.
-fn check_earlier(manifest: &Path, folder: &Path) -> Result<(), Failure> {
-    // A million units are 16 MiB.
-    let hash = |input: &str, work: &str| {
-        let mut hasher = DefaultHasher::new();
-        (input, work).hash(&mut hasher);
-        hasher.finish()
-    };
-    let mut asked = HashSet::new();
-    let keep = |unit: &Unit| asked.extend([hash(&unit.input, &unit::text(unit))]);
-    manifest::for_each_unit(manifest, keep).map_err(input)?;
-    let why = match results::earlier(folder, |input, work| asked.contains(&hash(input, work))).map_err(failed)? {
-        Earlier::Begun | Earlier::OfThese => return Ok(()),
-        Earlier::Nothing => "it holds no results of a batch".to_string(),
-        Earlier::OfOthers => format!("its results are of other units than those of {}", manifest.display()),
-    };
-    Err(input(format!("--resume: {}: {why}; to begin a batch there, leave --resume out", folder.display())))
 }
 
 /// True once the grace time after a signal is over: a unit that still runs on the device is dropped.

@@ -5,7 +5,7 @@ use echolume::batch::agreement::{Agreement, Class, Drawer};
 use echolume::batch::comparisons::pairs;
 use echolume::batch::manifest::{self, Unit};
 use echolume::batch::report::{Merged, html};
-use echolume::batch::results::{self, OutputFile, Record, Results, Seconds, Status};
+use echolume::batch::results::{self, Asked, Earlier, OutputFile, Record, Results, Seconds, Status};
 use echolume::batch::shard::{Shard, assign};
 use echolume::batch::unit::{Kind, Work};
 use echolume::picture::Picture;
@@ -186,26 +186,62 @@ fn record(input: &str, status: Status, driver: &str, sha256: &str) -> Record {
     }
 }
 
+fn open(folder: &Folder, shard: Shard) -> Result<Results, String> {
+    Results::open(folder, shard, Earlier::read(folder, shard, None)?)
+}
+
+/// Prevents a batch that goes on in a folder of other units, and units of another division or version that are counted wrongly.
+#[test]
+fn earlier_results_are_those_of_the_units_that_are_asked_for_in_any_shard() {
+    let folder = Folder::new("earlier");
+    let [own, other] = [1, 0].map(|n| Shard::new(n, 2).expect("a shard"));
+    let mut asked = Asked::default();
+    ["a", "b", "c", "d"].iter().for_each(|input| asked.add(input, "render"));
+    let read = || Earlier::read(&folder, own, Some(&asked)).expect("read");
+    assert!(!read().is_begun && !folder.0.join("results").exists(), "a folder that is only read stays as it is");
+    let mut results = open(&folder, other).expect("opened");
+    assert!(read().is_begun && !read().has_lines);
+    let add = |results: &mut Results, input: &str, status| {
+        let program = echolume::machine::program();
+        results.add(&Record { program, ..record(input, status, "x", "1") }).expect("added");
+    };
+    add(&mut results, "z", Status::Done);
+    assert!(read().has_lines && !read().is_of_these, "results of other units");
+    add(&mut results, "a", Status::Done);
+    add(&mut results, "b", Status::Failed);
+    // Of an earlier version of the program: its outputs have other names, so that the unit is done again.
+    results.add(&record("c", Status::Done, "x", "1")).expect("added");
+    add(&mut open(&folder, own).expect("opened"), "d", Status::Done);
+    let earlier = read();
+    let done = |input: &str| earlier.says_done(input, "render");
+    assert!(earlier.is_of_these);
+    assert_eq!(["a", "b", "c", "d", "z"].map(done), [true, false, false, true, false]);
+    assert!(!earlier.says_done("a", "measure"));
+    // Lines of a shard are those of its own file.
+    let results = Results::open(&folder, own, earlier).expect("opened");
+    assert!(results.has(&record("d", Status::Done, "x", "1")) && !results.has(&record("a", Status::Done, "x", "1")));
+}
+
 #[test]
 fn a_line_that_a_killed_process_left_spoils_no_other() {
     let folder = Folder::new("torn");
     let shard = Shard::new(2, 5).expect("a shard");
     let (mut first, second) = (record("a", Status::Done, "x", "1"), record("b", Status::Lost, "x", "1"));
     first.figures.insert("count".into(), 3.into());
-    Results::open(&folder, shard).expect("opened").add(&first).expect("added");
+    open(&folder, shard).expect("opened").add(&first).expect("added");
     let file = folder.0.join("results/shard-0002-of-0005.ndjson");
     let mut torn = std::fs::OpenOptions::new().append(true).open(&file).expect("the results");
     torn.write_all(b"{\"format\":\"echolume-batch-1\",\"key\":\"f").expect("written");
-    let mut again = Results::open(&folder, shard).expect("opened");
+    let mut again = open(&folder, shard).expect("opened");
     assert!(again.has(&first) && !again.has(&second) && again.losses("b", "render") == 0);
     again.add(&second).expect("added");
     let (records, broken) = results::read_all(&folder).expect("read");
     first.figures.clear();
     assert_eq!((records, broken), (vec![first, second.clone()], 1), "all but the figures");
-    let mut again = Results::open(&folder, shard).expect("opened");
+    let mut again = open(&folder, shard).expect("opened");
     assert_eq!((again.losses("b", "render"), again.losses("a", "render")), (1, 0));
     again.add(&second).expect("added");
-    assert_eq!(Results::open(&folder, shard).expect("opened").losses("b", "render"), 2);
+    assert_eq!(open(&folder, shard).expect("opened").losses("b", "render"), 2);
 }
 
 #[test]
