@@ -203,7 +203,7 @@ pub mod live;
 #[forbid(unsafe_code)]
 pub mod machine;
 #[forbid(unsafe_code)]
-mod marked;
+pub mod marked;
 #[forbid(unsafe_code)]
 pub mod measure;
 #[forbid(unsafe_code)]

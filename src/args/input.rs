@@ -30,9 +30,9 @@ pub struct InputArgs {
     scene: SceneArgs,
     #[command(flatten)]
     geometry: GeometryArgs,
-    /// Volume of the recording to use, counted from 0
-    #[arg(long, value_name = "N", default_value_t = 0)]
-    volume: usize,
+    /// Volume of the recording to use, counted from 0 [default: that of the workspace, otherwise 0]
+    #[arg(long, value_name = "N")]
+    volume: Option<usize>,
 }
 
 impl InputArgs {
@@ -104,10 +104,25 @@ impl InputArgs {
 
     /// The number of the volume to use.
     pub fn volume(&self) -> Result<usize, Failure> {
-        Ok(match (self.volume, self.workspace()?) {
-            (0, Some((_, workspace))) => workspace.origin.volume,
-            (volume, _) => volume,
-        })
+        match self.volume {
+            Some(volume) => Ok(volume),
+            None => Ok(self.workspace()?.map_or(0, |(_, workspace)| workspace.origin.volume)),
+        }
+    }
+
+    /// Refuses `--volumes` beside `--volume`, and volumes among which that of the workspace is not: what it measures belongs to that one.
+    pub fn check_volumes(&self, flag: &str, is_among: impl Fn(usize) -> bool) -> Result<(), Failure> {
+        if self.volume.is_some() {
+            return Err(input("--volume and --volumes: give one of them"));
+        }
+        match self.workspace()? {
+            Some((file, workspace)) if !is_among(workspace.origin.volume) => Err(input(format!(
+                "{flag}: leaves out volume {}, which {} is of; choose volumes with it, or set volume in its table [workspace]",
+                workspace.origin.volume,
+                file.display()
+            ))),
+            _ => Ok(()),
+        }
     }
 
     /// The recording as it was typed, or `phantom`.
@@ -373,9 +388,8 @@ pub fn check_volume(source: &dyn Source, volume: usize, name: impl std::fmt::Dis
 
 /// The samples of a recording, with the range that the settings ask for.
 fn samples_of(source: &dyn Source, settings: &Settings) -> Input {
-    // i16 samples are stored with an offset, which the setting does not have.
-    let asked = settings.samples.range.map(|range| range.map(|value| value + source.sample_type().shift()));
-    Input { stored: source.stored_type(), range: asked.unwrap_or_else(|| source.range()) }
+    let stated = Input { stored: source.stored_type(), range: source.range() };
+    stated.in_range_of(settings, source.sample_type().shift())
 }
 
 /// The scene that shows a volume: settings that nobody chose follow from the recording, whose `levels` are asked for only if they matter.

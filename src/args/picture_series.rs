@@ -39,7 +39,11 @@ impl SeriesTarget {
             let (after, format, folder) = (".png".into(), PictureFormat::Png, Some(path.into()));
             return Ok(SeriesTarget::Files { before, digits: 6, after, format, folder });
         }
+        let file = path.file_name().unwrap_or_default().to_string_lossy();
         if path.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("mp4")) {
+            if file.contains('%') {
+                return refuse("a film is one file, whose name has no number: leave the % out");
+            }
             return match cfg!(feature = "video") {
                 true => Ok(SeriesTarget::Film(path.into())),
                 false => refuse(
@@ -48,7 +52,6 @@ impl SeriesTarget {
                 ),
             };
         }
-        let file = path.file_name().unwrap_or_default().to_string_lossy();
         let Some((first, rest)) = file.split_once('%') else {
             return refuse(
                 "several pictures are written: give a folder (face/), a pattern (face-%03d.png) or a film (face.mp4)",
@@ -98,6 +101,7 @@ pub struct PictureSeries<'a> {
     /// Pictures of a film in a second.
     #[cfg_attr(not(feature = "video"), allow(dead_code))]
     rate: f64,
+    count: usize,
     #[cfg(feature = "video")]
     film: Option<FilmWriter>,
 }
@@ -107,21 +111,24 @@ impl<'a> PictureSeries<'a> {
         PictureSeries {
             target,
             rate,
+            count: 0,
             #[cfg(feature = "video")]
             film: None,
         }
     }
 
-    /// Writes a picture: to its file, or to the end of the film.
+    /// Writes a picture: to its file, or to the end of the film. It counts from then on.
     pub fn write(&mut self, number: usize, picture: &Picture) -> Result<(), Failure> {
         let file = self.target.file(number);
         let unwritable = |e: String| failed(format!("{}: cannot be written: {e}", file.display()));
         match self.target {
             SeriesTarget::Files { format, .. } => {
-                replace(&file, &picture.encoded(*format).map_err(unwritable)?).map_err(failed)
+                replace(&file, &picture.encoded(*format).map_err(unwritable)?).map_err(failed)?;
             }
-            SeriesTarget::Film(path) => self.add(path, picture).map_err(unwritable),
+            SeriesTarget::Film(path) => self.add(path, picture).map_err(unwritable)?,
         }
+        self.count += 1;
+        Ok(())
     }
 
     #[cfg(feature = "video")]
@@ -135,6 +142,11 @@ impl<'a> PictureSeries<'a> {
     #[cfg(not(feature = "video"))]
     fn add(&mut self, _: &Path, _: &Picture) -> Result<(), String> {
         Err("this program was built without films".into())
+    }
+
+    /// Number of pictures that are written.
+    pub fn count(&self) -> usize {
+        self.count
     }
 
     /// Ends the series: a film is put in its place.
@@ -166,6 +178,8 @@ mod tests {
             let fault = of(wrong).expect_err(wrong).message();
             assert!(fault.starts_with(&format!("-o {wrong}: ")), "{wrong}: {fault}");
         }
+        let fault = of("face-%03d.mp4").expect_err("a pattern").message();
+        assert!(fault.contains("leave the % out"), "in a program without films, too: {fault}");
         match of("face.MP4") {
             Ok(SeriesTarget::Film(path)) => assert!(cfg!(feature = "video") && path == Path::new("face.MP4")),
             Ok(other) => panic!("{other:?}"),

@@ -2,7 +2,7 @@
 
 use super::agreement::Drawer;
 use crate::args::open_device_until;
-use crate::gpu::{Bands, Context, Deadline, DeviceChoice, GpuError, Renderer, RendererOptions};
+use crate::gpu::{Context, Deadline, DeviceChoice, GpuError, Losses, Renderer, RendererOptions};
 use crate::passes::{Slot, Texels};
 use crate::picture::Picture;
 use crate::scene::Scene;
@@ -25,19 +25,16 @@ pub struct Painter {
     context: Arc<Context>,
     renderer: Option<Renderer>,
     options: DeviceOptions,
-    /// How often the device was lost by the running unit.
-    losses: u32,
+    /// Of the running unit.
+    losses: Losses,
 }
-
-/// A device that is lost so often by one unit is given up: no band can become smaller.
-const MAX_LOSSES: u32 = 6;
 
 impl Painter {
     /// # Errors
     /// There is no such device, or it cannot be opened.
     pub fn open(options: &DeviceOptions) -> Result<Painter, GpuError> {
         let context = open_device_until(options.device.clone(), options.deadline, options.stop)?;
-        Ok(Painter { context, renderer: None, options: options.clone(), losses: 0 })
+        Ok(Painter { context, renderer: None, options: options.clone(), losses: Losses::default() })
     }
 
     pub fn drawer(&self) -> Drawer {
@@ -55,24 +52,22 @@ impl Painter {
     /// # Errors
     /// The device lacks something, has too little memory, or was lost again.
     pub fn draw(&mut self, scene: &Scene, frames: &[Frame], is_whole: bool) -> Result<Picture, GpuError> {
-        self.losses = 0;
+        self.losses = Losses::default();
         loop {
             let drawn = self.draw_once(scene, frames, is_whole);
             let Err(error) = drawn else { return drawn };
             // What failed may have left anything.
             self.renderer = None;
-            self.losses += 1;
-            if !error.is_device_lost() || error.is_given_up() || self.losses >= MAX_LOSSES {
+            if !self.losses.allow_after(&error) {
                 return Err(error);
             }
-            tracing::warn!("{error}; the device is reopened, and its work is divided into smaller parts");
             self.context = open_device_until(self.options.device.clone(), self.options.deadline, self.options.stop)?;
         }
     }
 
     fn draw_once(&mut self, scene: &Scene, frames: &[Frame], is_whole: bool) -> Result<Picture, GpuError> {
         // Where frames are missing, those of the recording before must not be seen. A new renderer has none.
-        if !is_whole || self.losses > 0 {
+        if !is_whole || self.losses.any() {
             self.renderer = None;
         }
         let renderer = match &mut self.renderer {
@@ -81,8 +76,7 @@ impl Painter {
                 there
             }
             none => {
-                let bands = if self.losses > 0 { Bands::Measured { losses: self.losses } } else { Bands::default() };
-                let options = RendererOptions { bands, ..RendererOptions::default() };
+                let options = RendererOptions { bands: self.losses.bands(), ..RendererOptions::default() };
                 none.insert(Renderer::new(&self.context, scene.clone(), &options)?)
             }
         };

@@ -1,27 +1,10 @@
-//! What the commands that draw pictures of a recording share: faults on the way, and marks on what is written.
+//! What the commands that draw pictures of a recording share: how frames are sent, and another try after the device was lost.
 
-use crate::gpu::GpuError;
-use crate::marked;
-use crate::picture::Picture;
-use crate::scene::Scene;
-use crate::terminal::{Failure, failed};
-use std::borrow::Cow;
-use std::time::SystemTime;
-
-/// A device that was lost so often is given up: no band can become smaller.
-pub const MAX_LOSSES: u32 = 6;
-
-/// The picture as it is written: with its measurements, and its marks if the settings ask for them.
-pub fn with_marks<'a>(picture: &'a Picture, scene: &Scene) -> Result<Cow<'a, Picture>, Failure> {
-    match scene.settings.marks.bar {
-        false if scene.settings.measure.is_empty() && !scene.has_reference() => Ok(Cow::Borrowed(picture)),
-        false => marked::measured(picture, scene).map(Cow::Owned).map_err(failed),
-        true => {
-            let marked = marked::marked(picture, scene, &marked::time_line(SystemTime::now()), None);
-            marked.map(Cow::Owned).map_err(failed)
-        }
-    }
-}
+use crate::args::frames_of;
+use crate::gpu::{Context, GpuError, Losses, Renderer, RendererOptions};
+use crate::source::{Frame, Source};
+use crate::terminal::{Failure, failed, input};
+use std::sync::Arc;
 
 /// Why a picture could not be drawn.
 pub enum DrawFault {
@@ -32,5 +15,65 @@ pub enum DrawFault {
 impl From<GpuError> for DrawFault {
     fn from(error: GpuError) -> DrawFault {
         DrawFault::Gpu(error)
+    }
+}
+
+impl DrawFault {
+    /// The failure that ends the command. With shaders of the user one that does not compile is a fault of the input.
+    fn failure(self, own_shaders: bool) -> Failure {
+        match self {
+            DrawFault::Gpu(e @ GpuError::Shader { .. }) if own_shaders => input(e),
+            DrawFault::Gpu(e) => failed(e),
+            DrawFault::Source(failure) => failure,
+        }
+    }
+}
+
+/// Draws on the device of `context`. If it is lost, `reopen` opens it again and `draw` is called again, with smaller bands in `options`, until
+/// it was lost too often ([`Losses`]). `draw` gets true if it is called again: the source may have been read in part by then.
+///
+/// # Errors
+/// What `draw` or `reopen` failed with.
+pub fn draw_despite_losses<T>(
+    context: &mut Arc<Context>,
+    options: &mut RendererOptions,
+    own_shaders: bool,
+    reopen: impl Fn() -> Result<Arc<Context>, Failure>,
+    mut draw: impl FnMut(&Arc<Context>, &RendererOptions, bool) -> Result<T, DrawFault>,
+) -> Result<T, Failure> {
+    let mut losses = Losses::default();
+    loop {
+        match draw(context, options, losses.any()) {
+            Err(DrawFault::Gpu(error)) if losses.allow_after(&error) => {
+                options.bands = losses.bands();
+                *context = reopen()?;
+            }
+            drawn => return drawn.map_err(|fault| fault.failure(own_shaders)),
+        }
+    }
+}
+
+/// Sends every frame of a volume to volume image 0. `each` takes the frame before it is sent.
+///
+/// # Errors
+/// A source that cannot be read, what `each` failed with, or a device that failed: a loss is told apart, so that it can be tried again.
+pub fn send_volume(
+    renderer: &mut Renderer,
+    source: &mut dyn Source,
+    volume: usize,
+    mut each: impl FnMut(&Frame) -> Result<(), Failure>,
+) -> Result<(), DrawFault> {
+    let mut fault = None;
+    let sent = frames_of(source, volume, |frame| {
+        each(&frame)?;
+        renderer.frame(frame.slice as u32, &frame.bytes, 0).map_err(|e| {
+            let failure = failed(&e);
+            fault = Some(e);
+            failure
+        })
+    });
+    match fault {
+        Some(fault) => Err(DrawFault::Gpu(fault)),
+        None => sent.map_err(DrawFault::Source),
     }
 }

@@ -1,6 +1,6 @@
 //! `echolume render`.
 
-use super::drawing::{DrawFault, MAX_LOSSES, with_marks};
+use super::drawing::{DrawFault, draw_despite_losses, send_volume};
 use super::one_colour;
 use super::series::{Job, SeriesArgs};
 use crate::args::{InputArgs, Output, PictureFile, check_outputs};
@@ -10,7 +10,8 @@ use crate::error_report::command::{parse_nanoseconds, read_report};
 use crate::error_report::{Measure, choose, map};
 use crate::files;
 use crate::gpu::shader_reload::ShaderFolder;
-use crate::gpu::{Bands, Context, GpuError, Renderer, RendererOptions, TimeStamps};
+use crate::gpu::{Context, Renderer, RendererOptions, TimeStamps};
+use crate::marked;
 use crate::passes::{PassTime, Slot, Texels};
 use crate::picture::{Picture, PictureFormat};
 use crate::plan::Plan;
@@ -18,7 +19,7 @@ use crate::probe::Probe;
 use crate::profile::export::pass_time_table;
 use crate::scene::{Mode, Scene};
 use crate::source::{Frame, Source};
-use crate::terminal::{Failure, failed, input, remark, say};
+use crate::terminal::{Failure, failed, input, progress_bar, remark, say};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
@@ -77,6 +78,7 @@ pub struct Render {
 impl Render {
     pub fn run(&self) -> Result<(), Failure> {
         let options = self.options()?;
+        self.series.check()?;
         if self.series.is_given() && !self.explain {
             let alone = [
                 ("--dump", self.dump.is_some()),
@@ -123,25 +125,21 @@ impl Render {
         }
         let mut context = self.input.open_device(self.validate)?;
         let mut options = options;
-        let mut losses = 0;
-        let Drawn { mut renderer, picture, kept } = loop {
-            match self.draw(&context, &mut *source, scene.clone(), &options) {
-                Ok(drawn) => break drawn,
-                // What hung once would hang again: a device that was given up is not tried a second time.
-                Err(DrawFault::Gpu(lost)) if lost.is_device_lost() && !lost.is_given_up() && losses < MAX_LOSSES => {
-                    tracing::warn!("{lost}; the device is reopened, and its work is divided into smaller parts");
-                    losses += 1;
-                    options.bands = Bands::Measured { losses };
-                    context = self.input.open_device(self.validate)?;
-                    source = self.open()?.0;
+        let reopen = || self.input.open_device(self.validate);
+        let Drawn { mut renderer, picture, kept } = draw_despite_losses(
+            &mut context,
+            &mut options,
+            self.glsl.is_some(),
+            reopen,
+            |context, options, is_again| {
+                if is_again {
+                    source = self.open().map_err(DrawFault::Source)?.0;
                 }
-                Err(DrawFault::Gpu(e @ GpuError::Shader { .. })) if self.glsl.is_some() => return Err(input(e)),
-                Err(DrawFault::Gpu(e)) => return Err(failed(e)),
-                Err(DrawFault::Source(failure)) => return Err(failure),
-            }
-        };
+                self.draw(context, &mut *source, scene.clone(), options)
+            },
+        )?;
         let compared = finer.map(|finer| (scene, finer));
-        let shown = with_marks(&picture, renderer.scene())?;
+        let shown = marked::as_set(&picture, renderer.scene()).map_err(failed)?;
         output.write(|format| shown.encoded(format))?;
         let measured = renderer.take_times().map_err(failed)?;
         self.judge_budget(&measured)?;
@@ -177,21 +175,15 @@ impl Render {
         options: &RendererOptions,
     ) -> Result<Drawn, DrawFault> {
         let mut renderer = Renderer::new(context, scene, options)?;
-        let (mut kept, mut fault) = (Vec::new(), None);
-        let send = |frame: Frame| {
-            if let Err(e) = renderer.frame(frame.slice as u32, &frame.bytes, 0) {
-                let failure = failed(&e);
-                fault = Some(e);
-                return Err(failure);
-            }
-            kept.extend(self.error_map.is_some().then_some(frame));
+        let mut kept = Vec::new();
+        let volume = self.input.volume().map_err(DrawFault::Source)?;
+        let bar = progress_bar(source.frames_per_volume() as u64).with_message("frames");
+        send_volume(&mut renderer, source, volume, |frame| {
+            kept.extend(self.error_map.is_some().then(|| frame.clone()));
+            bar.inc(1);
             Ok(())
-        };
-        let sent = self.input.for_each_frame(source, send);
-        if let Some(fault) = fault {
-            return Err(DrawFault::Gpu(fault));
-        }
-        sent.map_err(DrawFault::Source)?;
+        })?;
+        bar.finish_and_clear();
         renderer.show(0)?;
         let picture = renderer.picture()?;
         Ok(Drawn { renderer, picture, kept })

@@ -1,12 +1,14 @@
 //! `echolume render --turntable` and `--volumes`: several pictures of one recording, drawn on one device.
 
-use super::drawing::{DrawFault, MAX_LOSSES, with_marks};
+use super::drawing::{DrawFault, draw_despite_losses, send_volume};
 use super::one_colour;
-use crate::args::{InputArgs, PictureSeries, SeriesTarget, check_volume, frames_of};
+use crate::args::{InputArgs, PictureSeries, SeriesTarget, check_volume};
 use crate::files::signals::Writing;
-use crate::gpu::{Bands, Context, GpuError, Renderer, RendererOptions};
+use crate::gpu::{Context, Renderer, RendererOptions};
+use crate::marked;
 use crate::passes::Slot;
 use crate::plan::Rerun;
+use crate::probe::Probe;
 use crate::profile::export::pass_time_table;
 use crate::scene::{Scene, Settings};
 use crate::source::Source;
@@ -28,10 +30,13 @@ pub struct SeriesArgs {
     /// Draw a picture of each of these volumes in time: FIRST:LAST, counted from 0, or all. -o as with --turntable
     #[arg(long, value_name = "FIRST:LAST")]
     volumes: Option<Volumes>,
-    /// Pictures of a film in a second, 0.1..=240
-    #[arg(long, value_name = "N", default_value_t = 25.0, value_parser = rate)]
-    rate: f64,
+    /// Pictures of a film in a second, 0.1..=240 [default: 25]
+    #[arg(long, value_name = "N", value_parser = rate)]
+    rate: Option<f64>,
 }
+
+/// Pictures of a film in a second, if `--rate` does not say it.
+const RATE: f64 = 25.0;
 
 /// The volumes that are shown.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -102,12 +107,30 @@ impl SeriesArgs {
         self.turntable.is_some() || self.volumes.is_some()
     }
 
+    /// Refuses what only a series has, if none is asked for.
+    pub fn check(&self) -> Result<(), Failure> {
+        match self.rate {
+            Some(_) if !self.is_given() => {
+                Err(input("--rate: is for a film of several pictures; add --turntable or --volumes"))
+            }
+            _ => Ok(()),
+        }
+    }
+
     /// Draws and writes the pictures. A signal ends the command after the file that is being written.
     pub fn run(&self, job: &Job) -> Result<(), Failure> {
         let name = if self.volumes.is_some() { "volume" } else { "picture" };
         let target = SeriesTarget::of(job.output, name)?;
-        if self.volumes.is_some() && job.input.volume()? != 0 {
-            return Err(input("--volume and --volumes: give one of them"));
+        if let (Some(_), SeriesTarget::Files { .. }) = (self.rate, &target) {
+            return Err(input("--rate: is for a film (-o face.mp4); pictures in files have no rate"));
+        }
+        match self.volumes {
+            Some(Volumes::All) => job.input.check_volumes("--volumes all", |_| true)?,
+            Some(Volumes::Range(first, last)) => {
+                job.input
+                    .check_volumes(&format!("--volumes {first}:{last}"), |volume| (first..=last).contains(&volume))?;
+            }
+            None => {}
         }
         // Dropped last: after everything is in order, a signal that arrived ends the process.
         let signals = Writing::begin();
@@ -131,48 +154,43 @@ impl SeriesArgs {
         let views = self.views(&*source, &scene, job)?;
         let numbers = (0..views.count()).map(|n| views.number(n));
         target.check(numbers, &job.input.read_files(&*source))?;
+        if let Some(cut) = scene.probe().and_then(Probe::folded) {
+            remark(&cut);
+        }
         let context = opened.insert(job.input.open_device(job.validate)?);
         let mut options = job.options.clone();
         let bar = progress_bar(views.count() as u64).with_message("pictures");
-        let (chosen, written) = (job.input.volume()?, PictureSeries::new(target, self.rate));
-        let mut series = Series { views, scene, chosen, signals, bar, next: 0, written, times: String::new() };
-        let mut losses = 0;
-        loop {
-            let done = series.draw(context, &mut *source, &options);
-            if let Some(signal) = signals.signal() {
-                series.bar.finish_and_clear();
-                let (next, count) = (series.next, series.views.count());
-                let kept = if matches!(target, SeriesTarget::Film(_)) { "; the film is not kept" } else { "" };
-                remark(&format!("stopped by {signal} after {next} of {count} pictures{kept}"));
-                return Err(failed(format!("stopped by {signal}")));
+        let (chosen, rate) = (job.input.volume()?, self.rate.unwrap_or(RATE));
+        let written = PictureSeries::new(target, rate);
+        let mut series = Series { views, scene, chosen, signals, bar, written, times: None };
+        let reopen = || job.input.open_device(job.validate);
+        draw_despite_losses(context, &mut options, job.own_shaders, reopen, |context, options, is_again| {
+            if is_again {
+                source = self.open(job).map_err(DrawFault::Source)?.0;
             }
-            match done {
-                Ok(()) => break,
-                Err(DrawFault::Gpu(lost)) if lost.is_device_lost() && !lost.is_given_up() && losses < MAX_LOSSES => {
-                    tracing::warn!("{lost}; the device is reopened, and its work is divided into smaller parts");
-                    losses += 1;
-                    options.bands = Bands::Measured { losses };
-                    *context = job.input.open_device(job.validate)?;
-                    source = self.open(job)?.0;
-                }
-                Err(DrawFault::Gpu(e @ GpuError::Shader { .. })) if job.own_shaders => return Err(input(e)),
-                Err(DrawFault::Gpu(e)) => return Err(failed(e)),
-                Err(DrawFault::Source(failure)) => return Err(failure),
-            }
-        }
+            let done = series.draw(context, &mut *source, options);
+            let Some(signal) = signals.signal() else { return done };
+            series.bar.finish_and_clear();
+            let (written, count) = (series.written.count(), series.views.count());
+            let kept = if matches!(target, SeriesTarget::Film(_)) { "; the film is not kept" } else { "" };
+            remark(&format!("stopped by {signal} after {written} of {count} pictures{kept}"));
+            Err(DrawFault::Source(failed(format!("stopped by {signal}"))))
+        })?;
         let Series { views, bar, written, times, .. } = series;
         written.finish()?;
         bar.finish_and_clear();
         let count = views.count();
         match target {
-            SeriesTarget::Film(file) => say!("film: {}, {count} pictures, {} a second", file.display(), self.rate),
+            SeriesTarget::Film(file) => say!("film: {}, {count} pictures, {rate} a second", file.display()),
             SeriesTarget::Files { .. } => {
                 let [first, last] = [0, count - 1].map(|n| target.file(views.number(n)).display().to_string());
                 say!("pictures: {first} to {last}, {count}");
             }
         }
-        if job.timings {
-            say!("{}", times.trim_end());
+        match times {
+            Some(times) if job.timings => say!("{}", times.trim_end()),
+            None if job.timings => say!("no times: the device was lost before they were read"),
+            _ => {}
         }
         Ok(())
     }
@@ -190,10 +208,8 @@ impl SeriesArgs {
         let last = source.volumes().saturating_sub(1);
         match (self.turntable, self.volumes) {
             (Some(count), _) => {
-                if scene.is_flat() {
-                    return Err(input("--turntable: this mode shows planes, which do not turn with the view"));
-                }
-                let cameras = scene.turntable(count).map_err(input)?;
+                let cameras =
+                    scene.turntable(count).map_err(|e| input(format!("--turntable: {}: {}", e.field, e.fault)))?;
                 let with = |camera| Settings { camera, ..scene.settings.clone() };
                 Ok(Views::Turn(cameras.into_iter().map(with).collect()))
             }
@@ -215,29 +231,31 @@ struct Series<'a> {
     chosen: usize,
     signals: &'a Writing,
     bar: ProgressBar,
-    /// The picture that is drawn next: those before are written.
-    next: usize,
+    /// The pictures so far. The next one is drawn; what is written is never drawn again, whatever is lost in between.
     written: PictureSeries<'a>,
-    /// The table of times so far.
-    times: String,
+    /// The table of times of the pictures since the last loss. None until all are written.
+    times: Option<String>,
 }
 
 impl Series<'_> {
-    /// Draws and writes what is left.
+    /// Draws and writes what is left: nothing, if the device was lost after the last picture.
     fn draw(
         &mut self,
         context: &Arc<Context>,
         source: &mut dyn Source,
         options: &RendererOptions,
     ) -> Result<(), DrawFault> {
-        let mut renderer = Renderer::new(context, self.scene_of(self.next, source)?, options)?;
+        if self.written.count() == self.views.count() {
+            return Ok(());
+        }
+        let mut renderer = Renderer::new(context, self.scene_of(self.written.count(), source)?, options)?;
         let volume = |series: &Self, n: usize| match &series.views {
             Views::Turn(_) => None,
             Views::Time(volumes) => Some(volumes.start() + n),
         };
         let mut is_empty = true;
-        while self.next < self.views.count() {
-            let n = self.next;
+        while self.written.count() < self.views.count() {
+            let n = self.written.count();
             if self.signals.signal().is_some() {
                 return Ok(());
             }
@@ -254,20 +272,22 @@ impl Series<'_> {
                 renderer.show(0)?;
             }
             let picture = renderer.picture()?;
-            let shown = with_marks(&picture, renderer.scene()).map_err(DrawFault::Source)?;
+            let shown = marked::as_set(&picture, renderer.scene()).map_err(|e| DrawFault::Source(failed(e)))?;
+            // Before the picture is written: a device that is lost here draws it again.
+            let why = match one_colour::of(&picture).filter(|_| n == 0) {
+                Some(colour) => {
+                    let volume = renderer.read(Slot::Volume)?;
+                    let why = volume.map(|v| one_colour::cause(renderer.scene(), &v, source.sample_type().shift()));
+                    Some(one_colour::line("the first picture", colour, why.as_deref()))
+                }
+                None => None,
+            };
             self.written.write(self.views.number(n), &shown).map_err(DrawFault::Source)?;
-            if n == 0
-                && let Some(colour) = one_colour::of(&picture)
-            {
-                let volume = renderer.read(Slot::Volume)?;
-                let why = volume.map(|v| one_colour::cause(renderer.scene(), &v, source.sample_type().shift()));
-                remark(&one_colour::line("the first picture", colour, why.as_deref()));
-            }
-            self.next += 1;
+            why.iter().for_each(|line| remark(line));
             self.bar.inc(1);
         }
         let times = renderer.take_times()?;
-        self.times = pass_time_table(&times, renderer.scene());
+        self.times = Some(pass_time_table(&times, renderer.scene()));
         Ok(())
     }
 
@@ -281,22 +301,14 @@ impl Series<'_> {
 
     /// Sends the frames of a volume; of the one that the arguments choose, if there is no other. True if none is missing.
     fn send(&self, renderer: &mut Renderer, source: &mut dyn Source, volume: Option<usize>) -> Result<bool, DrawFault> {
-        let (mut fault, mut slices) = (None, BTreeSet::new());
-        let sent = frames_of(source, volume.unwrap_or(self.chosen), |frame| {
-            if let Some(signal) = self.signals.signal() {
-                return Err(failed(format!("stopped by {signal}")));
-            }
+        let mut slices = BTreeSet::new();
+        send_volume(renderer, source, volume.unwrap_or(self.chosen), |frame| {
             slices.insert(frame.slice);
-            renderer.frame(frame.slice as u32, &frame.bytes, 0).map_err(|e| {
-                let failure = failed(&e);
-                fault = Some(e);
-                failure
-            })
-        });
-        match fault {
-            Some(fault) => return Err(DrawFault::Gpu(fault)),
-            None => sent.map_err(DrawFault::Source)?,
-        }
+            match self.signals.signal() {
+                Some(signal) => Err(failed(format!("stopped by {signal}"))),
+                None => Ok(()),
+            }
+        })?;
         Ok(slices.len() >= source.frames_per_volume())
     }
 }

@@ -4,7 +4,7 @@ use super::one_colour;
 use super::serve::{ServeArgs, Serving};
 use crate::args::{SceneArgs, SourceArgs, StreamArgs, check_outputs};
 use crate::files::signals::Held;
-use crate::gpu::{Context, GpuError};
+use crate::gpu::{Context, GpuError, Losses};
 use crate::live::feed::Observer;
 use crate::live::metrics::{LiveMetrics, SourceStatus};
 use crate::live::{Feed, FinishedPicture, Statistics, Step, Stream as Live, StreamError, StreamOptions, Update};
@@ -18,8 +18,6 @@ use std::time::{Duration, Instant};
 
 /// A status line says that the device is stalled if it has finished nothing for so long.
 const STALL: Duration = Duration::from_secs(2);
-/// A device that is lost so often in a row is given up.
-const MAX_LOSSES: u32 = 6;
 /// Interval of the statistics lines.
 const INTERVAL: Duration = Duration::from_secs(1);
 
@@ -117,7 +115,7 @@ impl Stream {
         let signals = Held::first();
         let began = Instant::now();
         let (mut last_status, mut all, mut memory) = (began, Statistics::default(), None);
-        let (mut pictures, mut losses, mut enough_at) = (0, 0, None);
+        let (mut pictures, mut losses, mut enough_at) = (0, Losses::default(), None);
         // Said of the first picture that is wholly one colour, not of every one.
         let mut explained = false;
         let end = loop {
@@ -126,14 +124,13 @@ impl Stream {
                 Err(StreamError::Gpu(GpuError::Stopped { .. })) => break None,
                 // Each time the work is divided into smaller parts. A device that is lost all the same, without a picture in between, is
                 // given up.
-                Err(StreamError::Gpu(lost)) if lost.is_device_lost() && losses < MAX_LOSSES => {
+                Err(StreamError::Gpu(lost)) if lost.is_device_lost() && losses.allow_another() => {
                     match lost.is_given_up() {
                         true => say!("{:>6.1} s  stalled: {lost}; opening it again", began.elapsed().as_secs_f64()),
                         false => {
                             tracing::warn!("{lost}; the device is reopened; rendering continues with the next volume")
                         }
                     }
-                    losses += 1;
                     metrics.iter_mut().for_each(|metrics| metrics.device_lost(&lost));
                     *context = self.scene.open_device(self.validate)?;
                     stream.revive(context).map_err(fault)?;
@@ -152,7 +149,7 @@ impl Stream {
                         serving.publisher.picture([picture.width, picture.height], picture.rgba);
                     }
                     pictures += 1;
-                    losses = 0;
+                    losses = Losses::default();
                 }
                 Step::Fault(fault) => tracing::warn!("{fault}"),
                 Step::Progress => {}

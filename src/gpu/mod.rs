@@ -8,7 +8,7 @@
 //!   descriptors.
 //! - `recorder` records command buffers with their barriers and the time stamps of `timing`; `timeline` says when a submission is done,
 //!   and `watchdog` gives up a device that does not finish. `bands` divides dispatches that a driver's watchdog might end.
-//! - `lost_device` reports why a device was lost, `budget` how much memory it has left; `host_memory` returns what drivers freed.
+//! - `lost_device` reports why a device was lost, `losses` counts how often the same work lost it, `budget` how much memory it has left; `host_memory` returns what drivers freed.
 //! - `renderer` runs the four stages, `pass_runner` a single pass for tests and benchmarks.
 //! - `window` presents pictures.
 
@@ -22,6 +22,7 @@ pub(crate) mod error;
 pub mod faults;
 pub(crate) mod formats;
 pub(crate) mod host_memory;
+mod losses;
 pub mod lost_device;
 mod memory;
 pub mod pass_runner;
@@ -45,6 +46,7 @@ pub use context::{Context, ContextOptions};
 pub use device_selection::{Candidate, DeviceChoice};
 pub use error::GpuError;
 pub use formats::TexelAccess;
+pub use losses::Losses;
 pub use pipeline_compiler::{SceneMaker, Wake};
 pub use pipelines::Shaders;
 pub use renderer::{Renderer, RendererOptions};

@@ -8,6 +8,7 @@ use crate::picture::Picture;
 use crate::scene::Scene;
 use crate::scene::marks::TileMarks;
 use plotters::prelude::{BLACK, DrawingBackend, RGBColor, ShapeStyle, WHITE};
+use std::borrow::Cow;
 use std::time::{SystemTime, UNIX_EPOCH};
 
 const BACKGROUND: RGBColor = RGBColor(18, 21, 26);
@@ -23,6 +24,18 @@ pub fn time_line(now: SystemTime) -> String {
     // A clock before 1970 is not set.
     let now = humantime::format_rfc3339_seconds(now.max(UNIX_EPOCH)).to_string();
     now.replace('T', " ").replace('Z', " UTC")
+}
+
+/// A picture of the scene as its settings ask for it to be saved: with its measurements, and with marks and a bar if `marks.bar` is set.
+///
+/// # Errors
+/// One line: the picture is not of this scene's size, or the drawing failed.
+pub fn as_set<'a>(picture: &'a Picture, scene: &Scene) -> Result<Cow<'a, Picture>, String> {
+    match scene.settings.marks.bar {
+        false if scene.settings.measure.is_empty() && !scene.has_reference() => Ok(Cow::Borrowed(picture)),
+        false => measured(picture, scene).map(Cow::Owned),
+        true => marked(picture, scene, &time_line(SystemTime::now()), None).map(Cow::Owned),
+    }
 }
 
 /// A picture of the scene with its marks. `time`: when it was made, for the bar. `origin`: what it shows, such as "Demo data (phantom)".

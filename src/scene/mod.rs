@@ -80,6 +80,15 @@ pub struct Input {
     pub range: [f64; 2],
 }
 
+impl Input {
+    /// The same samples with the range that the settings ask for, if they do. `shift`: what signed samples are stored with
+    /// ([`SampleType::shift`](crate::source::samples::SampleType::shift)), which the setting does not have.
+    pub fn in_range_of(self, settings: &Settings, shift: f64) -> Input {
+        let asked = settings.samples.range.map(|range| range.map(|value| value + shift));
+        Input { range: asked.unwrap_or(self.range), ..self }
+    }
+}
+
 /// The pixel grid of a slice. The centre of pixel (0, 0) lies at `origin`, in-plane (x, y) in mm.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SliceGrid {

@@ -6,7 +6,7 @@
 use super::camera::full_size;
 use super::region::{depth_offset, framed_low, is_still};
 use super::settings::Camera;
-use super::{Scene, SceneError, camera};
+use super::{Scene, SceneError, camera, refuse};
 use glam::DVec3;
 
 impl Scene {
@@ -14,8 +14,11 @@ impl Scene {
     /// last to the first, the view turns by 360 / `count` degrees about the picture's vertical axis through the target.
     ///
     /// # Errors
-    /// As [`Scene::new`]: a region without volume.
+    /// A mode that shows planes, which do not turn with the view; as [`Scene::new`], a region without volume.
     pub fn turntable(&self, count: u32) -> Result<Vec<Camera>, SceneError> {
+        if self.is_flat() {
+            return refuse("mode", "shows planes, which do not turn with the view: a turntable needs a rendering");
+        }
         let framed = framed_low(&self.geometry, &self.settings, self.low, self.high)?;
         let half = (self.high - framed) / 2.0;
         let along = |axis: DVec3| axis.abs().dot(half);
@@ -73,7 +76,7 @@ fn angles(right: DVec3, forward: DVec3) -> [f64; 3] {
 mod tests {
     use super::*;
     use crate::probe::{Geometry, Grid};
-    use crate::scene::{Input, Rays, Settings};
+    use crate::scene::{Input, Mode, Rays, Settings};
     use crate::source::StoredType;
 
     fn scene(change: impl Fn(&mut Settings)) -> Scene {
@@ -169,5 +172,17 @@ mod tests {
         let (scene, _) = views(|_| {}, 1);
         let zoom = |n: usize| scene.turntable(4).expect("cameras")[n].zoom;
         assert!((zoom(0) - zoom(2)).abs() < 1e-12 && (0..4).any(|n| (zoom(n) - 1.0).abs() < 1e-12));
+    }
+
+    /// Prevents a turn whose pictures are all the same.
+    #[test]
+    fn modes_that_show_planes_are_refused() {
+        for mode in [Mode::Plane, Mode::Orthogonal, Mode::Tomography] {
+            let fault = scene(|s| s.mode = mode).turntable(4).expect_err("planes do not turn").to_string();
+            assert!(fault.starts_with("scene: mode: shows planes, which do not turn"), "{mode:?}: {fault}");
+        }
+        for mode in [Mode::Cube, Mode::Mip, Mode::Surface] {
+            assert!(scene(|s| s.mode = mode).turntable(4).is_ok(), "{mode:?}");
+        }
     }
 }

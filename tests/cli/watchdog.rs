@@ -36,6 +36,37 @@ fn a_picture_that_loses_the_device_is_drawn_in_parts() {
     assert!(dispatches(losses) > dispatches(0), "{reports:?}");
 }
 
+/// Prevents a series that panics if the device is lost after its last picture, as when the times are read, and one that begins anew.
+#[test]
+fn a_series_that_loses_the_device_near_its_end_is_whole() {
+    let folder = Folder::new("series-lost");
+    let report = folder.path("report.json");
+    let series = |name: &str, settings: &[(&str, &str)]| {
+        let turn = folder.path(name);
+        let flags = ["--mode", "mip", "--size", "24x16", "--turntable", "2", "--timings", "-o", &turn];
+        let mut command = Command::new(PROGRAM);
+        command.arg("render").arg(BONE).args(flags);
+        let (code, said, err) = finish(under_layer(&mut command, settings));
+        assert_eq!(code, Some(0), "{settings:?}: {said}{err}");
+        let pictures = [0, 1].map(|n| std::fs::read(format!("{turn}/picture-{n:06}.png")).expect("a picture"));
+        (pictures, said, err)
+    };
+    let (whole, ..) = series("whole", &[("REPORT", &report)]);
+    let waits = reports(&report)[0]["waits"].as_u64().expect("counted");
+    let (mut lost, mut without_times) = (0, 0);
+    // The last waits are those for the last picture, for the times, and those before the device is destroyed.
+    for wait in (1..=waits).rev().take(10) {
+        let (pictures, said, err) = series("lost", &[("LOSE_WAIT", &wait.to_string())]);
+        assert!(pictures == whole, "lost at wait {wait} of {waits}: other pictures");
+        lost += usize::from(err.contains("the device is reopened"));
+        without_times += usize::from(said.contains("no times: the device was lost before they were read"));
+    }
+    assert!(
+        lost > without_times && without_times > 0,
+        "{lost} losses, {without_times} after the last picture, of {waits} waits"
+    );
+}
+
 /// Prevents a stream that ends where its pictures are too large for the device: the volumes after the loss are shown.
 #[test]
 fn a_stream_that_loses_the_device_continues_with_smaller_parts() {
