@@ -118,3 +118,36 @@ fn rust_version_is_what_the_crates_need() {
     assert!(count > 100, "only {count} crates say which Rust they need");
     assert!(version("1.88") < version("1.88.1") && version("1.100") > version("1.95") && version("1.95") == [1, 95, 0]);
 }
+
+/// Prevents a wheel or a fuzz target that cannot be built, because a crate was added here: nothing in the gate builds them.
+#[test]
+fn the_crates_beside_the_program_have_locked_what_the_library_needs() {
+    #[derive(Deserialize)]
+    struct Entry {
+        name: String,
+        #[serde(default)]
+        dependencies: Vec<String>,
+    }
+    #[derive(Deserialize)]
+    struct Entries {
+        package: Vec<Entry>,
+    }
+    let manifest: toml::Table = toml("Cargo.toml");
+    let mut tables = vec![&manifest["dependencies"]];
+    tables.extend(manifest["target"].as_table().expect("targets").values().map(|target| &target["dependencies"]));
+    let all: BTreeMap<&String, &toml::Value> =
+        tables.into_iter().flat_map(|table| table.as_table().expect("dependencies")).collect();
+    let is_optional = |about: &toml::Value| about.get("optional").and_then(toml::Value::as_bool).unwrap_or(false);
+    for name in ["tools/python/Cargo.lock", "tools/fuzz/Cargo.lock"] {
+        let lock: Entries = toml(name);
+        let entry = lock.package.iter().find(|entry| entry.name == "echolume").expect("the library");
+        // A crate of which there are two versions has its version behind its name.
+        let locked: Vec<&str> = entry.dependencies.iter().filter_map(|crate_| crate_.split(' ').next()).collect();
+        for (needed, _) in all.iter().filter(|(_, about)| !is_optional(about)) {
+            assert!(locked.contains(&needed.as_str()), "{name} lacks {needed}: run `cargo metadata` beside it");
+        }
+        for there in locked {
+            assert!(all.keys().any(|known| *known == there), "{name} has {there}, which the library needs no more");
+        }
+    }
+}

@@ -1,6 +1,8 @@
 //! Echolume as a Python module. Arrays are made by numpy itself, from bytes that are copied once.
 
 use echolume::live::{Feed, Step};
+use echolume::marked;
+use echolume::picture::Picture;
 use echolume::probe::Geometry;
 use echolume::scene::default_look::block_edge;
 use echolume::scene::load::Layers;
@@ -95,18 +97,28 @@ fn context_of(device: Option<&str>) -> PyResult<Arc<Context>> {
     Context::new(&ContextOptions { device, ..ContextOptions::default() }).map_err(of_device)
 }
 
-/// The settings that show a volume: what nobody chose follows from its echoes, as in `echolume render`.
-fn completed(layers: &Layers, geometry: &Geometry, input: Input, frames: &[Frame]) -> PyResult<Settings> {
+/// The samples with the range that the settings ask for, and the settings that show a volume: what nobody chose follows from its echoes, as in
+/// `echolume render`.
+fn completed(layers: &Layers, geometry: &Geometry, stored: Stored, frames: &[Frame]) -> PyResult<(Input, Settings)> {
+    let input = stored.input.in_range_of(&layers.clone().finish().map_err(invalid)?, stored.shift);
     let levels = layers.needs_levels().then(|| {
         let mut histogram = EchoHistogram::new(geometry, input, block_edge(geometry));
         frames.iter().for_each(|frame| histogram.take(&frame.bytes));
         histogram.levels()
     });
-    match levels {
+    let settings = match levels {
         // Of a volume that is all the same nothing follows.
-        Some(None) => layers.clone().finish().map_err(invalid),
-        levels => Ok(layers.completed(geometry, levels.flatten().as_ref()).map_err(invalid)?.settings),
-    }
+        Some(None) => layers.clone().finish().map_err(invalid)?,
+        levels => layers.completed(geometry, levels.flatten().as_ref()).map_err(invalid)?.settings,
+    };
+    Ok((input, settings))
+}
+
+/// The picture as `echolume render` saves it: with its measurements, and with marks and a bar if the settings ask for them. Its bytes, RGBA, and
+/// its height and width.
+fn saved(picture: &Picture, scene: &Scene) -> PyResult<(Vec<u8>, [usize; 2])> {
+    let picture = marked::as_set(picture, scene).map_err(of_device)?.into_owned();
+    Ok((picture.rgba, [picture.height as usize, picture.width as usize]))
 }
 
 /// Reads one volume of a recording into memory. See the stubs for all it returns.
@@ -173,19 +185,28 @@ fn read<'py>(
     Ok(found)
 }
 
+/// The samples of a recording.
+#[derive(Clone, Copy)]
+struct Stored {
+    /// As the recording states them.
+    input: Input,
+    /// What signed samples are stored with.
+    shift: f64,
+}
+
 /// What a renderer holds.
 struct Drawing {
     renderer: echolume::Renderer,
     layers: Layers,
     frames: Vec<Frame>,
     geometry: Geometry,
-    input: Input,
+    stored: Stored,
 }
 
 impl Drawing {
     fn scene(&self, layers: &Layers) -> PyResult<Scene> {
-        let settings = completed(layers, &self.geometry, self.input, &self.frames)?;
-        Scene::new(self.geometry.clone(), self.input, settings).map_err(invalid)
+        let (input, settings) = completed(layers, &self.geometry, self.stored, &self.frames)?;
+        Scene::new(self.geometry.clone(), input, settings).map_err(invalid)
     }
 
     fn send(&mut self) -> PyResult<()> {
@@ -206,7 +227,24 @@ impl Drawing {
     /// The picture, RGBA, and its height and width.
     fn picture(&mut self) -> PyResult<(Vec<u8>, [usize; 2])> {
         let picture = self.renderer.picture().map_err(of_device)?;
-        Ok((picture.rgba, [picture.height as usize, picture.width as usize]))
+        saved(&picture, self.renderer.scene())
+    }
+
+    /// The pictures of one turn, one after the other, and the height and width of each. Leaves the camera at the last one.
+    fn turn(&mut self, count: u32) -> PyResult<(Vec<u8>, [usize; 2])> {
+        let scene = self.renderer.scene().clone();
+        let mut all = (Vec::new(), [0; 2]);
+        for camera in scene.turntable(count).map_err(invalid)? {
+            // A signal of Python, as Ctrl-C, ends the turn.
+            Python::attach(|py| py.check_signals())?;
+            let settings = Settings { camera, ..scene.settings.clone() };
+            let turned = Scene::new(scene.geometry.clone(), scene.input, settings).map_err(invalid)?;
+            self.change(turned)?;
+            let (rgba, size) = self.picture()?;
+            all.0.extend(rgba);
+            all.1 = size;
+        }
+        Ok(all)
     }
 }
 
@@ -244,13 +282,14 @@ impl Renderer {
             let mut source = open(path.as_ref(), options)?;
             check_volume(&*source, volume)?;
             let frames = frames(&mut *source, volume)?;
-            let (geometry, input) =
-                (source.geometry(volume), Input { stored: source.stored_type(), range: source.range() });
-            let settings = completed(&layers, &geometry, input, &frames)?;
+            let stated = Input { stored: source.stored_type(), range: source.range() };
+            let stored = Stored { input: stated, shift: source.sample_type().shift() };
+            let geometry = source.geometry(volume);
+            let (input, settings) = completed(&layers, &geometry, stored, &frames)?;
             let scene = Scene::new(geometry.clone(), input, settings).map_err(invalid)?;
             let context = context_of(device.as_deref())?;
             let renderer = echolume::Renderer::new(&context, scene, &RendererOptions::default()).map_err(of_device)?;
-            let mut drawing = Drawing { renderer, layers, frames, geometry, input };
+            let mut drawing = Drawing { renderer, layers, frames, geometry, stored };
             drawing.send()?;
             Ok(Renderer { drawing: Mutex::new(drawing) })
         })
@@ -286,19 +325,11 @@ impl Renderer {
         let (bytes, [height, width]) = py.detach(|| {
             let mut drawing = self.lock();
             let scene = drawing.renderer.scene().clone();
-            let mut all = (Vec::new(), [0; 2]);
-            for camera in scene.turntable(count).map_err(invalid)? {
-                // A signal of Python, as Ctrl-C, ends the turn.
-                Python::attach(|py| py.check_signals())?;
-                let settings = Settings { camera, ..scene.settings.clone() };
-                let turned = Scene::new(scene.geometry.clone(), scene.input, settings).map_err(invalid)?;
-                drawing.change(turned)?;
-                let (rgba, size) = drawing.picture()?;
-                all.0.extend(rgba);
-                all.1 = size;
-            }
-            drawing.change(scene)?;
-            PyResult::Ok(all)
+            let turned = drawing.turn(count);
+            // Also where a picture of the turn failed: the next picture looks as before.
+            let restored = drawing.change(scene);
+            let turned = turned?;
+            restored.map(|()| turned)
         })?;
         array(py, &bytes, "u1", &[count as usize, height, width, 4])
     }
@@ -319,13 +350,24 @@ impl Stream {
     fn __next__<'py>(&self, py: Python<'py>) -> PyResult<Option<(u32, Bound<'py, PyAny>)>> {
         loop {
             py.check_signals()?;
-            let step = py.detach(|| self.stream.lock().unwrap_or_else(|e| e.into_inner()).step(PATIENCE));
-            match step.map_err(of_device)? {
-                Step::Picture(shown) => {
-                    let Some(picture) = shown.picture else { continue };
-                    let shape = [picture.height as usize, picture.width as usize, 4];
-                    return Ok(Some((shown.volume, array(py, &picture.rgba, "u1", &shape)?)));
+            let step = py.detach(|| {
+                let mut stream = self.stream.lock().unwrap_or_else(|e| e.into_inner());
+                let step = stream.step(PATIENCE).map_err(of_device)?;
+                let Step::Picture(shown) = step else { return Ok(Err(step)) };
+                // The renderer still has the scene that it drew.
+                let picture = shown.picture.as_ref().zip(stream.renderer());
+                let saved = picture.map(|(picture, renderer)| saved(picture, renderer.scene())).transpose()?;
+                PyResult::Ok(Ok((shown.volume, saved)))
+            })?;
+            let step = match step {
+                Ok((_, None)) => continue,
+                Ok((volume, Some((rgba, [height, width])))) => {
+                    return Ok(Some((volume, array(py, &rgba, "u1", &[height, width, 4])?)));
                 }
+                Err(step) => step,
+            };
+            match step {
+                Step::Picture(_) => continue,
                 Step::Fault(why) => return Err(invalid(why)),
                 Step::End(Some(why)) => return Err(invalid(why)),
                 Step::End(None) => return Ok(None),
@@ -360,6 +402,9 @@ fn stream(
         let options = OpenOptions { probe: probe.as_deref(), voxel_spacing, ..OpenOptions::default() };
         let source = open(Some(&path), options)?;
         let chosen = layers.clone().finish().map_err(invalid)?;
+        if chosen.samples.range.is_some() {
+            return Err(invalid("samples.range: a stream has the range that its recording states; only a Renderer takes another"));
+        }
         let context = context_of(device.as_deref())?;
         let feed = Feed::new(Box::new(PlaybackSource::new(source, playback, 1)), None).map_err(of_device)?;
         let options = StreamOptions { chosen: Some(layers), ..StreamOptions::default() };

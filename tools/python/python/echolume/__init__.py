@@ -19,6 +19,26 @@ True
 >>> renderer.turntable(3).shape
 (3, 64, 96, 4)
 
+Settings do what they do in `echolume render`: the range of the samples, measurements, and a bar below the picture:
+
+>>> before = renderer.picture()
+>>> renderer.set("samples.range=[0,100]")
+>>> bool((renderer.picture() != before).any())
+True
+>>> renderer.set("samples.range=[0,255]")
+>>> bool((renderer.picture() == before).all())
+True
+>>> renderer.set("marks.bar=true")
+>>> barred = renderer.picture()
+>>> barred.shape[0] > 64, barred.shape[1:]
+(True, (96, 4))
+>>> renderer.turntable(2).shape == (2, *barred.shape)
+True
+>>> renderer.set("marks.bar=false", 'measure=[{kind="distance",points=[[-10,10,0],[10,30,0]],on_surface=true}]')
+>>> measured = renderer.picture()
+>>> measured.shape == before.shape, bool((measured != before).any())
+(True, True)
+
 The volumes of a recording as they are played:
 
 >>> [(volume, picture.shape) for volume, picture in echolume.stream(BONE, settings=["mode=mip", "picture.size=[32,24]"])]
@@ -32,6 +52,13 @@ ValueError: nowhere.mha: file: cannot be read: No such file or directory (os err
 >>> renderer.set("mode=sideways")  # doctest: +ELLIPSIS
 Traceback (most recent call last):
 ValueError: ...mode...
+>>> echolume.stream(BONE, settings=["samples.range=[0,100]"])
+Traceback (most recent call last):
+ValueError: samples.range: a stream has the range that its recording states; only a Renderer takes another
+>>> renderer.set("mode=plane")
+>>> renderer.turntable(3)
+Traceback (most recent call last):
+ValueError: scene: mode: shows planes, which do not turn with the view: a turntable needs a rendering
 >>> echolume.Renderer(BONE, 1)
 Traceback (most recent call last):
 IndexError: volume 1: there are 1, numbered from 0

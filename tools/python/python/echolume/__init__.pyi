@@ -59,7 +59,10 @@ class Renderer:
         voxel_spacing: tuple[float, float, float] | None = None,
     ) -> None: ...
     def picture(self) -> npt.NDArray[np.uint8]:
-        """Draws the picture: (height, width, 4), red, green, blue, alpha; rows from the top. Raises DeviceError."""
+        """Draws the picture: (height, width, 4), red, green, blue, alpha; rows from the top. Raises DeviceError.
+
+        It has its measurements (`measure`) and, with `marks.bar=true`, marks and a bar below, which makes it higher.
+        """
 
     def set(self, *assignments: str) -> None:
         """Changes settings, such as "camera.azimuth=30" (docs/settings.md). All or none of them take effect.
@@ -68,9 +71,10 @@ class Renderer:
         """
 
     def turntable(self, count: int) -> npt.NDArray[np.uint8]:
-        """Pictures of one turn about the vertical axis of the view, at one scale: (count, height, width, 4). The settings stay.
+        """Pictures of one turn about the vertical axis of the view, at one scale: (count, height, width, 4). The settings stay, also if a
+        picture fails.
 
-        Raises ValueError for a count outside of 1..=3600, DeviceError.
+        Raises ValueError for a count outside of 1..=3600 and for a mode that shows planes, DeviceError.
         """
 
 class Stream:
@@ -92,7 +96,8 @@ def stream(
 ) -> Stream:
     """Plays a recording and draws each of its volumes, as `echolume stream`. A file loses no volume to a slow reader.
 
-    `rate`: volumes in a second; None as fast as they can be drawn. The other arguments are those of `Renderer`.
+    `rate`: volumes in a second; None as fast as they can be drawn. The other arguments are those of `Renderer`; the setting `samples.range` is
+    refused, since a stream has the range that its recording states.
 
     Raises ValueError for a file or a setting that is refused, DeviceError.
     """
