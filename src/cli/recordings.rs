@@ -286,7 +286,7 @@ impl Convert {
         bar.finish_and_clear();
         let frames = writer.frames();
         writer.finish().map_err(failed)?;
-        say!("frames: {}, {frames} of {} volumes", self.output.display(), recording.volumes());
+        say!("recording: {}, {frames} frames of {} volumes", self.output.display(), recording.volumes());
         Ok(())
     }
 }

@@ -9,8 +9,10 @@ use crate::live::feed::Observer;
 use crate::live::metrics::{LiveMetrics, SourceStatus};
 use crate::live::{Feed, FinishedPicture, Statistics, Step, Stream as Live, StreamError, StreamOptions, Update};
 use crate::machine::resident_bytes;
+use crate::marked;
 use crate::passes::Slot;
 use crate::picture;
+use crate::scene::Scene;
 use crate::terminal::{Failure, failed, input, is_closed, remark, say};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -141,7 +143,7 @@ impl Stream {
             let drew = matches!(step, Step::Picture(_));
             match step {
                 Step::Picture(shown) => {
-                    let file = self.write_picture(&shown, update, pictures)?;
+                    let file = self.write_picture(&shown, stream.scene(), update, pictures)?;
                     if !explained && let Some(file) = file {
                         explained = explain_one_colour(stream, &shown, &file)?;
                     }
@@ -224,15 +226,23 @@ impl Stream {
         }
     }
 
-    /// Writes a picture, if `--out` is given, and returns its file.
-    fn write_picture(&self, shown: &FinishedPicture, update: Update, number: u64) -> Result<Option<PathBuf>, Failure> {
+    /// Writes a picture as the settings of its scene ask for it, if `--out` is given, and returns its file.
+    fn write_picture(
+        &self,
+        shown: &FinishedPicture,
+        scene: Option<&Scene>,
+        update: Update,
+        number: u64,
+    ) -> Result<Option<PathBuf>, Failure> {
         let Some(folder) = &self.out else { return Ok(None) };
         let name = match update {
             Update::Whole => format!("volume-{:06}.png", shown.volume),
             Update::Rolling => format!("picture-{number:06}.png"),
         };
         let file = folder.join(name);
-        shown.picture.as_ref().map_or(Ok(()), |picture| picture.save(&file)).map_err(failed)?;
+        if let (Some(picture), Some(scene)) = (&shown.picture, scene) {
+            marked::as_set(picture, scene).and_then(|picture| picture.save(&file)).map_err(failed)?;
+        }
         Ok(Some(file))
     }
 }

@@ -17,6 +17,8 @@ pub enum Command {
     Tool(Tool),
     /// Rotates the camera, degrees: azimuth (towards +lateral), elevation (towards +elevation).
     Rotate([f64; 2]),
+    /// Shows a rendering from one side, upright.
+    LookFrom(Viewpoint),
     /// Rotates the picture clockwise, degrees.
     Roll(f64),
     /// Multiplies the zoom; above 1 is closer.
@@ -121,6 +123,16 @@ pub enum Command {
     SaveAndExit,
     /// Leaves the program without another question.
     Discard,
+}
+
+/// Where a rendering is seen from: the sides of the picture at its start, not those of a patient.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Viewpoint {
+    /// From the probe.
+    Front,
+    Left,
+    Right,
+    Top,
 }
 
 /// What a drag on the picture does.
@@ -243,6 +255,10 @@ pub const KEY_BINDINGS: &[Binding] = &[
     shift(Key::Right, "rotate", Command::Rotate([5.0, 0.0])).repeating(),
     shift(Key::Up, "rotate", Command::Rotate([0.0, 5.0])).repeating(),
     shift(Key::Down, "rotate", Command::Rotate([0.0, -5.0])).repeating(),
+    control(Char('1'), "from the front", Command::LookFrom(Viewpoint::Front)),
+    control(Char('2'), "from the left", Command::LookFrom(Viewpoint::Left)),
+    control(Char('3'), "from the right", Command::LookFrom(Viewpoint::Right)),
+    control(Char('4'), "from the top", Command::LookFrom(Viewpoint::Top)),
     on(Char(','), "roll", Command::Roll(-5.0)).repeating(),
     on(Char('.'), "roll", Command::Roll(5.0)).repeating(),
     on(Char('+'), "closer", Command::Zoom(1.1)).repeating(),

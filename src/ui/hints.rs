@@ -1,6 +1,6 @@
 //! What each control does, in one or two sentences: the tooltips of the view.
 
-use super::command::Tool;
+use super::command::{Tool, Viewpoint};
 use crate::scene::{Layout, MeasureKind, Mode};
 
 /// By name of a slider: what it does.
@@ -95,6 +95,16 @@ pub(super) fn of_tool(tool: Tool) -> &'static str {
         Tool::Clip => "Drag up cuts away what is nearer to you.",
         Tool::Plane => "Drag or click moves the planes.",
         Tool::Measure(kind) => of_measure(kind),
+    }
+}
+
+/// Where a viewpoint is.
+pub(super) fn of_viewpoint(viewpoint: Viewpoint) -> &'static str {
+    match viewpoint {
+        Viewpoint::Front => "Seen from the probe, upright. (Ctrl+1)",
+        Viewpoint::Left => "Seen from the left of the front view; the patient's sides are the letters. (Ctrl+2)",
+        Viewpoint::Right => "Seen from the right of the front view; the patient's sides are the letters. (Ctrl+3)",
+        Viewpoint::Top => "Seen from the top of the front view. (Ctrl+4)",
     }
 }
 

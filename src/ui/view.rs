@@ -1,6 +1,7 @@
 //! How commands change the camera, the light, the viewer's clip plane, the planes and the region. Every function takes finite numbers of
 //! any size and returns numbers that [`Scene::new`] accepts.
 
+use super::command::Viewpoint;
 use super::picking::Picker;
 use crate::probe::{Geometry, Motion};
 use crate::scene::{Camera, Clip, MAX_CLIPS, Mode, PlaneName, Scene, Settings, insonified_box};
@@ -62,6 +63,23 @@ pub(super) fn rotate(now: &Scene, [azimuth, elevation]: [f64; 2]) -> Camera {
     let level = level(&now.geometry);
     let elevation = (camera.elevation + elevation).clamp(level - 90.0, level + 90.0);
     Camera { azimuth: wrap_degrees(camera.azimuth + azimuth), elevation, ..camera }
+}
+
+/// The camera at a viewpoint, upright.
+pub(super) fn look_from(now: &Scene, viewpoint: Viewpoint) -> Camera {
+    let [azimuth, elevation] = match viewpoint {
+        Viewpoint::Front => [0.0, 0.0],
+        Viewpoint::Left => [90.0, 0.0],
+        Viewpoint::Right => [-90.0, 0.0],
+        Viewpoint::Top => [0.0, -90.0],
+    };
+    Camera { azimuth, elevation: level(&now.geometry) + elevation, roll: 0.0, ..now.settings.camera.clone() }
+}
+
+/// True if a rendering is seen from a viewpoint.
+pub(super) fn is_seen_from(now: &Scene, viewpoint: Viewpoint) -> bool {
+    let angles = |camera: &Camera| [camera.azimuth, camera.elevation, camera.roll];
+    angles(&now.settings.camera) == angles(&look_from(now, viewpoint))
 }
 
 /// A zoom multiplied by a factor, within [`ZOOM`].

@@ -263,6 +263,10 @@ impl Controls {
                     new.mode = Mode::Surface;
                 }
             }
+            Command::LookFrom(viewpoint) if !now.is_flat() => {
+                new.camera = view::look_from(now, viewpoint);
+                return view::keep_scale(now, new);
+            }
             Command::Rotate(by) if finite(&by) && !now.is_flat() => {
                 new.camera = view::rotate(now, by);
                 return view::keep_scale(now, new);

@@ -4,9 +4,10 @@
 use super::measures;
 use super::{ACCENT, BUTTON, PanelState, TEXT, TEXT_SIZE, TOUCH_SIZE, WARNING, WEAK_TEXT, heading};
 use crate::scene::{ColourMap, Layout, Mode, PlaneName, Settings, Transfer, TransferName};
-use crate::ui::command::{Command, Tool};
+use crate::ui::command::{Command, Tool, Viewpoint};
 use crate::ui::hints;
 use crate::ui::sliders::{Group, SLIDERS, Slider as Control};
+use crate::ui::view;
 use egui::{
     Align, Button, CollapsingHeader, Color32, FontId, Label, Panel, Rect, RichText, ScrollArea, Sense, Slider, Stroke,
     StrokeKind, Ui, WidgetInfo, WidgetType, pos2, vec2,
@@ -19,6 +20,9 @@ const TOOLS: [(Tool, &str); 5] = [
     (Tool::Clip, "Clip"),
     (Tool::Plane, "Planes"),
 ];
+
+const VIEWPOINTS: [(Viewpoint, &str); 4] =
+    [(Viewpoint::Front, "Front"), (Viewpoint::Left, "Left"), (Viewpoint::Right, "Right"), (Viewpoint::Top, "Top")];
 
 const PLANES: [(PlaneName, &str); 3] = [(PlaneName::A, "A"), (PlaneName::B, "B"), (PlaneName::C, "C")];
 
@@ -46,6 +50,11 @@ pub(super) fn show_modes(ui: &mut Ui, state: &PanelState, width: f32, execute: &
             heading(ui, "Layout");
             let layouts = [(Layout::Single, "Single"), (Layout::Four, "4-up"), (Layout::Pair, "VR | SR")];
             row.show(ui, &layouts, 2, |l| settings.layout == l, hints::of_layout, |l| execute(Command::Layout(l)));
+            if !settings.mode.is_flat() {
+                heading(ui, "View from");
+                let is_there = |v| state.scene.is_some_and(|scene| view::is_seen_from(scene, v));
+                row.show(ui, &VIEWPOINTS, 2, is_there, hints::of_viewpoint, |v| execute(Command::LookFrom(v)));
+            }
             heading(ui, "Drag");
             row.show(ui, &TOOLS, 2, |t| state.controls.tool() == t, hints::of_tool, |t| execute(Command::Tool(t)));
             if settings.mode.is_flat() && settings.mode != Mode::Orthogonal {

@@ -1,10 +1,11 @@
 //! Known answers for gestures of a mouse and of fingers.
 
 use super::*;
+use crate::ui::command::Viewpoint;
 use crate::ui::gestures::DEGREES_PER_HEIGHT;
 use crate::ui::input::Phase;
 use crate::ui::picking::Picker;
-use crate::ui::view::{face_axis, nearest_face};
+use crate::ui::view::{self, face_axis, nearest_face};
 
 fn near(a: f64, b: f64, off: f64) {
     assert!((a - b).abs() <= off, "{a} is not {b}");
@@ -373,4 +374,24 @@ fn one_finger_rotates_and_a_double_tap_shows_a_tile() {
         touch(&mut window, 8, Phase::Up, [103.0, 100.0]);
     }
     assert_eq!(window.controls.settings().layout, Layout::Single);
+}
+
+/// A viewpoint is upright, looks along its axis at the middle of the region, and the picture keeps its scale.
+#[test]
+fn a_viewpoint_looks_along_its_axis_at_the_same_scale() {
+    let (x, y, z) = (DVec3::X, DVec3::Y, DVec3::Z);
+    let views = [(Viewpoint::Left, x, z), (Viewpoint::Top, -z, y), (Viewpoint::Right, -x, z), (Viewpoint::Front, y, z)];
+    for toml in ["mode='vr'", "mode='sr'\ncamera.azimuth=37\ncamera.elevation=-20\ncamera.roll=12\ncamera.zoom=1.7"] {
+        let mut window = TestWindow::new(toml);
+        let scale = |window: &TestWindow| Picker::of(&window.scene()).mm_per_pixel();
+        let before = scale(&window);
+        for (viewpoint, forward, up) in views {
+            apply(&mut window, Command::LookFrom(viewpoint));
+            let scene = window.scene();
+            assert!(scene.rays.forward.distance(forward) < 1e-9, "{viewpoint:?}: {:?}", scene.rays.forward);
+            assert!(scene.rays.up.distance(up) < 1e-9, "{viewpoint:?}: {:?}", scene.rays.up);
+            assert!((scale(&window) / before - 1.0).abs() < 1e-9, "{viewpoint:?}");
+            assert!(views.iter().all(|(other, ..)| view::is_seen_from(&scene, *other) == (*other == viewpoint)));
+        }
+    }
 }

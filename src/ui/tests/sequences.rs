@@ -2,7 +2,7 @@
 
 use super::*;
 use crate::scene::{ColourMap, TransferName};
-use crate::ui::command::{HeldKeys, KEY_BINDINGS};
+use crate::ui::command::{HeldKeys, KEY_BINDINGS, Viewpoint};
 use crate::ui::input::Phase;
 use proptest::prelude::*;
 
@@ -27,6 +27,7 @@ fn command() -> impl Strategy<Value = Command> {
         2 => prop::sample::select(vec![Layout::Single, Layout::Four, Layout::Pair]).prop_map(Command::Layout),
         1 => tool().prop_map(Command::Tool),
         1 => two().prop_map(Command::Rotate),
+        1 => prop::sample::select(vec![Viewpoint::Left, Viewpoint::Top]).prop_map(Command::LookFrom),
         1 => number().prop_map(Command::Roll),
         1 => number().prop_map(Command::Zoom),
         1 => two().prop_map(Command::Pan),
