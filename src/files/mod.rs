@@ -109,6 +109,25 @@ fn is_special(file: &Path) -> bool {
     metadata(file).is_ok_and(|there| !there.is_file() && !there.is_dir())
 }
 
+/// A folder for files that are not yet whole. Dropping it deletes it with all that is in it.
+#[derive(Debug)]
+pub struct WorkFolder(tempfile::TempDir);
+
+impl WorkFolder {
+    /// A new folder in `parent`, whose name begins with `prefix`.
+    ///
+    /// # Errors
+    /// One line: it cannot be created.
+    pub fn new(parent: &Path, prefix: &str) -> Result<WorkFolder, String> {
+        let created = tempfile::Builder::new().prefix(prefix).tempdir_in(parent);
+        created.map(WorkFolder).map_err(|e| format!("{}: {e}", parent.display()))
+    }
+
+    pub fn path(&self) -> &Path {
+        self.0.path()
+    }
+}
+
 /// A file under a temporary name until it is complete. Dropping it earlier deletes it. After a signal, writes fail, so that the writer
 /// stops; the signal takes effect when the file is deleted.
 pub struct Unfinished {

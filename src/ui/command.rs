@@ -1,7 +1,7 @@
 //! The commands of a user, which gestures on the picture, keys and panels give; and the key bindings: what every key does, and its
 //! description in the help.
 
-pub use super::view::Face;
+pub use super::view::{Face, Viewpoint};
 
 use super::input::{Input, Key, Modifiers};
 use super::sliders::{GAIN, THRESHOLD};
@@ -123,16 +123,6 @@ pub enum Command {
     SaveAndExit,
     /// Leaves the program without another question.
     Discard,
-}
-
-/// Where a rendering is seen from: the sides of the picture at its start, not those of a patient.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Viewpoint {
-    /// From the probe.
-    Front,
-    Left,
-    Right,
-    Top,
 }
 
 /// What a drag on the picture does.

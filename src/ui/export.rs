@@ -1,11 +1,11 @@
 //! Saves pictures, recordings and exports of the view in background threads. File names contain the time and nothing about the patient.
 
-use super::volume_export::{Export, Job};
+use super::volume_export::{Export, Job, write_frames};
 use crate::files;
 use crate::gpu::Wake;
 use crate::live::cine::CineVolume;
 use crate::picture::Picture;
-use crate::source::recorder::{Header, Writer};
+use crate::source::recorder::Header;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::mpsc::{Receiver, Sender, channel};
@@ -137,22 +137,6 @@ impl Drop for Exporter {
         self.cancel_export();
         if let Some((.., thread)) = self.export.take() {
             let _ = thread.join();
-        }
-    }
-}
-
-/// Writes volumes as a recording, whole or not at all.
-///
-/// # Errors
-/// One line: a file that cannot be written.
-pub(super) fn write_frames(file: &Path, header: Header, volumes: &[CineVolume]) -> Result<(), String> {
-    let mut writer = Writer::create(file, header).map_err(|e| e.to_string())?;
-    let mut frames = volumes.iter().flat_map(|volume| &volume.frames);
-    match frames.try_for_each(|frame| writer.frame(frame, frame.time.unwrap_or(0.0))) {
-        Ok(()) => writer.finish().map_err(|e| e.to_string()),
-        Err(e) => {
-            writer.discard();
-            Err(e.to_string())
         }
     }
 }

@@ -1,7 +1,6 @@
 //! How commands change the camera, the light, the viewer's clip plane, the planes and the region. Every function takes finite numbers of
 //! any size and returns numbers that [`Scene::new`] accepts.
 
-use super::command::Viewpoint;
 use super::picking::Picker;
 use crate::probe::{Geometry, Motion};
 use crate::scene::{Camera, Clip, MAX_CLIPS, Mode, PlaneName, Scene, Settings, insonified_box};
@@ -63,6 +62,16 @@ pub(super) fn rotate(now: &Scene, [azimuth, elevation]: [f64; 2]) -> Camera {
     let level = level(&now.geometry);
     let elevation = (camera.elevation + elevation).clamp(level - 90.0, level + 90.0);
     Camera { azimuth: wrap_degrees(camera.azimuth + azimuth), elevation, ..camera }
+}
+
+/// Where a rendering is seen from: the sides of the picture at its start, not those of a patient.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Viewpoint {
+    /// From the probe.
+    Front,
+    Left,
+    Right,
+    Top,
 }
 
 /// The camera at a viewpoint, upright.

@@ -1,10 +1,10 @@
 //! Exports of the volume that is shown, as other programs read it: a volume, a surface or a turntable. `convert`, `mesh` or `render` of this
 //! program does the work in a process of its own: a long one does not stop the view, and one that fails does not end it.
 
-use super::export;
+use crate::files::WorkFolder;
 use crate::files::signals::Writing;
 use crate::live::cine::CineVolume;
-use crate::source::recorder::Header;
+use crate::source::recorder::{Header, Writer};
 use crate::text::printable;
 use crate::workspace::{self, Origin};
 use std::io::Read;
@@ -117,10 +117,9 @@ impl Export {
         // A signal that ends this program waits until nothing unfinished is left. Dropped last.
         let signals = Writing::begin();
         let beside = file.parent().unwrap_or(Path::new("."));
-        let folder = tempfile::Builder::new().prefix(".echolume-export-").tempdir_in(beside);
-        let folder = folder.map_err(|e| format!("{}: {e}", beside.display()))?;
+        let folder = WorkFolder::new(beside, ".echolume-export-")?;
         let recording = folder.path().join("volume.frames");
-        export::write_frames(&recording, job.header.clone(), std::slice::from_ref(&job.volume))?;
+        write_frames(&recording, job.header.clone(), std::slice::from_ref(&job.volume))?;
         let made = folder.path().join(format!("out.{}", job.format.ending));
         self.process(&mut job.command(&recording, &made)?, &|| signals.signal().is_some())?;
         std::fs::rename(&made, file).map_err(|e| format!("{}: {e}", file.display()))
@@ -164,6 +163,22 @@ fn last_words(mut messages: impl Read) -> String {
     // A full pipe would block it.
     let _ = std::io::copy(&mut messages, &mut std::io::sink());
     String::from_utf8_lossy(&bytes).into_owned()
+}
+
+/// Writes volumes as a recording, whole or not at all.
+///
+/// # Errors
+/// One line: a file that cannot be written.
+pub(super) fn write_frames(file: &Path, header: Header, volumes: &[CineVolume]) -> Result<(), String> {
+    let mut writer = Writer::create(file, header).map_err(|e| e.to_string())?;
+    let mut frames = volumes.iter().flat_map(|volume| &volume.frames);
+    match frames.try_for_each(|frame| writer.frame(frame, frame.time.unwrap_or(0.0))) {
+        Ok(()) => writer.finish().map_err(|e| e.to_string()),
+        Err(e) => {
+            writer.discard();
+            Err(e.to_string())
+        }
+    }
 }
 
 /// What is exported, and as what.
