@@ -30,7 +30,7 @@ impl DrawFault {
 }
 
 /// Draws on the device of `context`. If it is lost, `reopen` opens it again and `draw` is called again, with smaller bands in `options`, until
-/// it was lost too often ([`Losses`]). `draw` gets true if it is called again: the source may have been read in part by then.
+/// it was lost too often in a row ([`Losses`]): `progress` says how many of several pictures are finished. `draw` gets true if it is called again: the source may have been read in part by then.
 ///
 /// # Errors
 /// What `draw` or `reopen` failed with.
@@ -39,11 +39,17 @@ pub fn draw_despite_losses<T>(
     options: &mut RendererOptions,
     own_shaders: bool,
     reopen: impl Fn() -> Result<Arc<Context>, Failure>,
+    progress: impl Fn() -> usize,
     mut draw: impl FnMut(&Arc<Context>, &RendererOptions, bool) -> Result<T, DrawFault>,
 ) -> Result<T, Failure> {
-    let mut losses = Losses::default();
+    let (mut losses, mut reached) = (Losses::default(), 0);
     loop {
-        match draw(context, options, losses.any()) {
+        let drawn = draw(context, options, losses.any());
+        // What was finished since the last loss begins another row of them.
+        if progress() > reached {
+            (losses, reached) = (Losses::default(), progress());
+        }
+        match drawn {
             Err(DrawFault::Gpu(error)) if losses.allow_after(&error) => {
                 options.bands = losses.bands();
                 *context = reopen()?;

@@ -68,6 +68,8 @@ pub struct MakeMesh {
 const COLOURS: [(&str, [u8; 3]); 2] = [("grey", [128, 128, 128]), ("skin", [224, 172, 140])];
 /// Thickest base, mm.
 const MAX_BASE: f64 = 1000.0;
+/// Most rows of a slice with a base: as many as an edge of a volume that is written.
+const MAX_ROWS: usize = 16_384;
 /// Widest smoothing, voxels: its slices are kept in memory.
 const MAX_DEVIATION: f64 = 32.0;
 
@@ -134,6 +136,11 @@ impl MakeMesh {
             }
             let rows = (mm / grid.spacing[1]).ceil() as usize;
             size[1] = found.rows(rows).unwrap_or(size[1]);
+            if size[1] > MAX_ROWS {
+                let fault =
+                    format!("--base {mm}: makes {} rows of {} mm, at most {MAX_ROWS}", size[1], grid.spacing[1]);
+                return Err(input(format!("{fault}; give a thinner base or a larger --spacing")));
+            }
             base = Some(found);
         }
         let mut read = reader();

@@ -131,6 +131,7 @@ impl Render {
             &mut options,
             self.glsl.is_some(),
             reopen,
+            || 0,
             |context, options, is_again| {
                 if is_again {
                     source = self.open().map_err(DrawFault::Source)?.0;

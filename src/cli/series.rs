@@ -14,6 +14,7 @@ use crate::scene::{Scene, Settings};
 use crate::source::Source;
 use crate::terminal::{Failure, failed, input, progress_bar, remark, say};
 use indicatif::ProgressBar;
+use std::cell::Cell;
 use std::collections::BTreeSet;
 use std::ops::RangeInclusive;
 use std::path::Path;
@@ -164,11 +165,14 @@ impl SeriesArgs {
         let written = PictureSeries::new(target, rate);
         let mut series = Series { views, scene, chosen, signals, bar, written, times: None };
         let reopen = || job.input.open_device(job.validate);
-        draw_despite_losses(context, &mut options, job.own_shaders, reopen, |context, options, is_again| {
+        let progress = Cell::new(0);
+        let finished = || progress.get();
+        draw_despite_losses(context, &mut options, job.own_shaders, reopen, finished, |context, options, is_again| {
             if is_again {
                 source = self.open(job).map_err(DrawFault::Source)?.0;
             }
             let done = series.draw(context, &mut *source, options);
+            progress.set(series.written.count());
             let Some(signal) = signals.signal() else { return done };
             series.bar.finish_and_clear();
             let (written, count) = (series.written.count(), series.views.count());

@@ -8,7 +8,7 @@ use std::collections::VecDeque;
 use std::sync::Arc;
 
 /// A complete volume.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 pub struct CineVolume {
     pub volume: u32,
     /// In order of the slices.

@@ -94,7 +94,9 @@ impl Exporter {
 
     /// The name of the export in work.
     pub(super) fn exporting(&self) -> Option<&'static str> {
-        self.export.as_ref().filter(|(_, export, _)| !export.is_finished()).map(|(name, ..)| *name)
+        // The thread also ends without any work, if there is no folder for it.
+        let is_at_work = |export: &Export, thread: &JoinHandle<()>| !export.is_finished() && !thread.is_finished();
+        self.export.as_ref().filter(|(_, export, thread)| is_at_work(export, thread)).map(|(name, ..)| *name)
     }
 
     /// Ends the export in work, if there is one.
@@ -157,7 +159,10 @@ fn unused_name(folder: &Path, stamp: &str, number: u32, extension: &str) -> Path
 #[cfg(test)]
 mod tests {
     use super::*;
-    use std::sync::Arc;
+    use crate::probe::{Geometry, Grid};
+    use crate::scene::Settings;
+    use crate::source::StoredType;
+    use crate::ui::volume_export::FORMATS;
     use std::time::Duration;
 
     fn wait(exporter: &mut Exporter) -> Result<PathBuf, String> {
@@ -168,6 +173,14 @@ mod tests {
             std::thread::sleep(Duration::from_millis(5));
         }
         Err("nothing was reported".into())
+    }
+
+    fn job() -> Job {
+        let grid = Grid { size: [1; 3], spacing: [1.0; 3], origin: [0.0; 3] };
+        let (forward, backward) = (Geometry::Cartesian(grid), Geometry::Cartesian(grid));
+        let header = Header { forward, backward, stored: StoredType::U8, range: [0.0, 255.0], posed: false };
+        let volume = CineVolume::default();
+        Job { format: FORMATS[0], header, volume, settings: Settings::default(), device: String::new() }
     }
 
     #[test]
@@ -193,5 +206,13 @@ mod tests {
         let mut nowhere = Exporter::new(PathBuf::from("/dev/null/pictures"), Arc::new(|| ()));
         nowhere.picture(move || Ok(picture)).expect("thread");
         assert!(wait(&mut nowhere).unwrap_err().contains("/dev/null/pictures"));
+        // An export that could not begin does not keep the next one from beginning.
+        for _ in 0..2 {
+            nowhere.export(job()).expect("none is in work");
+            assert!(wait(&mut nowhere).unwrap_err().contains("/dev/null/pictures"));
+            while nowhere.exporting().is_some() {
+                std::thread::yield_now();
+            }
+        }
     }
 }

@@ -142,7 +142,10 @@ impl Export {
             match child.try_wait() {
                 Ok(Some(status)) => break status,
                 Ok(None) => thread::sleep(POLL),
-                Err(e) => return Err(format!("the export was lost: {e}")),
+                Err(e) => {
+                    let _ = child.kill();
+                    return Err(format!("the export was lost: {e}"));
+                }
             }
         };
         let said = said.join().unwrap_or_default();
@@ -187,6 +190,8 @@ pub(super) struct Job {
     pub(super) header: Header,
     pub(super) volume: CineVolume,
     pub(super) settings: crate::scene::Settings,
+    /// The name of the device of a turntable: that of the view.
+    pub(super) device: String,
 }
 
 impl Job {
@@ -202,7 +207,11 @@ impl Job {
                 let scene = self.workspace(recording)?;
                 // A folder of pictures has to end like one.
                 let made = if self.format.ending == "turntable" { made.join("") } else { made.to_path_buf() };
-                command.arg("render").arg(scene).args(["--turntable", TURNTABLE, "-o"]).arg(made)
+                command
+                    .arg("render")
+                    .arg(scene)
+                    .args(["--device", &self.device, "--turntable", TURNTABLE, "-o"])
+                    .arg(made)
             }
         };
         Ok(command)

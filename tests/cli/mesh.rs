@@ -102,6 +102,7 @@ fn a_mesh_that_would_be_wrong_is_not_written() {
         (&[&input, &stl, "--simplify", "0"], "--simplify 0"),
         (&[&input, &stl, "--base", "0"], "--base 0"),
         (&[&input, &stl, "--start", "inf"], "--start inf"),
+        (&[&input, &stl, "--base", "1000", "--spacing", "0.05", "--threshold", "0.6"], "--base 1000: makes 20"),
         (&[&input, &stl, "--threshold", "0"], "--threshold 0"),
         (&[&input, "-"], ".stl, .ply or .glb"),
     ] {

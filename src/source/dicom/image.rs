@@ -13,7 +13,8 @@ use std::sync::Arc;
 const MAX_FRAMES: u64 = 1 << 20;
 /// Most bytes of a frame.
 const MAX_FRAME_BYTES: u64 = 1 << 30;
-/// The same of JPEG 2000, whose decoder takes some 30 bytes for each number.
+/// The same of lossless JPEG, whose decoder takes 7 bytes for each number, and of JPEG 2000, whose decoder takes some 30 bytes for each number.
+const MAX_LOSSLESS_BYTES: u64 = 1 << 28;
 const MAX_JPEG_2000_BYTES: u64 = 1 << 26;
 /// Red, green and blue in luminance (ITU-R BT.601).
 const LUMINANCE: [f64; 3] = [0.299, 0.587, 0.114];
@@ -71,7 +72,11 @@ impl Image {
         };
         let (pixel, arrangement, stored) = format(path, elements, coding)?;
         let each = size[0] as u64 * size[1] as u64 * stored as u64;
-        let most = if coding == Coding::Jpeg2000 { MAX_JPEG_2000_BYTES } else { MAX_FRAME_BYTES };
+        let most = match coding {
+            Coding::Jpeg2000 => MAX_JPEG_2000_BYTES,
+            Coding::JpegLossless => MAX_LOSSLESS_BYTES,
+            _ => MAX_FRAME_BYTES,
+        };
         if each > most {
             return fault("rows and columns", format!("make frames of {each} bytes, at most {most} are read"));
         }
@@ -154,7 +159,11 @@ fn format(path: &Path, elements: &Elements, coding: Coding) -> Result<(PixelForm
         _ => return fault("bits allocated (0028,0100)", format!("is {bits}: 8, 16 and 32 are read")),
     };
     let high = root.word(tags::HIGH_BIT).unwrap_or(stored_bits.saturating_sub(1));
-    if stored_bits == 0 || stored_bits > bits || high + 1 != stored_bits || (signed && stored_bits != bits) {
+    if stored_bits == 0
+        || stored_bits > bits
+        || high.checked_add(1) != Some(stored_bits)
+        || (signed && stored_bits != bits)
+    {
         return fault("bits stored (0028,0101)", format!("{stored_bits} of {bits}, up to bit {high}, are not read"));
     }
     let (most, name) = match coding {

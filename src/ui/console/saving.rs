@@ -59,7 +59,13 @@ impl Console {
             (Some(header), Some(volume)) => {
                 let mut settings = self.controls.settings().clone();
                 settings.marks.bar = self.saves_bar;
-                self.exporter.export(Job { format, header, volume, settings })
+                self.exporter.export(Job {
+                    format,
+                    header,
+                    volume,
+                    settings,
+                    device: self.context.candidate.name.clone(),
+                })
             }
             _ => Err("there is no volume yet".into()),
         };
