@@ -57,7 +57,7 @@ impl PassRunner {
     /// # Errors
     /// A shader that does not exist, or that disagrees with the declaration of the pass.
     pub fn shader(&self, scene: &Scene, pass: &Pass, args: &DispatchArgs) -> Result<Prepared, GpuError> {
-        self.pipelines.prepare(&Pipelines::key(pass, scene, args), pass, scene, args)
+        self.pipelines.prepare(&self.pipelines.key(pass, scene, args), pass, scene, args)
     }
 
     /// Dispatches `pass` once and returns its outputs. `inputs` have the names of the shader's bindings; slots that the scene computes

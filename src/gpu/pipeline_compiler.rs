@@ -131,7 +131,7 @@ impl AsyncPipelineCompiler {
         let mut held = Vec::new();
         for step in &plan.steps {
             let args = step.args();
-            let key = Pipelines::key(step.pass, scene, &args);
+            let key = self.pipelines.key(step.pass, scene, &args);
             if let Some(pipeline) = self.pipelines.cached(&key) {
                 held.push(pipeline);
                 continue;
@@ -259,7 +259,7 @@ impl Worker {
         let mut lined_up = HashSet::new();
         let missing = plan.steps.iter().filter_map(|step| {
             let (args, pass) = (step.args(), step.pass);
-            let key = Pipelines::key(pass, &scene, &args);
+            let key = self.pipelines.key(pass, &scene, &args);
             let is_missing = self.pipelines.cached(&key).is_none() && lined_up.insert(key.clone());
             is_missing.then(|| Job { key, pass, scene: scene.clone(), args })
         });

@@ -69,7 +69,7 @@ pub fn measure(context: &Arc<Context>, scenes: &[Scene]) -> Result<Vec<MeasuredP
         formats::check(context, &plan, scene)?;
         for step in &plan.steps {
             let args = step.args();
-            let key = Pipelines::key(step.pass, scene, &args);
+            let key = pipelines.key(step.pass, scene, &args);
             if known.insert(key.clone()) {
                 targets.push(Target { key, pass: step.pass, scene, args });
             }
@@ -90,7 +90,7 @@ pub fn compile_time(context: &Arc<Context>, scene: &Scene, pass: &'static Pass) 
     let mut sum = Duration::ZERO;
     for iteration in 0..(pass.repeat)(&scene) {
         let args = DispatchArgs { iteration, ..DispatchArgs::default() };
-        let key = Pipelines::key(pass, &scene, &args);
+        let key = pipelines.key(pass, &scene, &args);
         if known.insert(key.clone()) {
             let target = Target { key, pass, scene: &scene, args };
             let how = Compile { cache: vk::PipelineCache::null(), flags: vk::PipelineCreateFlags::empty() };
@@ -146,7 +146,7 @@ fn measure_targets(
             pass: target.pass.name,
             shader,
             constants,
-            formats,
+            formats: formats.into_iter().map(|(format, _)| format).collect(),
             executables: executables(context, pipeline.handle).context(|| format!("read statistics of '{shader}'"))?,
             cold: pipeline.compilation.0,
             warm: Duration::ZERO,

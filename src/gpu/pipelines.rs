@@ -35,8 +35,9 @@ pub struct Pipeline {
     pub time: Arc<InvocationTime>,
 }
 
-/// Shader, constants, and the formats of the inputs, because the formats of storage images are part of the module.
-pub type Key = (&'static str, Vec<(&'static str, i32)>, Vec<Format>);
+/// Shader, constants, and the formats of the inputs, because the formats of storage images are part of the module; and for each input whether
+/// it is a lookup table that is too large, or too small, for a texel buffer.
+pub type Key = (&'static str, Vec<(&'static str, i32)>, Vec<(Format, bool)>);
 
 /// What a pipeline is compiled from: SPIR-V as the device gets it, what it declares, and constants by name.
 pub struct Prepared {
@@ -138,9 +139,16 @@ impl Pipelines {
     }
 
     /// What tells the pipeline of a pass in a scene from others.
-    pub fn key(pass: &Pass, scene: &Scene, args: &DispatchArgs) -> Key {
-        let formats = pass.reads(scene, args).iter().map(|b| b.slot.format(scene)).collect();
-        (pass.shader(scene, args), (pass.constants)(scene, args), formats)
+    /// What a pipeline of a pass in a scene is kept by.
+    pub fn key(&self, pass: &Pass, scene: &Scene, args: &DispatchArgs) -> Key {
+        let no_texels = |slot: Slot| match slot.shape(scene) {
+            Shape::Buffer(bytes) => {
+                self.texel_access == TexelAccess::Storage && !has_texels(&self.context, bytes.into())
+            }
+            _ => false,
+        };
+        let inputs = pass.reads(scene, args).iter().map(|b| (b.slot.format(scene), no_texels(b.slot))).collect();
+        (pass.shader(scene, args), (pass.constants)(scene, args), inputs)
     }
 
     /// The pipeline of a key, if it is compiled.
@@ -167,7 +175,7 @@ impl Pipelines {
     /// # Errors
     /// A shader that does not exist, or that disagrees with the declaration of the pass.
     pub fn get(&self, pass: &Pass, scene: &Scene, args: &DispatchArgs) -> Result<Arc<Pipeline>, GpuError> {
-        let key = Pipelines::key(pass, scene, args);
+        let key = self.key(pass, scene, args);
         if let Some(pipeline) = self.cached(&key) {
             return Ok(pipeline);
         }
@@ -214,7 +222,7 @@ impl Pipelines {
         scene: &Scene,
         cached: impl Fn(&Key) -> Option<Arc<Pipeline>>,
     ) -> (Result<Vec<Arc<Pipeline>>, GpuError>, Vec<Compiled>) {
-        let keys: Vec<Key> = plan.steps.iter().map(|step| Pipelines::key(step.pass, scene, &step.args())).collect();
+        let keys: Vec<Key> = plan.steps.iter().map(|step| self.key(step.pass, scene, &step.args())).collect();
         let mut found: HashMap<&Key, Arc<Pipeline>> = HashMap::new();
         let mut missing: Vec<usize> = Vec::new();
         let mut seen = HashSet::new();

@@ -139,12 +139,14 @@ struct MissingFeature {
     change: fn(&mut Context),
     options: RendererOptions,
     sampling: Option<Sampling>,
+    /// Entries of the lookup tables with which it is drawn again, one after the other.
+    tables: &'static [u32],
 }
 
 fn missing_features() -> Vec<MissingFeature> {
     let plain = RendererOptions::default;
     let reading = |fetch| RendererOptions { texel_access: Some(fetch), ..RendererOptions::default() };
-    let of = |name, change, options, sampling| MissingFeature { name, change, options, sampling };
+    let of = |name, change, options, sampling| MissingFeature { name, change, options, sampling, tables: &[] };
     vec![
         of("no filter", formats::disable_linear_filter, reading(TexelAccess::Textures), Some(Sampling::Exact)),
         // The maximum allocation holds the volume, but not four times as much.
@@ -155,7 +157,15 @@ fn missing_features() -> Vec<MissingFeature> {
             Some(Sampling::Exact),
         ),
         of("no tables as texels", |c| c.limits.max_texel_buffer_elements = 0, reading(TexelAccess::Storage), None),
-        of("small tables as texels", |c| c.limits.max_texel_buffer_elements = 300, reading(TexelAccess::Storage), None),
+        MissingFeature {
+            tables: &[65, 1025],
+            ..of(
+                "small tables as texels",
+                |c| c.limits.max_texel_buffer_elements = 300,
+                reading(TexelAccess::Storage),
+                None,
+            )
+        },
         of("texels by texelFetch", |_| (), reading(TexelAccess::Textures), None),
         of("texels by imageLoad", |_| (), reading(TexelAccess::Storage), None),
         of("no pushed descriptors", |c| c.push_descriptor = None, plain(), None),
@@ -174,19 +184,18 @@ fn missing_features() -> Vec<MissingFeature> {
 
 fn fallbacks(dut: &mut DeviceUnderTest) -> Result<Findings, GpuError> {
     let (mut findings, mut largest, allowed) = (Findings::default(), LargestDifference::default(), [0.6, 3.0]);
-    let modes = ["mip", "sr", "vr"].map(|mode| small(mode, "r8", "sampling = 'auto'"));
-    let mut scenes: Vec<(Scene, Vec<Texels>, Picture)> = Vec::new();
-    for scene in modes {
-        let scene = scene?;
+    let mut scenes: Vec<(&str, Scene, Vec<Texels>, Picture)> = Vec::new();
+    for mode in ["mip", "sr", "vr"] {
+        let scene = small(mode, "r8", "sampling = 'auto'")?;
         let frames = wall(&scene, 0);
         let expected = stored_reference_picture(&scene, &frames);
-        scenes.push((scene, frames, expected));
+        scenes.push((mode, scene, frames, expected));
     }
     for missing in missing_features() {
         let isolated = IsolatedContext::lacking(dut, missing.change)?;
         let context: &Arc<Context> = &isolated.context;
         let mut took = String::new();
-        for (scene, frames, expected) in &scenes {
+        for (mode, scene, frames, expected) in &scenes {
             let mut renderer = render::sent(context, scene, frames, &missing.options)?;
             let picture = renderer.picture()?;
             let what = format!("{}, mode {:?}", missing.name, scene.settings.mode);
@@ -196,6 +205,14 @@ fn fallbacks(dut: &mut DeviceUnderTest) -> Result<Findings, GpuError> {
                 format!("{what}: samples are taken {}", sampling.words())
             });
             took = format!("samples {}, {}", sampling.words(), renderer.texel_access().describe());
+            // Tables that fit into a texel buffer, then such that do not, by one renderer.
+            for entries in missing.tables {
+                let ray = format!("sampling = 'auto', slice_index = 'table', entries = {entries}");
+                renderer.change(small(mode, "r8", &ray)?)?;
+                render::send(&mut renderer, frames, 0)?;
+                let picture = renderer.picture()?;
+                largest.add(&mut findings, &format!("{what}, {entries} entries"), expected, &picture, allowed);
+            }
         }
         findings.notes.push(format!("{}: {took}", missing.name));
         isolated.report_validation(&mut findings);
