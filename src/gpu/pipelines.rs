@@ -35,8 +35,8 @@ pub struct Pipeline {
     pub time: Arc<InvocationTime>,
 }
 
-/// Shader, constants, and the formats of the inputs, because the formats of storage images are part of the module; and for each input whether
-/// it is a lookup table that is too large, or too small, for a texel buffer.
+/// Shader, constants, and for each input its format, which is part of the module, and whether it is read as a storage image or a texel buffer:
+/// two slots may differ in that, and a lookup table may be too large for it.
 pub type Key = (&'static str, Vec<(&'static str, i32)>, Vec<(Format, bool)>);
 
 /// What a pipeline is compiled from: SPIR-V as the device gets it, what it declares, and constants by name.
@@ -141,14 +141,18 @@ impl Pipelines {
     /// What tells the pipeline of a pass in a scene from others.
     /// What a pipeline of a pass in a scene is kept by.
     pub fn key(&self, pass: &Pass, scene: &Scene, args: &DispatchArgs) -> Key {
-        let no_texels = |slot: Slot| match slot.shape(scene) {
-            Shape::Buffer(bytes) => {
-                self.texel_access == TexelAccess::Storage && !has_texels(&self.context, bytes.into())
-            }
-            _ => false,
-        };
-        let inputs = pass.reads(scene, args).iter().map(|b| (b.slot.format(scene), no_texels(b.slot))).collect();
+        let inputs =
+            pass.reads(scene, args).iter().map(|b| (b.slot.format(scene), self.stores(b.slot, scene))).collect();
         (pass.shader(scene, args), (pass.constants)(scene, args), inputs)
+    }
+
+    /// True if passes read this input as a storage image or a texel buffer: they do where texels are read by storage, and the slot allows it.
+    fn stores(&self, slot: Slot, scene: &Scene) -> bool {
+        self.texel_access == TexelAccess::Storage
+            && match slot.shape(scene) {
+                Shape::Buffer(bytes) => has_texels(&self.context, bytes.into()),
+                _ => formats::usage(&self.context, slot).contains(vk::ImageUsageFlags::STORAGE),
+            }
     }
 
     /// The pipeline of a key, if it is compiled.
@@ -269,10 +273,7 @@ impl Pipelines {
         let words = (self.shaders)(key.0).map_err(at_fault)?;
         let mut words = interface_check::for_scene(pass, scene, args, &words).map_err(at_fault)?;
         if self.texel_access == TexelAccess::Storage {
-            let stores = |slot: Slot| match slot.shape(scene) {
-                Shape::Buffer(bytes) => has_texels(&self.context, bytes.into()),
-                _ => formats::usage(&self.context, slot).contains(vk::ImageUsageFlags::STORAGE),
-            };
+            let stores = |slot: Slot| self.stores(slot, scene);
             words = interface_check::for_cpu(pass, scene, args, &words, stores).map_err(at_fault)?;
         }
         self.context.faults.words(pass.name, &mut words).map_err(at_fault)?;

@@ -111,9 +111,11 @@ fn forgotten_pipelines_are_compiled_again_and_draw_the_same() {
     let device = Device::watched_with(ContextOptions { max_unused_pipelines: 0, ..ContextOptions::default() });
     let made = || device.counts.pipelines.load(Ordering::Relaxed);
     let frames = body_frames(&in_mode(MODES[0]), |p| 0.5 + 0.4 * (0.3 * p.y).sin());
+    // Of the same kind, with every pipeline kept: those that are shared by the tests specialize their shaders themselves.
+    let keeping = Device::watched_with(ContextOptions::default());
     let expected: Vec<_> = MODES
         .iter()
-        .map(|mode| rendered(&Device::new(), in_mode(mode), &frames).picture().expect("a picture").rgba)
+        .map(|mode| rendered(&keeping, in_mode(mode), &frames).picture().expect("a picture").rgba)
         .collect();
     let mut renderer = Renderer::new(&device, in_mode(MODES[0]), &RendererOptions::default()).expect("renderer");
     let mut compiled = Vec::new();
@@ -128,7 +130,9 @@ fn forgotten_pipelines_are_compiled_again_and_draw_the_same() {
             }
             renderer.change(in_mode(mode)).expect("a change");
             send(&mut renderer, &frames, 0);
-            assert!(renderer.picture().expect("a picture").rgba == *expected, "{mode} in round {round}");
+            let drawn = renderer.picture().expect("a picture").rgba;
+            let differ = drawn.iter().zip(expected).filter(|(a, b)| a != b).count();
+            assert_eq!(differ, 0, "{mode} in round {round}: values of {} that differ", drawn.len());
         }
         compiled.push(made() - before);
     }
