@@ -28,14 +28,13 @@ pub use bricks::{Bricks, Reach, Side, TILE};
 pub use camera::Rays;
 pub use echo_levels::{EchoHistogram, EchoLevels};
 pub use light_lattice::{LightLattice, Propagation};
-pub use region::insonified_box;
+pub use region::{depth_offset, insonified_box};
 pub use settings::*;
 pub use visible_bounds::{Rectangle, Shared, VisibleBounds};
 
 use crate::probe::{Array, Geometry, Probe};
 use crate::source::StoredType;
 use glam::DVec3;
-pub(crate) use region::depth_offset;
 use region::{framed_low, is_still, slice_grid, visible_box};
 use sizes::{Pitches, ResolvedSize, Resolver};
 

@@ -5,7 +5,7 @@ use crate::probe::{Geometry, Motion, Probe};
 use glam::DVec3;
 
 /// Offset from a depth below the probe's face to Y, mm.
-pub(crate) fn depth_offset(geometry: &Geometry) -> f64 {
+pub fn depth_offset(geometry: &Geometry) -> f64 {
     match geometry {
         Geometry::Sweep(probe) => probe.array_radius(),
         Geometry::Cartesian(_) => 0.0,
