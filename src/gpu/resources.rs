@@ -6,7 +6,7 @@ use super::error::{ErrorContext, GpuError};
 use super::formats;
 use super::memory::{Reserve, free, reserve};
 use crate::passes::Slot;
-use crate::passes::slots::{Format, Initializer, Shape};
+use crate::passes::slots::{Format, Initializer, Shape, ring_entry_end};
 use crate::plan::Plan;
 use crate::scene::Scene;
 use ash::vk;
@@ -21,7 +21,8 @@ pub struct Image {
     pub handle: vk::Image,
     /// A view of the complete image.
     pub view: vk::ImageView,
-    /// Of the frame array, a view of the layers from each one on: a batch of frames begins with the first layer of its view.
+    /// Of the frame array, a view of the layers from each one to the last of its entry in the ring: a batch of frames begins with the first
+    /// layer of its view. Validation takes every layer of a view for read, so a view holds none of the other entries, which may be written.
     pub from_layer: Vec<vk::ImageView>,
     pub extent: vk::Extent3D,
     pub shape: Shape,
@@ -89,10 +90,12 @@ impl Image {
         let bound = unsafe { device.bind_image_memory(handle, allocation.memory(), allocation.offset()) };
         image.allocation = Some(allocation);
         bound.context(operation)?;
-        image.view = image.create_view(slot.name(), view_kind, 0)?;
+        image.view = image.create_view(slot.name(), view_kind, WHOLE)?;
         if slot == Slot::Frames {
             for layer in 0..layers {
-                let view = image.create_view(slot.name(), view_kind, layer)?;
+                let count = ring_entry_end(layers, layer) - layer;
+                let range = vk::ImageSubresourceRange { base_array_layer: layer, layer_count: count, ..WHOLE };
+                let view = image.create_view(slot.name(), view_kind, range)?;
                 image.from_layer.push(view);
             }
         }
@@ -106,9 +109,12 @@ impl Image {
         (self.shape, self.format.texel_bytes())
     }
 
-    /// A view of the layers from `first` on.
-    fn create_view(&self, name: &str, kind: vk::ImageViewType, first: u32) -> Result<vk::ImageView, GpuError> {
-        let range = vk::ImageSubresourceRange { base_array_layer: first, ..WHOLE };
+    fn create_view(
+        &self,
+        name: &str,
+        kind: vk::ImageViewType,
+        range: vk::ImageSubresourceRange,
+    ) -> Result<vk::ImageView, GpuError> {
         let create = vk::ImageViewCreateInfo::default()
             .image(self.handle)
             .view_type(kind)

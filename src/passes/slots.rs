@@ -312,6 +312,12 @@ fn frame_layers(scene: &Scene) -> Shape {
     Shape::Layers([width, height, BATCHES_IN_FLIGHT * frames_per_batch(scene)])
 }
 
+/// Of a frame array with so many layers, the layer behind those of the ring entry that holds `layer`.
+pub(crate) fn ring_entry_end(layers: u32, layer: u32) -> u32 {
+    let entry = (layers / BATCHES_IN_FLIGHT).max(1);
+    layer - layer % entry + entry
+}
+
 /// A layer for each frame of a batch.
 fn batch([width, height]: [u32; 2], scene: &Scene) -> Shape {
     Shape::Layers([width, height, frames_per_batch(scene)])
@@ -567,6 +573,25 @@ impl Shape {
         match self {
             Shape::Layers(n) | Shape::Three(n) => n[2],
             _ => 1,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A batch that is read must have its layers in its view, and those of the batches that are written beside it must not be there.
+    #[test]
+    fn a_view_of_a_batch_ends_with_its_entry_of_the_ring() {
+        for batch in 1..=MAX_FRAMES as u32 {
+            let layers = BATCHES_IN_FLIGHT * batch;
+            for entry in 0..BATCHES_IN_FLIGHT {
+                let first = entry * batch;
+                for layer in first..first + batch {
+                    assert_eq!(ring_entry_end(layers, layer), first + batch, "layer {layer} of {layers}");
+                }
+            }
         }
     }
 }

@@ -299,8 +299,10 @@ pub fn dispatch_args_of(scene: &Scene, pass: &Pass, iteration: u32) -> DispatchA
     let visible = scene.visible_bounds.slices();
     let slice = (visible.start + visible.end) / 2;
     let slices = scene.slices().div_ceil(3).min(visible.end - slice);
-    let slices = if pass.frequency == Frequency::Frame { slices.clamp(1, frames_per_batch(scene)) } else { slices };
-    DispatchArgs { layer: 2, slice, slices, iteration, image: 0 }
+    // The second entry of the ring.
+    let layer = frames_per_batch(scene);
+    let slices = if pass.frequency == Frequency::Frame { slices.clamp(1, layer) } else { slices };
+    DispatchArgs { layer, slice, slices, iteration, image: 0 }
 }
 
 /// Inputs of a pass, of one of [`KINDS`]. Arrays that an earlier pass computes are derived from the others.
