@@ -102,6 +102,14 @@ pub enum Command {
     SeekCine(usize),
     /// Plays the cine loop repeatedly, or stops it.
     PlayCine,
+    /// The cine loop begins with the volume that is shown; `true`: it ends with it.
+    MarkCine(bool),
+    /// The cine loop is all volumes again.
+    WholeCine,
+    /// Plays the cine loop so many steps faster.
+    CineSpeed(i32),
+    /// Plays the cine loop back and forth, or forwards only.
+    BackAndForth(bool),
     SavePicture,
     /// Saves the volumes of the cine loop as a recording.
     SaveLoop,
@@ -304,6 +312,13 @@ pub const KEY_BINDINGS: &[Binding] = &[
     on(Key::Home, "oldest volume", Command::SeekCine(0)),
     on(Key::End, "newest volume", Command::SeekCine(usize::MAX)),
     on(Key::Enter, "play the cine loop", Command::PlayCine),
+    shift(Key::Home, "the loop begins, ends here", Command::MarkCine(false)),
+    shift(Key::End, "the loop begins, ends here", Command::MarkCine(true)),
+    control(Key::Home, "the complete loop", Command::WholeCine),
+    control(Key::Left, "loop slower, faster", Command::CineSpeed(-1)),
+    control(Key::Right, "loop slower, faster", Command::CineSpeed(1)),
+    shift(Key::Enter, "loop back and forth", Command::BackAndForth(true)),
+    control(Key::Enter, "loop forwards", Command::BackAndForth(false)),
     on(Char('p'), "save the picture", Command::SavePicture),
     on(Char('r'), "save the recording", Command::SaveLoop),
     control(Char('s'), "save the workspace", Command::SaveWorkspace),

@@ -8,6 +8,7 @@
 //! - [`window`] shows the console in a window. Without a windowing system, `direct` shows it on a monitor and `devices` reads
 //!   input devices from the kernel.
 
+mod cine_player;
 mod clipboard;
 pub mod command;
 pub mod console;

@@ -10,6 +10,7 @@ mod saving;
 use self::measuring::Counting;
 use self::opening::Opening;
 pub use self::options::{ConsoleOptions, OpenFile, StartupFault};
+use super::cine_player::CinePlayer;
 use super::clipboard::Clipboard;
 use super::command::{Command, HeldKeys, Tool};
 use super::controls::{Change, Controls};
@@ -49,8 +50,6 @@ const REST_BEFORE_WARMING: Duration = Duration::from_secs(1);
 const MAX_SEARCH: usize = 40;
 /// A pause after which the same drag or key is another step for undo.
 const STEP_PAUSE: Duration = Duration::from_millis(500);
-/// Time between two volumes of a cine loop.
-const CINE_INTERVAL: Duration = Duration::from_millis(200);
 
 /// What the event loop does after an update of the console.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -120,8 +119,7 @@ pub struct Console {
     saved_volume: Option<u32>,
     /// Where to draw the pointer, pixels of the window.
     pointer: Option<[f64; 2]>,
-    /// When the next volume of the cine loop is due, while it plays.
-    next_cine_step: Option<Instant>,
+    player: CinePlayer,
     /// The first input whose settings the stream has not been given yet.
     unsent_input: Option<Instant>,
     /// The first input that no picture shows yet, and when its settings were given to the stream.
@@ -261,7 +259,7 @@ impl Console {
             saving_volume: None,
             saved_volume: None,
             pointer: None,
-            next_cine_step: None,
+            player: CinePlayer::default(),
             unsent_input: None,
             unshown_input: None,
             last_input: now,
@@ -509,7 +507,7 @@ impl Console {
         let count = self.stream.cine().volumes().len();
         match *command {
             Command::Freeze => {
-                self.next_cine_step = None;
+                self.player.stop();
                 self.stream.freeze(!self.stream.is_frozen());
             }
             Command::StepCine(by) => {
@@ -523,11 +521,15 @@ impl Console {
             }
             Command::PlayCine => {
                 self.stream.freeze(true);
-                self.next_cine_step = match self.next_cine_step {
-                    None if count > 1 => Some(now),
-                    _ => None,
-                };
+                self.player.toggle(self.stream.cine().volumes(), now);
             }
+            Command::MarkCine(end) => {
+                let at = self.stream.cine_position().unwrap_or(count.saturating_sub(1));
+                self.player.mark(self.stream.cine().volumes(), at, end);
+            }
+            Command::WholeCine => self.player.unmark(),
+            Command::CineSpeed(by) => self.player.step_speed(by),
+            Command::BackAndForth(on) => self.player.set_back_and_forth(on),
             Command::SavePicture => self.save_picture(),
             Command::SaveLoop => _ = self.save_loop(),
             Command::ToggleHelp => (self.shows_help, self.help_search) = (!self.shows_help, None),
@@ -563,20 +565,19 @@ impl Console {
     }
 
     fn show_cine_volume(&mut self, index: usize) {
-        self.next_cine_step = None;
+        self.player.stop();
         self.stream.freeze(true);
         self.stream.show_cine_volume(index);
     }
 
     /// Shows the next volume of the cine loop when it is due.
     fn advance_cine(&mut self, now: Instant) {
-        let (Some(due), count) = (self.next_cine_step, self.stream.cine().volumes().len()) else { return };
-        if count < 2 {
-            self.next_cine_step = None;
-        } else if now >= due && !self.stream.is_replaying() {
-            let next = self.stream.cine_position().map_or(0, |index| (index + 1) % count);
+        if self.stream.is_replaying() {
+            return;
+        }
+        let shown = self.stream.cine_position();
+        if let Some(next) = self.player.advance(self.stream.cine().volumes(), shown, now) {
             self.stream.show_cine_volume(next);
-            self.next_cine_step = Some((due + CINE_INTERVAL).max(now));
         }
     }
 

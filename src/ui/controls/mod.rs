@@ -194,6 +194,10 @@ impl Controls {
             | Command::StepCine(_)
             | Command::SeekCine(_)
             | Command::PlayCine
+            | Command::MarkCine(_)
+            | Command::WholeCine
+            | Command::CineSpeed(_)
+            | Command::BackAndForth(_)
             | Command::SavePicture
             | Command::SaveLoop
             | Command::ToggleHelp

@@ -4,6 +4,7 @@
 use super::measures;
 use super::{ACCENT, BUTTON, PanelState, TEXT, TEXT_SIZE, TOUCH_SIZE, WARNING, WEAK_TEXT, heading};
 use crate::scene::{ColourMap, Layout, Mode, PlaneName, Settings, Transfer, TransferName};
+use crate::ui::cine_player::{CineState, SPEEDS};
 use crate::ui::command::{Command, Tool, Viewpoint};
 use crate::ui::hints;
 use crate::ui::sliders::{Group, SLIDERS, Slider as Control};
@@ -411,35 +412,79 @@ pub(super) fn show_cine_bar(ui: &mut Ui, state: &PanelState, height: f32, execut
     });
 }
 
+/// Room for the speed and the marks of the loop, points.
+const LOOP_TOOLS: f32 = 300.0;
+
 /// The cine loop in so much room, points.
 fn cine(ui: &mut Ui, state: &PanelState, room: f32, touch: f32, execute: &mut dyn FnMut(Command)) {
-    let (count, place) = state.cine;
-    if count == 0 {
+    let cine = &state.cine;
+    if cine.count == 0 {
         ui.label(RichText::new("no volumes yet").color(WEAK_TEXT));
         return;
     }
-    let label = if state.is_playing { "Stop" } else { "Play" };
-    let hint = "Plays the last volumes as a loop (Enter).";
-    if ui.add(Button::new(label).min_size(vec2(64.0, touch))).on_hover_text(hint).clicked() {
-        execute(Command::PlayCine);
-    }
+    let mut button = |ui: &mut Ui, label: &str, width: f32, hint: &str, command: Command| {
+        if ui.add(Button::new(label).min_size(vec2(width, touch))).on_hover_text(hint).clicked() {
+            execute(command);
+        }
+    };
+    let label = if cine.is_playing { "Stop" } else { "Play" };
+    button(ui, label, 64.0, "Plays the last volumes as a loop (Enter).", Command::PlayCine);
+    let text = cine_text(cine);
     if room >= 330.0 {
-        for (label, by, hint) in [("<", -1, "One volume back (Left)."), (">", 1, "One volume forth (Right).")] {
-            if ui.add(Button::new(label).min_size(vec2(44.0, touch))).on_hover_text(hint).clicked() {
-                execute(Command::StepCine(by));
+        button(ui, "<", 44.0, "One volume back (Left).", Command::StepCine(-1));
+        button(ui, ">", 44.0, "One volume forth (Right).", Command::StepCine(1));
+        let has_tools = room >= 330.0 + LOOP_TOOLS;
+        let tools = if has_tools { LOOP_TOOLS } else { 0.0 };
+        if has_tools {
+            let speed = format!("{}x", cine.speed);
+            let faster = if cine.speed >= SPEEDS[SPEEDS.len() - 1] { -(SPEEDS.len() as i32) } else { 1 };
+            let hint = "Speed of the loop; 1x is that of the acquisition (Ctrl+Left, Ctrl+Right).";
+            button(ui, &speed, 56.0, hint, Command::CineSpeed(faster));
+            let (label, hint) = match cine.goes_back_and_forth {
+                true => ("<->", "The loop is played back and forth: click for forwards (Ctrl+Enter)."),
+                false => ("->", "The loop is played forwards: click for back and forth (Shift+Enter)."),
+            };
+            button(ui, label, 44.0, hint, Command::BackAndForth(!cine.goes_back_and_forth));
+            button(ui, "[", 36.0, "The loop begins with this volume (Shift+Home).", Command::MarkCine(false));
+            button(ui, "]", 36.0, "The loop ends with this volume (Shift+End).", Command::MarkCine(true));
+            let whole = Button::new("All").min_size(vec2(44.0, touch));
+            let whole = ui.add_enabled(cine.is_trimmed, whole).on_hover_text("The loop is all volumes (Ctrl+Home).");
+            if whole.clicked() {
+                execute(Command::WholeCine);
             }
         }
-        ui.spacing_mut().slider_width = (room - 290.0).clamp(30.0, 400.0);
-        let mut at = place.map_or(count, |p| p + 1);
-        let slider = ui.add_enabled(count > 1, Slider::new(&mut at, 1..=count).show_value(false));
+        ui.spacing_mut().slider_width = (room - 290.0 - tools).clamp(30.0, 400.0);
+        let mut at = cine.shown.map_or(cine.count, |p| p + 1);
+        let slider = ui.add_enabled(cine.count > 1, Slider::new(&mut at, 1..=cine.count).show_value(false));
+        if cine.is_trimmed {
+            // What is played, under the slider.
+            let last = (cine.count - 1).max(1) as f32;
+            let x = |index: usize| egui::lerp(slider.rect.x_range().shrink(8.0), index as f32 / last);
+            let [low, high] = [*cine.range.start(), *cine.range.end()].map(x);
+            let y = slider.rect.bottom() - 3.0;
+            ui.painter().hline(low - 3.0..=high + 3.0, y, Stroke::new(3.0, ACCENT));
+        }
         let slider = slider.on_hover_text("The volumes of the loop, oldest first.");
         let is_held = slider.dragged() || slider.clicked() || slider.is_pointer_button_down_on();
-        if is_held && place != Some(at - 1) {
+        if is_held && cine.shown != Some(at - 1) {
             execute(Command::SeekCine(at - 1));
         }
+        ui.add(Label::new(text).extend());
+    } else {
+        ui.add(Label::new(text.split("  ").next().unwrap_or_default()).extend());
     }
-    let shown = place.map_or("-".into(), |p| (p + 1).to_string());
-    ui.add(Label::new(format!("{shown} of {count}")).extend());
+}
+
+/// Place, time and rate of the loop, as far as they are known.
+fn cine_text(cine: &CineState) -> String {
+    let mut text = format!("{} of {}", cine.shown.map_or("-".into(), |p| (p + 1).to_string()), cine.count);
+    if let Some(seconds) = cine.seconds {
+        text += &format!("  {seconds:.1} s");
+    }
+    if let Some(rate) = cine.rate {
+        text += &format!("  {rate:.1}/s");
+    }
+    text
 }
 
 #[cfg(test)]

@@ -13,6 +13,7 @@ use super::command::Command;
 use super::input::{Button, Input, Modifiers, Phase};
 use crate::gpu;
 use crate::scene::Scene;
+use crate::ui::cine_player::CineState;
 use crate::ui::controls::Controls;
 use crate::ui::times::Times;
 use egui::{
@@ -277,9 +278,7 @@ pub(super) struct PanelState<'a> {
     /// The name of the export in work.
     pub(super) exporting: Option<&'a str>,
     pub(super) is_frozen: bool,
-    pub(super) is_playing: bool,
-    /// Number of volumes in the cine loop, and the index of the one that is shown.
-    pub(super) cine: (usize, Option<usize>),
+    pub(super) cine: CineState,
     /// True after the first picture.
     pub(super) has_drawn: bool,
     /// The current rung of the quality ladder, and the frame budget.

@@ -135,6 +135,44 @@ fn exported_files_are_what_was_shown_and_recorded() {
     desk.rest();
 }
 
+/// Prevents a loop that plays or saves volumes beyond its marks.
+#[test]
+fn a_trimmed_loop_is_played_back_and_forth_and_saved() {
+    use echolume::source::Source;
+    let (device, folder) = (Device::new(), Folder::new("trimmed"));
+    let mut desk = Desk::new(&device, ConsoleOptions { folder: folder.0.clone(), ..options() });
+    desk.begin();
+    (0..5).for_each(|number| _ = desk.live(number));
+    let shift = Modifiers { shift: true, ..Modifiers::default() };
+    desk.press(Key::Home);
+    desk.press(Key::Right);
+    desk.held(shift, Key::Home);
+    desk.press(Key::End);
+    desk.press(Key::Left);
+    desk.held(shift, Key::End);
+    desk.held(shift, Key::Enter);
+    desk.press(Key::Enter);
+    let (mut places, begun, mut now) = (Vec::new(), Instant::now(), Instant::now());
+    while places.len() < 7 {
+        assert!(begun.elapsed() < BOUND, "{places:?}");
+        let next = desk.tick(now);
+        let stream = desk.console.stream();
+        if stream.is_idle() {
+            places.extend(stream.cine_position().filter(|place| places.last() != Some(place)));
+            now = next.wake_at.expect("a loop goes on").max(now);
+        }
+    }
+    let first_end = places.iter().position(|place| *place == 1).expect("the loop reaches its begin");
+    assert_eq!(places[first_end..][..4], [1, 2, 3, 2], "{places:?}");
+    desk.press(Key::Enter);
+    desk.press(Key::Char('r'));
+    let mut saved = folder.wait("frames", |file| Reader::open(file).ok().filter(|r| !r.rebuilt()));
+    let volumes: Vec<u32> =
+        std::iter::from_fn(|| saved.next_frame().expect("read")).map(|frame| frame.volume).collect();
+    assert_eq!(volumes, [[1; 9], [2; 9], [3; 9]].concat());
+    desk.rest();
+}
+
 /// Prevents panels next to the picture from changing it.
 #[test]
 fn panels_take_space_and_change_nothing_else() {
