@@ -62,7 +62,7 @@ impl Console {
             match saved {
                 Ok(file) => {
                     if file.extension().is_some_and(|end| end == "frames") {
-                        self.saved_volume = self.saving_volume.take();
+                        self.saved_volume = self.saving_volume.take().or(self.saved_volume);
                         self.request.exit |= std::mem::take(&mut self.leaves_when_saved);
                     }
                     self.notify(&format!("Saved {}", file.display()), false);

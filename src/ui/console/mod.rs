@@ -558,6 +558,8 @@ impl Console {
             Command::Exit | Command::Discard => self.request.exit |= !self.fixed.is_kiosk,
             Command::SaveAndExit => {
                 self.asks_to_leave = false;
+                // The question names all volumes.
+                self.player.unmark();
                 self.leaves_when_saved = self.save_loop();
             }
             _ => {}

@@ -42,6 +42,8 @@ impl Console {
     /// Saves the cine loop, from its first mark to its last. False if it cannot be.
     pub(super) fn save_loop(&mut self) -> bool {
         let volumes = self.marked_volumes();
+        // What lies beyond the marks is still in no file.
+        let is_whole = volumes.len() == self.stream.cine().volumes().len();
         let saved = match self.stream.header() {
             Some(header) if !volumes.is_empty() => {
                 let header = header.clone();
@@ -49,7 +51,8 @@ impl Console {
             }
             _ => Err("there are no volumes yet".into()),
         };
-        self.saving_volume = self.stream.cine().volumes().back().map(|kept| kept.volume).filter(|_| saved.is_ok());
+        let newest = self.stream.cine().volumes().back().map(|kept| kept.volume);
+        self.saving_volume = newest.filter(|_| saved.is_ok() && is_whole);
         if let Err(fault) = &saved {
             self.notify(&format!("The loop was not saved: {fault}"), true);
         }

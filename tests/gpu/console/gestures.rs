@@ -171,6 +171,9 @@ fn a_trimmed_loop_is_played_back_and_forth_and_saved() {
         std::iter::from_fn(|| saved.next_frame().expect("read")).map(|frame| frame.volume).collect();
     assert_eq!(volumes, [[1; 9], [2; 9], [3; 9]].concat());
     desk.rest();
+    // Two volumes are in no file.
+    desk.press(Key::Char('q'));
+    assert!(desk.console.asks_to_leave());
 }
 
 /// Prevents panels next to the picture from changing it.
