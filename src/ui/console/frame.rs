@@ -375,6 +375,7 @@ impl Console {
         let time = now.saturating_duration_since(self.started).as_secs_f64();
         let output = self.panels.lay_out(&state, self.size, time);
         self.repaint_at = (output.repaint_after < Duration::from_secs(3600)).then(|| now + output.repaint_after);
+        self.tree = output.tree.or(self.tree.take());
         for command in output.commands {
             self.execute(&command, now);
         }
