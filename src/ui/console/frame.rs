@@ -65,6 +65,9 @@ impl Console {
                         self.saved_volume = self.saving_volume.take();
                         self.request.exit |= std::mem::take(&mut self.leaves_when_saved);
                     }
+                    if file.extension().is_some_and(|end| end == "toml") {
+                        self.opening.remember(&file);
+                    }
                     self.notify(&format!("Saved {}", file.display()), false);
                 }
                 Err(fault) => {

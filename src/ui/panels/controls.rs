@@ -44,15 +44,21 @@ pub(super) fn show_modes(ui: &mut Ui, state: &PanelState, width: f32, execute: &
         // A low window scrolls.
         ScrollArea::vertical().auto_shrink(false).show(ui, |ui| {
             let settings = state.controls.settings();
-            let row = Row { width, height: TOUCH_SIZE * 0.92, is_large_title: false };
+            let row = Row { width, height: TOUCH_SIZE * 0.92, title: "", is_large_title: false };
             ui.add_space(6.0);
             undo_and_redo(ui, state, &row, execute);
             let modes = Mode::ALL.map(|mode| (mode, mode.title()));
-            row.show(ui, "Mode", &modes, 2, |m| settings.mode == m, hints::of_mode, |m| execute(Command::Mode(m)));
-            let layouts = [(Layout::Single, "Single"), (Layout::Four, "4-up"), (Layout::Pair, "VR | SR")];
-            row.show(
+            row.titled("Mode").show(
                 ui,
-                "Layout",
+                &modes,
+                2,
+                |m| settings.mode == m,
+                hints::of_mode,
+                |m| execute(Command::Mode(m)),
+            );
+            let layouts = [(Layout::Single, "Single"), (Layout::Four, "4-up"), (Layout::Pair, "VR | SR")];
+            row.titled("Layout").show(
+                ui,
                 &layouts,
                 2,
                 |l| settings.layout == l,
@@ -61,13 +67,11 @@ pub(super) fn show_modes(ui: &mut Ui, state: &PanelState, width: f32, execute: &
             );
             if !settings.mode.is_flat() {
                 let is_there = |v| state.scene.is_some_and(|scene| view::is_seen_from(scene, v));
-                row.show(ui, "View from", &VIEWPOINTS, 2, is_there, hints::of_viewpoint, |v| {
-                    execute(Command::LookFrom(v))
-                });
+                row.titled("View from")
+                    .show(ui, &VIEWPOINTS, 2, is_there, hints::of_viewpoint, |v| execute(Command::LookFrom(v)));
             }
-            row.show(
+            row.titled("Drag").show(
                 ui,
-                "Drag",
                 &TOOLS,
                 2,
                 |t| state.controls.tool() == t,
@@ -76,7 +80,14 @@ pub(super) fn show_modes(ui: &mut Ui, state: &PanelState, width: f32, execute: &
             );
             if settings.mode.is_flat() && settings.mode != Mode::Orthogonal {
                 let hint = |_| "The plane that is shown and moved.";
-                row.show(ui, "Plane", &PLANES, 3, |p| settings.planes.plane == p, hint, |p| execute(Command::Plane(p)));
+                row.titled("Plane").show(
+                    ui,
+                    &PLANES,
+                    3,
+                    |p| settings.planes.plane == p,
+                    hint,
+                    |p| execute(Command::Plane(p)),
+                );
             }
             if settings.mode.is_flat() || settings.layout == Layout::Four {
                 let hint = "Moves the point where the planes cross to the middle (J; double click with Planes).";
@@ -136,20 +147,25 @@ fn undo_and_redo(ui: &mut Ui, state: &PanelState, row: &Row, execute: &mut dyn F
     });
 }
 
-/// Rows of buttons of which one is chosen.
+/// Rows of buttons of which one is chosen, under a title.
+#[derive(Clone, Copy)]
 struct Row {
     /// Width of the panel, points.
     width: f32,
     height: f32,
+    title: &'static str,
     /// The title is as large as the names of the controls.
     is_large_title: bool,
 }
 
 impl Row {
+    fn titled(self, title: &'static str) -> Row {
+        Row { title, ..self }
+    }
+
     fn show<T: Copy>(
         &self,
         ui: &mut Ui,
-        title: &str,
         all: &[(T, &str)],
         columns: usize,
         is: impl Fn(T) -> bool,
@@ -158,10 +174,10 @@ impl Row {
     ) {
         let gap = ui.spacing().item_spacing.x;
         let width = (self.width - 16.0 - gap * (columns - 1) as f32) / columns as f32;
-        names::group(ui, title, |ui| {
+        names::group(ui, self.title, |ui| {
             match self.is_large_title {
-                true => _ = ui.label(title),
-                false => heading(ui, title),
+                true => _ = ui.label(self.title),
+                false => heading(ui, self.title),
             }
             for some in all.chunks(columns) {
                 ui.horizontal(|ui| {
@@ -237,9 +253,8 @@ pub(super) fn show_controls(ui: &mut Ui, state: &PanelState, width: f32, execute
                 Colour::Map(map) => settings.post.colour_map == map,
             };
             let hint = |_| "Colours of the tissue; they stand for no flow.";
-            Row { width: width - 24.0, height: TOUCH_SIZE * 0.8, is_large_title: true }.show(
+            Row { width: width - 24.0, height: TOUCH_SIZE * 0.8, title: "Colour", is_large_title: true }.show(
                 ui,
-                "Colour",
                 colours,
                 3,
                 is,

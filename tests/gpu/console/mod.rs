@@ -7,6 +7,7 @@ mod idle;
 mod metrics;
 mod monkey;
 mod shaders;
+mod tasks;
 mod warming;
 
 use crate::common::gpu::*;
