@@ -284,7 +284,7 @@ impl Console {
         }
         let corner = self.picture_area().0;
         let Some(screen) = &mut self.screen else {
-            (self.has_new_picture, self.needs_redraw) = (false, false);
+            (self.has_new_picture, self.needs_redraw) = (false, self.panels.has_pending_input());
             return Ok(());
         };
         let presented = match self.stream.renderer().filter(|_| has_drawn) {

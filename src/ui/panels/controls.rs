@@ -5,7 +5,7 @@ use super::measures;
 use super::names::{self, Tell};
 use super::{ACCENT, BUTTON, PanelState, TEXT, TEXT_SIZE, TOUCH_SIZE, WARNING, WEAK_TEXT, heading};
 use crate::scene::{ColourMap, Layout, Mode, PlaneName, Settings, Transfer, TransferName};
-use crate::ui::command::{Command, Tool, Viewpoint};
+use crate::ui::command::{Command, Tool};
 use crate::ui::hints;
 use crate::ui::sliders::{Group, SLIDERS, Slider as Control};
 use crate::ui::view;
@@ -22,9 +22,6 @@ const TOOLS: [(Tool, &str); 5] = [
     (Tool::Clip, "Clip"),
     (Tool::Plane, "Planes"),
 ];
-
-pub(super) const VIEWPOINTS: [(Viewpoint, &str); 4] =
-    [(Viewpoint::Front, "Front"), (Viewpoint::Left, "Left"), (Viewpoint::Right, "Right"), (Viewpoint::Top, "Top")];
 
 const PLANES: [(PlaneName, &str); 3] = [(PlaneName::A, "A"), (PlaneName::B, "B"), (PlaneName::C, "C")];
 
@@ -68,7 +65,7 @@ pub(super) fn show_modes(ui: &mut Ui, state: &PanelState, width: f32, execute: &
             if !settings.mode.is_flat() {
                 let is_there = |v| state.scene.is_some_and(|scene| view::is_seen_from(scene, v));
                 row.titled("View from")
-                    .show(ui, &VIEWPOINTS, 2, is_there, hints::of_viewpoint, |v| execute(Command::LookFrom(v)));
+                    .show(ui, &names::VIEWPOINTS, 2, is_there, hints::of_viewpoint, |v| execute(Command::LookFrom(v)));
             }
             row.titled("Drag").show(
                 ui,

@@ -167,7 +167,7 @@ impl Panels {
             viewport.native_pixels_per_point = Some(self.scale);
         }
         let mut commands = Vec::new();
-        self.gets_focus = false;
+        self.gets_focus &= self.has_pending_input();
         // egui may lay out twice, to place what it sees for the first time: the inputs are in the first.
         let output = self.context.run_ui(input, |ui| {
             let from_panels = commands.len();
@@ -302,8 +302,11 @@ impl EguiInput {
         !self.events.is_empty()
     }
 
+    /// The events of the next layout: all up to a key, because egui moves the focus once a layout.
     fn take(&mut self) -> (Vec<Event>, EguiModifiers) {
-        (std::mem::take(&mut self.events), self.modifiers)
+        let is_end = |event: &Event| matches!(event, Event::Key { pressed: false, .. });
+        let count = self.events.iter().position(is_end).map_or(self.events.len(), |at| at + 1);
+        (self.events.drain(..count).collect(), self.modifiers)
     }
 }
 

@@ -3,9 +3,14 @@
 
 use super::{PanelState, picture_rect};
 use crate::scene::{Layout, PlaneName, Scene};
+use crate::ui::command::Viewpoint;
 use crate::ui::view;
 use egui::accesskit::{Action, Live, Node, Rect as Bounds, Role};
 use egui::{Color32, Context, Id, Key, Response, Stroke, StrokeKind, Ui};
+
+/// Where a rendering is seen from, as the panels call it.
+pub(super) const VIEWPOINTS: [(Viewpoint, &str); 4] =
+    [(Viewpoint::Front, "Front"), (Viewpoint::Left, "Left"), (Viewpoint::Right, "Right"), (Viewpoint::Top, "Top")];
 
 /// Changes the node of the tree that stands for a widget, while a screen reader listens.
 fn node(context: &Context, id: Id, change: impl FnOnce(&mut Node)) {
@@ -124,7 +129,7 @@ fn view_in_words(scene: &Scene) -> String {
         };
         return if scene.shows_three() { String::new() } else { format!(", plane {plane}") };
     }
-    let side = super::controls::VIEWPOINTS.iter().find(|(viewpoint, _)| view::is_seen_from(scene, *viewpoint));
+    let side = VIEWPOINTS.iter().find(|(viewpoint, _)| view::is_seen_from(scene, *viewpoint));
     match side {
         Some((_, side)) => format!(" from the {}", side.to_lowercase()),
         None => {

@@ -4,6 +4,7 @@ mod budget;
 mod failures;
 mod gestures;
 mod idle;
+mod keyboard;
 mod metrics;
 mod monkey;
 mod shaders;
