@@ -122,6 +122,8 @@ pub enum Command {
     ToggleTimes,
     /// Shows or hides sliders and buttons.
     TogglePanels,
+    /// Gives the keyboard to the panels, or back to the picture.
+    FocusPanels,
     ToggleFullScreen,
     /// Closes what is open, else leaves full screen, else leaves the program.
     Back,
@@ -329,6 +331,7 @@ pub const KEY_BINDINGS: &[Binding] = &[
     on(Function(1), "this help", Command::ToggleHelp),
     on(Function(2), "times of the passes", Command::ToggleTimes),
     on(Function(3), "sliders", Command::TogglePanels),
+    control(Key::Tab, "keyboard to the buttons and sliders, and back", Command::FocusPanels),
     on(Function(11), "full screen", Command::ToggleFullScreen),
     on(Key::Escape, "close what is open, leave full screen, quit", Command::Back),
     on(Char('q'), "quit", Command::Exit),

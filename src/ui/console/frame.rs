@@ -65,6 +65,9 @@ impl Console {
                         self.saved_volume = self.saving_volume.take().or(self.saved_volume);
                         self.request.exit |= std::mem::take(&mut self.leaves_when_saved);
                     }
+                    if file.extension().is_some_and(|end| end == "toml") {
+                        self.opening.remember(&file);
+                    }
                     self.notify(&format!("Saved {}", file.display()), false);
                 }
                 Err(fault) => {
@@ -281,7 +284,7 @@ impl Console {
         }
         let corner = self.picture_area().0;
         let Some(screen) = &mut self.screen else {
-            (self.has_new_picture, self.needs_redraw) = (false, false);
+            (self.has_new_picture, self.needs_redraw) = (false, self.panels.has_pending_input());
             return Ok(());
         };
         let presented = match self.stream.renderer().filter(|_| has_drawn) {
@@ -374,6 +377,7 @@ impl Console {
         let time = now.saturating_duration_since(self.started).as_secs_f64();
         let output = self.panels.lay_out(&state, self.size, time);
         self.repaint_at = (output.repaint_after < Duration::from_secs(3600)).then(|| now + output.repaint_after);
+        self.tree = output.tree.or(self.tree.take());
         for command in output.commands {
             self.execute(&command, now);
         }

@@ -18,6 +18,7 @@ use super::export::Exporter;
 use super::frame_budget::{self, Pace, Quality, Rung};
 use super::gestures::Gestures;
 use super::input::{Input, Key};
+use super::panels::accesskit::{ActionRequest, TreeUpdate};
 use super::panels::{self, Note, Panels};
 use super::picking::Viewport;
 use super::source_supervisor::{OpenSource, SourceSupervisor};
@@ -146,6 +147,8 @@ pub struct Console {
     stall_shown_until: Option<Instant>,
     /// Since when there is no picture to show.
     blank_since: Option<Instant>,
+    /// What a screen reader says of the panels, since they were laid out last.
+    tree: Option<TreeUpdate>,
     /// When the panels want to be drawn again.
     repaint_at: Option<Instant>,
     /// There was no surface to present to; do not try again before this time.
@@ -275,6 +278,7 @@ impl Console {
             device_faults: 0,
             stall_shown_until: None,
             blank_since: None,
+            tree: None,
             repaint_at: None,
             present_retry_at: None,
             startup_fault: options.startup_fault.map(|fault| (fault, now + FAULT_CHECK_INTERVAL)),
@@ -375,7 +379,8 @@ impl Console {
             self.request.exit = true;
         }
         let is_search = self.search_help(input);
-        let typed = self.typed(input);
+        let is_of_panels = self.key_of_panels(input);
+        let typed = if is_of_panels { Some(Vec::new()) } else { self.typed(input) };
         if typed.is_some() {
             // The keys go on to be held, and give nothing else.
             self.keys.input(input);
@@ -403,6 +408,35 @@ impl Console {
         for command in self.gestures.input(input, &on, self.controls.tool(), self.keys.modifiers()) {
             self.execute(&command, now);
         }
+    }
+
+    /// Takes a key for the control that has the keyboard. True if it is none of the view's own.
+    fn key_of_panels(&mut self, input: &Input) -> bool {
+        let Input::Key { key, pressed: true } = *input else { return false };
+        let has_keys_of_its_own = self.asks_to_leave || self.controls.typing().is_some();
+        self.fixed.overlay && !has_keys_of_its_own && self.panels.key(key, self.keys.modifiers())
+    }
+
+    /// Describes the panels to a screen reader from now on, or no longer.
+    pub fn describe(&mut self, is_described: bool) {
+        self.panels.describe(is_described && self.fixed.overlay);
+        (self.tree, self.needs_redraw) = (None, true);
+    }
+
+    pub fn is_described(&self) -> bool {
+        self.panels.is_described()
+    }
+
+    /// What a screen reader says of the panels, if they were laid out since the last call.
+    pub fn take_tree(&mut self) -> Option<TreeUpdate> {
+        self.tree.take()
+    }
+
+    /// Does what a screen reader asks of a control.
+    pub fn act(&mut self, request: ActionRequest) {
+        self.user_acts(Instant::now());
+        self.panels.act(request);
+        self.needs_redraw = true;
     }
 
     /// Takes a key for the search of the help. True if it is none of the view's own.
@@ -539,6 +573,11 @@ impl Console {
             Command::TogglePanels => {
                 self.shows_panels = !self.shows_panels && self.fixed.overlay;
                 self.resize_picture();
+            }
+            Command::FocusPanels if self.fixed.overlay => {
+                self.shows_panels = true;
+                self.resize_picture();
+                self.panels.toggle_focus();
             }
             Command::ToggleFullScreen => self.request.toggle_full_screen |= !self.fixed.is_kiosk,
             Command::PickSurface(at) => self.pick_surface(at),

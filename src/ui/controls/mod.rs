@@ -205,6 +205,7 @@ impl Controls {
             | Command::SavesBar(_)
             | Command::ToggleTimes
             | Command::TogglePanels
+            | Command::FocusPanels
             | Command::ToggleFullScreen
             | Command::Back
             | Command::Exit

@@ -2,13 +2,15 @@
 //! every examination needs are in front; the others are below them, by stage.
 
 use super::measures;
+use super::names::{self, Tell};
 use super::{ACCENT, BUTTON, PanelState, TEXT, TEXT_SIZE, TOUCH_SIZE, WARNING, WEAK_TEXT, heading};
 use crate::scene::{ColourMap, Layout, Mode, PlaneName, Settings, Transfer, TransferName};
 use crate::ui::cine_player::{CineState, SPEEDS};
-use crate::ui::command::{Command, Tool, Viewpoint};
+use crate::ui::command::{Command, Tool};
 use crate::ui::hints;
 use crate::ui::sliders::{Group, SLIDERS, Slider as Control};
 use crate::ui::view;
+use egui::accesskit::Role;
 use egui::{
     Align, Button, CollapsingHeader, Color32, FontId, Label, Panel, Rect, RichText, ScrollArea, Sense, Slider, Stroke,
     StrokeKind, Ui, WidgetInfo, WidgetType, pos2, vec2,
@@ -21,9 +23,6 @@ const TOOLS: [(Tool, &str); 5] = [
     (Tool::Clip, "Clip"),
     (Tool::Plane, "Planes"),
 ];
-
-const VIEWPOINTS: [(Viewpoint, &str); 4] =
-    [(Viewpoint::Front, "Front"), (Viewpoint::Left, "Left"), (Viewpoint::Right, "Right"), (Viewpoint::Top, "Top")];
 
 const PLANES: [(PlaneName, &str); 3] = [(PlaneName::A, "A"), (PlaneName::B, "B"), (PlaneName::C, "C")];
 
@@ -39,43 +38,69 @@ const FRONT: [(&str, &[&str]); 6] = [
 
 pub(super) fn show_modes(ui: &mut Ui, state: &PanelState, width: f32, execute: &mut dyn FnMut(Command)) {
     Panel::left("rail").exact_size(width).resizable(false).show_separator_line(false).show(ui, |ui| {
+        names::name(ui, Role::Toolbar, "Modes and tools");
         // A low window scrolls.
         ScrollArea::vertical().auto_shrink(false).show(ui, |ui| {
             let settings = state.controls.settings();
-            let row = Row { width, height: TOUCH_SIZE * 0.92 };
+            let row = Row { width, height: TOUCH_SIZE * 0.92, title: "", is_large_title: false };
             ui.add_space(6.0);
             undo_and_redo(ui, state, &row, execute);
-            heading(ui, "Mode");
             let modes = Mode::ALL.map(|mode| (mode, mode.title()));
-            row.show(ui, &modes, 2, |m| settings.mode == m, hints::of_mode, |m| execute(Command::Mode(m)));
-            heading(ui, "Layout");
+            row.titled("Mode").show(
+                ui,
+                &modes,
+                2,
+                |m| settings.mode == m,
+                hints::of_mode,
+                |m| execute(Command::Mode(m)),
+            );
             let layouts = [(Layout::Single, "Single"), (Layout::Four, "4-up"), (Layout::Pair, "VR | SR")];
-            row.show(ui, &layouts, 2, |l| settings.layout == l, hints::of_layout, |l| execute(Command::Layout(l)));
+            row.titled("Layout").show(
+                ui,
+                &layouts,
+                2,
+                |l| settings.layout == l,
+                hints::of_layout,
+                |l| execute(Command::Layout(l)),
+            );
             if !settings.mode.is_flat() {
-                heading(ui, "View from");
                 let is_there = |v| state.scene.is_some_and(|scene| view::is_seen_from(scene, v));
-                row.show(ui, &VIEWPOINTS, 2, is_there, hints::of_viewpoint, |v| execute(Command::LookFrom(v)));
+                row.titled("View from")
+                    .show(ui, &names::VIEWPOINTS, 2, is_there, hints::of_viewpoint, |v| execute(Command::LookFrom(v)));
             }
-            heading(ui, "Drag");
-            row.show(ui, &TOOLS, 2, |t| state.controls.tool() == t, hints::of_tool, |t| execute(Command::Tool(t)));
+            row.titled("Drag").show(
+                ui,
+                &TOOLS,
+                2,
+                |t| state.controls.tool() == t,
+                hints::of_tool,
+                |t| execute(Command::Tool(t)),
+            );
             if settings.mode.is_flat() && settings.mode != Mode::Orthogonal {
-                heading(ui, "Plane");
                 let hint = |_| "The plane that is shown and moved.";
-                row.show(ui, &PLANES, 3, |p| settings.planes.plane == p, hint, |p| execute(Command::Plane(p)));
+                row.titled("Plane").show(
+                    ui,
+                    &PLANES,
+                    3,
+                    |p| settings.planes.plane == p,
+                    hint,
+                    |p| execute(Command::Plane(p)),
+                );
             }
             if settings.mode.is_flat() || settings.layout == Layout::Four {
                 let hint = "Moves the point where the planes cross to the middle (J; double click with Planes).";
                 let button = Button::new("Recentre planes").min_size(vec2(width - 16.0, TOUCH_SIZE * 0.75));
-                if ui.add(button).on_hover_text(hint).clicked() {
+                if ui.add(button).tell(hint).clicked() {
                     execute(Command::Recentre);
                 }
             }
-            heading(ui, "Measure");
-            measures::show_tools(ui, state, width - 16.0, execute);
+            names::group(ui, "Measure", |ui| {
+                heading(ui, "Measure");
+                measures::show_tools(ui, state, width - 16.0, execute);
+            });
             if !state.has_column {
                 measures::show_results(ui, state, width - 24.0, execute);
             }
-            heading(ui, "Workspace");
             let files = [
                 (
                     Command::OpenFiles,
@@ -85,18 +110,21 @@ pub(super) fn show_modes(ui: &mut Ui, state: &PanelState, width: f32, execute: &
                 (Command::SaveWorkspace, "Save", "Saves settings, recording and measurements together (Ctrl+S)."),
             ];
             let half = vec2((width - 16.0 - ui.spacing().item_spacing.x) / 2.0, TOUCH_SIZE * 0.75);
-            ui.horizontal(|ui| {
-                for (command, name, hint) in files {
-                    if ui.add(Button::new(name).min_size(half)).on_hover_text(hint).clicked() {
-                        execute(command);
-                    }
-                }
-            });
             let hint = "Exports the volume that is shown: as a volume, a surface to print, or a turntable (Ctrl+E).";
             let whole = vec2(width - 16.0, TOUCH_SIZE * 0.75);
-            if ui.add(Button::new("Export").min_size(whole)).on_hover_text(hint).clicked() {
-                execute(Command::Exports);
-            }
+            names::group(ui, "Workspace", |ui| {
+                heading(ui, "Workspace");
+                ui.horizontal(|ui| {
+                    for (command, name, hint) in files {
+                        if ui.add(Button::new(name).min_size(half)).tell(hint).clicked() {
+                            execute(command);
+                        }
+                    }
+                });
+                if ui.add(Button::new("Export").min_size(whole)).tell(hint).clicked() {
+                    execute(Command::Exports);
+                }
+            });
         });
     });
 }
@@ -110,21 +138,29 @@ fn undo_and_redo(ui: &mut Ui, state: &PanelState, row: &Row, execute: &mut dyn F
             (Command::Redo, "Redo", can_redo, "Does it again (Ctrl+Y)."),
         ] {
             let button = ui.add_enabled(is_there, Button::new(name).min_size(size));
-            if button.on_hover_text(hint).on_disabled_hover_text(hint).clicked() {
+            if button.tell(hint).on_disabled_hover_text(hint).clicked() {
                 execute(command);
             }
         }
     });
 }
 
-/// Rows of buttons of which one is chosen.
+/// Rows of buttons of which one is chosen, under a title.
+#[derive(Clone, Copy)]
 struct Row {
     /// Width of the panel, points.
     width: f32,
     height: f32,
+    title: &'static str,
+    /// The title is as large as the names of the controls.
+    is_large_title: bool,
 }
 
 impl Row {
+    fn titled(self, title: &'static str) -> Row {
+        Row { title, ..self }
+    }
+
     fn show<T: Copy>(
         &self,
         ui: &mut Ui,
@@ -136,16 +172,22 @@ impl Row {
     ) {
         let gap = ui.spacing().item_spacing.x;
         let width = (self.width - 16.0 - gap * (columns - 1) as f32) / columns as f32;
-        for some in all.chunks(columns) {
-            ui.horizontal(|ui| {
-                for (value, name) in some {
-                    let button = Button::selectable(is(*value), *name).frame_when_inactive(true);
-                    if ui.add(button.min_size(vec2(width, self.height))).on_hover_text(hint(*value)).clicked() {
-                        select(*value);
+        names::group(ui, self.title, |ui| {
+            match self.is_large_title {
+                true => _ = ui.label(self.title),
+                false => heading(ui, self.title),
+            }
+            for some in all.chunks(columns) {
+                ui.horizontal(|ui| {
+                    for (value, name) in some {
+                        let button = Button::selectable(is(*value), *name).frame_when_inactive(true);
+                        if ui.add(button.min_size(vec2(width, self.height))).tell(hint(*value)).clicked() {
+                            select(*value);
+                        }
                     }
-                }
-            });
-        }
+                });
+            }
+        });
     }
 }
 
@@ -188,6 +230,7 @@ pub(super) fn front(sliders: &[&str], settings: &Settings) -> Option<usize> {
 pub(super) fn show_controls(ui: &mut Ui, state: &PanelState, width: f32, execute: &mut dyn FnMut(Command)) {
     let settings = state.controls.settings();
     Panel::right("column").exact_size(width).resizable(false).show_separator_line(false).show(ui, |ui| {
+        names::name(ui, Role::Group, "Controls");
         ScrollArea::vertical().auto_shrink(false).show(ui, |ui| {
             // Leaves room for the scroll bar, which covers the edge.
             ui.set_max_width(width - 32.0);
@@ -203,13 +246,12 @@ pub(super) fn show_controls(ui: &mut Ui, state: &PanelState, width: f32, execute
             }
             let colours = colours(settings);
             ui.add_space(4.0);
-            ui.label("Colour");
             let is = |colour| match colour {
                 Colour::Transfer(name) => settings.volume.transfer == Transfer::Named(name),
                 Colour::Map(map) => settings.post.colour_map == map,
             };
             let hint = |_| "Colours of the tissue; they stand for no flow.";
-            Row { width: width - 24.0, height: TOUCH_SIZE * 0.8 }.show(
+            Row { width: width - 24.0, height: TOUCH_SIZE * 0.8, title: "Colour", is_large_title: true }.show(
                 ui,
                 colours,
                 3,
@@ -249,11 +291,14 @@ pub(super) fn show_controls(ui: &mut Ui, state: &PanelState, width: f32, execute
                 if there.is_empty() {
                     continue;
                 }
-                CollapsingHeader::new(name).id_salt(name).show_unindented(ui, |ui| {
+                let shown = CollapsingHeader::new(name).id_salt(name).show_unindented(ui, |ui| {
+                    names::name(ui, Role::Group, name);
                     for number in there {
                         slider(ui, state, number, SLIDERS[number].name, false, execute);
                     }
                 });
+                // A control in front may have the name of a stage.
+                shown.header_response.expanded(shown.openness > 0.5).named(&format!("Advanced: {name}"));
             }
         });
     });
@@ -293,26 +338,28 @@ fn slider(
     }
     let mut value = before.clamp(low, high.max(low));
     let digits = (-slider.step.log10().floor()).clamp(0.0, 3.0) as usize;
+    let space = if slider.unit.is_empty() || slider.unit == "°" { "" } else { " " };
+    let shown = format!("{before:.digits$}{space}{}", slider.unit);
     ui.horizontal(|ui| {
         let text = RichText::new(name);
         ui.label(if is_large { text.strong() } else { text });
         ui.with_layout(egui::Layout::right_to_left(Align::Center), |ui| {
-            let space = if slider.unit.is_empty() || slider.unit == "°" { "" } else { " " };
-            ui.label(RichText::new(format!("{before:.digits$}{space}{}", slider.unit)).color(ACCENT));
+            ui.label(RichText::new(&shown).color(ACCENT));
         });
     });
     ui.spacing_mut().slider_width = ui.available_width();
     // Tall enough for a finger, although the rail is thin.
     ui.spacing_mut().interact_size.y = TOUCH_SIZE * if is_large { 0.62 } else { 0.5 };
     let response = ui.add(Slider::new(&mut value, low..=high.max(low)).show_value(false).step_by(slider.step));
-    let response = response.on_hover_text(format!("{hint} Double click: as at the start."));
+    let response = response.tell(&format!("{hint} Double click: as at the start.")).named(name).with_value(&shown);
     if response.double_clicked() {
         execute(Command::ResetSlider(number));
         return;
     }
     // egui also reports a change when it rounds a value to the step, without any input.
     let is_held = response.dragged() || response.clicked() || response.is_pointer_button_down_on();
-    if is_held && value != before {
+    let is_asked = names::asks_for_value(ui, &response);
+    if (is_held || is_asked) && value != before {
         execute(Command::SetSlider(number, value));
     }
 }
@@ -320,11 +367,11 @@ fn slider(
 /// A switch with its name; the whole row reacts. True if the user changed it.
 fn switch(ui: &mut Ui, on: &mut bool, name: &str, hint: &str) -> bool {
     let (area, response) = ui.allocate_exact_size(vec2(ui.available_width(), TOUCH_SIZE * 0.75), Sense::click());
-    let response = response.on_hover_text(hint);
     if response.clicked() {
         *on = !*on;
     }
     response.widget_info(|| WidgetInfo::selected(WidgetType::Checkbox, true, *on, name));
+    let response = response.tell(hint).with_role(Role::Switch);
     let (width, height) = (44.0, 24.0);
     let right = pos2(area.right() - width, area.center().y - height / 2.0);
     let track = Rect::from_min_size(right, vec2(width, height));
@@ -346,6 +393,7 @@ fn switch(ui: &mut Ui, on: &mut bool, name: &str, hint: &str) -> bool {
 
 pub(super) fn show_cine_bar(ui: &mut Ui, state: &PanelState, height: f32, execute: &mut dyn FnMut(Command)) {
     Panel::bottom("bar").exact_size(height).resizable(false).show_separator_line(false).show(ui, |ui| {
+        names::name(ui, Role::Toolbar, "Cine loop");
         let touch = (height - 12.0).min(TOUCH_SIZE);
         ui.horizontal_centered(|ui| {
             let room = ui.available_width();
@@ -357,7 +405,8 @@ pub(super) fn show_cine_bar(ui: &mut Ui, state: &PanelState, height: f32, execut
             let text = RichText::new(label).color(Color32::WHITE).strong();
             let width = if is_narrow { 84.0 } else { 120.0 };
             let hint = "Keeps this volume on the screen (Space).";
-            if ui.add(Button::new(text).fill(fill).min_size(vec2(width, touch))).on_hover_text(hint).clicked() {
+            let freeze = Button::new(text).fill(fill).min_size(vec2(width, touch));
+            if ui.add(freeze).tell(hint).named(if state.is_frozen { "Unfreeze" } else { "Freeze" }).clicked() {
                 execute(Command::Freeze);
             }
             let mut left = room - width - ui.spacing().item_spacing.x;
@@ -403,7 +452,8 @@ pub(super) fn show_cine_bar(ui: &mut Ui, state: &PanelState, height: f32, execut
                     _ => 5,
                 });
                 for (label, width, command, hint) in shown {
-                    if ui.add(Button::new(label).min_size(vec2(width, touch))).on_hover_text(hint).clicked() {
+                    let name = if label == "?" { "Help" } else { label };
+                    if ui.add(Button::new(label).min_size(vec2(width, touch))).tell(hint).named(name).clicked() {
                         execute(command);
                     }
                 }
@@ -422,8 +472,11 @@ fn cine(ui: &mut Ui, state: &PanelState, room: f32, touch: f32, execute: &mut dy
         ui.label(RichText::new("no volumes yet").color(WEAK_TEXT));
         return;
     }
+    // The name of a sign is what its hint says before the keys.
     let mut button = |ui: &mut Ui, label: &str, width: f32, hint: &str, command: Command| {
-        if ui.add(Button::new(label).min_size(vec2(width, touch))).on_hover_text(hint).clicked() {
+        let name = hint.split([':', ';', '(']).next().unwrap_or(label).trim();
+        let name = if label.chars().all(|c| c.is_ascii_punctuation()) { name } else { label };
+        if ui.add(Button::new(label).min_size(vec2(width, touch))).tell(hint).named(name).clicked() {
             execute(command);
         }
     };
@@ -448,7 +501,7 @@ fn cine(ui: &mut Ui, state: &PanelState, room: f32, touch: f32, execute: &mut dy
             button(ui, "[", 36.0, "The loop begins with this volume (Shift+Home).", Command::MarkCine(false));
             button(ui, "]", 36.0, "The loop ends with this volume (Shift+End).", Command::MarkCine(true));
             let whole = Button::new("All").min_size(vec2(44.0, touch));
-            let whole = ui.add_enabled(cine.is_trimmed, whole).on_hover_text("The loop is all volumes (Ctrl+Home).");
+            let whole = ui.add_enabled(cine.is_trimmed, whole).tell("The loop is all volumes (Ctrl+Home).");
             if whole.clicked() {
                 execute(Command::WholeCine);
             }
@@ -464,9 +517,10 @@ fn cine(ui: &mut Ui, state: &PanelState, room: f32, touch: f32, execute: &mut dy
             let y = slider.rect.bottom() - 3.0;
             ui.painter().hline(low - 3.0..=high + 3.0, y, Stroke::new(3.0, ACCENT));
         }
-        let slider = slider.on_hover_text("The volumes of the loop, oldest first.");
+        let slider = slider.tell("The volumes of the loop, oldest first.").named("Volume of the loop");
         let is_held = slider.dragged() || slider.clicked() || slider.is_pointer_button_down_on();
-        if is_held && cine.shown != Some(at - 1) {
+        let is_asked = names::asks_for_value(ui, &slider);
+        if (is_held || is_asked) && cine.shown != Some(at - 1) {
             execute(Command::SeekCine(at - 1));
         }
         ui.add(Label::new(text).extend());

@@ -3,6 +3,7 @@
 mod budget;
 mod gestures;
 mod measuring;
+mod screen_reader;
 mod sequences;
 
 use super::command::{Command, Face, Tool};
