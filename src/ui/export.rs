@@ -23,6 +23,8 @@ pub(super) struct Exporter {
     pending: usize,
     number: u32,
     wake: Wake,
+    /// The threads that save anything else than an export.
+    threads: Vec<JoinHandle<()>>,
     /// The export that was begun last: its name and its thread.
     export: Option<(&'static str, Arc<Export>, JoinHandle<()>)>,
 }
@@ -31,7 +33,7 @@ impl Exporter {
     /// `folder`: where files are saved; it is created with the first one. `wake` is called when a file is done.
     pub(super) fn new(folder: PathBuf, wake: Wake) -> Exporter {
         let (sender, receiver) = channel();
-        Exporter { folder, sender, receiver, pending: 0, number: 0, wake, export: None }
+        Exporter { folder, sender, receiver, pending: 0, number: 0, wake, threads: Vec::new(), export: None }
     }
 
     /// The next file that was saved since the last call, or why it was not.
@@ -49,7 +51,9 @@ impl Exporter {
         &mut self,
         make: impl FnOnce() -> Result<Picture, String> + Send + 'static,
     ) -> Result<(), String> {
-        self.save("png", move |file| make()?.save(file)).map(|_| ())
+        let thread = self.save("png", move |file| make()?.save(file))?;
+        self.keep(thread);
+        Ok(())
     }
 
     /// Saves a text under a name with this ending.
@@ -57,7 +61,9 @@ impl Exporter {
     /// # Errors
     /// As for [`Exporter::picture`].
     pub(super) fn text(&mut self, ending: &'static str, text: String) -> Result<(), String> {
-        self.save(ending, move |file| files::replace(file, text.as_bytes())).map(|_| ())
+        let thread = self.save(ending, move |file| files::replace(file, text.as_bytes()))?;
+        self.keep(thread);
+        Ok(())
     }
 
     /// The folder of saved files.
@@ -70,7 +76,9 @@ impl Exporter {
     /// # Errors
     /// As for [`Exporter::picture`].
     pub(super) fn volumes(&mut self, header: Header, volumes: Vec<CineVolume>) -> Result<(), String> {
-        self.save("frames", move |file| write_frames(file, header, &volumes)).map(|_| ())
+        let thread = self.save("frames", move |file| write_frames(file, header, &volumes))?;
+        self.keep(thread);
+        Ok(())
     }
 
     /// Exports a volume. One export runs at a time.
@@ -106,6 +114,12 @@ impl Exporter {
         }
     }
 
+    /// Waits for this thread before the view ends.
+    fn keep(&mut self, thread: JoinHandle<()>) {
+        self.threads.retain(|thread| !thread.is_finished());
+        self.threads.push(thread);
+    }
+
     fn save(
         &mut self,
         extension: &'static str,
@@ -133,10 +147,13 @@ impl Exporter {
     }
 }
 
-/// Nothing of an export stays when the view ends.
+/// When the view ends, nothing of an export stays, and what is being saved is written to its end.
 impl Drop for Exporter {
     fn drop(&mut self) {
         self.cancel_export();
+        for thread in self.threads.drain(..) {
+            let _ = thread.join();
+        }
         if let Some((.., thread)) = self.export.take() {
             let _ = thread.join();
         }
@@ -190,6 +207,25 @@ mod tests {
         std::fs::create_dir_all(&folder).expect("folder");
         std::fs::write(folder.join("echolume-x-1.png"), "").expect("file");
         assert_eq!(unused_name(&folder, "x", 1, "png"), folder.join("echolume-x-2.png"));
+        std::fs::remove_dir_all(&folder).expect("folder");
+    }
+
+    #[test]
+    fn what_is_being_saved_is_whole_when_the_view_has_ended() {
+        let folder = std::env::temp_dir().join(format!("echolume-ended-{}", std::process::id()));
+        let picture = Picture { width: 1, height: 1, rgba: vec![1, 2, 3, 255] };
+        let same = picture.clone();
+        let mut exporter = Exporter::new(folder.clone(), Arc::new(|| ()));
+        exporter
+            .picture(move || {
+                std::thread::sleep(Duration::from_millis(200));
+                Ok(same)
+            })
+            .expect("thread");
+        drop(exporter);
+        let files: Vec<_> = std::fs::read_dir(&folder).expect("folder").flatten().map(|file| file.path()).collect();
+        assert_eq!(files.len(), 1, "{files:?}");
+        assert_eq!(Picture::load(&files[0]).expect("picture"), picture);
         std::fs::remove_dir_all(&folder).expect("folder");
     }
 
