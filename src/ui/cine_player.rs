@@ -7,7 +7,8 @@ use std::time::{Duration, Instant};
 
 /// The speeds, as multiples of that of the acquisition.
 pub(super) const SPEEDS: [f64; 7] = [0.1, 0.25, 0.5, 1.0, 2.0, 4.0, 8.0];
-const NORMAL: usize = 3;
+/// The index of 1 in them.
+const NORMAL: i32 = 3;
 /// Time from a volume to the next where their time stamps do not say it, s.
 const UNKNOWN_INTERVAL: f64 = 0.2;
 /// Intervals that time stamps can state, s. Longer ones are pauses of the acquisition.
@@ -18,21 +19,12 @@ const INTERVALS: RangeInclusive<f64> = 1e-3..=5.0;
 pub(super) struct CinePlayer {
     /// When the next volume is due, while the loop plays.
     next: Option<Instant>,
-    speed: Speed,
+    /// Steps along [`SPEEDS`] from the speed of the acquisition.
+    speed: i32,
     goes_back_and_forth: bool,
     is_backwards: bool,
     /// Numbers of the first and the last volume that are played. The loop may lose volumes meanwhile.
     marks: [Option<u32>; 2],
-}
-
-/// An index in [`SPEEDS`].
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-struct Speed(usize);
-
-impl Default for Speed {
-    fn default() -> Speed {
-        Speed(NORMAL)
-    }
 }
 
 /// What the panel shows of a loop.
@@ -78,8 +70,11 @@ impl CinePlayer {
 
     /// Moves so many steps along [`SPEEDS`].
     pub(super) fn step_speed(&mut self, by: i32) {
-        let last = SPEEDS.len() as i64 - 1;
-        self.speed = Speed((self.speed.0 as i64 + i64::from(by)).clamp(0, last) as usize);
+        self.speed = self.speed.saturating_add(by).clamp(-NORMAL, SPEEDS.len() as i32 - 1 - NORMAL);
+    }
+
+    fn speed(&self) -> f64 {
+        SPEEDS[(NORMAL + self.speed) as usize]
     }
 
     pub(super) fn set_back_and_forth(&mut self, on: bool) {
@@ -152,7 +147,7 @@ impl CinePlayer {
         // The last lasts as long as the one before it: nothing follows it.
         let from = if self.is_backwards { index.saturating_sub(1) } else { index };
         let from = from.clamp(*range.start(), range.end().saturating_sub(1));
-        let seconds = interval(volumes, from).unwrap_or(UNKNOWN_INTERVAL) / SPEEDS[self.speed.0];
+        let seconds = interval(volumes, from).unwrap_or(UNKNOWN_INTERVAL) / self.speed();
         // Time that was lost is not caught up.
         self.next = Some((due + Duration::from_secs_f64(seconds)).max(now));
         Some(index)
@@ -161,28 +156,26 @@ impl CinePlayer {
     pub(super) fn state(&self, volumes: &VecDeque<CineVolume>, shown: Option<usize>) -> CineState {
         let range = self.range(volumes);
         let since = |index: usize| Some(begins(volumes.get(index)?)? - begins(volumes.front()?)?);
-        let intervals: Vec<f64> = range.clone().filter_map(|index| interval(volumes, index)).collect();
-        let steps = range.end() - range.start();
         // A rate that some of the volumes do not state would be a guess.
-        let is_known = steps > 0 && (*range.start()..*range.end()).all(|index| interval(volumes, index).is_some());
-        let seconds: f64 = intervals.iter().take(steps).sum();
+        let intervals: Option<Vec<f64>> =
+            (*range.start()..*range.end()).map(|index| interval(volumes, index)).collect();
+        let intervals = intervals.filter(|intervals| !intervals.is_empty());
         CineState {
             count: volumes.len(),
             shown,
             is_trimmed: range.clone().count() < volumes.len(),
             range,
             is_playing: self.is_playing(),
-            speed: SPEEDS[self.speed.0],
+            speed: self.speed(),
             goes_back_and_forth: self.goes_back_and_forth,
             seconds: shown.and_then(since).filter(|s| s.is_finite() && *s >= 0.0),
-            rate: is_known.then(|| steps as f64 / seconds),
+            rate: intervals.map(|intervals| intervals.len() as f64 / intervals.iter().sum::<f64>()),
         }
     }
 
     /// Volumes a second as they are played.
     pub(super) fn played_rate(&self, volumes: &VecDeque<CineVolume>) -> f64 {
-        let rate = self.state(volumes, None).rate.unwrap_or(1.0 / UNKNOWN_INTERVAL);
-        rate * SPEEDS[self.speed.0]
+        self.state(volumes, None).rate.unwrap_or(1.0 / UNKNOWN_INTERVAL) * self.speed()
     }
 }
 
@@ -206,7 +199,7 @@ mod tests {
 
     fn volume(number: u32, time: Option<f64>) -> CineVolume {
         let frame = |k: usize| Frame { time: time.map(|t| t + 0.01 * k as f64), ..Frame::of_slice(number, k, vec![0]) };
-        // Swept backwards: the first frame is the earliest no more.
+        // Swept backwards: in order of the slices, its first frame came last.
         let frames = [frame(1), frame(0)].map(Arc::new).to_vec();
         let mut volume = CineVolume::default();
         (volume.volume, volume.frames) = (number, frames);

@@ -15,11 +15,18 @@ use std::time::{SystemTime, UNIX_EPOCH};
 /// Largest number of files that are being saved: a key that is held must not fill the disk.
 const MAX_PENDING: usize = 4;
 
+/// What became of a file.
+pub(super) struct Saved {
+    pub(super) file: Result<PathBuf, String>,
+    /// Of a complete cine loop, the number of its newest volume.
+    pub(super) complete_to: Option<u32>,
+}
+
 /// Saves files in the background.
 pub(super) struct Exporter {
     folder: PathBuf,
-    sender: Sender<Result<PathBuf, String>>,
-    receiver: Receiver<Result<PathBuf, String>>,
+    sender: Sender<Saved>,
+    receiver: Receiver<Saved>,
     pending: usize,
     number: u32,
     wake: Wake,
@@ -37,7 +44,7 @@ impl Exporter {
     }
 
     /// The next file that was saved since the last call, or why it was not.
-    pub(super) fn poll(&mut self) -> Option<Result<PathBuf, String>> {
+    pub(super) fn poll(&mut self) -> Option<Saved> {
         let done = self.receiver.try_recv().ok()?;
         self.pending = self.pending.saturating_sub(1);
         Some(done)
@@ -51,9 +58,7 @@ impl Exporter {
         &mut self,
         make: impl FnOnce() -> Result<Picture, String> + Send + 'static,
     ) -> Result<(), String> {
-        let thread = self.save("png", move |file| make()?.save(file))?;
-        self.keep(thread);
-        Ok(())
+        self.keep(|own| own.save("png", None, move |file| make()?.save(file)))
     }
 
     /// Saves a text under a name with this ending.
@@ -61,9 +66,7 @@ impl Exporter {
     /// # Errors
     /// As for [`Exporter::picture`].
     pub(super) fn text(&mut self, ending: &'static str, text: String) -> Result<(), String> {
-        let thread = self.save(ending, move |file| files::replace(file, text.as_bytes()))?;
-        self.keep(thread);
-        Ok(())
+        self.keep(|own| own.save(ending, None, move |file| files::replace(file, text.as_bytes())))
     }
 
     /// The folder of saved files.
@@ -71,14 +74,17 @@ impl Exporter {
         &self.folder
     }
 
-    /// Saves volumes as a recording of frames.
+    /// Saves volumes as a recording of frames. `complete_to`: as [`Saved::complete_to`].
     ///
     /// # Errors
     /// As for [`Exporter::picture`].
-    pub(super) fn volumes(&mut self, header: Header, volumes: Vec<CineVolume>) -> Result<(), String> {
-        let thread = self.save("frames", move |file| write_frames(file, header, &volumes))?;
-        self.keep(thread);
-        Ok(())
+    pub(super) fn volumes(
+        &mut self,
+        header: Header,
+        volumes: Vec<CineVolume>,
+        complete_to: Option<u32>,
+    ) -> Result<(), String> {
+        self.keep(|own| own.save("frames", complete_to, move |file| write_frames(file, header, &volumes)))
     }
 
     /// Exports a volume. One export runs at a time.
@@ -91,7 +97,7 @@ impl Exporter {
         }
         let export = Arc::new(Export::default());
         let (own, name) = (export.clone(), job.format.name);
-        let thread = self.save(job.format.ending, move |file| {
+        let thread = self.save(job.format.ending, None, move |file| {
             let done = own.run(&job, file);
             own.finish();
             done
@@ -114,15 +120,18 @@ impl Exporter {
         }
     }
 
-    /// Waits for this thread before the view ends.
-    fn keep(&mut self, thread: JoinHandle<()>) {
+    /// Begins to save. The view waits for it before it ends.
+    fn keep(&mut self, begin: impl FnOnce(&mut Exporter) -> Result<JoinHandle<()>, String>) -> Result<(), String> {
         self.threads.retain(|thread| !thread.is_finished());
+        let thread = begin(self)?;
         self.threads.push(thread);
+        Ok(())
     }
 
     fn save(
         &mut self,
         extension: &'static str,
+        complete_to: Option<u32>,
         write: impl FnOnce(&Path) -> Result<(), String> + Send + 'static,
     ) -> Result<JoinHandle<()>, String> {
         if self.pending >= MAX_PENDING {
@@ -133,11 +142,11 @@ impl Exporter {
         let (sender, wake) = (self.sender.clone(), self.wake.clone());
         let work = move || {
             let cannot = |e| format!("{}: cannot be created: {e}", folder.display());
-            let saved = std::fs::create_dir_all(&folder).map_err(cannot).and_then(|()| {
+            let file = std::fs::create_dir_all(&folder).map_err(cannot).and_then(|()| {
                 let file = unused_name(&folder, &timestamp(SystemTime::now()), number, extension);
                 write(&file).map(|()| file)
             });
-            let _ = sender.send(saved);
+            let _ = sender.send(Saved { file, complete_to });
             wake();
         };
         let started = std::thread::Builder::new().name("saving".into()).spawn(work);
@@ -185,7 +194,7 @@ mod tests {
     fn wait(exporter: &mut Exporter) -> Result<PathBuf, String> {
         for _ in 0..2000 {
             if let Some(done) = exporter.poll() {
-                return done;
+                return done.file;
             }
             std::thread::sleep(Duration::from_millis(5));
         }

@@ -96,7 +96,12 @@ pub const FORMATS: &[Format] = &[
         "A folder of PNG files: the rendering as it is shown, of each volume of the loop from its first mark to its last.",
     ),
     #[cfg(feature = "video")]
-    format("Loop, film", "mp4", Work::Loop, "The same as AV1 in MP4, at the speed of the loop."),
+    format(
+        "Loop, film",
+        "mp4",
+        Work::Loop,
+        "The same as AV1 in MP4, forwards, at the mean rate times the speed of the loop (0.1 to 240 pictures a second).",
+    ),
 ];
 
 /// An export in work.
@@ -196,7 +201,11 @@ pub(super) fn write_frames(file: &Path, header: Header, volumes: &[CineVolume]) 
     let mut writer = Writer::create(file, header).map_err(|e| e.to_string())?;
     let mut frames = volumes.iter().flat_map(|volume| &volume.frames);
     match frames.try_for_each(|frame| writer.frame(frame, frame.time.unwrap_or(0.0))) {
-        Ok(()) => writer.finish().map_err(|e| e.to_string()),
+        Ok(()) => writer.finish().map_err(|e| {
+            // What is said not to be saved is not there.
+            let _ = std::fs::remove_file(file);
+            e.to_string()
+        }),
         Err(e) => {
             writer.discard();
             Err(e.to_string())

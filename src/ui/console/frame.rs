@@ -59,19 +59,18 @@ impl Console {
             (self.last_arrival, self.needs_redraw) = (now, true);
         }
         while let Some(saved) = self.exporter.poll() {
-            match saved {
+            let ends = saved.complete_to.is_some() && saved.complete_to == self.leaves_when_saved;
+            match saved.file {
                 Ok(file) => {
-                    if file.extension().is_some_and(|end| end == "frames") {
-                        self.saved_volume = self.saving_volume.take().or(self.saved_volume);
-                        self.request.exit |= std::mem::take(&mut self.leaves_when_saved);
-                    }
+                    self.saved_volume = self.saved_volume.max(saved.complete_to);
+                    self.request.exit |= ends;
                     if file.extension().is_some_and(|end| end == "toml") {
                         self.opening.remember(&file);
                     }
                     self.notify(&format!("Saved {}", file.display()), false);
                 }
                 Err(fault) => {
-                    self.leaves_when_saved = false;
+                    self.leaves_when_saved = self.leaves_when_saved.filter(|_| !ends);
                     self.notify(&format!("Not saved: {fault}"), true);
                 }
             }

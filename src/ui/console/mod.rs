@@ -113,10 +113,10 @@ pub struct Console {
     shows_exports: bool,
     /// Asks whether to save the loop before leaving.
     asks_to_leave: bool,
-    leaves_when_saved: bool,
+    /// Leaves when the loop up to this volume is saved.
+    leaves_when_saved: Option<u32>,
     is_full_screen: bool,
-    /// The newest volume of the loop that is being saved, and of the one that was saved last.
-    saving_volume: Option<u32>,
+    /// The newest volume of the loops that were saved whole.
     saved_volume: Option<u32>,
     /// Where to draw the pointer, pixels of the window.
     pointer: Option<[f64; 2]>,
@@ -257,9 +257,8 @@ impl Console {
             help_search: None,
             shows_exports: false,
             asks_to_leave: false,
-            leaves_when_saved: false,
+            leaves_when_saved: None,
             is_full_screen: false,
-            saving_volume: None,
             saved_volume: None,
             pointer: None,
             player: CinePlayer::default(),
@@ -599,7 +598,8 @@ impl Console {
                 self.asks_to_leave = false;
                 // The question names all volumes.
                 self.player.unmark();
-                self.leaves_when_saved = self.save_loop();
+                let newest = self.stream.cine().volumes().back().map(|newest| newest.volume);
+                self.leaves_when_saved = newest.filter(|_| self.save_loop());
             }
             _ => {}
         }
@@ -647,7 +647,8 @@ impl Console {
 
     /// True if volumes of the loop exist nowhere else: neither in a file that they were read from or recorded to, nor in one that was saved.
     fn has_unsaved_loop(&self) -> bool {
-        let is_only_here = matches!(self.fixed.source, SourceKind::Probe | SourceKind::Pipe) && !self.fixed.records;
+        let is_recorded = self.fixed.records && self.stream.feed_counts().unrecorded == 0;
+        let is_only_here = matches!(self.fixed.source, SourceKind::Probe | SourceKind::Pipe) && !is_recorded;
         let newest = self.stream.cine().volumes().back().map(|kept| kept.volume);
         is_only_here && newest.is_some() && newest != self.saved_volume
     }

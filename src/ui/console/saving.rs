@@ -42,17 +42,16 @@ impl Console {
     /// Saves the cine loop, from its first mark to its last. False if it cannot be.
     pub(super) fn save_loop(&mut self) -> bool {
         let volumes = self.marked_volumes();
+        let kept = self.stream.cine().volumes();
         // What lies beyond the marks is still in no file.
-        let is_whole = volumes.len() == self.stream.cine().volumes().len();
+        let complete_to = kept.back().map(|newest| newest.volume).filter(|_| volumes.len() == kept.len());
         let saved = match self.stream.header() {
             Some(header) if !volumes.is_empty() => {
                 let header = header.clone();
-                self.exporter.volumes(header, volumes)
+                self.exporter.volumes(header, volumes, complete_to)
             }
             _ => Err("there are no volumes yet".into()),
         };
-        let newest = self.stream.cine().volumes().back().map(|kept| kept.volume);
-        self.saving_volume = newest.filter(|_| saved.is_ok() && is_whole);
         if let Err(fault) = &saved {
             self.notify(&format!("The loop was not saved: {fault}"), true);
         }

@@ -410,6 +410,7 @@ pub(super) fn show_cine_bar(ui: &mut Ui, state: &PanelState, height: f32, execut
                 execute(Command::Freeze);
             }
             let mut left = room - width - ui.spacing().item_spacing.x;
+            let loop_room = LoopRoom::of(ui, state);
             // In the order in which they give way to a narrow window; the first is always there.
             let buttons = [
                 (
@@ -431,7 +432,8 @@ pub(super) fn show_cine_bar(ui: &mut Ui, state: &PanelState, height: f32, execut
                 let kept = match n {
                     0 => 0.0,
                     1 => 60.0,
-                    _ => 330.0,
+                    2 => loop_room.steps,
+                    _ => loop_room.steps + LoopRoom::TOOLS,
                 };
                 if n == 0 || left >= wanted + kept {
                     left -= wanted;
@@ -439,7 +441,7 @@ pub(super) fn show_cine_bar(ui: &mut Ui, state: &PanelState, height: f32, execut
                 }
             }
             if left >= 150.0 {
-                cine(ui, state, left, touch, execute);
+                cine(ui, state, left, touch, &loop_room, execute);
             }
             ui.with_layout(egui::Layout::right_to_left(Align::Center), |ui| {
                 // From the right: help first, the picture next to the loop.
@@ -462,51 +464,69 @@ pub(super) fn show_cine_bar(ui: &mut Ui, state: &PanelState, height: f32, execut
     });
 }
 
-/// Room for the speed and the marks of the loop, points.
-const LOOP_TOOLS: f32 = 300.0;
+/// Room that the cine loop needs, points.
+struct LoopRoom {
+    text: String,
+    /// For the text alone.
+    words: f32,
+    /// With buttons, steps, the text and a short slider.
+    steps: f32,
+}
+
+impl LoopRoom {
+    /// In addition for the speed and the marks.
+    const TOOLS: f32 = 268.0;
+    const SHORTEST_SLIDER: f32 = 50.0;
+
+    fn of(ui: &Ui, state: &PanelState) -> LoopRoom {
+        let text = cine_text(&state.cine);
+        let words = ui.painter().layout_no_wrap(text.clone(), FontId::proportional(TEXT_SIZE), TEXT).size().x;
+        let between = ui.spacing().item_spacing.x;
+        LoopRoom { text, words, steps: 64.0 + 2.0 * 44.0 + LoopRoom::SHORTEST_SLIDER + words + 6.0 * between }
+    }
+}
 
 /// The cine loop in so much room, points.
-fn cine(ui: &mut Ui, state: &PanelState, room: f32, touch: f32, execute: &mut dyn FnMut(Command)) {
+fn cine(ui: &mut Ui, state: &PanelState, room: f32, touch: f32, needed: &LoopRoom, execute: &mut dyn FnMut(Command)) {
     let cine = &state.cine;
     if cine.count == 0 {
         ui.label(RichText::new("no volumes yet").color(WEAK_TEXT));
         return;
     }
-    // The name of a sign is what its hint says before the keys.
-    let mut button = |ui: &mut Ui, label: &str, width: f32, hint: &str, command: Command| {
-        let name = hint.split([':', ';', '(']).next().unwrap_or(label).trim();
-        let name = if label.chars().all(|c| c.is_ascii_punctuation()) { name } else { label };
+    let mut button = |ui: &mut Ui, label: &str, width: f32, name: &str, hint: &str, command: Command| {
         if ui.add(Button::new(label).min_size(vec2(width, touch))).tell(hint).named(name).clicked() {
             execute(command);
         }
     };
     let label = if cine.is_playing { "Stop" } else { "Play" };
-    button(ui, label, 64.0, "Plays the last volumes as a loop (Enter).", Command::PlayCine);
-    let text = cine_text(cine);
-    if room >= 330.0 {
-        button(ui, "<", 44.0, "One volume back (Left).", Command::StepCine(-1));
-        button(ui, ">", 44.0, "One volume forth (Right).", Command::StepCine(1));
-        let has_tools = room >= 330.0 + LOOP_TOOLS;
-        let tools = if has_tools { LOOP_TOOLS } else { 0.0 };
+    button(ui, label, 64.0, label, "Plays the last volumes as a loop (Enter).", Command::PlayCine);
+    if room >= needed.steps {
+        button(ui, "<", 44.0, "One volume back", "One volume back (Left).", Command::StepCine(-1));
+        button(ui, ">", 44.0, "One volume forth", "One volume forth (Right).", Command::StepCine(1));
+        let has_tools = room >= needed.steps + LoopRoom::TOOLS;
         if has_tools {
             let speed = format!("{}x", cine.speed);
+            // After the fastest comes the slowest.
             let faster = if cine.speed >= SPEEDS[SPEEDS.len() - 1] { -(SPEEDS.len() as i32) } else { 1 };
             let hint = "Speed of the loop; 1x is that of the acquisition (Ctrl+Left, Ctrl+Right).";
-            button(ui, &speed, 56.0, hint, Command::CineSpeed(faster));
-            let (label, hint) = match cine.goes_back_and_forth {
-                true => ("<->", "The loop is played back and forth: click for forwards (Ctrl+Enter)."),
-                false => ("->", "The loop is played forwards: click for back and forth (Shift+Enter)."),
+            button(ui, &speed, 56.0, &format!("Speed {speed}"), hint, Command::CineSpeed(faster));
+            let (label, name, hint) = match cine.goes_back_and_forth {
+                true => ("<->", "Back and forth", "Back and forth; a click: forwards (Ctrl+Enter)."),
+                false => ("->", "Forwards", "Forwards; a click: back and forth (Shift+Enter)."),
             };
-            button(ui, label, 44.0, hint, Command::BackAndForth(!cine.goes_back_and_forth));
-            button(ui, "[", 36.0, "The loop begins with this volume (Shift+Home).", Command::MarkCine(false));
-            button(ui, "]", 36.0, "The loop ends with this volume (Shift+End).", Command::MarkCine(true));
+            button(ui, label, 44.0, name, hint, Command::BackAndForth(!cine.goes_back_and_forth));
+            let hint = "The loop begins with this volume (Shift+Home).";
+            button(ui, "[", 36.0, "Loop begins here", hint, Command::MarkCine(false));
+            let hint = "The loop ends with this volume (Shift+End).";
+            button(ui, "]", 36.0, "Loop ends here", hint, Command::MarkCine(true));
             let whole = Button::new("All").min_size(vec2(44.0, touch));
             let whole = ui.add_enabled(cine.is_trimmed, whole).tell("The loop is all volumes (Ctrl+Home).");
-            if whole.clicked() {
+            if whole.named("All volumes").clicked() {
                 execute(Command::WholeCine);
             }
         }
-        ui.spacing_mut().slider_width = (room - 290.0 - tools).clamp(30.0, 400.0);
+        let tools = if has_tools { LoopRoom::TOOLS } else { 0.0 };
+        ui.spacing_mut().slider_width = (room - needed.steps - tools + LoopRoom::SHORTEST_SLIDER).min(400.0);
         let mut at = cine.shown.map_or(cine.count, |p| p + 1);
         let slider = ui.add_enabled(cine.count > 1, Slider::new(&mut at, 1..=cine.count).show_value(false));
         if cine.is_trimmed {
@@ -523,15 +543,21 @@ fn cine(ui: &mut Ui, state: &PanelState, room: f32, touch: f32, execute: &mut dy
         if (is_held || is_asked) && cine.shown != Some(at - 1) {
             execute(Command::SeekCine(at - 1));
         }
-        ui.add(Label::new(text).extend());
+        ui.add(Label::new(&needed.text).extend());
+    } else if room >= 64.0 + needed.words + ui.spacing().item_spacing.x {
+        ui.add(Label::new(&needed.text).extend());
     } else {
-        ui.add(Label::new(text.split("  ").next().unwrap_or_default()).extend());
+        ui.add(Label::new(place_text(cine)).extend());
     }
+}
+
+fn place_text(cine: &CineState) -> String {
+    format!("{} of {}", cine.shown.map_or("-".into(), |p| (p + 1).to_string()), cine.count)
 }
 
 /// Place, time and rate of the loop, as far as they are known.
 fn cine_text(cine: &CineState) -> String {
-    let mut text = format!("{} of {}", cine.shown.map_or("-".into(), |p| (p + 1).to_string()), cine.count);
+    let mut text = place_text(cine);
     if let Some(seconds) = cine.seconds {
         text += &format!("  {seconds:.1} s");
     }
