@@ -79,8 +79,8 @@ def volume_rows(new):
     ]
 
 
-# The slice that the peers show is cut, though a picture that small is hardly one.
-TINY = ("--size", "16x16", "--mode", "mpr", "--set", "slices.format=r8")
+# The slice that the peers show is cut, though a picture that small is hardly one. Every texel is made, as by the peers, not only what it shows.
+TINY = ("--size", "16x16", "--mode", "mpr", "--set", "slices.format=r8", "--set", "slices.everything=true")
 
 
 def slice_row(name, title, peers, setting, **more):
