@@ -385,9 +385,7 @@ pub fn check_volume(
     name: impl std::fmt::Display,
 ) -> Result<(), Failure> {
     match source.volumes() {
-        count if volume >= count => {
-            Err(input(format!("{name}: {flag}: there is no volume {volume}; there are {count}, numbered from 0")))
-        }
+        count if volume >= count => Err(input(format!("{name}: {flag} {volume}: there are {count}, numbered from 0"))),
         _ => Ok(()),
     }
 }
