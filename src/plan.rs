@@ -115,14 +115,15 @@ impl Plan {
                     let names = |slots: Vec<crate::passes::Bind>| {
                         slots.iter().map(|b| b.slot.name()).collect::<Vec<_>>().join(", ")
                     };
-                    // A pass that repeats may use several shaders; each is listed once.
+                    // A pass that repeats may use several pipelines; each is listed once.
                     let mut listed = Vec::new();
                     for args in
                         (0..(pass.repeat)(scene)).map(|iteration| DispatchArgs { iteration, ..DispatchArgs::default() })
                     {
                         let shader = pass.shader(scene, &args);
-                        if !listed.contains(&shader) {
-                            listed.push(shader);
+                        let pipeline = (shader, pass.constants(scene, &args));
+                        if !listed.contains(&pipeline) {
+                            listed.push(pipeline);
                             let (reads, writes) = (pass.reads(scene, &args), pass.writes(scene, &args));
                             let _ = writeln!(text, "    {:<19} {shader}: {} -> {}", "", names(reads), names(writes));
                         }
@@ -321,7 +322,7 @@ impl Step {
         let (a, b) = (self.pass, other.pass);
         let args = self.args();
         a.shader(old, &args) == b.shader(new, &args)
-            && (a.constants)(old, &args) == (b.constants)(new, &args)
+            && a.constants(old, &args) == b.constants(new, &args)
             && a.numbers(old, &args) == b.numbers(new, &args)
             && a.invocations(old, &args) == b.invocations(new, &args)
             && a.reads(old, &args) == b.reads(new, &args)

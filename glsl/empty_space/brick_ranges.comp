@@ -1,6 +1,5 @@
 // The smallest and the largest value that samples in each brick may have, for bricks that depend on an updated slice. A brick
 // outside the insonified region has no samples: its smallest value is larger than its largest.
-// variants: plain
 #version 460
 #include "common.glsl"
 layout(scalar) uniform Params {

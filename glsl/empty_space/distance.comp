@@ -1,6 +1,5 @@
 // The Chebyshev distance in bricks to the nearest brick of another kind, one axis per dispatch. All bricks nearer than that are of
 // one kind, so that a ray may skip them at once (Deakin and Knackstedt 2020).
-// variants: plain
 #version 460
 #include "common.glsl"
 layout(constant_id = 0) const int AXIS = 0;

@@ -1,5 +1,4 @@
 // The smallest and the largest value of every tile, for the slices that a new frame changes.
-// variants: plain
 #version 460
 #include "common.glsl"
 layout(constant_id = 0) const int TILE = 4;

@@ -1,5 +1,5 @@
 // Backward substitution along a row or a column, an invocation each: u[i] = forward[i] + shares[i] u[i+1].
-// variants: rows; plane COLUMNS; slice COLUMNS SLICE; richardson_plane COLUMNS RICHARDSON; richardson_slice COLUMNS SLICE RICHARDSON; picture_rows PICTURE; picture COLUMNS PICTURE
+// variants: slice; picture PICTURE
 #version 460
 layout(local_size_x = 64) in;
 #include "aos.glsl"

@@ -1,6 +1,6 @@
 // Forward elimination of (I - 2 tau A) u = f along a row or a column, an invocation each; A is the diffusion of that axis (Weickert, ter Haar
 // Romeny and Viergever 1998). Every unknown becomes u[i] = forward[i] + shares[i] u[i+1].
-// variants: plane; picture PICTURE
+// variants: slice; picture PICTURE
 #version 460
 layout(local_size_x = 64) in;
 #include "aos.glsl"

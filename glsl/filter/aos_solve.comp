@@ -2,7 +2,7 @@
 // 1965) takes the system apart into one for each invocation, which solves it by elimination, as Zhang, Cohen and Owens (2010) do.
 // An equation is u[i] = before u[i-n] + after u[i+n] + right, and `kept` is what `before` and `after` lack to 1: carried, not computed, so that
 // all terms are positive. Nothing cancels, and the maximum principle holds at any tau (Grassmann, Taksar and Heyman 1985).
-// variants: rows; plane COLUMNS; slice COLUMNS SLICE; richardson_plane COLUMNS RICHARDSON; richardson_slice COLUMNS SLICE RICHARDSON; picture_rows PICTURE; picture COLUMNS PICTURE
+// variants: slice; picture PICTURE
 #version 460
 #extension GL_EXT_control_flow_attributes : require
 const int THREADS = 128;

@@ -1,12 +1,13 @@
 // The sigma filter with a growing window (thesis 5.4, 5.5): while fewer pixels than the starting window holds are within the
 // range of the estimated centre, the window grows by one on every side. Colours are compared by their brightness. A miss stays
-// a miss and is ignored elsewhere. Variant growth writes the number of rings that the window grew.
-// variants: plane; slice SLICE; distance DISTANCE; picture PICTURE; growth GROWTH
+// a miss and is ignored elsewhere.
+// variants: slice; distance DISTANCE; picture PICTURE
 #version 460
 layout(constant_id = 0) const int RADIUS = 2;  // of the starting window
 layout(constant_id = 1) const int MAX_RADIUS = 9;
 layout(constant_id = 2) const int ESTIMATOR = 0;
 layout(constant_id = 3) const int MULTIPLICATIVE = 0; // the range is a share of the centre
+layout(constant_id = 4) const int GROWTH = 0;         // 1: the result is the number of rings that the window grew
 #extension GL_EXT_scalar_block_layout : require
 layout(scalar) uniform Params {
     float range; // 2 sigma, at most 1e30
@@ -59,9 +60,10 @@ void main() {
             start_count += r <= RADIUS ? 1.0 : 0.0;
         }
     }
-#ifdef GROWTH
-    write_at(at, float(rings));
-#else
+    if (GROWTH == 1) {
+        write_at(at, T(rings));
+        return;
+    }
     T result = sum / max(count, 1.0);
     // Near the border fewer pixels exist: all of them are enough.
     if (count <= min(few, start_count - 1.0)) {
@@ -78,5 +80,4 @@ void main() {
         result = sum / max(count, 1.0);
     }
     write_at(at, here + result);
-#endif
 }

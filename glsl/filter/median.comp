@@ -1,7 +1,7 @@
 // Median of a square window; beyond the border the nearest pixel repeats. For distances, where more pixels are hits than misses,
 // the (lower) median of the hits: this closes pinholes and draws no rim towards a miss. An invocation makes four vertically
 // adjacent pixels, whose windows share most of their texels.
-// variants: plane; slice SLICE; distance DISTANCE
+// variants: slice; distance DISTANCE
 #version 460
 #ifdef DISTANCE
 layout(constant_id = 0) const int RADIUS = 7;

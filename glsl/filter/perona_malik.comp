@@ -1,6 +1,6 @@
 // One explicit step of anisotropic diffusion with four neighbours (Perona and Malik 1990; thesis 5-9..5-12). Nothing flows
 // across the border, nor to or from a miss.
-// variants: plane; slice SLICE; distance DISTANCE; picture PICTURE
+// variants: slice; distance DISTANCE; picture PICTURE
 #version 460
 layout(constant_id = 0) const int CONDUCTANCE = 0; // 0 quotient, 1 exponential
 #extension GL_EXT_scalar_block_layout : require

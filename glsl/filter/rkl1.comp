@@ -1,9 +1,9 @@
 // One stage of a step of anisotropic diffusion by the Runge-Kutta-Legendre method of first order (Meyer, Balsara and Aslam 2014):
 // y[j] = mu y[j-1] + nu y[j-2] + share M(y[j-1]), M the flow from the four neighbours. Nothing flows across the border.
-// variants: first; plane LATER; slice LATER SLICE
 #version 460
 #include "common.glsl"
 layout(constant_id = 0) const int CONDUCTANCE = 0; // 0 quotient, 1 exponential
+layout(constant_id = 1) const int FIRST = 0;       // 1: the first stage, which has no y[j-2]
 layout(scalar) uniform Params {
     float edge; // k, 1e-30..1e30
     float mu;
@@ -18,15 +18,8 @@ layout(scalar) uniform Params {
 #define T float
 #include "diffusion.glsl"
 uniform texture2DArray last; // y[j-1]
-#ifdef LATER
 uniform texture2DArray before; // y[j-2]
-#endif
-#ifdef SLICE
-#include "stored_volume.glsl"
-uniform writeonly image3D target;
-#else
-uniform writeonly image2DArray target;
-#endif
+#include "volume_target.glsl"
 
 void main() {
     ivec3 at = ivec3(gl_GlobalInvocationID); // z is the slice within the batch
@@ -41,13 +34,8 @@ void main() {
         flow += across(away) * away;
     }
     float result = mu * here + share * flow;
-#ifdef LATER
-    result += nu * texelFetch(before, at, 0).x;
-#endif
-#ifdef SLICE
-    ivec3 to = at + ivec3(0, 0, slice) - first_stored;
-    if (all(lessThan(uvec3(to), uvec3(imageSize(target))))) imageStore(target, to, vec4(result, 0.0, 0.0, 0.0));
-#else
-    imageStore(target, at, vec4(result, 0.0, 0.0, 0.0));
-#endif
+    if (FIRST == 0) result += nu * texelFetch(before, at, 0).x;
+    ivec3 to = place_in_target(at);
+    // All of a slice is solved, and a part of the volume stored.
+    if (LAYERED == 1 || all(lessThan(uvec3(to), uvec3(imageSize(target))))) imageStore(target, to, vec4(result, 0.0, 0.0, 0.0));
 }

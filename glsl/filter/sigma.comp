@@ -1,7 +1,7 @@
 // Lee's sigma filter: the mean of the neighbours within `range` of the centre. Where at most `few` are, and not all that exist,
 // the mean of the four immediate neighbours. (Lee 1983; thesis 5.3.) An invocation makes four vertically adjacent pixels, whose
 // windows share most of their texels.
-// variants: plane; slice SLICE; distance DISTANCE; picture PICTURE
+// variants: slice; distance DISTANCE; picture PICTURE
 #version 460
 layout(constant_id = 0) const int RADIUS = 3;
 layout(constant_id = 1) const int MULTIPLICATIVE = 0; // the range is a share of the centre

@@ -1,9 +1,8 @@
 // What a filter reads and writes, by variant. T is the type of one texel.
-//   plane     layers to layers, one channel    slices between filters, an invocation's z is its slice within the batch
-//   slice     layers to slices of 3D texture   the last filter of stage 1
-//   volume    3D to 3D                         across slices; coordinates in the stored part
+//   slice     layers to layers, or to slices of the 3D texture; an invocation's z is its slice within the batch
 //   distance  2D to 2D, one channel with misses
 //   picture   2D to 2D, colours, channel by channel
+// SOURCE_3D declares the source three-dimensional: layers, or the part of the volume that is stored.
 #include "common.glsl"
 
 #ifdef PICTURE
@@ -22,11 +21,7 @@
 #define VALID(v) true
 #endif
 
-#if defined(VOLUME) || defined(SLICE)
-#include "stored_volume.glsl"
-#endif
-
-#ifdef VOLUME
+#ifdef SOURCE_3D
 uniform texture3D source;
 ivec3 source_size() { return textureSize(source, 0); }
 T read_at(ivec3 at) { return LOADED(texelFetch(source, at, 0)); }
@@ -42,12 +37,11 @@ T read_at(ivec3 at) { return LOADED(texelFetch(source, ivec3(at.xy, gl_GlobalInv
 #endif
 #endif
 
-#if defined(VOLUME) || defined(SLICE)
-uniform writeonly image3D target;
-#elif defined(DISTANCE) || defined(PICTURE)
+#if defined(DISTANCE) || defined(PICTURE)
 uniform writeonly image2D target;
+ivec2 place_in_target(ivec3 at) { return at.xy; }
 #else
-uniform writeonly image2DArray target;
+#include "volume_target.glsl"
 #endif
 
 // The first of the `run` texels along an axis that this invocation makes, relative to the visible rectangle of a slice.
@@ -57,21 +51,8 @@ ivec3 made_run(int axis, int run) {
 #if !defined(DISTANCE) && !defined(PICTURE)
     at.xy += ivec2(first_column, first_row);
 #endif
-#ifdef VOLUME
-    at += ivec3(0, 0, slice) - first_stored; // `slice` is the first updated slice
-#endif
     return at;
 }
 ivec3 made_texel() { return made_run(0, 1); }
 
-void write_at(ivec3 at, T value) {
-#if defined(VOLUME)
-    imageStore(target, at, STORED(value));
-#elif defined(SLICE)
-    imageStore(target, at + ivec3(0, 0, slice) - first_stored, STORED(value));
-#elif defined(DISTANCE) || defined(PICTURE)
-    imageStore(target, at.xy, STORED(value));
-#else
-    imageStore(target, at, STORED(value));
-#endif
-}
+void write_at(ivec3 at, T value) { imageStore(target, place_in_target(at), STORED(value)); }

@@ -16,7 +16,6 @@ vec3 toned(vec3 c) {
     return c;
 }
 
-#ifdef LINES
 vec3 with_lines(vec3 c, ivec2 pixel, ivec2 size) {
     ivec2 cells = ivec2(columns, rows), cell = cell_of(pixel, size, cells);
     int n = cell.y * columns + cell.x;
@@ -35,4 +34,3 @@ vec3 with_lines(vec3 c, ivec2 pixel, ivec2 size) {
     if ((frame.w == 1.0 && around) || (frame.w == 2.0 && between)) c = frame.rgb;
     return c;
 }
-#endif

@@ -1,25 +1,21 @@
 // Light from everywhere above: seven cones towards the probe, each through four levels of the pyramid, whose cells widen with the distance.
 // With it the back light, which has its own propagation. Red, green, blue, and the ambient share alone.
-// variants: plain; back BACK
 #version 460
 #extension GL_EXT_control_flow_attributes : require
 #include "common.glsl"
+layout(constant_id = 0) const int BACK = 0; // 1: there is a back light
 layout(scalar) uniform Params {
     float absorption; // 1/mm in matter of density 1
     float density;    // cells of this lattice per mm
     vec3 powers;      // of the share that arrives, for red, green and blue
     float ambient;
-#ifdef BACK
     vec3 back_colour; // times its strength
-#endif
 };
 uniform texture3D pyramid_1;
 uniform texture3D pyramid_2;
 uniform texture3D pyramid_3;
 uniform texture3D pyramid_4;
-#ifdef BACK
 uniform texture3D back_light;
-#endif
 uniform writeonly image3D ambient_light;
 #include "light_lattice.glsl"
 
@@ -51,8 +47,6 @@ void main() {
         }
     }
     vec3 light = ambient * pow(vec3(max(open, 1e-6)), powers);
-#ifdef BACK
-    light += back_colour * texelFetch(back_light, at, 0).rgb;
-#endif
+    if (BACK == 1) light += back_colour * texelFetch(back_light, at, 0).rgb;
     imageStore(ambient_light, at, vec4(light, ambient * open));
 }

@@ -1,6 +1,5 @@
 // Light that tissue scatters on: along one axis a Gaussian for each colour, weighted by the density of the matter, so that fluid passes nothing
 // on. Where no matter is near, light stays as it is.
-// variants: plain
 #version 460
 #include "common.glsl"
 layout(constant_id = 0) const int AXIS = 0;

@@ -1,6 +1,5 @@
 // What each cell of the light volume holds: the density of its matter, of 1 where the transfer function is most opaque, and the echo, whose
 // slope is that of the tissue's surface.
-// variants: plain
 #version 460
 #include "common.glsl"
 layout(constant_id = 29) const int ENTRIES = 256; // of the transfer table

@@ -1,5 +1,4 @@
 // The next level of a Gaussian pyramid of the matter: half as many cells along each axis, by (1, 3, 3, 1) / 8 along each.
-// variants: plain
 #version 460
 #include "common.glsl"
 uniform texture3D source;

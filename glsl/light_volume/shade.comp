@@ -1,6 +1,5 @@
 // The light that leaves each cell by scattering, and its orientation: what does not depend on the view. `relief` is how much the light depends
 // on the orientation.
-// variants: plain
 #version 460
 #include "common.glsl"
 layout(scalar) uniform Params {

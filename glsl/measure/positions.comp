@@ -1,6 +1,5 @@
 // One sample of a volume for each texel of the output, at positions inside of it and beyond its borders: to check the device's filter
 // sample by sample.
-// variants: plain
 #version 460
 #include "common.glsl"
 uniform sampler3D volume;

@@ -1,5 +1,4 @@
 // Measures how fast the device takes samples without computing: adjacent pixels, straight through the volume.
-// variants: plain
 #version 460
 #include "common.glsl"
 layout(constant_id = 0) const int SAMPLING = 0; // 0 the device's filter, 1 eight fetches, 2 one fetch

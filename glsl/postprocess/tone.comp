@@ -1,21 +1,17 @@
 // The picture in 8 bits, toned; over planes with cross-lines and frames.
-// variants: plain; lines LINES
 #version 460
 #include "common.glsl"
 #include "tone_constants.glsl"
+layout(constant_id = 33) const int LINES = 0; // 1: over planes
 layout(scalar) uniform Params {
 #include "tone_params.glsl"
-#ifdef LINES
-    int columns;
+    int columns; // of planes
     int rows;
     float line_strength; // 0..1
-#endif
 };
 uniform texture2D picture;
 uniform writeonly image2D screen;
-#ifdef LINES
 #include "tiles.glsl"
-#endif
 #include "tone.glsl"
 
 void main() {
@@ -25,8 +21,6 @@ void main() {
     vec4 lit = texelFetch(picture, pixel, 0);
     // Pixels without a hit stay black, whatever the brightness.
     vec3 c = lit.a > 0.0 ? toned(lit.rgb) : vec3(0.0);
-#ifdef LINES
-    c = with_lines(c, pixel, size);
-#endif
+    if (LINES == 1) c = with_lines(c, pixel, size);
     imageStore(screen, pixel, vec4(c, 1.0));
 }

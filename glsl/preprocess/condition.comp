@@ -1,11 +1,11 @@
 // Conditions the lines of a polar frame before scan conversion: time gain compensation, Gaussian low pass and decimation along the
 // line, log compression (thesis 4.3). Output j is centred on input j FACTOR.
-// variants: plain; gained GAINED
 #version 460
 #include "common.glsl"
 layout(constant_id = 0) const int RADIUS = 0; // taps of the low pass on one side
 layout(constant_id = 1) const int FACTOR = 1; // decimation factor
 layout(constant_id = 2) const int LOG = 0;    // 0 input is log-compressed, 1 input is linear envelopes
+layout(constant_id = 3) const int GAINED = 0; // 1: with time gain compensation
 layout(scalar) uniform Params {
     float gain; // stored value to 0..1
     float offset;
@@ -13,16 +13,12 @@ layout(scalar) uniform Params {
     float per_octave; // 20 log10(2) / dynamic range
 };
 uniform texture2DArray frames; // the batch's first frame is layer 0
-#ifdef GAINED
 readonly buffer Tgc { float entry[]; } tgc; // gain per sample: a factor of envelopes, an addend of compressed samples
-#endif
 uniform writeonly image2DArray conditioned; // a layer for each frame of the batch
 
 float sample_at(ivec2 at) {
     float value = clamp(texelFetch(frames, ivec3(at, gl_GlobalInvocationID.z), 0).x * gain + offset, 0.0, 1.0);
-#ifdef GAINED
-    value = LOG == 1 ? value * tgc.entry[at.x] : value + tgc.entry[at.x];
-#endif
+    if (GAINED == 1) value = LOG == 1 ? value * tgc.entry[at.x] : value + tgc.entry[at.x];
     return value;
 }
 

@@ -1,5 +1,4 @@
 // Parts of the volume that float, lowered below what is drawn; all else as it is. All images hold the stored part of the volume.
-// variants: plain
 #version 460
 #include "common.glsl"
 layout(scalar) uniform Params {

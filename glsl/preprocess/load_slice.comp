@@ -1,5 +1,4 @@
 // A slice of a Cartesian volume, scaled to 0..1.
-// variants: plane; slice SLICE
 #version 460
 #include "common.glsl"
 layout(scalar) uniform Params {

@@ -1,6 +1,5 @@
 // Each texel of a slice with its neighbours one column and one row on, as they are stored. An interpolated sample then takes one
 // load per slice. Both images hold the stored part of the volume.
-// variants: plain
 #version 460
 #include "common.glsl"
 layout(constant_id = 0) const int RUN = 4;    // texels per invocation

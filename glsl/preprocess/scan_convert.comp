@@ -1,6 +1,5 @@
 // Converts polar frames into slices. The look-up table gives the fractional sample and line of each pixel. Pixels outside
 // the sector are not written (thesis Fig. 31), or are black where a filter reads the slice next.
-// variants: plane; slice SLICE
 #version 460
 #include "common.glsl"
 layout(scalar) uniform Params {
@@ -19,10 +18,8 @@ void main() {
     if (any(greaterThanEqual(at.xy, textureSize(scan_lut, 0)))) return;
     vec2 index = texelFetch(scan_lut, at.xy, 0).xy;
     if (index.x < 0.0) { // outside the sector
-#ifndef SLICE
-        // Filters with a large reach must not read what an earlier frame left there.
-        write_slice(at, 0.0);
-#endif
+        // Filters must not read what an earlier frame left there.
+        if (LAYERED == 1) write_slice(at, 0.0);
         return;
     }
     ivec2 base = min(ivec2(index), textureSize(frames, 0).xy - 2);

@@ -1,6 +1,5 @@
 // The volume as a solid block: each ray shows the sample where it enters the block. Where that is outside the insonified
 // region, the ray continues until it is inside: the sector's border is then a face.
-// variants: plain
 #version 460
 #include "common.glsl"
 layout(constant_id = 3) const int EDGES = 1; // lines where two faces meet

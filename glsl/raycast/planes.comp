@@ -1,6 +1,6 @@
 // MPR: each pixel shows a point of its tile's plane, or the mean, largest or smallest value of a slab around it. No ray is cast.
 // TONED: writes the final 8 bits directly, where stage 4 only tones.
-// variants: plain; toned TONED LINES
+// variants: plain; toned TONED
 #version 460
 #include "common.glsl"
 layout(constant_id = 3) const int SAMPLES = 1; // through the slab

@@ -1,5 +1,4 @@
 // The largest, the smallest, or the mean of the samples of each ray in the insonified region.
-// variants: plain
 #version 460
 #include "common.glsl"
 layout(constant_id = 3) const int KEPT = 0; // 0 largest, 1 smallest, 2 mean

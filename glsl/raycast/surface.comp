@@ -1,7 +1,6 @@
 // SR: the first surface on each ray (thesis 4-3). D is the mean of the newer half of the last eight samples minus the mean
 // of the older half. A rough detector with longer steps ignores specks; where it fires, the ray steps back and a fine
 // detector finds the position.
-// variants: plain
 #version 460
 #include "common.glsl"
 layout(constant_id = 15) const int ECHO = 1;  // 0: nothing reads the echo at the surface, and it is not stored

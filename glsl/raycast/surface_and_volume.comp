@@ -1,7 +1,6 @@
 // SR and VR of one march (thesis 4.4.2): the surface detector finds the distance of the first surface in the samples that are
 // composited along the whole ray. Each sample is taken once, where the detector does not step back. Compositing takes every sample of
 // the detector's lattice once and in order, whatever the detector does.
-// variants: plain
 #version 460
 #include "common.glsl"
 #define TWO_KINDS

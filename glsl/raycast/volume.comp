@@ -1,5 +1,4 @@
 // VR: emission and absorption, front to back (thesis 4-1, 4-2).
-// variants: plain
 #version 460
 #include "common.glsl"
 const int LAYER = 1;  // the ray ends at the surface; the result is a layer in front of it

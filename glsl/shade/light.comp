@@ -1,5 +1,4 @@
 // Blinn-Phong with normals from the distance map (thesis 4-4..4-7), shadow and occlusion where the scene has them, and skin.
-// variants: plain
 #version 460
 #include "common.glsl"
 layout(constant_id = 0) const int POINT = 0; // 0: directional light, 1: point light

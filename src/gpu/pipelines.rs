@@ -138,12 +138,11 @@ impl Pipelines {
         Ok(Pipelines { context: context.clone(), made, shaders, texel_access, sampler })
     }
 
-    /// What tells the pipeline of a pass in a scene from others.
-    /// What a pipeline of a pass in a scene is kept by.
+    /// What the pipeline of a pass in a scene is kept by.
     pub fn key(&self, pass: &Pass, scene: &Scene, args: &DispatchArgs) -> Key {
         let inputs =
             pass.reads(scene, args).iter().map(|b| (b.slot.format(scene), self.stores(b.slot, scene))).collect();
-        (pass.shader(scene, args), (pass.constants)(scene, args), inputs)
+        (pass.shader(scene, args), pass.constants(scene, args), inputs)
     }
 
     /// True if passes read this input as a storage image or a texel buffer: they do where texels are read by storage, and the slot allows it.

@@ -6,7 +6,6 @@ use super::PASSES;
 use super::pass::{
     Arrays, Bind, Chain, Dispatch, DispatchArgs, Filter, Frequency, Link, Need, Params, Pass, RUN, Slot, Texels,
 };
-use super::slots::Shape;
 use crate::scene::{Rectangle, Scene, TILE, VisibleBounds};
 
 impl Chain {
@@ -160,6 +159,21 @@ impl Pass {
         (self.shader)(scene, &Dispatch::new(args, self.link_slots(scene, args)))
     }
 
+    /// Structure of a dispatch: specialization constants by name; of slices on their way to the volume, with whether they go to layers.
+    pub fn constants(&self, scene: &Scene, args: &DispatchArgs) -> Vec<(&'static str, i32)> {
+        let mut constants = (self.constants)(scene, &Dispatch::new(args, self.link_slots(scene, args)));
+        let is_of_frames = match self.link {
+            Link::Filter(filter) => filter.chain.is_of_frames(),
+            Link::Observer(chain) => chain.is_of_frames(),
+            Link::None | Link::AfterSlices => false,
+        };
+        if is_of_frames {
+            let target = self.writes(scene, args).into_iter().find(|bind| bind.name == "target");
+            constants.extend(target.map(|bind| ("LAYERED", bind.slot.is_layered(scene) as i32)));
+        }
+        constants
+    }
+
     /// What a dispatch reads, by the names that the shader gives it.
     pub fn reads(&self, scene: &Scene, args: &DispatchArgs) -> Vec<Bind> {
         (self.reads)(scene, &Dispatch::new(args, self.link_slots(scene, args)))
@@ -177,7 +191,7 @@ impl Pass {
         if self.frequency != Frequency::Frame {
             return (self.reference)(scene, &Dispatch::new(args, slots), reads, writes);
         }
-        let is_layered = |bind: &Bind| matches!(bind.slot.shape(scene), Shape::Layers(_));
+        let is_layered = |bind: &Bind| bind.slot.is_layered(scene);
         let (bound, written) = (self.reads(scene, args), self.writes(scene, args));
         for n in 0..args.slices {
             let (mut own, mut made) = (Arrays::default(), Arrays::default());

@@ -74,7 +74,7 @@ pub const TILE_RANGES: Pass = Pass {
     stage: Stage::Preprocess,
     frequency: Frequency::Volume,
     link: Link::AfterSlices,
-    shader: |_, _| "empty_space/tile_ranges.plain",
+    shader: |_, _| "empty_space/tile_ranges",
     needed: need,
     // A slice changes with the frames that are smoothed into it.
     reads: |s, _| vec![Bind { part: Part::Around(s.reach_to_frames()), ..whole("volume", Slot::Volume) }],
@@ -116,7 +116,7 @@ pub const BRICK_RANGES: Pass = Pass {
     stage: Stage::Preprocess,
     frequency: Frequency::Volume,
     link: Link::None,
-    shader: |_, _| "empty_space/brick_ranges.plain",
+    shader: |_, _| "empty_space/brick_ranges",
     needed: need,
     reads: |s, _| {
         let part = Part::Around(s.reach_to_frames());
@@ -167,7 +167,7 @@ pub const CLASSIFY_SURFACE: Pass = Pass {
     stage: Stage::Raycast,
     frequency: Frequency::Picture,
     link: Link::None,
-    shader: |_, _| "empty_space/classify.plain",
+    shader: |_, _| "empty_space/classify",
     needed: |s| match (s.detects_surface(), need(s)) {
         (true, Ok(_)) => Ok("where no sample exceeds the threshold the detector cannot fire"),
         (true, not) => not,
@@ -178,7 +178,7 @@ pub const CLASSIFY_SURFACE: Pass = Pass {
     extent: |s, _| s.bricks().count,
     repeat: once,
     params: |s, _| window(s, s.surface_view()).f32("quiet_level", quiet_level(s)),
-    constants: |_, _| vec![("MAX_DISTANCE", MAX_DISTANCE as i32)],
+    constants: |_, _| constants(0, false),
     tolerance: Tolerance {
         absolute: 0.0,
         relative: 0.0,
@@ -198,7 +198,6 @@ pub const CLASSIFY_SURFACE: Pass = Pass {
 /// The kind of each brick to the mode that composites, or takes the mean.
 pub const CLASSIFY_VOLUME: Pass = Pass {
     name: "classify_bricks_volume",
-    shader: |s, _| if s.composites() { "empty_space/classify.transparent" } else { "empty_space/classify.plain" },
     needed: |s| match (s.composites(), s.settings.mode, need(s)) {
         (true, _, Ok(_)) => Ok("what is transparent or outside is left out"),
         (_, Mode::Mean, Ok(_)) => Ok("what is zero or outside is counted without looking"),
@@ -210,17 +209,13 @@ pub const CLASSIFY_VOLUME: Pass = Pass {
         reads.extend(s.composites().then_some(whole("opaque_before", Slot::OpaqueBefore)));
         reads
     },
-    params: |s, _| match s.composites() {
-        true => window(s, s.volume_view()),
-        false => window(s, s.projection_view()).f32("quiet_level", 0.0),
+    // What is composited has no quiet bricks; of a mean only those of zeros are.
+    params: |s, _| {
+        window(s, if s.composites() { s.volume_view() } else { s.projection_view() }).f32("quiet_level", 0.0)
     },
-    constants: |s, _| {
-        let mut constants = vec![("MAX_DISTANCE", MAX_DISTANCE as i32)];
-        if s.composites() {
-            constants.push(("FROM_ZERO", between_samples(s) as i32));
-            constants.push(("ENTRIES", s.transfer_entries() as i32));
-        }
-        constants
+    constants: |s, _| match s.composites() {
+        true => constants(s.transfer_entries(), between_samples(s)),
+        false => constants(0, false),
     },
     reference: |s, _, reads, writes| {
         if !s.composites() {
@@ -243,6 +238,11 @@ pub const CLASSIFY_VOLUME: Pass = Pass {
     },
     ..CLASSIFY_SURFACE
 };
+
+/// `entries` of the transfer function: 0 where nothing is composited.
+fn constants(entries: usize, from_zero: bool) -> Vec<(&'static str, i32)> {
+    vec![("MAX_DISTANCE", MAX_DISTANCE as i32), ("ENTRIES", entries as i32), ("FROM_ZERO", from_zero as i32)]
+}
 
 /// The slots that every kind follows from.
 fn ranges() -> Vec<Bind> {
@@ -298,7 +298,7 @@ pub const DISTANCE_SURFACE: Pass = Pass {
     stage: Stage::Raycast,
     frequency: Frequency::Picture,
     link: Link::None,
-    shader: |_, _| "empty_space/distance.plain",
+    shader: |_, _| "empty_space/distance",
     needed: CLASSIFY_SURFACE.needed,
     reads: |_, t| vec![whole("source", link(Slot::SurfaceBrickDistances, t).0)],
     writes: |_, t| vec![whole("target", link(Slot::SurfaceBrickDistances, t).1)],

@@ -107,7 +107,7 @@ impl Change {
             && match self {
                 Change::Numbers { .. } => turns.iter().any(|t| self.numbers(pass, scene, &mut pass.numbers(scene, t))),
                 Change::Constant { .. } => {
-                    turns.iter().any(|t| self.constants(pass.name, &mut (pass.constants)(scene, t)))
+                    turns.iter().any(|t| self.constants(pass.name, &mut pass.constants(scene, t)))
                 }
                 Change::Shader { pass: name, .. } | Change::Extent { pass: name, .. } => pass.name.starts_with(name),
                 Change::DispatchArgs { .. } => turns.iter().any(|t| self.args(pass.name, scene, &mut t.clone())),

@@ -15,7 +15,7 @@ pub const DROP: Pass = Pass {
     stage: Stage::Preprocess,
     frequency: Frequency::Volume,
     link: Link::AfterSlices,
-    shader: |_, _| "preprocess/drop_floating.plain",
+    shader: |_, _| "preprocess/drop_floating",
     needed: |s| match s.drops_floating() {
         true => Ok("small parts that float are not drawn"),
         false => Err("not asked for, or nothing is drawn that could float"),

@@ -7,34 +7,48 @@ use crate::spirv::hoist_uniforms::hoist_uniforms;
 use crate::spirv::storage_to_texel_buffer::storage_to_texel_buffer;
 use crate::spirv::strip_bindings::strip_bindings;
 use crate::spirv::texture_to_storage::{ImageFormat, texture_to_storage};
+use crate::spirv::volumes_to_layers::volumes_to_layers;
 use crate::spirv::{self, Access, Dimension, Kind, Member, Module};
 
 /// Textures and tables that a shader declares and a pass may not bind. Specialization constants say whether they are read or written.
-const OPTIONAL: [&str; 14] = [
+const OPTIONAL: [&str; 24] = [
+    "back_light",
+    "before",
     "bricks",
+    "composited",
     "distance_map",
+    "front",
     "hit_distance",
     "light_normals",
     "light_shade",
     "line_lut",
     "occlusion",
+    "opaque_before",
     "packed_neighbours",
+    "planes",
+    "rows",
     "shadow",
     "slice_table",
+    "step_result",
     "surface",
     "sweep_lut",
+    "tgc",
+    "tiles",
     "volume_bricks",
     "volume_layer",
 ];
 
-/// A pass's shader without the textures and tables that this scene does not have.
+/// A pass's shader as this scene needs it: without the textures and tables that the scene does not have, and with an array of layers
+/// for each volume that is one.
 ///
 /// # Errors
 /// A module that breaks the format.
 pub fn for_scene(pass: &Pass, scene: &Scene, args: &DispatchArgs, words: &[u32]) -> Result<Vec<u32>, String> {
     let bound = [pass.reads(scene, args), pass.writes(scene, args)].concat();
     let absent: Vec<_> = OPTIONAL.into_iter().filter(|name| bound.iter().all(|b| b.name != *name)).collect();
-    strip_bindings(words, &absent).map_err(|e| e.to_string())
+    let words = strip_bindings(words, &absent).map_err(|e| e.to_string())?;
+    let layered: Vec<_> = bound.iter().filter(|bind| bind.slot.is_layered(scene)).map(|bind| bind.name).collect();
+    volumes_to_layers(&words, &layered).map_err(|e| e.to_string())
 }
 
 /// A pass's shader as a CPU runs it fastest: its numbers loaded once, what it only fetches texels of as storage images, and its
@@ -100,7 +114,7 @@ pub fn check(pass: &Pass, scene: &Scene, args: &DispatchArgs, module: &Module) -
         }
     }
     check_params(module, &pass.numbers(scene, args))?;
-    let constants = (pass.constants)(scene, args);
+    let constants = pass.constants(scene, args);
     for (name, _) in &constants {
         if !module.constants.iter().any(|c| c.name == *name) {
             return Err(format!("the pass sets constant '{name}', glsl has none of that name"));

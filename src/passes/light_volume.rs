@@ -56,7 +56,7 @@ pub const MATTER: Pass = Pass {
     stage: Stage::Raycast,
     frequency: Frequency::Picture,
     link: Link::None,
-    shader: |_, _| "light_volume/matter.plain",
+    shader: |_, _| "light_volume/matter",
     needed: need,
     reads: |s, _| {
         let mut reads = ray::reads(s);
@@ -119,7 +119,7 @@ pub const MATTER: Pass = Pass {
 /// The levels of the pyramid, one after the other.
 pub const REDUCE: Pass = Pass {
     name: "light_reduce",
-    shader: |_, _| "light_volume/reduce.plain",
+    shader: |_, _| "light_volume/reduce",
     reads: |_, t| vec![whole("source", level(t.iteration))],
     writes: |_, t| vec![whole("target", level(t.iteration + 1))],
     extent: |s, t| cells(s).map(|n| n.div_ceil(2 << t.iteration)),
@@ -235,6 +235,10 @@ impl Beam {
         extinction.map(|e| e * self.propagation(scene).path * self.cell(scene))
     }
 
+    fn constants(&self, scene: &Scene, args: &DispatchArgs) -> Vec<(&'static str, i32)> {
+        vec![("AXIS", self.propagation(scene).axis as i32), ("FIRST", i32::from(args.iteration == 0))]
+    }
+
     fn params(&self, scene: &Scene, args: &DispatchArgs) -> Params {
         Params::default()
             .i32("layer", self.layer(scene, args))
@@ -286,13 +290,13 @@ impl Beam {
 /// The light that `light.direction` names, layer by layer.
 pub const PROPAGATE: Pass = Pass {
     name: "light_propagate",
-    shader: |_, t| if t.iteration == 0 { "light_volume/propagate.first" } else { "light_volume/propagate.next" },
+    shader: |_, _| "light_volume/propagate",
     reads: |_, t| KEY.reads(t),
     writes: |_, t| KEY.writes(t),
     extent: |s, _| KEY.extent(s),
     repeat: |s| KEY.layers(s),
     params: |s, t| KEY.params(s, t),
-    constants: |s, _| vec![("AXIS", KEY.propagation(s).axis as i32)],
+    constants: |s, t| KEY.constants(s, t),
     tolerance: Tolerance {
         absolute: 1e-6,
         relative: 6e-4,
@@ -312,7 +316,7 @@ pub const PROPAGATE_BACK: Pass = Pass {
     extent: |s, _| BACK.extent(s),
     repeat: |s| BACK.layers(s),
     params: |s, t| BACK.params(s, t),
-    constants: |s, _| vec![("AXIS", BACK.propagation(s).axis as i32)],
+    constants: |s, t| BACK.constants(s, t),
     reference: |s, t, reads, writes| BACK.reference(s, t, reads, writes),
     ..PROPAGATE
 };
@@ -320,7 +324,7 @@ pub const PROPAGATE_BACK: Pass = Pass {
 /// Light that tissue scatters, along one axis a dispatch.
 pub const DIFFUSE: Pass = Pass {
     name: "light_diffuse",
-    shader: |_, _| "light_volume/diffuse.plain",
+    shader: |_, _| "light_volume/diffuse",
     needed: |s| match s.lit_by_volume() {
         Some(light) if light.scatter > 0.0 => Ok("tissue scatters light"),
         Some(_) => Err("tissue scatters no light"),
@@ -391,7 +395,7 @@ fn scatter(scene: &Scene) -> [f64; 3] {
 /// Light from everywhere above, and from behind.
 pub const AMBIENT: Pass = Pass {
     name: "light_ambient",
-    shader: |s, _| if need_back(s).is_ok() { "light_volume/ambient.back" } else { "light_volume/ambient.plain" },
+    shader: |_, _| "light_volume/ambient",
     reads: |s, _| {
         let mut reads: Vec<Bind> = (1..=4)
             .zip(["pyramid_1", "pyramid_2", "pyramid_3", "pyramid_4"])
@@ -405,17 +409,14 @@ pub const AMBIENT: Pass = Pass {
     repeat: once,
     params: |s, _| {
         let light = light_of(s);
-        let params = Params::default()
+        Params::default()
             .f32("absorption", light.ambient_extinction())
             .f32("density", 0.5 / s.light_lattice().cell)
             .vec3("powers", light.ambient_powers())
-            .f32("ambient", s.settings.light.ambient);
-        match need_back(s) {
-            Ok(_) => params.vec3("back_colour", light.back_colour.map(|c| c * light.back)),
-            Err(_) => params,
-        }
+            .f32("ambient", s.settings.light.ambient)
+            .vec3("back_colour", light.back_colour.map(|c| c * light.back))
     },
-    constants: no_constants,
+    constants: |s, _| vec![("BACK", need_back(s).is_ok() as i32)],
     tolerance: Tolerance {
         absolute: 2e-5,
         relative: 1e-3,
@@ -474,7 +475,7 @@ fn cones() -> [DVec3; 7] {
 /// What leaves each cell, and its orientation.
 pub const SHADE: Pass = Pass {
     name: "light_shade",
-    shader: |_, _| "light_volume/shade.plain",
+    shader: |_, _| "light_volume/shade",
     reads: |s, _| {
         let arriving = if (DIFFUSE.needed)(s).is_ok() { Slot::LightScattered } else { Slot::LightArriving };
         vec![

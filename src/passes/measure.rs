@@ -18,7 +18,7 @@ pub const FILTERED: Pass = Pass {
     stage: Stage::Raycast,
     frequency: Frequency::Picture,
     link: Link::None,
-    shader: |_, _| "measure/sampling.plain",
+    shader: |_, _| "measure/sampling",
     needed: |_| Err("measures the device, not a scene"),
     reads: |_, _| vec![Bind { filtered: true, ..whole("volume", Slot::Volume) }],
     writes: |_, _| vec![whole("picture", Slot::Picture)],
@@ -76,7 +76,7 @@ pub const COPY: Pass = Pass {
 /// One sample for each texel of the output, at [`sample_position`]: to judge a device's filter. No profile times it.
 pub const POSITIONS: Pass = Pass {
     name: "measure_positions",
-    shader: |_, _| "measure/positions.plain",
+    shader: |_, _| "measure/positions",
     writes: |_, _| vec![whole("values", Slot::Distance)],
     extent: ray_extent,
     constants: no_constants,

@@ -270,7 +270,7 @@ pub struct Pass {
     /// Numbers: they change from picture to picture and compile nothing.
     pub params: fn(&Scene, &DispatchArgs) -> Params,
     /// Structure: a change of it is another pipeline.
-    pub constants: fn(&Scene, &DispatchArgs) -> Vec<(&'static str, i32)>,
+    pub constants: fn(&Scene, &Dispatch) -> Vec<(&'static str, i32)>,
     pub tolerance: Tolerance,
     /// The same from the formula, in f64. Reads arrays by the shader's names; texels it leaves NaN stay untouched. Of a pass over
     /// frames it is called for each frame, with that frame's layer of every array of layers.
@@ -281,7 +281,7 @@ pub fn once(_: &Scene) -> u32 {
     1
 }
 
-pub(super) fn no_constants(_: &Scene, _: &DispatchArgs) -> Vec<(&'static str, i32)> {
+pub(super) fn no_constants(_: &Scene, _: &Dispatch) -> Vec<(&'static str, i32)> {
     Vec::new()
 }
 

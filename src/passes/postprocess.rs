@@ -14,7 +14,7 @@ pub const TONE: Pass = Pass {
     stage: Stage::Postprocess,
     frequency: Frequency::Picture,
     link: Link::Observer(Chain::Pictures),
-    shader: |s, _| if s.draws_lines() { "postprocess/tone.lines" } else { "postprocess/tone.plain" },
+    shader: |_, _| "postprocess/tone",
     needed: |s| match s.tones_planes() {
         true => Err("planes are cut straight to 8 bits"),
         false => Ok("every picture ends in 8 bits"),
@@ -28,14 +28,10 @@ pub const TONE: Pass = Pass {
     extent: picture_extent,
     repeat: once,
     params: |s, _| {
-        let params = tone_params(s, Params::default());
-        if !s.draws_lines() {
-            return params;
-        }
         let [columns, rows] = s.tile_grid();
-        params.i32("columns", columns).i32("rows", rows).f32("line_strength", LINE_STRENGTH)
+        tone_params(s, Params::default()).i32("columns", columns).i32("rows", rows).f32("line_strength", LINE_STRENGTH)
     },
-    constants: |s, _| tone_constants(s, s.draws_lines()),
+    constants: |s, _| [tone_constants(s), vec![("LINES", s.draws_lines() as i32)]].concat(),
     tolerance: Tolerance {
         absolute: 1.01 / 255.0,
         relative: 0.0,
@@ -69,15 +65,14 @@ pub fn tone_params(scene: &Scene, params: Params) -> Params {
         .vec3("map_4", e)
 }
 
-/// The constants of toning; with `lines`, over planes.
-pub fn tone_constants(scene: &Scene, lines: bool) -> Vec<(&'static str, i32)> {
+/// The constants of toning.
+pub fn tone_constants(scene: &Scene) -> Vec<(&'static str, i32)> {
     let post = &scene.settings.post;
-    let mut constants = vec![("COLOUR_MAP", (post.colour_map != ColourMap::None) as i32)];
-    constants.push(("GAMMA", (post.gamma != 1.0) as i32));
-    if lines {
-        constants.push(("CROSSING", if scene.shows_three() && scene.draws_lines() { 2 } else { 0 }));
-    }
-    constants
+    vec![
+        ("COLOUR_MAP", (post.colour_map != ColourMap::None) as i32),
+        ("GAMMA", (post.gamma != 1.0) as i32),
+        ("CROSSING", if scene.shows_three() && scene.draws_lines() { 2 } else { 0 }),
+    ]
 }
 
 /// The colour on the screen, black where there is none; with the lines of the sheet, if it has any.
@@ -138,11 +133,7 @@ pub const ASSEMBLE: Pass = Pass {
     stage: Stage::Postprocess,
     frequency: Frequency::Picture,
     link: Link::None,
-    shader: |s, _| match s.settings.layout {
-        Layout::Single => "postprocess/assemble.alone",
-        Layout::Four => "postprocess/assemble.four",
-        Layout::Pair => "postprocess/assemble.pair",
-    },
+    shader: |_, _| "postprocess/assemble",
     needed: |s| match (rendered(s), s.settings.layout) {
         (Slot::Picture, _) => Err("one ray makes a pixel of the whole picture"),
         (_, Layout::Four) => Ok("the rendering stands beside three planes"),
@@ -160,7 +151,14 @@ pub const ASSEMBLE: Pass = Pass {
     extent: picture_extent,
     repeat: once,
     params: |_, _| Params::default(),
-    constants: |s, _| vec![("RAYS", s.settings.ray.rays as i32), ("APART", s.settings.ray.apart() as i32)],
+    constants: |s, _| {
+        let layout = match s.settings.layout {
+            Layout::Single => 0,
+            Layout::Four => 1,
+            Layout::Pair => 2,
+        };
+        vec![("RAYS", s.settings.ray.rays as i32), ("APART", s.settings.ray.apart() as i32), ("LAYOUT", layout)]
+    },
     tolerance: Tolerance {
         absolute: 1e-3,
         relative: 0.0,

@@ -13,9 +13,7 @@ pub const SCAN_CONVERT: Pass = Pass {
     stage: Stage::Preprocess,
     frequency: Frequency::Frame,
     link: Link::Filter(Filter::of(Chain::Slices)),
-    shader: |_, t| {
-        if t.writes_volume() { "preprocess/scan_convert.slice" } else { "preprocess/scan_convert.plane" }
-    },
+    shader: |_, _| "preprocess/scan_convert",
     needed: |s| match s.probe() {
         Some(_) => Ok("frames are polar"),
         None => Err("the volume is Cartesian already"),
@@ -97,13 +95,7 @@ pub const CONDITION: Pass = Pass {
     stage: Stage::Preprocess,
     frequency: Frequency::Frame,
     link: Link::None,
-    shader: |s, _| {
-        if s.settings.conditioning.tgc.is_empty() {
-            "preprocess/condition.plain"
-        } else {
-            "preprocess/condition.gained"
-        }
-    },
+    shader: |_, _| "preprocess/condition",
     needed: |s| match s.probe() {
         None => Err("the volume is Cartesian already: it has no lines"),
         Some(_) if s.conditions() => Ok("asked for, or lines are longer than asked for"),
@@ -136,6 +128,7 @@ pub const CONDITION: Pass = Pass {
             ("RADIUS", gaussian_radius(c.deviation(s.decimation())) as i32),
             ("FACTOR", s.decimation() as i32),
             ("LOG", c.dynamic_range.is_some() as i32),
+            ("GAINED", !c.tgc.is_empty() as i32),
         ]
     },
     tolerance: Tolerance {
@@ -198,9 +191,7 @@ pub const LOAD_SLICE: Pass = Pass {
     stage: Stage::Preprocess,
     frequency: Frequency::Frame,
     link: Link::Filter(Filter { copies: stores_without_loss, is_identity: is_unscaled, ..Filter::of(Chain::Slices) }),
-    shader: |_, t| {
-        if t.writes_volume() { "preprocess/load_slice.slice" } else { "preprocess/load_slice.plane" }
-    },
+    shader: |_, _| "preprocess/load_slice",
     needed: |s| match s.probe() {
         None => Ok("the volume is Cartesian already: its slices are only scaled"),
         Some(_) => Err("frames are polar"),
@@ -259,7 +250,7 @@ pub const PACKED_NEIGHBOURS: Pass = Pass {
     stage: Stage::Preprocess,
     frequency: Frequency::Volume,
     link: Link::AfterSlices,
-    shader: |_, _| "preprocess/packed_neighbours.plain",
+    shader: |_, _| "preprocess/packed_neighbours",
     needed: |s| match s.packs() {
         true => Ok("rays load the four neighbours of a slice at once"),
         false => Err("no ray is cast, or samples are taken in another way"),

@@ -11,7 +11,7 @@ pub const LIGHT: Pass = Pass {
     stage: Stage::Shade,
     frequency: Frequency::Picture,
     link: Link::Observer(Chain::Distances),
-    shader: |_, _| "shade/light.plain",
+    shader: |_, _| "shade/light",
     needed: |s| match (s.has_distance(), s.lights_volume()) {
         (true, false) => Ok("a surface is lit"),
         (true, true) => Ok("the volume is lit where rays hit it first"),

@@ -445,6 +445,11 @@ impl Slot {
         }
     }
 
+    /// True for an array of layers.
+    pub fn is_layered(self, scene: &Scene) -> bool {
+        matches!(self.shape(scene), Shape::Layers(_))
+    }
+
     /// True if the slot has a texel for each of the volume, of which the visible part is stored.
     pub fn is_volume(self) -> bool {
         let of_rays = matches!(self, Slot::Volume | Slot::SharpVolume | Slot::WholeVolume | Slot::Floating);

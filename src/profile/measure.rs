@@ -321,7 +321,7 @@ fn dispatched(step: &Step, scene: &Scene) -> u64 {
 /// Texels that one step fetches; None unless it is a filter whose window does not depend on the data.
 fn fetches(pass: &Pass, scene: &Scene, step: &Step) -> Option<u64> {
     let args = DispatchArgs { slices: pass.slices(scene), ..step.args() };
-    let constants = (pass.constants)(scene, &args);
+    let constants = pass.constants(scene, &args);
     let radius = constants.iter().find(|(name, _)| *name == "RADIUS").map(|(_, r)| *r as u64)?;
     let edge = 2 * radius + 1;
     // One invocation filters a run of neighbours and shares their window.

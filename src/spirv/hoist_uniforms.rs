@@ -143,7 +143,7 @@ mod tests {
             let same = old.iter().filter(kept).zip(new.iter().filter(kept));
             assert!(same.clone().count() > 0 && same.into_iter().all(|(o, n)| o.operands == n.operands), "{name}");
         }
-        let (early, late) = count_loads(&words(embedded("raycast/projection.plain").unwrap()));
+        let (early, late) = count_loads(&words(embedded("raycast/projection").unwrap()));
         assert!(early + late > 40, "ray casting has that many uniform numbers");
     }
 

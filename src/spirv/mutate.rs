@@ -131,7 +131,7 @@ mod tests {
                 assert_eq!(reflect(&before).unwrap(), reflect(&after).unwrap(), "{name}");
             }
         }
-        let tone = words(embedded("postprocess/tone.plain").unwrap());
+        let tone = words(embedded("postprocess/tone").unwrap());
         let after = add_to_writes(&tone, "screen", [0.1, 0.1, 0.1, 0.0]).unwrap();
         assert_eq!(reflect(&tone).unwrap(), reflect(&after).unwrap());
         assert_eq!(decode(&after).unwrap().len(), decode(&tone).unwrap().len() + 6);
@@ -139,7 +139,7 @@ mod tests {
         let median = words(embedded("filter/median.slice").unwrap());
         let after = replace_last(&median, FMAX, FMIN).unwrap();
         assert_eq!(after.iter().zip(&median).filter(|(a, b)| a != b).count(), 1);
-        let light = words(embedded("shade/light.plain").unwrap());
+        let light = words(embedded("shade/light").unwrap());
         let after = replace_last_opcode(&light, F_ADD, F_SUB).unwrap();
         assert_eq!(after.iter().zip(&light).filter(|(a, b)| a != b).count(), 1);
         assert!(replace_last_opcode(&light, 0xffff, F_SUB).is_err());
@@ -147,7 +147,7 @@ mod tests {
 
     #[test]
     fn a_malformed_module_is_an_error() {
-        let intact = words(embedded("postprocess/tone.plain").unwrap());
+        let intact = words(embedded("postprocess/tone").unwrap());
         for cut in 0..intact.len() {
             let _ = add_to_writes(&intact[..cut], "screen", [0.0; 4]);
             let _ = round_to_half(&intact[..cut]);

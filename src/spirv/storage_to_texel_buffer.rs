@@ -239,7 +239,7 @@ mod tests {
 
     #[test]
     fn tables_become_texel_buffers_and_nothing_else_changes() {
-        let before = words(embedded("raycast/volume.plain").unwrap());
+        let before = words(embedded("raycast/volume").unwrap());
         let mut names = table_names(&before);
         names.sort();
         assert_eq!(names, ["line_lut", "slice_table", "sweep_lut", "transfer"]);
@@ -266,7 +266,7 @@ mod tests {
     #[test]
     fn buffers_of_structures_and_writable_buffers_are_not_tables() {
         assert!(table_names(&words(embedded("filter/sigma.slice").unwrap())).is_empty());
-        assert!(table_names(&words(embedded("shade/light.plain").unwrap())).is_empty());
+        assert!(table_names(&words(embedded("shade/light").unwrap())).is_empty());
     }
 
     #[test]

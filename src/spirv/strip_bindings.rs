@@ -118,7 +118,7 @@ mod tests {
     #[test]
     fn only_the_named_bindings_are_removed() {
         let removed = ["bricks", "packed_neighbours", "line_lut", "slice_table"];
-        let before = words(embedded("raycast/surface.plain").unwrap());
+        let before = words(embedded("raycast/surface").unwrap());
         let after = strip_bindings(&before, &[&removed[..], &["nothing"]].concat()).unwrap();
         let (old, new) = (reflect(&before).unwrap(), reflect(&after).unwrap());
         let kept: Vec<_> = old.bindings.iter().filter(|b| !removed.contains(&b.name.as_str())).collect();
@@ -130,7 +130,7 @@ mod tests {
 
     #[test]
     fn a_sampled_texture_is_removed_and_a_malformed_module_is_an_error() {
-        let intact = words(embedded("raycast/surface.plain").unwrap());
+        let intact = words(embedded("raycast/surface").unwrap());
         let without = reflect(&strip_bindings(&intact, &["volume"]).unwrap()).unwrap();
         assert!(without.bindings.iter().all(|b| b.name != "volume"), "it is read with a filter and without");
         // A small ray caster, cut at every seventh word: the time is that of its square.

@@ -202,7 +202,7 @@ mod tests {
 
     #[test]
     fn named_textures_become_storage_images_of_their_format_and_nothing_else_changes() {
-        let before = words(embedded("shade/light.plain").unwrap());
+        let before = words(embedded("shade/light").unwrap());
         let after =
             texture_to_storage(&before, &[("distance_map", ImageFormat::R32f), ("shadow", ImageFormat::R16f)]).unwrap();
         let (old, new) = (reflect(&before).unwrap(), reflect(&after).unwrap());
@@ -224,7 +224,7 @@ mod tests {
 
     #[test]
     fn a_sampled_volume_becomes_a_storage_image() {
-        let before = words(embedded("raycast/surface.plain").unwrap());
+        let before = words(embedded("raycast/surface").unwrap());
         let after = texture_to_storage(&before, &[("volume", ImageFormat::R8)]).unwrap();
         let volume = reflect(&after).unwrap().bindings.into_iter().find(|b| b.name == "volume").unwrap();
         assert_eq!((volume.kind, volume.access, volume.dimension), (Kind::Storage, Access::Read, Dimension::Three));
@@ -232,7 +232,7 @@ mod tests {
 
     #[test]
     fn other_bindings_are_refused_and_a_malformed_module_is_an_error() {
-        let intact = words(embedded("raycast/surface.plain").unwrap());
+        let intact = words(embedded("raycast/surface").unwrap());
         for name in ["distance_map", "sweep_lut", "Params", "nothing"] {
             assert!(texture_to_storage(&intact, &[(name, ImageFormat::R8)]).is_err(), "{name}");
         }

@@ -95,7 +95,7 @@ fn dispatch_key(scene: &Scene, pass: &Pass) -> u64 {
 fn variant(scene: &Scene, pass: &Pass) -> Variant {
     let args = dispatch_args_of(scene, pass, 0);
     let bound = pass.reads(scene, &args).into_iter().chain(pass.writes(scene, &args));
-    (pass.shader(scene, &args), (pass.constants)(scene, &args), bound.map(|b| b.slot.format(scene)).collect())
+    (pass.shader(scene, &args), pass.constants(scene, &args), bound.map(|b| b.slot.format(scene)).collect())
 }
 
 fn check(dut: &mut DeviceUnderTest, pass: &'static Pass) -> Result<Findings, GpuError> {

@@ -49,7 +49,7 @@ fn the_pipelines_of_a_scene_are_compiled_at_the_same_time_and_once() {
         .map(|step| {
             let (args, scene) = (step.args(), renderer.scene());
             let formats: Vec<_> = step.pass.reads(scene, &args).iter().map(|b| b.slot.format(scene)).collect();
-            format!("{} {:?} {formats:?}", step.pass.shader(scene, &args), (step.pass.constants)(scene, &args))
+            format!("{} {:?} {formats:?}", step.pass.shader(scene, &args), step.pass.constants(scene, &args))
         })
         .collect();
     let made = device.counts.pipelines.load(Ordering::Relaxed) - before;

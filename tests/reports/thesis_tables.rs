@@ -20,7 +20,7 @@ fn pass_names(plan: &Plan, first: bool) -> Vec<&'static str> {
 /// A specialization constant of a pass of the plan.
 fn constant(plan: &Plan, scene: &Scene, pass: &str, name: &str) -> i32 {
     let step = plan.steps.iter().find(|s| s.pass.name == pass).expect("pass");
-    let constants = (step.pass.constants)(scene, &DispatchArgs::default());
+    let constants = step.pass.constants(scene, &DispatchArgs::default());
     constants.iter().find(|c| c.0 == name).expect("constant").1
 }
 

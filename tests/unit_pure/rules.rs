@@ -297,7 +297,7 @@ fn every_pass_agrees_with_every_shader_it_may_use() {
                 let slots: Vec<_> = binds.iter().map(|b| (b.slot.format(&scene), b.slot.shape(&scene))).collect();
                 let numbers: Vec<_> =
                     pass.numbers(&scene, &args).0.iter().map(|(name, v)| (*name, std::mem::discriminant(v))).collect();
-                let constants = (pass.constants)(&scene, &args);
+                let constants = pass.constants(&scene, &args);
                 if !checked.insert(format!("{} {shader} {binds:?} {slots:?} {numbers:?} {constants:?}", pass.name)) {
                     continue;
                 }
@@ -334,8 +334,10 @@ fn every_pass_agrees_with_every_shader_it_may_use() {
 #[test]
 fn an_interface_mismatch_names_both_sides() {
     let scene = scenes().swap_remove(1);
-    let module = spirv::reflect(&spirv::words(spirv::embedded("postprocess/tone.plain").unwrap())).unwrap();
     let tone = echolume::passes::by_name("tone").unwrap();
+    let words = spirv::words(spirv::embedded("postprocess/tone").unwrap());
+    let module =
+        spirv::reflect(&interface_check::for_scene(tone, &scene, &DispatchArgs::default(), &words).unwrap()).unwrap();
     let changed = |change: fn(&mut Pass)| {
         let mut pass = Pass { ..*tone };
         change(&mut pass);

@@ -20,22 +20,14 @@ pub const SLICE: Pass = Pass {
     stage: Stage::Preprocess,
     frequency: Frequency::Frame,
     link: Link::Filter(Filter { dispatches: |s| SLICES.solver(s).dispatches(), ..Filter::of_slices(|_| None) }),
-    shader: |s, t| match SLICES.turn_of(s, t) {
-        (_, Sweep::Forward) => "filter/aos_forward.plane",
-        (0, Sweep::Backward) => "filter/aos_backward.rows",
-        (_, Sweep::Backward) if t.writes_volume() => "filter/aos_backward.slice",
-        (_, Sweep::Backward) => "filter/aos_backward.plane",
-        (0, Sweep::Both) => "filter/aos_solve.rows",
-        (_, Sweep::Both) if t.writes_volume() => "filter/aos_solve.slice",
-        (_, Sweep::Both) => "filter/aos_solve.plane",
-    },
+    shader: |s, t| SLICES.shader(s, t),
     needed: |s| need(s.slice_filters.perona_malik, Scheme::Aos),
     reads: |s, t| SLICES.reads(s, t.source(), t),
     writes: |s, t| SLICES.writes(s, slices("target", t.target()), t),
     extent: |s, t| SLICES.extent(s, t),
     repeat: |s| SLICES.solver(s).dispatches() * s.slice_filters.perona_malik.unwrap_or_default().repeat,
     params: |s, t| SLICES.params(s, s.slice_filters.perona_malik, t),
-    constants: |s, t| SLICES.constants(s, s.slice_filters.perona_malik, t),
+    constants: |s, t| SLICES.constants(s, s.slice_filters.perona_malik, t, false),
     tolerance: TOLERANCE,
     reference: |s, t, reads, writes| SLICES.reference(s, s.slice_filters.perona_malik, t, reads, writes),
 };
@@ -45,20 +37,14 @@ pub const PICTURE: Pass = Pass {
     stage: Stage::Postprocess,
     frequency: Frequency::Picture,
     link: Link::Filter(Filter { dispatches: |s| PICTURES.solver(s).dispatches(), ..Filter::of(Chain::Pictures) }),
-    shader: |s, t| match PICTURES.turn_of(s, t) {
-        (_, Sweep::Forward) => "filter/aos_forward.picture",
-        (0, Sweep::Backward) => "filter/aos_backward.picture_rows",
-        (_, Sweep::Backward) => "filter/aos_backward.picture",
-        (0, Sweep::Both) => "filter/aos_solve.picture_rows",
-        (_, Sweep::Both) => "filter/aos_solve.picture",
-    },
+    shader: |s, t| PICTURES.shader(s, t),
     needed: |s| need(s.settings.post.perona_malik, Scheme::Aos),
     reads: |s, t| PICTURES.reads(s, t.source(), t),
     writes: |s, t| PICTURES.writes(s, slices("target", t.target()), t),
     extent: |s, t| PICTURES.extent(s, t),
     repeat: |s| PICTURES.solver(s).dispatches() * s.settings.post.perona_malik.unwrap_or_default().repeat,
     params: |s, t| PICTURES.params(s, s.settings.post.perona_malik, t),
-    constants: |s, t| PICTURES.constants(s, s.settings.post.perona_malik, t),
+    constants: |s, t| PICTURES.constants(s, s.settings.post.perona_malik, t, false),
     tolerance: TOLERANCE,
     reference: |s, t, reads, writes| PICTURES.reference(s, s.settings.post.perona_malik, t, reads, writes),
 };
@@ -89,6 +75,8 @@ impl Solver {
 
 /// The images of one kind under AOS: the slots between the dispatches of a step, the size, and the number of channels.
 pub(super) struct Images {
+    /// The shaders that eliminate, substitute back, and do both.
+    shaders: [&'static str; 3],
     shares: Slot,
     forward: Slot,
     rows: Slot,
@@ -99,6 +87,7 @@ pub(super) struct Images {
 }
 
 pub(super) const SLICES: Images = Images {
+    shaders: ["filter/aos_forward.slice", "filter/aos_backward.slice", "filter/aos_solve.slice"],
     shares: Slot::SliceShares,
     forward: Slot::SliceForward,
     rows: Slot::SliceRows,
@@ -107,6 +96,7 @@ pub(super) const SLICES: Images = Images {
     images: |t| t.slices,
 };
 const PICTURES: Images = Images {
+    shaders: ["filter/aos_forward.picture", "filter/aos_backward.picture", "filter/aos_solve.picture"],
     shares: Slot::PictureShares,
     forward: Slot::PictureForward,
     rows: Slot::PictureRows,
@@ -116,7 +106,7 @@ const PICTURES: Images = Images {
 };
 
 #[derive(Clone, Copy, PartialEq)]
-pub(super) enum Sweep {
+enum Sweep {
     Forward,
     Backward,
     Both,
@@ -137,7 +127,7 @@ impl Images {
     }
 
     /// The axis (0 along rows, 1 along columns) of a dispatch, and which sweeps it makes.
-    pub(super) fn turn_of(&self, scene: &Scene, args: &DispatchArgs) -> (usize, Sweep) {
+    fn turn_of(&self, scene: &Scene, args: &DispatchArgs) -> (usize, Sweep) {
         match self.solver(scene) {
             Solver::Hybrid => ((args.iteration % 2) as usize, Sweep::Both),
             Solver::Thomas => {
@@ -145,6 +135,10 @@ impl Images {
                 ((args.iteration % 4 / 2) as usize, sweep)
             }
         }
+    }
+
+    pub(super) fn shader(&self, scene: &Scene, args: &DispatchArgs) -> &'static str {
+        self.shaders[self.turn_of(scene, args).1 as usize]
     }
 
     pub(super) fn reads(&self, scene: &Scene, source: Slot, args: &DispatchArgs) -> Vec<Bind> {
@@ -181,15 +175,18 @@ impl Images {
         }
     }
 
+    /// `extrapolates`: the dispatch ends both half steps of Richardson's extrapolation.
     pub(super) fn constants(
         &self,
         scene: &Scene,
         settings: Option<PeronaMalik>,
         args: &DispatchArgs,
+        extrapolates: bool,
     ) -> Vec<(&'static str, i32)> {
         let (axis, sweep) = self.turn_of(scene, args);
         let mut constants = vec![("AXIS", axis as i32)];
         constants.extend((sweep != Sweep::Backward).then(|| constant(settings)));
+        constants.extend((sweep != Sweep::Forward).then_some(("RICHARDSON", extrapolates as i32)));
         constants.extend((sweep == Sweep::Both).then(|| ("CHUNK", self.chunk(scene, axis) as i32)));
         constants
     }

@@ -2,7 +2,7 @@
 //! of one complete step is of second order in time. It stays stable, but a value may leave the range of its neighbours. Three steps
 //! of AOS, whose shaders and reference these are; the last dispatch also extrapolates.
 
-use super::aos::{self, SLICES, Sweep};
+use super::aos::{self, SLICES};
 use super::perona_malik::need;
 use crate::passes::pass::*;
 use crate::scene::{PeronaMalik, Scene, Scheme};
@@ -15,17 +15,7 @@ pub const SLICE: Pass = Pass {
     stage: Stage::Preprocess,
     frequency: Frequency::Frame,
     link: Link::Filter(Filter { dispatches, ..Filter::of_slices(|_| None) }),
-    shader: |s, t| match (SLICES.turn_of(s, t), is_last(s, t), t.writes_volume()) {
-        ((_, Sweep::Forward), _, _) => "filter/aos_forward.plane",
-        ((0, Sweep::Backward), _, _) => "filter/aos_backward.rows",
-        ((_, Sweep::Backward), false, _) => "filter/aos_backward.plane",
-        ((_, Sweep::Backward), true, false) => "filter/aos_backward.richardson_plane",
-        ((_, Sweep::Backward), true, true) => "filter/aos_backward.richardson_slice",
-        ((0, Sweep::Both), _, _) => "filter/aos_solve.rows",
-        ((_, Sweep::Both), false, _) => "filter/aos_solve.plane",
-        ((_, Sweep::Both), true, false) => "filter/aos_solve.richardson_plane",
-        ((_, Sweep::Both), true, true) => "filter/aos_solve.richardson_slice",
-    },
+    shader: |s, t| SLICES.shader(s, t),
     needed: |s| need(s.slice_filters.perona_malik, Scheme::AosRichardson),
     reads: |s, t| {
         let source = if part(s, t) == Part::SecondHalf { Slot::SliceHalfStep } else { t.source() };
@@ -44,7 +34,7 @@ pub const SLICE: Pass = Pass {
     extent: |s, t| SLICES.extent(s, t),
     repeat: |s| dispatches(s) * s.slice_filters.perona_malik.unwrap_or_default().repeat,
     params: |s, t| SLICES.params(s, step_of(s, t), t),
-    constants: |s, t| SLICES.constants(s, s.slice_filters.perona_malik, t),
+    constants: |s, t| SLICES.constants(s, s.slice_filters.perona_malik, t, is_last(s, t)),
     tolerance: Tolerance { absolute: 6e-5, ..aos::TOLERANCE },
     reference: |s, t, reads, writes| {
         SLICES.reference(s, step_of(s, t), t, reads, writes);

@@ -14,17 +14,14 @@ pub const SLICE: Pass = Pass {
     stage: Stage::Preprocess,
     frequency: Frequency::Frame,
     link: Link::Filter(Filter::of_slices(|s| Some([reach(s, s.slice_filters.enhanced_sigma); 2]))),
-    shader: |_, t| match t.writes_volume() {
-        true => "filter/enhanced_sigma.slice",
-        false => "filter/enhanced_sigma.plane",
-    },
+    shader: |_, _| "filter/enhanced_sigma.slice",
     needed: |s| need(s.slice_filters.enhanced_sigma),
     reads: reads_source,
     writes: writes_target,
     extent: slice_extent,
     repeat: once,
     params: |s, t| params(s.slice_filters.enhanced_sigma, LEAST, t),
-    constants: |s, _| constants(s, s.slice_filters.enhanced_sigma),
+    constants: |s, _| constants(s, s.slice_filters.enhanced_sigma, false),
     tolerance: Tolerance { absolute: 6e-4, relative: 0.0, outliers: 2e-3, why: WHY },
     reference: |s, t, reads, writes| {
         let enhanced = Enhanced::new(s, s.slice_filters.enhanced_sigma, LEAST, |_| true);
@@ -47,7 +44,7 @@ pub const DISTANCE: Pass = Pass {
     extent: ray_extent,
     repeat: once,
     params: |s, t| params(s.distance.enhanced_sigma, LEAST_DISTANCE, t),
-    constants: |s, _| constants(s, s.distance.enhanced_sigma),
+    constants: |s, _| constants(s, s.distance.enhanced_sigma, false),
     // A pixel in mm differs by 4e-6 between f32 and f64, a hundred times as much as one in 0..1.
     tolerance: Tolerance { absolute: 2e-5, relative: 1e-6, outliers: 5e-3, why: WHY },
     reference: |s, t, reads, writes| {
@@ -68,7 +65,7 @@ pub const PICTURE: Pass = Pass {
     extent: picture_extent,
     repeat: once,
     params: |s, t| params(s.settings.post.enhanced_sigma, LEAST, t),
-    constants: |s, _| constants(s, s.settings.post.enhanced_sigma),
+    constants: |s, _| constants(s, s.settings.post.enhanced_sigma, false),
     tolerance: Tolerance { absolute: 1e-3, relative: 1e-3, outliers: 1e-2, why: WHY },
     reference: |s, t, reads, writes| {
         let enhanced = Enhanced::new(s, s.settings.post.enhanced_sigma, LEAST, |_| true);
@@ -83,7 +80,7 @@ pub const GROWTH: Pass = Pass {
     stage: Stage::Preprocess,
     frequency: Frequency::Frame,
     link: Link::Observer(Chain::Slices),
-    shader: |_, _| "filter/enhanced_sigma.growth",
+    shader: |_, _| "filter/enhanced_sigma.slice",
     needed: |s| match s.slice_filters.enhanced_sigma {
         Some(e) if e.growth && e.sigma > 0.0 => Ok("the windows' growth is asked for"),
         Some(e) if e.growth => Err("a sigma of 0 grows no window"),
@@ -94,7 +91,7 @@ pub const GROWTH: Pass = Pass {
     extent: slice_extent,
     repeat: once,
     params: |s, t| params(s.slice_filters.enhanced_sigma, LEAST, t),
-    constants: |s, _| constants(s, s.slice_filters.enhanced_sigma),
+    constants: |s, _| constants(s, s.slice_filters.enhanced_sigma, true),
     tolerance: Tolerance {
         absolute: 0.0,
         relative: 0.0,
@@ -127,13 +124,15 @@ fn params(enhanced: Option<EnhancedSigma>, least: f64, args: &DispatchArgs) -> P
     estimator::params(params, e.edge, least).i32("slice", args.slice)
 }
 
-fn constants(scene: &Scene, enhanced: Option<EnhancedSigma>) -> Vec<(&'static str, i32)> {
+/// `growth`: the result is the number of rings that the window grew.
+fn constants(scene: &Scene, enhanced: Option<EnhancedSigma>, growth: bool) -> Vec<(&'static str, i32)> {
     let e = enhanced.unwrap_or_default();
     vec![
         ("RADIUS", (e.window / 2) as i32),
         ("MAX_RADIUS", (e.largest / 2) as i32),
         ("ESTIMATOR", estimator::constant(scene.centre(e))),
         ("MULTIPLICATIVE", i32::from(e.noise == Noise::Multiplicative)),
+        ("GROWTH", growth as i32),
     ]
 }
 

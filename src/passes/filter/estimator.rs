@@ -9,7 +9,7 @@ pub const SLICE: Pass = Pass {
     stage: Stage::Preprocess,
     frequency: Frequency::Frame,
     link: Link::Filter(Filter::of_slices(|s| Some([s.settings.slices.estimator.map_or(0, reach); 2]))),
-    shader: |_, t| if t.writes_volume() { "filter/estimator.slice" } else { "filter/estimator.plane" },
+    shader: |_, _| "filter/estimator",
     needed: |s| s.settings.slices.estimator.map_or(Err("not asked for"), |_| Ok("asked for")),
     reads: reads_source,
     writes: writes_target,

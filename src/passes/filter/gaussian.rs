@@ -62,9 +62,7 @@ const fn within_slices<const VOLUME: usize, const AXIS: usize>(name: &'static st
             },
             ..Filter::of(VOLUMES[VOLUME].chain)
         }),
-        shader: |_, t| {
-            if t.writes_volume() { "filter/gaussian.slice" } else { "filter/gaussian.plane" }
-        },
+        shader: |_, _| "filter/gaussian",
         needed: |s| need(VOLUME, s, AXIS),
         reads: reads_source,
         writes: writes_target,
@@ -84,7 +82,7 @@ const fn across_slices<const VOLUME: usize>(name: &'static str) -> Pass {
         stage: Stage::Preprocess,
         frequency: Frequency::Volume,
         link: Link::AfterSlices,
-        shader: |_, _| "filter/gaussian.volume",
+        shader: |_, _| "filter/gaussian",
         needed: |s| match s.sharpens() {
             true => (VOLUMES[VOLUME].needed)(s, Ok("the cubic B-spline is to meet the slices")),
             false => need(VOLUME, s, 2),
@@ -99,8 +97,8 @@ const fn across_slices<const VOLUME: usize>(name: &'static str) -> Pass {
         },
         extent: |s, t| in_runs([s.grid.size[0], s.grid.size[1], t.slices], 2),
         repeat: once,
-        params: |s, t| params(VOLUME, s, 2, t).i32("slices", t.slices),
-        constants: |s, _| constants(VOLUME, s, 2),
+        params: |s, t| params(VOLUME, s, 2, t),
+        constants: |s, _| [constants(VOLUME, s, 2), vec![("LAYERED", 0)]].concat(),
         tolerance: TOLERANCE,
         reference: |s, t, reads, writes| match s.sharpens() {
             true => sharpened(t, reads, writes),
@@ -118,7 +116,7 @@ fn params(volume: usize, scene: &Scene, axis: usize, args: &DispatchArgs) -> Par
     let deviation = (VOLUMES[volume].deviations)(scene)[axis];
     // Without a Gaussian the shader has other weights, and no use for this one.
     let narrowness = if deviation > 0.0 { 0.5 / (deviation * deviation) } else { 0.0 };
-    Params::default().f32("narrowness", narrowness).i32("slice", args.slice)
+    Params::default().f32("narrowness", narrowness).i32("slice", args.slice).i32("slices", args.slices)
 }
 
 fn constants(volume: usize, scene: &Scene, axis: usize) -> Vec<(&'static str, i32)> {

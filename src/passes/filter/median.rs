@@ -7,7 +7,7 @@ pub const SLICE: Pass = Pass {
     stage: Stage::Preprocess,
     frequency: Frequency::Frame,
     link: Link::Filter(Filter::of_slices(|_| Some([1; 2]))),
-    shader: |_, t| if t.writes_volume() { "filter/median.slice" } else { "filter/median.plane" },
+    shader: |_, _| "filter/median.slice",
     needed: |s| if s.settings.slices.median { Ok("asked for") } else { Err("not asked for") },
     reads: reads_source,
     writes: writes_target,

@@ -12,10 +12,7 @@ pub const SLICE: Pass = Pass {
     stage: Stage::Preprocess,
     frequency: Frequency::Frame,
     link: Link::Filter(Filter::of_slices(|_| Some([1; 2]))),
-    shader: |_, t| match t.writes_volume() {
-        true => "filter/perona_malik.slice",
-        false => "filter/perona_malik.plane",
-    },
+    shader: |_, _| "filter/perona_malik.slice",
     needed: |s| need(s.slice_filters.perona_malik, Scheme::Explicit),
     reads: reads_source,
     writes: writes_target,

@@ -16,11 +16,7 @@ pub const SLICE: Pass = Pass {
     stage: Stage::Preprocess,
     frequency: Frequency::Frame,
     link: Link::Filter(Filter { dispatches: stages, ..Filter::of_slices(|_| None) }),
-    shader: |s, t| match stage_of(s, t) {
-        1 => "filter/rkl1.first",
-        stage if stage == stages(s) && t.writes_volume() => "filter/rkl1.slice",
-        _ => "filter/rkl1.plane",
-    },
+    shader: |_, _| "filter/rkl1",
     needed: |s| need(s.slice_filters.perona_malik, Scheme::Rkl1),
     reads: |s, t| {
         // After no stage: the step's beginning.
@@ -46,7 +42,7 @@ pub const SLICE: Pass = Pass {
             .f32("share", c.share * p.step)
             .i32("slice", t.slice)
     },
-    constants: |s, _| vec![constant(s.slice_filters.perona_malik)],
+    constants: |s, t| vec![constant(s.slice_filters.perona_malik), ("FIRST", i32::from(stage_of(s, t) == 1))],
     tolerance: Tolerance {
         absolute: 3e-6,
         relative: 3e-6,

@@ -13,7 +13,7 @@ pub const SLICE: Pass = Pass {
     stage: Stage::Preprocess,
     frequency: Frequency::Frame,
     link: Link::Filter(Filter::of_slices(|s| Some([radius(s.slice_filters.sigma); 2]))),
-    shader: |_, t| if t.writes_volume() { "filter/sigma.slice" } else { "filter/sigma.plane" },
+    shader: |_, _| "filter/sigma.slice",
     needed: |s| need(s.slice_filters.sigma),
     reads: reads_source,
     writes: writes_target,

@@ -17,7 +17,7 @@ pub const PASS: Pass = Pass {
     stage: Stage::Raycast,
     frequency: Frequency::Picture,
     link: Link::None,
-    shader: |_, _| "raycast/cube.plain",
+    shader: |_, _| "raycast/cube",
     needed: |s| match s.settings.mode {
         Mode::Cube => Ok("the volume is a solid block"),
         _ => Err("no block in this mode"),

@@ -56,7 +56,7 @@ pub const TONED: Pass = Pass {
     },
     writes: |_, _| vec![whole("screen", Slot::Screen)],
     params: |s, _| postprocess::tone_params(s, params(s)).f32("line_strength", postprocess::LINE_STRENGTH),
-    constants: |s, _| [constants(s), postprocess::tone_constants(s, true)].concat(),
+    constants: |s, _| [constants(s), postprocess::tone_constants(s)].concat(),
     tolerance: Tolerance {
         absolute: 2.01 / 255.0,
         relative: 0.0,

@@ -11,7 +11,7 @@ pub const PASS: Pass = Pass {
     stage: Stage::Raycast,
     frequency: Frequency::Picture,
     link: Link::None,
-    shader: |_, _| "raycast/projection.plain",
+    shader: |_, _| "raycast/projection",
     needed: |s| match s.settings.mode {
         Mode::Mip | Mode::MinIp | Mode::Mean => Ok("the mode keeps one value of each ray"),
         _ => Err("the mode is no projection"),

@@ -11,7 +11,7 @@ pub const PASS: Pass = Pass {
     stage: Stage::Raycast,
     frequency: Frequency::Picture,
     link: Link::None,
-    shader: |_, _| "raycast/surface.plain",
+    shader: |_, _| "raycast/surface",
     needed: |s| match (s.detects_surface(), s.marches_once()) {
         (false, _) => Err("no surface in this mode"),
         (true, Ok(_)) => Err("found in the march that composites"),

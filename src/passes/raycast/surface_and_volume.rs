@@ -9,7 +9,7 @@ use crate::passes::pass::*;
 
 pub const PASS: Pass = Pass {
     name: "raycast_surface_and_volume",
-    shader: |_, _| "raycast/surface_and_volume.plain",
+    shader: |_, _| "raycast/surface_and_volume",
     needed: |s| s.marches_once(),
     reads: |s, _| {
         let mut reads = ray::marching_reads(s, empty_space::surface_skipping(s));

@@ -13,7 +13,7 @@ pub const PASS: Pass = Pass {
     stage: Stage::Raycast,
     frequency: Frequency::Picture,
     link: Link::None,
-    shader: |_, _| "raycast/volume.plain",
+    shader: |_, _| "raycast/volume",
     needed: |s| match (s.composites(), s.marches_once()) {
         (false, _) => Err("nothing is composited in this mode"),
         (true, Ok(_)) if kind(s) == Kind::Colour => Err("composited in the march that finds the surface"),

@@ -36,7 +36,7 @@ fn planned(settings: &Settings) -> String {
             for step in &plan.steps {
                 let (pass, args) = (step.pass, DispatchArgs { iteration: step.iteration, ..DispatchArgs::default() });
                 pass.invocations(&scene, &args);
-                let _ = (pass.shader(&scene, &args), (pass.constants)(&scene, &args));
+                let _ = (pass.shader(&scene, &args), pass.constants(&scene, &args));
             }
             let _ = (Plan::new(&usual).rerun(&usual, &scene), plan.rerun(&scene, &usual), plan.rerun(&scene, &scene));
             outcome += &format!("{:?}", scene.settings.mode);

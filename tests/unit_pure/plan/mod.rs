@@ -96,9 +96,13 @@ fn a_plan_explains_itself() {
     assert_eq!(line("+ aos_slice"), "+ aos_slice 8 x 1 x 1, each frame, 8 times: asked for");
     assert_eq!(line("+ tone"), "+ tone 5 x 4 x 1, each picture: every picture ends in 8 bits");
     assert_eq!(line("- sigma_slice"), "- sigma_slice not asked for");
-    // Eight dispatches of three shaders, each listed once.
-    assert_eq!(line("filter/aos_forward.plane"), "filter/aos_forward.plane: slice_b -> slice_shares, slice_forward");
-    assert_eq!(line("filter/aos_backward.rows"), "filter/aos_backward.rows: slice_shares, slice_forward -> slice_rows");
+    // Eight dispatches of five pipelines, each listed once: those of rows, of columns, and of the columns that go to the volume.
+    let listed: Vec<&str> = text.lines().map(str::trim).filter(|line| line.starts_with("filter/aos")).collect();
+    let forward = "filter/aos_forward.slice: slice_b -> slice_shares, slice_forward";
+    let rows = "filter/aos_backward.slice: slice_shares, slice_forward -> slice_rows";
+    let columns = "filter/aos_backward.slice: slice_shares, slice_forward, slice_rows -> slice_a";
+    let last = "filter/aos_backward.slice: slice_shares, slice_forward, slice_rows -> sharp_volume";
+    assert_eq!(listed, [forward, rows, forward, columns, last]);
     assert!(line("samples of the volume").contains("fastest"));
     assert_eq!(
         line("visible"),

@@ -24,8 +24,10 @@ fn numbers(scene: &Scene, name: &str) -> Vec<(&'static str, f64)> {
     (pass(name).params)(scene, &args).0.iter().map(|(name, value)| (*name, of(value))).collect()
 }
 
+/// The constants that a pass names; whether slices go to layers is seen by their slot.
 fn constants(scene: &Scene, name: &str, iteration: u32) -> Vec<(&'static str, i32)> {
-    (pass(name).constants)(scene, &DispatchArgs { iteration, ..DispatchArgs::default() })
+    let all = pass(name).constants(scene, &DispatchArgs { iteration, ..DispatchArgs::default() });
+    all.into_iter().filter(|(name, _)| *name != "LAYERED").collect()
 }
 
 const ALL: &str =
@@ -35,19 +37,19 @@ const ALL: &str =
 fn filters_of_slices_go_from_slot_to_slot_and_the_last_into_the_volume() {
     let scene = slices([21, 10], &format!("{ALL}, smooth = {{ lateral = 1.0, depth = 2.0, elevation = 1.0 }}"));
     for (name, expected) in [
-        ("median_slice", "filter/median.plane: slice_a -> slice_b [21, 3, 2]"),
-        ("estimator_slice", "filter/estimator.plane: slice_b -> slice_a [21, 10, 2]"),
-        ("sigma_slice", "filter/sigma.plane: slice_a -> slice_b [21, 3, 2]"),
-        ("growth_slice", "filter/enhanced_sigma.growth: slice_b -> growth [21, 10, 2]"),
-        ("enhanced_sigma_slice", "filter/enhanced_sigma.plane: slice_b -> slice_a [21, 10, 2]"),
-        ("perona_malik_slice", "filter/perona_malik.plane: slice_a -> slice_b [21, 10, 2]"),
-        ("gaussian_lateral", "filter/gaussian.plane: slice_b -> slice_a [6, 10, 2]"),
-        ("gaussian_depth", "filter/gaussian.slice: slice_a -> sharp_volume [21, 3, 2]"),
-        ("gaussian_elevation", "filter/gaussian.volume: sharp_volume -> volume [21, 10, 1]"),
+        ("median_slice", "filter/median.slice: slice_a -> slice_b [21, 3, 2]"),
+        ("estimator_slice", "filter/estimator: slice_b -> slice_a [21, 10, 2]"),
+        ("sigma_slice", "filter/sigma.slice: slice_a -> slice_b [21, 3, 2]"),
+        ("growth_slice", "filter/enhanced_sigma.slice: slice_b -> growth [21, 10, 2]"),
+        ("enhanced_sigma_slice", "filter/enhanced_sigma.slice: slice_b -> slice_a [21, 10, 2]"),
+        ("perona_malik_slice", "filter/perona_malik.slice: slice_a -> slice_b [21, 10, 2]"),
+        ("gaussian_lateral", "filter/gaussian: slice_b -> slice_a [6, 10, 2]"),
+        ("gaussian_depth", "filter/gaussian: slice_a -> sharp_volume [21, 3, 2]"),
+        ("gaussian_elevation", "filter/gaussian: sharp_volume -> volume [21, 10, 1]"),
     ] {
         assert_eq!(told(&scene, name, 0), expected);
         // Alone each writes the volume.
-        let alone = expected.split(' ').next().expect("a shader").replace("plane", "slice");
+        let alone = expected.split(' ').next().expect("a shader");
         let filter = match name {
             "growth_slice" | "gaussian_elevation" => continue,
             "median_slice" => "median = true",
@@ -59,7 +61,17 @@ fn filters_of_slices_go_from_slot_to_slot_and_the_last_into_the_volume() {
             _ => "perona_malik = { repeat = 1 }",
         };
         let told = told(&slices([21, 10], filter), name, 0);
-        assert!(told.starts_with(&alone) && told.contains("slice_a -> volume"), "{told}");
+        assert!(told.starts_with(alone) && told.contains("slice_a -> volume"), "{told}");
+    }
+}
+
+/// What goes to a layer of a batch is where its invocations are; what goes to the volume is placed by its slice.
+#[test]
+fn only_the_last_filter_of_slices_places_them_in_the_volume() {
+    let scene = slices([21, 10], "median = true, sigma = {}, smooth = { elevation = 1.0 }");
+    for (name, is_layered) in [("load_slice", 1), ("median_slice", 1), ("sigma_slice", 0), ("gaussian_elevation", 0)] {
+        let constants = pass(name).constants(&scene, &DispatchArgs::default());
+        assert!(constants.contains(&("LAYERED", is_layered)), "{name}: {constants:?}");
     }
 }
 
@@ -69,17 +81,18 @@ fn elimination_goes_forth_and_back_along_rows_and_then_columns() {
     assert_eq!((pass("aos_slice").repeat)(&scene), 8);
     let last = "shares, slice_forward, slice_rows -> ";
     for (iteration, expected) in [
-        (0, "filter/aos_forward.plane: slice_a -> slice_shares, slice_forward [10, 1, 2]".into()),
-        (1, "filter/aos_backward.rows: slice_shares, slice_forward -> slice_rows [10, 1, 2]".into()),
-        (2, "filter/aos_forward.plane: slice_a -> slice_shares, slice_forward [21, 1, 2]".into()),
-        (3, format!("filter/aos_backward.plane: slice_{last}slice_b [21, 1, 2]")),
-        (4, "filter/aos_forward.plane: slice_b -> slice_shares, slice_forward [10, 1, 2]".into()),
+        (0, "filter/aos_forward.slice: slice_a -> slice_shares, slice_forward [10, 1, 2]".into()),
+        (1, "filter/aos_backward.slice: slice_shares, slice_forward -> slice_rows [10, 1, 2]".into()),
+        (2, "filter/aos_forward.slice: slice_a -> slice_shares, slice_forward [21, 1, 2]".into()),
+        (3, format!("filter/aos_backward.slice: slice_{last}slice_b [21, 1, 2]")),
+        (4, "filter/aos_forward.slice: slice_b -> slice_shares, slice_forward [10, 1, 2]".into()),
         (7, format!("filter/aos_backward.slice: slice_{last}volume [21, 1, 2]")),
     ] {
         let expected: String = expected;
         assert_eq!(told(&scene, "aos_slice", iteration), expected);
         let axis = i32::from(iteration % 4 > 1);
-        let expected = if iteration % 2 == 0 { vec![("AXIS", axis), ("CONDUCTANCE", 0)] } else { vec![("AXIS", axis)] };
+        let own = if iteration % 2 == 0 { ("CONDUCTANCE", 0) } else { ("RICHARDSON", 0) };
+        let expected = [("AXIS", axis), own];
         assert_eq!(constants(&scene, "aos_slice", iteration), expected);
     }
     let scene = picture(
@@ -90,7 +103,7 @@ fn elimination_goes_forth_and_back_along_rows_and_then_columns() {
     let shares = "picture_shares, picture_forward";
     for (iteration, expected) in [
         (0, format!("filter/aos_forward.picture: picture -> {shares} [10, 1, 1]")),
-        (1, format!("filter/aos_backward.picture_rows: {shares} -> picture_rows [10, 1, 1]")),
+        (1, format!("filter/aos_backward.picture: {shares} -> picture_rows [10, 1, 1]")),
         (2, format!("filter/aos_forward.picture: picture -> {shares} [21, 1, 1]")),
         (3, format!("filter/aos_backward.picture: {shares}, picture_rows -> smooth_picture [21, 1, 1]")),
     ] {
@@ -112,15 +125,15 @@ fn workgroups_solve_rows_and_columns_that_their_memory_holds() {
     let scene = of([21, 300], 16 << 10);
     assert_eq!((pass("aos_slice").repeat)(&scene), 4);
     for (iteration, expected) in [
-        (0, "filter/aos_solve.rows: slice_a -> slice_rows [38400, 1, 2]"),
-        (1, "filter/aos_solve.plane: slice_a, slice_rows -> slice_b [2688, 1, 2]"),
-        (2, "filter/aos_solve.rows: slice_b -> slice_rows [38400, 1, 2]"),
+        (0, "filter/aos_solve.slice: slice_a -> slice_rows [38400, 1, 2]"),
+        (1, "filter/aos_solve.slice: slice_a, slice_rows -> slice_b [2688, 1, 2]"),
+        (2, "filter/aos_solve.slice: slice_b -> slice_rows [38400, 1, 2]"),
         (3, "filter/aos_solve.slice: slice_b, slice_rows -> volume [2688, 1, 2]"),
     ] {
         assert_eq!(told(&scene, "aos_slice", iteration), expected);
     }
-    assert_eq!(constants(&scene, "aos_slice", 2), [("AXIS", 0), ("CONDUCTANCE", 0), ("CHUNK", 1)]);
-    assert_eq!(constants(&scene, "aos_slice", 3), [("AXIS", 1), ("CONDUCTANCE", 0), ("CHUNK", 3)]);
+    assert_eq!(constants(&scene, "aos_slice", 2), [("AXIS", 0), ("CONDUCTANCE", 0), ("RICHARDSON", 0), ("CHUNK", 1)]);
+    assert_eq!(constants(&scene, "aos_slice", 3), [("AXIS", 1), ("CONDUCTANCE", 0), ("RICHARDSON", 0), ("CHUNK", 3)]);
     // 16 bytes a pixel of a slice, 28 of a picture, in whole chunks of 128.
     for (size, bytes, dispatches) in [
         ([1024, 9], 16 << 10, 4),
@@ -221,7 +234,7 @@ fn shaders_and_references_get_the_same_parameters() {
     let expected = [("range", 0.5), ("few", 3.0), ("edge", 0.5), ("least", least), ("slice", 1.0)];
     assert_eq!(numbers(&scene, "enhanced_sigma_slice"), expected);
     assert_eq!(numbers(&scene, "growth_slice"), expected);
-    let expected = [("RADIUS", 3), ("MAX_RADIUS", 6), ("ESTIMATOR", 3), ("MULTIPLICATIVE", 0)];
+    let expected = [("RADIUS", 3), ("MAX_RADIUS", 6), ("ESTIMATOR", 3), ("MULTIPLICATIVE", 0), ("GROWTH", 0)];
     assert_eq!(constants(&scene, "enhanced_sigma_slice", 0), expected);
     assert_eq!(numbers(&scene, "perona_malik_slice"), [("edge", 0.5), ("lambda", 0.125), ("slice", 1.0)]);
     assert_eq!(constants(&scene, "perona_malik_slice", 0), [("CONDUCTANCE", 1)]);
