@@ -103,7 +103,7 @@ def other_rows():
     none = {"Echolume": "has no command that writes a Cartesian volume"}
     scan = (*TINY, "--set", "slices.pixels=512")
     return [
-        Row("scan", "scan conversion 256 x 512 -> 512 x 512", "scan", ("OpenCV",), scan, sizes=(512,), per=phantom.SCAN["frames"]),
+        Row("scan", "scan conversion 256 x 512 -> 512 x 512", "scan", ("OpenCV", "FAST"), scan, sizes=(512,), per=phantom.SCAN["frames"]),
         Row("sweep", "sweep to Cartesian, 512 x 256 x 37", "sweep", ("scipy",), sizes=(128, 256), notes=none),
         slice_row("median3", "median 3x3, slice of 512 x 512, u8", ("OpenCV", "SimpleITK"), "slices.median=true"),
         slice_row("gaussian", "Gaussian of 1.5 pixels, slice of 512 x 512, u8", ("OpenCV", "SimpleITK"), blur),

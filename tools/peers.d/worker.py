@@ -25,6 +25,7 @@ PEERS = {
     "pygfx": ("peer_pygfx", "rendered"),
     "vispy": ("peer_vispy", "rendered"),
     "OpenCV": ("peer_arrays", "opencv"),
+    "FAST": ("peer_fast", "scan"),
     "SimpleITK": ("peer_arrays", "simpleitk"),
     "scipy": ("peer_arrays", "scipy"),
 }
