@@ -64,6 +64,7 @@
     ("postprocess/tone.lines", include_bytes!("postprocess/tone.lines.spv")),
     ("preprocess/condition.plain", include_bytes!("preprocess/condition.plain.spv")),
     ("preprocess/condition.gained", include_bytes!("preprocess/condition.gained.spv")),
+    ("preprocess/cut.plain", include_bytes!("preprocess/cut.plain.spv")),
     ("preprocess/drop_floating.plain", include_bytes!("preprocess/drop_floating.plain.spv")),
     ("preprocess/load_slice.plane", include_bytes!("preprocess/load_slice.plane.spv")),
     ("preprocess/load_slice.slice", include_bytes!("preprocess/load_slice.slice.spv")),

@@ -10,13 +10,14 @@ use crate::spirv::texture_to_storage::{ImageFormat, texture_to_storage};
 use crate::spirv::{self, Access, Dimension, Kind, Member, Module};
 
 /// Textures and tables that a shader declares and a pass may not bind. Specialization constants say whether they are read or written.
-const OPTIONAL: [&str; 14] = [
+const OPTIONAL: [&str; 15] = [
     "bricks",
     "distance_map",
     "hit_distance",
     "light_normals",
     "light_shade",
     "line_lut",
+    "line_shares",
     "occlusion",
     "packed_neighbours",
     "shadow",

@@ -1,5 +1,6 @@
 //! The settings of the view, and how commands change them. After any command the settings can be drawn with the current volume.
 
+mod cutting;
 mod history;
 mod measuring;
 
@@ -10,7 +11,8 @@ use crate::scene::default_look::Defaults;
 use crate::scene::load;
 use crate::scene::planes::MAX_TILES;
 use crate::scene::{
-    Camera, Cube, Inset, Layout, MAX_PICTURE, Measurement, Mode, Planes, Scene, Settings, Shadow, Tilt, Transfer,
+    Camera, Cube, Inset, KeptSide, Layout, MAX_PICTURE, Measurement, Mode, Planes, Scene, Settings, Shadow, Tilt,
+    Transfer,
 };
 use history::History;
 use std::borrow::Cow;
@@ -46,6 +48,9 @@ pub struct Controls {
     work: Option<Measurement>,
     /// The measurement whose text is being typed.
     typing: Option<usize>,
+    /// The contour of a cut in work, pixels of the picture, and the side of it that stays.
+    outline: Vec<[f64; 2]>,
+    kept_side: KeptSide,
 }
 
 impl Controls {
@@ -61,6 +66,8 @@ impl Controls {
             history: History::default(),
             work: None,
             typing: None,
+            outline: Vec::new(),
+            kept_side: KeptSide::default(),
         }
     }
 
@@ -175,6 +182,9 @@ impl Controls {
     /// Applies a command. `scene` is the one on the screen, which may be of earlier settings. Without it only the tool, the reset and
     /// the commands for the caller have an effect.
     pub(super) fn apply(&mut self, command: &Command, scene: Option<&Scene>) -> Change {
+        if let Some(change) = self.cut(command, scene) {
+            return change;
+        }
         match command {
             Command::Tool(tool) => {
                 let changed = *tool != self.tool;

@@ -3,7 +3,7 @@
 
 use super::measures;
 use super::{ACCENT, BUTTON, PanelState, TEXT, TEXT_SIZE, TOUCH_SIZE, WARNING, WEAK_TEXT, heading};
-use crate::scene::{ColourMap, Layout, Mode, PlaneName, Settings, Transfer, TransferName};
+use crate::scene::{ColourMap, KeptSide, Layout, Mode, PlaneName, Settings, Transfer, TransferName};
 use crate::ui::command::{Command, Tool, Viewpoint};
 use crate::ui::hints;
 use crate::ui::sliders::{Group, SLIDERS, Slider as Control};
@@ -13,11 +13,12 @@ use egui::{
     StrokeKind, Ui, WidgetInfo, WidgetType, pos2, vec2,
 };
 
-const TOOLS: [(Tool, &str); 5] = [
+const TOOLS: [(Tool, &str); 6] = [
     (Tool::Rotate, "Turn"),
     (Tool::Light, "Light"),
     (Tool::Region, "Region"),
     (Tool::Clip, "Clip"),
+    (Tool::Cut, "Cut"),
     (Tool::Plane, "Planes"),
 ];
 
@@ -57,6 +58,7 @@ pub(super) fn show_modes(ui: &mut Ui, state: &PanelState, width: f32, execute: &
             }
             heading(ui, "Drag");
             row.show(ui, &TOOLS, 2, |t| state.controls.tool() == t, hints::of_tool, |t| execute(Command::Tool(t)));
+            cuts(ui, state, width - 16.0, execute);
             if settings.mode.is_flat() && settings.mode != Mode::Orthogonal {
                 heading(ui, "Plane");
                 let hint = |_| "The plane that is shown and moved.";
@@ -98,6 +100,34 @@ pub(super) fn show_modes(ui: &mut Ui, state: &PanelState, width: f32, execute: &
             }
         });
     });
+}
+
+/// With the tool for cuts, which side of a contour stays; and what removes the cuts, while there are any.
+fn cuts(ui: &mut Ui, state: &PanelState, width: f32, execute: &mut dyn FnMut(Command)) {
+    if state.controls.tool() == Tool::Cut {
+        ui.scope(|ui| {
+            ui.set_max_width(width);
+            let mut on = state.controls.kept_side() == KeptSide::Inside;
+            if switch(
+                ui,
+                &mut on,
+                "Keep inside",
+                "The next contour takes away what is outside of it, not what is within.",
+            ) {
+                execute(Command::KeepSide(if on { KeptSide::Inside } else { KeptSide::Outside }));
+            }
+        });
+    }
+    if !state.controls.settings().cuts.is_empty() {
+        let button = Button::new("Remove all cuts").min_size(vec2(width, TOUCH_SIZE * 0.75));
+        if ui
+            .add(button)
+            .on_hover_text("Renderings show everything again (Shift+F; undo brings the cuts back).")
+            .clicked()
+        {
+            execute(Command::ClearCuts);
+        }
+    }
 }
 
 fn undo_and_redo(ui: &mut Ui, state: &PanelState, row: &Row, execute: &mut dyn FnMut(Command)) {
