@@ -61,7 +61,8 @@ impl InputArgs {
     ) -> Result<(Box<dyn Source>, Scene), Failure> {
         let mut source = self.source()?;
         let volume = asked.map_or_else(|| self.volume(), Ok)?;
-        check_volume(&*source, volume, self.name())?;
+        let flag = if asked.is_some() { "--volumes" } else { "--volume" };
+        check_volume(&*source, flag, volume, self.name())?;
         let layers = self.layers_with(chosen)?;
         // The settings of a workspace are complete.
         let scene = match to_show && self.workspace()?.is_none() {
@@ -376,12 +377,15 @@ pub fn frames_of(
     Ok(())
 }
 
-/// Refuses a volume that a recording, whose `name` the message has, does not hold.
-pub fn check_volume(source: &dyn Source, volume: usize, name: impl std::fmt::Display) -> Result<(), Failure> {
+/// Refuses a volume that a recording does not hold. The message has the recording's `name` and the `flag` that asks for the volume.
+pub fn check_volume(
+    source: &dyn Source,
+    flag: &str,
+    volume: usize,
+    name: impl std::fmt::Display,
+) -> Result<(), Failure> {
     match source.volumes() {
-        count if volume >= count => {
-            Err(input(format!("{name}: --volume {volume}: there are {count}, numbered from 0")))
-        }
+        count if volume >= count => Err(input(format!("{name}: {flag} {volume}: there are {count}, numbered from 0"))),
         _ => Ok(()),
     }
 }

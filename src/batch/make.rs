@@ -90,7 +90,7 @@ pub fn unit(file: &Path, command: &[String]) -> Result<Found, Failure> {
         return left_out(format!("{}: its name is not UTF-8, which a manifest is", file.display()));
     };
     let opened = source::open_with(file, work.geometry.options()).map_err(input).and_then(|source| {
-        check_volume(&*source, work.volume, file.display())?;
+        check_volume(&*source, "--volume", work.volume, file.display())?;
         Ok(source)
     });
     let source = match opened {

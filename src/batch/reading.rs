@@ -108,7 +108,7 @@ pub fn read(task: Task, folder: &Path, again: impl Fn(&Key) -> bool) -> Read {
 
 fn open(task: &Task) -> Result<Box<dyn Source>, Failure> {
     let source = source::open_with(&task.input, task.work.geometry.options()).map_err(input)?;
-    check_volume(&*source, task.work.volume, task.input.display())?;
+    check_volume(&*source, "--volume", task.work.volume, task.input.display())?;
     Ok(source)
 }
 

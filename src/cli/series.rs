@@ -218,7 +218,7 @@ impl SeriesArgs {
                 Ok(Views::Turn(cameras.into_iter().map(with).collect()))
             }
             (None, Some(Volumes::Range(first, end))) => {
-                check_volume(source, end, job.input.name())?;
+                check_volume(source, "--volumes", end, job.input.name())?;
                 Ok(Views::Time(first..=end))
             }
             (None, _) => Ok(Views::Time(0..=last)),

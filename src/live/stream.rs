@@ -485,10 +485,13 @@ impl Stream {
         &self.cine
     }
 
-    /// Position in the cine loop of the volume on display, 0 for the oldest. None if it is not in the loop.
+    /// Position in the cine loop of the volume on display, or of the one that will be next while it is frozen; 0 for the oldest. None if it is
+    /// not in the loop.
     pub fn cine_position(&self) -> Option<usize> {
         let session = self.session.as_ref()?;
-        let volume = session.replayed_volume().or(session.display.volume())?;
+        // What was sent again waits for the picture that is being drawn.
+        let waiting = session.pool.waiting().filter(|_| self.is_frozen);
+        let volume = session.replayed_volume().or(waiting).or(session.display.volume())?;
         self.cine.volumes().iter().position(|kept| kept.volume == volume)
     }
 

@@ -114,6 +114,14 @@ pub enum Command {
     SeekCine(usize),
     /// Plays the cine loop repeatedly, or stops it.
     PlayCine,
+    /// The cine loop begins with the volume that is shown; `true`: it ends with it.
+    MarkCine(bool),
+    /// The cine loop is all volumes again.
+    WholeCine,
+    /// Plays the cine loop so many steps faster.
+    CineSpeed(i32),
+    /// Plays the cine loop back and forth, or forwards only.
+    BackAndForth(bool),
     SavePicture,
     /// Saves the volumes of the cine loop as a recording.
     SaveLoop,
@@ -126,6 +134,8 @@ pub enum Command {
     ToggleTimes,
     /// Shows or hides sliders and buttons.
     TogglePanels,
+    /// Gives the keyboard to the panels, or back to the picture.
+    FocusPanels,
     ToggleFullScreen,
     /// Closes what is open, else leaves full screen, else leaves the program.
     Back,
@@ -320,6 +330,13 @@ pub const KEY_BINDINGS: &[Binding] = &[
     on(Key::Home, "oldest volume", Command::SeekCine(0)),
     on(Key::End, "newest volume", Command::SeekCine(usize::MAX)),
     on(Key::Enter, "play the cine loop", Command::PlayCine),
+    shift(Key::Home, "the loop begins, ends here", Command::MarkCine(false)),
+    shift(Key::End, "the loop begins, ends here", Command::MarkCine(true)),
+    control(Key::Home, "the complete loop", Command::WholeCine),
+    control(Key::Left, "loop slower, faster", Command::CineSpeed(-1)),
+    control(Key::Right, "loop slower, faster", Command::CineSpeed(1)),
+    shift(Key::Enter, "loop back and forth", Command::BackAndForth(true)),
+    control(Key::Enter, "loop forwards", Command::BackAndForth(false)),
     on(Char('p'), "save the picture", Command::SavePicture),
     on(Char('r'), "save the recording", Command::SaveLoop),
     control(Char('s'), "save the workspace", Command::SaveWorkspace),
@@ -330,6 +347,7 @@ pub const KEY_BINDINGS: &[Binding] = &[
     on(Function(1), "this help", Command::ToggleHelp),
     on(Function(2), "times of the passes", Command::ToggleTimes),
     on(Function(3), "sliders", Command::TogglePanels),
+    control(Key::Tab, "keyboard to the buttons and sliders, and back", Command::FocusPanels),
     on(Function(11), "full screen", Command::ToggleFullScreen),
     on(Key::Escape, "close what is open, leave full screen, quit", Command::Back),
     on(Char('q'), "quit", Command::Exit),

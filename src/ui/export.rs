@@ -15,14 +15,23 @@ use std::time::{SystemTime, UNIX_EPOCH};
 /// Largest number of files that are being saved: a key that is held must not fill the disk.
 const MAX_PENDING: usize = 4;
 
+/// What became of a file.
+pub(super) struct Saved {
+    pub(super) file: Result<PathBuf, String>,
+    /// Of a complete cine loop, the number of its newest volume.
+    pub(super) complete_to: Option<u32>,
+}
+
 /// Saves files in the background.
 pub(super) struct Exporter {
     folder: PathBuf,
-    sender: Sender<Result<PathBuf, String>>,
-    receiver: Receiver<Result<PathBuf, String>>,
+    sender: Sender<Saved>,
+    receiver: Receiver<Saved>,
     pending: usize,
     number: u32,
     wake: Wake,
+    /// The threads that save anything else than an export.
+    threads: Vec<JoinHandle<()>>,
     /// The export that was begun last: its name and its thread.
     export: Option<(&'static str, Arc<Export>, JoinHandle<()>)>,
 }
@@ -31,11 +40,11 @@ impl Exporter {
     /// `folder`: where files are saved; it is created with the first one. `wake` is called when a file is done.
     pub(super) fn new(folder: PathBuf, wake: Wake) -> Exporter {
         let (sender, receiver) = channel();
-        Exporter { folder, sender, receiver, pending: 0, number: 0, wake, export: None }
+        Exporter { folder, sender, receiver, pending: 0, number: 0, wake, threads: Vec::new(), export: None }
     }
 
     /// The next file that was saved since the last call, or why it was not.
-    pub(super) fn poll(&mut self) -> Option<Result<PathBuf, String>> {
+    pub(super) fn poll(&mut self) -> Option<Saved> {
         let done = self.receiver.try_recv().ok()?;
         self.pending = self.pending.saturating_sub(1);
         Some(done)
@@ -49,7 +58,7 @@ impl Exporter {
         &mut self,
         make: impl FnOnce() -> Result<Picture, String> + Send + 'static,
     ) -> Result<(), String> {
-        self.save("png", move |file| make()?.save(file)).map(|_| ())
+        self.keep(|own| own.save("png", None, move |file| make()?.save(file)))
     }
 
     /// Saves a text under a name with this ending.
@@ -57,7 +66,7 @@ impl Exporter {
     /// # Errors
     /// As for [`Exporter::picture`].
     pub(super) fn text(&mut self, ending: &'static str, text: String) -> Result<(), String> {
-        self.save(ending, move |file| files::replace(file, text.as_bytes())).map(|_| ())
+        self.keep(|own| own.save(ending, None, move |file| files::replace(file, text.as_bytes())))
     }
 
     /// The folder of saved files.
@@ -65,12 +74,17 @@ impl Exporter {
         &self.folder
     }
 
-    /// Saves volumes as a recording of frames.
+    /// Saves volumes as a recording of frames. `complete_to`: as [`Saved::complete_to`].
     ///
     /// # Errors
     /// As for [`Exporter::picture`].
-    pub(super) fn volumes(&mut self, header: Header, volumes: Vec<CineVolume>) -> Result<(), String> {
-        self.save("frames", move |file| write_frames(file, header, &volumes)).map(|_| ())
+    pub(super) fn volumes(
+        &mut self,
+        header: Header,
+        volumes: Vec<CineVolume>,
+        complete_to: Option<u32>,
+    ) -> Result<(), String> {
+        self.keep(|own| own.save("frames", complete_to, move |file| write_frames(file, header, &volumes)))
     }
 
     /// Exports a volume. One export runs at a time.
@@ -83,7 +97,7 @@ impl Exporter {
         }
         let export = Arc::new(Export::default());
         let (own, name) = (export.clone(), job.format.name);
-        let thread = self.save(job.format.ending, move |file| {
+        let thread = self.save(job.format.ending, None, move |file| {
             let done = own.run(&job, file);
             own.finish();
             done
@@ -106,9 +120,18 @@ impl Exporter {
         }
     }
 
+    /// Begins to save. The view waits for it before it ends.
+    fn keep(&mut self, begin: impl FnOnce(&mut Exporter) -> Result<JoinHandle<()>, String>) -> Result<(), String> {
+        self.threads.retain(|thread| !thread.is_finished());
+        let thread = begin(self)?;
+        self.threads.push(thread);
+        Ok(())
+    }
+
     fn save(
         &mut self,
         extension: &'static str,
+        complete_to: Option<u32>,
         write: impl FnOnce(&Path) -> Result<(), String> + Send + 'static,
     ) -> Result<JoinHandle<()>, String> {
         if self.pending >= MAX_PENDING {
@@ -119,11 +142,11 @@ impl Exporter {
         let (sender, wake) = (self.sender.clone(), self.wake.clone());
         let work = move || {
             let cannot = |e| format!("{}: cannot be created: {e}", folder.display());
-            let saved = std::fs::create_dir_all(&folder).map_err(cannot).and_then(|()| {
+            let file = std::fs::create_dir_all(&folder).map_err(cannot).and_then(|()| {
                 let file = unused_name(&folder, &timestamp(SystemTime::now()), number, extension);
                 write(&file).map(|()| file)
             });
-            let _ = sender.send(saved);
+            let _ = sender.send(Saved { file, complete_to });
             wake();
         };
         let started = std::thread::Builder::new().name("saving".into()).spawn(work);
@@ -133,10 +156,13 @@ impl Exporter {
     }
 }
 
-/// Nothing of an export stays when the view ends.
+/// When the view ends, nothing of an export stays, and what is being saved is written to its end.
 impl Drop for Exporter {
     fn drop(&mut self) {
         self.cancel_export();
+        for thread in self.threads.drain(..) {
+            let _ = thread.join();
+        }
         if let Some((.., thread)) = self.export.take() {
             let _ = thread.join();
         }
@@ -168,7 +194,7 @@ mod tests {
     fn wait(exporter: &mut Exporter) -> Result<PathBuf, String> {
         for _ in 0..2000 {
             if let Some(done) = exporter.poll() {
-                return done;
+                return done.file;
             }
             std::thread::sleep(Duration::from_millis(5));
         }
@@ -179,8 +205,8 @@ mod tests {
         let grid = Grid { size: [1; 3], spacing: [1.0; 3], origin: [0.0; 3] };
         let (forward, backward) = (Geometry::Cartesian(grid), Geometry::Cartesian(grid));
         let header = Header { forward, backward, stored: StoredType::U8, range: [0.0, 255.0], posed: false };
-        let volume = CineVolume::default();
-        Job { format: FORMATS[0], header, volume, settings: Settings::default(), device: String::new() }
+        let volumes = vec![CineVolume::default()];
+        Job { format: FORMATS[0], header, volumes, rate: 1.0, settings: Settings::default(), device: String::new() }
     }
 
     #[test]
@@ -190,6 +216,25 @@ mod tests {
         std::fs::create_dir_all(&folder).expect("folder");
         std::fs::write(folder.join("echolume-x-1.png"), "").expect("file");
         assert_eq!(unused_name(&folder, "x", 1, "png"), folder.join("echolume-x-2.png"));
+        std::fs::remove_dir_all(&folder).expect("folder");
+    }
+
+    #[test]
+    fn what_is_being_saved_is_whole_when_the_view_has_ended() {
+        let folder = std::env::temp_dir().join(format!("echolume-ended-{}", std::process::id()));
+        let picture = Picture { width: 1, height: 1, rgba: vec![1, 2, 3, 255] };
+        let same = picture.clone();
+        let mut exporter = Exporter::new(folder.clone(), Arc::new(|| ()));
+        exporter
+            .picture(move || {
+                std::thread::sleep(Duration::from_millis(200));
+                Ok(same)
+            })
+            .expect("thread");
+        drop(exporter);
+        let files: Vec<_> = std::fs::read_dir(&folder).expect("folder").flatten().map(|file| file.path()).collect();
+        assert_eq!(files.len(), 1, "{files:?}");
+        assert_eq!(Picture::load(&files[0]).expect("picture"), picture);
         std::fs::remove_dir_all(&folder).expect("folder");
     }
 

@@ -5,9 +5,10 @@
 //! - [`console`] connects inputs, stream and screen. [`frame_budget`] keeps the time of a picture on the rungs of the
 //!   quality ladder, [`source_supervisor`] keeps the source open, [`export`] saves files (`volume_export` in the formats of other programs), and [`panels`] lays out what is
 //!   drawn over the picture. None of these depends on a window, so all of them are tested without one.
-//! - [`window`] shows the console in a window. Without a windowing system, `direct` shows it on a monitor and `devices` reads
+//! - [`window`] shows the console in a window, and `screen_reader` tells the desktop's screen readers what its panels are. Without a windowing system, `direct` shows it on a monitor and `devices` reads
 //!   input devices from the kernel.
 
+mod cine_player;
 mod clipboard;
 pub mod command;
 pub mod console;
@@ -25,6 +26,7 @@ mod open_list;
 pub mod panels;
 mod picking;
 mod recovery;
+mod screen_reader;
 pub mod sliders;
 pub mod source_supervisor;
 mod times;

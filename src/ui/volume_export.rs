@@ -20,8 +20,19 @@ const MAX_MESSAGE: u64 = 1 << 16;
 const POLL: Duration = Duration::from_millis(20);
 /// Pictures of a turntable: one every five degrees.
 const TURNTABLE: &str = "72";
+/// What `render --rate` takes.
+const FILM_RATES: [f64; 2] = [0.1, 240.0];
+/// Name of the recording that the process reads.
+const RECORDING: &str = "volume.frames";
 /// Thickness of the base of a relief, mm.
 const BASE: &str = "3";
+
+impl Format {
+    /// True if it takes the volumes of the loop, false if only the one that is shown.
+    pub(super) fn takes_the_loop(&self) -> bool {
+        self.work == Work::Loop
+    }
+}
 
 /// What can be exported.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -39,6 +50,7 @@ enum Work {
     Mesh,
     Relief,
     Turntable,
+    Loop,
 }
 
 const fn format(name: &'static str, ending: &'static str, work: Work, hint: &'static str) -> Format {
@@ -77,6 +89,19 @@ pub const FORMATS: &[Format] = &[
     ),
     #[cfg(feature = "video")]
     format("Turntable, film", "mp4", Work::Turntable, "One turn of the rendering as it is shown, as AV1 in MP4."),
+    format(
+        "Loop, pictures",
+        "loop",
+        Work::Loop,
+        "A folder of PNG files: the rendering as it is shown, of each volume of the loop from its first mark to its last.",
+    ),
+    #[cfg(feature = "video")]
+    format(
+        "Loop, film",
+        "mp4",
+        Work::Loop,
+        "The same as AV1 in MP4, forwards, at the mean rate times the speed of the loop (0.1 to 240 pictures a second).",
+    ),
 ];
 
 /// An export in work.
@@ -118,8 +143,8 @@ impl Export {
         let signals = Writing::begin();
         let beside = file.parent().unwrap_or(Path::new("."));
         let folder = WorkFolder::new(beside, ".echolume-export-")?;
-        let recording = folder.path().join("volume.frames");
-        write_frames(&recording, job.header.clone(), std::slice::from_ref(&job.volume))?;
+        let recording = folder.path().join(RECORDING);
+        write_frames(&recording, job.header.clone(), &job.volumes)?;
         let made = folder.path().join(format!("out.{}", job.format.ending));
         self.process(&mut job.command(&recording, &made)?, &|| signals.signal().is_some())?;
         std::fs::rename(&made, file).map_err(|e| format!("{}: {e}", file.display()))
@@ -176,7 +201,11 @@ pub(super) fn write_frames(file: &Path, header: Header, volumes: &[CineVolume]) 
     let mut writer = Writer::create(file, header).map_err(|e| e.to_string())?;
     let mut frames = volumes.iter().flat_map(|volume| &volume.frames);
     match frames.try_for_each(|frame| writer.frame(frame, frame.time.unwrap_or(0.0))) {
-        Ok(()) => writer.finish().map_err(|e| e.to_string()),
+        Ok(()) => writer.finish().map_err(|e| {
+            // What is said not to be saved is not there.
+            let _ = std::fs::remove_file(file);
+            e.to_string()
+        }),
         Err(e) => {
             writer.discard();
             Err(e.to_string())
@@ -188,7 +217,10 @@ pub(super) fn write_frames(file: &Path, header: Header, volumes: &[CineVolume]) 
 pub(super) struct Job {
     pub(super) format: Format,
     pub(super) header: Header,
-    pub(super) volume: CineVolume,
+    /// The volume that is shown; of a loop all of them.
+    pub(super) volumes: Vec<CineVolume>,
+    /// Volumes a second of a loop.
+    pub(super) rate: f64,
     pub(super) settings: crate::scene::Settings,
     /// The name of the device of a turntable: that of the view.
     pub(super) device: String,
@@ -205,21 +237,35 @@ impl Job {
             Work::Relief => command.arg("mesh").args([recording, made]).args(["--base", BASE]),
             Work::Turntable => {
                 let scene = self.workspace(recording)?;
-                // A folder of pictures has to end like one.
-                let made = if self.format.ending == "turntable" { made.join("") } else { made.to_path_buf() };
+                let series = ["--turntable", TURNTABLE].map(String::from);
                 command
                     .arg("render")
                     .arg(scene)
-                    .args(["--device", &self.device, "--turntable", TURNTABLE, "-o"])
-                    .arg(made)
+                    .args(series)
+                    .args(["--device", &self.device, "-o"])
+                    .arg(self.series(made))
+            }
+            Work::Loop => {
+                let scene = self.workspace(recording)?;
+                command.arg("render").arg(scene).args(["--volumes", "all"]);
+                // Pictures have no rate.
+                if self.format.ending == "mp4" {
+                    command.args(["--rate", &self.rate.clamp(FILM_RATES[0], FILM_RATES[1]).to_string()]);
+                }
+                command.args(["--device", &self.device, "-o"]).arg(self.series(made))
             }
         };
         Ok(command)
     }
 
+    /// A folder of pictures has to end like one.
+    fn series(&self, made: &Path) -> PathBuf {
+        if self.format.ending == "mp4" { made.to_path_buf() } else { made.join("") }
+    }
+
     fn workspace(&self, recording: &Path) -> Result<PathBuf, String> {
         let file = recording.with_file_name("scene.toml");
-        let text = workspace::text(&self.settings, &Origin::of(Some("volume.frames".into())))?;
+        let text = workspace::text(&self.settings, &Origin::of(Some(RECORDING.into())))?;
         std::fs::write(&file, text).map_err(|e| format!("{}: {e}", file.display()))?;
         Ok(file)
     }

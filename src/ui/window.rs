@@ -3,6 +3,7 @@
 use super::console::{Console, LoopRequest};
 use super::input::{Button, Input, Key, Modifiers, Phase};
 use super::recovery::{self, Lost, Output, Recovery, RecoveryStep};
+use super::screen_reader::ScreenReader;
 use crate::gpu::window::{PresentMode, Screen, Target};
 use crate::gpu::{Context, ContextOptions, GpuError, Wake};
 use std::sync::Arc;
@@ -71,6 +72,7 @@ pub fn run(
         size: [0; 2],
         context: None,
         console: None,
+        screen_reader: None,
         failed: None,
         recovery: Recovery::default(),
         ends: None,
@@ -93,6 +95,7 @@ struct WindowLoop<'a> {
     // The console is dropped first: it holds the surface of the window.
     console: Option<Console>,
     context: Option<Arc<Context>>,
+    screen_reader: Option<ScreenReader>,
     window: Option<Arc<Window>>,
     /// As the last event has it. To ask the window would panic inside winit once the X server has destroyed it, before that event arrives.
     size: [u32; 2],
@@ -126,7 +129,16 @@ impl WindowLoop<'_> {
             .with_title("Echolume")
             .with_inner_size(PhysicalSize::new(width, height))
             .with_fullscreen(full);
-        events.create_window(attributes).map(Arc::new).map_err(|e| GpuError::Window(e.to_string()))
+        // A screen reader knows a window before it is seen. The window of a kiosk may be destroyed at any time; to be asked for its place then would
+        // end the program.
+        let is_read = ScreenReader::IS_SERVED && !self.options.stays_open;
+        let window = events.create_window(attributes.with_visible(!is_read));
+        let window = window.map_err(|e| GpuError::Window(e.to_string()))?;
+        self.screen_reader = is_read.then(|| ScreenReader::new(events, &window, self.wake.clone()));
+        if is_read {
+            window.set_visible(true);
+        }
+        Ok(Arc::new(window))
     }
 
     fn monitor(&self, events: &ActiveEventLoop) -> Option<MonitorHandle> {
@@ -166,6 +178,7 @@ impl WindowLoop<'_> {
             RecoveryStep::Restore(lost) => self.restore(events, lost),
         };
         let Some(console) = &mut self.console else { return };
+        self.screen_reader.iter_mut().for_each(|reader| reader.listen(console));
         match restored.and_then(|()| console.update(now).map_err(recovery::lost_by)) {
             Ok(next) => self.after_update(events, next, now),
             Err((lost, fault)) => self.schedule_recovery(events, now, lost, fault),
@@ -184,6 +197,9 @@ impl WindowLoop<'_> {
     }
 
     fn after_update(&mut self, events: &ActiveEventLoop, next: LoopRequest, now: Instant) {
+        if let (Some(reader), Some(console)) = (&mut self.screen_reader, &mut self.console) {
+            reader.tell(console);
+        }
         if next.exit || self.ends.is_some_and(|end| now >= end) {
             events.exit();
             return;
@@ -225,6 +241,9 @@ impl ApplicationHandler<()> for WindowLoop<'_> {
         // Another one was hidden when its device was given up.
         if self.window.as_ref().is_some_and(|current| current.id() != window) {
             return;
+        }
+        if let (Some(reader), Some(window)) = (&mut self.screen_reader, &self.window) {
+            reader.event(window, &event);
         }
         let Some(console) = &mut self.console else { return };
         match &event {

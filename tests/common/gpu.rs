@@ -8,6 +8,7 @@ use echolume::picture::Picture;
 use echolume::scene::Scene;
 use echolume::verify::built_in;
 use std::ops::Deref;
+use std::sync::atomic::Ordering;
 use std::sync::{Arc, Mutex};
 use std::time::Duration;
 
@@ -99,6 +100,7 @@ impl Drop for Device {
         }
         if let Some(runner) = self.runner.take().filter(|_| !std::thread::panicking()) {
             assert!(!self.provoked, "a test that expects messages needs a device alone");
+            assert!(!self.context.is_deep.load(Ordering::Relaxed), "a test that changes its device needs one alone");
             IDLE.lock().unwrap_or_else(|e| e.into_inner()).push((self.context.clone(), runner));
         }
     }

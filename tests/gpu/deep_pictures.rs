@@ -10,7 +10,8 @@ use std::sync::atomic::Ordering;
 /// Prevents a deep window that shows pictures of 256 levels, and saved pictures that differ because of it.
 #[test]
 fn a_deep_window_gets_more_levels_and_files_the_same_picture() {
-    let (plain, deep) = (Device::new(), Device::new());
+    // Another test must not get the deep one.
+    let (plain, deep) = (Device::new(), Device::alone());
     deep.is_deep.store(true, Ordering::Relaxed);
     let toml = "mode = 'mip'\npicture = { size = [64, 48] }\nslices = { pixels = 64, format = 'r32f' }";
     let scene = scene(Geometry::Sweep(wobbler()), FLOATS, toml);

@@ -111,7 +111,7 @@ fn forgotten_pipelines_are_compiled_again_and_draw_the_same() {
     let device = Device::watched_with(ContextOptions { max_unused_pipelines: 0, ..ContextOptions::default() });
     let made = || device.counts.pipelines.load(Ordering::Relaxed);
     let frames = body_frames(&in_mode(MODES[0]), |p| 0.5 + 0.4 * (0.3 * p.y).sin());
-    // Of the same kind, with every pipeline kept: those that are shared by the tests specialize their shaders themselves.
+    // With every pipeline kept.
     let keeping = Device::watched_with(ContextOptions::default());
     let expected: Vec<_> = MODES
         .iter()

@@ -51,6 +51,9 @@ class Echolume:
             measured = json.load(file)
         self.driver = f"{measured['device']['name']}, {measured['device']['driver']}"
         self.program = measured["program"]
+        made = max((p["runs_per_picture"] for p in measured["passes"] if p["stage"] == "preprocess"), default=self.row.per)
+        if made < self.row.per:
+            raise Failed(f"made {made} of {self.row.per} slices")
         return {"wall": measured["wall_ns"], "cpu": measured.get("cpu_ns") or None}
 
     def measure(self, count):

@@ -7,7 +7,7 @@ import phantom
 import view
 
 # Aims of the ratio of CPU time, Echolume over the fastest peer.
-FIXED, NEW_SHADED, PLANES = 0.5, 0.2, 1.0
+VOLUME, FIXED_PLANE, NEW_PLANE = 0.5, 0.8, 1.0
 
 
 @dataclass(frozen=True)
@@ -55,8 +55,7 @@ VOLUME_PEERS = ("VTK fixed-point", "VTK GPU")
 
 def volume_rows(new):
     def row(name, title, echolume, peers, **more):
-        if not new:
-            more.setdefault("aim", FIXED)
+        more.setdefault("aim", VOLUME)
         title += ", a new volume every picture" if new else ", fixed volume"
         return Row(name, title, "volume", peers, echolume, new=new, **more)
 
@@ -68,19 +67,20 @@ def volume_rows(new):
     }
     shadowed = {"VTK GPU": "shadow rays through the volume; Echolume traces the distance map"}
     return [
-        row("shaded", "volume, shaded", FIRST_HIT, VOLUME_PEERS, notes=shaded, **({"aim": NEW_SHADED} if new else {})),
+        row("shaded", "volume, shaded", FIRST_HIT, VOLUME_PEERS, notes=shaded),
         row("unshaded", "volume, unshaded", ("--mode", "vr"), VOLUME_PEERS),
         row("surface", "surface", ("--mode", "sr"), ("VTK GPU", "VTK flying edges", "pygfx"), notes=polygons),
         row("mip", "MIP", ("--mode", "mip"), ("VTK fixed-point", "pygfx", "vispy")),
         row("minip", "MinIP (volume inverted)", ("--mode", "minip"), ("VTK fixed-point", "pygfx", "vispy"), inverted=True),
         row("mean", "mean", ("--mode", "xray"), ("VTK GPU", "vispy")),
-        row("mpr", "oblique plane (MPR)", ("--mode", "mpr"), ("VTK reslice",), aim=PLANES),
+        row("mpr", "oblique plane (MPR)", ("--mode", "mpr"), ("VTK reslice",), aim=NEW_PLANE if new else FIXED_PLANE),
         row("shadows", "volume with shadows", FIRST_HIT + SHADOW, ("VTK GPU",), notes=shadowed, sizes=(128, 256)),
     ]
 
 
-# The slice that the peers show is cut, though a picture that small is hardly one.
-TINY = ("--size", "16x16", "--mode", "mpr", "--set", "slices.format=r8")
+# The slice that the peers show is cut, though a picture that small is hardly one. All slices are made, as by the peers, not only
+# those that the plane is cut from.
+TINY = ("--size", "16x16", "--mode", "mpr", "--set", "slices.format=r8", "--set", "slices.everything=true")
 
 
 def slice_row(name, title, peers, setting, **more):

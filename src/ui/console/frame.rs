@@ -59,16 +59,18 @@ impl Console {
             (self.last_arrival, self.needs_redraw) = (now, true);
         }
         while let Some(saved) = self.exporter.poll() {
-            match saved {
+            let ends = saved.complete_to.is_some() && saved.complete_to == self.leaves_when_saved;
+            match saved.file {
                 Ok(file) => {
-                    if file.extension().is_some_and(|end| end == "frames") {
-                        self.saved_volume = self.saving_volume.take();
-                        self.request.exit |= std::mem::take(&mut self.leaves_when_saved);
+                    self.saved_volume = self.saved_volume.max(saved.complete_to);
+                    self.request.exit |= ends;
+                    if file.extension().is_some_and(|end| end == "toml") {
+                        self.opening.remember(&file);
                     }
                     self.notify(&format!("Saved {}", file.display()), false);
                 }
                 Err(fault) => {
-                    self.leaves_when_saved = false;
+                    self.leaves_when_saved = self.leaves_when_saved.filter(|_| !ends);
                     self.notify(&format!("Not saved: {fault}"), true);
                 }
             }
@@ -245,7 +247,7 @@ impl Console {
             self.source.wakes_at(),
             self.pace.rests_at(now),
             self.repaint_at,
-            self.next_cine_step,
+            self.player.due(),
             self.stall_shown_until,
             self.metrics.as_ref().map(LiveMetrics::due),
             self.warms_at(now),
@@ -281,7 +283,7 @@ impl Console {
         }
         let corner = self.picture_area().0;
         let Some(screen) = &mut self.screen else {
-            (self.has_new_picture, self.needs_redraw) = (false, false);
+            (self.has_new_picture, self.needs_redraw) = (false, self.panels.has_pending_input());
             return Ok(());
         };
         let presented = match self.stream.renderer().filter(|_| has_drawn) {
@@ -362,8 +364,7 @@ impl Console {
             origin: self.fixed.source.origin(),
             asks_to_leave: self.asks_to_leave,
             is_frozen: self.stream.is_frozen(),
-            is_playing: self.next_cine_step.is_some(),
-            cine: (self.stream.cine().volumes().len(), self.stream.cine_position()),
+            cine: self.player.state(self.stream.cine().volumes(), self.stream.cine_position()),
             has_drawn,
             quality,
             budget: self.pace.budget(),
@@ -375,6 +376,7 @@ impl Console {
         let time = now.saturating_duration_since(self.started).as_secs_f64();
         let output = self.panels.lay_out(&state, self.size, time);
         self.repaint_at = (output.repaint_after < Duration::from_secs(3600)).then(|| now + output.repaint_after);
+        self.tree = output.tree.or(self.tree.take());
         for command in output.commands {
             self.execute(&command, now);
         }

@@ -10,6 +10,7 @@ mod saving;
 use self::measuring::Counting;
 use self::opening::Opening;
 pub use self::options::{ConsoleOptions, OpenFile, StartupFault};
+use super::cine_player::CinePlayer;
 use super::clipboard::Clipboard;
 use super::command::{Command, HeldKeys, Tool};
 use super::controls::{Change, Controls};
@@ -17,6 +18,7 @@ use super::export::Exporter;
 use super::frame_budget::{self, Pace, Quality, Rung};
 use super::gestures::Gestures;
 use super::input::{Input, Key};
+use super::panels::accesskit::{ActionRequest, TreeUpdate};
 use super::panels::{self, Note, Panels};
 use super::picking::Viewport;
 use super::source_supervisor::{OpenSource, SourceSupervisor};
@@ -49,8 +51,6 @@ const REST_BEFORE_WARMING: Duration = Duration::from_secs(1);
 const MAX_SEARCH: usize = 40;
 /// A pause after which the same drag or key is another step for undo.
 const STEP_PAUSE: Duration = Duration::from_millis(500);
-/// Time between two volumes of a cine loop.
-const CINE_INTERVAL: Duration = Duration::from_millis(200);
 
 /// What the event loop does after an update of the console.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -113,15 +113,14 @@ pub struct Console {
     shows_exports: bool,
     /// Asks whether to save the loop before leaving.
     asks_to_leave: bool,
-    leaves_when_saved: bool,
+    /// Leaves when the loop up to this volume is saved.
+    leaves_when_saved: Option<u32>,
     is_full_screen: bool,
-    /// The newest volume of the loop that is being saved, and of the one that was saved last.
-    saving_volume: Option<u32>,
+    /// The newest volume of the loops that were saved whole.
     saved_volume: Option<u32>,
     /// Where to draw the pointer, pixels of the window.
     pointer: Option<[f64; 2]>,
-    /// When the next volume of the cine loop is due, while it plays.
-    next_cine_step: Option<Instant>,
+    player: CinePlayer,
     /// The first input whose settings the stream has not been given yet.
     unsent_input: Option<Instant>,
     /// The first input that no picture shows yet, and when its settings were given to the stream.
@@ -148,6 +147,8 @@ pub struct Console {
     stall_shown_until: Option<Instant>,
     /// Since when there is no picture to show.
     blank_since: Option<Instant>,
+    /// What a screen reader says of the panels, since they were laid out last.
+    tree: Option<TreeUpdate>,
     /// When the panels want to be drawn again.
     repaint_at: Option<Instant>,
     /// There was no surface to present to; do not try again before this time.
@@ -256,12 +257,11 @@ impl Console {
             help_search: None,
             shows_exports: false,
             asks_to_leave: false,
-            leaves_when_saved: false,
+            leaves_when_saved: None,
             is_full_screen: false,
-            saving_volume: None,
             saved_volume: None,
             pointer: None,
-            next_cine_step: None,
+            player: CinePlayer::default(),
             unsent_input: None,
             unshown_input: None,
             last_input: now,
@@ -277,6 +277,7 @@ impl Console {
             device_faults: 0,
             stall_shown_until: None,
             blank_since: None,
+            tree: None,
             repaint_at: None,
             present_retry_at: None,
             startup_fault: options.startup_fault.map(|fault| (fault, now + FAULT_CHECK_INTERVAL)),
@@ -377,7 +378,8 @@ impl Console {
             self.request.exit = true;
         }
         let is_search = self.search_help(input);
-        let typed = self.typed(input);
+        let is_of_panels = self.key_of_panels(input);
+        let typed = if is_of_panels { Some(Vec::new()) } else { self.typed(input) };
         if typed.is_some() {
             // The keys go on to be held, and give nothing else.
             self.keys.input(input);
@@ -405,6 +407,35 @@ impl Console {
         for command in self.gestures.input(input, &on, self.controls.tool(), self.keys.modifiers()) {
             self.execute(&command, now);
         }
+    }
+
+    /// Takes a key for the control that has the keyboard. True if it is none of the view's own.
+    fn key_of_panels(&mut self, input: &Input) -> bool {
+        let Input::Key { key, pressed: true } = *input else { return false };
+        let has_keys_of_its_own = self.asks_to_leave || self.controls.typing().is_some();
+        self.fixed.overlay && !has_keys_of_its_own && self.panels.key(key, self.keys.modifiers())
+    }
+
+    /// Describes the panels to a screen reader from now on, or no longer.
+    pub fn describe(&mut self, is_described: bool) {
+        self.panels.describe(is_described && self.fixed.overlay);
+        (self.tree, self.needs_redraw) = (None, true);
+    }
+
+    pub fn is_described(&self) -> bool {
+        self.panels.is_described()
+    }
+
+    /// What a screen reader says of the panels, if they were laid out since the last call.
+    pub fn take_tree(&mut self) -> Option<TreeUpdate> {
+        self.tree.take()
+    }
+
+    /// Does what a screen reader asks of a control.
+    pub fn act(&mut self, request: ActionRequest) {
+        self.user_acts(Instant::now());
+        self.panels.act(request);
+        self.needs_redraw = true;
     }
 
     /// Takes a key for the search of the help. True if it is none of the view's own.
@@ -509,7 +540,7 @@ impl Console {
         let count = self.stream.cine().volumes().len();
         match *command {
             Command::Freeze => {
-                self.next_cine_step = None;
+                self.player.stop();
                 self.stream.freeze(!self.stream.is_frozen());
             }
             Command::StepCine(by) => {
@@ -523,11 +554,15 @@ impl Console {
             }
             Command::PlayCine => {
                 self.stream.freeze(true);
-                self.next_cine_step = match self.next_cine_step {
-                    None if count > 1 => Some(now),
-                    _ => None,
-                };
+                self.player.toggle(self.stream.cine().volumes(), now);
             }
+            Command::MarkCine(end) => {
+                let at = self.stream.cine_position().unwrap_or(count.saturating_sub(1));
+                self.player.mark(self.stream.cine().volumes(), at, end);
+            }
+            Command::WholeCine => self.player.unmark(),
+            Command::CineSpeed(by) => self.player.step_speed(by),
+            Command::BackAndForth(on) => self.player.set_back_and_forth(on),
             Command::SavePicture => self.save_picture(),
             Command::SaveLoop => _ = self.save_loop(),
             Command::ToggleHelp => (self.shows_help, self.help_search) = (!self.shows_help, None),
@@ -537,6 +572,11 @@ impl Console {
             Command::TogglePanels => {
                 self.shows_panels = !self.shows_panels && self.fixed.overlay;
                 self.resize_picture();
+            }
+            Command::FocusPanels if self.fixed.overlay => {
+                self.shows_panels = true;
+                self.resize_picture();
+                self.panels.toggle_focus();
             }
             Command::ToggleFullScreen => self.request.toggle_full_screen |= !self.fixed.is_kiosk,
             Command::PickSurface(at) => self.pick_surface(at),
@@ -556,27 +596,29 @@ impl Console {
             Command::Exit | Command::Discard => self.request.exit |= !self.fixed.is_kiosk,
             Command::SaveAndExit => {
                 self.asks_to_leave = false;
-                self.leaves_when_saved = self.save_loop();
+                // The question names all volumes.
+                self.player.unmark();
+                let newest = self.stream.cine().volumes().back().map(|newest| newest.volume);
+                self.leaves_when_saved = newest.filter(|_| self.save_loop());
             }
             _ => {}
         }
     }
 
     fn show_cine_volume(&mut self, index: usize) {
-        self.next_cine_step = None;
+        self.player.stop();
         self.stream.freeze(true);
         self.stream.show_cine_volume(index);
     }
 
     /// Shows the next volume of the cine loop when it is due.
     fn advance_cine(&mut self, now: Instant) {
-        let (Some(due), count) = (self.next_cine_step, self.stream.cine().volumes().len()) else { return };
-        if count < 2 {
-            self.next_cine_step = None;
-        } else if now >= due && !self.stream.is_replaying() {
-            let next = self.stream.cine_position().map_or(0, |index| (index + 1) % count);
+        if self.stream.is_replaying() {
+            return;
+        }
+        let shown = self.stream.cine_position();
+        if let Some(next) = self.player.advance(self.stream.cine().volumes(), shown, now) {
             self.stream.show_cine_volume(next);
-            self.next_cine_step = Some((due + CINE_INTERVAL).max(now));
         }
     }
 
@@ -605,7 +647,8 @@ impl Console {
 
     /// True if volumes of the loop exist nowhere else: neither in a file that they were read from or recorded to, nor in one that was saved.
     fn has_unsaved_loop(&self) -> bool {
-        let is_only_here = matches!(self.fixed.source, SourceKind::Probe | SourceKind::Pipe) && !self.fixed.records;
+        let is_recorded = self.fixed.records && self.stream.feed_counts().unrecorded == 0;
+        let is_only_here = matches!(self.fixed.source, SourceKind::Probe | SourceKind::Pipe) && !is_recorded;
         let newest = self.stream.cine().volumes().back().map(|kept| kept.volume);
         is_only_here && newest.is_some() && newest != self.saved_volume
     }

@@ -37,6 +37,11 @@ impl Opening {
         self.list.as_ref().map(|list| (list.title.as_str(), list.names.as_slice()))
     }
 
+    /// Puts a file first on the list of recent files, if one is kept.
+    pub(super) fn remember(&self, file: &Path) {
+        self.recent.iter().for_each(|list| open_list::remember(list, file));
+    }
+
     /// The list of a folder; with the recent files first if asked for.
     fn list(&self, folder: &Path, with_recent: bool) -> List {
         let folder = std::path::absolute(folder).unwrap_or_else(|_| folder.to_path_buf());
@@ -126,7 +131,7 @@ impl Console {
         self.opening.opened = None;
         match opened {
             Ok(path) => {
-                self.opening.recent.iter().for_each(|list| open_list::remember(list, &path));
+                self.opening.remember(&path);
                 self.request.restart = true;
             }
             Err(fault) => self.notify(&format!("Not opened: {fault}"), true),

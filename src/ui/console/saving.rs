@@ -1,6 +1,7 @@
 //! Saving what is shown: the picture, the cine loop, and the volume in the formats of other programs.
 
 use super::Console;
+use crate::live::cine::CineVolume;
 use crate::marked;
 use crate::ui::volume_export::{FORMATS, Job};
 use std::time::SystemTime;
@@ -32,17 +33,25 @@ impl Console {
         }
     }
 
-    /// Saves the cine loop. False if it cannot be.
+    /// The volumes between the marks of the cine loop.
+    fn marked_volumes(&self) -> Vec<CineVolume> {
+        let volumes = self.stream.cine().volumes();
+        volumes.range(self.player.range(volumes).start()..).take(self.player.range(volumes).count()).cloned().collect()
+    }
+
+    /// Saves the cine loop, from its first mark to its last. False if it cannot be.
     pub(super) fn save_loop(&mut self) -> bool {
-        let volumes: Vec<_> = self.stream.cine().volumes().iter().cloned().collect();
+        let volumes = self.marked_volumes();
+        let kept = self.stream.cine().volumes();
+        // What lies beyond the marks is still in no file.
+        let complete_to = kept.back().map(|newest| newest.volume).filter(|_| volumes.len() == kept.len());
         let saved = match self.stream.header() {
             Some(header) if !volumes.is_empty() => {
                 let header = header.clone();
-                self.exporter.volumes(header, volumes)
+                self.exporter.volumes(header, volumes, complete_to)
             }
             _ => Err("there are no volumes yet".into()),
         };
-        self.saving_volume = self.stream.cine().volumes().back().map(|kept| kept.volume).filter(|_| saved.is_ok());
         if let Err(fault) = &saved {
             self.notify(&format!("The loop was not saved: {fault}"), true);
         }
@@ -53,16 +62,19 @@ impl Console {
     pub(super) fn export_volume(&mut self, n: usize) {
         let Some(format) = FORMATS.get(n).copied() else { return };
         self.shows_exports = false;
-        let volumes = self.stream.cine().volumes();
-        let shown = self.stream.cine_position().and_then(|at| volumes.get(at)).or(volumes.back()).cloned();
-        let begun = match (self.stream.header().cloned(), shown) {
-            (Some(header), Some(volume)) => {
+        let cine = self.stream.cine().volumes();
+        let shown = || self.stream.cine_position().and_then(|at| cine.get(at)).or(cine.back()).cloned();
+        let volumes = if format.takes_the_loop() { self.marked_volumes() } else { shown().into_iter().collect() };
+        let rate = self.player.played_rate(cine);
+        let begun = match self.stream.header().cloned() {
+            Some(header) if !volumes.is_empty() => {
                 let mut settings = self.controls.settings().clone();
                 settings.marks.bar = self.saves_bar;
                 self.exporter.export(Job {
                     format,
                     header,
-                    volume,
+                    volumes,
+                    rate,
                     settings,
                     device: self.context.candidate.name.clone(),
                 })

@@ -204,6 +204,10 @@ impl Controls {
             | Command::StepCine(_)
             | Command::SeekCine(_)
             | Command::PlayCine
+            | Command::MarkCine(_)
+            | Command::WholeCine
+            | Command::CineSpeed(_)
+            | Command::BackAndForth(_)
             | Command::SavePicture
             | Command::SaveLoop
             | Command::ToggleHelp
@@ -211,6 +215,7 @@ impl Controls {
             | Command::SavesBar(_)
             | Command::ToggleTimes
             | Command::TogglePanels
+            | Command::FocusPanels
             | Command::ToggleFullScreen
             | Command::Back
             | Command::Exit

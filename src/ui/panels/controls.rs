@@ -2,12 +2,15 @@
 //! every examination needs are in front; the others are below them, by stage.
 
 use super::measures;
+use super::names::{self, Tell};
 use super::{ACCENT, BUTTON, PanelState, TEXT, TEXT_SIZE, TOUCH_SIZE, WARNING, WEAK_TEXT, heading};
 use crate::scene::{ColourMap, KeptSide, Layout, Mode, PlaneName, Settings, Transfer, TransferName};
-use crate::ui::command::{Command, Tool, Viewpoint};
+use crate::ui::cine_player::{CineState, SPEEDS};
+use crate::ui::command::{Command, Tool};
 use crate::ui::hints;
 use crate::ui::sliders::{Group, SLIDERS, Slider as Control};
 use crate::ui::view;
+use egui::accesskit::Role;
 use egui::{
     Align, Button, CollapsingHeader, Color32, FontId, Label, Panel, Rect, RichText, ScrollArea, Sense, Slider, Stroke,
     StrokeKind, Ui, WidgetInfo, WidgetType, pos2, vec2,
@@ -21,9 +24,6 @@ const TOOLS: [(Tool, &str); 6] = [
     (Tool::Cut, "Cut"),
     (Tool::Plane, "Planes"),
 ];
-
-const VIEWPOINTS: [(Viewpoint, &str); 4] =
-    [(Viewpoint::Front, "Front"), (Viewpoint::Left, "Left"), (Viewpoint::Right, "Right"), (Viewpoint::Top, "Top")];
 
 const PLANES: [(PlaneName, &str); 3] = [(PlaneName::A, "A"), (PlaneName::B, "B"), (PlaneName::C, "C")];
 
@@ -39,44 +39,70 @@ const FRONT: [(&str, &[&str]); 6] = [
 
 pub(super) fn show_modes(ui: &mut Ui, state: &PanelState, width: f32, execute: &mut dyn FnMut(Command)) {
     Panel::left("rail").exact_size(width).resizable(false).show_separator_line(false).show(ui, |ui| {
+        names::name(ui, Role::Toolbar, "Modes and tools");
         // A low window scrolls.
         ScrollArea::vertical().auto_shrink(false).show(ui, |ui| {
             let settings = state.controls.settings();
-            let row = Row { width, height: TOUCH_SIZE * 0.92 };
+            let row = Row { width, height: TOUCH_SIZE * 0.92, title: "", is_large_title: false };
             ui.add_space(6.0);
             undo_and_redo(ui, state, &row, execute);
-            heading(ui, "Mode");
             let modes = Mode::ALL.map(|mode| (mode, mode.title()));
-            row.show(ui, &modes, 2, |m| settings.mode == m, hints::of_mode, |m| execute(Command::Mode(m)));
-            heading(ui, "Layout");
+            row.titled("Mode").show(
+                ui,
+                &modes,
+                2,
+                |m| settings.mode == m,
+                hints::of_mode,
+                |m| execute(Command::Mode(m)),
+            );
             let layouts = [(Layout::Single, "Single"), (Layout::Four, "4-up"), (Layout::Pair, "VR | SR")];
-            row.show(ui, &layouts, 2, |l| settings.layout == l, hints::of_layout, |l| execute(Command::Layout(l)));
+            row.titled("Layout").show(
+                ui,
+                &layouts,
+                2,
+                |l| settings.layout == l,
+                hints::of_layout,
+                |l| execute(Command::Layout(l)),
+            );
             if !settings.mode.is_flat() {
-                heading(ui, "View from");
                 let is_there = |v| state.scene.is_some_and(|scene| view::is_seen_from(scene, v));
-                row.show(ui, &VIEWPOINTS, 2, is_there, hints::of_viewpoint, |v| execute(Command::LookFrom(v)));
+                row.titled("View from")
+                    .show(ui, &names::VIEWPOINTS, 2, is_there, hints::of_viewpoint, |v| execute(Command::LookFrom(v)));
             }
-            heading(ui, "Drag");
-            row.show(ui, &TOOLS, 2, |t| state.controls.tool() == t, hints::of_tool, |t| execute(Command::Tool(t)));
+            row.titled("Drag").show(
+                ui,
+                &TOOLS,
+                2,
+                |t| state.controls.tool() == t,
+                hints::of_tool,
+                |t| execute(Command::Tool(t)),
+            );
             cuts(ui, state, width - 16.0, execute);
             if settings.mode.is_flat() && settings.mode != Mode::Orthogonal {
-                heading(ui, "Plane");
                 let hint = |_| "The plane that is shown and moved.";
-                row.show(ui, &PLANES, 3, |p| settings.planes.plane == p, hint, |p| execute(Command::Plane(p)));
+                row.titled("Plane").show(
+                    ui,
+                    &PLANES,
+                    3,
+                    |p| settings.planes.plane == p,
+                    hint,
+                    |p| execute(Command::Plane(p)),
+                );
             }
             if settings.mode.is_flat() || settings.layout == Layout::Four {
                 let hint = "Moves the point where the planes cross to the middle (J; double click with Planes).";
                 let button = Button::new("Recentre planes").min_size(vec2(width - 16.0, TOUCH_SIZE * 0.75));
-                if ui.add(button).on_hover_text(hint).clicked() {
+                if ui.add(button).tell(hint).clicked() {
                     execute(Command::Recentre);
                 }
             }
-            heading(ui, "Measure");
-            measures::show_tools(ui, state, width - 16.0, execute);
+            names::group(ui, "Measure", |ui| {
+                heading(ui, "Measure");
+                measures::show_tools(ui, state, width - 16.0, execute);
+            });
             if !state.has_column {
                 measures::show_results(ui, state, width - 24.0, execute);
             }
-            heading(ui, "Workspace");
             let files = [
                 (
                     Command::OpenFiles,
@@ -86,18 +112,21 @@ pub(super) fn show_modes(ui: &mut Ui, state: &PanelState, width: f32, execute: &
                 (Command::SaveWorkspace, "Save", "Saves settings, recording and measurements together (Ctrl+S)."),
             ];
             let half = vec2((width - 16.0 - ui.spacing().item_spacing.x) / 2.0, TOUCH_SIZE * 0.75);
-            ui.horizontal(|ui| {
-                for (command, name, hint) in files {
-                    if ui.add(Button::new(name).min_size(half)).on_hover_text(hint).clicked() {
-                        execute(command);
-                    }
-                }
-            });
             let hint = "Exports the volume that is shown: as a volume, a surface to print, or a turntable (Ctrl+E).";
             let whole = vec2(width - 16.0, TOUCH_SIZE * 0.75);
-            if ui.add(Button::new("Export").min_size(whole)).on_hover_text(hint).clicked() {
-                execute(Command::Exports);
-            }
+            names::group(ui, "Workspace", |ui| {
+                heading(ui, "Workspace");
+                ui.horizontal(|ui| {
+                    for (command, name, hint) in files {
+                        if ui.add(Button::new(name).min_size(half)).tell(hint).clicked() {
+                            execute(command);
+                        }
+                    }
+                });
+                if ui.add(Button::new("Export").min_size(whole)).tell(hint).clicked() {
+                    execute(Command::Exports);
+                }
+            });
         });
     });
 }
@@ -139,21 +168,29 @@ fn undo_and_redo(ui: &mut Ui, state: &PanelState, row: &Row, execute: &mut dyn F
             (Command::Redo, "Redo", can_redo, "Does it again (Ctrl+Y)."),
         ] {
             let button = ui.add_enabled(is_there, Button::new(name).min_size(size));
-            if button.on_hover_text(hint).on_disabled_hover_text(hint).clicked() {
+            if button.tell(hint).on_disabled_hover_text(hint).clicked() {
                 execute(command);
             }
         }
     });
 }
 
-/// Rows of buttons of which one is chosen.
+/// Rows of buttons of which one is chosen, under a title.
+#[derive(Clone, Copy)]
 struct Row {
     /// Width of the panel, points.
     width: f32,
     height: f32,
+    title: &'static str,
+    /// The title is as large as the names of the controls.
+    is_large_title: bool,
 }
 
 impl Row {
+    fn titled(self, title: &'static str) -> Row {
+        Row { title, ..self }
+    }
+
     fn show<T: Copy>(
         &self,
         ui: &mut Ui,
@@ -165,16 +202,22 @@ impl Row {
     ) {
         let gap = ui.spacing().item_spacing.x;
         let width = (self.width - 16.0 - gap * (columns - 1) as f32) / columns as f32;
-        for some in all.chunks(columns) {
-            ui.horizontal(|ui| {
-                for (value, name) in some {
-                    let button = Button::selectable(is(*value), *name).frame_when_inactive(true);
-                    if ui.add(button.min_size(vec2(width, self.height))).on_hover_text(hint(*value)).clicked() {
-                        select(*value);
+        names::group(ui, self.title, |ui| {
+            match self.is_large_title {
+                true => _ = ui.label(self.title),
+                false => heading(ui, self.title),
+            }
+            for some in all.chunks(columns) {
+                ui.horizontal(|ui| {
+                    for (value, name) in some {
+                        let button = Button::selectable(is(*value), *name).frame_when_inactive(true);
+                        if ui.add(button.min_size(vec2(width, self.height))).tell(hint(*value)).clicked() {
+                            select(*value);
+                        }
                     }
-                }
-            });
-        }
+                });
+            }
+        });
     }
 }
 
@@ -217,6 +260,7 @@ pub(super) fn front(sliders: &[&str], settings: &Settings) -> Option<usize> {
 pub(super) fn show_controls(ui: &mut Ui, state: &PanelState, width: f32, execute: &mut dyn FnMut(Command)) {
     let settings = state.controls.settings();
     Panel::right("column").exact_size(width).resizable(false).show_separator_line(false).show(ui, |ui| {
+        names::name(ui, Role::Group, "Controls");
         ScrollArea::vertical().auto_shrink(false).show(ui, |ui| {
             // Leaves room for the scroll bar, which covers the edge.
             ui.set_max_width(width - 32.0);
@@ -232,13 +276,12 @@ pub(super) fn show_controls(ui: &mut Ui, state: &PanelState, width: f32, execute
             }
             let colours = colours(settings);
             ui.add_space(4.0);
-            ui.label("Colour");
             let is = |colour| match colour {
                 Colour::Transfer(name) => settings.volume.transfer == Transfer::Named(name),
                 Colour::Map(map) => settings.post.colour_map == map,
             };
             let hint = |_| "Colours of the tissue; they stand for no flow.";
-            Row { width: width - 24.0, height: TOUCH_SIZE * 0.8 }.show(
+            Row { width: width - 24.0, height: TOUCH_SIZE * 0.8, title: "Colour", is_large_title: true }.show(
                 ui,
                 colours,
                 3,
@@ -278,11 +321,14 @@ pub(super) fn show_controls(ui: &mut Ui, state: &PanelState, width: f32, execute
                 if there.is_empty() {
                     continue;
                 }
-                CollapsingHeader::new(name).id_salt(name).show_unindented(ui, |ui| {
+                let shown = CollapsingHeader::new(name).id_salt(name).show_unindented(ui, |ui| {
+                    names::name(ui, Role::Group, name);
                     for number in there {
                         slider(ui, state, number, SLIDERS[number].name, false, execute);
                     }
                 });
+                // A control in front may have the name of a stage.
+                shown.header_response.expanded(shown.openness > 0.5).named(&format!("Advanced: {name}"));
             }
         });
     });
@@ -322,26 +368,28 @@ fn slider(
     }
     let mut value = before.clamp(low, high.max(low));
     let digits = (-slider.step.log10().floor()).clamp(0.0, 3.0) as usize;
+    let space = if slider.unit.is_empty() || slider.unit == "°" { "" } else { " " };
+    let shown = format!("{before:.digits$}{space}{}", slider.unit);
     ui.horizontal(|ui| {
         let text = RichText::new(name);
         ui.label(if is_large { text.strong() } else { text });
         ui.with_layout(egui::Layout::right_to_left(Align::Center), |ui| {
-            let space = if slider.unit.is_empty() || slider.unit == "°" { "" } else { " " };
-            ui.label(RichText::new(format!("{before:.digits$}{space}{}", slider.unit)).color(ACCENT));
+            ui.label(RichText::new(&shown).color(ACCENT));
         });
     });
     ui.spacing_mut().slider_width = ui.available_width();
     // Tall enough for a finger, although the rail is thin.
     ui.spacing_mut().interact_size.y = TOUCH_SIZE * if is_large { 0.62 } else { 0.5 };
     let response = ui.add(Slider::new(&mut value, low..=high.max(low)).show_value(false).step_by(slider.step));
-    let response = response.on_hover_text(format!("{hint} Double click: as at the start."));
+    let response = response.tell(&format!("{hint} Double click: as at the start.")).named(name).with_value(&shown);
     if response.double_clicked() {
         execute(Command::ResetSlider(number));
         return;
     }
     // egui also reports a change when it rounds a value to the step, without any input.
     let is_held = response.dragged() || response.clicked() || response.is_pointer_button_down_on();
-    if is_held && value != before {
+    let is_asked = names::asks_for_value(ui, &response);
+    if (is_held || is_asked) && value != before {
         execute(Command::SetSlider(number, value));
     }
 }
@@ -349,11 +397,11 @@ fn slider(
 /// A switch with its name; the whole row reacts. True if the user changed it.
 fn switch(ui: &mut Ui, on: &mut bool, name: &str, hint: &str) -> bool {
     let (area, response) = ui.allocate_exact_size(vec2(ui.available_width(), TOUCH_SIZE * 0.75), Sense::click());
-    let response = response.on_hover_text(hint);
     if response.clicked() {
         *on = !*on;
     }
     response.widget_info(|| WidgetInfo::selected(WidgetType::Checkbox, true, *on, name));
+    let response = response.tell(hint).with_role(Role::Switch);
     let (width, height) = (44.0, 24.0);
     let right = pos2(area.right() - width, area.center().y - height / 2.0);
     let track = Rect::from_min_size(right, vec2(width, height));
@@ -375,6 +423,7 @@ fn switch(ui: &mut Ui, on: &mut bool, name: &str, hint: &str) -> bool {
 
 pub(super) fn show_cine_bar(ui: &mut Ui, state: &PanelState, height: f32, execute: &mut dyn FnMut(Command)) {
     Panel::bottom("bar").exact_size(height).resizable(false).show_separator_line(false).show(ui, |ui| {
+        names::name(ui, Role::Toolbar, "Cine loop");
         let touch = (height - 12.0).min(TOUCH_SIZE);
         ui.horizontal_centered(|ui| {
             let room = ui.available_width();
@@ -386,10 +435,12 @@ pub(super) fn show_cine_bar(ui: &mut Ui, state: &PanelState, height: f32, execut
             let text = RichText::new(label).color(Color32::WHITE).strong();
             let width = if is_narrow { 84.0 } else { 120.0 };
             let hint = "Keeps this volume on the screen (Space).";
-            if ui.add(Button::new(text).fill(fill).min_size(vec2(width, touch))).on_hover_text(hint).clicked() {
+            let freeze = Button::new(text).fill(fill).min_size(vec2(width, touch));
+            if ui.add(freeze).tell(hint).named(if state.is_frozen { "Unfreeze" } else { "Freeze" }).clicked() {
                 execute(Command::Freeze);
             }
             let mut left = room - width - ui.spacing().item_spacing.x;
+            let loop_room = LoopRoom::of(ui, state);
             // In the order in which they give way to a narrow window; the first is always there.
             let buttons = [
                 (
@@ -411,7 +462,8 @@ pub(super) fn show_cine_bar(ui: &mut Ui, state: &PanelState, height: f32, execut
                 let kept = match n {
                     0 => 0.0,
                     1 => 60.0,
-                    _ => 330.0,
+                    2 => loop_room.steps,
+                    _ => loop_room.steps + LoopRoom::TOOLS,
                 };
                 if n == 0 || left >= wanted + kept {
                     left -= wanted;
@@ -419,7 +471,7 @@ pub(super) fn show_cine_bar(ui: &mut Ui, state: &PanelState, height: f32, execut
                 }
             }
             if left >= 150.0 {
-                cine(ui, state, left, touch, execute);
+                cine(ui, state, left, touch, &loop_room, execute);
             }
             ui.with_layout(egui::Layout::right_to_left(Align::Center), |ui| {
                 // From the right: help first, the picture next to the loop.
@@ -432,7 +484,8 @@ pub(super) fn show_cine_bar(ui: &mut Ui, state: &PanelState, height: f32, execut
                     _ => 5,
                 });
                 for (label, width, command, hint) in shown {
-                    if ui.add(Button::new(label).min_size(vec2(width, touch))).on_hover_text(hint).clicked() {
+                    let name = if label == "?" { "Help" } else { label };
+                    if ui.add(Button::new(label).min_size(vec2(width, touch))).tell(hint).named(name).clicked() {
                         execute(command);
                     }
                 }
@@ -441,35 +494,107 @@ pub(super) fn show_cine_bar(ui: &mut Ui, state: &PanelState, height: f32, execut
     });
 }
 
+/// Room that the cine loop needs, points.
+struct LoopRoom {
+    text: String,
+    /// For the text alone.
+    words: f32,
+    /// With buttons, steps, the text and a short slider.
+    steps: f32,
+}
+
+impl LoopRoom {
+    /// In addition for the speed and the marks.
+    const TOOLS: f32 = 268.0;
+    const SHORTEST_SLIDER: f32 = 50.0;
+
+    fn of(ui: &Ui, state: &PanelState) -> LoopRoom {
+        let text = cine_text(&state.cine);
+        let words = ui.painter().layout_no_wrap(text.clone(), FontId::proportional(TEXT_SIZE), TEXT).size().x;
+        let between = ui.spacing().item_spacing.x;
+        LoopRoom { text, words, steps: 64.0 + 2.0 * 44.0 + LoopRoom::SHORTEST_SLIDER + words + 6.0 * between }
+    }
+}
+
 /// The cine loop in so much room, points.
-fn cine(ui: &mut Ui, state: &PanelState, room: f32, touch: f32, execute: &mut dyn FnMut(Command)) {
-    let (count, place) = state.cine;
-    if count == 0 {
+fn cine(ui: &mut Ui, state: &PanelState, room: f32, touch: f32, needed: &LoopRoom, execute: &mut dyn FnMut(Command)) {
+    let cine = &state.cine;
+    if cine.count == 0 {
         ui.label(RichText::new("no volumes yet").color(WEAK_TEXT));
         return;
     }
-    let label = if state.is_playing { "Stop" } else { "Play" };
-    let hint = "Plays the last volumes as a loop (Enter).";
-    if ui.add(Button::new(label).min_size(vec2(64.0, touch))).on_hover_text(hint).clicked() {
-        execute(Command::PlayCine);
-    }
-    if room >= 330.0 {
-        for (label, by, hint) in [("<", -1, "One volume back (Left)."), (">", 1, "One volume forth (Right).")] {
-            if ui.add(Button::new(label).min_size(vec2(44.0, touch))).on_hover_text(hint).clicked() {
-                execute(Command::StepCine(by));
+    let mut button = |ui: &mut Ui, label: &str, width: f32, name: &str, hint: &str, command: Command| {
+        if ui.add(Button::new(label).min_size(vec2(width, touch))).tell(hint).named(name).clicked() {
+            execute(command);
+        }
+    };
+    let label = if cine.is_playing { "Stop" } else { "Play" };
+    button(ui, label, 64.0, label, "Plays the last volumes as a loop (Enter).", Command::PlayCine);
+    if room >= needed.steps {
+        button(ui, "<", 44.0, "One volume back", "One volume back (Left).", Command::StepCine(-1));
+        button(ui, ">", 44.0, "One volume forth", "One volume forth (Right).", Command::StepCine(1));
+        let has_tools = room >= needed.steps + LoopRoom::TOOLS;
+        if has_tools {
+            let speed = format!("{}x", cine.speed);
+            // After the fastest comes the slowest.
+            let faster = if cine.speed >= SPEEDS[SPEEDS.len() - 1] { -(SPEEDS.len() as i32) } else { 1 };
+            let hint = "Speed of the loop; 1x is that of the acquisition (Ctrl+Left, Ctrl+Right).";
+            button(ui, &speed, 56.0, &format!("Speed {speed}"), hint, Command::CineSpeed(faster));
+            let (label, name, hint) = match cine.goes_back_and_forth {
+                true => ("<->", "Back and forth", "Back and forth; a click: forwards (Ctrl+Enter)."),
+                false => ("->", "Forwards", "Forwards; a click: back and forth (Shift+Enter)."),
+            };
+            button(ui, label, 44.0, name, hint, Command::BackAndForth(!cine.goes_back_and_forth));
+            let hint = "The loop begins with this volume (Shift+Home).";
+            button(ui, "[", 36.0, "Loop begins here", hint, Command::MarkCine(false));
+            let hint = "The loop ends with this volume (Shift+End).";
+            button(ui, "]", 36.0, "Loop ends here", hint, Command::MarkCine(true));
+            let whole = Button::new("All").min_size(vec2(44.0, touch));
+            let whole = ui.add_enabled(cine.is_trimmed, whole).tell("The loop is all volumes (Ctrl+Home).");
+            if whole.named("All volumes").clicked() {
+                execute(Command::WholeCine);
             }
         }
-        ui.spacing_mut().slider_width = (room - 290.0).clamp(30.0, 400.0);
-        let mut at = place.map_or(count, |p| p + 1);
-        let slider = ui.add_enabled(count > 1, Slider::new(&mut at, 1..=count).show_value(false));
-        let slider = slider.on_hover_text("The volumes of the loop, oldest first.");
+        let tools = if has_tools { LoopRoom::TOOLS } else { 0.0 };
+        ui.spacing_mut().slider_width = (room - needed.steps - tools + LoopRoom::SHORTEST_SLIDER).min(400.0);
+        let mut at = cine.shown.map_or(cine.count, |p| p + 1);
+        let slider = ui.add_enabled(cine.count > 1, Slider::new(&mut at, 1..=cine.count).show_value(false));
+        if cine.is_trimmed {
+            // What is played, under the slider.
+            let last = (cine.count - 1).max(1) as f32;
+            let x = |index: usize| egui::lerp(slider.rect.x_range().shrink(8.0), index as f32 / last);
+            let [low, high] = [*cine.range.start(), *cine.range.end()].map(x);
+            let y = slider.rect.bottom() - 3.0;
+            ui.painter().hline(low - 3.0..=high + 3.0, y, Stroke::new(3.0, ACCENT));
+        }
+        let slider = slider.tell("The volumes of the loop, oldest first.").named("Volume of the loop");
         let is_held = slider.dragged() || slider.clicked() || slider.is_pointer_button_down_on();
-        if is_held && place != Some(at - 1) {
+        let is_asked = names::asks_for_value(ui, &slider);
+        if (is_held || is_asked) && cine.shown != Some(at - 1) {
             execute(Command::SeekCine(at - 1));
         }
+        ui.add(Label::new(&needed.text).extend());
+    } else if room >= 64.0 + needed.words + ui.spacing().item_spacing.x {
+        ui.add(Label::new(&needed.text).extend());
+    } else {
+        ui.add(Label::new(place_text(cine)).extend());
     }
-    let shown = place.map_or("-".into(), |p| (p + 1).to_string());
-    ui.add(Label::new(format!("{shown} of {count}")).extend());
+}
+
+fn place_text(cine: &CineState) -> String {
+    format!("{} of {}", cine.shown.map_or("-".into(), |p| (p + 1).to_string()), cine.count)
+}
+
+/// Place, time and rate of the loop, as far as they are known.
+fn cine_text(cine: &CineState) -> String {
+    let mut text = place_text(cine);
+    if let Some(seconds) = cine.seconds {
+        text += &format!("  {seconds:.1} s");
+    }
+    if let Some(rate) = cine.rate {
+        text += &format!("  {rate:.1}/s");
+    }
+    text
 }
 
 #[cfg(test)]

@@ -1,8 +1,10 @@
 //! Lists over the window of which an entry is chosen: the files to open, and the formats of an export.
 
+use super::names::{self, Tell};
 use super::{ACCENT, PANEL, SMALL_TEXT, TOUCH_SIZE, WEAK_TEXT};
 use crate::ui::command::Command;
 use crate::ui::volume_export::FORMATS;
+use egui::accesskit::Role;
 use egui::{Align2, Area, Button, Frame, Id, Margin, Order, RichText, ScrollArea, Stroke, Ui, vec2};
 
 struct List<'a> {
@@ -33,7 +35,7 @@ pub(super) fn show_exports(ui: &Ui, running: Option<&str>, execute: &mut dyn FnM
     let entries = FORMATS.iter().map(|format| (format.name, format.hint));
     let cancel = |ui: &mut Ui, execute: &mut dyn FnMut(Command)| {
         let hint = "Ends the export in work; nothing of it stays.";
-        if running.is_some() && ui.button("Cancel the export").on_hover_text(hint).clicked() {
+        if running.is_some() && ui.button("Cancel the export").tell(hint).clicked() {
             execute(Command::CancelExport);
         }
     };
@@ -54,6 +56,7 @@ impl List<'_> {
         let area =
             Area::new(Id::new(self.title)).order(Order::Foreground).anchor(Align2::CENTER_CENTER, vec2(0.0, 0.0));
         area.show(ui.ctx(), |ui| {
+            names::name(ui, Role::Dialog, self.title);
             let frame = Frame::new().fill(PANEL).inner_margin(Margin::same(16)).corner_radius(10);
             frame.stroke(Stroke::new(2.0, ACCENT)).show(ui, |ui| {
                 let width = (screen.width() - 80.0).clamp(120.0, 720.0);
@@ -61,7 +64,7 @@ impl List<'_> {
                 ui.horizontal(|ui| {
                     ui.heading(self.title);
                     ui.with_layout(egui::Layout::right_to_left(egui::Align::Center), |ui| {
-                        if ui.button("Close  (Esc)").on_hover_text(self.close.0).clicked() {
+                        if ui.button("Close  (Esc)").tell(self.close.0).named("Close").clicked() {
                             execute(self.close.1);
                         }
                     });
@@ -70,6 +73,7 @@ impl List<'_> {
                 more(ui, execute);
                 let height = (screen.height() - 200.0).max(60.0);
                 ScrollArea::vertical().max_height(height).show(ui, |ui| {
+                    names::name(ui, Role::List, self.about);
                     if entries.len() == 0 {
                         ui.label(self.empty);
                     }
@@ -77,7 +81,7 @@ impl List<'_> {
                         let key = if n < 9 { format!("{}   ", n + 1) } else { "     ".into() };
                         let button = Button::new(format!("{key}{name}")).truncate();
                         let button = button.min_size(vec2(width - 20.0, TOUCH_SIZE * 0.7));
-                        if ui.add(button).on_hover_text(hint).clicked() {
+                        if ui.add(button).tell(hint).named(name).clicked() {
                             choose(n, execute);
                         }
                     }

@@ -1,11 +1,13 @@
 //! Measuring: its tools, the list of results, and what is drawn of both over the picture.
 
+use super::names::{self, Tell};
 use super::{ACCENT, PanelState, SMALL_TEXT, TEXT, TEXT_SIZE, TOUCH_SIZE, WARNING, heading, picture_rect};
 use crate::measure::outcome::{self, Quantity};
 use crate::measure::overlay::{self, Drawn};
 use crate::scene::{MeasureKind, Scene};
 use crate::ui::command::{Command, Tool};
 use crate::ui::hints;
+use egui::accesskit::Role;
 use egui::{Button, Color32, FontId, Label, Painter, Pos2, Rect, RichText, Stroke, StrokeKind, Ui, pos2, vec2};
 
 /// The tools of the rail and their names there.
@@ -37,7 +39,7 @@ pub(super) fn show_tools(ui: &mut Ui, state: &PanelState, width: f32, execute: &
             kind => (Command::Tool(Tool::Measure(kind)), state.controls.tool() == Tool::Measure(kind)),
         };
         let button = Button::selectable(is_on, name).frame_when_inactive(true).min_size(vec2(width, TOUCH_SIZE * 0.75));
-        if ui.add(button).on_hover_text(hints::of_measure(kind)).clicked() {
+        if ui.add(button).tell(hints::of_measure(kind)).clicked() {
             // A second click leaves the tool.
             execute(if is_on { Command::Tool(Tool::default()) } else { command });
         }
@@ -58,15 +60,24 @@ pub(super) fn show_results(ui: &mut Ui, state: &PanelState, width: f32, execute:
     if measures.is_empty() && state.controls.work().is_none() && !is_measuring {
         return;
     }
+    names::group(ui, "Measurements", |ui| results(ui, state, width, execute));
+}
+
+fn results(ui: &mut Ui, state: &PanelState, width: f32, execute: &mut dyn FnMut(Command)) {
+    let measures = state.controls.measures();
     heading(ui, "Measurements");
     if let Tool::Measure(kind) = state.controls.tool() {
-        ui.add(Label::new(RichText::new(next_step(state, kind)).size(SMALL_TEXT).color(ACCENT)).wrap());
+        let step = next_step(state, kind);
+        names::group(ui, step, |ui| {
+            names::announce(ui, step, false);
+            ui.add(Label::new(RichText::new(step).size(SMALL_TEXT).color(ACCENT)).wrap());
+        });
     }
     if let Some(work) = state.controls.work().filter(|work| work.kind.complete_at().is_none()) {
         let name =
             if work.kind == MeasureKind::Volume && work.points.is_empty() { "End volume" } else { "Close contour" };
         let button = Button::new(name).fill(ACCENT.gamma_multiply(0.45)).min_size(vec2(width, TOUCH_SIZE * 0.65));
-        if ui.add(button).on_hover_text("Ends what is being traced (Enter).").clicked() {
+        if ui.add(button).tell("Ends what is being traced (Enter).").clicked() {
             execute(Command::EndMeasure);
         }
     }
@@ -88,10 +99,12 @@ pub(super) fn show_results(ui: &mut Ui, state: &PanelState, width: f32, execute:
                 let rest = found.iter().map(|q| format!("{}: {}", q.name, q.shown()));
                 let hint: Vec<String> = rest.chain(["Click to type a text for it.".to_string()]).collect();
                 ui.with_layout(egui::Layout::right_to_left(egui::Align::Center), |ui| {
-                    ui.label(RichText::new(main).color(LINE).size(SMALL_TEXT));
+                    ui.label(RichText::new(&main).color(LINE).size(SMALL_TEXT));
                     ui.with_layout(egui::Layout::left_to_right(egui::Align::Center), |ui| {
                         let label = ui.add(Label::new(text).truncate().sense(egui::Sense::click()));
-                        if label.on_hover_text(hint.join("\n")).clicked() {
+                        let spoken = format!("{} {name} {main}", n + 1);
+                        let label = label.tell(&hint.join("\n")).with_role(Role::Button);
+                        if label.named(spoken.trim_end()).clicked() {
                             execute(Command::LabelMeasure(n));
                         }
                     });
@@ -99,7 +112,8 @@ pub(super) fn show_results(ui: &mut Ui, state: &PanelState, width: f32, execute:
             });
             ui.spacing_mut().button_padding.x = 3.0;
             let delete = Button::new("x").min_size(vec2(22.0, TOUCH_SIZE * 0.55));
-            if ui.add(delete).on_hover_text("Deletes it (undo brings it back).").clicked() {
+            let delete = ui.add(delete).tell("Deletes it (undo brings it back).");
+            if delete.named(&format!("Delete measurement {}", n + 1)).clicked() {
                 execute(Command::DeleteMeasure(n));
             }
         });
@@ -114,7 +128,7 @@ pub(super) fn show_results(ui: &mut Ui, state: &PanelState, width: f32, execute:
                 (Command::ClearMeasures, "Clear", "Deletes all (undo brings them back)."),
             ] {
                 let button = Button::new(RichText::new(name).size(SMALL_TEXT + 1.0)).min_size(third);
-                if ui.add(button).on_hover_text(hint).clicked() {
+                if ui.add(button).tell(hint).clicked() {
                     execute(command);
                 }
             }

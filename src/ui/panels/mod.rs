@@ -7,14 +7,18 @@ mod annotations;
 mod controls;
 mod lists;
 mod measures;
+mod names;
 mod overlays;
 
 use super::command::Command;
-use super::input::{Button, Input, Modifiers, Phase};
+use super::input::{Button, Input, Key, Modifiers, Phase};
 use crate::gpu;
 use crate::scene::Scene;
+use crate::ui::cine_player::CineState;
 use crate::ui::controls::Controls;
 use crate::ui::times::Times;
+pub use egui::accesskit;
+use egui::accesskit::{ActionRequest, TreeUpdate};
 use egui::{
     Color32, CornerRadius, Event, FontData, FontDefinitions, FontFamily, FontId, Modifiers as EguiModifiers,
     MouseWheelUnit, PointerButton, Pos2, Rect, Stroke, TextStyle, Theme, TouchPhase, pos2, vec2,
@@ -26,8 +30,22 @@ use std::time::Duration;
 pub(super) struct PanelOutput {
     pub(super) panels: gpu::window::Panels,
     pub(super) commands: Vec<Command>,
+    /// What a screen reader says of the panels, while one listens.
+    pub(super) tree: Option<TreeUpdate>,
     /// When the panels need another layout without an event.
     pub(super) repaint_after: Duration,
+}
+
+#[cfg(test)]
+impl PanelOutput {
+    /// Corners of all triangles, points, and their colours: red, green, blue, opacity.
+    pub(super) fn corners(&self) -> Vec<([f32; 2], [u8; 4])> {
+        let meshes = self.panels.shapes.iter().filter_map(|shape| match &shape.primitive {
+            egui::epaint::Primitive::Mesh(mesh) => Some(mesh),
+            egui::epaint::Primitive::Callback(_) => None,
+        });
+        meshes.flat_map(|mesh| &mesh.vertices).map(|v| (v.pos.into(), v.color.to_array())).collect()
+    }
 }
 
 /// The panels of one window.
@@ -36,6 +54,10 @@ pub(super) struct Panels {
     egui_input: EguiInput,
     /// Pixels per point.
     scale: f32,
+    /// A screen reader listens.
+    is_described: bool,
+    /// The keyboard is on its way to a control: the next layout says to which.
+    gets_focus: bool,
 }
 
 impl Panels {
@@ -43,7 +65,8 @@ impl Panels {
     pub(super) fn new(scale: f32) -> Panels {
         let context = egui::Context::default();
         apply_theme(&context);
-        Panels { context, egui_input: EguiInput::default(), scale: scale.clamp(0.5, 4.0) }
+        let scale = scale.clamp(0.5, 4.0);
+        Panels { context, egui_input: EguiInput::default(), scale, is_described: false, gets_focus: false }
     }
 
     pub(super) fn scale(&self) -> f32 {
@@ -52,7 +75,64 @@ impl Panels {
 
     /// Starts again after the device with the textures was lost: all textures are sent again.
     pub(super) fn reset(&mut self) {
+        let is_described = self.is_described;
         *self = Panels::new(self.scale);
+        self.describe(is_described);
+    }
+
+    /// Describes the panels to a screen reader from the next layout on, or no longer.
+    pub(super) fn describe(&mut self, is_described: bool) {
+        self.is_described = is_described;
+        match is_described {
+            true => self.context.enable_accesskit(),
+            false => self.context.disable_accesskit(),
+        }
+    }
+
+    pub(super) fn is_described(&self) -> bool {
+        self.is_described
+    }
+
+    /// Does what a screen reader asks of a control.
+    pub(super) fn act(&mut self, request: ActionRequest) {
+        self.egui_input.events.push(Event::AccessKitActionRequest(request));
+    }
+
+    /// True while a control has the keyboard.
+    pub(super) fn has_focus(&self) -> bool {
+        self.gets_focus || self.context.memory(|memory| memory.focused()).is_some()
+    }
+
+    /// Gives the keyboard to the first control, or takes it from the one that has it.
+    pub(super) fn toggle_focus(&mut self) {
+        let key = if self.has_focus() { egui::Key::Escape } else { egui::Key::Tab };
+        self.gets_focus = key == egui::Key::Tab;
+        self.egui_input.press(key, EguiModifiers::NONE);
+    }
+
+    /// Takes a key that went down for the control that has the keyboard: Tab goes to the next one, arrows move a slider, Space and Enter press
+    /// a button, Escape leaves. False if no control has the keyboard, or it does not use the key.
+    pub(super) fn key(&mut self, key: Key, modifiers: Modifiers) -> bool {
+        let plain = modifiers == Modifiers::default();
+        let back = modifiers == Modifiers { shift: true, ..Modifiers::default() };
+        let key = match key {
+            Key::Tab if plain || back => egui::Key::Tab,
+            _ if !plain => return false,
+            Key::Enter => egui::Key::Enter,
+            Key::Space => egui::Key::Space,
+            Key::Escape => egui::Key::Escape,
+            Key::Left => egui::Key::ArrowLeft,
+            Key::Right => egui::Key::ArrowRight,
+            Key::Up => egui::Key::ArrowUp,
+            Key::Down => egui::Key::ArrowDown,
+            _ => return false,
+        };
+        if !self.has_focus() {
+            return false;
+        }
+        self.gets_focus &= key != egui::Key::Escape;
+        self.egui_input.press(key, if back { EguiModifiers::SHIFT } else { EguiModifiers::NONE });
+        true
     }
 
     pub(super) fn input(&mut self, input: &Input) {
@@ -88,9 +168,12 @@ impl Panels {
             viewport.native_pixels_per_point = Some(self.scale);
         }
         let mut commands = Vec::new();
+        self.gets_focus &= self.has_pending_input();
+        // egui may lay out twice, to place what it sees for the first time: the inputs are in the first.
         let output = self.context.run_ui(input, |ui| {
-            commands.clear();
+            let from_panels = commands.len();
             let execute = &mut |command| commands.push(command);
+            names::picture(ui, state, self.scale);
             let shows_panels = state.shows_panels && state.picture.1 != size;
             if shows_panels {
                 let Edges { left, right, below } = Edges::of(points.into(), true);
@@ -122,14 +205,17 @@ impl Panels {
                 lists::show_exports(ui, state.exporting, execute);
             }
             if state.asks_to_leave {
-                overlays::ask_to_leave(ui, execute);
+                // A screen reader reaches what a pointer does not.
+                commands.truncate(from_panels);
+                overlays::ask_to_leave(ui, &mut |command| commands.push(command));
             }
+            names::mark_focus(ui.ctx());
             overlays::paint_pointer(ui, state, self.scale);
         });
         let repaint_after = output.viewport_output.values().map(|v| v.repaint_delay).min().unwrap_or(Duration::MAX);
         let shapes = self.context.tessellate(output.shapes, output.pixels_per_point);
         let panels = gpu::window::Panels { shapes, textures: output.textures_delta, scale: output.pixels_per_point };
-        PanelOutput { panels, commands, repaint_after }
+        PanelOutput { panels, commands, tree: output.platform_output.accesskit_update, repaint_after }
     }
 }
 
@@ -156,7 +242,7 @@ impl EguiInput {
                 phase: TouchPhase::Move,
                 modifiers: self.modifiers,
             }),
-            // Keys have their own bindings: no panel has a text field.
+            // Keys have their own bindings: no panel has a text field. Those for a control come by `press`.
             Input::Key { .. } => {}
             Input::Modifiers(Modifiers { shift, control, alt }) => {
                 self.modifiers = EguiModifiers { alt, ctrl: control, shift, mac_cmd: false, command: control };
@@ -166,6 +252,14 @@ impl EguiInput {
                 self.finger = None;
                 self.events.push(Event::PointerGone);
             }
+        }
+    }
+
+    /// A key that goes down and up.
+    fn press(&mut self, key: egui::Key, modifiers: EguiModifiers) {
+        // With the modifiers that egui is told before any event, the arrows and Tab would be other keys.
+        for pressed in [true, false] {
+            self.events.push(Event::Key { key, physical_key: None, pressed, repeat: false, modifiers });
         }
     }
 
@@ -209,8 +303,11 @@ impl EguiInput {
         !self.events.is_empty()
     }
 
+    /// The events of the next layout: all up to a key, because egui moves the focus once a layout.
     fn take(&mut self) -> (Vec<Event>, EguiModifiers) {
-        (std::mem::take(&mut self.events), self.modifiers)
+        let is_end = |event: &Event| matches!(event, Event::Key { pressed: false, .. });
+        let count = self.events.iter().position(is_end).map_or(self.events.len(), |at| at + 1);
+        (self.events.drain(..count).collect(), self.modifiers)
     }
 }
 
@@ -277,9 +374,7 @@ pub(super) struct PanelState<'a> {
     /// The name of the export in work.
     pub(super) exporting: Option<&'a str>,
     pub(super) is_frozen: bool,
-    pub(super) is_playing: bool,
-    /// Number of volumes in the cine loop, and the index of the one that is shown.
-    pub(super) cine: (usize, Option<usize>),
+    pub(super) cine: CineState,
     /// True after the first picture.
     pub(super) has_drawn: bool,
     /// The current rung of the quality ladder, and the frame budget.

@@ -1,5 +1,6 @@
 //! What is drawn over the picture: banner and notes, times, help, a question with its answers, and the pointer where no windowing system draws one.
 
+use super::names::{self, Tell};
 use super::{
     ACCENT, BACKGROUND, FAULT, GOOD, LARGE_TEXT, PANEL, PanelState, SMALL_TEXT, TEXT, TEXT_SIZE, TOUCH_SIZE, WARNING,
     WEAK_TEXT, picture_rect,
@@ -7,9 +8,10 @@ use super::{
 use crate::ui::command::{self, Command};
 use crate::ui::hints;
 use crate::ui::sliders::SLIDERS;
+use egui::accesskit::Role;
 use egui::{
     Align2, Area, Button, Color32, Frame, Id, LayerId, Margin, Mesh, Order, Rect, RichText, ScrollArea, Shape, Stroke,
-    Ui, Vec2, pos2, vec2,
+    Ui, Vec2, WidgetInfo, WidgetType, pos2, vec2,
 };
 
 pub(super) fn show_notes(ui: &mut Ui, state: &PanelState, scale: f32) {
@@ -24,6 +26,7 @@ pub(super) fn show_notes(ui: &mut Ui, state: &PanelState, scale: f32) {
         Area::new(Id::new("banner")).order(Order::Middle).pivot(align).fixed_pos(at).interactable(false).show(
             ui.ctx(),
             |ui| {
+                names::announce(ui, &format!("{}. {}", banner.title, banner.text), banner.is_fault);
                 message_frame(colour).show(ui, |ui| {
                     ui.set_max_width((picture.width() - 60.0).clamp(120.0, 760.0));
                     ui.label(RichText::new(&banner.title).size(LARGE_TEXT).color(colour));
@@ -46,6 +49,7 @@ pub(super) fn show_notes(ui: &mut Ui, state: &PanelState, scale: f32) {
         .show(ui.ctx(), |ui| {
             for note in state.notes {
                 message_frame(if note.is_fault { FAULT } else { ACCENT }).show(ui, |ui| {
+                    names::announce(ui, &note.text, note.is_fault);
                     ui.set_max_width((picture.width() - 60.0).clamp(120.0, 760.0));
                     ui.label(RichText::new(&note.text).size(TEXT_SIZE));
                 });
@@ -72,6 +76,7 @@ const MAX_PASSES: usize = 9;
 pub(super) fn show_times(ui: &mut Ui, state: &PanelState, scale: f32) {
     let at = picture_rect(state, scale).left_top() + vec2(12.0, 12.0);
     Area::new(Id::new("times")).order(Order::Middle).fixed_pos(at).interactable(false).show(ui.ctx(), |ui| {
+        names::name(ui, Role::Group, "Times");
         let frame = Frame::new().fill(BACKGROUND.gamma_multiply(0.82)).inner_margin(Margin::same(12)).corner_radius(8);
         frame.show(ui, |ui| {
             ui.set_width(WIDTH);
@@ -153,7 +158,8 @@ fn bars(ui: &mut Ui, state: &PanelState) {
 }
 
 fn bar(ui: &mut Ui, name: &str, share: f64, figure: String) {
-    let (area, _) = ui.allocate_exact_size(vec2(WIDTH, SMALL_TEXT + 5.0), egui::Sense::hover());
+    let (area, response) = ui.allocate_exact_size(vec2(WIDTH, SMALL_TEXT + 5.0), egui::Sense::hover());
+    response.widget_info(|| WidgetInfo::labeled(WidgetType::Label, true, format!("{name} {figure}")));
     let filled = Rect::from_min_size(area.min, vec2((area.width() * share as f32).max(1.0), area.height()));
     let painter = ui.painter();
     painter.rect_filled(area, 2.0, Color32::from_white_alpha(8));
@@ -215,6 +221,7 @@ pub(super) fn show_help(ui: &mut Ui, state: &PanelState, execute: &mut dyn FnMut
                 .inner_margin(Margin::same(14))
                 .corner_radius(10)
                 .stroke(Stroke::new(1.0, WEAK_TEXT));
+            names::name(ui, Role::Dialog, "Keys and gestures");
             frame.show(ui, |ui| {
                 let width = (screen.width() - 48.0).clamp(100.0, 1400.0);
                 ui.set_width(width);
@@ -227,7 +234,8 @@ pub(super) fn show_help(ui: &mut Ui, state: &PanelState, execute: &mut dyn FnMut
                             Some(text) => format!("Search: {text}_"),
                             None => "Search  ( / )".into(),
                         };
-                        if ui.button(label).clicked() {
+                        let button = ui.button(label).tell("Finds keys, gestures and controls ( / ).").named("Search");
+                        if button.with_value(state.help_search.unwrap_or_default()).clicked() {
                             execute(Command::SearchHelp);
                         }
                     });
@@ -300,11 +308,13 @@ pub(super) fn ask_to_leave(ui: &Ui, execute: &mut dyn FnMut(Command)) {
     // Nothing behind it reacts.
     let shade = Area::new(Id::new("shade")).order(Order::Foreground).fixed_pos(screen.min);
     shade.show(ui.ctx(), |ui| {
-        ui.allocate_rect(screen, egui::Sense::click_and_drag());
+        // The keyboard goes past it.
+        ui.allocate_rect(screen, egui::Sense::CLICK | egui::Sense::DRAG);
         ui.painter().rect_filled(screen, 0.0, Color32::from_black_alpha(150));
     });
     let area = Area::new(Id::new("leave")).order(Order::Tooltip).anchor(Align2::CENTER_CENTER, vec2(0.0, 0.0));
     area.show(ui.ctx(), |ui| {
+        names::name(ui, Role::AlertDialog, "The loop is not saved");
         let frame = Frame::new().fill(PANEL).inner_margin(Margin::same(20)).corner_radius(10);
         frame.stroke(Stroke::new(2.0, ACCENT)).show(ui, |ui| {
             ui.set_width((screen.width() - 80.0).clamp(120.0, 420.0));

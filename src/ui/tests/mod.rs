@@ -4,6 +4,7 @@ mod budget;
 mod cutting;
 mod gestures;
 mod measuring;
+mod screen_reader;
 mod sequences;
 
 use super::command::{Command, Face, Tool};

@@ -59,6 +59,22 @@ fn every_key_of_a_mode_or_layout_shows_what_its_settings_say() {
     }
 }
 
+/// The places of the next seven volumes of a loop that plays.
+fn played(desk: &mut Desk) -> Vec<usize> {
+    let (mut places, begun, mut now) = (Vec::new(), Instant::now(), Instant::now());
+    while places.len() < 7 {
+        assert!(begun.elapsed() < BOUND, "{places:?}");
+        let next = desk.tick(now);
+        let stream = desk.console.stream();
+        if stream.is_idle() {
+            places.extend(stream.cine_position().filter(|place| places.last() != Some(place)));
+            // The requested wake-up happens at once.
+            now = next.wake_at.expect("a loop goes on").max(now);
+        }
+    }
+    places
+}
+
 /// Prevents volumes that the keys of the cine loop skip or show twice, and a loop that does not advance.
 #[test]
 fn the_keys_of_time_freeze_look_back_and_play() {
@@ -86,18 +102,16 @@ fn the_keys_of_time_freeze_look_back_and_play() {
             "{key:?}: {place}"
         );
     }
-    desk.press(Key::Enter);
-    let (mut places, begun, mut now) = (Vec::new(), Instant::now(), Instant::now());
-    while places.len() < 7 {
-        assert!(begun.elapsed() < BOUND, "{places:?}");
-        let next = desk.tick(now);
-        let stream = desk.console.stream();
-        if stream.is_idle() {
-            places.extend(stream.cine_position().filter(|place| places.last() != Some(place)));
-            // The requested wake-up happens at once.
-            now = next.wake_at.expect("a loop goes on").max(now);
+    // A step counts from the volume that was asked for, also before that is shown.
+    for _ in 0..2 {
+        desk.press(Key::Right);
+        while desk.console.stream().is_replaying() {
+            desk.tick(Instant::now());
         }
     }
+    assert_eq!(desk.console.stream().cine_position(), Some(2));
+    desk.press(Key::Enter);
+    let places = played(&mut desk);
     assert!(places.windows(2).all(|w| w[1] == (w[0] + 1) % 3), "{places:?}");
     desk.press(Key::Enter);
     desk.press(Key::Space);
@@ -133,6 +147,38 @@ fn exported_files_are_what_was_shown_and_recorded() {
         }
     }
     desk.rest();
+}
+
+/// Prevents a loop that plays or saves volumes beyond its marks.
+#[test]
+fn a_trimmed_loop_is_played_back_and_forth_and_saved() {
+    use echolume::source::Source;
+    let (device, folder) = (Device::new(), Folder::new("trimmed"));
+    let mut desk = Desk::new(&device, ConsoleOptions { folder: folder.0.clone(), ..options() });
+    desk.begin();
+    (0..5).for_each(|number| _ = desk.live(number));
+    let shift = Modifiers { shift: true, ..Modifiers::default() };
+    desk.press(Key::Home);
+    desk.press(Key::Right);
+    desk.held(shift, Key::Home);
+    desk.press(Key::End);
+    desk.press(Key::Left);
+    desk.held(shift, Key::End);
+    desk.held(shift, Key::Enter);
+    desk.press(Key::Enter);
+    let places = played(&mut desk);
+    let first_end = places.iter().position(|place| *place == 1).expect("the loop reaches its begin");
+    assert_eq!(places[first_end..][..4], [1, 2, 3, 2], "{places:?}");
+    desk.press(Key::Enter);
+    desk.press(Key::Char('r'));
+    let mut saved = folder.wait("frames", |file| Reader::open(file).ok().filter(|r| !r.rebuilt()));
+    let volumes: Vec<u32> =
+        std::iter::from_fn(|| saved.next_frame().expect("read")).map(|frame| frame.volume).collect();
+    assert_eq!(volumes, [[1; 9], [2; 9], [3; 9]].concat());
+    desk.rest();
+    // Two volumes are in no file.
+    desk.press(Key::Char('q'));
+    assert!(desk.console.asks_to_leave());
 }
 
 /// Prevents panels next to the picture from changing it.

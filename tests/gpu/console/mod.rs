@@ -4,9 +4,11 @@ mod budget;
 mod failures;
 mod gestures;
 mod idle;
+mod keyboard;
 mod metrics;
 mod monkey;
 mod shaders;
+mod tasks;
 mod warming;
 
 use crate::common::gpu::*;

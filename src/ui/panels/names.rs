@@ -1,0 +1,170 @@
+//! Names, roles and values of the panels for a screen reader, and the frame around the control that has the keyboard. egui makes a tree of
+//! its widgets (AccessKit) from which the desktop's interface for screen readers is served; what egui cannot know is added here.
+
+use super::{PanelState, picture_rect};
+use crate::scene::{Layout, PlaneName, Scene};
+use crate::ui::command::Viewpoint;
+use crate::ui::view;
+use egui::accesskit::{Action, Live, Node, Rect as Bounds, Role};
+use egui::{Color32, Context, Id, Key, Response, Stroke, StrokeKind, Ui};
+
+/// Where a rendering is seen from, as the panels call it.
+pub(super) const VIEWPOINTS: [(Viewpoint, &str); 4] =
+    [(Viewpoint::Front, "Front"), (Viewpoint::Left, "Left"), (Viewpoint::Right, "Right"), (Viewpoint::Top, "Top")];
+
+/// Changes the node of the tree that stands for a widget, while a screen reader listens.
+fn node(context: &Context, id: Id, change: impl FnOnce(&mut Node)) {
+    _ = context.accesskit_node_builder(id, change);
+}
+
+/// What a control says of itself.
+pub(super) trait Tell {
+    /// A tooltip, which is the description in the tree.
+    fn tell(self, hint: &str) -> Response;
+    /// A name in place of the text on the control.
+    fn named(self, name: &str) -> Response;
+    fn with_role(self, role: Role) -> Response;
+    /// The value in words, with its unit.
+    fn with_value(self, value: &str) -> Response;
+    /// Whether what it opens is open.
+    fn expanded(self, is_open: bool) -> Response;
+}
+
+impl Tell for Response {
+    fn tell(self, hint: &str) -> Response {
+        keep_in_view(&self);
+        node(&self.ctx, self.id, |node| node.set_description(hint));
+        self.on_hover_text(hint)
+    }
+
+    fn named(self, name: &str) -> Response {
+        node(&self.ctx, self.id, |node| node.set_label(name));
+        self
+    }
+
+    fn with_role(self, role: Role) -> Response {
+        node(&self.ctx, self.id, |node| node.set_role(role));
+        self
+    }
+
+    fn with_value(self, value: &str) -> Response {
+        node(&self.ctx, self.id, |node| node.set_value(value));
+        self
+    }
+
+    fn expanded(self, is_open: bool) -> Response {
+        keep_in_view(&self);
+        node(&self.ctx, self.id, |node| node.set_expanded(is_open));
+        self
+    }
+}
+
+/// Gives what a [`Ui`] holds a role and a name.
+pub(super) fn name(ui: &Ui, role: Role, name: &str) {
+    node(ui.ctx(), ui.unique_id(), |node| {
+        node.set_role(role);
+        node.set_label(name);
+    });
+}
+
+/// Controls that belong together, under a name.
+pub(super) fn group<R>(ui: &mut Ui, title: &str, add: impl FnOnce(&mut Ui) -> R) -> R {
+    ui.scope(|ui| {
+        name(ui, Role::Group, title);
+        add(ui)
+    })
+    .inner
+}
+
+/// A message that a screen reader reads when it appears: a fault at once, others when it has finished.
+pub(super) fn announce(ui: &Ui, text: &str, is_fault: bool) {
+    name(ui, if is_fault { Role::Alert } else { Role::Status }, text);
+    let live = if is_fault { Live::Assertive } else { Live::Polite };
+    node(ui.ctx(), ui.unique_id(), |node| node.set_live(live));
+}
+
+/// The picture: what it shows, in words.
+pub(super) fn picture(ui: &Ui, state: &PanelState, scale: f32) {
+    let at = picture_rect(state, scale);
+    let (title, about) = in_words(state);
+    node(ui.ctx(), Id::new("picture"), |node| {
+        node.set_role(Role::Image);
+        node.set_label(title);
+        node.set_description(about);
+        let [x0, y0, x1, y1] = [at.min.x, at.min.y, at.max.x, at.max.y].map(f64::from);
+        node.set_bounds(Bounds { x0, y0, x1, y1 });
+    });
+}
+
+/// The name of the picture, such as "Surface from the front, live, Demo data (phantom)", and what else is to be said of it.
+fn in_words(state: &PanelState) -> (String, String) {
+    let Some(scene) = state.scene.filter(|_| state.has_drawn) else {
+        return ("No picture yet".into(), String::new());
+    };
+    let settings = &scene.settings;
+    let layout = match settings.layout {
+        Layout::Single => "",
+        Layout::Four => " with three planes",
+        Layout::Pair => " beside the volume",
+    };
+    let time = if state.is_frozen { "frozen" } else { "live" };
+    let origin = state.origin.map_or(String::new(), |origin| format!(", {origin}"));
+    let name = format!("{}{layout}{}, {time}{origin}", settings.mode.title(), view_in_words(scene));
+    let volume = match (state.cine.count, state.cine.shown) {
+        (count, Some(at)) => format!("Volume {} of {count}. ", at + 1),
+        _ => String::new(),
+    };
+    let count = state.controls.measures().len();
+    let plural = if count == 1 { "" } else { "s" };
+    (name, format!("{volume}{count} measurement{plural}."))
+}
+
+fn view_in_words(scene: &Scene) -> String {
+    let settings = &scene.settings;
+    if scene.is_flat() {
+        let plane = match settings.planes.plane {
+            PlaneName::A => "A",
+            PlaneName::B => "B",
+            PlaneName::C => "C",
+        };
+        return if scene.shows_three() { String::new() } else { format!(", plane {plane}") };
+    }
+    let side = VIEWPOINTS.iter().find(|(viewpoint, _)| view::is_seen_from(scene, *viewpoint));
+    match side {
+        Some((_, side)) => format!(" from the {}", side.to_lowercase()),
+        None => {
+            let camera = &settings.camera;
+            format!(", turned to azimuth {:.0}° and elevation {:.0}°", camera.azimuth, camera.elevation)
+        }
+    }
+}
+
+/// True if the keyboard or a screen reader asks a slider for another value. egui reports a change without any input too.
+pub(super) fn asks_for_value(ui: &Ui, slider: &Response) -> bool {
+    let has_focus = slider.has_focus();
+    ui.input(|input| {
+        let is_stepped = has_focus && (input.key_pressed(Key::ArrowLeft) || input.key_pressed(Key::ArrowRight));
+        let actions = [Action::SetValue, Action::Increment, Action::Decrement];
+        is_stepped || actions.into_iter().any(|action| input.has_accesskit_action_request(slider.id, action))
+    })
+}
+
+/// Scrolls to a control that just got the keyboard.
+fn keep_in_view(control: &Response) {
+    if control.gained_focus() {
+        control.scroll_to_me(None);
+    }
+}
+
+/// A frame around the control that has the keyboard: bright over a dark edge, which shows on every colour.
+pub(super) fn mark_focus(context: &Context) {
+    let focused = context.memory(|memory| memory.focused()).and_then(|id| context.read_response(id));
+    let Some(control) = focused else { return };
+    let painter = context.layer_painter(control.layer_id);
+    let area = control.rect.expand(1.0);
+    painter.rect_stroke(area, 6.0, Stroke::new(5.0, Color32::BLACK), StrokeKind::Middle);
+    painter.rect_stroke(area, 6.0, Stroke::new(2.5, FOCUS), StrokeKind::Middle);
+}
+
+/// Colour of that frame.
+pub(super) const FOCUS: Color32 = Color32::WHITE;

@@ -1,0 +1,449 @@
+//! What a screen reader gets: the tree of the panels, with a name for every control, and the way back by its actions and by the keyboard. No
+//! screen reader runs here.
+
+use super::*;
+use crate::live::cine::CineVolume;
+use crate::scene::MeasureKind;
+use crate::source::phantom::{Phantom, PhantomOptions};
+use crate::ui::cine_player::CinePlayer;
+use crate::ui::command::Viewpoint;
+use crate::ui::input::Key;
+use crate::ui::panels::accesskit::{
+    Action, ActionData, ActionRequest, Node, NodeId, Role, Toggled, TreeId, TreeUpdate,
+};
+use crate::ui::panels::{self, Banner, Note, PanelOutput, PanelState, Panels};
+use crate::ui::times::Times;
+use std::collections::{BTreeMap, BTreeSet};
+
+const SIZE: [u32; 2] = [1280, 800];
+
+/// The panels around the phantom, as the console lays them out.
+struct Shown {
+    panels: Panels,
+    controls: Controls,
+    scene: Scene,
+    times: Times,
+    time: f64,
+    is_frozen: bool,
+    banner: Option<Banner>,
+    notes: Vec<Note>,
+    files: Option<(String, Vec<String>)>,
+    /// Help, times, exports, the question whether to leave.
+    open: [bool; 4],
+    /// What the last layout said.
+    tree: BTreeMap<NodeId, Node>,
+    focus: Option<NodeId>,
+    /// Corners of the triangles of the last layout, and their colours.
+    drawn: Vec<([f32; 2], [u8; 4])>,
+}
+
+impl Shown {
+    fn new(toml: &str) -> Shown {
+        let phantom = Phantom::new(PhantomOptions::default()).expect("a phantom");
+        let geometry = Geometry::Sweep(phantom.probe(0).clone());
+        let mut controls = Controls::new(settings("fetal", toml));
+        controls.resize(panels::picture_area(SIZE, 1.0, true).1);
+        let scene = scene(&geometry, controls.settings());
+        let mut panels = Panels::new(1.0);
+        panels.describe(true);
+        let mut shown = Shown {
+            panels,
+            controls,
+            scene,
+            times: Times::default(),
+            time: 0.0,
+            is_frozen: false,
+            banner: None,
+            notes: Vec::new(),
+            files: None,
+            open: [false; 4],
+            tree: BTreeMap::new(),
+            focus: None,
+            drawn: Vec::new(),
+        };
+        // Twice: scroll areas know their content from the layout before.
+        shown.lay_out();
+        shown.lay_out();
+        shown
+    }
+
+    /// Lays the panels out, applies their commands, and returns these.
+    fn lay_out(&mut self) -> Vec<Command> {
+        self.time += 0.1;
+        let [shows_help, shows_times, shows_exports, asks_to_leave] = self.open;
+        let state = PanelState {
+            controls: &self.controls,
+            scene: Some(&self.scene),
+            times: &self.times,
+            picture: panels::picture_area(SIZE, 1.0, true),
+            shows_panels: true,
+            has_column: true,
+            shows_help,
+            shows_times,
+            help_search: None,
+            saves_bar: true,
+            origin: Some("Demo data (phantom)"),
+            asks_to_leave,
+            files: self.files.as_ref().map(|(title, names)| (title.as_str(), names.as_slice())),
+            shows_exports,
+            exporting: Some("Surface"),
+            is_frozen: self.is_frozen,
+            cine: CinePlayer::default().state(&(0..20).map(|_| CineVolume::default()).collect(), Some(2)),
+            has_drawn: true,
+            quality: "full",
+            budget: None,
+            banner: self.banner.clone(),
+            notes: &self.notes,
+            exit_key: "",
+            pointer: None,
+        };
+        let output = self.panels.lay_out(&state, SIZE, self.time);
+        self.drawn = output.corners();
+        let PanelOutput { commands, tree, .. } = output;
+        let TreeUpdate { nodes, focus, tree, .. } = tree.expect("a tree");
+        let root = tree.expect("a root").root;
+        self.tree = nodes.into_iter().collect();
+        self.focus = Some(focus).filter(|focus| *focus != root);
+        for command in &commands {
+            self.controls.apply(command, Some(&self.scene));
+        }
+        self.scene = scene(&self.scene.geometry, self.controls.settings());
+        commands
+    }
+
+    fn ask(&mut self, target_node: NodeId, action: Action, data: Option<ActionData>) -> Vec<Command> {
+        self.panels.act(ActionRequest { action, target_tree: TreeId::ROOT, target_node, data });
+        let commands = self.lay_out();
+        self.lay_out();
+        commands
+    }
+
+    fn key(&mut self, key: Key, shift: bool) -> Vec<Command> {
+        assert!(self.panels.key(key, Modifiers { shift, ..Modifiers::default() }), "{key:?} is not taken");
+        let commands = self.lay_out();
+        // The focus moves back with the layout that follows.
+        [commands, self.lay_out()].concat()
+    }
+
+    /// The control of this role and name in the group of this name.
+    fn find(&self, group: &str, role: Role, name: &str) -> NodeId {
+        let all = self.groups();
+        let found: Vec<_> =
+            all.get(group).into_iter().flatten().filter(|id| is_named(&self.tree[id], role, name)).collect();
+        assert_eq!(found.len(), 1, "{role:?} {name:?} in {group:?}: {:?}", self.names(group));
+        *found[0]
+    }
+
+    fn names(&self, group: &str) -> Vec<String> {
+        let all = self.groups();
+        all.get(group).into_iter().flatten().map(|id| self.tree[id].label().unwrap_or_default().to_string()).collect()
+    }
+
+    /// The nodes below each node with a role for groups and a name, as far as the next such node.
+    fn groups(&self) -> BTreeMap<String, Vec<NodeId>> {
+        let mut groups = BTreeMap::new();
+        let children: BTreeSet<_> = self.tree.values().flat_map(|node| node.children().iter().copied()).collect();
+        let root = *self.tree.keys().find(|id| !children.contains(id)).expect("a root");
+        self.walk(root, "", &mut groups);
+        let reached: usize = groups.values().map(Vec::len).sum();
+        assert_eq!(reached + 1, self.tree.len(), "some nodes are below none, or below several");
+        groups
+    }
+
+    fn walk(&self, from: NodeId, group: &str, groups: &mut BTreeMap<String, Vec<NodeId>>) {
+        let node = &self.tree[&from];
+        let is_group = matches!(
+            node.role(),
+            Role::Group | Role::Toolbar | Role::List | Role::Dialog | Role::AlertDialog | Role::Alert | Role::Status
+        );
+        let own = node.label().filter(|_| is_group).map_or(group.to_string(), str::to_string);
+        for child in node.children() {
+            groups.entry(own.clone()).or_default().push(*child);
+            self.walk(*child, &own, groups);
+        }
+    }
+
+    /// Every control has a name and a role, and no two of a group share both.
+    fn check(&self, what: &str) {
+        for (group, members) in self.groups() {
+            let mut seen = BTreeSet::new();
+            for id in members {
+                let node = &self.tree[&id];
+                if !is_control(node) {
+                    continue;
+                }
+                let name = node.label().unwrap_or_default();
+                assert!(!name.trim().is_empty(), "{what}: a control without a name in {group:?}: {node:?}");
+                assert!(
+                    matches!(node.role(), Role::Button | Role::Slider | Role::Switch),
+                    "{what}: {name:?} is a {:?}",
+                    node.role()
+                );
+                assert!(seen.insert(name.to_string()), "{what}: two controls {name:?} in {group:?}");
+            }
+        }
+    }
+}
+
+/// True for what can be pressed, set or given the keyboard. A scroll bar is for the pointer alone: a control that gets the keyboard is scrolled to.
+fn is_control(node: &Node) -> bool {
+    node.role() != Role::ScrollBar
+        && [Action::Click, Action::Focus, Action::SetValue].into_iter().any(|action| node.supports_action(action))
+}
+
+fn is_named(node: &Node, role: Role, name: &str) -> bool {
+    node.role() == role && node.label() == Some(name)
+}
+
+/// Prevents a control that a screen reader calls "button" and nothing else, or two that sound the same.
+#[test]
+fn every_control_has_a_name_of_its_own_in_every_mode_and_list() {
+    for mode in Mode::ALL {
+        for layout in [Layout::Single, Layout::Four, Layout::Pair] {
+            let mut shown = Shown::new("");
+            apply_to(&mut shown, Command::Mode(mode));
+            apply_to(&mut shown, Command::Layout(layout));
+            shown.check(&format!("{mode:?} {layout:?}"));
+        }
+    }
+    let mut shown = Shown::new("mode='plane'");
+    apply_to(&mut shown, Command::Tool(Tool::Measure(MeasureKind::Distance)));
+    for point in [[0.0, 30.0, 0.0], [0.0, 40.0, 0.0], [0.0, 50.0, 0.0], [5.0, 60.0, 0.0]] {
+        apply_to(&mut shown, Command::Point(point, false));
+    }
+    shown.check("measurements");
+    let measured = shown.names("Measurements");
+    for name in [
+        "1 Caliper 10.0 mm",
+        "Delete measurement 1",
+        "2 Caliper 11.2 mm",
+        "Delete measurement 2",
+        "Copy",
+        "Save",
+        "Clear",
+    ] {
+        assert!(measured.iter().any(|found| found == name), "{name}: {measured:?}");
+    }
+    assert!(shown.groups().contains_key("Click the first end."), "the next step is read");
+}
+
+fn apply_to(shown: &mut Shown, command: Command) {
+    shown.controls.apply(&command, Some(&shown.scene));
+    shown.scene = scene(&shown.scene.geometry, shown.controls.settings());
+    shown.lay_out();
+    shown.lay_out();
+}
+
+/// Prevents a tool or a control in front that cannot be found by what it is called.
+#[test]
+fn the_tools_and_the_controls_in_front_are_found_by_role_and_name() {
+    let shown = Shown::new("mode='surface'");
+    for (group, names) in [
+        ("Mode", &["Surface", "Volume", "Mixed", "MIP", "MinIP", "X-ray", "Plane", "3 planes", "Slices", "Cube"][..]),
+        ("Layout", &["Single", "4-up", "VR | SR"]),
+        ("View from", &["Front", "Left", "Right", "Top"]),
+        ("Drag", &["Turn", "Light", "Region", "Clip", "Planes"]),
+        (
+            "Measure",
+            &["Caliper", "Angle", "Ellipse", "Trace", "Surface", "Volume", "Vol. by threshold", "Text", "Arrow"],
+        ),
+        ("Workspace", &["Open", "Save", "Export"]),
+        ("Modes and tools", &["Undo", "Redo"]),
+        ("Cine loop", &["Freeze", "Play", "Save picture", "Save loop", "Reset", "Help"]),
+    ] {
+        names.iter().for_each(|name| _ = shown.find(group, Role::Button, name));
+    }
+    let chosen = &shown.tree[&shown.find("Mode", Role::Button, "Surface")];
+    assert_eq!(chosen.toggled(), Some(Toggled::True));
+    assert_eq!(shown.tree[&shown.find("Mode", Role::Button, "Volume")].toggled(), Some(Toggled::False));
+    assert!(shown.tree[&shown.find("Modes and tools", Role::Button, "Redo")].is_disabled());
+    for name in ["Threshold", "Gain", "Smooth", "Brightness", "Light", "Depth"] {
+        let knob = &shown.tree[&shown.find("Controls", Role::Slider, name)];
+        let [low, high] = [knob.min_numeric_value(), knob.max_numeric_value()].map(|n| n.expect("a range"));
+        let value = knob.numeric_value().expect("a value");
+        assert!(low < high && (low..=high).contains(&value), "{name}: {value} of {low}..{high}");
+        assert!(knob.value().is_some_and(|shown| !shown.is_empty()), "{name} has no value in words");
+        assert!(knob.description().is_some_and(|about| about.len() > 10), "{name} is not explained");
+    }
+    let unit = shown.tree[&shown.find("Controls", Role::Slider, "Depth")].value().map(str::to_string);
+    assert!(unit.as_ref().is_some_and(|value| value.ends_with(" mm")), "{unit:?}");
+    shown.find("Controls", Role::Switch, "Cast shadows");
+    shown.find("Controls", Role::Switch, "Bar on saved pictures");
+    let advanced = &shown.tree[&shown.find("Controls", Role::Button, "Advanced: Filters")];
+    assert_eq!(advanced.is_expanded(), Some(false));
+}
+
+#[test]
+fn the_picture_is_described() {
+    let mut shown = Shown::new("mode='surface'");
+    apply_to(&mut shown, Command::LookFrom(Viewpoint::Front));
+    let picture = |shown: &Shown| {
+        let mut images = shown.tree.values().filter(|node| node.role() == Role::Image);
+        let (image, more) = (images.next().expect("the picture"), images.next());
+        assert!(more.is_none(), "{more:?}");
+        let bounds = image.bounds().expect("its place");
+        let ([x, y], [width, height]) = panels::picture_area(SIZE, 1.0, true);
+        assert_eq!([bounds.x0, bounds.y0, bounds.x1, bounds.y1], [x, y, x + width, y + height].map(f64::from));
+        [image.label(), image.description()].map(|text| text.unwrap_or_default().to_string())
+    };
+    assert_eq!(picture(&shown)[0], "Surface from the front, live, Demo data (phantom)");
+    apply_to(&mut shown, Command::Rotate([30.0, 20.0]));
+    shown.is_frozen = true;
+    apply_to(&mut shown, Command::Layout(Layout::Four));
+    let [name, about] = picture(&shown);
+    assert!(name.starts_with("Surface with three planes, turned to azimuth") && name.contains(", frozen,"), "{name}");
+    assert_eq!(about, "Volume 3 of 20. 0 measurements.");
+    apply_to(&mut shown, Command::Plane(PlaneName::B));
+    apply_to(&mut shown, Command::Mode(Mode::Plane));
+    assert_eq!(picture(&shown)[0], "Plane, plane B, frozen, Demo data (phantom)");
+}
+
+#[test]
+fn messages_are_read_when_they_appear_and_faults_at_once() {
+    use panels::accesskit::Live;
+    let mut shown = Shown::new("");
+    shown.banner = Some(Banner { title: "No probe".into(), text: "Connection refused".into(), is_fault: true });
+    shown.notes = vec![Note { text: "Saved a.png".into(), is_fault: false }];
+    shown.lay_out();
+    let live = |name: &str| shown.tree.values().find(|node| node.label() == Some(name)).map(|n| (n.role(), n.live()));
+    assert_eq!(live("No probe. Connection refused"), Some((Role::Alert, Some(Live::Assertive))));
+    assert_eq!(live("Saved a.png"), Some((Role::Status, Some(Live::Polite))));
+    shown.check("messages");
+}
+
+/// Prevents a list or a question that a screen reader cannot answer, and one that reaches what is behind the question.
+#[test]
+fn lists_and_questions_are_answered_by_a_screen_reader() {
+    let mut shown = Shown::new("");
+    shown.files = Some(("/data".into(), vec!["..  (the folder above)".into(), "a.mha".into(), "b.toml".into()]));
+    shown.lay_out();
+    shown.lay_out();
+    shown.check("files");
+    let file = shown.find("/data", Role::Button, "b.toml");
+    assert_eq!(shown.ask(file, Action::Click, None), [Command::OpenFile(2)]);
+    shown.files = None;
+    for (n, what) in ["help", "times", "exports"].into_iter().enumerate() {
+        shown.open = std::array::from_fn(|open| open == n);
+        shown.lay_out();
+        shown.lay_out();
+        shown.check(what);
+    }
+    let cancel = shown.find("Export", Role::Button, "Cancel the export");
+    assert_eq!(shown.ask(cancel, Action::Click, None), [Command::CancelExport]);
+    shown.open = [false, false, false, true];
+    shown.lay_out();
+    shown.lay_out();
+    shown.check("the question");
+    let behind = shown.find("Cine loop", Role::Button, "Reset");
+    assert_eq!(shown.ask(behind, Action::Click, None), [], "nothing behind it reacts");
+    let leave = shown.find("The loop is not saved", Role::Button, "Leave without saving  (L)");
+    assert_eq!(shown.ask(leave, Action::Click, None), [Command::Discard]);
+}
+
+#[test]
+fn a_screen_reader_sets_a_slider_and_presses_buttons() {
+    let mut shown = Shown::new("mode='surface'");
+    let gain = shown.find("Controls", Role::Slider, "Gain");
+    let before = SLIDERS[GAIN].get(shown.controls.settings());
+    let asked = shown.ask(gain, Action::SetValue, Some(ActionData::NumericValue(0.2)));
+    assert!(matches!(asked[..], [Command::SetSlider(GAIN, _)]), "{asked:?}");
+    let set = SLIDERS[GAIN].get(shown.controls.settings());
+    assert!((set - 0.2).abs() < 1e-9 && set != before, "{before} {set}");
+    assert_eq!(shown.tree[&gain].numeric_value(), Some(set));
+    shown.ask(gain, Action::Increment, None);
+    assert!((SLIDERS[GAIN].get(shown.controls.settings()) - set - SLIDERS[GAIN].step).abs() < 1e-9);
+    shown.ask(gain, Action::SetValue, Some(ActionData::NumericValue(1e9)));
+    assert_eq!(SLIDERS[GAIN].get(shown.controls.settings()), SLIDERS[GAIN].range[1], "beyond its range");
+    // A button does what a click with the pointer does.
+    let volume = shown.find("Mode", Role::Button, "Volume");
+    let asked = shown.ask(volume, Action::Click, None);
+    assert_eq!(asked, [Command::Mode(Mode::Volume)]);
+    let mut clicked = Shown::new("mode='surface'");
+    let bounds = clicked.tree[&volume].bounds().expect("its place");
+    let at = [(bounds.x0 + bounds.x1) / 2.0, (bounds.y0 + bounds.y1) / 2.0];
+    let commands: Vec<Command> = [
+        Input::Moved(at),
+        Input::Button { button: Button::Left, pressed: true },
+        Input::Button { button: Button::Left, pressed: false },
+    ]
+    .iter()
+    .flat_map(|input| {
+        clicked.panels.input(input);
+        clicked.lay_out()
+    })
+    .collect();
+    assert_eq!(commands, asked);
+    // A switch.
+    let bar = shown.find("Controls", Role::Switch, "Bar on saved pictures");
+    assert_eq!(shown.tree[&bar].toggled(), Some(Toggled::True));
+    assert_eq!(shown.ask(bar, Action::Click, None), [Command::SavesBar(false)]);
+    // What is switched off does nothing.
+    let redo = shown.find("Modes and tools", Role::Button, "Redo");
+    assert_eq!(shown.ask(redo, Action::Click, None), []);
+}
+
+/// Requirement: each control is reached by Tab alone, in the order of the screen, and is marked while it has the keyboard.
+#[test]
+fn tab_reaches_every_control_and_marks_it() {
+    let mut shown = Shown::new("mode='surface'");
+    let controls: BTreeSet<NodeId> =
+        shown.tree.iter().filter(|(_, node)| is_control(node) && !node.is_disabled()).map(|(id, _)| *id).collect();
+    assert!(controls.len() > 40, "{}", controls.len());
+    assert!(
+        !shown.panels.key(Key::Tab, Modifiers::default()),
+        "Tab belongs to the view until a control has the keyboard"
+    );
+    let rest = shown.drawn.clone();
+    shown.panels.toggle_focus();
+    assert!(shown.panels.has_focus());
+    shown.lay_out();
+    let mut reached = Vec::new();
+    for _ in 0..controls.len() {
+        let focus = shown.focus.expect("a control has the keyboard");
+        assert!(controls.contains(&focus), "{:?} takes the keyboard", shown.tree[&focus]);
+        if reached.contains(&focus) {
+            break;
+        }
+        let name = shown.tree[&focus].label().unwrap_or_default().to_string();
+        shown.lay_out();
+        let bounds = shown.tree[&focus].bounds().expect("its place");
+        let edges = [bounds.x0, bounds.y0, bounds.x1, bounds.y1].map(|n| n as f32);
+        let is_at_edge = |[x, y]: [f32; 2]| {
+            let [left, top, right, bottom] = edges;
+            let out = (left - x).max(x - right).max(top - y).max(y - bottom);
+            out.abs() < 5.0
+        };
+        let bright = shown.drawn.iter().filter(|corner| corner.1 == [255; 4] && is_at_edge(corner.0));
+        let new = bright.filter(|corner| !rest.contains(corner)).count();
+        assert!(new >= 8, "{name} is not marked: {new} corners at {edges:?}");
+        assert!(edges[1] >= 0.0 && edges[3] <= SIZE[1] as f32, "{name} is out of sight: {edges:?}");
+        reached.push(focus);
+        shown.key(Key::Tab, false);
+    }
+    let missed: Vec<_> = controls.iter().filter(|id| !reached.contains(id)).map(|id| &shown.tree[id]).collect();
+    assert!(missed.is_empty(), "not reached: {missed:?}");
+    // Back, and out.
+    shown.key(Key::Tab, true);
+    assert_eq!(shown.focus, reached.last().copied());
+    shown.key(Key::Escape, false);
+    assert_eq!((shown.focus, shown.panels.has_focus()), (None, false));
+    assert!(!shown.panels.key(Key::Space, Modifiers::default()), "the keys are those of the view again");
+}
+
+#[test]
+fn the_keyboard_moves_a_slider_and_presses_a_button() {
+    let mut shown = Shown::new("mode='surface'");
+    let gain = shown.find("Controls", Role::Slider, "Gain");
+    shown.ask(gain, Action::Focus, None);
+    assert_eq!(shown.focus, Some(gain));
+    let before = SLIDERS[GAIN].get(shown.controls.settings());
+    assert!(matches!(shown.key(Key::Right, false)[..], [Command::SetSlider(GAIN, _)]));
+    let after = SLIDERS[GAIN].get(shown.controls.settings());
+    assert!((after - before - SLIDERS[GAIN].step).abs() < 1e-9, "{before} {after}");
+    assert_eq!(shown.focus, Some(gain), "the arrow is the slider's");
+    let freeze = shown.find("Cine loop", Role::Button, "Freeze");
+    shown.ask(freeze, Action::Focus, None);
+    for key in [Key::Space, Key::Enter] {
+        assert_eq!(shown.key(key, false), [Command::Freeze], "{key:?}");
+    }
+}

@@ -1,0 +1,601 @@
+//! The tasks of docs/viewer.md, performed by the inputs of a user: each has the result that it should have, with the number of actions that the
+//! page says. The phantom is a ball of known place and size.
+
+use super::*;
+use echolume::measure::outcome;
+use echolume::scene::picker::Picker;
+use echolume::scene::{Mode, PlaneName, Scene};
+use echolume::source::live::{Playback, PlaybackSource};
+use echolume::source::phantom::{Body, CachedPhantom, Phantom, PhantomOptions, Speckle, Truth};
+use echolume::ui::panels::accesskit::{Node, Role};
+use echolume::ui::panels::picture_area;
+use echolume::workspace::Origin;
+use glam::DVec3;
+use std::f64::consts::{PI, TAU};
+use std::path::{Path, PathBuf};
+
+const WINDOW: [u32; 2] = [1000, 700];
+/// Lengths, mm: one of the program's own requirements.
+const LENGTH: f64 = 0.1;
+/// Longer than the clicks of a double click are apart.
+const PAUSE: Duration = Duration::from_millis(450);
+
+/// Performs a task, and returns what the page says of its actions.
+type Perform = fn(&mut User) -> String;
+
+/// Each task of the page, in its order, and what performs it.
+const TASKS: &[(&str, Perform)] = &[
+    ("the length of the nose", nose),
+    ("the angle of the profile", profile),
+    ("head circumference", circumference),
+    ("the area of a shadow", shadow),
+    ("the way along the cheek", cheek),
+    ("the volume of the bladder", bladder),
+    ("the volume of all bright tissue in the region", bright_tissue),
+    ("name a structure", structure),
+    ("point at a structure", arrow),
+    ("name a measurement", measurement),
+    ("correct a caliper", caliper),
+    ("take a wrong trace back", wrong_trace),
+    ("results for the report", results),
+    ("a picture with its measurements", picture),
+    ("a surface to print", |user| export(user, '7', "Relief to print, STL")),
+    ("a turntable for a talk", |user| export(user, '8', "Turntable, pictures")),
+    ("the volume for 3D Slicer", |user| export(user, '1', "Volume, NRRD")),
+    ("go on tomorrow", tomorrow),
+    ("another recording", another),
+    ("the planes through a point", point),
+    ("the planes back to the middle", middle),
+    ("why is there no picture", no_picture),
+    ("leave without loss", leave),
+];
+
+/// Requirement: the page says of every task how it is done, and that is how it is done.
+#[test]
+fn every_task_of_the_page_is_done_with_the_actions_that_it_says() {
+    let page = std::fs::read_to_string(repository("docs/viewer.md")).expect("docs/viewer.md");
+    let section = page.split("\n## Tasks\n").nth(1).and_then(|rest| rest.split("\n## ").next()).expect("its tasks");
+    let rows: Vec<Vec<&str>> = section
+        .lines()
+        .filter(|line| line.starts_with("| ") && !line.starts_with("| task |"))
+        .map(|line| line.trim_matches('|').split(" | ").map(str::trim).collect())
+        .collect();
+    let (named, performed): (Vec<_>, Vec<_>) =
+        (rows.iter().map(|row| row[0]).collect(), TASKS.iter().map(|(name, _)| *name).collect());
+    assert_eq!(named, performed, "tasks of the page, and tasks that are performed");
+    let device = Device::new();
+    let mut user = User::new(&device);
+    for (row, (name, perform)) in rows.iter().zip(TASKS) {
+        user.begin(name);
+        let actions = perform(&mut user);
+        assert_eq!(Some(&actions.as_str()), row.get(2), "{name}: {}", row[1]);
+    }
+}
+
+/// Someone at a console in a window, whose actions are counted.
+struct User {
+    device: Arc<Context>,
+    console: Console,
+    folder: Folder,
+    ball: (DVec3, f64),
+    task: String,
+    actions: usize,
+    /// What a screen reader would have been told last: where the buttons and messages are.
+    tree: Vec<Node>,
+    /// Files that the console had opened.
+    opened: Arc<Mutex<Vec<PathBuf>>>,
+    request: LoopRequest,
+}
+
+fn ball() -> Phantom {
+    let options = PhantomOptions {
+        body: Body::Sphere,
+        speckle: Speckle::None,
+        lines: 96,
+        samples: 384,
+        ..PhantomOptions::default()
+    };
+    Phantom::new(options).expect("a phantom")
+}
+
+fn source() -> OpenSource {
+    Arc::new(|| {
+        Ok(Box::new(PlaybackSource::new(Box::new(CachedPhantom::new(ball())), Playback::Fast, 1)) as Box<dyn Live>)
+    })
+}
+
+fn ball_options(folder: &Folder) -> ConsoleOptions {
+    let Truth::Sphere { centre, .. } = ball().truth() else { panic!("a ball") };
+    let around = format!("planes.position = [{}, {}, {}]", centre.x, centre.y - 40.0, centre.z);
+    let settings = settings(&format!("mode = 'sr'\nsurface.threshold = 0.4\n{around}"));
+    let folder = folder.0.join("kept");
+    ConsoleOptions { settings, source: SourceKind::Recording, panels: true, folder, bar: true, ..options() }
+}
+
+impl User {
+    fn new(device: &Arc<Context>) -> User {
+        let Truth::Sphere { centre, radius, .. } = ball().truth() else { panic!("a ball") };
+        let folder = Folder::new("tasks");
+        let opened = Arc::new(Mutex::new(Vec::new()));
+        let all = opened.clone();
+        let options = ConsoleOptions {
+            origin: Some(Origin::of(Some(PathBuf::from("phantom")))),
+            open_file: Some(Arc::new(move |path: &Path| {
+                all.lock().expect("lock").push(path.to_path_buf());
+                Ok(())
+            })),
+            recent: Some(folder.0.join("recent")),
+            ..ball_options(&folder)
+        };
+        let console = Console::new(device, source(), options, WINDOW);
+        let (device, request) = (device.clone(), LoopRequest::default());
+        let mut user = User {
+            device,
+            console,
+            folder,
+            ball: (centre, radius),
+            task: String::new(),
+            actions: 0,
+            tree: Vec::new(),
+            opened,
+            request,
+        };
+        user.console.describe(true);
+        user.until("a volume", |user| (user.console.stream().volumes_shown() > 0).then_some(()));
+        user
+    }
+
+    /// The state before a task: the settings of the start, and no measurements. What is set up for a task is no action of it.
+    fn begin(&mut self, task: &str) {
+        for command in [Command::CancelMeasure, Command::ClearMeasures, Command::Tool(Tool::Rotate), Command::Reset] {
+            self.console.execute(&command, Instant::now());
+        }
+        self.settle();
+        (self.task, self.actions, self.request) = (task.to_string(), 0, LoopRequest::default());
+    }
+
+    fn on_planes(&mut self) {
+        self.console.execute(&Command::Mode(Mode::Plane), Instant::now());
+        self.settle();
+    }
+
+    fn update(&mut self) {
+        let next = self.console.update(Instant::now() + LATER).expect("the device is there");
+        self.request.exit |= next.exit;
+        self.request.restart |= next.restart;
+        if let Some(tree) = self.console.take_tree() {
+            self.tree = tree.nodes.into_iter().map(|(_, node)| node).collect();
+        }
+    }
+
+    fn until<T>(&mut self, what: &str, mut look: impl FnMut(&mut User) -> Option<T>) -> T {
+        let begun = Instant::now();
+        loop {
+            self.update();
+            if let Some(found) = look(self) {
+                return found;
+            }
+            assert!(begun.elapsed() < BOUND, "{}: no {what}", self.task);
+            std::thread::sleep(Duration::from_millis(1));
+        }
+    }
+
+    /// Waits until everything is drawn.
+    fn settle(&mut self) {
+        let mut still = 0;
+        self.until("rest", |user| {
+            // Measurements are drawn over the picture, and planes have every slice.
+            let wanted = user.console.controls().settings().clone();
+            let stream = user.console.stream();
+            let is_drawn = stream.scene().is_none_or(|scene| {
+                let drawn = &scene.settings;
+                (drawn.mode, drawn.layout, &drawn.planes) == (wanted.mode, wanted.layout, &wanted.planes)
+            });
+            still = if stream.is_idle() && is_drawn { still + 1 } else { 0 };
+            (still > 5).then_some(())
+        });
+    }
+
+    fn press(&mut self, held: Modifiers, key: Key) {
+        self.console.input(&Input::Modifiers(held));
+        self.console.input(&Input::Key { key, pressed: true });
+        self.console.input(&Input::Key { key, pressed: false });
+        self.console.input(&Input::Modifiers(Modifiers::default()));
+        self.settle();
+    }
+
+    fn key(&mut self, key: Key) {
+        self.actions += 1;
+        self.press(Modifiers::default(), key);
+    }
+
+    fn letter(&mut self, letter: char) {
+        self.key(Key::Char(letter));
+    }
+
+    fn control(&mut self, letter: char) {
+        self.actions += 1;
+        self.press(Modifiers { control: true, ..Modifiers::default() }, Key::Char(letter));
+    }
+
+    fn types(&mut self, text: &str) {
+        self.actions += 1;
+        text.chars().for_each(|letter| self.press(Modifiers::default(), Key::Char(letter)));
+    }
+
+    /// Presses and releases the left button along these places of the window.
+    fn drag(&mut self, way: &[[f64; 2]]) {
+        self.actions += 1;
+        std::thread::sleep(PAUSE);
+        self.console.input(&Input::Moved(way[0]));
+        self.update();
+        self.console.input(&Input::Button { button: Button::Left, pressed: true });
+        self.update();
+        way[1..].iter().for_each(|at| self.console.input(&Input::Moved(*at)));
+        self.console.input(&Input::Button { button: Button::Left, pressed: false });
+        self.settle();
+    }
+
+    fn click(&mut self, at: [f64; 2]) {
+        self.drag(&[at]);
+    }
+
+    fn wheel(&mut self, notches: f64) {
+        self.actions += 1;
+        self.console.input(&Input::Scroll(notches));
+        self.settle();
+    }
+
+    fn scene(&mut self) -> Scene {
+        self.console.stream().scene().expect("a scene").clone()
+    }
+
+    /// Where the window shows a place on the first tile of planes.
+    fn on_tile(&mut self, place: DVec3) -> [f64; 2] {
+        let sheet = self.scene().sheet();
+        in_window(sheet.project(&sheet.tiles[0], place).0)
+    }
+
+    /// Places in the plane of the first tile, relative to the middle of the ball: right, down, mm.
+    fn click_plane(&mut self, right: f64, down: f64) {
+        let at = self.place(right, down);
+        let at = self.on_tile(at);
+        self.click(at);
+    }
+
+    fn place(&mut self, right: f64, down: f64) -> DVec3 {
+        let plane = self.scene().sheet().tiles[0].plane;
+        self.ball.0 + plane.right * right + plane.down * down
+    }
+
+    /// Drags round the section of the ball, `off` its middle.
+    fn trace(&mut self, off: f64) {
+        let (centre, radius) = self.ball;
+        let sheet = self.scene().sheet();
+        let plane = sheet.tiles[0].plane;
+        let section = (radius * radius - off * off).sqrt();
+        let way: Vec<_> = (0..120)
+            .map(|n| {
+                let (sin, cos) = (f64::from(n) * TAU / 120.0).sin_cos();
+                let place = centre + plane.normal * off + (plane.right * cos + plane.down * sin) * section;
+                in_window(sheet.project(&sheet.tiles[0], place).0)
+            })
+            .collect();
+        self.drag(&way);
+    }
+
+    /// The n-th quantity of the last measurement is this, within an absolute or a relative error.
+    fn measured(&mut self, n: usize, truth: f64, within: f64) {
+        let measures = self.console.controls().measures();
+        let last = measures.last().unwrap_or_else(|| panic!("{}: nothing is measured", self.task));
+        let found = &outcome::quantities(last).expect("results")[n];
+        let off = (found.value - truth).abs();
+        assert!(off <= within, "{}: {} is {}, not {truth}", self.task, found.name, found.value);
+    }
+
+    fn texts(&self) -> Vec<String> {
+        self.console.controls().measures().iter().map(|measured| measured.text.clone()).collect()
+    }
+
+    /// The middle of what has this role and a name that begins so, in the window.
+    fn shown(&self, role: Role, name: &str) -> Option<[f64; 2]> {
+        let is_it = |node: &&Node| node.role() == role && node.label().is_some_and(|label| label.starts_with(name));
+        let bounds = self.tree.iter().find(is_it)?.bounds().unwrap_or_default();
+        Some([(bounds.x0 + bounds.x1) / 2.0, (bounds.y0 + bounds.y1) / 2.0])
+    }
+
+    /// Waits for a file with this ending.
+    fn saved(&mut self, ending: &str) -> PathBuf {
+        let kept = self.folder.0.join("kept");
+        self.until(ending, |_| {
+            let files = std::fs::read_dir(&kept).into_iter().flatten().flatten().map(|entry| entry.path());
+            let is_whole = |file: &PathBuf| std::fs::metadata(file).is_ok_and(|file| file.len() > 0);
+            files.filter(|file| file.extension().is_some_and(|end| end == ending)).find(is_whole)
+        })
+    }
+
+    fn count(&self) -> String {
+        self.actions.to_string()
+    }
+
+    /// A caliper of so many mm to the right of the middle of the ball, on planes; no action of the task.
+    fn has_caliper(&mut self, length: f64) {
+        self.on_planes();
+        let ends = [self.place(0.0, 0.0), self.place(length, 0.0)].map(|place| Scene::point_of(&self.scene(), place));
+        self.console.execute(&Command::Tool(Tool::Measure(echolume::scene::MeasureKind::Distance)), Instant::now());
+        ends.iter().for_each(|end| self.console.execute(&Command::Point(*end, false), Instant::now()));
+        self.settle();
+    }
+}
+
+fn in_window([x, y]: [f64; 2]) -> [f64; 2] {
+    let corner = picture_area(WINDOW, 1.0, true).0.map(f64::from);
+    [corner[0] + x, corner[1] + y]
+}
+
+fn nose(user: &mut User) -> String {
+    user.letter('7');
+    user.letter('m');
+    let radius = user.ball.1;
+    user.click_plane(-radius, 0.0);
+    user.click_plane(radius, 0.0);
+    user.measured(0, 2.0 * radius, LENGTH);
+    user.count()
+}
+
+fn profile(user: &mut User) -> String {
+    user.on_planes();
+    user.letter('n');
+    [[15.0, 0.0], [0.0, 0.0], [0.0, 9.0]].into_iter().for_each(|[right, down]| user.click_plane(right, down));
+    user.measured(0, 90.0, 0.1);
+    user.count()
+}
+
+fn circumference(user: &mut User) -> String {
+    user.on_planes();
+    user.letter('e');
+    let radius = user.ball.1;
+    [[0.0, -radius], [0.0, radius], [radius, 0.0]].into_iter().for_each(|[right, down]| user.click_plane(right, down));
+    user.measured(1, TAU * radius, LENGTH);
+    user.count()
+}
+
+fn shadow(user: &mut User) -> String {
+    user.on_planes();
+    user.letter('o');
+    user.trace(0.0);
+    let area = PI * user.ball.1.powi(2) / 100.0;
+    user.measured(0, area, 0.01 * area);
+    user.count()
+}
+
+/// The path along the ball between two places half a radian to the left and to the right of its front. The surface that is found lies within
+/// the width of a sample and of a slice of the ball.
+fn cheek(user: &mut User) -> String {
+    user.on_planes();
+    user.letter('1');
+    user.letter('u');
+    let (centre, radius) = user.ball;
+    let scene = user.scene();
+    for angle in [-0.5_f64, 0.5] {
+        let place = centre + (scene.rays.right * angle.sin() - scene.rays.forward * angle.cos()) * radius;
+        let at = Picker::of(&scene).project(place).expect("in front");
+        user.click(in_window(at));
+    }
+    user.measured(0, radius, 0.05 * radius);
+    user.count()
+}
+
+/// Contours every 4 mm. Their volume is that of the ball to 1 % (tests/unit_pure/measure.rs); those of the mouse are to a pixel.
+fn bladder(user: &mut User) -> String {
+    const STEP: f64 = 4.0;
+    let (radius, centre) = (user.ball.1, user.ball.0);
+    user.letter('7');
+    user.letter('w');
+    let planes = (2.0 * radius / STEP).floor() as usize;
+    let first = -0.5 * STEP * (planes - 1) as f64;
+    user.console.execute(&Command::StepPlane(first), Instant::now());
+    user.settle();
+    for n in 0..planes {
+        let off = (user.scene().sheet().tiles[0].plane.at - centre).dot(user.scene().sheet().tiles[0].plane.normal);
+        assert!((off - first - STEP * n as f64).abs() < 1e-6, "the wheel moved the plane to {off}");
+        user.trace(off);
+        user.wheel(STEP);
+    }
+    user.key(Key::Enter);
+    let volume = 4.0 / 3.0 * PI * radius.powi(3) / 1000.0;
+    user.measured(0, volume, 0.03 * volume);
+    format!("{} + 2 a plane", user.actions - 2 * planes)
+}
+
+/// The voxels of the ball, whose edge is one sample and one slice wide.
+fn bright_tissue(user: &mut User) -> String {
+    user.letter('k');
+    user.until("result", |user| (!user.console.controls().measures().is_empty()).then_some(()));
+    let volume = 4.0 / 3.0 * PI * user.ball.1.powi(3) / 1000.0;
+    user.measured(0, volume, 0.05 * volume);
+    user.count()
+}
+
+fn structure(user: &mut User) -> String {
+    user.on_planes();
+    user.letter('i');
+    user.click_plane(3.0, 4.0);
+    user.types("nose");
+    user.key(Key::Enter);
+    assert_eq!((user.texts(), user.console.controls().typing()), (vec!["nose".to_string()], None));
+    user.count()
+}
+
+fn arrow(user: &mut User) -> String {
+    user.on_planes();
+    user.letter('y');
+    user.click_plane(3.0, 4.0);
+    user.click_plane(12.0, 14.0);
+    user.types("lip");
+    user.key(Key::Enter);
+    assert_eq!((user.texts(), user.console.controls().typing()), (vec!["lip".to_string()], None));
+    user.count()
+}
+
+fn measurement(user: &mut User) -> String {
+    user.has_caliper(10.0);
+    let at = user.shown(Role::Button, "1 Caliper").expect("a line of the list");
+    user.click(at);
+    assert_eq!(user.console.controls().typing(), Some(0), "a click on the list");
+    user.types("crl");
+    user.key(Key::Enter);
+    assert_eq!(user.texts(), ["crl"]);
+    user.measured(0, 10.0, 1e-6);
+    user.count()
+}
+
+fn caliper(user: &mut User) -> String {
+    user.has_caliper(10.0);
+    let way = [10.0, 12.0, 16.0].map(|right| user.place(right, 0.0)).map(|place| user.on_tile(place));
+    user.drag(&way);
+    user.measured(0, 16.0, LENGTH);
+    assert_eq!(user.console.controls().measures().len(), 1, "no other one");
+    user.count()
+}
+
+fn wrong_trace(user: &mut User) -> String {
+    user.on_planes();
+    user.letter('o');
+    user.trace(0.0);
+    assert_eq!(user.console.controls().measures().len(), 1);
+    user.actions = 0;
+    user.control('z');
+    assert_eq!(user.console.controls().measures().len(), 0);
+    user.count()
+}
+
+/// On a desktop the text is on its clipboard; without one it is in a file.
+fn results(user: &mut User) -> String {
+    user.has_caliper(10.0);
+    user.control('c');
+    if user.shown(Role::Status, "The results are copied as CSV").is_none() {
+        let text = std::fs::read_to_string(user.saved("csv")).expect("a table");
+        assert!(text.contains("10.0000"), "{text}");
+    }
+    user.count()
+}
+
+fn picture(user: &mut User) -> String {
+    user.has_caliper(10.0);
+    user.letter('p');
+    let file = user.saved("png");
+    let saved = user.until("whole picture", |_| Picture::load(&file).ok());
+    let size = picture_area(WINDOW, 1.0, true).1;
+    assert!(saved.width == size[0] && saved.height > size[1], "with its bar: {} x {}", saved.width, saved.height);
+    // The middle of the caliper is yellow.
+    let at = user.place(5.0, 0.0);
+    let [x, y] = user.on_tile(at);
+    let [left, top] = picture_area(WINDOW, 1.0, true).0.map(f64::from);
+    let pixel = |x: f64, y: f64| &saved.rgba[4 * ((y as u32 * saved.width + x as u32) as usize)..][..3];
+    let near = (-1..=1).map(|dy| pixel(x - left, y - top + f64::from(dy)));
+    assert!(near.into_iter().any(|p| p[0] > 200 && p[1] > 150 && p[2] < 150), "no line at {x}, {y}");
+    user.count()
+}
+
+/// The number that the menu has for this format; the key would start the program that this test is. tests/window/panels.rs presses it.
+fn export(user: &mut User, number: char, name: &str) -> String {
+    let test = std::fs::read_to_string(repository("tests/window/panels.rs")).expect("tests/window/panels.rs");
+    let is_made = [format!("('{number}', "), format!("export('{number}')")].iter().any(|made| test.contains(made));
+    assert!(is_made, "tests/window/panels.rs makes no export {number}");
+    user.control('e');
+    // All entries are as wide.
+    let place = |node: &Node| node.bounds().unwrap_or_default();
+    let is_it = |node: &&Node| node.role() == Role::Button && node.label() == Some(name);
+    let own = user.tree.iter().find(is_it).map(place).unwrap_or_else(|| panic!("{name} is not in the menu"));
+    let is_above = |node: &&Node| (place(node).x0, place(node).x1) == (own.x0, own.x1) && place(node).y0 <= own.y0;
+    let above = user.tree.iter().filter(|node| node.role() == Role::Button).filter(is_above).count();
+    assert_eq!(above, number as usize - '0' as usize, "{name} has another number");
+    let count = user.actions + 1;
+    user.key(Key::Escape);
+    count.to_string()
+}
+
+fn tomorrow(user: &mut User) -> String {
+    user.has_caliper(10.0);
+    user.control('s');
+    let file = user.saved("toml");
+    user.until("note of the saved file", |user| user.shown(Role::Status, "Saved"));
+    // Tomorrow.
+    user.control('o');
+    user.actions += 1;
+    user.console.input(&Input::Key { key: Key::Char('1'), pressed: true });
+    user.console.input(&Input::Key { key: Key::Char('1'), pressed: false });
+    user.until("file that is opened", |user| user.request.restart.then_some(()));
+    assert_eq!(*user.opened.lock().expect("lock"), [file], "the workspace is the first of the list");
+    user.opened.lock().expect("lock").clear();
+    user.count()
+}
+
+/// As the window hands it on.
+fn another(user: &mut User) -> String {
+    let dropped = PathBuf::from("/data/other.mha");
+    user.actions += 1;
+    user.console.open_path(&dropped);
+    user.until("file that is opened", |user| user.request.restart.then_some(()));
+    assert_eq!(*user.opened.lock().expect("lock"), [dropped]);
+    user.count()
+}
+
+fn point(user: &mut User) -> String {
+    user.letter('8');
+    user.letter('s');
+    let wanted = user.place(7.0, -4.0);
+    let at = user.on_tile(wanted);
+    user.click(at);
+    let scene = user.scene();
+    for name in [PlaneName::A, PlaneName::B, PlaneName::C] {
+        let plane = scene.plane(name);
+        let off = (wanted - plane.at).dot(plane.normal).abs();
+        assert!(off < 1e-6, "plane {name:?} is {off} mm beside the point");
+    }
+    user.count()
+}
+
+fn middle(user: &mut User) -> String {
+    user.on_planes();
+    assert!(user.console.controls().settings().planes.position.is_some());
+    user.letter('j');
+    let scene = user.scene();
+    let off = scene.plane(PlaneName::A).at - (scene.low + scene.high) / 2.0;
+    assert!(off.length() < 1e-6, "{off}");
+    user.count()
+}
+
+/// At another console, whose probe does not answer.
+fn no_picture(user: &mut User) -> String {
+    let open: OpenSource = Arc::new(|| Err("connection refused".into()));
+    let options = ConsoleOptions {
+        retry: Some(Duration::from_secs(60)),
+        source: SourceKind::Probe,
+        ..ball_options(&user.folder)
+    };
+    user.console = Console::new(&user.device, open, options, WINDOW);
+    user.console.describe(true);
+    user.until("banner", |user| {
+        let mut messages = user.tree.iter().filter(|node| matches!(node.role(), Role::Alert | Role::Status));
+        messages.any(|node| node.label().is_some_and(|text| text.contains("connection refused"))).then_some(())
+    });
+    user.key(Key::Function(2));
+    user.until("times", |user| user.shown(Role::Group, "Times"));
+    user.count()
+}
+
+/// At another console, of a probe whose volume is in no file.
+fn leave(user: &mut User) -> String {
+    let options = ConsoleOptions { source: SourceKind::Probe, ..ball_options(&user.folder) };
+    user.console = Console::new(&user.device, source(), options, WINDOW);
+    user.until("a volume", |user| (user.console.stream().volumes_shown() > 0).then_some(()));
+    user.request = LoopRequest::default();
+    user.key(Key::Escape);
+    assert!(user.console.asks_to_leave() && !user.request.exit);
+    user.key(Key::Enter);
+    user.until("end", |user| user.request.exit.then_some(()));
+    assert!(std::fs::metadata(user.saved("frames")).is_ok_and(|file| file.len() > 100_000), "the loop is saved");
+    user.count()
+}
