@@ -117,7 +117,7 @@ fn the_hole_has_the_form_of_the_contour() {
                 let (origin, direction) = rays.at((n % 96) as f64 + 0.5, (n / 96) as f64 + 0.5);
                 let along = (rays.target - origin).dot(rays.forward) / direction.dot(rays.forward);
                 let (Some(at), _) = shape.project(origin + direction * along) else { panic!("in front of the eye") };
-                let around = (0..16).map(|n| pitch * glam::DVec2::from_angle(f64::from(n) * 0.3927));
+                let around = (0..16).map(|n| pitch * glam::DVec2::from_angle(f64::from(n) * std::f64::consts::FRAC_PI_8));
                 let inside = around.clone().filter(|by| shape.winds_about(at + *by)).count();
                 match inside {
                     16 => (within, faults) = (within + 1, faults + usize::from(new[0] > 2)),
