@@ -96,7 +96,7 @@ fn the_hole_has_the_form_of_the_contour() {
             let whole = scene(geometry.clone(), BYTES, &view);
             let rays = whole.rays;
             // In the plane through the camera's target, as wide as most of the volume.
-            let size = (whole.high - whole.low).min_element() / 2.2;
+            let size = (whole.high - whole.low).min_element() / 1.6;
             let corners = [[-1.0, -0.8], [1.1, -0.9], [0.2, 1.2]].map(|corner| corner.map(|v: f64| v * size));
             let eye = (rays.target - rays.origin).dot(rays.forward);
             let eye = if field_of_view > 0.0 { format!(", eye = {eye}") } else { String::new() };
@@ -110,14 +110,20 @@ fn the_hole_has_the_form_of_the_contour() {
             let frames = body_frames(&whole, |_| 0.9);
             let (before, after) = (picture(&device, whole.clone(), &frames), picture(&device, scene.clone(), &frames));
             let Some(shape) = scene.cuts().next() else { panic!("no cut") };
-            // Slices are farthest apart: what is interpolated towards a texel that stays.
+            // Slices are farthest apart: what is interpolated towards a texel that stays. Nearer to the eye than the plane that is wider in it.
             let [mut within, mut without, mut faults] = [0, 0, 0];
-            let pitch = 1.2 * slice_distance(&whole);
+            let [low, high] = [whole.low, whole.high].map(|corner| corner.to_array());
+            let corners =
+                (0..8).map(|n| DVec3::from(std::array::from_fn(|a| if n >> a & 1 == 1 { high[a] } else { low[a] })));
+            let nearest = corners.map(|corner| shape.project(corner).1).fold(f64::INFINITY, f64::min);
+            let wider = shape.eye.map_or(1.0, |eye| eye / (eye + nearest));
+            let pitch = 1.2 * slice_distance(&whole) * wider.max(1.0);
             for (n, (old, new)) in before.rgba.chunks_exact(4).zip(after.rgba.chunks_exact(4)).enumerate() {
                 let (origin, direction) = rays.at((n % 96) as f64 + 0.5, (n / 96) as f64 + 0.5);
                 let along = (rays.target - origin).dot(rays.forward) / direction.dot(rays.forward);
                 let (Some(at), _) = shape.project(origin + direction * along) else { panic!("in front of the eye") };
-                let around = (0..16).map(|n| pitch * glam::DVec2::from_angle(f64::from(n) * std::f64::consts::FRAC_PI_8));
+                let around =
+                    (0..16).map(|n| pitch * glam::DVec2::from_angle(f64::from(n) * std::f64::consts::FRAC_PI_8));
                 let inside = around.clone().filter(|by| shape.winds_about(at + *by)).count();
                 match inside {
                     16 => (within, faults) = (within + 1, faults + usize::from(new[0] > 2)),

@@ -1,11 +1,21 @@
 //! Cuts: a contour that is drawn on a rendering takes away what lies along the view within it, or outside of it.
 
 use super::{Change, Controls, drawable};
-use crate::scene::{KeptSide, MAX_CUTS, Scene};
+use crate::scene::{KeptSide, MAX_CUTS, Scene, Settings};
 use crate::ui::command::Command;
 
 /// Most points of a contour in work. A drag longer than that goes on without more.
 const MAX_OUTLINE: usize = 20_000;
+
+/// Why a mode or a control does nothing.
+pub const CUTS_IN_THE_WAY: &str =
+    "That draws both what is dark and what is bright, of which nothing can be cut: remove the cuts first (Shift+F).";
+
+/// True if settings cannot be drawn with their cuts, and can without.
+pub(super) fn is_in_the_way(now: &Scene, settings: Settings) -> bool {
+    let has_cuts = !settings.cuts.is_empty();
+    has_cuts && drawable(now, Settings { cuts: Vec::new(), ..settings }).is_some()
+}
 
 impl Controls {
     /// The contour in work, pixels of the picture.

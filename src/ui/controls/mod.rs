@@ -14,6 +14,7 @@ use crate::scene::{
     Camera, Cube, Inset, KeptSide, Layout, MAX_PICTURE, Measurement, Mode, Planes, Scene, Settings, Shadow, Tilt,
     Transfer,
 };
+pub(super) use cutting::CUTS_IN_THE_WAY;
 use history::History;
 use std::borrow::Cow;
 
@@ -238,7 +239,8 @@ impl Controls {
         }
         // The scene lags behind if several commands come between two pictures: each one builds on the settings of the one before.
         let Some(now) = scene.and_then(|scene| self.current(scene)) else { return Change::Nothing };
-        match self.changed(command, &now).and_then(|settings| drawable(&now, self.switched(settings))) {
+        let wanted = self.changed(command, &now).map(|settings| self.switched(settings));
+        match wanted.clone().and_then(|settings| drawable(&now, settings)) {
             Some(settings) if settings != self.settings => {
                 if !settings.mode.is_flat() {
                     self.rendered = settings.mode;
@@ -246,6 +248,9 @@ impl Controls {
                 let before = std::mem::replace(&mut self.settings, settings);
                 self.history.record(before, command);
                 Change::Settings
+            }
+            None if wanted.is_some_and(|settings| cutting::is_in_the_way(&now, settings)) => {
+                Change::Refused(CUTS_IN_THE_WAY)
             }
             _ => Change::Nothing,
         }

@@ -131,32 +131,41 @@ pub(super) fn show_modes(ui: &mut Ui, state: &PanelState, width: f32, execute: &
     });
 }
 
-/// With the tool for cuts, which side of a contour stays; and what removes the cuts, while there are any.
+/// The slider that is below the tools while the one for cuts is chosen.
+const DEPTH_OF_CUT: &str = "Depth of cut";
+
+/// The number of that slider, if it is there.
+fn depth_of_cut(state: &PanelState) -> Option<usize> {
+    let is_it = |slider: &Control| slider.name == DEPTH_OF_CUT && slider.applies(state.controls.settings());
+    SLIDERS.iter().position(is_it).filter(|_| state.controls.tool() == Tool::Cut)
+}
+
+/// With the tool for cuts, which side of a contour stays, and how deep the last cut is; and what removes the cuts, while there are any.
 fn cuts(ui: &mut Ui, state: &PanelState, width: f32, execute: &mut dyn FnMut(Command)) {
-    if state.controls.tool() == Tool::Cut {
-        ui.scope(|ui| {
-            ui.set_max_width(width);
+    let is_chosen = state.controls.tool() == Tool::Cut;
+    if !is_chosen && state.controls.settings().cuts.is_empty() {
+        return;
+    }
+    names::group(ui, "Cuts", |ui| {
+        ui.set_max_width(width);
+        if is_chosen {
             let mut on = state.controls.kept_side() == KeptSide::Inside;
-            if switch(
-                ui,
-                &mut on,
-                "Keep inside",
-                "The next contour takes away what is outside of it, not what is within.",
-            ) {
+            let hint = "The next contour takes away what is outside of it, not what is within.";
+            if switch(ui, &mut on, "Keep inside", hint) {
                 execute(Command::KeepSide(if on { KeptSide::Inside } else { KeptSide::Outside }));
             }
-        });
-    }
-    if !state.controls.settings().cuts.is_empty() {
-        let button = Button::new("Remove all cuts").min_size(vec2(width, TOUCH_SIZE * 0.75));
-        if ui
-            .add(button)
-            .on_hover_text("Renderings show everything again (Shift+F; undo brings the cuts back).")
-            .clicked()
-        {
-            execute(Command::ClearCuts);
         }
-    }
+        if let Some(number) = depth_of_cut(state) {
+            slider(ui, state, number, DEPTH_OF_CUT, false, execute);
+        }
+        if !state.controls.settings().cuts.is_empty() {
+            let button = Button::new("Remove all cuts").min_size(vec2(width, TOUCH_SIZE * 0.75));
+            let hint = "Renderings show everything again (Shift+F; undo brings the cuts back).";
+            if ui.add(button).tell(hint).clicked() {
+                execute(Command::ClearCuts);
+            }
+        }
+    });
 }
 
 fn undo_and_redo(ui: &mut Ui, state: &PanelState, row: &Row, execute: &mut dyn FnMut(Command)) {
@@ -268,6 +277,7 @@ pub(super) fn show_controls(ui: &mut Ui, state: &PanelState, width: f32, execute
             measures::show_results(ui, state, width - 40.0, execute);
             heading(ui, "Controls");
             let in_front = FRONT.map(|(name, sliders)| (name, front(sliders, settings)));
+            let in_rail = depth_of_cut(state);
             for (name, number) in in_front {
                 match number {
                     Some(number) => slider(ui, state, number, name, true, execute),
@@ -315,7 +325,9 @@ pub(super) fn show_controls(ui: &mut Ui, state: &PanelState, width: f32, execute
             heading(ui, "Advanced");
             for (group, name) in Group::ALL {
                 let is_there = |(number, s): &(usize, &Control)| {
-                    s.group == group && s.applies(settings) && in_front.iter().all(|(_, front)| *front != Some(*number))
+                    let is_elsewhere =
+                        in_rail == Some(*number) || in_front.iter().any(|(_, front)| *front == Some(*number));
+                    s.group == group && s.applies(settings) && !is_elsewhere
                 };
                 let there: Vec<usize> = SLIDERS.iter().enumerate().filter(is_there).map(|(number, _)| number).collect();
                 if there.is_empty() {

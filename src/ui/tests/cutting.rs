@@ -155,3 +155,17 @@ fn a_long_scribble_has_as_many_corners_as_a_cut_may_have() {
     }
     assert_eq!((cuts(&window).len(), &cuts(&window)[0]), (32, &one));
 }
+
+#[test]
+fn a_mode_that_cannot_have_cuts_says_why() {
+    let mut window = TestWindow::new("mode='surface'\nsurface.sign='dark'");
+    window.tool(Tool::Cut);
+    let [x, y] = super::super::picking::Picker::of(&window.scene()).centre();
+    circle(&mut window, [x, y], 40.0, 100);
+    let made = cuts(&window);
+    assert_eq!(made.len(), 1);
+    assert_eq!(apply(&mut window, Command::Mode(Mode::Mixed)), Change::Refused(crate::ui::controls::CUTS_IN_THE_WAY));
+    assert_eq!((window.controls.settings().mode, cuts(&window)), (Mode::Surface, made));
+    apply(&mut window, Command::ClearCuts);
+    assert_eq!(apply(&mut window, Command::Mode(Mode::Mixed)), Change::Settings);
+}
