@@ -77,7 +77,9 @@ pub(super) fn show_modes(ui: &mut Ui, state: &PanelState, width: f32, execute: &
                 hints::of_tool,
                 |t| execute(Command::Tool(t)),
             );
-            cuts(ui, state, width - 16.0, execute);
+            if !state.has_column {
+                cuts(ui, state, width - 16.0, execute);
+            }
             if settings.mode.is_flat() && settings.mode != Mode::Orthogonal {
                 let hint = |_| "The plane that is shown and moved.";
                 row.titled("Plane").show(
@@ -131,7 +133,7 @@ pub(super) fn show_modes(ui: &mut Ui, state: &PanelState, width: f32, execute: &
     });
 }
 
-/// The slider that is below the tools while the one for cuts is chosen.
+/// The slider that is with the cuts while their tool is chosen.
 const DEPTH_OF_CUT: &str = "Depth of cut";
 
 /// The number of that slider, if it is there.
@@ -147,6 +149,7 @@ fn cuts(ui: &mut Ui, state: &PanelState, width: f32, execute: &mut dyn FnMut(Com
         return;
     }
     names::group(ui, "Cuts", |ui| {
+        heading(ui, "Cuts");
         ui.set_max_width(width);
         if is_chosen {
             let mut on = state.controls.kept_side() == KeptSide::Inside;
@@ -275,9 +278,10 @@ pub(super) fn show_controls(ui: &mut Ui, state: &PanelState, width: f32, execute
             ui.set_max_width(width - 32.0);
             ui.add_space(6.0);
             measures::show_results(ui, state, width - 40.0, execute);
+            cuts(ui, state, width - 32.0, execute);
             heading(ui, "Controls");
             let in_front = FRONT.map(|(name, sliders)| (name, front(sliders, settings)));
-            let in_rail = depth_of_cut(state);
+            let with_cuts = depth_of_cut(state);
             for (name, number) in in_front {
                 match number {
                     Some(number) => slider(ui, state, number, name, true, execute),
@@ -326,7 +330,7 @@ pub(super) fn show_controls(ui: &mut Ui, state: &PanelState, width: f32, execute
             for (group, name) in Group::ALL {
                 let is_there = |(number, s): &(usize, &Control)| {
                     let is_elsewhere =
-                        in_rail == Some(*number) || in_front.iter().any(|(_, front)| *front == Some(*number));
+                        with_cuts == Some(*number) || in_front.iter().any(|(_, front)| *front == Some(*number));
                     s.group == group && s.applies(settings) && !is_elsewhere
                 };
                 let there: Vec<usize> = SLIDERS.iter().enumerate().filter(is_there).map(|(number, _)| number).collect();
