@@ -385,7 +385,10 @@ fn slider(
     let mut value = before.clamp(low, high.max(low));
     let digits = (-slider.step.log10().floor()).clamp(0.0, 3.0) as usize;
     let space = if slider.unit.is_empty() || slider.unit == "°" { "" } else { " " };
-    let shown = format!("{before:.digits$}{space}{}", slider.unit);
+    let shown = match slider.name == DEPTH_OF_CUT && before <= 0.0 {
+        true => "through all".to_string(),
+        false => format!("{before:.digits$}{space}{}", slider.unit),
+    };
     ui.horizontal(|ui| {
         let text = RichText::new(name);
         ui.label(if is_large { text.strong() } else { text });
