@@ -258,6 +258,7 @@ fn scenes() -> Vec<Scene> {
                 "'vr'\nvolume = { shading = 'first-hit' }",
                 "'vr'\nlayout = 'four'",
                 "'vr'\nfloating = 20",
+                "'vr'\ncuts = [{ contour = [[0, 0], [1, 0], [0, 1]], view = { at = [0, 0, 0], direction = [0, 1, 0], up = [0, 0, 1] } }]",
                 "'vr'\nlayout = 'four'\nplanes = { smooth = { lateral = 1.0, depth = 1.0, elevation = 1.0 } }",
                 "'sr'\nlayout = 'pair'",
             ] {

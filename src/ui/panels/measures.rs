@@ -163,11 +163,12 @@ fn next_step(state: &PanelState, kind: MeasureKind) -> &'static str {
     }
 }
 
-/// Draws measurements and annotations over the picture.
+/// Draws measurements and annotations over the picture, and the contour of a cut in work.
 pub(super) fn paint(ui: &Ui, state: &PanelState, scale: f32) {
     let Some(scene) = state.scene else { return };
-    let measures = state.controls.measures();
-    if (measures.is_empty() && state.controls.work().is_none()) || scene.picture_size() != state.picture.1 {
+    let (measures, outline) = (state.controls.measures(), state.controls.outline());
+    let is_empty = measures.is_empty() && state.controls.work().is_none() && outline.is_empty();
+    if is_empty || scene.picture_size() != state.picture.1 {
         return;
     }
     let picture = picture_rect(state, scale);
@@ -178,6 +179,11 @@ pub(super) fn paint(ui: &Ui, state: &PanelState, scale: f32) {
             drawn.label.push('_');
         }
         canvas.draw(&drawn);
+    }
+    if let Some(last) = outline.last() {
+        // Back to where it began, as it will be closed.
+        let ends = outline.windows(2).map(|ends| [ends[0], ends[1]]).chain([[*last, outline[0]]]);
+        canvas.lines(&canvas.painter, &ends.map(|ends| ends.map(|at| canvas.at(at))).collect::<Vec<_>>());
     }
     if let Some(work) = state.controls.work() {
         let hover = ui.ctx().pointer_hover_pos().filter(|at| picture.contains(*at));
@@ -213,6 +219,13 @@ impl Canvas {
         self.origin + vec2(near(x), near(y))
     }
 
+    /// A dark edge along the bright line is visible on any picture.
+    fn lines(&self, painter: &Painter, strokes: &[[Pos2; 2]]) {
+        for stroke in [Stroke::new(3.5, Color32::from_black_alpha(170)), Stroke::new(1.5, LINE)] {
+            strokes.iter().for_each(|ends| _ = painter.line_segment(*ends, stroke));
+        }
+    }
+
     fn draw(&self, drawn: &Drawn) {
         let [corner, size] = drawn.tile;
         let end = [corner[0] + size[0], corner[1] + size[1]];
@@ -228,10 +241,7 @@ impl Canvas {
         }
         let heads = drawn.head.iter().flat_map(|head| overlay::arrow_head(*head, HEAD * f64::from(self.scale)));
         strokes.extend(heads.map(|ends| ends.map(|at| self.at(at))));
-        // A dark edge along the bright line is visible on any picture.
-        for stroke in [Stroke::new(3.5, Color32::from_black_alpha(170)), Stroke::new(1.5, LINE)] {
-            strokes.iter().for_each(|ends| _ = painter.line_segment(*ends, stroke));
-        }
+        self.lines(&painter, &strokes);
         if drawn.label.is_empty() {
             return;
         }

@@ -175,8 +175,8 @@ fn small(ui: &mut Ui, text: String, colour: Color32) {
 }
 
 /// Gestures on the picture, for the help.
-const GESTURES: [(&str, &str); 9] = [
-    ("drag", "use the tool: turn, light, region, clip, planes"),
+const GESTURES: [(&str, &str); 10] = [
+    ("drag", "use the tool: turn, light, region, clip, cut, planes"),
     ("Shift + drag, middle drag", "move the picture"),
     ("Ctrl + drag", "move the light"),
     ("wheel", "zoom; over a plane: step it"),
@@ -184,6 +184,7 @@ const GESTURES: [(&str, &str); 9] = [
     ("double click on a tile", "show that tile alone, and back"),
     ("Region, then drag", "move the nearest face of the box"),
     ("Clip, then drag up", "cut away what is nearer to the viewer"),
+    ("Cut, then drag round", "cut away what is within, along the view"),
     ("Planes, then click", "move the point where the three planes cross"),
 ];
 
