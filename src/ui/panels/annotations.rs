@@ -1,7 +1,8 @@
 //! Annotations of the picture: in every tile a scale, the patient's sides and the probe's marker; the orientation of the axes, and a colour
 //! bar.
 
-use super::{ACCENT, PanelState, SMALL_TEXT, TEXT, WARNING, WEAK_TEXT, picture_rect};
+use super::colours::{self, ACCENT, AXES, BACKING, MEASURE, ON_PLANE, OUTLINE, SIDES, TEXT, WARNING, WEAK_TEXT};
+use super::{PanelState, SMALL_TEXT, picture_rect};
 use crate::measure::overlay;
 use crate::passes::postprocess;
 use crate::scene::marks::{BAR_LENGTHS, TileMarks};
@@ -46,7 +47,7 @@ pub(super) fn paint(ui: &Ui, state: &PanelState, scale: f32) {
         }
     }
     if picture.width().min(picture.height()) >= MIN_FOR_AXES && scene.settings.layout != Layout::Four {
-        colours(&painter, picture, scene);
+        colour_bar(&painter, picture, scene);
     }
     if let Some(origin) = state.origin {
         // Between the letter of the upper edge and a marker in the corner.
@@ -62,36 +63,54 @@ fn sides(painter: &Painter, area: Rect, tile: &TileMarks) {
         area.center() + vec2(x as f32 * half.x, y as f32 * half.y)
     };
     for (edge, letter) in &tile.letters {
-        let font = FontId::proportional(SMALL_TEXT * 1.3);
-        let place = at(edge.offset());
-        painter.text(place + vec2(1.0, 1.0), Align2::CENTER_CENTER, letter, font.clone(), Color32::BLACK);
-        painter.text(place, Align2::CENTER_CENTER, letter, font, Color32::WHITE);
+        outlined(painter, at(edge.offset()), Align2::CENTER_CENTER, letter, SMALL_TEXT * 1.3, SIDES);
     }
     if let Some(edge) = tile.probe {
         // In the corner of that side, where no letter is.
         let [x, y] = edge.offset();
         let place = at([if x == 0.0 { -1.0 } else { x }, if y == 0.0 { -1.0 } else { y }]);
-        painter.circle_filled(place, 7.0, Color32::from_black_alpha(160));
+        painter.circle_filled(place, 7.0, OUTLINE);
         painter.circle_filled(place, 5.0, ACCENT);
     }
     if let Some((letter, colour)) = tile.plane {
-        let [r, g, b] = colour.map(|c| (c * 255.0).round() as u8);
         let place = Rect::from_center_size(at(tile.plane_corner()), vec2(20.0, 20.0));
-        painter.rect_filled(place, 3.0, Color32::from_rgb(r, g, b));
-        painter.text(place.center(), Align2::CENTER_CENTER, letter, FontId::proportional(SMALL_TEXT), Color32::BLACK);
+        painter.rect_filled(place, 3.0, colours::of_scene(colour));
+        painter.text(place.center(), Align2::CENTER_CENTER, letter, FontId::proportional(SMALL_TEXT), ON_PLANE);
     }
 }
 
 fn line(painter: &Painter, from: Pos2, to: Pos2) {
-    // A dark edge along the bright line is visible on any picture.
-    painter.line_segment([from, to], Stroke::new(4.0, Color32::from_black_alpha(150)));
-    painter.line_segment([from, to], Stroke::new(1.5, TEXT));
+    stroke(painter, [from, to], 1.5, TEXT);
+}
+
+/// A bright line between dark edges, which is visible on any picture.
+fn stroke(painter: &Painter, ends: [Pos2; 2], width: f32, colour: Color32) {
+    painter.line_segment(ends, Stroke::new(width + 2.5, OUTLINE));
+    painter.line_segment(ends, Stroke::new(width, colour));
 }
 
 fn text(painter: &Painter, at: Pos2, align: Align2, label: &str, colour: Color32) {
-    let font = FontId::proportional(SMALL_TEXT);
-    painter.text(at + vec2(1.0, 1.0), align, label, font.clone(), Color32::from_black_alpha(200));
-    painter.text(at, align, label, font, colour);
+    outlined(painter, at, align, label, SMALL_TEXT, colour);
+}
+
+/// Bright text with a dark edge all round, which is readable on any picture.
+fn outlined(painter: &Painter, at: Pos2, align: Align2, label: &str, size: f32, colour: Color32) {
+    const RING: [Vec2; 8] = [
+        vec2(1.2, 0.0),
+        vec2(0.9, 0.9),
+        vec2(0.0, 1.2),
+        vec2(-0.9, 0.9),
+        vec2(-1.2, 0.0),
+        vec2(-0.9, -0.9),
+        vec2(0.0, -1.2),
+        vec2(0.9, -0.9),
+    ];
+    let galley = painter.layout_no_wrap(label.into(), FontId::proportional(size), colour);
+    let corner = align.anchor_size(at, galley.size()).min;
+    for away in RING {
+        painter.galley_with_override_text_color(corner + away, galley.clone(), OUTLINE);
+    }
+    painter.galley(corner, galley, colour);
 }
 
 /// A ruler along the left edge with numbered ticks of the depth below the probe's face. `top`: depth at the upper edge, mm.
@@ -140,7 +159,7 @@ fn slices(painter: &Painter, origin: Pos2, area: Rect, scene: &Scene, scale: f32
     let painter = painter.with_clip_rect(area);
     for ends in sheet.slice_lines() {
         let ends = ends.map(|[x, y]| origin + vec2(x as f32, y as f32) / scale);
-        painter.line_segment(ends, Stroke::new(1.0, Color32::from_rgb(255, 214, 64)));
+        stroke(&painter, ends, 1.0, MEASURE);
     }
     let at = area.center_bottom() - vec2(0.0, 6.0);
     text(&painter, at, Align2::CENTER_BOTTOM, &overlay::spacing_label(&sheet), TEXT);
@@ -150,26 +169,22 @@ fn slices(painter: &Painter, origin: Pos2, area: Rect, scene: &Scene, scale: f32
 fn axes(painter: &Painter, area: Rect, scene: &Scene) {
     const ARM: f64 = 34.0;
     let centre = area.left_bottom() + vec2(58.0, -58.0);
-    painter.circle_filled(centre, 50.0, Color32::from_black_alpha(110));
+    painter.circle_filled(centre, 50.0, BACKING);
     let rays = &scene.rays;
-    let named = [
-        (DVec3::X, "lat.", Color32::from_rgb(235, 110, 100)),
-        (DVec3::Y, "depth", Color32::from_rgb(120, 205, 120)),
-        (DVec3::Z, "elev.", Color32::from_rgb(110, 160, 245)),
-    ];
-    let mut arms: Vec<(f64, Vec2, &str, Color32)> = named
+    let mut arms: Vec<(f64, Vec2, &str, Color32)> = DVec3::AXES
         .iter()
-        .map(|(axis, name, colour)| {
+        .zip(&AXES)
+        .map(|(axis, (name, colour))| {
             let projected = vec2((axis.dot(rays.right) * ARM) as f32, (-axis.dot(rays.up) * ARM) as f32);
             (axis.dot(rays.forward), projected, *name, *colour)
         })
         .collect();
-    // Axes that point away are drawn first, and weaker.
+    // Axes that point away are drawn first, and thinner.
     arms.sort_by(|a, b| b.0.total_cmp(&a.0));
     for (away, arm, name, colour) in arms {
-        let colour = colour.gamma_multiply((1.0 - 0.45 * away.max(0.0)) as f32);
-        painter.line_segment([centre, centre + arm], Stroke::new(3.5, colour));
-        painter.circle_filled(centre + arm, 4.0, colour);
+        let width = 3.5 - 2.0 * away.max(0.0) as f32;
+        stroke(painter, [centre, centre + arm], width, colour);
+        painter.circle_filled(centre + arm, 2.3 + 0.5 * width, colour);
         // An axis along the view is too short for a name.
         if arm.length() > 9.0 {
             // A single letter would be read as a side of the patient.
@@ -180,7 +195,7 @@ fn axes(painter: &Painter, area: Rect, scene: &Scene) {
 }
 
 /// A bar of the colours of all values, with the limits of the window.
-fn colours(painter: &Painter, picture: Rect, scene: &Scene) {
+fn colour_bar(painter: &Painter, picture: Rect, scene: &Scene) {
     let settings = &scene.settings;
     let window = match settings.mode {
         // The colours of a lit surface do not stand for values.
@@ -206,11 +221,12 @@ fn colours(painter: &Painter, picture: Rect, scene: &Scene) {
     let area = Rect::from_min_size(pos2(picture.right() - 34.0, picture.top() + 26.0), vec2(16.0, height));
     for n in 0..STEPS {
         let value = (n as f64 + 0.5) / STEPS as f64;
-        let [r, g, b] = postprocess::toned(scene, ramp(value)).map(|c| (c.clamp(0.0, 1.0) * 255.0).round() as u8);
+        let colour = colours::of_scene(postprocess::toned(scene, ramp(value)));
         let low = area.bottom() - height * n as f32 / STEPS as f32;
         let part = Rect::from_min_max(pos2(area.left(), low - height / STEPS as f32 - 0.5), pos2(area.right(), low));
-        painter.rect_filled(part, 0.0, Color32::from_rgb(r, g, b));
+        painter.rect_filled(part, 0.0, colour);
     }
+    painter.rect_stroke(area, 0.0, Stroke::new(2.5, OUTLINE), egui::StrokeKind::Outside);
     painter.rect_stroke(area, 0.0, Stroke::new(1.0, WEAK_TEXT), egui::StrokeKind::Outside);
     for (value, y, align) in
         [(window[1], area.top(), Align2::RIGHT_TOP), (window[0], area.bottom(), Align2::RIGHT_BOTTOM)]

@@ -1,7 +1,8 @@
 //! Lists over the window of which an entry is chosen: the files to open, and the formats of an export.
 
+use super::colours::{ACCENT, PANEL, WEAK_TEXT};
 use super::names::{self, Tell};
-use super::{ACCENT, PANEL, SMALL_TEXT, TOUCH_SIZE, WEAK_TEXT};
+use super::{SMALL_TEXT, TOUCH_SIZE};
 use crate::ui::command::Command;
 use crate::ui::volume_export::FORMATS;
 use egui::accesskit::Role;

@@ -1,10 +1,11 @@
 //! What is drawn over the picture: banner and notes, times, help, a question with its answers, and the pointer where no windowing system draws one.
 
-use super::names::{self, Tell};
-use super::{
-    ACCENT, BACKGROUND, FAULT, GOOD, LARGE_TEXT, PANEL, PanelState, SMALL_TEXT, TEXT, TEXT_SIZE, TOUCH_SIZE, WARNING,
-    WEAK_TEXT, picture_rect,
+use super::colours::{
+    ACCENT, BAR, FAULT, FOCUS_EDGE, GOOD, MESSAGE, ON_SELECTED, PANEL, POINTER, SELECTED, SHADE, TEXT, WARNING,
+    WEAK_TEXT, WHOLE_BAR,
 };
+use super::names::{self, Tell};
+use super::{LARGE_TEXT, PanelState, SMALL_TEXT, TEXT_SIZE, TOUCH_SIZE, picture_rect};
 use crate::ui::command::{self, Command};
 use crate::ui::hints;
 use crate::ui::sliders::SLIDERS;
@@ -62,11 +63,7 @@ pub(super) fn show_notes(ui: &mut Ui, state: &PanelState, scale: f32) {
 }
 
 fn message_frame(edge: Color32) -> Frame {
-    Frame::new()
-        .fill(BACKGROUND.gamma_multiply(0.92))
-        .inner_margin(Margin::symmetric(16, 10))
-        .corner_radius(8)
-        .stroke(Stroke::new(2.0, edge))
+    Frame::new().fill(MESSAGE).inner_margin(Margin::symmetric(16, 10)).corner_radius(8).stroke(Stroke::new(2.0, edge))
 }
 
 const WIDTH: f32 = 316.0;
@@ -77,7 +74,7 @@ pub(super) fn show_times(ui: &mut Ui, state: &PanelState, scale: f32) {
     let at = picture_rect(state, scale).left_top() + vec2(12.0, 12.0);
     Area::new(Id::new("times")).order(Order::Middle).fixed_pos(at).interactable(false).show(ui.ctx(), |ui| {
         names::name(ui, Role::Group, "Times");
-        let frame = Frame::new().fill(BACKGROUND.gamma_multiply(0.82)).inner_margin(Margin::same(12)).corner_radius(8);
+        let frame = Frame::new().fill(MESSAGE).inner_margin(Margin::same(12)).corner_radius(8);
         frame.show(ui, |ui| {
             ui.set_width(WIDTH);
             ui.spacing_mut().item_spacing.y = 3.0;
@@ -162,8 +159,8 @@ fn bar(ui: &mut Ui, name: &str, share: f64, figure: String) {
     response.widget_info(|| WidgetInfo::labeled(WidgetType::Label, true, format!("{name} {figure}")));
     let filled = Rect::from_min_size(area.min, vec2((area.width() * share as f32).max(1.0), area.height()));
     let painter = ui.painter();
-    painter.rect_filled(area, 2.0, Color32::from_white_alpha(8));
-    painter.rect_filled(filled, 2.0, ACCENT.gamma_multiply(0.4));
+    painter.rect_filled(area, 2.0, WHOLE_BAR);
+    painter.rect_filled(filled, 2.0, BAR);
     let font = egui::FontId::proportional(SMALL_TEXT);
     let middle = area.center().y;
     painter.text(pos2(area.left() + 6.0, middle), egui::Align2::LEFT_CENTER, name, font.clone(), TEXT);
@@ -216,7 +213,7 @@ pub(super) fn show_help(ui: &mut Ui, state: &PanelState, execute: &mut dyn FnMut
         ui.ctx(),
         |ui| {
             let frame = Frame::new()
-                .fill(PANEL.gamma_multiply(0.97))
+                .fill(PANEL)
                 .inner_margin(Margin::same(14))
                 .corner_radius(10)
                 .stroke(Stroke::new(1.0, WEAK_TEXT));
@@ -301,6 +298,11 @@ fn help_line(ui: &mut Ui, row: &HelpRow, size: f32) {
     }
 }
 
+/// A button that is meant first.
+pub(super) fn first(text: &str) -> Button<'_> {
+    Button::new(RichText::new(text).color(ON_SELECTED)).fill(SELECTED)
+}
+
 /// Asks whether to save the loop before the program ends.
 pub(super) fn ask_to_leave(ui: &Ui, execute: &mut dyn FnMut(Command)) {
     let screen = ui.ctx().content_rect();
@@ -309,7 +311,7 @@ pub(super) fn ask_to_leave(ui: &Ui, execute: &mut dyn FnMut(Command)) {
     shade.show(ui.ctx(), |ui| {
         // The keyboard goes past it.
         ui.allocate_rect(screen, egui::Sense::CLICK | egui::Sense::DRAG);
-        ui.painter().rect_filled(screen, 0.0, Color32::from_black_alpha(150));
+        ui.painter().rect_filled(screen, 0.0, SHADE);
     });
     let area = Area::new(Id::new("leave")).order(Order::Tooltip).anchor(Align2::CENTER_CENTER, vec2(0.0, 0.0));
     area.show(ui.ctx(), |ui| {
@@ -321,14 +323,13 @@ pub(super) fn ask_to_leave(ui: &Ui, execute: &mut dyn FnMut(Command)) {
             ui.label(RichText::new("Its volumes are lost when the program ends.").size(TEXT_SIZE));
             ui.add_space(8.0);
             let answers = [
-                ("Save and leave  (Enter)", ACCENT.gamma_multiply(0.45), Command::SaveAndExit),
-                ("Leave without saving  (L)", Color32::TRANSPARENT, Command::Discard),
-                ("Stay  (Esc)", Color32::TRANSPARENT, Command::Back),
+                ("Save and leave  (Enter)", true, Command::SaveAndExit),
+                ("Leave without saving  (L)", false, Command::Discard),
+                ("Stay  (Esc)", false, Command::Back),
             ];
-            for (text, fill, command) in answers {
-                let button = Button::new(text).min_size(vec2(ui.available_width(), TOUCH_SIZE * 0.85));
-                let button = if fill == Color32::TRANSPARENT { button } else { button.fill(fill) };
-                if ui.add(button).clicked() {
+            for (text, is_first, command) in answers {
+                let button = if is_first { first(text) } else { Button::new(text) };
+                if ui.add(button.min_size(vec2(ui.available_width(), TOUCH_SIZE * 0.85))).clicked() {
                     execute(command);
                 }
             }
@@ -356,11 +357,11 @@ pub(super) fn paint_pointer(ui: &Ui, state: &PanelState, scale: f32) {
     let painter = ui.ctx().layer_painter(LayerId::new(Order::Debug, Id::new("pointer")));
     let corners = CORNERS.map(|corner| tip + corner);
     let mut mesh = Mesh::default();
-    corners.iter().for_each(|corner| mesh.colored_vertex(*corner, Color32::WHITE));
+    corners.iter().for_each(|corner| mesh.colored_vertex(*corner, POINTER));
     TRIANGLES.iter().for_each(|[a, b, c]| mesh.add_triangle(*a, *b, *c));
     painter.add(mesh);
     // A dark outline around a bright arrow is visible on any picture.
-    painter.add(Shape::closed_line(corners.to_vec(), Stroke::new(1.5, Color32::BLACK)));
+    painter.add(Shape::closed_line(corners.to_vec(), Stroke::new(1.5, FOCUS_EDGE)));
 }
 
 #[cfg(test)]
