@@ -28,7 +28,7 @@ use crate::gpu::window::Screen;
 use crate::gpu::{Context, GpuError};
 use crate::kiosk::chord::Chord;
 use crate::live::metrics::LiveMetrics;
-use crate::live::{self, Feed, Stream, StreamError};
+use crate::live::{self, Feed, StartStep, Stream, StreamError};
 use crate::plan::Work;
 use crate::scene::{Layout, Scene, Settings, variants};
 use crate::source::live::SourceKind;
@@ -145,6 +145,13 @@ pub struct Console {
     device_faults: u32,
     /// The device did not finish and was opened again; a banner says so until then.
     stall_shown_until: Option<Instant>,
+    /// What is done before the first picture, as the screen says it; and since when.
+    start_step: Option<StartStep>,
+    start_step_at: Instant,
+    /// The screen says that the first picture is being drawn.
+    tells_of_picture: bool,
+    /// The start is over: a picture was presented.
+    has_started: bool,
     /// Since when there is no picture to show.
     blank_since: Option<Instant>,
     /// What a screen reader says of the panels, since they were laid out last.
@@ -207,6 +214,9 @@ impl Console {
             shaders: options.shaders.clone(),
             chosen: options.chosen,
             lowered,
+            prepares: true,
+            // Full quality always means the first picture too.
+            coarse_first: options.budget.is_some(),
         };
         let watch = options.shaders.as_ref().map(|folder| Watch::new(folder, options.wake.clone())).transpose();
         let (shader_watch, watch_fault) = match watch {
@@ -276,6 +286,10 @@ impl Console {
             metrics,
             device_faults: 0,
             stall_shown_until: None,
+            start_step: None,
+            start_step_at: now,
+            tells_of_picture: false,
+            has_started: false,
             blank_since: None,
             tree: None,
             repaint_at: None,
