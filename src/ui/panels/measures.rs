@@ -76,7 +76,7 @@ fn results(ui: &mut Ui, state: &PanelState, width: f32, execute: &mut dyn FnMut(
     if let Some(work) = state.controls.work().filter(|work| work.kind.complete_at().is_none()) {
         let name =
             if work.kind == MeasureKind::Volume && work.points.is_empty() { "End volume" } else { "Close contour" };
-        let button = first(name).min_size(vec2(width, TOUCH_SIZE * 0.65));
+        let button = first(RichText::new(name)).min_size(vec2(width, TOUCH_SIZE * 0.65));
         if ui.add(button).tell("Ends what is being traced (Enter).").clicked() {
             execute(Command::EndMeasure);
         }

@@ -68,6 +68,15 @@ pub(super) fn name(ui: &Ui, role: Role, name: &str) {
     });
 }
 
+/// Entries of a list, under a name.
+pub(super) fn list<R>(ui: &mut Ui, title: &str, add: impl FnOnce(&mut Ui) -> R) -> R {
+    ui.scope(|ui| {
+        name(ui, Role::List, title);
+        add(ui)
+    })
+    .inner
+}
+
 /// Controls that belong together, under a name.
 pub(super) fn group<R>(ui: &mut Ui, title: &str, add: impl FnOnce(&mut Ui) -> R) -> R {
     ui.scope(|ui| {

@@ -3,6 +3,7 @@
 mod budget;
 mod colours;
 mod gestures;
+mod layout;
 mod measuring;
 mod screen_reader;
 mod sequences;
