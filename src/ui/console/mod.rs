@@ -460,13 +460,7 @@ impl Console {
         let modifiers = self.keys.modifiers();
         match (&mut self.help_search, key) {
             (None, Key::Char('/')) => self.help_search = Some(String::new()),
-            (Some(text), Key::Char(letter)) if !modifiers.control && !modifiers.alt => {
-                if text.chars().count() < MAX_SEARCH {
-                    text.push(*letter);
-                }
-            }
-            (Some(text), Key::Space) => text.push(' '),
-            (Some(text), Key::Backspace) => _ = text.pop(),
+            (Some(text), key) if !modifiers.control && !modifiers.alt => return edit_search(text, *key),
             _ => return false,
         }
         true
@@ -606,7 +600,8 @@ impl Console {
             Command::Back => self.go_back(),
             // A kiosk ends only with its exit keys: a sleeve may press Escape.
             Command::Exit if self.fixed.is_kiosk => {}
-            Command::Exit if self.has_unsaved_loop() => self.asks_to_leave = true,
+            // Without panels nobody sees a question.
+            Command::Exit if self.fixed.overlay && self.has_unsaved_loop() => self.asks_to_leave = true,
             Command::Exit | Command::Discard => self.request.exit |= !self.fixed.is_kiosk,
             Command::SaveAndExit => {
                 self.asks_to_leave = false;
@@ -669,7 +664,7 @@ impl Console {
 
     /// The user asked the windowing system to close the window: asks first if that loses a loop. False if it may be closed at once.
     pub(super) fn asks_before_closing(&mut self) -> bool {
-        if self.asks_to_leave || !self.has_unsaved_loop() {
+        if self.asks_to_leave || !self.fixed.overlay || !self.has_unsaved_loop() {
             return false;
         }
         (self.asks_to_leave, self.needs_redraw) = (true, true);
@@ -742,6 +737,23 @@ impl Console {
     }
 }
 
+/// Takes a key for the text that the help is searched for. False if it is none of a text's.
+fn edit_search(text: &mut String, key: Key) -> bool {
+    let letter = match key {
+        Key::Char(letter) => letter,
+        Key::Space => ' ',
+        Key::Backspace => {
+            text.pop();
+            return true;
+        }
+        _ => return false,
+    };
+    if text.chars().count() < MAX_SEARCH {
+        text.push(letter);
+    }
+    true
+}
+
 /// The command of a key while the console asks whether to save the loop before it leaves.
 fn answer(input: &Input) -> Option<Command> {
     match input {
@@ -756,4 +768,21 @@ fn answer(input: &Input) -> Option<Command> {
 fn is_of_tone(command: &Command) -> bool {
     use Command::{MoveCrossing, MoveLight, RotatePlanes, SetSlider, StepPlane, StepSlider};
     matches!(command, MoveLight(_) | StepPlane(_) | MoveCrossing(_) | RotatePlanes(_) | SetSlider(..) | StepSlider(..))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Prevents a search that grows while a key is held.
+    #[test]
+    fn the_search_of_the_help_has_a_longest_text() {
+        let mut text = String::new();
+        for key in [Key::Char('ä'), Key::Space, Key::Char('b')].into_iter().cycle().take(3 * MAX_SEARCH) {
+            assert!(edit_search(&mut text, key));
+        }
+        assert_eq!(text.chars().count(), MAX_SEARCH);
+        (0..MAX_SEARCH + 1).for_each(|_| assert!(edit_search(&mut text, Key::Backspace)));
+        assert!(text.is_empty() && !edit_search(&mut text, Key::Escape));
+    }
 }
