@@ -159,7 +159,7 @@ impl CinePlayer {
         let step = |n: usize| Some((begins(volumes.get(n + 1)?)? - begins(volumes.get(n)?)?).max(0.0));
         let since = |index: usize| -> Option<f64> {
             begins(volumes.get(index)?)?;
-            (0..index).map(step).sum()
+            (0..index).map(step).try_fold(0.0, |sum, step| Some(sum + step?))
         };
         // A rate that some of the volumes do not state would be a guess.
         let has_times = range.clone().all(|index| volumes.get(index).and_then(begins).is_some());
@@ -316,6 +316,8 @@ mod tests {
         let paused = volumes(&[Some(0.0), Some(0.5), Some(100.0), Some(100.5)]);
         let state = CinePlayer::default().state(&paused, Some(3));
         assert_eq!((state.seconds, state.rate), (Some(100.5), Some(2.0)));
+        let first = CinePlayer::default().state(&again, Some(0)).seconds;
+        assert_eq!(first.map(|seconds| format!("{seconds:.1}")), Some("0.0".into()), "not -0.0");
         let none = CinePlayer::default().state(&VecDeque::new(), None);
         assert_eq!((none.count, none.rate, none.is_trimmed), (0, None, false));
     }

@@ -177,15 +177,16 @@ fn ruler(painter: &Painter, taken: &mut Taken, area: Rect, top: f64, per_point: 
     let x = area.left() + 6.0;
     let at = |depth: f64| area.top() + ((depth - top) / per_point) as f32;
     let from = ((top.max(0.0) / step).ceil() * step).max(0.0);
-    let mut depth = from;
+    let (mut depth, mut has_unit) = (from, false);
     while depth <= bottom {
         let y = at(depth);
         if taken.is_free(Rect::from_min_max(pos2(x, y - 3.0), pos2(x + 9.0, y + 3.0))) {
             line(painter, pos2(x, y), pos2(x + 9.0, y));
             if y > area.top() + 8.0 && y < area.bottom() - 8.0 {
-                let unit = if depth == from { " mm" } else { "" };
+                let unit = if has_unit { "" } else { " mm" };
                 let place = [pos2(x + 13.0, y)];
-                text_at_one_of(painter, taken, place, Align2::LEFT_CENTER, &format!("{depth:.0}{unit}"), TEXT);
+                has_unit |=
+                    text_at_one_of(painter, taken, place, Align2::LEFT_CENTER, &format!("{depth:.0}{unit}"), TEXT);
             }
         }
         depth += step;

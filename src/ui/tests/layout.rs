@@ -108,6 +108,10 @@ fn check(shown: &Shown, what: &str) {
     }
     let marks = annotations(shown);
     assert!(marks.iter().any(|(name, _)| name.starts_with("Demo data")), "{what}: the phantom is not named: {marks:?}");
+    let is_number = |(name, _): &(String, Area)| name.parse::<u32>().is_ok();
+    let has_unit = |(name, _): &(String, Area)| name.ends_with(" mm");
+    let has_ruler = shown.scene.marks().iter().any(|tile| tile.depth_from.is_some());
+    assert!(!has_ruler || !marks.iter().any(is_number) || marks.iter().any(has_unit), "{what}: no unit: {marks:?}");
     for (n, (name, area)) in marks.iter().enumerate() {
         for (other, covered) in &marks[..n] {
             // The names of the axes stand around and on their disc.
