@@ -226,7 +226,8 @@ fn the_volume_is_exported_as_the_commands_do() {
     let open = || {
         let view = desk.view(&["--size", "700x500", "--source", &ball, "--save-to", &kept, "--mode", "mip"]);
         until("a picture", || {
-            let seen = view.look()?;
+            let (corner, size) = echolume::ui::panels::picture_area([700, 500], 1.0, true);
+            let seen = crop(&view.look()?, corner, size)?;
             let is_bright = |pixel: &[u8]| pixel[..3].iter().all(|c| *c > 150);
             (seen.rgba.chunks(4).filter(|pixel| is_bright(pixel)).count() > 5000).then_some(())
         });

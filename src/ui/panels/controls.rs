@@ -1,9 +1,10 @@
 //! The panels with buttons and sliders: modes and tools on the left, controls on the right, the cine loop below. The six controls that
 //! every examination needs are in front; the others are below them, by stage.
 
+use super::colours::{ABSENT, ACCENT, BUTTON, ON_SELECTED, ON_WARNING, SELECTED, TEXT, WARNING, WEAK_TEXT};
 use super::measures;
 use super::names::{self, Tell};
-use super::{ACCENT, BUTTON, PanelState, TEXT, TEXT_SIZE, TOUCH_SIZE, WARNING, WEAK_TEXT, heading};
+use super::{PanelState, TEXT_SIZE, TOUCH_SIZE, heading};
 use crate::scene::{ColourMap, KeptSide, Layout, Mode, PlaneName, Settings, Transfer, TransferName};
 use crate::ui::cine_player::{CineState, SPEEDS};
 use crate::ui::command::{Command, Tool};
@@ -12,7 +13,7 @@ use crate::ui::sliders::{Group, SLIDERS, Slider as Control};
 use crate::ui::view;
 use egui::accesskit::Role;
 use egui::{
-    Align, Button, CollapsingHeader, Color32, FontId, Label, Panel, Rect, RichText, ScrollArea, Sense, Slider, Stroke,
+    Align, Button, CollapsingHeader, FontId, Label, Panel, Rect, RichText, ScrollArea, Sense, Slider, Stroke,
     StrokeKind, Ui, WidgetInfo, WidgetType, pos2, vec2,
 };
 
@@ -353,9 +354,9 @@ pub(super) fn show_controls(ui: &mut Ui, state: &PanelState, width: f32, execute
 /// A control in front that the mode has not: it keeps its place.
 fn absent(ui: &mut Ui, name: &str) {
     ui.horizontal(|ui| {
-        ui.label(RichText::new(name).color(WEAK_TEXT.gamma_multiply(0.6)));
+        ui.label(RichText::new(name).color(ABSENT));
         ui.with_layout(egui::Layout::right_to_left(Align::Center), |ui| {
-            ui.label(RichText::new("-").color(WEAK_TEXT.gamma_multiply(0.6)));
+            ui.label(RichText::new("-").color(ABSENT));
         });
     });
     let size = vec2(ui.available_width(), TOUCH_SIZE * 0.62);
@@ -425,12 +426,12 @@ fn switch(ui: &mut Ui, on: &mut bool, name: &str, hint: &str) -> bool {
     let right = pos2(area.right() - width, area.center().y - height / 2.0);
     let track = Rect::from_min_size(right, vec2(width, height));
     let painter = ui.painter();
-    let fill = if *on { ACCENT.gamma_multiply(0.55) } else { BUTTON };
+    let fill = if *on { SELECTED } else { BUTTON };
     painter.rect_filled(track, height / 2.0, fill);
     let edge = if response.hovered() || response.has_focus() { TEXT } else { WEAK_TEXT };
     painter.rect_stroke(track, height / 2.0, Stroke::new(1.0, edge), StrokeKind::Inside);
     let x = if *on { track.right() - height / 2.0 } else { track.left() + height / 2.0 };
-    painter.circle_filled(pos2(x, track.center().y), height / 2.0 - 4.0, Color32::WHITE);
+    painter.circle_filled(pos2(x, track.center().y), height / 2.0 - 4.0, ON_SELECTED);
     let font = FontId::proportional(TEXT_SIZE);
     // A long name ends before the switch.
     let name = painter.layout_no_wrap(name.to_string(), font, TEXT);
@@ -447,11 +448,11 @@ pub(super) fn show_cine_bar(ui: &mut Ui, state: &PanelState, height: f32, execut
         ui.horizontal_centered(|ui| {
             let room = ui.available_width();
             let is_narrow = room < 420.0;
-            let (label, fill) = match state.is_frozen {
-                true => ("FROZEN", WARNING.gamma_multiply(0.75)),
-                false => ("Freeze", ACCENT.gamma_multiply(0.45)),
+            let (label, fill, colour) = match state.is_frozen {
+                true => ("FROZEN", WARNING, ON_WARNING),
+                false => ("Freeze", SELECTED, ON_SELECTED),
             };
-            let text = RichText::new(label).color(Color32::WHITE).strong();
+            let text = RichText::new(label).color(colour).strong();
             let width = if is_narrow { 84.0 } else { 120.0 };
             let hint = "Keeps this volume on the screen (Space).";
             let freeze = Button::new(text).fill(fill).min_size(vec2(width, touch));

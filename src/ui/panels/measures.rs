@@ -1,14 +1,16 @@
 //! Measuring: its tools, the list of results, and what is drawn of both over the picture.
 
+use super::colours::{ACCENT, BACKING, MEASURE, OUTLINE, TEXT, WARNING};
 use super::names::{self, Tell};
-use super::{ACCENT, PanelState, SMALL_TEXT, TEXT, TEXT_SIZE, TOUCH_SIZE, WARNING, heading, picture_rect};
+use super::overlays::first;
+use super::{PanelState, SMALL_TEXT, TEXT_SIZE, TOUCH_SIZE, heading, picture_rect};
 use crate::measure::outcome::{self, Quantity};
 use crate::measure::overlay::{self, Drawn};
 use crate::scene::{MeasureKind, Scene};
 use crate::ui::command::{Command, Tool};
 use crate::ui::hints;
 use egui::accesskit::Role;
-use egui::{Button, Color32, FontId, Label, Painter, Pos2, Rect, RichText, Stroke, StrokeKind, Ui, pos2, vec2};
+use egui::{Button, FontId, Label, Painter, Pos2, Rect, RichText, Stroke, StrokeKind, Ui, pos2, vec2};
 
 /// The tools of the rail and their names there.
 const TOOLS: [(MeasureKind, &str); 9] = [
@@ -23,8 +25,6 @@ const TOOLS: [(MeasureKind, &str); 9] = [
     (MeasureKind::Arrow, "Arrow"),
 ];
 
-/// Colour of measurements: yellow, which no tissue has and every kind of colour vision sees on grey.
-const LINE: Color32 = Color32::from_rgb(255, 214, 64);
 /// Half the size of a cross, and the length of an arrow's head, points.
 const CROSS: f32 = 5.0;
 const HEAD: f64 = 12.0;
@@ -76,7 +76,7 @@ fn results(ui: &mut Ui, state: &PanelState, width: f32, execute: &mut dyn FnMut(
     if let Some(work) = state.controls.work().filter(|work| work.kind.complete_at().is_none()) {
         let name =
             if work.kind == MeasureKind::Volume && work.points.is_empty() { "End volume" } else { "Close contour" };
-        let button = Button::new(name).fill(ACCENT.gamma_multiply(0.45)).min_size(vec2(width, TOUCH_SIZE * 0.65));
+        let button = first(RichText::new(name)).min_size(vec2(width, TOUCH_SIZE * 0.65));
         if ui.add(button).tell("Ends what is being traced (Enter).").clicked() {
             execute(Command::EndMeasure);
         }
@@ -99,7 +99,7 @@ fn results(ui: &mut Ui, state: &PanelState, width: f32, execute: &mut dyn FnMut(
                 let rest = found.iter().map(|q| format!("{}: {}", q.name, q.shown()));
                 let hint: Vec<String> = rest.chain(["Click to type a text for it.".to_string()]).collect();
                 ui.with_layout(egui::Layout::right_to_left(egui::Align::Center), |ui| {
-                    ui.label(RichText::new(&main).color(LINE).size(SMALL_TEXT));
+                    ui.label(RichText::new(&main).color(MEASURE).size(SMALL_TEXT));
                     ui.with_layout(egui::Layout::left_to_right(egui::Align::Center), |ui| {
                         let label = ui.add(Label::new(text).truncate().sense(egui::Sense::click()));
                         let spoken = format!("{} {name} {main}", n + 1);
@@ -221,7 +221,7 @@ impl Canvas {
 
     /// A dark edge along the bright line is visible on any picture.
     fn lines(&self, painter: &Painter, strokes: &[[Pos2; 2]]) {
-        for stroke in [Stroke::new(3.5, Color32::from_black_alpha(170)), Stroke::new(1.5, LINE)] {
+        for stroke in [Stroke::new(3.5, OUTLINE), Stroke::new(1.5, MEASURE)] {
             strokes.iter().for_each(|ends| _ = painter.line_segment(*ends, stroke));
         }
     }
@@ -250,8 +250,8 @@ impl Canvas {
         let size = (galley.size() + vec2(8.0, 2.0)) * self.scale;
         let corner = self.at(overlay::label_corner(drawn, [f64::from(size.x), f64::from(size.y)]));
         let area = Rect::from_min_size(corner, size / self.scale);
-        painter.rect_filled(area, 3.0, Color32::from_black_alpha(170));
-        painter.rect_stroke(area, 3.0, Stroke::new(1.0, LINE.gamma_multiply(0.5)), StrokeKind::Inside);
+        painter.rect_filled(area, 3.0, BACKING);
+        painter.rect_stroke(area, 3.0, Stroke::new(1.0, MEASURE.gamma_multiply(0.5)), StrokeKind::Inside);
         painter.galley(pos2(area.left() + 4.0, area.center().y - galley.size().y / 2.0), galley, colour);
     }
 }
