@@ -278,7 +278,9 @@ impl Renderer {
         for (slot, _) in new {
             self.fill(slot)?;
         }
-        self.timelines.wait_all()
+        self.timelines.wait_all()?;
+        // The next frame may write what was cleared here.
+        self.context.show_layer_the_wait()
     }
 
     /// Uploads a slot that the CPU computes from the scene. Nothing that reads it may be in flight.
