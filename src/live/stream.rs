@@ -2,13 +2,14 @@
 
 use super::cine::{Cine, CineLimits};
 use super::feed::{Arrived, Feed, FeedCounts};
+use super::first_pipelines::FirstPipelines;
 use super::first_volume::FirstVolume;
 use super::phase::{Pending, Phase};
 use super::session::{Begun, FinishedPicture, Session, Views};
 use super::statistics::Statistics;
 use super::volume_pool::{Update, VolumeCounts, VolumePool};
 use crate::gpu::shader_reload::ShaderFolder;
-use crate::gpu::{self, Bands, Context, GpuError, Preparation, Prepared, Renderer, SceneMaker, TimeStamps, Wake};
+use crate::gpu::{self, Bands, Context, GpuError, Preparation, Renderer, SceneMaker, TimeStamps, Wake};
 use crate::probe::Probe;
 use crate::scene::default_look::Defaults;
 use crate::scene::load::Layers;
@@ -22,9 +23,6 @@ use std::time::{Duration, Instant};
 
 /// Longest wait for an event while a picture is being drawn: its end is noticed no later than that.
 const DRAWING_WAIT: Duration = Duration::from_micros(200);
-
-/// How often pipelines are compiled again before the first picture because settings have changed meanwhile.
-const MOST_CHANGES: u32 = 2;
 
 /// How a [`Stream`] renders.
 #[derive(Clone)]
@@ -122,15 +120,6 @@ pub enum StreamError {
     Scene(#[from] SceneError),
 }
 
-/// Pipelines in the making for a geometry that begins when they are compiled.
-struct Preparing {
-    preparation: Preparation,
-    /// The settings that it was begun for, as drawn and at full quality.
-    settings: [Settings; 2],
-    /// How many were begun before, for settings that have changed since.
-    changes: u32,
-}
-
 /// A live source that is rendered. The caller drives it by calling [`Stream::step`] again and again, on one thread.
 pub struct Stream {
     context: Arc<Context>,
@@ -161,11 +150,7 @@ pub struct Stream {
     newest: Option<u32>,
     /// Its counts go on in the next session.
     previous_pool: Option<VolumePool>,
-    /// What the first geometry needs is being compiled, and is compiled.
-    preparing: Option<Preparing>,
-    prepared: Option<Prepared>,
-    /// Cancelled ones that have not ended yet. What they return does not matter.
-    cancelled: Vec<Preparation>,
+    first_pipelines: FirstPipelines,
     /// The next picture is drawn with few rays.
     is_coarse: bool,
     /// The source has ended, and why.
@@ -189,9 +174,7 @@ impl Stream {
             full: None,
             first_volume: options.chosen.clone().map(FirstVolume::new),
             found: None,
-            preparing: None,
-            prepared: None,
-            cancelled: Vec::new(),
+            first_pipelines: FirstPipelines::default(),
             is_coarse: options.coarse_first,
             options,
             session: None,
@@ -217,7 +200,7 @@ impl Stream {
     /// # Errors
     /// A device that fails, and settings that a new geometry cannot be drawn with.
     pub fn step(&mut self, patience: Duration) -> Result<Step, StreamError> {
-        self.cancelled.retain(|preparation| !preparation.is_finished());
+        self.first_pipelines.forget_ended();
         let result = self.advance(patience);
         // A renderer that cannot draw any more is made anew with the next geometry.
         if result.is_err()
@@ -327,7 +310,7 @@ impl Stream {
             let is_prepared = self.has_prepared().inspect_err(|error| self.cannot_prepare(error))?;
             if let Some(header) = self.next_header.take_if(|_| is_prepared) {
                 let begun = self.begin_geometry(header);
-                self.prepared = None;
+                self.first_pipelines.release();
                 begun?;
             }
             return Ok(Step::Progress);
@@ -345,33 +328,22 @@ impl Stream {
 
     /// True if the next geometry can begin: what it needs is compiled, or will be when it begins. Otherwise that is being compiled.
     fn has_prepared(&mut self) -> Result<bool, StreamError> {
-        let mut changes = 0;
-        let done = self.preparing.take_if(|preparing| preparing.preparation.is_finished());
-        let (Some(header), Some(wake), None) = (&self.next_header, &self.options.wake, &self.session) else {
+        let prepares = self.options.prepares && self.session.is_none();
+        let mut pipelines = std::mem::take(&mut self.first_pipelines);
+        let (Some(header), Some(wake), true) = (&self.next_header, &self.options.wake, prepares) else {
+            pipelines.release();
+            self.first_pipelines = pipelines;
             return Ok(true);
         };
-        if self.preparing.is_some() || !self.options.prepares {
-            return Ok(self.preparing.is_none());
-        }
         let settings = self.first_settings(header);
-        if let Some(done) = done {
-            let is_current = done.settings == settings || done.changes == MOST_CHANGES;
-            match done.preparation.finish() {
-                // None after a panic: what is missing is compiled when the geometry begins, and what was compiled before is kept.
-                Ok(prepared) => self.prepared = prepared.or(self.prepared.take()),
-                Err(error) if is_current || error.is_device_lost() => return Err(error.into()),
-                Err(error) => tracing::debug!("settings that were changed meanwhile: {error}"),
-            }
-            if is_current {
-                return Ok(true);
-            }
-            changes = done.changes + 1;
-        }
-        let views = views(header, &settings[0], Some(&settings[1]), &self.options)?;
-        let options = self.renderer_options(self.options.images);
-        let preparation = Preparation::begin(&self.context, views.first().clone(), &options, wake.clone())?;
-        self.preparing = preparation.map(|preparation| Preparing { preparation, settings, changes });
-        Ok(self.preparing.is_none())
+        let begin = |settings: &[Settings; 2]| {
+            let views = views(header, &settings[0], Some(&settings[1]), &self.options)?;
+            let options = self.renderer_options(self.options.images);
+            Ok(Preparation::begin(&self.context, views.first().clone(), &options, wake.clone())?)
+        };
+        let is_prepared = pipelines.advance(settings, begin);
+        self.first_pipelines = pipelines;
+        is_prepared
     }
 
     /// The settings that a geometry would begin with now, as drawn and at full quality.
@@ -395,15 +367,6 @@ impl Stream {
             self.cine = Cine::new(CineLimits::default(), 0);
             self.header = next;
         }
-    }
-
-    /// Forgets what is being compiled for a geometry, without waiting for it. False if nothing was.
-    fn cancel_preparation(&mut self) -> bool {
-        self.prepared = None;
-        let Some(Preparing { preparation, .. }) = self.preparing.take() else { return false };
-        preparation.cancel();
-        self.cancelled.push(preparation);
-        true
     }
 
     /// Settings as the next picture is drawn with them.
@@ -430,7 +393,7 @@ impl Stream {
     /// What is being done before there is a picture; none once there is one, or it is being drawn.
     pub fn start_step(&self) -> Option<StartStep> {
         let Some(session) = &self.session else {
-            let progress = self.preparing.as_ref().map(|preparing| preparing.preparation.progress());
+            let progress = self.first_pipelines.progress();
             return Some(progress.map_or(StartStep::Source, |[done, count]| StartStep::Compiling { done, count }));
         };
         let frames = || {
@@ -599,7 +562,7 @@ impl Stream {
         self.context = context.clone();
         self.losses += 1;
         // Its pipelines are of the device before. The next step compiles them for this one.
-        let was_preparing = self.cancel_preparation();
+        let was_preparing = self.first_pipelines.cancel();
         match self.header.clone() {
             Some(header) if !was_preparing => self.begin_geometry(header),
             _ => Ok(()),
@@ -679,7 +642,7 @@ impl Stream {
         (self.feed, self.end) = (feed, None);
         // A geometry of the source before that did not begin yet is not shown any more.
         self.next_header = None;
-        self.cancel_preparation();
+        self.first_pipelines.cancel();
         self.cine.discard_partial();
         // Two volumes with one number could not be distinguished in the cine loop.
         if let Some(newest) = self.newest.take() {
@@ -754,8 +717,8 @@ impl Stream {
 
     /// True if a step has nothing to do until the source reports an event or a pipeline is compiled.
     pub fn is_idle(&self) -> bool {
-        if let Some(Preparing { preparation, .. }) = &self.preparing {
-            return !preparation.is_finished();
+        if let Some(is_working) = self.first_pipelines.is_working() {
+            return is_working;
         }
         let is_busy = self.session.as_ref().is_some_and(Session::is_busy);
         !is_busy && !self.is_replaying() && self.feed.waiting() == 0
