@@ -247,6 +247,8 @@ pub mod thesis_tables;
 #[forbid(unsafe_code)]
 pub mod ui;
 #[forbid(unsafe_code)]
+pub mod user_presets;
+#[forbid(unsafe_code)]
 pub mod verify;
 #[forbid(unsafe_code)]
 pub mod workspace;

@@ -2,18 +2,19 @@
 
 use super::picture_file::STANDARD;
 use super::recording::{GeometryArgs, open_recording};
-use super::user_files::pipeline_folder;
+use super::user_files::{pipeline_folder, presets_file};
 use crate::files::signals;
 use crate::files::{check_target, replace};
 use crate::gpu::context::list;
 use crate::gpu::{Context, ContextOptions, Deadline, DeviceChoice, GpuError, TexelAccess, device_selection};
 use crate::probe::Geometry;
 use crate::scene::default_look::block_edge;
-use crate::scene::load::Layers;
+use crate::scene::load::{Layers, LoadError};
 use crate::scene::{EchoHistogram, EchoLevels, Input, Scene, Settings};
 use crate::source::phantom::{self, Phantom, PhantomSource};
 use crate::source::{Frame, Source};
 use crate::terminal::{Failure, failed, input, progress_bar, say};
+use crate::user_presets;
 use crate::workspace::{self, Workspace};
 use std::collections::HashSet;
 use std::path::{Path, PathBuf};
@@ -227,7 +228,8 @@ pub struct SceneArgs {
     #[arg(long, value_name = "FILE")]
     scene: Option<PathBuf>,
     /// Preset of settings: bmode, bone, face, face-classic, fetal, glass, skeleton, thesis, vessel. May be repeated; a later one
-    /// overrides an earlier one. Without one, windows and filters of a recording follow from its echoes
+    /// overrides an earlier one. Without one, windows and filters of a recording follow from its echoes. Another name is that of a preset
+    /// that was saved in `echolume view`
     #[arg(long, value_name = "NAME")]
     preset: Vec<String>,
     /// Width and height of the picture, pixels
@@ -269,7 +271,7 @@ impl SceneArgs {
     /// Adds the presets, files and flags on top of `layers`.
     pub fn layers_over(&self, mut layers: Layers, chosen: &[String]) -> Result<Layers, Failure> {
         for preset in &self.preset {
-            layers.preset(preset).map_err(input)?;
+            add_preset(&mut layers, preset)?;
         }
         if let Some(file) = &self.scene {
             layers.file(file).map_err(input)?;
@@ -421,6 +423,26 @@ pub fn scene_to_show(
     let mut scene = Scene::new(geometry, samples, settings).map_err(input)?;
     scene.found = found;
     Ok(scene)
+}
+
+/// Adds a preset: a built-in one, or else one of the user's.
+fn add_preset(layers: &mut Layers, name: &str) -> Result<(), Failure> {
+    let unknown = match layers.preset(name) {
+        Err(unknown @ LoadError::UnknownPreset { .. }) => unknown,
+        added => return added.map_err(input),
+    };
+    let own = match presets_file() {
+        Some(file) => user_presets::read(&file).map_err(|e| input(format!("--preset {name}: {e}")))?,
+        None => Vec::new(),
+    };
+    match own.iter().find(|preset| preset.name == name.trim()) {
+        Some(preset) => layers.look(name, &preset.look().map_err(input)?).map_err(input),
+        None if own.is_empty() => Err(input(unknown)),
+        None => {
+            let names: Vec<&str> = own.iter().map(|preset| preset.name.as_str()).collect();
+            Err(input(format!("{unknown}; of your own: {}", names.join(", "))))
+        }
+    }
 }
 
 /// Other names of modes.

@@ -1,4 +1,4 @@
-//! What the program keeps for a user between runs: compiled pipelines, and the list of recent files.
+//! What the program keeps for a user between runs: compiled pipelines, presets, and the list of recent files.
 
 use std::ffi::OsString;
 use std::path::PathBuf;
@@ -15,6 +15,8 @@ struct Place {
 
 const PIPELINES: Place =
     Place { variable: "ECHOLUME_PIPELINE_CACHE", xdg: ("XDG_CACHE_HOME", ".cache"), name: "pipelines" };
+const PRESETS: Place =
+    Place { variable: "ECHOLUME_PRESETS", xdg: ("XDG_CONFIG_HOME", ".config"), name: "presets.toml" };
 #[cfg(feature = "view")]
 const RECENT: Place = Place { variable: "ECHOLUME_RECENT", xdg: ("XDG_STATE_HOME", ".local/state"), name: "recent" };
 
@@ -22,6 +24,12 @@ const RECENT: Place = Place { variable: "ECHOLUME_RECENT", xdg: ("XDG_STATE_HOME
 /// `none` or empty, or if the system names no such folder.
 pub fn pipeline_folder() -> Option<PathBuf> {
     PIPELINES.path(|name| std::env::var_os(name))
+}
+
+/// The file of the user's presets: `presets.toml` in the user's folder of configurations, or what ECHOLUME_PRESETS names instead; none if that is
+/// `none` or empty, or if the system names no such folder.
+pub fn presets_file() -> Option<PathBuf> {
+    PRESETS.path(|name| std::env::var_os(name))
 }
 
 /// The list of recent files: `recent` in the user's folder of state, or what ECHOLUME_RECENT names instead; none if that is `none` or empty, or if
@@ -55,9 +63,11 @@ mod tests {
     #[cfg(all(unix, feature = "view"))]
     #[test]
     fn a_place_is_in_the_users_folder_unless_another_is_named_or_none() {
-        for (place, standard) in
-            [(PIPELINES, "/home/a/.cache/echolume/pipelines"), (RECENT, "/home/a/.local/state/echolume/recent")]
-        {
+        for (place, standard) in [
+            (PIPELINES, "/home/a/.cache/echolume/pipelines"),
+            (PRESETS, "/home/a/.config/echolume/presets.toml"),
+            (RECENT, "/home/a/.local/state/echolume/recent"),
+        ] {
             let of =
                 |set: &[(&str, &str)]| place.path(|name| set.iter().find(|(n, _)| *n == name).map(|(_, v)| v.into()));
             let (home, (xdg, _)) = (("HOME", "/home/a"), place.xdg);

@@ -98,7 +98,7 @@ impl Defaults {
 
 impl Layers {
     /// The layers with another mode and layout on top, as if a user had given them.
-    fn in_mode(mut self, mode: Mode, layout: Layout) -> Option<Layers> {
+    pub fn in_mode(mut self, mode: Mode, layout: Layout) -> Option<Layers> {
         let table = Table::from_iter([
             ("mode".to_string(), Value::try_from(mode).ok()?),
             ("layout".to_string(), Value::try_from(layout).ok()?),

@@ -1,5 +1,6 @@
 //! Layers of settings: defaults, presets, a scene file and the command line. Each layer overrides the one before.
 
+use super::look::is_look;
 use super::{Settings, TransferPoint};
 use crate::files;
 use crate::text::printable;
@@ -96,6 +97,21 @@ impl Layers {
         self.add(&format!("preset {name}"), text, None)?;
         self.given = given;
         self.presets.push(name.to_string());
+        Ok(())
+    }
+
+    /// Adds a preset of a user: the whole look of `settings` in place of the look of the layers so far. Its values count as given.
+    ///
+    /// # Errors
+    /// The settings cannot be written as TOML.
+    pub fn look(&mut self, name: &str, settings: &Settings) -> Result<(), LoadError> {
+        let fault =
+            |e: &dyn std::fmt::Display| LoadError::Layer { layer: format!("preset {name}"), fault: e.to_string() };
+        let before = self.settings().map_err(|e| fault(&e))?;
+        self.merged = Table::try_from(settings.look_over(&before)).map_err(|e| fault(&e))?;
+        let mut given = BTreeSet::new();
+        add_paths(&Table::try_from(settings).map_err(|e| fault(&e))?, "", &mut given);
+        self.given.extend(given.into_iter().filter(|path| is_look(path)));
         Ok(())
     }
 

@@ -12,6 +12,7 @@ mod echo_levels;
 mod floating;
 mod light_lattice;
 pub mod load;
+pub mod look;
 pub mod marks;
 pub mod picker;
 pub mod planes;

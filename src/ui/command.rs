@@ -106,6 +106,20 @@ pub enum Command {
     Export(usize),
     /// Ends the export in work.
     CancelExport,
+    /// Shows or hides the list of presets.
+    Presets,
+    /// Takes the n-th preset of that list: first the built-in ones, then those of the user.
+    Preset(usize),
+    /// Begins to type the name under which the present look is kept.
+    NamePreset,
+    /// Begins to type another name for the n-th preset of the user.
+    RenamePreset(usize),
+    /// Keeps the name that was typed.
+    EndNaming,
+    /// Deletes the n-th preset of the user.
+    DeletePreset(usize),
+    /// Brings the presets of the user back as they were before the last change.
+    RestorePresets,
     /// Freezes or unfreezes the live picture.
     Freeze,
     /// Steps so many volumes back (negative) or forward, and freezes.
@@ -342,6 +356,7 @@ pub const KEY_BINDINGS: &[Binding] = &[
     control(Char('s'), "save the workspace", Command::SaveWorkspace),
     control(Char('o'), "open a recording or a workspace", Command::OpenFiles),
     control(Char('e'), "export the volume", Command::Exports),
+    control(Char('p'), "presets", Command::Presets),
     // The screen.
     on(Char('h'), "this help", Command::ToggleHelp),
     on(Function(1), "this help", Command::ToggleHelp),

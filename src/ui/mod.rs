@@ -29,6 +29,7 @@ mod recovery;
 mod screen_reader;
 pub mod sliders;
 pub mod source_supervisor;
+mod thumbnails;
 mod times;
 mod view;
 mod volume_export;

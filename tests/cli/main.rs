@@ -18,6 +18,7 @@ mod one_colour;
 mod oracle;
 mod outputs;
 mod pipelines;
+mod presets;
 mod series;
 mod service;
 mod shaders;

@@ -20,6 +20,7 @@ use x11rb::rust_connection::RustConnection;
 pub const TAB: u32 = 0xff09;
 pub const ESCAPE: u32 = 0xff1b;
 pub const F1: u32 = 0xffbe;
+pub const RETURN: u32 = 0xff0d;
 pub const SHIFT: u32 = 0xffe1;
 pub const CONTROL: u32 = 0xffe3;
 pub const ALT: u32 = 0xffe9;
@@ -94,6 +95,9 @@ impl Desk {
     pub fn view_by(&self, command: &mut Command, arguments: &[&str]) -> View<'_> {
         command.args(["view", "--validate"]).args(arguments).env("DISPLAY", &self.display);
         command.env("ECHOLUME_RECENT", "none");
+        if !command.get_envs().any(|(name, _)| name == "ECHOLUME_PRESETS") {
+            command.env("ECHOLUME_PRESETS", "none");
+        }
         command.env_remove("WAYLAND_DISPLAY").stdin(Stdio::null()).stdout(Stdio::piped()).stderr(Stdio::piped());
         let mut program = command.spawn().expect("start the program");
         let window = until("a window", || {

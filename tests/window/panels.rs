@@ -34,8 +34,8 @@ fn buttons_act_on_the_picture_and_reset_takes_it_all_back() {
     let (_, size) = picture();
     let start = headless(size, &[]);
     shows(&view, &start, "the start");
-    // The second button of the first row of modes, below undo and redo.
-    view.click(155, 104);
+    // The second button of the first row of modes, below undo, redo and presets.
+    view.click(155, 151);
     shows(&view, &headless(size, &["--mode", "vr"]), "volume");
     // Reset, by its key: Backspace; undo and redo by their buttons.
     desk.tap(0xff08_u32);
@@ -114,6 +114,45 @@ fn saved_pictures_and_loops_have_names_without_patient_data() {
     let (from, middle) = (size.map(|n| n / 4), size.map(|n| n / 2));
     assert_eq!(crop(&saved, from, middle), crop(&start, from, middle), "without panels");
     measure_on_a_plane(&desk, &view, &folder);
+    view.leave();
+}
+
+/// Presets are pictures of the volume; one that is chosen shows what `render --preset` does, also one of the user's.
+#[test]
+fn presets_are_pictures_and_show_what_the_command_renders() {
+    let desk = Desk::new(false);
+    let folder = Folder::new("presets");
+    let file = folder.path("presets.toml");
+    let mut command = std::process::Command::new(PROGRAM);
+    command.env("ECHOLUME_PRESETS", &file);
+    let view = desk.view_by(&mut command, &["--size", "1000x700", "--source", SWEEP]);
+    let (_, size) = picture();
+    let start = headless(size, &[]);
+    shows(&view, &start, "the start");
+    control(&desk, 'p');
+    until("the picture of B-mode in the list", || {
+        let seen = view.look()?;
+        // The list is in the middle of the window, and B-mode the third of its second row.
+        let margin = crop(&seen, [131, 330], [4, 40])?;
+        let is_list = margin.rgba.chunks(4).all(|pixel| pixel[..3] == [18, 21, 26]);
+        let tile = crop(&seen, [640, 390], [190, 110])?;
+        let grey = tile.rgba.chunks(4).filter(|p| p[0] > 90 && p[0] == p[1] && p[1] == p[2]).count();
+        (is_list && grey > 500).then_some(())
+    });
+    desk.tap('6');
+    let plane = headless(size, &["--preset", "bmode"]);
+    shows(&view, &plane, "B-mode");
+    control(&desk, 'p');
+    desk.tap('s');
+    "mine".chars().for_each(|letter| desk.tap(letter));
+    desk.tap(RETURN);
+    until("the preset", || echolume::user_presets::read(file.as_ref()).ok().filter(|kept| kept.len() == 1));
+    desk.tap(ESCAPE);
+    control(&desk, 'z');
+    shows(&view, &start, "taken back");
+    control(&desk, 'p');
+    desk.tap('7');
+    shows(&view, &plane, "the preset of the user");
     view.leave();
 }
 

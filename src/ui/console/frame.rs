@@ -79,6 +79,7 @@ impl Console {
         }
         self.poll_opening();
         self.poll_counting();
+        self.poll_thumbnails(now);
         self.advance_cine(now);
         self.send_settings(now);
         self.run_stream(now)?;
@@ -277,6 +278,7 @@ impl Console {
             self.stall_shown_until,
             self.metrics.as_ref().map(LiveMetrics::due),
             self.warms_at(now),
+            self.thumbnails_at(now),
             silence,
             statistics,
         ]
@@ -386,6 +388,7 @@ impl Console {
             files: self.opening.shown(),
             shows_exports: self.shows_exports,
             exporting: self.exporter.exporting(),
+            presets: self.presets.shown(),
             // egui panics if a list has a negative height.
             shows_help: self.shows_help && self.size[1] as f32 > MIN_HELP_HEIGHT * self.panels.scale(),
             shows_times: self.shows_times,

@@ -255,6 +255,9 @@ impl Console {
                 _ => Some(Vec::new()),
             };
         }
+        if self.presets.is_shown() {
+            return self.key_of_presets(key, modifiers.shift);
+        }
         if self.controls.typing().is_some() {
             return Some(match key {
                 Key::Char(letter) if modifiers.shift => letter.to_uppercase().map(Command::Type).collect(),

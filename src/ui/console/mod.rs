@@ -5,11 +5,13 @@ mod frame;
 mod measuring;
 mod opening;
 mod options;
+mod presets;
 mod saving;
 
 use self::measuring::Counting;
 use self::opening::Opening;
 pub use self::options::{ConsoleOptions, OpenFile, StartupFault};
+use self::presets::Presets;
 use super::cine_player::CinePlayer;
 use super::clipboard::Clipboard;
 use super::command::{Command, HeldKeys, Tool};
@@ -165,6 +167,7 @@ pub struct Console {
     request: LoopRequest,
     /// What can be opened, and what is being opened.
     opening: Opening,
+    presets: Presets,
     clipboard: Clipboard,
     /// Counts voxels in the background.
     counting: Counting,
@@ -234,6 +237,7 @@ impl Console {
             gestures: Gestures::default(),
             keys: HeldKeys::default(),
             opening: Opening::new(options.open_file, options.recent, options.wake.clone()),
+            presets: Presets::new(options.presets, options.wake.clone()),
             clipboard: Clipboard::default(),
             counting: Counting::new(options.wake.clone()),
             surface_from: None,
@@ -332,6 +336,7 @@ impl Console {
     /// The device cannot hold what is shown.
     pub fn revive(&mut self, context: &Arc<Context>, screen: Option<Screen>) -> Result<(), StreamError> {
         self.screen = None;
+        self.presets.device_lost();
         self.context = context.clone();
         let revived = self.stream.revive(context);
         self.set_screen(screen);
@@ -597,6 +602,13 @@ impl Console {
             Command::Exports => self.shows_exports = !self.shows_exports,
             Command::Export(n) => self.export_volume(n),
             Command::CancelExport => self.exporter.cancel_export(),
+            Command::Presets => self.toggle_presets(),
+            Command::Preset(n) => self.take_preset(n, now),
+            Command::NamePreset => self.begin_naming(None),
+            Command::RenamePreset(n) => self.begin_naming(Some(n)),
+            Command::EndNaming => self.end_naming(),
+            Command::DeletePreset(n) => self.delete_preset(n),
+            Command::RestorePresets => self.restore_presets(),
             Command::Back => self.go_back(),
             // A kiosk ends only with its exit keys: a sleeve may press Escape.
             Command::Exit if self.fixed.is_kiosk => {}
@@ -639,6 +651,8 @@ impl Console {
             self.toggle_files();
         } else if self.shows_exports {
             self.shows_exports = false;
+        } else if self.leave_presets() {
+            self.needs_redraw = true;
         } else if self.help_search.is_some() {
             self.help_search = None;
         } else if self.shows_help {

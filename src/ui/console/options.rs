@@ -61,6 +61,8 @@ pub struct ConsoleOptions {
     pub open_file: Option<OpenFile>,
     /// The file with the list of recent files.
     pub recent: Option<PathBuf>,
+    /// The file with the presets of the user.
+    pub presets: Option<PathBuf>,
     /// Called when [`Console::update`] has something to do.
     pub wake: Wake,
     /// A fault that prevents the view: only its message is shown.
@@ -100,6 +102,7 @@ impl Default for ConsoleOptions {
             plays_once: false,
             open_file: None,
             recent: None,
+            presets: None,
             wake: Arc::new(|| ()),
             startup_fault: None,
             shaders: None,

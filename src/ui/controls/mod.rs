@@ -3,6 +3,7 @@
 mod cutting;
 mod history;
 mod measuring;
+mod presets;
 
 use super::command::{Command, Tool};
 use super::sliders::SLIDERS;
@@ -16,6 +17,7 @@ use crate::scene::{
 };
 pub(super) use cutting::CUTS_IN_THE_WAY;
 use history::History;
+pub(super) use presets::EXAMS;
 use std::borrow::Cow;
 
 /// The effect of a command.
@@ -231,7 +233,14 @@ impl Controls {
             | Command::OpenFile(_)
             | Command::Exports
             | Command::Export(_)
-            | Command::CancelExport => return Change::Caller(*command),
+            | Command::CancelExport
+            | Command::Presets
+            | Command::Preset(_)
+            | Command::NamePreset
+            | Command::RenamePreset(_)
+            | Command::EndNaming
+            | Command::DeletePreset(_)
+            | Command::RestorePresets => return Change::Caller(*command),
             _ => {}
         }
         if let Some(change) = self.measure(command) {

@@ -27,6 +27,8 @@ pub(in crate::ui) const FAULT: Color32 = Color32::from_rgb(240, 96, 84);
 
 /// Behind messages and times over the picture: BACKGROUND that lets a little of the picture through.
 pub(in crate::ui) const MESSAGE: Color32 = Color32::from_rgba_premultiplied(8, 9, 12, 235);
+/// A picture in its own colours.
+pub(in crate::ui) const UNCOLOURED: Color32 = Color32::WHITE;
 /// Over everything behind a question.
 pub(in crate::ui) const SHADE: Color32 = Color32::from_black_alpha(150);
 /// A bar of a pass's time, and what it is a share of.

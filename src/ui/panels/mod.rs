@@ -12,8 +12,10 @@ mod lists;
 mod measures;
 mod names;
 mod overlays;
+mod presets;
 
 use self::colours::{BACKGROUND, BUTTON, EDGE, ON_SELECTED, PANEL, SELECTED, TEXT, WEAK_TEXT};
+pub(super) use self::presets::{PresetTile, PresetsShown};
 use super::command::Command;
 use super::input::{Button, Input, Key, Modifiers, Phase};
 use crate::gpu;
@@ -65,6 +67,7 @@ pub(super) struct Panels {
     is_described: bool,
     /// The keyboard is on its way to a control: the next layout says to which.
     gets_focus: bool,
+    thumbnails: presets::Textures,
 }
 
 impl Panels {
@@ -73,7 +76,14 @@ impl Panels {
         let context = egui::Context::default();
         apply_theme(&context);
         let scale = scale.clamp(0.5, 4.0);
-        Panels { context, egui_input: EguiInput::default(), scale, is_described: false, gets_focus: false }
+        Panels {
+            context,
+            egui_input: EguiInput::default(),
+            scale,
+            is_described: false,
+            gets_focus: false,
+            thumbnails: presets::Textures::default(),
+        }
     }
 
     pub(super) fn scale(&self) -> f32 {
@@ -176,6 +186,7 @@ impl Panels {
         }
         let mut commands = Vec::new();
         self.gets_focus &= self.has_pending_input();
+        let thumbnails = self.thumbnails.of(&self.context, state.presets.as_ref());
         // egui may lay out twice, to place what it sees for the first time: the inputs are in the first.
         let output = self.context.run_ui(input, |ui| {
             let from_panels = commands.len();
@@ -210,6 +221,9 @@ impl Panels {
             }
             if state.shows_exports {
                 lists::show_exports(ui, state.exporting, execute);
+            }
+            if let Some(shown) = &state.presets {
+                presets::show(ui, shown, &thumbnails, execute);
             }
             if state.asks_to_leave {
                 // A screen reader reaches what a pointer does not.
@@ -387,6 +401,8 @@ pub(super) struct PanelState<'a> {
     /// The list of files to open, while it is shown: its title and its entries.
     pub(super) files: Option<(&'a str, &'a [String])>,
     pub(super) shows_exports: bool,
+    /// The list of presets, while it is shown.
+    pub(super) presets: Option<PresetsShown<'a>>,
     /// The name of the export in work.
     pub(super) exporting: Option<&'a str>,
     pub(super) is_frozen: bool,

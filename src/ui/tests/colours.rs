@@ -230,6 +230,15 @@ fn everything_that_is_drawn_has_the_contrast_that_wcag_demands() {
     }
     shown.open = [false; 4];
     shown.files = Some(("/data".into(), vec!["a.mha".into(), "b.toml".into()]));
+    shown.settle();
+    check(&shown, "files");
+    shown.files = None;
+    for naming in [None, Some("12 weeks".to_string())] {
+        shown.presets = Some((vec!["Profile".into(), "12 weeks, thin".into()], naming));
+        shown.settle();
+        check(&shown, "presets");
+    }
+    shown.presets = None;
     for is_fault in [true, false] {
         let (title, text) = ("No frames from the probe".to_string(), "Connection refused".to_string());
         shown.banner = Some(Banner { title, text, is_fault });

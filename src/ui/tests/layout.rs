@@ -221,7 +221,9 @@ fn dialogs_fit_into_the_window() {
     // Text at other scales has sizes between these.
     for (size, scale) in windows().filter(|(_, scale)| scale.fract() == 0.0) {
         let mut shown = Shown::sized("mode='surface'", size, scale);
-        for (n, what) in ["help", "times", "exports", "the question", "files"].into_iter().enumerate() {
+        for (n, what) in
+            ["help", "times", "exports", "the question", "files", "presets", "a name"].into_iter().enumerate()
+        {
             // The console shows no help in a lower window.
             if n == 0 && size[1] as f32 <= 200.0 * scale {
                 continue;
@@ -229,6 +231,8 @@ fn dialogs_fit_into_the_window() {
             shown.open = std::array::from_fn(|open| open == n);
             let names = (0..30).map(|n| format!("recording-{n}.mha")).collect();
             shown.files = (n == 4).then(|| ("/data".into(), names));
+            let own = (0..12).map(|n| format!("Preset of a rather long name {n}")).collect();
+            shown.presets = (n > 4).then(|| (own, (n == 6).then(|| "W".repeat(40))));
             (0..3).for_each(|_| shown.settle());
             let [window, _] = places(&shown);
             // Their frames, and their buttons as far as they are in sight.

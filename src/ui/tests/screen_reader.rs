@@ -134,7 +134,7 @@ fn the_tools_and_the_controls_in_front_are_found_by_role_and_name() {
             &["Caliper", "Angle", "Ellipse", "Trace", "Surface", "Volume", "Vol. by threshold", "Text", "Arrow"],
         ),
         ("Workspace", &["Open", "Save", "Export"]),
-        ("Modes and tools", &["Undo", "Redo"]),
+        ("Modes and tools", &["Undo", "Redo", "Presets"]),
         ("Cine loop", &["Freeze", "Play", "Save picture", "Save loop", "Reset", "Help"]),
     ] {
         names.iter().for_each(|name| _ = shown.find(group, Role::Button, name));
@@ -214,6 +214,29 @@ fn lists_and_questions_are_answered_by_a_screen_reader() {
         shown.lay_out();
         shown.check(what);
     }
+    shown.open = [false; 4];
+    shown.presets = Some((vec!["Profile".into(), "12 weeks".into()], None));
+    shown.settle();
+    shown.check("presets");
+    for (name, command) in [
+        ("Glass", Command::Preset(2)),
+        ("12 weeks", Command::Preset(7)),
+        ("Rename 12 weeks", Command::RenamePreset(1)),
+        ("Delete Profile", Command::DeletePreset(0)),
+    ] {
+        let button = shown.find("Looks", Role::Button, name);
+        assert_eq!(shown.ask(button, Action::Click, None), [command], "{name}");
+    }
+    let undo = shown.find("Presets", Role::Button, "Undo");
+    assert_eq!(shown.ask(undo, Action::Click, None), [Command::RestorePresets]);
+    shown.presets = Some((Vec::new(), Some("Pro".into())));
+    shown.settle();
+    shown.check("a name");
+    let keep = shown.find("Presets", Role::Button, "Keep");
+    assert_eq!(shown.ask(keep, Action::Click, None), [Command::EndNaming]);
+    shown.presets = None;
+    shown.open = [false, false, true, false];
+    shown.settle();
     let cancel = shown.find("Export", Role::Button, "Cancel the export");
     assert_eq!(shown.ask(cancel, Action::Click, None), [Command::CancelExport]);
     shown.open = [false, false, false, true];

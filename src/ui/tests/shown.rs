@@ -2,13 +2,16 @@
 
 use super::*;
 use crate::live::cine::CineVolume;
+use crate::picture::Picture;
 use crate::source::phantom::{Phantom, PhantomOptions};
 use crate::ui::cine_player::{CinePlayer, CineState};
+use crate::ui::controls::EXAMS;
 use crate::ui::panels::accesskit::{Action, ActionData, ActionRequest, Node, NodeId, TreeId, TreeUpdate};
 use crate::ui::panels::drawn::Drawn;
-use crate::ui::panels::{self, Banner, Note, PanelOutput, PanelState, Panels};
+use crate::ui::panels::{self, Banner, Note, PanelOutput, PanelState, Panels, PresetTile, PresetsShown};
 use crate::ui::times::Times;
 use std::collections::BTreeMap;
+use std::sync::Arc;
 
 /// The usual window.
 pub(super) const SIZE: [u32; 2] = [1280, 800];
@@ -28,6 +31,8 @@ pub(super) struct Shown {
     pub(super) banner: Option<Banner>,
     pub(super) notes: Vec<Note>,
     pub(super) files: Option<(String, Vec<String>)>,
+    /// The names of the presets of the user, while the list of presets is shown; and the name that is being typed.
+    pub(super) presets: Option<(Vec<String>, Option<String>)>,
     /// Help, times, exports, the question whether to leave.
     pub(super) open: [bool; 4],
     pub(super) pointer: Option<[f64; 2]>,
@@ -68,6 +73,7 @@ impl Shown {
             banner: None,
             notes: Vec::new(),
             files: None,
+            presets: None,
             open: [false; 4],
             pointer: None,
             tree: BTreeMap::new(),
@@ -113,6 +119,7 @@ impl Shown {
             files: self.files.as_ref().map(|(title, names)| (title.as_str(), names.as_slice())),
             shows_exports,
             exporting: Some("Surface"),
+            presets: self.presets.as_ref().map(|(own, naming)| presets(own, naming.as_deref())),
             is_frozen: self.is_frozen,
             cine: self.cine.clone(),
             has_drawn: self.has_drawn,
@@ -143,5 +150,21 @@ impl Shown {
         let commands = self.lay_out();
         self.lay_out();
         commands
+    }
+}
+
+/// The list of presets as the console shows it, with pictures of some.
+fn presets<'a>(own: &'a [String], naming: Option<&'a str>) -> PresetsShown<'a> {
+    let picture = || Some(Arc::new(Picture { width: 2, height: 1, rgba: vec![90, 60, 40, 255, 10, 10, 10, 255] }));
+    let built_in =
+        EXAMS.iter().map(|exam| PresetTile { name: exam.title, hint: exam.hint, picture: picture(), own: None });
+    let own =
+        own.iter().enumerate().map(|(n, name)| PresetTile { name, hint: "Your own.", picture: None, own: Some(n) });
+    PresetsShown {
+        tiles: built_in.chain(own).collect(),
+        can_save: true,
+        fault: Some("/home/a/.config/echolume/presets.toml: line 3: damaged"),
+        naming: naming.map(|text| (text, false)),
+        can_restore: true,
     }
 }

@@ -7,6 +7,7 @@ mod idle;
 mod keyboard;
 mod metrics;
 mod monkey;
+mod presets;
 mod shaders;
 mod tasks;
 mod warming;
@@ -69,6 +70,7 @@ pub fn options() -> ConsoleOptions {
         plays_once: false,
         open_file: None,
         recent: None,
+        presets: None,
         startup_fault: None,
         shaders: None,
         warms: false,

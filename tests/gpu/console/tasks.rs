@@ -48,6 +48,8 @@ const TASKS: &[(&str, Perform)] = &[
     ("the volume for 3D Slicer", |user| export(user, '1', "Volume, NRRD")),
     ("go on tomorrow", tomorrow),
     ("another recording", another),
+    ("the look of bone", bone),
+    ("keep a look for the next patient", kept_look),
     ("the planes through a point", point),
     ("the planes back to the middle", middle),
     ("why is there no picture", no_picture),
@@ -130,6 +132,7 @@ impl User {
                 Ok(())
             })),
             recent: Some(folder.0.join("recent")),
+            presets: Some(folder.0.join("presets.toml")),
             ..ball_options(&folder)
         };
         let console = Console::new(device, source(ball), options, WINDOW);
@@ -529,6 +532,28 @@ fn largest_part(met: &[Option<Label>], width: usize, label: Label) -> Vec<bool> 
 }
 
 /// At another console, of the fetal head, from the front: by the phantom's labels the cord is gone from the picture, and the rest is as before.
+fn bone(user: &mut User) -> String {
+    user.control('p');
+    user.letter('5');
+    let settings = user.console.controls().settings();
+    assert_eq!((settings.surface.threshold, settings.distance.median), (0.08, 15), "those of preset bone");
+    user.count()
+}
+
+fn kept_look(user: &mut User) -> String {
+    user.console.execute(&Command::Mode(Mode::Mip), Instant::now());
+    user.settle();
+    user.control('p');
+    user.letter('s');
+    user.types("thin");
+    user.key(Key::Enter);
+    let kept = echolume::user_presets::read(&user.folder.0.join("presets.toml")).expect("presets");
+    assert_eq!((kept[0].name.as_str(), kept[0].look().expect("a look").mode), ("thin", Mode::Mip));
+    let actions = user.count();
+    user.press(Modifiers::default(), Key::Escape);
+    actions
+}
+
 fn cord(user: &mut User) -> String {
     let phantom = head();
     let mut layers = Layers::default();

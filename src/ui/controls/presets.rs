@@ -1,0 +1,81 @@
+//! Presets over the present settings: the look changes, and the region, the view, cuts and measurements stay.
+
+use super::{Change, Controls, drawable};
+use crate::scene::load::Layers;
+use crate::scene::{Layout, Scene, Settings};
+use crate::ui::command::Command;
+
+/// A built-in preset in the list of the view.
+pub(in crate::ui) struct Exam {
+    pub(in crate::ui) title: &'static str,
+    pub(in crate::ui) hint: &'static str,
+    preset: &'static str,
+    /// Region and camera are made for the head of the phantom.
+    is_framed: bool,
+}
+
+const fn exam(title: &'static str, preset: &'static str, is_framed: bool, hint: &'static str) -> Exam {
+    Exam { title, hint, preset, is_framed }
+}
+
+/// The built-in presets of the list.
+pub(in crate::ui) const EXAMS: [Exam; 6] = [
+    exam("Face", "face", true, "Skin in fluid, under light that goes into it."),
+    exam("Skeleton", "skeleton", true, "What reflects the most shines through a thin veil of soft tissue."),
+    exam("Glass", "glass", true, "Only the edges of tissue shine: everything can be seen through."),
+    exam("Vessels", "vessel", true, "Inverted: fluid is opaque, tissue is clear."),
+    exam("Bone", "bone", false, "A bright surface under soft tissue."),
+    exam("B-mode", "bmode", false, "The scan plane in grey."),
+];
+
+/// The base of what the phantom is drawn with.
+const PHANTOM: &str = "face-classic";
+
+impl Controls {
+    /// The settings after a built-in preset. Of the phantom, for which most of them are framed, region and camera change too.
+    pub(in crate::ui) fn with_exam(&self, n: usize, scene: &Scene, is_phantom: bool) -> Option<Settings> {
+        let exam = EXAMS.get(n)?;
+        let mut layers = Layers::default();
+        if is_phantom {
+            layers.preset(PHANTOM).ok()?;
+        }
+        layers.preset(exam.preset).ok()?;
+        let mode = layers.clone().finish().ok()?.mode;
+        let is_four = self.settings.layout == Layout::Four && !mode.is_flat();
+        let layers = layers.in_mode(mode, if is_four { Layout::Four } else { Layout::Single })?;
+        let look = layers.completed(&scene.geometry, None).ok()?.settings;
+        let mut settings = look.look_over(&self.in_mode_of_look(&look));
+        if is_phantom && exam.is_framed {
+            (settings.region, settings.camera) = (look.region, look.camera);
+        }
+        self.drawn_by(settings, scene)
+    }
+
+    /// The settings after a preset of the user.
+    pub(in crate::ui) fn with_look(&self, look: &Settings, scene: &Scene) -> Option<Settings> {
+        self.drawn_by(look.look_over(&self.in_mode_of_look(look)), scene)
+    }
+
+    /// The present settings in the mode of a look, with what follows from it.
+    fn in_mode_of_look(&self, look: &Settings) -> Settings {
+        self.switched(Settings { mode: look.mode, layout: look.layout, ..self.settings.clone() })
+    }
+
+    fn drawn_by(&self, settings: Settings, scene: &Scene) -> Option<Settings> {
+        drawable(self.current(scene)?.as_ref(), settings)
+    }
+
+    /// Takes the settings of a preset, as one step for undo.
+    pub(in crate::ui) fn take(&mut self, settings: Settings, command: &Command) -> Change {
+        if settings == self.settings {
+            return Change::Nothing;
+        }
+        if !settings.mode.is_flat() {
+            self.rendered = settings.mode;
+        }
+        let before = std::mem::replace(&mut self.settings, settings);
+        self.history.seal();
+        self.history.record(before, command);
+        Change::Settings
+    }
+}

@@ -1,0 +1,216 @@
+//! The list of presets: a tile with a small picture of the present volume for each, and what saves, renames and deletes those of the user.
+
+use super::colours::{ACCENT, BACKGROUND, BUTTON, EDGE, FAULT, PANEL, TEXT, UNCOLOURED, WEAK_TEXT};
+use super::names::{self, Tell};
+use super::overlays::{LOW_WINDOW, first};
+use super::{SMALL_TEXT, TEXT_SIZE, TOUCH_SIZE};
+use crate::picture::Picture;
+use crate::ui::command::Command;
+use egui::accesskit::Role;
+use egui::{
+    Align2, Area, Button, ColorImage, Context, FontId, Frame, Id, Label, Margin, Order, Pos2, Rect, RichText,
+    ScrollArea, Sense, Stroke, StrokeKind, TextureHandle, TextureId, TextureOptions, Ui, WidgetInfo, WidgetType, pos2,
+    vec2,
+};
+use std::sync::Arc;
+
+/// The list while it is shown.
+pub(in crate::ui) struct PresetsShown<'a> {
+    pub(in crate::ui) tiles: Vec<PresetTile<'a>>,
+    /// The user has presets.
+    pub(in crate::ui) can_save: bool,
+    /// Why those of the user cannot be read.
+    pub(in crate::ui) fault: Option<&'a str>,
+    /// The name that is being typed, and whether a preset is renamed.
+    pub(in crate::ui) naming: Option<(&'a str, bool)>,
+    pub(in crate::ui) can_restore: bool,
+}
+
+/// A preset of the list.
+pub(in crate::ui) struct PresetTile<'a> {
+    pub(in crate::ui) name: &'a str,
+    pub(in crate::ui) hint: &'a str,
+    pub(in crate::ui) picture: Option<Arc<Picture>>,
+    /// Its number among those of the user.
+    pub(in crate::ui) own: Option<usize>,
+}
+
+/// Width of a tile where there is room, points; and width over height of its picture.
+const TILE: f32 = 170.0;
+const SHAPE: f32 = 1.6;
+const GAP: f32 = 8.0;
+/// Height of the name below the picture.
+const NAME: f32 = 26.0;
+/// Height of the buttons below a preset of the user.
+const BUTTONS: f32 = 36.0;
+const TITLE: &str = "Presets";
+
+/// The textures of the thumbnails.
+#[derive(Default)]
+pub(super) struct Textures(Vec<(Arc<Picture>, TextureHandle)>);
+
+impl Textures {
+    /// The texture of each tile that has a picture. Those of other pictures are given back.
+    pub(super) fn of(&mut self, context: &Context, shown: Option<&PresetsShown>) -> Vec<Option<TextureId>> {
+        let tiles = shown.map_or(&[][..], |shown| &shown.tiles);
+        let is_shown = |picture: &Arc<Picture>| {
+            tiles.iter().any(|tile| tile.picture.as_ref().is_some_and(|other| Arc::ptr_eq(picture, other)))
+        };
+        self.0.retain(|(picture, _)| is_shown(picture));
+        let mut texture = |picture: &Arc<Picture>| {
+            if let Some((_, texture)) = self.0.iter().find(|(known, _)| Arc::ptr_eq(known, picture)) {
+                return texture.id();
+            }
+            let size = [picture.width as usize, picture.height as usize];
+            let image = ColorImage::from_rgba_unmultiplied(size, &picture.rgba);
+            let texture = context.load_texture("thumbnail", image, TextureOptions::LINEAR);
+            let id = texture.id();
+            self.0.push((picture.clone(), texture));
+            id
+        };
+        tiles.iter().map(|tile| tile.picture.as_ref().map(&mut texture)).collect()
+    }
+}
+
+pub(super) fn show(ui: &Ui, shown: &PresetsShown, textures: &[Option<TextureId>], execute: &mut dyn FnMut(Command)) {
+    let screen = ui.ctx().content_rect();
+    let area = Area::new(Id::new(TITLE)).order(Order::Foreground).anchor(Align2::CENTER_CENTER, vec2(0.0, 0.0));
+    area.show(ui.ctx(), |ui| {
+        names::name(ui, Role::Dialog, TITLE);
+        let is_low = screen.height() < LOW_WINDOW;
+        let margin = if is_low { 6 } else { 12 };
+        let frame = Frame::new().fill(PANEL).inner_margin(Margin::same(margin)).corner_radius(10);
+        frame.stroke(Stroke::new(2.0, ACCENT)).show(ui, |ui| {
+            let width = (screen.width() - 2.0 * f32::from(margin) - 12.0).clamp(120.0, 720.0);
+            ui.set_width(width);
+            // In a low window all of it scrolls.
+            if !is_low {
+                header(ui, shown, execute);
+            }
+            let height = (screen.height() - ui.min_rect().height() - 2.0 * f32::from(margin) - 24.0).max(30.0);
+            // The area takes its place from its size of the layout before, which tells nothing of the room that there is.
+            ScrollArea::vertical().max_height(height).min_scrolled_height(height).show(ui, |ui| {
+                if is_low {
+                    header(ui, shown, execute);
+                }
+                names::list(ui, "Looks", |ui| tiles(ui, shown, textures, width - 20.0, execute));
+            });
+        });
+    });
+}
+
+fn header(ui: &mut Ui, shown: &PresetsShown, execute: &mut dyn FnMut(Command)) {
+    title(ui, shown, execute);
+    if let Some(fault) = shown.fault {
+        ui.add(Label::new(RichText::new(fault).size(SMALL_TEXT).color(FAULT)).truncate()).on_hover_text(fault);
+    }
+}
+
+/// The title, and what closes the list and saves a preset; or the name that is being typed.
+fn title(ui: &mut Ui, shown: &PresetsShown, execute: &mut dyn FnMut(Command)) {
+    ui.horizontal_wrapped(|ui| {
+        if let Some((text, is_rename)) = shown.naming {
+            let about = if is_rename { "New name" } else { "Name" };
+            let typed = ui.add(Label::new(RichText::new(format!("{about}: {text}_")).size(TEXT_SIZE)).wrap());
+            typed.named(about).with_value(text);
+            let hint = "Keeps the look under this name: mode, filters, colours and light, without region and view.";
+            if ui.add(first(RichText::new("Keep  (Enter)"))).tell(hint).named("Keep").clicked() {
+                execute(Command::EndNaming);
+            }
+            if ui.button("Cancel  (Esc)").tell("Keeps no name.").named("Cancel").clicked() {
+                execute(Command::Back);
+            }
+            return;
+        }
+        ui.heading(TITLE);
+        if shown.can_save {
+            let hint =
+                "Keeps the present look under a name: mode, filters, colours and light, without region and view.";
+            if ui.button("Save present look  (S)").tell(hint).named("Save present look").clicked() {
+                execute(Command::NamePreset);
+            }
+        }
+        if shown.can_restore {
+            let hint = "Brings your presets back as they were before the last change.";
+            if ui.button("Undo  (Z)").tell(hint).named("Undo").clicked() {
+                execute(Command::RestorePresets);
+            }
+        }
+        if ui.button("Close  (Esc)").tell("Changes nothing.").named("Close").clicked() {
+            execute(Command::Presets);
+        }
+    });
+}
+
+fn tiles(
+    ui: &mut Ui,
+    shown: &PresetsShown,
+    textures: &[Option<TextureId>],
+    width: f32,
+    execute: &mut dyn FnMut(Command),
+) {
+    let columns = ((width + GAP) / (TILE + GAP)).floor().clamp(1.0, 3.0) as usize;
+    let each = (width - GAP * (columns - 1) as f32) / columns as f32;
+    ui.spacing_mut().item_spacing = vec2(GAP, GAP);
+    let all: Vec<(usize, &PresetTile)> = shown.tiles.iter().enumerate().collect();
+    for row in all.chunks(columns) {
+        ui.horizontal_top(|ui| {
+            for (n, tile) in row {
+                ui.vertical(|ui| {
+                    ui.set_width(each);
+                    if button(ui, *n, tile, textures.get(*n).copied().flatten(), each) {
+                        execute(Command::Preset(*n));
+                    }
+                    if let Some(own) = tile.own {
+                        own_buttons(ui, own, tile.name, each, execute);
+                    }
+                });
+            }
+        });
+    }
+}
+
+/// A picture with a name. True if it was clicked.
+fn button(ui: &mut Ui, n: usize, tile: &PresetTile, texture: Option<TextureId>, width: f32) -> bool {
+    let edge = 4.0;
+    let picture = vec2(width - 2.0 * edge, (width - 2.0 * edge) / SHAPE);
+    let (area, response) = ui.allocate_exact_size(vec2(width, picture.y + NAME + 2.0 * edge), Sense::CLICK);
+    response.widget_info(|| WidgetInfo::labeled(WidgetType::Button, true, tile.name));
+    let painter = ui.painter();
+    let stroke = Stroke::new(if response.hovered() { 2.0 } else { 1.0 }, if response.hovered() { TEXT } else { EDGE });
+    painter.rect(area, 6.0, BUTTON, stroke, StrokeKind::Inside);
+    let inside = Rect::from_min_size(area.min + vec2(edge, edge), picture);
+    match texture {
+        Some(texture) => {
+            let whole = Rect::from_min_max(Pos2::ZERO, pos2(1.0, 1.0));
+            painter.image(texture, inside, whole, UNCOLOURED);
+        }
+        None => _ = painter.rect_filled(inside, 2.0, BACKGROUND),
+    }
+    let key = if n < 9 { format!("{}  ", n + 1) } else { String::new() };
+    let font = FontId::proportional(TEXT_SIZE - 2.0);
+    let mut job = egui::text::LayoutJob::default();
+    job.append(&key, 0.0, egui::TextFormat::simple(font.clone(), WEAK_TEXT));
+    job.append(tile.name, 0.0, egui::TextFormat::simple(font, TEXT));
+    job.wrap = egui::text::TextWrapping::truncate_at_width(width - 4.0 * edge);
+    let galley = painter.layout_job(job);
+    let at = pos2(area.left() + 2.0 * edge, inside.bottom() + (NAME + edge - galley.size().y) / 2.0);
+    painter.galley(at, galley, TEXT);
+    response.tell(tile.hint).named(tile.name).clicked()
+}
+
+/// What renames and deletes a preset of the user.
+fn own_buttons(ui: &mut Ui, own: usize, name: &str, width: f32, execute: &mut dyn FnMut(Command)) {
+    let size = vec2((width - GAP) / 2.0, BUTTONS.min(TOUCH_SIZE * 0.7));
+    ui.horizontal(|ui| {
+        for (command, label, hint) in [
+            (Command::RenamePreset(own), "Rename", "Gives this preset another name."),
+            (Command::DeletePreset(own), "Delete", "Deletes this preset; Undo above brings it back."),
+        ] {
+            let text = RichText::new(label).size(SMALL_TEXT);
+            if ui.add(Button::new(text).min_size(size)).tell(hint).named(&format!("{label} {name}")).clicked() {
+                execute(command);
+            }
+        }
+    });
+}

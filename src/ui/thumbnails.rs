@@ -1,0 +1,246 @@
+//! Small pictures of the present volume, one for each preset of the list, made beside the view by a renderer of their own. They are made of a
+//! coarse copy of the volume, and each one waits for the view to rest. Without the list there is neither copy nor renderer.
+
+use crate::gpu::{Context, Renderer, RendererOptions, Wake};
+use crate::picture::Picture;
+use crate::probe::Geometry;
+use crate::scene::{
+    Bilateral, Conditioning, Distance, Input, Layout, LightVolume, Marks, Post, Ray, Scene, Settings, Slices,
+};
+use crate::source::Frame;
+use crate::source::coarse::coarse;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::mpsc::{Receiver, Sender, TryRecvError, channel};
+use std::thread::JoinHandle;
+use std::time::{Duration, Instant};
+
+/// Width and height, pixels.
+pub(super) const SIZE: [u32; 2] = [256, 160];
+/// Longest edge of a slice, pixels.
+const SLICE: u32 = 128;
+/// Least distance of the samples of a ray, mm.
+const STEP: f64 = 0.6;
+/// Least edge of a cell of light, mm.
+const CELL: f64 = 1.6;
+/// Longest that a picture waits for the view to rest.
+const PATIENCE: Duration = Duration::from_secs(1);
+const POLL: Duration = Duration::from_millis(10);
+
+/// What pictures are made of.
+pub(super) struct Job {
+    pub(super) context: Arc<Context>,
+    pub(super) geometry: Geometry,
+    pub(super) input: Input,
+    pub(super) frames: Vec<Arc<Frame>>,
+    /// One for each picture; none where there is nothing to draw.
+    pub(super) settings: Vec<Option<Settings>>,
+}
+
+/// The pictures, and the thread that makes them.
+pub(super) struct Thumbnails {
+    wake: Wake,
+    pictures: Vec<Option<Arc<Picture>>>,
+    work: Option<Work>,
+    /// Threads that were told to stop.
+    ending: Vec<JoinHandle<()>>,
+}
+
+struct Work {
+    made: Receiver<(usize, Option<Picture>)>,
+    orders: Arc<Orders>,
+    thread: JoinHandle<()>,
+}
+
+/// What the thread is told while it works.
+#[derive(Default)]
+struct Orders {
+    must_stop: AtomicBool,
+    /// The view rests.
+    may_draw: AtomicBool,
+}
+
+impl Thumbnails {
+    pub(super) fn new(wake: Wake) -> Thumbnails {
+        Thumbnails { wake, pictures: Vec::new(), work: None, ending: Vec::new() }
+    }
+
+    /// The pictures that are made so far; earlier ones stay until they are made again.
+    pub(super) fn pictures(&self) -> &[Option<Arc<Picture>>] {
+        &self.pictures
+    }
+
+    pub(super) fn is_working(&self) -> bool {
+        self.work.is_some()
+    }
+
+    /// Begins to make pictures in place of those that are being made.
+    pub(super) fn begin(&mut self, job: Job) {
+        self.stop();
+        self.pictures.resize(job.settings.len(), None);
+        let (sender, made) = channel();
+        let orders = Arc::new(Orders::default());
+        let (heard, wake) = (orders.clone(), self.wake.clone());
+        let work = move || job.draw(&heard, &sender, &wake);
+        match std::thread::Builder::new().name("thumbnails".into()).spawn(work) {
+            Ok(thread) => self.work = Some(Work { made, orders, thread }),
+            Err(e) => tracing::debug!("no thumbnails are made: {e}"),
+        }
+    }
+
+    /// Takes what was made. `may_draw`: the view rests. True if there is another picture.
+    pub(super) fn poll(&mut self, may_draw: bool) -> bool {
+        self.ending.retain(|thread| !thread.is_finished());
+        let Some(work) = &self.work else { return false };
+        work.orders.may_draw.store(may_draw, Ordering::Relaxed);
+        let mut is_new = false;
+        loop {
+            match work.made.try_recv() {
+                Ok((n, picture)) => {
+                    is_new = true;
+                    if let Some(place) = self.pictures.get_mut(n) {
+                        *place = picture.map(Arc::new);
+                    }
+                }
+                Err(TryRecvError::Empty) => return is_new,
+                Err(TryRecvError::Disconnected) => {
+                    self.stop();
+                    return true;
+                }
+            }
+        }
+    }
+
+    /// Moves the picture of a preset that was deleted out of the list.
+    pub(super) fn remove(&mut self, n: usize) {
+        if n < self.pictures.len() {
+            self.pictures.remove(n);
+        }
+    }
+
+    /// Tells the thread to stop, without waiting for it.
+    pub(super) fn stop(&mut self) {
+        if let Some(work) = self.work.take() {
+            work.orders.must_stop.store(true, Ordering::Relaxed);
+            self.ending.push(work.thread);
+        }
+    }
+
+    /// Stops, and forgets the pictures.
+    pub(super) fn clear(&mut self) {
+        self.stop();
+        self.pictures.clear();
+    }
+}
+
+impl Drop for Thumbnails {
+    fn drop(&mut self) {
+        self.stop();
+        // The device must not go while one of them uses it.
+        self.ending.drain(..).for_each(|thread| drop(thread.join()));
+    }
+}
+
+impl Job {
+    fn draw(self, orders: &Orders, made: &Sender<(usize, Option<Picture>)>, wake: &Wake) {
+        let Some((geometry, frames)) = coarse(&self.geometry, self.input.stored, &self.frames) else { return };
+        let mut renderer = None;
+        for (n, settings) in self.settings.iter().enumerate() {
+            let since = Instant::now();
+            while !orders.may_draw.load(Ordering::Relaxed) && since.elapsed() < PATIENCE {
+                if orders.must_stop.load(Ordering::Relaxed) {
+                    return;
+                }
+                std::thread::sleep(POLL);
+            }
+            if orders.must_stop.load(Ordering::Relaxed) {
+                return;
+            }
+            let scene = settings.as_ref().and_then(|s| Scene::new(geometry.clone(), self.input, thumbnail(s)).ok());
+            let picture = scene.and_then(|scene| drawn(&self.context, &mut renderer, scene, &frames));
+            if made.send((n, picture)).is_err() {
+                return;
+            }
+            wake();
+        }
+    }
+}
+
+/// A picture of the frames; none if the device does not make one.
+fn drawn(context: &Arc<Context>, renderer: &mut Option<Renderer>, scene: Scene, frames: &[Frame]) -> Option<Picture> {
+    let draw = || {
+        let mut there = match renderer.take() {
+            Some(mut there) => {
+                there.change(scene)?;
+                there
+            }
+            None => Renderer::new(context, scene, &RendererOptions::default())?,
+        };
+        for frame in frames {
+            there.frame(frame.slice as u32, &frame.bytes, 0)?;
+        }
+        there.show(0)?;
+        let picture = there.picture()?;
+        *renderer = Some(there);
+        Ok::<_, crate::gpu::GpuError>(picture)
+    };
+    draw().map_err(|fault| tracing::debug!("no thumbnail: {fault}")).ok()
+}
+
+/// Settings of a small picture that looks like the large one: filters in pixels are smaller, and what a coarse volume has no use for is left out.
+fn thumbnail(settings: &Settings) -> Settings {
+    let of = settings.clone();
+    let volume = of.light.volume.map(|volume| LightVolume { cell: volume.cell.max(CELL), ..volume });
+    let has_distance = of.distance.median > 0 || of.distance.median_mm.is_some() || of.distance.bilateral.is_some();
+    let bilateral = Bilateral { pixels: 1.5, mm: None, distance: 3.0, repeat: 1 };
+    Settings {
+        layout: if of.layout == Layout::Pair { Layout::Pair } else { Layout::Single },
+        floating: 0.0,
+        picture: crate::scene::settings::Picture { size: SIZE },
+        conditioning: Conditioning { low_pass: None, low_pass_mm: None, samples: None, ..of.conditioning },
+        slices: Slices { pixels: SLICE.min(of.slices.pixels), smooth: of.slices.smooth, ..Slices::default() },
+        ray: Ray {
+            step: Some(of.ray.step.unwrap_or(STEP).max(STEP)),
+            samples_per_voxel: None,
+            half: false,
+            quarter: false,
+            rays: 1,
+            sliding: 0,
+            ..of.ray
+        },
+        distance: match has_distance {
+            true => Distance { median: 3, bilateral: Some(bilateral), ..Distance::default() },
+            false => Distance::default(),
+        },
+        light: crate::scene::Light { volume, ..of.light },
+        planes: crate::scene::Planes { lines: false, reference: false, smooth: None, ..of.planes },
+        post: Post { sigma: None, enhanced_sigma: None, perona_malik: None, ..of.post },
+        marks: Marks::default(),
+        measure: Vec::new(),
+        ..of
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::probe::Geometry;
+    use crate::scene::load::{Layers, PRESETS};
+    use crate::source::StoredType;
+    use crate::source::phantom::{Phantom, PhantomOptions};
+
+    /// Prevents a preset whose thumbnail is refused, or as large as the picture itself.
+    #[test]
+    fn a_thumbnail_of_every_preset_is_a_small_scene() {
+        let phantom = Phantom::new(PhantomOptions::default()).expect("a phantom");
+        let geometry = Geometry::Sweep(phantom.probe(0).clone());
+        let input = Input { stored: StoredType::U8, range: [0.0, 255.0] };
+        for (name, _) in PRESETS {
+            let mut layers = Layers::default();
+            layers.preset(name).expect("preset");
+            let settings = thumbnail(&layers.finish().expect("settings"));
+            let scene = Scene::new(geometry.clone(), input, settings).unwrap_or_else(|e| panic!("{name}: {e}"));
+            assert_eq!(scene.picture_size(), SIZE, "{name}");
+        }
+    }
+}
