@@ -29,6 +29,8 @@ pub enum Command {
     MoveLight([f64; 2]),
     /// Moves a face of the region outwards, mm.
     MoveFace(Face, f64),
+    /// Moves the region: lateral, depth, elevation, mm.
+    MoveRegion([f64; 3]),
     /// Moves the viewer's clip plane further into the volume, mm; negative values pull it back.
     MoveClip(f64),
     /// Selects the plane that is shown alone, stepped and moved.
@@ -190,6 +192,7 @@ impl Command {
                 | Command::Pan(_)
                 | Command::MoveLight(_)
                 | Command::MoveFace(..)
+                | Command::MoveRegion(_)
                 | Command::MoveClip(_)
                 | Command::StepPlane(_)
                 | Command::MoveCrossing(_)

@@ -4,6 +4,7 @@
 use super::command::{Command, Face, Tool};
 use super::input::{Button, Input, Modifiers, Phase};
 use super::picking::{Pane, Picker, Viewport, closest_along};
+use super::region_box::{self, Part};
 use super::sliders::PLANES_ZOOM;
 use super::view;
 use crate::scene::{Layout, MeasureKind, Mode, PlaneName};
@@ -272,6 +273,17 @@ enum Drag {
     Clip,
     /// A face of the region.
     Face(Face),
+    /// A face of the region, by its line on a tile of planes.
+    FaceOnPlane {
+        tile: usize,
+        face: Face,
+    },
+    /// The region, from where it was grabbed on a tile, and how far it moved, mm.
+    Region {
+        tile: usize,
+        from: DVec3,
+        moved: DVec3,
+    },
     RotatePlanes,
     /// The point where three planes cross, dragged on one of their tiles. It is grabbed where it is: `way` from the pointer; `along`: only
     /// along the normal of the plane whose line was grabbed.
@@ -280,8 +292,8 @@ enum Drag {
         way: DVec3,
         along: Option<DVec3>,
     },
-    /// A stack of planes.
-    Step,
+    /// The plane of a tile, or a stack of planes.
+    Step(usize),
     /// A point of a measurement on a tile: index of the measurement, index of the point.
     Point {
         tile: usize,
@@ -342,7 +354,20 @@ impl Press {
                 }
             }
             (Pane::Rendering, Tool::Measure(_)) => Drag::Rotate,
+            // What the wheel does.
+            (Pane::Plane(tile), _) if button != Button::Left => Drag::Step(tile),
             (Pane::Plane(_), _) if !is_plain => Drag::Nothing,
+            (Pane::Plane(tile), Tool::Region) => {
+                let reach = [GRAB_LINE, GRAB].map(|reach| reach * viewport.scale());
+                match region_box::part_at(scene, tile, pixel, reach) {
+                    Some(Part::Face(face)) => Drag::FaceOnPlane { tile, face },
+                    Some(Part::Inside) => {
+                        let from = viewport.point_on_plane(tile, at)?;
+                        Drag::Region { tile, from, moved: DVec3::ZERO }
+                    }
+                    None => Drag::Nothing,
+                }
+            }
             (Pane::Plane(tile), Tool::Measure(kind)) => match (viewport.measure_point_at(tile, at, GRAB), kind) {
                 (Some((index, point)), _) => Drag::Point { tile, index, point },
                 (None, MeasureKind::Trace | MeasureKind::Volume) => Drag::Trace(tile),
@@ -356,12 +381,15 @@ impl Press {
                     (Some((way, along)), _) => Drag::Crossing { tile, way, along },
                     (None, Tool::Rotate) => Drag::RotatePlanes,
                     (None, _) if scene.shows_three() => Drag::Crossing { tile, way: DVec3::ZERO, along: None },
-                    (None, _) => Drag::Step,
+                    (None, _) => Drag::Step(tile),
                 }
             }
             (Pane::Plane(_), _) => Drag::Nothing,
         };
-        let travel = if let Drag::Face(face) = drag { view::face_travel(scene, face) } else { [0.0; 2] };
+        let travel = match drag {
+            Drag::Face(face) | Drag::FaceOnPlane { face, .. } => view::face_travel(scene, face),
+            _ => [0.0; 2],
+        };
         let slop = if is_plain { slop } else { 0.0 };
         Some(Press {
             drag,
@@ -426,6 +454,14 @@ impl Press {
         }
     }
 
+    /// How far a face moves that is dragged to a position along its axis, mm; none if it stays. It moves from where it was grabbed: beyond its range
+    /// it waits for the pointer to come back.
+    fn face_moved(&mut self, position: f64) -> Option<f64> {
+        let moved = (position - self.grabbed?).clamp(self.travel[0], self.travel[1]);
+        let by = moved - std::mem::replace(&mut self.moved_mm, moved);
+        (by != 0.0).then_some(by)
+    }
+
     /// A pixel of the picture on the half of a pair that shows the surface.
     fn to_surface(&self, [x, y]: [f64; 2]) -> [f64; 2] {
         [x + self.columns_to_surface, y]
@@ -448,7 +484,16 @@ impl Press {
             Drag::RotatePlanes => Command::RotatePlanes(degrees(-x, -y)),
             // Dragging up moves away from the viewer, further into the volume.
             Drag::Clip => Command::MoveClip(-y * viewport.scale() * Picker::of(scene).mm_per_pixel()),
-            Drag::Step => Command::StepPlane(-y * viewport.scale() * scene.sheet().pixel),
+            Drag::Step(tile) => {
+                match viewport.plane_name(tile).filter(|name| *name != scene.settings.planes.plane) {
+                    // It is moved when it is the one that is moved.
+                    Some(name) => {
+                        self.last = from;
+                        Command::Plane(name)
+                    }
+                    None => Command::StepPlane(-y * viewport.scale() * scene.sheet().pixel),
+                }
+            }
             Drag::Crossing { tile, way, along } => {
                 let to = viewport.point_on_plane(tile, to)? + way;
                 let common = scene.plane(PlaneName::A).at;
@@ -456,6 +501,23 @@ impl Press {
                 Command::MoveCrossing(view::below_face(scene, to).to_array())
             }
             Drag::Point { tile, index, point } => Command::MovePoint(index, point, point_on(viewport, tile, to)?),
+            Drag::FaceOnPlane { tile, face } => {
+                let position = |at| Some(region_box::along(face, viewport.point_on_plane(tile, at)?));
+                if self.grabbed.is_none() {
+                    self.grabbed = position(from);
+                }
+                Command::MoveFace(face, self.face_moved(position(to)?)?)
+            }
+            Drag::Region { tile, from, ref mut moved } => {
+                let [least, most] = view::region_travel(scene);
+                let wanted = viewport.point_on_plane(tile, to)? - from - *moved;
+                let by = wanted.clamp(least, most);
+                *moved += by;
+                if by == DVec3::ZERO {
+                    return None;
+                }
+                Command::MoveRegion(by.to_array())
+            }
             Drag::Caliper { .. } => return None,
             Drag::Cut => Command::CutAlong(pixel),
             Drag::Trace(tile) => Command::Point(point_on(viewport, tile, to)?, false),
@@ -467,13 +529,7 @@ impl Press {
                 if self.grabbed.is_none() {
                     self.grabbed = position(self.to_surface(viewport.pixel_at(from)?.1));
                 }
-                // Relative to where the face was grabbed: beyond its range the face waits for the pointer to come back.
-                let moved = (position(pixel)? - self.grabbed?).clamp(self.travel[0], self.travel[1]);
-                let by = moved - std::mem::replace(&mut self.moved_mm, moved);
-                if by == 0.0 {
-                    return None;
-                }
-                Command::MoveFace(face, by)
+                Command::MoveFace(face, self.face_moved(position(pixel)?)?)
             }
         };
         Some(command)

@@ -95,7 +95,9 @@ pub(super) fn of_tool(tool: Tool) -> &'static str {
     match tool {
         Tool::Rotate => "Drag turns the view.",
         Tool::Light => "Drag moves the lamp.",
-        Tool::Region => "Drag moves the nearest face of the region.",
+        Tool::Region => {
+            "Drag moves the nearest face of the region; on the planes of 4-up a side of its box, or all of it. (G)"
+        }
         Tool::Clip => "Drag up cuts away what is nearer to you.",
         Tool::Cut => "Drag round what is in the way: it is cut away along the view. (F)",
         Tool::Plane => "Drag or click moves the planes.",

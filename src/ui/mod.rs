@@ -26,6 +26,7 @@ mod open_list;
 pub mod panels;
 mod picking;
 mod recovery;
+mod region_box;
 mod screen_reader;
 pub mod sliders;
 pub mod source_supervisor;

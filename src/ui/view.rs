@@ -204,7 +204,7 @@ pub struct Face {
     pub high: bool,
 }
 
-const FACES: [Face; 6] = [
+pub(super) const FACES: [Face; 6] = [
     Face { axis: 0, high: false },
     Face { axis: 0, high: true },
     Face { axis: 1, high: false },
@@ -214,7 +214,7 @@ const FACES: [Face; 6] = [
 ];
 
 /// The outward normal of a face.
-fn outwards(face: Face) -> DVec3 {
+pub(super) fn outwards(face: Face) -> DVec3 {
     DVec3::AXES[face.axis] * if face.high { 1.0 } else { -1.0 }
 }
 
@@ -253,20 +253,50 @@ pub(super) fn move_face(scene: &Scene, face: Face, by: f64) -> Settings {
     settings
 }
 
+/// How far the region can move along each axis, mm: backwards (at most 0) and forwards (at least 0).
+pub(super) fn region_travel(scene: &Scene) -> [DVec3; 2] {
+    let (low, high) = insonified_box(&scene.geometry);
+    [(low - scene.low).min(DVec3::ZERO), (high - scene.high).max(DVec3::ZERO)]
+}
+
+/// Settings whose region is moved, mm, as far as it can be.
+pub(super) fn move_region(scene: &Scene, by: DVec3) -> Settings {
+    let [least, most] = region_travel(scene);
+    let by = by.clamp(least, most);
+    let (low, high) = (below_face(scene, scene.low), below_face(scene, scene.high));
+    let mut settings = scene.settings.clone();
+    let region = &mut settings.region;
+    for (axis, side) in [&mut region.lateral, &mut region.depth, &mut region.elevation].into_iter().enumerate() {
+        if by[axis] != 0.0 {
+            *side = Some([low[axis] + by[axis], high[axis] + by[axis]]);
+        }
+    }
+    settings
+}
+
 /// A face cannot be dragged if its axis appears shorter than this fraction of its length: small drags would move it too far.
 const MIN_FORESHORTENING: f64 = 0.25;
+
+/// True if the axis of a face is long enough in the rendering for the face to be dragged.
+pub(super) fn can_be_dragged(scene: &Scene, picker: &Picker, face: Face) -> bool {
+    let (middle, out) = face_axis(scene, face);
+    let ends = picker.project(middle).zip(picker.project(middle + out));
+    ends.is_some_and(|(from, to)| {
+        (to[0] - from[0]).hypot(to[1] - from[1]) * picker.mm_per_pixel() >= MIN_FORESHORTENING
+    })
+}
 
 /// The face whose axis, from its centre outwards, is nearest to a position on the picture.
 pub(super) fn nearest_face(scene: &Scene, at: [f64; 2]) -> Option<Face> {
     let picker = Picker::of(scene);
     let distance = |face: &Face| {
         let (middle, out) = face_axis(scene, *face);
+        if !can_be_dragged(scene, &picker, *face) {
+            return None;
+        }
         let (from, to) = (picker.project(middle)?, picker.project(middle + out)?);
         let projected = [to[0] - from[0], to[1] - from[1]];
         let length = projected[0].hypot(projected[1]);
-        if length * picker.mm_per_pixel() < MIN_FORESHORTENING {
-            return None;
-        }
         let grab = [at[0] - from[0], at[1] - from[1]];
         let along = (grab[0] * projected[0] + grab[1] * projected[1]) / length;
         let across = (grab[0] * projected[1] - grab[1] * projected[0]) / length;

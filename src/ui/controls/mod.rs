@@ -16,6 +16,7 @@ use crate::scene::{
     Transfer,
 };
 pub(super) use cutting::CUTS_IN_THE_WAY;
+use glam::DVec3;
 use history::History;
 pub(super) use presets::EXAMS;
 use std::borrow::Cow;
@@ -317,6 +318,9 @@ impl Controls {
             Command::MoveLight(by) if finite(&by) && !now.is_flat() => view::move_light(&mut new, by),
             Command::MoveFace(face, by) if finite(&[by]) && face.axis < 3 => {
                 return view::keep_scale(now, view::move_face(now, face, by));
+            }
+            Command::MoveRegion(by) if finite(&by) => {
+                return view::keep_scale(now, view::move_region(now, DVec3::from(by)));
             }
             Command::MoveClip(by) if finite(&[by]) && !now.is_flat() => {
                 new.clip = view::move_clip(now, self.start.clip.len(), by)?

@@ -1,7 +1,9 @@
 //! The panels with buttons and sliders: modes and tools on the left, controls on the right, the cine loop below. The six controls that
 //! every examination needs are in front; the others are below them, by stage.
 
-use super::colours::{ABSENT, ACCENT, BUTTON, ON_SELECTED, ON_WARNING, SELECTED, TEXT, WARNING, WEAK_TEXT};
+use super::colours::{
+    self, ABSENT, ACCENT, BUTTON, EDGE, ON_SELECTED, ON_WARNING, OUTLINE, SELECTED, TEXT, WARNING, WEAK_TEXT,
+};
 use super::measures;
 use super::names::{self, Tell};
 use super::{PanelState, TEXT_SIZE, TOUCH_SIZE, heading};
@@ -290,6 +292,16 @@ pub(super) fn show_controls(ui: &mut Ui, state: &PanelState, width: f32, execute
             let with_cuts = depth_of_cut(state);
             for (name, number) in in_front {
                 match number {
+                    Some(number) if name == "Light" => {
+                        ui.horizontal_top(|ui| {
+                            let width = ui.available_width() - BALL - ui.spacing().item_spacing.x;
+                            ui.vertical(|ui| {
+                                ui.set_width(width);
+                                slider(ui, state, number, name, true, execute);
+                            });
+                            light_ball(ui, settings, execute);
+                        });
+                    }
                     Some(number) => slider(ui, state, number, name, true, execute),
                     None => absent(ui, name),
                 }
@@ -416,6 +428,49 @@ fn slider(
     let is_asked = names::asks_for_value(ui, &response);
     if (is_held || is_asked) && value != before {
         execute(Command::SetSlider(number, value));
+    }
+}
+
+/// Width of the light ball, points.
+const BALL: f32 = 68.0;
+
+/// A ball under the lamp, which a drag on it moves.
+fn light_ball(ui: &mut Ui, settings: &Settings, execute: &mut dyn FnMut(Command)) {
+    let (area, response) = ui.allocate_exact_size(vec2(BALL, BALL), Sense::DRAG);
+    let response = response.tell("Drag here to move the lamp; on the picture, drag with Ctrl.").named("Light ball");
+    let (centre, radius) = (area.center(), BALL / 2.0 - 2.0);
+    let light = settings.light.position.unwrap_or(settings.light.direction).normalize_or(glam::DVec3::Z);
+    // The ball in rings, lit as a matt one is.
+    const RINGS: u32 = 8;
+    const SPOKES: u32 = 24;
+    let mut mesh = egui::Mesh::default();
+    for ring in 0..=RINGS {
+        for spoke in 0..SPOKES {
+            let out = f64::from(ring) / f64::from(RINGS);
+            let (sin, cos) = (f64::from(spoke) / f64::from(SPOKES) * std::f64::consts::TAU).sin_cos();
+            let normal = glam::DVec3::new(out * cos, out * sin, (1.0 - out * out).max(0.0).sqrt());
+            let bright = 0.12 + 0.6 * normal.dot(light).max(0.0);
+            let at = centre + vec2(normal.x as f32, -normal.y as f32) * radius;
+            mesh.colored_vertex(at, colours::of_scene([bright; 3]));
+        }
+    }
+    for (ring, spoke) in (0..RINGS).flat_map(|ring| (0..SPOKES).map(move |spoke| (ring, spoke))) {
+        let corner = |ring: u32, spoke: u32| ring * SPOKES + spoke % SPOKES;
+        let [a, b] = [corner(ring, spoke), corner(ring, spoke + 1)];
+        let [c, d] = [corner(ring + 1, spoke), corner(ring + 1, spoke + 1)];
+        mesh.add_triangle(a, c, d);
+        mesh.add_triangle(a, d, b);
+    }
+    let painter = ui.painter();
+    painter.add(mesh);
+    let edge = if response.hovered() || response.dragged() { TEXT } else { EDGE };
+    painter.circle_stroke(centre, radius, Stroke::new(1.5, edge));
+    let lamp = centre + vec2(light.x as f32, -light.y as f32) * radius;
+    painter.circle(lamp, 5.0, ON_SELECTED, Stroke::new(1.5, OUTLINE));
+    let by = response.drag_delta();
+    if response.dragged() && by != egui::Vec2::ZERO {
+        // The width of the ball is that of the dome over which the lamp moves.
+        execute(Command::MoveLight([by.x, by.y].map(|points| f64::from(points / (2.0 * radius)))));
     }
 }
 

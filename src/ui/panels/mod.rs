@@ -13,6 +13,7 @@ mod measures;
 mod names;
 mod overlays;
 mod presets;
+mod region;
 
 use self::colours::{BACKGROUND, BUTTON, EDGE, ON_SELECTED, PANEL, SELECTED, TEXT, WEAK_TEXT};
 pub(super) use self::presets::{PresetTile, PresetsShown};
@@ -207,6 +208,7 @@ impl Panels {
                 annotations::paint(ui, state, self.scale);
             }
             if state.has_drawn {
+                region::paint(ui, state, self.scale);
                 measures::paint(ui, state, self.scale);
             }
             if state.shows_times {

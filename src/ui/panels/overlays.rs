@@ -241,14 +241,16 @@ fn small(ui: &mut Ui, text: String, colour: Color32) {
 }
 
 /// Gestures on the picture, for the help.
-const GESTURES: [(&str, &str); 10] = [
+const GESTURES: [(&str, &str); 12] = [
     ("drag", "use the tool: turn, light, region, clip, cut, planes"),
-    ("Shift + drag, middle drag", "move the picture"),
+    ("Shift + drag, right or middle drag", "move the picture; over a plane: step it"),
     ("Ctrl + drag", "move the light"),
     ("wheel", "zoom; over a plane: step it"),
     ("two fingers", "pinch to zoom, twist to roll, move to pan"),
     ("double click on a tile", "show that tile alone, and back"),
     ("Region, then drag", "move the nearest face of the box"),
+    ("Region, then drag on a plane (4-up)", "move a side of the box; from within: all of it"),
+    ("drag on the light ball (below Light)", "move the lamp"),
     ("Clip, then drag up", "cut away what is nearer to the viewer"),
     ("Cut, then drag round", "cut away what is within, along the view"),
     ("Planes, then click", "move the point where the three planes cross"),

@@ -1,0 +1,173 @@
+//! The region as a box that is seen and grabbed: its section by each plane beside a rendering, with a handle on each side, and its edges in the
+//! rendering.
+
+use super::command::Face;
+use super::picking::Picker;
+use super::view::{FACES, face_axis, outwards};
+use crate::scene::Scene;
+use crate::scene::planes::{Sheet, Tile};
+use glam::DVec3;
+
+/// A shorter side of a section has no handle, pixels.
+const MIN_SIDE: f64 = 12.0;
+
+/// A side of the section of the region by a plane, pixels of the picture, and the face of the region that it lies on.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Side {
+    pub(super) face: Face,
+    pub(super) ends: [[f64; 2]; 2],
+    /// The middle of what is seen of it on its tile, if that is long enough to be grabbed.
+    pub(super) handle: Option<[f64; 2]>,
+}
+
+/// What of the region's box is at a place of a tile.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) enum Part {
+    Face(Face),
+    Inside,
+}
+
+/// An edge of the region in the rendering, pixels of the picture.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Edge {
+    pub(super) ends: [[f64; 2]; 2],
+    /// Both of its faces are turned away from the viewer.
+    pub(super) is_behind: bool,
+}
+
+/// True if planes show where the region is: those beside a rendering, which are not cropped to it.
+pub(super) fn is_on_planes(scene: &Scene) -> bool {
+    scene.has_sections()
+}
+
+/// The sides of the section of the region by the plane of a tile; none if the plane misses the region.
+pub(super) fn section(scene: &Scene, sheet: &Sheet, tile: &Tile) -> Vec<Side> {
+    let plane = &tile.plane;
+    let reach = 4.0 * (scene.high - scene.low).length() + 2.0 * (plane.at - (scene.low + scene.high) / 2.0).length();
+    // A square beyond the region, cut to it face by face. With each corner, the face of the side that begins there.
+    let corner = |x: f64, y: f64| (plane.at + (plane.right * x + plane.down * y) * reach, None);
+    let mut outline: Vec<(DVec3, Option<Face>)> =
+        vec![corner(-1.0, -1.0), corner(1.0, -1.0), corner(1.0, 1.0), corner(-1.0, 1.0)];
+    for face in FACES {
+        let (middle, out) = face_axis(scene, face);
+        let beyond = |place: DVec3| (place - middle).dot(out);
+        let count = outline.len();
+        let mut kept = Vec::with_capacity(count + 1);
+        for n in 0..count {
+            let ((from, side), (to, _)) = (outline[n], outline[(n + 1) % count]);
+            let (here, there) = (beyond(from), beyond(to));
+            if here <= 0.0 {
+                kept.push((from, side));
+            }
+            if (here <= 0.0) != (there <= 0.0) {
+                let on_face = from + (to - from) * (here / (here - there));
+                kept.push((on_face, if here <= 0.0 { Some(face) } else { side }));
+            }
+        }
+        outline = kept;
+    }
+    let count = outline.len();
+    let sides = (0..count).filter_map(|n| {
+        let ((from, face), (to, _)) = (outline[n], outline[(n + 1) % count]);
+        let ends = [from, to].map(|place| sheet.project(tile, place).0);
+        Some(Side { face: face?, ends, handle: handle(tile, ends) })
+    });
+    sides.collect()
+}
+
+/// The middle of the part of a line that is on a tile, if that is long enough.
+fn handle(tile: &Tile, [from, to]: [[f64; 2]; 2]) -> Option<[f64; 2]> {
+    let way = [to[0] - from[0], to[1] - from[1]];
+    let (mut begin, mut end) = (0.0_f64, 1.0_f64);
+    for axis in 0..2 {
+        let low = f64::from(tile.corner[axis]);
+        let sides = [low, low + f64::from(tile.size[axis])].map(|side| (side - from[axis]) / way[axis]);
+        if way[axis].abs() < 1e-9 {
+            if !(low..=low + f64::from(tile.size[axis])).contains(&from[axis]) {
+                return None;
+            }
+        } else {
+            begin = begin.max(sides[0].min(sides[1]));
+            end = end.min(sides[0].max(sides[1]));
+        }
+    }
+    let middle = (begin + end) / 2.0;
+    let is_long = (end - begin) * way[0].hypot(way[1]) >= MIN_SIDE;
+    is_long.then(|| [0, 1].map(|axis| from[axis] + way[axis] * middle))
+}
+
+/// What of the region's section is at a place of a tile, pixels of the picture. `reach`: of a side and of its handle, pixels.
+pub(super) fn part_at(scene: &Scene, tile: usize, at: [f64; 2], reach: [f64; 2]) -> Option<Part> {
+    if !is_on_planes(scene) {
+        return None;
+    }
+    let sheet = scene.sheet();
+    let sides = section(scene, &sheet, sheet.tiles.get(tile)?);
+    let [of_side, of_handle] = reach;
+    let to_handle = |side: &Side| side.handle.map(|[x, y]| (x - at[0]).hypot(y - at[1]));
+    let handles = sides.iter().filter_map(|side| Some((to_handle(side)?, side.face)));
+    let handle = handles.filter(|(away, _)| *away <= of_handle).min_by(|a, b| a.0.total_cmp(&b.0));
+    let lines = sides.iter().map(|side| (distance(at, side.ends), side.face));
+    let line = lines.filter(|(away, _)| *away <= of_side).min_by(|a, b| a.0.total_cmp(&b.0));
+    let is_inside = || {
+        let place = sheet.point(&sheet.tiles[tile], at);
+        place.cmpge(scene.low).all() && place.cmple(scene.high).all()
+    };
+    match handle.or(line) {
+        Some((_, face)) => Some(Part::Face(face)),
+        None => is_inside().then_some(Part::Inside),
+    }
+}
+
+/// Distance of a point from a line between two ends.
+fn distance(at: [f64; 2], [from, to]: [[f64; 2]; 2]) -> f64 {
+    let [way, off] = [[to[0] - from[0], to[1] - from[1]], [at[0] - from[0], at[1] - from[1]]];
+    let length = (way[0] * way[0] + way[1] * way[1]).max(1e-30);
+    let share = ((off[0] * way[0] + off[1] * way[1]) / length).clamp(0.0, 1.0);
+    (off[0] - share * way[0]).hypot(off[1] - share * way[1])
+}
+
+/// The edges of the region in the rendering. What is behind the camera is left out.
+pub(super) fn wireframe(scene: &Scene) -> Vec<Edge> {
+    if scene.is_flat() {
+        return Vec::new();
+    }
+    let picker = Picker::of(scene);
+    let rays = &scene.rays;
+    let is_turned_away = |face: Face| {
+        let (middle, out) = face_axis(scene, face);
+        let towards = if rays.is_perspective { middle - rays.origin } else { rays.forward };
+        towards.dot(out) > 0.0
+    };
+    let corner = |ends: [bool; 3]| {
+        let pick = |axis: usize| if ends[axis] { scene.high[axis] } else { scene.low[axis] };
+        DVec3::new(pick(0), pick(1), pick(2))
+    };
+    let edge = |n: usize| {
+        let (axis, others) = (n / 4, [n & 1 == 1, n & 2 == 2]);
+        let [a, b] = [(axis + 1) % 3, (axis + 2) % 3];
+        let mut from = [false; 3];
+        (from[a], from[b]) = (others[0], others[1]);
+        let mut to = from;
+        to[axis] = true;
+        let faces = [Face { axis: a, high: from[a] }, Face { axis: b, high: from[b] }];
+        let ends = [picker.project(corner(from))?, picker.project(corner(to))?];
+        Some(Edge { ends, is_behind: faces.into_iter().all(is_turned_away) })
+    };
+    (0..12).filter_map(edge).collect()
+}
+
+/// Where the faces of the region are grabbed in the rendering: the middle of each whose axis is not seen from its end, pixels of the picture.
+pub(super) fn rendered_handles(scene: &Scene) -> Vec<[f64; 2]> {
+    if scene.is_flat() {
+        return Vec::new();
+    }
+    let picker = Picker::of(scene);
+    let handles = FACES.into_iter().filter(|face| super::view::can_be_dragged(scene, &picker, *face));
+    handles.filter_map(|face| picker.project(face_axis(scene, face).0)).collect()
+}
+
+/// How far a face moves so that its line on a plane follows a way in that plane, mm.
+pub(super) fn along(face: Face, way: DVec3) -> f64 {
+    way.dot(outwards(face))
+}
