@@ -50,14 +50,35 @@ bool winds_about(vec2 p, int first, int end) {
     return winding != 0;
 }
 
+// True if a point is within a radius of the strokes of a brush. The w of a point is 1 where a stroke begins.
+bool is_brushed(vec3 p, float radius, int first, int end) {
+    vec3 from = vec3(0.0);
+    for (int n = first; n < end; ++n) {
+        vec4 point = cuts.entry[n];
+        if (point.w > 0.5) from = point.xyz;
+        vec3 along = point.xyz - from, off = p - from;
+        float square = dot(along, along);
+        vec3 away = off - along * (square > 0.0 ? clamp(dot(off, along) / square, 0.0, 1.0) : 0.0);
+        if (dot(away, away) <= radius * radius) return true;
+        from = point.xyz;
+    }
+    return false;
+}
+
 bool is_removed(vec3 p) {
     int first = 0;
     for (int n = 0; n < cut_count; ++n) {
         vec4 right = cuts.entry[first], up = cuts.entry[first + 1], forward = cuts.entry[first + 2];
-        vec4 limits = cuts.entry[first + 3]; // distance of the eye or 0, depth, 1 if the inside is removed, edges
+        vec4 limits = cuts.entry[first + 3]; // distance of the eye or 0, depth, 1 if the inside is removed, edges; of a brush radius, 0, 2, points
         vec4 bounds = cuts.entry[first + 4];
         int edges = first + HEADER, end = edges + int(limits.w);
         first = end;
+        if (limits.z > 1.5) {
+            // Of a brush, the first two are the corners of its bounds.
+            bool may_be = all(greaterThanEqual(p, right.xyz)) && all(lessThanEqual(p, up.xyz));
+            if (may_be && is_brushed(p, limits.x, edges, end)) return true;
+            continue;
+        }
         float behind = dot(forward.xyz, p) + forward.w;
         if (behind > limits.y) continue;
         vec2 across = vec2(dot(right.xyz, p) + right.w, dot(up.xyz, p) + up.w);

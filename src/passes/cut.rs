@@ -82,15 +82,31 @@ fn removed(scene: &Scene) -> f64 {
 /// Vectors of four before the edges of a cut: HEADER of cut.comp.
 const HEADER: usize = 5;
 
+/// What tells a brush from a contour: its header has the corners of its bounds in place of the axes.
+const BRUSH: f64 = 2.0;
+
 /// Vectors of four of all cuts.
 pub(super) fn table_length(scene: &Scene) -> usize {
-    scene.settings.cuts.iter().map(|cut| HEADER + cut.contour.len()).sum()
+    HEADER * scene.settings.cuts.len() + scene.cut_corners()
 }
 
 /// The cuts as cut.comp reads them, relative to [`Scene::local_origin`].
 pub(super) fn table(scene: &Scene) -> Vec<f32> {
-    let mut table = Vec::with_capacity(4 * table_length(scene));
+    let mut table: Vec<f64> = Vec::with_capacity(4 * table_length(scene));
     for cut in scene.cuts() {
+        if let Some(brush) = &cut.brush {
+            brush.bounds().into_iter().for_each(|corner| table.extend(scene.to_local(corner).extend(0.0).to_array()));
+            let count = brush.strokes.iter().map(Vec::len).sum::<usize>();
+            table.extend([0.0; 4]);
+            table.extend([brush.radius, 0.0, BRUSH, count as f64]);
+            table.extend([0.0; 4]);
+            for stroke in &brush.strokes {
+                // A stroke begins where w is 1.
+                let points = stroke.iter().enumerate().map(|(n, point)| (scene.to_local(*point), f64::from(n == 0)));
+                table.extend(points.flat_map(|(point, begins)| point.extend(begins).to_array()));
+            }
+            continue;
+        }
         let at = scene.to_local(cut.at);
         for axis in [cut.right, cut.up, cut.forward] {
             table.extend(axis.extend(-axis.dot(at)).to_array());

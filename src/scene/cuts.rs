@@ -6,7 +6,8 @@
 use super::check::within;
 use super::picker::Picker;
 use super::{
-    Cut, CutView, KeptSide, MAX_CUT_POINTS, MAX_CUTS, Mode, Scene, SceneError, Sign, refuse, region, transfer,
+    Brush, Cut, CutView, KeptSide, MAX_BRUSH_POINTS, MAX_CUT_POINTS, MAX_CUTS, Mode, Scene, SceneError, Sign, refuse,
+    region, transfer,
 };
 use crate::probe::{Advance, Geometry, Motion};
 use glam::{DVec2, DVec3};
@@ -33,6 +34,39 @@ pub struct CutShape {
     pub removes_inside: bool,
     /// Nothing is removed farther behind the plane, mm.
     pub depth: Option<f64>,
+    /// What is removed is near these strokes; the contour is then empty.
+    pub brush: Option<BrushShape>,
+}
+
+/// Strokes of a brush in space.
+#[derive(Clone, Debug, PartialEq)]
+pub struct BrushShape {
+    pub radius: f64,
+    pub strokes: Vec<Vec<DVec3>>,
+}
+
+impl BrushShape {
+    /// True if a place is within the radius of a stroke: in a ball about each point, or in a cylinder about the line between two.
+    pub fn holds(&self, place: DVec3) -> bool {
+        let is_near = |from: DVec3, to: DVec3| {
+            let (along, off) = (to - from, place - from);
+            let square = along.length_squared();
+            let share = if square > 0.0 { (off.dot(along) / square).clamp(0.0, 1.0) } else { 0.0 };
+            (off - along * share).length_squared() <= self.radius * self.radius
+        };
+        self.strokes.iter().any(|stroke| {
+            let first = stroke.first().is_some_and(|point| is_near(*point, *point));
+            first || stroke.windows(2).any(|ends| is_near(ends[0], ends[1]))
+        })
+    }
+
+    /// Lower and upper corner of the box that holds all of it.
+    pub fn bounds(&self) -> [DVec3; 2] {
+        let ends = [DVec3::INFINITY, DVec3::NEG_INFINITY];
+        let [low, high] =
+            self.strokes.iter().flatten().fold(ends, |[low, high], point| [low.min(*point), high.max(*point)]);
+        [low - self.radius, high + self.radius]
+    }
 }
 
 impl CutShape {
@@ -48,6 +82,7 @@ impl CutShape {
             contour: cut.contour.iter().map(|corner| DVec2::from(*corner)).collect(),
             removes_inside: cut.keep == KeptSide::Outside,
             depth: cut.depth,
+            brush: None,
         }
     }
 
@@ -78,6 +113,9 @@ impl CutShape {
 
     /// True if the cut removes what is at a place in space.
     pub fn removes(&self, place: DVec3) -> bool {
+        if let Some(brush) = &self.brush {
+            return brush.holds(place);
+        }
         let (point, behind) = self.project(place);
         self.depth.is_none_or(|depth| behind <= depth)
             && point.is_some_and(|point| self.winds_about(point)) == self.removes_inside
@@ -97,14 +135,21 @@ impl Scene {
         !self.settings.cuts.is_empty() && (self.composites() || self.detects_surface() || self.projects())
     }
 
-    /// Corners of all contours.
+    /// Corners of all contours, and points of all brushes.
     pub fn cut_corners(&self) -> usize {
-        self.settings.cuts.iter().map(|cut| cut.contour.len()).sum()
+        self.settings.cuts.iter().map(|cut| cut.contour.len() + cut.brush.as_ref().map_or(0, Brush::points)).sum()
     }
 
     /// The cuts in space.
     pub fn cuts(&self) -> impl Iterator<Item = CutShape> {
-        self.settings.cuts.iter().map(|cut| CutShape::new(cut, self.place_of(cut.view.at)))
+        let in_space = |brush: &Brush| BrushShape {
+            radius: brush.radius,
+            strokes: brush.strokes.iter().map(|s| s.iter().map(|point| self.place_of(*point)).collect()).collect(),
+        };
+        self.settings.cuts.iter().map(move |cut| CutShape {
+            brush: cut.brush.as_ref().map(in_space),
+            ..CutShape::new(cut, self.place_of(cut.view.at))
+        })
     }
 
     /// The cut along a contour that was drawn on the rendering, pixels of the picture. Its plane faces the view at the first place of the region that
@@ -139,7 +184,7 @@ impl Scene {
             up: rays.up.to_array(),
             eye: rays.is_perspective.then_some(nearest - eye),
         };
-        Some(Cut { contour: contour.collect(), view, keep, depth: None })
+        Some(Cut { contour: contour.collect(), view, keep, depth: None, brush: None })
     }
 
     /// The value of what is removed: one of which the rendering draws nothing. 0, or 1 where what is dark is drawn. The mean takes it for dark matter.
@@ -249,6 +294,10 @@ pub(super) fn check(cuts: &[Cut]) -> Result<(), SceneError> {
         return refuse("cuts", format!("has {} entries, at most {MAX_CUTS}", cuts.len()));
     }
     for (n, cut) in cuts.iter().enumerate() {
+        if let Some(brush) = &cut.brush {
+            check_brush(n, cut, brush)?;
+            continue;
+        }
         let count = cut.contour.len();
         if !(3..=MAX_CUT_POINTS).contains(&count) {
             return refuse(
@@ -271,6 +320,22 @@ pub(super) fn check(cuts: &[Cut]) -> Result<(), SceneError> {
         within("cuts.depth", cut.depth.unwrap_or(0.0), 0.0, LARGEST)?;
     }
     Ok(())
+}
+
+fn check_brush(n: usize, cut: &Cut, brush: &Brush) -> Result<(), SceneError> {
+    if !cut.contour.is_empty() || cut.depth.is_some() || cut.keep != KeptSide::default() {
+        return refuse("cuts.brush", format!("entry {}: has no contour, depth and keep", n + 1));
+    }
+    let count = brush.points();
+    if !(1..=MAX_BRUSH_POINTS).contains(&count) || brush.strokes.iter().any(Vec::is_empty) {
+        return refuse(
+            "cuts.brush.strokes",
+            format!("entry {}: has {count} points, must have 1 to {MAX_BRUSH_POINTS}, and one in each stroke", n + 1),
+        );
+    }
+    within("cuts.brush.radius", brush.radius, 0.1, 100.0)?;
+    let points = brush.strokes.iter().flatten().flatten();
+    points.into_iter().try_for_each(|value| within("cuts.brush.strokes", *value, -LARGEST, LARGEST))
 }
 
 /// # Errors
@@ -338,6 +403,35 @@ mod tests {
         // Any length of direction and up, and an up that is not level.
         let view = CutView { direction: [0.0, 3.0, 0.0], up: [0.0, 0.7, 0.2], ..CutView::default() };
         assert!(at(&Cut { view, ..corner.clone() }, [3.0, 20.0, 1.0]));
+    }
+
+    #[test]
+    fn a_brush_removes_what_is_within_its_radius_and_wrong_ones_are_refused() {
+        let strokes = vec![vec![DVec3::ZERO, DVec3::new(10.0, 0.0, 0.0)], vec![DVec3::new(0.0, 20.0, 0.0)]];
+        let brush = BrushShape { radius: 2.0, strokes };
+        let holds = |x: f64, y: f64, z: f64| brush.holds(DVec3::new(x, y, z));
+        assert!(holds(5.0, 1.9, 0.0) && holds(-1.9, 0.0, 0.0) && holds(11.9, 0.0, 0.0) && holds(0.0, 20.0, -1.9));
+        assert!(!holds(5.0, 1.5, 1.5) && !holds(-1.5, 1.5, 0.0) && !holds(0.0, 10.0, 0.0) && !holds(10.0, 20.0, 0.0));
+        assert_eq!(brush.bounds(), [DVec3::new(-2.0, -2.0, -2.0), DVec3::new(12.0, 22.0, 2.0)]);
+        let fault = |change: &dyn Fn(&mut Cut)| {
+            let brush = Some(Brush { radius: 2.0, strokes: vec![vec![[0.0; 3]]] });
+            let mut cut = Cut { brush, ..Cut::default() };
+            change(&mut cut);
+            Settings { cuts: vec![cut], ..Settings::default() }.check().map_err(|fault| fault.to_string())
+        };
+        let with = |radius: f64, strokes: Vec<Vec<[f64; 3]>>| {
+            fault(&|cut| {
+                cut.brush = Some(Brush { radius, strokes: strokes.clone() });
+            })
+        };
+        assert_eq!(fault(&|_| ()), Ok(()));
+        assert!(fault(&|cut| cut.depth = Some(3.0)).is_err_and(|fault| fault.contains("cuts.brush: entry 1")));
+        assert!(with(0.0, vec![vec![[0.0; 3]]]).is_err_and(|fault| fault.contains("cuts.brush.radius")));
+        assert!(with(1.0, vec![vec![[f64::NAN; 3]]]).is_err_and(|fault| fault.contains("cuts.brush.strokes")));
+        assert!(with(1.0, vec![vec![[0.0; 3]; 513]]).is_err_and(|fault| fault.contains("513")));
+        for empty in [vec![], vec![vec![]], vec![vec![[0.0; 3]], vec![]]] {
+            assert!(with(1.0, empty).is_err());
+        }
     }
 
     #[test]

@@ -88,6 +88,8 @@ pub enum Command {
     CancelCut,
     /// Chooses the side of the next contour that stays.
     KeepSide(KeptSide),
+    /// Sets the radius of the brush, mm.
+    BrushRadius(f64),
     /// Removes all cuts.
     ClearCuts,
     /// Counts the voxels of the region whose echo reaches the threshold.
@@ -175,6 +177,8 @@ pub enum Tool {
     Clip,
     /// Draws the contour of a cut on a rendering.
     Cut,
+    /// Removes what is near the surface along the drag.
+    Brush,
     /// Moves the planes of sections.
     Plane,
     /// Sets the points of a measurement.
@@ -281,6 +285,7 @@ pub const KEY_BINDINGS: &[Binding] = &[
     on(Char('x'), "drag cuts from the front", Command::Tool(Tool::Clip)),
     on(Char('s'), "drag moves the planes (sections)", Command::Tool(Tool::Plane)),
     on(Char('f'), "drag round it cuts it away (freehand)", Command::Tool(Tool::Cut)),
+    on(Char('z'), "drag over it brushes it away", Command::Tool(Tool::Brush)),
     shift(Char('f'), "remove all cuts", Command::ClearCuts),
     shift(Char('x'), "nothing cut from the front", Command::MoveClip(-BEYOND_ANY_VOLUME_MM)),
     // The view.
@@ -458,7 +463,8 @@ mod tests {
     fn every_mode_layout_tool_and_plane_has_a_key() {
         use Mode::*;
         let modes = [Volume, Surface, Mixed, Mip, MinIp, Mean, Plane, Orthogonal, Tomography, Cube].map(Command::Mode);
-        let tools = [Tool::Rotate, Tool::Light, Tool::Region, Tool::Clip, Tool::Cut, Tool::Plane].map(Command::Tool);
+        let tools = [Tool::Rotate, Tool::Light, Tool::Region, Tool::Clip, Tool::Cut, Tool::Brush, Tool::Plane]
+            .map(Command::Tool);
         let layouts = [Layout::Single, Layout::Four, Layout::Pair].map(Command::Layout);
         let planes = [PlaneName::A, PlaneName::B, PlaneName::C].map(Command::Plane);
         for command in modes.iter().chain(&tools).chain(&layouts).chain(&planes) {

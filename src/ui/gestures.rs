@@ -222,6 +222,8 @@ impl Gestures {
         });
         if is_second {
             match (tool, viewport.scene) {
+                // It goes over the same place again.
+                (Tool::Brush, _) if pane == Pane::Rendering => {}
                 (Tool::Measure(_), _) => return vec![Command::EndMeasure],
                 (Tool::Plane, Some(scene)) if scene.shows_three() => return vec![Command::Recentre],
                 _ => {}
@@ -229,6 +231,10 @@ impl Gestures {
             return self.double_click(pane, viewport);
         }
         self.last_click = Some(Click { at, time: viewport.now });
+        if (pane, tool) == (Pane::Rendering, Tool::Brush) {
+            let pixel = viewport.pixel_at(at).map(|(_, pixel)| press.to_surface(pixel));
+            return pixel.map_or(Vec::new(), |pixel| vec![Command::BeginCut(pixel), Command::EndCut]);
+        }
         match (pane, viewport.scene) {
             (Pane::Plane(tile), Some(scene)) if tool == Tool::Plane => {
                 let point = viewport.point_on_plane(tile, at).map(|point| view::below_face(scene, point).to_array());
@@ -344,7 +350,7 @@ impl Press {
             (Pane::Rendering, Tool::Rotate) => Drag::Rotate,
             (Pane::Rendering, Tool::Light) => Drag::Light,
             (Pane::Rendering, Tool::Clip) => Drag::Clip,
-            (Pane::Rendering, Tool::Cut) => Drag::Cut,
+            (Pane::Rendering, Tool::Cut | Tool::Brush) => Drag::Cut,
             (Pane::Rendering, Tool::Region) => view::nearest_face(scene, pixel).map_or(Drag::Nothing, Drag::Face),
             (Pane::Rendering, Tool::Plane) => {
                 if scene.cuts_planes() {

@@ -100,6 +100,9 @@ pub(super) fn of_tool(tool: Tool) -> &'static str {
         }
         Tool::Clip => "Drag up cuts away what is nearer to you.",
         Tool::Cut => "Drag round what is in the way: it is cut away along the view. (F)",
+        Tool::Brush => {
+            "Drag over what is in the way: what is near the surface there is removed. Modes Surface and Mixed. (Z)"
+        }
         Tool::Plane => "Drag or click moves the planes.",
         Tool::Measure(kind) => of_measure(kind),
     }

@@ -296,7 +296,7 @@ pub const SLIDERS: &[Slider] = &[
         |s, v| s.post.sigma = sigma(s.post.sigma, v),
     ),
     slider("Depth of cut", "mm", Image, [0.0, DEEPEST], 1.0).of(
-        |s| !s.cuts.is_empty() && !s.mode.is_flat() && s.mode != Mode::Cube,
+        |s| s.cuts.last().is_some_and(|cut| cut.brush.is_none()) && !s.mode.is_flat() && s.mode != Mode::Cube,
         |s| s.cuts.last().and_then(|cut| cut.depth).unwrap_or(0.0),
         |s, v| {
             if let Some(cut) = s.cuts.last_mut() {

@@ -208,11 +208,12 @@ pub fn wall(scene: &Scene, number: u32) -> Vec<Texels> {
     })
 }
 
-/// A prism and a cone.
+/// A prism and a cone, and a brush.
 const TWO_CUTS: &str = "mode = 'vr'
     cuts = [
         { contour = [[-8, -6], [9, -5], [3, 2], [2, 9]], view = { at = [0, 20, 0], direction = [0.2, 1, 0], up = [0, 0, 1] } },
         { contour = [[-1, -3], [7, -2], [7, 4], [-2, 4], [7, -3]], view = { at = [-8, 30, 0], direction = [1, 0.5, 0.3], up = [0, -1, 0], eye = 45 }, depth = 20 },
+        { brush = { radius = 3.1, strokes = [[[-4, 33, 2], [3, 36, -5], [8, 35, -4]], [[6.2, 50, 7.1]]] } },
     ]";
 
 pub const TURNED: &str = "azimuth = 25, tilt = -15, roll = 40";
@@ -277,7 +278,7 @@ fn plane_scenes() -> Vec<SceneSpec> {
     for (name, geometry, toml) in [
         ("Cartesian, 4-up, planes of all samples", &voxels, "mode = 'vr'\nlayout = 'four'\nplanes.smooth = {}"),
         ("fan, parts that float", &Geometry::Sweep(wobbler()), "mode = 'vr'\nfloating = 30"),
-        ("fan, two cuts", &Geometry::Sweep(wobbler()), TWO_CUTS),
+        ("fan, two cuts and a brush", &Geometry::Sweep(wobbler()), TWO_CUTS),
         (
             "fan, motor moving, a cut beside planes",
             &Geometry::Sweep(moving()),

@@ -65,6 +65,20 @@ fn a_circle_removes_its_area_times_the_length() {
     close(removed(&block(&cut(&circle(radius), cone, ""))), frustum);
 }
 
+/// A ball at each end and a cylinder between. The error is that of a circle above.
+#[test]
+fn a_brush_removes_a_capsule_and_balls() {
+    let radius = 5.0;
+    let of = |strokes: &str| {
+        removed(&block(&format!("mode = 'vr'\ncuts = [{{ brush = {{ radius = {radius}, strokes = {strokes} }} }}]")))
+    };
+    let ball = 4.0 / 3.0 * PI * f64::powi(radius, 3);
+    let close = |got: f64, expected: f64| assert!((got / expected - 1.0).abs() < 1e-2, "{got} {expected}");
+    close(of("[[[1, 20, -2]]]"), ball);
+    close(of("[[[-6, 12, -2], [6, 24, 4]]]"), ball + PI * radius * radius * 18.0);
+    close(of("[[[-10, 12, -2]], [[9, 24, 4]]]"), 2.0 * ball);
+}
+
 /// The texels of a fan grow with the range, and lie on arcs: the cut is straight.
 #[test]
 fn a_cut_of_a_fan_is_straight() {

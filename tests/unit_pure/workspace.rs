@@ -2,7 +2,7 @@
 
 use crate::common::files::Folder;
 use echolume::scene::load::Layers;
-use echolume::scene::{Cut, CutView, KeptSide, MeasureKind, Measurement, Mode};
+use echolume::scene::{Brush, Cut, CutView, KeptSide, MeasureKind, Measurement, Mode};
 use echolume::workspace::{Origin, Workspace, is_workspace, text};
 use std::path::{Path, PathBuf};
 
@@ -35,8 +35,12 @@ fn what_is_saved_is_read_again_exactly() {
         let view = CutView { at: [0.1, 1e-9, -3.0], eye: Some(1.0 / 3.0), ..CutView::default() };
         let contour = vec![[0.0, 1.0 / 3.0], [1e-9, 2.0], [-3.0, 4.0]];
         settings.cuts = vec![
-            Cut { contour: contour.clone(), view, keep: KeptSide::Inside, depth: Some(0.1) },
+            Cut { contour: contour.clone(), view, keep: KeptSide::Inside, depth: Some(0.1), brush: None },
             Cut { contour, ..Cut::default() },
+            Cut {
+                brush: Some(Brush { radius: 0.3, strokes: vec![vec![[0.1, 1.0 / 3.0, -2.0]; 2]] }),
+                ..Cut::default()
+            },
         ];
         let mut origin = Origin::of(Some("sweep.mha".into()));
         origin.volume = 3;

@@ -1,4 +1,4 @@
-//! Settings of cuts: contours drawn on a rendering, along whose view the volume is removed from renderings.
+//! Settings of cuts: contours drawn on a rendering, along whose view the volume is removed from renderings, and what a brush went over.
 
 use serde::{Deserialize, Serialize};
 
@@ -7,15 +7,20 @@ pub const MAX_CUTS: usize = 32;
 /// Most corners of the contour of a cut.
 pub const MAX_CUT_POINTS: usize = 512;
 
+/// Most points of a brush.
+pub const MAX_BRUSH_POINTS: usize = 512;
+
 /// A cut. What lies within its contour, seen from where that was drawn, is removed from renderings. The cut keeps its place in the volume whatever
-/// the view: a prism of a parallel view, a cone of one in perspective.
+/// the view: a prism of a parallel view, a cone of one in perspective. Or, with `brush`, what lies near its strokes.
 #[derive(Clone, Debug, Default, PartialEq, Deserialize, Serialize)]
 #[serde(deny_unknown_fields)]
 pub struct Cut {
     /// Corners of the closed contour, 3 to 512: mm to the right of `view.at` and up, in the plane through it that faces the view. What the contour
-    /// winds about is inside, also where it crosses itself.
+    /// winds about is inside, also where it crosses itself. Absent with `brush`.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub contour: Vec<[f64; 2]>,
-    /// The view at which the contour was drawn.
+    /// The view at which the contour was drawn. Absent: from the probe down.
+    #[serde(default)]
     pub view: CutView,
     /// The side of the contour that stays.
     #[serde(default)]
@@ -23,6 +28,27 @@ pub struct Cut {
     /// How deep the cut is: nothing is removed more than so many mm behind the contour's plane, 0..=1e7. Absent: it goes through everything.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub depth: Option<f64>,
+    /// A brush in place of a contour; `keep` and `depth` are then absent.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub brush: Option<Brush>,
+}
+
+/// A brush: what lies within a radius of its strokes is removed from renderings.
+#[derive(Clone, Debug, Default, PartialEq, Deserialize, Serialize)]
+#[serde(deny_unknown_fields)]
+pub struct Brush {
+    /// 0.1..=100 mm.
+    pub radius: f64,
+    /// Points that straight lines join, mm: lateral, depth (from the probe's face), elevation. A stroke of one point is a ball. All strokes have 1 to
+    /// 512 points together.
+    pub strokes: Vec<Vec<[f64; 3]>>,
+}
+
+impl Brush {
+    /// Points of all strokes.
+    pub fn points(&self) -> usize {
+        self.strokes.iter().map(Vec::len).sum()
+    }
 }
 
 /// The view at which the contour of a cut was drawn.

@@ -38,15 +38,15 @@ impl Counting {
 }
 
 /// The points of the rendered surface.
-struct SurfaceMap<'a> {
-    picker: Picker<'a>,
-    size: [u32; 2],
-    distances: crate::passes::Texels,
+pub(super) struct SurfaceMap<'a> {
+    pub(super) picker: Picker<'a>,
+    pub(super) size: [u32; 2],
+    pub(super) distances: crate::passes::Texels,
 }
 
 impl SurfaceMap<'_> {
     /// The point under a pixel of the picture; none where no surface is.
-    fn at(&self, pixel: [f64; 2]) -> Option<DVec3> {
+    pub(super) fn at(&self, pixel: [f64; 2]) -> Option<DVec3> {
         let ([x, y], (origin, direction)) = self.picker.nearest_ray(pixel, self.size)?;
         let away = self.distances.one(x, y, 0);
         (away < MISSED && away > -MISSED).then(|| origin + direction * away)

@@ -1,6 +1,7 @@
 //! The console of the live view. It connects the stream with gestures, keys, panels and the screen. It depends on no window: inputs, the
 //! time and a screen (which may be missing) are passed in, so that everything a window can do is tested without one.
 
+mod brushing;
 mod frame;
 mod measuring;
 mod opening;
@@ -592,6 +593,7 @@ impl Console {
                 self.panels.toggle_focus();
             }
             Command::ToggleFullScreen => self.request.toggle_full_screen |= !self.fixed.is_kiosk,
+            Command::EndCut => self.end_stroke(now),
             Command::PickSurface(at) => self.pick_surface(at),
             Command::CountVoxels => self.count_voxels(),
             Command::CopyMeasures => self.copy_measures(),

@@ -1,11 +1,15 @@
-//! Cuts: a contour that is drawn on a rendering takes away what lies along the view within it, or outside of it.
+//! Cuts: a contour that is drawn on a rendering takes away what lies along the view within it, or outside of it; a brush what is near its strokes.
 
 use super::{Change, Controls, drawable};
-use crate::scene::{KeptSide, MAX_CUTS, Scene, Settings};
-use crate::ui::command::Command;
+use crate::scene::{Brush, Cut, KeptSide, MAX_BRUSH_POINTS, MAX_CUTS, Scene, Settings};
+use crate::ui::command::{Command, Tool};
 
 /// Most points of a contour in work. A drag longer than that goes on without more.
 const MAX_OUTLINE: usize = 20_000;
+
+/// Radius of the brush at the start, and its limits, mm.
+pub(super) const BRUSH_RADIUS: f64 = 4.0;
+pub const BRUSH_RADII: [f64; 2] = [0.5, 20.0];
 
 /// Why a mode or a control does nothing.
 pub const CUTS_IN_THE_WAY: &str =
@@ -28,6 +32,16 @@ impl Controls {
         self.kept_side
     }
 
+    /// Radius of the brush, mm.
+    pub fn brush_radius(&self) -> f64 {
+        self.brush_radius
+    }
+
+    /// The places that a stroke of the brush went over, pixels of the picture; it is over.
+    pub(in crate::ui) fn take_stroke(&mut self) -> Vec<[f64; 2]> {
+        std::mem::take(&mut self.outline)
+    }
+
     /// Applies a command about cuts; none if it is about something else, which leaves the contour in work.
     pub(super) fn cut(&mut self, command: &Command, scene: Option<&Scene>) -> Option<Change> {
         Some(match *command {
@@ -40,6 +54,12 @@ impl Controls {
                     self.outline.push(at);
                 }
                 Change::Marks
+            }
+            // The caller knows where the surface is.
+            Command::EndCut if self.tool == Tool::Brush => Change::Caller(*command),
+            Command::BrushRadius(radius) if radius.is_finite() => {
+                self.brush_radius = radius.clamp(BRUSH_RADII[0], BRUSH_RADII[1]);
+                Change::Tool
             }
             Command::EndCut => {
                 let outline = std::mem::take(&mut self.outline);
@@ -65,6 +85,7 @@ impl Controls {
             Command::CancelCut
             | Command::BeginCut(_)
             | Command::CutAlong(_)
+            | Command::BrushRadius(_)
             | Command::KeepSide(_)
             | Command::ClearCuts => Change::Nothing,
             _ => {
@@ -72,6 +93,18 @@ impl Controls {
                 return None;
             }
         })
+    }
+
+    /// Removes what is near strokes over the surface: lateral, depth, elevation, mm. Strokes with one radius are one cut.
+    pub(in crate::ui) fn brush(&mut self, strokes: Vec<Vec<[f64; 3]>>, scene: &Scene) -> Change {
+        let (radius, count) = (self.brush_radius, strokes.iter().map(Vec::len).sum::<usize>());
+        let mut new = self.settings.clone();
+        let last = new.cuts.last_mut().and_then(|cut| cut.brush.as_mut());
+        match last.filter(|last| last.radius == radius && last.points() + count <= MAX_BRUSH_POINTS) {
+            Some(last) => last.strokes.extend(strokes),
+            None => new.cuts.push(Cut { brush: Some(Brush { radius, strokes }), ..Cut::default() }),
+        }
+        self.take_cut(new, &Command::EndCut, scene)
     }
 
     fn cut_along(&mut self, command: &Command, outline: &[[f64; 2]], scene: &Scene) -> Change {
@@ -86,6 +119,14 @@ impl Controls {
         };
         let mut new = self.settings.clone();
         new.cuts.push(cut);
+        self.take_cut(new, command, scene)
+    }
+
+    /// Takes settings with more cuts.
+    fn take_cut(&mut self, new: Settings, command: &Command, scene: &Scene) -> Change {
+        if new.cuts.len() > MAX_CUTS {
+            return Change::Refused("There are as many cuts as a scene can have: remove them, or take one back.");
+        }
         let now = self.current(scene);
         match now.and_then(|now| drawable(&now, new)) {
             Some(settings) => {

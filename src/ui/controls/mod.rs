@@ -15,7 +15,7 @@ use crate::scene::{
     Camera, Cube, Inset, KeptSide, Layout, MAX_PICTURE, Measurement, Mode, Planes, Scene, Settings, Shadow, Tilt,
     Transfer,
 };
-pub(super) use cutting::CUTS_IN_THE_WAY;
+pub(super) use cutting::{BRUSH_RADII, CUTS_IN_THE_WAY};
 use glam::DVec3;
 use history::History;
 pub(super) use presets::EXAMS;
@@ -55,6 +55,8 @@ pub struct Controls {
     /// The contour of a cut in work, pixels of the picture, and the side of it that stays.
     outline: Vec<[f64; 2]>,
     kept_side: KeptSide,
+    /// Of the brush, mm.
+    brush_radius: f64,
 }
 
 impl Controls {
@@ -72,6 +74,7 @@ impl Controls {
             typing: None,
             outline: Vec::new(),
             kept_side: KeptSide::default(),
+            brush_radius: cutting::BRUSH_RADIUS,
         }
     }
 

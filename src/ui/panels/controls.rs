@@ -10,6 +10,7 @@ use super::{PanelState, TEXT_SIZE, TOUCH_SIZE, heading};
 use crate::scene::{ColourMap, KeptSide, Layout, Mode, PlaneName, Settings, Transfer, TransferName};
 use crate::ui::cine_player::{CineState, SPEEDS};
 use crate::ui::command::{Command, Tool};
+use crate::ui::controls::BRUSH_RADII;
 use crate::ui::hints;
 use crate::ui::sliders::{Group, SLIDERS, Slider as Control};
 use crate::ui::view;
@@ -19,12 +20,13 @@ use egui::{
     StrokeKind, Ui, WidgetInfo, WidgetType, pos2, vec2,
 };
 
-const TOOLS: [(Tool, &str); 6] = [
+const TOOLS: [(Tool, &str); 7] = [
     (Tool::Rotate, "Turn"),
     (Tool::Light, "Light"),
     (Tool::Region, "Region"),
     (Tool::Clip, "Clip"),
     (Tool::Cut, "Cut"),
+    (Tool::Brush, "Brush"),
     (Tool::Plane, "Planes"),
 ];
 
@@ -153,7 +155,8 @@ fn depth_of_cut(state: &PanelState) -> Option<usize> {
 /// With the tool for cuts, which side of a contour stays, and how deep the last cut is; and what removes the cuts, while there are any.
 fn cuts(ui: &mut Ui, state: &PanelState, width: f32, execute: &mut dyn FnMut(Command)) {
     let is_chosen = state.controls.tool() == Tool::Cut;
-    if !is_chosen && state.controls.settings().cuts.is_empty() {
+    let is_brush = state.controls.tool() == Tool::Brush;
+    if !is_chosen && !is_brush && state.controls.settings().cuts.is_empty() {
         return;
     }
     names::group(ui, "Cuts", |ui| {
@@ -166,6 +169,9 @@ fn cuts(ui: &mut Ui, state: &PanelState, width: f32, execute: &mut dyn FnMut(Com
                 execute(Command::KeepSide(if on { KeptSide::Inside } else { KeptSide::Outside }));
             }
         }
+        if is_brush {
+            brush_radius(ui, state, execute);
+        }
         if let Some(number) = depth_of_cut(state) {
             slider(ui, state, number, DEPTH_OF_CUT, false, execute);
         }
@@ -177,6 +183,27 @@ fn cuts(ui: &mut Ui, state: &PanelState, width: f32, execute: &mut dyn FnMut(Com
             }
         }
     });
+}
+
+fn brush_radius(ui: &mut Ui, state: &PanelState, execute: &mut dyn FnMut(Command)) {
+    let before = state.controls.brush_radius();
+    let (mut value, [low, high]) = (before, BRUSH_RADII);
+    let shown = format!("{before:.1} mm");
+    ui.horizontal(|ui| {
+        ui.label("Radius of brush");
+        ui.with_layout(egui::Layout::right_to_left(Align::Center), |ui| {
+            ui.label(RichText::new(&shown).color(ACCENT));
+        });
+    });
+    ui.spacing_mut().slider_width = ui.available_width();
+    ui.spacing_mut().interact_size.y = TOUCH_SIZE * 0.5;
+    let slider = ui.add(Slider::new(&mut value, low..=high).show_value(false).step_by(0.5));
+    let hint = "How far from the surface under the pointer the brush removes.";
+    let slider = slider.tell(hint).named("Radius of brush").with_value(&shown);
+    let is_held = slider.dragged() || slider.clicked() || slider.is_pointer_button_down_on();
+    if (is_held || names::asks_for_value(ui, &slider)) && value != before {
+        execute(Command::BrushRadius(value));
+    }
 }
 
 fn undo_and_redo(ui: &mut Ui, state: &PanelState, row: &Row, execute: &mut dyn FnMut(Command)) {

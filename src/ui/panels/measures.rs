@@ -9,6 +9,7 @@ use crate::measure::overlay::{self, Drawn};
 use crate::scene::{MeasureKind, Scene};
 use crate::ui::command::{Command, Tool};
 use crate::ui::hints;
+use crate::ui::picking::Picker;
 use egui::accesskit::Role;
 use egui::{Button, FontId, Label, Painter, Pos2, Rect, RichText, Stroke, StrokeKind, Ui, pos2, vec2};
 
@@ -167,7 +168,8 @@ fn next_step(state: &PanelState, kind: MeasureKind) -> &'static str {
 pub(super) fn paint(ui: &Ui, state: &PanelState, scale: f32) {
     let Some(scene) = state.scene else { return };
     let (measures, outline) = (state.controls.measures(), state.controls.outline());
-    let is_empty = measures.is_empty() && state.controls.work().is_none() && outline.is_empty();
+    let is_brush = state.controls.tool() == Tool::Brush && !scene.is_flat();
+    let is_empty = measures.is_empty() && state.controls.work().is_none() && outline.is_empty() && !is_brush;
     if is_empty || scene.picture_size() != state.picture.1 {
         return;
     }
@@ -180,9 +182,20 @@ pub(super) fn paint(ui: &Ui, state: &PanelState, scale: f32) {
         }
         canvas.draw(&drawn);
     }
+    if is_brush {
+        let hover = ui.ctx().pointer_hover_pos().filter(|at| picture.contains(*at));
+        let place = outline.last().map(|at| canvas.at(*at)).or(hover);
+        let radius = (state.controls.brush_radius() / Picker::of(scene).mm_per_pixel()) as f32 / scale;
+        if let Some(place) = place.filter(|_| radius.is_finite()) {
+            for stroke in [Stroke::new(3.5, OUTLINE), Stroke::new(1.5, MEASURE)] {
+                canvas.painter.circle_stroke(place, radius.min(1e4), stroke);
+            }
+        }
+    }
     if let Some(last) = outline.last() {
-        // Back to where it began, as it will be closed.
-        let ends = outline.windows(2).map(|ends| [ends[0], ends[1]]).chain([[*last, outline[0]]]);
+        // A contour goes back to where it began, as it will be closed.
+        let closing = [[*last, outline[0]]].into_iter().filter(|_| !is_brush);
+        let ends = outline.windows(2).map(|ends| [ends[0], ends[1]]).chain(closing);
         canvas.lines(&canvas.painter, &ends.map(|ends| ends.map(|at| canvas.at(at))).collect::<Vec<_>>());
     }
     if let Some(work) = state.controls.work() {

@@ -241,7 +241,7 @@ fn small(ui: &mut Ui, text: String, colour: Color32) {
 }
 
 /// Gestures on the picture, for the help.
-const GESTURES: [(&str, &str); 12] = [
+const GESTURES: [(&str, &str); 13] = [
     ("drag", "use the tool: turn, light, region, clip, cut, planes"),
     ("Shift + drag, right or middle drag", "move the picture; over a plane: step it"),
     ("Ctrl + drag", "move the light"),
@@ -253,6 +253,7 @@ const GESTURES: [(&str, &str); 12] = [
     ("drag on the light ball (below Light)", "move the lamp"),
     ("Clip, then drag up", "cut away what is nearer to the viewer"),
     ("Cut, then drag round", "cut away what is within, along the view"),
+    ("Brush, then drag over it", "remove what is near the surface there"),
     ("Planes, then click", "move the point where the three planes cross"),
 ];
 

@@ -198,3 +198,48 @@ fn a_contour_of_a_finger_is_given_up_when_another_comes_or_the_touch_is_cancelle
     touch(&mut window, 1, Phase::Up, -84.0);
     assert!(window.controls.outline().is_empty() && cuts(&window).is_empty());
 }
+
+/// The caller knows where the surface is: gestures give the places on the picture, and strokes come back.
+#[test]
+fn strokes_of_a_brush_are_one_cut_and_each_is_taken_back() {
+    let mut window = TestWindow::new("mode='surface'");
+    window.tool(Tool::Brush);
+    let pressed = window.click([200.0, 220.0]);
+    assert_eq!(pressed, [Command::BeginCut([200.0, 220.0]), Command::EndCut], "a click is a stroke of one point");
+    assert_eq!(window.controls.take_stroke(), [[200.0, 220.0]]);
+    window.drag(Button::Left, [200.0, 220.0], [300.0, 220.0]);
+    assert!(window.controls.take_stroke().len() > 8 && cuts(&window).is_empty());
+    let scene = window.scene();
+    let stroke = |n: usize| vec![vec![[0.0, 40.0 + n as f64, 0.0], [5.0, 40.0, 0.0]]];
+    let brush = |window: &mut TestWindow, n| window.controls.brush(stroke(n), &scene);
+    assert_eq!(brush(&mut window, 1), Change::Settings);
+    assert_eq!(brush(&mut window, 2), Change::Settings);
+    let strokes = |window: &TestWindow| -> Vec<usize> {
+        cuts(window).iter().map(|cut| cut.brush.as_ref().map_or(0, |brush| brush.strokes.len())).collect()
+    };
+    assert_eq!(strokes(&window), [2]);
+    assert!(!SLIDERS.iter().any(|s| s.name == "Depth of cut" && s.applies(window.controls.settings())));
+    apply(&mut window, Command::BrushRadius(7.5));
+    brush(&mut window, 3);
+    assert_eq!(strokes(&window), [2, 1]);
+    assert_eq!(cuts(&window)[1].brush.as_ref().map(|brush| brush.radius), Some(7.5));
+    apply(&mut window, Command::Undo);
+    apply(&mut window, Command::Undo);
+    assert_eq!(strokes(&window), [1]);
+    apply(&mut window, Command::BrushRadius(1e9));
+    assert_eq!(window.controls.brush_radius(), 20.0);
+    // Bounded: a cut has so many points, and a scene so many cuts.
+    for n in 0..MAX_CUT_POINTS {
+        brush(&mut window, n);
+    }
+    assert!(cuts(&window).iter().all(|cut| cut.brush.as_ref().is_some_and(|brush| brush.points() <= MAX_CUT_POINTS)));
+    for n in 0..40 {
+        apply(&mut window, Command::BrushRadius(1.0 + f64::from(n) / 10.0));
+        if let Change::Refused(why) = brush(&mut window, 1) {
+            assert!(n > 20 && why.contains("as many cuts"), "{n}: {why}");
+        }
+    }
+    assert_eq!(cuts(&window).len(), 32);
+    apply(&mut window, Command::ClearCuts);
+    assert!(cuts(&window).is_empty());
+}

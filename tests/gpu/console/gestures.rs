@@ -205,3 +205,31 @@ fn panels_take_space_and_change_nothing_else() {
     desk.rest();
     assert!(desk.picture() == headless(&device, &desk.drawn(), &body(0)));
 }
+
+/// What the brush went over is gone, the picture is that of a separate renderer with the same settings, and undo brings it back.
+#[test]
+fn a_brush_removes_what_it_goes_over() {
+    let device = Device::new();
+    let mut desk = Desk::new(&device, options());
+    desk.begin();
+    let first = desk.live(0);
+    desk.press(Key::Char('z'));
+    desk.rest();
+    desk.drag([32.0, 36.0], [48.0, 36.0]);
+    desk.rest();
+    let cuts = desk.console.controls().settings().cuts.clone();
+    let brush = cuts.first().and_then(|cut| cut.brush.as_ref()).expect("a brush");
+    assert!(cuts.len() == 1 && brush.points() > 1 && brush.radius == 4.0, "{cuts:?}");
+    let brushed = desk.picture();
+    assert!(brushed != first, "nothing is removed");
+    assert!(brushed == headless(&device, &desk.drawn(), &body(0)));
+    desk.held(Modifiers { control: true, ..Modifiers::default() }, Key::Char('z'));
+    desk.rest();
+    assert!(desk.picture() == first, "taken back");
+    // Without a surface there is nothing to brush.
+    desk.press(Key::Char('2'));
+    desk.rest();
+    desk.drag([32.0, 36.0], [48.0, 36.0]);
+    desk.rest();
+    assert!(desk.console.controls().settings().cuts.is_empty());
+}

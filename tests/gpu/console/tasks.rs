@@ -41,6 +41,7 @@ const TASKS: &[(&str, Perform)] = &[
     ("correct a caliper", caliper),
     ("take a wrong trace back", wrong_trace),
     ("cut the cord away", cord),
+    ("brush a speck away", speck),
     ("results for the report", results),
     ("a picture with its measurements", picture),
     ("a surface to print", |user| export(user, '7', "Relief to print, STL")),
@@ -532,6 +533,22 @@ fn largest_part(met: &[Option<Label>], width: usize, label: Label) -> Vec<bool> 
 }
 
 /// At another console, of the fetal head, from the front: by the phantom's labels the cord is gone from the picture, and the rest is as before.
+/// The front of the ball, as seen, is brushed away as deep as the brush reaches.
+fn speck(user: &mut User) -> String {
+    let scene = user.scene();
+    let front = user.ball.0 - scene.rays.forward * user.ball.1;
+    let middle = Picker::of(&scene).project(front).expect("in front");
+    user.letter('z');
+    let way: Vec<_> = (-10..=10).map(|n| in_window([middle[0] + 2.0 * f64::from(n), middle[1]])).collect();
+    user.drag(&way);
+    let scene = user.scene();
+    let shape = scene.cuts().next().expect("a cut");
+    let deeper = |mm: f64| front + scene.rays.forward * mm;
+    // The surface is found within the width of a sample and of a slice.
+    assert!(shape.removes(deeper(0.0)) && shape.removes(deeper(2.5)) && !shape.removes(deeper(6.0)));
+    user.count()
+}
+
 fn bone(user: &mut User) -> String {
     user.control('p');
     user.letter('5');
