@@ -323,7 +323,8 @@ pub struct MakePhantom {
     /// Seed of the speckle; the same seed gives the same bytes
     #[arg(long, value_name = "N", default_value_t = 1)]
     seed: u64,
-    /// head, or a body whose picture has a closed formula: sphere, step, wires, constant, ramp
+    /// head, or a body whose picture has a closed formula: sphere, step, wires, constant, ramp; or heart,
+    /// a beating chamber, of which one slow sweep has many cycles
     #[arg(long, value_name = "NAME", default_value = "head")]
     body: String,
     /// Number of volumes in time; the head moves

@@ -25,10 +25,13 @@ pub enum Body {
     Constant,
     /// Grey that rises linearly with range, line angle and motor angle.
     Ramp,
+    /// A beating chamber: dark blood in a bright wall.
+    Heart,
 }
 
 impl Body {
-    pub const ALL: [Body; 6] = [Body::Head, Body::Sphere, Body::Step, Body::Wires, Body::Constant, Body::Ramp];
+    pub const ALL: [Body; 7] =
+        [Body::Head, Body::Sphere, Body::Step, Body::Wires, Body::Constant, Body::Ramp, Body::Heart];
 
     pub fn name(self) -> &'static str {
         match self {
@@ -38,6 +41,7 @@ impl Body {
             Body::Wires => "wires",
             Body::Constant => "constant",
             Body::Ramp => "ramp",
+            Body::Heart => "heart",
         }
     }
 }
@@ -124,6 +128,40 @@ pub enum Truth {
         grey: f64,
     },
     Ramp(RampTruth),
+    Heart(HeartTruth),
+}
+
+/// A ball of blood in a wall, whose radius changes with time.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct HeartTruth {
+    pub centre: DVec3,
+    /// Of the blood, mm: at the end of systole, and of diastole.
+    pub radii: [f64; 2],
+    /// Thickness of the wall, mm.
+    pub wall: f64,
+    /// Length of a cycle, s.
+    pub period: f64,
+    pub blood: f64,
+    pub muscle: f64,
+    pub outside: f64,
+}
+
+impl HeartTruth {
+    /// Share of the cycle that the heart contracts.
+    const SYSTOLE: f64 = 0.38;
+
+    /// Radius of the blood at a time, mm: largest at time 0.
+    pub fn radius(&self, time: f64) -> f64 {
+        let phase = (time / self.period).rem_euclid(1.0);
+        let filled = match phase < HeartTruth::SYSTOLE {
+            true => 0.5 + 0.5 * (std::f64::consts::PI * phase / HeartTruth::SYSTOLE).cos(),
+            false => {
+                let filling = (phase - HeartTruth::SYSTOLE) / (1.0 - HeartTruth::SYSTOLE);
+                0.5 - 0.5 * (std::f64::consts::PI * filling).cos()
+            }
+        };
+        self.radii[0] + (self.radii[1] - self.radii[0]) * filled
+    }
 }
 
 /// Grey values of the bodies with a formula. The constant one is 15 dB below full scale, where neither end of the scale clips.
@@ -170,6 +208,16 @@ impl Scatterers {
                 Truth::Wires { wires, peak: WIRE_PEAK, per_mm2: WIRE_FALL, outside: DARK }
             }
             Body::Constant => Truth::Constant { grey: CONSTANT },
+            // A large fetal heart at 144 a minute.
+            Body::Heart => Truth::Heart(HeartTruth {
+                centre: DVec3::new(2.0, depth(58.0), -1.0),
+                radii: [9.0, 13.0],
+                wall: 4.0,
+                period: 60.0 / 144.0,
+                blood: DARK,
+                muscle: BRIGHT,
+                outside: CONSTANT,
+            }),
             Body::Ramp => {
                 // A third of the scale for each of the three, so that no corner clips.
                 let share = 80.0;
@@ -229,6 +277,10 @@ fn exact(truth: &Truth, beam: &Beam, sample: usize, pitch: f64) -> Echo {
             } else {
                 Echo { diffuse: level(*outside), mirror }
             };
+        }
+        Truth::Heart(heart) => {
+            let away = (place - heart.centre).length() - heart.radius(beam.time);
+            edge(away, heart.blood, edge(away - heart.wall, heart.muscle, heart.outside))
         }
         Truth::Constant { grey } => *grey,
         Truth::Ramp(ramp) => ramp.grey(beam.range + pitch * sample as f64, beam.line_angle, beam.motor_angle),

@@ -18,7 +18,7 @@ mod speckle;
 mod tests;
 mod truth;
 
-pub use body::{Body, RampTruth, Truth, Wire};
+pub use body::{Body, HeartTruth, RampTruth, Truth, Wire};
 pub use labels::Label;
 pub use sampling::{PointSpread, Sampling};
 pub use source::{CachedPhantom, PhantomSource};
