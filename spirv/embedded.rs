@@ -37,6 +37,7 @@
     ("postprocess/assemble", include_bytes!("postprocess/assemble.spv")),
     ("postprocess/tone", include_bytes!("postprocess/tone.spv")),
     ("preprocess/condition", include_bytes!("preprocess/condition.spv")),
+    ("preprocess/cut", include_bytes!("preprocess/cut.spv")),
     ("preprocess/drop_floating", include_bytes!("preprocess/drop_floating.spv")),
     ("preprocess/load_slice", include_bytes!("preprocess/load_slice.spv")),
     ("preprocess/packed_neighbours", include_bytes!("preprocess/packed_neighbours.spv")),

@@ -128,9 +128,11 @@ fn meaning(slot: Slot) -> (&'static [&'static str], &'static str) {
         | Slot::SharpVolume
         | Slot::SharpSectionVolume
         | Slot::WholeVolume
+        | Slot::CutVolume
         | Slot::SectionVolume
         | Slot::Volume => (GREY, SHARE_OF_RANGE),
         Slot::Floating => (GREY, "1 in parts of the volume that float"),
+        Slot::LineShares => (GREY, "share of the frame's lines that fired before"),
         Slot::TileRanges | Slot::BrickRanges => (&["smallest", "largest"], SHARE_OF_RANGE),
         Slot::Tgc => (GREY, "gain of a sample: a factor, or an addend where samples are log-compressed"),
         Slot::ScanLut => (&["sample", "line"], "index from 0; -1 outside the sector"),
@@ -159,7 +161,9 @@ fn meaning(slot: Slot) -> (&'static [&'static str], &'static str) {
         Slot::SelfAttenuated => {
             (&["red", "green", "blue", "opacity"], "premultiplied colour and opacity of a step, 0..1")
         }
-        Slot::Tiles | Slot::Block => (&["x", "y", "z", "w"], "vectors as the shader takes them"),
+        Slot::Tiles | Slot::Block | Slot::Cuts | Slot::SlicePlaces => {
+            (&["x", "y", "z", "w"], "vectors as the shader takes them")
+        }
         Slot::Surface => {
             (&["echo", "found", "echo_behind", "unused"], "echo 0..1 after the grey window; found: 0 or 1")
         }

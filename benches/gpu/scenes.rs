@@ -143,6 +143,14 @@ pub const SCENES: &[Stated] = &[
         &["section_scan_convert", "section_lateral", "section_depth", "section_elevation"],
     ),
     sweep("parts that float", &["mode=volume", "floating=50"], &["drop_floating"]),
+    sweep(
+        "a cut",
+        &[
+            "mode=volume",
+            "cuts=[{ contour = [[-20, -10], [20, -10], [10, 15], [-10, 15]], view = { at = [0, 40, 0], direction = [0, 1, 0], up = [0, 0, 1] } }]",
+        ],
+        &["cut"],
+    ),
     Stated {
         name: "Cartesian, 4-up, planes of their own volume",
         set: &[

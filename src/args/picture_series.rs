@@ -4,6 +4,7 @@ use super::input::check_inputs;
 use super::picture_file::STANDARD;
 use crate::picture::{Picture, PictureFormat, check_target, replace};
 use crate::terminal::{Failure, failed, input};
+use std::ffi::OsString;
 use std::path::{Path, PathBuf};
 
 #[cfg(feature = "video")]
@@ -16,7 +17,7 @@ const MAX_DIGITS: usize = 9;
 #[derive(Clone, Debug, PartialEq)]
 pub enum SeriesTarget {
     /// Numbered files: what stands before and after the number, its least number of digits, and the folder to make, if one was named.
-    Files { before: String, digits: usize, after: String, format: PictureFormat, folder: Option<PathBuf> },
+    Files { before: OsString, digits: usize, after: String, format: PictureFormat, folder: Option<PathBuf> },
     /// A film in one file.
     Film(PathBuf),
 }
@@ -35,11 +36,13 @@ impl SeriesTarget {
         let has_ending = path.extension().is_some_and(|ending| !ending.is_empty());
         let is_folder = text.ends_with(std::path::is_separator) || path.is_dir();
         if is_folder || !(has_ending || text.contains('%')) {
-            let before = path.join(format!("{name}-")).to_string_lossy().into_owned();
+            let before = path.join(format!("{name}-")).into_os_string();
             let (after, format, folder) = (".png".into(), PictureFormat::Png, Some(path.into()));
             return Ok(SeriesTarget::Files { before, digits: 6, after, format, folder });
         }
-        let file = path.file_name().unwrap_or_default().to_string_lossy();
+        let Some(file) = path.file_name().unwrap_or_default().to_str() else {
+            return refuse("the name of a pattern or a film must be UTF-8; that of a folder need not");
+        };
         if path.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("mp4")) {
             if file.contains('%') {
                 return refuse("a film is one file, whose name has no number: leave the % out");
@@ -68,14 +71,18 @@ impl SeriesTarget {
             return refuse(pattern);
         }
         let format = PictureFormat::of(path).map_err(|fault| input(format!("-o {fault}")))?;
-        let before = folder.join(first).to_string_lossy().into_owned();
+        let before = folder.join(first).into_os_string();
         Ok(SeriesTarget::Files { before, digits, after: after.into(), format, folder: None })
     }
 
     /// The file of a picture.
     pub fn file(&self, number: usize) -> PathBuf {
         match self {
-            SeriesTarget::Files { before, digits, after, .. } => format!("{before}{number:0digits$}{after}").into(),
+            SeriesTarget::Files { before, digits, after, .. } => {
+                let mut file = before.clone();
+                file.push(format!("{number:0digits$}{after}"));
+                file.into()
+            }
             SeriesTarget::Film(path) => path.clone(),
         }
     }
@@ -163,6 +170,28 @@ impl<'a> PictureSeries<'a> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// Prevents a folder that is made and then refused.
+    #[cfg(unix)]
+    #[test]
+    fn a_folder_may_have_a_name_that_is_not_utf_8() {
+        use std::ffi::OsStr;
+        use std::os::unix::ffi::OsStrExt;
+        let name = |end: &[u8]| OsString::from(OsStr::from_bytes(&[&b"echolume-series-\xff"[..], end].concat()));
+        let folder = std::env::temp_dir().join(name(format!("-{}", std::process::id()).as_bytes()));
+        let target = SeriesTarget::of(&folder, "picture").unwrap_or_else(|fault| panic!("{}", fault.message()));
+        assert_eq!(target.file(7), folder.join("picture-000007.png"));
+        target.check(0..2, &[]).unwrap_or_else(|fault| panic!("{}", fault.message()));
+        let picture = Picture { width: 1, height: 1, rgba: vec![1, 2, 3, 255] };
+        let mut series = PictureSeries::new(&target, 25.0);
+        series.write(1, &picture).unwrap_or_else(|fault| panic!("{}", fault.message()));
+        assert_eq!(Picture::load(&folder.join("picture-000001.png")).expect("a picture"), picture);
+        std::fs::remove_dir_all(&folder).expect("remove it");
+        // A pattern is refused before anything is made.
+        let pattern = folder.join(name(b"-%d.png"));
+        assert!(SeriesTarget::of(&pattern, "picture").is_err_and(|fault| fault.message().contains("UTF-8")));
+        assert!(!folder.exists());
+    }
 
     #[test]
     fn a_folder_a_pattern_and_a_film_are_told_apart_and_all_else_is_refused() {

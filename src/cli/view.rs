@@ -60,7 +60,7 @@ pub struct View {
     /// fifo: every picture, at the monitor's refresh; mailbox: only the newest picture, with less latency
     #[arg(long, value_name = "HOW", default_value = "fifo")]
     present: PresentMode,
-    /// Show the picture alone: no panels, no marks
+    /// Show the picture alone: no panels, no marks, no messages. Leaving asks nothing, also if the loop is not saved
     #[arg(long)]
     no_ui: bool,
     /// Start without sliders and buttons (F3 shows them)

@@ -85,7 +85,7 @@ fn features(context: &Context, slot: Slot, scene: &Scene) -> vk::FormatFeatureFl
     if usage(context, slot).contains(vk::ImageUsageFlags::STORAGE) {
         features |= vk::FormatFeatureFlags::STORAGE_IMAGE;
     }
-    if [Slot::Volume, Slot::of_planes(scene)].contains(&slot) && scene.filters_in_hardware() {
+    if [Slot::of_rays(scene), Slot::of_planes(scene)].contains(&slot) && scene.filters_in_hardware() {
         features |= vk::FormatFeatureFlags::SAMPLED_IMAGE_FILTER_LINEAR;
     }
     features

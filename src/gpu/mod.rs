@@ -3,7 +3,7 @@
 //! - `context` owns instance, device, queues and allocator; `device_selection` picks the device; `faults` injects faults.
 //! - `resources` are images and the slots of a scene, `buffers` what is uploaded and read back, `memory` where both lie, `formats` what
 //!   the device can do with them.
-//! - `pipelines` compiles shaders, `pipeline_compiler` on a thread of its own, `pipeline_measure` to measure that; `pipeline_cache` keeps
+//! - `pipelines` compiles shaders, `pipeline_compiler` on a thread of its own, `preparation` before there is a renderer, `pipeline_measure` to measure that; `pipeline_cache` keeps
 //!   what was compiled on disk; `shader_reload` takes shaders from a folder that is watched. `descriptor_sets` are for devices without push
 //!   descriptors.
 //! - `recorder` records command buffers with their barriers and the time stamps of `timing`; `timeline` says when a submission is done,
@@ -30,6 +30,7 @@ mod pipeline_cache;
 mod pipeline_compiler;
 pub mod pipeline_measure;
 mod pipelines;
+mod preparation;
 mod recently_used;
 mod recorder;
 mod renderer;
@@ -49,6 +50,7 @@ pub use formats::TexelAccess;
 pub use losses::Losses;
 pub use pipeline_compiler::{SceneMaker, Wake};
 pub use pipelines::Shaders;
+pub use preparation::{Preparation, Prepared};
 pub use renderer::{Renderer, RendererOptions};
 pub use timing::TimeStamps;
 pub use watchdog::Deadline;

@@ -16,7 +16,7 @@ use crate::spirv::{self, Kind, Module};
 use ash::vk;
 use rayon::prelude::*;
 use std::collections::{HashMap, HashSet};
-use std::sync::atomic::Ordering;
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::sync::{Arc, LazyLock, Mutex, MutexGuard, Weak};
 use std::time::{Duration, Instant};
 
@@ -193,7 +193,18 @@ impl Pipelines {
     /// # Errors
     /// As of [`Pipelines::get`]: the first of the plan that fails. Those that were compiled are kept.
     pub fn of_plan(&self, plan: &Plan, scene: &Scene) -> Result<Vec<Arc<Pipeline>>, GpuError> {
-        let (steps, compiled) = self.complete(plan, scene, |key| self.cached(key));
+        self.of_plan_while(plan, scene, &|_, _| true)
+    }
+
+    /// The same while `goes_on` returns true, which is told before the first and after each how many of those that are missing are compiled, and how
+    /// many these are. If it returns false, some are left out.
+    pub(super) fn of_plan_while(
+        &self,
+        plan: &Plan,
+        scene: &Scene,
+        goes_on: &(dyn Fn(usize, usize) -> bool + Sync),
+    ) -> Result<Vec<Arc<Pipeline>>, GpuError> {
+        let (steps, compiled) = self.complete(plan, scene, |key| self.cached(key), goes_on);
         compiled.into_iter().for_each(|(key, pipeline)| self.keep(key, pipeline));
         steps
     }
@@ -211,7 +222,7 @@ impl Pipelines {
     ) -> Result<Vec<Arc<Pipeline>>, GpuError> {
         let is_current = |key: &Key| !shaders.contains(key.0);
         let current = |key: &Key| is_current(key).then(|| self.cached(key)).flatten();
-        let (steps, compiled) = self.complete(plan, scene, current);
+        let (steps, compiled) = self.complete(plan, scene, current, &|_, _| true);
         let steps = steps?;
         self.made().retain(is_current);
         compiled.into_iter().for_each(|(key, pipeline)| self.keep(key, pipeline));
@@ -224,6 +235,7 @@ impl Pipelines {
         plan: &Plan,
         scene: &Scene,
         cached: impl Fn(&Key) -> Option<Arc<Pipeline>>,
+        goes_on: &(dyn Fn(usize, usize) -> bool + Sync),
     ) -> (Result<Vec<Arc<Pipeline>>, GpuError>, Vec<Compiled>) {
         let keys: Vec<Key> = plan.steps.iter().map(|step| self.key(step.pass, scene, &step.args())).collect();
         let mut found: HashMap<&Key, Arc<Pipeline>> = HashMap::new();
@@ -235,10 +247,21 @@ impl Pipelines {
                 None => missing.push(i),
             }
         }
-        let compile = |&i: &usize| self.make(&keys[i], plan.steps[i].pass, scene, &plan.steps[i].args());
-        let results: Vec<Result<_, GpuError>> = missing.par_iter().map(compile).collect();
+        let (count, done) = (missing.len(), AtomicUsize::new(0));
+        let is_stopped = AtomicBool::new(!goes_on(0, count));
+        let compile = |&i: &usize| {
+            if is_stopped.load(Ordering::Relaxed) {
+                return None;
+            }
+            let made = self.make(&keys[i], plan.steps[i].pass, scene, &plan.steps[i].args());
+            if !goes_on(done.fetch_add(1, Ordering::Relaxed) + 1, count) {
+                is_stopped.store(true, Ordering::Relaxed);
+            }
+            Some((i, made))
+        };
+        let results: Vec<Option<(usize, Result<_, GpuError>)>> = missing.par_iter().map(compile).collect();
         let (mut compiled, mut fault) = (Vec::new(), None);
-        for (i, result) in missing.into_iter().zip(results) {
+        for (i, result) in results.into_iter().flatten() {
             match result {
                 Ok(pipeline) => {
                     found.insert(&keys[i], pipeline.clone());

@@ -42,6 +42,11 @@ impl FirstVolume {
         Some(self.defaults(header, None))
     }
 
+    /// What [`FirstVolume::begin`] will return.
+    pub fn at_begin(&self, header: &Header) -> Option<Defaults> {
+        (self.header.as_ref() != Some(header)).then(|| self.defaults(header, None))
+    }
+
     fn defaults(&self, header: &Header, levels: Option<EchoLevels>) -> Defaults {
         Defaults { layers: self.layers.clone(), geometry: header.forward.clone(), levels }
     }

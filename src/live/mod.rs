@@ -18,5 +18,5 @@ pub mod volume_pool;
 pub use feed::Feed;
 pub use session::{FinishedPicture, Views};
 pub use statistics::Statistics;
-pub use stream::{Lowered, Step, Stream, StreamError, StreamOptions};
+pub use stream::{Lowered, StartStep, Step, Stream, StreamError, StreamOptions};
 pub use volume_pool::Update;

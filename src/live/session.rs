@@ -30,6 +30,8 @@ pub struct FinishedPicture {
     pub took: Duration,
     /// How much of it was drawn again.
     pub work: Work,
+    /// It was drawn with few rays, to be there soon ([`StreamOptions::coarse_first`](super::StreamOptions::coarse_first)).
+    pub is_coarse: bool,
 }
 
 /// The scenes of a stream: one for each direction of the sweep, and mixtures of both for rolling volumes. All see the same visible
@@ -306,7 +308,7 @@ impl Session {
         statistics.pictures += 1;
         let latency = arrived.iter().max().map_or(Duration::ZERO, |at| now.saturating_duration_since(*at));
         let (took, work) = (now.saturating_duration_since(self.begun), self.renderer.drawn_work());
-        Ok(FinishedPicture { volume, picture, latency, took, work })
+        Ok(FinishedPicture { volume, picture, latency, took, work, is_coarse: false })
     }
 
     /// Starts to send a volume again, instead of one that is being sent. Without a free volume image nothing happens.

@@ -8,7 +8,7 @@ use super::session::{Begun, FinishedPicture, Session, Views};
 use super::statistics::Statistics;
 use super::volume_pool::{Update, VolumeCounts, VolumePool};
 use crate::gpu::shader_reload::ShaderFolder;
-use crate::gpu::{self, Bands, Context, GpuError, Renderer, SceneMaker, TimeStamps, Wake};
+use crate::gpu::{self, Bands, Context, GpuError, Preparation, Prepared, Renderer, SceneMaker, TimeStamps, Wake};
 use crate::probe::Probe;
 use crate::scene::default_look::Defaults;
 use crate::scene::load::Layers;
@@ -47,6 +47,10 @@ pub struct StreamOptions {
     /// Other settings that the pictures of a volume are drawn with in turn, from the scene at full quality: stage 1 serves them too, so that
     /// a change among them sends no frame again.
     pub lowered: Option<Lowered>,
+    /// Compiles the pipelines of the first geometry in the background, if there is a `wake`: steps return at once meanwhile.
+    pub prepares: bool,
+    /// Draws the first picture with a 16th of the rays, and then at once the same in full: something is seen soon on a slow device.
+    pub coarse_first: bool,
 }
 
 /// The settings that a scene at full quality is drawn with while the view moves.
@@ -65,8 +69,32 @@ impl Default for StreamOptions {
             shaders: None,
             chosen: None,
             lowered: None,
+            prepares: false,
+            coarse_first: false,
         }
     }
+}
+
+/// What is being done before there is a picture.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum StartStep {
+    /// Nothing has come from the source.
+    Source,
+    /// So many of the pipelines are compiled.
+    Compiling { done: usize, count: usize },
+    /// So many frames of the first volume have come.
+    Frames { done: u64, count: u64 },
+    /// The first picture is to be drawn next.
+    Picture,
+}
+
+/// Settings whose picture takes a 16th of the rays.
+fn coarse(settings: &Settings) -> Settings {
+    let mut coarse = settings.clone();
+    if !settings.mode.is_flat() {
+        (coarse.ray.half, coarse.ray.quarter, coarse.ray.rays) = (false, true, 1);
+    }
+    coarse
 }
 
 /// The result of a step.
@@ -119,6 +147,11 @@ pub struct Stream {
     newest: Option<u32>,
     /// Its counts go on in the next session.
     previous_pool: Option<VolumePool>,
+    /// What the first geometry needs is being compiled, and is compiled.
+    preparation: Option<Preparation>,
+    prepared: Option<Prepared>,
+    /// The next picture is drawn with few rays.
+    is_coarse: bool,
     /// The source has ended, and why.
     end: Option<Option<String>>,
     began: Instant,
@@ -140,6 +173,9 @@ impl Stream {
             full: None,
             first_volume: options.chosen.clone().map(FirstVolume::new),
             found: None,
+            preparation: None,
+            prepared: None,
+            is_coarse: options.coarse_first,
             options,
             session: None,
             cine: Cine::new(CineLimits::default(), 0),
@@ -186,9 +222,15 @@ impl Stream {
 
     fn step_drawing(&mut self, is_ending: bool, patience: Duration) -> Result<Step, StreamError> {
         let Some(session) = &mut self.session else { return Ok(Step::Progress) };
-        if is_ending || !session.renderer.is_drawing()? {
+        // Who has no patience looks again.
+        if !session.renderer.is_drawing()? || (is_ending && !patience.is_zero()) {
             let queued = if session.pool.is_rolling() && !is_ending { self.feed.waiting() } else { 0 };
-            return Ok(Step::Picture(session.finish(queued, &mut self.statistics)?));
+            let picture = session.finish(queued, &mut self.statistics)?;
+            let is_coarse = self.draw_in_full()?;
+            return Ok(Step::Picture(FinishedPicture { is_coarse, ..picture }));
+        }
+        if is_ending {
+            return Ok(Step::Progress);
         }
         let patience = patience.min(DRAWING_WAIT);
         if self.feed.can_wait() && session.pool.is_waiting() {
@@ -197,6 +239,16 @@ impl Stream {
             return Ok(Step::Progress);
         }
         self.replay_or_next_event(patience)
+    }
+
+    /// The first picture is there: what follows is drawn in full. True if it had fewer rays.
+    fn draw_in_full(&mut self) -> Result<bool, StreamError> {
+        let was_coarse = std::mem::take(&mut self.is_coarse) && coarse(&self.settings) != self.settings;
+        if let (true, Some(session), Some(header)) = (was_coarse, &mut self.session, &self.header) {
+            let full = views(header, &self.settings, self.full.as_ref(), &self.options)?;
+            session.pending = Pending::Ready(full);
+        }
+        Ok(was_coarse)
     }
 
     fn step_draining(&mut self) -> Result<Step, StreamError> {
@@ -229,7 +281,9 @@ impl Stream {
             Begun::Refused(fault) => {
                 // Another geometry or device does not try the refused settings again.
                 if session.pending.is_none() {
-                    (self.settings, self.full) = (session.views.first().settings.clone(), None);
+                    let shown = session.views.first().settings.clone();
+                    let ray = if self.is_coarse { self.settings.ray.clone() } else { shown.ray.clone() };
+                    (self.settings, self.full) = (Settings { ray, ..shown }, None);
                 }
                 return Ok(Step::Fault(fault));
             }
@@ -250,8 +304,13 @@ impl Stream {
     fn next_event(&mut self, patience: Duration) -> Result<Step, StreamError> {
         // A new geometry would discard the volume that is frozen.
         let shows_frozen = self.is_frozen && self.session.is_some();
-        if let Some(header) = self.next_header.take_if(|_| !shows_frozen) {
-            self.begin_geometry(header)?;
+        if self.next_header.is_some() && !shows_frozen {
+            let is_prepared = self.has_prepared().inspect_err(|_| self.next_header = None)?;
+            if let Some(header) = self.next_header.take_if(|_| is_prepared) {
+                let begun = self.begin_geometry(header);
+                self.prepared = None;
+                begun?;
+            }
             return Ok(Step::Progress);
         }
         if let Some(end) = &self.end {
@@ -263,6 +322,63 @@ impl Stream {
         };
         self.submit_last()?;
         step
+    }
+
+    /// True if the next geometry can begin: what it needs is compiled, or will be when it begins. Otherwise that is being compiled.
+    fn has_prepared(&mut self) -> Result<bool, StreamError> {
+        if let Some(done) = self.preparation.take_if(|preparation| preparation.is_finished()) {
+            self.prepared = done.finish()?;
+            return Ok(true);
+        }
+        let (Some(header), Some(wake), None) = (&self.next_header, &self.options.wake, &self.session) else {
+            return Ok(true);
+        };
+        if self.preparation.is_none() && self.options.prepares {
+            let found = self.first_volume.as_ref().and_then(|search| search.at_begin(header));
+            let found = found.and_then(|found| found.settings().ok());
+            let found = found.map(|found| Settings { picture: self.settings.picture.clone(), ..found });
+            let settings = self.drawn(found.as_ref().unwrap_or(&self.settings));
+            let full = if found.is_some() { None } else { self.full.as_ref() };
+            let full = full.or(found.as_ref()).unwrap_or(&self.settings);
+            let views = views(header, &settings, Some(full), &self.options)?;
+            let options = self.renderer_options(self.options.images);
+            self.preparation = Preparation::begin(&self.context, views.first().clone(), &options, wake.clone())?;
+        }
+        Ok(self.preparation.is_none())
+    }
+
+    /// Settings as the next picture is drawn with them.
+    fn drawn(&self, settings: &Settings) -> Settings {
+        if self.is_coarse { coarse(settings) } else { settings.clone() }
+    }
+
+    fn renderer_options(&self, volume_images: u32) -> gpu::RendererOptions {
+        let mut options = gpu::RendererOptions {
+            volume_images,
+            queues: self.options.queues,
+            readback: self.options.readback,
+            wake: self.options.wake.clone(),
+            time_stamps: self.options.time_stamps,
+            bands: Bands::Measured { losses: self.losses },
+            ..gpu::RendererOptions::default()
+        };
+        if let Some(folder) = &self.options.shaders {
+            options.shaders = folder.shaders_or_embedded();
+        }
+        options
+    }
+
+    /// What is being done before there is a picture; none once there is one, or it is being drawn.
+    pub fn start_step(&self) -> Option<StartStep> {
+        let Some(session) = &self.session else {
+            let progress = self.preparation.as_ref().map(Preparation::progress);
+            return Some(progress.map_or(StartStep::Source, |[done, count]| StartStep::Compiling { done, count }));
+        };
+        let frames = || {
+            let count = u64::from(session.renderer.scene().slices());
+            StartStep::Frames { done: self.statistics.frames.min(count), count }
+        };
+        (!session.renderer.has_drawn()).then(|| if session.pool.has_new() { StartStep::Picture } else { frames() })
     }
 
     /// Submits what was taken from the feed, unless more waits there: frames that wait together go through stage 1 together.
@@ -395,7 +511,8 @@ impl Stream {
         if let Some(Session { pool, .. }) = session {
             self.previous_pool = Some(pool);
         }
-        let views = views(&header, &self.settings, self.full.as_ref(), &self.options)?;
+        let full = self.full.as_ref().unwrap_or(&self.settings);
+        let views = views(&header, &self.drawn(&self.settings), Some(full), &self.options)?;
         if let Some(cut) = views.first().probe().and_then(Probe::folded) {
             tracing::warn!("{cut}");
         }
@@ -405,18 +522,7 @@ impl Stream {
         }
         self.cine.discard_partial();
         let mut pool = VolumePool::new(self.options.update, self.options.images, slices);
-        let mut options = gpu::RendererOptions {
-            volume_images: pool.images(),
-            queues: self.options.queues,
-            readback: self.options.readback,
-            wake: self.options.wake.clone(),
-            time_stamps: self.options.time_stamps,
-            bands: Bands::Measured { losses: self.losses },
-            ..gpu::RendererOptions::default()
-        };
-        if let Some(folder) = &self.options.shaders {
-            options.shaders = folder.shaders_or_embedded();
-        }
+        let options = self.renderer_options(pool.images());
         let renderer = Renderer::new(&self.context, views.first().clone(), &options)?;
         if let Some(previous) = self.previous_pool.take() {
             pool.continue_from(previous);
@@ -456,8 +562,10 @@ impl Stream {
     }
 
     fn change_to(&mut self, settings: Settings, full: Option<Settings>) -> Result<(), StreamError> {
+        let drawn = self.drawn(&settings);
         if let (Some(session), Some(header)) = (&mut self.session, &self.header) {
-            session.pending = Pending::Ready(views(header, &settings, full.as_ref(), &self.options)?);
+            let full = full.as_ref().unwrap_or(&settings);
+            session.pending = Pending::Ready(views(header, &drawn, Some(full), &self.options)?);
         }
         (self.settings, self.full) = (settings, full);
         Ok(())
@@ -581,6 +689,9 @@ impl Stream {
 
     /// True if a step has nothing to do until the source reports an event or a pipeline is compiled.
     pub fn is_idle(&self) -> bool {
+        if let Some(preparation) = &self.preparation {
+            return !preparation.is_finished();
+        }
         let is_busy = self.session.as_ref().is_some_and(Session::is_busy);
         !is_busy && !self.is_replaying() && self.feed.waiting() == 0
     }

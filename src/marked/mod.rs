@@ -103,7 +103,7 @@ fn mark_tile(picture: &mut Picture, tile: &TileMarks, square: u32) -> Result<(),
     Ok(())
 }
 
-/// Lays white on black over the picture: white covers it, black dims it by a half.
+/// Lays white on black over the picture: white covers it, black dims it to a quarter, on which white is readable whatever the picture shows.
 fn blend(picture: &mut Picture, glyph: &Picture, at: [i64; 2]) {
     for (n, pixel) in glyph.rgba.chunks_exact(4).enumerate() {
         let (x, y) = (at[0] + n as i64 % i64::from(glyph.width), at[1] + n as i64 / i64::from(glyph.width));
@@ -113,7 +113,7 @@ fn blend(picture: &mut Picture, glyph: &Picture, at: [i64; 2]) {
         let first = 4 * (y as usize * picture.width as usize + x as usize);
         let cover = u32::from(pixel[0]);
         for channel in &mut picture.rgba[first..first + 3] {
-            *channel = ((u32::from(*channel) / 2 * (255 - cover) + 235 * cover) / 255) as u8;
+            *channel = ((u32::from(*channel) / 4 * (255 - cover) + 235 * cover) / 255) as u8;
         }
     }
 }
@@ -276,6 +276,18 @@ mod tests {
         assert_eq!(pixel(0), [100; 3], "nothing elsewhere");
         let bright = drawn.rgba.chunks_exact(4).filter(|p| p[2] > 200).count();
         assert!(bright > 20, "{bright} pixels of the label");
+    }
+
+    /// Prevents letters that a bright picture hides: contrast of 4.5 (WCAG 2.2, AA) with what is behind them.
+    #[test]
+    fn letters_are_readable_on_white() {
+        let linear = |c: u8| ((f64::from(c) / 255.0 + 0.055) / 1.055).powf(2.4);
+        let mut white = grey([8, 8]);
+        white.rgba.fill(255);
+        let glyph = Picture { width: 2, height: 1, rgba: vec![255, 255, 255, 255, 0, 0, 0, 255] };
+        blend(&mut white, &glyph, [0, 0]);
+        let [letter, behind] = [white.rgba[0], white.rgba[4]].map(|c| linear(c) + 0.05);
+        assert!(letter / behind > 4.5, "{letter} on {behind}");
     }
 
     #[test]

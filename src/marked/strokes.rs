@@ -60,7 +60,9 @@ pub(super) fn slices(picture: &mut Picture, scene: &Scene) -> Result<(), String>
     let sheet = scene.sheet();
     let Some(first) = sheet.tiles.first() else { return Ok(()) };
     let tile = [first.corner, first.size].map(|corner| corner.map(f64::from));
-    sheet.slice_lines().iter().for_each(|ends| stroke(picture, tile, *ends, 0.5, LINE));
+    for (half, colour) in [(1.5, EDGE), (0.5, LINE)] {
+        sheet.slice_lines().iter().for_each(|ends| stroke(picture, tile, *ends, half, colour));
+    }
     let text = overlay::spacing_label(&sheet);
     let width = canvas::text_width(&text, TEXT)?.min(tile[1][0]).ceil() as u32 + 6;
     let label = canvas::picture([width, TEXT + 6], &Label(&text))?;

@@ -77,7 +77,7 @@ pub const TILE_RANGES: Pass = Pass {
     shader: |_, _| "empty_space/tile_ranges",
     needed: need,
     // A slice changes with the frames that are smoothed into it.
-    reads: |s, _| vec![Bind { part: Part::Around(s.reach_to_frames()), ..whole("volume", Slot::Volume) }],
+    reads: |s, _| vec![Bind { part: Part::Around(s.reach_to_frames()), ..whole("volume", Slot::of_rays(s)) }],
     writes: |_, _| vec![Bind { part: Part::Around(0), ..whole("tile_ranges", Slot::TileRanges) }],
     extent: |s, t| {
         let [width, height, _] = s.tile_counts();

@@ -11,7 +11,7 @@ use crate::spirv::volumes_to_layers::volumes_to_layers;
 use crate::spirv::{self, Access, Dimension, Kind, Member, Module};
 
 /// Textures and tables that a shader declares and a pass may not bind. Specialization constants say whether they are read or written.
-const OPTIONAL: [&str; 24] = [
+const OPTIONAL: [&str; 25] = [
     "back_light",
     "before",
     "bricks",
@@ -22,6 +22,7 @@ const OPTIONAL: [&str; 24] = [
     "light_normals",
     "light_shade",
     "line_lut",
+    "line_shares",
     "occlusion",
     "opaque_before",
     "packed_neighbours",

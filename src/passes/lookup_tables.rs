@@ -4,7 +4,7 @@ use crate::probe::{Advance, Array, Axis, Geometry, Motion, Probe};
 use crate::scene::{Bricks, Reach, Scene, Side, self_attenuation, transfer};
 use rayon::prelude::*;
 
-fn floats(values: impl IntoIterator<Item = f64>) -> Vec<f32> {
+pub(super) fn floats(values: impl IntoIterator<Item = f64>) -> Vec<f32> {
     values.into_iter().map(|v| v as f32).collect()
 }
 

@@ -3,6 +3,7 @@
 
 pub mod chain;
 pub mod components;
+pub mod cut;
 pub mod fault_injection;
 pub mod floating;
 pub mod interface_check;
@@ -67,6 +68,7 @@ pub const PASSES: &[Pass] = &[
     filter::gaussian::ELEVATION,
     filter::gaussian::SECTION_ELEVATION,
     floating::DROP,
+    cut::PASS,
     preprocess::PACKED_NEIGHBOURS,
     empty_space::TILE_RANGES,
     empty_space::BRICK_RANGES,

@@ -256,7 +256,7 @@ pub const PACKED_NEIGHBOURS: Pass = Pass {
         false => Err("no ray is cast, or samples are taken in another way"),
     },
     // A slice changes with the frames that are smoothed into it.
-    reads: |s, _| vec![Bind { part: Part::Around(s.reach_to_frames()), ..whole("volume", Slot::Volume) }],
+    reads: |s, _| vec![Bind { part: Part::Around(s.reach_to_frames()), ..whole("volume", Slot::of_rays(s)) }],
     writes: |_, _| vec![Bind { part: Part::Around(0), ..whole("packed_neighbours", Slot::PackedNeighbours) }],
     extent: |s, t| in_runs([s.grid.size[0], s.grid.size[1], t.slices], 0),
     repeat: once,

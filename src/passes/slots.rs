@@ -1,7 +1,7 @@
 //! Slots: the GPU resources that passes read and write. Each is declared once, in the table below; its shape and format
 //! follow from the scene. A slot that no pass of a plan names does not exist.
 
-use super::lookup_tables;
+use super::{cut, lookup_tables};
 use crate::scene::planes::TILE_VECTORS;
 use crate::scene::{Layout, Propagation, Scene, SurfaceColour, VolumeFormat};
 use crate::source::StoredType;
@@ -169,6 +169,14 @@ slots! {
         .by_volume(|a, b| a.floating_basis() != b.floating_basis());
     /// The 3D texture that rays are cast through: the part that is visible.
     Volume = D::image("volume", volume, volume_format).multibuffered().clear().across_queues();
+    /// The volume without what cuts remove: rays are cast through it in place of the other.
+    CutVolume = D::image("cut_volume", volume, volume_format).multibuffered().clear();
+    /// The cuts: the axes of their views, and the edges of their contours.
+    Cuts = D::table("cuts", |s| Shape::Buffer(16 * cut::table_length(s) as u32), cut::table, ByContent);
+    /// Where each slice is.
+    SlicePlaces = D::table("slice_places", |s| Shape::Buffer(16 * s.slices()), cut::slice_places, ByContent);
+    /// Share of the lines of a frame that fired before the one at each texel of a slice.
+    LineShares = D::image("line_shares", one_slice, |_| Format::R32f).by_scene(cut::line_shares, By(lattice_differs));
     /// The volume that the planes beside a rendering are cut from, before smoothing across slices, and after.
     SharpSectionVolume = D::image("sharp_section_volume", volume, volume_format).multibuffered().clear().across_queues();
     SectionVolume = D::image("section_volume", volume, volume_format).multibuffered().clear().across_queues();
@@ -452,8 +460,14 @@ impl Slot {
 
     /// True if the slot has a texel for each of the volume, of which the visible part is stored.
     pub fn is_volume(self) -> bool {
-        let of_rays = matches!(self, Slot::Volume | Slot::SharpVolume | Slot::WholeVolume | Slot::Floating);
+        let of_rays =
+            matches!(self, Slot::Volume | Slot::SharpVolume | Slot::WholeVolume | Slot::Floating | Slot::CutVolume);
         of_rays || matches!(self, Slot::SectionVolume | Slot::SharpSectionVolume)
+    }
+
+    /// The volume that rays are cast through: without what cuts remove.
+    pub fn of_rays(scene: &Scene) -> Slot {
+        if scene.has_cuts() { Slot::CutVolume } else { Slot::Volume }
     }
 
     /// The volume that planes are cut from: their own beside a rendering if they have one, otherwise that of the rays, with what is dropped

@@ -6,6 +6,7 @@ pub mod camera;
 mod check;
 mod check_measures;
 pub mod cube;
+pub mod cuts;
 pub mod default_look;
 mod echo_levels;
 mod floating;
@@ -221,6 +222,7 @@ impl Settings {
     pub fn check(&self) -> Result<(), SceneError> {
         check::check(self)?;
         check_measures::check_measures(&self.measure)?;
+        cuts::check(&self.cuts)?;
         check::check_planes(self)
     }
 }
@@ -340,6 +342,7 @@ impl Scene {
         }
         scene.apron = 2.0 + scene.filter_reach();
         floating::check_floating(&scene)?;
+        cuts::check_drawn(&scene)?;
         check::check_planes_resolved(&scene)?;
         scene.visible_bounds = visible_bounds::of(&scene);
         Ok(scene)

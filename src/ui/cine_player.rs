@@ -155,11 +155,16 @@ impl CinePlayer {
 
     pub(super) fn state(&self, volumes: &VecDeque<CineVolume>, shown: Option<usize>) -> CineState {
         let range = self.range(volumes);
-        let since = |index: usize| Some(begins(volumes.get(index)?)? - begins(volumes.front()?)?);
+        // A recording or the phantom that is played again begins its time stamps again: nothing states how long that took.
+        let step = |n: usize| Some((begins(volumes.get(n + 1)?)? - begins(volumes.get(n)?)?).max(0.0));
+        let since = |index: usize| -> Option<f64> {
+            begins(volumes.get(index)?)?;
+            (0..index).map(step).try_fold(0.0, |sum, step| Some(sum + step?))
+        };
         // A rate that some of the volumes do not state would be a guess.
-        let intervals: Option<Vec<f64>> =
-            (*range.start()..*range.end()).map(|index| interval(volumes, index)).collect();
-        let intervals = intervals.filter(|intervals| !intervals.is_empty());
+        let has_times = range.clone().all(|index| volumes.get(index).and_then(begins).is_some());
+        let intervals = (*range.start()..*range.end()).filter_map(|index| interval(volumes, index));
+        let intervals = Some(intervals.collect::<Vec<f64>>()).filter(|known| has_times && !known.is_empty());
         CineState {
             count: volumes.len(),
             shown,
@@ -303,6 +308,16 @@ mod tests {
             player.state(&unknown, Some(1)),
             CineState { seconds: None, rate: None, ..player.state(&unknown, Some(1)) }
         );
+        // Played twice, and with a pause.
+        let again = volumes(&[Some(0.0), Some(0.5), Some(1.0), Some(0.0), Some(0.5)]);
+        let state = CinePlayer::default().state(&again, Some(4));
+        assert_eq!((state.seconds, state.rate), (Some(1.5), Some(2.0)));
+        assert_eq!(CinePlayer::default().state(&again, Some(3)).seconds, Some(1.0));
+        let paused = volumes(&[Some(0.0), Some(0.5), Some(100.0), Some(100.5)]);
+        let state = CinePlayer::default().state(&paused, Some(3));
+        assert_eq!((state.seconds, state.rate), (Some(100.5), Some(2.0)));
+        let first = CinePlayer::default().state(&again, Some(0)).seconds;
+        assert_eq!(first.map(|seconds| format!("{seconds:.1}")), Some("0.0".into()), "not -0.0");
         let none = CinePlayer::default().state(&VecDeque::new(), None);
         assert_eq!((none.count, none.rate, none.is_trimmed), (0, None, false));
     }

@@ -5,7 +5,7 @@ pub use super::view::{Face, Viewpoint};
 
 use super::input::{Input, Key, Modifiers};
 use super::sliders::{GAIN, THRESHOLD};
-use crate::scene::{ColourMap, Layout, MeasureKind, Mode, PlaneName, TransferName};
+use crate::scene::{ColourMap, KeptSide, Layout, MeasureKind, Mode, PlaneName, TransferName};
 use Key::{Char, Function};
 
 /// One command.
@@ -76,6 +76,18 @@ pub enum Command {
     Type(char),
     Untype,
     EndTyping,
+    /// Begins the contour of a cut at this pixel of the picture.
+    BeginCut([f64; 2]),
+    /// Draws the contour on to this pixel.
+    CutAlong([f64; 2]),
+    /// Closes the contour and cuts along it.
+    EndCut,
+    /// Leaves the contour in work.
+    CancelCut,
+    /// Chooses the side of the next contour that stays.
+    KeepSide(KeptSide),
+    /// Removes all cuts.
+    ClearCuts,
     /// Counts the voxels of the region whose echo reaches the threshold.
     CountVoxels,
     /// Copies the results as CSV.
@@ -145,6 +157,8 @@ pub enum Tool {
     Region,
     /// Moves a clip plane that faces the viewer.
     Clip,
+    /// Draws the contour of a cut on a rendering.
+    Cut,
     /// Moves the planes of sections.
     Plane,
     /// Sets the points of a measurement.
@@ -249,6 +263,8 @@ pub const KEY_BINDINGS: &[Binding] = &[
     on(Char('g'), "drag moves the region's faces", Command::Tool(Tool::Region)),
     on(Char('x'), "drag cuts from the front", Command::Tool(Tool::Clip)),
     on(Char('s'), "drag moves the planes (sections)", Command::Tool(Tool::Plane)),
+    on(Char('f'), "drag round it cuts it away (freehand)", Command::Tool(Tool::Cut)),
+    shift(Char('f'), "remove all cuts", Command::ClearCuts),
     shift(Char('x'), "nothing cut from the front", Command::MoveClip(-BEYOND_ANY_VOLUME_MM)),
     // The view.
     shift(Key::Left, "rotate", Command::Rotate([-5.0, 0.0])).repeating(),
@@ -424,7 +440,7 @@ mod tests {
     fn every_mode_layout_tool_and_plane_has_a_key() {
         use Mode::*;
         let modes = [Volume, Surface, Mixed, Mip, MinIp, Mean, Plane, Orthogonal, Tomography, Cube].map(Command::Mode);
-        let tools = [Tool::Rotate, Tool::Light, Tool::Region, Tool::Clip, Tool::Plane].map(Command::Tool);
+        let tools = [Tool::Rotate, Tool::Light, Tool::Region, Tool::Clip, Tool::Cut, Tool::Plane].map(Command::Tool);
         let layouts = [Layout::Single, Layout::Four, Layout::Pair].map(Command::Layout);
         let planes = [PlaneName::A, PlaneName::B, PlaneName::C].map(Command::Plane);
         for command in modes.iter().chain(&tools).chain(&layouts).chain(&planes) {

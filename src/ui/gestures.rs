@@ -81,8 +81,9 @@ impl Gestures {
             Input::Touch { finger, phase, at } => self.touch(finger, phase, at, viewport, tool),
             Input::FocusLost => {
                 // The tile that is shown alone does not depend on what is pressed.
+                let is_cutting = self.presses().any(|press| matches!(press.drag, Drag::Cut));
                 *self = Gestures { back: self.back, ..Gestures::default() };
-                Vec::new()
+                if is_cutting { vec![Command::CancelCut] } else { Vec::new() }
             }
             _ => Vec::new(),
         }
@@ -91,6 +92,10 @@ impl Gestures {
     /// The last position of the pointer.
     pub(super) fn pointer(&self) -> Option<[f64; 2]> {
         self.pointer
+    }
+
+    fn presses(&self) -> impl Iterator<Item = &Press> {
+        self.mouse.iter().map(|(_, press)| press).chain(&self.finger_press)
     }
 
     /// True while a button or a finger is down on the picture.
@@ -283,6 +288,8 @@ enum Drag {
     },
     /// A contour along the drag, on a tile.
     Trace(usize),
+    /// The contour of a cut along the drag, on the rendering.
+    Cut,
 }
 
 /// A button or a finger that is down.
@@ -318,6 +325,7 @@ impl Press {
             (Pane::Rendering, Tool::Rotate) => Drag::Rotate,
             (Pane::Rendering, Tool::Light) => Drag::Light,
             (Pane::Rendering, Tool::Clip) => Drag::Clip,
+            (Pane::Rendering, Tool::Cut) => Drag::Cut,
             (Pane::Rendering, Tool::Region) => view::nearest_face(scene, pixel).map_or(Drag::Nothing, Drag::Face),
             (Pane::Rendering, Tool::Plane) => {
                 if scene.cuts_planes() {
@@ -383,10 +391,14 @@ impl Press {
                     self.last = self.start;
                     return point_on(viewport, tile, self.start).map(|point| Command::Point(point, false));
                 }
+                Drag::Cut => {
+                    self.last = self.start;
+                    return viewport.pixel_at(self.start).map(|(_, pixel)| Command::BeginCut(self.to_surface(pixel)));
+                }
                 _ => {}
             }
         }
-        if let Drag::Trace(_) = self.drag
+        if let Drag::Trace(_) | Drag::Cut = self.drag
             && (to[0] - self.last[0]).hypot(to[1] - self.last[1]) < TRACE_STEP
         {
             return None;
@@ -402,13 +414,18 @@ impl Press {
                 point_on(viewport, tile, self.last).map(|point| Command::Point(point, false)).into_iter().collect()
             }
             Drag::Trace(_) => vec![Command::EndMeasure],
+            Drag::Cut => vec![Command::EndCut],
             _ => Vec::new(),
         }
     }
 
+    /// A pixel of the picture on the half of a pair that shows the surface.
+    fn to_surface(&self, [x, y]: [f64; 2]) -> [f64; 2] {
+        [x + self.columns_to_surface, y]
+    }
+
     fn dragged(&mut self, from: [f64; 2], to: [f64; 2], viewport: &Viewport) -> Option<Command> {
-        let to_surface = |[x, y]: [f64; 2]| [x + self.columns_to_surface, y];
-        let (scene, pixel) = viewport.pixel_at(to).map(|(scene, pixel)| (scene, to_surface(pixel)))?;
+        let (scene, pixel) = viewport.pixel_at(to).map(|(scene, pixel)| (scene, self.to_surface(pixel)))?;
         let [x, y] = [to[0] - from[0], to[1] - from[1]];
         let of_picture = |n: f64| n / viewport.size[1];
         let degrees = |x: f64, y: f64| [x, y].map(|n| n / viewport.pane_height(self.pane) * DEGREES_PER_HEIGHT);
@@ -433,6 +450,7 @@ impl Press {
             }
             Drag::Point { tile, index, point } => Command::MovePoint(index, point, point_on(viewport, tile, to)?),
             Drag::Caliper { .. } => return None,
+            Drag::Cut => Command::CutAlong(pixel),
             Drag::Trace(tile) => Command::Point(point_on(viewport, tile, to)?, false),
             Drag::Face(face) => {
                 let picker = Picker::of(scene);
@@ -440,7 +458,7 @@ impl Press {
                 // Positions count along the axis from the origin, which does not move with the face.
                 let position = |pixel| closest_along((line.0 - line.1 * line.0.dot(line.1), line.1), picker.ray(pixel));
                 if self.grabbed.is_none() {
-                    self.grabbed = position(to_surface(viewport.pixel_at(from)?.1));
+                    self.grabbed = position(self.to_surface(viewport.pixel_at(from)?.1));
                 }
                 // Relative to where the face was grabbed: beyond its range the face waits for the pointer to come back.
                 let moved = (position(pixel)? - self.grabbed?).clamp(self.travel[0], self.travel[1]);

@@ -4,7 +4,7 @@ use super::command::{Tool, Viewpoint};
 use crate::scene::{Layout, MeasureKind, Mode};
 
 /// By name of a slider: what it does.
-const SLIDERS: [(&str, &str); 49] = [
+const SLIDERS: [(&str, &str); 50] = [
     ("Gain", "Makes the picture brighter or darker as a whole."),
     ("Contrast", "Spreads bright and dark apart."),
     ("Gamma", "Brightens (above 1) or darkens the middle tones; black and white stay."),
@@ -12,6 +12,10 @@ const SLIDERS: [(&str, &str); 49] = [
     ("Window low", "Echoes up to this value are black or transparent."),
     ("Window high", "Echoes from this value on have full brightness."),
     ("Start depth", "Hides everything nearer to the probe, such as the wall in front of the face."),
+    (
+        "Depth of cut",
+        "How deep the last cut is, from where its contour meets the region. 0: it goes through everything.",
+    ),
     ("Planes zoom", "Enlarges the planes."),
     ("Slab", "Thickness of the planes: a thick slab shows less speckle and more of what runs along it."),
     ("Spacing", "Distance between neighbouring slices. 0: they divide the region evenly."),
@@ -93,6 +97,7 @@ pub(super) fn of_tool(tool: Tool) -> &'static str {
         Tool::Light => "Drag moves the lamp.",
         Tool::Region => "Drag moves the nearest face of the region.",
         Tool::Clip => "Drag up cuts away what is nearer to you.",
+        Tool::Cut => "Drag round what is in the way: it is cut away along the view. (F)",
         Tool::Plane => "Drag or click moves the planes.",
         Tool::Measure(kind) => of_measure(kind),
     }

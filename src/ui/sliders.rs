@@ -117,6 +117,9 @@ pub(super) const GAIN: usize = 0;
 pub(super) const THRESHOLD: usize = 3;
 pub(super) const PLANES_ZOOM: usize = 7;
 
+/// Greatest depth of a cut that the slider sets, mm.
+const DEEPEST: f64 = 200.0;
+
 /// All sliders. Those of windows, thresholds and start depths change the values of the current mode. A mixed picture has them for its
 /// surface, and again for its volume layer.
 pub const SLIDERS: &[Slider] = &[
@@ -291,6 +294,15 @@ pub const SLIDERS: &[Slider] = &[
         always,
         |s| s.post.sigma.map_or(0.0, |f| f.sigma),
         |s, v| s.post.sigma = sigma(s.post.sigma, v),
+    ),
+    slider("Depth of cut", "mm", Image, [0.0, DEEPEST], 1.0).of(
+        |s| !s.cuts.is_empty() && !s.mode.is_flat() && s.mode != Mode::Cube,
+        |s| s.cuts.last().and_then(|cut| cut.depth).unwrap_or(0.0),
+        |s, v| {
+            if let Some(cut) = s.cuts.last_mut() {
+                cut.depth = (v > 0.0).then_some(v);
+            }
+        },
     ),
     slider("Step", "mm", Quality, [0.0, 2.0], 0.05).of(
         renders_rays,

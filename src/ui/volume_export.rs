@@ -178,6 +178,8 @@ impl Export {
             true => Ok(()),
             false => {
                 let last = said.lines().map(str::trim).rfind(|line| !line.is_empty()).unwrap_or("it ended early");
+                // The view says itself that this program did not save.
+                let last = last.strip_prefix("echolume: ").unwrap_or(last);
                 Err(printable(last.trim_start_matches("error: ")))
             }
         }
@@ -281,6 +283,7 @@ mod tests {
         let run = |script: &str| process(Command::new("sh").args(["-c", script]));
         assert_eq!(run("exit 0"), Ok(()));
         assert_eq!(run("echo warning >&2; echo 'error: no room' >&2; exit 1"), Err("no room".into()));
+        assert_eq!(run("echo 'echolume: a.mha: no room' >&2; exit 1"), Err("a.mha: no room".into()));
         assert_eq!(run("exit 3"), Err("it ended early".into()));
         // More than a pipe holds.
         assert_eq!(run("yes abc | head -c 400000 >&2; exit 0"), Ok(()));

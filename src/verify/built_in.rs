@@ -208,17 +208,28 @@ pub fn wall(scene: &Scene, number: u32) -> Vec<Texels> {
     })
 }
 
+/// A prism and a cone.
+const TWO_CUTS: &str = "mode = 'vr'
+    cuts = [
+        { contour = [[-8, -6], [9, -5], [3, 2], [2, 9]], view = { at = [0, 20, 0], direction = [0.2, 1, 0], up = [0, 0, 1] } },
+        { contour = [[-1, -3], [7, -2], [7, 4], [-2, 4], [7, -3]], view = { at = [-8, 30, 0], direction = [1, 0.5, 0.3], up = [0, -1, 0], eye = 45 }, depth = 20 },
+    ]";
+
 pub const TURNED: &str = "azimuth = 25, tilt = -15, roll = 40";
+
+/// A wobbler whose motor moves while a frame is acquired.
+fn moving() -> Probe {
+    let probe = wobbler();
+    Probe { advance: Advance::Same(0.7 * probe.slices.pitch()), ..probe }
+}
 
 /// All variants of the geometry, by name.
 pub fn geometries() -> Vec<(&'static str, Geometry)> {
-    let mut moved = wobbler();
-    moved.advance = Advance::Same(0.7 * moved.slices.pitch());
     let mut mixed = uneven(wobbler());
     mixed.advance = Advance::Each((0..9).map(|k| if k < 4 { 0.02 } else { -0.02 }).collect());
     vec![
         ("fan", Geometry::Sweep(wobbler())),
-        ("fan, motor moving", Geometry::Sweep(moved)),
+        ("fan, motor moving", Geometry::Sweep(moving())),
         ("fan, uneven", Geometry::Sweep(uneven(wobbler()))),
         ("fan, uneven and mixed", Geometry::Sweep(mixed)),
         ("linear array, translated", Geometry::Sweep(linear())),
@@ -266,6 +277,25 @@ fn plane_scenes() -> Vec<SceneSpec> {
     for (name, geometry, toml) in [
         ("Cartesian, 4-up, planes of all samples", &voxels, "mode = 'vr'\nlayout = 'four'\nplanes.smooth = {}"),
         ("fan, parts that float", &Geometry::Sweep(wobbler()), "mode = 'vr'\nfloating = 30"),
+        ("fan, two cuts", &Geometry::Sweep(wobbler()), TWO_CUTS),
+        (
+            "fan, motor moving, a cut beside planes",
+            &Geometry::Sweep(moving()),
+            "mode = 'sr'\nlayout = 'four'\n\
+             cuts = [{ contour = [[-5, -4], [6, -4], [0, 9]], view = { at = [3, 25, -2], direction = [0.4, 1, -0.6], up = [0, 0, 1], eye = 60 } }]",
+        ),
+        (
+            "translated, a cut of what floats",
+            &Geometry::Sweep(linear()),
+            "mode = 'vr'\nfloating = 30\nregion.lateral = [-9, 12]\n\
+             cuts = [{ contour = [[-5, -4], [6, -4], [0, 9]], view = { at = [0, 20, 0], direction = [0, 1, 1], up = [1, 0, 0] }, keep = 'inside', depth = 9 }]",
+        ),
+        (
+            "Cartesian, a cut of the smallest echoes",
+            &voxels,
+            "mode = 'minip'\nslices.format = 'r16f'\n\
+             cuts = [{ contour = [[-3, -2], [4, -2], [0, 3]], view = { at = [6, 9, 4], direction = [1, 1, 0], up = [0, 0, 1], eye = 12 }, depth = 3 }]",
+        ),
         (
             "Cartesian, parts that float",
             &voxels,

@@ -248,7 +248,7 @@ fn input(scene: &Scene, bind: &Bind, slices: u32, kind: &str, noise: &mut Noise)
     if bind.slot == Slot::Surface {
         texels.values.chunks_exact_mut(2).for_each(|p| p[1] = p[1].round());
     }
-    if [Slot::Volume, Slot::of_planes(scene)].contains(&bind.slot) && kind == "noise" {
+    if [Slot::Volume, Slot::of_rays(scene), Slot::of_planes(scene)].contains(&bind.slot) && kind == "noise" {
         texels = blurred(&texels);
     }
     // Both the device and the reference get values that the format can store.
@@ -267,7 +267,7 @@ fn blurred(noise: &Texels) -> Texels {
 
 /// The empty-space slots of a volume, computed by the references of their passes.
 fn empty_space_of(scene: &Scene, slot: Slot, volume: &Texels) -> Texels {
-    let mut slots = std::collections::BTreeMap::from([(Slot::Volume, volume.clone())]);
+    let mut slots = std::collections::BTreeMap::from([(Slot::of_rays(scene), volume.clone())]);
     let made = |name: &str| {
         ["tile_ranges", "brick_ranges", "classify_bricks", "brick_distance"].iter().any(|p| name.starts_with(p))
     };

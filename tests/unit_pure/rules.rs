@@ -100,6 +100,8 @@ fn no_layer_uses_a_layer_above_it() {
         ("rav1e::", &["src/picture/film.rs"]),
         ("winit::", &["src/ui/window.rs", "src/ui/screen_reader.rs"]),
         ("egui::", &["src/ui/panels/", "src/gpu/window/"]),
+        // The colours that the contrast of everything is tested with are in one place.
+        ("Color32::", &["src/ui/panels/colours.rs", "src/ui/panels/drawn.rs"]),
     ];
     for (name, text) in &all {
         let text = code(text);
@@ -258,6 +260,7 @@ fn scenes() -> Vec<Scene> {
                 "'vr'\nvolume = { shading = 'first-hit' }",
                 "'vr'\nlayout = 'four'",
                 "'vr'\nfloating = 20",
+                "'vr'\ncuts = [{ contour = [[0, 0], [1, 0], [0, 1]], view = { at = [0, 0, 0], direction = [0, 1, 0], up = [0, 0, 1] } }]",
                 "'vr'\nlayout = 'four'\nplanes = { smooth = { lateral = 1.0, depth = 1.0, elevation = 1.0 } }",
                 "'sr'\nlayout = 'pair'",
             ] {

@@ -2,7 +2,7 @@
 
 use crate::common::files::Folder;
 use echolume::scene::load::Layers;
-use echolume::scene::{MeasureKind, Measurement, Mode};
+use echolume::scene::{Cut, CutView, KeptSide, MeasureKind, Measurement, Mode};
 use echolume::workspace::{Origin, Workspace, is_workspace, text};
 use std::path::{Path, PathBuf};
 
@@ -32,6 +32,12 @@ fn what_is_saved_is_read_again_exactly() {
                 ..Measurement::default()
             },
         ];
+        let view = CutView { at: [0.1, 1e-9, -3.0], eye: Some(1.0 / 3.0), ..CutView::default() };
+        let contour = vec![[0.0, 1.0 / 3.0], [1e-9, 2.0], [-3.0, 4.0]];
+        settings.cuts = vec![
+            Cut { contour: contour.clone(), view, keep: KeptSide::Inside, depth: Some(0.1) },
+            Cut { contour, ..Cut::default() },
+        ];
         let mut origin = Origin::of(Some("sweep.mha".into()));
         origin.volume = 3;
         let (folder, file) = kept("workspace-exact", &text(&settings, &origin).expect("text"));
@@ -50,6 +56,10 @@ fn a_wrong_file_is_refused_in_one_line_that_names_it() {
         ("[workspace]\nversion = 1\ncolour = 3\n", "colour"),
         ("mode = 'plan'\n[workspace]\nversion = 1\n", "plan"),
         ("[workspace]\nversion = 1\n[[measure]]\nkind = 'distance'\n", "entry 1"),
+        (
+            "[workspace]\nversion = 1\n[[cuts]]\ncontour = [[0, 0], [1, 0]]\n[cuts.view]\nat = [0, 0, 0]\ndirection = [0, 1, 0]\nup = [0, 0, 1]\n",
+            "entry 1: has 2 corners",
+        ),
         ("[workspace]\nversion = 1\n[planes]\nzom = 1\n", "zom"),
         ("\u{1}", "line 1"),
     ] {

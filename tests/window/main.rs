@@ -8,3 +8,4 @@ mod kiosk;
 mod panels;
 mod pictures;
 mod shapes;
+mod start;

@@ -5,6 +5,7 @@ use echolume::measure::outcome;
 use echolume::picture::Picture;
 use echolume::scene::{Input, Scene};
 use echolume::workspace::Workspace;
+use std::path::PathBuf;
 
 /// The window of these tests, and the size of the picture between the panels, from `ui::panels::place`.
 const WINDOW: [u32; 2] = [1000, 700];
@@ -116,6 +117,68 @@ fn saved_pictures_and_loops_have_names_without_patient_data() {
     view.leave();
 }
 
+/// Saves a workspace by its key; the only one in the folder.
+fn save_workspace(desk: &Desk, folder: &Folder) -> PathBuf {
+    control(desk, 's');
+    until("the workspace", || {
+        let entries = std::fs::read_dir(folder.path("kept")).into_iter().flatten().flatten();
+        entries.map(|entry| entry.path()).find(|path| path.extension().is_some_and(|end| end == "toml"))
+    })
+}
+
+fn control(desk: &Desk, key: char) {
+    desk.press(CONTROL, true);
+    desk.tap(key);
+    desk.press(CONTROL, false);
+}
+
+/// What is drawn round is removed at once, stays removed in the workspace, and comes back.
+#[test]
+fn a_cut_is_shown_saved_and_taken_back() {
+    let desk = Desk::new(false);
+    let folder = Folder::new("cut");
+    let view = desk.view(&["--size", "1000x700", "--source", SWEEP, "--save-to", &folder.path("kept")]);
+    let (corner, size) = picture();
+    let start = headless(size, &[]);
+    shows(&view, &start, "the start");
+    desk.tap('f');
+    let round = |n: i32| {
+        let (sin, cos) = (f64::from(n) * std::f64::consts::TAU / 40.0).sin_cos();
+        let at = [cos, sin].map(|by| 0.12 * f64::from(size[1]) * by);
+        [0, 1].map(|a| (corner[a] + size[a] / 2) as i16 + at[a] as i16)
+    };
+    let begin = round(0);
+    view.hover(begin[0], begin[1]);
+    view.button(1, true);
+    for at in (1..40).map(round) {
+        view.hover(at[0], at[1]);
+        std::thread::sleep(std::time::Duration::from_millis(10));
+    }
+    view.button(1, false);
+    let file = save_workspace(&desk, &folder);
+    until("the whole workspace", || Workspace::read(&file).ok());
+    let png = folder.path("cut.png");
+    let size_of_picture = format!("{}x{}", size[0], size[1]);
+    let run = std::process::Command::new(PROGRAM)
+        .args(["render", &file.to_string_lossy(), "-o", &png, "--size", &size_of_picture])
+        .output()
+        .expect("the program runs");
+    assert!(run.status.success(), "{}", String::from_utf8_lossy(&run.stderr));
+    let cut = Picture::load(png.as_ref()).expect("a picture");
+    let changed = cut.rgba.chunks(4).zip(start.rgba.chunks(4)).filter(|(a, b)| a != b).count();
+    assert!(changed > 1000, "{changed} pixels differ from those without the cut");
+    shows(&view, &cut, "the cut");
+    control(&desk, 'z');
+    shows(&view, &start, "taken back");
+    control(&desk, 'y');
+    shows(&view, &cut, "done again");
+    desk.press(SHIFT, true);
+    desk.tap('f');
+    desk.press(SHIFT, false);
+    shows(&view, &start, "no cuts");
+    view.leave();
+}
+
 /// A caliper of 100 pixels and an angle on plane A, whose workspace renders with them. Requirement: 0.1 mm.
 fn measure_on_a_plane(desk: &Desk, view: &View, folder: &Folder) {
     let (corner, size) = picture();
@@ -127,13 +190,7 @@ fn measure_on_a_plane(desk: &Desk, view: &View, folder: &Folder) {
     at(300, 60);
     desk.tap('n');
     [(200, 80), (200, 180), (300, 180)].iter().for_each(|(x, y)| at(*x, *y));
-    desk.press(CONTROL, true);
-    desk.tap('s');
-    desk.press(CONTROL, false);
-    let file = until("the workspace", || {
-        let entries = std::fs::read_dir(folder.path("kept")).into_iter().flatten().flatten();
-        entries.map(|entry| entry.path()).find(|path| path.extension().is_some_and(|end| end == "toml"))
-    });
+    let file = save_workspace(desk, folder);
     let workspace = until("the whole workspace", || Workspace::read(&file).ok());
     let settings = workspace.layers.clone().finish().expect("settings");
     let recording = echolume::source::open(workspace.recording(&file).expect("a recording"), None).expect("it opens");
@@ -169,7 +226,8 @@ fn the_volume_is_exported_as_the_commands_do() {
     let open = || {
         let view = desk.view(&["--size", "700x500", "--source", &ball, "--save-to", &kept, "--mode", "mip"]);
         until("a picture", || {
-            let seen = view.look()?;
+            let (corner, size) = echolume::ui::panels::picture_area([700, 500], 1.0, true);
+            let seen = crop(&view.look()?, corner, size)?;
             let is_bright = |pixel: &[u8]| pixel[..3].iter().all(|c| *c > 150);
             (seen.rgba.chunks(4).filter(|pixel| is_bright(pixel)).count() > 5000).then_some(())
         });
@@ -177,9 +235,7 @@ fn the_volume_is_exported_as_the_commands_do() {
     };
     let view = open();
     let export = |format: char| {
-        desk.press(CONTROL, true);
-        desk.tap('e');
-        desk.press(CONTROL, false);
+        control(&desk, 'e');
         desk.tap(format);
     };
     let all = || std::fs::read_dir(folder.path("kept")).into_iter().flatten().flatten().map(|entry| entry.path());

@@ -89,7 +89,12 @@ struct PartialFrame {
 }
 
 /// The scene with the fields that the device resolves, and this many frames through stage 1 at once if that is given.
-fn adapted(context: &Context, texel_access: TexelAccess, frames_at_once: Option<u32>, scene: Scene) -> Scene {
+pub(super) fn adapted(
+    context: &Context,
+    texel_access: TexelAccess,
+    frames_at_once: Option<u32>,
+    scene: Scene,
+) -> Scene {
     let adapted = formats::adapt_scene(context, texel_access, scene);
     Scene { frames_at_once: frames_at_once.unwrap_or(adapted.frames_at_once), ..adapted }
 }

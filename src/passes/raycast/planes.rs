@@ -78,7 +78,7 @@ pub const TONED: Pass = Pass {
 
 fn reads(scene: &Scene) -> Vec<Bind> {
     let mut reads = ray::reads(scene);
-    reads.iter_mut().filter(|b| b.slot == Slot::Volume).for_each(|b| b.slot = Slot::of_planes(scene));
+    reads.iter_mut().filter(|b| b.slot == Slot::of_rays(scene)).for_each(|b| b.slot = Slot::of_planes(scene));
     reads.push(whole("tiles", Slot::Tiles));
     reads
 }

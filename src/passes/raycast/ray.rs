@@ -27,7 +27,7 @@ fn tables(scene: &Scene) -> (bool, bool, bool) {
 
 pub(in crate::passes) fn reads(scene: &Scene) -> Vec<Bind> {
     let (swept, non_uniform, moving) = tables(scene);
-    let mut reads = vec![Bind { filtered: scene.filters_in_hardware(), ..whole("volume", Slot::Volume) }];
+    let mut reads = vec![Bind { filtered: scene.filters_in_hardware(), ..whole("volume", Slot::of_rays(scene)) }];
     reads.extend((swept && scene.slice_terms() == 0).then_some(whole("sweep_lut", Slot::SweepLut)));
     reads.extend(moving.then_some(whole("line_lut", Slot::LineLut)));
     reads.extend(non_uniform.then_some(whole("slice_table", Slot::SliceTable)));

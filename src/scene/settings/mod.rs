@@ -1,6 +1,7 @@
 //! The settings of a scene: keys, types, defaults and units of the TOML scene file. Lengths are in mm, angles in degrees, samples and
 //! opacities in 0..1. Every struct refuses unknown keys, so that a typing error does not silently become a default.
 
+mod cuts;
 mod marks;
 mod measure;
 mod planes;
@@ -8,6 +9,7 @@ mod preprocess;
 mod raycast;
 mod shading;
 
+pub use cuts::*;
 pub use marks::*;
 pub use measure::*;
 pub use planes::*;
@@ -41,6 +43,9 @@ pub struct Settings {
     pub region: Region,
     /// Clip planes, at most 4. Each removes the side that its normal points to.
     pub clip: Vec<Clip>,
+    /// Cuts: parts of the volume within contours drawn on a rendering, at most 32. Renderings lose them; planes and the block of mode cube show
+    /// everything. Their edges are as fine as the texels of the volume.
+    pub cuts: Vec<Cut>,
     /// Stage 2: the camera.
     pub camera: Camera,
     /// Stage 2: the rays of every mode.

@@ -5,7 +5,7 @@ use crate::gpu;
 use crate::gpu::window::PresentOutcome;
 use crate::live::metrics::{LiveMetrics, SourceStatus};
 use crate::live::volume_pool::VolumeCounts;
-use crate::live::{Feed, FinishedPicture, Step, StreamError};
+use crate::live::{Feed, FinishedPicture, StartStep, Step, StreamError};
 use crate::ui::frame_budget;
 use crate::ui::panels::{self, Banner, PanelState};
 use crate::ui::source_supervisor::SourceState;
@@ -26,6 +26,8 @@ const BLANK_DELAY: Duration = Duration::from_millis(400);
 const PRESENT_RETRY: Duration = Duration::from_millis(100);
 /// Interval of the updates while there is no picture to show.
 const BLANK_INTERVAL: Duration = Duration::from_millis(20);
+/// Longest that the screen says less of the start than is known: each drawing of it takes the processor from what it tells of.
+const START_INTERVAL: Duration = Duration::from_millis(100);
 /// The help needs a window of this height, points.
 const MIN_HELP_HEIGHT: f32 = 200.0;
 /// Lines of a shader compiler's message that are shown.
@@ -80,6 +82,7 @@ impl Console {
         self.advance_cine(now);
         self.send_settings(now);
         self.run_stream(now)?;
+        self.follow_start(now);
         self.warm(now);
         let shader_fault = self.shaders.as_ref().and_then(|folder| folder.fault());
         self.needs_redraw |= shader_fault != self.shader_fault;
@@ -126,10 +129,26 @@ impl Console {
         }
     }
 
+    /// Draws the panels again where the start goes on.
+    fn follow_start(&mut self, now: Instant) {
+        let step = self.stream.start_step();
+        let is_other =
+            step.map(|step| std::mem::discriminant(&step)) != self.start_step.map(|step| std::mem::discriminant(&step));
+        let is_due = now.saturating_duration_since(self.start_step_at) >= START_INTERVAL;
+        if is_other || (step != self.start_step && is_due) {
+            (self.start_step, self.start_step_at, self.needs_redraw) = (step, now, true);
+        }
+    }
+
     /// Runs the stream until a picture is finished, it has nothing to do, or its time slice ends.
     fn run_stream(&mut self, now: Instant) -> Result<(), ConsoleError> {
         let begun = Instant::now();
         loop {
+            // Nothing is presented while the device draws: the screen says before what it is about to do.
+            if !self.tells_of_picture && self.stream.start_step() == Some(StartStep::Picture) {
+                self.tells_of_picture = true;
+                break;
+            }
             match self.stream.step(Duration::ZERO) {
                 Ok(Step::Picture(picture)) => {
                     self.picture_finished(&picture);
@@ -180,8 +199,15 @@ impl Console {
 
     fn picture_finished(&mut self, picture: &FinishedPicture) {
         self.has_new_picture = true;
-        self.pace.picture_took(picture.work, self.quality, picture.took);
-        self.times.pictures.add(picture.took);
+        // A coarse one says nothing of what a picture of this quality takes.
+        if !picture.is_coarse {
+            self.pace.picture_took(picture.work, self.quality, picture.took);
+            self.times.pictures.add(picture.took);
+        }
+        if !self.has_started {
+            tracing::debug!("start: a picture {}", if picture.is_coarse { "with few rays" } else { "in full" });
+        }
+        self.has_started |= !picture.is_coarse;
     }
 
     /// Takes the statistics of the last interval.
@@ -269,7 +295,8 @@ impl Console {
             return Ok(());
         }
         let has_drawn = self.stream.renderer().is_some_and(|renderer| renderer.has_drawn());
-        if !has_drawn && !self.stream.is_idle() {
+        // At the start there is no old content to keep.
+        if !has_drawn && !self.stream.is_idle() && self.has_started {
             let since = *self.blank_since.get_or_insert(now);
             if now.saturating_duration_since(since) < BLANK_DELAY {
                 return Ok(());
@@ -294,6 +321,9 @@ impl Console {
             Ok(PresentOutcome::Presented) => {
                 (self.has_new_picture, self.needs_redraw) = (false, self.panels.has_pending_input());
                 self.present_retry_at = None;
+                if let Some(step) = self.start_step.filter(|_| !has_drawn && !self.has_started) {
+                    tracing::debug!("start: the screen says {step:?}");
+                }
                 self.measure_input_latency();
                 let shown = self.screen.as_mut().map(|screen| screen.take_latencies()).unwrap_or_default();
                 shown.into_iter().for_each(|time| self.times.scan_out.add(time));
@@ -401,7 +431,19 @@ impl Console {
         let is_silent = now.saturating_duration_since(self.last_arrival) >= SILENCE && !self.stream.is_frozen();
         let (state, gone) = (self.source.state(), self.stream.disconnected());
         let has_shown = self.stream.volumes_shown() > 0;
-        let notice = self.fixed.source.notice(state, gone.as_deref(), is_silent, has_shown)?;
-        Some(banner(notice.0, &notice.1, notice.2))
+        let (title, text, is_fault) = self.fixed.source.notice(state, gone.as_deref(), is_silent, has_shown)?;
+        let is_start = !is_fault && text.is_empty() && matches!(state, SourceState::Open);
+        match self.start_step.filter(|_| is_start) {
+            Some(StartStep::Compiling { count: 0, .. }) => Some(banner("Preparing the device", "", false)),
+            Some(StartStep::Compiling { done, count }) => {
+                Some(banner("Preparing the device", &format!("{done} of {count} shaders are compiled"), false))
+            }
+            Some(StartStep::Frames { done: 0, .. }) => Some(banner(title, "Waiting for the first frame", false)),
+            Some(StartStep::Frames { done, count }) => {
+                Some(banner(title, &format!("{done} of {count} frames of the first volume"), false))
+            }
+            Some(StartStep::Picture) => Some(banner("Drawing the first picture", "", false)),
+            Some(StartStep::Source) | None => Some(banner(title, &text, is_fault)),
+        }
     }
 }

@@ -28,7 +28,7 @@ use crate::gpu::window::Screen;
 use crate::gpu::{Context, GpuError};
 use crate::kiosk::chord::Chord;
 use crate::live::metrics::LiveMetrics;
-use crate::live::{self, Feed, Stream, StreamError};
+use crate::live::{self, Feed, StartStep, Stream, StreamError};
 use crate::plan::Work;
 use crate::scene::{Layout, Scene, Settings, variants};
 use crate::source::live::SourceKind;
@@ -145,6 +145,13 @@ pub struct Console {
     device_faults: u32,
     /// The device did not finish and was opened again; a banner says so until then.
     stall_shown_until: Option<Instant>,
+    /// What is done before the first picture, as the screen says it; and since when.
+    start_step: Option<StartStep>,
+    start_step_at: Instant,
+    /// The screen says that the first picture is being drawn.
+    tells_of_picture: bool,
+    /// The start is over: a picture was presented.
+    has_started: bool,
     /// Since when there is no picture to show.
     blank_since: Option<Instant>,
     /// What a screen reader says of the panels, since they were laid out last.
@@ -207,6 +214,9 @@ impl Console {
             shaders: options.shaders.clone(),
             chosen: options.chosen,
             lowered,
+            prepares: true,
+            // Full quality always means the first picture too.
+            coarse_first: options.budget.is_some(),
         };
         let watch = options.shaders.as_ref().map(|folder| Watch::new(folder, options.wake.clone())).transpose();
         let (shader_watch, watch_fault) = match watch {
@@ -276,6 +286,10 @@ impl Console {
             metrics,
             device_faults: 0,
             stall_shown_until: None,
+            start_step: None,
+            start_step_at: now,
+            tells_of_picture: false,
+            has_started: false,
             blank_since: None,
             tree: None,
             repaint_at: None,
@@ -446,13 +460,7 @@ impl Console {
         let modifiers = self.keys.modifiers();
         match (&mut self.help_search, key) {
             (None, Key::Char('/')) => self.help_search = Some(String::new()),
-            (Some(text), Key::Char(letter)) if !modifiers.control && !modifiers.alt => {
-                if text.chars().count() < MAX_SEARCH {
-                    text.push(*letter);
-                }
-            }
-            (Some(text), Key::Space) => text.push(' '),
-            (Some(text), Key::Backspace) => _ = text.pop(),
+            (Some(text), key) if !modifiers.control && !modifiers.alt => return edit_search(text, *key),
             _ => return false,
         }
         true
@@ -592,7 +600,8 @@ impl Console {
             Command::Back => self.go_back(),
             // A kiosk ends only with its exit keys: a sleeve may press Escape.
             Command::Exit if self.fixed.is_kiosk => {}
-            Command::Exit if self.has_unsaved_loop() => self.asks_to_leave = true,
+            // Without panels nobody sees a question.
+            Command::Exit if self.fixed.overlay && self.has_unsaved_loop() => self.asks_to_leave = true,
             Command::Exit | Command::Discard => self.request.exit |= !self.fixed.is_kiosk,
             Command::SaveAndExit => {
                 self.asks_to_leave = false;
@@ -655,7 +664,7 @@ impl Console {
 
     /// The user asked the windowing system to close the window: asks first if that loses a loop. False if it may be closed at once.
     pub(super) fn asks_before_closing(&mut self) -> bool {
-        if self.asks_to_leave || !self.has_unsaved_loop() {
+        if self.asks_to_leave || !self.fixed.overlay || !self.has_unsaved_loop() {
             return false;
         }
         (self.asks_to_leave, self.needs_redraw) = (true, true);
@@ -728,6 +737,23 @@ impl Console {
     }
 }
 
+/// Takes a key for the text that the help is searched for. False if it is none of a text's.
+fn edit_search(text: &mut String, key: Key) -> bool {
+    let letter = match key {
+        Key::Char(letter) => letter,
+        Key::Space => ' ',
+        Key::Backspace => {
+            text.pop();
+            return true;
+        }
+        _ => return false,
+    };
+    if text.chars().count() < MAX_SEARCH {
+        text.push(letter);
+    }
+    true
+}
+
 /// The command of a key while the console asks whether to save the loop before it leaves.
 fn answer(input: &Input) -> Option<Command> {
     match input {
@@ -742,4 +768,21 @@ fn answer(input: &Input) -> Option<Command> {
 fn is_of_tone(command: &Command) -> bool {
     use Command::{MoveCrossing, MoveLight, RotatePlanes, SetSlider, StepPlane, StepSlider};
     matches!(command, MoveLight(_) | StepPlane(_) | MoveCrossing(_) | RotatePlanes(_) | SetSlider(..) | StepSlider(..))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Prevents a search that grows while a key is held.
+    #[test]
+    fn the_search_of_the_help_has_a_longest_text() {
+        let mut text = String::new();
+        for key in [Key::Char('ä'), Key::Space, Key::Char('b')].into_iter().cycle().take(3 * MAX_SEARCH) {
+            assert!(edit_search(&mut text, key));
+        }
+        assert_eq!(text.chars().count(), MAX_SEARCH);
+        (0..MAX_SEARCH + 1).for_each(|_| assert!(edit_search(&mut text, Key::Backspace)));
+        assert!(text.is_empty() && !edit_search(&mut text, Key::Escape));
+    }
 }

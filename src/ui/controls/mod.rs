@@ -1,5 +1,6 @@
 //! The settings of the view, and how commands change them. After any command the settings can be drawn with the current volume.
 
+mod cutting;
 mod history;
 mod measuring;
 
@@ -10,8 +11,10 @@ use crate::scene::default_look::Defaults;
 use crate::scene::load;
 use crate::scene::planes::MAX_TILES;
 use crate::scene::{
-    Camera, Cube, Inset, Layout, MAX_PICTURE, Measurement, Mode, Planes, Scene, Settings, Shadow, Tilt, Transfer,
+    Camera, Cube, Inset, KeptSide, Layout, MAX_PICTURE, Measurement, Mode, Planes, Scene, Settings, Shadow, Tilt,
+    Transfer,
 };
+pub(super) use cutting::CUTS_IN_THE_WAY;
 use history::History;
 use std::borrow::Cow;
 
@@ -46,6 +49,9 @@ pub struct Controls {
     work: Option<Measurement>,
     /// The measurement whose text is being typed.
     typing: Option<usize>,
+    /// The contour of a cut in work, pixels of the picture, and the side of it that stays.
+    outline: Vec<[f64; 2]>,
+    kept_side: KeptSide,
 }
 
 impl Controls {
@@ -61,6 +67,8 @@ impl Controls {
             history: History::default(),
             work: None,
             typing: None,
+            outline: Vec::new(),
+            kept_side: KeptSide::default(),
         }
     }
 
@@ -175,6 +183,9 @@ impl Controls {
     /// Applies a command. `scene` is the one on the screen, which may be of earlier settings. Without it only the tool, the reset and
     /// the commands for the caller have an effect.
     pub(super) fn apply(&mut self, command: &Command, scene: Option<&Scene>) -> Change {
+        if let Some(change) = self.cut(command, scene) {
+            return change;
+        }
         match command {
             Command::Tool(tool) => {
                 let changed = *tool != self.tool;
@@ -228,7 +239,8 @@ impl Controls {
         }
         // The scene lags behind if several commands come between two pictures: each one builds on the settings of the one before.
         let Some(now) = scene.and_then(|scene| self.current(scene)) else { return Change::Nothing };
-        match self.changed(command, &now).and_then(|settings| drawable(&now, self.switched(settings))) {
+        let wanted = self.changed(command, &now).map(|settings| self.switched(settings));
+        match wanted.clone().and_then(|settings| drawable(&now, settings)) {
             Some(settings) if settings != self.settings => {
                 if !settings.mode.is_flat() {
                     self.rendered = settings.mode;
@@ -236,6 +248,9 @@ impl Controls {
                 let before = std::mem::replace(&mut self.settings, settings);
                 self.history.record(before, command);
                 Change::Settings
+            }
+            None if wanted.is_some_and(|settings| cutting::is_in_the_way(&now, settings)) => {
+                Change::Refused(CUTS_IN_THE_WAY)
             }
             _ => Change::Nothing,
         }

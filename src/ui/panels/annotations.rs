@@ -1,7 +1,8 @@
 //! Annotations of the picture: in every tile a scale, the patient's sides and the probe's marker; the orientation of the axes, and a colour
 //! bar.
 
-use super::{ACCENT, PanelState, SMALL_TEXT, TEXT, WARNING, WEAK_TEXT, picture_rect};
+use super::colours::{self, ACCENT, AXES, BACKING, MEASURE, ON_PLANE, OUTLINE, SIDES, TEXT, WARNING, WEAK_TEXT};
+use super::{PanelState, SMALL_TEXT, picture_rect};
 use crate::measure::overlay;
 use crate::passes::postprocess;
 use crate::scene::marks::{BAR_LENGTHS, TileMarks};
@@ -23,79 +24,150 @@ pub(super) fn paint(ui: &Ui, state: &PanelState, scale: f32) {
     }
     let painter = ui.ctx().layer_painter(egui::LayerId::background()).with_clip_rect(picture);
     let marks = scene.marks();
-    for (n, tile) in marks.iter().enumerate() {
+    let area_of = |tile: &TileMarks| {
         let [corner, size] = [tile.corner, tile.size].map(|[x, y]| vec2(x as f32, y as f32) / scale);
-        let area = Rect::from_min_size(picture.min + corner, size);
-        if area.width().min(area.height()) < MIN_FOR_SCALE {
-            continue;
+        Rect::from_min_size(picture.min + corner, size)
+    };
+    let has_room = |area: &Rect, least: f32| area.width().min(area.height()) >= least;
+    let tiles = || marks.iter().enumerate().map(|(n, tile)| (n, tile, area_of(tile)));
+    let tiles = || tiles().filter(|(.., area)| has_room(area, MIN_FOR_SCALE));
+    // What tells the sides goes before what tells sizes: that gives way.
+    let mut taken = Taken::default();
+    tiles().for_each(|(_, tile, area)| sides(&painter, &mut taken, area, tile));
+    if let Some(origin) = state.origin {
+        // Between the letter of the upper edge and a marker in the corner; in a narrow picture further down.
+        let lower = (5..40).map(|n| vec2(-6.0, 6.0 + 5.0 * n as f32));
+        // On the right or the left of that letter, or of the lower edge's.
+        let [left, low] = [-picture.width() / 2.0 - 12.0, picture.height() - 24.0];
+        let beside = [vec2(-6.0, 4.0), vec2(left, 4.0), vec2(-6.0, low), vec2(left, low)];
+        let places = [vec2(-32.0, 6.0)].into_iter().chain(lower).chain(beside);
+        let places = places.map(|away| picture.right_top() + away);
+        // In the smallest pictures without what stands in brackets.
+        let short = origin.split(" (").next().unwrap_or(origin);
+        _ = text_at_one_of(&painter, &mut taken, places.clone(), Align2::RIGHT_TOP, origin, WARNING)
+            || text_at_one_of(&painter, &mut taken, places, Align2::RIGHT_TOP, short, WARNING);
+    }
+    for (n, tile, area) in tiles() {
+        if n == 0 && scene.has_reference() {
+            slices(&painter, &mut taken, picture.min, area, scene, scale);
         }
-        sides(&painter, area, tile);
+        if tile.is_rendering && has_room(&area, MIN_FOR_AXES) {
+            axes(&painter, &mut taken, area, scene);
+        }
+    }
+    if has_room(&picture, MIN_FOR_AXES) && scene.settings.layout != Layout::Four {
+        colour_bar(&painter, &mut taken, picture, scene);
+    }
+    for (n, tile, area) in tiles() {
         // All tiles of a tomography have the same scale: only the first one shows it.
         if n > 0 && scene.settings.mode == Mode::Tomography {
             continue;
         }
         match tile.depth_from {
-            Some(top) => ruler(&painter, area, top, tile.pixel * f64::from(scale)),
-            None => bar(&painter, area, tile.pixel * f64::from(scale)),
+            Some(top) => ruler(&painter, &mut taken, area, top, tile.pixel * f64::from(scale)),
+            None => bar(&painter, &mut taken, area, tile.pixel * f64::from(scale)),
         }
-        if n == 0 && scene.has_reference() {
-            slices(&painter, picture.min, area, scene, scale);
-        }
-        if tile.is_rendering && area.width().min(area.height()) >= MIN_FOR_AXES {
-            axes(&painter, area, scene);
-        }
-    }
-    if picture.width().min(picture.height()) >= MIN_FOR_AXES && scene.settings.layout != Layout::Four {
-        colours(&painter, picture, scene);
-    }
-    if let Some(origin) = state.origin {
-        // Between the letter of the upper edge and a marker in the corner.
-        let at = picture.right_top() + vec2(-32.0, 6.0);
-        text(&painter, at, Align2::RIGHT_TOP, origin, WARNING);
     }
 }
 
+/// The areas that marks have taken: no other is drawn there.
+#[derive(Default)]
+struct Taken(Vec<Rect>);
+
+impl Taken {
+    fn is_free(&self, area: Rect) -> bool {
+        !self.0.iter().any(|taken| taken.expand(2.0).intersects(area))
+    }
+
+    /// Takes an area if it is free.
+    fn take(&mut self, area: Rect) -> bool {
+        let is_free = self.is_free(area);
+        if is_free {
+            self.0.push(area);
+        }
+        is_free
+    }
+}
+
+/// Draws a text at the first of these places that is free and in sight. False if there is none.
+fn text_at_one_of(
+    painter: &Painter,
+    taken: &mut Taken,
+    places: impl IntoIterator<Item = Pos2>,
+    align: Align2,
+    label: &str,
+    colour: Color32,
+) -> bool {
+    let size = painter.layout_no_wrap(label.into(), FontId::proportional(SMALL_TEXT), colour).size();
+    let area = |at: &Pos2| Some(align.anchor_size(*at, size)).filter(|area| painter.clip_rect().contains_rect(*area));
+    let at = places.into_iter().find(|at| area(at).is_some_and(|area| taken.take(area)));
+    at.iter().for_each(|at| text(painter, *at, align, label, colour));
+    at.is_some()
+}
+
 /// The letters of the patient's sides, and a dot on the side of the probe's marker.
-fn sides(painter: &Painter, area: Rect, tile: &TileMarks) {
+fn sides(painter: &Painter, taken: &mut Taken, area: Rect, tile: &TileMarks) {
     let at = |[x, y]: [f64; 2]| {
         let half = area.size() / 2.0 - vec2(16.0, 16.0);
         area.center() + vec2(x as f32 * half.x, y as f32 * half.y)
     };
     for (edge, letter) in &tile.letters {
-        let font = FontId::proportional(SMALL_TEXT * 1.3);
         let place = at(edge.offset());
-        painter.text(place + vec2(1.0, 1.0), Align2::CENTER_CENTER, letter, font.clone(), Color32::BLACK);
-        painter.text(place, Align2::CENTER_CENTER, letter, font, Color32::WHITE);
+        taken.take(Rect::from_center_size(place, vec2(16.0, 20.0)));
+        outlined(painter, place, Align2::CENTER_CENTER, letter, SMALL_TEXT * 1.3, SIDES);
     }
     if let Some(edge) = tile.probe {
         // In the corner of that side, where no letter is.
         let [x, y] = edge.offset();
         let place = at([if x == 0.0 { -1.0 } else { x }, if y == 0.0 { -1.0 } else { y }]);
-        painter.circle_filled(place, 7.0, Color32::from_black_alpha(160));
+        taken.take(Rect::from_center_size(place, vec2(14.0, 14.0)));
+        painter.circle_filled(place, 7.0, OUTLINE);
         painter.circle_filled(place, 5.0, ACCENT);
     }
     if let Some((letter, colour)) = tile.plane {
-        let [r, g, b] = colour.map(|c| (c * 255.0).round() as u8);
         let place = Rect::from_center_size(at(tile.plane_corner()), vec2(20.0, 20.0));
-        painter.rect_filled(place, 3.0, Color32::from_rgb(r, g, b));
-        painter.text(place.center(), Align2::CENTER_CENTER, letter, FontId::proportional(SMALL_TEXT), Color32::BLACK);
+        taken.take(place);
+        painter.rect_filled(place, 3.0, colours::of_scene(colour));
+        painter.text(place.center(), Align2::CENTER_CENTER, letter, FontId::proportional(SMALL_TEXT), ON_PLANE);
     }
 }
 
 fn line(painter: &Painter, from: Pos2, to: Pos2) {
-    // A dark edge along the bright line is visible on any picture.
-    painter.line_segment([from, to], Stroke::new(4.0, Color32::from_black_alpha(150)));
-    painter.line_segment([from, to], Stroke::new(1.5, TEXT));
+    stroke(painter, [from, to], 1.5, TEXT);
+}
+
+/// A bright line between dark edges, which is visible on any picture.
+fn stroke(painter: &Painter, ends: [Pos2; 2], width: f32, colour: Color32) {
+    painter.line_segment(ends, Stroke::new(width + 2.5, OUTLINE));
+    painter.line_segment(ends, Stroke::new(width, colour));
 }
 
 fn text(painter: &Painter, at: Pos2, align: Align2, label: &str, colour: Color32) {
-    let font = FontId::proportional(SMALL_TEXT);
-    painter.text(at + vec2(1.0, 1.0), align, label, font.clone(), Color32::from_black_alpha(200));
-    painter.text(at, align, label, font, colour);
+    outlined(painter, at, align, label, SMALL_TEXT, colour);
+}
+
+/// Bright text with a dark edge all round, which is readable on any picture.
+fn outlined(painter: &Painter, at: Pos2, align: Align2, label: &str, size: f32, colour: Color32) {
+    const RING: [Vec2; 8] = [
+        vec2(1.2, 0.0),
+        vec2(0.9, 0.9),
+        vec2(0.0, 1.2),
+        vec2(-0.9, 0.9),
+        vec2(-1.2, 0.0),
+        vec2(-0.9, -0.9),
+        vec2(0.0, -1.2),
+        vec2(0.9, -0.9),
+    ];
+    let galley = painter.layout_no_wrap(label.into(), FontId::proportional(size), colour);
+    let corner = align.anchor_size(at, galley.size()).min;
+    for away in RING {
+        painter.galley_with_override_text_color(corner + away, galley.clone(), OUTLINE);
+    }
+    painter.galley(corner, galley, colour);
 }
 
 /// A ruler along the left edge with numbered ticks of the depth below the probe's face. `top`: depth at the upper edge, mm.
-fn ruler(painter: &Painter, area: Rect, top: f64, per_point: f64) {
+fn ruler(painter: &Painter, taken: &mut Taken, area: Rect, top: f64, per_point: f64) {
     let bottom = top + f64::from(area.height()) * per_point;
     if !(per_point > 0.0 && bottom > top && bottom - top < 1e4) {
         return;
@@ -105,71 +177,84 @@ fn ruler(painter: &Painter, area: Rect, top: f64, per_point: f64) {
     let x = area.left() + 6.0;
     let at = |depth: f64| area.top() + ((depth - top) / per_point) as f32;
     let from = ((top.max(0.0) / step).ceil() * step).max(0.0);
-    let mut depth = from;
+    let (mut depth, mut has_unit) = (from, false);
     while depth <= bottom {
         let y = at(depth);
-        line(painter, pos2(x, y), pos2(x + 9.0, y));
-        if y > area.top() + 8.0 && y < area.bottom() - 8.0 {
-            let unit = if depth == from { " mm" } else { "" };
-            text(painter, pos2(x + 13.0, y), Align2::LEFT_CENTER, &format!("{depth:.0}{unit}"), TEXT);
+        if taken.is_free(Rect::from_min_max(pos2(x, y - 3.0), pos2(x + 9.0, y + 3.0))) {
+            line(painter, pos2(x, y), pos2(x + 9.0, y));
+            if y > area.top() + 8.0 && y < area.bottom() - 8.0 {
+                let unit = if has_unit { "" } else { " mm" };
+                let place = [pos2(x + 13.0, y)];
+                has_unit |=
+                    text_at_one_of(painter, taken, place, Align2::LEFT_CENTER, &format!("{depth:.0}{unit}"), TEXT);
+            }
         }
         depth += step;
     }
 }
 
-/// A scale bar in the lower right corner.
-fn bar(painter: &Painter, area: Rect, per_point: f64) {
+/// A scale bar in the lower right corner, or further up.
+fn bar(painter: &Painter, taken: &mut Taken, area: Rect, per_point: f64) {
     if !(per_point > 0.0 && per_point.is_finite()) {
         return;
     }
     let max_length = f64::from(area.width()) * 0.3 * per_point;
     let Some(mm) = BAR_LENGTHS.into_iter().rev().find(|mm| *mm <= max_length) else { return };
     let width = (mm / per_point) as f32;
-    let right = pos2(area.right() - 16.0, area.bottom() - 16.0);
+    let label = format!("{mm} mm");
+    let words = painter.layout_no_wrap(label.clone(), FontId::proportional(SMALL_TEXT), TEXT).size();
+    let places = (0..6).map(|n| area.right_bottom() - vec2(16.0, 16.0 + 24.0 * n as f32));
+    let right = places.into_iter().find(|right| {
+        let half = width.max(words.x) / 2.0;
+        let middle = right.x - width / 2.0;
+        let top = right.y - 8.0 - words.y;
+        taken.take(Rect::from_min_max(pos2(middle - half, top), pos2(middle + half, right.y + 6.0)))
+    });
+    let Some(right) = right else { return };
     let left = right - vec2(width, 0.0);
     line(painter, left, right);
     for end in [left, right] {
         line(painter, end - vec2(0.0, 5.0), end + vec2(0.0, 5.0));
     }
-    text(painter, left + vec2(width / 2.0, -8.0), Align2::CENTER_BOTTOM, &format!("{mm} mm"), TEXT);
+    text(painter, left + vec2(width / 2.0, -8.0), Align2::CENTER_BOTTOM, &label, TEXT);
 }
 
 /// Where the slices of a tomography are, on its reference tile, and their distance.
-fn slices(painter: &Painter, origin: Pos2, area: Rect, scene: &Scene, scale: f32) {
+fn slices(painter: &Painter, taken: &mut Taken, origin: Pos2, area: Rect, scene: &Scene, scale: f32) {
     let sheet = scene.sheet();
     let painter = painter.with_clip_rect(area);
     for ends in sheet.slice_lines() {
         let ends = ends.map(|[x, y]| origin + vec2(x as f32, y as f32) / scale);
-        painter.line_segment(ends, Stroke::new(1.0, Color32::from_rgb(255, 214, 64)));
+        stroke(&painter, ends, 1.0, MEASURE);
     }
-    let at = area.center_bottom() - vec2(0.0, 6.0);
-    text(&painter, at, Align2::CENTER_BOTTOM, &overlay::spacing_label(&sheet), TEXT);
+    // Above the letter of the lower edge, or higher.
+    let places = (0..5).map(|n| area.center_bottom() - vec2(0.0, 6.0 + 20.0 * n as f32));
+    text_at_one_of(&painter, taken, places, Align2::CENTER_BOTTOM, &overlay::spacing_label(&sheet), TEXT);
 }
 
 /// The axes of the volume in camera view, in the lower left corner.
-fn axes(painter: &Painter, area: Rect, scene: &Scene) {
+fn axes(painter: &Painter, taken: &mut Taken, area: Rect, scene: &Scene) {
     const ARM: f64 = 34.0;
     let centre = area.left_bottom() + vec2(58.0, -58.0);
-    painter.circle_filled(centre, 50.0, Color32::from_black_alpha(110));
+    if !taken.take(Rect::from_center_size(centre, vec2(100.0, 100.0))) {
+        return;
+    }
+    painter.circle_filled(centre, 50.0, BACKING);
     let rays = &scene.rays;
-    let named = [
-        (DVec3::X, "lat.", Color32::from_rgb(235, 110, 100)),
-        (DVec3::Y, "depth", Color32::from_rgb(120, 205, 120)),
-        (DVec3::Z, "elev.", Color32::from_rgb(110, 160, 245)),
-    ];
-    let mut arms: Vec<(f64, Vec2, &str, Color32)> = named
+    let mut arms: Vec<(f64, Vec2, &str, Color32)> = DVec3::AXES
         .iter()
-        .map(|(axis, name, colour)| {
+        .zip(&AXES)
+        .map(|(axis, (name, colour))| {
             let projected = vec2((axis.dot(rays.right) * ARM) as f32, (-axis.dot(rays.up) * ARM) as f32);
             (axis.dot(rays.forward), projected, *name, *colour)
         })
         .collect();
-    // Axes that point away are drawn first, and weaker.
+    // Axes that point away are drawn first, and thinner.
     arms.sort_by(|a, b| b.0.total_cmp(&a.0));
     for (away, arm, name, colour) in arms {
-        let colour = colour.gamma_multiply((1.0 - 0.45 * away.max(0.0)) as f32);
-        painter.line_segment([centre, centre + arm], Stroke::new(3.5, colour));
-        painter.circle_filled(centre + arm, 4.0, colour);
+        let width = 3.5 - 2.0 * away.max(0.0) as f32;
+        stroke(painter, [centre, centre + arm], width, colour);
+        painter.circle_filled(centre + arm, 2.3 + 0.5 * width, colour);
         // An axis along the view is too short for a name.
         if arm.length() > 9.0 {
             // A single letter would be read as a side of the patient.
@@ -180,7 +265,7 @@ fn axes(painter: &Painter, area: Rect, scene: &Scene) {
 }
 
 /// A bar of the colours of all values, with the limits of the window.
-fn colours(painter: &Painter, picture: Rect, scene: &Scene) {
+fn colour_bar(painter: &Painter, taken: &mut Taken, picture: Rect, scene: &Scene) {
     let settings = &scene.settings;
     let window = match settings.mode {
         // The colours of a lit surface do not stand for values.
@@ -203,14 +288,21 @@ fn colours(painter: &Painter, picture: Rect, scene: &Scene) {
     };
     const STEPS: usize = 64;
     let height = (picture.height() * 0.3).clamp(60.0, 220.0);
-    let area = Rect::from_min_size(pos2(picture.right() - 34.0, picture.top() + 26.0), vec2(16.0, height));
+    // With its numbers on the left. In the right corner, or beside the letter of the right edge.
+    let places = [[34.0, 26.0], [62.0, 26.0], [34.0, 56.0], [62.0, 56.0]];
+    let places = places.map(|[left, below]| {
+        Rect::from_min_size(pos2(picture.right() - left, picture.top() + below), vec2(16.0, height))
+    });
+    let with_numbers = |area: Rect| Rect::from_min_max(area.min - vec2(36.0, 4.0), area.max + vec2(2.0, 4.0));
+    let Some(area) = places.into_iter().find(|area| taken.take(with_numbers(*area))) else { return };
     for n in 0..STEPS {
         let value = (n as f64 + 0.5) / STEPS as f64;
-        let [r, g, b] = postprocess::toned(scene, ramp(value)).map(|c| (c.clamp(0.0, 1.0) * 255.0).round() as u8);
+        let colour = colours::of_scene(postprocess::toned(scene, ramp(value)));
         let low = area.bottom() - height * n as f32 / STEPS as f32;
         let part = Rect::from_min_max(pos2(area.left(), low - height / STEPS as f32 - 0.5), pos2(area.right(), low));
-        painter.rect_filled(part, 0.0, Color32::from_rgb(r, g, b));
+        painter.rect_filled(part, 0.0, colour);
     }
+    painter.rect_stroke(area, 0.0, Stroke::new(2.5, OUTLINE), egui::StrokeKind::Outside);
     painter.rect_stroke(area, 0.0, Stroke::new(1.0, WEAK_TEXT), egui::StrokeKind::Outside);
     for (value, y, align) in
         [(window[1], area.top(), Align2::RIGHT_TOP), (window[0], area.bottom(), Align2::RIGHT_BOTTOM)]

@@ -1,10 +1,11 @@
 //! The panels with buttons and sliders: modes and tools on the left, controls on the right, the cine loop below. The six controls that
 //! every examination needs are in front; the others are below them, by stage.
 
+use super::colours::{ABSENT, ACCENT, BUTTON, ON_SELECTED, ON_WARNING, SELECTED, TEXT, WARNING, WEAK_TEXT};
 use super::measures;
 use super::names::{self, Tell};
-use super::{ACCENT, BUTTON, PanelState, TEXT, TEXT_SIZE, TOUCH_SIZE, WARNING, WEAK_TEXT, heading};
-use crate::scene::{ColourMap, Layout, Mode, PlaneName, Settings, Transfer, TransferName};
+use super::{PanelState, TEXT_SIZE, TOUCH_SIZE, heading};
+use crate::scene::{ColourMap, KeptSide, Layout, Mode, PlaneName, Settings, Transfer, TransferName};
 use crate::ui::cine_player::{CineState, SPEEDS};
 use crate::ui::command::{Command, Tool};
 use crate::ui::hints;
@@ -12,15 +13,16 @@ use crate::ui::sliders::{Group, SLIDERS, Slider as Control};
 use crate::ui::view;
 use egui::accesskit::Role;
 use egui::{
-    Align, Button, CollapsingHeader, Color32, FontId, Label, Panel, Rect, RichText, ScrollArea, Sense, Slider, Stroke,
+    Align, Button, CollapsingHeader, FontId, Label, Panel, Rect, RichText, ScrollArea, Sense, Slider, Stroke,
     StrokeKind, Ui, WidgetInfo, WidgetType, pos2, vec2,
 };
 
-const TOOLS: [(Tool, &str); 5] = [
+const TOOLS: [(Tool, &str); 6] = [
     (Tool::Rotate, "Turn"),
     (Tool::Light, "Light"),
     (Tool::Region, "Region"),
     (Tool::Clip, "Clip"),
+    (Tool::Cut, "Cut"),
     (Tool::Plane, "Planes"),
 ];
 
@@ -76,6 +78,9 @@ pub(super) fn show_modes(ui: &mut Ui, state: &PanelState, width: f32, execute: &
                 hints::of_tool,
                 |t| execute(Command::Tool(t)),
             );
+            if !state.has_column {
+                cuts(ui, state, width - 16.0, execute);
+            }
             if settings.mode.is_flat() && settings.mode != Mode::Orthogonal {
                 let hint = |_| "The plane that is shown and moved.";
                 row.titled("Plane").show(
@@ -126,6 +131,44 @@ pub(super) fn show_modes(ui: &mut Ui, state: &PanelState, width: f32, execute: &
                 }
             });
         });
+    });
+}
+
+/// The slider that is with the cuts while their tool is chosen.
+const DEPTH_OF_CUT: &str = "Depth of cut";
+
+/// The number of that slider, if it is there.
+fn depth_of_cut(state: &PanelState) -> Option<usize> {
+    let is_it = |slider: &Control| slider.name == DEPTH_OF_CUT && slider.applies(state.controls.settings());
+    SLIDERS.iter().position(is_it).filter(|_| state.controls.tool() == Tool::Cut)
+}
+
+/// With the tool for cuts, which side of a contour stays, and how deep the last cut is; and what removes the cuts, while there are any.
+fn cuts(ui: &mut Ui, state: &PanelState, width: f32, execute: &mut dyn FnMut(Command)) {
+    let is_chosen = state.controls.tool() == Tool::Cut;
+    if !is_chosen && state.controls.settings().cuts.is_empty() {
+        return;
+    }
+    names::group(ui, "Cuts", |ui| {
+        heading(ui, "Cuts");
+        ui.set_max_width(width);
+        if is_chosen {
+            let mut on = state.controls.kept_side() == KeptSide::Inside;
+            let hint = "The next contour takes away what is outside of it, not what is within.";
+            if switch(ui, &mut on, "Keep inside", hint) {
+                execute(Command::KeepSide(if on { KeptSide::Inside } else { KeptSide::Outside }));
+            }
+        }
+        if let Some(number) = depth_of_cut(state) {
+            slider(ui, state, number, DEPTH_OF_CUT, false, execute);
+        }
+        if !state.controls.settings().cuts.is_empty() {
+            let button = Button::new("Remove all cuts").min_size(vec2(width, TOUCH_SIZE * 0.75));
+            let hint = "Renderings show everything again (Shift+F; undo brings the cuts back).";
+            if ui.add(button).tell(hint).clicked() {
+                execute(Command::ClearCuts);
+            }
+        }
     });
 }
 
@@ -236,8 +279,10 @@ pub(super) fn show_controls(ui: &mut Ui, state: &PanelState, width: f32, execute
             ui.set_max_width(width - 32.0);
             ui.add_space(6.0);
             measures::show_results(ui, state, width - 40.0, execute);
+            cuts(ui, state, width - 32.0, execute);
             heading(ui, "Controls");
             let in_front = FRONT.map(|(name, sliders)| (name, front(sliders, settings)));
+            let with_cuts = depth_of_cut(state);
             for (name, number) in in_front {
                 match number {
                     Some(number) => slider(ui, state, number, name, true, execute),
@@ -285,7 +330,9 @@ pub(super) fn show_controls(ui: &mut Ui, state: &PanelState, width: f32, execute
             heading(ui, "Advanced");
             for (group, name) in Group::ALL {
                 let is_there = |(number, s): &(usize, &Control)| {
-                    s.group == group && s.applies(settings) && in_front.iter().all(|(_, front)| *front != Some(*number))
+                    let is_elsewhere =
+                        with_cuts == Some(*number) || in_front.iter().any(|(_, front)| *front == Some(*number));
+                    s.group == group && s.applies(settings) && !is_elsewhere
                 };
                 let there: Vec<usize> = SLIDERS.iter().enumerate().filter(is_there).map(|(number, _)| number).collect();
                 if there.is_empty() {
@@ -307,9 +354,9 @@ pub(super) fn show_controls(ui: &mut Ui, state: &PanelState, width: f32, execute
 /// A control in front that the mode has not: it keeps its place.
 fn absent(ui: &mut Ui, name: &str) {
     ui.horizontal(|ui| {
-        ui.label(RichText::new(name).color(WEAK_TEXT.gamma_multiply(0.6)));
+        ui.label(RichText::new(name).color(ABSENT));
         ui.with_layout(egui::Layout::right_to_left(Align::Center), |ui| {
-            ui.label(RichText::new("-").color(WEAK_TEXT.gamma_multiply(0.6)));
+            ui.label(RichText::new("-").color(ABSENT));
         });
     });
     let size = vec2(ui.available_width(), TOUCH_SIZE * 0.62);
@@ -339,7 +386,10 @@ fn slider(
     let mut value = before.clamp(low, high.max(low));
     let digits = (-slider.step.log10().floor()).clamp(0.0, 3.0) as usize;
     let space = if slider.unit.is_empty() || slider.unit == "°" { "" } else { " " };
-    let shown = format!("{before:.digits$}{space}{}", slider.unit);
+    let shown = match slider.name == DEPTH_OF_CUT && before <= 0.0 {
+        true => "through all".to_string(),
+        false => format!("{before:.digits$}{space}{}", slider.unit),
+    };
     ui.horizontal(|ui| {
         let text = RichText::new(name);
         ui.label(if is_large { text.strong() } else { text });
@@ -376,12 +426,12 @@ fn switch(ui: &mut Ui, on: &mut bool, name: &str, hint: &str) -> bool {
     let right = pos2(area.right() - width, area.center().y - height / 2.0);
     let track = Rect::from_min_size(right, vec2(width, height));
     let painter = ui.painter();
-    let fill = if *on { ACCENT.gamma_multiply(0.55) } else { BUTTON };
+    let fill = if *on { SELECTED } else { BUTTON };
     painter.rect_filled(track, height / 2.0, fill);
     let edge = if response.hovered() || response.has_focus() { TEXT } else { WEAK_TEXT };
     painter.rect_stroke(track, height / 2.0, Stroke::new(1.0, edge), StrokeKind::Inside);
     let x = if *on { track.right() - height / 2.0 } else { track.left() + height / 2.0 };
-    painter.circle_filled(pos2(x, track.center().y), height / 2.0 - 4.0, Color32::WHITE);
+    painter.circle_filled(pos2(x, track.center().y), height / 2.0 - 4.0, ON_SELECTED);
     let font = FontId::proportional(TEXT_SIZE);
     // A long name ends before the switch.
     let name = painter.layout_no_wrap(name.to_string(), font, TEXT);
@@ -398,11 +448,11 @@ pub(super) fn show_cine_bar(ui: &mut Ui, state: &PanelState, height: f32, execut
         ui.horizontal_centered(|ui| {
             let room = ui.available_width();
             let is_narrow = room < 420.0;
-            let (label, fill) = match state.is_frozen {
-                true => ("FROZEN", WARNING.gamma_multiply(0.75)),
-                false => ("Freeze", ACCENT.gamma_multiply(0.45)),
+            let (label, fill, colour) = match state.is_frozen {
+                true => ("FROZEN", WARNING, ON_WARNING),
+                false => ("Freeze", SELECTED, ON_SELECTED),
             };
-            let text = RichText::new(label).color(Color32::WHITE).strong();
+            let text = RichText::new(label).color(colour).strong();
             let width = if is_narrow { 84.0 } else { 120.0 };
             let hint = "Keeps this volume on the screen (Space).";
             let freeze = Button::new(text).fill(fill).min_size(vec2(width, touch));

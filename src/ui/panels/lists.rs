@@ -1,11 +1,13 @@
 //! Lists over the window of which an entry is chosen: the files to open, and the formats of an export.
 
+use super::colours::{ACCENT, PANEL, WEAK_TEXT};
 use super::names::{self, Tell};
-use super::{ACCENT, PANEL, SMALL_TEXT, TOUCH_SIZE, WEAK_TEXT};
+use super::overlays::LOW_WINDOW;
+use super::{SMALL_TEXT, TOUCH_SIZE};
 use crate::ui::command::Command;
 use crate::ui::volume_export::FORMATS;
 use egui::accesskit::Role;
-use egui::{Align2, Area, Button, Frame, Id, Margin, Order, RichText, ScrollArea, Stroke, Ui, vec2};
+use egui::{Align2, Area, Button, Frame, Id, Label, Margin, Order, RichText, ScrollArea, Stroke, Ui, vec2};
 
 struct List<'a> {
     title: &'a str,
@@ -43,7 +45,7 @@ pub(super) fn show_exports(ui: &Ui, running: Option<&str>, execute: &mut dyn FnM
 }
 
 impl List<'_> {
-    /// `entries`: names and tooltips. `more` is drawn below the list's title.
+    /// `entries`: names and tooltips. `more` is drawn before them.
     fn show<'a>(
         &self,
         ui: &Ui,
@@ -57,9 +59,11 @@ impl List<'_> {
             Area::new(Id::new(self.title)).order(Order::Foreground).anchor(Align2::CENTER_CENTER, vec2(0.0, 0.0));
         area.show(ui.ctx(), |ui| {
             names::name(ui, Role::Dialog, self.title);
-            let frame = Frame::new().fill(PANEL).inner_margin(Margin::same(16)).corner_radius(10);
+            let is_low = screen.height() < LOW_WINDOW;
+            let margin = if is_low { 6 } else { 16 };
+            let frame = Frame::new().fill(PANEL).inner_margin(Margin::same(margin)).corner_radius(10);
             frame.stroke(Stroke::new(2.0, ACCENT)).show(ui, |ui| {
-                let width = (screen.width() - 80.0).clamp(120.0, 720.0);
+                let width = (screen.width() - 2.0 * f32::from(margin) - 12.0).clamp(120.0, 720.0);
                 ui.set_width(width);
                 ui.horizontal(|ui| {
                     ui.heading(self.title);
@@ -69,22 +73,24 @@ impl List<'_> {
                         }
                     });
                 });
-                ui.label(RichText::new(self.about).size(SMALL_TEXT).color(WEAK_TEXT));
-                more(ui, execute);
-                let height = (screen.height() - 200.0).max(60.0);
-                ScrollArea::vertical().max_height(height).show(ui, |ui| {
-                    names::name(ui, Role::List, self.about);
-                    if entries.len() == 0 {
-                        ui.label(self.empty);
-                    }
-                    for (n, (name, hint)) in entries.enumerate() {
-                        let key = if n < 9 { format!("{}   ", n + 1) } else { "     ".into() };
-                        let button = Button::new(format!("{key}{name}")).truncate();
-                        let button = button.min_size(vec2(width - 20.0, TOUCH_SIZE * 0.7));
-                        if ui.add(button).tell(hint).named(name).clicked() {
-                            choose(n, execute);
+                ui.add(Label::new(RichText::new(self.about).size(SMALL_TEXT).color(WEAK_TEXT)).truncate());
+                // Below the title and what it is about.
+                let height = (screen.height() - if is_low { 100.0 } else { 160.0 }).max(30.0);
+                ScrollArea::vertical().max_height(height).min_scrolled_height(0.0).show(ui, |ui| {
+                    more(ui, execute);
+                    names::list(ui, self.about, |ui| {
+                        if entries.len() == 0 {
+                            ui.label(self.empty);
                         }
-                    }
+                        for (n, (name, hint)) in entries.enumerate() {
+                            let key = if n < 9 { format!("{}   ", n + 1) } else { "     ".into() };
+                            let button = Button::new(format!("{key}{name}")).truncate();
+                            let button = button.min_size(vec2(width - 20.0, TOUCH_SIZE * 0.7));
+                            if ui.add(button).tell(hint).named(name).clicked() {
+                                choose(n, execute);
+                            }
+                        }
+                    });
                 });
             });
         });

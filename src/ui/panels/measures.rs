@@ -1,14 +1,16 @@
 //! Measuring: its tools, the list of results, and what is drawn of both over the picture.
 
+use super::colours::{ACCENT, BACKING, MEASURE, OUTLINE, TEXT, WARNING};
 use super::names::{self, Tell};
-use super::{ACCENT, PanelState, SMALL_TEXT, TEXT, TEXT_SIZE, TOUCH_SIZE, WARNING, heading, picture_rect};
+use super::overlays::first;
+use super::{PanelState, SMALL_TEXT, TEXT_SIZE, TOUCH_SIZE, heading, picture_rect};
 use crate::measure::outcome::{self, Quantity};
 use crate::measure::overlay::{self, Drawn};
 use crate::scene::{MeasureKind, Scene};
 use crate::ui::command::{Command, Tool};
 use crate::ui::hints;
 use egui::accesskit::Role;
-use egui::{Button, Color32, FontId, Label, Painter, Pos2, Rect, RichText, Stroke, StrokeKind, Ui, pos2, vec2};
+use egui::{Button, FontId, Label, Painter, Pos2, Rect, RichText, Stroke, StrokeKind, Ui, pos2, vec2};
 
 /// The tools of the rail and their names there.
 const TOOLS: [(MeasureKind, &str); 9] = [
@@ -23,8 +25,6 @@ const TOOLS: [(MeasureKind, &str); 9] = [
     (MeasureKind::Arrow, "Arrow"),
 ];
 
-/// Colour of measurements: yellow, which no tissue has and every kind of colour vision sees on grey.
-const LINE: Color32 = Color32::from_rgb(255, 214, 64);
 /// Half the size of a cross, and the length of an arrow's head, points.
 const CROSS: f32 = 5.0;
 const HEAD: f64 = 12.0;
@@ -76,7 +76,7 @@ fn results(ui: &mut Ui, state: &PanelState, width: f32, execute: &mut dyn FnMut(
     if let Some(work) = state.controls.work().filter(|work| work.kind.complete_at().is_none()) {
         let name =
             if work.kind == MeasureKind::Volume && work.points.is_empty() { "End volume" } else { "Close contour" };
-        let button = Button::new(name).fill(ACCENT.gamma_multiply(0.45)).min_size(vec2(width, TOUCH_SIZE * 0.65));
+        let button = first(RichText::new(name)).min_size(vec2(width, TOUCH_SIZE * 0.65));
         if ui.add(button).tell("Ends what is being traced (Enter).").clicked() {
             execute(Command::EndMeasure);
         }
@@ -99,7 +99,7 @@ fn results(ui: &mut Ui, state: &PanelState, width: f32, execute: &mut dyn FnMut(
                 let rest = found.iter().map(|q| format!("{}: {}", q.name, q.shown()));
                 let hint: Vec<String> = rest.chain(["Click to type a text for it.".to_string()]).collect();
                 ui.with_layout(egui::Layout::right_to_left(egui::Align::Center), |ui| {
-                    ui.label(RichText::new(&main).color(LINE).size(SMALL_TEXT));
+                    ui.label(RichText::new(&main).color(MEASURE).size(SMALL_TEXT));
                     ui.with_layout(egui::Layout::left_to_right(egui::Align::Center), |ui| {
                         let label = ui.add(Label::new(text).truncate().sense(egui::Sense::click()));
                         let spoken = format!("{} {name} {main}", n + 1);
@@ -163,11 +163,12 @@ fn next_step(state: &PanelState, kind: MeasureKind) -> &'static str {
     }
 }
 
-/// Draws measurements and annotations over the picture.
+/// Draws measurements and annotations over the picture, and the contour of a cut in work.
 pub(super) fn paint(ui: &Ui, state: &PanelState, scale: f32) {
     let Some(scene) = state.scene else { return };
-    let measures = state.controls.measures();
-    if (measures.is_empty() && state.controls.work().is_none()) || scene.picture_size() != state.picture.1 {
+    let (measures, outline) = (state.controls.measures(), state.controls.outline());
+    let is_empty = measures.is_empty() && state.controls.work().is_none() && outline.is_empty();
+    if is_empty || scene.picture_size() != state.picture.1 {
         return;
     }
     let picture = picture_rect(state, scale);
@@ -178,6 +179,11 @@ pub(super) fn paint(ui: &Ui, state: &PanelState, scale: f32) {
             drawn.label.push('_');
         }
         canvas.draw(&drawn);
+    }
+    if let Some(last) = outline.last() {
+        // Back to where it began, as it will be closed.
+        let ends = outline.windows(2).map(|ends| [ends[0], ends[1]]).chain([[*last, outline[0]]]);
+        canvas.lines(&canvas.painter, &ends.map(|ends| ends.map(|at| canvas.at(at))).collect::<Vec<_>>());
     }
     if let Some(work) = state.controls.work() {
         let hover = ui.ctx().pointer_hover_pos().filter(|at| picture.contains(*at));
@@ -213,6 +219,13 @@ impl Canvas {
         self.origin + vec2(near(x), near(y))
     }
 
+    /// A dark edge along the bright line is visible on any picture.
+    fn lines(&self, painter: &Painter, strokes: &[[Pos2; 2]]) {
+        for stroke in [Stroke::new(3.5, OUTLINE), Stroke::new(1.5, MEASURE)] {
+            strokes.iter().for_each(|ends| _ = painter.line_segment(*ends, stroke));
+        }
+    }
+
     fn draw(&self, drawn: &Drawn) {
         let [corner, size] = drawn.tile;
         let end = [corner[0] + size[0], corner[1] + size[1]];
@@ -228,10 +241,7 @@ impl Canvas {
         }
         let heads = drawn.head.iter().flat_map(|head| overlay::arrow_head(*head, HEAD * f64::from(self.scale)));
         strokes.extend(heads.map(|ends| ends.map(|at| self.at(at))));
-        // A dark edge along the bright line is visible on any picture.
-        for stroke in [Stroke::new(3.5, Color32::from_black_alpha(170)), Stroke::new(1.5, LINE)] {
-            strokes.iter().for_each(|ends| _ = painter.line_segment(*ends, stroke));
-        }
+        self.lines(&painter, &strokes);
         if drawn.label.is_empty() {
             return;
         }
@@ -240,8 +250,8 @@ impl Canvas {
         let size = (galley.size() + vec2(8.0, 2.0)) * self.scale;
         let corner = self.at(overlay::label_corner(drawn, [f64::from(size.x), f64::from(size.y)]));
         let area = Rect::from_min_size(corner, size / self.scale);
-        painter.rect_filled(area, 3.0, Color32::from_black_alpha(170));
-        painter.rect_stroke(area, 3.0, Stroke::new(1.0, LINE.gamma_multiply(0.5)), StrokeKind::Inside);
+        painter.rect_filled(area, 3.0, BACKING);
+        painter.rect_stroke(area, 3.0, Stroke::new(1.0, MEASURE.gamma_multiply(0.5)), StrokeKind::Inside);
         painter.galley(pos2(area.left() + 4.0, area.center().y - galley.size().y / 2.0), galley, colour);
     }
 }

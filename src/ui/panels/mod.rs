@@ -4,12 +4,16 @@
 //! The theme is dark, so that the picture is the brightest part of the screen, and large enough for gloves and for reading from 2 m.
 
 mod annotations;
+pub(super) mod colours;
 mod controls;
+#[cfg(test)]
+pub(super) mod drawn;
 mod lists;
 mod measures;
 mod names;
 mod overlays;
 
+use self::colours::{BACKGROUND, BUTTON, EDGE, ON_SELECTED, PANEL, SELECTED, TEXT, WEAK_TEXT};
 use super::command::Command;
 use super::input::{Button, Input, Key, Modifiers, Phase};
 use crate::gpu;
@@ -20,8 +24,8 @@ use crate::ui::times::Times;
 pub use egui::accesskit;
 use egui::accesskit::{ActionRequest, TreeUpdate};
 use egui::{
-    Color32, CornerRadius, Event, FontData, FontDefinitions, FontFamily, FontId, Modifiers as EguiModifiers,
-    MouseWheelUnit, PointerButton, Pos2, Rect, Stroke, TextStyle, Theme, TouchPhase, pos2, vec2,
+    CornerRadius, Event, FontData, FontDefinitions, FontFamily, FontId, Modifiers as EguiModifiers, MouseWheelUnit,
+    PointerButton, Pos2, Rect, Stroke, TextStyle, Theme, TouchPhase, pos2, vec2,
 };
 use std::sync::Arc;
 use std::time::Duration;
@@ -34,6 +38,9 @@ pub(super) struct PanelOutput {
     pub(super) tree: Option<TreeUpdate>,
     /// When the panels need another layout without an event.
     pub(super) repaint_after: Duration,
+    /// What is drawn, before it becomes triangles.
+    #[cfg(test)]
+    pub(super) drawn: Vec<drawn::Drawn>,
 }
 
 #[cfg(test)]
@@ -213,9 +220,18 @@ impl Panels {
             overlays::paint_pointer(ui, state, self.scale);
         });
         let repaint_after = output.viewport_output.values().map(|v| v.repaint_delay).min().unwrap_or(Duration::MAX);
+        #[cfg(test)]
+        let drawn = drawn::drawn(&output.shapes);
         let shapes = self.context.tessellate(output.shapes, output.pixels_per_point);
         let panels = gpu::window::Panels { shapes, textures: output.textures_delta, scale: output.pixels_per_point };
-        PanelOutput { panels, commands, tree: output.platform_output.accesskit_update, repaint_after }
+        PanelOutput {
+            panels,
+            commands,
+            tree: output.platform_output.accesskit_update,
+            repaint_after,
+            #[cfg(test)]
+            drawn,
+        }
     }
 }
 
@@ -427,16 +443,6 @@ fn picture_rect(state: &PanelState, scale: f32) -> Rect {
     Rect::from_min_size(pos2(x, y), vec2(w, h))
 }
 
-const BACKGROUND: Color32 = Color32::from_rgb(9, 10, 13);
-const PANEL: Color32 = Color32::from_rgb(18, 21, 26);
-const BUTTON: Color32 = Color32::from_rgb(36, 42, 50);
-const TEXT: Color32 = Color32::from_rgb(214, 221, 229);
-const WEAK_TEXT: Color32 = Color32::from_rgb(138, 150, 163);
-const ACCENT: Color32 = Color32::from_rgb(64, 184, 220);
-const GOOD: Color32 = Color32::from_rgb(110, 200, 120);
-const WARNING: Color32 = Color32::from_rgb(250, 190, 70);
-const FAULT: Color32 = Color32::from_rgb(240, 96, 84);
-
 /// Size of running text, points: at a scale of 1 on a monitor with 96 dots per inch it is 5 mm high, which a healthy eye reads from 2 m.
 const TEXT_SIZE: f32 = 19.0;
 /// Size of important text, such as messages.
@@ -479,18 +485,23 @@ fn apply_theme(context: &egui::Context) {
     visuals.panel_fill = PANEL;
     visuals.window_fill = PANEL;
     visuals.extreme_bg_color = BACKGROUND;
-    visuals.override_text_color = Some(TEXT);
-    visuals.selection.bg_fill = ACCENT.gamma_multiply(0.55);
-    visuals.selection.stroke = Stroke::new(1.5, Color32::WHITE);
+    visuals.selection.bg_fill = SELECTED;
+    visuals.selection.stroke = Stroke::new(1.5, ON_SELECTED);
     visuals.slider_trailing_fill = true;
-    for widget in [&mut visuals.widgets.inactive, &mut visuals.widgets.hovered, &mut visuals.widgets.active] {
-        (widget.bg_fill, widget.weak_bg_fill) = (BUTTON, BUTTON);
+    visuals.widgets.noninteractive.fg_stroke = Stroke::new(1.0, TEXT);
+    let widgets = &mut visuals.widgets;
+    for widget in [&mut widgets.inactive, &mut widgets.hovered, &mut widgets.active, &mut widgets.open] {
+        // Rails and knobs of sliders; buttons.
+        (widget.bg_fill, widget.weak_bg_fill) = (EDGE, BUTTON);
+        widget.bg_stroke = Stroke::new(1.0, EDGE);
+        // Text of buttons, and the edge of a knob.
+        widget.fg_stroke = Stroke::new(2.0, TEXT);
         widget.corner_radius = CornerRadius::same(6);
         widget.expansion = 0.0;
     }
-    visuals.widgets.hovered.bg_stroke = Stroke::new(1.0, WEAK_TEXT);
-    visuals.widgets.active.bg_fill = ACCENT.gamma_multiply(0.4);
-    visuals.widgets.active.weak_bg_fill = ACCENT.gamma_multiply(0.4);
+    visuals.widgets.hovered.bg_stroke = Stroke::new(1.0, TEXT);
+    visuals.widgets.active.weak_bg_fill = SELECTED;
+    visuals.widgets.active.fg_stroke = Stroke::new(2.0, ON_SELECTED);
     context.set_style_of(Theme::Dark, style);
 }
 

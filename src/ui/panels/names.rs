@@ -1,12 +1,13 @@
 //! Names, roles and values of the panels for a screen reader, and the frame around the control that has the keyboard. egui makes a tree of
 //! its widgets (AccessKit) from which the desktop's interface for screen readers is served; what egui cannot know is added here.
 
+use super::colours::{FOCUS, FOCUS_EDGE};
 use super::{PanelState, picture_rect};
 use crate::scene::{Layout, PlaneName, Scene};
 use crate::ui::command::Viewpoint;
 use crate::ui::view;
 use egui::accesskit::{Action, Live, Node, Rect as Bounds, Role};
-use egui::{Color32, Context, Id, Key, Response, Stroke, StrokeKind, Ui};
+use egui::{Context, Id, Key, Response, Stroke, StrokeKind, Ui};
 
 /// Where a rendering is seen from, as the panels call it.
 pub(super) const VIEWPOINTS: [(Viewpoint, &str); 4] =
@@ -65,6 +66,15 @@ pub(super) fn name(ui: &Ui, role: Role, name: &str) {
         node.set_role(role);
         node.set_label(name);
     });
+}
+
+/// Entries of a list, under a name.
+pub(super) fn list<R>(ui: &mut Ui, title: &str, add: impl FnOnce(&mut Ui) -> R) -> R {
+    ui.scope(|ui| {
+        name(ui, Role::List, title);
+        add(ui)
+    })
+    .inner
 }
 
 /// Controls that belong together, under a name.
@@ -162,9 +172,6 @@ pub(super) fn mark_focus(context: &Context) {
     let Some(control) = focused else { return };
     let painter = context.layer_painter(control.layer_id);
     let area = control.rect.expand(1.0);
-    painter.rect_stroke(area, 6.0, Stroke::new(5.0, Color32::BLACK), StrokeKind::Middle);
+    painter.rect_stroke(area, 6.0, Stroke::new(5.0, FOCUS_EDGE), StrokeKind::Middle);
     painter.rect_stroke(area, 6.0, Stroke::new(2.5, FOCUS), StrokeKind::Middle);
 }
-
-/// Colour of that frame.
-pub(super) const FOCUS: Color32 = Color32::WHITE;

@@ -1,72 +1,138 @@
 //! What is drawn over the picture: banner and notes, times, help, a question with its answers, and the pointer where no windowing system draws one.
 
-use super::names::{self, Tell};
-use super::{
-    ACCENT, BACKGROUND, FAULT, GOOD, LARGE_TEXT, PANEL, PanelState, SMALL_TEXT, TEXT, TEXT_SIZE, TOUCH_SIZE, WARNING,
-    WEAK_TEXT, picture_rect,
+use super::colours::{
+    ACCENT, BAR, FAULT, FOCUS_EDGE, GOOD, MESSAGE, ON_SELECTED, PANEL, POINTER, SELECTED, SHADE, TEXT, WARNING,
+    WEAK_TEXT, WHOLE_BAR,
 };
+use super::names::{self, Tell};
+use super::{LARGE_TEXT, Note, PanelState, SMALL_TEXT, TEXT_SIZE, TOUCH_SIZE, picture_rect};
 use crate::ui::command::{self, Command};
 use crate::ui::hints;
 use crate::ui::sliders::SLIDERS;
 use egui::accesskit::Role;
+use egui::text::LayoutJob;
 use egui::{
-    Align2, Area, Button, Color32, Frame, Id, LayerId, Margin, Mesh, Order, Rect, RichText, ScrollArea, Shape, Stroke,
-    Ui, Vec2, WidgetInfo, WidgetType, pos2, vec2,
+    Align2, Area, Button, Color32, FontId, Frame, Galley, Id, LayerId, Margin, Mesh, Order, Rect, RichText, ScrollArea,
+    Shape, Stroke, Ui, Vec2, WidgetInfo, WidgetType, pos2, vec2,
 };
+use std::sync::Arc;
 
-pub(super) fn show_notes(ui: &mut Ui, state: &PanelState, scale: f32) {
-    let picture = picture_rect(state, scale);
-    if let Some(banner) = &state.banner {
-        // In the centre without a picture, at the top over one.
-        let (align, at) = match state.has_drawn {
-            true => (Align2::CENTER_TOP, picture.center_top() + vec2(0.0, 12.0)),
-            false => (Align2::CENTER_CENTER, picture.center()),
-        };
-        let colour = if banner.is_fault { FAULT } else { WARNING };
-        Area::new(Id::new("banner")).order(Order::Middle).pivot(align).fixed_pos(at).interactable(false).show(
-            ui.ctx(),
-            |ui| {
-                names::announce(ui, &format!("{}. {}", banner.title, banner.text), banner.is_fault);
-                message_frame(colour).show(ui, |ui| {
-                    ui.set_max_width((picture.width() - 60.0).clamp(120.0, 760.0));
-                    ui.label(RichText::new(&banner.title).size(LARGE_TEXT).color(colour));
-                    if !banner.text.is_empty() {
-                        ui.label(RichText::new(&banner.text).size(TEXT_SIZE));
-                    }
-                });
-            },
-        );
-    }
-    if state.notes.is_empty() {
-        return;
-    }
-    let at = picture.center_bottom() - vec2(0.0, 14.0);
-    let shown = Area::new(Id::new("notes"))
-        .order(Order::Middle)
-        .pivot(Align2::CENTER_BOTTOM)
-        .fixed_pos(at)
-        .interactable(false)
-        .show(ui.ctx(), |ui| {
-            for note in state.notes {
-                message_frame(if note.is_fault { FAULT } else { ACCENT }).show(ui, |ui| {
-                    names::announce(ui, &note.text, note.is_fault);
-                    ui.set_max_width((picture.width() - 60.0).clamp(120.0, 760.0));
-                    ui.label(RichText::new(&note.text).size(TEXT_SIZE));
-                });
+/// Sizes of the text of messages, title first, where the picture has room for them, and where it is small.
+const MESSAGE_TEXT: [f32; 2] = [LARGE_TEXT, TEXT_SIZE];
+const SMALL_MESSAGE_TEXT: [f32; 2] = [TEXT_SIZE, SMALL_TEXT];
+/// A picture with less room has small messages, points.
+const MIN_FOR_LARGE_MESSAGES: [f32; 2] = [340.0, 260.0];
+/// Frame and margins of a message, together on two sides; and what is between messages.
+const MESSAGE_FRAME: [f32; 2] = [36.0, 24.0];
+const BETWEEN_MESSAGES: f32 = 8.0;
+/// Between messages and the upper and the lower edge of the picture.
+const MESSAGE_EDGES: [f32; 2] = [12.0, 14.0];
+
+/// A message whose text is laid out.
+struct Message {
+    parts: Vec<Arc<Galley>>,
+    edge: Color32,
+    spoken: String,
+    is_fault: bool,
+}
+
+impl Message {
+    /// Lays texts out in so much room for a message, each with its size and colour. What has no room ends in dots.
+    fn new(
+        ui: &Ui,
+        texts: &[(&str, f32, Color32)],
+        room: Vec2,
+        edge: Color32,
+        spoken: String,
+        is_fault: bool,
+    ) -> Message {
+        let [across, down] = MESSAGE_FRAME;
+        let width = (room.x - across).clamp(60.0, 760.0);
+        let mut left = room.y - down;
+        let mut parts: Vec<Arc<Galley>> = Vec::new();
+        for (text, size, colour) in texts.iter().filter(|(text, ..)| !text.is_empty()) {
+            let font = FontId::proportional(*size);
+            let row = ui.fonts_mut(|fonts| fonts.row_height(&font));
+            let rows = (left / row).floor();
+            if rows < 1.0 && !parts.is_empty() {
+                break;
             }
+            let mut job = LayoutJob::simple((*text).to_string(), font, *colour, width);
+            job.wrap.max_rows = (rows as usize).max(1);
+            let galley = ui.fonts_mut(|fonts| fonts.layout_job(job));
+            left -= galley.size().y + BETWEEN_MESSAGES;
+            parts.push(galley);
+        }
+        Message { parts, edge, spoken, is_fault }
+    }
+
+    fn height(&self) -> f32 {
+        let gaps = self.parts.len().saturating_sub(1) as f32 * BETWEEN_MESSAGES;
+        self.parts.iter().map(|part| part.size().y).sum::<f32>() + gaps + MESSAGE_FRAME[1]
+    }
+
+    fn show(self, ui: &mut Ui) {
+        message_frame(self.edge).show(ui, |ui| {
+            names::announce(ui, &self.spoken, self.is_fault);
+            self.parts.into_iter().for_each(|part| _ = ui.label(part));
         });
-    // An area is placed by its size of the layout before: one more note would reach over the bar.
-    if shown.response.rect.bottom() > at.y + 1.0 {
-        ui.ctx().request_repaint();
     }
 }
 
+/// Shows banner and notes in the picture, one above the other. The newest notes go before the older ones, and where there is no room for both, before the banner,
+/// which comes back when they have gone.
+pub(super) fn show_notes(ui: &mut Ui, state: &PanelState, scale: f32) {
+    let picture = picture_rect(state, scale);
+    let is_large = picture.width() >= MIN_FOR_LARGE_MESSAGES[0] && picture.height() >= MIN_FOR_LARGE_MESSAGES[1];
+    let [title_size, text_size] = if is_large { MESSAGE_TEXT } else { SMALL_MESSAGE_TEXT };
+    let [above, below] = MESSAGE_EDGES;
+    let room = vec2(picture.width() - 24.0, picture.height() - above - below);
+    let note = |note: &Note| {
+        let texts = [(note.text.as_str(), text_size, TEXT)];
+        Message::new(ui, &texts, room, if note.is_fault { FAULT } else { ACCENT }, note.text.clone(), note.is_fault)
+    };
+    let newest = state.notes.last().map_or(0.0, |newest| note(newest).height() + BETWEEN_MESSAGES);
+    let banner = state.banner.as_ref().map(|banner| {
+        let colour = if banner.is_fault { FAULT } else { WARNING };
+        let texts = [(banner.title.as_str(), title_size, colour), (banner.text.as_str(), text_size, TEXT)];
+        let spoken = format!("{}. {}", banner.title, banner.text);
+        Message::new(ui, &texts, vec2(room.x, room.y - newest), colour, spoken, banner.is_fault)
+    });
+    let banner = banner.filter(|banner| banner.height() + newest <= room.y);
+    let mut left = room.y - banner.as_ref().map_or(0.0, |banner| banner.height() + BETWEEN_MESSAGES);
+    // In the centre without a picture and without notes, at the top over one.
+    let is_at_top = state.has_drawn || !state.notes.is_empty();
+    let mut shown: Vec<Message> = Vec::new();
+    for message in state.notes.iter().rev().map(note) {
+        left -= message.height() + BETWEEN_MESSAGES;
+        if left < -BETWEEN_MESSAGES && !shown.is_empty() {
+            break;
+        }
+        shown.push(message);
+    }
+    if let Some(banner) = banner {
+        let (align, at) = match is_at_top {
+            true => (Align2::CENTER_TOP, picture.center_top() + vec2(0.0, above)),
+            false => (Align2::CENTER_CENTER, picture.center()),
+        };
+        let area = Area::new(Id::new("banner")).order(Order::Middle).pivot(align).fixed_pos(at).interactable(false);
+        area.show(ui.ctx(), |ui| banner.show(ui));
+    }
+    if shown.is_empty() {
+        return;
+    }
+    // An area is placed by its size of the layout before, so the place of its top is told.
+    let height = shown.iter().map(|note| note.height() + BETWEEN_MESSAGES).sum::<f32>() - BETWEEN_MESSAGES;
+    let at = picture.center_bottom() - vec2(0.0, below + height);
+    let area = Area::new(Id::new("notes")).order(Order::Middle).pivot(Align2::CENTER_TOP).fixed_pos(at);
+    area.interactable(false).show(ui.ctx(), |ui| {
+        ui.spacing_mut().item_spacing.y = BETWEEN_MESSAGES;
+        shown.into_iter().rev().for_each(|note| note.show(ui));
+    });
+}
+
 fn message_frame(edge: Color32) -> Frame {
-    Frame::new()
-        .fill(BACKGROUND.gamma_multiply(0.92))
-        .inner_margin(Margin::symmetric(16, 10))
-        .corner_radius(8)
-        .stroke(Stroke::new(2.0, edge))
+    Frame::new().fill(MESSAGE).inner_margin(Margin::symmetric(16, 10)).corner_radius(8).stroke(Stroke::new(2.0, edge))
 }
 
 const WIDTH: f32 = 316.0;
@@ -77,7 +143,7 @@ pub(super) fn show_times(ui: &mut Ui, state: &PanelState, scale: f32) {
     let at = picture_rect(state, scale).left_top() + vec2(12.0, 12.0);
     Area::new(Id::new("times")).order(Order::Middle).fixed_pos(at).interactable(false).show(ui.ctx(), |ui| {
         names::name(ui, Role::Group, "Times");
-        let frame = Frame::new().fill(BACKGROUND.gamma_multiply(0.82)).inner_margin(Margin::same(12)).corner_radius(8);
+        let frame = Frame::new().fill(MESSAGE).inner_margin(Margin::same(12)).corner_radius(8);
         frame.show(ui, |ui| {
             ui.set_width(WIDTH);
             ui.spacing_mut().item_spacing.y = 3.0;
@@ -162,9 +228,9 @@ fn bar(ui: &mut Ui, name: &str, share: f64, figure: String) {
     response.widget_info(|| WidgetInfo::labeled(WidgetType::Label, true, format!("{name} {figure}")));
     let filled = Rect::from_min_size(area.min, vec2((area.width() * share as f32).max(1.0), area.height()));
     let painter = ui.painter();
-    painter.rect_filled(area, 2.0, Color32::from_white_alpha(8));
-    painter.rect_filled(filled, 2.0, ACCENT.gamma_multiply(0.4));
-    let font = egui::FontId::proportional(SMALL_TEXT);
+    painter.rect_filled(area, 2.0, WHOLE_BAR);
+    painter.rect_filled(filled, 2.0, BAR);
+    let font = FontId::proportional(SMALL_TEXT);
     let middle = area.center().y;
     painter.text(pos2(area.left() + 6.0, middle), egui::Align2::LEFT_CENTER, name, font.clone(), TEXT);
     painter.text(pos2(area.right() - 6.0, middle), egui::Align2::RIGHT_CENTER, figure, font, TEXT);
@@ -175,8 +241,8 @@ fn small(ui: &mut Ui, text: String, colour: Color32) {
 }
 
 /// Gestures on the picture, for the help.
-const GESTURES: [(&str, &str); 9] = [
-    ("drag", "use the tool: turn, light, region, clip, planes"),
+const GESTURES: [(&str, &str); 10] = [
+    ("drag", "use the tool: turn, light, region, clip, cut, planes"),
     ("Shift + drag, middle drag", "move the picture"),
     ("Ctrl + drag", "move the light"),
     ("wheel", "zoom; over a plane: step it"),
@@ -184,6 +250,7 @@ const GESTURES: [(&str, &str); 9] = [
     ("double click on a tile", "show that tile alone, and back"),
     ("Region, then drag", "move the nearest face of the box"),
     ("Clip, then drag up", "cut away what is nearer to the viewer"),
+    ("Cut, then drag round", "cut away what is within, along the view"),
     ("Planes, then click", "move the point where the three planes cross"),
 ];
 
@@ -216,7 +283,7 @@ pub(super) fn show_help(ui: &mut Ui, state: &PanelState, execute: &mut dyn FnMut
         ui.ctx(),
         |ui| {
             let frame = Frame::new()
-                .fill(PANEL.gamma_multiply(0.97))
+                .fill(PANEL)
                 .inner_margin(Margin::same(14))
                 .corner_radius(10)
                 .stroke(Stroke::new(1.0, WEAK_TEXT));
@@ -301,6 +368,14 @@ fn help_line(ui: &mut Ui, row: &HelpRow, size: f32) {
     }
 }
 
+/// A button that is meant first.
+pub(super) fn first<'a>(text: RichText) -> Button<'a> {
+    Button::new(text.color(ON_SELECTED)).fill(SELECTED)
+}
+
+/// In a lower window lists and questions are as small as they can be, points.
+pub(super) const LOW_WINDOW: f32 = 360.0;
+
 /// Asks whether to save the loop before the program ends.
 pub(super) fn ask_to_leave(ui: &Ui, execute: &mut dyn FnMut(Command)) {
     let screen = ui.ctx().content_rect();
@@ -309,25 +384,37 @@ pub(super) fn ask_to_leave(ui: &Ui, execute: &mut dyn FnMut(Command)) {
     shade.show(ui.ctx(), |ui| {
         // The keyboard goes past it.
         ui.allocate_rect(screen, egui::Sense::CLICK | egui::Sense::DRAG);
-        ui.painter().rect_filled(screen, 0.0, Color32::from_black_alpha(150));
+        ui.painter().rect_filled(screen, 0.0, SHADE);
     });
     let area = Area::new(Id::new("leave")).order(Order::Tooltip).anchor(Align2::CENTER_CENTER, vec2(0.0, 0.0));
     area.show(ui.ctx(), |ui| {
         names::name(ui, Role::AlertDialog, "The loop is not saved");
-        let frame = Frame::new().fill(PANEL).inner_margin(Margin::same(20)).corner_radius(10);
+        // In a low window the three answers go before all else.
+        let is_low = screen.height() < LOW_WINDOW;
+        let (margin, title, text) = if is_low { (8, TEXT_SIZE, SMALL_TEXT) } else { (20, LARGE_TEXT, TEXT_SIZE) };
+        let height = if is_low { ((screen.height() - 80.0) / 3.0).clamp(24.0, 40.0) } else { TOUCH_SIZE * 0.85 };
+        let frame = Frame::new().fill(PANEL).inner_margin(Margin::same(margin)).corner_radius(10);
         frame.stroke(Stroke::new(2.0, ACCENT)).show(ui, |ui| {
-            ui.set_width((screen.width() - 80.0).clamp(120.0, 420.0));
-            ui.heading("The loop is not saved");
-            ui.label(RichText::new("Its volumes are lost when the program ends.").size(TEXT_SIZE));
-            ui.add_space(8.0);
+            ui.set_width((screen.width() - 2.0 * f32::from(margin) - 12.0).clamp(120.0, 420.0));
+            if is_low {
+                ui.spacing_mut().item_spacing.y = 4.0;
+                ui.spacing_mut().interact_size.y = height;
+                ui.spacing_mut().button_padding.y = 1.0;
+            }
+            ui.label(RichText::new("The loop is not saved").size(title));
+            if !is_low {
+                ui.label(RichText::new("Its volumes are lost when the program ends.").size(text));
+                ui.add_space(8.0);
+            }
             let answers = [
-                ("Save and leave  (Enter)", ACCENT.gamma_multiply(0.45), Command::SaveAndExit),
-                ("Leave without saving  (L)", Color32::TRANSPARENT, Command::Discard),
-                ("Stay  (Esc)", Color32::TRANSPARENT, Command::Back),
+                ("Save and leave  (Enter)", true, Command::SaveAndExit),
+                ("Leave without saving  (L)", false, Command::Discard),
+                ("Stay  (Esc)", false, Command::Back),
             ];
-            for (text, fill, command) in answers {
-                let button = Button::new(text).min_size(vec2(ui.available_width(), TOUCH_SIZE * 0.85));
-                let button = if fill == Color32::TRANSPARENT { button } else { button.fill(fill) };
+            for (answer, is_first, command) in answers {
+                let shown = RichText::new(answer).size(text);
+                let button = if is_first { first(shown) } else { Button::new(shown) };
+                let button = button.truncate().min_size(vec2(ui.available_width(), height));
                 if ui.add(button).clicked() {
                     execute(command);
                 }
@@ -356,11 +443,11 @@ pub(super) fn paint_pointer(ui: &Ui, state: &PanelState, scale: f32) {
     let painter = ui.ctx().layer_painter(LayerId::new(Order::Debug, Id::new("pointer")));
     let corners = CORNERS.map(|corner| tip + corner);
     let mut mesh = Mesh::default();
-    corners.iter().for_each(|corner| mesh.colored_vertex(*corner, Color32::WHITE));
+    corners.iter().for_each(|corner| mesh.colored_vertex(*corner, POINTER));
     TRIANGLES.iter().for_each(|[a, b, c]| mesh.add_triangle(*a, *b, *c));
     painter.add(mesh);
     // A dark outline around a bright arrow is visible on any picture.
-    painter.add(Shape::closed_line(corners.to_vec(), Stroke::new(1.5, Color32::BLACK)));
+    painter.add(Shape::closed_line(corners.to_vec(), Stroke::new(1.5, FOCUS_EDGE)));
 }
 
 #[cfg(test)]

@@ -1,10 +1,14 @@
 //! Gestures, keys and settings together, without a window; and known answers for what commands change.
 
 mod budget;
+mod colours;
+mod cutting;
 mod gestures;
+mod layout;
 mod measuring;
 mod screen_reader;
 mod sequences;
+mod shown;
 
 use super::command::{Command, Face, Tool};
 use super::controls::{Change, Controls};

@@ -1,123 +1,16 @@
 //! What a screen reader gets: the tree of the panels, with a name for every control, and the way back by its actions and by the keyboard. No
 //! screen reader runs here.
 
+use super::shown::{SIZE, Shown};
 use super::*;
-use crate::live::cine::CineVolume;
 use crate::scene::MeasureKind;
-use crate::source::phantom::{Phantom, PhantomOptions};
-use crate::ui::cine_player::CinePlayer;
 use crate::ui::command::Viewpoint;
 use crate::ui::input::Key;
-use crate::ui::panels::accesskit::{
-    Action, ActionData, ActionRequest, Node, NodeId, Role, Toggled, TreeId, TreeUpdate,
-};
-use crate::ui::panels::{self, Banner, Note, PanelOutput, PanelState, Panels};
-use crate::ui::times::Times;
+use crate::ui::panels::accesskit::{Action, ActionData, Node, NodeId, Role, Toggled};
+use crate::ui::panels::{self, Banner, Note};
 use std::collections::{BTreeMap, BTreeSet};
 
-const SIZE: [u32; 2] = [1280, 800];
-
-/// The panels around the phantom, as the console lays them out.
-struct Shown {
-    panels: Panels,
-    controls: Controls,
-    scene: Scene,
-    times: Times,
-    time: f64,
-    is_frozen: bool,
-    banner: Option<Banner>,
-    notes: Vec<Note>,
-    files: Option<(String, Vec<String>)>,
-    /// Help, times, exports, the question whether to leave.
-    open: [bool; 4],
-    /// What the last layout said.
-    tree: BTreeMap<NodeId, Node>,
-    focus: Option<NodeId>,
-    /// Corners of the triangles of the last layout, and their colours.
-    drawn: Vec<([f32; 2], [u8; 4])>,
-}
-
 impl Shown {
-    fn new(toml: &str) -> Shown {
-        let phantom = Phantom::new(PhantomOptions::default()).expect("a phantom");
-        let geometry = Geometry::Sweep(phantom.probe(0).clone());
-        let mut controls = Controls::new(settings("fetal", toml));
-        controls.resize(panels::picture_area(SIZE, 1.0, true).1);
-        let scene = scene(&geometry, controls.settings());
-        let mut panels = Panels::new(1.0);
-        panels.describe(true);
-        let mut shown = Shown {
-            panels,
-            controls,
-            scene,
-            times: Times::default(),
-            time: 0.0,
-            is_frozen: false,
-            banner: None,
-            notes: Vec::new(),
-            files: None,
-            open: [false; 4],
-            tree: BTreeMap::new(),
-            focus: None,
-            drawn: Vec::new(),
-        };
-        // Twice: scroll areas know their content from the layout before.
-        shown.lay_out();
-        shown.lay_out();
-        shown
-    }
-
-    /// Lays the panels out, applies their commands, and returns these.
-    fn lay_out(&mut self) -> Vec<Command> {
-        self.time += 0.1;
-        let [shows_help, shows_times, shows_exports, asks_to_leave] = self.open;
-        let state = PanelState {
-            controls: &self.controls,
-            scene: Some(&self.scene),
-            times: &self.times,
-            picture: panels::picture_area(SIZE, 1.0, true),
-            shows_panels: true,
-            has_column: true,
-            shows_help,
-            shows_times,
-            help_search: None,
-            saves_bar: true,
-            origin: Some("Demo data (phantom)"),
-            asks_to_leave,
-            files: self.files.as_ref().map(|(title, names)| (title.as_str(), names.as_slice())),
-            shows_exports,
-            exporting: Some("Surface"),
-            is_frozen: self.is_frozen,
-            cine: CinePlayer::default().state(&(0..20).map(|_| CineVolume::default()).collect(), Some(2)),
-            has_drawn: true,
-            quality: "full",
-            budget: None,
-            banner: self.banner.clone(),
-            notes: &self.notes,
-            exit_key: "",
-            pointer: None,
-        };
-        let output = self.panels.lay_out(&state, SIZE, self.time);
-        self.drawn = output.corners();
-        let PanelOutput { commands, tree, .. } = output;
-        let TreeUpdate { nodes, focus, tree, .. } = tree.expect("a tree");
-        let root = tree.expect("a root").root;
-        self.tree = nodes.into_iter().collect();
-        self.focus = Some(focus).filter(|focus| *focus != root);
-        for command in &commands {
-            self.controls.apply(command, Some(&self.scene));
-        }
-        self.scene = scene(&self.scene.geometry, self.controls.settings());
-        commands
-    }
-
-    fn ask(&mut self, target_node: NodeId, action: Action, data: Option<ActionData>) -> Vec<Command> {
-        self.panels.act(ActionRequest { action, target_tree: TreeId::ROOT, target_node, data });
-        let commands = self.lay_out();
-        self.lay_out();
-        commands
-    }
-
     fn key(&mut self, key: Key, shift: bool) -> Vec<Command> {
         assert!(self.panels.key(key, Modifiers { shift, ..Modifiers::default() }), "{key:?} is not taken");
         let commands = self.lay_out();
@@ -201,15 +94,15 @@ fn every_control_has_a_name_of_its_own_in_every_mode_and_list() {
     for mode in Mode::ALL {
         for layout in [Layout::Single, Layout::Four, Layout::Pair] {
             let mut shown = Shown::new("");
-            apply_to(&mut shown, Command::Mode(mode));
-            apply_to(&mut shown, Command::Layout(layout));
+            shown.apply(Command::Mode(mode));
+            shown.apply(Command::Layout(layout));
             shown.check(&format!("{mode:?} {layout:?}"));
         }
     }
     let mut shown = Shown::new("mode='plane'");
-    apply_to(&mut shown, Command::Tool(Tool::Measure(MeasureKind::Distance)));
+    shown.apply(Command::Tool(Tool::Measure(MeasureKind::Distance)));
     for point in [[0.0, 30.0, 0.0], [0.0, 40.0, 0.0], [0.0, 50.0, 0.0], [5.0, 60.0, 0.0]] {
-        apply_to(&mut shown, Command::Point(point, false));
+        shown.apply(Command::Point(point, false));
     }
     shown.check("measurements");
     let measured = shown.names("Measurements");
@@ -225,13 +118,6 @@ fn every_control_has_a_name_of_its_own_in_every_mode_and_list() {
         assert!(measured.iter().any(|found| found == name), "{name}: {measured:?}");
     }
     assert!(shown.groups().contains_key("Click the first end."), "the next step is read");
-}
-
-fn apply_to(shown: &mut Shown, command: Command) {
-    shown.controls.apply(&command, Some(&shown.scene));
-    shown.scene = scene(&shown.scene.geometry, shown.controls.settings());
-    shown.lay_out();
-    shown.lay_out();
 }
 
 /// Prevents a tool or a control in front that cannot be found by what it is called.
@@ -276,7 +162,7 @@ fn the_tools_and_the_controls_in_front_are_found_by_role_and_name() {
 #[test]
 fn the_picture_is_described() {
     let mut shown = Shown::new("mode='surface'");
-    apply_to(&mut shown, Command::LookFrom(Viewpoint::Front));
+    shown.apply(Command::LookFrom(Viewpoint::Front));
     let picture = |shown: &Shown| {
         let mut images = shown.tree.values().filter(|node| node.role() == Role::Image);
         let (image, more) = (images.next().expect("the picture"), images.next());
@@ -287,14 +173,14 @@ fn the_picture_is_described() {
         [image.label(), image.description()].map(|text| text.unwrap_or_default().to_string())
     };
     assert_eq!(picture(&shown)[0], "Surface from the front, live, Demo data (phantom)");
-    apply_to(&mut shown, Command::Rotate([30.0, 20.0]));
+    shown.apply(Command::Rotate([30.0, 20.0]));
     shown.is_frozen = true;
-    apply_to(&mut shown, Command::Layout(Layout::Four));
+    shown.apply(Command::Layout(Layout::Four));
     let [name, about] = picture(&shown);
     assert!(name.starts_with("Surface with three planes, turned to azimuth") && name.contains(", frozen,"), "{name}");
     assert_eq!(about, "Volume 3 of 20. 0 measurements.");
-    apply_to(&mut shown, Command::Plane(PlaneName::B));
-    apply_to(&mut shown, Command::Mode(Mode::Plane));
+    shown.apply(Command::Plane(PlaneName::B));
+    shown.apply(Command::Mode(Mode::Plane));
     assert_eq!(picture(&shown)[0], "Plane, plane B, frozen, Demo data (phantom)");
 }
 
@@ -393,7 +279,7 @@ fn tab_reaches_every_control_and_marks_it() {
         !shown.panels.key(Key::Tab, Modifiers::default()),
         "Tab belongs to the view until a control has the keyboard"
     );
-    let rest = shown.drawn.clone();
+    let rest = shown.corners.clone();
     shown.panels.toggle_focus();
     assert!(shown.panels.has_focus());
     shown.lay_out();
@@ -413,7 +299,7 @@ fn tab_reaches_every_control_and_marks_it() {
             let out = (left - x).max(x - right).max(top - y).max(y - bottom);
             out.abs() < 5.0
         };
-        let bright = shown.drawn.iter().filter(|corner| corner.1 == [255; 4] && is_at_edge(corner.0));
+        let bright = shown.corners.iter().filter(|corner| corner.1 == [255; 4] && is_at_edge(corner.0));
         let new = bright.filter(|corner| !rest.contains(corner)).count();
         assert!(new >= 8, "{name} is not marked: {new} corners at {edges:?}");
         assert!(edges[1] >= 0.0 && edges[3] <= SIZE[1] as f32, "{name} is out of sight: {edges:?}");

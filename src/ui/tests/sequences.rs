@@ -17,7 +17,7 @@ fn mode() -> impl Strategy<Value = Mode> {
 }
 
 fn tool() -> impl Strategy<Value = Tool> {
-    prop::sample::select(vec![Tool::Rotate, Tool::Light, Tool::Region, Tool::Clip, Tool::Plane])
+    prop::sample::select(vec![Tool::Rotate, Tool::Light, Tool::Region, Tool::Clip, Tool::Cut, Tool::Plane])
 }
 
 fn command() -> impl Strategy<Value = Command> {

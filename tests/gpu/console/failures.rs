@@ -197,6 +197,12 @@ fn escape_closes_what_is_open_and_leaving_asks_for_a_loop_that_is_not_saved() {
     desk.live(1);
     desk.press(Key::Char('q'));
     assert!(!desk.tick(Instant::now()).exit && desk.console.asks_to_leave(), "another volume came");
+    // Nobody sees a question without panels.
+    let mut alone = Desk::new(&device, ConsoleOptions { overlay: false, ..options() });
+    alone.begin();
+    alone.live(0);
+    assert_eq!(escape(&mut alone), (true, false), "it leaves");
+    assert!(!alone.console.asks_to_leave());
     // What was read from a file is there.
     let mut desk = Desk::new(&device, ConsoleOptions { source: SourceKind::Recording, ..options() });
     desk.begin();

@@ -4,6 +4,7 @@ use super::*;
 use ash::vk;
 use echolume::gpu::Wake;
 use echolume::gpu::faults::InjectionPoint;
+use echolume::live::StartStep;
 use echolume::plan::Plan;
 use echolume::probe::{Axis, Geometry, Probe};
 use echolume::scene::{Scene, VolumeFormat};
@@ -129,4 +130,50 @@ fn running_out_of_memory_rejects_the_settings_and_keeps_the_stream() {
         assert!(shown == old && bench.faults.is_empty(), "allocation {n}");
     }
     assert!(refused > 3, "{refused}");
+}
+
+/// Prevents a window that stands still while the first pipelines compile, and a first picture that comes late or stays coarse.
+#[test]
+fn the_first_pipelines_compile_beside_the_steps_and_the_first_picture_has_few_rays() {
+    let (device, plain) = (Device::alone(), Device::alone());
+    let (woken, options) = waking();
+    let now = "mode = 'mip'";
+    let options = live::StreamOptions { prepares: true, coarse_first: true, ..options };
+    let mut bench = Bench::new(&device, now, options);
+    assert_eq!(bench.stream.start_step(), Some(StartStep::Source));
+    bench.begin(header(0.3));
+    bench.frames(speckled(0));
+    let (mut steps, begun) = (Vec::new(), Instant::now());
+    let first = loop {
+        assert!(begun.elapsed() < BOUND, "no picture: {steps:?}");
+        let step = bench.stream.step(Duration::ZERO).expect("step");
+        let name = match bench.stream.start_step() {
+            None => "none",
+            Some(StartStep::Source) => "source",
+            Some(StartStep::Compiling { done, count }) => {
+                assert!(done <= count);
+                "compiling"
+            }
+            Some(StartStep::Frames { done, count }) => {
+                assert!(done <= count && count == 9);
+                "frames"
+            }
+            Some(StartStep::Picture) => "picture",
+        };
+        if steps.last() != Some(&name) {
+            steps.push(name);
+        }
+        if let Step::Picture(picture) = step {
+            break picture;
+        }
+    };
+    assert_eq!(steps, ["source", "compiling", "frames", "picture", "none"]);
+    assert!(woken.load(Ordering::Relaxed) > 2, "each pipeline wakes the loop");
+    assert_eq!(waited_for(&device), 0, "pipelines were made while everything waited");
+    let quarter = of(&plain, &format!("{now}\nray.quarter = true"), 0);
+    assert!(first.is_coarse && first.picture.expect("brought back") == quarter);
+    let last = bench.settle().pop().expect("the same in full");
+    assert!(!last.is_coarse && last.picture.expect("brought back") == of(&plain, now, 0));
+    // Later ones are drawn in full at once.
+    assert!(bench.live(1) == of(&plain, now, 1));
 }

@@ -1,0 +1,109 @@
+//! Pipelines of a scene that are compiled before its renderer is made, on threads of their own, so that a window goes on meanwhile.
+
+use super::context::Context;
+use super::error::GpuError;
+use super::formats::{self, TexelAccess};
+use super::pipeline_compiler::Wake;
+use super::pipelines::{Pipeline, Pipelines, embedded};
+use super::renderer::{RendererOptions, adapted};
+use crate::plan::Plan;
+use crate::scene::Scene;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
+use std::thread::JoinHandle;
+
+/// The pipelines of a scene. A renderer that is made while this is held compiles none of them.
+pub struct Prepared {
+    _pipelines: Arc<Pipelines>,
+    _made: Vec<Arc<Pipeline>>,
+}
+
+/// Pipelines in the making.
+pub struct Preparation {
+    progress: Arc<Progress>,
+    thread: Option<JoinHandle<Result<Prepared, GpuError>>>,
+}
+
+#[derive(Default)]
+struct Progress {
+    done: AtomicUsize,
+    count: AtomicUsize,
+    is_cancelled: AtomicBool,
+    is_finished: AtomicBool,
+}
+
+impl Preparation {
+    /// Begins to compile what a renderer of this scene with these options will need; `wake` is called after each pipeline and at the end. None for
+    /// shaders of a folder: renderers do not share their pipelines.
+    ///
+    /// # Errors
+    /// The thread cannot be started.
+    pub fn begin(
+        context: &Arc<Context>,
+        scene: Scene,
+        options: &RendererOptions,
+        wake: Wake,
+    ) -> Result<Option<Preparation>, GpuError> {
+        if !Arc::ptr_eq(&options.shaders, &embedded()) {
+            return Ok(None);
+        }
+        let texel_access = options.texel_access.unwrap_or(TexelAccess::for_device(&context.candidate));
+        let (context, shaders, frames_at_once) = (context.clone(), options.shaders.clone(), options.frames_at_once);
+        let progress = Arc::new(Progress::default());
+        let own = progress.clone();
+        let work = move || {
+            let compile = || {
+                let scene = adapted(&context, texel_access, frames_at_once, scene);
+                let plan = Plan::new(&scene);
+                formats::check(&context, &plan, &scene)?;
+                let pipelines = Pipelines::shared(&context, shaders, texel_access)?;
+                let goes_on = |done: usize, count: usize| {
+                    own.count.store(count, Ordering::Relaxed);
+                    // Two may end at the same time.
+                    own.done.fetch_max(done, Ordering::Relaxed);
+                    wake();
+                    !own.is_cancelled.load(Ordering::Relaxed)
+                };
+                let made = pipelines.of_plan_while(&plan, &scene, &goes_on)?;
+                let count = own.done.load(Ordering::Relaxed) as u64;
+                context.counts.async_pipelines.fetch_add(count, Ordering::Relaxed);
+                Ok(Prepared { _pipelines: pipelines, _made: made })
+            };
+            let made = compile();
+            own.is_finished.store(true, Ordering::Release);
+            wake();
+            made
+        };
+        let thread = std::thread::Builder::new().name("preparing".into()).spawn(work);
+        let thread =
+            thread.map_err(|e| GpuError::Memory { operation: "start a thread".into(), fault: e.to_string() })?;
+        Ok(Some(Preparation { progress, thread: Some(thread) }))
+    }
+
+    /// How many pipelines are compiled, and how many there are; 0 and 0 before they are counted.
+    pub fn progress(&self) -> [usize; 2] {
+        [&self.progress.done, &self.progress.count].map(|count| count.load(Ordering::Relaxed))
+    }
+
+    pub fn is_finished(&self) -> bool {
+        self.progress.is_finished.load(Ordering::Acquire)
+            || self.thread.as_ref().is_none_or(|thread| thread.is_finished())
+    }
+
+    /// Waits for the end. None if the thread panicked: whoever needs the pipelines compiles them, and reports why not.
+    ///
+    /// # Errors
+    /// What a renderer of the scene would fail with.
+    pub fn finish(mut self) -> Result<Option<Prepared>, GpuError> {
+        self.thread.take().and_then(|thread| thread.join().ok()).transpose()
+    }
+}
+
+impl Drop for Preparation {
+    fn drop(&mut self) {
+        self.progress.is_cancelled.store(true, Ordering::Relaxed);
+        if let Some(thread) = self.thread.take() {
+            let _ = thread.join();
+        }
+    }
+}

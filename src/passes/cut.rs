@@ -1,0 +1,137 @@
+//! Cuts: the volume that rays are cast through, without what lies within (or outside of) the contours that the user drew. The volume stays as it
+//! is beside it, so that a cut that is drawn, changed or taken back needs no frame again.
+//!
+//! A texel is removed if its centre is, and gets a value of which the rendering draws nothing. What skips empty space, packed neighbours and the light
+//! volume read what is left.
+
+use super::lookup_tables;
+use super::pass::*;
+use crate::probe::{Geometry, Motion};
+use crate::scene::Scene;
+
+pub const PASS: Pass = Pass {
+    name: "cut",
+    stage: Stage::Preprocess,
+    frequency: Frequency::Volume,
+    link: Link::AfterSlices,
+    shader: |_, _| "preprocess/cut",
+    needed: |s| match s.has_cuts() {
+        true => Ok("what was cut away is not drawn"),
+        false => Err("nothing is cut away, or nothing is drawn that could be"),
+    },
+    // A slice changes with the frames that are smoothed into it.
+    reads: |s, _| {
+        let mut reads = vec![
+            Bind { part: Part::Around(s.reach_to_frames()), ..whole("source", Slot::Volume) },
+            whole("slice_places", Slot::SlicePlaces),
+            whole("cuts", Slot::Cuts),
+        ];
+        reads.extend(s.moves_in_frames().then_some(whole("line_shares", Slot::LineShares)));
+        reads
+    },
+    writes: |_, _| vec![Bind { part: Part::Around(0), ..whole("target", Slot::CutVolume) }],
+    extent: slice_extent,
+    repeat: once,
+    params: |s, t| {
+        let (grid, local) = (&s.grid, s.local_origin());
+        Params::default()
+            .f32("removed", removed(s))
+            .i32("cut_count", s.settings.cuts.len() as u32)
+            .vec2("grid_origin", [grid.origin[0] - local.x, grid.origin[1] - local.y])
+            .vec2("grid_pitch", grid.pitch)
+            .f32("axis_depth", s.probe().map_or(0.0, |probe| probe.axis_depth()))
+            .i32("slice", t.slice)
+    },
+    constants: |s, _| {
+        let sweep = match &s.geometry {
+            Geometry::Cartesian(_) => 0,
+            Geometry::Sweep(probe) => match probe.motion {
+                Motion::Fan { .. } => 1,
+                Motion::Translated => 2,
+                Motion::Still { .. } => 3,
+            },
+        };
+        vec![("SWEEP", sweep), ("INTRA_FRAME_MOTION", s.moves_in_frames() as i32)]
+    },
+    tolerance: Tolerance {
+        absolute: 5e-4,
+        relative: 0.0,
+        outliers: 1e-3,
+        why: "a copy, but for what is removed; R16F stores 1 to 4.9e-4; a texel whose centre is within 1e-5 of its distance from the origin of a \
+              contour's edge may be on either side",
+    },
+    reference: |scene, args, reads, writes| {
+        let source = reads.get("source");
+        let target = writes.get_mut("target");
+        let cuts: Vec<_> = scene.cuts().collect();
+        for z in args.slice..args.slice + args.slices {
+            for (x, y) in (0..source.size[1]).flat_map(|y| (0..source.size[0]).map(move |x| (x, y))) {
+                let place = scene.texel_place([x as u32, y as u32, z]);
+                let is_removed = cuts.iter().any(|cut| cut.removes(place));
+                let value = if is_removed { removed(scene) } else { source.one(x, y, z as usize) };
+                target.set([x, y, z as usize], &[value]);
+            }
+        }
+    },
+};
+
+fn removed(scene: &Scene) -> f64 {
+    scene.removed_value().unwrap_or(0.0)
+}
+
+/// Vectors of four before the edges of a cut: HEADER of cut.comp.
+const HEADER: usize = 5;
+
+/// Vectors of four of all cuts.
+pub(super) fn table_length(scene: &Scene) -> usize {
+    scene.settings.cuts.iter().map(|cut| HEADER + cut.contour.len()).sum()
+}
+
+/// The cuts as cut.comp reads them, relative to [`Scene::local_origin`].
+pub(super) fn table(scene: &Scene) -> Vec<f32> {
+    let mut table = Vec::with_capacity(4 * table_length(scene));
+    for cut in scene.cuts() {
+        let at = scene.to_local(cut.at);
+        for axis in [cut.right, cut.up, cut.forward] {
+            table.extend(axis.extend(-axis.dot(at)).to_array());
+        }
+        // The largest float is deeper than everything.
+        let depth = cut.depth.unwrap_or(MISS);
+        let removes_inside = if cut.removes_inside { 1.0 } else { 0.0 };
+        table.extend([cut.eye.unwrap_or(0.0), depth, removes_inside, cut.contour.len() as f64]);
+        let [low, high] = cut.bounds();
+        table.extend([low.x, low.y, high.x, high.y]);
+        let next = cut.contour.iter().cycle().skip(1);
+        table.extend(cut.contour.iter().zip(next).flat_map(|(from, to)| [from.x, from.y, to.x, to.y]));
+    }
+    lookup_tables::floats(table)
+}
+
+/// Where each slice is, as cut.comp reads it: cosine and sine of its angle in a fan, otherwise 0 and its z relative to [`Scene::local_origin`]; how
+/// far the motor moves while its frame is acquired; and 0.
+pub(super) fn slice_places(scene: &Scene) -> Vec<f32> {
+    let place = |slice: u32| {
+        let slice = f64::from(slice);
+        match &scene.geometry {
+            Geometry::Cartesian(grid) => {
+                [0.0, grid.origin[2] + slice * grid.spacing[2] - scene.local_origin().z, 0.0, 0.0]
+            }
+            Geometry::Sweep(probe) => {
+                let (at, advance) = (probe.slices.at(slice), probe.advance_at(slice));
+                match probe.motion {
+                    Motion::Fan { .. } => [at.cos(), at.sin(), advance, 0.0],
+                    Motion::Translated => [0.0, at, advance, 0.0],
+                    Motion::Still { .. } => [0.0; 4],
+                }
+            }
+        }
+    };
+    lookup_tables::floats((0..scene.slices()).flat_map(place))
+}
+
+/// Share of the lines of a frame that fired before the one at each texel of a slice.
+pub(super) fn line_shares(scene: &Scene) -> Vec<f32> {
+    let [columns, rows] = scene.grid.size;
+    let texels = (0..rows).flat_map(|row| (0..columns).map(move |column| (column, row)));
+    lookup_tables::floats(texels.map(|(column, row)| scene.share_fired(column, row)))
+}

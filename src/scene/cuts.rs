@@ -1,0 +1,350 @@
+//! Cuts resolved to space: where a texel of the volume is, and whether a cut removes it.
+//!
+//! A cut is decided texel by texel, at the texel's centre. Its edge in the volume is therefore as fine as the lattice of the volume: between a texel
+//! that is removed and one that stays, samples are interpolated, and the edge lies up to half a texel beside the contour.
+
+use super::check::within;
+use super::picker::Picker;
+use super::{
+    Cut, CutView, KeptSide, MAX_CUT_POINTS, MAX_CUTS, Mode, Scene, SceneError, Sign, refuse, region, transfer,
+};
+use crate::probe::{Advance, Geometry, Motion};
+use glam::{DVec2, DVec3};
+
+/// The farthest that a point of a cut's plane may be, mm: as of a clip plane.
+const FARTHEST: f64 = 1e10;
+/// The largest lengths of a contour and of its view, mm.
+const LARGEST: f64 = 1e7;
+
+/// A cut in space.
+#[derive(Clone, Debug, PartialEq)]
+pub struct CutShape {
+    /// Origin of the contour's plane, mm.
+    pub at: DVec3,
+    /// Unit axes: in the contour's plane, and away from the viewer.
+    pub right: DVec3,
+    pub up: DVec3,
+    pub forward: DVec3,
+    /// Distance of the eye from the plane, mm; none in parallel projection.
+    pub eye: Option<f64>,
+    /// Corners in the plane, mm.
+    pub contour: Vec<DVec2>,
+    /// What is removed is within the contour; otherwise it is outside.
+    pub removes_inside: bool,
+    /// Nothing is removed farther behind the plane, mm.
+    pub depth: Option<f64>,
+}
+
+impl CutShape {
+    fn new(cut: &Cut, at: DVec3) -> CutShape {
+        let forward = DVec3::from(cut.view.direction).normalize();
+        let right = forward.cross(DVec3::from(cut.view.up)).normalize();
+        CutShape {
+            at,
+            right,
+            up: right.cross(forward),
+            forward,
+            eye: cut.view.eye,
+            contour: cut.contour.iter().map(|corner| DVec2::from(*corner)).collect(),
+            removes_inside: cut.keep == KeptSide::Outside,
+            depth: cut.depth,
+        }
+    }
+
+    /// Where the line of sight through a place crosses the contour's plane, mm; none behind the eye. And how far the place is behind the plane.
+    pub fn project(&self, place: DVec3) -> (Option<DVec2>, f64) {
+        let from = place - self.at;
+        let behind = from.dot(self.forward);
+        let across = DVec2::new(from.dot(self.right), from.dot(self.up));
+        match self.eye {
+            None => (Some(across), behind),
+            Some(eye) => ((behind + eye > 0.0).then(|| across * eye / (behind + eye)), behind),
+        }
+    }
+
+    /// True if the contour winds about a point of its plane (Sunday 2001, "Inclusion of a point in a polygon").
+    pub fn winds_about(&self, point: DVec2) -> bool {
+        let next = self.contour.iter().cycle().skip(1);
+        let turns = self.contour.iter().zip(next).map(|(from, to)| {
+            let side = (*to - *from).perp_dot(point - *from);
+            match (from.y > point.y, to.y > point.y) {
+                (false, true) if side > 0.0 => 1,
+                (true, false) if side < 0.0 => -1,
+                _ => 0,
+            }
+        });
+        turns.sum::<i32>() != 0
+    }
+
+    /// True if the cut removes what is at a place in space.
+    pub fn removes(&self, place: DVec3) -> bool {
+        let (point, behind) = self.project(place);
+        self.depth.is_none_or(|depth| behind <= depth)
+            && point.is_some_and(|point| self.winds_about(point)) == self.removes_inside
+    }
+
+    /// Lower and upper corner of the contour's bounds.
+    pub fn bounds(&self) -> [DVec2; 2] {
+        let ends = [DVec2::INFINITY, DVec2::NEG_INFINITY];
+        self.contour.iter().fold(ends, |[low, high], corner| [low.min(*corner), high.max(*corner)])
+    }
+}
+
+impl Scene {
+    /// True if a rendering has cuts: it casts rays through a volume without what they remove. Planes and the block of mode cube show the echoes as
+    /// they are.
+    pub fn has_cuts(&self) -> bool {
+        !self.settings.cuts.is_empty() && (self.composites() || self.detects_surface() || self.projects())
+    }
+
+    /// The cuts in space.
+    pub fn cuts(&self) -> impl Iterator<Item = CutShape> {
+        self.settings.cuts.iter().map(|cut| CutShape::new(cut, self.place_of(cut.view.at)))
+    }
+
+    /// The cut along a contour that was drawn on the rendering, pixels of the picture. Its plane faces the view at the first place of the region that
+    /// the contour meets. None if it encloses nothing, or meets no region.
+    pub fn cut_along(&self, outline: &[[f64; 2]], keep: KeptSide) -> Option<Cut> {
+        let (picker, rays) = (Picker::of(self), &self.rays);
+        let corners = simplified(outline.iter().map(|at| DVec2::from(*at)).collect());
+        if corners.len() < 3 {
+            return None;
+        }
+        let low = region::framed_low(&self.geometry, &self.settings, self.low, self.high).unwrap_or(self.low);
+        let along: Vec<(DVec3, DVec3)> = corners.iter().map(|at| picker.ray(at.to_array())).collect();
+        let behind = |place: DVec3| (place - rays.target).dot(rays.forward);
+        let entries = along.iter().filter_map(|(origin, direction)| {
+            entry(low, self.high, *origin, *direction).map(|away| behind(*origin + *direction * away))
+        });
+        let nearest = entries.reduce(f64::min)?;
+        let eye = behind(rays.origin);
+        // An eye within the region is not on the contour's plane.
+        let nearest = if rays.is_perspective { nearest.max(eye + 1.0) } else { nearest };
+        let at = rays.target + rays.forward * nearest;
+        // A tenth of a micrometre: files stay short.
+        let short = |mm: f64| (mm * 1e4).round() / 1e4;
+        let contour = along.iter().map(|(origin, direction)| {
+            let away = (nearest - behind(*origin)) / direction.dot(rays.forward);
+            let from = *origin + *direction * away - at;
+            [short(from.dot(rays.right)), short(from.dot(rays.up))]
+        });
+        let view = CutView {
+            at: self.point_of(at),
+            direction: rays.forward.to_array(),
+            up: rays.up.to_array(),
+            eye: rays.is_perspective.then_some(nearest - eye),
+        };
+        Some(Cut { contour: contour.collect(), view, keep, depth: None })
+    }
+
+    /// The value of what is removed: one of which the rendering draws nothing. 0, or 1 where what is dark is drawn. The mean takes it for dark matter.
+    /// None if the rendering draws both.
+    pub fn removed_value(&self) -> Option<f64> {
+        let is_drawn = |value: f64| {
+            let is_composited = self.composites() && {
+                let volume = &self.settings.volume;
+                let table = transfer::table_of(volume, self.reference_length(), self.transfer_entries());
+                let entry = if value > 0.5 { table.last() } else { table.first() };
+                entry.is_some_and(|entry| entry[3] > 0.0)
+            };
+            let dark = self.settings.surface.sign == Sign::Dark;
+            let is_detected = self.detects_surface() && dark == (value < 0.5);
+            let is_kept = self.settings.mode == Mode::MinIp && value < 0.5;
+            is_composited || is_detected || is_kept
+        };
+        [0.0, 1.0].into_iter().find(|value| !is_drawn(*value))
+    }
+
+    /// The place in space of a texel of the volume, mm.
+    pub fn texel_place(&self, [column, row, slice]: [u32; 3]) -> DVec3 {
+        let (x, y) = self.grid.place(f64::from(column), f64::from(row));
+        let slice = f64::from(slice);
+        match &self.geometry {
+            Geometry::Cartesian(grid) => DVec3::new(x, y, grid.origin[2] + slice * grid.spacing[2]),
+            Geometry::Sweep(probe) => {
+                let fired = self.share_fired(column, row);
+                probe.sweep_map(x, y, probe.slices.at(slice) + probe.advance_at(slice) * fired)
+            }
+        }
+    }
+
+    /// Share of a frame's lines that fired before the one through a texel of its slice, 0..1; beside the sector that of the nearest.
+    pub(crate) fn share_fired(&self, column: u32, row: u32) -> f64 {
+        let Some(probe) = self.probe() else { return 0.0 };
+        let (x, y) = self.grid.place(f64::from(column), f64::from(row));
+        let count = probe.lines.len() as f64;
+        probe.plane_indices(x, y).1.clamp(0.0, count - 1.0) / count
+    }
+
+    /// True if slices of a sweep are acquired while the motor moves.
+    pub(crate) fn moves_in_frames(&self) -> bool {
+        self.probe().is_some_and(|probe| {
+            let is_moving = match &probe.advance {
+                Advance::None => false,
+                Advance::Same(advance) => *advance != 0.0,
+                Advance::Each(table) => table.iter().any(|advance| *advance != 0.0),
+            };
+            is_moving && !matches!(probe.motion, Motion::Still { .. })
+        })
+    }
+}
+
+/// Distance at which a ray enters a box, mm; 0 within it, none beside it.
+fn entry(low: DVec3, high: DVec3, origin: DVec3, direction: DVec3) -> Option<f64> {
+    let (a, b) = ((low - origin) / direction, (high - origin) / direction);
+    let (enter, leave) = (a.min(b).max_element().max(0.0), a.max(b).min_element());
+    (enter <= leave).then_some(enter)
+}
+
+/// Distance that a contour may be moved for fewer corners, pixels.
+const TOLERANCE: f64 = 0.4;
+
+/// A closed contour with as few corners as its form needs, at most [`MAX_CUT_POINTS`] (Douglas and Peucker 1973); none if it has no extent.
+fn simplified(outline: Vec<DVec2>) -> Vec<DVec2> {
+    let Some(first) = outline.first().copied() else { return Vec::new() };
+    let farthest = |from: DVec2| {
+        let away = outline.iter().map(|at| at.distance(from)).enumerate();
+        away.max_by(|a, b| a.1.total_cmp(&b.1)).map_or((0, 0.0), |found| found)
+    };
+    let (middle, extent) = farthest(first);
+    if extent < 2.0 {
+        return Vec::new();
+    }
+    let closed: Vec<DVec2> = outline.iter().copied().chain([first]).collect();
+    // What lies farthest from the line between two corners becomes a corner, the farthest of all first.
+    let span = |from: usize, to: usize| {
+        let away = (from + 1..to).map(|n| (n, distance(closed[n], closed[from], closed[to])));
+        away.max_by(|a, b| a.1.total_cmp(&b.1)).map(|(n, away)| (away, from, n, to))
+    };
+    let mut corners = vec![0, middle];
+    let mut spans: Vec<_> = [span(0, middle), span(middle, closed.len() - 1)].into_iter().flatten().collect();
+    while corners.len() < MAX_CUT_POINTS {
+        let widest = spans.iter().enumerate().max_by(|a, b| a.1.0.total_cmp(&b.1.0)).map(|(at, _)| at);
+        let Some((away, from, n, to)) = widest.map(|at| spans.swap_remove(at)) else { break };
+        if away <= TOLERANCE {
+            break;
+        }
+        corners.push(n);
+        spans.extend([span(from, n), span(n, to)].into_iter().flatten());
+    }
+    corners.sort_unstable();
+    corners.into_iter().map(|n| closed[n]).collect()
+}
+
+/// Distance of a point from the line between two others.
+fn distance(point: DVec2, from: DVec2, to: DVec2) -> f64 {
+    let along = to - from;
+    let share = ((point - from).dot(along) / along.length_squared().max(1e-30)).clamp(0.0, 1.0);
+    point.distance(from + along * share)
+}
+
+/// Checks that need no geometry.
+pub(super) fn check(cuts: &[Cut]) -> Result<(), SceneError> {
+    if cuts.len() > MAX_CUTS {
+        return refuse("cuts", format!("has {} entries, at most {MAX_CUTS}", cuts.len()));
+    }
+    for (n, cut) in cuts.iter().enumerate() {
+        let count = cut.contour.len();
+        if !(3..=MAX_CUT_POINTS).contains(&count) {
+            return refuse(
+                "cuts.contour",
+                format!("entry {}: has {count} corners, must have 3 to {MAX_CUT_POINTS}", n + 1),
+            );
+        }
+        cut.contour.iter().flatten().try_for_each(|value| within("cuts.contour", *value, -LARGEST, LARGEST))?;
+        cut.view.at.iter().try_for_each(|value| within("cuts.view.at", *value, -FARTHEST, FARTHEST))?;
+        let (direction, up) = (DVec3::from(cut.view.direction), DVec3::from(cut.view.up));
+        for (field, vector) in [("cuts.view.direction", direction), ("cuts.view.up", up)] {
+            if !vector.is_finite() || !(1e-9..=1e9).contains(&vector.length()) {
+                return refuse(field, "must be finite and not zero");
+            }
+        }
+        if direction.normalize().cross(up.normalize()).length() < 1e-6 {
+            return refuse("cuts.view.up", "must not be parallel to cuts.view.direction");
+        }
+        within("cuts.view.eye", cut.view.eye.unwrap_or(1.0), 1e-3, LARGEST)?;
+        within("cuts.depth", cut.depth.unwrap_or(0.0), 0.0, LARGEST)?;
+    }
+    Ok(())
+}
+
+/// # Errors
+/// Nothing can be removed where everything is drawn.
+pub(super) fn check_drawn(scene: &Scene) -> Result<(), SceneError> {
+    match scene.has_cuts() && scene.removed_value().is_none() {
+        true => refuse(
+            "cuts",
+            "remove the volume by a value of which nothing is drawn, and here both what is dark and what is bright is drawn (surface.sign, or a \
+             transfer function that is opaque at 0 and at 1): remove the cuts",
+        ),
+        false => Ok(()),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scene::Settings;
+
+    fn square() -> Cut {
+        Cut { contour: vec![[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]], ..Cut::default() }
+    }
+
+    fn fault(change: impl Fn(&mut Cut)) -> String {
+        let mut wrong = square();
+        change(&mut wrong);
+        let settings = Settings { cuts: vec![square(), wrong], ..Settings::default() };
+        settings.check().expect_err("refused").to_string()
+    }
+
+    #[test]
+    fn wrong_cuts_are_refused_in_one_line_that_names_the_key() {
+        assert!(Settings { cuts: vec![square(); MAX_CUTS], ..Settings::default() }.check().is_ok());
+        let many =
+            Settings { cuts: vec![square(); MAX_CUTS + 1], ..Settings::default() }.check().expect_err("too many");
+        assert_eq!(many.field, "cuts");
+        assert!(fault(|cut| cut.contour.truncate(2)).starts_with("scene: cuts.contour: entry 2: has 2 corners"));
+        assert!(fault(|cut| cut.contour = vec![[0.0; 2]; 513]).contains("has 513 corners"));
+        assert!(fault(|cut| cut.contour[1][0] = f64::NAN).contains("cuts.contour: is NaN"));
+        assert!(fault(|cut| cut.view.at[2] = f64::INFINITY).contains("cuts.view.at: is inf"));
+        assert!(fault(|cut| cut.view.direction = [0.0; 3]).contains("cuts.view.direction"));
+        assert!(fault(|cut| cut.view.up = [f64::NAN; 3]).contains("cuts.view.up"));
+        assert!(fault(|cut| cut.view.up = [0.0, -3.0, 0.0]).contains("cuts.view.up: must not be parallel"));
+        assert!(fault(|cut| cut.view.eye = Some(0.0)).contains("cuts.view.eye"));
+        assert!(fault(|cut| cut.depth = Some(-1.0)).contains("cuts.depth"));
+    }
+
+    #[test]
+    fn a_cut_is_a_prism_or_a_cone_whose_axes_are_those_of_its_view() {
+        let at =
+            |cut: &Cut, place: [f64; 3]| CutShape::new(cut, DVec3::new(0.0, 10.0, 0.0)).removes(DVec3::from(place));
+        // A triangle that points to the right and up: lateral and elevation, seen from the probe.
+        let corner = Cut { contour: vec![[0.0, 0.0], [4.0, 0.0], [4.0, 4.0]], ..Cut::default() };
+        assert!(at(&corner, [3.0, 20.0, 1.0]) && at(&corner, [3.0, -90.0, 1.0]));
+        assert!(!at(&corner, [1.0, 20.0, 3.0]) && !at(&corner, [-3.0, 20.0, 1.0]) && !at(&corner, [3.0, 20.0, -1.0]));
+        let deep = Cut { depth: Some(5.0), ..corner.clone() };
+        assert!(at(&deep, [3.0, 15.0, 1.0]) && !at(&deep, [3.0, 15.1, 1.0]) && at(&deep, [3.0, 2.0, 1.0]));
+        let inside = Cut { keep: KeptSide::Inside, ..deep.clone() };
+        assert!(!at(&inside, [3.0, 15.0, 1.0]) && at(&inside, [1.0, 15.0, 3.0]) && !at(&inside, [1.0, 15.1, 3.0]));
+        // The eye is 8 mm in front: twice as far away, all is twice as large.
+        let cone = Cut { view: CutView { eye: Some(8.0), ..CutView::default() }, ..corner.clone() };
+        assert!(at(&cone, [7.9, 18.0, 1.0]) && !at(&cone, [8.1, 18.0, 1.0]) && !at(&cone, [7.9, 17.0, 1.0]));
+        assert!(!at(&cone, [3.0, 1.9, 1.0]), "behind the eye");
+        // Any length of direction and up, and an up that is not level.
+        let view = CutView { direction: [0.0, 3.0, 0.0], up: [0.0, 0.7, 0.2], ..CutView::default() };
+        assert!(at(&Cut { view, ..corner.clone() }, [3.0, 20.0, 1.0]));
+    }
+
+    #[test]
+    fn a_contour_that_crosses_itself_has_no_holes() {
+        // Twice around, and an eight.
+        let star: Vec<[f64; 2]> =
+            (0..5).map(|n| (f64::from(n) * 4.0 * std::f64::consts::PI / 5.0).sin_cos()).map(|(x, y)| [x, y]).collect();
+        let eight = vec![[-2.0, -1.0], [2.0, 1.0], [2.0, -1.0], [-2.0, 1.0]];
+        for (contour, inside) in [(star, [[0.0, 0.0], [0.0, 0.8]]), (eight, [[-1.5, 0.1], [1.5, 0.1]])] {
+            let shape = CutShape::new(&Cut { contour, ..Cut::default() }, DVec3::ZERO);
+            assert!(inside.iter().all(|point| shape.winds_about(DVec2::from(*point))));
+            assert!(!shape.winds_about(DVec2::new(0.0, 1.5)));
+        }
+    }
+}

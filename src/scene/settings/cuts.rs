@@ -1,0 +1,59 @@
+//! Settings of cuts: contours drawn on a rendering, along whose view the volume is removed from renderings.
+
+use serde::{Deserialize, Serialize};
+
+/// Most cuts of a scene.
+pub const MAX_CUTS: usize = 32;
+/// Most corners of the contour of a cut.
+pub const MAX_CUT_POINTS: usize = 512;
+
+/// A cut. What lies within its contour, seen from where that was drawn, is removed from renderings. The cut keeps its place in the volume whatever
+/// the view: a prism of a parallel view, a cone of one in perspective.
+#[derive(Clone, Debug, Default, PartialEq, Deserialize, Serialize)]
+#[serde(deny_unknown_fields)]
+pub struct Cut {
+    /// Corners of the closed contour, 3 to 512: mm to the right of `view.at` and up, in the plane through it that faces the view. What the contour
+    /// winds about is inside, also where it crosses itself.
+    pub contour: Vec<[f64; 2]>,
+    /// The view at which the contour was drawn.
+    pub view: CutView,
+    /// The side of the contour that stays.
+    #[serde(default)]
+    pub keep: KeptSide,
+    /// How deep the cut is: nothing is removed more than so many mm behind the contour's plane, 0..=1e7. Absent: it goes through everything.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub depth: Option<f64>,
+}
+
+/// The view at which the contour of a cut was drawn.
+#[derive(Clone, Copy, Debug, PartialEq, Deserialize, Serialize)]
+#[serde(deny_unknown_fields)]
+pub struct CutView {
+    /// A point of the contour's plane, its origin, in mm: lateral, depth (from the probe's face), elevation.
+    pub at: [f64; 3],
+    /// Direction of the view, away from the viewer, of any length but 0: the normal of the contour's plane.
+    pub direction: [f64; 3],
+    /// The upward direction, not parallel to the other; of it, what lies in the plane.
+    pub up: [f64; 3],
+    /// Perspective: distance of the viewer's eye from the contour's plane, in front of its origin, 1e-3..=1e7 mm. Absent: a parallel view.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub eye: Option<f64>,
+}
+
+/// From the probe down, as a camera without angles looks.
+impl Default for CutView {
+    fn default() -> CutView {
+        CutView { at: [0.0; 3], direction: [0.0, 1.0, 0.0], up: [0.0, 0.0, 1.0], eye: None }
+    }
+}
+
+/// The side of a cut's contour that stays.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum KeptSide {
+    /// What is within the contour is removed.
+    #[default]
+    Outside,
+    /// What is outside of the contour is removed.
+    Inside,
+}

@@ -1,0 +1,93 @@
+//! What a layout draws, for tests: in the order in which it is painted, in points, colours premultiplied with their opacity.
+
+use egui::Shape;
+use egui::epaint::ClippedShape;
+
+/// Left, top, right, bottom.
+pub(in crate::ui) type Area = [f32; 4];
+pub(in crate::ui) type Colour = [u8; 4];
+
+#[derive(Clone, Debug, PartialEq)]
+pub(in crate::ui) enum Kind {
+    Rect {
+        area: Area,
+        fill: Colour,
+        edge: Colour,
+    },
+    Circle {
+        centre: [f32; 2],
+        radius: f32,
+        fill: Colour,
+        edge: Colour,
+    },
+    Line {
+        ends: [[f32; 2]; 2],
+        width: f32,
+        colour: Colour,
+    },
+    Polygon {
+        corners: Vec<[f32; 2]>,
+        fill: Colour,
+    },
+    /// The area of the letters, and the height of the largest.
+    Text {
+        area: Area,
+        text: String,
+        size: f32,
+        colours: Vec<Colour>,
+    },
+}
+
+#[derive(Clone, Debug, PartialEq)]
+pub(in crate::ui) struct Drawn {
+    /// Nothing is drawn outside.
+    pub(in crate::ui) clip: Area,
+    pub(in crate::ui) kind: Kind,
+}
+
+pub(super) fn drawn(shapes: &[ClippedShape]) -> Vec<Drawn> {
+    let mut found = Vec::new();
+    shapes.iter().for_each(|clipped| add(area(clipped.clip_rect), &clipped.shape, &mut found));
+    found
+}
+
+fn area(rect: egui::Rect) -> Area {
+    [rect.left(), rect.top(), rect.right(), rect.bottom()]
+}
+
+fn add(clip: Area, shape: &Shape, found: &mut Vec<Drawn>) {
+    let kind = match shape {
+        Shape::Vec(shapes) => return shapes.iter().for_each(|shape| add(clip, shape, found)),
+        // A shadow is no boundary.
+        Shape::Rect(rect) if rect.blur_width > 0.0 => return,
+        Shape::Rect(rect) => {
+            Kind::Rect { area: area(rect.rect), fill: rect.fill.to_array(), edge: rect.stroke.color.to_array() }
+        }
+        Shape::Circle(circle) => Kind::Circle {
+            centre: circle.center.into(),
+            radius: circle.radius,
+            fill: circle.fill.to_array(),
+            edge: circle.stroke.color.to_array(),
+        },
+        Shape::LineSegment { points, stroke } => {
+            Kind::Line { ends: points.map(Into::into), width: stroke.width, colour: stroke.color.to_array() }
+        }
+        Shape::Path(path) => {
+            Kind::Polygon { corners: path.points.iter().map(|p| (*p).into()).collect(), fill: path.fill.to_array() }
+        }
+        Shape::Text(text) => {
+            let galley = &text.galley;
+            let ink = galley.mesh_bounds.translate(text.pos.to_vec2());
+            let sections = &galley.job.sections;
+            let colours = sections.iter().map(|section| {
+                let own = section.format.color;
+                let own = if own == egui::Color32::PLACEHOLDER { text.fallback_color } else { own };
+                text.override_text_color.unwrap_or(own).gamma_multiply(text.opacity_factor).to_array()
+            });
+            let size = sections.iter().map(|section| section.format.font_id.size).fold(0.0, f32::max);
+            Kind::Text { area: area(ink), text: galley.text().to_string(), size, colours: colours.collect() }
+        }
+        _ => return,
+    };
+    found.push(Drawn { clip, kind });
+}

@@ -1,0 +1,246 @@
+//! Where everything is, in windows from 640 x 480 to 3840 x 2160 at scales from 1 to 3, in every mode and layout.
+
+use super::shown::Shown;
+use super::*;
+use crate::ui::panels::accesskit::{Node, Role};
+use crate::ui::panels::colours::{BACKING, MESSAGE, OUTLINE, PANEL};
+use crate::ui::panels::drawn::{Area, Kind};
+use crate::ui::panels::{self, Banner, Note};
+
+const SIZES: [[u32; 2]; 8] =
+    [[640, 480], [800, 600], [1024, 768], [1280, 720], [1280, 1024], [1920, 1080], [2560, 1440], [3840, 2160]];
+const SCALES: [f32; 6] = [1.0, 1.25, 1.5, 2.0, 2.5, 3.0];
+/// Rounding to pixels.
+const NEAR: f32 = 1.0;
+
+fn overlap(a: Area, b: Area) -> bool {
+    a[0] + NEAR < b[2] && b[0] + NEAR < a[2] && a[1] + NEAR < b[3] && b[1] + NEAR < a[3]
+}
+
+fn is_inside(inner: Area, outer: Area) -> bool {
+    inner[0] >= outer[0] - NEAR
+        && inner[1] >= outer[1] - NEAR
+        && inner[2] <= outer[2] + NEAR
+        && inner[3] <= outer[3] + NEAR
+}
+
+fn common(a: Area, b: Area) -> Option<Area> {
+    let both = [a[0].max(b[0]), a[1].max(b[1]), a[2].min(b[2]), a[3].min(b[3])];
+    (both[0] + NEAR < both[2] && both[1] + NEAR < both[3]).then_some(both)
+}
+
+/// The window and the picture in it, points.
+fn places(shown: &Shown) -> [Area; 2] {
+    let scale = shown.panels.scale();
+    let ([x, y], [w, h]) = panels::picture_area(shown.size, scale, true);
+    let [width, height] = shown.size;
+    [[0, 0, width, height], [x, y, x + w, y + h]].map(|area| area.map(|n| n as f32 / scale))
+}
+
+fn place(node: &Node) -> Option<Area> {
+    node.bounds().map(|b| [b.x0, b.y0, b.x1, b.y1].map(|n| n as f32))
+}
+
+/// The controls of the panels with their names, as far as they are in sight: a column ends above the bar, and scrolls.
+fn controls(shown: &Shown) -> Vec<(String, Area)> {
+    let [window, picture] = places(shown);
+    let columns = [[0.0, 0.0, picture[0], picture[3]], [picture[2], 0.0, window[2], picture[3]]];
+    let bar = [0.0, picture[3], window[2], window[3]];
+    let controls = shown.tree.values().filter(|node| matches!(node.role(), Role::Button | Role::Slider | Role::Switch));
+    let seen = controls.filter_map(|node| {
+        let area = place(node)?;
+        // Of a row of a column, the middle decides where it belongs.
+        let middle = (area[0] + area[2]) / 2.0;
+        let home =
+            if area[1] >= bar[1] - NEAR && shown.names_of_bar().contains(&node.label().unwrap_or_default().into()) {
+                bar
+            } else {
+                *columns.iter().find(|column| (column[0]..column[2]).contains(&middle)).unwrap_or(&bar)
+            };
+        Some((node.label().unwrap_or_default().to_string(), common(area, home)?, area, home))
+    });
+    seen.map(|(name, seen, area, home)| {
+        let is_in_width = area[0] >= home[0] - NEAR && area[2] <= home[2] + NEAR;
+        assert!(is_in_width, "{name} reaches out of its panel: {area:?} of {home:?}");
+        (name, seen)
+    })
+    .collect()
+}
+
+/// What annotations draw over the picture: each once, without its dark edges.
+fn annotations(shown: &Shown) -> Vec<(String, Area)> {
+    let [_, picture] = places(shown);
+    let drawn = shown.drawn.iter().filter_map(|drawn| match &drawn.kind {
+        Kind::Text { area, text, colours, .. } if colours[0] != OUTLINE.to_array() => Some((text.clone(), *area)),
+        Kind::Circle { centre: [x, y], radius, fill, .. } if *fill == BACKING.to_array() => {
+            Some(("axes".to_string(), [x - radius, y - radius, x + radius, y + radius]))
+        }
+        Kind::Circle { centre: [x, y], radius: 5.0, .. } => {
+            Some(("probe".into(), [x - 5.0, y - 5.0, x + 5.0, y + 5.0]))
+        }
+        Kind::Rect { area, fill, .. } if fill[3] == 0 && area[2] - area[0] == 16.0 => Some(("colours".into(), *area)),
+        _ => None,
+    });
+    let mut found: Vec<(String, Area)> = drawn.filter(|(_, area)| is_inside(*area, picture)).collect();
+    found.dedup();
+    found
+}
+
+fn check(shown: &Shown, what: &str) {
+    let [window, picture] = places(shown);
+    let share = |area: Area| (area[2] - area[0]) * (area[3] - area[1]);
+    assert!(share(picture) >= 0.5 * share(window), "{what}: the picture has {picture:?} of {window:?}");
+    let controls = controls(shown);
+    for (n, (name, area)) in controls.iter().enumerate() {
+        assert!(is_inside(*area, window), "{what}: {name} at {area:?} is not in {window:?}");
+        assert!(!overlap(*area, picture), "{what}: {name} at {area:?} covers the picture {picture:?}");
+        for (other, covered) in &controls[..n] {
+            assert!(!overlap(*area, *covered), "{what}: {name} at {area:?} covers {other} at {covered:?}");
+        }
+    }
+    for wanted in [&["Freeze", "Unfreeze"][..], &["Save", "Save picture"]] {
+        let is_there = |(name, area): &(String, Area)| wanted.contains(&name.as_str()) && area[1] >= picture[3] - NEAR;
+        let found = controls.iter().find(|control| is_there(control));
+        assert!(
+            found.is_some_and(|(_, area)| area[2] - area[0] > 40.0 && area[3] - area[1] > 30.0),
+            "{what}: {wanted:?} {found:?}"
+        );
+    }
+    let marks = annotations(shown);
+    assert!(marks.iter().any(|(name, _)| name.starts_with("Demo data")), "{what}: the phantom is not named: {marks:?}");
+    let is_number = |(name, _): &(String, Area)| name.parse::<u32>().is_ok();
+    let has_unit = |(name, _): &(String, Area)| name.ends_with(" mm");
+    let has_ruler = shown.scene.marks().iter().any(|tile| tile.depth_from.is_some());
+    assert!(!has_ruler || !marks.iter().any(is_number) || marks.iter().any(has_unit), "{what}: no unit: {marks:?}");
+    for (n, (name, area)) in marks.iter().enumerate() {
+        for (other, covered) in &marks[..n] {
+            // The names of the axes stand around and on their disc.
+            let are_axes = [name, other].iter().all(|name| ["axes", "lat.", "depth", "elev."].contains(&name.as_str()));
+            assert!(are_axes || !overlap(*area, *covered), "{what}: {name} at {area:?} covers {other} at {covered:?}");
+        }
+        if name == "axes" || name == "colours" {
+            let tile = shown.scene.marks().into_iter().map(|tile| {
+                let [corner, size] = [tile.corner, tile.size].map(|v| v.map(|n| n as f32 / shown.panels.scale()));
+                let [x, y] = [picture[0] + corner[0], picture[1] + corner[1]];
+                [x, y, x + size[0], y + size[1]]
+            });
+            let tile = tile.filter(|tile| is_inside(*area, *tile)).min_by(|a, b| share(*a).total_cmp(&share(*b)));
+            let tile = tile.unwrap_or(picture);
+            let part = share(*area) / share(tile);
+            assert!(part < 0.12, "{what}: {name} at {area:?} covers {part:.2} of its tile {tile:?}");
+        }
+    }
+}
+
+impl Shown {
+    fn names_of_bar(&self) -> Vec<String> {
+        let bar = self.tree.values().find(|node| node.role() == Role::Toolbar && node.label() == Some("Cine loop"));
+        let mut found = Vec::new();
+        let mut left: Vec<_> = bar.map(|bar| bar.children().to_vec()).unwrap_or_default();
+        while let Some(id) = left.pop() {
+            let node = &self.tree[&id];
+            found.push(node.label().unwrap_or_default().to_string());
+            left.extend(node.children());
+        }
+        found
+    }
+}
+
+fn windows() -> impl Iterator<Item = ([u32; 2], f32)> {
+    SIZES.iter().flat_map(|size| SCALES.map(|scale| (*size, scale)))
+}
+
+/// Prevents a control, a mark or the picture that something else covers, and a window without Freeze or Save.
+#[test]
+fn nothing_covers_anything_in_any_window_mode_and_layout() {
+    let looks = [
+        (Mode::Surface, Layout::Single),
+        (Mode::Surface, Layout::Pair),
+        (Mode::Volume, Layout::Four),
+        (Mode::Mip, Layout::Single),
+        (Mode::Plane, Layout::Single),
+        (Mode::Orthogonal, Layout::Single),
+        (Mode::Tomography, Layout::Single),
+        (Mode::Cube, Layout::Single),
+    ];
+    for (size, scale) in windows() {
+        let mut shown =
+            Shown::sized("marks.lateral='right-left'\nmarks.elevation='head-feet'\nplanes.reference=true", size, scale);
+        for (mode, layout) in looks {
+            shown.apply(Command::Mode(mode));
+            shown.apply(Command::Layout(layout));
+            check(&shown, &format!("{size:?} at {scale}, {mode:?} {layout:?}"));
+        }
+    }
+}
+
+/// Prevents messages over the button that they confirm, over each other, or out of the picture.
+#[test]
+fn messages_stay_in_the_picture_and_apart() {
+    let note = |text: &str, is_fault| Note { text: text.into(), is_fault };
+    for (size, scale) in windows() {
+        let mut shown = Shown::sized("mode='surface'", size, scale);
+        shown.banner = Some(Banner {
+            title: "No frames from the probe".into(),
+            text: "It is connected but sends nothing.".into(),
+            is_fault: true,
+        });
+        shown.notes = vec![
+            note("Saved /home/operator/pictures/echolume-20261123-231205-1.png", false),
+            note("The loop was not saved: there are no volumes yet", true),
+            note("Exporting: Volume, NRRD", false),
+            note("Saved /home/operator/pictures/echolume-20261123-231205-2.frames", false),
+        ];
+        // An area is placed by its size of the layout before.
+        (0..3).for_each(|_| shown.settle());
+        let [window, picture] = places(&shown);
+        let messages: Vec<Area> = shown
+            .drawn
+            .iter()
+            .filter_map(|drawn| match &drawn.kind {
+                Kind::Rect { area, fill, .. } if *fill == MESSAGE.to_array() => Some(*area),
+                _ => None,
+            })
+            .collect();
+        let what = format!("{size:?} at {scale}, window {window:?}, picture {picture:?}: {messages:?}");
+        assert!(!messages.is_empty(), "{what}");
+        for (n, area) in messages.iter().enumerate() {
+            assert!(is_inside(*area, picture), "{area:?} is not in the picture: {what}");
+            assert!(messages[..n].iter().all(|other| !overlap(*area, *other)), "{area:?} covers another: {what}");
+        }
+        let confirmed = note("Saved /home/operator/pictures/echolume-20261123-231205-2.frames", false).text;
+        let newest =
+            shown.drawn.iter().any(|drawn| matches!(&drawn.kind, Kind::Text { text, .. } if *text == confirmed));
+        assert!(newest, "the newest message is shown: {what}");
+    }
+}
+
+/// Prevents a list, a question or the help of which a part is out of the window.
+#[test]
+fn dialogs_fit_into_the_window() {
+    for (size, scale) in windows() {
+        let mut shown = Shown::sized("mode='surface'", size, scale);
+        for (n, what) in ["help", "times", "exports", "the question", "files"].into_iter().enumerate() {
+            // The console shows no help in a lower window.
+            if n == 0 && size[1] as f32 <= 200.0 * scale {
+                continue;
+            }
+            shown.open = std::array::from_fn(|open| open == n);
+            let names = (0..30).map(|n| format!("recording-{n}.mha")).collect();
+            shown.files = (n == 4).then(|| ("/data".into(), names));
+            (0..3).for_each(|_| shown.settle());
+            let [window, _] = places(&shown);
+            // Their frames, and their buttons as far as they are in sight.
+            let dialogs = shown.drawn.iter().filter_map(|drawn| match &drawn.kind {
+                Kind::Rect { area, fill, edge } if *fill == PANEL.to_array() && edge[3] > 0 => Some(*area),
+                _ => None,
+            });
+            let dialogs: Vec<Area> = dialogs.collect();
+            assert_eq!(dialogs.len(), usize::from(n != 1), "{size:?} at {scale}: {what}");
+            for dialog in dialogs {
+                let area = dialog;
+                assert!(is_inside(area, window), "{size:?} at {scale}: {what} at {area:?} is not in {window:?}");
+            }
+        }
+    }
+}

@@ -1,0 +1,147 @@
+//! The panels around the phantom, as the console lays them out, without a console.
+
+use super::*;
+use crate::live::cine::CineVolume;
+use crate::source::phantom::{Phantom, PhantomOptions};
+use crate::ui::cine_player::{CinePlayer, CineState};
+use crate::ui::panels::accesskit::{Action, ActionData, ActionRequest, Node, NodeId, TreeId, TreeUpdate};
+use crate::ui::panels::drawn::Drawn;
+use crate::ui::panels::{self, Banner, Note, PanelOutput, PanelState, Panels};
+use crate::ui::times::Times;
+use std::collections::BTreeMap;
+
+/// The usual window.
+pub(super) const SIZE: [u32; 2] = [1280, 800];
+
+pub(super) struct Shown {
+    pub(super) panels: Panels,
+    pub(super) size: [u32; 2],
+    pub(super) controls: Controls,
+    pub(super) scene: Scene,
+    pub(super) times: Times,
+    pub(super) budget: Option<Duration>,
+    pub(super) time: f64,
+    pub(super) shows_panels: bool,
+    pub(super) has_drawn: bool,
+    pub(super) is_frozen: bool,
+    pub(super) cine: CineState,
+    pub(super) banner: Option<Banner>,
+    pub(super) notes: Vec<Note>,
+    pub(super) files: Option<(String, Vec<String>)>,
+    /// Help, times, exports, the question whether to leave.
+    pub(super) open: [bool; 4],
+    pub(super) pointer: Option<[f64; 2]>,
+    /// What the last layout said.
+    pub(super) tree: BTreeMap<NodeId, Node>,
+    pub(super) focus: Option<NodeId>,
+    /// What the last layout drew: corners of triangles and their colours, and the same before it became triangles.
+    pub(super) corners: Vec<([f32; 2], [u8; 4])>,
+    pub(super) drawn: Vec<Drawn>,
+}
+
+impl Shown {
+    pub(super) fn new(toml: &str) -> Shown {
+        Shown::sized(toml, SIZE, 1.0)
+    }
+
+    /// In a window of this size, pixels, at a scale.
+    pub(super) fn sized(toml: &str, size: [u32; 2], scale: f32) -> Shown {
+        let phantom = Phantom::new(PhantomOptions::default()).expect("a phantom");
+        let geometry = Geometry::Sweep(phantom.probe(0).clone());
+        let mut controls = Controls::new(settings("fetal", toml));
+        controls.resize(panels::picture_area(size, scale, true).1);
+        let scene = scene(&geometry, controls.settings());
+        let mut panels = Panels::new(scale);
+        panels.describe(true);
+        let mut shown = Shown {
+            panels,
+            size,
+            controls,
+            scene,
+            times: Times::default(),
+            budget: None,
+            time: 0.0,
+            shows_panels: true,
+            has_drawn: true,
+            is_frozen: false,
+            cine: CinePlayer::default().state(&(0..20).map(|_| CineVolume::default()).collect(), Some(2)),
+            banner: None,
+            notes: Vec::new(),
+            files: None,
+            open: [false; 4],
+            pointer: None,
+            tree: BTreeMap::new(),
+            focus: None,
+            corners: Vec::new(),
+            drawn: Vec::new(),
+        };
+        shown.settle();
+        shown
+    }
+
+    /// Lays the panels out until they stay: scroll areas know their content from the layout before, and what opens fades in.
+    pub(super) fn settle(&mut self) {
+        self.lay_out();
+        self.time += 1.0;
+        self.lay_out();
+    }
+
+    pub(super) fn apply(&mut self, command: Command) {
+        self.controls.apply(&command, Some(&self.scene));
+        self.scene = scene(&self.scene.geometry, self.controls.settings());
+        self.settle();
+    }
+
+    /// Lays the panels out, applies their commands, and returns these.
+    pub(super) fn lay_out(&mut self) -> Vec<Command> {
+        self.time += 0.1;
+        let scale = self.panels.scale();
+        let [shows_help, shows_times, shows_exports, asks_to_leave] = self.open;
+        let state = PanelState {
+            controls: &self.controls,
+            scene: Some(&self.scene),
+            times: &self.times,
+            picture: panels::picture_area(self.size, scale, self.shows_panels),
+            shows_panels: self.shows_panels,
+            has_column: panels::has_column(self.size, scale, self.shows_panels),
+            shows_help,
+            shows_times,
+            help_search: None,
+            saves_bar: true,
+            origin: Some("Demo data (phantom)"),
+            asks_to_leave,
+            files: self.files.as_ref().map(|(title, names)| (title.as_str(), names.as_slice())),
+            shows_exports,
+            exporting: Some("Surface"),
+            is_frozen: self.is_frozen,
+            cine: self.cine.clone(),
+            has_drawn: self.has_drawn,
+            quality: "full",
+            budget: self.budget,
+            banner: self.banner.clone(),
+            notes: &self.notes,
+            exit_key: "",
+            pointer: self.pointer,
+        };
+        let output = self.panels.lay_out(&state, self.size, self.time);
+        self.corners = output.corners();
+        let PanelOutput { commands, tree, drawn, .. } = output;
+        self.drawn = drawn;
+        let TreeUpdate { nodes, focus, tree, .. } = tree.expect("a tree");
+        let root = tree.expect("a root").root;
+        self.tree = nodes.into_iter().collect();
+        self.focus = Some(focus).filter(|focus| *focus != root);
+        for command in &commands {
+            self.controls.apply(command, Some(&self.scene));
+        }
+        self.scene = scene(&self.scene.geometry, self.controls.settings());
+        commands
+    }
+
+    pub(super) fn ask(&mut self, target_node: NodeId, action: Action, data: Option<ActionData>) -> Vec<Command> {
+        self.panels.act(ActionRequest { action, target_tree: TreeId::ROOT, target_node, data });
+        let commands = self.lay_out();
+        self.lay_out();
+        commands
+    }
+}
