@@ -7,14 +7,14 @@ use echolume::source::phantom::{Body, HeartTruth, Phantom, PhantomOptions, Speck
 use echolume::source::{Frame, StoredType};
 use glam::DVec3;
 
-/// A slow sweep of 32 lines of 160 samples a frame: about 200 frames a second.
+/// A slow sweep of 64 lines of 128 samples a frame: 100 frames a second.
 fn sweep(frames: usize, speckle: Speckle) -> (Phantom, HeartTruth) {
     let options = PhantomOptions {
         body: Body::Heart,
         speckle,
         frames,
-        lines: 32,
-        samples: 160,
+        lines: 64,
+        samples: 128,
         fan_angle_deg: 30.0,
         ..PhantomOptions::default()
     };
@@ -77,7 +77,7 @@ fn volumes_of_one_cycle_have_the_radius_of_their_phase() {
 
 #[test]
 fn the_rate_is_found_through_speckle_and_a_body_at_rest_has_none() {
-    let (phantom, truth) = sweep(500, Speckle::Random);
+    let (phantom, truth) = sweep(1000, Speckle::Random);
     let frames = phantom.volume(0);
     let (rate, motion) = seen(&phantom, &frames);
     let rhythm = Rhythm::find(&motion, rate, [90.0, 220.0]).expect("a rhythm");
@@ -97,7 +97,7 @@ fn r_waves_put_phase_zero_where_they_are() {
     let (rate, _) = seen(&phantom, &frames);
     let times: Vec<f64> = frames.iter().map(|frame| frame.time.expect("a time")).collect();
     // Largest at whole periods: the waves come a quarter of a cycle later.
-    let waves: Vec<f64> = (0..12).map(|n| (f64::from(n) + 0.25) * truth.period).collect();
+    let waves: Vec<f64> = (0..26).map(|n| (f64::from(n) + 0.25) * truth.period).collect();
     let rhythm = Rhythm::of_triggers(&times, &waves).expect("a rhythm");
     let options = CycleOptions { phases: Some(8), slices: Some(12) };
     let cycle = Cycle::new(&phantom.probe(0), StoredType::U8, frames, rhythm, rate, options).expect("a cycle");
