@@ -471,11 +471,24 @@ impl Context {
     /// # Errors
     /// A device that fails or is given up.
     pub(super) fn show_layer_an_idle_queue(&self) -> Result<(), GpuError> {
-        let is_needed = self.messenger.is_some() && !self.layer_knows_timelines && self.queues.len() == 1;
+        let is_needed = self.layer_misses_waits() && self.queues.len() == 1;
         if !is_needed || !self.unseen_waits.fetch_add(1, Ordering::Relaxed).is_multiple_of(UNSEEN_WAITS) {
             return Ok(());
         }
         self.wait_queue(0)
+    }
+
+    /// As [`Context::show_layer_an_idle_queue`], at once and on any number of queues: to be called where another timeline goes on with what the first
+    /// queue wrote, which an older layer would report as a hazard.
+    ///
+    /// # Errors
+    /// A device that fails or is given up.
+    pub(super) fn show_layer_the_wait(&self) -> Result<(), GpuError> {
+        if self.layer_misses_waits() { self.wait_queue(0) } else { Ok(()) }
+    }
+
+    fn layer_misses_waits(&self) -> bool {
+        self.messenger.is_some() && !self.layer_knows_timelines
     }
 
     /// Waits until a queue has done what was submitted to it so far.

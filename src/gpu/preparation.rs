@@ -24,6 +24,19 @@ pub struct Preparation {
     thread: Option<JoinHandle<Result<Prepared, GpuError>>>,
 }
 
+/// Tells at the end of a thread that it ended, also if it panicked.
+struct End {
+    progress: Arc<Progress>,
+    wake: Wake,
+}
+
+impl Drop for End {
+    fn drop(&mut self) {
+        self.progress.is_finished.store(true, Ordering::Release);
+        (self.wake)();
+    }
+}
+
 #[derive(Default)]
 struct Progress {
     done: AtomicUsize,
@@ -52,6 +65,7 @@ impl Preparation {
         let progress = Arc::new(Progress::default());
         let own = progress.clone();
         let work = move || {
+            let _end = End { progress: own.clone(), wake: wake.clone() };
             let compile = || {
                 let scene = adapted(&context, texel_access, frames_at_once, scene);
                 let plan = Plan::new(&scene);
@@ -69,10 +83,7 @@ impl Preparation {
                 context.counts.async_pipelines.fetch_add(count, Ordering::Relaxed);
                 Ok(Prepared { _pipelines: pipelines, _made: made })
             };
-            let made = compile();
-            own.is_finished.store(true, Ordering::Release);
-            wake();
-            made
+            compile()
         };
         let thread = std::thread::Builder::new().name("preparing".into()).spawn(work);
         let thread =
@@ -90,6 +101,11 @@ impl Preparation {
             || self.thread.as_ref().is_none_or(|thread| thread.is_finished())
     }
 
+    /// No further pipeline is begun. Does not wait for those in the making.
+    pub fn cancel(&self) {
+        self.progress.is_cancelled.store(true, Ordering::Relaxed);
+    }
+
     /// Waits for the end. None if the thread panicked: whoever needs the pipelines compiles them, and reports why not.
     ///
     /// # Errors
@@ -100,8 +116,9 @@ impl Preparation {
 }
 
 impl Drop for Preparation {
+    /// Waits for the pipelines in the making: a program that ends while its driver compiles on another thread may crash in that driver.
     fn drop(&mut self) {
-        self.progress.is_cancelled.store(true, Ordering::Relaxed);
+        self.cancel();
         if let Some(thread) = self.thread.take() {
             let _ = thread.join();
         }

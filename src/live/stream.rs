@@ -2,13 +2,14 @@
 
 use super::cine::{Cine, CineLimits};
 use super::feed::{Arrived, Feed, FeedCounts};
+use super::first_pipelines::FirstPipelines;
 use super::first_volume::FirstVolume;
 use super::phase::{Pending, Phase};
 use super::session::{Begun, FinishedPicture, Session, Views};
 use super::statistics::Statistics;
 use super::volume_pool::{Update, VolumeCounts, VolumePool};
 use crate::gpu::shader_reload::ShaderFolder;
-use crate::gpu::{self, Bands, Context, GpuError, Preparation, Prepared, Renderer, SceneMaker, TimeStamps, Wake};
+use crate::gpu::{self, Bands, Context, GpuError, Preparation, Renderer, SceneMaker, TimeStamps, Wake};
 use crate::probe::Probe;
 use crate::scene::default_look::Defaults;
 use crate::scene::load::Layers;
@@ -143,13 +144,13 @@ pub struct Stream {
     next_header: Option<Header>,
     /// Added to the volume numbers of the current source, so that volumes of several sources differ in the cine loop.
     volume_base: u32,
+    /// The number of frames when the current geometry began.
+    frames_before: u64,
     /// The highest volume number so far.
     newest: Option<u32>,
     /// Its counts go on in the next session.
     previous_pool: Option<VolumePool>,
-    /// What the first geometry needs is being compiled, and is compiled.
-    preparation: Option<Preparation>,
-    prepared: Option<Prepared>,
+    first_pipelines: FirstPipelines,
     /// The next picture is drawn with few rays.
     is_coarse: bool,
     /// The source has ended, and why.
@@ -173,8 +174,7 @@ impl Stream {
             full: None,
             first_volume: options.chosen.clone().map(FirstVolume::new),
             found: None,
-            preparation: None,
-            prepared: None,
+            first_pipelines: FirstPipelines::default(),
             is_coarse: options.coarse_first,
             options,
             session: None,
@@ -183,6 +183,7 @@ impl Stream {
             header: None,
             next_header: None,
             volume_base: 0,
+            frames_before: 0,
             newest: None,
             previous_pool: None,
             end: None,
@@ -199,6 +200,7 @@ impl Stream {
     /// # Errors
     /// A device that fails, and settings that a new geometry cannot be drawn with.
     pub fn step(&mut self, patience: Duration) -> Result<Step, StreamError> {
+        self.first_pipelines.forget_ended();
         let result = self.advance(patience);
         // A renderer that cannot draw any more is made anew with the next geometry.
         if result.is_err()
@@ -305,10 +307,10 @@ impl Stream {
         // A new geometry would discard the volume that is frozen.
         let shows_frozen = self.is_frozen && self.session.is_some();
         if self.next_header.is_some() && !shows_frozen {
-            let is_prepared = self.has_prepared().inspect_err(|_| self.next_header = None)?;
+            let is_prepared = self.has_prepared().inspect_err(|error| self.cannot_prepare(error))?;
             if let Some(header) = self.next_header.take_if(|_| is_prepared) {
                 let begun = self.begin_geometry(header);
-                self.prepared = None;
+                self.first_pipelines.release();
                 begun?;
             }
             return Ok(Step::Progress);
@@ -326,25 +328,45 @@ impl Stream {
 
     /// True if the next geometry can begin: what it needs is compiled, or will be when it begins. Otherwise that is being compiled.
     fn has_prepared(&mut self) -> Result<bool, StreamError> {
-        if let Some(done) = self.preparation.take_if(|preparation| preparation.is_finished()) {
-            self.prepared = done.finish()?;
-            return Ok(true);
-        }
-        let (Some(header), Some(wake), None) = (&self.next_header, &self.options.wake, &self.session) else {
+        let prepares = self.options.prepares && self.session.is_none();
+        let mut pipelines = std::mem::take(&mut self.first_pipelines);
+        let (Some(header), Some(wake), true) = (&self.next_header, &self.options.wake, prepares) else {
+            pipelines.release();
+            self.first_pipelines = pipelines;
             return Ok(true);
         };
-        if self.preparation.is_none() && self.options.prepares {
-            let found = self.first_volume.as_ref().and_then(|search| search.at_begin(header));
-            let found = found.and_then(|found| found.settings().ok());
-            let found = found.map(|found| Settings { picture: self.settings.picture.clone(), ..found });
-            let settings = self.drawn(found.as_ref().unwrap_or(&self.settings));
-            let full = if found.is_some() { None } else { self.full.as_ref() };
-            let full = full.or(found.as_ref()).unwrap_or(&self.settings);
-            let views = views(header, &settings, Some(full), &self.options)?;
+        let settings = self.first_settings(header);
+        let begin = |settings: &[Settings; 2]| {
+            let views = views(header, &settings[0], Some(&settings[1]), &self.options)?;
             let options = self.renderer_options(self.options.images);
-            self.preparation = Preparation::begin(&self.context, views.first().clone(), &options, wake.clone())?;
+            Ok(Preparation::begin(&self.context, views.first().clone(), &options, wake.clone())?)
+        };
+        let is_prepared = pipelines.advance(settings, begin);
+        self.first_pipelines = pipelines;
+        is_prepared
+    }
+
+    /// The settings that a geometry would begin with now, as drawn and at full quality.
+    fn first_settings(&self, header: &Header) -> [Settings; 2] {
+        let found = self.first_volume.as_ref().and_then(|search| search.at_begin(header));
+        let found = found.and_then(|found| found.settings().ok());
+        let found = found.map(|found| Settings { picture: self.settings.picture.clone(), ..found });
+        let settings = self.drawn(found.as_ref().unwrap_or(&self.settings));
+        let full = if found.is_some() { None } else { self.full.as_ref() };
+        [settings, full.or(found.as_ref()).unwrap_or(&self.settings).clone()]
+    }
+
+    /// The next geometry cannot begin. After the loss of the device it is prepared again, otherwise it may begin on another device.
+    fn cannot_prepare(&mut self, error: &StreamError) {
+        if matches!(error, StreamError::Gpu(error) if error.is_device_lost()) {
+            return;
         }
-        Ok(self.preparation.is_none())
+        let next = self.next_header.take();
+        if next.is_some() && next != self.header {
+            // Its volumes are of the geometry before.
+            self.cine = Cine::new(CineLimits::default(), 0);
+            self.header = next;
+        }
     }
 
     /// Settings as the next picture is drawn with them.
@@ -371,12 +393,12 @@ impl Stream {
     /// What is being done before there is a picture; none once there is one, or it is being drawn.
     pub fn start_step(&self) -> Option<StartStep> {
         let Some(session) = &self.session else {
-            let progress = self.preparation.as_ref().map(Preparation::progress);
+            let progress = self.first_pipelines.progress();
             return Some(progress.map_or(StartStep::Source, |[done, count]| StartStep::Compiling { done, count }));
         };
         let frames = || {
             let count = u64::from(session.renderer.scene().slices());
-            StartStep::Frames { done: self.statistics.frames.min(count), count }
+            StartStep::Frames { done: (self.statistics.frames - self.frames_before).min(count), count }
         };
         (!session.renderer.has_drawn()).then(|| if session.pool.has_new() { StartStep::Picture } else { frames() })
     }
@@ -501,6 +523,7 @@ impl Stream {
         let shown = session.as_ref().and_then(|session| session.replayed_volume().or(session.current_volume()));
         let to_restore = shown.or_else(|| self.cine.volumes().back().map(|kept| kept.volume)).filter(|_| is_same);
         self.header = Some(header.clone());
+        self.frames_before = self.statistics.frames;
         let found = self.first_volume.as_mut().and_then(|search| search.begin(&header));
         if let Some(settings) = found.as_ref().and_then(|found| found.settings().ok()) {
             self.settings = Settings { picture: self.settings.picture.clone(), ..settings };
@@ -538,9 +561,11 @@ impl Stream {
     pub fn revive(&mut self, context: &Arc<Context>) -> Result<(), StreamError> {
         self.context = context.clone();
         self.losses += 1;
+        // Its pipelines are of the device before. The next step compiles them for this one.
+        let was_preparing = self.first_pipelines.cancel();
         match self.header.clone() {
-            Some(header) => self.begin_geometry(header),
-            None => Ok(()),
+            Some(header) if !was_preparing => self.begin_geometry(header),
+            _ => Ok(()),
         }
     }
 
@@ -615,6 +640,9 @@ impl Stream {
     pub fn replace_source(&mut self, feed: Feed) {
         self.earlier_feeds = self.feed_counts();
         (self.feed, self.end) = (feed, None);
+        // A geometry of the source before that did not begin yet is not shown any more.
+        self.next_header = None;
+        self.first_pipelines.cancel();
         self.cine.discard_partial();
         // Two volumes with one number could not be distinguished in the cine loop.
         if let Some(newest) = self.newest.take() {
@@ -689,8 +717,8 @@ impl Stream {
 
     /// True if a step has nothing to do until the source reports an event or a pipeline is compiled.
     pub fn is_idle(&self) -> bool {
-        if let Some(preparation) = &self.preparation {
-            return !preparation.is_finished();
+        if let Some(is_working) = self.first_pipelines.is_working() {
+            return is_working;
         }
         let is_busy = self.session.as_ref().is_some_and(Session::is_busy);
         !is_busy && !self.is_replaying() && self.feed.waiting() == 0

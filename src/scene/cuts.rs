@@ -97,6 +97,11 @@ impl Scene {
         !self.settings.cuts.is_empty() && (self.composites() || self.detects_surface() || self.projects())
     }
 
+    /// Corners of all contours.
+    pub fn cut_corners(&self) -> usize {
+        self.settings.cuts.iter().map(|cut| cut.contour.len()).sum()
+    }
+
     /// The cuts in space.
     pub fn cuts(&self) -> impl Iterator<Item = CutShape> {
         self.settings.cuts.iter().map(|cut| CutShape::new(cut, self.place_of(cut.view.at)))

@@ -165,7 +165,9 @@ impl Gestures {
                     (viewport.pane_at(at), viewport.is_covered || self.fingers.len() >= MAX_FINGERS)
                 {
                     self.fingers.push(Finger { id, at, pane });
+                    let press = self.finger_press.take();
                     self.restart_press(viewport, tool);
+                    return given_up(press);
                 }
                 Vec::new()
             }
@@ -176,7 +178,10 @@ impl Gestures {
                 let press = self.finger_press.take();
                 let is_tap = self.fingers.is_empty() && phase == Phase::Up && !self.had_several;
                 self.restart_press(viewport, tool);
-                press.filter(|_| is_tap).map_or(Vec::new(), |press| self.release(&press, viewport, tool, FINGER_SLOP))
+                match press {
+                    Some(press) if is_tap => self.release(&press, viewport, tool, FINGER_SLOP),
+                    press => given_up(press),
+                }
             }
             (_, None) => Vec::new(),
         }
@@ -191,6 +196,8 @@ impl Gestures {
         self.had_several = self.fingers.len() > 1 || (self.had_several && !self.fingers.is_empty());
         if self.had_several {
             self.last_click = None;
+            // The finger that is left of two moved the view: it draws no contour.
+            self.finger_press.take_if(|press| matches!(press.drag, Drag::Cut));
         }
     }
 
@@ -476,6 +483,11 @@ impl Press {
 /// The point of the settings that a tile shows at a position in the window, mm.
 fn point_on(viewport: &Viewport, tile: usize, at: [f64; 2]) -> Option<[f64; 3]> {
     Some(view::below_face(viewport.scene?, viewport.point_on_plane(tile, at)?).to_array())
+}
+
+/// What a press leaves behind that ends without a release: the contour that it drew.
+fn given_up(press: Option<Press>) -> Vec<Command> {
+    press.filter(|press| matches!(press.drag, Drag::Cut)).map_or(Vec::new(), |_| vec![Command::CancelCut])
 }
 
 /// The commands for two fingers that moved from `old` to `new` positions in the window: what is under them stays under them. `pane` is

@@ -170,6 +170,10 @@ impl WindowLoop<'_> {
     }
 
     fn update(&mut self, events: &ActiveEventLoop) {
+        // A hidden window may never take a picture.
+        if events.exiting() {
+            return;
+        }
         let now = Instant::now();
         self.wake_pending.store(false, Ordering::Relaxed);
         let restored = match self.recovery.poll(now) {
@@ -201,7 +205,7 @@ impl WindowLoop<'_> {
             reader.tell(console);
         }
         if next.exit || self.ends.is_some_and(|end| now >= end) {
-            events.exit();
+            leave(self.window.as_deref(), events);
             return;
         }
         if let (true, Some(window), Some(context)) = (next.restart, &self.window, &self.context) {
@@ -254,7 +258,7 @@ impl ApplicationHandler<()> for WindowLoop<'_> {
             }
             WindowEvent::Destroyed => events.exit(),
             WindowEvent::CloseRequested if self.options.stays_open || console.asks_before_closing() => {}
-            WindowEvent::CloseRequested => events.exit(),
+            WindowEvent::CloseRequested => leave(self.window.as_deref(), events),
             WindowEvent::Resized(size) => {
                 self.size = (*size).into();
                 console.resize(self.size);
@@ -275,6 +279,12 @@ impl ApplicationHandler<()> for WindowLoop<'_> {
     fn about_to_wait(&mut self, events: &ActiveEventLoop) {
         self.update(events);
     }
+}
+
+/// Hides the window at once: to end what the console does may take longer, as pipelines in the making are waited for.
+fn leave(window: Option<&Window>, events: &ActiveEventLoop) {
+    window.iter().for_each(|window| window.set_visible(false));
+    events.exit();
 }
 
 /// Converts an event of the window to an input; none if it is not one.

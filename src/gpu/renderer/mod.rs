@@ -15,9 +15,9 @@ use super::recorder::{BarrierRecorder, BufferLayout, Dispatch, Recorder, SlotPar
 use super::resources::SlotResources;
 use super::timeline::Timelines;
 use super::timing::{TimeStamps, Timings};
-use crate::passes::chain;
 use crate::passes::slots::{BATCH_BYTES, BATCHES_IN_FLIGHT, Format, Initializer, frames_per_batch};
 use crate::passes::{DispatchArgs, Frequency, PassTime, Slot, Span, Stage, Texels};
+use crate::passes::{chain, cut};
 use crate::picture::Picture;
 use crate::plan::{Contents, Plan, Rerun, Work, affected};
 use crate::queues::oracle::SubmissionLog;
@@ -278,7 +278,9 @@ impl Renderer {
         for (slot, _) in new {
             self.fill(slot)?;
         }
-        self.timelines.wait_all()
+        self.timelines.wait_all()?;
+        // The next frame may write what was cleared here.
+        self.context.show_layer_the_wait()
     }
 
     /// Uploads a slot that the CPU computes from the scene. Nothing that reads it may be in flight.
@@ -420,9 +422,13 @@ impl Renderer {
         if sends_frames || scene.reach_across_slices() != self.scene.reach_across_slices() {
             self.filtered_bounds = scene.visible_bounds;
         }
-        // Rays of smaller steps take longer than the last ones did.
-        for (_, pipeline) in plan.steps.iter().zip(&steps).filter(|(s, _)| s.pass.stage == Stage::Raycast) {
-            pipeline.time.lengthen(self.scene.step / scene.step);
+        // Rays of smaller steps take longer than the last ones did, and so do cuts of more corners.
+        for (step, pipeline) in plan.steps.iter().zip(&steps) {
+            if step.pass.stage == Stage::Raycast {
+                pipeline.time.lengthen(self.scene.step / scene.step);
+            } else if step.pass.name == cut::PASS.name {
+                pipeline.time.lengthen(scene.cut_corners() as f64 / self.scene.cut_corners().max(1) as f64);
+            }
         }
         (self.plan, self.steps, self.scene) = (plan, steps, scene);
         self.broken = None;

@@ -3,6 +3,7 @@
 use super::*;
 use crate::scene::cuts::CutShape;
 use crate::scene::{Cut, KeptSide, MAX_CUT_POINTS};
+use crate::ui::input::Phase;
 
 /// Drags round a circle of the picture.
 fn circle(window: &mut TestWindow, centre: [f64; 2], radius: f64, steps: u32) {
@@ -168,4 +169,32 @@ fn a_mode_that_cannot_have_cuts_says_why() {
     assert_eq!((window.controls.settings().mode, cuts(&window)), (Mode::Surface, made));
     apply(&mut window, Command::ClearCuts);
     assert_eq!(apply(&mut window, Command::Mode(Mode::Mixed)), Change::Settings);
+}
+
+/// A second finger, or a palm that the screen rejects, ends a contour without a cut; the finger that is left draws none.
+#[test]
+fn a_contour_of_a_finger_is_given_up_when_another_comes_or_the_touch_is_cancelled() {
+    let mut window = TestWindow::new("mode='volume'");
+    window.tool(Tool::Cut);
+    let scene = window.scene();
+    let [x, y] = super::super::picking::Picker::of(&scene).centre();
+    let touch = |window: &mut TestWindow, id: u64, phase: Phase, right: f64| {
+        let at = window.at([x + right, y]);
+        window.input(Input::Touch { finger: id, phase, at });
+    };
+    let begin = |window: &mut TestWindow| {
+        touch(window, 1, Phase::Down, 0.0);
+        (1..8).for_each(|n| touch(window, 1, Phase::Moved, 12.0 * f64::from(n)));
+        assert!(!window.controls.outline().is_empty(), "it is shown while it is drawn");
+    };
+    begin(&mut window);
+    touch(&mut window, 1, Phase::Cancelled, 84.0);
+    assert!(window.controls.outline().is_empty() && cuts(&window).is_empty());
+    begin(&mut window);
+    touch(&mut window, 2, Phase::Down, 30.0);
+    assert!(window.controls.outline().is_empty());
+    touch(&mut window, 2, Phase::Up, 30.0);
+    (1..8).for_each(|n| touch(&mut window, 1, Phase::Moved, -12.0 * f64::from(n)));
+    touch(&mut window, 1, Phase::Up, -84.0);
+    assert!(window.controls.outline().is_empty() && cuts(&window).is_empty());
 }

@@ -177,3 +177,133 @@ fn the_first_pipelines_compile_beside_the_steps_and_the_first_picture_has_few_ra
     // Later ones are drawn in full at once.
     assert!(bench.live(1) == of(&plain, now, 1));
 }
+
+/// A stream whose first pipelines are being compiled.
+fn preparing(device: &Device, toml: &str, options: live::StreamOptions) -> Bench {
+    let mut bench = Bench::new(device, toml, live::StreamOptions { prepares: true, ..options });
+    bench.begin(header(0.3));
+    bench.frames(speckled(0));
+    step_until(&mut bench, |stream| matches!(stream.start_step(), Some(StartStep::Compiling { .. })));
+    bench
+}
+
+fn step_until(bench: &mut Bench, is_there: impl Fn(&Stream) -> bool) {
+    let begun = Instant::now();
+    while !is_there(&bench.stream) {
+        assert!(begun.elapsed() < BOUND, "{:?}", bench.stream.start_step());
+        bench.stream.step(Duration::ZERO).expect("step");
+    }
+}
+
+/// Prevents a picture that never comes because the device was lost while the first pipelines were compiled, and one that stops the window.
+#[test]
+fn a_device_lost_while_the_first_pipelines_compile_is_prepared_anew() {
+    let (device, other, plain) = (Device::alone(), Device::alone(), Device::alone());
+    let toml = "mode = 'mip'";
+    let mut bench = preparing(&device, toml, waking().1);
+    bench.stream.revive(&other).expect("made anew");
+    assert!(bench.picture() == (0, of(&plain, toml, 0)));
+    assert_eq!(waited_for(&other), 0, "pipelines were made while everything waited");
+}
+
+/// Prevents a source that has to be opened again after settings that only the device refuses: the geometry begins with the next device.
+#[test]
+fn a_geometry_that_cannot_be_prepared_begins_on_the_next_device() {
+    let (device, other, plain) = (Device::alone(), Device::alone(), Device::alone());
+    let small = "mode = 'mip'";
+    let mut bench = Bench::new(&device, small, live::StreamOptions { prepares: true, ..waking().1 });
+    let mut large = settings("mode = 'sr'");
+    large.slices.pixels = 4096;
+    large.slices.format = VolumeFormat::R32f;
+    bench.stream.change(large).expect("told by the device alone");
+    // Fine slices of many frames are more than any image of the device.
+    let geometry = Geometry::Sweep(Probe { slices: Axis::centred(0.006, 90), ..wobbler() });
+    let many = Header { forward: geometry.clone(), backward: geometry, ..header(0.0) };
+    bench.begin(many.clone());
+    let begun = Instant::now();
+    let fault = loop {
+        assert!(begun.elapsed() < BOUND, "{:?}", bench.stream.start_step());
+        if let Err(fault) = bench.stream.step(Duration::ZERO) {
+            break fault.to_string();
+        }
+    };
+    assert!(fault.contains("4096"), "{fault}");
+    assert_eq!(bench.stream.header(), Some(&many));
+    bench.stream.change(settings(small)).expect("change");
+    bench.stream.revive(&other).expect("made anew");
+    let frame = |n: u32| {
+        let bytes = (0..24 * 64).map(|i| (i * 7 + n * 13) as u8).collect();
+        Frame { volume: 0, number: n, slice: n as usize, backward: false, time: None, pose: None, bytes }
+    };
+    let frames: Vec<_> = (0..90).map(frame).collect();
+    bench.frames(frames.clone());
+    assert!(bench.picture() == (0, fresh(&plain, small, &many, Update::Whole, &frames)));
+}
+
+/// Prevents a source that waits for the pipelines of the one before it, or is closed by what they fail with.
+#[test]
+fn a_source_opened_while_the_first_pipelines_compile_replaces_the_one_before() {
+    let (device, plain) = (Device::alone(), Device::alone());
+    let toml = "mode = 'mip'";
+    let mut bench = preparing(&device, toml, waking().1);
+    let (say, feed) = fed(None);
+    bench.stream.replace_source(feed);
+    bench.say = say;
+    assert_eq!(bench.stream.start_step(), Some(StartStep::Source));
+    assert!(bench.settle().is_empty() && bench.stream.header().is_none(), "the source before began");
+    let next = header(0.2);
+    bench.begin(next.clone());
+    bench.frames(speckled(1));
+    step_until(&mut bench, |stream| stream.header().is_some());
+    assert_eq!(bench.stream.header(), Some(&next));
+    assert!(bench.picture() == (1, fresh(&plain, toml, &next, Update::Whole, &speckled(1))));
+    assert!(bench.faults.is_empty(), "{:?}", bench.faults);
+}
+
+/// Prevents a window that stands still because a setting was changed before the first picture.
+#[test]
+fn settings_changed_while_the_first_pipelines_compile_are_prepared_too() {
+    let (device, plain) = (Device::alone(), Device::alone());
+    let mut bench = preparing(&device, "mode = 'mip'", waking().1);
+    let next = "mode = 'sr'\nslices.median = true";
+    bench.stream.change(settings(next)).expect("change");
+    assert!(bench.picture() == (0, of(&plain, next, 0)));
+    assert_eq!(waited_for(&device), 0, "pipelines were made while everything waited");
+}
+
+/// Prevents a window that sleeps on because the thread that compiles for it panicked.
+#[test]
+fn a_thread_that_panics_over_the_first_pipelines_wakes_the_stream() {
+    let (device, plain) = (Device::alone(), Device::alone());
+    let woken = Arc::new(AtomicU64::new(0));
+    let counted = woken.clone();
+    let wake: Wake = Arc::new(move || {
+        let is_first =
+            std::thread::current().name() == Some("preparing") && counted.fetch_add(1, Ordering::Relaxed) == 0;
+        assert!(!is_first, "a panic of this test");
+    });
+    let toml = "mode = 'mip'";
+    let mut bench = preparing(&device, toml, live::StreamOptions { wake: Some(wake), ..kept(Update::Whole) });
+    let begun = Instant::now();
+    while woken.load(Ordering::Relaxed) < 2 {
+        assert!(begun.elapsed() < BOUND, "nobody was woken");
+        std::thread::sleep(Duration::from_millis(1));
+    }
+    assert!(!bench.stream.is_idle());
+    assert!(bench.picture() == (0, of(&plain, toml, 0)));
+}
+
+/// Prevents a count of the first frames that is full before any came, as that of the whole stream is.
+#[test]
+fn the_frames_before_the_first_picture_are_those_of_the_geometry() {
+    let device = Device::alone();
+    let mut bench = Bench::new(&device, "mode = 'mip'", kept(Update::Whole));
+    bench.begin(header(0.3));
+    bench.live(0);
+    bench.begin(header(0.2));
+    bench.frames(speckled(1).drain(..4));
+    step_until(&mut bench, |stream| stream.header() == Some(&header(0.2)));
+    assert_eq!(bench.stream.start_step(), Some(StartStep::Frames { done: 0, count: 9 }));
+    bench.settle();
+    assert_eq!(bench.stream.start_step(), Some(StartStep::Frames { done: 4, count: 9 }));
+}

@@ -1,0 +1,87 @@
+//! The pipelines that a stream's first geometry needs: compiled on a thread while the window goes on, and again for what the user changes meanwhile.
+
+use crate::gpu::{GpuError, Preparation, Prepared};
+use crate::scene::Settings;
+
+/// How often settings that change while pipelines are compiled are followed before the geometry begins.
+const MOST_CHANGES: u32 = 2;
+
+/// Pipelines in the making, made, and given up.
+#[derive(Default)]
+pub(super) struct FirstPipelines {
+    making: Option<Making>,
+    /// Held so that they are not forgotten before the geometry begins.
+    made: Option<Prepared>,
+    /// Cancelled ones that have not ended yet. What they return does not matter.
+    cancelled: Vec<Preparation>,
+}
+
+struct Making {
+    preparation: Preparation,
+    /// The settings that it was begun for, as drawn and at full quality.
+    settings: [Settings; 2],
+    /// How many were begun before, for settings that have changed since.
+    changes: u32,
+}
+
+impl FirstPipelines {
+    /// Forgets cancelled ones that have ended.
+    pub fn forget_ended(&mut self) {
+        self.cancelled.retain(|preparation| !preparation.is_finished());
+    }
+
+    /// What is in the making, if it has not ended: its progress, pipelines compiled and pipelines in all.
+    pub fn progress(&self) -> Option<[usize; 2]> {
+        self.making.as_ref().map(|making| making.preparation.progress())
+    }
+
+    /// True while a thread compiles; false when it has ended; none if nothing is in the making.
+    pub fn is_working(&self) -> Option<bool> {
+        self.making.as_ref().map(|making| !making.preparation.is_finished())
+    }
+
+    /// True if all is compiled for these settings, or will be when the geometry begins. Otherwise `begin` begins to.
+    ///
+    /// # Errors
+    /// What a renderer of the settings would fail with, a lost device, and what `begin` fails with.
+    pub fn advance<E: From<GpuError>>(
+        &mut self,
+        settings: [Settings; 2],
+        begin: impl FnOnce(&[Settings; 2]) -> Result<Option<Preparation>, E>,
+    ) -> Result<bool, E> {
+        if self.is_working() == Some(true) {
+            return Ok(false);
+        }
+        let mut changes = 0;
+        if let Some(done) = self.making.take() {
+            let is_current = done.settings == settings || done.changes == MOST_CHANGES;
+            match done.preparation.finish() {
+                // None after a panic: what is missing is compiled when the geometry begins, and what was compiled before is kept.
+                Ok(made) => self.made = made.or(self.made.take()),
+                Err(error) if is_current || error.is_device_lost() => return Err(error.into()),
+                Err(error) => tracing::debug!("settings that were changed meanwhile: {error}"),
+            }
+            if is_current {
+                return Ok(true);
+            }
+            changes = done.changes + 1;
+        }
+        self.making = begin(&settings)?.map(|preparation| Making { preparation, settings, changes });
+        Ok(self.making.is_none())
+    }
+
+    /// A geometry has begun, or nothing is prepared for the next one: a renderer holds what it needs.
+    pub fn release(&mut self) {
+        self.made = None;
+        self.making.take_if(|making| making.preparation.is_finished());
+    }
+
+    /// Forgets what is being compiled, without waiting for it. False if nothing was.
+    pub fn cancel(&mut self) -> bool {
+        self.made = None;
+        let Some(Making { preparation, .. }) = self.making.take() else { return false };
+        preparation.cancel();
+        self.cancelled.push(preparation);
+        true
+    }
+}
