@@ -3,6 +3,7 @@
 use super::recordings::OUTPUT;
 use crate::args::{GeometryArgs, check_outputs, open_recording};
 use crate::files::signals::Writing;
+use crate::files::{quoted, read_text};
 use crate::probe::Geometry;
 use crate::source::cardiac::{Cycle, CycleOptions, Motion, Rhythm};
 use crate::source::recorder::Writer;
@@ -17,14 +18,15 @@ const MOST_TRIGGERS: u64 = 1 << 20;
 
 #[derive(clap::Args)]
 #[command(after_help = "Examples:\n  echolume stic sweep.mha heart.frames\n  \
-                        echolume view --source heart.frames    (a loop of one cycle)\n  \
+                        echolume view --source heart.frames    (Enter plays the loop)\n  \
+                        echolume stic sweep.mha heart.frames --r-waves ecg.txt --phases 40\n  \
                         echolume phantom -o sweep.mha --body heart --frames 640 --lines 64 --fan 30    (a sweep to try it with)")]
 pub struct Stic {
     /// A recording of a slow sweep, of the formats that `convert` reads
     recording: PathBuf,
     /// The volumes of one cycle (.frames); a file that is there is not replaced
     output: PathBuf,
-    /// Volumes of the cycle, 2..=1024 [default: as many as a cycle has frames, at most 32]
+    /// Volumes of the cycle, 2..=1024 [default: as many as a cycle has frames, at most 20: the cine loop of `view`]
     #[arg(long, value_name = "N")]
     phases: Option<usize>,
     /// Slices of a volume, 2..=1024 [default: as many as there are whole cycles]
@@ -33,7 +35,7 @@ pub struct Stic {
     /// Least and largest heart rate that is looked for, cycles a minute
     #[arg(long, value_name = "LOW:HIGH", default_value = "90:220", value_parser = rates)]
     heart_rate: [f64; 2],
-    /// Frames a second [default: from the time stamps of the frames]
+    /// Frames a second, where time stamps are missing or wrong [default: from the time stamps of the frames]
     #[arg(long, value_name = "RATE")]
     frame_rate: Option<f64>,
     /// Text file with the times of an ECG's R waves, s, one a line, on the clock of the frames. Without it the frames tell the rhythm
@@ -64,30 +66,31 @@ impl Stic {
         let read = recording.files();
         let read = read.iter().chain(&self.geometry.probe).chain(&self.r_waves).map(PathBuf::as_path);
         check_outputs(&[(OUTPUT, Some(&self.output))], read)?;
-        let at_fault = |fault: String| input(format!("{}: {fault}", self.recording.display()));
-        let (frames, motion) = self.read(&mut *recording)?;
+        let fault_of = |file: &Path, fault: String| input(format!("{}: {fault}", file.display()));
+        let at_fault = |fault: String| fault_of(&self.recording, fault);
         let Geometry::Sweep(probe) = recording.geometry(self.volume) else {
             return Err(at_fault("is a Cartesian volume, whose slices are of one time".into()));
         };
-        let rate = self.rate(&frames).map_err(at_fault)?;
-        let rhythm = match &triggers {
-            Some(triggers) => {
-                let first = frames[0].time.unwrap_or(0.0);
-                let time = |(n, frame): (usize, &Frame)| match self.frame_rate {
-                    Some(rate) => first + n as f64 / rate,
-                    None => frame.time.unwrap_or(first + n as f64 / rate),
-                };
-                let times: Vec<f64> = frames.iter().enumerate().map(time).collect();
-                Rhythm::of_triggers(&times, triggers)
+        let (frames, motion) = self.read(&mut *recording)?;
+        let (rate, times) = self.times(&frames).map_err(at_fault)?;
+        let rhythm = match (&triggers, &self.r_waves) {
+            (Some(triggers), Some(file)) => {
+                Rhythm::of_triggers(&times, triggers).map_err(|fault| fault_of(file, fault))?
             }
-            None => Rhythm::find(&motion, rate, self.heart_rate),
+            _ => {
+                let longest = times.windows(2).map(|t| t[1] - t[0]).fold(0.0, f64::max);
+                // Where frames are missing the phase would jump.
+                if longest > 15.0 / self.heart_rate[1] {
+                    return Err(at_fault(format!("its time stamps have a gap of {longest:.3} s: frames are missing")));
+                }
+                Rhythm::find(&motion, rate, self.heart_rate).map_err(at_fault)?
+            }
         };
-        let rhythm = rhythm.map_err(at_fault)?;
-        let (count, cycles, correlation) = (frames.len(), rhythm.cycles(), rhythm.correlation);
+        let (count, cycles, height) = (frames.len(), rhythm.cycles(), rhythm.height);
         let options = CycleOptions { phases: self.phases, slices: self.slices };
         let cycle = Cycle::new(&probe, recording.stored_type(), frames, rhythm, rate, options).map_err(at_fault)?;
         self.write(&cycle, recording.range())?;
-        let from = correlation.map_or("by the ECG".into(), |c| format!("correlation {c:.2}"));
+        let from = height.map_or("from the R waves".into(), |h| format!("{h:.0} dB above its surroundings"));
         say!("heart rate: {:.1} a minute, {cycles:.1} cycles in {count} frames; {from}", 60.0 / cycle.seconds);
         let (phases, slices) = (cycle.phases, cycle.probe.slices.len());
         say!("cycle: {}, {phases} volumes of {slices} slices in {:.3} s", self.output.display(), cycle.seconds);
@@ -116,23 +119,32 @@ impl Stic {
             frames.push(frame);
         }
         if frames.len() < 2 {
-            return Err(input(format!("{file}: a sweep of {} frames", frames.len())));
+            return Err(input(format!("{file}: a sweep of one frame; STIC needs the frames of several cycles")));
         }
         Ok((frames, motion))
     }
 
-    /// Frames a second.
-    fn rate(&self, frames: &[Frame]) -> Result<f64, String> {
+    /// Frames a second, and when each was acquired.
+    fn times(&self, frames: &[Frame]) -> Result<(f64, Vec<f64>), String> {
         if let Some(rate) = self.frame_rate {
-            let is_one = rate.is_finite() && rate > 0.0;
-            return if is_one { Ok(rate) } else { Err(format!("--frame-rate {rate}: must be above 0")) };
+            if !(rate.is_finite() && rate > 0.0) {
+                return Err(format!("--frame-rate {rate}: must be above 0"));
+            }
+            let first = frames[0].time.filter(|time| time.is_finite()).unwrap_or(0.0);
+            return Ok((rate, (0..frames.len()).map(|n| first + n as f64 / rate).collect()));
         }
-        let span = match (frames[0].time, frames[frames.len() - 1].time) {
-            (Some(first), Some(last)) => last - first,
-            _ => return Err("its frames have no time stamps; give --frame-rate".into()),
-        };
+        let times: Option<Vec<f64>> = frames.iter().map(|frame| frame.time).collect();
+        let Some(times) = times else { return Err("its frames have no time stamps; give --frame-rate".into()) };
+        if let Some(n) = (1..times.len()).find(|n| !(times[*n] > times[n - 1] && times[*n].is_finite())) {
+            return Err(format!(
+                "its time stamps do not rise: {} s after {} s; give --frame-rate",
+                times[n],
+                times[n - 1]
+            ));
+        }
+        let span = times[times.len() - 1] - times[0];
         match span.is_finite() && span > 0.0 {
-            true => Ok((frames.len() - 1) as f64 / span),
+            true => Ok(((times.len() - 1) as f64 / span, times)),
             false => Err(format!("its time stamps span {span} s; give --frame-rate")),
         }
     }
@@ -159,21 +171,24 @@ impl Stic {
             return Err(failure);
         }
         bar.finish_and_clear();
-        writer.finish().map_err(failed)
+        writer.finish().map_err(|fault| {
+            // Without its index: completely, or not at all.
+            let _ = std::fs::remove_file(&self.output);
+            failed(fault)
+        })
     }
 }
 
 /// Times, s, one a line; empty lines and what follows a # are skipped.
 fn read_times(file: &Path) -> Result<Vec<f64>, Failure> {
     let at_fault = |fault: String| input(format!("{}: {fault}", file.display()));
-    let length = std::fs::metadata(file).map_err(|e| at_fault(e.to_string()))?.len();
-    if length > MOST_TRIGGERS {
-        return Err(at_fault(format!("has {length} bytes; a list of R waves has at most {MOST_TRIGGERS}")));
-    }
-    let text = std::fs::read_to_string(file).map_err(|e| at_fault(e.to_string()))?;
+    let text = read_text(file, MOST_TRIGGERS, "list of R waves").map_err(at_fault)?;
     let lines = text.lines().enumerate().map(|(n, line)| (n + 1, line.split('#').next().unwrap_or("").trim()));
     lines
         .filter(|(_, line)| !line.is_empty())
-        .map(|(n, line)| line.parse().map_err(|_| at_fault(format!("line {n}: '{line}' is no time in seconds"))))
+        .map(|(n, line)| match line.parse::<f64>() {
+            Ok(time) if time.is_finite() => Ok(time),
+            _ => Err(at_fault(format!("line {n}: {} is no time in seconds", quoted(line)))),
+        })
         .collect()
 }

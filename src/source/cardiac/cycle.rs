@@ -9,11 +9,13 @@ use rayon::prelude::*;
 
 /// Most volumes of a cycle, and slices of a volume.
 const MOST: usize = 1024;
+/// Most volumes of a cycle where nothing else is asked for.
+const USUAL: usize = 20;
 
 /// What is made of a sweep.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct CycleOptions {
-    /// Volumes of one cycle, 2..=1024. None: as many as a cycle has frames, at most 32.
+    /// Volumes of one cycle, 2..=1024. None: as many as a cycle has frames, at most 20, which the cine loop of the viewer holds.
     pub phases: Option<usize>,
     /// Slices of a volume, 2..=1024. None: as many as there are cycles, since that many places of the sweep are seen at each phase.
     pub slices: Option<usize>,
@@ -52,8 +54,8 @@ impl Cycle {
         if frames.len() != rhythm.phases.len() || cycles < 4.0 {
             return Err(format!("the sweep has {cycles:.1} cycles: at least 4 are needed, better 10 or more"));
         }
-        let seconds = (frames.len() - 1) as f64 / rate / cycles;
-        let phases = options.phases.unwrap_or((seconds * rate).round().clamp(2.0, 32.0) as usize);
+        let seconds = 1.0 / rate / rhythm.mean;
+        let phases = options.phases.unwrap_or((seconds * rate).round().clamp(2.0, USUAL as f64) as usize);
         // A phase has its first place within the first cycle and its last within the last.
         let slices = options.slices.unwrap_or((cycles - 1.0).round().clamp(2.0, MOST as f64) as usize);
         for (name, count) in [("phases", phases), ("slices", slices)] {

@@ -1,5 +1,6 @@
 //! The bodies of the phantom: their echoes, and the ground truth of those that have a formula.
 
+use super::PhantomOptions;
 use super::head::Head;
 use super::speckle::{Beam, DYNAMIC_RANGE, Echo};
 use crate::files::InputError;
@@ -139,8 +140,10 @@ pub struct HeartTruth {
     pub radii: [f64; 2],
     /// Thickness of the wall, mm.
     pub wall: f64,
-    /// Length of a cycle, s.
+    /// Length of a cycle, s, where the rate is the mean one.
     pub period: f64,
+    /// Share of the mean rate by which the rate rises and falls, in [`HeartTruth::SWING_SECONDS`].
+    pub swing: f64,
     pub blood: f64,
     pub muscle: f64,
     pub outside: f64,
@@ -149,10 +152,18 @@ pub struct HeartTruth {
 impl HeartTruth {
     /// Share of the cycle that the heart contracts.
     const SYSTOLE: f64 = 0.38;
+    /// In so many seconds the rate rises, falls below the mean and comes back.
+    pub const SWING_SECONDS: f64 = 8.0;
 
-    /// Radius of the blood at a time, mm: largest at time 0.
-    pub fn radius(&self, time: f64) -> f64 {
-        let phase = (time / self.period).rem_euclid(1.0);
+    /// Cycles since time 0; whole ones at the end of diastole.
+    pub fn cycles(&self, time: f64) -> f64 {
+        let turn = std::f64::consts::TAU / HeartTruth::SWING_SECONDS;
+        (time + self.swing * (1.0 - (turn * time).cos()) / turn) / self.period
+    }
+
+    /// Radius of the blood at a phase, of which 1 is a cycle, mm: largest at phase 0.
+    pub fn radius(&self, phase: f64) -> f64 {
+        let phase = phase.rem_euclid(1.0);
         let filled = match phase < HeartTruth::SYSTOLE {
             true => 0.5 + 0.5 * (std::f64::consts::PI * phase / HeartTruth::SYSTOLE).cos(),
             false => {
@@ -179,11 +190,12 @@ pub(super) enum Scatterers {
 }
 
 impl Scatterers {
-    /// `still`: a body that could move does not.
-    pub fn new(body: Body, probe: &Probe, still: bool) -> Scatterers {
+    /// Of the body that the options name.
+    pub fn new(options: &PhantomOptions, probe: &Probe) -> Scatterers {
+        let still = options.still;
         let face = probe.array_radius();
         let depth = |depth: f64| face + depth;
-        let truth = match body {
+        let truth = match options.body {
             Body::Head => return Scatterers::Head(Box::new(Head::new(face, still))),
             Body::Sphere => Truth::Sphere {
                 centre: DVec3::new(4.0, depth(62.0), -3.0),
@@ -211,9 +223,10 @@ impl Scatterers {
             // A large fetal heart at 144 a minute.
             Body::Heart => Truth::Heart(HeartTruth {
                 centre: DVec3::new(2.0, depth(58.0), -1.0),
-                radii: [9.0, 13.0],
+                radii: if still { [13.0; 2] } else { [9.0, 13.0] },
                 wall: 4.0,
                 period: 60.0 / 144.0,
+                swing: options.heart_swing,
                 blood: DARK,
                 muscle: BRIGHT,
                 outside: CONSTANT,
@@ -279,7 +292,7 @@ fn exact(truth: &Truth, beam: &Beam, sample: usize, pitch: f64) -> Echo {
             };
         }
         Truth::Heart(heart) => {
-            let away = (place - heart.centre).length() - heart.radius(beam.time);
+            let away = (place - heart.centre).length() - heart.radius(heart.cycles(beam.time));
             edge(away, heart.blood, edge(away - heart.wall, heart.muscle, heart.outside))
         }
         Truth::Constant { grey } => *grey,
