@@ -33,8 +33,8 @@ pub struct Stic {
     #[arg(long, value_name = "N")]
     slices: Option<usize>,
     /// Least and largest heart rate that is looked for, cycles a minute
-    #[arg(long, value_name = "LOW:HIGH", default_value = "90:220", value_parser = rates)]
-    heart_rate: [f64; 2],
+    #[arg(long, value_name = "LOW:HIGH", default_value = "90:220")]
+    heart_rate: String,
     /// Frames a second, where time stamps are missing or wrong [default: from the time stamps of the frames]
     #[arg(long, value_name = "RATE")]
     frame_rate: Option<f64>,
@@ -48,19 +48,26 @@ pub struct Stic {
     geometry: GeometryArgs,
 }
 
-fn rates(text: &str) -> Result<[f64; 2], String> {
-    let parts: Vec<f64> = text.split(':').map_while(|part| part.trim().parse().ok()).collect();
-    match parts[..] {
-        [low, high] if low >= 10.0 && low < high && high <= 1000.0 && text.split(':').count() == 2 => Ok([low, high]),
-        _ => Err("must be LOW:HIGH with 10 <= LOW < HIGH <= 1000, such as 110:180".into()),
-    }
-}
-
 impl Stic {
+    /// Least and largest heart rate, cycles a minute.
+    fn heart_rate(&self) -> Result<[f64; 2], Failure> {
+        let parts: Vec<f64> = self.heart_rate.split(':').filter_map(|part| part.trim().parse().ok()).collect();
+        match parts[..] {
+            [low, high] if low >= 10.0 && low < high && high <= 1000.0 && self.heart_rate.split(':').count() == 2 => {
+                Ok([low, high])
+            }
+            _ => {
+                let allowed = "must be LOW:HIGH with 10 <= LOW < HIGH <= 1000, such as 110:180";
+                Err(input(format!("--heart-rate {}: {allowed}", quoted(&self.heart_rate))))
+            }
+        }
+    }
+
     pub fn run(&self) -> Result<(), Failure> {
         if !self.output.extension().is_some_and(|e| e.eq_ignore_ascii_case("frames")) {
             return Err(input(format!("{}: volumes in time are written to a .frames file", self.output.display())));
         }
+        let heart_rate = self.heart_rate()?;
         let triggers = self.r_waves.as_deref().map(read_times).transpose()?;
         let mut recording = open_recording(&self.recording, self.geometry.options())?;
         let read = recording.files();
@@ -80,10 +87,10 @@ impl Stic {
             _ => {
                 let longest = times.windows(2).map(|t| t[1] - t[0]).fold(0.0, f64::max);
                 // Where frames are missing the phase would jump.
-                if longest > 15.0 / self.heart_rate[1] {
+                if longest > 15.0 / heart_rate[1] {
                     return Err(at_fault(format!("its time stamps have a gap of {longest:.3} s: frames are missing")));
                 }
-                Rhythm::find(&motion, rate, self.heart_rate).map_err(at_fault)?
+                Rhythm::find(&motion, rate, heart_rate).map_err(at_fault)?
             }
         };
         let (count, cycles, height) = (frames.len(), rhythm.cycles(), rhythm.height);

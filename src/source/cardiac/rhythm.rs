@@ -19,12 +19,12 @@ use crate::source::{Frame, StoredType};
 use rayon::prelude::*;
 use std::f64::consts::TAU;
 
-/// Blocks along an edge of a frame. With 4 as with 16 the errors on simulated sweeps were larger.
+/// Blocks along an edge of a frame. With 16 the errors on simulated sweeps were larger: while a wall crosses a small block, its waveform changes.
 const BLOCKS: usize = 8;
 /// Least height of a peak of the spectrum, dB. That of speckle at rest was 1.4 dB at most on simulated sweeps, that of a small heart (6 to 8 mm) 6 dB
 /// and that of a large one 20 dB.
 const LEAST_HEIGHT: f64 = 3.5;
-/// Least share of all changes of the blocks that a heart has. Edges that the sweep moves over samples repeat as well, but stayed below 1e-4 without any
+/// Least share of all changes of the blocks that a heart has. Edges that the sweep moves over samples repeat as well, but had 1e-4 at most without any
 /// speckle, which hides them; a small heart has 1e-2.
 const LEAST_SHARE: f64 = 3e-4;
 /// The surroundings of a rate are the spectrum at so many times the rate and at its inverse.
