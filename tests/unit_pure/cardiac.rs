@@ -7,14 +7,14 @@ use echolume::source::phantom::{Body, HeartTruth, Phantom, PhantomOptions, Speck
 use echolume::source::{Frame, StoredType};
 use glam::DVec3;
 
-/// A slow sweep of 64 lines of 96 samples a frame: 100 frames a second.
+/// A slow sweep of 64 lines of 80 samples a frame: 100 frames a second.
 fn slow(frames: usize, speckle: Speckle) -> PhantomOptions {
     PhantomOptions {
         body: Body::Heart,
         speckle,
         frames,
         lines: 64,
-        samples: 96,
+        samples: 80,
         fan_angle_deg: 30.0,
         ..PhantomOptions::default()
     }
@@ -81,46 +81,57 @@ fn phase_error(phantom: &Phantom, truth: &HeartTruth, frames: &[Frame], rhythm: 
     (middle, mean_square.sqrt(), errors.iter().map(|e| (e - middle).abs()).fold(0.0, f64::max))
 }
 
-/// A volume of 16 phases has the radius of its phase, which goes from 9 to 13 mm. The limits are those of the measured errors, doubled: of the rate,
-/// 0.2 %; of the phase, 0.4 % of a cycle at a constant rate and 2 % at one that swings by 5 % within 8 s.
+/// The radius goes from 9 to 13 mm. Without speckle it is compared with the formula, and with speckle, whose point spread makes the blood narrower, with
+/// the volume of the exact phases. It changes by up to 16 mm a cycle: a phase that is 2 % wrong makes 0.3 mm.
+///
+/// The limits are about twice the errors that were measured: of the rate, of the phase (root mean square, largest), of the radius (the same).
+/// A rate that swings by 5 % within 8 s is not 144 a minute on average while the heart is seen. This costs 3 s of CPU: speckle of 2 x 800 frames.
 #[test]
 fn volumes_of_one_cycle_have_the_radius_of_their_phase() {
     let mut said = Vec::new();
     for (speckle, heart_swing, limits) in [
-        (Speckle::None, 0.0, [0.006, 0.01, 0.03, 0.25]),
-        (Speckle::Random, 0.0, [0.006, 0.01, 0.03, 0.3]),
-        (Speckle::None, 0.05, [0.06, 0.03, 0.1, 0.3]),
-        (Speckle::Random, 0.05, [0.06, 0.04, 0.15, 0.4]),
+        (Speckle::None, 0.0, [0.006, 0.012, 0.05, 0.3, 0.6]),
+        (Speckle::Random, 0.0, [0.006, 0.012, 0.05, 0.2, 0.4]),
+        (Speckle::None, 0.05, [0.05, 0.03, 0.12, 0.4, 0.8]),
+        (Speckle::Random, 0.05, [0.05, 0.04, 0.16, 0.3, 0.6]),
     ] {
-        let (phantom, truth) = sweep(PhantomOptions { heart_swing, ..slow(1000, speckle) });
+        let (phantom, truth) = sweep(PhantomOptions { heart_swing, ..slow(800, speckle) });
         let frames = phantom.volume(0);
         let (rate, motion) = seen(&phantom, &frames);
         let rhythm = Rhythm::find(&motion, rate, [90.0, 220.0]).expect("a rhythm");
         let (offset, mean, largest) = phase_error(&phantom, &truth, &frames, &rhythm);
+        let exact = Rhythm {
+            phases: frames.iter().map(|f| truth.cycles(f.time.expect("a time") + 0.5 / rate) - offset).collect(),
+            ..rhythm.clone()
+        };
         let probe = phantom.probe(0);
         let unsorted = radius(&Geometry::Sweep(probe.clone()), frames.clone(), &truth, speckle);
-        let options = CycleOptions { phases: Some(16), slices: None };
-        let cycle = Cycle::new(&probe, StoredType::U8, frames, rhythm, rate, options).expect("a cycle");
-        let geometry = Geometry::Sweep(cycle.probe.clone());
-        let (mut worst, mut worst_unsorted) = (0.0f64, 0.0f64);
+        let options = CycleOptions { phases: Some(8), slices: None };
+        let sorted =
+            |rhythm| Cycle::new(&probe, StoredType::U8, frames.clone(), rhythm, rate, options).expect("a cycle");
+        let (cycle, exact) = (sorted(rhythm), sorted(exact));
+        let of =
+            |cycle: &Cycle, phase| radius(&Geometry::Sweep(cycle.probe.clone()), cycle.volume(phase), &truth, speckle);
+        let (mut sum, mut worst, mut worst_unsorted) = (0.0f64, 0.0f64, 0.0f64);
         for phase in 0..cycle.phases {
-            let frames = cycle.volume(phase);
-            let share = frames[0].time.expect("a time") / cycle.seconds;
-            assert!((share - phase as f64 / 16.0).abs() < 1e-9, "volume {phase} is of {share}");
-            let expected = truth.radius(share + offset);
-            worst = worst.max((radius(&geometry, frames, &truth, speckle) - expected).abs());
-            worst_unsorted = worst_unsorted.max((unsorted - expected).abs());
+            let share = cycle.volume(phase)[0].time.expect("a time") / cycle.seconds;
+            assert!((share - phase as f64 / 8.0).abs() < 1e-9, "volume {phase} is of {share}");
+            let expected = match speckle {
+                Speckle::None => truth.radius(share + offset),
+                _ => of(&exact, phase),
+            };
+            let error = (of(&cycle, phase) - expected).abs();
+            sum += error * error / cycle.phases as f64;
+            worst = worst.max(error);
+            worst_unsorted = worst_unsorted.max((unsorted - truth.radius(share + offset)).abs());
         }
-        let rate_error = (cycle.seconds / truth.period - 1.0).abs();
-        let case = format!(
-            "{speckle:?}, swing {heart_swing}: rate {:.2} %, phase {mean:.4} and at most {largest:.3} of a cycle, radius {worst:.2} mm",
-            rate_error * 100.0
-        );
-        let within = [rate_error, mean, largest, worst].into_iter().zip(limits).all(|(error, limit)| error < limit);
-        said.push((case, within));
+        let errors = [(cycle.seconds / truth.period - 1.0).abs(), mean, largest, sum.sqrt(), worst];
+        println!("{speckle:?}, swing {heart_swing}: {errors:.4?}");
+        let within = errors.iter().zip(limits).all(|(error, limit)| *error < limit);
+        said.push((speckle, heart_swing, errors, within));
         assert!(worst_unsorted > 1.5, "a sweep that is not sorted is as near: {worst_unsorted:.2} mm");
     }
-    assert!(said.iter().all(|(_, within)| *within), "{said:#?}");
+    assert!(said.iter().all(|(.., within)| *within), "{said:#?}");
 }
 
 #[test]

@@ -120,12 +120,14 @@ impl Motion {
     fn demodulated(&self, frame: usize, half: usize, harmonic: f64, phases: &[f64]) -> [Vec<f64>; 2] {
         let (mut re, mut im) = (vec![0.0; BLOCKS * BLOCKS], vec![0.0; BLOCKS * BLOCKS]);
         let (mut mean, mut all) = (vec![0.0; BLOCKS * BLOCKS], [0.0; 3]);
-        for n in frame.saturating_sub(half)..=(frame + half).min(self.means.len() - 1) {
+        let from = frame.saturating_sub(half);
+        let within = self.means.iter().zip(phases).enumerate().take(frame + half + 1).skip(from);
+        for (n, (means, phase)) in within {
             let at = TAU * (n as f64 - frame as f64) / (2 * half + 2) as f64;
             let weight = 0.42 + 0.5 * at.cos() + 0.08 * (2.0 * at).cos();
-            let (sin, cos) = (-TAU * harmonic * phases[n]).sin_cos();
+            let (sin, cos) = (-TAU * harmonic * phase).sin_cos();
             all = [all[0] + weight, all[1] + weight * cos, all[2] + weight * sin];
-            let each = re.iter_mut().zip(&mut im).zip(&mut mean).zip(&self.means[n]);
+            let each = re.iter_mut().zip(&mut im).zip(&mut mean).zip(means);
             for (((re, im), mean), x) in each {
                 *re += x * weight * cos;
                 *im += x * weight * sin;

@@ -142,7 +142,7 @@ pub struct HeartTruth {
     pub wall: f64,
     /// Length of a cycle, s, where the rate is the mean one.
     pub period: f64,
-    /// Share of the mean rate by which the rate rises and falls, in [`HeartTruth::SWING_SECONDS`].
+    /// Share of the mean rate by which the rate rises and falls, within 8 s.
     pub swing: f64,
     pub blood: f64,
     pub muscle: f64,
@@ -153,7 +153,7 @@ impl HeartTruth {
     /// Share of the cycle that the heart contracts.
     const SYSTOLE: f64 = 0.38;
     /// In so many seconds the rate rises, falls below the mean and comes back.
-    pub const SWING_SECONDS: f64 = 8.0;
+    const SWING_SECONDS: f64 = 8.0;
 
     /// Cycles since time 0; whole ones at the end of diastole.
     pub fn cycles(&self, time: f64) -> f64 {
