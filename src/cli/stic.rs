@@ -29,7 +29,7 @@ pub struct Stic {
     /// Volumes of the cycle, 2..=1024 [default: as many as a cycle has frames, at most 20: the cine loop of `view`]
     #[arg(long, value_name = "N")]
     phases: Option<usize>,
-    /// Slices of a volume, 2..=1024 [default: as many as there are whole cycles]
+    /// Slices of a volume, 2..=1024 [default: one less than there are cycles]
     #[arg(long, value_name = "N")]
     slices: Option<usize>,
     /// Least and largest heart rate that is looked for, cycles a minute

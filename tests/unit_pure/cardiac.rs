@@ -193,3 +193,21 @@ fn what_makes_no_cycle_is_refused_in_one_line() {
         assert!(error.contains(wanted) && error.lines().count() == 1, "{error}");
     }
 }
+
+/// Speckle of scatterers on planes between the frames is as bright as that of a body at rest, whether the frames are denser than the planes or not.
+#[test]
+fn speckle_of_a_beating_body_has_the_level_of_its_echoes() {
+    let level = |speckle, frames| {
+        let (phantom, _) = sweep(PhantomOptions { still: true, ..slow(frames, speckle) });
+        // In front of the heart.
+        let near =
+            |frame: Frame| frame.bytes.chunks_exact(80).flat_map(|line| line[..24].to_vec()).collect::<Vec<u8>>();
+        let greys: Vec<f64> = phantom.volume(0).into_iter().flat_map(near).map(f64::from).collect();
+        greys.iter().sum::<f64>() / greys.len() as f64
+    };
+    for frames in [20, 120] {
+        let (random, mean) = (level(Speckle::Random, frames), level(Speckle::Mean, frames));
+        // Some 1500 independent samples of a standard deviation of 28.
+        assert!((random - mean).abs() < 2.5, "{frames} frames: {random:.1} for {mean:.1}");
+    }
+}

@@ -17,7 +17,7 @@ const USUAL: usize = 20;
 pub struct CycleOptions {
     /// Volumes of one cycle, 2..=1024. None: as many as a cycle has frames, at most 20, which the cine loop of the viewer holds.
     pub phases: Option<usize>,
-    /// Slices of a volume, 2..=1024. None: as many as there are cycles, since that many places of the sweep are seen at each phase.
+    /// Slices of a volume, 2..=1024. None: one less than there are cycles, as many places of the sweep as are seen at every phase.
     pub slices: Option<usize>,
 }
 
