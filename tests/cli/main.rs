@@ -24,6 +24,7 @@ mod shaders;
 mod signals;
 mod snakemake;
 mod standard_streams;
+mod stic;
 mod stream;
 mod support_bundle;
 mod verify;
