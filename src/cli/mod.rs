@@ -15,6 +15,7 @@ mod recordings;
 mod render;
 mod series;
 mod serve;
+mod stic;
 mod stream;
 #[cfg(feature = "view")]
 mod view;
@@ -81,6 +82,8 @@ enum Command {
     Phantom(recordings::MakePhantom),
     /// Resample a volume to a Cartesian grid (.mha, .nrrd), or convert frames
     Convert(recordings::Convert),
+    /// Sort the frames of one slow sweep over a beating heart into volumes of one cycle (STIC)
+    Stic(stic::Stic),
     /// Write the surface of a recording as a mesh (.stl, .ply, .glb)
     Mesh(mesh::MakeMesh),
     /// Describe a recording, without patient fields
@@ -150,6 +153,7 @@ pub fn run() -> ExitCode {
         Command::Report(report) => report.run(),
         Command::Phantom(phantom) => phantom.run(),
         Command::Convert(convert) => convert.run(),
+        Command::Stic(stic) => stic.run(),
         Command::Mesh(mesh) => mesh.run(),
         Command::Info(info) => info.run(),
         Command::Batch(batch) => batch.run(),

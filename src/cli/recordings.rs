@@ -323,7 +323,8 @@ pub struct MakePhantom {
     /// Seed of the speckle; the same seed gives the same bytes
     #[arg(long, value_name = "N", default_value_t = 1)]
     seed: u64,
-    /// head, or a body whose picture has a closed formula: sphere, step, wires, constant, ramp
+    /// head, or a body whose picture has a closed formula: sphere, step, wires, constant, ramp; or heart,
+    /// a beating chamber, of which one slow sweep has many cycles
     #[arg(long, value_name = "NAME", default_value = "head")]
     body: String,
     /// Number of volumes in time; the head moves
@@ -356,9 +357,12 @@ pub struct MakePhantom {
     /// The same from frame to frame, degrees [default: 1.2; gallery: 0.6]
     #[arg(long, value_name = "DEG")]
     psf_elevation: Option<f64>,
-    /// The head does not move
+    /// The head does not move, the heart does not beat
     #[arg(long)]
     still: bool,
+    /// Share by which the rate of the heart rises and falls within 8 s, 0..0.3
+    #[arg(long, value_name = "SHARE", default_value_t = 0.0)]
+    heart_swing: f64,
     /// Also write what is where in the first volume of the head: labels to this file (.mha, or .seg.nrrd with their names for 3D Slicer), and the signed distance from the
     /// skin, mm, to NAME.distance.mha. 0 fluid, 1 skin, 2 hand, 3 cord, 4 skull, 5 brain, 6 choroid plexus, 7 ventricle, 8 falx, 9 uterus
     #[arg(long, value_name = "FILE")]
@@ -398,6 +402,7 @@ impl MakePhantom {
                 elevation_deg: self.psf_elevation.unwrap_or(psf.elevation_deg),
             },
             still: self.still || usual.still,
+            heart_swing: self.heart_swing,
             ..usual
         };
         let phantom = Phantom::new(options).map_err(input)?;

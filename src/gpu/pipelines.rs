@@ -385,7 +385,8 @@ impl Pipeline {
         let shader = unsafe { device.create_shader_module(&vk::ShaderModuleCreateInfo::default().code(&words), None) }
             .context(operation)?;
         context.name(shader, name);
-        let values = by_id(&pipeline.module, &constants);
+        // A module that is specialized already gets none: a layer would specialize and validate it again for each pipeline.
+        let values = if context.specializes { Vec::new() } else { by_id(&pipeline.module, &constants) };
         let entries: Vec<_> = values
             .iter()
             .enumerate()

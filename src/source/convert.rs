@@ -141,13 +141,7 @@ impl Volume {
 
     fn sample(&self, at: [usize; 3]) -> f64 {
         let n = (at[1] * self.size[0] + at[0]) * self.stored.bytes();
-        let bytes = self.frames[at[2]].get(n..n + self.stored.bytes());
-        match (self.stored, bytes) {
-            (StoredType::U8, Some([a])) => f64::from(*a),
-            (StoredType::U16, Some([a, b])) => f64::from(u16::from_le_bytes([*a, *b])),
-            (StoredType::F32, Some([a, b, c, d])) => f64::from(f32::from_le_bytes([*a, *b, *c, *d])),
-            _ => 0.0,
-        }
+        self.frames[at[2]].get(n..n + self.stored.bytes()).map_or(0.0, |bytes| self.stored.value(bytes))
     }
 
     /// The stored value at a point in space, mm; None outside the insonified region.

@@ -81,6 +81,12 @@ pub struct PlaybackSource {
     base: u32,
     highest: u32,
     begun: Option<(Instant, f64)>,
+    /// The volume that is played, when it was due, and its time stamp.
+    playing: Option<(u32, Instant, f64)>,
+    /// How long the volume before it lasted, s.
+    lasted: f64,
+    /// When the next round begins, at the earliest.
+    resumes: Option<Instant>,
     header: Option<Header>,
     /// Of all frames without one of their own.
     pose: Option<DAffine3>,
@@ -100,6 +106,9 @@ impl PlaybackSource {
             base: 0,
             highest: 0,
             begun: None,
+            playing: None,
+            lasted: 0.0,
+            resumes: None,
             header: None,
             pose: None,
             waiting: None,
@@ -116,8 +125,10 @@ impl PlaybackSource {
                 if self.round >= self.rounds || self.frames == 0 {
                     return Ok(None);
                 }
-                // The time stamps begin again.
+                // The time stamps begin again. The last volume lasts as long as the one before it: nothing states its end.
                 self.begun = None;
+                let lasted = Duration::try_from_secs_f64(self.lasted).unwrap_or_default();
+                self.resumes = self.playing.take().map(|(_, due, _)| due + lasted);
                 self.base = self.highest.wrapping_add(1);
                 self.source.skip_to_volume(0).map_err(|e| e.to_string())?;
                 match self.source.next_frame().map_err(|e| e.to_string())? {
@@ -135,13 +146,23 @@ impl PlaybackSource {
             Playback::Recorded => self.source.arrival().or(frame.time).unwrap_or(0.0),
         };
         self.frames += 1;
-        let (began, first) = *self.begun.get_or_insert_with(|| (Instant::now(), stamp));
+        let now = Instant::now();
+        let starts = self.resumes.take().map_or(now, |resumes| resumes.max(now));
+        let (began, first) = *self.begun.get_or_insert((starts, stamp));
         // A stamp that is not finite or before the first is due at once.
         let after = Duration::try_from_secs_f64((stamp - first).clamp(0.0, MAX_SPAN)).unwrap_or_default();
-        Ok(Some((began + after, frame)))
+        let due = began + after;
+        if self.playing.is_none_or(|(volume, ..)| volume != frame.volume) {
+            let before = self.playing.replace((frame.volume, due, stamp));
+            let lasted = before.map_or(0.0, |(_, _, before)| stamp - before);
+            self.lasted = if (0.0..=LONGEST_VOLUME).contains(&lasted) { lasted } else { 0.0 };
+        }
+        Ok(Some((due, frame)))
     }
 }
 
+/// Longest interval between two volumes that is not a pause, s.
+const LONGEST_VOLUME: f64 = 5.0;
 /// Longest time from the first to the last frame of a recording, s: ten days.
 const MAX_SPAN: f64 = 864_000.0;
 

@@ -4,6 +4,7 @@
 //! Every reader is total: any bytes give frames or an [`InputError`], never a panic. No reader takes more memory than the bytes of its
 //! file account for, or than a live source documents.
 
+pub mod cardiac;
 pub mod coarse;
 pub mod convert;
 mod describe;

@@ -552,6 +552,11 @@ impl Reader {
         if let Some([first, last]) = summary.times {
             add("time stamps", format!("{} .. {} s, {} of them", number(first), number(last), summary.stamped));
         }
+        if let Some([first, last]) =
+            summary.begins.filter(|[first, last]| last > first && summary.begun == summary.volumes)
+        {
+            add("volume rate", format!("{} a second", number((summary.volumes - 1) as f64 / (last - first))));
+        }
         if let Some([first, last]) = summary.arrivals {
             let rate = match last - first {
                 span if span > 0.0 && span.is_finite() => {
@@ -579,6 +584,10 @@ impl Reader {
                 of_volume = 0;
                 summary.volumes += 1;
                 summary.backward += usize::from(frame.backward);
+                if let Some(time) = frame.time.filter(|t| t.is_finite()) {
+                    summary.begun += 1;
+                    widen(&mut summary.begins, time);
+                }
             }
             of_volume += 1;
             if let Some(pose) = frame.pose {
@@ -610,6 +619,9 @@ struct Summary {
     whole: usize,
     /// Number of volumes swept backwards.
     backward: usize,
+    /// Number of volumes whose first frame has a time stamp, and the first and last of these, s.
+    begun: usize,
+    begins: Option<[f64; 2]>,
     stamped: usize,
     /// First and last, s.
     times: Option<[f64; 2]>,

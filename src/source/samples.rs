@@ -73,6 +73,25 @@ impl StoredType {
             StoredType::F32 => 4,
         }
     }
+
+    /// The sample that these bytes are, little-endian; 0 of another number of bytes.
+    pub(super) fn value(self, bytes: &[u8]) -> f64 {
+        match (self, bytes) {
+            (StoredType::U8, [a]) => f64::from(*a),
+            (StoredType::U16, [a, b]) => f64::from(u16::from_le_bytes([*a, *b])),
+            (StoredType::F32, [a, b, c, d]) => f64::from(f32::from_le_bytes([*a, *b, *c, *d])),
+            _ => 0.0,
+        }
+    }
+
+    /// Appends a sample; integers are rounded.
+    pub(super) fn append(self, value: f64, bytes: &mut Vec<u8>) {
+        match self {
+            StoredType::U8 => bytes.push(value.round() as u8),
+            StoredType::U16 => bytes.extend((value.round() as u16).to_le_bytes()),
+            StoredType::F32 => bytes.extend((value as f32).to_le_bytes()),
+        }
+    }
 }
 
 impl fmt::Display for SampleType {

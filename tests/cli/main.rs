@@ -25,6 +25,7 @@ mod shaders;
 mod signals;
 mod snakemake;
 mod standard_streams;
+mod stic;
 mod stream;
 mod support_bundle;
 mod verify;

@@ -34,6 +34,7 @@ fn rows(folder: &Folder) -> Vec<Row> {
     let report = folder.write("error.json", crate::budget::error_report("[160, 216, 33]"));
     let tape = folder.path("in.frames");
     done(&["convert", SWEEP, &tape]);
+    let waves = folder.write("waves.txt", "0\n0.5\n1\n1.5\n2\n2.5\n3\n");
     let row = |ending, kind, early, words: &[&str], more: &[&str]| {
         let arguments = words.iter().chain(more).map(|w| w.to_string()).collect();
         Row { arguments, ending, kind, early }
@@ -74,6 +75,7 @@ fn rows(folder: &Folder) -> Vec<Row> {
         row("mha", File, false, &["convert", &tape, "@", "--sequence"], &[]),
         row("stl", File, false, &["mesh", BONE, "@", "--spacing", "4"], &[]),
         row("frames", New, false, &["convert", SWEEP, "@"], &[]),
+        row("frames", New, false, &["stic", SWEEP, "@", "--frame-rate", "10", "--r-waves", &waves], &[]),
         row("", Dir, false, &["stream", "--source", BONE, "--out", "@"], &SMALL),
         row("frames", New, false, &["stream", "--source", BONE, "--null", "--record", "@"], &SMALL),
         row(

@@ -4,10 +4,12 @@ use crate::common::files::{Folder, SWEEP};
 use crate::common::probes::wobbler;
 use crate::common::program::run;
 use echolume::probe::{Advance, Axis, Geometry, Grid, Probe};
+use echolume::source::live::{Event, Live, Playback, PlaybackSource};
 use echolume::source::recorder::{Header, Reader, Writer};
 use echolume::source::{Frame, Source, StoredType};
 use proptest::prelude::*;
 use std::path::Path;
+use std::time::{Duration, Instant};
 
 fn probe(advance: f64) -> Probe {
     Probe {
@@ -214,5 +216,39 @@ proptest! {
                 prop_assert!(originals.contains(&frame), "a frame that was never written");
             }
         }
+    }
+}
+
+/// Prevents a loop of one cycle that skips its last phase: nothing states when the last volume ends.
+#[test]
+fn the_last_volume_lasts_as_long_as_the_one_before_it_when_a_recording_is_played_again() {
+    let folder = Folder::new("again");
+    let path = folder.join("loop.frames");
+    let mut writer = Writer::create(&path, header()).expect("made");
+    for volume in 0..3u32 {
+        for slice in 0..5 {
+            let mut frame = Frame::of_slice(volume, slice, vec![0; 16 * 6 * 2]);
+            frame.time = Some(0.05 * f64::from(volume));
+            writer.frame(&frame, 0.05 * f64::from(volume)).expect("written");
+        }
+    }
+    writer.finish().expect("finished");
+    let reader = Reader::open(&path).expect("a recording");
+    let mut live = PlaybackSource::new(Box::new(reader), Playback::Recorded, 2);
+    let (mut begun, mut volumes) = (None, Vec::new());
+    loop {
+        match live.next(Duration::from_secs(1)) {
+            Event::Frame(frame) if frame.slice == 0 => {
+                let begun = *begun.get_or_insert_with(Instant::now);
+                volumes.push(begun.elapsed().as_secs_f64());
+            }
+            Event::End(fault) => break assert_eq!(fault, None),
+            _ => {}
+        }
+    }
+    assert_eq!(volumes.len(), 6);
+    // Not before; a busy machine may be later.
+    for (n, at) in volumes.into_iter().enumerate() {
+        assert!(at > 0.05 * n as f64 - 0.01, "volume {n} after {at} s");
     }
 }

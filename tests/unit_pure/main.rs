@@ -3,6 +3,7 @@
 mod batch;
 mod bounds;
 mod bricks;
+mod cardiac;
 mod cluster;
 #[path = "../common/mod.rs"]
 mod common;

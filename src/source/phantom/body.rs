@@ -1,5 +1,6 @@
 //! The bodies of the phantom: their echoes, and the ground truth of those that have a formula.
 
+use super::PhantomOptions;
 use super::head::Head;
 use super::speckle::{Beam, DYNAMIC_RANGE, Echo};
 use crate::files::InputError;
@@ -25,10 +26,13 @@ pub enum Body {
     Constant,
     /// Grey that rises linearly with range, line angle and motor angle.
     Ramp,
+    /// A beating chamber: dark blood in a bright wall.
+    Heart,
 }
 
 impl Body {
-    pub const ALL: [Body; 6] = [Body::Head, Body::Sphere, Body::Step, Body::Wires, Body::Constant, Body::Ramp];
+    pub const ALL: [Body; 7] =
+        [Body::Head, Body::Sphere, Body::Step, Body::Wires, Body::Constant, Body::Ramp, Body::Heart];
 
     pub fn name(self) -> &'static str {
         match self {
@@ -38,6 +42,7 @@ impl Body {
             Body::Wires => "wires",
             Body::Constant => "constant",
             Body::Ramp => "ramp",
+            Body::Heart => "heart",
         }
     }
 }
@@ -124,6 +129,50 @@ pub enum Truth {
         grey: f64,
     },
     Ramp(RampTruth),
+    Heart(HeartTruth),
+}
+
+/// A ball of blood in a wall, whose radius changes with time.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct HeartTruth {
+    pub centre: DVec3,
+    /// Of the blood, mm: at the end of systole, and of diastole.
+    pub radii: [f64; 2],
+    /// Thickness of the wall, mm.
+    pub wall: f64,
+    /// Length of a cycle, s, where the rate is the mean one.
+    pub period: f64,
+    /// Share of the mean rate by which the rate rises and falls, within 8 s.
+    pub swing: f64,
+    pub blood: f64,
+    pub muscle: f64,
+    pub outside: f64,
+}
+
+impl HeartTruth {
+    /// Share of the cycle that the heart contracts.
+    const SYSTOLE: f64 = 0.38;
+    /// In so many seconds the rate rises, falls below the mean and comes back.
+    const SWING_SECONDS: f64 = 8.0;
+
+    /// Cycles since time 0; whole ones at the end of diastole.
+    pub fn cycles(&self, time: f64) -> f64 {
+        let turn = std::f64::consts::TAU / HeartTruth::SWING_SECONDS;
+        (time + self.swing * (1.0 - (turn * time).cos()) / turn) / self.period
+    }
+
+    /// Radius of the blood at a phase, of which 1 is a cycle, mm: largest at phase 0.
+    pub fn radius(&self, phase: f64) -> f64 {
+        let phase = phase.rem_euclid(1.0);
+        let filled = match phase < HeartTruth::SYSTOLE {
+            true => 0.5 + 0.5 * (std::f64::consts::PI * phase / HeartTruth::SYSTOLE).cos(),
+            false => {
+                let filling = (phase - HeartTruth::SYSTOLE) / (1.0 - HeartTruth::SYSTOLE);
+                0.5 - 0.5 * (std::f64::consts::PI * filling).cos()
+            }
+        };
+        self.radii[0] + (self.radii[1] - self.radii[0]) * filled
+    }
 }
 
 /// Grey values of the bodies with a formula. The constant one is 15 dB below full scale, where neither end of the scale clips.
@@ -141,11 +190,12 @@ pub(super) enum Scatterers {
 }
 
 impl Scatterers {
-    /// `still`: a body that could move does not.
-    pub fn new(body: Body, probe: &Probe, still: bool) -> Scatterers {
+    /// Of the body that the options name.
+    pub fn new(options: &PhantomOptions, probe: &Probe) -> Scatterers {
+        let still = options.still;
         let face = probe.array_radius();
         let depth = |depth: f64| face + depth;
-        let truth = match body {
+        let truth = match options.body {
             Body::Head => return Scatterers::Head(Box::new(Head::new(face, still))),
             Body::Sphere => Truth::Sphere {
                 centre: DVec3::new(4.0, depth(62.0), -3.0),
@@ -170,6 +220,17 @@ impl Scatterers {
                 Truth::Wires { wires, peak: WIRE_PEAK, per_mm2: WIRE_FALL, outside: DARK }
             }
             Body::Constant => Truth::Constant { grey: CONSTANT },
+            // A large fetal heart at 144 a minute.
+            Body::Heart => Truth::Heart(HeartTruth {
+                centre: DVec3::new(2.0, depth(58.0), -1.0),
+                radii: if still { [13.0; 2] } else { [9.0, 13.0] },
+                wall: 4.0,
+                period: 60.0 / 144.0,
+                swing: options.heart_swing,
+                blood: DARK,
+                muscle: BRIGHT,
+                outside: CONSTANT,
+            }),
             Body::Ramp => {
                 // A third of the scale for each of the three, so that no corner clips.
                 let share = 80.0;
@@ -229,6 +290,10 @@ fn exact(truth: &Truth, beam: &Beam, sample: usize, pitch: f64) -> Echo {
             } else {
                 Echo { diffuse: level(*outside), mirror }
             };
+        }
+        Truth::Heart(heart) => {
+            let away = (place - heart.centre).length() - heart.radius(heart.cycles(beam.time));
+            edge(away, heart.blood, edge(away - heart.wall, heart.muscle, heart.outside))
         }
         Truth::Constant { grey } => *grey,
         Truth::Ramp(ramp) => ramp.grey(beam.range + pitch * sample as f64, beam.line_angle, beam.motor_angle),

@@ -18,7 +18,7 @@ mod speckle;
 mod tests;
 mod truth;
 
-pub use body::{Body, RampTruth, Truth, Wire};
+pub use body::{Body, HeartTruth, RampTruth, Truth, Wire};
 pub use labels::Label;
 pub use sampling::{PointSpread, Sampling};
 pub use source::{CachedPhantom, PhantomSource};
@@ -94,8 +94,10 @@ pub struct PhantomOptions {
     /// Angle from the first frame to the last, degrees, 10..=120.
     pub fan_angle_deg: f64,
     pub point_spread: PointSpread,
-    /// The head does not move.
+    /// The head does not move, the heart does not beat.
     pub still: bool,
+    /// Share by which the rate of the heart rises and falls, 0..=0.3.
+    pub heart_swing: f64,
 }
 
 impl Default for PhantomOptions {
@@ -113,6 +115,7 @@ impl Default for PhantomOptions {
             fan_angle_deg: FAN_ANGLE_DEG,
             point_spread: PointSpread { axial_mm: 0.35, lateral_deg: 0.8, elevation_deg: 1.2 },
             still: false,
+            heart_swing: 0.0,
         }
     }
 }
@@ -148,6 +151,9 @@ impl Phantom {
         if !(10.0..=120.0).contains(&options.fan_angle_deg) {
             return Err(refusal("fan_angle", format!("is {}, must lie in 10..=120", options.fan_angle_deg)));
         }
+        if !(0.0..=0.3).contains(&options.heart_swing) {
+            return Err(refusal("heart_swing", format!("is {}, must lie in 0..=0.3", options.heart_swing)));
+        }
         options.point_spread.check()?;
         let volumes = Volumes {
             both_ways: options.both_ways,
@@ -166,7 +172,7 @@ impl Phantom {
             advance: Advance::None,
             sound_speed: SOUND_SPEED,
         };
-        let scatterers = Scatterers::new(options.body, &probe, options.still);
+        let scatterers = Scatterers::new(&options, &probe);
         let phantom = Phantom { options, probe, volumes, scatterers };
         for volume in 0..phantom.options.volumes.min(2) {
             phantom.probe(volume).check().map_err(|e| refusal(e.field, e.fault))?;
@@ -198,24 +204,31 @@ impl Phantom {
         let backward = self.volumes.backward(volume);
         let frames = self.options.frames;
 
-        let echoes: Vec<Vec<Echo>> = (0..frames)
-            .into_par_iter()
-            .map(|slice| {
+        let along = |frame: usize, slice: f64, echoes: &mut [Echo]| {
+            for (line, out) in echoes.chunks_exact_mut(self.options.samples).enumerate() {
+                let time = self.line_time(volume, frame, line);
+                self.scatterers.along(&Beam::new(&probe, line, slice, time), out);
+            }
+        };
+        let still = || -> Vec<Vec<Echo>> {
+            let echoes = |frame: usize| {
                 let mut echoes = vec![Echo::SILENT; self.options.lines * self.options.samples];
-                for (line, out) in echoes.chunks_exact_mut(self.options.samples).enumerate() {
-                    let time = self.line_time(volume, slice, line);
-                    self.scatterers.along(&Beam::new(&probe, line, slice, time), out);
-                }
+                along(frame, frame as f64, &mut echoes);
                 echoes
-            })
-            .collect();
+            };
+            (0..frames).into_par_iter().map(echoes).collect()
+        };
         // Scatterers at rest give the same speckle in every volume. Those of a moving body do not.
         let noise_of_volume = if self.options.body == Body::Head { volume as u64 } else { 0 };
-        let psf = &self.options.point_spread;
-        let slices: Vec<Vec<u8>> = match self.options.speckle {
-            Speckle::Random => speckle::slices(&echoes, &probe, psf, self.options.seed, noise_of_volume),
-            Speckle::Mean => speckle::mean_slices(&echoes, &probe, psf),
-            Speckle::None => echoes.par_iter().map(|slice| slice.iter().map(|e| grey(e.bare())).collect()).collect(),
+        let (psf, seed) = (&self.options.point_spread, self.options.seed);
+        let slices: Vec<Vec<u8>> = match (self.options.speckle, self.options.body) {
+            (Speckle::Random, Body::Heart) => speckle::moving_slices(&probe, psf, Some(seed), along),
+            (Speckle::Mean, Body::Heart) => speckle::moving_slices(&probe, psf, None, along),
+            (Speckle::Random, _) => speckle::slices(&still(), &probe, psf, seed, noise_of_volume),
+            (Speckle::Mean, _) => speckle::mean_slices(&still(), &probe, psf),
+            (Speckle::None, _) => {
+                still().par_iter().map(|slice| slice.iter().map(|e| grey(e.bare())).collect()).collect()
+            }
         };
         let mut made: Vec<Frame> = slices
             .into_iter()

@@ -31,8 +31,9 @@ pub(super) struct Beam {
 }
 
 impl Beam {
-    pub fn new(probe: &Probe, line: usize, slice: usize, time: f64) -> Beam {
-        let (line, slice) = (line as f64, slice as f64);
+    /// At a fractional slice, which may lie beyond the ends of the sweep.
+    pub fn new(probe: &Probe, line: usize, slice: f64, time: f64) -> Beam {
+        let line = line as f64;
         let place = |sample| probe.to_space(Indices { sample, line, slice });
         // Computed over the whole length, for precision.
         let last = (probe.samples - 1) as f64;
@@ -154,6 +155,65 @@ pub(super) fn mean_slices(echoes: &[Vec<Echo>], probe: &Probe, psf: &PointSpread
                 mean_grey(f64::from(scattered / power), f64::from(mirror * mirror / power))
             };
             (0..echoes[slice].len()).map(mean).collect()
+        })
+        .collect()
+}
+
+/// Grey values of all slices of a body that moves while the sweep goes on, in geometric order. The scatterers lie on planes of constant slice.
+/// A frame sees those that the point-spread function reaches, at the time of the frame: the motion is blurred in space and not over
+/// the times of other frames. `along` gives the echoes of such a plane, a fractional slice, at the time of a frame; only the diffuse ones are
+/// shown. `seed`: one realisation of the speckle, or else the mean over all.
+pub(super) fn moving_slices(
+    probe: &Probe,
+    psf: &PointSpread,
+    seed: Option<u64>,
+    along: impl Fn(usize, f64, &mut [Echo]) + Sync,
+) -> Vec<Vec<u8>> {
+    let (blur, frames) = (Blur::new(probe, psf), probe.slices.len());
+    let squared = blur.squared();
+    // Samples of a Gaussian one standard deviation apart have its power to 1e-4, wherever they begin.
+    let apart = blur.elevation.max(1.0);
+    let reach = reach(blur.elevation / apart);
+    let near = |frame: usize| {
+        let middle = (frame as f32 / apart).round() as isize;
+        let sd = blur.elevation;
+        (middle - reach..=middle + reach).map(move |k| (k, bell(k as f32 * apart - frame as f32, sd)))
+    };
+    let length = probe.lines.len() * probe.samples;
+    let last = ((frames - 1) as f32 / apart).round() as isize + reach;
+    let noise: Vec<Vec<(f32, f32)>> = (-reach..=last)
+        .into_par_iter()
+        .map(|k| {
+            let Some(seed) = seed else { return Vec::new() };
+            let stream = stream(seed, 0, k as u64);
+            (0..length as u64).map(|i| gaussian_pair(stream, i)).collect()
+        })
+        .collect();
+    (0..frames)
+        .into_par_iter()
+        .map(|frame| {
+            let power: f32 = near(frame).map(|(_, w)| w * w).sum();
+            let mut echoes = vec![Echo::SILENT; length];
+            let mut sum = Field::silent(length);
+            for (k, weight) in near(frame) {
+                along(frame, f64::from(k as f32 * apart), &mut echoes);
+                let noise = &noise[(k + reach) as usize];
+                for (i, echo) in echoes.iter().enumerate() {
+                    match noise.get(i) {
+                        Some((re, im)) => {
+                            let amplitude = weight * root(echo.diffuse) * (0.5 / power).sqrt();
+                            sum.re[i] += re * amplitude;
+                            sum.im[i] += im * amplitude;
+                        }
+                        None => sum.re[i] += (weight * root(echo.diffuse)).powi(2) / power,
+                    }
+                }
+            }
+            if seed.is_none() {
+                return squared.both_ways(&sum.re).into_iter().map(|power| mean_grey(f64::from(power), 0.0)).collect();
+            }
+            let sum = blur.apply(sum);
+            sum.re.iter().zip(&sum.im).map(|(re, im)| grey(10.0 * (re * re + im * im + 1e-20).log10())).collect()
         })
         .collect()
 }

@@ -249,7 +249,12 @@ impl Monkey {
 
 /// With few pipelines that nothing uses: 256 of them would be what the process may grow by.
 fn opened(validation: bool) -> Device {
-    Device::opened(ContextOptions { validation, max_unused_pipelines: 8, ..ContextOptions::default() })
+    Device::opened(ContextOptions {
+        validation,
+        specialize: validation,
+        max_unused_pipelines: 8,
+        ..ContextOptions::default()
+    })
 }
 
 /// Resident memory of this process, bytes.
