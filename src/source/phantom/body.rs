@@ -1,6 +1,6 @@
 //! The bodies of the phantom: their echoes, and the ground truth of those that have a formula.
 
-use super::head::Head;
+use super::head::{Head, Surroundings};
 use super::speckle::{Beam, DYNAMIC_RANGE, Echo};
 use crate::files::InputError;
 use crate::probe::Probe;
@@ -141,12 +141,11 @@ pub(super) enum Scatterers {
 }
 
 impl Scatterers {
-    /// `still`: a body that could move does not.
-    pub fn new(body: Body, probe: &Probe, still: bool) -> Scatterers {
+    pub fn new(body: Body, probe: &Probe, surroundings: &Surroundings) -> Scatterers {
         let face = probe.array_radius();
         let depth = |depth: f64| face + depth;
         let truth = match body {
-            Body::Head => return Scatterers::Head(Box::new(Head::new(face, still))),
+            Body::Head => return Scatterers::Head(Box::new(Head::new(face, surroundings))),
             Body::Sphere => Truth::Sphere {
                 centre: DVec3::new(4.0, depth(62.0), -3.0),
                 radius: 20.0,

@@ -31,6 +31,7 @@ use crate::source::frame::Frame;
 use crate::source::samples::SampleType;
 use crate::source::sequence::{self, MAX_FRAMES};
 use body::{Scatterers, refusal};
+use head::Surroundings;
 use rayon::prelude::*;
 use speckle::{Beam, Echo, grey};
 use std::fmt::Write as _;
@@ -43,6 +44,8 @@ const WOBBLE_RADIUS: f64 = 25.0;
 const SECTOR_ANGLE_DEG: f64 = 75.0;
 /// Default angle from the first frame to the last.
 pub const FAN_ANGLE_DEG: f64 = 61.0;
+/// Fluid between the near wall and the fetus where they are nearest, mm.
+pub const GAP: f64 = 29.9;
 /// Depth of the last sample, mm.
 const END_DEPTH: f64 = 120.0;
 /// m/s.
@@ -96,6 +99,10 @@ pub struct PhantomOptions {
     pub point_spread: PointSpread,
     /// The head does not move.
     pub still: bool,
+    /// Fluid between the near uterine wall and the fetus of body head where they are nearest, mm, 0..=29.9: the wall is so much thicker.
+    pub gap: f64,
+    /// Level of clutter in body head, dB re full scale, -60..=0: haze of reverberations and side lobes everywhere. None is none.
+    pub clutter_db: Option<f64>,
 }
 
 impl Default for PhantomOptions {
@@ -113,6 +120,8 @@ impl Default for PhantomOptions {
             fan_angle_deg: FAN_ANGLE_DEG,
             point_spread: PointSpread { axial_mm: 0.35, lateral_deg: 0.8, elevation_deg: 1.2 },
             still: false,
+            gap: GAP,
+            clutter_db: None,
         }
     }
 }
@@ -148,6 +157,12 @@ impl Phantom {
         if !(10.0..=120.0).contains(&options.fan_angle_deg) {
             return Err(refusal("fan_angle", format!("is {}, must lie in 10..=120", options.fan_angle_deg)));
         }
+        if !(0.0..=GAP).contains(&options.gap) {
+            return Err(refusal("gap", format!("is {}, must lie in 0..={GAP}", options.gap)));
+        }
+        if let Some(level) = options.clutter_db.filter(|level| !(-60.0..=0.0).contains(level)) {
+            return Err(refusal("clutter", format!("is {level}, must lie in -60..=0")));
+        }
         options.point_spread.check()?;
         let volumes = Volumes {
             both_ways: options.both_ways,
@@ -166,7 +181,8 @@ impl Phantom {
             advance: Advance::None,
             sound_speed: SOUND_SPEED,
         };
-        let scatterers = Scatterers::new(options.body, &probe, options.still);
+        let PhantomOptions { still, gap, clutter_db, .. } = options;
+        let scatterers = Scatterers::new(options.body, &probe, &Surroundings { still, gap, clutter_db });
         let phantom = Phantom { options, probe, volumes, scatterers };
         for volume in 0..phantom.options.volumes.min(2) {
             phantom.probe(volume).check().map_err(|e| refusal(e.field, e.fault))?;
