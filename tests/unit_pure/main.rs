@@ -27,5 +27,6 @@ mod sampling;
 mod sizes_in_mm;
 mod soak;
 mod supply;
+mod unveil;
 mod verify_report;
 mod workspace;
