@@ -17,6 +17,7 @@ use self::colours::{BACKGROUND, BUTTON, EDGE, ON_SELECTED, PANEL, SELECTED, TEXT
 use super::command::Command;
 use super::input::{Button, Input, Key, Modifiers, Phase};
 use crate::gpu;
+use crate::passes::unveil::StartLine;
 use crate::scene::Scene;
 use crate::ui::cine_player::CineState;
 use crate::ui::controls::Controls;
@@ -400,6 +401,8 @@ pub(super) struct PanelState<'a> {
     pub(super) notes: &'a [Note],
     /// The keys that end the program, for the help.
     pub(super) exit_key: &'a str,
+    /// Where rendering starts on planes beside it, if that follows the fluid.
+    pub(super) start_lines: &'a [StartLine],
     /// Where to draw a pointer, pixels of the window. None if the windowing system draws it.
     pub(super) pointer: Option<[f64; 2]>,
 }

@@ -6,6 +6,7 @@ mod cutting;
 mod gestures;
 mod layout;
 mod measuring;
+mod render_start;
 mod screen_reader;
 mod sequences;
 mod shown;

@@ -2,6 +2,7 @@
 
 use super::*;
 use crate::live::cine::CineVolume;
+use crate::passes::unveil::StartLine;
 use crate::source::phantom::{Phantom, PhantomOptions};
 use crate::ui::cine_player::{CinePlayer, CineState};
 use crate::ui::panels::accesskit::{Action, ActionData, ActionRequest, Node, NodeId, TreeId, TreeUpdate};
@@ -30,6 +31,7 @@ pub(super) struct Shown {
     pub(super) files: Option<(String, Vec<String>)>,
     /// Help, times, exports, the question whether to leave.
     pub(super) open: [bool; 4],
+    pub(super) start_lines: Vec<StartLine>,
     pub(super) pointer: Option<[f64; 2]>,
     /// What the last layout said.
     pub(super) tree: BTreeMap<NodeId, Node>,
@@ -69,6 +71,7 @@ impl Shown {
             notes: Vec::new(),
             files: None,
             open: [false; 4],
+            start_lines: Vec::new(),
             pointer: None,
             tree: BTreeMap::new(),
             focus: None,
@@ -121,6 +124,7 @@ impl Shown {
             banner: self.banner.clone(),
             notes: &self.notes,
             exit_key: "",
+            start_lines: &self.start_lines,
             pointer: self.pointer,
         };
         let output = self.panels.lay_out(&state, self.size, self.time);

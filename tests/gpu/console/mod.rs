@@ -7,6 +7,7 @@ mod idle;
 mod keyboard;
 mod metrics;
 mod monkey;
+mod render_start;
 mod shaders;
 mod tasks;
 mod warming;
