@@ -1,8 +1,10 @@
-// What cuts remove, set to a value of which nothing is drawn; all else as it is. A texel is removed if its centre is. All images hold the
-// stored part of the volume.
+// What cuts remove, and what is in front of the render start, set to a value of which nothing is drawn; all else as it is. A texel is removed if
+// its centre is. All images hold the stored part of the volume.
 #version 460
 #include "common.glsl"
 layout(constant_id = 0) const int SWEEP = 1;               // 0 Cartesian, 1 fan, 2 translated, 3 still
+layout(constant_id = 2) const int CUTS = 1;                // 1: there are some
+layout(constant_id = 3) const int UNVEILS = 0;             // 1: rendering starts at a surface
 layout(constant_id = 36) const int INTRA_FRAME_MOTION = 0; // 1: the motor moves while a frame is acquired
 layout(scalar) uniform Params {
     float removed; // the value of what is removed
@@ -17,6 +19,7 @@ uniform texture3D source;
 uniform texture2D line_shares; // of INTRA_FRAME_MOTION: share of the frame's lines that fired before the one at a texel
 readonly buffer SlicePlaces { vec4 entry[]; } slice_places; // of a fan cosine and sine of the angle, otherwise z in y; then the motor's advance
 readonly buffer Cuts { vec4 entry[]; } cuts;                // each: HEADER entries, then an edge of its contour in each
+uniform texture2D start_surface; // of UNVEILS: by column and slice, the row at which rendering starts
 uniform writeonly image3D target;
 
 const int HEADER = 5;
@@ -97,6 +100,8 @@ void main() {
     ivec3 at = ivec3(gl_GlobalInvocationID) + ivec3(first_column, first_row, slice);
     ivec3 stored = at - first_stored;
     if (any(greaterThanEqual(stored, imageSize(target)))) return;
-    float value = is_removed(place_of(at)) ? removed : texelFetch(source, stored, 0).x;
+    bool is_drawn = CUTS == 0 || !is_removed(place_of(at));
+    if (UNVEILS == 1) is_drawn = is_drawn && float(at.y) >= texelFetch(start_surface, at.xz, 0).x;
+    float value = is_drawn ? texelFetch(source, stored, 0).x : removed;
     imageStore(target, stored, vec4(value, 0.0, 0.0, 0.0));
 }

@@ -363,6 +363,12 @@ pub struct MakePhantom {
     /// Share by which the rate of the heart rises and falls within 8 s, 0..0.3
     #[arg(long, value_name = "SHARE", default_value_t = 0.0)]
     heart_swing: f64,
+    /// Body head: fluid between the near uterine wall and the fetus where they are nearest, mm, 0 to 29.9; the wall is so much thicker [default: 29.9]
+    #[arg(long, value_name = "MM")]
+    gap: Option<f64>,
+    /// Body head: level of clutter (reverberations and side lobes) everywhere, dB re full scale, -60 to 0 [default: none]
+    #[arg(long, value_name = "DB", allow_negative_numbers = true)]
+    clutter: Option<f64>,
     /// Also write what is where in the first volume of the head: labels to this file (.mha, or .seg.nrrd with their names for 3D Slicer), and the signed distance from the
     /// skin, mm, to NAME.distance.mha. 0 fluid, 1 skin, 2 hand, 3 cord, 4 skull, 5 brain, 6 choroid plexus, 7 ventricle, 8 falx, 9 uterus
     #[arg(long, value_name = "FILE")]
@@ -403,6 +409,8 @@ impl MakePhantom {
             },
             still: self.still || usual.still,
             heart_swing: self.heart_swing,
+            gap: self.gap.unwrap_or(usual.gap),
+            clutter_db: self.clutter,
             ..usual
         };
         let phantom = Phantom::new(options).map_err(input)?;

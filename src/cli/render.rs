@@ -140,8 +140,13 @@ impl Render {
             },
         )?;
         let compared = finer.map(|finer| (scene, finer));
-        let shown = marked::as_set(&picture, renderer.scene()).map_err(failed)?;
+        let shown = marked::as_set(&picture, renderer.scene(), renderer.unveiled()).map_err(failed)?;
         output.write(|format| shown.encoded(format))?;
+        if let Some(outcome) =
+            renderer.unveiled().map(|unveiled| unveiled.outcome).filter(|outcome| !outcome.is_found())
+        {
+            remark(&format!("unveil: {outcome}"));
+        }
         let measured = renderer.take_times().map_err(failed)?;
         self.judge_budget(&measured)?;
         if let Some(colour) = one_colour::of(&picture) {

@@ -276,7 +276,8 @@ impl Series<'_> {
                 renderer.show(0)?;
             }
             let picture = renderer.picture()?;
-            let shown = marked::as_set(&picture, renderer.scene()).map_err(|e| DrawFault::Source(failed(e)))?;
+            let shown = marked::as_set(&picture, renderer.scene(), renderer.unveiled())
+                .map_err(|e| DrawFault::Source(failed(e)))?;
             // Before the picture is written: a device that is lost here draws it again.
             let why = match one_colour::of(&picture).filter(|_| n == 0) {
                 Some(colour) => {

@@ -11,6 +11,7 @@ use crate::live::{Feed, FinishedPicture, Statistics, Step, Stream as Live, Strea
 use crate::machine::resident_bytes;
 use crate::marked;
 use crate::passes::Slot;
+use crate::passes::unveil::Unveiled;
 use crate::picture;
 use crate::scene::Scene;
 use crate::terminal::{Failure, failed, input, is_closed, remark, say};
@@ -120,6 +121,8 @@ impl Stream {
         let (mut pictures, mut losses, mut enough_at) = (0, Losses::default(), None);
         // Said of the first picture that is wholly one colour, not of every one.
         let mut explained = false;
+        // Said when the fluid is lost, not of every picture without it.
+        let mut was_found = true;
         let end = loop {
             let step = match stream.step(Duration::from_millis(50)) {
                 // The device is busy, and a signal is not to wait for it.
@@ -143,7 +146,13 @@ impl Stream {
             let drew = matches!(step, Step::Picture(_));
             match step {
                 Step::Picture(shown) => {
-                    let file = self.write_picture(&shown, stream.scene(), update, pictures)?;
+                    let start = stream.renderer().and_then(|renderer| renderer.unveiled().cloned());
+                    let is_found = start.as_ref().is_none_or(|start| start.outcome.is_found());
+                    if let Some(start) = start.as_ref().filter(|_| was_found && !is_found) {
+                        remark(&format!("unveil: {}", start.outcome));
+                    }
+                    was_found = is_found;
+                    let file = self.write_picture(&shown, stream.scene(), start.as_ref(), update, pictures)?;
                     if !explained && let Some(file) = file {
                         explained = explain_one_colour(stream, &shown, &file)?;
                     }
@@ -231,6 +240,7 @@ impl Stream {
         &self,
         shown: &FinishedPicture,
         scene: Option<&Scene>,
+        start: Option<&Unveiled>,
         update: Update,
         number: u64,
     ) -> Result<Option<PathBuf>, Failure> {
@@ -241,7 +251,7 @@ impl Stream {
         };
         let file = folder.join(name);
         if let (Some(picture), Some(scene)) = (&shown.picture, scene) {
-            marked::as_set(picture, scene).and_then(|picture| picture.save(&file)).map_err(failed)?;
+            marked::as_set(picture, scene, start).and_then(|picture| picture.save(&file)).map_err(failed)?;
         }
         Ok(Some(file))
     }

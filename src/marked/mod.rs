@@ -4,6 +4,7 @@
 mod strokes;
 
 use crate::canvas::{self, Canvas, Drawing, Drawn};
+use crate::passes::unveil::{self, Unveiled};
 use crate::picture::Picture;
 use crate::scene::Scene;
 use crate::scene::marks::TileMarks;
@@ -26,15 +27,17 @@ pub fn time_line(now: SystemTime) -> String {
     now.replace('T', " ").replace('Z', " UTC")
 }
 
-/// A picture of the scene as its settings ask for it to be saved: with its measurements, and with marks and a bar if `marks.bar` is set.
+/// A picture of the scene as its settings ask for it to be saved: with its measurements, and with marks and a bar if `marks.bar` is set. `start`:
+/// where its rendering starts, if that follows the fluid.
 ///
 /// # Errors
 /// One line: the picture is not of this scene's size, or the drawing failed.
-pub fn as_set<'a>(picture: &'a Picture, scene: &Scene) -> Result<Cow<'a, Picture>, String> {
+pub fn as_set<'a>(picture: &'a Picture, scene: &Scene, start: Option<&Unveiled>) -> Result<Cow<'a, Picture>, String> {
+    let has_lines = scene.has_reference() || start.is_some();
     match scene.settings.marks.bar {
-        false if scene.settings.measure.is_empty() && !scene.has_reference() => Ok(Cow::Borrowed(picture)),
-        false => measured(picture, scene).map(Cow::Owned),
-        true => marked(picture, scene, &time_line(SystemTime::now()), None).map(Cow::Owned),
+        false if scene.settings.measure.is_empty() && !has_lines => Ok(Cow::Borrowed(picture)),
+        false => measured(picture, scene, start).map(Cow::Owned),
+        true => marked(picture, scene, start, &time_line(SystemTime::now()), None).map(Cow::Owned),
     }
 }
 
@@ -42,13 +45,19 @@ pub fn as_set<'a>(picture: &'a Picture, scene: &Scene) -> Result<Cow<'a, Picture
 ///
 /// # Errors
 /// One line: the picture is not of this scene's size, or the drawing failed.
-pub fn marked(picture: &Picture, scene: &Scene, time: &str, origin: Option<&str>) -> Result<Picture, String> {
+pub fn marked(
+    picture: &Picture,
+    scene: &Scene,
+    start: Option<&Unveiled>,
+    time: &str,
+    origin: Option<&str>,
+) -> Result<Picture, String> {
     if [picture.width, picture.height] != scene.picture_size() {
         let [width, height] = scene.picture_size();
         return Err(format!("a picture of {} x {} is no scene of {width} x {height}", picture.width, picture.height));
     }
     let marks = scene.marks();
-    let mut marked = measured(picture, scene)?;
+    let mut marked = measured(picture, scene, start)?;
     let square = LETTER_SHARE * f64::from(picture.width.min(picture.height));
     let square = square.clamp(LETTER[0], LETTER[1]).round() as u32;
     for tile in &marks {
@@ -61,14 +70,15 @@ pub fn marked(picture: &Picture, scene: &Scene, time: &str, origin: Option<&str>
     Ok(marked)
 }
 
-/// A picture of the scene with its measurements and annotations, and the lines of its reference tile.
+/// A picture of the scene with its measurements and annotations, the lines of its reference tile, and the line at which rendering starts.
 ///
 /// # Errors
 /// One line: the drawing failed.
-pub fn measured(picture: &Picture, scene: &Scene) -> Result<Picture, String> {
+pub fn measured(picture: &Picture, scene: &Scene, start: Option<&Unveiled>) -> Result<Picture, String> {
     let mut measured = picture.clone();
     if [picture.width, picture.height] == scene.picture_size() {
         strokes::slices(&mut measured, scene)?;
+        start.iter().for_each(|start| strokes::start(&mut measured, &unveil::lines(scene, start)));
         strokes::draw(&mut measured, scene)?;
     }
     Ok(measured)
@@ -249,7 +259,8 @@ mod tests {
     #[test]
     fn the_bar_is_below_and_letters_and_dot_stand_at_their_edges() {
         let scene = scene(&["mode='plane'", "marks.lateral='right-left'"]);
-        let drawn = marked(&grey([120, 96]), &scene, "2026-11-23 20:00:00 UTC", Some("Demo data")).expect("marked");
+        let drawn =
+            marked(&grey([120, 96]), &scene, None, "2026-11-23 20:00:00 UTC", Some("Demo data")).expect("marked");
         assert!(drawn.width == 120 && drawn.height > 96 && drawn.rgba.len() == (4 * 120 * drawn.height) as usize);
         for (at, is) in
             [([0.1, 0.5], true), ([0.9, 0.5], true), ([0.1, 0.1], true), ([0.5, 0.5], false), ([0.9, 0.1], false)]
@@ -259,7 +270,8 @@ mod tests {
         let bar = &drawn.rgba[4 * 120 * 96..];
         let bright = bar.chunks_exact(4).filter(|p| p[0] > 180).count();
         assert!(bright > 100, "{bright} pixels of text and scale");
-        let later = marked(&grey([120, 96]), &scene, "2026-11-23 20:00:01 UTC", Some("Demo data")).expect("marked");
+        let later =
+            marked(&grey([120, 96]), &scene, None, "2026-11-23 20:00:01 UTC", Some("Demo data")).expect("marked");
         assert_ne!(later, drawn, "the time is written");
     }
 
@@ -267,7 +279,7 @@ mod tests {
     fn measurements_are_drawn_where_they_lie_and_without_a_bar_too() {
         let caliper = "measure=[{ kind = 'distance', points = [[-5, 14.5, 0], [5, 14.5, 0]] }]";
         let scene = scene(&["mode='plane'", caliper]);
-        let drawn = measured(&grey([120, 96]), &scene).expect("drawn");
+        let drawn = measured(&grey([120, 96]), &scene, None).expect("drawn");
         assert_eq!((drawn.width, drawn.height), (120, 96));
         // The middle of the line is in the middle of the plane.
         let middle = 4 * (48 * 120 + 60) as usize;
@@ -292,7 +304,7 @@ mod tests {
 
     #[test]
     fn a_picture_of_another_size_is_refused() {
-        let fault = marked(&grey([64, 64]), &scene(&[]), "", None).expect_err("refused");
+        let fault = marked(&grey([64, 64]), &scene(&[]), None, "", None).expect_err("refused");
         assert!(fault.contains("64 x 64"), "{fault}");
     }
 

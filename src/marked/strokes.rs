@@ -3,12 +3,15 @@
 use super::blend;
 use crate::canvas::{self, Canvas, Drawing, Drawn};
 use crate::measure::overlay;
+use crate::passes::unveil::StartLine;
 use crate::picture::Picture;
 use crate::scene::Scene;
 use plotters::prelude::{BLACK, DrawingBackend, ShapeStyle, WHITE};
 
 /// Colour of lines: yellow, which no tissue has.
 const LINE: [u8; 3] = [255, 214, 64];
+/// Colour of the line at which rendering starts: green, as on scanners.
+const START: [u8; 3] = [64, 235, 96];
 const EDGE: [u8; 3] = [0, 0, 0];
 /// Half the width of a line, and of its dark edge, pixels.
 const HALF: f64 = 0.8;
@@ -69,6 +72,15 @@ pub(super) fn slices(picture: &mut Picture, scene: &Scene) -> Result<(), String>
     let bottom = tile[0][1] + tile[1][1] - f64::from(TEXT + 8);
     blend(picture, &label, [tile[0][0].round() as i64 + 2, bottom.round() as i64]);
     Ok(())
+}
+
+/// Draws where rendering starts on the planes.
+pub(super) fn start(picture: &mut Picture, lines: &[StartLine]) {
+    for (half, colour) in [(HALF_EDGE, EDGE), (HALF, START)] {
+        for line in lines {
+            line.pieces.iter().for_each(|ends| stroke(picture, line.tile, *ends, half, colour));
+        }
+    }
 }
 
 /// Draws a line with smooth borders, within a tile.

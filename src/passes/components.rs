@@ -21,9 +21,36 @@ struct Run {
     row: u32,
 }
 
+/// The parts of a lattice, by their runs.
+pub struct Parts {
+    columns: usize,
+    runs: Vec<Run>,
+    /// By run: the first run of its part.
+    roots: Vec<usize>,
+}
+
 impl Lattice<'_> {
     /// By texel, the column fastest: true in a part whose size is below `least`. `is_set` holds for the texels of parts.
     pub fn floating(&self, is_set: impl Fn(usize) -> bool, least: u64) -> Vec<bool> {
+        let [columns, rows, slices] = self.size;
+        let parts = self.parts(is_set);
+        let mut sizes = vec![0u64; parts.runs.len()];
+        for (run, root) in parts.runs.iter().zip(&parts.roots) {
+            let [start, end] = run.columns;
+            sizes[*root] =
+                sizes[*root].saturating_add(self.sizes[run.row as usize].saturating_mul(u64::from(end - start)));
+        }
+        let mut floats = vec![false; columns * rows * slices];
+        for (run, root) in parts.runs.iter().zip(&parts.roots) {
+            if sizes[*root] < least {
+                floats[run.texels(columns)].fill(true);
+            }
+        }
+        floats
+    }
+
+    /// The parts of the texels for which `is_set` holds.
+    pub fn parts(&self, is_set: impl Fn(usize) -> bool) -> Parts {
         let [columns, rows, slices] = self.size;
         let mut runs: Vec<Run> = Vec::new();
         // The runs of each row, by slice and row.
@@ -53,21 +80,32 @@ impl Lattice<'_> {
                 }
             }
         }
-        let mut sizes = vec![0u64; runs.len()];
-        for (n, run) in runs.iter().enumerate() {
-            let [start, end] = run.columns;
-            let root = root(&mut parents, n);
-            sizes[root] =
-                sizes[root].saturating_add(self.sizes[run.row as usize].saturating_mul(u64::from(end - start)));
-        }
-        let mut floats = vec![false; columns * rows * slices];
-        for (n, run) in runs.iter().enumerate() {
-            if sizes[root(&mut parents, n)] < least {
-                let [start, end] = run.columns.map(|column| run.row as usize * columns + column as usize);
-                floats[start..end].fill(true);
+        let roots = (0..runs.len()).map(|run| root(&mut parents, run)).collect();
+        Parts { columns, runs, roots }
+    }
+}
+
+impl Parts {
+    /// By texel: the part that it belongs to, in the order of their first texels from 1 on; 0 in none.
+    pub fn numbers(&self, texels: usize) -> Vec<u32> {
+        let mut numbers = vec![0; texels];
+        let (mut of_root, mut count) = (vec![0; self.runs.len()], 0);
+        for (run, root) in self.runs.iter().zip(&self.roots) {
+            // The root is the first run of its part.
+            if of_root[*root] == 0 {
+                count += 1;
+                of_root[*root] = count;
             }
+            numbers[run.texels(self.columns)].fill(of_root[*root]);
         }
-        floats
+        numbers
+    }
+}
+
+impl Run {
+    fn texels(&self, columns: usize) -> Range<usize> {
+        let [start, end] = self.columns.map(|column| self.row as usize * columns + column as usize);
+        start..end
     }
 }
 

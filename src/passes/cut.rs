@@ -1,5 +1,6 @@
-//! Cuts: the volume that rays are cast through, without what lies within (or outside of) the contours that the user drew. The volume stays as it
-//! is beside it, so that a cut that is drawn, changed or taken back needs no frame again.
+//! Cuts: the volume that rays are cast through, without what lies within (or outside of) the contours that the user drew, and in front of the
+//! render start that follows the fluid (`unveil`). The volume stays as it is beside it, so that a cut that is drawn, changed or taken back needs no
+//! frame again.
 //!
 //! A texel is removed if its centre is, and gets a value of which the rendering draws nothing. What skips empty space, packed neighbours and the light
 //! volume read what is left.
@@ -15,18 +16,20 @@ pub const PASS: Pass = Pass {
     frequency: Frequency::Volume,
     link: Link::AfterSlices,
     shader: |_, _| "preprocess/cut",
-    needed: |s| match s.has_cuts() {
-        true => Ok("what was cut away is not drawn"),
-        false => Err("nothing is cut away, or nothing is drawn that could be"),
+    needed: |s| match (s.has_cuts(), s.unveils()) {
+        (true, true) => Ok("what was cut away, and what is in front of the fluid, is not drawn"),
+        (true, false) => Ok("what was cut away is not drawn"),
+        (false, true) => Ok("what is in front of the fluid is not drawn"),
+        (false, false) => Err("nothing is cut away, or nothing is drawn that could be"),
     },
     // A slice changes with the frames that are smoothed into it.
     reads: |s, _| {
-        let mut reads = vec![
-            Bind { part: Part::Around(s.reach_to_frames()), ..whole("source", Slot::Volume) },
-            whole("slice_places", Slot::SlicePlaces),
-            whole("cuts", Slot::Cuts),
-        ];
-        reads.extend(s.moves_in_frames().then_some(whole("line_shares", Slot::LineShares)));
+        let mut reads = vec![Bind { part: Part::Around(s.reach_to_frames()), ..whole("source", Slot::Volume) }];
+        if s.has_cuts() {
+            reads.extend([whole("slice_places", Slot::SlicePlaces), whole("cuts", Slot::Cuts)]);
+            reads.extend(s.moves_in_frames().then_some(whole("line_shares", Slot::LineShares)));
+        }
+        reads.extend(s.unveils().then_some(whole("start_surface", Slot::StartSurface)));
         reads
     },
     writes: |_, _| vec![Bind { part: Part::Around(0), ..whole("target", Slot::CutVolume) }],
@@ -51,7 +54,12 @@ pub const PASS: Pass = Pass {
                 Motion::Still { .. } => 3,
             },
         };
-        vec![("SWEEP", sweep), ("INTRA_FRAME_MOTION", s.moves_in_frames() as i32)]
+        vec![
+            ("SWEEP", sweep),
+            ("INTRA_FRAME_MOTION", (s.has_cuts() && s.moves_in_frames()) as i32),
+            ("CUTS", s.has_cuts() as i32),
+            ("UNVEILS", s.unveils() as i32),
+        ]
     },
     tolerance: Tolerance {
         absolute: 5e-4,
@@ -67,7 +75,8 @@ pub const PASS: Pass = Pass {
         for z in args.slice..args.slice + args.slices {
             for (x, y) in (0..source.size[1]).flat_map(|y| (0..source.size[0]).map(move |x| (x, y))) {
                 let place = scene.texel_place([x as u32, y as u32, z]);
-                let is_removed = cuts.iter().any(|cut| cut.removes(place));
+                let is_before = scene.unveils() && (y as f64) < reads.get("start_surface").one(x, z as usize, 0);
+                let is_removed = is_before || cuts.iter().any(|cut| cut.removes(place));
                 let value = if is_removed { removed(scene) } else { source.one(x, y, z as usize) };
                 target.set([x, y, z as usize], &[value]);
             }

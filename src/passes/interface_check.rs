@@ -11,11 +11,12 @@ use crate::spirv::volumes_to_layers::volumes_to_layers;
 use crate::spirv::{self, Access, Dimension, Kind, Member, Module};
 
 /// Textures and tables that a shader declares and a pass may not bind. Specialization constants say whether they are read or written.
-const OPTIONAL: [&str; 25] = [
+const OPTIONAL: [&str; 28] = [
     "back_light",
     "before",
     "bricks",
     "composited",
+    "cuts",
     "distance_map",
     "front",
     "hit_distance",
@@ -29,7 +30,9 @@ const OPTIONAL: [&str; 25] = [
     "planes",
     "rows",
     "shadow",
+    "slice_places",
     "slice_table",
+    "start_surface",
     "step_result",
     "surface",
     "sweep_lut",

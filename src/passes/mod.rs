@@ -12,6 +12,7 @@ pub mod measure;
 pub mod pass;
 pub mod slots;
 pub mod texels;
+pub mod unveil;
 
 pub mod filter {
     pub mod aos;

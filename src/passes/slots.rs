@@ -169,8 +169,12 @@ slots! {
         .by_volume(|a, b| a.floating_basis() != b.floating_basis());
     /// The 3D texture that rays are cast through: the part that is visible.
     Volume = D::image("volume", volume, volume_format).multibuffered().clear().across_queues();
-    /// The volume without what cuts remove: rays are cast through it in place of the other.
+    /// The volume without what is removed, by cuts or in front of the render start: rays are cast through it in place of the other.
     CutVolume = D::image("cut_volume", volume, volume_format).multibuffered().clear();
+    /// The row of each column and slice of the volume at which rendering starts.
+    StartSurface = D::image("start_surface", |s| Shape::Two([s.grid.size[0], s.slices()]), |_| Format::R32f)
+        .by_volume(|a, b| a.unveil_basis() != b.unveil_basis())
+        .multibuffered();
     /// The cuts: the axes of their views, and the edges of their contours.
     Cuts = D::table("cuts", |s| Shape::Buffer(16 * cut::table_length(s) as u32), cut::table, ByContent);
     /// Where each slice is.
@@ -465,9 +469,9 @@ impl Slot {
         of_rays || matches!(self, Slot::SectionVolume | Slot::SharpSectionVolume)
     }
 
-    /// The volume that rays are cast through: without what cuts remove.
+    /// The volume that rays are cast through: without what is removed.
     pub fn of_rays(scene: &Scene) -> Slot {
-        if scene.has_cuts() { Slot::CutVolume } else { Slot::Volume }
+        if scene.removes() { Slot::CutVolume } else { Slot::Volume }
     }
 
     /// The volume that planes are cut from: their own beside a rendering if they have one, otherwise that of the rays, with what is dropped

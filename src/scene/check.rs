@@ -47,6 +47,8 @@ pub(super) fn check(settings: &Settings) -> Result<(), SceneError> {
         return refuse("layout", "pair shows a volume and the surface found in the same march: set mode=surface");
     }
     within("floating", settings.floating, 0.0, 1e9)?;
+    within("unveil.offset", settings.unveil.offset, -100.0, 100.0)?;
+    within("unveil.smoothing", settings.unveil.smoothing, 0.0, 20.0)?;
     let s = &settings.slices;
     within("slices.pixels", f64::from(s.pixels), 2.0, 4096.0)?;
     check_smooth(

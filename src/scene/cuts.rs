@@ -135,6 +135,11 @@ impl Scene {
         !self.settings.cuts.is_empty() && (self.composites() || self.detects_surface() || self.projects())
     }
 
+    /// True if rays are cast through a volume without what is removed: by cuts, or in front of the render start.
+    pub fn removes(&self) -> bool {
+        self.has_cuts() || self.unveils()
+    }
+
     /// Corners of all contours, and points of all brushes.
     pub fn cut_corners(&self) -> usize {
         self.settings.cuts.iter().map(|cut| cut.contour.len() + cut.brush.as_ref().map_or(0, Brush::points)).sum()

@@ -23,6 +23,7 @@ mod sizes;
 mod slice_index;
 pub mod transfer;
 mod turntable;
+pub mod unveil;
 pub mod variants;
 pub mod visible_bounds;
 
@@ -344,6 +345,7 @@ impl Scene {
         scene.apron = 2.0 + scene.filter_reach();
         floating::check_floating(&scene)?;
         cuts::check_drawn(&scene)?;
+        unveil::check_unveiled(&scene)?;
         check::check_planes_resolved(&scene)?;
         scene.visible_bounds = visible_bounds::of(&scene);
         Ok(scene)
@@ -624,9 +626,10 @@ impl Scene {
         [lateral, depth, if self.sharpens() { 1 } else { elevation }]
     }
 
-    /// Frames on either side that change a slice of the volume that rays are cast through: all of them where parts that float are dropped.
+    /// Frames on either side that change a slice of the volume that rays are cast through: all of them where parts that float are dropped, or the
+    /// render start follows the fluid.
     pub fn reach_to_frames(&self) -> u32 {
-        if self.drops_floating() { self.slices() } else { self.smoothing_radius()[2] }
+        if self.drops_floating() || self.unveils() { self.slices() } else { self.smoothing_radius()[2] }
     }
 
     /// Neighbours on either side that a filtered slice is made of, in the volume with the most.

@@ -34,7 +34,7 @@ const MODES: [(Mode, &str); 10] = [
 const SAMPLINGS: [&str; 3] = ["hardware", "exact", "quads"];
 
 /// Filters, lights and other choices that are structure: each line is a table of a scene file.
-const CHOICES: [&str; 46] = [
+const CHOICES: [&str; 47] = [
     "slices.median = true",
     "slices.sigma = {}",
     "slices.enhanced_sigma = { window = 5, largest = 19, sigma = 0.1 }",
@@ -77,6 +77,7 @@ const CHOICES: [&str; 46] = [
     "mode = 'vr'\nlight.volume = { ground = {}, back = 0 }\nregion.fade = 6",
     "mode = 'mixed'\nlight.volume = {}",
     "mode = 'vr'\nfloating = 100",
+    "mode = 'vr'\nunveil.enabled = true",
     "mode = 'vr'\ncuts = [{ contour = [[0, 0], [1, 0], [0, 1]], view = { at = [0, 0, 0], direction = [0, 1, 0], up = [0, 0, 1] } }]",
     "mode = 'vr'\nlayout = '4up'\nplanes.smooth = { lateral = 0.5, depth = 0.5, elevation = 1 }",
     "mode = 'vr'\nvolume.shading = 'first-hit'",

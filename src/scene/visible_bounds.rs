@@ -160,8 +160,8 @@ impl Scene {
 /// The visible bounds of a scene.
 pub(super) fn of(scene: &Scene) -> VisibleBounds {
     let counts_growth = scene.settings.slices.enhanced_sigma.is_some_and(|e| e.growth);
-    // A part is as large as it is in all of the sector.
-    if scene.settings.slices.everything || counts_growth || scene.drops_floating() {
+    // A part is as large as it is in all of the sector, and fluid lies where it does whatever the region is.
+    if scene.settings.slices.everything || counts_growth || scene.drops_floating() || scene.unveils() {
         return VisibleBounds::all(scene.volume_size());
     }
     looks(scene).iter().filter_map(|look| touched(scene, look)).fold(VisibleBounds::default(), VisibleBounds::with)

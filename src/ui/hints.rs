@@ -4,7 +4,7 @@ use super::command::{Tool, Viewpoint};
 use crate::scene::{Layout, MeasureKind, Mode};
 
 /// By name of a slider: what it does.
-const SLIDERS: [(&str, &str); 50] = [
+const SLIDERS: [(&str, &str); 53] = [
     ("Gain", "Makes the picture brighter or darker as a whole."),
     ("Contrast", "Spreads bright and dark apart."),
     ("Gamma", "Brightens (above 1) or darkens the middle tones; black and white stay."),
@@ -16,6 +16,12 @@ const SLIDERS: [(&str, &str); 50] = [
         "Depth of cut",
         "How deep the last cut is, from where its contour meets the region. 0: it goes through everything.",
     ),
+    (
+        "Auto render start",
+        "Starts rendering at the fluid before the face: the wall in front of it goes. Where no fluid is found, nothing changes.",
+    ),
+    ("Start offset", "How far behind the near face of the fluid rendering starts: more removes more."),
+    ("Start smoothing", "Smooths the surface at which rendering starts."),
     ("Planes zoom", "Enlarges the planes."),
     ("Slab", "Thickness of the planes: a thick slab shows less speckle and more of what runs along it."),
     ("Spacing", "Distance between neighbouring slices. 0: they divide the region evenly."),

@@ -117,6 +117,10 @@ pub(super) const GAIN: usize = 0;
 pub(super) const THRESHOLD: usize = 3;
 pub(super) const PLANES_ZOOM: usize = 7;
 
+/// The switch of the render start that follows the fluid.
+pub(super) const AUTO_START: &str = "Auto render start";
+pub(super) const START_OFFSET: &str = "Start offset";
+
 /// Greatest depth of a cut that the slider sets, mm.
 const DEEPEST: f64 = 200.0;
 
@@ -304,6 +308,17 @@ pub const SLIDERS: &[Slider] = &[
             }
         },
     ),
+    slider(AUTO_START, "", Image, [0.0, 1.0], 1.0).reruns().of(
+        can_unveil,
+        |s| f64::from(u8::from(s.unveil.enabled)),
+        |s, v| s.unveil.enabled = v >= 0.5,
+    ),
+    slider(START_OFFSET, "mm", Image, [-10.0, 30.0], 0.5).of(unveils, |s| s.unveil.offset, |s, v| s.unveil.offset = v),
+    slider("Start smoothing", "mm", Image, [0.0, 10.0], 0.5).of(
+        unveils,
+        |s| s.unveil.smoothing,
+        |s, v| s.unveil.smoothing = v,
+    ),
     slider("Step", "mm", Quality, [0.0, 2.0], 0.05).of(
         renders_rays,
         |s| s.ray.step.unwrap_or(0.0),
@@ -320,6 +335,15 @@ pub const SLIDERS: &[Slider] = &[
         |s, v| s.ray.rays = if s.ray.apart() > 1 { 1 } else { v.round() as u32 },
     ),
 ];
+
+/// True if rendering may start at the fluid.
+fn can_unveil(s: &Settings) -> bool {
+    !s.mode.is_flat() && s.mode != Mode::Cube
+}
+
+fn unveils(s: &Settings) -> bool {
+    can_unveil(s) && s.unveil.enabled
+}
 
 fn always(_: &Settings) -> bool {
     true

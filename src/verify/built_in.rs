@@ -279,6 +279,13 @@ fn plane_scenes() -> Vec<SceneSpec> {
         ("Cartesian, 4-up, planes of all samples", &voxels, "mode = 'vr'\nlayout = 'four'\nplanes.smooth = {}"),
         ("fan, parts that float", &Geometry::Sweep(wobbler()), "mode = 'vr'\nfloating = 30"),
         ("fan, two cuts and a brush", &Geometry::Sweep(wobbler()), TWO_CUTS),
+        ("fan, start at the fluid", &Geometry::Sweep(wobbler()), "mode = 'vr'\nunveil.enabled = true"),
+        (
+            "translated, a cut behind the start at the fluid",
+            &Geometry::Sweep(linear()),
+            "mode = 'minip'\nunveil = { enabled = true, offset = 2 }\n\
+             cuts = [{ contour = [[-5, -4], [6, -4], [0, 9]], view = { at = [0, 20, 0], direction = [0, 1, 1], up = [1, 0, 0] }, depth = 9 }]",
+        ),
         (
             "fan, motor moving, a cut beside planes",
             &Geometry::Sweep(moving()),

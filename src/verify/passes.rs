@@ -241,6 +241,11 @@ fn input(scene: &Scene, bind: &Bind, slices: u32, kind: &str, noise: &mut Noise)
             _ => 0.0,
         };
     }
+    if bind.slot == Slot::StartSurface {
+        // Rows of the volume, and beyond both ends.
+        let rows = f64::from(scene.grid.size[1]);
+        texels.values.iter_mut().for_each(|v| *v = *v * 1.2 * rows - 0.1 * rows);
+    }
     if bind.slot == Slot::Picture || bind.slot == Slot::SmoothPicture {
         // The passes write alpha as 0 or 1.
         texels.values.chunks_exact_mut(4).for_each(|p| p[3] = p[3].round());

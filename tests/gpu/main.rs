@@ -54,6 +54,7 @@ mod stored_volume;
 mod tiles;
 mod timing;
 mod truth;
+mod unveil;
 mod verify_groups;
 mod visible_bounds;
 mod volume_storage;

@@ -28,6 +28,7 @@ mod sampling;
 mod sizes_in_mm;
 mod soak;
 mod supply;
+mod unveil;
 mod user_presets;
 mod verify_report;
 mod workspace;

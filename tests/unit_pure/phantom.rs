@@ -7,6 +7,7 @@ use echolume::source::phantom::{
     Body, DYNAMIC_RANGE, Label, Phantom, PhantomOptions, PointSpread, Sampling, Speckle, Truth, distance_path,
 };
 use echolume::source::{Frame, Recording};
+use glam::DVec3;
 use std::fs;
 
 /// A small sweep: the tests need no more.
@@ -485,4 +486,47 @@ fn the_written_truth_reads_back_and_has_every_label() {
     assert_eq!(distance_path(&path), folder.join("named.distance.mha"));
     let named = read(&path);
     assert!(named.iter().zip(&labels).all(|(a, b)| a.bytes == b.bytes) && named.len() == labels.len());
+}
+
+/// Fluid between the near wall and the fetus, where they are nearest.
+#[test]
+fn the_gap_is_the_fluid_between_the_wall_and_the_fetus() {
+    for gap in [13.0, 5.0, 2.0] {
+        let head = phantom(PhantomOptions { gap, still: true, ..small(Body::Head) });
+        let face = head.probe(0).array_radius();
+        // The wall's inner face, and the first of the fetus below it, by lines along the depth.
+        let (mut walls, mut skins) = (Vec::new(), Vec::new());
+        for (x, z) in (-32..=32).flat_map(|x| (-32..=32).map(move |z| (1.25 * f64::from(x), 1.25 * f64::from(z)))) {
+            let at = |depth: f64| DVec3::new(x, face + depth, z);
+            let mut labels =
+                (6..240).map(|n| 0.25 * f64::from(n)).map(|depth| (at(depth), head.label(0, at(depth)).unwrap()));
+            walls.extend(labels.find(|(_, label)| *label != Label::Uterus).map(|(place, _)| place));
+            skins.extend(labels.find(|(_, label)| *label != Label::Fluid).map(|(place, _)| place));
+        }
+        let of = |skin: &DVec3| walls.iter().map(|wall| wall.distance(*skin)).fold(f64::INFINITY, f64::min);
+        let least = skins.iter().map(of).fold(f64::INFINITY, f64::min);
+        println!("{gap} {least}");
+    }
+}
+
+/// Speckle of clutter adds to what is dark, and hardly to what is bright.
+#[test]
+fn clutter_lifts_fluid_to_its_level() {
+    let of = |clutter_db| {
+        let mean = PhantomOptions { clutter_db, speckle: Speckle::None, still: true, ..small(Body::Head) };
+        let head = phantom(mean);
+        let [mut fluid, mut tissue] = [(0.0, 0.0); 2];
+        each_sample(&head, 0, |probe, at, grey| {
+            let of = match head.label(0, probe.to_space(at)).unwrap() {
+                Label::Fluid => &mut fluid,
+                Label::Uterus => &mut tissue,
+                _ => return,
+            };
+            *of = (of.0 + grey, of.1 + 1.0);
+        });
+        [fluid, tissue].map(|(sum, count)| (sum / count / 255.0 - 1.0) * DYNAMIC_RANGE)
+    };
+    let (none, some) = (of(None), of(Some(-35.0)));
+    assert!(none[0] < -43.0 && (some[0] + 35.0).abs() < 1.0, "{none:?} {some:?}");
+    assert!((some[1] - none[1]).abs() < 1.5, "{none:?} {some:?}");
 }

@@ -4,7 +4,8 @@
 use super::*;
 #[cfg(feature = "view")]
 use crate::gpu::window::screen::{Drawn, Panels, PresentOutcome, Screen};
-use crate::passes::floating;
+use crate::passes::unveil::{self, Unveiled};
+use crate::passes::{cut, floating};
 use crate::plan::Work;
 
 impl Renderer {
@@ -145,8 +146,17 @@ impl Renderer {
             };
             if step.pass.frequency == Frequency::Volume && !runs.is_empty() {
                 self.filtered_bounds = scene.visible_bounds;
-                if step.reads(scene).contains(&Slot::Floating) {
-                    self.find_floating()?;
+                let reads = step.reads(scene);
+                if reads.contains(&Slot::Floating) {
+                    self.find(Slot::WholeVolume, Slot::Floating, "floating", |_, scene, bytes| {
+                        floating::find(scene, bytes)
+                    })?;
+                }
+                if step.pass.name == cut::PASS.name && reads.contains(&Slot::StartSurface) {
+                    self.find(Slot::Volume, Slot::StartSurface, "unveil", |unveiled, scene, bytes| {
+                        let found = unveiled.insert(unveil::find(scene, bytes));
+                        bytemuck::cast_slice(&found.rows).to_vec()
+                    })?;
                 }
             }
             let (slots, pipeline, scene) = (&self.slots, &*self.steps[i], &self.scene);
@@ -180,11 +190,23 @@ impl Renderer {
 }
 
 impl Renderer {
-    /// Finds the parts that float in the volume that is shown. What was recorded before is done first; the recording goes on afterwards.
-    fn find_floating(&mut self) -> Result<(), GpuError> {
-        let (source, target) = (Slot::WholeVolume, Slot::Floating);
+    /// What the CPU last found of the volume that is shown, where the render start follows the fluid.
+    pub fn unveiled(&self) -> Option<&Unveiled> {
+        let found = self.unveiled.get(self.shown as usize)?.as_ref();
+        found.filter(|_| self.scene.unveils())
+    }
+
+    /// Finds something in the volume that is shown, from the texels of `source`, and uploads it to `target`. What was recorded before is done first; the
+    /// recording goes on afterwards. `search` gets what was found in the last volume of the image, which it may replace.
+    fn find(
+        &mut self,
+        source: Slot,
+        target: Slot,
+        name: &'static str,
+        search: impl FnOnce(&mut Option<Unveiled>, &Scene, &[u8]) -> Vec<u8>,
+    ) -> Result<(), GpuError> {
         let Some(volume) = self.slots.image(source, self.shown) else { return Ok(()) };
-        let readback = Readback::new(&self.context, "floating", volume.shape, volume.format.texel_bytes())?;
+        let readback = Readback::new(&self.context, name, volume.shape, volume.format.texel_bytes())?;
         self.picture.copy_out(&mut self.barriers, volume, source, self.shown, &readback);
         let done = self.picture.cut(&mut self.barriers, &mut self.timelines).and_then(|()| self.timelines.wait_all());
         if done.is_err() {
@@ -192,11 +214,14 @@ impl Renderer {
             self.unread.push(readback);
             return done;
         }
+        self.unveiled.resize(self.volume_images as usize, None);
         let (scene, bytes) = (&self.scene, readback.bytes()?);
-        let found = self.timings.host("floating", || floating::find(scene, &bytes));
-        let Some(image) = self.slots.image(target, 0) else { return Ok(()) };
-        let place = SlotParts { slot: target, copy: 0, parts: 0..image.shape.parts() };
-        let upload = Upload::new(&self.context, "floating", image.layout(), place.parts.clone(), &found)?;
+        let Some(unveiled) = self.unveiled.get_mut(self.shown as usize) else { return Ok(()) };
+        let found = self.timings.host(name, || search(unveiled, scene, &bytes));
+        let copy = if target.is_multibuffered() { self.shown } else { 0 };
+        let Some(image) = self.slots.image(target, copy) else { return Ok(()) };
+        let place = SlotParts { slot: target, copy, parts: 0..image.shape.parts() };
+        let upload = Upload::new(&self.context, name, image.layout(), place.parts.clone(), &found)?;
         self.picture.upload(&mut self.barriers, &upload, image, place);
         self.uploads.push(upload);
         Ok(())

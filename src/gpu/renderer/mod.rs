@@ -16,6 +16,7 @@ use super::resources::SlotResources;
 use super::timeline::Timelines;
 use super::timing::{TimeStamps, Timings};
 use crate::passes::slots::{BATCH_BYTES, BATCHES_IN_FLIGHT, Format, Initializer, frames_per_batch};
+use crate::passes::unveil::Unveiled;
 use crate::passes::{DispatchArgs, Frequency, PassTime, Slot, Span, Stage, Texels};
 use crate::passes::{chain, cut};
 use crate::picture::Picture;
@@ -122,6 +123,8 @@ pub struct Renderer {
     contents: Contents,
     /// By volume image and slice: the passes over the volume have not processed it yet.
     unprocessed: Vec<Vec<bool>>,
+    /// By volume image: what the CPU found of its volume, where the render start follows the fluid.
+    unveiled: Vec<Option<Unveiled>>,
     /// The error that left the last change of scene incomplete.
     broken: Option<String>,
     /// Buffers of a single copy, kept until the device is done with them.
@@ -195,6 +198,7 @@ impl Renderer {
             stale: vec![true; plan.steps.len()],
             contents: Contents::new(),
             unprocessed: Vec::new(),
+            unveiled: Vec::new(),
             broken: None,
             uploads: Vec::new(),
             unread: Vec::new(),

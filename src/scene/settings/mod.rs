@@ -8,6 +8,7 @@ mod planes;
 mod preprocess;
 mod raycast;
 mod shading;
+mod unveil;
 
 pub use cuts::*;
 pub use marks::*;
@@ -16,6 +17,7 @@ pub use planes::*;
 pub use preprocess::*;
 pub use raycast::*;
 pub use shading::*;
+pub use unveil::*;
 
 use serde::{Deserialize, Serialize};
 
@@ -46,6 +48,8 @@ pub struct Settings {
     /// Cuts: parts of the volume within contours drawn on a rendering, at most 32. Renderings lose them; planes and the block of mode cube show
     /// everything. Their edges are as fine as the texels of the volume.
     pub cuts: Vec<Cut>,
+    /// The render start that follows the fluid before a face.
+    pub unveil: Unveil,
     /// Stage 2: the camera.
     pub camera: Camera,
     /// Stage 2: the rays of every mode.

@@ -1,7 +1,7 @@
 //! The bodies of the phantom: their echoes, and the ground truth of those that have a formula.
 
 use super::PhantomOptions;
-use super::head::Head;
+use super::head::{Head, Surroundings};
 use super::speckle::{Beam, DYNAMIC_RANGE, Echo};
 use crate::files::InputError;
 use crate::probe::Probe;
@@ -192,11 +192,11 @@ pub(super) enum Scatterers {
 impl Scatterers {
     /// Of the body that the options name.
     pub fn new(options: &PhantomOptions, probe: &Probe) -> Scatterers {
-        let still = options.still;
+        let PhantomOptions { still, gap, clutter_db, .. } = *options;
         let face = probe.array_radius();
         let depth = |depth: f64| face + depth;
         let truth = match options.body {
-            Body::Head => return Scatterers::Head(Box::new(Head::new(face, still))),
+            Body::Head => return Scatterers::Head(Box::new(Head::new(face, &Surroundings { still, gap, clutter_db }))),
             Body::Sphere => Truth::Sphere {
                 centre: DVec3::new(4.0, depth(62.0), -3.0),
                 radius: 20.0,

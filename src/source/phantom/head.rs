@@ -1,11 +1,11 @@
 //! The fetal head in fluid: echoes and attenuation along a scan line.
 
-use super::face;
 use super::labels::Label;
 use super::limbs::{Hand, cord, shoulders};
 use super::shape::{gradient, normal};
 use super::skull::{self, Intracranial, intracranial, is_bone};
 use super::speckle::{Beam, Echo};
+use super::{GAP, face};
 use glam::{Mat3, Vec3, vec3};
 use std::f32::consts::TAU;
 
@@ -45,10 +45,23 @@ const SKIN_THICKNESS: f32 = 2.2;
 /// Least depth of a bone below the skin, mm.
 const SKIN_LEAST: f32 = 0.8;
 
+/// Radius of the near wall, mm, that leaves a gap of [`GAP`].
+const NEAR_WALL: f32 = 88.0;
+
 /// Scale of the anatomy: mm in space for one mm of the model.
 const SCALE: f32 = 1.0;
 /// The distances of the model may grow faster than the point moves. So much of a distance is safe to skip.
 const SAFE_STEP: f32 = 0.6;
+
+/// What is around the fetus, and whether it moves.
+pub(super) struct Surroundings {
+    /// Nothing moves.
+    pub still: bool,
+    /// Fluid between the near wall and the fetus where they are nearest, mm.
+    pub gap: f64,
+    /// Level of the clutter, dB re full scale.
+    pub clutter_db: Option<f64>,
+}
 
 pub(super) struct Head {
     /// Between the eyes, in the space of the probe.
@@ -57,6 +70,10 @@ pub(super) struct Head {
     face: f32,
     /// Nothing moves.
     still: bool,
+    /// Radius of the near wall, mm: how far it bulges towards the fetus.
+    near_wall: f32,
+    /// Power of the clutter, re full scale; 0 without.
+    clutter: f32,
 }
 
 /// The moving parts at one time.
@@ -100,11 +117,18 @@ enum Part {
 }
 
 impl Head {
-    /// A head in front of an array whose face is at Y = `face` mm. `still`: it stays as it is at time 0.
-    pub fn new(face: f64, still: bool) -> Head {
+    /// A head in front of an array whose face is at Y = `face` mm.
+    pub fn new(face: f64, surroundings: &Surroundings) -> Head {
         let face = face as f32;
-        // The whole vault is inside the fan.
-        Head { origin: vec3(0.0, face + 55.0, 0.0), face, still }
+        let Surroundings { still, gap, clutter_db } = *surroundings;
+        Head {
+            // The whole vault is inside the fan.
+            origin: vec3(0.0, face + 55.0, 0.0),
+            face,
+            still,
+            near_wall: NEAR_WALL + (GAP - gap) as f32,
+            clutter: clutter_db.map_or(0.0, |level| 10f32.powf(level as f32 / 10.0)),
+        }
     }
 
     fn pose(&self, time: f64) -> Pose {
@@ -150,6 +174,11 @@ impl Head {
             }
             loss += lost * pitch;
             sample += 1;
+        }
+        if self.clutter > 0.0 {
+            // What reverberates adds its power, and arrives from no place of its own.
+            let with_clutter = |level: f32| 10.0 * (10f32.powf(level / 10.0) + self.clutter).log10();
+            out.iter_mut().for_each(|echo| echo.diffuse = with_clutter(echo.diffuse));
         }
     }
 
@@ -213,7 +242,7 @@ impl Head {
     /// Distance into the uterine wall, mm, negative in the cavity. The inner face is slightly uneven.
     fn wall(&self, place: Vec3) -> f32 {
         // The near wall is pressed in by the probe, the far one is concave.
-        let near = 88.0 - (place - vec3(0.0, self.face - 72.0, 0.0)).length();
+        let near = self.near_wall - (place - vec3(0.0, self.face - 72.0, 0.0)).length();
         let far = (place - vec3(0.0, self.face + 22.0, 0.0)).length() - 90.0;
         let cavity = near.max(far);
         cavity

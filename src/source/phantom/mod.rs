@@ -43,6 +43,8 @@ const WOBBLE_RADIUS: f64 = 25.0;
 const SECTOR_ANGLE_DEG: f64 = 75.0;
 /// Default angle from the first frame to the last.
 pub const FAN_ANGLE_DEG: f64 = 61.0;
+/// Fluid between the near wall and the fetus where they are nearest, mm.
+pub const GAP: f64 = 29.9;
 /// Depth of the last sample, mm.
 const END_DEPTH: f64 = 120.0;
 /// m/s.
@@ -98,6 +100,10 @@ pub struct PhantomOptions {
     pub still: bool,
     /// Share by which the rate of the heart rises and falls, 0..=0.3.
     pub heart_swing: f64,
+    /// Fluid between the near uterine wall and the fetus of body head where they are nearest, mm, 0..=29.9: the wall is so much thicker.
+    pub gap: f64,
+    /// Level of clutter in body head, dB re full scale, -60..=0: haze of reverberations and side lobes everywhere. None is none.
+    pub clutter_db: Option<f64>,
 }
 
 impl Default for PhantomOptions {
@@ -116,6 +122,8 @@ impl Default for PhantomOptions {
             point_spread: PointSpread { axial_mm: 0.35, lateral_deg: 0.8, elevation_deg: 1.2 },
             still: false,
             heart_swing: 0.0,
+            gap: GAP,
+            clutter_db: None,
         }
     }
 }
@@ -153,6 +161,12 @@ impl Phantom {
         }
         if !(0.0..=0.3).contains(&options.heart_swing) {
             return Err(refusal("heart_swing", format!("is {}, must lie in 0..=0.3", options.heart_swing)));
+        }
+        if !(0.0..=GAP).contains(&options.gap) {
+            return Err(refusal("gap", format!("is {}, must lie in 0..={GAP}", options.gap)));
+        }
+        if let Some(level) = options.clutter_db.filter(|level| !(-60.0..=0.0).contains(level)) {
+            return Err(refusal("clutter", format!("is {level}, must lie in -60..=0")));
         }
         options.point_spread.check()?;
         let volumes = Volumes {

@@ -6,8 +6,10 @@ use crate::gpu::window::PresentOutcome;
 use crate::live::metrics::{LiveMetrics, SourceStatus};
 use crate::live::volume_pool::VolumeCounts;
 use crate::live::{Feed, FinishedPicture, StartStep, Step, StreamError};
+use crate::passes::unveil;
 use crate::ui::frame_budget;
 use crate::ui::panels::{self, Banner, PanelState};
+use crate::ui::sliders::AUTO_START;
 use crate::ui::source_supervisor::SourceState;
 use crate::ui::times::RecentTimes;
 use std::time::{Duration, Instant};
@@ -200,6 +202,7 @@ impl Console {
 
     fn picture_finished(&mut self, picture: &FinishedPicture) {
         self.has_new_picture = true;
+        self.take_start();
         // A coarse one says nothing of what a picture of this quality takes.
         if !picture.is_coarse {
             self.pace.picture_took(picture.work, self.quality, picture.took);
@@ -209,6 +212,20 @@ impl Console {
             tracing::debug!("start: a picture {}", if picture.is_coarse { "with few rays" } else { "in full" });
         }
         self.has_started |= !picture.is_coarse;
+    }
+
+    /// Takes where the rendering of the picture starts, and says so when the fluid is lost.
+    fn take_start(&mut self) {
+        let start = self.stream.renderer().and_then(|renderer| {
+            renderer.unveiled().map(|start| (start.outcome, unveil::lines(renderer.scene(), start)))
+        });
+        let (outcome, lines) = start.unzip();
+        self.start_lines = lines.unwrap_or_default();
+        let lost = outcome.filter(|outcome| !outcome.is_found());
+        if let Some(outcome) = lost.filter(|_| !self.has_lost_fluid) {
+            self.notify(&format!("{AUTO_START}: {outcome}."), false);
+        }
+        self.has_lost_fluid = lost.is_some();
     }
 
     /// Takes the statistics of the last interval.
@@ -404,6 +421,7 @@ impl Console {
             banner: self.banner(now),
             notes: &notes,
             exit_key: &exit_key,
+            start_lines: &self.start_lines,
             pointer: self.pointer,
         };
         let time = now.saturating_duration_since(self.started).as_secs_f64();

@@ -32,6 +32,7 @@ use crate::gpu::{Context, GpuError};
 use crate::kiosk::chord::Chord;
 use crate::live::metrics::LiveMetrics;
 use crate::live::{self, Feed, StartStep, Stream, StreamError};
+use crate::passes::unveil::StartLine;
 use crate::plan::Work;
 use crate::scene::{Layout, Scene, Settings, variants};
 use crate::source::live::SourceKind;
@@ -121,6 +122,10 @@ pub struct Console {
     is_full_screen: bool,
     /// The newest volume of the loops that were saved whole.
     saved_volume: Option<u32>,
+    /// Where the rendering that is shown starts on planes beside it.
+    start_lines: Vec<StartLine>,
+    /// The fluid at which rendering should start cannot be told.
+    has_lost_fluid: bool,
     /// Where to draw the pointer, pixels of the window.
     pointer: Option<[f64; 2]>,
     player: CinePlayer,
@@ -275,6 +280,8 @@ impl Console {
             leaves_when_saved: None,
             is_full_screen: false,
             saved_volume: None,
+            start_lines: Vec::new(),
+            has_lost_fluid: false,
             pointer: None,
             player: CinePlayer::default(),
             unsent_input: None,

@@ -14,7 +14,7 @@ impl Console {
                 Ok(picture) => {
                     let mut scene = renderer.scene().clone();
                     scene.settings.measure = self.controls.measures().to_vec();
-                    Ok((picture, scene))
+                    Ok((picture, scene, renderer.unveiled().cloned()))
                 }
                 Err(fault) => Err(fault.to_string()),
             },
@@ -22,10 +22,10 @@ impl Console {
         };
         let (has_bar, time) = (self.saves_bar, marked::time_line(SystemTime::now()));
         let origin = self.fixed.source.origin();
-        let saved = picture.and_then(|(picture, scene)| {
+        let saved = picture.and_then(|(picture, scene, start)| {
             self.exporter.picture(move || match has_bar {
-                true => marked::marked(&picture, &scene, &time, origin),
-                false => marked::measured(&picture, &scene),
+                true => marked::marked(&picture, &scene, start.as_ref(), &time, origin),
+                false => marked::measured(&picture, &scene, start.as_ref()),
             })
         });
         if let Err(fault) = saved {

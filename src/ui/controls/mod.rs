@@ -262,8 +262,11 @@ impl Controls {
                 self.history.record(before, command);
                 Change::Settings
             }
-            None if wanted.is_some_and(|settings| cutting::is_in_the_way(&now, settings)) => {
+            None if wanted.clone().is_some_and(|settings| cutting::is_in_the_way(&now, settings)) => {
                 Change::Refused(CUTS_IN_THE_WAY)
+            }
+            None if wanted.is_some_and(|settings| is_unveiling_in_the_way(&now, settings)) => {
+                Change::Refused(UNVEILING_IN_THE_WAY)
             }
             _ => Change::Nothing,
         }
@@ -410,7 +413,19 @@ fn drawable(now: &Scene, settings: Settings) -> Option<Settings> {
     relaxed.cube = Cube { inset: Inset::default(), tilt: Tilt::default(), ..relaxed.cube };
     relaxed.planes =
         Planes { columns: default_planes.columns, rows: default_planes.rows, thickness: 0.0, ..relaxed.planes };
+    if !can_draw(now, &relaxed) {
+        relaxed.unveil.enabled = false;
+    }
     can_draw(now, &relaxed).then_some(relaxed)
+}
+
+/// Why the automatic render start, or a control beside it, does nothing.
+const UNVEILING_IN_THE_WAY: &str = "That draws both what is dark and what is bright, of which nothing can be removed: rendering cannot start at the fluid.";
+
+/// True if settings cannot be drawn with the automatic render start, and can without.
+fn is_unveiling_in_the_way(now: &Scene, mut settings: Settings) -> bool {
+    let is_on = std::mem::take(&mut settings.unveil.enabled);
+    is_on && drawable(now, settings).is_some()
 }
 
 /// Whether settings can be drawn with the volume of a scene.

@@ -1,7 +1,7 @@
 //! Annotations of the picture: in every tile a scale, the patient's sides and the probe's marker; the orientation of the axes, and a colour
 //! bar.
 
-use super::colours::{self, ACCENT, AXES, BACKING, MEASURE, ON_PLANE, OUTLINE, SIDES, TEXT, WARNING, WEAK_TEXT};
+use super::colours::{self, ACCENT, AXES, BACKING, MEASURE, ON_PLANE, OUTLINE, SIDES, START, TEXT, WARNING, WEAK_TEXT};
 use super::{PanelState, SMALL_TEXT, picture_rect};
 use crate::measure::overlay;
 use crate::passes::postprocess;
@@ -46,6 +46,13 @@ pub(super) fn paint(ui: &Ui, state: &PanelState, scale: f32) {
         let short = origin.split(" (").next().unwrap_or(origin);
         _ = text_at_one_of(&painter, &mut taken, places.clone(), Align2::RIGHT_TOP, origin, WARNING)
             || text_at_one_of(&painter, &mut taken, places, Align2::RIGHT_TOP, short, WARNING);
+    }
+    for line in state.start_lines {
+        let [corner, size] = line.tile.map(|[x, y]| vec2(x as f32, y as f32) / scale);
+        let painter = painter.with_clip_rect(Rect::from_min_size(picture.min + corner, size).intersect(picture));
+        for ends in &line.pieces {
+            stroke(&painter, ends.map(|[x, y]| picture.min + vec2(x as f32, y as f32) / scale), 1.5, START);
+        }
     }
     for (n, tile, area) in tiles() {
         if n == 0 && scene.has_reference() {

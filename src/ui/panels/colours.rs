@@ -46,6 +46,8 @@ pub(in crate::ui) const ON_PLANE: Color32 = Color32::BLACK;
 /// Measurements: yellow, which no tissue has and every kind of colour vision sees on grey. Plane A has a similar yellow; a measurement has crosses at its points
 /// and a number.
 pub(in crate::ui) const MEASURE: Color32 = Color32::from_rgb(255, 214, 64);
+/// The line at which rendering starts: green, as on scanners.
+pub(in crate::ui) const START: Color32 = Color32::from_rgb(64, 235, 96);
 /// The axes of the volume, each with its name: for some kinds of colour vision two of them look alike.
 pub(in crate::ui) const AXES: [(&str, Color32); 3] = [
     ("lat.", Color32::from_rgb(235, 110, 100)),

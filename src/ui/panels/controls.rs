@@ -12,7 +12,7 @@ use crate::ui::cine_player::{CineState, SPEEDS};
 use crate::ui::command::{Command, Tool};
 use crate::ui::controls::BRUSH_RADII;
 use crate::ui::hints;
-use crate::ui::sliders::{Group, SLIDERS, Slider as Control};
+use crate::ui::sliders::{AUTO_START, Group, SLIDERS, START_OFFSET, Slider as Control};
 use crate::ui::view;
 use egui::accesskit::Role;
 use egui::{
@@ -317,6 +317,7 @@ pub(super) fn show_controls(ui: &mut Ui, state: &PanelState, width: f32, execute
             heading(ui, "Controls");
             let in_front = FRONT.map(|(name, sliders)| (name, front(sliders, settings)));
             let with_cuts = depth_of_cut(state);
+            let start = [AUTO_START, START_OFFSET].map(|name| front(&[name], settings));
             for (name, number) in in_front {
                 match number {
                     Some(number) if name == "Light" => {
@@ -358,6 +359,9 @@ pub(super) fn show_controls(ui: &mut Ui, state: &PanelState, width: f32, execute
                     execute(Command::Shadow(on));
                 }
             }
+            for number in start.iter().flatten() {
+                slider(ui, state, *number, SLIDERS[*number].name, false, execute);
+            }
             if settings.mode == Mode::Tomography {
                 let mut on = settings.planes.reference;
                 let hint = "The first tile shows the plane across the slices, and where each of them is.";
@@ -376,6 +380,7 @@ pub(super) fn show_controls(ui: &mut Ui, state: &PanelState, width: f32, execute
                 let is_there = |(number, s): &(usize, &Control)| {
                     let is_elsewhere =
                         with_cuts == Some(*number) || in_front.iter().any(|(_, front)| *front == Some(*number));
+                    let is_elsewhere = is_elsewhere || start.contains(&Some(*number));
                     s.group == group && s.applies(settings) && !is_elsewhere
                 };
                 let there: Vec<usize> = SLIDERS.iter().enumerate().filter(is_there).map(|(number, _)| number).collect();

@@ -20,6 +20,7 @@ pub(super) use self::presets::{PresetTile, PresetsShown};
 use super::command::Command;
 use super::input::{Button, Input, Key, Modifiers, Phase};
 use crate::gpu;
+use crate::passes::unveil::StartLine;
 use crate::scene::Scene;
 use crate::ui::cine_player::CineState;
 use crate::ui::controls::Controls;
@@ -418,6 +419,8 @@ pub(super) struct PanelState<'a> {
     pub(super) notes: &'a [Note],
     /// The keys that end the program, for the help.
     pub(super) exit_key: &'a str,
+    /// Where rendering starts on planes beside it, if that follows the fluid.
+    pub(super) start_lines: &'a [StartLine],
     /// Where to draw a pointer, pixels of the window. None if the windowing system draws it.
     pub(super) pointer: Option<[f64; 2]>,
 }

@@ -159,6 +159,11 @@ fn check_boundaries(shown: &Shown, what: &str) {
         let is_near = |other: Area| (0..4).all(|k| (other[k] - area[k]).abs() < 2.0);
         let is_inside = |other: Area| holds(area, [other[0], other[1]]) && holds(area, [other[2], other[3]]);
         let at = middle(area);
+        // The name of a switch is in its row: where that is not in sight, the row is scrolled under the bar below.
+        let names_it = |drawn: &&Drawn| matches!(&drawn.kind, Kind::Text { area: at, text, .. } if text == name && holds(area, middle(*at)));
+        if node.role() == Role::Switch && !shown.drawn.iter().filter(names_it).any(|drawn| holds(drawn.clip, at)) {
+            continue;
+        }
         let rects = shown.drawn.iter().enumerate().filter_map(|(n, drawn)| match drawn.kind {
             Kind::Rect { area: rect, fill, edge } if holds(drawn.clip, at) && (fill[3] > 0 || edge[3] > 0) => {
                 Some((n, rect, fill, edge))

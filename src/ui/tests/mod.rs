@@ -7,6 +7,7 @@ mod gestures;
 mod layout;
 mod measuring;
 mod region;
+mod render_start;
 mod screen_reader;
 mod sequences;
 mod shown;

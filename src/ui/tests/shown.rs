@@ -2,6 +2,7 @@
 
 use super::*;
 use crate::live::cine::CineVolume;
+use crate::passes::unveil::StartLine;
 use crate::picture::Picture;
 use crate::source::phantom::{Phantom, PhantomOptions};
 use crate::ui::cine_player::{CinePlayer, CineState};
@@ -35,6 +36,7 @@ pub(super) struct Shown {
     pub(super) presets: Option<(Vec<String>, Option<String>)>,
     /// Help, times, exports, the question whether to leave.
     pub(super) open: [bool; 4],
+    pub(super) start_lines: Vec<StartLine>,
     pub(super) pointer: Option<[f64; 2]>,
     /// What the last layout said.
     pub(super) tree: BTreeMap<NodeId, Node>,
@@ -75,6 +77,7 @@ impl Shown {
             files: None,
             presets: None,
             open: [false; 4],
+            start_lines: Vec::new(),
             pointer: None,
             tree: BTreeMap::new(),
             focus: None,
@@ -128,6 +131,7 @@ impl Shown {
             banner: self.banner.clone(),
             notes: &self.notes,
             exit_key: "",
+            start_lines: &self.start_lines,
             pointer: self.pointer,
         };
         let output = self.panels.lay_out(&state, self.size, self.time);

@@ -8,6 +8,7 @@ mod keyboard;
 mod metrics;
 mod monkey;
 mod presets;
+mod render_start;
 mod shaders;
 mod tasks;
 mod warming;

@@ -116,8 +116,8 @@ fn completed(layers: &Layers, geometry: &Geometry, stored: Stored, frames: &[Fra
 
 /// The picture as `echolume render` saves it: with its measurements, and with marks and a bar if the settings ask for them. Its bytes, RGBA, and
 /// its height and width.
-fn saved(picture: &Picture, scene: &Scene) -> PyResult<(Vec<u8>, [usize; 2])> {
-    let picture = marked::as_set(picture, scene).map_err(of_device)?.into_owned();
+fn saved(picture: &Picture, renderer: &echolume::Renderer) -> PyResult<(Vec<u8>, [usize; 2])> {
+    let picture = marked::as_set(picture, renderer.scene(), renderer.unveiled()).map_err(of_device)?.into_owned();
     Ok((picture.rgba, [picture.height as usize, picture.width as usize]))
 }
 
@@ -227,7 +227,7 @@ impl Drawing {
     /// The picture, RGBA, and its height and width.
     fn picture(&mut self) -> PyResult<(Vec<u8>, [usize; 2])> {
         let picture = self.renderer.picture().map_err(of_device)?;
-        saved(&picture, self.renderer.scene())
+        saved(&picture, &self.renderer)
     }
 
     /// The pictures of one turn, one after the other, and the height and width of each. Leaves the camera at the last one.
@@ -356,7 +356,7 @@ impl Stream {
                 let Step::Picture(shown) = step else { return Ok(Err(step)) };
                 // The renderer still has the scene that it drew.
                 let picture = shown.picture.as_ref().zip(stream.renderer());
-                let saved = picture.map(|(picture, renderer)| saved(picture, renderer.scene())).transpose()?;
+                let saved = picture.map(|(picture, renderer)| saved(picture, renderer)).transpose()?;
                 PyResult::Ok(Ok((shown.volume, saved)))
             })?;
             let step = match step {

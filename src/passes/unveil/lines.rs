@@ -1,0 +1,71 @@
+//! The start surface as lines on the planes beside a rendering.
+
+use super::Unveiled;
+use crate::passes::raycast::ray;
+use crate::scene::planes::{Sheet, Tile};
+use crate::scene::{Layout, Scene};
+use glam::DVec3;
+
+/// Cells along each edge of a tile between whose corners a line is straight: the surface is smooth.
+const CELLS: usize = 72;
+
+/// The line of the start surface on a tile, in straight pieces.
+#[derive(Clone, Debug, PartialEq)]
+pub struct StartLine {
+    /// Corner and size of the tile, pixels of the picture.
+    pub tile: [[f64; 2]; 2],
+    /// The ends of each piece, pixels of the picture.
+    pub pieces: Vec<[[f64; 2]; 2]>,
+}
+
+/// Where the planes beside a rendering cut the start surface, by tile; nothing where the pocket of fluid cannot be told, and without
+/// lines over planes.
+pub fn lines(scene: &Scene, unveiled: &Unveiled) -> Vec<StartLine> {
+    let is_shown = scene.unveils() && scene.settings.layout == Layout::Four && scene.draws_lines();
+    if !is_shown || !unveiled.outcome.is_found() {
+        return Vec::new();
+    }
+    let sheet = scene.sheet();
+    sheet.tiles.iter().map(|tile| on_tile(scene, unveiled, &sheet, tile)).collect()
+}
+
+/// Rows from the start surface to a place, negative in front of it; none outside the sector.
+fn behind(scene: &Scene, unveiled: &Unveiled, place: DVec3) -> Option<f64> {
+    let [column, row, slice] = ray::texel(scene, place)?;
+    let (width, slices) = (scene.grid.size[0] as usize, scene.slices() as usize);
+    let axis = |at: f64, count: usize| {
+        let at = at.clamp(0.0, (count - 1) as f64);
+        (at as usize, (at as usize + 1).min(count - 1), at.fract())
+    };
+    let ((x0, x1, u), (z0, z1, v)) = (axis(column, width), axis(slice, slices));
+    let start = |x: usize, z: usize| unveiled.rows.get(z * width + x).map(|row| f64::from(*row));
+    let along = |z: usize| Some(start(x0, z)? * (1.0 - u) + start(x1, z)? * u);
+    Some(row - (along(z0)? * (1.0 - v) + along(z1)? * v))
+}
+
+/// Marching squares (Lorensen and Cline 1987, in the plane) over cells of the tile.
+fn on_tile(scene: &Scene, unveiled: &Unveiled, sheet: &Sheet, tile: &Tile) -> StartLine {
+    let [corner, size] = [tile.corner, tile.size].map(|edge| edge.map(f64::from));
+    let at = |x: usize, y: usize| -> [f64; 2] {
+        let share = [x, y].map(|n| n as f64 / CELLS as f64);
+        std::array::from_fn(|a| corner[a] + size[a] * share[a])
+    };
+    let width = CELLS + 1;
+    let points: Vec<[usize; 2]> = (0..width).flat_map(|y| (0..width).map(move |x| [x, y])).collect();
+    let values: Vec<Option<f64>> =
+        points.iter().map(|[x, y]| behind(scene, unveiled, sheet.point(tile, at(*x, *y)))).collect();
+    let mut pieces = Vec::new();
+    for (x, y) in (0..CELLS).flat_map(|y| (0..CELLS).map(move |x| (x, y))) {
+        // Around the cell.
+        let corners = [(x, y), (x + 1, y), (x + 1, y + 1), (x, y + 1)];
+        let crossing = |n: usize| {
+            let ((x0, y0), (x1, y1)) = (corners[n], corners[(n + 1) % 4]);
+            let (a, b) = (values[y0 * width + x0]?, values[y1 * width + x1]?);
+            let (from, to) = (at(x0, y0), at(x1, y1));
+            ((a < 0.0) != (b < 0.0)).then(|| std::array::from_fn(|i| from[i] + (to[i] - from[i]) * a / (a - b)))
+        };
+        let crossings: Vec<[f64; 2]> = (0..4).filter_map(crossing).collect();
+        pieces.extend(crossings.chunks_exact(2).map(|ends| [ends[0], ends[1]]));
+    }
+    StartLine { tile: [corner, size], pieces }
+}
