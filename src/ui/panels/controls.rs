@@ -508,13 +508,17 @@ fn light_ball(ui: &mut Ui, settings: &Settings, execute: &mut dyn FnMut(Command)
 
 /// A switch with its name; the whole row reacts. True if the user changed it.
 fn switch(ui: &mut Ui, on: &mut bool, name: &str, hint: &str) -> bool {
-    let (area, response) = ui.allocate_exact_size(vec2(ui.available_width(), TOUCH_SIZE * 0.75), Sense::click());
+    let (width, height) = (44.0, 24.0);
+    // A long name has two lines, and ends before the switch.
+    let room = (ui.available_width() - width - 6.0).max(0.0);
+    let label = ui.painter().layout(name.to_string(), FontId::proportional(TEXT_SIZE), TEXT, room);
+    let size = vec2(ui.available_width(), (TOUCH_SIZE * 0.75).max(label.size().y + 4.0));
+    let (area, response) = ui.allocate_exact_size(size, Sense::click());
     if response.clicked() {
         *on = !*on;
     }
     response.widget_info(|| WidgetInfo::selected(WidgetType::Checkbox, true, *on, name));
     let response = response.tell(hint).with_role(Role::Switch);
-    let (width, height) = (44.0, 24.0);
     let right = pos2(area.right() - width, area.center().y - height / 2.0);
     let track = Rect::from_min_size(right, vec2(width, height));
     let painter = ui.painter();
@@ -524,12 +528,9 @@ fn switch(ui: &mut Ui, on: &mut bool, name: &str, hint: &str) -> bool {
     painter.rect_stroke(track, height / 2.0, Stroke::new(1.0, edge), StrokeKind::Inside);
     let x = if *on { track.right() - height / 2.0 } else { track.left() + height / 2.0 };
     painter.circle_filled(pos2(x, track.center().y), height / 2.0 - 4.0, ON_SELECTED);
-    let font = FontId::proportional(TEXT_SIZE);
-    // A long name ends before the switch.
-    let name = painter.layout_no_wrap(name.to_string(), font, TEXT);
-    let at = pos2(area.left(), area.center().y - name.size().y / 2.0);
+    let at = pos2(area.left(), area.center().y - label.size().y / 2.0);
     let clip = Rect::from_min_max(area.min, pos2(track.left() - 6.0, area.bottom()));
-    painter.with_clip_rect(clip).galley(at, name, TEXT);
+    painter.with_clip_rect(clip).galley(at, label, TEXT);
     response.clicked()
 }
 
