@@ -258,6 +258,8 @@ impl Series<'_> {
             Views::Time(volumes) => Some(volumes.start() + n),
         };
         let mut is_empty = true;
+        // Said when the fluid is lost, not of every picture without it.
+        let mut was_found = true;
         while self.written.count() < self.views.count() {
             let n = self.written.count();
             if self.signals.signal().is_some() {
@@ -288,6 +290,12 @@ impl Series<'_> {
                 None => None,
             };
             self.written.write(self.views.number(n), &shown).map_err(DrawFault::Source)?;
+            let start = renderer.unveiled().map(|start| start.outcome);
+            let is_found = start.is_none_or(|outcome| outcome.is_found());
+            if let Some(outcome) = start.filter(|_| was_found && !is_found) {
+                remark(&format!("picture {}: unveil: {outcome}", n + 1));
+            }
+            was_found = is_found;
             why.iter().for_each(|line| remark(line));
             self.bar.inc(1);
         }

@@ -328,8 +328,9 @@ pub(super) fn check(cuts: &[Cut]) -> Result<(), SceneError> {
 }
 
 fn check_brush(n: usize, cut: &Cut, brush: &Brush) -> Result<(), SceneError> {
-    if !cut.contour.is_empty() || cut.depth.is_some() || cut.keep != KeptSide::default() {
-        return refuse("cuts.brush", format!("entry {}: has no contour, depth and keep", n + 1));
+    let has_no_view = cut.view == CutView::default();
+    if !cut.contour.is_empty() || cut.depth.is_some() || cut.keep != KeptSide::default() || !has_no_view {
+        return refuse("cuts.brush", format!("entry {}: has no contour, view, depth and keep", n + 1));
     }
     let count = brush.points();
     if !(1..=MAX_BRUSH_POINTS).contains(&count) || brush.strokes.iter().any(Vec::is_empty) {

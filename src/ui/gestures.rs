@@ -220,10 +220,9 @@ impl Gestures {
             (at[0] - first.at[0]).hypot(at[1] - first.at[1]) < 2.0 * slop
                 && viewport.now.saturating_sub(first.time) <= DOUBLE_CLICK
         });
-        if is_second {
+        // A brush goes over the same place again.
+        if is_second && (pane, tool) != (Pane::Rendering, Tool::Brush) {
             match (tool, viewport.scene) {
-                // It goes over the same place again.
-                (Tool::Brush, _) if pane == Pane::Rendering => {}
                 (Tool::Measure(_), _) => return vec![Command::EndMeasure],
                 (Tool::Plane, Some(scene)) if scene.shows_three() => return vec![Command::Recentre],
                 _ => {}
@@ -284,10 +283,11 @@ enum Drag {
         tile: usize,
         face: Face,
     },
-    /// The region, from where it was grabbed on a tile, and how far it moved, mm.
+    /// The region, from where it was grabbed on a tile; how far it can move, and how far it moved, mm.
     Region {
         tile: usize,
         from: DVec3,
+        travel: [DVec3; 2],
         moved: DVec3,
     },
     RotatePlanes,
@@ -369,7 +369,7 @@ impl Press {
                     Some(Part::Face(face)) => Drag::FaceOnPlane { tile, face },
                     Some(Part::Inside) => {
                         let from = viewport.point_on_plane(tile, at)?;
-                        Drag::Region { tile, from, moved: DVec3::ZERO }
+                        Drag::Region { tile, from, travel: view::region_travel(scene), moved: DVec3::ZERO }
                     }
                     None => Drag::Nothing,
                 }
@@ -514,11 +514,10 @@ impl Press {
                 }
                 Command::MoveFace(face, self.face_moved(position(to)?)?)
             }
-            Drag::Region { tile, from, ref mut moved } => {
-                let [least, most] = view::region_travel(scene);
-                let wanted = viewport.point_on_plane(tile, to)? - from - *moved;
-                let by = wanted.clamp(least, most);
-                *moved += by;
+            Drag::Region { tile, from, travel: [least, most], ref mut moved } => {
+                let wanted = (viewport.point_on_plane(tile, to)? - from).clamp(least, most);
+                let by = wanted - *moved;
+                *moved = wanted;
                 if by == DVec3::ZERO {
                     return None;
                 }

@@ -18,11 +18,12 @@ pub struct StartLine {
     pub pieces: Vec<[[f64; 2]; 2]>,
 }
 
-/// Where the planes beside a rendering cut the start surface, by tile; nothing where the pocket of fluid cannot be told, and without
-/// lines over planes.
+/// Where the planes beside a rendering cut the start surface, by tile; nothing where the pocket of fluid cannot be told or nothing lies in front
+/// of it, and without lines over planes.
 pub fn lines(scene: &Scene, unveiled: &Unveiled) -> Vec<StartLine> {
     let is_shown = scene.unveils() && scene.settings.layout == Layout::Four && scene.draws_lines();
-    if !is_shown || !unveiled.outcome.is_found() {
+    let removes_nothing = !unveiled.outcome.is_found() || unveiled.rows.iter().all(|row| *row <= 0.0);
+    if !is_shown || removes_nothing {
         return Vec::new();
     }
     let sheet = scene.sheet();

@@ -137,12 +137,20 @@ fn cells(scene: &Scene, lattice: &FluidLattice, bytes: &[u8]) -> Vec<u16> {
         let texels = width * height * format.texel_bytes();
         let bytes = bytes.get(slice * texels..(slice + 1) * texels).unwrap_or(&[]);
         let values = Texels::decode([width, height, 1], format, bytes).values;
+        // In voxels, what is black down to the first echo of a column or from its last one on lies beside a sector; between them it is fluid.
+        let mut echoes = vec![(0, if has_empty { 0 } else { height }); width];
+        for (x, echoes) in echoes.iter_mut().enumerate().filter(|_| has_empty) {
+            let has_echo = |y: &usize| values.get(y * width + x).is_some_and(|value| *value != 0.0);
+            if let Some(first) = (0..height).find(has_echo) {
+                *echoes = (first, (first..height).rfind(has_echo).unwrap_or(first) + 1);
+            }
+        }
         let mut sums = vec![(0u32, 0u32, 0u32); columns * rows];
         for (y, row) in values.chunks_exact(width).enumerate() {
             for (x, value) in row.iter().enumerate() {
                 let sum = &mut sums[y / tall * columns + x / wide];
                 sum.2 += 1;
-                if mask[y * width + x] && !(has_empty && *value == 0.0) {
+                if mask[y * width + x] && (echoes[x].0..echoes[x].1).contains(&y) {
                     sum.0 += level_of(*value);
                     sum.1 += 1;
                 }

@@ -62,11 +62,14 @@ fn means(scene: &Scene, lattice: &FluidLattice, volume: &Texels) -> Cells {
                 (x * lattice.cell[0]..((x + 1) * lattice.cell[0]).min(width)).map(move |column| [column, row])
             })
             .collect();
-        let values = texels.iter().filter(|[column, row]| mask[row * width + column]);
-        let values = values.map(|[column, row]| volume.one(*column, *row, z));
-        // What is black in voxels lies beside a sector.
-        let levels: Vec<i64> =
-            values.filter(|v| scene.probe().is_some() || *v != 0.0).map(|v| i64::from(level_of(v))).collect();
+        // Voxels without an echo before them in their column, or without one behind them, lie beside a sector.
+        let has_echo =
+            |column: usize, mut rows: std::ops::Range<usize>| rows.any(|row| volume.one(column, row, z) != 0.0);
+        let is_inside = |column: usize, row: usize| {
+            scene.probe().is_some() || has_echo(column, 0..row + 1) && has_echo(column, row..height)
+        };
+        let values = texels.iter().filter(|[column, row]| mask[row * width + column] && is_inside(*column, *row));
+        let levels: Vec<i64> = values.map(|[column, row]| i64::from(level_of(volume.one(*column, *row, z)))).collect();
         (2 * levels.len() >= texels.len()).then(|| levels.iter().sum::<i64>() / levels.len() as i64)
     };
     each(lattice).map(mean).collect()

@@ -97,12 +97,21 @@ impl Controls {
 
     /// Removes what is near strokes over the surface: lateral, depth, elevation, mm. Strokes with one radius are one cut.
     pub(in crate::ui) fn brush(&mut self, strokes: Vec<Vec<[f64; 3]>>, scene: &Scene) -> Change {
-        let (radius, count) = (self.brush_radius, strokes.iter().map(Vec::len).sum::<usize>());
+        let radius = self.brush_radius;
         let mut new = self.settings.clone();
-        let last = new.cuts.last_mut().and_then(|cut| cut.brush.as_mut());
-        match last.filter(|last| last.radius == radius && last.points() + count <= MAX_BRUSH_POINTS) {
-            Some(last) => last.strokes.extend(strokes),
-            None => new.cuts.push(Cut { brush: Some(Brush { radius, strokes }), ..Cut::default() }),
+        for mut rest in strokes {
+            // A long stroke goes on in the next cut, from the point where it was divided.
+            while !rest.is_empty() {
+                let stroke: Vec<[f64; 3]> = rest.iter().take(MAX_BRUSH_POINTS).copied().collect();
+                rest.drain(..if rest.len() > stroke.len() { stroke.len() - 1 } else { rest.len() });
+                let last = new.cuts.last_mut().and_then(|cut| cut.brush.as_mut());
+                match last.filter(|last| last.radius == radius && last.points() + stroke.len() <= MAX_BRUSH_POINTS) {
+                    Some(last) => last.strokes.push(stroke),
+                    None => {
+                        new.cuts.push(Cut { brush: Some(Brush { radius, strokes: vec![stroke] }), ..Cut::default() })
+                    }
+                }
+            }
         }
         self.take_cut(new, &Command::EndCut, scene)
     }

@@ -206,6 +206,8 @@ fn strokes_of_a_brush_are_one_cut_and_each_is_taken_back() {
     window.tool(Tool::Brush);
     let pressed = window.click([200.0, 220.0]);
     assert_eq!(pressed, [Command::BeginCut([200.0, 220.0]), Command::EndCut], "a click is a stroke of one point");
+    window.controls.take_stroke();
+    assert_eq!(window.click([200.0, 220.0]), pressed, "a second one is no double click");
     assert_eq!(window.controls.take_stroke(), [[200.0, 220.0]]);
     window.drag(Button::Left, [200.0, 220.0], [300.0, 220.0]);
     assert!(window.controls.take_stroke().len() > 8 && cuts(&window).is_empty());
@@ -228,6 +230,16 @@ fn strokes_of_a_brush_are_one_cut_and_each_is_taken_back() {
     assert_eq!(strokes(&window), [1]);
     apply(&mut window, Command::BrushRadius(1e9));
     assert_eq!(window.controls.brush_radius(), 20.0);
+    // A long one is divided, and none of it is lost; one step of undo takes all of it back.
+    let long: Vec<[f64; 3]> = (0..1100).map(|n| [0.02 * f64::from(n), 40.0, 0.0]).collect();
+    assert_eq!(window.controls.brush(vec![long.clone()], &scene), Change::Settings);
+    let made = cuts(&window);
+    let parts: Vec<_> =
+        made[1..].iter().filter_map(|cut| cut.brush.as_ref()).flat_map(|brush| &brush.strokes).collect();
+    assert_eq!(parts.iter().map(|part| part.len()).collect::<Vec<_>>(), [512, 512, 78]);
+    assert!(parts.windows(2).all(|two| two[0].last() == two[1].first()) && parts[2].last() == long.last());
+    apply(&mut window, Command::Undo);
+    assert_eq!(strokes(&window), [1]);
     // Bounded: a cut has so many points, and a scene so many cuts.
     for n in 0..MAX_CUT_POINTS {
         brush(&mut window, n);
