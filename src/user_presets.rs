@@ -62,13 +62,19 @@ impl UserPreset {
 /// # Errors
 /// One line: it is empty, longer than [`MAX_NAME`], has control characters, or is that of a built-in preset.
 pub fn checked_name(name: &str) -> Result<String, String> {
-    let name = name.trim();
-    if name.is_empty() || name.chars().count() > MAX_NAME || name.chars().any(char::is_control) {
-        return Err(format!("a preset has a name of 1 to {MAX_NAME} letters"));
-    }
+    let name = spelled(name)?;
     match PRESETS.iter().find(|(known, _)| known.eq_ignore_ascii_case(name)) {
         Some((known, _)) => Err(format!("{known} is a built-in preset: choose another name")),
         None => Ok(name.into()),
+    }
+}
+
+/// A name without blanks at its ends.
+fn spelled(name: &str) -> Result<&str, String> {
+    let name = name.trim();
+    match name.is_empty() || name.chars().count() > MAX_NAME || name.chars().any(char::is_control) {
+        true => Err(format!("a preset has a name of 1 to {MAX_NAME} letters")),
+        false => Ok(name),
     }
 }
 
@@ -93,7 +99,8 @@ pub fn read(file: &Path) -> Result<Vec<UserPreset>, String> {
         return Err(fault(&format!("has {} presets, at most {MAX_PRESETS} are kept", kept.preset.len())));
     }
     for (n, preset) in kept.preset.iter().enumerate() {
-        let name = checked_name(&preset.name).map_err(|e| fault(&e))?;
+        // One that has become the name of a built-in preset can still be changed.
+        let name = spelled(&preset.name).map_err(|e| fault(&e))?;
         if name != preset.name || kept.preset[..n].iter().any(|other| other.name == name) {
             return Err(fault(&format!("has the name {name:?} twice, or with blanks")));
         }
@@ -107,6 +114,9 @@ pub fn read(file: &Path) -> Result<Vec<UserPreset>, String> {
 /// One line that names the file: it is damaged, which is for its owner to see; it cannot be written.
 pub fn write(file: &Path, presets: &[UserPreset]) -> Result<(), String> {
     read(file).map_err(|e| format!("{e}; the file is left as it is"))?;
+    if presets.len() > MAX_PRESETS {
+        return Err(format!("{MAX_PRESETS} presets are kept: delete one first"));
+    }
     let kept = Kept { version: VERSION, preset: presets.to_vec() };
     let text = toml::to_string(&kept).map_err(|e| format!("presets cannot be written: {e}"))?;
     let text = format!("# Presets that were saved in `echolume view`; `--preset NAME` takes them too.\n{text}");

@@ -111,11 +111,10 @@ impl Thumbnails {
         }
     }
 
-    /// Moves the picture of a preset that was deleted out of the list.
-    pub(super) fn remove(&mut self, n: usize) {
-        if n < self.pictures.len() {
-            self.pictures.remove(n);
-        }
+    /// Stops, and forgets all pictures but the first `count`.
+    pub(super) fn keep_first(&mut self, count: usize) {
+        self.stop();
+        self.pictures.truncate(count);
     }
 
     /// Tells the thread to stop, without waiting for it.
@@ -143,7 +142,11 @@ impl Drop for Thumbnails {
 
 impl Job {
     fn draw(self, orders: &Orders, made: &Sender<(usize, Option<Picture>)>, wake: &Wake) {
-        let Some((geometry, frames)) = coarse(&self.geometry, self.input.stored, &self.frames) else { return };
+        let Some((geometry, frames)) = coarse(&self.geometry, self.input.stored, &self.frames) else {
+            // Pictures of an earlier volume are not to stay.
+            (0..self.settings.len()).for_each(|n| drop(made.send((n, None))));
+            return wake();
+        };
         let mut renderer = None;
         for (n, settings) in self.settings.iter().enumerate() {
             let since = Instant::now();
@@ -157,7 +160,7 @@ impl Job {
                 return;
             }
             let scene = settings.as_ref().and_then(|s| Scene::new(geometry.clone(), self.input, thumbnail(s)).ok());
-            let picture = scene.and_then(|scene| drawn(&self.context, &mut renderer, scene, &frames));
+            let picture = scene.and_then(|scene| drawn(&self.context, &mut renderer, scene, &frames, orders));
             if made.send((n, picture)).is_err() {
                 return;
             }
@@ -166,8 +169,14 @@ impl Job {
     }
 }
 
-/// A picture of the frames; none if the device does not make one.
-fn drawn(context: &Arc<Context>, renderer: &mut Option<Renderer>, scene: Scene, frames: &[Frame]) -> Option<Picture> {
+/// A picture of the frames; none if the device does not make one, or the list is closed meanwhile.
+fn drawn(
+    context: &Arc<Context>,
+    renderer: &mut Option<Renderer>,
+    scene: Scene,
+    frames: &[Frame],
+    orders: &Orders,
+) -> Option<Picture> {
     let draw = || {
         let mut there = match renderer.take() {
             Some(mut there) => {
@@ -177,14 +186,17 @@ fn drawn(context: &Arc<Context>, renderer: &mut Option<Renderer>, scene: Scene, 
             None => Renderer::new(context, scene, &RendererOptions::default())?,
         };
         for frame in frames {
+            if orders.must_stop.load(Ordering::Relaxed) {
+                return Ok(None);
+            }
             there.frame(frame.slice as u32, &frame.bytes, 0)?;
         }
         there.show(0)?;
         let picture = there.picture()?;
         *renderer = Some(there);
-        Ok::<_, crate::gpu::GpuError>(picture)
+        Ok::<_, crate::gpu::GpuError>(Some(picture))
     };
-    draw().map_err(|fault| tracing::debug!("no thumbnail: {fault}")).ok()
+    draw().map_err(|fault| tracing::debug!("no thumbnail: {fault}")).ok().flatten()
 }
 
 /// Settings of a small picture that looks like the large one: filters in pixels are smaller, and what a coarse volume has no use for is left out.

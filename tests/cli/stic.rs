@@ -46,7 +46,8 @@ fn what_makes_no_cycle_is_refused_in_one_line_and_nothing_is_left() {
     let not = folder.write("not.txt", "0.1\nNaN\n1.0\n");
     let falls = folder.write("falls.txt", "0.5\n0.1\n");
     let apart = folder.write("apart.txt", "100\n100.5\n101\n");
-    let few = folder.write("few.txt", "0.1\n0.9\n");
+    let few = folder.write("few.txt", "0.1\n1.6\n2.9\n");
+    let part = folder.write("part.txt", "0.1\n0.9\n");
     let none = folder.write("none.txt", "# nothing\n\n");
     let (out, picture) = (folder.path("out.frames"), folder.path("out.mha"));
     let at_ten = ["--frame-rate", "10"];
@@ -73,6 +74,12 @@ fn what_makes_no_cycle_is_refused_in_one_line_and_nothing_is_left() {
         (SWEEP, &out, waves(leak(&falls)), "falls.txt: R wave 2, at 0.1 s, does not come after"),
         (SWEEP, &out, waves(leak(&apart)), "apart.txt: 0 of 3 R waves lie between 0.000 and 3.000 s"),
         (SWEEP, &out, waves(leak(&few)), "cycles: at least 4 are needed"),
+        (
+            SWEEP,
+            &out,
+            waves(leak(&part)),
+            "part.txt: 2.6 cycles of the sweep lie before the first or after the last R wave",
+        ),
         (SWEEP, &out, waves(leak(&none)), "none.txt: 0 of 0 R waves"),
         (SWEEP, &out, waves("missing.txt"), "missing.txt"),
     ];

@@ -65,7 +65,6 @@ fn a_damaged_file_is_one_line_and_stays_as_it_is() {
         ("version = 2\n", "version 2"),
         ("", "version"),
         ("version = 1\n[[preset]]\nname = 'a'\n", "settings"),
-        ("version = 1\n[[preset]]\nname = 'Face'\n[preset.settings]\n", "built-in"),
         ("version = 1\n[[preset]]\nname = \"a\\nb\"\n[preset.settings]\n", "name"),
         (&format!("version = 1\n{}", "[[preset]]\nname = 'a'\n[preset.settings]\n".repeat(2)), "twice"),
         (&long, "at most"),
@@ -83,6 +82,13 @@ fn a_damaged_file_is_one_line_and_stays_as_it_is() {
     let said = presets[0].look().expect_err("an unknown setting");
     assert!(said.contains("\"a\"") && said.contains("colour") && said.lines().count() == 1, "{said}");
     assert_eq!(presets[1].look().expect("a look").mode, echolume::scene::Mode::Mip);
+    // So does one whose name a later version gave to a preset of its own: it can be given another.
+    let file =
+        PathBuf::from(folder.write("presets.toml", "version = 1\n[[preset]]\nname = 'Face'\n[preset.settings]\n"));
+    assert_eq!(read(&file).expect("a list")[0].name, "Face");
+    // More than can be read are not written.
+    let said = write(&file, &vec![good.clone(); MAX_PRESETS + 1]).expect_err("too many");
+    assert!(said.contains("delete one") && read(&file).expect("a list").len() == 1, "{said}");
 }
 
 #[test]

@@ -43,6 +43,11 @@ const HARMONICS: usize = 2;
 /// Weight of the mean rate, as a share of the mean weight of what is seen. It decides where no heart is seen.
 const PRIOR: f64 = 0.05;
 
+/// Between two R waves, s.
+const INTERVALS: std::ops::RangeInclusive<f64> = 0.06..=6.0;
+/// Most cycles before the first or after the last R wave.
+const MOST_BEYOND: f64 = 2.0;
+
 /// Mean grey values of the blocks of each frame.
 pub struct Motion {
     /// Samples of a line, and lines.
@@ -263,6 +268,16 @@ impl Rhythm {
                 ));
             }
         }
+        // As `--heart-rate` allows. Detectors find one wave twice, or miss some.
+        if let Some(n) = (1..triggers.len()).find(|n| !INTERVALS.contains(&(triggers[*n] - triggers[*n - 1]))) {
+            return Err(format!(
+                "R wave {} comes {} s after the one before it, must be {} to {} s",
+                n + 1,
+                triggers[n] - triggers[n - 1],
+                INTERVALS.start(),
+                INTERVALS.end()
+            ));
+        }
         let (Some(first), Some(last)) = (times.first(), times.last()) else { return Err("no frames".into()) };
         let within = triggers.iter().filter(|t| (first..=last).contains(t)).count();
         if within < 2 {
@@ -275,6 +290,13 @@ impl Rhythm {
             let n = triggers.partition_point(|t| *t <= time).clamp(1, triggers.len() - 1) - 1;
             n as f64 + (time - triggers[n]) / (triggers[n + 1] - triggers[n])
         };
+        // The nearest cycle says little of one that is far from it.
+        let beyond = (-phase(*first)).max(phase(*last) - (triggers.len() - 1) as f64);
+        if beyond > MOST_BEYOND {
+            return Err(format!(
+                "{beyond:.1} cycles of the sweep lie before the first or after the last R wave; at most {MOST_BEYOND}"
+            ));
+        }
         let mean = (phase(*last) - phase(*first)) / (times.len() - 1) as f64;
         Ok(Rhythm { phases: times.iter().map(|time| phase(*time)).collect(), mean, height: None })
     }
@@ -332,6 +354,9 @@ fn followed(motion: &Motion, mut mean: f64) -> (Vec<f64>, f64) {
         }
         let usual = said.iter().zip(&weights).map(|(said, weight)| said * weight).sum::<f64>() / all;
         let prior = PRIOR * all / weights.len() as f64;
+        if !(0.5..=2.0).contains(&(usual / apart as f64 / mean)) {
+            break;
+        }
         mean = usual / apart as f64;
         let more: Vec<f64> = (0..said.len())
             .map(|n| {
@@ -429,6 +454,8 @@ mod tests {
             (times, vec![0.5, 0.5], "R wave 2"),
             (times, vec![f64::NAN, 0.5, 1.0], "R wave 2"),
             (times, vec![0.2, 0.5, f64::INFINITY], "R wave 3"),
+            (times, vec![0.2, 0.5, 0.500001], "R wave 3"),
+            (times, vec![0.1, 0.3], "8.5 cycles of the sweep lie"),
             ([0.0, 2.0, 1.0], vec![0.2, 0.5, 1.0], "frame 3"),
         ] {
             let error = Rhythm::of_triggers(&times, &triggers).expect_err(wanted);

@@ -253,6 +253,9 @@ impl Console {
         let file = self.presets.file.as_deref().ok_or("this view keeps no presets")?;
         user_presets::write(file, &own)?;
         self.presets.before = Some(std::mem::replace(&mut self.presets.own, own));
+        // Pictures belong to places in the list, and it has others now.
+        self.presets.thumbnails.keep_first(EXAMS.len());
+        self.presets.made_of = None;
         Ok(())
     }
 
@@ -263,7 +266,6 @@ impl Console {
         own.retain(|preset| preset.name != name);
         match self.keep_presets(own) {
             Ok(()) => {
-                self.presets.thumbnails.remove(EXAMS.len() + n);
                 self.notify(&format!("{name} is deleted. Undo in the list brings it back"), false);
             }
             Err(why) => self.notify(&why, true),
@@ -273,6 +275,12 @@ impl Console {
     /// Brings the presets of the user back as they were before the last change.
     pub(super) fn restore_presets(&mut self) {
         let Some(before) = self.presets.before.clone() else { return };
+        let known = self.presets.own.clone();
+        self.presets.read();
+        if self.presets.own != known {
+            self.presets.before = None;
+            return self.notify("The presets were changed elsewhere: nothing is taken back", true);
+        }
         match self.keep_presets(before) {
             Ok(()) => self.notify("The presets are as they were", false),
             Err(why) => self.notify(&why, true),
