@@ -17,6 +17,5 @@ pub use picture_file::PictureFile;
 pub use picture_series::{PictureSeries, SeriesTarget};
 pub use recording::{GeometryArgs, open_recording};
 pub use source::{SourceArgs, StreamArgs};
-pub use user_files::presets_file;
 #[cfg(feature = "view")]
-pub use user_files::{pipeline_folder, recent_list};
+pub use user_files::{pipeline_folder, presets_file, recent_list};

@@ -52,8 +52,8 @@ pub(super) fn show_modes(ui: &mut Ui, state: &PanelState, width: f32, execute: &
             ui.add_space(6.0);
             undo_and_redo(ui, state, &row, execute);
             let hint = "The looks of an examination, with small pictures of this volume, and your own. (Ctrl+P)";
-            let button = Button::new("Presets").min_size(vec2(width - 16.0, TOUCH_SIZE * 0.75));
-            if ui.add(button).tell(hint).clicked() {
+            let size = vec2(width - 16.0, TOUCH_SIZE * 0.75);
+            if ui.add_sized(size, Button::new("Presets")).tell(hint).clicked() {
                 execute(Command::Presets);
             }
             let modes = Mode::ALL.map(|mode| (mode, mode.title()));
