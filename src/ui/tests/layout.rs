@@ -146,8 +146,14 @@ impl Shown {
     }
 }
 
+/// The smallest and the largest at every scale, of the others every second one.
 fn windows() -> impl Iterator<Item = ([u32; 2], f32)> {
-    SIZES.iter().flat_map(|size| SCALES.map(|scale| (*size, scale)))
+    let all = SIZES
+        .iter()
+        .enumerate()
+        .flat_map(|(m, size)| SCALES.iter().enumerate().map(move |(n, scale)| (m, size, n, scale)));
+    let is_taken = |m: usize, n: usize| m == 0 || m + 1 == SIZES.len() || (m + n).is_multiple_of(2);
+    all.filter(move |(m, _, n, _)| is_taken(*m, *n)).map(|(_, size, _, scale)| (*size, *scale))
 }
 
 /// Prevents a control, a mark or the picture that something else covers, and a window without Freeze or Save.
