@@ -483,7 +483,7 @@ impl Context {
     ///
     /// # Errors
     /// A device that fails or is given up.
-    pub(super) fn show_layer_the_wait(&self) -> Result<(), GpuError> {
+    pub(crate) fn show_layer_the_wait(&self) -> Result<(), GpuError> {
         if self.layer_misses_waits() { self.wait_queue(0) } else { Ok(()) }
     }
 
