@@ -483,11 +483,12 @@ impl Context {
     ///
     /// # Errors
     /// A device that fails or is given up.
-    pub(crate) fn show_layer_the_wait(&self) -> Result<(), GpuError> {
+    pub(super) fn show_layer_the_wait(&self) -> Result<(), GpuError> {
         if self.layer_misses_waits() { self.wait_queue(0) } else { Ok(()) }
     }
 
-    fn layer_misses_waits(&self) -> bool {
+    /// True if validation is on and its layer is one of those that do not see that a timeline is waited for.
+    pub(super) fn layer_misses_waits(&self) -> bool {
         self.messenger.is_some() && !self.layer_knows_timelines
     }
 

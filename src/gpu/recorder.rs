@@ -626,6 +626,14 @@ impl Recorder {
         }
     }
 
+    /// Says by a barrier that everything submitted so far was waited for, where the layer does not see waits for timelines. A layer that
+    /// sees them gets no barrier.
+    pub fn show_layer_the_wait(&self) {
+        if self.context.layer_misses_waits() {
+            flush(&self.context.device, self.commands, vk::AccessFlags2::MEMORY_READ | vk::AccessFlags2::MEMORY_WRITE);
+        }
+    }
+
     /// Copies everything that an upload holds into its parts of an image.
     pub fn upload(&mut self, barriers: &mut BarrierRecorder, from: &Upload, image: &Image, to: SlotParts) {
         self.barrier(barriers, &[Access::of_slot(to.slot, to.copy, to.parts, true, PipelineStage::Copy)]);

@@ -193,8 +193,6 @@ fn drawn(
         }
         there.show(0)?;
         let picture = there.picture()?;
-        // The next one is drawn into the same images, which the device is done with.
-        context.show_layer_the_wait()?;
         *renderer = Some(there);
         Ok::<_, crate::gpu::GpuError>(Some(picture))
     };

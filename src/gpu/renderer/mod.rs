@@ -303,6 +303,8 @@ impl Renderer {
         let place = SlotParts { slot, copy, parts: 0..image.shape.parts() };
         let upload = Upload::new(&self.context, "upload", image.layout(), place.parts.clone(), bytes)?;
         self.picture.begin(&mut self.barriers, &self.timelines)?;
+        // A layer that tracks submissions of two threads forgets what was between this upload and the last one.
+        self.picture.show_layer_the_wait();
         self.picture.upload(&mut self.barriers, &upload, image, place);
         self.uploads.push(upload);
         self.picture.submit(&mut self.barriers, &mut self.timelines)?;
@@ -420,6 +422,12 @@ impl Renderer {
             Rerun::Steps { slots, .. } if !touched(slots) => self.wait_drawn()?,
             _ => self.collect()?,
         }
+        // Of slots that are made again with the images, `fit` uploads the content.
+        let changed: Vec<Slot> = match &rerun {
+            Rerun::Steps { slots, .. } => slots.clone(),
+            Rerun::Frames => plan.slots.iter().copied().filter(|s| s.differs(&self.scene, &scene)).collect(),
+            Rerun::Everything => Vec::new(),
+        };
         let kept: Vec<_> = self.plan.steps.iter().zip(&self.stale).filter(|s| *s.1).map(|s| s.0.id()).collect();
         self.stale = plan.steps.iter().map(|s| kept.contains(&s.id())).collect();
         // Of frames that were not sent, none may be counted on where smoothing across slices reaches further than it did for them.
@@ -436,7 +444,7 @@ impl Renderer {
         }
         (self.plan, self.steps, self.scene) = (plan, steps, scene);
         self.broken = None;
-        self.rebuild(&rerun).inspect_err(|error| self.broken = Some(error.to_string()))?;
+        self.rebuild(&rerun, &changed).inspect_err(|error| self.broken = Some(error.to_string()))?;
         Ok(rerun)
     }
 
@@ -455,7 +463,7 @@ impl Renderer {
         self.collect()?;
         self.steps = self.pipelines.recompile(shaders, &self.plan, &self.scene)?;
         let rerun = self.plan.rerun_shaders(&self.scene, |shader| shaders.contains(shader));
-        self.rebuild(&rerun).inspect_err(|error| self.broken = Some(error.to_string()))?;
+        self.rebuild(&rerun, &[]).inspect_err(|error| self.broken = Some(error.to_string()))?;
         Ok(rerun)
     }
 
@@ -464,14 +472,14 @@ impl Renderer {
         self.timelines.of(0).wait(self.presented)
     }
 
-    fn rebuild(&mut self, rerun: &Rerun) -> Result<(), GpuError> {
-        let refilled = match rerun {
-            Rerun::Steps { steps, slots } => {
+    /// Prepares what has to run again. `changed`: the slots whose content the CPU makes differently of the current scene.
+    fn rebuild(&mut self, rerun: &Rerun, changed: &[Slot]) -> Result<(), GpuError> {
+        match rerun {
+            Rerun::Steps { steps, .. } => {
                 steps.iter().for_each(|i| self.stale[*i] = true);
                 if steps.iter().any(|i| self.plan.steps[*i].pass.frequency == Frequency::Volume) {
                     self.invalidate_volumes();
                 }
-                slots.clone()
             }
             Rerun::Frames | Rerun::Everything => {
                 self.stale.iter_mut().for_each(|stale| *stale = true);
@@ -485,12 +493,11 @@ impl Renderer {
                     self.ring = self.new_ring()?;
                     self.ring_index = 0;
                 }
-                self.plan.slots.clone()
             }
-        };
+        }
         self.fit()?;
-        for slot in refilled {
-            self.fill(slot)?;
+        for slot in changed {
+            self.fill(*slot)?;
         }
         if self.readback.as_ref().is_some_and(|r| r.size != Slot::Screen.bytes(&self.scene)) {
             self.readback = Some(readback(&self.context, &self.scene)?);
