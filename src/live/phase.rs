@@ -123,7 +123,7 @@ impl Phase {
 pub(super) enum Pending<T> {
     #[default]
     None,
-    /// Their pipelines are being compiled in the background. Each step asks again.
+    /// Their pipelines are being compiled in the background. Each step between pictures asks again; the end of a compilation wakes the loop.
     Compiling(T),
     /// The next step that may begin a picture applies them, or starts their compilation.
     Ready(T),
@@ -135,6 +135,14 @@ impl<T> Pending<T> {
             Pending::None => None,
             Pending::Compiling(next) | Pending::Ready(next) => Some(next),
         }
+    }
+
+    /// The next step that may begin a picture asks whether the pipelines are compiled.
+    pub fn ask_again(&mut self) {
+        *self = match std::mem::take(self) {
+            Pending::Compiling(next) => Pending::Ready(next),
+            other => other,
+        };
     }
 
     pub fn is_none(&self) -> bool {

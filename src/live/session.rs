@@ -303,6 +303,8 @@ impl Session {
     pub fn finish(&mut self, queued: usize, statistics: &mut Statistics) -> Result<FinishedPicture, GpuError> {
         let picture = self.renderer.end_drawing()?;
         let InFlight { volume, arrived } = self.phase.finish(queued);
+        // Their pipelines may have been compiled meanwhile, and nothing would ask again.
+        self.pending.ask_again();
         let now = Instant::now();
         arrived.iter().for_each(|at| statistics.record_latency(now.saturating_duration_since(*at)));
         statistics.pictures += 1;

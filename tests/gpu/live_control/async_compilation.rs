@@ -59,6 +59,41 @@ fn a_new_mode_compiles_in_the_background_while_pictures_continue() {
     }
 }
 
+/// Prevents a picture that comes seconds late: its pipelines were compiled while another picture was drawn, and nobody asked again.
+#[test]
+fn what_compiles_during_a_picture_is_drawn_after_it() {
+    let device = Device::alone();
+    let (woken, options) = waking();
+    let mut bench = Bench::new(&device, "mode = 'mip'", options);
+    bench.begin(header(0.3));
+    (0..2).for_each(|number| drop(bench.live(number)));
+    // A complete volume waits, and is drawn with the settings before.
+    let frames = bench.stream.frames();
+    bench.frames(speckled(2));
+    while bench.stream.frames() < frames + 9 {
+        bench.stream.step(Duration::from_millis(1)).expect("step");
+    }
+    let next = "mode = 'sr'\nslices.median = true";
+    bench.stream.change(settings(next)).expect("change");
+    while !bench.stream.is_drawing() {
+        bench.stream.step(Duration::ZERO).expect("step");
+    }
+    // Every pipeline, so that none is left to wake anybody.
+    let mut last = (woken.load(Ordering::Relaxed), Instant::now());
+    while last.0 == 0 || last.1.elapsed() < Duration::from_secs(1) {
+        std::thread::sleep(Duration::from_millis(20));
+        let now = woken.load(Ordering::Relaxed);
+        last = if now == last.0 { last } else { (now, Instant::now()) };
+    }
+    // As an event loop does it: without an event, only what has something to do is asked.
+    let mut drawn = 0;
+    while !bench.stream.is_idle() {
+        drawn += usize::from(matches!(bench.stream.step(Duration::ZERO).expect("step"), live::Step::Picture(_)));
+    }
+    assert_eq!(drawn, 2, "the picture in flight, and the one of the new settings");
+    assert_eq!(bench.stream.scene().expect("begun").settings, settings(next));
+}
+
 /// Prevents a stream that ends or goes black because settings exceed the device; and that they return with another device.
 #[test]
 fn settings_too_large_for_the_device_are_reported_and_the_picture_stays() {
