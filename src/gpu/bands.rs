@@ -7,9 +7,14 @@
 
 use crate::passes::{Pass, Stage};
 use std::sync::atomic::{AtomicU64, Ordering};
+use std::time::Duration;
 
 /// Time that a submission may take, ns: far less than any watchdog allows, since the next picture may be slower than the last.
 const TARGET_NS: f64 = 100e6;
+/// The same of a software device that draws a window's panels between.
+const PACED_TARGET_NS: f64 = 20e6;
+/// How often the first bands of a software device are halved: it takes some microseconds for a ray.
+const SOFTWARE_HALVINGS: u32 = 2;
 /// The shortest such time after losses, ns.
 const LEAST_NS: f64 = 1e6;
 /// Invocations of a pass that casts rays, in its first band on a device, when its time is not known.
@@ -69,8 +74,8 @@ pub struct Band {
 /// What one submission may hold.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum BandLimit {
-    /// Time, ns; and how often the first bands were halved.
-    Time { target: f64, losses: u32 },
+    /// Time, ns; and how often the first bands are halved.
+    Time { target: f64, halvings: u32 },
     /// Invocations of a band.
     Invocations(u64),
 }
@@ -81,22 +86,42 @@ impl BandLimit {
         match bands {
             Bands::Measured { losses: 0 } if is_software => None,
             Bands::Measured { losses } => {
-                Some(BandLimit::Time { target: (TARGET_NS / 2f64.powi(losses.min(64) as i32)).max(LEAST_NS), losses })
+                Some(BandLimit::Time { target: after_losses(TARGET_NS, losses), halvings: losses })
             }
             Bands::Fixed(invocations) => Some(BandLimit::Invocations(invocations.max(1))),
         }
     }
 
+    /// The limit of a device whose queue draws a window's panels between the bands.
+    pub fn paced(bands: Bands, is_software: bool) -> Option<BandLimit> {
+        match bands {
+            Bands::Measured { losses } if is_software => Some(BandLimit::Time {
+                target: after_losses(PACED_TARGET_NS, losses),
+                halvings: losses.saturating_add(SOFTWARE_HALVINGS),
+            }),
+            _ => BandLimit::new(bands, is_software),
+        }
+    }
+
+    /// Expected time of what is submitted at once, so that the device does not wait for the host between two bands.
+    pub fn in_flight(&self) -> Duration {
+        match *self {
+            BandLimit::Time { target, .. } => Duration::from_nanos((2.0 * target) as u64),
+            // Their time is not known: one is in flight.
+            BandLimit::Invocations(_) => Duration::ZERO,
+        }
+    }
+
     /// The expected time of a dispatch, ns; 0 under a limit of invocations.
     pub fn expected(&self, pass: &Pass, time: &InvocationTime, invocations: u64) -> f64 {
-        let BandLimit::Time { target, losses } = *self else { return 0.0 };
+        let BandLimit::Time { target, halvings } = *self else { return 0.0 };
         let each = time.measured().unwrap_or_else(|| {
             let first = match pass.stage {
                 Stage::Raycast | Stage::Shade => FIRST_RAYS,
                 _ => FIRST_TEXELS,
             };
             // Halved after a loss, as the time is: unless that is at its least.
-            target / (first >> losses.min(12)).max(1) as f64
+            target / (first >> halvings.min(12)).max(1) as f64
         });
         each * invocations as f64
     }
@@ -130,6 +155,11 @@ impl BandLimit {
             _ => (0..all).step_by(each as usize).map(band).collect(),
         }
     }
+}
+
+/// Each loss of the device halves the time that a submission may take.
+fn after_losses(target: f64, losses: u32) -> f64 {
+    (target / 2f64.powi(losses.min(64) as i32)).max(LEAST_NS)
 }
 
 /// Work in a submission whose time is measured: a pass, by the time of its invocations, and their number.
@@ -215,7 +245,7 @@ mod tests {
         assert!(BandLimit::new(Bands::Measured { losses: 1 }, true).is_some());
         assert_eq!(
             BandLimit::new(Bands::Measured { losses: 99 }, true),
-            Some(BandLimit::Time { target: LEAST_NS, losses: 99 })
+            Some(BandLimit::Time { target: LEAST_NS, halvings: 99 })
         );
     }
 

@@ -7,7 +7,8 @@
 //!   what was compiled on disk; `shader_reload` takes shaders from a folder that is watched. `descriptor_sets` are for devices without push
 //!   descriptors.
 //! - `recorder` records command buffers with their barriers and the time stamps of `timing`; `timeline` says when a submission is done,
-//!   and `watchdog` gives up a device that does not finish. `bands` divides dispatches that a driver's watchdog might end.
+//!   and `watchdog` gives up a device that does not finish. `bands` divides dispatches that a driver's watchdog might end, and `paced`
+//!   holds bands back while a window's panels are drawn.
 //! - `lost_device` reports why a device was lost, `losses` counts how often the same work lost it, `budget` how much memory it has left; `host_memory` returns what drivers freed.
 //! - `renderer` runs the four stages, `pass_runner` a single pass for tests and benchmarks.
 //! - `window` presents pictures.
@@ -25,6 +26,7 @@ pub(crate) mod host_memory;
 mod losses;
 pub mod lost_device;
 mod memory;
+mod paced;
 pub mod pass_runner;
 mod pipeline_cache;
 mod pipeline_compiler;

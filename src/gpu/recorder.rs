@@ -8,7 +8,7 @@ use super::error::{ErrorContext, GpuError};
 use super::formats;
 use super::pipelines::{Pipeline, descriptor_type};
 use super::resources::{Image, Resource, SlotResources, WHOLE};
-use super::timeline::Timelines;
+use super::timeline::{Submission, Timelines};
 use super::timing::{Stamps, TimeStamps, Timings};
 use crate::barriers::{self, Access, Barrier, PipelineStage, PipelineStages};
 use crate::passes::slots::Shape;
@@ -71,6 +71,8 @@ pub struct Recorder {
     used: usize,
     /// The passes in the command buffer that is being recorded, if they are timed.
     open: Vec<Work>,
+    /// Expected time of the command buffer that is being recorded, ns.
+    expected: f64,
     params: Buffer,
     params_used: u64,
     /// For a device without push descriptors.
@@ -120,6 +122,7 @@ impl Recorder {
             allocated: Vec::new(),
             used: 0,
             open: Vec::new(),
+            expected: 0.0,
             params,
             params_used: 0,
             sets: DescriptorSets::new(context),
@@ -173,6 +176,7 @@ impl Recorder {
         self.commands = self.allocated[self.used];
         self.used += 1;
         self.open.clear();
+        self.expected = 0.0;
         let begin = vk::CommandBufferBeginInfo::default().flags(vk::CommandBufferUsageFlags::ONE_TIME_SUBMIT);
         // SAFETY: the command buffer is in its initial state: it is new, or its pool was reset, and it was not used since.
         unsafe { self.context.device.begin_command_buffer(self.commands, &begin) }
@@ -196,7 +200,13 @@ impl Recorder {
             stamps.continues();
         }
         barriers.begin(self.queue);
-        self.begin_commands(barriers)
+        self.begin_commands(barriers)?;
+        if self.context.presentation.is_some() {
+            // Older layers ignore dispatches with a base, and forget the barrier of a command buffer that has no other: those of bands. Headless,
+            // nothing hides what they see.
+            self.show_layer_the_wait();
+        }
+        Ok(())
     }
 
     /// What has to follow a time stamp: where passes are timed, nothing may begin before it.
@@ -270,28 +280,11 @@ impl Recorder {
         unsafe { self.context.device.end_command_buffer(self.commands) }
             .context(|| format!("record '{}'", self.label))?;
         let waits = barriers.queues.waits(self.queue);
-        let waited: Vec<_> = waits
-            .iter()
-            .map(|wait| {
-                vk::SemaphoreSubmitInfo::default()
-                    .semaphore(timelines.of(wait.queue).semaphore)
-                    .value(wait.value)
-                    .stage_mask(vk::PipelineStageFlags2::ALL_COMMANDS)
-            })
-            .collect();
-        let timeline = timelines.of_mut(self.queue);
-        let commands = [vk::CommandBufferSubmitInfo::default().command_buffer(self.commands)];
-        let signal = [vk::SemaphoreSubmitInfo::default()
-            .semaphore(timeline.semaphore)
-            .value(timeline.submitted + 1)
-            .stage_mask(vk::PipelineStageFlags2::ALL_COMMANDS)];
-        let submit = vk::SubmitInfo2::default()
-            .wait_semaphore_infos(&waited)
-            .command_buffer_infos(&commands)
-            .signal_semaphore_infos(&signal);
-        self.context.submit(self.queue, &submit, vk::Fence::null(), || format!("submit '{}'", self.label))?;
-        timeline.advance(self.label);
-        self.done_at = timeline.submitted;
+        let waited = waits.iter().map(|wait| (timelines.of(wait.queue).semaphore, wait.value)).collect();
+        let (queue, commands, label) = (self.queue, self.commands, self.label);
+        let expected = std::mem::take(&mut self.expected);
+        let work = Submission { queue, commands, waits: waited, label, expected };
+        self.done_at = timelines.of_mut(queue).submit(work)?;
         barriers.submitted(self.queue, &waits, self.done_at);
         Ok(())
     }
@@ -372,6 +365,7 @@ impl Recorder {
     }
 
     fn dispatch_band(&mut self, barriers: &mut BarrierRecorder, dispatch: &Dispatch, band: &Band, work: Work) {
+        self.expected += work.expected;
         let Dispatch { pipeline, pass, .. } = *dispatch;
         let (device, commands) = (&self.context.device, self.commands);
         // Before any query begins, because lavapipe reads the pipeline then.

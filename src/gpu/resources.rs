@@ -104,6 +104,56 @@ impl Image {
         Ok(image)
     }
 
+    /// True if another image has its shape and format.
+    #[cfg(feature = "view")]
+    pub(super) fn is_like(&self, other: &Image) -> bool {
+        (self.shape, self.format) == (other.shape, other.format)
+    }
+
+    /// An image of the same slot, shape and format, in layout UNDEFINED.
+    ///
+    /// # Errors
+    /// The device has no memory for it.
+    #[cfg(feature = "view")]
+    pub(super) fn another(&self, context: &Arc<Context>, slot: Slot) -> Result<Image, GpuError> {
+        Image::new(context, slot, self.shape, self.format)
+    }
+
+    /// Records a copy of the complete image, which is in layout GENERAL and was written before a barrier for copies, into another of its
+    /// shape and format, whose last use is done. The other is then in layout GENERAL, and its content visible to copies.
+    #[cfg(feature = "view")]
+    pub(super) fn copy_to(&self, device: &ash::Device, commands: vk::CommandBuffer, to: &Image) {
+        let (stage, general) = (vk::PipelineStageFlags2::ALL_TRANSFER, vk::ImageLayout::GENERAL);
+        let barrier = |from: vk::ImageLayout, access: [vk::AccessFlags2; 2]| {
+            let barrier = [vk::ImageMemoryBarrier2::default()
+                .src_stage_mask(stage)
+                .src_access_mask(access[0])
+                .dst_stage_mask(stage)
+                .dst_access_mask(access[1])
+                .old_layout(from)
+                .new_layout(general)
+                .src_queue_family_index(vk::QUEUE_FAMILY_IGNORED)
+                .dst_queue_family_index(vk::QUEUE_FAMILY_IGNORED)
+                .image(to.handle)
+                .subresource_range(WHOLE)];
+            let dependency = vk::DependencyInfo::default().image_memory_barriers(&barrier);
+            // SAFETY: the command buffer is being recorded; the image is alive.
+            unsafe { device.cmd_pipeline_barrier2(commands, &dependency) };
+        };
+        let layers = vk::ImageSubresourceLayers {
+            aspect_mask: vk::ImageAspectFlags::COLOR,
+            layer_count: 1,
+            ..vk::ImageSubresourceLayers::default()
+        };
+        let copy = [vk::ImageCopy::default().src_subresource(layers).dst_subresource(layers).extent(self.extent)];
+        // The last copy is done; older layers do not know it.
+        let write = vk::AccessFlags2::TRANSFER_WRITE;
+        barrier(vk::ImageLayout::UNDEFINED, [write, write]);
+        // SAFETY: both images are alive, in these layouts, and of one size and format.
+        unsafe { device.cmd_copy_image(commands, self.handle, general, to.handle, general, &copy) };
+        barrier(general, [write, vk::AccessFlags2::TRANSFER_READ]);
+    }
+
     /// Its shape and the bytes of a texel.
     pub fn layout(&self) -> (Shape, usize) {
         (self.shape, self.format.texel_bytes())

@@ -3,6 +3,7 @@
 use super::context::Context;
 use super::error::{ErrorContext, GpuError};
 use super::faults::InjectionPoint;
+use super::paced::Paced;
 use super::watchdog::Progress;
 use ash::vk;
 use std::sync::{Arc, Mutex};
@@ -17,6 +18,19 @@ pub struct Timeline {
     /// Name of the last submission.
     label: String,
     progress: Mutex<Progress>,
+    /// What is held back, if submissions are.
+    paced: Option<Mutex<Paced<(u64, Submission)>>>,
+}
+
+/// Recorded commands, and what orders them.
+pub(super) struct Submission {
+    pub queue: usize,
+    pub commands: vk::CommandBuffer,
+    /// Semaphores of other queues, and the values to wait for.
+    pub waits: Vec<(vk::Semaphore, u64)>,
+    pub label: &'static str,
+    /// Expected time, ns; 0 if it is short or not known.
+    pub expected: f64,
 }
 
 impl Timeline {
@@ -28,14 +42,80 @@ impl Timeline {
             unsafe { context.device.create_semaphore(&create, None) }.context(|| "create timeline".into())?;
         context.name(semaphore, "timeline");
         let (context, label, progress) = (context.clone(), String::new(), Mutex::default());
-        Ok(Timeline { context, semaphore, submitted: 0, label, progress })
+        Ok(Timeline { context, semaphore, submitted: 0, label, progress, paced: None })
     }
 
-    /// Counts a submission that signals `submitted + 1`.
+    /// Counts a submission that signals `submitted + 1`, made elsewhere. Nothing may be held back.
+    #[cfg(feature = "view")]
     pub(super) fn advance(&mut self, label: &str) {
         self.submitted += 1;
         label.clone_into(&mut self.label);
         self.progress(|progress| progress.submitted(self.submitted, Instant::now()));
+    }
+
+    /// Submits, or holds back where the device has enough to do. Returns the value at which the work is done.
+    ///
+    /// # Errors
+    /// A device that fails. The work then counts as not submitted.
+    pub(super) fn submit(&mut self, work: Submission) -> Result<u64, GpuError> {
+        let (value, label) = (self.submitted + 1, work.label);
+        match &self.paced {
+            None => self.send(&work, value)?,
+            Some(paced) => {
+                let mut paced = paced.lock().unwrap_or_else(|e| e.into_inner());
+                let expected = work.expected;
+                paced.push(value, expected, (value, work));
+                self.send_due(&mut paced).inspect_err(|_| paced.pop_back())?;
+            }
+        }
+        self.submitted = value;
+        label.clone_into(&mut self.label);
+        Ok(value)
+    }
+
+    /// Submits at once. The timeline gets `value` when it is done.
+    fn send(&self, work: &Submission, value: u64) -> Result<(), GpuError> {
+        let everything = vk::PipelineStageFlags2::ALL_COMMANDS;
+        let semaphore = |(handle, value): (vk::Semaphore, u64)| {
+            vk::SemaphoreSubmitInfo::default().semaphore(handle).value(value).stage_mask(everything)
+        };
+        let waits: Vec<_> = work.waits.iter().map(|wait| semaphore(*wait)).collect();
+        let commands = [vk::CommandBufferSubmitInfo::default().command_buffer(work.commands)];
+        let signal = [semaphore((self.semaphore, value))];
+        let submit = vk::SubmitInfo2::default()
+            .wait_semaphore_infos(&waits)
+            .command_buffer_infos(&commands)
+            .signal_semaphore_infos(&signal);
+        self.context.submit(work.queue, &submit, vk::Fence::null(), || format!("submit '{}'", work.label))?;
+        self.progress(|progress| progress.submitted(value, Instant::now()));
+        Ok(())
+    }
+
+    fn send_due(&self, paced: &mut Paced<(u64, Submission)>) -> Result<(), GpuError> {
+        while let Some((value, work)) = paced.due() {
+            self.send(work, *value)?;
+            paced.sent();
+        }
+        Ok(())
+    }
+
+    /// Submits what is held back up to this value.
+    ///
+    /// # Errors
+    /// A device that fails. What is not submitted stays held back.
+    pub(super) fn release(&self, value: u64) -> Result<(), GpuError> {
+        let Some(paced) = &self.paced else { return Ok(()) };
+        let mut paced = paced.lock().unwrap_or_else(|e| e.into_inner());
+        while let Some((value, work)) = paced.up_to(value) {
+            self.send(work, *value)?;
+            paced.sent();
+        }
+        Ok(())
+    }
+
+    /// Number of submissions that are held back.
+    fn held(&self) -> usize {
+        self.paced.as_ref().map_or(0, |paced| paced.lock().unwrap_or_else(|e| e.into_inner()).held())
     }
 
     fn progress<T>(&self, with: impl FnOnce(&mut Progress) -> T) -> T {
@@ -51,6 +131,9 @@ impl Timeline {
         // SAFETY: the semaphore is alive.
         let reached = unsafe { self.context.device.get_semaphore_counter_value(self.semaphore) }?;
         self.progress(|progress| progress.reached(reached, Instant::now()));
+        if let Some(paced) = &self.paced {
+            paced.lock().unwrap_or_else(|e| e.into_inner()).reached(reached);
+        }
         Ok(reached)
     }
 
@@ -72,6 +155,7 @@ impl Timeline {
     /// A device that fails, or is given up because it does not finish.
     pub fn wait(&self, value: u64) -> Result<(), GpuError> {
         let operation = || self.operation();
+        self.release(value)?;
         match self.context.faults.check(InjectionPoint::Wait) {
             Err(vk::Result::TIMEOUT) => return Err(self.context.watchdog.inject_lateness(operation)),
             other => other.context(operation).map_err(|error| self.context.explain(error))?,
@@ -93,7 +177,7 @@ impl Timeline {
         self.wait(self.submitted)
     }
 
-    /// True if a submission is done; does not wait.
+    /// True if a submission is done; does not wait. Submits what is held back and due.
     ///
     /// # Errors
     /// A device that fails, or is given up because it does not finish.
@@ -102,6 +186,9 @@ impl Timeline {
         let reached = self.reached().context(|| self.operation()).map_err(|error| self.context.explain(error))?;
         if reached >= value {
             return Ok(true);
+        }
+        if let Some(paced) = &self.paced {
+            self.send_due(&mut paced.lock().unwrap_or_else(|e| e.into_inner()))?;
         }
         self.context.watchdog.check_deadline(self.busy_since(), || self.operation())?;
         Ok(false)
@@ -122,6 +209,32 @@ pub struct Timelines(Vec<Timeline>);
 impl Timelines {
     pub fn new(context: &Arc<Context>, queues: usize) -> Result<Timelines, GpuError> {
         (0..queues).map(|_| Timeline::new(context)).collect::<Result<_, _>>().map(Timelines)
+    }
+
+    /// From now on, submissions are held back where the device has this much to do. Of several queues, which wait for each other, none is.
+    pub(super) fn pace(&mut self, most: Duration) {
+        if let [only] = &mut self.0[..] {
+            only.paced = Some(Mutex::new(Paced::new(most)));
+        }
+    }
+
+    /// Submits what is held back.
+    ///
+    /// # Errors
+    /// A device that fails.
+    #[cfg(feature = "view")]
+    pub(super) fn release(&self) -> Result<(), GpuError> {
+        self.0.iter().try_for_each(|timeline| timeline.release(timeline.submitted))
+    }
+
+    /// True if submissions are held back.
+    pub(super) fn is_paced(&self) -> bool {
+        self.0.iter().any(|timeline| timeline.paced.is_some())
+    }
+
+    /// Number of submissions that are held back.
+    pub(super) fn held(&self) -> usize {
+        self.0.iter().map(Timeline::held).sum()
     }
 
     pub(super) fn of(&self, queue: usize) -> &Timeline {

@@ -52,6 +52,9 @@ pub struct StreamOptions {
     pub prepares: bool,
     /// Draws the first picture with a 16th of the rays, and then at once the same in full: something is seen soon on a slow device.
     pub coarse_first: bool,
+    /// Holds back what keeps the device busy, so that a window's panels are drawn while a picture is: see
+    /// [`RendererOptions::paced`](gpu::RendererOptions::paced). Frames that the device has no room for stay in the feed.
+    pub paced: bool,
 }
 
 /// The settings that a scene at full quality is drawn with while the view moves.
@@ -72,6 +75,7 @@ impl Default for StreamOptions {
             lowered: None,
             prepares: false,
             coarse_first: false,
+            paced: false,
         }
     }
 }
@@ -235,8 +239,9 @@ impl Stream {
             return Ok(Step::Progress);
         }
         let patience = patience.min(DRAWING_WAIT);
-        if self.feed.can_wait() && session.pool.is_waiting() {
-            // A further volume would replace the one that waits to be shown.
+        let is_full = session.renderer.is_paced() && !session.renderer.takes_frame()?;
+        if is_full || (self.feed.can_wait() && session.pool.is_waiting()) {
+            // A frame would wait for the picture; a further volume would replace the one that waits to be shown.
             std::thread::sleep(patience);
             return Ok(Step::Progress);
         }
@@ -382,6 +387,7 @@ impl Stream {
             wake: self.options.wake.clone(),
             time_stamps: self.options.time_stamps,
             bands: Bands::Measured { losses: self.losses },
+            paced: self.options.paced,
             ..gpu::RendererOptions::default()
         };
         if let Some(folder) = &self.options.shaders {
@@ -698,6 +704,14 @@ impl Stream {
     /// True while a picture is being drawn.
     pub fn is_drawing(&self) -> bool {
         self.session.as_ref().is_some_and(|session| session.phase.is_drawing())
+    }
+
+    /// True if a step has nothing to do until the picture goes on.
+    pub fn is_waiting(&self) -> bool {
+        let Some(session) = self.session.as_ref().filter(|session| session.phase.is_drawing()) else { return false };
+        // A device that fails is reported by the step.
+        let is_full = session.renderer.is_paced() && !session.renderer.takes_frame().unwrap_or(true);
+        is_full || self.feed.waiting() == 0
     }
 
     /// True while frames may arrive: the source has not ended, and is connected.

@@ -192,3 +192,71 @@ fn each_band_is_a_submission_and_all_are_ordered() {
         assert_eq!(rays.iter().map(|(_, extent)| extent[1]).sum::<u32>(), height);
     }
 }
+
+/// A renderer whose bands are held back, each until the one before is done.
+fn paced(device: &Device, scene: &Scene) -> Renderer {
+    let options =
+        RendererOptions { bands: Bands::Fixed(INVOCATIONS), paced: true, volume_images: 2, ..Default::default() };
+    renderer(device, scene, &options)
+}
+
+/// Asks until the picture is done. Returns how often something was held back.
+fn poll(renderer: &mut Renderer) -> usize {
+    let mut held = 0;
+    while renderer.is_drawing().expect("asked") {
+        held += usize::from(renderer.held_back() > 0);
+        std::thread::yield_now();
+    }
+    held
+}
+
+/// Bands that are held back are submitted by asking and by waiting, before whatever came later, and leave the same picture.
+#[test]
+fn bands_that_are_held_back_give_the_same_pictures_in_the_same_order() {
+    let device = Device::alone();
+    let scene = &band_scenes()[2];
+    let other: Vec<Texels> = frames_of(scene).into_iter().rev().collect();
+    let expected = |frames: &[Texels]| {
+        let mut plain = Renderer::new(&device, scene.clone(), &RendererOptions::default()).expect("renderer");
+        send(&mut plain, frames, 0);
+        plain.picture().expect("picture")
+    };
+    let wanted = [expected(&frames_of(scene)), expected(&other)];
+
+    let mut renderer = paced(&device, scene);
+    assert!(renderer.is_paced());
+    renderer.begin_picture().expect("begun");
+    assert!(renderer.held_back() > 1 && poll(&mut renderer) > 1 && renderer.held_back() == 0);
+    assert!(renderer.end_picture().expect("picture") == wanted[0]);
+
+    // Frames of the next volume come behind the bands, and the picture of it behind the frames.
+    renderer.show(0).expect("shown again");
+    renderer.begin_picture().expect("begun");
+    assert!(renderer.takes_frame().expect("asked"));
+    send(&mut renderer, &other, 1);
+    assert!(renderer.end_picture().expect("picture") == wanted[0], "of the volume that it was begun with");
+    renderer.show(1).expect("the other");
+    renderer.begin_picture().expect("begun");
+    assert!(renderer.held_back() > 1, "nobody asked");
+    assert!(renderer.end_picture().expect("picture") == wanted[1]);
+
+    // A change of scene, and the end, wait for all of it.
+    renderer.show(1).expect("again");
+    renderer.begin_picture().expect("begun");
+    let mut smaller = scene.clone();
+    smaller.settings.picture.size = [40, 44];
+    renderer.change(Scene::new(smaller.geometry, smaller.input, smaller.settings).expect("scene")).expect("change");
+    assert_eq!(renderer.held_back(), 0);
+    renderer.begin_picture().expect("begun");
+    assert!(renderer.held_back() > 1);
+    drop(renderer);
+}
+
+/// Nobody waits on a device with several queues for what is not submitted yet.
+#[test]
+fn nothing_is_held_back_where_several_queues_wait_for_each_other() {
+    let device = Device::alone();
+    let options = RendererOptions { paced: true, queues: Some(2), ..Default::default() };
+    let renderer = renderer(&device, &band_scenes()[0], &options);
+    assert!(!renderer.is_paced() && renderer.held_back() == 0);
+}

@@ -117,6 +117,27 @@ fn saved_pictures_and_loops_have_names_without_patient_data() {
     view.leave();
 }
 
+/// The panels answer while a picture is drawn, over a copy of the last one. Of a device with several queues the picture is short.
+#[test]
+fn panels_are_presented_while_a_picture_is_drawn() {
+    let desk = Desk::new(false);
+    let view = desk.view(&["--size", "1000x700", "--source", SWEEP, "--budget", "none"]);
+    let (_, size) = picture();
+    let start = headless(size, &[]);
+    shows(&view, &start, "the start");
+    // The help is asked for while the picture is drawn, and closed again.
+    desk.tap('1');
+    for _ in 0..40 {
+        desk.tap('h');
+        std::thread::sleep(std::time::Duration::from_millis(50));
+    }
+    shows(&view, &headless(size, &["--mode", "sr"]), "the surface");
+    let said = view.leave();
+    let between = said.split(" shown on the window, ").nth(1).and_then(|rest| rest.split(' ').next());
+    let between: u64 = between.and_then(|count| count.parse().ok()).expect("a count");
+    assert!(between > 0 || !said.contains("software"), "{said}");
+}
+
 /// Presets are pictures of the volume; one that is chosen shows what `render --preset` does, also one of the user's.
 #[test]
 fn presets_are_pictures_and_show_what_the_command_renders() {

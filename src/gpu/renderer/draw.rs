@@ -46,12 +46,22 @@ impl Renderer {
         }
     }
 
-    /// True if a picture is in flight.
+    /// True if a picture is in flight. Submits what is held back of it and due.
     ///
     /// # Errors
     /// A device that fails.
     pub fn is_drawing(&self) -> Result<bool, GpuError> {
         Ok(self.drawing && !self.picture.is_done(&self.timelines)?)
+    }
+
+    /// Number of submissions that are held back.
+    pub fn held_back(&self) -> usize {
+        self.timelines.held()
+    }
+
+    /// True if what is submitted to the device now begins before the picture in flight is done: its bands are held back.
+    pub fn is_paced(&self) -> bool {
+        self.timelines.is_paced()
     }
 
     /// How long the device has been at work without finishing anything; zero if it is idle.
@@ -242,13 +252,10 @@ impl Renderer {
         panels: Option<Panels>,
     ) -> Result<PresentOutcome, GpuError> {
         self.check(self.shown)?;
-        let drawn = self.slots.image(Slot::Screen, 0).map(|image| Drawn {
-            image,
-            barriers: &mut self.barriers,
-            timelines: &mut self.timelines,
-            at,
-        });
-        let outcome = screen.show_with(drawn, panels);
+        let is_kept = self.timelines.is_paced();
+        let Some(image) = self.slots.image(Slot::Screen, 0) else { return screen.show(panels) };
+        let (barriers, timelines) = (&mut self.barriers, &mut self.timelines);
+        let outcome = screen.show_picture(Drawn { image, barriers, timelines, at, is_kept }, panels);
         self.presented = self.timelines.of(0).submitted;
         outcome
     }

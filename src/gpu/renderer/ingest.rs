@@ -206,6 +206,18 @@ impl Renderer {
         if self.batch.as_ref().is_some_and(grows) { Ok(()) } else { self.flush() }
     }
 
+    /// True if the next frame is taken without a wait for the device.
+    ///
+    /// # Errors
+    /// A device that fails.
+    pub fn takes_frame(&self) -> Result<bool, GpuError> {
+        // The buffer of a batch that has begun was waited for; it ends with a frame that needs the next one.
+        let next = if self.batch.is_some() { self.ring_index + 1 } else { self.ring_index };
+        let entry = &self.ring[next % self.ring.len()];
+        let is_copied = entry.copier.as_ref().map_or(Ok(true), |copier| copier.is_done(&self.timelines))?;
+        Ok(is_copied && entry.recorder.is_done(&self.timelines)?)
+    }
+
     /// Submits the frames that wait for their successors, so that the device works on them until more arrive. What is only copied goes on
     /// waiting: submitting a slice takes longer than copying it.
     ///

@@ -42,6 +42,9 @@ pub struct RendererOptions {
     pub time_stamps: TimeStamps,
     /// How the passes over the volume and the picture are divided, so that no submission takes too long.
     pub bands: Bands,
+    /// Hold back bands of a picture while the device has enough to do, so that a window's panels are drawn between them. They are submitted
+    /// by [`Renderer::is_drawing`], and by whatever waits. On a device with several queues nothing is held back.
+    pub paced: bool,
     /// How single texels are read; `None` selects what is fast on the device.
     pub texel_access: Option<TexelAccess>,
     /// Maximum number of frames that go through stage 1 at once, 1..; `None` selects what is fast on the device.
@@ -65,6 +68,7 @@ impl Default for RendererOptions {
             spans: false,
             time_stamps: TimeStamps::default(),
             bands: Bands::default(),
+            paced: false,
             texel_access: None,
             frames_at_once: None,
             queues: None,
@@ -222,10 +226,16 @@ impl Renderer {
             timings: Timings::new(context, options.spans),
             spans: options.spans,
             time_stamps: options.time_stamps,
-            limit: BandLimit::new(options.bands, context.candidate.is_software()),
+            limit: match options.paced && queues == 1 {
+                true => BandLimit::paced(options.bands, context.candidate.is_software()),
+                false => BandLimit::new(options.bands, context.candidate.is_software()),
+            },
             texel_access,
             wake: options.wake.clone(),
         };
+        if let Some(limit) = renderer.limit.filter(|_| options.paced) {
+            renderer.timelines.pace(limit.in_flight());
+        }
         renderer.ring = renderer.new_ring()?;
         renderer.invalidate_volumes();
         renderer.fit()?;

@@ -37,12 +37,24 @@ pub(in crate::gpu) struct Drawn<'a> {
     pub timelines: &'a mut Timelines,
     /// The upper left corner of the picture in the window, pixels.
     pub at: [u32; 2],
+    /// The picture is shown again while the next one is drawn.
+    pub is_kept: bool,
+}
+
+/// What is shown beside the panels.
+enum Content<'a> {
+    Nothing,
+    Picture(Drawn<'a>),
+    /// The picture that was kept, with its upper left corner here.
+    Kept([u32; 2]),
 }
 
 /// A window or monitor on which pictures are presented.
 pub struct Screen {
     // Fields are dropped in this order, after `drop` has waited for the device.
     overlay: Option<Overlay>,
+    /// A copy of the last picture that was presented, in layout GENERAL, where it is shown again while the next one is drawn.
+    kept: Option<Image>,
     chain: Swapchain,
     pool: vk::CommandPool,
     commands: vk::CommandBuffer,
@@ -78,6 +90,7 @@ impl Screen {
         let device = &context.device;
         let mut screen = Screen {
             overlay: None,
+            kept: None,
             chain,
             pool: vk::CommandPool::null(),
             commands: vk::CommandBuffer::null(),
@@ -131,15 +144,39 @@ impl Screen {
     /// # Errors
     /// A device that fails; a lost surface that cannot be recreated.
     pub fn show(&mut self, panels: Option<Panels>) -> Result<PresentOutcome, GpuError> {
-        self.show_with(None, panels)
+        self.show_with(Content::Nothing, panels)
     }
 
-    pub(in crate::gpu) fn show_with(
+    /// Presents a picture and panels over it. A picture in flight is waited for on the device.
+    ///
+    /// # Errors
+    /// As of [`Screen::show`].
+    pub(in crate::gpu) fn show_picture(
         &mut self,
-        mut drawn: Option<Drawn>,
-        mut panels: Option<Panels>,
+        drawn: Drawn,
+        panels: Option<Panels>,
     ) -> Result<PresentOutcome, GpuError> {
+        self.show_with(Content::Picture(drawn), panels)
+    }
+
+    /// Presents the picture that was kept, if there is one, with its upper left corner at pixel `at`, and panels over it.
+    ///
+    /// # Errors
+    /// As of [`Screen::show`].
+    pub fn show_kept(&mut self, at: [u32; 2], panels: Option<Panels>) -> Result<PresentOutcome, GpuError> {
+        self.show_with(Content::Kept(at), panels)
+    }
+
+    fn show_with(&mut self, mut content: Content, mut panels: Option<Panels>) -> Result<PresentOutcome, GpuError> {
         self.wait()?;
+        if let Content::Picture(drawn) = &content {
+            // What is held back of the picture comes before its copy.
+            drawn.timelines.release()?;
+            if drawn.is_kept && self.kept.as_ref().is_none_or(|kept| !kept.is_like(drawn.image)) {
+                self.kept = None;
+                self.kept = Some(drawn.image.another(&self.context, Slot::Screen)?);
+            }
+        }
         if let Some(panels) = &mut panels {
             if self.overlay.is_none() {
                 self.overlay = Some(Overlay::new(&self.context, self.chain.format)?);
@@ -158,7 +195,7 @@ impl Screen {
             match self.chain.acquire(ACQUIRE_TIMEOUT_NS, self.free) {
                 Ok(image) => {
                     self.unused_acquire = true;
-                    self.draw(image, drawn.as_mut(), panels.as_ref())?;
+                    self.draw(image, &mut content, panels.as_ref())?;
                     self.unused_acquire = false;
                     return self.present(image);
                 }
@@ -234,7 +271,7 @@ impl Screen {
         }
     }
 
-    fn draw(&mut self, image: u32, drawn: Option<&mut Drawn>, panels: Option<&Panels>) -> Result<(), GpuError> {
+    fn draw(&mut self, image: u32, content: &mut Content, panels: Option<&Panels>) -> Result<(), GpuError> {
         let (device, commands, size) = (self.context.device.clone(), self.commands, self.chain.size);
         let (target, view, after) = {
             let shown = &self.chain.images[image as usize];
@@ -255,7 +292,11 @@ impl Screen {
         };
         go(Stage::Copied);
         let mut queued = None;
-        let region = drawn.as_ref().map(|drawn| region(drawn.image, drawn.at, size));
+        let region = match (&*content, &self.kept) {
+            (Content::Picture(drawn), _) => Some(region(drawn.image, drawn.at, size)),
+            (Content::Kept(at), Some(kept)) => Some(region(kept, *at, size)),
+            (Content::Kept(_), None) | (Content::Nothing, _) => None,
+        };
         if region.is_none_or(|(_, [w, h])| [w, h] != size) {
             let colour = vk::ClearColorValue { float32: BACKGROUND };
             let layout = vk::ImageLayout::TRANSFER_DST_OPTIMAL;
@@ -263,26 +304,32 @@ impl Screen {
             unsafe { device.cmd_clear_color_image(commands, target, layout, &colour, &[WHOLE]) };
             go(Stage::Copied);
         }
-        if let (Some(drawn), Some((region, [w, h]))) = (drawn, region) {
-            drawn.barriers.begin(0);
-            let read = Access::of_slot(Slot::Screen, 0, 0..drawn.image.shape.parts(), false, PipelineStage::Copy);
-            drawn.barriers.before(&self.context, 0, commands, &[read]);
-            if w > 0 && h > 0 {
-                // The size is the same: only the order of the channels changes.
-                // SAFETY: both images are alive and in these layouts; the region is inside both.
-                unsafe {
-                    device.cmd_blit_image(
-                        commands,
-                        drawn.image.handle,
-                        vk::ImageLayout::GENERAL,
-                        target,
-                        vk::ImageLayout::TRANSFER_DST_OPTIMAL,
-                        &[region],
-                        vk::Filter::NEAREST,
-                    );
+        let blit = |from: &Image, region: vk::ImageBlit| {
+            let (layout, to) = (vk::ImageLayout::GENERAL, vk::ImageLayout::TRANSFER_DST_OPTIMAL);
+            // The size is the same: only the order of the channels changes.
+            // SAFETY: both images are alive and in these layouts; the region is inside both.
+            unsafe { device.cmd_blit_image(commands, from.handle, layout, target, to, &[region], vk::Filter::NEAREST) };
+        };
+        let visible = region.filter(|(_, [w, h])| *w > 0 && *h > 0).map(|(region, _)| region);
+        match content {
+            Content::Picture(drawn) => {
+                drawn.barriers.begin(0);
+                let read = Access::of_slot(Slot::Screen, 0, 0..drawn.image.shape.parts(), false, PipelineStage::Copy);
+                drawn.barriers.before(&self.context, 0, commands, &[read]);
+                if let Some(region) = visible {
+                    blit(drawn.image, region);
+                }
+                if let Some(kept) = self.kept.as_ref().filter(|_| drawn.is_kept) {
+                    drawn.image.copy_to(&device, commands, kept);
+                }
+                queued = Some((&mut *drawn.barriers, &mut *drawn.timelines));
+            }
+            Content::Kept(_) => {
+                if let (Some(kept), Some(region)) = (&self.kept, visible) {
+                    blit(kept, region);
                 }
             }
-            queued = Some((&mut *drawn.barriers, &mut *drawn.timelines));
+            Content::Nothing => {}
         }
         if let (Some(panels), Some(overlay)) = (panels, &mut self.overlay) {
             overlay.textures.record(commands);

@@ -147,7 +147,7 @@ impl Console {
     fn run_stream(&mut self, now: Instant) -> Result<(), ConsoleError> {
         let begun = Instant::now();
         loop {
-            // Nothing is presented while the device draws: the screen says before what it is about to do.
+            // No panels may be presented while the device draws: the screen says before what it is about to do.
             if !self.tells_of_picture && self.stream.start_step() == Some(StartStep::Picture) {
                 self.tells_of_picture = true;
                 break;
@@ -175,8 +175,7 @@ impl Console {
                     break;
                 }
             }
-            let waits = self.stream.is_drawing() && !self.stream.has_waiting();
-            if begun.elapsed() >= STREAM_SLICE || waits || self.stream.is_idle() {
+            if begun.elapsed() >= STREAM_SLICE || self.stream.is_waiting() || self.stream.is_idle() {
                 break;
             }
         }
@@ -270,7 +269,7 @@ impl Console {
 
     /// When to update again without an event.
     fn next_wake(&self, now: Instant) -> Option<Instant> {
-        if self.stream.is_drawing() && !self.stream.has_waiting() {
+        if self.stream.is_waiting() {
             // Poll the picture at intervals: on a CPU device, polling all the time would take a core from the rendering.
             return Some(now + Duration::from_millis(1));
         }
@@ -309,8 +308,12 @@ impl Console {
     /// Presents the picture and the panels, if either is new.
     fn present(&mut self, now: Instant) -> Result<(), ConsoleError> {
         let is_new = self.has_new_picture || self.needs_redraw;
-        // While a picture is being drawn, presenting would wait for it: both are then presented together.
-        if !is_new || self.stream.is_drawing() || self.present_retry_at.is_some_and(|until| now < until) {
+        // While a picture is being drawn, its image is the device's: panels get the last one, of which the screen has a copy, if they can be
+        // drawn before the picture is done. Otherwise both are presented together.
+        let is_between = self.stream.is_drawing();
+        let gets_between = self.has_started && self.stream.renderer().is_some_and(|renderer| renderer.is_paced());
+        let is_late = is_between && !gets_between;
+        if !is_new || is_late || self.present_retry_at.is_some_and(|until| now < until) {
             return Ok(());
         }
         let has_drawn = self.stream.renderer().is_some_and(|renderer| renderer.has_drawn());
@@ -333,17 +336,21 @@ impl Console {
             return Ok(());
         };
         let presented = match self.stream.renderer().filter(|_| has_drawn) {
+            Some(_) if is_between => screen.show_kept(corner, panels),
             Some(renderer) => renderer.present(screen, corner, panels),
             None => screen.show(panels),
         };
         match presented {
             Ok(PresentOutcome::Presented) => {
                 (self.has_new_picture, self.needs_redraw) = (false, self.panels.has_pending_input());
+                self.shown_between += u64::from(is_between);
                 self.present_retry_at = None;
                 if let Some(step) = self.start_step.filter(|_| !has_drawn && !self.has_started) {
                     tracing::debug!("start: the screen says {step:?}");
                 }
-                self.measure_input_latency();
+                if !is_between {
+                    self.measure_input_latency();
+                }
                 let shown = self.screen.as_mut().map(|screen| screen.take_latencies()).unwrap_or_default();
                 shown.into_iter().for_each(|time| self.times.scan_out.add(time));
             }
@@ -372,11 +379,12 @@ impl Console {
         let (shown, dispatched) = (self.screen.as_ref().map_or(0, |s| s.shown()), self.stream.dispatches());
         let still = self.stream.last_begun().map_or(0.0, |begun| begun.elapsed().as_secs_f64());
         format!(
-            "{:.1} s: {} volumes, {} shown on the window, {dispatched} dispatches, none in the last {still:.1} s; ms: picture {}, \
+            "{:.1} s: {} volumes, {} shown on the window, {} of them while a picture was drawn, {dispatched} dispatches, none in the last {still:.1} s; ms: picture {}, \
              input to picture {}{}",
             self.started.elapsed().as_secs_f64(),
             self.stream.volumes_shown(),
             shown,
+            self.shown_between,
             percentiles(&self.times.pictures),
             percentiles(&self.times.input_latency),
             match self.times.scan_out.newest() {

@@ -107,6 +107,8 @@ pub struct Console {
     needs_redraw: bool,
     /// A picture was drawn that has not been shown.
     has_new_picture: bool,
+    /// Number of presentations of the panels while a picture was being drawn.
+    shown_between: u64,
     shows_help: bool,
     shows_times: bool,
     shows_panels: bool,
@@ -226,6 +228,8 @@ impl Console {
             prepares: true,
             // Full quality always means the first picture too.
             coarse_first: options.budget.is_some(),
+            // Without panels, nothing is to be drawn between.
+            paced: options.overlay,
         };
         let watch = options.shaders.as_ref().map(|folder| Watch::new(folder, options.wake.clone())).transpose();
         let (shader_watch, watch_fault) = match watch {
@@ -270,6 +274,7 @@ impl Console {
             notes: Vec::new(),
             needs_redraw: true,
             has_new_picture: false,
+            shown_between: 0,
             shows_help: false,
             shows_times: false,
             shows_panels,

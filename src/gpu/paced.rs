@@ -1,0 +1,120 @@
+//! Submissions that are held back, so that a queue is never busy for long with what was submitted: other work, such as the panels of a window,
+//! then gets in between. What is held back keeps its order.
+
+use std::collections::VecDeque;
+use std::time::Duration;
+
+/// Submissions of one queue, in order, and what the device is doing of them.
+#[derive(Debug)]
+pub(super) struct Paced<T> {
+    /// The device has less than this to do, expected, ns. A submission that takes longer by itself is alone.
+    most: f64,
+    held: VecDeque<Submission<T>>,
+    /// Submitted and not known to be done.
+    running: VecDeque<Submission<()>>,
+}
+
+#[derive(Debug)]
+struct Submission<T> {
+    /// That of the timeline once it is done. It increases.
+    value: u64,
+    /// Expected time, ns.
+    expected: f64,
+    work: T,
+}
+
+impl<T> Paced<T> {
+    /// `most`: expected time of what is submitted at once.
+    pub(super) fn new(most: Duration) -> Paced<T> {
+        Paced { most: most.as_nanos() as f64, held: VecDeque::new(), running: VecDeque::new() }
+    }
+
+    /// Adds a submission behind the others. `value`: that of the timeline once it is done; `expected`: its time, ns.
+    pub(super) fn push(&mut self, value: u64, expected: f64, work: T) {
+        self.held.push_back(Submission { value, expected, work });
+    }
+
+    /// Takes back the last submission, if it is still held.
+    pub(super) fn pop_back(&mut self) {
+        self.held.pop_back();
+    }
+
+    /// The device has reached a value of the timeline.
+    pub(super) fn reached(&mut self, value: u64) {
+        while self.running.front().is_some_and(|submission| submission.value <= value) {
+            self.running.pop_front();
+        }
+    }
+
+    /// The next submission, if the device has little enough to do. It counts as submitted after [`Paced::sent`].
+    pub(super) fn due(&self) -> Option<&T> {
+        let next = self.held.front()?;
+        let busy: f64 = self.running.iter().map(|submission| submission.expected).sum();
+        (self.running.is_empty() || busy + next.expected < self.most).then_some(&next.work)
+    }
+
+    /// The next submission up to this value, whatever the device has to do.
+    pub(super) fn up_to(&self, value: u64) -> Option<&T> {
+        self.held.front().filter(|next| next.value <= value).map(|next| &next.work)
+    }
+
+    /// The next submission was submitted.
+    pub(super) fn sent(&mut self) {
+        if let Some(Submission { value, expected, .. }) = self.held.pop_front() {
+            self.running.push_back(Submission { value, expected, work: () });
+        }
+    }
+
+    /// Number of submissions that are held back.
+    pub(super) fn held(&self) -> usize {
+        self.held.len()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The submissions that are due, in order, which then count as submitted.
+    fn send(paced: &mut Paced<u64>) -> Vec<u64> {
+        let mut sent = Vec::new();
+        while let Some(work) = paced.due().copied() {
+            paced.sent();
+            sent.push(work);
+        }
+        sent
+    }
+
+    #[test]
+    fn what_is_submitted_takes_no_longer_than_allowed_and_keeps_its_order() {
+        let mut paced = Paced::new(Duration::from_nanos(100));
+        for (value, expected) in [(1, 60.0), (2, 30.0), (3, 20.0), (4, 0.0), (5, 500.0), (6, 0.0)] {
+            paced.push(value, expected, value);
+        }
+        assert_eq!((send(&mut paced), paced.held()), (vec![1, 2], 4), "the fourth is short, but waits for the third");
+        paced.reached(1);
+        assert_eq!(send(&mut paced), [3, 4]);
+        paced.reached(3);
+        assert!(send(&mut paced).is_empty(), "the fourth runs, and the fifth does not fit beside it");
+        paced.reached(4);
+        assert_eq!(send(&mut paced), [5], "it never fits, and is alone");
+        assert!(send(&mut paced).is_empty());
+        paced.reached(5);
+        assert_eq!((send(&mut paced), paced.held()), (vec![6], 0));
+    }
+
+    #[test]
+    fn who_waits_gets_everything_up_to_it_submitted() {
+        let mut paced = Paced::new(Duration::from_nanos(100));
+        (1..=5).for_each(|value| paced.push(value, 100.0, value));
+        let mut sent = Vec::new();
+        while let Some(work) = paced.up_to(3).copied() {
+            paced.sent();
+            sent.push(work);
+        }
+        assert_eq!((sent, paced.held()), (vec![1, 2, 3], 2));
+        paced.pop_back();
+        paced.reached(3);
+        assert_eq!((send(&mut paced), paced.held()), (vec![4], 0));
+    }
+}
