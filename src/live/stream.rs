@@ -787,6 +787,12 @@ impl Stream {
         self.reported.totals()
     }
 
+    /// Number of complete volumes that came, shown or not, if the source does not wait for pictures and they are shown as they come.
+    pub fn live_volumes(&self) -> Option<u64> {
+        let is_live = !self.is_frozen && self.end.is_none() && !self.feed.can_wait();
+        self.pool().filter(|_| is_live).map(|pool| pool.counts().shown + pool.counts().dropped)
+    }
+
     /// Number of volumes that were shown.
     pub fn volumes_shown(&self) -> u64 {
         self.pool().map_or(0, |pool| pool.counts().shown)

@@ -18,6 +18,8 @@ const NEW_WEIGHT: f64 = 0.4;
 const MARGIN: f64 = 0.85;
 /// After so many pictures on a rung the measured ratios of the ladder are replaced by the expected ones.
 const FORGET_AFTER: u32 = 32;
+/// Volumes have stopped coming after so many times of that between two.
+const PAUSE: f64 = 3.0;
 /// Pictures on a rung before a better one is tried.
 const MIN_PICTURES: u32 = 4;
 
@@ -35,6 +37,42 @@ pub struct Quality {
 pub(super) struct Pace {
     rays: FrameBudget,
     shading: FrameBudget,
+    live: Live,
+}
+
+/// The budget of pictures of volumes that keep coming: the time between two of them, where that is longer than the frame budget. More would show
+/// older volumes, and less would leave out more than it has to.
+#[derive(Clone, Debug)]
+struct Live {
+    pictures: FrameBudget,
+    /// That of a view that moves, which is the least.
+    least: Option<Duration>,
+    /// When a volume came last, and the mean time between two, s.
+    came: Option<(Instant, Option<f64>)>,
+}
+
+impl Live {
+    fn volumes_came(&mut self, count: u64, now: Instant) {
+        let Some((last, mean)) = self.came else {
+            self.came = Some((now, None));
+            return;
+        };
+        let time = now.saturating_duration_since(last).as_secs_f64() / count.max(1) as f64;
+        // After a pause they come anew.
+        let mean = mean.filter(|mean| time < PAUSE * mean).map_or(time, |mean| mean + NEW_WEIGHT * (time - mean));
+        self.came = Some((now, Some(mean)));
+        self.pictures.budget = self.least.map(|least| least.max(Duration::from_secs_f64(mean)));
+    }
+
+    /// Until when the next volume is expected.
+    fn ends_at(&self) -> Option<Instant> {
+        let (last, mean) = self.came?;
+        mean.map(|mean| last + Duration::from_secs_f64(PAUSE * mean).max(REST_DELAY))
+    }
+
+    fn is_on(&self, now: Instant) -> bool {
+        self.pictures.budget.is_some() && self.ends_at().is_some_and(|end| now < end)
+    }
 }
 
 impl Pace {
@@ -42,7 +80,8 @@ impl Pace {
     pub(super) fn new(budget: Option<Duration>, rungs: &[Rung]) -> Pace {
         let shares: Vec<f64> = rungs.iter().map(|rung| rung.time_share).collect();
         let shading = SHADING.map(|(_, share)| share);
-        Pace { rays: FrameBudget::new(budget, &shares), shading: FrameBudget::new(budget, &shading) }
+        let live = Live { pictures: FrameBudget::new(budget, &shares), least: budget, came: None };
+        Pace { rays: FrameBudget::new(budget, &shares), shading: FrameBudget::new(budget, &shading), live }
     }
 
     pub(super) fn budget(&self) -> Option<Duration> {
@@ -58,21 +97,34 @@ impl Pace {
         }
     }
 
+    /// Records that so many volumes came from a source that does not wait for pictures.
+    pub(super) fn volumes_came(&mut self, count: u64, now: Instant) {
+        self.live.volumes_came(count, now);
+    }
+
+    /// No more volumes are shown as they come.
+    pub(super) fn volumes_stopped(&mut self) {
+        self.live.came = None;
+    }
+
     /// Discards the measurements: the scene changed.
     pub(super) fn forget(&mut self) {
+        self.live.pictures.forget();
         self.rays.forget();
         self.shading.forget();
     }
 
     /// When a moving view comes to rest.
     pub(super) fn rests_at(&self, now: Instant) -> Option<Instant> {
-        self.rays.rests_at(now).into_iter().chain(self.shading.rests_at(now)).min()
+        let live = self.live.ends_at().filter(|end| *end > now && self.live.pictures.rung > 0);
+        self.rays.rests_at(now).into_iter().chain(self.shading.rests_at(now)).chain(live).min()
     }
 
     /// The quality of the next picture.
     pub(super) fn quality(&self, now: Instant) -> Quality {
         match self.rays.is_moving(now) {
             true => Quality { rays: self.rays.rung(now), shading: 0 },
+            false if self.live.is_on(now) => Quality { rays: self.live.pictures.rung, shading: 0 },
             false => Quality { rays: 0, shading: self.shading.rung(now) },
         }
     }
@@ -80,7 +132,10 @@ impl Pace {
     /// Records the time of a picture of this quality that took this work.
     pub(super) fn picture_took(&mut self, work: Work, quality: Quality, time: Duration) {
         match work {
-            Work::Rays if quality.shading == 0 => self.rays.picture_took(quality.rays, time),
+            Work::Rays if quality.shading == 0 => {
+                self.rays.picture_took(quality.rays, time);
+                self.live.pictures.picture_took(quality.rays, time);
+            }
             Work::Shading if quality.rays == 0 => self.shading.picture_took(quality.shading, time),
             _ => {}
         }
@@ -417,6 +472,36 @@ mod tests {
         let mut frame_budget = FrameBudget::new(Some(Duration::from_millis(1)), &LADDER);
         let rungs = drag(&mut frame_budget, 1.0, &LADDER, 10, Instant::now());
         assert_eq!(rungs.last(), Some(&4));
+    }
+
+    #[test]
+    fn live_volumes_are_drawn_as_fast_as_they_come_and_no_faster() {
+        let rungs = built_in_ladder();
+        // Full quality takes so long, ms; the quality while volumes come every 200 ms, and after the last.
+        for (full, budget, live) in [(150, 33, 0), (500, 33, 1), (1500, 33, 4), (150, 300, 0), (1000, 300, 1)] {
+            let mut pace = Pace::new(Some(Duration::from_millis(budget)), &rungs);
+            let mut now = Instant::now();
+            for _ in 0..30 {
+                now += Duration::from_millis(200);
+                pace.volumes_came(1, now);
+                let quality = pace.quality(now);
+                let took = Duration::from_millis(full).mul_f64(rungs[quality.rays].time_share);
+                pace.picture_took(Work::Rays, quality, took);
+            }
+            assert_eq!(pace.quality(now), Quality { rays: live, shading: 0 }, "{full} ms, budget {budget}");
+            let end = now + Duration::from_millis(601);
+            assert_eq!(pace.rests_at(now).is_some(), live > 0);
+            assert_eq!(pace.quality(end), Quality::default(), "they have stopped");
+            pace.volumes_stopped();
+            assert_eq!(pace.quality(now), Quality::default(), "frozen");
+        }
+        // A single volume, and full quality always.
+        for budget in [Some(Duration::from_millis(1)), None] {
+            let (mut pace, now) = (Pace::new(budget, &rungs), Instant::now());
+            pace.volumes_came(1, now);
+            pace.picture_took(Work::Rays, Quality::default(), Duration::from_secs(1));
+            assert_eq!(pace.quality(now), Quality::default());
+        }
     }
 
     #[test]

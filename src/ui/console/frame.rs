@@ -85,6 +85,7 @@ impl Console {
         self.advance_cine(now);
         self.send_settings(now);
         self.run_stream(now)?;
+        self.follow_volumes(now);
         self.follow_start(now);
         self.warm(now);
         let shader_fault = self.shaders.as_ref().and_then(|folder| folder.fault());
@@ -130,6 +131,16 @@ impl Console {
         if let Some(found) = self.stream.take_found() {
             self.controls.adopt(found);
         }
+    }
+
+    /// Measures how often volumes come.
+    fn follow_volumes(&mut self, now: Instant) {
+        match self.stream.live_volumes() {
+            Some(count) if count > self.live_volumes => self.pace.volumes_came(count - self.live_volumes, now),
+            Some(_) => {}
+            None => self.pace.volumes_stopped(),
+        }
+        self.live_volumes = self.stream.live_volumes().unwrap_or(self.live_volumes);
     }
 
     /// Draws the panels again where the start goes on.

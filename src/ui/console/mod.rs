@@ -107,6 +107,8 @@ pub struct Console {
     needs_redraw: bool,
     /// A picture was drawn that has not been shown.
     has_new_picture: bool,
+    /// Number of volumes that had come from a live source.
+    live_volumes: u64,
     /// Number of presentations of the panels while a picture was being drawn.
     shown_between: u64,
     shows_help: bool,
@@ -274,6 +276,7 @@ impl Console {
             notes: Vec::new(),
             needs_redraw: true,
             has_new_picture: false,
+            live_volumes: 0,
             shown_between: 0,
             shows_help: false,
             shows_times: false,

@@ -103,3 +103,54 @@ fn tone_casts_no_ray_light_keeps_the_distance_map_and_no_rung_runs_stage_1() {
     assert!(lit.iter().any(|s| s.light.shadow.is_none()), "the shading has no ladder");
     assert!(desk.picture() == headless(&device, &desk.drawn(), &body(0)), "at rest");
 }
+
+/// A probe, which does not wait.
+struct Hasty(Fed);
+
+impl Live for Hasty {
+    fn next(&mut self, patience: Duration) -> Event {
+        self.0.next(patience)
+    }
+
+    fn can_wait(&self) -> bool {
+        false
+    }
+}
+
+/// Prevents live pictures that fall behind the probe, and a frozen volume that stays coarse.
+#[test]
+fn live_volumes_that_come_faster_than_pictures_go_down_the_ladder_until_they_are_frozen() {
+    let device = Device::alone();
+    let budget = Some(Duration::from_nanos(1));
+    let (say, said) = channel();
+    let said = Mutex::new(Some(said));
+    let open: OpenSource = Arc::new(move || match said.lock().expect("lock").take() {
+        Some(said) => Ok(Box::new(Hasty(Fed(said))) as Box<dyn Live>),
+        None => Err("no probe".into()),
+    });
+    let options = ConsoleOptions { settings: plain(), budget, ..options() };
+    let mut desk = Desk { console: Console::new(&device, open, options, SIZE), say };
+    desk.begin();
+    let first = desk.live(0);
+    assert_eq!(desk.console.quality(), Quality::default(), "of a single volume nothing is known");
+    // By the console's clock a volume comes each microsecond: no picture is so fast.
+    let start = Instant::now() + LATER;
+    let mut rungs = Vec::new();
+    for number in 1..=6 {
+        desk.frames(body(number));
+        let begun = Instant::now();
+        let now = start + Duration::from_micros(number.into());
+        while desk.console.stream().volumes_shown() <= u64::from(number) || !desk.console.stream().is_idle() {
+            assert!(begun.elapsed() < BOUND, "volume {number} is never shown");
+            std::thread::sleep(Duration::from_millis(1));
+            desk.tick(now);
+        }
+        rungs.push(desk.console.quality().rays);
+    }
+    assert!(rungs[1..].iter().all(|rung| *rung > 0), "{rungs:?}");
+    desk.press(Key::Space);
+    desk.rest();
+    assert_eq!(desk.console.quality(), Quality::default());
+    let (seen, wanted) = (desk.picture(), headless(&device, &desk.drawn(), &body(6)));
+    assert!(seen == wanted && seen != first);
+}
