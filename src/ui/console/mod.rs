@@ -725,7 +725,9 @@ impl Console {
     fn warm(&mut self, now: Instant) {
         let is_due = self.fixed.warms && now >= self.last_input + REST_BEFORE_WARMING;
         let is_done = self.stream.has_warmed() && self.warmed.as_ref() == Some(self.controls.settings());
-        if !is_due || is_done || !self.stream.renderer().is_some_and(|renderer| renderer.has_drawn()) {
+        // The first picture in full has the processor for itself.
+        let has_drawn = self.has_started && self.stream.renderer().is_some_and(|renderer| renderer.has_drawn());
+        if !is_due || is_done || !has_drawn {
             return;
         }
         let voxel = self.stream.scene().map_or(0.5, frame_budget::voxel);
