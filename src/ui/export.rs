@@ -6,6 +6,7 @@ use crate::gpu::Wake;
 use crate::live::cine::CineVolume;
 use crate::picture::Picture;
 use crate::source::recorder::Header;
+use crate::ui::texts;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::mpsc::{Receiver, Sender, channel};
@@ -93,7 +94,7 @@ impl Exporter {
     /// Another one is in work; as for [`Exporter::picture`].
     pub(super) fn export(&mut self, job: Job) -> Result<(), String> {
         if let Some(name) = self.exporting() {
-            return Err(format!("{name} is still being exported"));
+            return Err(texts::still_exporting(name));
         }
         let export = Arc::new(Export::default());
         let (own, name) = (export.clone(), job.format.name);
@@ -135,13 +136,13 @@ impl Exporter {
         write: impl FnOnce(&Path) -> Result<(), String> + Send + 'static,
     ) -> Result<JoinHandle<()>, String> {
         if self.pending >= MAX_PENDING {
-            return Err(format!("{MAX_PENDING} files are still being saved: wait a moment"));
+            return Err(texts::still_saving(MAX_PENDING));
         }
         self.number += 1;
         let (folder, number) = (self.folder.clone(), self.number);
         let (sender, wake) = (self.sender.clone(), self.wake.clone());
         let work = move || {
-            let cannot = |e| format!("{}: cannot be created: {e}", folder.display());
+            let cannot = |e| texts::why_no_folder(folder.display(), e);
             let file = std::fs::create_dir_all(&folder).map_err(cannot).and_then(|()| {
                 let file = unused_name(&folder, &timestamp(SystemTime::now()), number, extension);
                 write(&file).map(|()| file)
@@ -150,7 +151,7 @@ impl Exporter {
             wake();
         };
         let started = std::thread::Builder::new().name("saving".into()).spawn(work);
-        let started = started.map_err(|e| format!("a thread cannot be started: {e}"))?;
+        let started = started.map_err(texts::why_no_thread)?;
         self.pending += 1;
         Ok(started)
     }

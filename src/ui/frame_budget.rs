@@ -8,6 +8,7 @@ use crate::error_report::{Combination, Measure, Report, choose};
 use crate::plan::Work;
 use crate::scene::load::Layers;
 use crate::scene::{Ray, Scene, Settings, Transfer};
+use crate::ui::texts;
 use std::time::{Duration, Instant};
 
 /// The view is at rest so long after its last movement.
@@ -143,7 +144,8 @@ impl Pace {
 }
 
 /// The ladder of the shading: what is left out, and the time as a fraction of that of all of stage 3. A first estimate.
-const SHADING: [(&str, f64); 3] = [("full quality", 1.0), ("no occlusion", 0.6), ("no occlusion, no shadow", 0.25)];
+const SHADING: [(&str, f64); 3] =
+    [(texts::FULL_QUALITY, 1.0), (texts::NO_OCCLUSION, 0.6), (texts::NO_OCCLUSION_NO_SHADOW, 0.25)];
 
 /// The settings on a rung of the shading. Rays and filters of the distance map stay as they are.
 pub(super) fn shaded(mut settings: Settings, rung: usize) -> Settings {
@@ -340,17 +342,11 @@ pub fn built_in_ladder() -> Vec<Rung> {
         change: Change::BuiltIn { rays, step_factor, filters },
     };
     vec![
-        Rung { label: "full quality".into(), time_share: 1.0, change: Change::None },
-        rung("half the rays each way", 0.24, Rays::Half, 1.0, Filters::All),
-        rung("half the rays, steps x 1.5, small filters", 0.21, Rays::Half, 1.5, Filters::Small),
-        rung("half the rays, steps x 2, no shadow, no filters", 0.16, Rays::Half, 2.0, Filters::None),
-        rung(
-            "a quarter of the rays each way, steps x 2, no shadow, no filters",
-            0.055,
-            Rays::Quarter,
-            2.0,
-            Filters::None,
-        ),
+        Rung { label: texts::FULL_QUALITY.into(), time_share: 1.0, change: Change::None },
+        rung(texts::HALF_RAYS, 0.24, Rays::Half, 1.0, Filters::All),
+        rung(texts::HALF_RAYS_SMALL_FILTERS, 0.21, Rays::Half, 1.5, Filters::Small),
+        rung(texts::HALF_RAYS_NO_FILTERS, 0.16, Rays::Half, 2.0, Filters::None),
+        rung(texts::QUARTER_RAYS, 0.055, Rays::Quarter, 2.0, Filters::None),
     ]
 }
 
@@ -363,7 +359,7 @@ pub fn measured_ladder(report: &Report) -> Result<Vec<Rung>, String> {
     let picture_time = |c: &Combination| c.times.map(|t| t.picture.median).filter(|t| *t > 0.0);
     let as_it_is = report.choices.iter().find(|c| c.set.is_empty());
     let slowest = as_it_is.and_then(picture_time).ok_or("error report: the scene as it is has no time")?;
-    let full = Rung { label: "full quality".into(), time_share: 1.0, change: Change::None };
+    let full = Rung { label: texts::FULL_QUALITY.into(), time_share: 1.0, change: Change::None };
     // A rung must save at least a quarter of the time of the one before.
     let mut rungs = vec![full];
     for choice in choose::front(report, Measure::Rmse).into_iter().rev().map(|i| &report.choices[i]) {

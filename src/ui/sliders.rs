@@ -4,6 +4,7 @@ use crate::scene::{
     Bilateral, EnhancedSigma, Layout, MAX_DEVIATION, Mode, Occlusion, Scene, Settings, Shading, Shadow, Sigma, Skin,
     Smooth, Transfer,
 };
+use crate::ui::texts;
 
 /// A group of sliders in the panel.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -20,13 +21,13 @@ pub(super) enum Group {
 impl Group {
     /// All groups with their names, in display order.
     pub(super) const ALL: [(Group, &'static str); 7] = [
-        (Group::Image, "Image"),
-        (Group::Surface, "Surface"),
-        (Group::Volume, "Volume"),
-        (Group::Light, "Light"),
-        (Group::Planes, "Planes"),
-        (Group::Filters, "Filters"),
-        (Group::Quality, "Quality"),
+        (Group::Image, texts::IMAGE),
+        (Group::Surface, texts::SURFACE),
+        (Group::Volume, texts::VOLUME),
+        (Group::Light, texts::LIGHT),
+        (Group::Planes, texts::PLANES),
+        (Group::Filters, texts::FILTERS),
+        (Group::Quality, texts::QUALITY),
     ];
 }
 
@@ -117,189 +118,205 @@ pub(super) const GAIN: usize = 0;
 pub(super) const THRESHOLD: usize = 3;
 pub(super) const PLANES_ZOOM: usize = 7;
 
-/// The switch of the render start that follows the fluid.
-pub(super) const AUTO_START: &str = "Auto render start";
-pub(super) const START_OFFSET: &str = "Start offset";
-
 /// Greatest depth of a cut that the slider sets, mm.
 const DEEPEST: f64 = 200.0;
 
 /// All sliders. Those of windows, thresholds and start depths change the values of the current mode. A mixed picture has them for its
 /// surface, and again for its volume layer.
 pub const SLIDERS: &[Slider] = &[
-    slider("Gain", "", Image, [-1.0, 1.0], 0.02).of(always, |s| s.post.brightness, |s, v| s.post.brightness = v),
-    slider("Contrast", "", Image, [0.0, 3.0], 0.05).of(always, |s| s.post.contrast, |s, v| s.post.contrast = v),
-    slider("Gamma", "", Image, [0.3, 3.0], 0.05).of(always, |s| s.post.gamma, |s, v| s.post.gamma = v),
-    slider("Threshold", "", Image, [0.0, 1.0], 0.005).of(has_threshold, threshold, set_threshold),
-    slider("Window low", "", Image, [0.0, 1.0], 0.01).of(always, |s| window(s)[0], |s, v| set_low(window_mut(s), v)),
-    slider("Window high", "", Image, [0.0, 1.0], 0.01).of(always, |s| window(s)[1], |s, v| set_high(window_mut(s), v)),
-    slider("Start depth", "mm", Image, [0.0, 400.0], 1.0).within(depth_limits).reruns().of(
+    slider(texts::GAIN, "", Image, [-1.0, 1.0], 0.02).of(always, |s| s.post.brightness, |s, v| s.post.brightness = v),
+    slider(texts::CONTRAST, "", Image, [0.0, 3.0], 0.05).of(always, |s| s.post.contrast, |s, v| s.post.contrast = v),
+    slider(texts::GAMMA, "", Image, [0.3, 3.0], 0.05).of(always, |s| s.post.gamma, |s, v| s.post.gamma = v),
+    slider(texts::THRESHOLD, "", Image, [0.0, 1.0], 0.005).of(has_threshold, threshold, set_threshold),
+    slider(texts::WINDOW_LOW, "", Image, [0.0, 1.0], 0.01).of(
+        always,
+        |s| window(s)[0],
+        |s, v| set_low(window_mut(s), v),
+    ),
+    slider(texts::WINDOW_HIGH, "", Image, [0.0, 1.0], 0.01).of(
+        always,
+        |s| window(s)[1],
+        |s, v| set_high(window_mut(s), v),
+    ),
+    slider(texts::START_DEPTH, "mm", Image, [0.0, 400.0], 1.0).within(depth_limits).reruns().of(
         |s| start_depth(s).is_some(),
         |s| start_depth(s).flatten().unwrap_or(0.0),
         set_start_depth,
     ),
-    slider("Planes zoom", "", Planes, [0.2, 20.0], 0.1).of(shows_planes, |s| s.planes.zoom, |s, v| s.planes.zoom = v),
-    slider("Slab", "mm", Planes, [0.0, 40.0], 0.5).of(
+    slider(texts::PLANES_ZOOM, "", Planes, [0.2, 20.0], 0.1).of(
+        shows_planes,
+        |s| s.planes.zoom,
+        |s, v| s.planes.zoom = v,
+    ),
+    slider(texts::SLAB, "mm", Planes, [0.0, 40.0], 0.5).of(
         shows_planes,
         |s| s.planes.thickness,
         |s, v| s.planes.thickness = v,
     ),
-    slider("Spacing", "mm", Planes, [0.0, 40.0], 0.5).of(
+    slider(texts::SPACING, "mm", Planes, [0.0, 40.0], 0.5).of(
         |s| s.mode == Mode::Tomography,
         |s| s.planes.spacing.unwrap_or(0.0),
         |s, v| s.planes.spacing = above(v, 0.1),
     ),
-    slider("Planes azimuth", "°", Planes, [-180.0, 180.0], 5.0).of(
+    slider(texts::PLANES_AZIMUTH, "°", Planes, [-180.0, 180.0], 5.0).of(
         shows_planes,
         |s| s.planes.azimuth,
         |s, v| s.planes.azimuth = v,
     ),
-    slider("Planes tilt", "°", Planes, [-180.0, 180.0], 5.0).of(
+    slider(texts::PLANES_TILT, "°", Planes, [-180.0, 180.0], 5.0).of(
         shows_planes,
         |s| s.planes.tilt,
         |s, v| s.planes.tilt = v,
     ),
-    slider("Planes roll", "°", Planes, [-180.0, 180.0], 5.0).of(
+    slider(texts::PLANES_ROLL, "°", Planes, [-180.0, 180.0], 5.0).of(
         shows_planes,
         |s| s.planes.roll,
         |s, v| s.planes.roll = v,
     ),
-    slider("Planes window low", "", Planes, [0.0, 1.0], 0.01).of(
+    slider(texts::PLANES_WINDOW_LOW, "", Planes, [0.0, 1.0], 0.01).of(
         is_four,
         |s| s.planes.window[0],
         |s, v| set_low(&mut s.planes.window, v),
     ),
-    slider("Planes window high", "", Planes, [0.0, 1.0], 0.01).of(
+    slider(texts::PLANES_WINDOW_HIGH, "", Planes, [0.0, 1.0], 0.01).of(
         is_four,
         |s| s.planes.window[1],
         |s, v| set_high(&mut s.planes.window, v),
     ),
-    slider("Cut left", "mm", Planes, [0.0, 400.0], 1.0)
+    slider(texts::CUT_LEFT, "mm", Planes, [0.0, 400.0], 1.0)
         .within(|c| inset_limits(c, 0, c.settings.cube.inset.right))
         .reruns()
         .of(is_cube, |s| s.cube.inset.left, |s, v| s.cube.inset.left = v),
-    slider("Cut right", "mm", Planes, [0.0, 400.0], 1.0)
+    slider(texts::CUT_RIGHT, "mm", Planes, [0.0, 400.0], 1.0)
         .within(|c| inset_limits(c, 0, c.settings.cube.inset.left))
         .reruns()
         .of(is_cube, |s| s.cube.inset.right, |s, v| s.cube.inset.right = v),
-    slider("Cut near", "mm", Planes, [0.0, 400.0], 1.0)
+    slider(texts::CUT_NEAR, "mm", Planes, [0.0, 400.0], 1.0)
         .within(|c| inset_limits(c, 1, c.settings.cube.inset.far))
         .reruns()
         .of(is_cube, |s| s.cube.inset.near, |s, v| s.cube.inset.near = v),
-    slider("Cut far", "mm", Planes, [0.0, 400.0], 1.0)
+    slider(texts::CUT_FAR, "mm", Planes, [0.0, 400.0], 1.0)
         .within(|c| inset_limits(c, 1, c.settings.cube.inset.near))
         .reruns()
         .of(is_cube, |s| s.cube.inset.far, |s, v| s.cube.inset.far = v),
-    slider("Cut bottom", "mm", Planes, [0.0, 400.0], 1.0)
+    slider(texts::CUT_BOTTOM, "mm", Planes, [0.0, 400.0], 1.0)
         .within(|c| inset_limits(c, 2, c.settings.cube.inset.top))
         .reruns()
         .of(is_cube, |s| s.cube.inset.bottom, |s, v| s.cube.inset.bottom = v),
-    slider("Cut top", "mm", Planes, [0.0, 400.0], 1.0)
+    slider(texts::CUT_TOP, "mm", Planes, [0.0, 400.0], 1.0)
         .within(|c| inset_limits(c, 2, c.settings.cube.inset.bottom))
         .reruns()
         .of(is_cube, |s| s.cube.inset.top, |s, v| s.cube.inset.top = v),
-    slider("Face shading", "", Planes, [0.0, 1.0], 0.05).of(is_cube, |s| s.cube.shading, |s, v| s.cube.shading = v),
-    slider("Opacity", "", Volume, [0.01, 1.0], 0.02).of(has_opacity, opacity, set_opacity),
-    slider("Opacity of a hit", "", Volume, [0.01, 1.0], 0.02).of(
+    slider(texts::FACE_SHADING, "", Planes, [0.0, 1.0], 0.05).of(
+        is_cube,
+        |s| s.cube.shading,
+        |s, v| s.cube.shading = v,
+    ),
+    slider(texts::OPACITY, "", Volume, [0.01, 1.0], 0.02).of(has_opacity, opacity, set_opacity),
+    slider(texts::OPACITY_OF_A_HIT, "", Volume, [0.01, 1.0], 0.02).of(
         is_first_hit,
         |s| s.volume.hit,
         |s, v| s.volume.hit = v,
     ),
-    slider("Veil", "", Volume, [0.0, 1.0], 0.05).of(is_mixed, |s| s.volume.veil, |s, v| s.volume.veil = v),
-    slider("Volume threshold", "", Volume, [0.0, 1.0], 0.01).of(
+    slider(texts::VEIL, "", Volume, [0.0, 1.0], 0.05).of(is_mixed, |s| s.volume.veil, |s, v| s.volume.veil = v),
+    slider(texts::VOLUME_THRESHOLD, "", Volume, [0.0, 1.0], 0.01).of(
         has_own_volume,
         |s| s.volume.threshold,
         |s, v| s.volume.threshold = v,
     ),
-    slider("Volume window low", "", Volume, [0.0, 1.0], 0.01).of(
+    slider(texts::VOLUME_WINDOW_LOW, "", Volume, [0.0, 1.0], 0.01).of(
         has_own_volume,
         |s| s.volume.window[0],
         |s, v| set_low(&mut s.volume.window, v),
     ),
-    slider("Volume window high", "", Volume, [0.0, 1.0], 0.01).of(
+    slider(texts::VOLUME_WINDOW_HIGH, "", Volume, [0.0, 1.0], 0.01).of(
         has_own_volume,
         |s| s.volume.window[1],
         |s, v| set_high(&mut s.volume.window, v),
     ),
-    slider("Volume start depth", "mm", Volume, [0.0, 400.0], 1.0).within(depth_limits).reruns().of(
+    slider(texts::VOLUME_START_DEPTH, "mm", Volume, [0.0, 400.0], 1.0).within(depth_limits).reruns().of(
         has_own_volume,
         |s| s.volume.start_depth.unwrap_or(0.0),
         |s, v| s.volume.start_depth = above(v, 1e-9),
     ),
-    slider("Surface median", "px", Surface, [0.0, 31.0], 2.0).of(
+    slider(texts::SURFACE_MEDIAN, "px", Surface, [0.0, 31.0], 2.0).of(
         is_lit,
         |s| f64::from(s.distance.median),
         |s, v| (s.distance.median, s.distance.median_mm) = (odd(v), None),
     ),
-    slider("Surface smoothing", "px", Surface, [0.0, 10.0], 0.5).of(
+    slider(texts::SURFACE_SMOOTHING, "px", Surface, [0.0, 10.0], 0.5).of(
         is_lit,
         |s| s.distance.bilateral.map_or(0.0, |b| b.pixels),
         set_bilateral,
     ),
-    slider("Surface edge", "mm", Surface, [0.1, 20.0], 0.2).of(
+    slider(texts::SURFACE_EDGE, "mm", Surface, [0.1, 20.0], 0.2).of(
         |s| is_lit(s) && s.distance.bilateral.is_some(),
         |s| s.distance.bilateral.map_or(0.1, |b| b.distance),
         set_edge,
     ),
-    slider("Ambient", "", Light, [0.0, 2.0], 0.02).of(has_light, |s| s.light.ambient, |s, v| s.light.ambient = v),
-    slider("Diffuse", "", Light, [0.0, 2.0], 0.02).of(has_light, |s| s.light.diffuse, |s, v| s.light.diffuse = v),
-    slider("Specular", "", Light, [0.0, 2.0], 0.02).of(has_light, |s| s.light.specular, |s, v| s.light.specular = v),
-    slider("Light depth", "mm", Light, [0.2, 8.0], 0.1).of(
+    slider(texts::AMBIENT, "", Light, [0.0, 2.0], 0.02).of(has_light, |s| s.light.ambient, |s, v| s.light.ambient = v),
+    slider(texts::DIFFUSE, "", Light, [0.0, 2.0], 0.02).of(has_light, |s| s.light.diffuse, |s, v| s.light.diffuse = v),
+    slider(texts::SPECULAR, "", Light, [0.0, 2.0], 0.02).of(
+        has_light,
+        |s| s.light.specular,
+        |s, v| s.light.specular = v,
+    ),
+    slider(texts::LIGHT_DEPTH, "mm", Light, [0.2, 8.0], 0.1).of(
         is_lit_inside,
         |s| s.light.volume.map_or(0.2, |l| l.depth),
         |s, v| s.light.volume.iter_mut().for_each(|l| l.depth = v),
     ),
-    slider("Light warmth", "", Light, [0.0, 2.0], 0.05).of(
+    slider(texts::LIGHT_WARMTH, "", Light, [0.0, 2.0], 0.05).of(
         is_lit_inside,
         |s| s.light.volume.map_or(0.0, |l| l.warmth),
         |s, v| s.light.volume.iter_mut().for_each(|l| l.warmth = v),
     ),
-    slider("Exposure", "", Light, [0.1, 4.0], 0.05).of(
+    slider(texts::EXPOSURE, "", Light, [0.1, 4.0], 0.05).of(
         is_lit_inside,
         |s| s.light.volume.map_or(0.1, |l| l.exposure),
         |s, v| s.light.volume.iter_mut().for_each(|l| l.exposure = v),
     ),
-    slider("Shadow", "", Light, [0.0, 1.0], 0.05).of(
+    slider(texts::SHADOW, "", Light, [0.0, 1.0], 0.05).of(
         is_lit,
         |s| s.light.shadow.map_or(0.0, |l| l.strength),
         |s, v| s.light.shadow = with_strength(s.light.shadow, v, |l: &mut Shadow| &mut l.strength),
     ),
-    slider("Occlusion", "", Light, [0.0, 4.0], 0.1).of(
+    slider(texts::OCCLUSION, "", Light, [0.0, 4.0], 0.1).of(
         is_lit,
         |s| s.light.occlusion.map_or(0.0, |l| l.strength),
         |s, v| s.light.occlusion = with_strength(s.light.occlusion, v, |l: &mut Occlusion| &mut l.strength),
     ),
-    slider("Translucency", "", Light, [0.0, 1.0], 0.05).of(
+    slider(texts::TRANSLUCENCY, "", Light, [0.0, 1.0], 0.05).of(
         is_lit,
         |s| s.light.skin.map_or(0.0, |l| l.translucency),
         |s, v| s.light.skin = with_strength(s.light.skin, v, |l: &mut Skin| &mut l.translucency),
     ),
-    slider("Smoothing", "mm", Filters, [0.0, 3.0], 0.1).within(smoothing_limits).reruns().of(
+    slider(texts::SMOOTHING, "mm", Filters, [0.0, 3.0], 0.1).within(smoothing_limits).reruns().of(
         always,
         smoothing,
         set_smoothing,
     ),
-    slider("Median", "", Filters, [0.0, 1.0], 1.0).reruns().of(
+    slider(texts::MEDIAN, "", Filters, [0.0, 1.0], 1.0).reruns().of(
         always,
         |s| f64::from(u8::from(s.slices.median)),
         |s, v| s.slices.median = v >= 0.5,
     ),
-    slider("Speckle", "", Filters, [0.0, 0.5], 0.01).reruns().of(
+    slider(texts::SPECKLE, "", Filters, [0.0, 0.5], 0.01).reruns().of(
         always,
         |s| s.slices.sigma.map_or(0.0, |f| f.sigma),
         |s, v| s.slices.sigma = sigma(s.slices.sigma, v),
     ),
-    slider("Speckle, enhanced", "", Filters, [0.0, 0.5], 0.01).reruns().of(
+    slider(texts::SPECKLE_ENHANCED, "", Filters, [0.0, 0.5], 0.01).reruns().of(
         always,
         |s| s.slices.enhanced_sigma.map_or(0.0, |f| f.sigma),
         |s, v| s.slices.enhanced_sigma = enhanced_sigma(s.slices.enhanced_sigma, v),
     ),
-    slider("Picture speckle", "", Filters, [0.0, 0.5], 0.01).of(
+    slider(texts::PICTURE_SPECKLE, "", Filters, [0.0, 0.5], 0.01).of(
         always,
         |s| s.post.sigma.map_or(0.0, |f| f.sigma),
         |s, v| s.post.sigma = sigma(s.post.sigma, v),
     ),
-    slider("Depth of cut", "mm", Image, [0.0, DEEPEST], 1.0).of(
+    slider(texts::DEPTH_OF_CUT, "mm", Image, [0.0, DEEPEST], 1.0).of(
         |s| s.cuts.last().is_some_and(|cut| cut.brush.is_none()) && !s.mode.is_flat() && s.mode != Mode::Cube,
         |s| s.cuts.last().and_then(|cut| cut.depth).unwrap_or(0.0),
         |s, v| {
@@ -308,28 +325,32 @@ pub const SLIDERS: &[Slider] = &[
             }
         },
     ),
-    slider(AUTO_START, "", Image, [0.0, 1.0], 1.0).reruns().of(
+    slider(texts::AUTO_RENDER_START, "", Image, [0.0, 1.0], 1.0).reruns().of(
         can_unveil,
         |s| f64::from(u8::from(s.unveil.enabled)),
         |s, v| s.unveil.enabled = v >= 0.5,
     ),
-    slider(START_OFFSET, "mm", Image, [-10.0, 30.0], 0.5).of(unveils, |s| s.unveil.offset, |s, v| s.unveil.offset = v),
-    slider("Start smoothing", "mm", Image, [0.0, 10.0], 0.5).of(
+    slider(texts::START_OFFSET, "mm", Image, [-10.0, 30.0], 0.5).of(
+        unveils,
+        |s| s.unveil.offset,
+        |s, v| s.unveil.offset = v,
+    ),
+    slider(texts::START_SMOOTHING, "mm", Image, [0.0, 10.0], 0.5).of(
         unveils,
         |s| s.unveil.smoothing,
         |s, v| s.unveil.smoothing = v,
     ),
-    slider("Step", "mm", Quality, [0.0, 2.0], 0.05).of(
+    slider(texts::STEP, "mm", Quality, [0.0, 2.0], 0.05).of(
         renders_rays,
         |s| s.ray.step.unwrap_or(0.0),
         |s, v| s.ray.step = above(v, 0.05),
     ),
-    slider("Field of view", "°", Quality, [0.0, 90.0], 5.0).of(
+    slider(texts::FIELD_OF_VIEW, "°", Quality, [0.0, 90.0], 5.0).of(
         renders_rays,
         |s| s.camera.field_of_view,
         |s, v| s.camera.field_of_view = above(v, 1.0).unwrap_or(0.0),
     ),
-    slider("Rays a pixel", "", Quality, [1.0, 4.0], 1.0).of(
+    slider(texts::RAYS_A_PIXEL, "", Quality, [1.0, 4.0], 1.0).of(
         |s| renders_rays(s) && s.ray.apart() == 1,
         |s| f64::from(s.ray.rays),
         |s, v| s.ray.rays = if s.ray.apart() > 1 { 1 } else { v.round() as u32 },

@@ -3,6 +3,7 @@
 use crate::gpu::Wake;
 use crate::live::Feed;
 use crate::source::live::{Live, SourceKind};
+use crate::ui::texts;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::mpsc::{Receiver, TryRecvError, channel};
@@ -17,7 +18,7 @@ pub(super) type SourceNotice = (&'static str, String, bool);
 impl SourceKind {
     /// What its pictures show, if that is no patient.
     pub(super) fn origin(self) -> Option<&'static str> {
-        (self == SourceKind::Demo).then_some("Demo data (phantom)")
+        (self == SourceKind::Demo).then_some(texts::DEMO_DATA)
     }
 
     /// What there is to say about a source in this state. `disconnected`: why it is not connected. `is_silent`: no frame came for a while in
@@ -31,26 +32,28 @@ impl SourceKind {
     ) -> Option<SourceNotice> {
         use SourceKind::{Demo, Pipe, Probe, Recording};
         let waiting = match self {
-            Demo => "Computing the demo data",
-            Recording => "Reading the recording",
-            Pipe => "Waiting for frames on standard input",
-            Probe => "Connecting to the probe",
+            Demo => texts::COMPUTING_DEMO_DATA,
+            Recording => texts::READING_RECORDING,
+            Pipe => texts::WAITING_FOR_STANDARD_INPUT,
+            Probe => texts::CONNECTING_TO_PROBE,
         };
         let again = match self {
-            Demo => "No demo data: trying again",
-            Recording => "The recording cannot be opened: trying again",
-            Pipe => "Standard input cannot be read: trying again",
-            Probe => "No probe: trying again",
+            Demo => texts::NO_DEMO_DATA,
+            Recording => texts::RECORDING_NOT_OPENED,
+            Pipe => texts::STANDARD_INPUT_NOT_READ,
+            Probe => texts::NO_PROBE,
         };
         match (state, disconnected) {
             (SourceState::Opening, _) => Some((waiting, String::new(), false)),
             (SourceState::Retrying(why), _) => Some((again, why.clone(), true)),
-            (SourceState::Ended(why), _) => Some(("The source ended", why.clone()?, true)),
-            (SourceState::Open, Some(why)) => Some(("Not connected: trying again", why.into(), true)),
+            (SourceState::Ended(why), _) => Some((texts::SOURCE_ENDED, why.clone()?, true)),
+            (SourceState::Open, Some(why)) => Some((texts::NOT_CONNECTED, why.into(), true)),
             // Files and the phantom are read by this program: if they take long, it is busy.
             (SourceState::Open, None) if is_silent && matches!(self, Pipe | Probe) => match self {
-                Pipe => Some(("No frames on standard input", "It is open but nothing comes.".into(), true)),
-                _ => Some(("No frames from the probe", "It is connected but sends nothing.".into(), true)),
+                Pipe => {
+                    Some((texts::NO_FRAMES_ON_STANDARD_INPUT, texts::NO_FRAMES_ON_STANDARD_INPUT_ABOUT.into(), true))
+                }
+                _ => Some((texts::NO_FRAMES_FROM_THE_PROBE, texts::NO_FRAMES_FROM_THE_PROBE_ABOUT.into(), true)),
             },
             (SourceState::Open, None) if !has_shown => Some((waiting, String::new(), false)),
             (SourceState::Open, None) => None,
@@ -126,14 +129,13 @@ impl SourceSupervisor {
         let opened = match self.opening.as_ref()?.try_recv() {
             Ok(opened) => opened,
             Err(TryRecvError::Empty) => return None,
-            Err(TryRecvError::Disconnected) => Err("the thread that opens the source panicked".into()),
+            Err(TryRecvError::Disconnected) => Err(texts::WHY_SOURCE_PANICKED.into()),
         };
         self.opening = None;
         let feed = opened.and_then(|source| {
             // Each source gets its own file: none is overwritten.
             let record = self.record.as_deref().map(unused_name);
-            Feed::waking(source, record.as_deref(), Some(self.wake.clone()))
-                .map_err(|e| format!("a thread for the source cannot be started: {e}"))
+            Feed::waking(source, record.as_deref(), Some(self.wake.clone())).map_err(texts::why_no_thread_for_source)
         });
         match feed {
             Ok(feed) => {
@@ -153,7 +155,7 @@ impl SourceSupervisor {
         match self.retry {
             Some(retry) => {
                 self.next_attempt = Some(now + retry);
-                self.state = SourceState::Retrying(why.unwrap_or("the source ended".into()));
+                self.state = SourceState::Retrying(why.unwrap_or(texts::WHY_SOURCE_ENDED.into()));
             }
             None => self.state = SourceState::Ended(why),
         }
@@ -171,7 +173,7 @@ impl SourceSupervisor {
             Ok(_) => self.opening = Some(opening),
             Err(e) => {
                 self.not_opened += 1;
-                self.ended(Some(format!("a thread cannot be started: {e}")), now);
+                self.ended(Some(texts::why_no_thread(e)), now);
             }
         }
         // The reason stays visible until the source is open.

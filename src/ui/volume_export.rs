@@ -6,6 +6,7 @@ use crate::files::signals::Writing;
 use crate::live::cine::CineVolume;
 use crate::source::recorder::{Header, Writer};
 use crate::text::printable;
+use crate::ui::texts;
 use crate::workspace::{self, Origin};
 use std::io::Read;
 use std::path::{Path, PathBuf};
@@ -59,49 +60,19 @@ const fn format(name: &'static str, ending: &'static str, work: Work, hint: &'st
 
 /// All of them, in the order of the menu.
 pub const FORMATS: &[Format] = &[
-    format("Volume, NRRD", "nrrd", Work::Convert, "The scan-converted volume in its place, for 3D Slicer and ITK."),
-    format(
-        "Volume, NIfTI",
-        "nii.gz",
-        Work::Convert,
-        "The scan-converted volume in its place, for tools of imaging research.",
-    ),
-    format("Volume, MetaImage", "mha", Work::Convert, "The scan-converted volume in its place, for ITK and PLUS."),
-    format("Volume, DICOM", "dcm", Work::Convert, "An Enhanced US Volume without a patient's name."),
-    format(
-        "Surface, STL",
-        "stl",
-        Work::Mesh,
-        "The surface between darker and brighter echoes as closed triangles, mm.",
-    ),
-    format("Surface, glTF", "glb", Work::Mesh, "The same with a colour, for viewers and slides."),
-    format(
-        "Relief to print, STL",
-        "stl",
-        Work::Relief,
-        "The surface as the probe sees it, filled down to a flat base.",
-    ),
-    format(
-        "Turntable, pictures",
-        "turntable",
-        Work::Turntable,
-        "A folder of 72 PNG files: one turn of the rendering as it is shown.",
-    ),
+    format(texts::VOLUME_NRRD, "nrrd", Work::Convert, texts::VOLUME_NRRD_HINT),
+    format(texts::VOLUME_NIFTI, "nii.gz", Work::Convert, texts::VOLUME_NIFTI_HINT),
+    format(texts::VOLUME_METAIMAGE, "mha", Work::Convert, texts::VOLUME_METAIMAGE_HINT),
+    format(texts::VOLUME_DICOM, "dcm", Work::Convert, texts::VOLUME_DICOM_HINT),
+    format(texts::SURFACE_STL, "stl", Work::Mesh, texts::SURFACE_STL_HINT),
+    format(texts::SURFACE_GLTF, "glb", Work::Mesh, texts::SURFACE_GLTF_HINT),
+    format(texts::RELIEF_STL, "stl", Work::Relief, texts::RELIEF_STL_HINT),
+    format(texts::TURNTABLE_PICTURES, "turntable", Work::Turntable, texts::TURNTABLE_PICTURES_HINT),
     #[cfg(feature = "video")]
-    format("Turntable, film", "mp4", Work::Turntable, "One turn of the rendering as it is shown, as AV1 in MP4."),
-    format(
-        "Loop, pictures",
-        "loop",
-        Work::Loop,
-        "A folder of PNG files: the rendering as it is shown, of each volume of the loop from its first mark to its last.",
-    ),
+    format(texts::TURNTABLE_FILM, "mp4", Work::Turntable, texts::TURNTABLE_FILM_HINT),
+    format(texts::LOOP_PICTURES, "loop", Work::Loop, texts::LOOP_PICTURES_HINT),
     #[cfg(feature = "video")]
-    format(
-        "Loop, film",
-        "mp4",
-        Work::Loop,
-        "The same as AV1 in MP4, forwards, at the mean rate times the speed of the loop (0.1 to 240 pictures a second).",
-    ),
+    format(texts::LOOP_FILM, "mp4", Work::Loop, texts::LOOP_FILM_HINT),
 ];
 
 /// An export in work.
@@ -153,7 +124,7 @@ impl Export {
     /// `must_stop`: true if the work is to end early.
     fn process(&self, command: &mut Command, must_stop: &dyn Fn() -> bool) -> Result<(), String> {
         command.stdin(Stdio::null()).stdout(Stdio::null()).stderr(Stdio::piped());
-        let child = command.spawn().map_err(|e| format!("the export cannot be started: {e}"));
+        let child = command.spawn().map_err(texts::why_export_not_started);
         let mut child = child?;
         let messages = child.stderr.take();
         let said = thread::spawn(move || messages.map_or_else(String::new, last_words));
@@ -169,7 +140,7 @@ impl Export {
                 Ok(None) => thread::sleep(POLL),
                 Err(e) => {
                     let _ = child.kill();
-                    return Err(format!("the export was lost: {e}"));
+                    return Err(texts::why_export_lost(e));
                 }
             }
         };
@@ -177,7 +148,8 @@ impl Export {
         match status.success() {
             true => Ok(()),
             false => {
-                let last = said.lines().map(str::trim).rfind(|line| !line.is_empty()).unwrap_or("it ended early");
+                let last =
+                    said.lines().map(str::trim).rfind(|line| !line.is_empty()).unwrap_or(texts::WHY_EXPORT_ENDED);
                 // The view says itself that this program did not save.
                 let last = last.strip_prefix("echolume: ").unwrap_or(last);
                 Err(printable(last.trim_start_matches("error: ")))
@@ -231,7 +203,7 @@ pub(super) struct Job {
 impl Job {
     /// The command that makes `made` of a recording of one volume. A workspace for it goes beside the recording.
     fn command(&self, recording: &Path, made: &Path) -> Result<Command, String> {
-        let program = std::env::current_exe().map_err(|e| format!("this program's file is not known: {e}"))?;
+        let program = std::env::current_exe().map_err(texts::why_no_program)?;
         let mut command = Command::new(program);
         match self.format.work {
             Work::Convert => command.arg("convert").args([recording, made]),

@@ -39,6 +39,99 @@ fn code(text: &str) -> String {
     text.lines().map(|l| l.split("//").next().unwrap_or("")).collect::<Vec<_>>().join("\n")
 }
 
+/// The string literals of code, each with the code since the last end of a statement or block. Raw strings and characters are left out.
+fn literals(text: &str) -> Vec<(&str, &str)> {
+    let (bytes, mut found, mut at, mut since) = (text.as_bytes(), Vec::new(), 0, 0);
+    while at < bytes.len() {
+        match bytes[at] {
+            b'/' if bytes.get(at + 1) == Some(&b'/') => at = text[at..].find('\n').map_or(bytes.len(), |end| at + end),
+            b'\'' if bytes.get(at + 1) == Some(&b'\\') => at += 4,
+            b'\'' if bytes.get(at + 2) == Some(&b'\'') => at += 3,
+            b'"' => {
+                let start = at + 1;
+                at = start;
+                while at < bytes.len() && bytes[at] != b'"' {
+                    at += if bytes[at] == b'\\' { 2 } else { 1 };
+                }
+                found.push((&text[since..start - 1], &text[start..at.min(bytes.len())]));
+                at += 1;
+            }
+            end => {
+                at += 1;
+                // Braces within a line belong to an expression.
+                if end == b';' || (matches!(end, b'{' | b'}') && bytes.get(at) == Some(&b'\n')) {
+                    since = at;
+                }
+            }
+        }
+    }
+    found
+}
+
+/// True for words that a reader is meant to see: several, or one with a capital letter.
+fn is_prose(literal: &str) -> bool {
+    let mut outside = true;
+    let keep = |c: &char| {
+        match c {
+            '{' => outside = false,
+            '}' => outside = true,
+            _ => return outside,
+        }
+        false
+    };
+    let text: String = literal.chars().filter(keep).collect();
+    let is_word = |word: &&str| word.len() > 1 && word.chars().filter(|c| c.is_ascii_lowercase()).count() > 1;
+    let mut words = text.split_whitespace();
+    let first = words.next().unwrap_or("");
+    let begins_with_capital = first.starts_with(|c: char| c.is_ascii_uppercase()) && is_word(&first);
+    begins_with_capital || (text.contains(' ') && text.split_whitespace().any(|word| is_word(&word)))
+}
+
+#[test]
+fn every_text_of_the_window_is_in_its_table() {
+    // What goes to the log or ends the program without a window.
+    let is_elsewhere = |before: &str| ["tracing::", "GpuError::"].iter().any(|word| before.contains(word));
+    let allowed = [
+        // The name of the window is that of the program.
+        "Echolume",
+        // The last line on the terminal, and why a report of errors is refused there.
+        "{:.1} s: {} volumes",
+        ", presentation to monitor",
+        "error report: ",
+        "{fault}; is there a desktop?",
+        // With these a line of the program that exports begins.
+        "echolume: ",
+        "error: ",
+    ];
+    let mut count = 0;
+    for (name, text) in sources("src/ui") {
+        if name.contains("/tests") {
+            continue;
+        }
+        let end = text.find("#[cfg(test)]\nmod ").unwrap_or(text.len());
+        for (before, literal) in literals(&text[..end]).into_iter().filter(|(_, literal)| is_prose(literal)) {
+            if name.contains("/texts/") {
+                count += 1;
+                continue;
+            }
+            let is_fine = is_elsewhere(before) || allowed.iter().any(|start| literal.starts_with(start));
+            assert!(is_fine, "{name}: {literal:?} belongs in src/ui/texts");
+        }
+    }
+    assert!(count > 300, "only {count} texts are found");
+}
+
+#[test]
+fn texts_are_told_from_other_literals() {
+    let code =
+        "ui.label(\"Two words\"); // \"not this\"\nlet c = '\"'; tracing::warn!(\"lost {x}\"); f(\"a \\\" quote\")";
+    let found: Vec<&str> = literals(code).into_iter().map(|(_, literal)| literal).collect();
+    assert_eq!(found, ["Two words", "lost {x}", "a \\\" quote"]);
+    assert!(literals(code)[1].0.contains("tracing::"));
+    assert!(is_prose("Undo") && is_prose("the end") && is_prose("{n} files"));
+    assert!(!is_prose("png") && !is_prose("{a} {b}") && !is_prose("MIP") && !is_prose("{x:.1}"));
+}
+
 #[test]
 fn no_layer_uses_a_layer_above_it() {
     // A folder or file, and the names that it must not contain.

@@ -6,6 +6,7 @@ use crate::passes::chain;
 use crate::scene::Scene;
 use crate::scene::picker::Picker;
 use crate::ui::controls::Change;
+use crate::ui::texts;
 use std::time::Instant;
 
 /// Least distance of two points of a stroke, as a share of the radius: what they leave between them is a hundredth of it.
@@ -39,8 +40,8 @@ impl Console {
     /// The strokes over the surface under these pixels: it begins anew behind a gap or a step of the surface.
     fn stroke_over(&mut self, pixels: &[[f64; 2]]) -> Result<(Strokes, Scene), String> {
         let radius = self.controls.brush_radius();
-        let no_surface = "The brush needs a surface: choose the mode Surface or Mixed";
-        let renderer = self.stream.renderer().filter(|r| r.has_drawn()).ok_or("There is no picture yet")?;
+        let no_surface = texts::BRUSH_NEEDS_SURFACE;
+        let renderer = self.stream.renderer().filter(|r| r.has_drawn()).ok_or(texts::NO_PICTURE_TO_USE)?;
         let slot = match renderer.scene().has_distance() {
             true => chain::distance_end(renderer.scene()),
             false => return Err(no_surface.into()),
@@ -63,7 +64,7 @@ impl Console {
         }
         strokes.extend(Some(stroke).filter(|stroke| !stroke.is_empty()));
         if strokes.is_empty() {
-            return Err("There is no surface at this place".into());
+            return Err(texts::NO_SURFACE_HERE.into());
         }
         let points = |stroke: Vec<glam::DVec3>| stroke.into_iter().map(|place| scene.point_of(place)).collect();
         Ok((strokes.into_iter().map(points).collect(), scene.clone()))

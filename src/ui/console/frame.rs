@@ -9,8 +9,8 @@ use crate::live::{Feed, FinishedPicture, StartStep, Step, StreamError};
 use crate::passes::unveil;
 use crate::ui::frame_budget;
 use crate::ui::panels::{self, Banner, PanelState};
-use crate::ui::sliders::AUTO_START;
 use crate::ui::source_supervisor::SourceState;
+use crate::ui::texts;
 use crate::ui::times::RecentTimes;
 use std::time::{Duration, Instant};
 
@@ -71,11 +71,11 @@ impl Console {
                     if file.extension().is_some_and(|end| end == "toml") {
                         self.opening.remember(&file);
                     }
-                    self.notify(&format!("Saved {}", file.display()), false);
+                    self.notify(&texts::saved(file.display()), false);
                 }
                 Err(fault) => {
                     self.leaves_when_saved = self.leaves_when_saved.filter(|_| !ends);
-                    self.notify(&format!("Not saved: {fault}"), true);
+                    self.notify(&texts::not_saved(fault), true);
                 }
             }
         }
@@ -233,7 +233,7 @@ impl Console {
         self.start_lines = lines.unwrap_or_default();
         let lost = outcome.filter(|outcome| !outcome.is_found());
         if let Some(outcome) = lost.filter(|_| !self.has_lost_fluid) {
-            self.notify(&format!("{AUTO_START}: {outcome}."), false);
+            self.notify(&texts::render_start(outcome), false);
         }
         self.has_lost_fluid = lost.is_some();
     }
@@ -461,12 +461,11 @@ impl Console {
         }
         if let Some(fault) = &self.shader_fault {
             let lines: Vec<&str> = fault.lines().take(MAX_SHADER_LINES).collect();
-            return Some(banner("Shader error: the last good shader is shown", &lines.join("\n"), true));
+            return Some(banner(texts::SHADER_ERROR, &lines.join("\n"), true));
         }
         if self.stall_shown_until.is_some() {
-            let text =
-                "It did not finish in time and was opened again. The volumes that arrived in between are not shown.";
-            return Some(banner("The graphics device stalled", text, true));
+            let text = texts::DEVICE_STALLED_ABOUT;
+            return Some(banner(texts::DEVICE_STALLED, text, true));
         }
         let is_silent = now.saturating_duration_since(self.last_arrival) >= SILENCE && !self.stream.is_frozen();
         let (state, gone) = (self.source.state(), self.stream.disconnected());
@@ -474,15 +473,15 @@ impl Console {
         let (title, text, is_fault) = self.fixed.source.notice(state, gone.as_deref(), is_silent, has_shown)?;
         let is_start = !is_fault && text.is_empty() && matches!(state, SourceState::Open);
         match self.start_step.filter(|_| is_start) {
-            Some(StartStep::Compiling { count: 0, .. }) => Some(banner("Preparing the device", "", false)),
+            Some(StartStep::Compiling { count: 0, .. }) => Some(banner(texts::PREPARING_THE_DEVICE, "", false)),
             Some(StartStep::Compiling { done, count }) => {
-                Some(banner("Preparing the device", &format!("{done} of {count} shaders are compiled"), false))
+                Some(banner(texts::PREPARING_THE_DEVICE, &texts::shaders_compiled(done, count), false))
             }
-            Some(StartStep::Frames { done: 0, .. }) => Some(banner(title, "Waiting for the first frame", false)),
+            Some(StartStep::Frames { done: 0, .. }) => Some(banner(title, texts::WAITING_FOR_FRAME, false)),
             Some(StartStep::Frames { done, count }) => {
-                Some(banner(title, &format!("{done} of {count} frames of the first volume"), false))
+                Some(banner(title, &texts::frames_of_first_volume(done, count), false))
             }
-            Some(StartStep::Picture) => Some(banner("Drawing the first picture", "", false)),
+            Some(StartStep::Picture) => Some(banner(texts::DRAWING_FIRST_PICTURE, "", false)),
             Some(StartStep::Source) | None => Some(banner(title, &text, is_fault)),
         }
     }

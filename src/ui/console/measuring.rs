@@ -10,6 +10,7 @@ use crate::source::Frame;
 use crate::source::convert::Volume;
 use crate::ui::command::{Command, Tool};
 use crate::ui::input::{Input, Key};
+use crate::ui::texts;
 use crate::workspace;
 use glam::DVec3;
 use std::sync::Arc;
@@ -83,13 +84,13 @@ impl Console {
     /// Handles a picked pixel: a complete distance along the surface, or a point of another measurement, which is set at once.
     fn picked(&mut self, kind: MeasureKind, pixel: [f64; 2]) -> Result<Option<Measurement>, String> {
         if matches!(kind, MeasureKind::Trace | MeasureKind::Volume | MeasureKind::Ellipse) {
-            return Err("Outlines are traced on a plane: choose Plane, 3 planes or 4-up".into());
+            return Err(texts::OUTLINE_NEEDS_PLANE.into());
         }
         // Undo may have taken the first end back.
         let is_begun = self.controls.work().is_some_and(|work| work.kind == MeasureKind::Surface);
         let from = self.surface_from.filter(|_| is_begun);
-        let no_surface = "Points on a rendering need its surface: choose the mode Surface or Mixed";
-        let renderer = self.stream.renderer().filter(|r| r.has_drawn()).ok_or("There is no picture yet")?;
+        let no_surface = texts::POINT_NEEDS_SURFACE;
+        let renderer = self.stream.renderer().filter(|r| r.has_drawn()).ok_or(texts::NO_PICTURE_TO_USE)?;
         let slot = match renderer.scene().has_distance() {
             true => chain::distance_end(renderer.scene()),
             false => return Err(no_surface.into()),
@@ -97,7 +98,7 @@ impl Console {
         let distances = renderer.read(slot).map_err(|e| e.to_string())?.ok_or(no_surface)?;
         let scene = renderer.scene();
         let map = SurfaceMap { picker: Picker::of(scene), size: scene.ray_size(), distances };
-        let place = map.at(pixel).ok_or("There is no surface at this place")?;
+        let place = map.at(pixel).ok_or(texts::NO_SURFACE_HERE)?;
         let point = scene.point_of(place);
         if kind != MeasureKind::Surface {
             let now = Instant::now();
@@ -110,7 +111,7 @@ impl Console {
             self.execute(&Command::Point(point, true), now);
             return Ok(None);
         };
-        let path = map.path(from, place).ok_or("The first end is behind the camera: turn the view back")?;
+        let path = map.path(from, place).ok_or(texts::FIRST_END_BEHIND_CAMERA)?;
         let points = path.into_iter().map(|place| scene.point_of(place)).collect();
         self.surface_from = None;
         self.controls.leave_work();
@@ -130,9 +131,9 @@ impl Console {
                 match std::thread::Builder::new().name("counting".into()).spawn(work) {
                     Ok(_) => {
                         self.counting.counted = Some(receiver);
-                        self.notify("Counting the voxels of the region", false);
+                        self.notify(texts::COUNTING_VOXELS, false);
                     }
-                    Err(e) => self.notify(&format!("No voxels are counted: {e}"), true),
+                    Err(e) => self.notify(&texts::no_voxels_counted(e), true),
                 }
             }
             Err(why) => self.notify(why, true),
@@ -142,20 +143,19 @@ impl Console {
     /// What counts the voxels of the volume that is shown.
     fn voxels_to_count(&self) -> Result<impl FnOnce() -> Option<Measurement> + Send + 'static, &'static str> {
         if self.counting.counted.is_some() {
-            return Err("Voxels are being counted: wait a moment");
+            return Err(texts::STILL_COUNTING_VOXELS);
         }
         let (Some(scene), Some(header)) = (self.stream.scene(), self.stream.header()) else {
-            return Err("There is no volume yet");
+            return Err(texts::NO_VOLUME_YET);
         };
         let volumes = self.stream.cine().volumes();
         let shown = self.stream.cine_position().and_then(|at| volumes.get(at)).or(volumes.back());
-        let frames = shown.map(|kept| kept.frames.clone()).ok_or("No volume is in the cine loop: --cine keeps some")?;
+        let frames = shown.map(|kept| kept.frames.clone()).ok_or(texts::NO_VOLUME_IN_LOOP)?;
         let is_backward = frames.first().is_some_and(|frame| frame.backward);
         let geometry = if is_backward { header.backward.clone() } else { header.forward.clone() };
         let (stored, [low, high]) = (header.stored, header.range);
         let found = self.controls.found_threshold();
-        let threshold =
-            threshold(scene).or(found).ok_or("The threshold is 0: choose Surface or Volume and raise it")?;
+        let threshold = threshold(scene).or(found).ok_or(texts::THRESHOLD_IS_0)?;
         let (least, most) = insonified_box(&scene.geometry);
         let corners = [scene.low.max(least), scene.high.min(most)];
         let points = corners.map(|corner| scene.point_of(corner)).to_vec();
@@ -179,19 +179,19 @@ impl Console {
         match counted.map(|measured| self.controls.add_measure(measured)) {
             Some(crate::ui::controls::Change::Refused(why)) => self.notify(why, true),
             Some(_) => self.last_change = Instant::now(),
-            None => self.notify("The voxels cannot be counted: the region is empty", true),
+            None => self.notify(texts::REGION_IS_EMPTY, true),
         }
     }
 
     /// Copies the results as CSV.
     pub(super) fn copy_measures(&mut self) {
         if self.controls.measures().is_empty() {
-            return self.notify("There are no measurements yet", true);
+            return self.notify(texts::NO_MEASUREMENTS_YET, true);
         }
         match self.clipboard.copy(outcome::csv(self.controls.measures())) {
-            Ok(()) => self.notify("The results are copied as CSV", false),
+            Ok(()) => self.notify(texts::RESULTS_COPIED, false),
             Err(fault) => {
-                self.notify(&format!("There is no clipboard ({fault}): the results are saved instead"), true);
+                self.notify(&texts::no_clipboard(fault), true);
                 self.save_measures();
             }
         }
@@ -200,17 +200,17 @@ impl Console {
     /// Saves the results as a CSV file.
     pub(super) fn save_measures(&mut self) {
         let saved = match self.controls.measures().is_empty() {
-            true => Err("there are no measurements yet".into()),
+            true => Err(texts::WHY_NO_MEASUREMENTS.into()),
             false => self.exporter.text("csv", outcome::csv(self.controls.measures())),
         };
         if let Err(fault) = saved {
-            self.notify(&format!("The results were not saved: {fault}"), true);
+            self.notify(&texts::results_not_saved(fault), true);
         }
     }
 
     /// Saves settings, recording and measurements as a workspace.
     pub(super) fn save_workspace(&mut self) {
-        let origin = self.fixed.origin.clone().ok_or_else(|| "this view has none".to_string());
+        let origin = self.fixed.origin.clone().ok_or_else(|| texts::WHY_NO_ORIGIN.to_string());
         let saved = origin.and_then(|mut origin| {
             let volumes = self.stream.cine().volumes();
             let shown = self.stream.cine_position().and_then(|at| volumes.get(at)).filter(|_| self.fixed.plays_once);
@@ -221,8 +221,8 @@ impl Console {
         });
         match saved {
             Ok(false) => {}
-            Ok(true) => self.notify("The volumes are live and in no file: save the loop too (R)", false),
-            Err(fault) => self.notify(&format!("The workspace was not saved: {fault}"), true),
+            Ok(true) => self.notify(texts::VOLUMES_ARE_LIVE, false),
+            Err(fault) => self.notify(&texts::workspace_not_saved(fault), true),
         }
     }
 

@@ -36,6 +36,7 @@ use crate::passes::unveil::StartLine;
 use crate::plan::Work;
 use crate::scene::{Layout, Scene, Settings, variants};
 use crate::source::live::SourceKind;
+use crate::ui::texts;
 use crate::workspace::Origin;
 use glam::DVec3;
 use std::sync::Arc;
@@ -357,7 +358,7 @@ impl Console {
         let revived = self.stream.revive(context);
         self.set_screen(screen);
         match &revived {
-            Ok(()) => self.notify("The device was lost and opened again", false),
+            Ok(()) => self.notify(texts::DEVICE_OPENED_AGAIN, false),
             // Opening the source again sends its geometry, from which everything is created.
             Err(fault) => self.source_ended(Some(fault.to_string()), Instant::now()),
         }

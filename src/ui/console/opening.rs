@@ -3,6 +3,7 @@
 use super::{Console, OpenFile};
 use crate::gpu::Wake;
 use crate::ui::open_list;
+use crate::ui::texts;
 use std::path::{Path, PathBuf};
 use std::sync::mpsc::{Receiver, TryRecvError, channel};
 
@@ -53,7 +54,7 @@ impl Opening {
             let name = path.file_name().map_or(String::new(), |name| name.to_string_lossy().into_owned());
             let is_above = n == 0 && folder.parent() == Some(&path);
             names.push(match (is_above, path.is_dir()) {
-                (true, _) => "..  (the folder above)".into(),
+                (true, _) => texts::FOLDER_ABOVE.into(),
                 (_, true) => format!("{name}/"),
                 (_, false) => name,
             });
@@ -69,7 +70,7 @@ impl Console {
         self.opening.list = match self.opening.list {
             Some(_) => None,
             None if self.opening.open.is_none() => {
-                self.notify("This view opens no other files", true);
+                self.notify(texts::OPENS_NO_OTHER_FILES, true);
                 None
             }
             None => {
@@ -97,13 +98,13 @@ impl Console {
     /// Opens a recording or a workspace in place of what is shown, in the background.
     pub fn open_path(&mut self, path: &Path) {
         let Some(open) = self.opening.open.clone() else {
-            return self.notify("This view opens no other files", true);
+            return self.notify(texts::OPENS_NO_OTHER_FILES, true);
         };
         if self.opening.opened.is_some() {
-            return self.notify("A file is being opened: wait a moment", true);
+            return self.notify(texts::STILL_OPENING, true);
         }
         if self.has_unsaved_loop() {
-            return self.notify("The loop is not saved: save it first (R)", true);
+            return self.notify(texts::SAVE_THE_LOOP_FIRST, true);
         }
         let (sender, receiver) = channel();
         let (wake, path) = (self.opening.wake.clone(), path.to_path_buf());
@@ -115,9 +116,9 @@ impl Console {
         match std::thread::Builder::new().name("opening".into()).spawn(work) {
             Ok(_) => {
                 self.opening.opened = Some(receiver);
-                self.notify(&format!("Opening {name}"), false);
+                self.notify(&texts::opening(name), false);
             }
-            Err(e) => self.notify(&format!("{name} cannot be opened: {e}"), true),
+            Err(e) => self.notify(&texts::cannot_be_opened(name, e), true),
         }
     }
 
@@ -126,7 +127,7 @@ impl Console {
         let opened = match self.opening.opened.as_ref().map(Receiver::try_recv) {
             None | Some(Err(TryRecvError::Empty)) => return,
             Some(Ok(opened)) => opened,
-            Some(Err(TryRecvError::Disconnected)) => Err("it ended before the file was read".into()),
+            Some(Err(TryRecvError::Disconnected)) => Err(texts::WHY_FILE_NOT_READ.into()),
         };
         self.opening.opened = None;
         match opened {
@@ -134,7 +135,7 @@ impl Console {
                 self.opening.remember(&path);
                 self.request.restart = true;
             }
-            Err(fault) => self.notify(&format!("Not opened: {fault}"), true),
+            Err(fault) => self.notify(&texts::not_opened(fault), true),
         }
     }
 }

@@ -9,6 +9,7 @@ use crate::ui::command::Command;
 use crate::ui::controls::{Change, EXAMS};
 use crate::ui::input::Key;
 use crate::ui::panels::{PresetTile, PresetsShown};
+use crate::ui::texts;
 use crate::ui::thumbnails::{Job, Thumbnails};
 use crate::user_presets::{self, MAX_NAME, MAX_PRESETS, UserPreset, checked_name};
 use std::path::PathBuf;
@@ -105,7 +106,7 @@ impl Presets {
         });
         let own = self.own.iter().enumerate().map(|(n, preset)| PresetTile {
             name: &preset.name,
-            hint: "A preset of your own.",
+            hint: texts::OWN_PRESET_HINT,
             picture: picture(EXAMS.len() + n),
             own: Some(n),
         });
@@ -162,7 +163,7 @@ impl Console {
     }
 
     fn with_preset(&self, n: usize, scene: &Scene) -> Result<Settings, String> {
-        let misfit = || "This preset does not fit the volume".to_string();
+        let misfit = || texts::PRESET_DOES_NOT_FIT.to_string();
         if n < EXAMS.len() {
             let is_phantom = self.fixed.source == SourceKind::Demo;
             return self.controls.with_exam(n, scene, is_phantom).ok_or_else(misfit);
@@ -178,7 +179,7 @@ impl Console {
         }
         let settings = match self.stream.scene() {
             Some(scene) => self.with_preset(n, scene),
-            None => Err("There is no volume yet".into()),
+            None => Err(texts::NO_VOLUME_YET.into()),
         };
         match settings {
             Ok(settings) => {
@@ -200,7 +201,7 @@ impl Console {
         }
         let of = match of {
             None if self.presets.own.len() >= MAX_PRESETS => {
-                return self.notify(&format!("{MAX_PRESETS} presets are kept: delete one first"), true);
+                return self.notify(&texts::too_many_presets(MAX_PRESETS), true);
             }
             None => None,
             Some(n) => match self.presets.own.get(n) {
@@ -228,19 +229,19 @@ impl Console {
         let mut own = self.presets.own.clone();
         let same = own.iter().position(|preset| preset.name == name);
         let said = match (&naming.of, same) {
-            (Some(of), Some(_)) if *of != name => return Err(format!("{name} is the name of another preset")),
+            (Some(of), Some(_)) if *of != name => return Err(texts::name_is_taken(name)),
             (Some(of), _) => {
-                let preset = own.iter_mut().find(|preset| preset.name == *of).ok_or("this preset is gone")?;
+                let preset = own.iter_mut().find(|preset| preset.name == *of).ok_or(texts::WHY_PRESET_IS_GONE)?;
                 preset.name.clone_from(&name);
-                format!("The preset is called {name}")
+                texts::preset_is_called(name)
             }
             (None, Some(n)) => {
                 own[n] = UserPreset::new(&name, self.controls.settings())?;
-                format!("{name} has the present look. Undo in the list brings the earlier one back")
+                texts::preset_is_replaced(name)
             }
             (None, None) => {
                 own.push(UserPreset::new(&name, self.controls.settings())?);
-                format!("{name} is kept")
+                texts::preset_is_kept(name)
             }
         };
         self.keep_presets(own)?;
@@ -250,7 +251,7 @@ impl Console {
 
     /// Writes the presets of the user; the earlier ones can be brought back.
     fn keep_presets(&mut self, own: Vec<UserPreset>) -> Result<(), String> {
-        let file = self.presets.file.as_deref().ok_or("this view keeps no presets")?;
+        let file = self.presets.file.as_deref().ok_or(texts::WHY_NO_PRESETS)?;
         user_presets::write(file, &own)?;
         self.presets.before = Some(std::mem::replace(&mut self.presets.own, own));
         // Pictures belong to places in the list, and it has others now.
@@ -266,7 +267,7 @@ impl Console {
         own.retain(|preset| preset.name != name);
         match self.keep_presets(own) {
             Ok(()) => {
-                self.notify(&format!("{name} is deleted. Undo in the list brings it back"), false);
+                self.notify(&texts::preset_is_deleted(name), false);
             }
             Err(why) => self.notify(&why, true),
         }
@@ -279,10 +280,10 @@ impl Console {
         self.presets.read();
         if self.presets.own != known {
             self.presets.before = None;
-            return self.notify("The presets were changed elsewhere: nothing is taken back", true);
+            return self.notify(texts::PRESETS_CHANGED_ELSEWHERE, true);
         }
         match self.keep_presets(before) {
-            Ok(()) => self.notify("The presets are as they were", false),
+            Ok(()) => self.notify(texts::PRESETS_RESTORED, false),
             Err(why) => self.notify(&why, true),
         }
     }

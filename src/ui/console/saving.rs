@@ -3,6 +3,7 @@
 use super::Console;
 use crate::live::cine::CineVolume;
 use crate::marked;
+use crate::ui::texts;
 use crate::ui::volume_export::{FORMATS, Job};
 use std::time::SystemTime;
 
@@ -18,7 +19,7 @@ impl Console {
                 }
                 Err(fault) => Err(fault.to_string()),
             },
-            None => Err("there is no picture yet".into()),
+            None => Err(texts::WHY_NO_PICTURE.into()),
         };
         let (has_bar, time) = (self.saves_bar, marked::time_line(SystemTime::now()));
         let origin = self.fixed.source.origin();
@@ -29,7 +30,7 @@ impl Console {
             })
         });
         if let Err(fault) = saved {
-            self.notify(&format!("The picture was not saved: {fault}"), true);
+            self.notify(&texts::picture_not_saved(fault), true);
         }
     }
 
@@ -50,10 +51,10 @@ impl Console {
                 let header = header.clone();
                 self.exporter.volumes(header, volumes, complete_to)
             }
-            _ => Err("there are no volumes yet".into()),
+            _ => Err(texts::WHY_NO_VOLUMES.into()),
         };
         if let Err(fault) = &saved {
-            self.notify(&format!("The loop was not saved: {fault}"), true);
+            self.notify(&texts::loop_not_saved(fault), true);
         }
         saved.is_ok()
     }
@@ -79,11 +80,11 @@ impl Console {
                     device: self.context.candidate.name.clone(),
                 })
             }
-            _ => Err("there is no volume yet".into()),
+            _ => Err(texts::WHY_NO_VOLUME.into()),
         };
         match begun {
-            Ok(()) => self.notify(&format!("Exporting: {}", format.name), false),
-            Err(fault) => self.notify(&format!("Not exported: {fault}"), true),
+            Ok(()) => self.notify(&texts::exporting(format.name), false),
+            Err(fault) => self.notify(&texts::not_exported(fault), true),
         }
     }
 }

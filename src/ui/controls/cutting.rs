@@ -3,6 +3,7 @@
 use super::{Change, Controls, drawable};
 use crate::scene::{Brush, Cut, KeptSide, MAX_BRUSH_POINTS, MAX_CUTS, Scene, Settings};
 use crate::ui::command::{Command, Tool};
+use crate::ui::texts;
 
 /// Most points of a contour in work. A drag longer than that goes on without more.
 const MAX_OUTLINE: usize = 20_000;
@@ -10,10 +11,6 @@ const MAX_OUTLINE: usize = 20_000;
 /// Radius of the brush at the start, and its limits, mm.
 pub(super) const BRUSH_RADIUS: f64 = 4.0;
 pub const BRUSH_RADII: [f64; 2] = [0.5, 20.0];
-
-/// Why a mode or a control does nothing.
-pub const CUTS_IN_THE_WAY: &str =
-    "That draws both what is dark and what is bright, of which nothing can be cut: remove the cuts first (Shift+F).";
 
 /// True if settings cannot be drawn with their cuts, and can without.
 pub(super) fn is_in_the_way(now: &Scene, settings: Settings) -> bool {
@@ -118,13 +115,13 @@ impl Controls {
 
     fn cut_along(&mut self, command: &Command, outline: &[[f64; 2]], scene: &Scene) -> Change {
         if self.settings.cuts.len() >= MAX_CUTS {
-            return Change::Refused("There are as many cuts as a scene can have: remove them, or take one back.");
+            return Change::Refused(texts::TOO_MANY_CUTS);
         }
         if !(scene.composites() || scene.detects_surface() || scene.projects()) {
-            return Change::Refused("Cuts are made on a rendering: the block shows all of the volume.");
+            return Change::Refused(texts::CUTS_NEED_RENDERING);
         }
         let Some(cut) = scene.cut_along(outline, self.kept_side) else {
-            return Change::Refused("The contour is too small, or beside the volume.");
+            return Change::Refused(texts::CONTOUR_TOO_SMALL);
         };
         let mut new = self.settings.clone();
         new.cuts.push(cut);
@@ -134,7 +131,7 @@ impl Controls {
     /// Takes settings with more cuts.
     fn take_cut(&mut self, new: Settings, command: &Command, scene: &Scene) -> Change {
         if new.cuts.len() > MAX_CUTS {
-            return Change::Refused("There are as many cuts as a scene can have: remove them, or take one back.");
+            return Change::Refused(texts::TOO_MANY_CUTS);
         }
         let now = self.current(scene);
         match now.and_then(|now| drawable(&now, new)) {
@@ -143,7 +140,7 @@ impl Controls {
                 self.history.record(before, command);
                 Change::Settings
             }
-            None => Change::Refused("Nothing can be cut where both what is dark and what is bright is drawn."),
+            None => Change::Refused(texts::CANNOT_CUT_BOTH),
         }
     }
 }

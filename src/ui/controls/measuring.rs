@@ -4,10 +4,10 @@ use super::{Change, Controls};
 use crate::measure::outcome;
 use crate::scene::{MAX_ALL_POINTS, MAX_CONTOURS, MAX_MEASURES, MAX_POINTS, MAX_TEXT, MeasureKind, Measurement};
 use crate::ui::command::{Command, Tool};
+use crate::ui::texts;
 
 /// Farthest place of a point, mm.
 const FARTHEST: f64 = 1e6;
-const FULL: &str = "There are as many measurements as a scene can have: delete one first.";
 
 impl Controls {
     /// The measurements and annotations, in the order of their numbers.
@@ -33,7 +33,7 @@ impl Controls {
     /// Adds a measurement that is complete.
     pub(in crate::ui) fn add_measure(&mut self, measured: Measurement) -> Change {
         if self.is_full(measured.count()) {
-            return Change::Refused(FULL);
+            return Change::Refused(texts::TOO_MANY_MEASUREMENTS);
         }
         if let Err(why) = outcome::quantities(&measured) {
             return Change::Refused(why);
@@ -139,7 +139,7 @@ impl Controls {
             return Change::Nothing;
         }
         if self.work.is_none() && self.is_full(1) {
-            return Change::Refused(FULL);
+            return Change::Refused(texts::TOO_MANY_MEASUREMENTS);
         }
         let fits = |work: &Measurement| work.kind == kind && work.on_surface == on_surface;
         let new = || Measurement { kind, on_surface, ..Measurement::default() };
@@ -180,7 +180,7 @@ impl Controls {
             if work.points.len() < 3 || work.contours.len() >= MAX_CONTOURS {
                 work.points.clear();
                 self.work = Some(work).filter(|work| !work.contours.is_empty());
-                return Change::Refused("A contour needs three points or more; a volume has at most 64.");
+                return Change::Refused(texts::CONTOUR_LIMITS);
             }
             let contour = std::mem::take(&mut work.points);
             work.contours.push(contour);

@@ -15,7 +15,8 @@ use crate::scene::{
     Camera, Cube, Inset, KeptSide, Layout, MAX_PICTURE, Measurement, Mode, Planes, Scene, Settings, Shadow, Tilt,
     Transfer,
 };
-pub(super) use cutting::{BRUSH_RADII, CUTS_IN_THE_WAY};
+use crate::ui::texts;
+pub(super) use cutting::BRUSH_RADII;
 use glam::DVec3;
 use history::History;
 pub(super) use presets::EXAMS;
@@ -263,10 +264,10 @@ impl Controls {
                 Change::Settings
             }
             None if wanted.clone().is_some_and(|settings| cutting::is_in_the_way(&now, settings)) => {
-                Change::Refused(CUTS_IN_THE_WAY)
+                Change::Refused(texts::CUTS_IN_THE_WAY)
             }
             None if wanted.is_some_and(|settings| is_unveiling_in_the_way(&now, settings)) => {
-                Change::Refused(UNVEILING_IN_THE_WAY)
+                Change::Refused(texts::UNVEILING_IN_THE_WAY)
             }
             _ => Change::Nothing,
         }
@@ -418,9 +419,6 @@ fn drawable(now: &Scene, settings: Settings) -> Option<Settings> {
     }
     can_draw(now, &relaxed).then_some(relaxed)
 }
-
-/// Why the automatic render start, or a control beside it, does nothing.
-const UNVEILING_IN_THE_WAY: &str = "That draws both what is dark and what is bright, of which nothing can be removed: rendering cannot start at the fluid.";
 
 /// True if settings cannot be drawn with the automatic render start, and can without.
 fn is_unveiling_in_the_way(now: &Scene, mut settings: Settings) -> bool {

@@ -4,6 +4,7 @@ use super::{Change, Controls, drawable};
 use crate::scene::load::Layers;
 use crate::scene::{Layout, Scene, Settings};
 use crate::ui::command::Command;
+use crate::ui::texts;
 
 /// A built-in preset in the list of the view.
 pub(in crate::ui) struct Exam {
@@ -20,12 +21,12 @@ const fn exam(title: &'static str, preset: &'static str, is_framed: bool, hint: 
 
 /// The built-in presets of the list.
 pub(in crate::ui) const EXAMS: [Exam; 6] = [
-    exam("Face", "face", true, "Skin in fluid, under light that goes into it."),
-    exam("Skeleton", "skeleton", true, "What reflects the most shines through a thin veil of soft tissue."),
-    exam("Glass", "glass", true, "Only the edges of tissue shine: everything can be seen through."),
-    exam("Vessels", "vessel", true, "Inverted: fluid is opaque, tissue is clear."),
-    exam("Bone", "bone", false, "A bright surface under soft tissue."),
-    exam("B-mode", "bmode", false, "The scan plane in grey."),
+    exam(texts::FACE, "face", true, texts::FACE_HINT),
+    exam(texts::SKELETON, "skeleton", true, texts::SKELETON_HINT),
+    exam(texts::GLASS, "glass", true, texts::GLASS_HINT),
+    exam(texts::VESSELS, "vessel", true, texts::VESSELS_HINT),
+    exam(texts::BONE, "bone", false, texts::BONE_HINT),
+    exam(texts::B_MODE, "bmode", false, texts::B_MODE_HINT),
 ];
 
 /// The base of what the phantom is drawn with.

@@ -16,6 +16,7 @@ pub(super) use reader::DeviceMessage;
 
 use super::input::Input;
 use crate::gpu::Wake;
+use crate::ui::texts;
 use reader::OpenDevices;
 use rustix::event::{EventfdFlags, PollFd, PollFlags, Timespec, eventfd, poll};
 use std::io;
@@ -126,11 +127,11 @@ fn run_thread(shared: &Shared, grab: bool, sender: &SyncSender<DeviceMessage>) {
         let fault = match catch_unwind(AssertUnwindSafe(|| read_devices(shared, grab, &send))) {
             Ok(Ok(Stopped)) => return,
             Ok(Err(fault)) => fault.to_string(),
-            Err(_) => "the reader panicked".into(),
+            Err(_) => texts::WHY_DEVICES_LOST.into(),
         };
         // All devices are opened again.
         if send(DeviceMessage::Input(Input::FocusLost))
-            .and_then(|()| send(DeviceMessage::Warning(format!("input devices: {fault}"))))
+            .and_then(|()| send(DeviceMessage::Warning(texts::devices_lost(fault))))
             .is_err()
         {
             return;

@@ -3,6 +3,7 @@
 use super::profile::{Abilities, Profile, Span};
 use super::translator::{Event, State, Translator};
 use crate::ui::input::Input;
+use crate::ui::texts;
 use evdev::raw_stream::RawDevice;
 use evdev::{AbsoluteAxisCode as Abs, PropType};
 use std::collections::{BTreeMap, BTreeSet};
@@ -102,10 +103,7 @@ impl OpenDevices {
         let still = refused.intersection(&self.refused).count();
         if still > 0 && !self.refusal_is_reported {
             self.refusal_is_reported = true;
-            let text = format!(
-                "{still} input devices cannot be read: this user is not in the group input (as root: usermod -aG input USER)"
-            );
-            out.push(DeviceMessage::Warning(text));
+            out.push(DeviceMessage::Warning(texts::devices_not_read(still)));
         }
         self.refused = refused;
     }
@@ -184,7 +182,7 @@ impl Reader {
         if let Err(fault) = self.device.grab() {
             self.grab = Grab::Off;
             let (name, path) = (self.device.name().unwrap_or("unnamed"), self.path.display());
-            out.push(DeviceMessage::Warning(format!("{name} ({path}) cannot be grabbed: {fault}")));
+            out.push(DeviceMessage::Warning(texts::device_not_grabbed(name, path, fault)));
         }
     }
 }

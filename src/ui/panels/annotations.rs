@@ -7,6 +7,7 @@ use crate::measure::overlay;
 use crate::passes::postprocess;
 use crate::scene::marks::{BAR_LENGTHS, TileMarks};
 use crate::scene::{Layout, Mode, Scene, transfer};
+use crate::ui::texts;
 use egui::{Align2, Color32, FontId, Painter, Pos2, Rect, Stroke, Ui, Vec2, pos2, vec2};
 use glam::DVec3;
 
@@ -190,10 +191,9 @@ fn ruler(painter: &Painter, taken: &mut Taken, area: Rect, top: f64, per_point: 
         if taken.is_free(Rect::from_min_max(pos2(x, y - 3.0), pos2(x + 9.0, y + 3.0))) {
             line(painter, pos2(x, y), pos2(x + 9.0, y));
             if y > area.top() + 8.0 && y < area.bottom() - 8.0 {
-                let unit = if has_unit { "" } else { " mm" };
                 let place = [pos2(x + 13.0, y)];
-                has_unit |=
-                    text_at_one_of(painter, taken, place, Align2::LEFT_CENTER, &format!("{depth:.0}{unit}"), TEXT);
+                let label = if has_unit { format!("{depth:.0}") } else { texts::whole_millimetres(depth) };
+                has_unit |= text_at_one_of(painter, taken, place, Align2::LEFT_CENTER, &label, TEXT);
             }
         }
         depth += step;
@@ -208,7 +208,7 @@ fn bar(painter: &Painter, taken: &mut Taken, area: Rect, per_point: f64) {
     let max_length = f64::from(area.width()) * 0.3 * per_point;
     let Some(mm) = BAR_LENGTHS.into_iter().rev().find(|mm| *mm <= max_length) else { return };
     let width = (mm / per_point) as f32;
-    let label = format!("{mm} mm");
+    let label = texts::whole_millimetres(mm);
     let words = painter.layout_no_wrap(label.clone(), FontId::proportional(SMALL_TEXT), TEXT).size();
     let places = (0..6).map(|n| area.right_bottom() - vec2(16.0, 16.0 + 24.0 * n as f32));
     let right = places.into_iter().find(|right| {

@@ -11,8 +11,9 @@ use crate::scene::{ColourMap, KeptSide, Layout, Mode, PlaneName, Settings, Trans
 use crate::ui::cine_player::{CineState, SPEEDS};
 use crate::ui::command::{Command, Tool};
 use crate::ui::controls::BRUSH_RADII;
-use crate::ui::hints;
-use crate::ui::sliders::{AUTO_START, Group, SLIDERS, START_OFFSET, Slider as Control};
+use crate::ui::sliders::{Group, SLIDERS, Slider as Control};
+use crate::ui::texts;
+use crate::ui::texts::hints;
 use crate::ui::view;
 use egui::accesskit::Role;
 use egui::{
@@ -21,43 +22,43 @@ use egui::{
 };
 
 const TOOLS: [(Tool, &str); 7] = [
-    (Tool::Rotate, "Turn"),
-    (Tool::Light, "Light"),
-    (Tool::Region, "Region"),
-    (Tool::Clip, "Clip"),
-    (Tool::Cut, "Cut"),
-    (Tool::Brush, "Brush"),
-    (Tool::Plane, "Planes"),
+    (Tool::Rotate, texts::TURN),
+    (Tool::Light, texts::LIGHT),
+    (Tool::Region, texts::REGION),
+    (Tool::Clip, texts::CLIP),
+    (Tool::Cut, texts::CUT),
+    (Tool::Brush, texts::BRUSH),
+    (Tool::Plane, texts::PLANES),
 ];
 
 const PLANES: [(PlaneName, &str); 3] = [(PlaneName::A, "A"), (PlaneName::B, "B"), (PlaneName::C, "C")];
 
 /// The controls in front: their names, and the sliders of which the first that the mode has is meant.
 const FRONT: [(&str, &[&str]); 6] = [
-    ("Threshold", &["Threshold"]),
-    ("Gain", &["Gain"]),
-    ("Smooth", &["Smoothing"]),
-    ("Brightness", &["Exposure", "Gamma"]),
-    ("Light", &["Diffuse"]),
-    ("Depth", &["Start depth"]),
+    (texts::THRESHOLD, &[texts::THRESHOLD]),
+    (texts::GAIN, &[texts::GAIN]),
+    (texts::SMOOTH, &[texts::SMOOTHING]),
+    (texts::BRIGHTNESS, &[texts::EXPOSURE, texts::GAMMA]),
+    (texts::LIGHT, &[texts::DIFFUSE]),
+    (texts::DEPTH, &[texts::START_DEPTH]),
 ];
 
 pub(super) fn show_modes(ui: &mut Ui, state: &PanelState, width: f32, execute: &mut dyn FnMut(Command)) {
     Panel::left("rail").exact_size(width).resizable(false).show_separator_line(false).show(ui, |ui| {
-        names::name(ui, Role::Toolbar, "Modes and tools");
+        names::name(ui, Role::Toolbar, texts::MODES_AND_TOOLS);
         // A low window scrolls.
         ScrollArea::vertical().auto_shrink(false).show(ui, |ui| {
             let settings = state.controls.settings();
             let row = Row { width, height: TOUCH_SIZE * 0.92, title: "", is_large_title: false };
             ui.add_space(6.0);
             undo_and_redo(ui, state, &row, execute);
-            let hint = "The looks of an examination, with small pictures of this volume, and your own. (Ctrl+P)";
+            let hint = texts::PRESETS_HINT;
             let size = vec2(width - 16.0, TOUCH_SIZE * 0.75);
-            if ui.add_sized(size, Button::new("Presets")).tell(hint).clicked() {
+            if ui.add_sized(size, Button::new(texts::PRESETS)).tell(hint).clicked() {
                 execute(Command::Presets);
             }
             let modes = Mode::ALL.map(|mode| (mode, mode.title()));
-            row.titled("Mode").show(
+            row.titled(texts::MODE).show(
                 ui,
                 &modes,
                 2,
@@ -65,8 +66,12 @@ pub(super) fn show_modes(ui: &mut Ui, state: &PanelState, width: f32, execute: &
                 hints::of_mode,
                 |m| execute(Command::Mode(m)),
             );
-            let layouts = [(Layout::Single, "Single"), (Layout::Four, "4-up"), (Layout::Pair, "VR | SR")];
-            row.titled("Layout").show(
+            let layouts = [
+                (Layout::Single, texts::LAYOUT_SINGLE),
+                (Layout::Four, texts::LAYOUT_FOUR),
+                (Layout::Pair, texts::LAYOUT_PAIR),
+            ];
+            row.titled(texts::LAYOUT).show(
                 ui,
                 &layouts,
                 2,
@@ -76,10 +81,10 @@ pub(super) fn show_modes(ui: &mut Ui, state: &PanelState, width: f32, execute: &
             );
             if !settings.mode.is_flat() {
                 let is_there = |v| state.scene.is_some_and(|scene| view::is_seen_from(scene, v));
-                row.titled("View from")
+                row.titled(texts::VIEW_FROM)
                     .show(ui, &names::VIEWPOINTS, 2, is_there, hints::of_viewpoint, |v| execute(Command::LookFrom(v)));
             }
-            row.titled("Drag").show(
+            row.titled(texts::DRAG).show(
                 ui,
                 &TOOLS,
                 2,
@@ -91,8 +96,8 @@ pub(super) fn show_modes(ui: &mut Ui, state: &PanelState, width: f32, execute: &
                 cuts(ui, state, width - 16.0, execute);
             }
             if settings.mode.is_flat() && settings.mode != Mode::Orthogonal {
-                let hint = |_| "The plane that is shown and moved.";
-                row.titled("Plane").show(
+                let hint = |_| texts::PLANE_HINT;
+                row.titled(texts::PLANE).show(
                     ui,
                     &PLANES,
                     3,
@@ -102,32 +107,28 @@ pub(super) fn show_modes(ui: &mut Ui, state: &PanelState, width: f32, execute: &
                 );
             }
             if settings.mode.is_flat() || settings.layout == Layout::Four {
-                let hint = "Moves the point where the planes cross to the middle (J; double click with Planes).";
-                let button = Button::new("Recentre planes").min_size(vec2(width - 16.0, TOUCH_SIZE * 0.75));
+                let hint = texts::RECENTRE_PLANES_HINT;
+                let button = Button::new(texts::RECENTRE_PLANES).min_size(vec2(width - 16.0, TOUCH_SIZE * 0.75));
                 if ui.add(button).tell(hint).clicked() {
                     execute(Command::Recentre);
                 }
             }
-            names::group(ui, "Measure", |ui| {
-                heading(ui, "Measure");
+            names::group(ui, texts::MEASURE, |ui| {
+                heading(ui, texts::MEASURE);
                 measures::show_tools(ui, state, width - 16.0, execute);
             });
             if !state.has_column {
                 measures::show_results(ui, state, width - 24.0, execute);
             }
             let files = [
-                (
-                    Command::OpenFiles,
-                    "Open",
-                    "Opens a recording or a workspace (Ctrl+O), or drop a file on the window.",
-                ),
-                (Command::SaveWorkspace, "Save", "Saves settings, recording and measurements together (Ctrl+S)."),
+                (Command::OpenFiles, texts::OPEN, texts::OPEN_HINT),
+                (Command::SaveWorkspace, texts::SAVE, texts::SAVE_WORKSPACE_HINT),
             ];
             let half = vec2((width - 16.0 - ui.spacing().item_spacing.x) / 2.0, TOUCH_SIZE * 0.75);
-            let hint = "Exports the volume that is shown: as a volume, a surface to print, or a turntable (Ctrl+E).";
+            let hint = texts::EXPORT_HINT;
             let whole = vec2(width - 16.0, TOUCH_SIZE * 0.75);
-            names::group(ui, "Workspace", |ui| {
-                heading(ui, "Workspace");
+            names::group(ui, texts::WORKSPACE, |ui| {
+                heading(ui, texts::WORKSPACE);
                 ui.horizontal(|ui| {
                     for (command, name, hint) in files {
                         if ui.add(Button::new(name).min_size(half)).tell(hint).clicked() {
@@ -135,7 +136,7 @@ pub(super) fn show_modes(ui: &mut Ui, state: &PanelState, width: f32, execute: &
                         }
                     }
                 });
-                if ui.add(Button::new("Export").min_size(whole)).tell(hint).clicked() {
+                if ui.add(Button::new(texts::EXPORT).min_size(whole)).tell(hint).clicked() {
                     execute(Command::Exports);
                 }
             });
@@ -143,12 +144,9 @@ pub(super) fn show_modes(ui: &mut Ui, state: &PanelState, width: f32, execute: &
     });
 }
 
-/// The slider that is with the cuts while their tool is chosen.
-const DEPTH_OF_CUT: &str = "Depth of cut";
-
-/// The number of that slider, if it is there.
+/// The number of the slider that is with the cuts while their tool is chosen, if it is there.
 fn depth_of_cut(state: &PanelState) -> Option<usize> {
-    let is_it = |slider: &Control| slider.name == DEPTH_OF_CUT && slider.applies(state.controls.settings());
+    let is_it = |slider: &Control| slider.name == texts::DEPTH_OF_CUT && slider.applies(state.controls.settings());
     SLIDERS.iter().position(is_it).filter(|_| state.controls.tool() == Tool::Cut)
 }
 
@@ -159,13 +157,13 @@ fn cuts(ui: &mut Ui, state: &PanelState, width: f32, execute: &mut dyn FnMut(Com
     if !is_chosen && !is_brush && state.controls.settings().cuts.is_empty() {
         return;
     }
-    names::group(ui, "Cuts", |ui| {
-        heading(ui, "Cuts");
+    names::group(ui, texts::CUTS, |ui| {
+        heading(ui, texts::CUTS);
         ui.set_max_width(width);
         if is_chosen {
             let mut on = state.controls.kept_side() == KeptSide::Inside;
-            let hint = "The next contour takes away what is outside of it, not what is within.";
-            if switch(ui, &mut on, "Keep inside", hint) {
+            let hint = texts::KEEP_INSIDE_HINT;
+            if switch(ui, &mut on, texts::KEEP_INSIDE, hint) {
                 execute(Command::KeepSide(if on { KeptSide::Inside } else { KeptSide::Outside }));
             }
         }
@@ -173,11 +171,11 @@ fn cuts(ui: &mut Ui, state: &PanelState, width: f32, execute: &mut dyn FnMut(Com
             brush_radius(ui, state, execute);
         }
         if let Some(number) = depth_of_cut(state) {
-            slider(ui, state, number, DEPTH_OF_CUT, false, execute);
+            slider(ui, state, number, texts::DEPTH_OF_CUT, false, execute);
         }
         if !state.controls.settings().cuts.is_empty() {
-            let button = Button::new("Remove all cuts").min_size(vec2(width, TOUCH_SIZE * 0.75));
-            let hint = "Renderings show everything again (Shift+F; undo brings the cuts back).";
+            let button = Button::new(texts::REMOVE_ALL_CUTS).min_size(vec2(width, TOUCH_SIZE * 0.75));
+            let hint = texts::REMOVE_ALL_CUTS_HINT;
             if ui.add(button).tell(hint).clicked() {
                 execute(Command::ClearCuts);
             }
@@ -188,9 +186,9 @@ fn cuts(ui: &mut Ui, state: &PanelState, width: f32, execute: &mut dyn FnMut(Com
 fn brush_radius(ui: &mut Ui, state: &PanelState, execute: &mut dyn FnMut(Command)) {
     let before = state.controls.brush_radius();
     let (mut value, [low, high]) = (before, BRUSH_RADII);
-    let shown = format!("{before:.1} mm");
+    let shown = texts::millimetres(before);
     ui.horizontal(|ui| {
-        ui.label("Radius of brush");
+        ui.label(texts::RADIUS_OF_BRUSH);
         ui.with_layout(egui::Layout::right_to_left(Align::Center), |ui| {
             ui.label(RichText::new(&shown).color(ACCENT));
         });
@@ -198,8 +196,8 @@ fn brush_radius(ui: &mut Ui, state: &PanelState, execute: &mut dyn FnMut(Command
     ui.spacing_mut().slider_width = ui.available_width();
     ui.spacing_mut().interact_size.y = TOUCH_SIZE * 0.5;
     let slider = ui.add(Slider::new(&mut value, low..=high).show_value(false).step_by(0.5));
-    let hint = "How far from the surface under the pointer the brush removes.";
-    let slider = slider.tell(hint).named("Radius of brush").with_value(&shown);
+    let hint = texts::RADIUS_OF_BRUSH_HINT;
+    let slider = slider.tell(hint).named(texts::RADIUS_OF_BRUSH).with_value(&shown);
     let is_held = slider.dragged() || slider.clicked() || slider.is_pointer_button_down_on();
     if (is_held || names::asks_for_value(ui, &slider)) && value != before {
         execute(Command::BrushRadius(value));
@@ -211,8 +209,8 @@ fn undo_and_redo(ui: &mut Ui, state: &PanelState, row: &Row, execute: &mut dyn F
     let size = vec2((row.width - 16.0 - ui.spacing().item_spacing.x) / 2.0, TOUCH_SIZE * 0.75);
     ui.horizontal(|ui| {
         for (command, name, is_there, hint) in [
-            (Command::Undo, "Undo", can_undo, "Takes the last change back (Ctrl+Z)."),
-            (Command::Redo, "Redo", can_redo, "Does it again (Ctrl+Y)."),
+            (Command::Undo, texts::UNDO, can_undo, texts::UNDO_HINT),
+            (Command::Redo, texts::REDO, can_redo, texts::REDO_HINT),
         ] {
             let button = ui.add_enabled(is_there, Button::new(name).min_size(size));
             if button.tell(hint).on_disabled_hover_text(hint).clicked() {
@@ -276,20 +274,20 @@ enum Colour {
 }
 
 const OF_VOLUME: [(Colour, &str); 6] = [
-    (Colour::Transfer(TransferName::Grey), "Grey"),
-    (Colour::Transfer(TransferName::Sepia), "Sepia"),
-    (Colour::Transfer(TransferName::Skin), "Skin"),
-    (Colour::Transfer(TransferName::Bone), "Bone"),
-    (Colour::Transfer(TransferName::Cool), "Cool"),
-    (Colour::Transfer(TransferName::Warm), "Warm"),
+    (Colour::Transfer(TransferName::Grey), texts::GREY),
+    (Colour::Transfer(TransferName::Sepia), texts::SEPIA),
+    (Colour::Transfer(TransferName::Skin), texts::SKIN),
+    (Colour::Transfer(TransferName::Bone), texts::BONE),
+    (Colour::Transfer(TransferName::Cool), texts::COOL),
+    (Colour::Transfer(TransferName::Warm), texts::WARM),
 ];
 
 const OF_PICTURE: [(Colour, &str); 5] = [
-    (Colour::Map(ColourMap::None), "As is"),
-    (Colour::Map(ColourMap::Grey), "Grey"),
-    (Colour::Map(ColourMap::Sepia), "Sepia"),
-    (Colour::Map(ColourMap::Skin), "Skin"),
-    (Colour::Map(ColourMap::Ice), "Ice"),
+    (Colour::Map(ColourMap::None), texts::AS_IS),
+    (Colour::Map(ColourMap::Grey), texts::GREY),
+    (Colour::Map(ColourMap::Sepia), texts::SEPIA),
+    (Colour::Map(ColourMap::Skin), texts::SKIN),
+    (Colour::Map(ColourMap::Ice), texts::ICE),
 ];
 
 fn colours(settings: &Settings) -> &'static [(Colour, &'static str)] {
@@ -307,20 +305,20 @@ pub(super) fn front(sliders: &[&str], settings: &Settings) -> Option<usize> {
 pub(super) fn show_controls(ui: &mut Ui, state: &PanelState, width: f32, execute: &mut dyn FnMut(Command)) {
     let settings = state.controls.settings();
     Panel::right("column").exact_size(width).resizable(false).show_separator_line(false).show(ui, |ui| {
-        names::name(ui, Role::Group, "Controls");
+        names::name(ui, Role::Group, texts::CONTROLS);
         ScrollArea::vertical().auto_shrink(false).show(ui, |ui| {
             // Leaves room for the scroll bar, which covers the edge.
             ui.set_max_width(width - 32.0);
             ui.add_space(6.0);
             measures::show_results(ui, state, width - 40.0, execute);
             cuts(ui, state, width - 32.0, execute);
-            heading(ui, "Controls");
+            heading(ui, texts::CONTROLS);
             let in_front = FRONT.map(|(name, sliders)| (name, front(sliders, settings)));
             let with_cuts = depth_of_cut(state);
-            let start = [AUTO_START, START_OFFSET].map(|name| front(&[name], settings));
+            let start = [texts::AUTO_RENDER_START, texts::START_OFFSET].map(|name| front(&[name], settings));
             for (name, number) in in_front {
                 match number {
-                    Some(number) if name == "Light" => {
+                    Some(number) if name == texts::LIGHT => {
                         ui.horizontal_top(|ui| {
                             let width = ui.available_width() - BALL - ui.spacing().item_spacing.x;
                             ui.vertical(|ui| {
@@ -340,8 +338,8 @@ pub(super) fn show_controls(ui: &mut Ui, state: &PanelState, width: f32, execute
                 Colour::Transfer(name) => settings.volume.transfer == Transfer::Named(name),
                 Colour::Map(map) => settings.post.colour_map == map,
             };
-            let hint = |_| "Colours of the tissue; they stand for no flow.";
-            Row { width: width - 24.0, height: TOUCH_SIZE * 0.8, title: "Colour", is_large_title: true }.show(
+            let hint = |_| texts::COLOUR_HINT;
+            Row { width: width - 24.0, height: TOUCH_SIZE * 0.8, title: texts::COLOUR, is_large_title: true }.show(
                 ui,
                 colours,
                 3,
@@ -352,10 +350,10 @@ pub(super) fn show_controls(ui: &mut Ui, state: &PanelState, width: f32, execute
                     Colour::Map(map) => execute(Command::ColourMap(map)),
                 },
             );
-            let is_lit = SLIDERS.iter().any(|slider| slider.name == "Shadow" && slider.applies(settings));
+            let is_lit = SLIDERS.iter().any(|slider| slider.name == texts::SHADOW && slider.applies(settings));
             if is_lit {
                 let mut on = settings.light.shadow.is_some_and(|shadow| shadow.strength > 0.0);
-                if switch(ui, &mut on, "Cast shadows", "The lamp casts shadows on the surface.") {
+                if switch(ui, &mut on, texts::CAST_SHADOWS, texts::CAST_SHADOWS_HINT) {
                     execute(Command::Shadow(on));
                 }
             }
@@ -364,18 +362,18 @@ pub(super) fn show_controls(ui: &mut Ui, state: &PanelState, width: f32, execute
             }
             if settings.mode == Mode::Tomography {
                 let mut on = settings.planes.reference;
-                let hint = "The first tile shows the plane across the slices, and where each of them is.";
-                if switch(ui, &mut on, "Reference picture", hint) {
+                let hint = texts::REFERENCE_PICTURE_HINT;
+                if switch(ui, &mut on, texts::REFERENCE_PICTURE, hint) {
                     execute(Command::Reference(on));
                 }
             }
             let mut saves_bar = state.saves_bar;
-            let hint = "Saved pictures carry the patient's sides, and a bar with scale, depth, mode and time.";
-            if switch(ui, &mut saves_bar, "Bar on saved pictures", hint) {
+            let hint = texts::BAR_ON_SAVED_PICTURES_HINT;
+            if switch(ui, &mut saves_bar, texts::BAR_ON_SAVED_PICTURES, hint) {
                 execute(Command::SavesBar(saves_bar));
             }
             ui.add_space(8.0);
-            heading(ui, "Advanced");
+            heading(ui, texts::ADVANCED);
             for (group, name) in Group::ALL {
                 let is_there = |(number, s): &(usize, &Control)| {
                     let is_elsewhere =
@@ -394,7 +392,7 @@ pub(super) fn show_controls(ui: &mut Ui, state: &PanelState, width: f32, execute
                     }
                 });
                 // A control in front may have the name of a stage.
-                shown.header_response.expanded(shown.openness > 0.5).named(&format!("Advanced: {name}"));
+                shown.header_response.expanded(shown.openness > 0.5).named(&texts::advanced_group(name));
             }
         });
     });
@@ -409,7 +407,7 @@ fn absent(ui: &mut Ui, name: &str) {
         });
     });
     let size = vec2(ui.available_width(), TOUCH_SIZE * 0.62);
-    ui.allocate_exact_size(size, Sense::hover()).1.on_hover_text("This mode has no such control.");
+    ui.allocate_exact_size(size, Sense::hover()).1.on_hover_text(texts::NO_SUCH_CONTROL);
 }
 
 fn slider(
@@ -435,8 +433,8 @@ fn slider(
     let mut value = before.clamp(low, high.max(low));
     let digits = (-slider.step.log10().floor()).clamp(0.0, 3.0) as usize;
     let space = if slider.unit.is_empty() || slider.unit == "°" { "" } else { " " };
-    let shown = match slider.name == DEPTH_OF_CUT && before <= 0.0 {
-        true => "through all".to_string(),
+    let shown = match slider.name == texts::DEPTH_OF_CUT && before <= 0.0 {
+        true => texts::THROUGH_ALL.to_string(),
         false => format!("{before:.digits$}{space}{}", slider.unit),
     };
     ui.horizontal(|ui| {
@@ -450,7 +448,7 @@ fn slider(
     // Tall enough for a finger, although the rail is thin.
     ui.spacing_mut().interact_size.y = TOUCH_SIZE * if is_large { 0.62 } else { 0.5 };
     let response = ui.add(Slider::new(&mut value, low..=high.max(low)).show_value(false).step_by(slider.step));
-    let response = response.tell(&format!("{hint} Double click: as at the start.")).named(name).with_value(&shown);
+    let response = response.tell(&texts::slider_hint(hint)).named(name).with_value(&shown);
     if response.double_clicked() {
         execute(Command::ResetSlider(number));
         return;
@@ -469,7 +467,7 @@ const BALL: f32 = 68.0;
 /// A ball under the lamp, which a drag on it moves.
 fn light_ball(ui: &mut Ui, settings: &Settings, execute: &mut dyn FnMut(Command)) {
     let (area, response) = ui.allocate_exact_size(vec2(BALL, BALL), Sense::DRAG);
-    let response = response.tell("Drag here to move the lamp; on the picture, drag with Ctrl.").named("Light ball");
+    let response = response.tell(texts::LIGHT_BALL_HINT).named(texts::LIGHT_BALL);
     let (centre, radius) = (area.center(), BALL / 2.0 - 2.0);
     let light = settings.light.position.unwrap_or(settings.light.direction).normalize_or(glam::DVec3::Z);
     // The ball in rings, lit as a matt one is.
@@ -536,20 +534,21 @@ fn switch(ui: &mut Ui, on: &mut bool, name: &str, hint: &str) -> bool {
 
 pub(super) fn show_cine_bar(ui: &mut Ui, state: &PanelState, height: f32, execute: &mut dyn FnMut(Command)) {
     Panel::bottom("bar").exact_size(height).resizable(false).show_separator_line(false).show(ui, |ui| {
-        names::name(ui, Role::Toolbar, "Cine loop");
+        names::name(ui, Role::Toolbar, texts::CINE_LOOP);
         let touch = (height - 12.0).min(TOUCH_SIZE);
         ui.horizontal_centered(|ui| {
             let room = ui.available_width();
             let is_narrow = room < 420.0;
             let (label, fill, colour) = match state.is_frozen {
-                true => ("FROZEN", WARNING, ON_WARNING),
-                false => ("Freeze", SELECTED, ON_SELECTED),
+                true => (texts::FROZEN, WARNING, ON_WARNING),
+                false => (texts::FREEZE, SELECTED, ON_SELECTED),
             };
             let text = RichText::new(label).color(colour).strong();
             let width = if is_narrow { 84.0 } else { 120.0 };
-            let hint = "Keeps this volume on the screen (Space).";
+            let hint = texts::FREEZE_HINT;
             let freeze = Button::new(text).fill(fill).min_size(vec2(width, touch));
-            if ui.add(freeze).tell(hint).named(if state.is_frozen { "Unfreeze" } else { "Freeze" }).clicked() {
+            if ui.add(freeze).tell(hint).named(if state.is_frozen { texts::UNFREEZE } else { texts::FREEZE }).clicked()
+            {
                 execute(Command::Freeze);
             }
             let mut left = room - width - ui.spacing().item_spacing.x;
@@ -557,16 +556,16 @@ pub(super) fn show_cine_bar(ui: &mut Ui, state: &PanelState, height: f32, execut
             // In the order in which they give way to a narrow window; the first is always there.
             let buttons = [
                 (
-                    if is_narrow { "Save" } else { "Save picture" },
+                    if is_narrow { texts::SAVE } else { texts::SAVE_PICTURE },
                     if is_narrow { 64.0 } else { 124.0 },
                     Command::SavePicture,
-                    "Saves the picture (P).",
+                    texts::SAVE_PICTURE_HINT,
                 ),
-                ("?", 44.0, Command::ToggleHelp, "All keys and gestures (H)."),
-                ("Save loop", 100.0, Command::SaveLoop, "Saves the last volumes as a recording (R)."),
-                ("Reset", 70.0, Command::Reset, "All settings as at the start (Backspace)."),
-                ("Full screen", 110.0, Command::ToggleFullScreen, "Fills the screen, or leaves it (F11)."),
-                ("Times", 70.0, Command::ToggleTimes, "Times of pictures and frames (F2)."),
+                ("?", 44.0, Command::ToggleHelp, texts::HELP_HINT),
+                (texts::SAVE_LOOP, 100.0, Command::SaveLoop, texts::SAVE_LOOP_HINT),
+                (texts::RESET, 70.0, Command::Reset, texts::RESET_HINT),
+                (texts::FULL_SCREEN, 110.0, Command::ToggleFullScreen, texts::FULL_SCREEN_HINT),
+                (texts::TIMES, 70.0, Command::ToggleTimes, texts::TIMES_HINT),
             ];
             let mut shown = Vec::new();
             for (n, (label, width, command, hint)) in buttons.into_iter().enumerate() {
@@ -590,14 +589,14 @@ pub(super) fn show_cine_bar(ui: &mut Ui, state: &PanelState, height: f32, execut
                 // From the right: help first, the picture next to the loop.
                 shown.sort_by_key(|(label, ..)| match *label {
                     "?" => 0,
-                    "Full screen" => 1,
-                    "Times" => 2,
-                    "Reset" => 3,
-                    "Save loop" => 4,
+                    texts::FULL_SCREEN => 1,
+                    texts::TIMES => 2,
+                    texts::RESET => 3,
+                    texts::SAVE_LOOP => 4,
                     _ => 5,
                 });
                 for (label, width, command, hint) in shown {
-                    let name = if label == "?" { "Help" } else { label };
+                    let name = if label == "?" { texts::HELP } else { label };
                     if ui.add(Button::new(label).min_size(vec2(width, touch))).tell(hint).named(name).clicked() {
                         execute(command);
                     }
@@ -633,7 +632,7 @@ impl LoopRoom {
 fn cine(ui: &mut Ui, state: &PanelState, room: f32, touch: f32, needed: &LoopRoom, execute: &mut dyn FnMut(Command)) {
     let cine = &state.cine;
     if cine.count == 0 {
-        ui.label(RichText::new("no volumes yet").color(WEAK_TEXT));
+        ui.label(RichText::new(texts::NO_VOLUMES_YET).color(WEAK_TEXT));
         return;
     }
     let mut button = |ui: &mut Ui, label: &str, width: f32, name: &str, hint: &str, command: Command| {
@@ -641,30 +640,30 @@ fn cine(ui: &mut Ui, state: &PanelState, room: f32, touch: f32, needed: &LoopRoo
             execute(command);
         }
     };
-    let label = if cine.is_playing { "Stop" } else { "Play" };
-    button(ui, label, 64.0, label, "Plays the last volumes as a loop (Enter).", Command::PlayCine);
+    let label = if cine.is_playing { texts::STOP } else { texts::PLAY };
+    button(ui, label, 64.0, label, texts::PLAY_HINT, Command::PlayCine);
     if room >= needed.steps {
-        button(ui, "<", 44.0, "One volume back", "One volume back (Left).", Command::StepCine(-1));
-        button(ui, ">", 44.0, "One volume forth", "One volume forth (Right).", Command::StepCine(1));
+        button(ui, "<", 44.0, texts::ONE_VOLUME_BACK, texts::ONE_VOLUME_BACK_HINT, Command::StepCine(-1));
+        button(ui, ">", 44.0, texts::ONE_VOLUME_FORTH, texts::ONE_VOLUME_FORTH_HINT, Command::StepCine(1));
         let has_tools = room >= needed.steps + LoopRoom::TOOLS;
         if has_tools {
             let speed = format!("{}x", cine.speed);
             // After the fastest comes the slowest.
             let faster = if cine.speed >= SPEEDS[SPEEDS.len() - 1] { -(SPEEDS.len() as i32) } else { 1 };
-            let hint = "Speed of the loop; 1x is that of the acquisition (Ctrl+Left, Ctrl+Right).";
-            button(ui, &speed, 56.0, &format!("Speed {speed}"), hint, Command::CineSpeed(faster));
+            let hint = texts::SPEED_HINT;
+            button(ui, &speed, 56.0, &texts::speed(&speed), hint, Command::CineSpeed(faster));
             let (label, name, hint) = match cine.goes_back_and_forth {
-                true => ("<->", "Back and forth", "Back and forth; a click: forwards (Ctrl+Enter)."),
-                false => ("->", "Forwards", "Forwards; a click: back and forth (Shift+Enter)."),
+                true => ("<->", texts::BACK_AND_FORTH, texts::BACK_AND_FORTH_HINT),
+                false => ("->", texts::FORWARDS, texts::FORWARDS_HINT),
             };
             button(ui, label, 44.0, name, hint, Command::BackAndForth(!cine.goes_back_and_forth));
-            let hint = "The loop begins with this volume (Shift+Home).";
-            button(ui, "[", 36.0, "Loop begins here", hint, Command::MarkCine(false));
-            let hint = "The loop ends with this volume (Shift+End).";
-            button(ui, "]", 36.0, "Loop ends here", hint, Command::MarkCine(true));
-            let whole = Button::new("All").min_size(vec2(44.0, touch));
-            let whole = ui.add_enabled(cine.is_trimmed, whole).tell("The loop is all volumes (Ctrl+Home).");
-            if whole.named("All volumes").clicked() {
+            let hint = texts::LOOP_BEGINS_HERE_HINT;
+            button(ui, "[", 36.0, texts::LOOP_BEGINS_HERE, hint, Command::MarkCine(false));
+            let hint = texts::LOOP_ENDS_HERE_HINT;
+            button(ui, "]", 36.0, texts::LOOP_ENDS_HERE, hint, Command::MarkCine(true));
+            let whole = Button::new(texts::ALL_SHORT).min_size(vec2(44.0, touch));
+            let whole = ui.add_enabled(cine.is_trimmed, whole).tell(texts::ALL_VOLUMES_HINT);
+            if whole.named(texts::ALL_VOLUMES).clicked() {
                 execute(Command::WholeCine);
             }
         }
@@ -680,7 +679,7 @@ fn cine(ui: &mut Ui, state: &PanelState, room: f32, touch: f32, needed: &LoopRoo
             let y = slider.rect.bottom() - 3.0;
             ui.painter().hline(low - 3.0..=high + 3.0, y, Stroke::new(3.0, ACCENT));
         }
-        let slider = slider.tell("The volumes of the loop, oldest first.").named("Volume of the loop");
+        let slider = slider.tell(texts::VOLUME_OF_THE_LOOP_HINT).named(texts::VOLUME_OF_THE_LOOP);
         let is_held = slider.dragged() || slider.clicked() || slider.is_pointer_button_down_on();
         let is_asked = names::asks_for_value(ui, &slider);
         if (is_held || is_asked) && cine.shown != Some(at - 1) {
@@ -695,17 +694,17 @@ fn cine(ui: &mut Ui, state: &PanelState, room: f32, touch: f32, needed: &LoopRoo
 }
 
 fn place_text(cine: &CineState) -> String {
-    format!("{} of {}", cine.shown.map_or("-".into(), |p| (p + 1).to_string()), cine.count)
+    texts::place_in_loop(cine.shown.map_or("-".into(), |p| (p + 1).to_string()), cine.count)
 }
 
 /// Place, time and rate of the loop, as far as they are known.
 fn cine_text(cine: &CineState) -> String {
     let mut text = place_text(cine);
     if let Some(seconds) = cine.seconds {
-        text += &format!("  {seconds:.1} s");
+        text += &texts::loop_seconds(seconds);
     }
     if let Some(rate) = cine.rate {
-        text += &format!("  {rate:.1}/s");
+        text += &texts::loop_rate(rate);
     }
     text
 }

@@ -5,6 +5,7 @@ use super::names::{self, Tell};
 use super::overlays::LOW_WINDOW;
 use super::{SMALL_TEXT, TOUCH_SIZE};
 use crate::ui::command::Command;
+use crate::ui::texts;
 use crate::ui::volume_export::FORMATS;
 use egui::accesskit::Role;
 use egui::{Align2, Area, Button, Frame, Id, Label, Margin, Order, RichText, ScrollArea, Stroke, Ui, vec2};
@@ -21,10 +22,10 @@ struct List<'a> {
 /// Shows the files to open. `files`: where they are, and their names.
 pub(super) fn show_files(ui: &Ui, files: (&str, &[String]), execute: &mut dyn FnMut(Command)) {
     let list = List {
-        title: "Open",
+        title: texts::OPEN,
         about: files.0,
-        close: ("Opens nothing.", Command::OpenFiles),
-        empty: "There is no recording and no workspace here.",
+        close: (texts::CLOSE_OPEN_HINT, Command::OpenFiles),
+        empty: texts::NO_RECORDING_HERE,
     };
     let entries = files.1.iter().map(|name| (name.as_str(), name.as_str()));
     list.show(ui, entries, |n, execute| execute(Command::OpenFile(n)), |_, _| {}, execute);
@@ -32,12 +33,13 @@ pub(super) fn show_files(ui: &Ui, files: (&str, &[String]), execute: &mut dyn Fn
 
 /// Shows the formats of an export. `running`: the name of the one in work.
 pub(super) fn show_exports(ui: &Ui, running: Option<&str>, execute: &mut dyn FnMut(Command)) {
-    let about = running.map_or("The volume that is shown".into(), |name| format!("{name} is being exported"));
-    let list = List { title: "Export", about: &about, close: ("Exports nothing more.", Command::Exports), empty: "" };
+    let about = running.map_or(texts::VOLUME_SHOWN.into(), texts::is_being_exported);
+    let list =
+        List { title: texts::EXPORT, about: &about, close: (texts::CLOSE_EXPORT_HINT, Command::Exports), empty: "" };
     let entries = FORMATS.iter().map(|format| (format.name, format.hint));
     let cancel = |ui: &mut Ui, execute: &mut dyn FnMut(Command)| {
-        let hint = "Ends the export in work; nothing of it stays.";
-        if running.is_some() && ui.button("Cancel the export").tell(hint).clicked() {
+        let hint = texts::CANCEL_EXPORT_HINT;
+        if running.is_some() && ui.button(texts::CANCEL_EXPORT).tell(hint).clicked() {
             execute(Command::CancelExport);
         }
     };
@@ -68,7 +70,7 @@ impl List<'_> {
                 ui.horizontal(|ui| {
                     ui.heading(self.title);
                     ui.with_layout(egui::Layout::right_to_left(egui::Align::Center), |ui| {
-                        if ui.button("Close  (Esc)").tell(self.close.0).named("Close").clicked() {
+                        if ui.button(texts::CLOSE_BUTTON).tell(self.close.0).named(texts::CLOSE).clicked() {
                             execute(self.close.1);
                         }
                     });

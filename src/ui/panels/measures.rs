@@ -8,22 +8,23 @@ use crate::measure::outcome::{self, Quantity};
 use crate::measure::overlay::{self, Drawn};
 use crate::scene::{MeasureKind, Scene};
 use crate::ui::command::{Command, Tool};
-use crate::ui::hints;
 use crate::ui::picking::Picker;
+use crate::ui::texts;
+use crate::ui::texts::hints;
 use egui::accesskit::Role;
 use egui::{Button, FontId, Label, Painter, Pos2, Rect, RichText, Stroke, StrokeKind, Ui, pos2, vec2};
 
 /// The tools of the rail and their names there.
 const TOOLS: [(MeasureKind, &str); 9] = [
-    (MeasureKind::Distance, "Caliper"),
-    (MeasureKind::Angle, "Angle"),
-    (MeasureKind::Ellipse, "Ellipse"),
-    (MeasureKind::Trace, "Trace"),
-    (MeasureKind::Surface, "Surface"),
-    (MeasureKind::Volume, "Volume"),
-    (MeasureKind::Threshold, "Vol. by threshold"),
-    (MeasureKind::Text, "Text"),
-    (MeasureKind::Arrow, "Arrow"),
+    (MeasureKind::Distance, texts::CALIPER),
+    (MeasureKind::Angle, texts::ANGLE),
+    (MeasureKind::Ellipse, texts::ELLIPSE),
+    (MeasureKind::Trace, texts::TRACE),
+    (MeasureKind::Surface, texts::SURFACE),
+    (MeasureKind::Volume, texts::VOLUME),
+    (MeasureKind::Threshold, texts::VOLUME_BY_THRESHOLD),
+    (MeasureKind::Text, texts::TEXT),
+    (MeasureKind::Arrow, texts::ARROW),
 ];
 
 /// Half the size of a cross, and the length of an arrow's head, points.
@@ -61,12 +62,12 @@ pub(super) fn show_results(ui: &mut Ui, state: &PanelState, width: f32, execute:
     if measures.is_empty() && state.controls.work().is_none() && !is_measuring {
         return;
     }
-    names::group(ui, "Measurements", |ui| results(ui, state, width, execute));
+    names::group(ui, texts::MEASUREMENTS, |ui| results(ui, state, width, execute));
 }
 
 fn results(ui: &mut Ui, state: &PanelState, width: f32, execute: &mut dyn FnMut(Command)) {
     let measures = state.controls.measures();
-    heading(ui, "Measurements");
+    heading(ui, texts::MEASUREMENTS);
     if let Tool::Measure(kind) = state.controls.tool() {
         let step = next_step(state, kind);
         names::group(ui, step, |ui| {
@@ -75,10 +76,13 @@ fn results(ui: &mut Ui, state: &PanelState, width: f32, execute: &mut dyn FnMut(
         });
     }
     if let Some(work) = state.controls.work().filter(|work| work.kind.complete_at().is_none()) {
-        let name =
-            if work.kind == MeasureKind::Volume && work.points.is_empty() { "End volume" } else { "Close contour" };
+        let name = if work.kind == MeasureKind::Volume && work.points.is_empty() {
+            texts::END_VOLUME
+        } else {
+            texts::CLOSE_CONTOUR
+        };
         let button = first(RichText::new(name)).min_size(vec2(width, TOUCH_SIZE * 0.65));
-        if ui.add(button).tell("Ends what is being traced (Enter).").clicked() {
+        if ui.add(button).tell(texts::END_TRACING_HINT).clicked() {
             execute(Command::EndMeasure);
         }
     }
@@ -88,7 +92,7 @@ fn results(ui: &mut Ui, state: &PanelState, width: f32, execute: &mut dyn FnMut(
             let main = found.first().map_or(String::new(), Quantity::shown);
             let name = match (measured.kind, measured.text.is_empty()) {
                 (_, false) => &measured.text,
-                (MeasureKind::Threshold, true) => "Echoes",
+                (MeasureKind::Threshold, true) => texts::ECHOES,
                 (kind, true) => kind.title(),
             };
             let typing = if state.controls.typing() == Some(n) { "_" } else { "" };
@@ -98,7 +102,7 @@ fn results(ui: &mut Ui, state: &PanelState, width: f32, execute: &mut dyn FnMut(
             ui.allocate_ui_with_layout(row, egui::Layout::left_to_right(egui::Align::Center), |ui| {
                 ui.set_min_width(row.x);
                 let rest = found.iter().map(|q| format!("{}: {}", q.name, q.shown()));
-                let hint: Vec<String> = rest.chain(["Click to type a text for it.".to_string()]).collect();
+                let hint: Vec<String> = rest.chain([texts::TYPE_TEXT_HINT.to_string()]).collect();
                 ui.with_layout(egui::Layout::right_to_left(egui::Align::Center), |ui| {
                     ui.label(RichText::new(&main).color(MEASURE).size(SMALL_TEXT));
                     ui.with_layout(egui::Layout::left_to_right(egui::Align::Center), |ui| {
@@ -113,8 +117,8 @@ fn results(ui: &mut Ui, state: &PanelState, width: f32, execute: &mut dyn FnMut(
             });
             ui.spacing_mut().button_padding.x = 3.0;
             let delete = Button::new("x").min_size(vec2(22.0, TOUCH_SIZE * 0.55));
-            let delete = ui.add(delete).tell("Deletes it (undo brings it back).");
-            if delete.named(&format!("Delete measurement {}", n + 1)).clicked() {
+            let delete = ui.add(delete).tell(texts::DELETE_MEASUREMENT_HINT);
+            if delete.named(&texts::delete_measurement(n + 1)).clicked() {
                 execute(Command::DeleteMeasure(n));
             }
         });
@@ -124,9 +128,9 @@ fn results(ui: &mut Ui, state: &PanelState, width: f32, execute: &mut dyn FnMut(
         let third = vec2((width - 2.0 * gap) / 3.0, TOUCH_SIZE * 0.65);
         ui.horizontal(|ui| {
             for (command, name, hint) in [
-                (Command::CopyMeasures, "Copy", "Copies all results as CSV (Ctrl+C)."),
-                (Command::SaveMeasures, "Save", "Saves all results as a CSV file."),
-                (Command::ClearMeasures, "Clear", "Deletes all (undo brings them back)."),
+                (Command::CopyMeasures, texts::COPY, texts::COPY_HINT),
+                (Command::SaveMeasures, texts::SAVE, texts::SAVE_RESULTS_HINT),
+                (Command::ClearMeasures, texts::CLEAR, texts::CLEAR_HINT),
             ] {
                 let button = Button::new(RichText::new(name).size(SMALL_TEXT + 1.0)).min_size(third);
                 if ui.add(button).tell(hint).clicked() {
@@ -140,26 +144,26 @@ fn results(ui: &mut Ui, state: &PanelState, width: f32, execute: &mut dyn FnMut(
 /// What to do next with a tool.
 fn next_step(state: &PanelState, kind: MeasureKind) -> &'static str {
     if state.controls.typing().is_some() {
-        return "Type, then Enter.";
+        return texts::STEP_TYPE;
     }
     let work = state.controls.work().filter(|work| work.kind == kind);
     let set = work.map_or(0, |work| work.points.len());
     let has_contours = work.is_some_and(|work| !work.contours.is_empty());
     match (kind, set) {
-        (MeasureKind::Distance | MeasureKind::Surface, 0) => "Click the first end.",
-        (MeasureKind::Distance | MeasureKind::Surface, _) => "Click the other end.",
-        (MeasureKind::Angle, 0) => "Click the end of a leg.",
-        (MeasureKind::Angle, 1) => "Click the vertex.",
-        (MeasureKind::Angle, _) => "Click the end of the other leg.",
-        (MeasureKind::Ellipse, 0) => "Click one end of the long axis.",
-        (MeasureKind::Ellipse, 1) => "Click its other end.",
-        (MeasureKind::Ellipse, _) => "Click the end of the short axis.",
-        (MeasureKind::Volume, 0) if has_contours => "Step or turn the plane and trace again, or press Enter.",
-        (MeasureKind::Trace | MeasureKind::Volume, 0) => "Drag round the outline on a plane.",
-        (MeasureKind::Trace | MeasureKind::Volume, _) => "Enter closes the outline.",
-        (MeasureKind::Text, _) => "Click the place of the text.",
-        (MeasureKind::Arrow, 0) => "Click what the arrow points to.",
-        (MeasureKind::Arrow, _) => "Click its other end.",
+        (MeasureKind::Distance | MeasureKind::Surface, 0) => texts::STEP_FIRST_END,
+        (MeasureKind::Distance | MeasureKind::Surface, _) => texts::STEP_OTHER_END,
+        (MeasureKind::Angle, 0) => texts::STEP_FIRST_LEG,
+        (MeasureKind::Angle, 1) => texts::STEP_VERTEX,
+        (MeasureKind::Angle, _) => texts::STEP_OTHER_LEG,
+        (MeasureKind::Ellipse, 0) => texts::STEP_LONG_AXIS,
+        (MeasureKind::Ellipse, 1) => texts::STEP_LONG_AXIS_END,
+        (MeasureKind::Ellipse, _) => texts::STEP_SHORT_AXIS,
+        (MeasureKind::Volume, 0) if has_contours => texts::STEP_NEXT_CONTOUR,
+        (MeasureKind::Trace | MeasureKind::Volume, 0) => texts::STEP_OUTLINE,
+        (MeasureKind::Trace | MeasureKind::Volume, _) => texts::STEP_CLOSE_OUTLINE,
+        (MeasureKind::Text, _) => texts::STEP_TEXT,
+        (MeasureKind::Arrow, 0) => texts::STEP_ARROW_TIP,
+        (MeasureKind::Arrow, _) => texts::STEP_LONG_AXIS_END,
         (MeasureKind::Threshold, _) => "",
     }
 }

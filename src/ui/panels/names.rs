@@ -5,13 +5,18 @@ use super::colours::{FOCUS, FOCUS_EDGE};
 use super::{PanelState, picture_rect};
 use crate::scene::{Layout, PlaneName, Scene};
 use crate::ui::command::Viewpoint;
+use crate::ui::texts;
 use crate::ui::view;
 use egui::accesskit::{Action, Live, Node, Rect as Bounds, Role};
 use egui::{Context, Id, Key, Response, Stroke, StrokeKind, Ui};
 
 /// Where a rendering is seen from, as the panels call it.
-pub(super) const VIEWPOINTS: [(Viewpoint, &str); 4] =
-    [(Viewpoint::Front, "Front"), (Viewpoint::Left, "Left"), (Viewpoint::Right, "Right"), (Viewpoint::Top, "Top")];
+pub(super) const VIEWPOINTS: [(Viewpoint, &str); 4] = [
+    (Viewpoint::Front, texts::VIEW_FRONT),
+    (Viewpoint::Left, texts::VIEW_LEFT),
+    (Viewpoint::Right, texts::VIEW_RIGHT),
+    (Viewpoint::Top, texts::VIEW_TOP),
+];
 
 /// Changes the node of the tree that stands for a widget, while a screen reader listens.
 fn node(context: &Context, id: Id, change: impl FnOnce(&mut Node)) {
@@ -109,24 +114,23 @@ pub(super) fn picture(ui: &Ui, state: &PanelState, scale: f32) {
 /// The name of the picture, such as "Surface from the front, live, Demo data (phantom)", and what else is to be said of it.
 fn in_words(state: &PanelState) -> (String, String) {
     let Some(scene) = state.scene.filter(|_| state.has_drawn) else {
-        return ("No picture yet".into(), String::new());
+        return (texts::NO_PICTURE_YET.into(), String::new());
     };
     let settings = &scene.settings;
     let layout = match settings.layout {
         Layout::Single => "",
-        Layout::Four => " with three planes",
-        Layout::Pair => " beside the volume",
+        Layout::Four => texts::WITH_THREE_PLANES,
+        Layout::Pair => texts::BESIDE_THE_VOLUME,
     };
-    let time = if state.is_frozen { "frozen" } else { "live" };
+    let time = if state.is_frozen { texts::IS_FROZEN } else { texts::IS_LIVE };
     let origin = state.origin.map_or(String::new(), |origin| format!(", {origin}"));
     let name = format!("{}{layout}{}, {time}{origin}", settings.mode.title(), view_in_words(scene));
     let volume = match (state.cine.count, state.cine.shown) {
-        (count, Some(at)) => format!("Volume {} of {count}. ", at + 1),
+        (count, Some(at)) => texts::volume_of_loop(at + 1, count),
         _ => String::new(),
     };
     let count = state.controls.measures().len();
-    let plural = if count == 1 { "" } else { "s" };
-    (name, format!("{volume}{count} measurement{plural}."))
+    (name, volume + &texts::count_of_measurements(count))
 }
 
 fn view_in_words(scene: &Scene) -> String {
@@ -137,14 +141,14 @@ fn view_in_words(scene: &Scene) -> String {
             PlaneName::B => "B",
             PlaneName::C => "C",
         };
-        return if scene.shows_three() { String::new() } else { format!(", plane {plane}") };
+        return if scene.shows_three() { String::new() } else { texts::of_plane(plane) };
     }
     let side = VIEWPOINTS.iter().find(|(viewpoint, _)| view::is_seen_from(scene, *viewpoint));
     match side {
-        Some((_, side)) => format!(" from the {}", side.to_lowercase()),
+        Some((_, side)) => texts::seen_from(side.to_lowercase()),
         None => {
             let camera = &settings.camera;
-            format!(", turned to azimuth {:.0}° and elevation {:.0}°", camera.azimuth, camera.elevation)
+            texts::turned_to(camera.azimuth, camera.elevation)
         }
     }
 }

@@ -7,8 +7,9 @@ use super::colours::{
 use super::names::{self, Tell};
 use super::{LARGE_TEXT, Note, PanelState, SMALL_TEXT, TEXT_SIZE, TOUCH_SIZE, picture_rect};
 use crate::ui::command::{self, Command};
-use crate::ui::hints;
 use crate::ui::sliders::SLIDERS;
+use crate::ui::texts;
+use crate::ui::texts::hints;
 use egui::accesskit::Role;
 use egui::text::LayoutJob;
 use egui::{
@@ -142,7 +143,7 @@ const MAX_PASSES: usize = 9;
 pub(super) fn show_times(ui: &mut Ui, state: &PanelState, scale: f32) {
     let at = picture_rect(state, scale).left_top() + vec2(12.0, 12.0);
     Area::new(Id::new("times")).order(Order::Middle).fixed_pos(at).interactable(false).show(ui.ctx(), |ui| {
-        names::name(ui, Role::Group, "Times");
+        names::name(ui, Role::Group, texts::TIMES);
         let frame = Frame::new().fill(MESSAGE).inner_margin(Margin::same(12)).corner_radius(8);
         frame.show(ui, |ui| {
             ui.set_width(WIDTH);
@@ -156,49 +157,37 @@ pub(super) fn show_times(ui: &mut Ui, state: &PanelState, scale: f32) {
 
 fn figures(ui: &mut Ui, state: &PanelState) {
     let times = state.times;
-    let ms = |value: Option<f64>| value.map_or("-".into(), |ms| format!("{ms:.1} ms"));
+    let ms = |value: Option<f64>| value.map_or("-".into(), texts::milliseconds);
     let colour_of_time = match (state.budget, times.pictures.percentile(0.95)) {
         (Some(budget), Some(p95)) if p95 > budget.as_secs_f64() * 1e3 => WARNING,
         (Some(_), Some(_)) => GOOD,
         _ => TEXT,
     };
-    ui.label(RichText::new(format!("picture {}", ms(times.pictures.newest()))).size(LARGE_TEXT).color(colour_of_time));
-    let budget = state.budget.map_or("no budget".into(), |b| format!("budget {:.0} ms", b.as_secs_f64() * 1e3));
+    ui.label(RichText::new(texts::picture_time(ms(times.pictures.newest()))).size(LARGE_TEXT).color(colour_of_time));
+    let budget = state.budget.map_or(texts::NO_BUDGET.into(), |b| texts::budget(b.as_secs_f64() * 1e3));
     small(
         ui,
-        format!("p50 {}  p95 {}  {budget}", ms(times.pictures.percentile(0.5)), ms(times.pictures.percentile(0.95))),
+        texts::picture_times(ms(times.pictures.percentile(0.5)), ms(times.pictures.percentile(0.95)), budget),
         WEAK_TEXT,
     );
     small(ui, state.quality.to_string(), ACCENT);
-    small(
-        ui,
-        format!("{:.2} volumes/s   {:.0} frames/s   {:.1} pictures/s", times.volumes, times.frames, times.shown),
-        TEXT,
-    );
+    small(ui, texts::rates(times.volumes, times.frames, times.shown), TEXT);
     if let Some(acquisition_time) = times.acquisition_time.filter(|f| *f > 0.0) {
         let share = 100.0 * times.volumes * acquisition_time;
-        small(
-            ui,
-            format!("acquisition: {:.0} ms a volume; {share:.0} % of that rate", acquisition_time * 1e3),
-            WEAK_TEXT,
-        );
+        small(ui, texts::acquisition(acquisition_time * 1e3, share), WEAK_TEXT);
     }
-    small(ui, format!("frame to picture p95 {}", ms(times.latency)), TEXT);
+    small(ui, texts::frame_to_picture(ms(times.latency)), TEXT);
     small(
         ui,
-        format!(
-            "input to picture p50 {}  p95 {}",
-            ms(times.input_latency.percentile(0.5)),
-            ms(times.input_latency.percentile(0.95))
-        ),
+        texts::input_to_picture(ms(times.input_latency.percentile(0.5)), ms(times.input_latency.percentile(0.95))),
         TEXT,
     );
     if times.scan_out.newest().is_some() {
         let [p50, p95] = [0.5, 0.95].map(|share| ms(times.scan_out.percentile(share)));
-        small(ui, format!("presentation to monitor p50 {p50}  p95 {p95}"), TEXT);
+        small(ui, texts::presentation_to_monitor(p50, p95), TEXT);
     }
     let colour = if times.dropped + times.lost > 0 { WARNING } else { WEAK_TEXT };
-    small(ui, format!("{} volumes dropped, {} frames lost", times.dropped, times.lost), colour);
+    small(ui, texts::losses(times.dropped, times.lost), colour);
 }
 
 fn bars(ui: &mut Ui, state: &PanelState) {
@@ -206,7 +195,7 @@ fn bars(ui: &mut Ui, state: &PanelState) {
         state.times.passes.iter().map(|(name, mean, runs)| (*name, mean * *runs as f64)).collect();
     let all: f64 = passes.iter().map(|p| p.1).sum();
     if all <= 0.0 {
-        small(ui, "no times: the device has no time stamps, or no pass ran".into(), WEAK_TEXT);
+        small(ui, texts::NO_TIMES.into(), WEAK_TEXT);
         return;
     }
     passes.sort_by(|a, b| b.1.total_cmp(&a.1));
@@ -218,9 +207,9 @@ fn bars(ui: &mut Ui, state: &PanelState) {
         bar(ui, name, time / all, format!("{mean:.2}"));
     }
     if more > 0 {
-        bar(ui, &format!("{more} more"), rest / all, String::new());
+        bar(ui, &texts::more_passes(more), rest / all, String::new());
     }
-    small(ui, "ms per run; bars: share of the device time".into(), WEAK_TEXT);
+    small(ui, texts::TIMES_LEGEND.into(), WEAK_TEXT);
 }
 
 fn bar(ui: &mut Ui, name: &str, share: f64, figure: String) {
@@ -242,19 +231,19 @@ fn small(ui: &mut Ui, text: String, colour: Color32) {
 
 /// Gestures on the picture, for the help.
 const GESTURES: [(&str, &str); 13] = [
-    ("drag", "use the tool: turn, light, region, clip, cut, planes"),
-    ("Shift + drag, right or middle drag", "move the picture; over a plane: step it"),
-    ("Ctrl + drag", "move the light"),
-    ("wheel", "zoom; over a plane: step it"),
-    ("two fingers", "pinch to zoom, twist to roll, move to pan"),
-    ("double click on a tile", "show that tile alone, and back"),
-    ("Region, then drag", "move the nearest face of the box"),
-    ("Region, then drag on a plane (4-up)", "move a side of the box; from within: all of it"),
-    ("drag on the light ball (below Light)", "move the lamp"),
-    ("Clip, then drag up", "cut away what is nearer to the viewer"),
-    ("Cut, then drag round", "cut away what is within, along the view"),
-    ("Brush, then drag over it", "remove what is near the surface there"),
-    ("Planes, then click", "move the point where the three planes cross"),
+    (texts::DRAG_GESTURE, texts::DRAG_DOES),
+    (texts::SHIFT_DRAG, texts::SHIFT_DRAG_DOES),
+    (texts::CTRL_DRAG, texts::CTRL_DRAG_DOES),
+    (texts::WHEEL, texts::WHEEL_DOES),
+    (texts::TWO_FINGERS, texts::TWO_FINGERS_DO),
+    (texts::DOUBLE_CLICK, texts::DOUBLE_CLICK_DOES),
+    (texts::REGION_DRAG, texts::REGION_DRAG_DOES),
+    (texts::REGION_DRAG_ON_PLANE, texts::REGION_DRAG_ON_PLANE_DOES),
+    (texts::LIGHT_BALL_DRAG, texts::LIGHT_BALL_DRAG_DOES),
+    (texts::CLIP_DRAG, texts::CLIP_DRAG_DOES),
+    (texts::CUT_DRAG, texts::CUT_DRAG_DOES),
+    (texts::BRUSH_DRAG, texts::BRUSH_DRAG_DOES),
+    (texts::PLANES_CLICK, texts::PLANES_CLICK_DOES),
 ];
 
 /// A line of the help: keys or gesture, and what it does.
@@ -263,14 +252,17 @@ type HelpLine = (String, String);
 /// The groups of the help that contain a text, with those of their lines that do; all for an empty text.
 fn found(exit_key: &str, search: &str) -> Vec<(&'static str, Vec<HelpLine>)> {
     let keys = command::help().map(|(key, label)| (key, label.to_string()));
-    let exit = (!exit_key.is_empty()).then(|| (exit_key.to_string(), "quit".to_string()));
+    let exit = (!exit_key.is_empty()).then(|| (exit_key.to_string(), texts::QUIT.to_string()));
     let gestures = GESTURES.iter().map(|(gesture, label)| (gesture.to_string(), label.to_string()));
     let controls = SLIDERS.iter().map(|slider| (slider.name.to_string(), hints::of_slider(slider.name).to_string()));
     // Without a search all of it has to fit one page.
     let controls: Vec<HelpLine> = if search.is_empty() { Vec::new() } else { controls.collect() };
     let wanted: Vec<String> = search.split_whitespace().map(str::to_lowercase).collect();
-    let groups =
-        [("Keys", keys.chain(exit).collect::<Vec<_>>()), ("Gestures", gestures.collect()), ("Controls", controls)];
+    let groups = [
+        (texts::KEYS, keys.chain(exit).collect::<Vec<_>>()),
+        (texts::GESTURES, gestures.collect()),
+        (texts::CONTROLS, controls),
+    ];
     let has = |line: &HelpLine| {
         let text = format!("{} {}", line.0, line.1).to_lowercase();
         wanted.iter().all(|word| text.contains(word))
@@ -290,20 +282,20 @@ pub(super) fn show_help(ui: &mut Ui, state: &PanelState, execute: &mut dyn FnMut
                 .inner_margin(Margin::same(14))
                 .corner_radius(10)
                 .stroke(Stroke::new(1.0, WEAK_TEXT));
-            names::name(ui, Role::Dialog, "Keys and gestures");
+            names::name(ui, Role::Dialog, texts::KEYS_AND_GESTURES);
             frame.show(ui, |ui| {
                 let width = (screen.width() - 48.0).clamp(100.0, 1400.0);
                 ui.set_width(width);
                 ui.spacing_mut().item_spacing.y = 3.0;
                 ui.horizontal(|ui| {
-                    ui.heading("Keys and gestures");
+                    ui.heading(texts::KEYS_AND_GESTURES);
                     ui.with_layout(egui::Layout::right_to_left(egui::Align::Center), |ui| {
-                        is_closed = ui.button("Close").clicked();
+                        is_closed = ui.button(texts::CLOSE).clicked();
                         let label = match state.help_search {
-                            Some(text) => format!("Search: {text}_"),
-                            None => "Search  ( / )".into(),
+                            Some(text) => texts::searching_for(text),
+                            None => texts::SEARCH_BUTTON.into(),
                         };
-                        let button = ui.button(label).tell("Finds keys, gestures and controls ( / ).").named("Search");
+                        let button = ui.button(label).tell(texts::SEARCH_HINT).named(texts::SEARCH);
                         if button.with_value(state.help_search.unwrap_or_default()).clicked() {
                             execute(Command::SearchHelp);
                         }
@@ -322,9 +314,9 @@ pub(super) fn show_help(ui: &mut Ui, state: &PanelState, execute: &mut dyn FnMut
                         }
                     });
                     if lines.is_empty() {
-                        ui.label("Nothing is found.");
+                        ui.label(texts::NOTHING_FOUND);
                     }
-                    ui.label(RichText::new("Echolume is not a medical device.").size(MIN_HELP_TEXT).color(WEAK_TEXT));
+                    ui.label(RichText::new(texts::NO_MEDICAL_DEVICE).size(MIN_HELP_TEXT).color(WEAK_TEXT));
                 });
             });
         },
@@ -391,7 +383,7 @@ pub(super) fn ask_to_leave(ui: &Ui, execute: &mut dyn FnMut(Command)) {
     });
     let area = Area::new(Id::new("leave")).order(Order::Tooltip).anchor(Align2::CENTER_CENTER, vec2(0.0, 0.0));
     area.show(ui.ctx(), |ui| {
-        names::name(ui, Role::AlertDialog, "The loop is not saved");
+        names::name(ui, Role::AlertDialog, texts::LOOP_NOT_SAVED);
         // In a low window the three answers go before all else.
         let is_low = screen.height() < LOW_WINDOW;
         let (margin, title, text) = if is_low { (8, TEXT_SIZE, SMALL_TEXT) } else { (20, LARGE_TEXT, TEXT_SIZE) };
@@ -404,15 +396,15 @@ pub(super) fn ask_to_leave(ui: &Ui, execute: &mut dyn FnMut(Command)) {
                 ui.spacing_mut().interact_size.y = height;
                 ui.spacing_mut().button_padding.y = 1.0;
             }
-            ui.label(RichText::new("The loop is not saved").size(title));
+            ui.label(RichText::new(texts::LOOP_NOT_SAVED).size(title));
             if !is_low {
-                ui.label(RichText::new("Its volumes are lost when the program ends.").size(text));
+                ui.label(RichText::new(texts::LOOP_NOT_SAVED_ABOUT).size(text));
                 ui.add_space(8.0);
             }
             let answers = [
-                ("Save and leave  (Enter)", true, Command::SaveAndExit),
-                ("Leave without saving  (L)", false, Command::Discard),
-                ("Stay  (Esc)", false, Command::Back),
+                (texts::SAVE_AND_LEAVE, true, Command::SaveAndExit),
+                (texts::LEAVE_WITHOUT_SAVING, false, Command::Discard),
+                (texts::STAY, false, Command::Back),
             ];
             for (answer, is_first, command) in answers {
                 let shown = RichText::new(answer).size(text);

@@ -6,6 +6,7 @@ use super::overlays::{LOW_WINDOW, first};
 use super::{SMALL_TEXT, TEXT_SIZE, TOUCH_SIZE};
 use crate::picture::Picture;
 use crate::ui::command::Command;
+use crate::ui::texts;
 use egui::accesskit::Role;
 use egui::{
     Align2, Area, Button, ColorImage, Context, FontId, Frame, Id, Label, Margin, Order, Pos2, Rect, RichText,
@@ -43,7 +44,6 @@ const GAP: f32 = 8.0;
 const NAME: f32 = 26.0;
 /// Height of the buttons below a preset of the user.
 const BUTTONS: f32 = 36.0;
-const TITLE: &str = "Presets";
 
 /// The textures of the thumbnails.
 #[derive(Default)]
@@ -74,9 +74,10 @@ impl Textures {
 
 pub(super) fn show(ui: &Ui, shown: &PresetsShown, textures: &[Option<TextureId>], execute: &mut dyn FnMut(Command)) {
     let screen = ui.ctx().content_rect();
-    let area = Area::new(Id::new(TITLE)).order(Order::Foreground).anchor(Align2::CENTER_CENTER, vec2(0.0, 0.0));
+    let area =
+        Area::new(Id::new(texts::PRESETS)).order(Order::Foreground).anchor(Align2::CENTER_CENTER, vec2(0.0, 0.0));
     area.show(ui.ctx(), |ui| {
-        names::name(ui, Role::Dialog, TITLE);
+        names::name(ui, Role::Dialog, texts::PRESETS);
         let is_low = screen.height() < LOW_WINDOW;
         let margin = if is_low { 6 } else { 12 };
         let frame = Frame::new().fill(PANEL).inner_margin(Margin::same(margin)).corner_radius(10);
@@ -93,7 +94,7 @@ pub(super) fn show(ui: &Ui, shown: &PresetsShown, textures: &[Option<TextureId>]
                 if is_low {
                     header(ui, shown, execute);
                 }
-                names::list(ui, "Looks", |ui| tiles(ui, shown, textures, width - 20.0, execute));
+                names::list(ui, texts::LOOKS, |ui| tiles(ui, shown, textures, width - 20.0, execute));
             });
         });
     });
@@ -110,33 +111,32 @@ fn header(ui: &mut Ui, shown: &PresetsShown, execute: &mut dyn FnMut(Command)) {
 fn title(ui: &mut Ui, shown: &PresetsShown, execute: &mut dyn FnMut(Command)) {
     ui.horizontal_wrapped(|ui| {
         if let Some((text, is_rename)) = shown.naming {
-            let about = if is_rename { "New name" } else { "Name" };
+            let about = if is_rename { texts::NEW_NAME } else { texts::NAME };
             let typed = ui.add(Label::new(RichText::new(format!("{about}: {text}_")).size(TEXT_SIZE)).wrap());
             typed.named(about).with_value(text);
-            let hint = "Keeps the look under this name: mode, filters, colours and light, without region and view.";
-            if ui.add(first(RichText::new("Keep  (Enter)"))).tell(hint).named("Keep").clicked() {
+            let hint = texts::KEEP_PRESET_HINT;
+            if ui.add(first(RichText::new(texts::KEEP_BUTTON))).tell(hint).named(texts::KEEP).clicked() {
                 execute(Command::EndNaming);
             }
-            if ui.button("Cancel  (Esc)").tell("Keeps no name.").named("Cancel").clicked() {
+            if ui.button(texts::CANCEL_BUTTON).tell(texts::CANCEL_NAMING_HINT).named(texts::CANCEL).clicked() {
                 execute(Command::Back);
             }
             return;
         }
-        ui.heading(TITLE);
+        ui.heading(texts::PRESETS);
         if shown.can_save {
-            let hint =
-                "Keeps the present look under a name: mode, filters, colours and light, without region and view.";
-            if ui.button("Save present look  (S)").tell(hint).named("Save present look").clicked() {
+            let hint = texts::SAVE_PRESENT_LOOK_HINT;
+            if ui.button(texts::SAVE_PRESENT_LOOK_BUTTON).tell(hint).named(texts::SAVE_PRESENT_LOOK).clicked() {
                 execute(Command::NamePreset);
             }
         }
         if shown.can_restore {
-            let hint = "Brings your presets back as they were before the last change.";
-            if ui.button("Undo  (Z)").tell(hint).named("Undo").clicked() {
+            let hint = texts::UNDO_PRESETS_HINT;
+            if ui.button(texts::UNDO_PRESETS_BUTTON).tell(hint).named(texts::UNDO).clicked() {
                 execute(Command::RestorePresets);
             }
         }
-        if ui.button("Close  (Esc)").tell("Changes nothing.").named("Close").clicked() {
+        if ui.button(texts::CLOSE_BUTTON).tell(texts::CLOSE_PRESETS_HINT).named(texts::CLOSE).clicked() {
             execute(Command::Presets);
         }
     });
@@ -204,8 +204,8 @@ fn own_buttons(ui: &mut Ui, own: usize, name: &str, width: f32, execute: &mut dy
     let size = vec2((width - GAP) / 2.0, BUTTONS.min(TOUCH_SIZE * 0.7));
     ui.horizontal(|ui| {
         for (command, label, hint) in [
-            (Command::RenamePreset(own), "Rename", "Gives this preset another name."),
-            (Command::DeletePreset(own), "Delete", "Deletes this preset; Undo above brings it back."),
+            (Command::RenamePreset(own), texts::RENAME, texts::RENAME_HINT),
+            (Command::DeletePreset(own), texts::DELETE, texts::DELETE_PRESET_HINT),
         ] {
             let text = RichText::new(label).size(SMALL_TEXT);
             if ui.add(Button::new(text).min_size(size)).tell(hint).named(&format!("{label} {name}")).clicked() {

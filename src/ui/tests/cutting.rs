@@ -165,7 +165,7 @@ fn a_mode_that_cannot_have_cuts_says_why() {
     circle(&mut window, [x, y], 40.0, 100);
     let made = cuts(&window);
     assert_eq!(made.len(), 1);
-    assert_eq!(apply(&mut window, Command::Mode(Mode::Mixed)), Change::Refused(crate::ui::controls::CUTS_IN_THE_WAY));
+    assert_eq!(apply(&mut window, Command::Mode(Mode::Mixed)), Change::Refused(crate::ui::texts::CUTS_IN_THE_WAY));
     assert_eq!((window.controls.settings().mode, cuts(&window)), (Mode::Surface, made));
     apply(&mut window, Command::ClearCuts);
     assert_eq!(apply(&mut window, Command::Mode(Mode::Mixed)), Change::Settings);

@@ -1,0 +1,163 @@
+//! Notes and banners over the picture. Names that begin with `WHY_` are the reason in a sentence of another text, so they begin in lower case.
+
+use std::fmt::Display;
+
+// What was saved, what a start is at.
+pub fn saved(file: impl Display) -> String {
+    format!("Saved {file}")
+}
+pub fn not_saved(fault: impl Display) -> String {
+    format!("Not saved: {fault}")
+}
+pub const SHADER_ERROR: &str = "Shader error: the last good shader is shown";
+pub const DEVICE_STALLED_ABOUT: &str =
+    "It did not finish in time and was opened again. The volumes that arrived in between are not shown.";
+pub const DEVICE_STALLED: &str = "The graphics device stalled";
+pub const PREPARING_THE_DEVICE: &str = "Preparing the device";
+pub fn shaders_compiled(done: impl Display, count: impl Display) -> String {
+    format!("{done} of {count} shaders are compiled")
+}
+pub const WAITING_FOR_FRAME: &str = "Waiting for the first frame";
+pub fn frames_of_first_volume(done: impl Display, count: impl Display) -> String {
+    format!("{done} of {count} frames of the first volume")
+}
+pub const DRAWING_FIRST_PICTURE: &str = "Drawing the first picture";
+
+// The device.
+pub const DEVICE_OPENED_AGAIN: &str = "The device was lost and opened again";
+
+// Opening files.
+pub const FOLDER_ABOVE: &str = "..  (the folder above)";
+pub const OPENS_NO_OTHER_FILES: &str = "This view opens no other files";
+pub const STILL_OPENING: &str = "A file is being opened: wait a moment";
+pub const SAVE_THE_LOOP_FIRST: &str = "The loop is not saved: save it first (R)";
+pub fn opening(name: impl Display) -> String {
+    format!("Opening {name}")
+}
+pub fn cannot_be_opened(name: impl Display, e: impl Display) -> String {
+    format!("{name} cannot be opened: {e}")
+}
+pub const WHY_FILE_NOT_READ: &str = "it ended before the file was read";
+pub fn not_opened(fault: impl Display) -> String {
+    format!("Not opened: {fault}")
+}
+
+// Presets of the user.
+pub const OWN_PRESET_HINT: &str = "A preset of your own.";
+pub const PRESET_DOES_NOT_FIT: &str = "This preset does not fit the volume";
+pub fn too_many_presets(max_presets: impl Display) -> String {
+    format!("{max_presets} presets are kept: delete one first")
+}
+pub fn name_is_taken(name: impl Display) -> String {
+    format!("{name} is the name of another preset")
+}
+pub const WHY_PRESET_IS_GONE: &str = "this preset is gone";
+pub fn preset_is_called(name: impl Display) -> String {
+    format!("The preset is called {name}")
+}
+pub fn preset_is_replaced(name: impl Display) -> String {
+    format!("{name} has the present look. Undo in the list brings the earlier one back")
+}
+pub fn preset_is_kept(name: impl Display) -> String {
+    format!("{name} is kept")
+}
+pub const WHY_NO_PRESETS: &str = "this view keeps no presets";
+pub fn preset_is_deleted(name: impl Display) -> String {
+    format!("{name} is deleted. Undo in the list brings it back")
+}
+pub const PRESETS_CHANGED_ELSEWHERE: &str = "The presets were changed elsewhere: nothing is taken back";
+pub const PRESETS_RESTORED: &str = "The presets are as they were";
+
+// What cannot be saved.
+pub const WHY_NO_PICTURE: &str = "there is no picture yet";
+pub fn picture_not_saved(fault: impl Display) -> String {
+    format!("The picture was not saved: {fault}")
+}
+pub const WHY_NO_VOLUMES: &str = "there are no volumes yet";
+pub fn loop_not_saved(fault: impl Display) -> String {
+    format!("The loop was not saved: {fault}")
+}
+pub const WHY_NO_VOLUME: &str = "there is no volume yet";
+pub fn exporting(name: impl Display) -> String {
+    format!("Exporting: {name}")
+}
+pub fn not_exported(fault: impl Display) -> String {
+    format!("Not exported: {fault}")
+}
+
+// The brush.
+pub const BRUSH_NEEDS_SURFACE: &str = "The brush needs a surface: choose the mode Surface or Mixed";
+
+// Cuts.
+pub const CUTS_IN_THE_WAY: &str =
+    "That draws both what is dark and what is bright, of which nothing can be cut: remove the cuts first (Shift+F).";
+pub const TOO_MANY_CUTS: &str = "There are as many cuts as a scene can have: remove them, or take one back.";
+pub const CUTS_NEED_RENDERING: &str = "Cuts are made on a rendering: the block shows all of the volume.";
+pub const CONTOUR_TOO_SMALL: &str = "The contour is too small, or beside the volume.";
+pub const CANNOT_CUT_BOTH: &str = "Nothing can be cut where both what is dark and what is bright is drawn.";
+
+// The automatic render start.
+pub const UNVEILING_IN_THE_WAY: &str = "That draws both what is dark and what is bright, of which nothing can be removed: rendering cannot start at the fluid.";
+
+// The source: title and explanation.
+pub const DEMO_DATA: &str = "Demo data (phantom)";
+pub const COMPUTING_DEMO_DATA: &str = "Computing the demo data";
+pub const READING_RECORDING: &str = "Reading the recording";
+pub const WAITING_FOR_STANDARD_INPUT: &str = "Waiting for frames on standard input";
+pub const CONNECTING_TO_PROBE: &str = "Connecting to the probe";
+pub const NO_DEMO_DATA: &str = "No demo data: trying again";
+pub const RECORDING_NOT_OPENED: &str = "The recording cannot be opened: trying again";
+pub const STANDARD_INPUT_NOT_READ: &str = "Standard input cannot be read: trying again";
+pub const NO_PROBE: &str = "No probe: trying again";
+pub const SOURCE_ENDED: &str = "The source ended";
+pub const NOT_CONNECTED: &str = "Not connected: trying again";
+pub const NO_FRAMES_ON_STANDARD_INPUT: &str = "No frames on standard input";
+pub const NO_FRAMES_ON_STANDARD_INPUT_ABOUT: &str = "It is open but nothing comes.";
+pub const NO_FRAMES_FROM_THE_PROBE: &str = "No frames from the probe";
+pub const NO_FRAMES_FROM_THE_PROBE_ABOUT: &str = "It is connected but sends nothing.";
+pub const WHY_SOURCE_PANICKED: &str = "the thread that opens the source panicked";
+pub fn why_no_thread_for_source(e: impl Display) -> String {
+    format!("a thread for the source cannot be started: {e}")
+}
+pub const WHY_SOURCE_ENDED: &str = "the source ended";
+pub fn why_no_thread(e: impl Display) -> String {
+    format!("a thread cannot be started: {e}")
+}
+
+// Saving in the background.
+pub fn still_exporting(name: impl Display) -> String {
+    format!("{name} is still being exported")
+}
+pub fn still_saving(max_pending: impl Display) -> String {
+    format!("{max_pending} files are still being saved: wait a moment")
+}
+pub fn why_no_folder(folder: impl Display, e: impl Display) -> String {
+    format!("{folder}: cannot be created: {e}")
+}
+
+// The ladder of quality, for the times.
+pub const FULL_QUALITY: &str = "full quality";
+pub const NO_OCCLUSION: &str = "no occlusion";
+pub const NO_OCCLUSION_NO_SHADOW: &str = "no occlusion, no shadow";
+pub const HALF_RAYS: &str = "half the rays each way";
+pub const HALF_RAYS_SMALL_FILTERS: &str = "half the rays, steps x 1.5, small filters";
+pub const HALF_RAYS_NO_FILTERS: &str = "half the rays, steps x 2, no shadow, no filters";
+pub const QUARTER_RAYS: &str = "a quarter of the rays each way, steps x 2, no shadow, no filters";
+
+pub fn render_start(outcome: impl Display) -> String {
+    format!("{}: {outcome}.", super::AUTO_RENDER_START)
+}
+
+// Input devices, where there is no desktop.
+pub const WHY_DEVICES_LOST: &str = "the reader panicked";
+pub fn devices_lost(why: impl Display) -> String {
+    format!("input devices: {why}")
+}
+pub fn devices_not_read(count: impl Display) -> String {
+    format!(
+        "{count} input devices cannot be read: this user is not in the group input (as root: usermod -aG input USER)"
+    )
+}
+pub fn device_not_grabbed(name: impl Display, path: impl Display, fault: impl Display) -> String {
+    format!("{name} ({path}) cannot be grabbed: {fault}")
+}
