@@ -10,6 +10,7 @@ pub mod feed;
 mod first_pipelines;
 mod first_volume;
 pub mod metrics;
+mod options;
 mod phase;
 mod session;
 pub mod statistics;
@@ -17,7 +18,8 @@ mod stream;
 pub mod volume_pool;
 
 pub use feed::Feed;
+pub use options::{Lowered, StreamOptions};
 pub use session::{FinishedPicture, Views};
 pub use statistics::Statistics;
-pub use stream::{Lowered, StartStep, Step, Stream, StreamError, StreamOptions};
+pub use stream::{StartStep, Step, Stream, StreamError};
 pub use volume_pool::Update;
