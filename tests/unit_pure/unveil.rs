@@ -58,7 +58,7 @@ proptest! {
         thickness in 0.5f64..9.0,
         noise in 0.0f64..0.5,
         format in prop::sample::select(vec!["r8", "r16", "r16f", "r32f"]),
-        smoothing in prop::sample::select(vec![0.0, 1.0, 4.0]),
+        smoothing in prop::sample::select(vec![0.0, 1.0, 4.0, 20.0]),
         region in prop::sample::select(vec!["", "region = { lateral = [-6, 3], elevation = [-20, 4] }"]),
         seed in any::<u64>(),
     ) {

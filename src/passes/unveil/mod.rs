@@ -33,8 +33,8 @@ const THICKNESS: usize = 2;
 const PARTS: i64 = 256;
 /// Steps of the membrane that spans holes.
 const RELAXATIONS: usize = 200;
-/// Most passes of a smoothing along an axis.
-const MOST_PASSES: u32 = 4000;
+/// Passes of the kernel 1 2 1 from which on means of more neighbours come first: as many as that are not noticed.
+const FEW_PASSES: u32 = 64;
 /// Least difference of tissue and pocket, levels.
 const LEAST_CONTRAST: u32 = LEVELS / 8;
 /// Least share of the columns in view that have a near face, per cent.
@@ -387,21 +387,62 @@ fn spanned(lattice: &FluidLattice, heights: &Heights) -> Vec<i64> {
     spanned
 }
 
-/// The heights after a Gaussian of this deviation, mm: passes of the kernel 1 2 1, whose variance is half a cell.
+/// How a Gaussian is approximated along an axis of the lattice.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Kernels {
+    /// Three means of a cell and so many on each side, whose variance is `half (half + 1) / 3` cells; 0 for none.
+    half: [usize; 3],
+    /// And then so many passes of the kernel 1 2 1, whose variance is half a cell.
+    passes: u32,
+}
+
+impl Kernels {
+    /// Of a deviation in cells.
+    fn of(deviation: f64) -> Kernels {
+        let passes = (2.0 * deviation * deviation).round() as u32;
+        if passes <= FEW_PASSES {
+            return Kernels { half: [0; 3], passes };
+        }
+        // In sixths of a cell, of which a pass has three.
+        let mut left = 3 * u64::from(passes);
+        let half = [3, 2, 1].map(|boxes| {
+            let share = left / boxes;
+            // The largest with 2 half (half + 1) <= share.
+            let half = (((1 + 2 * share) as f64).sqrt() as u64).saturating_sub(1) / 2;
+            left -= 2 * half * (half + 1);
+            half as usize
+        });
+        Kernels { half, passes: (left / 3) as u32 }
+    }
+}
+
+/// The heights after a Gaussian of this deviation, mm. Windows are symmetric and end at the border, so the ends stay: a slope is not
+/// flattened towards them.
 fn smoothed(lattice: &FluidLattice, mut heights: Vec<i64>, deviation: f64) -> Vec<i64> {
     let [columns, _, slices] = lattice.size;
-    let passes =
-        |axis: usize| (2.0 * (deviation / lattice.pitch[axis]).powi(2)).round().min(f64::from(MOST_PASSES)) as u32;
-    for (step, count, passes) in [(1, columns, passes(0)), (columns, slices, passes(2))] {
-        for _ in 0..passes {
-            let before = heights.clone();
-            for n in 0..before.len() {
-                // The ends stay: a slope is not flattened towards them.
-                let at = n / step % count;
-                if at > 0 && at + 1 < count {
-                    heights[n] = (before[n - step] + 2 * before[n] + before[n + step] + 2).div_euclid(4);
+    for (axis, step, count) in [(0, 1, columns), (2, columns, slices)] {
+        let kernels = Kernels::of(deviation / lattice.pitch[axis]);
+        let mut line = vec![0; count];
+        let mut sums = vec![0; count + 1];
+        for first in (0..heights.len()).filter(|n| n / step % count == 0) {
+            (0..count).for_each(|n| line[n] = heights[first + n * step]);
+            for most in kernels.half.into_iter().filter(|half| *half > 0) {
+                (0..count).for_each(|n| sums[n + 1] = sums[n] + line[n]);
+                for (n, out) in line.iter_mut().enumerate() {
+                    let half = most.min(n).min(count - 1 - n);
+                    let cells = 2 * half as i64 + 1;
+                    *out = (sums[n + half + 1] - sums[n - half] + half as i64).div_euclid(cells);
                 }
             }
+            for _ in 0..kernels.passes {
+                let mut before = line[0];
+                for n in 1..count.saturating_sub(1) {
+                    let here = line[n];
+                    line[n] = (before + 2 * here + line[n + 1] + 2).div_euclid(4);
+                    before = here;
+                }
+            }
+            (0..count).for_each(|n| heights[first + n * step] = line[n]);
         }
     }
     heights
@@ -424,4 +465,24 @@ fn start_rows(scene: &Scene, lattice: &FluidLattice, heights: &[i64]) -> Vec<f32
         between as f32 / PARTS as f32
     };
     (0..slices).flat_map(|slice| (0..width).map(move |x| (slice, x))).map(|(slice, x)| of(slice, x)).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::Kernels;
+
+    /// Prevents smoothing that takes thousands of passes, and one that is narrower along the axis with the finer cells.
+    #[test]
+    fn the_variance_is_that_of_the_gaussian_and_takes_few_passes() {
+        let mut deviation = 0.1;
+        while deviation < 500.0 {
+            let Kernels { half, passes } = Kernels::of(deviation);
+            let variance = half.map(|h| (h * (h + 1)) as f64 / 3.0).iter().sum::<f64>() + f64::from(passes) / 2.0;
+            // Passes and sixths are rounded.
+            assert!((variance - deviation * deviation).abs() <= 0.6, "{deviation}: {variance} by {half:?}, {passes}");
+            assert!(f64::from(passes) <= 64.0f64.max(2.0 * deviation), "{deviation}: {passes} passes");
+            assert!(half[0].abs_diff(half[2]) <= 1, "{half:?}");
+            deviation *= 1.01;
+        }
+    }
 }

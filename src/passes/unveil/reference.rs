@@ -1,7 +1,7 @@
 //! Where rendering starts, cell by cell from the definition: without runs, threads or 16-bit cells. Integers as well, and equal to what
 //! [`find`](super::find) finds.
 
-use super::{Evidence, LEAST_CONTRAST, LEAST_SHARE, Outcome, PARTS, RELAXATIONS, THICKNESS, level_of};
+use super::{Evidence, Kernels, LEAST_CONTRAST, LEAST_SHARE, Outcome, PARTS, RELAXATIONS, THICKNESS, level_of};
 use crate::passes::pass::*;
 use crate::scene::Scene;
 use crate::scene::unveil::FluidLattice;
@@ -248,16 +248,26 @@ fn span(lattice: &FluidLattice, heights: &[Option<i64>]) -> Vec<i64> {
 }
 
 fn smooth(lattice: &FluidLattice, mut heights: Vec<i64>, deviation: f64) -> Vec<i64> {
-    for (axis, before, behind) in [(0, 0, 1), (2, 2, 3)] {
-        let passes =
-            (2.0 * (deviation / lattice.pitch[axis]).powi(2)).round().min(f64::from(super::MOST_PASSES)) as u32;
-        for _ in 0..passes {
+    let [columns, _, slices] = lattice.size;
+    for (axis, step, count) in [(0, 1, columns), (2, columns, slices)] {
+        let kernels = Kernels::of(deviation / lattice.pitch[axis]);
+        // The mean of a cell and its neighbours, those at both sides as far as there are any.
+        let mean = |heights: &[i64], n: usize, half: usize| {
+            let at = n / step % count;
+            let half = half.min(at).min(count - 1 - at);
+            let sum: i64 = (0..=2 * half).map(|k| heights[n + k * step - half * step]).sum();
+            (sum + half as i64).div_euclid(2 * half as i64 + 1)
+        };
+        for half in kernels.half {
+            heights = (0..heights.len()).map(|n| mean(&heights, n, half)).collect();
+        }
+        for _ in 0..kernels.passes {
             let mean = |n: usize| {
-                let near = around(lattice, n);
-                if near[before] == n || near[behind] == n {
+                let at = n / step % count;
+                if at == 0 || at + 1 == count {
                     return heights[n];
                 }
-                (heights[near[before]] + 2 * heights[n] + heights[near[behind]] + 2).div_euclid(4)
+                (heights[n - step] + 2 * heights[n] + heights[n + step] + 2).div_euclid(4)
             };
             heights = (0..heights.len()).map(mean).collect();
         }
