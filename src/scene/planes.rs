@@ -1,12 +1,15 @@
 //! Planes through the volume, resolved to the tiles of a picture: which pixel shows which point in space.
 
-use super::{Layout, Mode, PlaneName, Scene, Slab, View, insonified_box};
-use glam::{DMat3, DVec3};
+use super::curve::Line;
+use super::{Curve, Layout, Mode, PlaneName, Scene, Slab, View, depth_offset, insonified_box};
+use glam::{DMat3, DVec2, DVec3};
 
 /// Maximum number of tiles of a picture.
 pub const MAX_TILES: u32 = 64;
 /// Maximum number of samples through a slab.
 pub const MAX_SLAB: f64 = 4096.0;
+/// Points of the line of a curved plane that are closer than this coincide, mm.
+pub const MIN_APART: f64 = 1e-3;
 /// Size of a tile in the buffer, in vectors of four floats.
 pub const TILE_VECTORS: u32 = 9;
 
@@ -27,10 +30,26 @@ pub struct Tile {
     /// Position of the tile in the picture and its size, pixels.
     pub corner: [u32; 2],
     pub size: [u32; 2],
+    /// Its scale, mm per pixel.
+    pub pixel: f64,
+    /// Of a curved plane: the line that it follows. `plane` then goes through the middle of the line, `right` along its chord.
+    pub section: Option<Section>,
     pub frame: Frame,
     /// The planes whose cross-lines are drawn, and their colours.
     pub crossed_by: Vec<(Plane, [f64; 3])>,
 }
+
+/// A curved plane: it stands on a line in a reference plane, perpendicular to that.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Section {
+    pub line: Line,
+    /// Where the line's point (0, 0) is, at the level of the middle of the tile, and the axes of the reference plane.
+    pub origin: DVec3,
+    pub axes: [DVec3; 2],
+}
+
+/// A column of a curved plane: its place in the middle of the tile's height, and the unit vector across the plane.
+pub type Column = (DVec3, DVec3);
 
 /// The border of a tile.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -47,7 +66,7 @@ pub enum Frame {
 pub struct Sheet {
     pub columns: u32,
     pub rows: u32,
-    /// Scale of every tile, mm per pixel.
+    /// Scale of the planes, mm per pixel; a curved plane whose line is too long for its tile has a larger one.
     pub pixel: f64,
     pub tiles: Vec<Tile>,
 }
@@ -60,6 +79,9 @@ pub fn colour(plane: PlaneName) -> [f64; 3] {
         PlaneName::C => [0.2, 0.8, 1.0],
     }
 }
+
+/// Colour of a curved plane's frame and of its line.
+pub const CURVE_COLOUR: [f64; 3] = [0.55, 1.0, 0.35];
 
 /// Colour between the tiles of tomography.
 const BETWEEN: [f64; 3] = [0.35, 0.35, 0.35];
@@ -96,6 +118,7 @@ impl Scene {
     /// Number of columns and rows of tiles.
     pub fn tile_grid(&self) -> [u32; 2] {
         match (self.settings.layout, self.settings.mode) {
+            (Layout::Single, Mode::Plane) if self.has_curve() => [2, 1],
             (Layout::Four, _) | (_, Mode::Orthogonal) => [2, 2],
             (_, Mode::Tomography) => [self.settings.planes.columns, self.settings.planes.rows],
             _ => [1, 1],
@@ -105,7 +128,7 @@ impl Scene {
     /// Number of tiles that show a plane.
     pub fn tile_count(&self) -> u32 {
         let [columns, rows] = self.tile_grid();
-        if self.shows_three() { 3 } else { columns.saturating_mul(rows) }
+        if self.shows_three() { 3 + u32::from(self.has_curve()) } else { columns.saturating_mul(rows) }
     }
 
     /// True if three crossing planes are shown.
@@ -115,7 +138,7 @@ impl Scene {
 
     /// True if lines are drawn over the planes: cross-lines and frames, or the lines between tiles.
     pub fn draws_lines(&self) -> bool {
-        let several = self.shows_three() || self.settings.mode == Mode::Tomography;
+        let several = self.shows_three() || self.settings.mode == Mode::Tomography || self.has_curve();
         several && self.settings.planes.lines
     }
 
@@ -137,20 +160,82 @@ impl Scene {
     pub fn plane(&self, name: PlaneName) -> Plane {
         let settings = &self.settings.planes;
         let at = match settings.position {
-            Some([lateral, depth, elevation]) => {
-                DVec3::new(lateral, depth + super::depth_offset(&self.geometry), elevation)
-            }
+            Some([lateral, depth, elevation]) => DVec3::new(lateral, depth + depth_offset(&self.geometry), elevation),
             None => (self.low + self.high) / 2.0,
         };
-        let turned = DMat3::from_rotation_y(-settings.azimuth.to_radians())
-            * DMat3::from_rotation_x(settings.tilt.to_radians())
-            * DMat3::from_rotation_z(-settings.roll.to_radians());
-        let (right, down, normal) = match name {
-            PlaneName::A => (DVec3::X, DVec3::Y, DVec3::Z),
-            PlaneName::B => (DVec3::Z, DVec3::Y, DVec3::X),
-            PlaneName::C => (DVec3::X, -DVec3::Z, DVec3::Y),
-        };
+        let (turned, (right, down, normal)) = (self.turn(), axes(name));
         Plane { at, right: turned * right, down: turned * down, normal: turned * normal }
+    }
+
+    /// The rotation of the planes.
+    fn turn(&self) -> DMat3 {
+        let settings = &self.settings.planes;
+        DMat3::from_rotation_y(-settings.azimuth.to_radians())
+            * DMat3::from_rotation_x(settings.tilt.to_radians())
+            * DMat3::from_rotation_z(-settings.roll.to_radians())
+    }
+
+    /// The curved plane's settings, if this mode shows it.
+    pub fn curve(&self) -> Option<&Curve> {
+        let planes = &self.settings.planes;
+        planes.curve.as_ref().filter(|curve| match (self.settings.layout, self.settings.mode) {
+            (Layout::Single, Mode::Orthogonal) => true,
+            (Layout::Single, Mode::Plane) => curve.plane == planes.plane,
+            _ => false,
+        })
+    }
+
+    /// True if the last tile is a curved plane.
+    pub fn has_curve(&self) -> bool {
+        self.curve().is_some()
+    }
+
+    /// The plane of a tile, if that is one of the three; of a curved plane and the slices of tomography none.
+    pub fn plane_of_tile(&self, tile: usize) -> Option<PlaneName> {
+        match self.settings.mode {
+            _ if self.shows_three() => [PlaneName::A, PlaneName::B, PlaneName::C].get(tile).copied(),
+            Mode::Plane if tile == 0 => Some(self.settings.planes.plane),
+            _ => None,
+        }
+    }
+
+    /// Where a plane has its point (0, 0), at the level of the middle of the insonified region: what is turned turns about that middle, so that
+    /// a line stays in its place on a tile.
+    fn plane_origin(&self, name: PlaneName) -> DVec3 {
+        let (low, high) = insonified_box(&self.geometry);
+        let middle = (low + high) / 2.0;
+        let (turned, (right, down, _)) = (self.turn(), axes(name));
+        let from_face = middle - DVec3::Y * depth_offset(&self.geometry);
+        middle - turned * (right * from_face.dot(right) + down * from_face.dot(down))
+    }
+
+    /// A point of a plane by its coordinates there, mm in space.
+    pub fn place_on_plane(&self, name: PlaneName, [across, along]: [f64; 2]) -> DVec3 {
+        let (plane, origin) = (self.plane(name), self.plane_origin(name));
+        let place = origin + plane.right * across + plane.down * along;
+        place + plane.normal * (plane.at - place).dot(plane.normal)
+    }
+
+    /// The coordinates on a plane of a place in space, projected onto it.
+    pub fn point_on_plane(&self, name: PlaneName, place: DVec3) -> [f64; 2] {
+        let (plane, from) = (self.plane(name), place - self.plane_origin(name));
+        [from.dot(plane.right), from.dot(plane.down)]
+    }
+
+    /// The curved plane and the plane that it stands on. Its directions are such that a straight line to the right on A shows what C shows, and one on C what A
+    /// shows.
+    fn section(&self, middle: DVec3) -> Option<(Plane, Section, Plane)> {
+        let curve = self.curve()?;
+        let base = self.plane(curve.plane);
+        let line = Line::through(&curve.points);
+        let origin = self.plane_origin(curve.plane);
+        let origin = origin + base.normal * (middle - origin).dot(base.normal);
+        let down = if curve.plane == PlaneName::A { -base.normal } else { base.normal };
+        let section = Section { line, origin, axes: [base.right, base.down] };
+        let (at, _) = section.at(section.line.length() / 2.0);
+        let chord = section.line.at(section.line.length()).0 - section.line.at(0.0).0;
+        let right = section.in_space(chord.normalize_or(DVec2::X));
+        Some((Plane { at, right, down, normal: right.cross(down) }, section, base))
     }
 
     /// The tiles of this scene.
@@ -160,6 +245,7 @@ impl Scene {
         let three = [PlaneName::A, PlaneName::B, PlaneName::C];
         let planes: Vec<Plane> = match self.shows_three() {
             true => three.map(|name| self.plane(name)).to_vec(),
+            false if self.has_curve() => vec![self.plane(self.settings.planes.plane)],
             false if self.has_reference() => {
                 let slices = self.stepped(columns * rows - 1);
                 std::iter::once(self.plane(self.reference_name())).chain(slices).collect()
@@ -173,15 +259,22 @@ impl Scene {
             let across = extent(p.right) * f64::from(columns) / f64::from(width);
             across.max(extent(p.down) * f64::from(rows) / f64::from(height))
         };
-        let pixel = planes.iter().map(fit).fold(0.0, f64::max) / self.settings.planes.zoom;
+        let zoom = self.settings.planes.zoom;
+        let pixel = planes.iter().map(fit).fold(0.0, f64::max) / zoom;
         let middle = (low + high) / 2.0;
-        let tile = |(n, plane): (u32, &Plane)| {
+        let place = |n: u32| {
             let (column, row) = (n % columns, n / columns);
             let corner = [cell(width, column, columns), cell(height, row, rows)];
             let end = [cell(width, column + 1, columns), cell(height, row + 1, rows)];
+            (corner, [end[0] - corner[0], end[1] - corner[1]])
+        };
+        let section = self.section(middle);
+        let tile = |(n, plane): (u32, &Plane)| {
+            let (corner, size) = place(n);
             let at = middle - plane.normal * (middle - plane.at).dot(plane.normal);
             let (frame, crossed_by) = match (self.draws_lines(), self.shows_three()) {
                 (false, _) => (Frame::None, Vec::new()),
+                (true, false) if section.is_some() => (Frame::Around(colour(self.settings.planes.plane)), Vec::new()),
                 (true, false) => (Frame::Between(BETWEEN), Vec::new()),
                 (true, true) => {
                     let others = three.iter().zip(&planes).filter(|(_, other)| *other != plane);
@@ -189,10 +282,57 @@ impl Scene {
                     (Frame::Around(colour(three[n as usize])), crossed_by)
                 }
             };
-            let size = [end[0] - corner[0], end[1] - corner[1]];
-            Tile { plane: Plane { at, ..*plane }, corner, size, frame, crossed_by }
+            Tile { plane: Plane { at, ..*plane }, corner, size, pixel, section: None, frame, crossed_by }
         };
-        Sheet { columns, rows, pixel, tiles: (0..).zip(&planes).map(tile).collect() }
+        let mut tiles: Vec<Tile> = (0..).zip(&planes).map(tile).collect();
+        tiles.extend(section.zip(self.curve()).map(|((plane, section, base), curve)| {
+            let (corner, size) = place(planes.len() as u32);
+            let across = section.line.length() * f64::from(columns) / f64::from(width);
+            let along = extent(plane.down) * f64::from(rows) / f64::from(height);
+            let (frame, crossed_by) = match self.draws_lines() {
+                true => (Frame::Around(CURVE_COLOUR), vec![(base, colour(curve.plane))]),
+                false => (Frame::None, Vec::new()),
+            };
+            let pixel = pixel.max(across.max(along) / zoom);
+            Tile { plane, corner, size, pixel, section: Some(section), frame, crossed_by }
+        }));
+        Sheet { columns, rows, pixel, tiles }
+    }
+
+    /// The line of a curved plane on the tile of its plane: the tile, the line and its points, pixels of the picture. Also where the curved plane itself is not
+    /// shown.
+    pub fn curve_line(&self, sheet: &Sheet) -> Option<CurveLine> {
+        self.line_on_tile(sheet, self.settings.planes.curve.as_ref()?)
+    }
+
+    /// The same of a line that is not in the settings.
+    pub fn line_on_tile(&self, sheet: &Sheet, curve: &Curve) -> Option<CurveLine> {
+        let is_its = |n: &usize| self.plane_of_tile(*n) == Some(curve.plane);
+        let number = (0..sheet.tiles.len()).find(is_its).filter(|_| self.cuts_planes())?;
+        let tile = &sheet.tiles[number];
+        let at = |point: [f64; 2]| sheet.project(tile, self.place_on_plane(curve.plane, point)).0;
+        let outline = Line::through(&curve.points).outline();
+        Some(CurveLine {
+            tile: number,
+            line: outline.into_iter().map(|point| at(point.into())).collect(),
+            points: curve.points.iter().map(|point| at(*point)).collect(),
+        })
+    }
+
+    /// The way between two places of the curved plane that is straight on its tile, as points of settings; none if one of them is farther than `reach` mm from it.
+    /// The curved plane is straightened without stretching, so that the length of this way is its length on the tile.
+    pub fn way_on_section(&self, from: DVec3, to: DVec3, reach: f64, step: f64, most: usize) -> Option<Vec<DVec3>> {
+        let sheet = self.sheet();
+        let tile = sheet.tiles.last().filter(|tile| tile.section.is_some())?;
+        let section = tile.section.as_ref()?;
+        let ends = [from, to].map(|place| section.coordinates(tile.plane.down, place));
+        if ends.iter().any(|(_, off)| *off > reach) {
+            return None;
+        }
+        let [(from, _), (to, _)] = ends;
+        let count = ((from.distance(to) / step).ceil() as usize).clamp(1, most.max(2) - 1);
+        let between = |n: usize| from + (to - from) * (n as f64 / count as f64);
+        Some((0..=count).map(|n| between(n)).map(|at| section.at(at.x).0 + tile.plane.down * at.y).collect())
     }
 
     /// True if the first tile of tomography is the plane across its slices.
@@ -218,13 +358,71 @@ impl Scene {
     }
 }
 
+/// The line of a curved plane on a tile, pixels of the picture.
+#[derive(Clone, Debug, PartialEq)]
+pub struct CurveLine {
+    pub tile: usize,
+    pub line: Vec<[f64; 2]>,
+    /// The points that it was drawn through.
+    pub points: Vec<[f64; 2]>,
+}
+
+/// Right, down and normal of a plane that is not turned.
+fn axes(name: PlaneName) -> (DVec3, DVec3, DVec3) {
+    match name {
+        PlaneName::A => (DVec3::X, DVec3::Y, DVec3::Z),
+        PlaneName::B => (DVec3::Z, DVec3::Y, DVec3::X),
+        PlaneName::C => (DVec3::X, -DVec3::Z, DVec3::Y),
+    }
+}
+
+impl Section {
+    fn in_space(&self, direction: DVec2) -> DVec3 {
+        self.axes[0] * direction.x + self.axes[1] * direction.y
+    }
+
+    /// The place at a distance along the line, at the level of the middle of the tile, and the direction of the line there.
+    pub fn at(&self, along: f64) -> (DVec3, DVec3) {
+        let (at, direction) = self.line.at(along);
+        (self.origin + self.in_space(at), self.in_space(direction))
+    }
+
+    /// Where a place is on the curved plane: the distance along the line and that from the middle of the tile down, and how far it is from the curved
+    /// plane; mm.
+    fn coordinates(&self, down: DVec3, place: DVec3) -> (DVec2, f64) {
+        let from = place - self.origin;
+        let (along, off) = self.line.nearest(DVec2::new(from.dot(self.axes[0]), from.dot(self.axes[1])));
+        (DVec2::new(along, from.dot(down)), off)
+    }
+}
+
+impl Tile {
+    /// The middle of the tile, pixels of the picture.
+    fn middle(&self) -> [f64; 2] {
+        std::array::from_fn(|a| f64::from(self.corner[a]) + f64::from(self.size[a]) / 2.0)
+    }
+
+    /// The columns of a curved plane, from the left; none beyond the ends of its line. Nothing for a plane.
+    pub fn columns(&self) -> Vec<Option<Column>> {
+        let Some(section) = &self.section else { return Vec::new() };
+        let length = section.line.length();
+        let from_middle = |x: u32| (f64::from(x) + 0.5 - f64::from(self.size[0]) / 2.0) * self.pixel;
+        let column = |x: u32| {
+            let along = length / 2.0 + from_middle(x);
+            let (place, direction) =
+                Some(along).filter(|along| (0.0..=length).contains(along)).map(|s| section.at(s))?;
+            Some((place, direction.cross(self.plane.down)))
+        };
+        (0..self.size[0]).map(column).collect()
+    }
+}
+
 impl Sheet {
     /// Where the planes of the other tiles cut the first one, which is perpendicular to them: the ends of a line for each, pixels of the picture.
     /// They reach beyond the tile.
     pub fn slice_lines(&self) -> Vec<[[f64; 2]; 2]> {
         let Some((reference, slices)) = self.tiles.split_first() else { return Vec::new() };
-        let middle: [f64; 2] =
-            std::array::from_fn(|a| f64::from(reference.corner[a]) + f64::from(reference.size[a]) / 2.0);
+        let middle = reference.middle();
         let reach = f64::from(reference.size[0] + reference.size[1]);
         let line = |slice: &Tile| {
             let normal = slice.plane.normal;
@@ -247,37 +445,62 @@ impl Sheet {
         })
     }
 
-    /// The place in the tile's plane that a pixel's centre shows, mm in space.
+    /// The place in the tile's plane that a pixel's centre shows, mm in space; of a curved plane that of the plane through its chord.
     pub fn place(&self, tile: &Tile, x: usize, y: usize) -> DVec3 {
         let from_middle = |at: usize, axis: usize| {
             let middle = f64::from(tile.corner[axis]) + f64::from(tile.size[axis]) / 2.0;
-            (at as f64 + 0.5 - middle) * self.pixel
+            (at as f64 + 0.5 - middle) * tile.pixel
         };
         tile.plane.at + tile.plane.right * from_middle(x, 0) + tile.plane.down * from_middle(y, 1)
     }
 
-    /// The point of a tile's plane that a position on the picture shows, mm in space.
+    /// The point of a tile's plane that a position on the picture shows, mm in space; of a curved plane the nearest that its line reaches.
     pub fn point(&self, tile: &Tile, at: [f64; 2]) -> DVec3 {
         let [x, y]: [f64; 2] =
             std::array::from_fn(|a| at[a] - f64::from(tile.corner[a]) - f64::from(tile.size[a]) / 2.0);
-        tile.plane.at + (tile.plane.right * x + tile.plane.down * y) * self.pixel
+        match &tile.section {
+            Some(section) => {
+                section.at(section.line.length() / 2.0 + x * tile.pixel).0 + tile.plane.down * (y * tile.pixel)
+            }
+            None => tile.plane.at + (tile.plane.right * x + tile.plane.down * y) * tile.pixel,
+        }
     }
 
     /// Where a point in space lies on a tile: its position on the picture, and its distance from the plane along its normal, mm.
     pub fn project(&self, tile: &Tile, point: DVec3) -> ([f64; 2], f64) {
         let from = point - tile.plane.at;
-        let along = [from.dot(tile.plane.right), from.dot(tile.plane.down)];
-        let at =
-            std::array::from_fn(|a| f64::from(tile.corner[a]) + f64::from(tile.size[a]) / 2.0 + along[a] / self.pixel);
-        (at, from.dot(tile.plane.normal))
+        let (along, off) = match &tile.section {
+            Some(section) => {
+                let (at, off) = section.coordinates(tile.plane.down, point);
+                ([at.x - section.line.length() / 2.0, at.y], off)
+            }
+            None => ([from.dot(tile.plane.right), from.dot(tile.plane.down)], from.dot(tile.plane.normal)),
+        };
+        let middle = tile.middle();
+        (std::array::from_fn(|a| middle[a] + along[a] / tile.pixel), off)
     }
 
     /// The upper left corner of a tile in space, and the vectors of one pixel right, of one down, and through the slab, mm.
     pub fn vectors(&self, tile: &Tile, thickness: f64) -> [DVec3; 4] {
         let Plane { at, right, down, normal } = tile.plane;
-        let (dx, dy) = (right * self.pixel, down * self.pixel);
+        let (dx, dy) = (right * tile.pixel, down * tile.pixel);
         let [width, height] = tile.size.map(f64::from);
         [at - dx * (width / 2.0) - dy * (height / 2.0), dx, dy, normal * thickness]
+    }
+
+    /// The columns of the curved plane for the shaders: the place at the tile's upper edge and 1, or 0 beyond the ends of the line; and the vector through the
+    /// slab.
+    pub fn column_table(&self, thickness: f64) -> Vec<f64> {
+        let Some(tile) = self.tiles.last() else { return Vec::new() };
+        let up = tile.plane.down * (tile.pixel * f64::from(tile.size[1]) / 2.0);
+        let entry = |column: Option<Column>| match column {
+            Some((place, across)) => {
+                let (top, slab) = (place - up, across * thickness);
+                [top.x, top.y, top.z, 1.0, slab.x, slab.y, slab.z, 0.0]
+            }
+            None => [0.0; 8],
+        };
+        tile.columns().into_iter().flat_map(entry).collect()
     }
 
     /// The data of each tile for the shaders: the upper left corner in space and the vectors of one pixel right and down, the vector through
