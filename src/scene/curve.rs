@@ -110,22 +110,27 @@ impl Line {
 
     /// The distance along the line of its place nearest to a point, and how far that is, mm.
     pub fn nearest(&self, point: DVec2) -> (f64, f64) {
-        let away = |along: f64| self.at(along).0.distance(point);
         let near = |(n, _): &(usize, &f64)| self.place_of(*n).distance_squared(point);
         let nearest = self.starts.iter().enumerate().min_by(|a, b| near(a).total_cmp(&near(b))).map_or(0, |(n, _)| n);
-        // Within the two pieces beside the nearest end of a piece the distance has one minimum, unless the line turns sharply there.
-        let [mut low, mut high] =
-            [nearest.saturating_sub(1), nearest + 1].map(|n| self.starts.get(n).copied().unwrap_or(self.length()));
-        for _ in 0..60 {
-            let third = (high - low) / 3.0;
-            if away(low + third) <= away(high - third) {
-                high -= third;
-            } else {
-                low += third;
+        // It is in one of the two pieces beside the nearest end of a piece, in each of which the distance has one minimum, unless the line turns sharply.
+        let within = |piece: usize| {
+            let segment = self.segments.get(piece / PIECES)?;
+            let start = (piece % PIECES) as f64 / PIECES as f64;
+            let (mut low, mut high) = (start, start + 1.0 / PIECES as f64);
+            for _ in 0..50 {
+                let third = (high - low) / 3.0;
+                match segment.at(low + third).distance_squared(point)
+                    <= segment.at(high - third).distance_squared(point)
+                {
+                    true => high -= third,
+                    false => low += third,
+                }
             }
-        }
-        let along = (low + high) / 2.0;
-        (along, away(along))
+            let t = (low + high) / 2.0;
+            Some((self.starts[piece] + segment.length(start, t), segment.at(t).distance(point)))
+        };
+        let both = [nearest.checked_sub(1), Some(nearest)].into_iter().flatten().filter_map(within);
+        both.min_by(|a, b| a.1.total_cmp(&b.1)).unwrap_or((0.0, f64::INFINITY))
     }
 
     /// The place at the start of a piece, or at the end of the line.
@@ -139,6 +144,9 @@ impl Line {
 
     /// Places along the line, to draw it.
     pub fn outline(&self) -> Vec<DVec2> {
+        if self.segments.is_empty() {
+            return Vec::new();
+        }
         let straight = self.segments.len() == 1;
         (0..self.starts.len()).filter(|n| !straight || n % PIECES == 0).map(|n| self.place_of(n)).collect()
     }

@@ -1,7 +1,7 @@
 //! Planes through the volume, resolved to the tiles of a picture: which pixel shows which point in space.
 
 use super::curve::Line;
-use super::{Curve, Layout, Mode, PlaneName, Scene, Slab, View, depth_offset, insonified_box};
+use super::{Curve, Layout, MAX_POINTS, Mode, PlaneName, Scene, Slab, View, depth_offset, insonified_box};
 use glam::{DMat3, DVec2, DVec3};
 
 /// Maximum number of tiles of a picture.
@@ -10,6 +10,10 @@ pub const MAX_TILES: u32 = 64;
 pub const MAX_SLAB: f64 = 4096.0;
 /// Points of the line of a curved plane that are closer than this coincide, mm.
 pub const MIN_APART: f64 = 1e-3;
+/// A place is on a curved plane if it is no farther from it, mm.
+const ON_SECTION: f64 = 0.5;
+/// Distance between the places of a way along a curved plane, mm. Chords of a circle of 3 mm are shorter than it by 0.03 %.
+const WAY_STEP: f64 = 0.25;
 /// Size of a tile in the buffer, in vectors of four floats.
 pub const TILE_VECTORS: u32 = 9;
 
@@ -81,7 +85,7 @@ pub fn colour(plane: PlaneName) -> [f64; 3] {
 }
 
 /// Colour of a curved plane's frame and of its line.
-pub const CURVE_COLOUR: [f64; 3] = [0.55, 1.0, 0.35];
+pub const CURVE_COLOUR: [f64; 3] = [0.9, 1.0, 0.85];
 
 /// Colour between the tiles of tomography.
 const BETWEEN: [f64; 3] = [0.35, 0.35, 0.35];
@@ -319,20 +323,19 @@ impl Scene {
         })
     }
 
-    /// The way between two places of the curved plane that is straight on its tile, as points of settings; none if one of them is farther than `reach` mm from it.
-    /// The curved plane is straightened without stretching, so that the length of this way is its length on the tile.
-    pub fn way_on_section(&self, from: DVec3, to: DVec3, reach: f64, step: f64, most: usize) -> Option<Vec<DVec3>> {
+    /// The places along the way between two places of the curved plane that is straight on its tile; none if one of them is not on it. The curved plane is straightened without stretching, so that the length of this way is its length on the tile.
+    pub fn way_on_section(&self, from: DVec3, to: DVec3) -> Option<Vec<DVec3>> {
         let sheet = self.sheet();
         let tile = sheet.tiles.last().filter(|tile| tile.section.is_some())?;
         let section = tile.section.as_ref()?;
         let ends = [from, to].map(|place| section.coordinates(tile.plane.down, place));
-        if ends.iter().any(|(_, off)| *off > reach) {
+        if ends.iter().any(|(_, off)| *off > ON_SECTION) {
             return None;
         }
         let [(from, _), (to, _)] = ends;
-        let count = ((from.distance(to) / step).ceil() as usize).clamp(1, most.max(2) - 1);
+        let count = ((from.distance(to) / WAY_STEP).ceil() as usize).clamp(1, MAX_POINTS - 1);
         let between = |n: usize| from + (to - from) * (n as f64 / count as f64);
-        Some((0..=count).map(|n| between(n)).map(|at| section.at(at.x).0 + tile.plane.down * at.y).collect())
+        Some((0..=count).map(between).map(|at| section.at(at.x).0 + tile.plane.down * at.y).collect())
     }
 
     /// True if the first tile of tomography is the plane across its slices.
@@ -367,6 +370,16 @@ pub struct CurveLine {
     pub points: Vec<[f64; 2]>,
 }
 
+impl CurveLine {
+    /// The end of the line and a place before it, for an arrow that tells its direction: on the curved plane the line runs to the right.
+    pub fn head(&self) -> Option<[[f64; 2]; 2]> {
+        match self.line[..] {
+            [.., before, end] => Some([end, before]),
+            _ => None,
+        }
+    }
+}
+
 /// Right, down and normal of a plane that is not turned.
 fn axes(name: PlaneName) -> (DVec3, DVec3, DVec3) {
     match name {
@@ -379,6 +392,11 @@ fn axes(name: PlaneName) -> (DVec3, DVec3, DVec3) {
 impl Section {
     fn in_space(&self, direction: DVec2) -> DVec3 {
         self.axes[0] * direction.x + self.axes[1] * direction.y
+    }
+
+    /// The direction that all of the line keeps to within 45 degrees; zero if it bends more.
+    pub fn heading(&self) -> DVec3 {
+        self.line.heading().map_or(DVec3::ZERO, |heading| self.in_space(heading))
     }
 
     /// The place at a distance along the line, at the level of the middle of the tile, and the direction of the line there.

@@ -6,7 +6,7 @@ use super::colours::{
 };
 use super::measures;
 use super::names::{self, Tell};
-use super::{PanelState, TEXT_SIZE, TOUCH_SIZE, heading};
+use super::{PanelState, SMALL_TEXT, TEXT_SIZE, TOUCH_SIZE, heading};
 use crate::scene::{ColourMap, KeptSide, Layout, Mode, PlaneName, Settings, Transfer, TransferName};
 use crate::ui::cine_player::{CineState, SPEEDS};
 use crate::ui::command::{Command, Tool};
@@ -20,7 +20,7 @@ use egui::{
     StrokeKind, Ui, WidgetInfo, WidgetType, pos2, vec2,
 };
 
-const TOOLS: [(Tool, &str); 7] = [
+const TOOLS: [(Tool, &str); 8] = [
     (Tool::Rotate, "Turn"),
     (Tool::Light, "Light"),
     (Tool::Region, "Region"),
@@ -28,6 +28,7 @@ const TOOLS: [(Tool, &str); 7] = [
     (Tool::Cut, "Cut"),
     (Tool::Brush, "Brush"),
     (Tool::Plane, "Planes"),
+    (Tool::Curve, "Curve"),
 ];
 
 const PLANES: [(PlaneName, &str); 3] = [(PlaneName::A, "A"), (PlaneName::B, "B"), (PlaneName::C, "C")];
@@ -108,6 +109,9 @@ pub(super) fn show_modes(ui: &mut Ui, state: &PanelState, width: f32, execute: &
                     execute(Command::Recentre);
                 }
             }
+            if !state.has_column {
+                curve(ui, state, width - 16.0, execute);
+            }
             names::group(ui, "Measure", |ui| {
                 heading(ui, "Measure");
                 measures::show_tools(ui, state, width - 16.0, execute);
@@ -180,6 +184,44 @@ fn cuts(ui: &mut Ui, state: &PanelState, width: f32, execute: &mut dyn FnMut(Com
             let hint = "Renderings show everything again (Shift+F; undo brings the cuts back).";
             if ui.add(button).tell(hint).clicked() {
                 execute(Command::ClearCuts);
+            }
+        }
+    });
+}
+
+/// With its tool, what to do next for a curved plane; and what removes it, while there is one.
+fn curve(ui: &mut Ui, state: &PanelState, width: f32, execute: &mut dyn FnMut(Command)) {
+    let (is_chosen, line) = (state.controls.tool() == Tool::Curve, state.controls.line());
+    let has_curve = state.controls.settings().planes.curve.is_some();
+    if !is_chosen && !has_curve {
+        return;
+    }
+    names::group(ui, "Curved plane", |ui| {
+        heading(ui, "Curved plane");
+        ui.set_max_width(width);
+        if is_chosen {
+            let step = match (line.map(|line| line.points.len()), has_curve) {
+                (Some(1), _) => "Click the next point of the line.",
+                (Some(_), _) => "Click the next point; Enter or a double click ends the line.",
+                (None, true) => "Drag a point of the line, or draw another line.",
+                (None, false) => "Click the points of a line on A, B or C, or drag a straight line.",
+            };
+            names::group(ui, step, |ui| {
+                names::announce(ui, step, false);
+                ui.add(Label::new(RichText::new(step).size(SMALL_TEXT).color(ACCENT)).wrap());
+            });
+        }
+        let size = vec2(width, TOUCH_SIZE * 0.75);
+        if line.is_some_and(|line| line.points.len() > 1) {
+            let hint = "Shows the section along the line (Enter).";
+            if ui.add(super::overlays::first(RichText::new("End the line")).min_size(size)).tell(hint).clicked() {
+                execute(Command::EndCurve);
+            }
+        }
+        if has_curve {
+            let hint = "Shows the planes without it (Shift+Delete; undo brings it back).";
+            if ui.add(Button::new("Remove curved plane").min_size(size)).tell(hint).clicked() {
+                execute(Command::ClearCurve);
             }
         }
     });
@@ -314,6 +356,7 @@ pub(super) fn show_controls(ui: &mut Ui, state: &PanelState, width: f32, execute
             ui.add_space(6.0);
             measures::show_results(ui, state, width - 40.0, execute);
             cuts(ui, state, width - 32.0, execute);
+            curve(ui, state, width - 32.0, execute);
             heading(ui, "Controls");
             let in_front = FRONT.map(|(name, sliders)| (name, front(sliders, settings)));
             let with_cuts = depth_of_cut(state);

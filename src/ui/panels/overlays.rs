@@ -241,7 +241,7 @@ fn small(ui: &mut Ui, text: String, colour: Color32) {
 }
 
 /// Gestures on the picture, for the help.
-const GESTURES: [(&str, &str); 13] = [
+const GESTURES: [(&str, &str); 15] = [
     ("drag", "use the tool: turn, light, region, clip, cut, planes"),
     ("Shift + drag, right or middle drag", "move the picture; over a plane: step it"),
     ("Ctrl + drag", "move the light"),
@@ -255,6 +255,8 @@ const GESTURES: [(&str, &str); 13] = [
     ("Cut, then drag round", "cut away what is within, along the view"),
     ("Brush, then drag over it", "remove what is near the surface there"),
     ("Planes, then click", "move the point where the three planes cross"),
+    ("Curve, then clicks on a plane, Enter", "curved plane along them; a drag: a straight line"),
+    ("Curve, then drag a point of the line", "move it"),
 ];
 
 /// A line of the help: keys or gesture, and what it does.
