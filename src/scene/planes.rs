@@ -560,3 +560,110 @@ impl Slab {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scene::load::{Layers, block};
+
+    fn scene(lines: &[&str]) -> Scene {
+        block(&[&["picture.size=[200,160]"], lines].concat(), [41, 31, 21])
+    }
+
+    /// Prevents a distance on the straightened section that is none of the volume, and a mark that lands beside its place.
+    #[test]
+    fn a_place_on_a_curved_plane_is_where_it_is_shown() {
+        for plane in ["a", "b", "c"] {
+            let curve = format!("planes.curve={{plane='{plane}',points=[[-9,4],[-3,9],[2,6],[9,12]]}}");
+            let scene = scene(&["mode='orthogonal'", "planes.azimuth=20", "planes.roll=-12", &curve]);
+            let sheet = scene.sheet();
+            let tile = sheet.tiles.last().filter(|tile| tile.section.is_some()).expect("a section");
+            let middle = tile.middle();
+            let at = [[0.0, 0.0], [-12.0, 9.0], [12.0, -9.0]].map(|[x, y]| [middle[0] + x, middle[1] + y]);
+            let places = at.map(|at| sheet.point(tile, at));
+            for (at, place) in at.iter().zip(&places) {
+                let (back, off) = sheet.project(tile, *place);
+                assert!(
+                    (back[0] - at[0]).hypot(back[1] - at[1]) < 1e-3 && off.abs() < 1e-6,
+                    "{plane}: {at:?} {back:?}"
+                );
+            }
+            let away = sheet.project(tile, places[0] + tile.plane.normal * 2.0).1;
+            assert!(away > 1.0, "{plane}: 2 mm beside it are {away}");
+            // The way between two places has the length that the tile shows.
+            let way = scene.way_on_section(places[1], places[2]).expect("both are on it");
+            let length: f64 = way.windows(2).map(|ends| ends[0].distance(ends[1])).sum();
+            let wanted = (at[2][0] - at[1][0]).hypot(at[2][1] - at[1][1]) * tile.pixel;
+            assert!((length - wanted).abs() < 0.01, "{plane}: {length} of {wanted}");
+            assert!(scene.way_on_section(places[1], places[2] + tile.plane.normal * 4.0).is_none());
+        }
+    }
+
+    /// The line stays on the screen where it was drawn when the planes turn, and in the volume when they are stepped.
+    #[test]
+    fn a_line_turns_with_its_plane_and_stays_when_that_is_stepped() {
+        let curve = "planes.curve={plane='a',points=[[-9,4],[-3,9],[9,12]]}";
+        let line = |more: &[&str]| {
+            let scene = scene(&[&["mode='orthogonal'", curve], more].concat());
+            let sheet = scene.sheet();
+            let line = scene.curve_line(&sheet).expect("a line");
+            (line.points, sheet.point(sheet.tiles.last().expect("tiles"), [150.0, 120.0]), sheet.pixel)
+        };
+        let (points, place, pixel) = line(&[]);
+        let (stepped, same, _) = line(&["planes.position=[3,18,5]"]);
+        assert_eq!(points, stepped);
+        assert!(place.distance(same) < 1e-9, "{place} {same}");
+        let (turned, _, other) = line(&["planes.tilt=25", "planes.azimuth=-30"]);
+        for (a, b) in points.iter().zip(&turned) {
+            // From the middle of the first tile, which has another scale.
+            let middle = [50.0, 40.0];
+            let off = [0, 1].map(|n| (a[n] - middle[n]) * pixel - (b[n] - middle[n]) * other);
+            assert!(off[0].abs() < 1.0 && off[1].abs() < 1.0, "{a:?} {b:?}");
+        }
+        // Coordinates are those of the region while nothing is turned.
+        let plain = scene(&["mode='plane'", curve]);
+        assert!(
+            plain.place_on_plane(PlaneName::A, [-9.0, 4.0]).distance(DVec3::new(
+                -9.0,
+                4.0,
+                plain.plane(PlaneName::A).at.z
+            )) < 1e-9
+        );
+        assert_eq!(plain.point_on_plane(PlaneName::C, DVec3::new(3.0, 9.0, 2.0)), [3.0, -2.0]);
+    }
+
+    /// Prevents planes that shrink when a line is drawn on them, and a section that does not fit its tile.
+    #[test]
+    fn a_long_line_makes_the_scale_of_its_tile_smaller_and_no_others() {
+        let sheets = ["[[-5,15],[5,15]]", "[[-18,2],[0,28],[18,2],[0,15],[-18,28]]"]
+            .map(|points| scene(&["mode='orthogonal'", &format!("planes.curve={{points={points}}}")]).sheet());
+        assert_eq!(sheets[0].pixel, sheets[1].pixel);
+        assert_eq!(sheets[0].pixel, scene(&["mode='orthogonal'"]).sheet().pixel);
+        let [short, long] = sheets.map(|sheet| sheet.tiles.last().cloned().expect("tiles"));
+        assert_eq!(short.columns().iter().flatten().count(), (10.0 / short.pixel).round() as usize);
+        assert!(long.pixel > short.pixel);
+        let shown = long.columns();
+        assert!(shown.iter().flatten().count() >= shown.len() - 1, "all of the tile's width");
+    }
+
+    #[test]
+    fn a_line_that_is_none_is_refused_in_one_line() {
+        let fault = |points: String| {
+            let mut layers = Layers::default();
+            let set = format!("planes.curve={{plane='b',points={points}}}");
+            layers.set(&set).and_then(|()| layers.finish()).expect_err(&set).to_string()
+        };
+        let many = format!("[{}]", (0..65).map(|n| format!("[{n},0]")).collect::<Vec<_>>().join(","));
+        for (points, says) in [
+            ("[]".to_string(), "has 0 points, a line has 2 to 64"),
+            ("[[1,2]]".into(), "has 1 points, a line has 2 to 64"),
+            (many, "has 65 points, a line has 2 to 64"),
+            ("[[1,2],[3,4],[3,4],[5,6]]".into(), "points 2 and 3 coincide: leave one of them out"),
+            ("[[1,2],[nan,4]]".into(), "is NaN, must lie in -1000000..=1000000"),
+            ("[[1,2],[inf,4]]".into(), "is inf, must lie in -1000000..=1000000"),
+        ] {
+            let fault = fault(points);
+            assert!(fault.contains("planes.curve.points") && fault.contains(says) && !fault.contains('\n'), "{fault}");
+        }
+    }
+}

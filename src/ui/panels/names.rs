@@ -137,7 +137,11 @@ fn view_in_words(scene: &Scene) -> String {
             PlaneName::B => "B",
             PlaneName::C => "C",
         };
-        return if scene.shows_three() { String::new() } else { format!(", plane {plane}") };
+        let curved = match scene.curve() {
+            Some(curve) => format!(", with the section along a line on plane {}", curve.plane.letter()),
+            None => String::new(),
+        };
+        return if scene.shows_three() { curved } else { format!(", plane {plane}{curved}") };
     }
     let side = VIEWPOINTS.iter().find(|(viewpoint, _)| view::is_seen_from(scene, *viewpoint));
     match side {

@@ -2,6 +2,7 @@
 
 mod budget;
 mod colours;
+mod curving;
 mod cutting;
 mod gestures;
 mod layout;
