@@ -68,7 +68,6 @@ impl Scene {
         let mut all = Vec::new();
         if self.cuts_planes() {
             let sheet = self.sheet();
-            let three = [PlaneName::A, PlaneName::B, PlaneName::C].map(|name| (name.letter(), colour(name)));
             all.extend(sheet.tiles.iter().enumerate().map(|(n, tile)| {
                 // Along a line that bends away, left and right are no sides of the patient.
                 let heading = tile.section.as_ref().map_or(tile.plane.right, |section| section.heading());
@@ -85,7 +84,10 @@ impl Scene {
                     probe,
                     plane: match &tile.section {
                         Some(_) => Some(("S", CURVE_COLOUR)),
-                        None => three.get(n).copied().filter(|_| self.shows_three()),
+                        None if self.has_curve() || self.shows_three() => {
+                            self.plane_of_tile(n).map(|name| (name.letter(), colour(name)))
+                        }
+                        None => None,
                     },
                     along: tile.section.as_ref().map(|section| section.line.length()),
                 }

@@ -122,11 +122,21 @@ impl Scene {
     /// Number of columns and rows of tiles.
     pub fn tile_grid(&self) -> [u32; 2] {
         match (self.settings.layout, self.settings.mode) {
-            (Layout::Single, Mode::Plane) if self.has_curve() => [2, 1],
+            (Layout::Single, Mode::Plane) if self.has_curve() => self.grid_of_two(),
             (Layout::Four, _) | (_, Mode::Orthogonal) => [2, 2],
             (_, Mode::Tomography) => [self.settings.planes.columns, self.settings.planes.rows],
             _ => [1, 1],
         }
+    }
+
+    /// A plane and the curved plane on it are beside each other or one above the other, whichever shows them larger. The line has no say: it may be dragged.
+    fn grid_of_two(&self) -> [u32; 2] {
+        let plane = self.plane(self.settings.planes.plane);
+        let (low, high) = self.planes_box();
+        let [across, down, through] = [plane.right, plane.down, plane.normal].map(|axis| axis.abs().dot(high - low));
+        let ([width, height], down) = (self.picture_size().map(f64::from), down.max(through));
+        let (beside, above) = ((2.0 * across / width).max(down / height), (across / width).max(2.0 * down / height));
+        if beside <= above { [2, 1] } else { [1, 2] }
     }
 
     /// Number of tiles that show a plane.
@@ -588,8 +598,9 @@ mod tests {
                     "{plane}: {at:?} {back:?}"
                 );
             }
-            let away = sheet.project(tile, places[0] + tile.plane.normal * 2.0).1;
-            assert!(away > 1.0, "{plane}: 2 mm beside it are {away}");
+            let (_, across) = tile.columns()[tile.size[0] as usize / 2].expect("the middle of the line");
+            let away = sheet.project(tile, places[0] + across * 2.0).1;
+            assert!(away > 1.8, "{plane}: 2 mm beside it are {away}");
             // The way between two places has the length that the tile shows.
             let way = scene.way_on_section(places[1], places[2]).expect("both are on it");
             let length: f64 = way.windows(2).map(|ends| ends[0].distance(ends[1])).sum();
@@ -647,11 +658,22 @@ mod tests {
     }
 
     #[test]
+    fn the_plane_and_its_section_are_placed_where_they_are_larger() {
+        for (size, grid) in [("[200,90]", [2, 1]), ("[100,200]", [1, 2])] {
+            let size = format!("picture.size={size}");
+            let sheet = scene(&["mode='plane'", "planes.curve={points=[[-5,15],[5,15]]}", &size]).sheet();
+            assert_eq!(([sheet.columns, sheet.rows], sheet.tiles.len()), (grid, 2), "{size}");
+            assert!(sheet.tiles[0].section.is_none() && sheet.tiles[1].section.is_some());
+        }
+    }
+
+    #[test]
     fn a_line_that_is_none_is_refused_in_one_line() {
         let fault = |points: String| {
             let mut layers = Layers::default();
             let set = format!("planes.curve={{plane='b',points={points}}}");
-            layers.set(&set).and_then(|()| layers.finish()).expect_err(&set).to_string()
+            layers.set(&set).expect(&set);
+            layers.finish().expect(&set).check().expect_err(&set).to_string()
         };
         let many = format!("[{}]", (0..65).map(|n| format!("[{n},0]")).collect::<Vec<_>>().join(","));
         for (points, says) in [

@@ -246,6 +246,7 @@ fn a_curved_plane_is_drawn_shown_saved_and_taken_back() {
     let folder = Folder::new("curve");
     let view = desk.view(&["--size", "1000x700", "--source", SWEEP, "--save-to", &folder.path("kept")]);
     let (corner, size) = picture();
+    shows(&view, &headless(size, &[]), "the start");
     desk.tap('8');
     let start = headless(size, &["--mode", "orthogonal"]);
     // The lower right tile, without its borders and labels.

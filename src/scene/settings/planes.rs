@@ -46,9 +46,9 @@ pub struct Planes {
     /// memory, and scan conversion and this Gaussian once more for each frame.
     pub smooth: Option<Smooth>,
     /// A curved plane: the section along a line that is drawn on one of the planes, perpendicular to that plane, straightened. Mode orthogonal shows it in
-    /// its fourth tile, mode plane beside the plane that the line is drawn on. Across it shows the length along the line, down the direction
+    /// its fourth tile, mode plane below or beside the plane that the line is drawn on. Across it shows the length along the line, down the direction
     /// perpendicular to the plane, both in mm of the same scale: that of the planes, unless the line is too long for its tile. A slab reaches to both sides of
-    /// the line. Other modes show nothing of it.
+    /// the line. Other modes do not show it.
     pub curve: Option<Curve>,
 }
 

@@ -214,13 +214,14 @@ fn curve(ui: &mut Ui, state: &PanelState, width: f32, execute: &mut dyn FnMut(Co
         let size = vec2(width, TOUCH_SIZE * 0.75);
         if line.is_some_and(|line| line.points.len() > 1) {
             let hint = "Shows the section along the line (Enter).";
-            if ui.add(super::overlays::first(RichText::new("End the line")).min_size(size)).tell(hint).clicked() {
+            let button = super::overlays::first(RichText::new("End the line"));
+            if ui.add_sized(size, button).tell(hint).clicked() {
                 execute(Command::EndCurve);
             }
         }
         if has_curve {
             let hint = "Shows the planes without it (Shift+Delete; undo brings it back).";
-            if ui.add(Button::new("Remove curved plane").min_size(size)).tell(hint).clicked() {
+            if ui.add_sized(size, Button::new("Remove curved plane")).tell(hint).clicked() {
                 execute(Command::ClearCurve);
             }
         }

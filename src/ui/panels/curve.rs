@@ -31,19 +31,32 @@ pub(super) fn paint(ui: &Ui, state: &PanelState, scale: f32) {
         let painter = painter.with_clip_rect(area(line.tile).intersect(picture));
         draw(&painter, picture, scale, line, has_points);
     };
-    if let Some(line) = scene.curve_line(&sheet) {
-        draw(&line, is_chosen && work.is_none());
-    }
-    let Some(work) = work else { return };
-    // The line as it would be with a point under the pointer.
     let hover = ui.ctx().pointer_hover_pos().filter(|at| picture.contains(*at));
     let hover = hover.map(|at| ((at - picture.min) * scale).into()).map(|[x, y]: [f32; 2]| [x, y].map(f64::from));
+    // The tile under the pointer, and the place in space.
     let under = hover.and_then(|at| {
         let tile = sheet.tile_at(at[0].max(0.0) as usize, at[1].max(0.0) as usize)?;
         let number = sheet.tiles.iter().position(|other| other.corner == tile.corner)?;
-        let point = scene.point_on_plane(work.plane, sheet.point(tile, at));
-        (scene.plane_of_tile(number) == Some(work.plane)).then_some(point)
+        Some((number, sheet.point(tile, at)))
     });
+    if let Some(line) = scene.curve_line(&sheet) {
+        draw(&line, is_chosen && work.is_none());
+        // Where on the line the pointer over the section is.
+        if let Some((_, place)) = under.filter(|(number, _)| sheet.tiles[*number].section.is_some()) {
+            let [x, y] = sheet.project(&sheet.tiles[line.tile], place).0.map(|v| v as f32);
+            let at = picture.min + vec2(x, y) / scale;
+            let painter = painter.with_clip_rect(area(line.tile).intersect(picture));
+            [Stroke::new(4.0, OUTLINE), Stroke::new(2.0, colours::of_scene(CURVE_COLOUR))].into_iter().for_each(
+                |stroke| {
+                    painter.circle_stroke(at, POINT + 2.0, stroke);
+                },
+            );
+        }
+    }
+    let Some(work) = work else { return };
+    // The line as it would be with a point under the pointer.
+    let under = under.filter(|(number, _)| scene.plane_of_tile(*number) == Some(work.plane));
+    let under = under.map(|(_, place)| scene.point_on_plane(work.plane, place));
     let last = work.points.last();
     let under = under.filter(|[x, y]| last.is_some_and(|last| (last[0] - x).hypot(last[1] - y) >= MIN_APART));
     let points = work.points.iter().copied().chain(under).collect();
