@@ -162,7 +162,7 @@ fn meaning(slot: Slot) -> (&'static [&'static str], &'static str) {
         Slot::SelfAttenuated => {
             (&["red", "green", "blue", "opacity"], "premultiplied colour and opacity of a step, 0..1")
         }
-        Slot::Tiles | Slot::Block | Slot::Cuts | Slot::SlicePlaces => {
+        Slot::Tiles | Slot::CurveColumns | Slot::Block | Slot::Cuts | Slot::SlicePlaces => {
             (&["x", "y", "z", "w"], "vectors as the shader takes them")
         }
         Slot::Surface => {

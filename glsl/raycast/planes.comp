@@ -7,6 +7,8 @@ layout(constant_id = 3) const int SAMPLES = 1; // through the slab
 layout(constant_id = 4) const int SLAB = 0;    // 0 mean, 1 largest, 2 smallest
 // 1: one plane fills the picture. Its vectors are those of the rays: a CPU reads tables lane by lane, which takes nearly as long as a sample.
 layout(constant_id = 5) const int ONE_TILE = 0;
+// 1: the last tile is a curved plane, which has a place and a slab for each column.
+layout(constant_id = 6) const int CURVED = 0;
 #ifdef TONED
 #include "tone_constants.glsl"
 #endif
@@ -21,6 +23,8 @@ layout(scalar) uniform Params {
 };
 #include "ray.glsl"
 #include "tiles.glsl"
+// For each column the place at the upper edge of the tile, w 0 beyond the ends of the line; and from the slab's near face to its far one.
+readonly buffer CurveColumns { vec4 entry[]; } curve_columns;
 #ifdef TONED
 #include "tone.glsl"
 uniform writeonly image2D screen;
@@ -38,12 +42,13 @@ void main() {
     if (any(greaterThanEqual(pixel, size))) return;
     vec3 corner = origin, dx = origin_dx, dy = origin_dy, slab = direction;
     ivec2 first = ivec2(0);
-    bool is_covered = true;
+    bool is_covered = true, is_curved = false;
     if (ONE_TILE == 0) {
         ivec2 cells = ivec2(columns, rows), cell = cell_of(pixel, size, cells);
         int n = cell.y * columns + cell.x;
         first = cell_corner(cell, size, cells);
         is_covered = n < tile_count();
+        is_curved = n == tile_count() - 1;
         corner = tile_corner(n);
         dx = tile_dx(n);
         dy = tile_dy(n);
@@ -51,8 +56,16 @@ void main() {
     }
     float value = SLAB == 2 ? 1.0 : 0.0;
     int count = 0;
+    vec2 at = vec2(pixel - first) + 0.5;
+    if (CURVED == 1 && is_curved) {
+        int column = 2 * (pixel.x - first.x);
+        vec4 top = curve_columns.entry[column];
+        is_covered = top.w > 0.0;
+        corner = top.xyz;
+        dx = vec3(0.0);
+        slab = curve_columns.entry[column + 1].xyz;
+    }
     if (is_covered) {
-        vec2 at = vec2(pixel - first) + 0.5;
         vec3 middle = corner + dx * at.x + dy * at.y;
         for (int i = 0; i < SAMPLES; ++i) {
             float through = SAMPLES > 1 ? float(i) / float(max(SAMPLES - 1, 1)) - 0.5 : 0.0;

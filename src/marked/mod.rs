@@ -33,7 +33,7 @@ pub fn time_line(now: SystemTime) -> String {
 /// # Errors
 /// One line: the picture is not of this scene's size, or the drawing failed.
 pub fn as_set<'a>(picture: &'a Picture, scene: &Scene, start: Option<&Unveiled>) -> Result<Cow<'a, Picture>, String> {
-    let has_lines = scene.has_reference() || start.is_some();
+    let has_lines = scene.has_reference() || scene.has_curve() || start.is_some();
     match scene.settings.marks.bar {
         false if scene.settings.measure.is_empty() && !has_lines => Ok(Cow::Borrowed(picture)),
         false => measured(picture, scene, start).map(Cow::Owned),
@@ -78,6 +78,7 @@ pub fn measured(picture: &Picture, scene: &Scene, start: Option<&Unveiled>) -> R
     let mut measured = picture.clone();
     if [picture.width, picture.height] == scene.picture_size() {
         strokes::slices(&mut measured, scene)?;
+        strokes::curve(&mut measured, scene)?;
         start.iter().for_each(|start| strokes::start(&mut measured, &unveil::lines(scene, start)));
         strokes::draw(&mut measured, scene)?;
     }

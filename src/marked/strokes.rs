@@ -6,6 +6,7 @@ use crate::measure::overlay;
 use crate::passes::unveil::StartLine;
 use crate::picture::Picture;
 use crate::scene::Scene;
+use crate::scene::planes::CURVE_COLOUR;
 use plotters::prelude::{BLACK, DrawingBackend, ShapeStyle, WHITE};
 
 /// Colour of lines: yellow, which no tissue has.
@@ -71,6 +72,32 @@ pub(super) fn slices(picture: &mut Picture, scene: &Scene) -> Result<(), String>
     let label = canvas::picture([width, TEXT + 6], &Label(&text))?;
     let bottom = tile[0][1] + tile[1][1] - f64::from(TEXT + 8);
     blend(picture, &label, [tile[0][0].round() as i64 + 2, bottom.round() as i64]);
+    Ok(())
+}
+
+/// Draws the line of a curved plane on its plane, with its direction, and the length of it on the curved plane.
+///
+/// # Errors
+/// One line: the drawing of the label failed.
+pub(super) fn curve(picture: &mut Picture, scene: &Scene) -> Result<(), String> {
+    let sheet = scene.sheet();
+    let (Some(on), Some(_)) = (scene.curve_line(&sheet), scene.curve()) else { return Ok(()) };
+    let tile = &sheet.tiles[on.tile];
+    let tile = [tile.corner, tile.size].map(|corner| corner.map(f64::from));
+    let mut strokes: Vec<[[f64; 2]; 2]> = on.line.windows(2).map(|ends| [ends[0], ends[1]]).collect();
+    strokes.extend(on.head().into_iter().flat_map(|head| overlay::arrow_head(head, HEAD)));
+    let colour = CURVE_COLOUR.map(|c| (c * 255.0).round() as u8);
+    for (half, colour) in [(HALF_EDGE, EDGE), (HALF, colour)] {
+        strokes.iter().for_each(|ends| stroke(picture, tile, *ends, half, colour));
+    }
+    let marks = scene.marks();
+    let section = marks.iter().find_map(|tile| Some((tile, tile.along_label()?)));
+    if let Some((tile, text)) = section {
+        let width = canvas::text_width(&text, TEXT)?.min(tile.size[0]).ceil() as u32 + 6;
+        let label = canvas::picture([width, TEXT + 6], &Label(&text))?;
+        let bottom = tile.corner[1] + tile.size[1] - f64::from(TEXT + 8);
+        blend(picture, &label, [tile.corner[0].round() as i64 + 2, bottom.round() as i64]);
+    }
     Ok(())
 }
 

@@ -66,7 +66,7 @@ pub fn quantities(measured: &Measurement) -> Result<Vec<Quantity>, &'static str>
             Quantity::of("circumference", shapes::perimeter(&points), "mm"),
         ],
         (MeasureKind::Surface, [from, .., to]) => vec![
-            Quantity::of("along the surface", shapes::length(&points), "mm"),
+            Quantity::of(measured.way(), shapes::length(&points), "mm"),
             Quantity::of("straight", from.distance(*to), "mm"),
         ],
         (MeasureKind::Volume, _) => {
@@ -98,6 +98,9 @@ pub fn label(number: usize, measured: &Measurement) -> String {
         Ok(found) => found.first().map_or(String::new(), Quantity::shown),
         Err(_) => "-".into(),
     };
+    // A length along a curved plane is no straight one, which the same two points have on other planes.
+    let is_along = measured.kind == MeasureKind::Surface && !measured.on_surface;
+    let found = if is_along { format!("{found} {}", measured.way()) } else { found };
     match measured.text.is_empty() {
         true => format!("{number}: {found}"),
         false => format!("{number}: {} {found}", measured.text),
@@ -109,7 +112,7 @@ pub fn csv(all: &[Measurement]) -> String {
     let mut text = String::from("number,measurement,text,quantity,value,unit\n");
     for (n, measured) in all.iter().enumerate() {
         for Quantity { name, value, unit } in quantities(measured).unwrap_or_default() {
-            let (kind, label) = (measured.kind.title(), csv_quoted(&measured.text));
+            let (kind, label) = (measured.title(), csv_quoted(&measured.text));
             let _ = writeln!(text, "{},{kind},{label},{name},{value:.4},{unit}", n + 1);
         }
     }

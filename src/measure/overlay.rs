@@ -44,6 +44,10 @@ pub fn drawn(scene: &Scene, all: &[Measurement]) -> Vec<Drawn> {
             let view = OnTile { sheet: &sheet, tile, reach };
             let area = [tile.corner, tile.size].map(|[x, y]| [f64::from(x), f64::from(y)]);
             let drawn = all.iter().enumerate().filter(|(_, measured)| !measured.on_surface);
+            // What is straight in space, and its length, is another thing on a curved plane.
+            let is_curved = tile.section.is_some();
+            let fits = |kind| matches!(kind, MeasureKind::Surface | MeasureKind::Text | MeasureKind::Arrow);
+            let drawn = drawn.filter(|(_, measured)| !is_curved || fits(measured.kind));
             found.extend(drawn.filter_map(|(index, measured)| of(scene, index, measured, area, |p| view.project(p))));
         }
     }
@@ -56,9 +60,27 @@ pub fn drawn(scene: &Scene, all: &[Measurement]) -> Vec<Drawn> {
     found
 }
 
-/// What is drawn of a measurement in work, `hover` being the place of the pointer: what it would be with that point.
-pub fn preview(scene: &Scene, number: usize, work: &Measurement, hover: Option<[f64; 3]>) -> Vec<Drawn> {
+/// What is drawn of a measurement in work, `hover` being the place of the pointer, which may be on a curved plane: what it would be with
+/// that point.
+pub fn preview(
+    scene: &Scene,
+    number: usize,
+    work: &Measurement,
+    hover: Option<[f64; 3]>,
+    on_section: bool,
+) -> Vec<Drawn> {
     let mut shown = work.clone();
+    // On a curved plane the caliper is the way that is straight there.
+    let ends = work.points.first().copied().zip(hover).map(|(from, to)| [from, to].map(|point| scene.place_of(point)));
+    if let (MeasureKind::Distance, 1, Some([from, to])) = (work.kind, work.points.len(), ends.filter(|_| on_section))
+        && let Some(way) = scene.way_on_section(from, to)
+    {
+        let points = way.into_iter().map(|place| scene.point_of(place)).collect();
+        let way = Measurement { kind: MeasureKind::Surface, points, ..Measurement::default() };
+        let mut found = drawn(scene, &[way]);
+        found.iter_mut().for_each(|drawn| drawn.label = drawn.label.replacen("1:", &format!("{number}:"), 1));
+        return found;
+    }
     let is_open = work.kind.complete_at().is_none_or(|count| work.points.len() < count);
     shown.points.extend(hover.filter(|_| is_open && !work.points.is_empty()));
     let closed = Measurement { points: Vec::new(), ..shown.clone() };

@@ -11,11 +11,12 @@ use crate::spirv::volumes_to_layers::volumes_to_layers;
 use crate::spirv::{self, Access, Dimension, Kind, Member, Module};
 
 /// Textures and tables that a shader declares and a pass may not bind. Specialization constants say whether they are read or written.
-const OPTIONAL: [&str; 28] = [
+const OPTIONAL: [&str; 29] = [
     "back_light",
     "before",
     "bricks",
     "composited",
+    "curve_columns",
     "cuts",
     "distance_map",
     "front",

@@ -181,6 +181,15 @@ pub(super) fn tile_table(scene: &Scene) -> Vec<f32> {
     floats(sheet.table(scene.settings.planes.thickness))
 }
 
+/// The columns of a curved plane, as `Sheet::column_table` lays them out, relative to [`Scene::local_origin`].
+pub(super) fn curve_table(scene: &Scene) -> Vec<f32> {
+    let mut sheet = scene.sheet();
+    if let Some(section) = sheet.tiles.last_mut().and_then(|tile| tile.section.as_mut()) {
+        section.origin = scene.to_local(section.origin);
+    }
+    floats(sheet.column_table(scene.settings.planes.thickness))
+}
+
 /// Outward normal and limit of each half-space of the block, relative to [`Scene::local_origin`].
 pub(super) fn block_table(scene: &Scene) -> Vec<f32> {
     floats(

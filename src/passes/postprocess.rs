@@ -71,7 +71,7 @@ pub fn tone_constants(scene: &Scene) -> Vec<(&'static str, i32)> {
     vec![
         ("COLOUR_MAP", (post.colour_map != ColourMap::None) as i32),
         ("GAMMA", (post.gamma != 1.0) as i32),
-        ("CROSSING", if scene.shows_three() && scene.draws_lines() { 2 } else { 0 }),
+        ("CROSSING", if (scene.shows_three() || scene.has_curve()) && scene.draws_lines() { 2 } else { 0 }),
     ]
 }
 
@@ -104,7 +104,7 @@ pub fn toned(scene: &Scene, colour: [f64; 3]) -> [f64; 3] {
 fn with_lines(sheet: &Sheet, tile: &Tile, mut colour: [f64; 3], x: usize, y: usize) -> [f64; 3] {
     let place = sheet.place(tile, x, y);
     for (other, line) in &tile.crossed_by {
-        let cover = LINE_STRENGTH * (1.0 - distance(&tile.plane, other, place) / sheet.pixel).max(0.0);
+        let cover = LINE_STRENGTH * (1.0 - distance(&tile.plane, other, place) / tile.pixel).max(0.0);
         colour = std::array::from_fn(|c| colour[c] + (line[c] - colour[c]) * cover);
     }
     let before = |at: usize, axis: usize| at == tile.corner[axis] as usize;

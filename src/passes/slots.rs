@@ -2,7 +2,7 @@
 //! follow from the scene. A slot that no pass of a plan names does not exist.
 
 use super::{cut, lookup_tables};
-use crate::scene::planes::TILE_VECTORS;
+use crate::scene::planes::{TILE_VECTORS, cell};
 use crate::scene::{Layout, Propagation, Scene, SurfaceColour, VolumeFormat};
 use crate::source::StoredType;
 
@@ -257,6 +257,8 @@ slots! {
         lookup_tables::tile_table,
         ByContent,
     );
+    /// The columns of a curved plane: where each is, and through which vector its slab reaches.
+    CurveColumns = D::table("curve_columns", curve_columns, lookup_tables::curve_table, ByContent);
     /// The half-spaces that bound the block of mode cube.
     Block = D::table(
         "block",
@@ -396,6 +398,12 @@ fn entries(scene: &Scene) -> Shape {
 
 fn per_ray(scene: &Scene) -> Shape {
     Shape::Two(scene.ray_size())
+}
+
+/// Two vectors for each column of the last tile.
+fn curve_columns(scene: &Scene) -> Shape {
+    let ([columns, _], [width, _]) = (scene.tile_grid(), scene.picture_size());
+    Shape::Buffer(32 * (width - cell(width, columns - 1, columns)))
 }
 
 fn per_pixel(scene: &Scene) -> Shape {

@@ -1,10 +1,10 @@
 //! Checks of settings. Each error names the setting and its limits.
 
-use super::planes::{MAX_SLAB, MAX_TILES};
+use super::planes::{MAX_SLAB, MAX_TILES, MIN_APART};
 use super::{
-    Bilateral, Clip, Compositing, Conditioning, Distance, Edge, Elevation, EnhancedSigma, Layout, Light, MAX_CLIPS,
-    MAX_DEVIATION, MAX_PICTURE, MAX_WINDOW, Mode, Noise, PeronaMalik, Scene, SceneError, Scheme, Settings, Sigma,
-    Smooth, refuse, transfer,
+    Bilateral, Clip, Compositing, Conditioning, Curve, Distance, Edge, Elevation, EnhancedSigma, Layout, Light,
+    MAX_CLIPS, MAX_CURVE_POINTS, MAX_DEVIATION, MAX_PICTURE, MAX_WINDOW, Mode, Noise, PeronaMalik, Scene, SceneError,
+    Scheme, Settings, Sigma, Smooth, refuse, transfer,
 };
 use crate::probe::Geometry;
 use glam::DVec3;
@@ -459,6 +459,7 @@ pub(super) fn check_planes(settings: &Settings) -> Result<(), SceneError> {
     if let Some(spacing) = p.spacing {
         within("planes.spacing", spacing, 1e-4, 1e4)?;
     }
+    check_curve(p.curve.as_ref())?;
     let (inset, tilt) = (&settings.cube.inset, &settings.cube.tilt);
     for (field, inset, tilt) in [
         ("cube.inset.left, cube.tilt.left", inset.left, tilt.left),
@@ -473,6 +474,21 @@ pub(super) fn check_planes(settings: &Settings) -> Result<(), SceneError> {
         tilt.iter().try_for_each(|angle| within(field, *angle, -80.0, 80.0))?;
     }
     within("cube.shading", settings.cube.shading, 0.0, 1.0)
+}
+
+fn check_curve(curve: Option<&Curve>) -> Result<(), SceneError> {
+    let Some(Curve { points, .. }) = curve else { return Ok(()) };
+    let (field, count) = ("planes.curve.points", points.len());
+    if !(2..=MAX_CURVE_POINTS).contains(&count) {
+        let fault = format!("has {count} points, a line has 2 to {MAX_CURVE_POINTS}");
+        return refuse(field, fault);
+    }
+    points.iter().flatten().try_for_each(|value| within(field, *value, -1e6, 1e6))?;
+    let apart = |pair: &[[f64; 2]]| (pair[1][0] - pair[0][0]).hypot(pair[1][1] - pair[0][1]);
+    match points.windows(2).position(|pair| apart(pair) < MIN_APART) {
+        Some(n) => refuse(field, format!("points {} and {} coincide: leave one of them out", n + 1, n + 2)),
+        None => Ok(()),
+    }
 }
 
 /// Checks that need the volume: number of tiles and samples, and whether anything is left of the block.

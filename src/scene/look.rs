@@ -22,6 +22,7 @@ const OF_EXAMINATION: &[&str] = &[
     "planes.tilt",
     "planes.roll",
     "planes.plane",
+    "planes.curve",
     "cube.inset",
     "cube.tilt",
     "slices.everything",
@@ -58,6 +59,7 @@ impl Settings {
                 tilt: kept.planes.tilt,
                 roll: kept.planes.roll,
                 plane: kept.planes.plane,
+                curve: kept.planes.curve,
                 ..look.planes
             },
             cube: Cube { inset: kept.cube.inset, tilt: kept.cube.tilt, ..look.cube },
@@ -111,6 +113,7 @@ mod tests {
                 "planes.tilt=5",
                 "planes.roll=6",
                 "planes.plane=c",
+                "planes.curve={plane='b',points=[[1,2],[3,4]]}",
                 "cube.inset.left=7",
                 "cube.tilt.left=[8,9]",
                 "slices.everything=true",

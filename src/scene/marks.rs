@@ -1,7 +1,7 @@
 //! Marks of a picture: by tile its place, its scale, the letters of the patient's sides at its edges, and the side of the probe's marker.
 //! The viewer and written pictures draw the same.
 
-use super::planes::{cell, colour};
+use super::planes::{CURVE_COLOUR, cell, colour};
 use super::region::depth_offset;
 use super::{Layout, Mode, PlaneName, ProbeMarker, Scene};
 use glam::DVec3;
@@ -58,6 +58,8 @@ pub struct TileMarks {
     pub probe: Option<Edge>,
     /// The letter of the plane and its colour, where several planes are shown.
     pub plane: Option<(&'static str, [f64; 3])>,
+    /// Of a curved plane: the length of its line, mm.
+    pub along: Option<f64>,
 }
 
 impl Scene {
@@ -66,20 +68,28 @@ impl Scene {
         let mut all = Vec::new();
         if self.cuts_planes() {
             let sheet = self.sheet();
-            let three = [PlaneName::A, PlaneName::B, PlaneName::C].map(|name| (name.letter(), colour(name)));
             all.extend(sheet.tiles.iter().enumerate().map(|(n, tile)| {
-                let (letters, probe) = self.sides(tile.plane.right, tile.plane.down);
+                // Along a line that bends away, left and right are no sides of the patient.
+                let heading = tile.section.as_ref().map_or(tile.plane.right, |section| section.heading());
+                let (letters, probe) = self.sides(heading, tile.plane.down);
                 let middle = tile.plane.at.y - depth_offset(&self.geometry);
                 let is_upright = tile.plane.down.y > 0.99;
                 TileMarks {
                     corner: tile.corner.map(f64::from),
                     size: tile.size.map(f64::from),
-                    pixel: sheet.pixel,
+                    pixel: tile.pixel,
                     is_rendering: false,
-                    depth_from: is_upright.then(|| middle - sheet.pixel * f64::from(tile.size[1]) / 2.0),
+                    depth_from: is_upright.then(|| middle - tile.pixel * f64::from(tile.size[1]) / 2.0),
                     letters,
                     probe,
-                    plane: three.get(n).copied().filter(|_| self.shows_three()),
+                    plane: match &tile.section {
+                        Some(_) => Some(("S", CURVE_COLOUR)),
+                        None if self.has_curve() || self.shows_three() => {
+                            self.plane_of_tile(n).map(|name| (name.letter(), colour(name)))
+                        }
+                        None => None,
+                    },
+                    along: tile.section.as_ref().map(|section| section.line.length()),
                 }
             }));
         }
@@ -111,6 +121,7 @@ impl Scene {
             letters,
             probe,
             plane: None,
+            along: None,
         }
     }
 
@@ -160,6 +171,11 @@ impl TileMarks {
             Some(Edge::Right) => [-1.0, -1.0],
             _ => [1.0, -1.0],
         }
+    }
+
+    /// What a curved plane says of itself: across it shows the length along its line.
+    pub fn along_label(&self) -> Option<String> {
+        self.along.map(|mm| format!("along the line: {mm:.1} mm"))
     }
 
     /// The longest scale bar of at most a share of the tile's width: its length, mm and pixels.

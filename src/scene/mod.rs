@@ -6,6 +6,7 @@ pub mod camera;
 mod check;
 mod check_measures;
 pub mod cube;
+pub mod curve;
 pub mod cuts;
 pub mod default_look;
 mod echo_levels;

@@ -182,7 +182,7 @@ fn looks(scene: &Scene) -> Vec<Look> {
         let (clips, sheet): (Vec<_>, _) = (scene.planes_clips().collect(), scene.sheet());
         let view = scene.planes_view();
         looks.extend(sheet.tiles.iter().map(|tile| {
-            let planes = [clips.as_slice(), &tile_faces(scene, tile, sheet.pixel)].concat();
+            let planes = [clips.as_slice(), &tile_faces(scene, tile)].concat();
             Look { low: view.low, high: view.high, planes, reach: 0.0 }
         }));
     }
@@ -225,11 +225,22 @@ fn looks_of_rays(scene: &Scene) -> Vec<Look> {
 }
 
 /// The half-spaces that bound the samples of a tile: its rectangle, as thick as the slab.
-fn tile_faces(scene: &Scene, tile: &Tile, pixel: f64) -> Vec<(DVec3, f64)> {
+fn tile_faces(scene: &Scene, tile: &Tile) -> Vec<(DVec3, f64)> {
     let Plane { at, right, down, normal } = tile.plane;
-    let [width, height] = tile.size.map(|n| f64::from(n) * pixel / 2.0);
+    let [width, height] = tile.size.map(|n| f64::from(n) * tile.pixel / 2.0);
     // Slabs reach half of their thickness to either side.
-    let sides = [(right, width), (down, height), (normal, scene.settings.planes.thickness / 2.0)];
+    let slab = scene.settings.planes.thickness / 2.0;
+    if tile.section.is_some() {
+        // A box about the line, which is as high as the tile.
+        let columns: Vec<DVec3> = tile.columns().into_iter().flatten().map(|(place, _)| place).collect();
+        let side = |axis: DVec3| {
+            let most = columns.iter().map(|place| axis.dot(*place)).fold(f64::MIN, f64::max);
+            (axis, most + slab)
+        };
+        let ends = [(down, down.dot(at) + height), (-down, height - down.dot(at))];
+        return [right, -right, normal, -normal].map(side).into_iter().chain(ends).collect();
+    }
+    let sides = [(right, width), (down, height), (normal, slab)];
     let faces = |(axis, half): (DVec3, f64)| [(axis, axis.dot(at) + half), (-axis, half - axis.dot(at))];
     sides.into_iter().flat_map(faces).collect()
 }

@@ -93,6 +93,18 @@ pub enum Command {
     BrushRadius(f64),
     /// Removes all cuts.
     ClearCuts,
+    /// Sets a point of the line of a curved plane: the plane that it is drawn on, and the coordinates there, mm.
+    CurvePoint(PlaneName, [f64; 2]),
+    /// Ends the line, and shows the section along it.
+    EndCurve,
+    /// Leaves the line in work.
+    CancelCurve,
+    /// Moves a point of the line of the curved plane, mm.
+    MoveCurvePoint(usize, [f64; 2]),
+    /// Removes the curved plane.
+    ClearCurve,
+    /// Sets a point of the tool's measurement on the curved plane: lateral, depth, elevation, mm.
+    PointOnCurve([f64; 3]),
     /// Counts the voxels of the region whose echo reaches the threshold.
     CountVoxels,
     /// Copies the results as CSV.
@@ -182,6 +194,8 @@ pub enum Tool {
     Brush,
     /// Moves the planes of sections.
     Plane,
+    /// Draws the line of a curved plane.
+    Curve,
     /// Sets the points of a measurement.
     Measure(MeasureKind),
 }
@@ -202,6 +216,7 @@ impl Command {
                 | Command::StepPlane(_)
                 | Command::MoveCrossing(_)
                 | Command::RotatePlanes(_)
+                | Command::MoveCurvePoint(..)
                 | Command::SetSlider(..)
                 | Command::StepSlider(..)
         )
@@ -213,6 +228,7 @@ impl Command {
             (Command::SetSlider(a, _), Command::SetSlider(b, _)) => a == b,
             (Command::StepSlider(a, _), Command::StepSlider(b, _)) => a == b,
             (Command::MoveFace(a, _), Command::MoveFace(b, _)) => a == b,
+            (Command::MoveCurvePoint(a, _), Command::MoveCurvePoint(b, _)) => a == b,
             (Command::MovePoint(a, point, _), Command::MovePoint(b, other, _)) => (a, point) == (b, other),
             (Command::Type(_) | Command::Untype, Command::Type(_) | Command::Untype) => true,
             // Fingers move, turn and zoom at once.
@@ -319,6 +335,8 @@ pub const KEY_BINDINGS: &[Binding] = &[
     shift(Key::PageUp, keys::STEP_PLANE_FAR, Command::StepPlane(-5.0)).repeating(),
     shift(Key::PageDown, keys::STEP_PLANE_FAR, Command::StepPlane(5.0)).repeating(),
     on(Char('j'), keys::RECENTRE, Command::Recentre),
+    shift(Char('c'), keys::CURVED_PLANE, Command::Tool(Tool::Curve)),
+    shift(Key::Delete, keys::REMOVE_CURVED_PLANE, Command::ClearCurve),
     // Measuring.
     on(Char('m'), keys::CALIPER, Command::Tool(Tool::Measure(MeasureKind::Distance))),
     on(Char('n'), keys::ANGLE, Command::Tool(Tool::Measure(MeasureKind::Angle))),
@@ -467,8 +485,9 @@ mod tests {
     fn every_mode_layout_tool_and_plane_has_a_key() {
         use Mode::*;
         let modes = [Volume, Surface, Mixed, Mip, MinIp, Mean, Plane, Orthogonal, Tomography, Cube].map(Command::Mode);
-        let tools = [Tool::Rotate, Tool::Light, Tool::Region, Tool::Clip, Tool::Cut, Tool::Brush, Tool::Plane]
-            .map(Command::Tool);
+        let tools =
+            [Tool::Rotate, Tool::Light, Tool::Region, Tool::Clip, Tool::Cut, Tool::Brush, Tool::Plane, Tool::Curve]
+                .map(Command::Tool);
         let layouts = [Layout::Single, Layout::Four, Layout::Pair].map(Command::Layout);
         let planes = [PlaneName::A, PlaneName::B, PlaneName::C].map(Command::Plane);
         for command in modes.iter().chain(&tools).chain(&layouts).chain(&planes) {

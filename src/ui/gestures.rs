@@ -224,6 +224,7 @@ impl Gestures {
         if is_second && (pane, tool) != (Pane::Rendering, Tool::Brush) {
             match (tool, viewport.scene) {
                 (Tool::Measure(_), _) => return vec![Command::EndMeasure],
+                (Tool::Curve, _) => return vec![Command::EndCurve],
                 (Tool::Plane, Some(scene)) if scene.shows_three() => return vec![Command::Recentre],
                 _ => {}
             }
@@ -240,8 +241,10 @@ impl Gestures {
                 point.map(Command::MoveCrossing).into_iter().collect()
             }
             (Pane::Plane(tile), _) if matches!(tool, Tool::Measure(_)) => {
-                point_on(viewport, tile, at).map(|point| Command::Point(point, false)).into_iter().collect()
+                measured_at(viewport, tile, at).into_iter().collect()
             }
+            (Pane::Plane(_), _) if tool == Tool::Curve && matches!(press.drag, Drag::Handle { .. }) => Vec::new(),
+            (Pane::Plane(tile), _) if tool == Tool::Curve => line_point(viewport, tile, at).into_iter().collect(),
             (Pane::Rendering, _) if matches!(tool, Tool::Measure(_)) => {
                 let pixel = viewport.pixel_at(at).map(|(_, [x, y])| [x + viewport.columns_to_surface(at), y]);
                 pixel.map(Command::PickSurface).into_iter().collect()
@@ -313,6 +316,18 @@ enum Drag {
     },
     /// A contour along the drag, on a tile.
     Trace(usize),
+    /// What cannot be drawn on the curved plane of this tile, which the first point of it tells.
+    OnCurve(usize),
+    /// A straight line from the press to the release, on a tile; or the next point of the line in work.
+    Line {
+        tile: usize,
+        is_next: bool,
+    },
+    /// A point of the line of the curved plane, on its tile.
+    Handle {
+        tile: usize,
+        index: usize,
+    },
     /// The contour of a cut along the drag, on the rendering.
     Cut,
 }
@@ -359,7 +374,7 @@ impl Press {
                     Drag::Rotate
                 }
             }
-            (Pane::Rendering, Tool::Measure(_)) => Drag::Rotate,
+            (Pane::Rendering, Tool::Measure(_) | Tool::Curve) => Drag::Rotate,
             // What the wheel does.
             (Pane::Plane(tile), _) if button != Button::Left => Drag::Step(tile),
             (Pane::Plane(_), _) if !is_plain => Drag::Nothing,
@@ -376,11 +391,16 @@ impl Press {
             }
             (Pane::Plane(tile), Tool::Measure(kind)) => match (viewport.measure_point_at(tile, at, GRAB), kind) {
                 (Some((index, point)), _) => Drag::Point { tile, index, point },
+                (None, kind) if viewport.is_curved(tile) && !is_caliper(kind) => Drag::OnCurve(tile),
                 (None, MeasureKind::Trace | MeasureKind::Volume) => Drag::Trace(tile),
                 (None, MeasureKind::Distance | MeasureKind::Arrow) => {
                     Drag::Caliper { tile, has_first: viewport.has_work }
                 }
                 (None, _) => Drag::Nothing,
+            },
+            (Pane::Plane(tile), Tool::Curve) => match viewport.curve_point_at(tile, at, GRAB) {
+                Some(index) if !viewport.has_work => Drag::Handle { tile, index },
+                _ => Drag::Line { tile, is_next: viewport.has_work },
             },
             (Pane::Plane(tile), _) if tool == Tool::Plane || tool == Tool::Rotate => {
                 match (viewport.cross_at(tile, at, [GRAB_LINE, GRAB]), tool) {
@@ -428,9 +448,14 @@ impl Press {
             self.last = [self.start[0] + x / distance * self.slop, self.start[1] + y / distance * self.slop];
             match self.drag {
                 Drag::Caliper { has_first: true, .. } => {}
-                Drag::Caliper { tile, .. } | Drag::Trace(tile) => {
+                Drag::Caliper { tile, .. } | Drag::Trace(tile) | Drag::OnCurve(tile) => {
                     self.last = self.start;
-                    return point_on(viewport, tile, self.start).map(|point| Command::Point(point, false));
+                    return measured_at(viewport, tile, self.start);
+                }
+                Drag::Line { is_next: true, .. } => {}
+                Drag::Line { tile, .. } => {
+                    self.last = self.start;
+                    return line_point(viewport, tile, self.start);
                 }
                 Drag::Cut => {
                     self.last = self.start;
@@ -451,8 +476,14 @@ impl Press {
     /// The commands at the end of a drag.
     fn end(&self, viewport: &Viewport) -> Vec<Command> {
         match self.drag {
-            Drag::Caliper { tile, .. } => {
-                point_on(viewport, tile, self.last).map(|point| Command::Point(point, false)).into_iter().collect()
+            Drag::Caliper { tile, .. } => measured_at(viewport, tile, self.last).into_iter().collect(),
+            Drag::Line { tile, is_next } => {
+                let ends = (!is_next).then_some(Command::EndCurve);
+                line_point(viewport, tile, self.last)
+                    .into_iter()
+                    .flat_map(|point| [Some(point), ends])
+                    .flatten()
+                    .collect()
             }
             Drag::Trace(_) => vec![Command::EndMeasure],
             Drag::Cut => vec![Command::EndCut],
@@ -497,7 +528,11 @@ impl Press {
                         self.last = from;
                         Command::Plane(name)
                     }
-                    None => Command::StepPlane(-y * viewport.scale() * scene.sheet().pixel),
+                    None => {
+                        let sheet = scene.sheet();
+                        let pixel = sheet.tiles.get(tile).map_or(sheet.pixel, |tile| tile.pixel);
+                        Command::StepPlane(-y * viewport.scale() * pixel)
+                    }
                 }
             }
             Drag::Crossing { tile, way, along } => {
@@ -523,7 +558,8 @@ impl Press {
                 }
                 Command::MoveRegion(by.to_array())
             }
-            Drag::Caliper { .. } => return None,
+            Drag::Caliper { .. } | Drag::OnCurve(_) | Drag::Line { .. } => return None,
+            Drag::Handle { tile, index } => Command::MoveCurvePoint(index, viewport.coordinates(tile, to)?.1),
             Drag::Cut => Command::CutAlong(pixel),
             Drag::Trace(tile) => Command::Point(point_on(viewport, tile, to)?, false),
             Drag::Face(face) => {
@@ -544,6 +580,22 @@ impl Press {
 /// The point of the settings that a tile shows at a position in the window, mm.
 fn point_on(viewport: &Viewport, tile: usize, at: [f64; 2]) -> Option<[f64; 3]> {
     Some(view::below_face(viewport.scene?, viewport.point_on_plane(tile, at)?).to_array())
+}
+
+/// The command that sets a point of a measurement at a position on a tile.
+fn measured_at(viewport: &Viewport, tile: usize, at: [f64; 2]) -> Option<Command> {
+    let point = point_on(viewport, tile, at)?;
+    Some(if viewport.is_curved(tile) { Command::PointOnCurve(point) } else { Command::Point(point, false) })
+}
+
+/// The command that sets a point of a line at a position on a tile; none on tiles that show none of the three planes.
+fn line_point(viewport: &Viewport, tile: usize, at: [f64; 2]) -> Option<Command> {
+    viewport.coordinates(tile, at).map(|(plane, point)| Command::CurvePoint(plane, point))
+}
+
+/// True for what a drag draws from its start to its end.
+fn is_caliper(kind: MeasureKind) -> bool {
+    matches!(kind, MeasureKind::Distance | MeasureKind::Arrow)
 }
 
 /// What a press leaves behind that ends without a release: the contour that it drew.

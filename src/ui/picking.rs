@@ -3,7 +3,7 @@
 pub(super) use crate::scene::picker::Picker;
 
 use crate::measure::overlay;
-use crate::scene::{Measurement, PlaneName, Scene};
+use crate::scene::{MeasureKind, Measurement, PlaneName, Scene};
 use glam::DVec3;
 use std::time::Duration;
 
@@ -26,7 +26,7 @@ pub(super) struct Viewport<'a> {
     pub(super) scene: Option<&'a Scene>,
     /// The measurements that are drawn over it.
     pub(super) measures: &'a [Measurement],
-    /// The points of a measurement are being set.
+    /// The points of a measurement or of a line are being set.
     pub(super) has_work: bool,
     /// The pointer is over a panel: a press there does not reach the picture.
     pub(super) is_covered: bool,
@@ -100,6 +100,8 @@ impl<'a> Viewport<'a> {
         let corner = sheet.tiles.get(tile)?.corner.map(f64::from);
         let reach = reach * self.scale();
         let on_tile = overlay::drawn(scene, self.measures).into_iter().filter(|drawn| drawn.tile[0] == corner);
+        // The points of a way make one line.
+        let on_tile = on_tile.filter(|drawn| self.measures[drawn.index].kind != MeasureKind::Surface);
         let near = on_tile.flat_map(|drawn| drawn.points.into_iter().map(move |(point, at)| (drawn.index, point, at)));
         let near = near.map(|(index, point, [x, y])| (index, point, (x - pixel[0]).hypot(y - pixel[1])));
         near.filter(|near| near.2 <= reach).min_by(|a, b| a.2.total_cmp(&b.2)).map(|near| (near.0, near.1))
@@ -111,8 +113,16 @@ impl<'a> Viewport<'a> {
         let (scene, pixel) = self.pixel_at(at)?;
         let sheet = scene.sheet();
         let shown = sheet.tiles.get(tile).filter(|_| scene.shows_three() && scene.draws_lines())?;
+        if shown.section.is_some() {
+            return None;
+        }
         let way = scene.plane(PlaneName::A).at - sheet.point(shown, pixel);
-        let others = sheet.tiles.iter().enumerate().filter(|(n, _)| *n != tile).map(|(_, other)| other.plane.normal);
+        let others = sheet
+            .tiles
+            .iter()
+            .enumerate()
+            .filter(|(n, other)| *n != tile && other.section.is_none())
+            .map(|(_, other)| other.plane.normal);
         let away: Vec<(DVec3, f64)> = others.map(|normal| (normal, way.dot(normal).abs() / sheet.pixel)).collect();
         let [of_line, of_centre] = reach.map(|reach| reach * self.scale());
         if away.iter().all(|(_, pixels)| *pixels <= of_centre) {
@@ -146,9 +156,30 @@ impl<'a> Viewport<'a> {
         std::array::from_fn(|a| self.corner[a] + if scale > 0.0 { centre[a] / scale } else { 0.0 })
     }
 
-    /// The plane of a tile, if the tiles show different planes.
+    /// The plane of a tile, if the tiles show different planes; of a curved plane the one that it stands on.
     pub(super) fn plane_name(&self, tile: usize) -> Option<PlaneName> {
-        let shows_three = self.scene.is_some_and(Scene::shows_three);
-        [PlaneName::A, PlaneName::B, PlaneName::C].get(tile).copied().filter(|_| shows_three)
+        let scene = self.scene.filter(|scene| scene.shows_three())?;
+        scene.plane_of_tile(tile).or(scene.curve().map(|curve| curve.plane))
+    }
+
+    /// True if a tile is a curved plane.
+    pub(super) fn is_curved(&self, tile: usize) -> bool {
+        self.scene.is_some_and(|scene| scene.sheet().tiles.get(tile).is_some_and(|tile| tile.section.is_some()))
+    }
+
+    /// A position on a tile of one of the three planes: the plane, and the coordinates there, mm.
+    pub(super) fn coordinates(&self, tile: usize, at: [f64; 2]) -> Option<(PlaneName, [f64; 2])> {
+        let (scene, place) = (self.scene?, self.point_on_plane(tile, at)?);
+        let name = scene.plane_of_tile(tile)?;
+        Some((name, scene.point_on_plane(name, place)))
+    }
+
+    /// The point of the line of the curved plane that is drawn within `reach` pixels of the window of a position on a tile.
+    pub(super) fn curve_point_at(&self, tile: usize, at: [f64; 2], reach: f64) -> Option<usize> {
+        let (scene, pixel) = self.pixel_at(at)?;
+        let line = scene.curve_line(&scene.sheet()).filter(|line| line.tile == tile)?;
+        let away = line.points.iter().map(|[x, y]| (x - pixel[0]).hypot(y - pixel[1])).enumerate();
+        let near = away.filter(|(_, away)| *away <= reach * self.scale());
+        near.min_by(|a, b| a.1.total_cmp(&b.1)).map(|(index, _)| index)
     }
 }

@@ -263,6 +263,8 @@ fn plane_scenes() -> Vec<SceneSpec> {
         "mode = 'plane'\nplanes = { plane = 'b', thickness = 7, slab = 'min' }\npicture = { size = [19, 26] }\npost = { colour_map = 'ice' }".into(),
         "mode = 'plane'\nplanes = { position = [900, 20, 0], plane = 'b' }\npicture = { size = [9, 9] }".into(),
         format!("mode = 'plane'\nplanes = {{ {TURNED} }}\npicture = {{ size = [30, 30] }}\nclip = [{{ at = [0, 25, 0], normal = [0.3, -1, 0.2] }}, {{ at = [5, 0, 0], normal = [1, 0, 0] }}]"),
+        format!("mode = 'orthogonal'\npicture = {{ size = [47, 39] }}\nplanes = {{ {TURNED}, curve = {{ plane = 'c', points = [[-9, 3], [-2, -6], [5, 2], [11, 1]] }} }}"),
+        "mode = 'plane'\npicture = { size = [53, 29] }\nplanes = { thickness = 3, zoom = 1.4, curve = { points = [[-12, 12], [0, 24], [13, 15]] } }".into(),
         "mode = 'vr'\nlayout = 'four'\npicture = { size = [27, 31] }".into(),
         "mode = 'vr'\nlayout = 'four'\npicture = { size = [27, 31] }\nregion = { depth = [9, 20], lateral = [-4, 9] }
          clip = [{ at = [0, 15, 0], normal = [1, 0, 0.3] }]\nplanes.smooth = { lateral = 1.5, depth = 1, elevation = 1.2 }".into(),

@@ -10,6 +10,7 @@ mod conditioning;
 #[cfg(feature = "view")]
 mod console;
 mod cube;
+mod curved_plane;
 mod cuts;
 mod deep_pictures;
 mod detector;

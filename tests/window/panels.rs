@@ -239,6 +239,60 @@ fn a_cut_is_shown_saved_and_taken_back() {
     view.leave();
 }
 
+/// A line that is clicked on plane A is in the workspace as it was clicked, and the window shows the section that the command renders.
+#[test]
+fn a_curved_plane_is_drawn_shown_saved_and_taken_back() {
+    let desk = Desk::new(false);
+    let folder = Folder::new("curve");
+    let view = desk.view(&["--size", "1000x700", "--source", SWEEP, "--save-to", &folder.path("kept")]);
+    let (corner, size) = picture();
+    shows(&view, &headless(size, &[]), "the start");
+    desk.tap('8');
+    let start = headless(size, &["--mode", "orthogonal"]);
+    // The lower right tile, without its borders and labels.
+    let part = |wanted: &Picture, what: &str| {
+        let from = size.map(|n| n / 2 + n / 8);
+        view.shows_at(wanted, [corner[0] + from[0], corner[1] + from[1]], from, size.map(|n| n / 4), what);
+    };
+    part(&start, "three planes and no section");
+    desk.press(SHIFT, true);
+    desk.tap('c');
+    desk.press(SHIFT, false);
+    let clicks = [[60, 120], [110, 170], [180, 150], [230, 190]];
+    for [x, y] in clicks {
+        view.click(corner[0] as i16 + x, corner[1] as i16 + y);
+        // Not a double click.
+        std::thread::sleep(std::time::Duration::from_millis(500));
+    }
+    desk.tap(0xff0d_u32);
+    let file = save_workspace(&desk, &folder);
+    let workspace = until("the whole workspace", || Workspace::read(&file).ok());
+    let settings = workspace.layers.clone().finish().expect("settings");
+    let recording = echolume::source::open(workspace.recording(&file).expect("a recording"), None).expect("it opens");
+    let input = Input { stored: recording.stored_type(), range: recording.range() };
+    let scene = Scene::new(recording.geometry(0), input, settings).expect("a scene");
+    let line = scene.curve_line(&scene.sheet()).expect("a line");
+    assert_eq!(line.points.len(), clicks.len());
+    for ([x, y], clicked) in line.points.iter().zip(clicks) {
+        let off = (x - f64::from(clicked[0])).hypot(y - f64::from(clicked[1]));
+        assert!(off < 0.6, "{off} pixels beside {clicked:?}");
+    }
+    let png = folder.path("curve.png");
+    let size_of_picture = format!("{}x{}", size[0], size[1]);
+    let run = std::process::Command::new(PROGRAM)
+        .args(["render", &file.to_string_lossy(), "-o", &png, "--size", &size_of_picture])
+        .output()
+        .expect("the program runs");
+    assert!(run.status.success(), "{}", String::from_utf8_lossy(&run.stderr));
+    let curved = Picture::load(png.as_ref()).expect("a picture");
+    part(&curved, "the section");
+    control(&desk, 'z');
+    part(&start, "taken back");
+    control(&desk, 'y');
+    part(&curved, "done again");
+    view.leave();
+}
+
 /// A caliper of 100 pixels and an angle on plane A, whose workspace renders with them. Requirement: 0.1 mm.
 fn measure_on_a_plane(desk: &Desk, view: &View, folder: &Folder) {
     let (corner, size) = picture();

@@ -4,7 +4,7 @@
 use super::ray;
 use crate::passes::pass::*;
 use crate::passes::postprocess;
-use crate::scene::planes::Sheet;
+use crate::scene::planes::{Column, Sheet, Tile};
 use crate::scene::{Scene, Slab};
 use glam::DVec3;
 
@@ -36,7 +36,7 @@ pub const PASS: Pass = Pass {
     reference: |scene, _, reads, writes| {
         let volume = reads.get("volume");
         let picture = writes.get_mut("picture");
-        let sheet = scene.sheet();
+        let sheet = Cut::of(scene);
         let [width, height, _] = picture.size;
         for (x, y) in (0..height).flat_map(|y| (0..width).map(move |x| (x, y))) {
             let rgba = value_at(scene, volume, &sheet, x, y).map_or([0.0; 4], |v| [v, v, v, 1.0]);
@@ -66,11 +66,11 @@ pub const TONED: Pass = Pass {
     reference: |scene, _, reads, writes| {
         let volume = reads.get("volume");
         let screen = writes.get_mut("screen");
-        let sheet = scene.sheet();
+        let sheet = Cut::of(scene);
         let [width, height, _] = screen.size;
         for (x, y) in (0..height).flat_map(|y| (0..width).map(move |x| (x, y))) {
             let colour = value_at(scene, volume, &sheet, x, y).map(|v| [v; 3]);
-            screen.set([x, y, 0], &postprocess::reference_pixel(scene, Some(&sheet), colour, x, y));
+            screen.set([x, y, 0], &postprocess::reference_pixel(scene, Some(&sheet.sheet), colour, x, y));
         }
     },
     ..PASS
@@ -80,6 +80,7 @@ fn reads(scene: &Scene) -> Vec<Bind> {
     let mut reads = ray::reads(scene);
     reads.iter_mut().filter(|b| b.slot == Slot::of_rays(scene)).for_each(|b| b.slot = Slot::of_planes(scene));
     reads.push(whole("tiles", Slot::Tiles));
+    reads.extend(scene.has_curve().then_some(whole("curve_columns", Slot::CurveColumns)));
     reads
 }
 
@@ -98,13 +99,33 @@ fn constants(scene: &Scene) -> Vec<(&'static str, i32)> {
     constants.push(("SAMPLES", scene.slab_samples() as i32));
     constants.push(("SLAB", scene.settings.planes.slab.number()));
     constants.push(("ONE_TILE", (scene.tile_count() == 1) as i32));
+    constants.push(("CURVED", scene.has_curve() as i32));
     constants
 }
 
-/// The value of a pixel; none outside all tiles and outside the insonified region.
-fn value_at(scene: &Scene, volume: &Texels, sheet: &Sheet, x: usize, y: usize) -> Option<f64> {
+/// The sheet, and the columns of its curved plane.
+struct Cut {
+    sheet: Sheet,
+    columns: Vec<Option<Column>>,
+}
+
+impl Cut {
+    fn of(scene: &Scene) -> Cut {
+        let sheet = scene.sheet();
+        let columns = sheet.tiles.last().map_or(Vec::new(), Tile::columns);
+        Cut { sheet, columns }
+    }
+}
+
+/// The value of a pixel; none outside all tiles, beyond the ends of a curved plane, and outside the insonified region.
+fn value_at(scene: &Scene, volume: &Texels, Cut { sheet, columns }: &Cut, x: usize, y: usize) -> Option<f64> {
     let tile = sheet.tile_at(x, y)?;
-    slab(scene, volume, sheet.place(tile, x, y), tile.plane.normal)
+    if tile.section.is_none() {
+        return slab(scene, volume, sheet.place(tile, x, y), tile.plane.normal);
+    }
+    let (place, across) = columns[x - tile.corner[0] as usize]?;
+    let down = (y as f64 + 0.5 - f64::from(tile.corner[1]) - f64::from(tile.size[1]) / 2.0) * tile.pixel;
+    slab(scene, volume, place + tile.plane.down * down, across)
 }
 
 /// The scene without its camera and its rays' step, which no plane depends on. Where one plane fills the picture, the rays begin at its

@@ -55,7 +55,7 @@ pub enum MeasureKind {
     Ellipse,
     /// Area and circumference of a closed contour.
     Trace,
-    /// Length along the rendered surface.
+    /// Length along the rendered surface; without `on_surface` along a line in space, such as on a curved plane.
     Surface,
     /// Volume by contours: area times distance, or turned about an axis.
     Volume,
@@ -71,6 +71,19 @@ impl Measurement {
     /// Number of its points, those of its contours included.
     pub fn count(&self) -> usize {
         self.points.len() + self.contours.iter().map(Vec::len).sum::<usize>()
+    }
+
+    /// What the length of a way is along.
+    pub fn way(&self) -> &'static str {
+        if self.on_surface { "along the surface" } else { "along the line" }
+    }
+
+    /// Its name for the user.
+    pub fn title(&self) -> &'static str {
+        match (self.kind, self.on_surface) {
+            (MeasureKind::Surface, false) => "Along a line",
+            (kind, _) => kind.title(),
+        }
     }
 }
 

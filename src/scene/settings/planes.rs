@@ -45,7 +45,26 @@ pub struct Planes {
     /// planes and filters of the rendering are the rendering's. Absent: the planes are cut from what is rendered. It takes a second volume's
     /// memory, and scan conversion and this Gaussian once more for each frame.
     pub smooth: Option<Smooth>,
+    /// A curved plane: the section along a line that is drawn on one of the planes, perpendicular to that plane, straightened. Mode orthogonal shows it in
+    /// its fourth tile, mode plane below or beside the plane that the line is drawn on. Across it shows the length along the line, down the direction
+    /// perpendicular to the plane, both in mm of the same scale: that of the planes, unless the line is too long for its tile. A slab reaches to both sides of
+    /// the line. Other modes do not show it.
+    pub curve: Option<Curve>,
 }
+
+/// The line of a curved plane: `curve = { plane = 'a', points = [[-20, 40], [0, 50], [20, 40]] }`.
+#[derive(Clone, Debug, Default, PartialEq, Deserialize, Serialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct Curve {
+    /// The plane that it is drawn on. It turns with that plane, and stays when the plane is stepped.
+    pub plane: PlaneName,
+    /// 2 to 64 points of the plane, mm: lateral and depth on A, elevation and depth on B, lateral and -elevation on C, as in `region`. Planes that are turned turn
+    /// them about the middle of the insonified region. The line is a smooth cubic through them; two points make a straight line.
+    pub points: Vec<[f64; 2]>,
+}
+
+/// Most points of the line of a curved plane.
+pub const MAX_CURVE_POINTS: usize = 64;
 
 impl Default for Planes {
     fn default() -> Self {
@@ -65,6 +84,7 @@ impl Default for Planes {
             reference: false,
             lines: true,
             smooth: None,
+            curve: None,
         }
     }
 }

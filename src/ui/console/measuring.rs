@@ -233,7 +233,11 @@ impl Console {
             self.execute(&Command::CancelMeasure, Instant::now());
             return true;
         }
-        let is_measuring = matches!(self.controls.tool(), Tool::Measure(_));
+        if self.controls.line().is_some() {
+            self.execute(&Command::CancelCurve, Instant::now());
+            return true;
+        }
+        let is_measuring = matches!(self.controls.tool(), Tool::Measure(_) | Tool::Curve);
         if is_measuring {
             self.execute(&Command::Tool(Tool::default()), Instant::now());
         }
@@ -268,7 +272,12 @@ impl Console {
                 _ => Vec::new(),
             });
         }
-        (key == Key::Enter && self.controls.work().is_some()).then(|| vec![Command::EndMeasure])
+        let ends = match (self.controls.work(), self.controls.line()) {
+            (Some(_), _) => Some(Command::EndMeasure),
+            (None, Some(_)) => Some(Command::EndCurve),
+            (None, None) => None,
+        };
+        ends.filter(|_| key == Key::Enter).map(|command| vec![command])
     }
 }
 

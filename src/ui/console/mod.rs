@@ -436,7 +436,7 @@ impl Console {
             size: area.1.map(f64::from),
             scene: self.stream.scene(),
             measures: &measures,
-            has_work: self.controls.work().is_some(),
+            has_work: self.controls.work().is_some() || self.controls.line().is_some(),
             is_covered: self.asks_to_leave || (is_over_panel && self.fixed.overlay),
             now: now.saturating_duration_since(self.started),
         };
@@ -800,8 +800,17 @@ fn answer(input: &Input) -> Option<Command> {
 
 /// True for continuous commands that may leave the rays as they are.
 fn is_of_tone(command: &Command) -> bool {
-    use Command::{MoveCrossing, MoveLight, RotatePlanes, SetSlider, StepPlane, StepSlider};
-    matches!(command, MoveLight(_) | StepPlane(_) | MoveCrossing(_) | RotatePlanes(_) | SetSlider(..) | StepSlider(..))
+    use Command::{MoveCrossing, MoveCurvePoint, MoveLight, RotatePlanes, SetSlider, StepPlane, StepSlider};
+    matches!(
+        command,
+        MoveCurvePoint(..)
+            | MoveLight(_)
+            | StepPlane(_)
+            | MoveCrossing(_)
+            | RotatePlanes(_)
+            | SetSlider(..)
+            | StepSlider(..)
+    )
 }
 
 #[cfg(test)]

@@ -1,5 +1,6 @@
 //! The settings of the view, and how commands change them. After any command the settings can be drawn with the current volume.
 
+mod curving;
 mod cutting;
 mod history;
 mod measuring;
@@ -12,8 +13,8 @@ use crate::scene::default_look::Defaults;
 use crate::scene::load;
 use crate::scene::planes::MAX_TILES;
 use crate::scene::{
-    Camera, Cube, Inset, KeptSide, Layout, MAX_PICTURE, Measurement, Mode, Planes, Scene, Settings, Shadow, Tilt,
-    Transfer,
+    Camera, Cube, Curve, Inset, KeptSide, Layout, MAX_PICTURE, Measurement, Mode, Planes, Scene, Settings, Shadow,
+    Tilt, Transfer,
 };
 use crate::ui::texts;
 pub(super) use cutting::BRUSH_RADII;
@@ -53,6 +54,8 @@ pub struct Controls {
     work: Option<Measurement>,
     /// The measurement whose text is being typed.
     typing: Option<usize>,
+    /// The line of a curved plane in work.
+    line: Option<Curve>,
     /// The contour of a cut in work, pixels of the picture, and the side of it that stays.
     outline: Vec<[f64; 2]>,
     kept_side: KeptSide,
@@ -73,6 +76,7 @@ impl Controls {
             history: History::default(),
             work: None,
             typing: None,
+            line: None,
             outline: Vec::new(),
             kept_side: KeptSide::default(),
             brush_radius: cutting::BRUSH_RADIUS,
@@ -99,13 +103,13 @@ impl Controls {
             self.history.record(before, &Command::Reset);
         }
         (self.tool, self.rendered) = (Tool::default(), Controls::new(self.start.clone()).rendered);
-        (self.work, self.typing) = (None, None);
+        (self.work, self.typing, self.line) = (None, None, None);
     }
 
     /// Whether there is something to undo, and to redo.
     pub fn can_undo(&self) -> [bool; 2] {
         let [past, future] = self.history.has();
-        [past || self.work.is_some(), future]
+        [past || self.work.is_some() || self.line.is_some(), future]
     }
 
     /// The next change is a step of its own for undo.
@@ -116,7 +120,7 @@ impl Controls {
     /// Goes a step back, or forth again. The size of the picture stays. A step that this volume cannot show is left out.
     fn travel(&mut self, back: bool, scene: Option<&Scene>) -> Change {
         self.typing = None;
-        if back && self.undo_point() {
+        if back && (self.undo_point() || self.undo_line_point()) {
             return Change::Marks;
         }
         loop {
@@ -190,17 +194,22 @@ impl Controls {
     /// Applies a command. `scene` is the one on the screen, which may be of earlier settings. Without it only the tool, the reset and
     /// the commands for the caller have an effect.
     pub(super) fn apply(&mut self, command: &Command, scene: Option<&Scene>) -> Change {
-        if let Some(change) = self.cut(command, scene) {
+        if let Some(change) = self.cut(command, scene).or_else(|| self.curve(command, scene)) {
             return change;
         }
         match command {
             Command::Tool(tool) => {
                 let changed = *tool != self.tool;
                 if changed {
-                    (self.work, self.typing) = (None, None);
+                    (self.work, self.typing, self.line) = (None, None, None);
                 }
                 self.tool = *tool;
-                return if changed { Change::Tool } else { Change::Nothing };
+                let mode = self.mode_for_line().filter(|_| changed && *tool == Tool::Curve);
+                return match mode.map(|mode| self.apply(&mode, scene)) {
+                    Some(Change::Settings) => Change::Settings,
+                    _ if changed => Change::Tool,
+                    _ => Change::Nothing,
+                };
             }
             Command::Reset => {
                 self.reset();
@@ -350,6 +359,8 @@ impl Controls {
             }
             Command::Reference(on) if now.settings.mode == Mode::Tomography => new.planes.reference = on,
             Command::Recentre if now.cuts_planes() => new.planes.position = None,
+            Command::MoveCurvePoint(index, to) if finite(&to) => return curving::moved(new, index, to),
+            Command::ClearCurve => new.planes.curve = None,
             Command::RotatePlanes(by) if finite(&by) => {
                 new.planes.azimuth = view::wrap_degrees(new.planes.azimuth + by[0]);
                 new.planes.tilt = view::wrap_degrees(new.planes.tilt + by[1]);

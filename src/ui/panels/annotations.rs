@@ -71,6 +71,10 @@ pub(super) fn paint(ui: &Ui, state: &PanelState, scale: f32) {
         if n > 0 && scene.settings.mode == Mode::Tomography {
             continue;
         }
+        if let Some(label) = tile.along_label() {
+            let places = (0..5).map(|n| area.center_bottom() - vec2(0.0, 6.0 + 20.0 * n as f32));
+            text_at_one_of(&painter, &mut taken, places, Align2::CENTER_BOTTOM, &label, TEXT);
+        }
         match tile.depth_from {
             Some(top) => ruler(&painter, &mut taken, area, top, tile.pixel * f64::from(scale)),
             None => bar(&painter, &mut taken, area, tile.pixel * f64::from(scale)),

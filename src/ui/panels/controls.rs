@@ -6,7 +6,7 @@ use super::colours::{
 };
 use super::measures;
 use super::names::{self, Tell};
-use super::{PanelState, TEXT_SIZE, TOUCH_SIZE, heading};
+use super::{PanelState, SMALL_TEXT, TEXT_SIZE, TOUCH_SIZE, heading};
 use crate::scene::{ColourMap, KeptSide, Layout, Mode, PlaneName, Settings, Transfer, TransferName};
 use crate::ui::cine_player::{CineState, SPEEDS};
 use crate::ui::command::{Command, Tool};
@@ -21,7 +21,7 @@ use egui::{
     StrokeKind, Ui, WidgetInfo, WidgetType, pos2, vec2,
 };
 
-const TOOLS: [(Tool, &str); 7] = [
+const TOOLS: [(Tool, &str); 8] = [
     (Tool::Rotate, texts::TURN),
     (Tool::Light, texts::LIGHT),
     (Tool::Region, texts::REGION),
@@ -29,6 +29,7 @@ const TOOLS: [(Tool, &str); 7] = [
     (Tool::Cut, texts::CUT),
     (Tool::Brush, texts::BRUSH),
     (Tool::Plane, texts::PLANES),
+    (Tool::Curve, texts::CURVE),
 ];
 
 const PLANES: [(PlaneName, &str); 3] = [(PlaneName::A, "A"), (PlaneName::B, "B"), (PlaneName::C, "C")];
@@ -113,6 +114,9 @@ pub(super) fn show_modes(ui: &mut Ui, state: &PanelState, width: f32, execute: &
                     execute(Command::Recentre);
                 }
             }
+            if !state.has_column {
+                curve(ui, state, width - 16.0, execute);
+            }
             names::group(ui, texts::MEASURE, |ui| {
                 heading(ui, texts::MEASURE);
                 measures::show_tools(ui, state, width - 16.0, execute);
@@ -178,6 +182,45 @@ fn cuts(ui: &mut Ui, state: &PanelState, width: f32, execute: &mut dyn FnMut(Com
             let hint = texts::REMOVE_ALL_CUTS_HINT;
             if ui.add(button).tell(hint).clicked() {
                 execute(Command::ClearCuts);
+            }
+        }
+    });
+}
+
+/// With its tool, what to do next for a curved plane; and what removes it, while there is one.
+fn curve(ui: &mut Ui, state: &PanelState, width: f32, execute: &mut dyn FnMut(Command)) {
+    let (is_chosen, line) = (state.controls.tool() == Tool::Curve, state.controls.line());
+    let has_curve = state.controls.settings().planes.curve.is_some();
+    if !is_chosen && !has_curve {
+        return;
+    }
+    names::group(ui, texts::CURVED_PLANE, |ui| {
+        heading(ui, texts::CURVED_PLANE);
+        ui.set_max_width(width);
+        if is_chosen {
+            let step = match (line.map(|line| line.points.len()), has_curve) {
+                (Some(1), _) => texts::CURVE_STEP_SECOND,
+                (Some(_), _) => texts::CURVE_STEP_NEXT,
+                (None, true) => texts::CURVE_STEP_CHANGE,
+                (None, false) => texts::CURVE_STEP_FIRST,
+            };
+            names::group(ui, step, |ui| {
+                names::announce(ui, step, false);
+                ui.add(Label::new(RichText::new(step).size(SMALL_TEXT).color(ACCENT)).wrap());
+            });
+        }
+        let size = vec2(width, TOUCH_SIZE * 0.75);
+        if line.is_some_and(|line| line.points.len() > 1) {
+            let hint = texts::END_CURVE_HINT;
+            let button = super::overlays::first(RichText::new(texts::END_CURVE));
+            if ui.add_sized(size, button).tell(hint).clicked() {
+                execute(Command::EndCurve);
+            }
+        }
+        if has_curve {
+            let hint = texts::REMOVE_CURVE_HINT;
+            if ui.add_sized(size, Button::new(texts::REMOVE_CURVE)).tell(hint).clicked() {
+                execute(Command::ClearCurve);
             }
         }
     });
@@ -312,6 +355,7 @@ pub(super) fn show_controls(ui: &mut Ui, state: &PanelState, width: f32, execute
             ui.add_space(6.0);
             measures::show_results(ui, state, width - 40.0, execute);
             cuts(ui, state, width - 32.0, execute);
+            curve(ui, state, width - 32.0, execute);
             heading(ui, texts::CONTROLS);
             let in_front = FRONT.map(|(name, sliders)| (name, front(sliders, settings)));
             let with_cuts = depth_of_cut(state);

@@ -93,7 +93,7 @@ fn results(ui: &mut Ui, state: &PanelState, width: f32, execute: &mut dyn FnMut(
             let name = match (measured.kind, measured.text.is_empty()) {
                 (_, false) => &measured.text,
                 (MeasureKind::Threshold, true) => texts::ECHOES,
-                (kind, true) => kind.title(),
+                (_, true) => measured.title(),
             };
             let typing = if state.controls.typing() == Some(n) { "_" } else { "" };
             let text = RichText::new(format!("{} {name}{typing}", n + 1)).size(SMALL_TEXT);
@@ -206,19 +206,22 @@ pub(super) fn paint(ui: &Ui, state: &PanelState, scale: f32) {
         let hover = ui.ctx().pointer_hover_pos().filter(|at| picture.contains(*at));
         let hover = hover.and_then(|at| place_at(scene, ((at - picture.min) * scale).into()));
         let hover = hover.filter(|_| !work.on_surface);
-        overlay::preview(scene, measures.len() + 1, work, hover).iter().for_each(|drawn| canvas.draw(drawn));
+        let is_curved = hover.is_some_and(|(_, is_curved)| is_curved);
+        overlay::preview(scene, measures.len() + 1, work, hover.map(|(point, _)| point), is_curved)
+            .iter()
+            .for_each(|drawn| canvas.draw(drawn));
     }
 }
 
-/// The point of the settings that a plane shows at a position on the picture, mm.
-fn place_at(scene: &Scene, at: [f32; 2]) -> Option<[f64; 3]> {
+/// The point of the settings that a plane shows at a position on the picture, mm; and whether that is a curved plane.
+fn place_at(scene: &Scene, at: [f32; 2]) -> Option<([f64; 3], bool)> {
     if !scene.cuts_planes() {
         return None;
     }
     let sheet = scene.sheet();
     let at = at.map(f64::from);
     let tile = sheet.tile_at(at[0].max(0.0) as usize, at[1].max(0.0) as usize)?;
-    Some(scene.point_of(sheet.point(tile, at)))
+    Some((scene.point_of(sheet.point(tile, at)), tile.section.is_some()))
 }
 
 struct Canvas {

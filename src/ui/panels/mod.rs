@@ -6,6 +6,7 @@
 mod annotations;
 pub(super) mod colours;
 mod controls;
+mod curve;
 #[cfg(test)]
 pub(super) mod drawn;
 mod lists;
@@ -210,6 +211,7 @@ impl Panels {
             }
             if state.has_drawn {
                 region::paint(ui, state, self.scale);
+                curve::paint(ui, state, self.scale);
                 measures::paint(ui, state, self.scale);
             }
             if state.shows_times {

@@ -141,7 +141,8 @@ fn view_in_words(scene: &Scene) -> String {
             PlaneName::B => "B",
             PlaneName::C => "C",
         };
-        return if scene.shows_three() { String::new() } else { texts::of_plane(plane) };
+        let curved = scene.curve().map_or(String::new(), |curve| texts::with_curved_plane(curve.plane.letter()));
+        return if scene.shows_three() { curved } else { texts::of_plane(plane) + &curved };
     }
     let side = VIEWPOINTS.iter().find(|(viewpoint, _)| view::is_seen_from(scene, *viewpoint));
     match side {

@@ -4,11 +4,11 @@
 use super::shown::Shown;
 use super::*;
 use crate::measure::overlay;
-use crate::scene::planes::colour;
+use crate::scene::planes::{CURVE_COLOUR, colour};
 use crate::ui::panels::accesskit::Role;
 use crate::ui::panels::colours::{
     ABSENT, ACCENT, AXES, BACKGROUND, BUTTON, EDGE, FAULT, FOCUS, FOCUS_EDGE, GOOD, MEASURE, OUTLINE, PANEL, SELECTED,
-    WARNING, of_scene,
+    START, WARNING, of_scene,
 };
 use crate::ui::panels::drawn::{Area, Colour, Drawn, Kind};
 use crate::ui::panels::{Banner, Note};
@@ -222,6 +222,13 @@ fn everything_that_is_drawn_has_the_contrast_that_wcag_demands() {
     check(&shown, "measurements, and one in work");
     shown.apply(Command::Mode(Mode::Tomography));
     check(&shown, "slices");
+    let mut shown =
+        Shown::new("mode='orthogonal'\nplanes.curve={points=[[-20,40],[0,60],[25,45]]}\nmarks.lateral='right-left'");
+    shown.apply(Command::Tool(Tool::Curve));
+    check(&shown, "a curved plane");
+    shown.apply(Command::CurvePoint(PlaneName::A, [-9.0, 50.0]));
+    shown.apply(Command::CurvePoint(PlaneName::A, [5.0, 70.0]));
+    check(&shown, "a line in work");
     let mut shown = Shown::new("mode='surface'");
     shown.is_frozen = true;
     shown.pointer = Some([600.0, 400.0]);
@@ -336,6 +343,7 @@ fn the_formulas_have_their_known_answers() {
 #[test]
 fn colours_with_a_meaning_are_told_apart_by_every_kind_of_vision() {
     let [a, b, c] = [PlaneName::A, PlaneName::B, PlaneName::C].map(|name| of_scene(colour(name)));
+    let curved = of_scene(CURVE_COLOUR);
     let [lateral, depth, elevation] = AXES.map(|(_, colour)| colour);
     let pairs = [
         ("plane A", a, "plane B", b, false),
@@ -344,6 +352,11 @@ fn colours_with_a_meaning_are_told_apart_by_every_kind_of_vision() {
         ("plane A", a, "a measurement", MEASURE, true),
         ("plane B", b, "a measurement", MEASURE, false),
         ("plane C", c, "a measurement", MEASURE, false),
+        ("a curved plane", curved, "plane A", a, false),
+        ("a curved plane", curved, "plane B", b, false),
+        ("a curved plane", curved, "plane C", c, false),
+        ("a curved plane", curved, "a measurement", MEASURE, false),
+        ("a curved plane", curved, "the start of rendering", START, false),
         ("lateral", lateral, "depth", depth, true),
         ("lateral", lateral, "elevation", elevation, false),
         ("depth", depth, "elevation", elevation, true),

@@ -177,6 +177,12 @@ fn nothing_covers_anything_in_any_window_mode_and_layout() {
             shown.apply(Command::Layout(layout));
             check(&shown, &format!("{size:?} at {scale}, {mode:?} {layout:?}"));
         }
+        shown.apply(Command::Tool(Tool::Curve));
+        let points = [[-20.0, 50.0], [0.0, 60.0], [30.0, 52.0]];
+        points.into_iter().for_each(|at| shown.apply(Command::CurvePoint(PlaneName::A, at)));
+        shown.apply(Command::EndCurve);
+        assert!(shown.scene.has_curve());
+        check(&shown, &format!("{size:?} at {scale}, a curved plane"));
     }
 }
 

@@ -2,6 +2,7 @@
 
 mod budget;
 mod colours;
+mod curving;
 mod cutting;
 mod gestures;
 mod layout;
@@ -124,7 +125,8 @@ impl TestWindow {
     fn input(&mut self, input: Input) -> Vec<Command> {
         let scene = self.scene();
         let size = scene.picture_size().map(|n| f64::from(n) * self.enlarged);
-        let (measures, has_work) = (self.controls.measures().to_vec(), self.controls.work().is_some());
+        let has_work = self.controls.work().is_some() || self.controls.line().is_some();
+        let measures = self.controls.measures().to_vec();
         let (corner, scene_shown, now) = (self.corner, Some(&scene), self.now);
         let on = Viewport { corner, size, scene: scene_shown, measures: &measures, has_work, is_covered: false, now };
         let commands = self.gestures.input(&input, &on, self.controls.tool(), self.held);

@@ -17,7 +17,7 @@ fn mode() -> impl Strategy<Value = Mode> {
 }
 
 fn tool() -> impl Strategy<Value = Tool> {
-    prop::sample::select(vec![Tool::Rotate, Tool::Light, Tool::Region, Tool::Clip, Tool::Cut, Tool::Plane])
+    prop::sample::select(vec![Tool::Rotate, Tool::Light, Tool::Region, Tool::Clip, Tool::Cut, Tool::Plane, Tool::Curve])
 }
 
 fn command() -> impl Strategy<Value = Command> {
@@ -38,6 +38,9 @@ fn command() -> impl Strategy<Value = Command> {
         1 => number().prop_map(Command::StepPlane),
         1 => [number(), number(), number()].prop_map(Command::MoveCrossing),
         1 => two().prop_map(Command::RotatePlanes),
+        3 => two().prop_map(|point| Command::CurvePoint(PlaneName::B, point)),
+        2 => Just(Command::EndCurve),
+        1 => (0usize..3, two()).prop_map(|(index, to)| Command::MoveCurvePoint(index, to)),
         6 => (0..SLIDERS.len() + 1, number()).prop_map(|(place, value)| Command::SetSlider(place, value)),
         4 => (0..SLIDERS.len() + 1, any::<i32>()).prop_map(|(place, steps)| Command::StepSlider(place, steps % 20)),
         1 => prop::sample::select(vec![TransferName::Grey, TransferName::Bone]).prop_map(Command::Transfer),
@@ -77,7 +80,8 @@ fn is_finite(command: &Command) -> bool {
         | Command::MoveFace(_, n)
         | Command::MoveClip(n)
         | Command::StepPlane(n) => n.is_finite(),
-        Command::MoveCrossing(n) => all(n),
+        Command::MoveCrossing(n) | Command::PointOnCurve(n) => all(n),
+        Command::CurvePoint(_, n) | Command::MoveCurvePoint(_, n) => all(n),
         Command::SetSlider(_, n) => n.is_finite(),
         _ => true,
     }

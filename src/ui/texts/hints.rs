@@ -111,6 +111,9 @@ pub fn of_tool(tool: Tool) -> &'static str {
             "Drag over what is in the way: what is near the surface there is removed. Modes Surface and Mixed. (Z)"
         }
         Tool::Plane => "Drag or click moves the planes.",
+        Tool::Curve => {
+            "Curved plane: click the points of a line on A, B or C, then Enter or double click; or drag a straight one. (Shift+C)"
+        }
         Tool::Measure(kind) => of_measure(kind),
     }
 }

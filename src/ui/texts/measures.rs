@@ -75,3 +75,8 @@ pub const VOLUMES_ARE_LIVE: &str = "The volumes are live and in no file: save th
 pub fn workspace_not_saved(fault: impl Display) -> String {
     format!("The workspace was not saved: {fault}")
 }
+
+// On the curved plane.
+pub const CURVE_NEEDS_BOTH_ENDS: &str = "A distance on the curved plane needs both of its ends there.";
+pub const CURVE_MEASURES: &str =
+    "On the curved plane distances are measured (Caliper), and texts and arrows set; the rest on A, B or C.";

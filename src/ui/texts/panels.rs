@@ -10,6 +10,7 @@ pub const CLIP: &str = "Clip";
 pub const CUT: &str = "Cut";
 pub const BRUSH: &str = "Brush";
 pub const PLANES: &str = "Planes";
+pub const CURVE: &str = "Curve";
 pub const THRESHOLD: &str = "Threshold";
 pub const GAIN: &str = "Gain";
 pub const SMOOTH: &str = "Smooth";
@@ -197,6 +198,9 @@ pub fn volume_of_loop(number: impl Display, count: impl Display) -> String {
 pub fn count_of_measurements(count: usize) -> String {
     format!("{count} measurement{}.", if count == 1 { "" } else { "s" })
 }
+pub fn with_curved_plane(plane: impl Display) -> String {
+    format!(", with the section along a line on plane {plane}")
+}
 pub fn of_plane(plane: impl Display) -> String {
     format!(", plane {plane}")
 }
@@ -270,6 +274,10 @@ pub const BRUSH_DRAG: &str = "Brush, then drag over it";
 pub const BRUSH_DRAG_DOES: &str = "remove what is near the surface there";
 pub const PLANES_CLICK: &str = "Planes, then click";
 pub const PLANES_CLICK_DOES: &str = "move the point where the three planes cross";
+pub const CURVE_CLICKS: &str = "Curve, then clicks on a plane, Enter";
+pub const CURVE_CLICKS_DO: &str = "curved plane along them; a drag: a straight line";
+pub const CURVE_DRAG: &str = "Curve, then drag a point of the line";
+pub const CURVE_DRAG_DOES: &str = "move it";
 pub const QUIT: &str = "quit";
 pub const KEYS: &str = "Keys";
 pub const GESTURES: &str = "Gestures";
@@ -300,3 +308,19 @@ pub const VESSELS_HINT: &str = "Inverted: fluid is opaque, tissue is clear.";
 pub const BONE_HINT: &str = "A bright surface under soft tissue.";
 pub const B_MODE: &str = "B-mode";
 pub const B_MODE_HINT: &str = "The scan plane in grey.";
+
+// The curved plane.
+pub const CURVE_ON_ANOTHER_PLANE: &str =
+    "The line was begun on another plane: end it there (Enter), or leave it (Esc).";
+pub const CURVE_FULL: &str = "The line has as many points as it can have: end it (Enter).";
+pub const CURVE_NEEDS_POINTS: &str = "A line needs two points or more: click the next one.";
+pub const CURVE_NOT_DRAWN: &str = "This line cannot be drawn: draw another one.";
+pub const CURVED_PLANE: &str = "Curved plane";
+pub const CURVE_STEP_SECOND: &str = "Click the next point of the line.";
+pub const CURVE_STEP_NEXT: &str = "Click the next point; Enter or a double click ends the line.";
+pub const CURVE_STEP_CHANGE: &str = "Drag a point of the line, or draw another line.";
+pub const CURVE_STEP_FIRST: &str = "Click the points of a line on A, B or C, or drag a straight line.";
+pub const END_CURVE_HINT: &str = "Shows the section along the line (Enter).";
+pub const END_CURVE: &str = "End the line";
+pub const REMOVE_CURVE_HINT: &str = "Shows the planes without it (Shift+Delete; undo brings it back).";
+pub const REMOVE_CURVE: &str = "Remove curved plane";

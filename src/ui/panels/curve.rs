@@ -1,0 +1,87 @@
+//! The line of the curved plane on the plane that it is drawn on, with its points while its tool is chosen; and the line in work.
+
+use super::colours::{self, OUTLINE, TEXT};
+use super::{PanelState, picture_rect};
+use crate::measure::overlay;
+use crate::scene::Curve;
+use crate::scene::planes::{CURVE_COLOUR, CurveLine, MIN_APART};
+use crate::ui::command::Tool;
+use egui::{Painter, Rect, Stroke, Ui, vec2};
+
+/// Radius of a point, points.
+const POINT: f32 = 4.5;
+/// Length of the arrow's head, points.
+const HEAD: f64 = 12.0;
+
+pub(super) fn paint(ui: &Ui, state: &PanelState, scale: f32) {
+    let Some(scene) = state.scene else { return };
+    let (is_chosen, work) = (state.controls.tool() == Tool::Curve, state.controls.line());
+    // During a resize the scene has another size for a moment.
+    if scene.picture_size() != state.picture.1 || (scene.settings.planes.curve.is_none() && work.is_none()) {
+        return;
+    }
+    let picture = picture_rect(state, scale);
+    let painter = ui.ctx().layer_painter(egui::LayerId::background()).with_clip_rect(picture);
+    let sheet = scene.sheet();
+    let area = |tile: usize| {
+        let [corner, size] = [sheet.tiles[tile].corner, sheet.tiles[tile].size].map(|[x, y]| vec2(x as f32, y as f32));
+        Rect::from_min_size(picture.min + corner / scale, size / scale)
+    };
+    let draw = |line: &CurveLine, has_points: bool| {
+        let painter = painter.with_clip_rect(area(line.tile).intersect(picture));
+        draw(&painter, picture, scale, line, has_points);
+    };
+    let hover = ui.ctx().pointer_hover_pos().filter(|at| picture.contains(*at));
+    let hover = hover.map(|at| ((at - picture.min) * scale).into()).map(|[x, y]: [f32; 2]| [x, y].map(f64::from));
+    // The tile under the pointer, and the place in space.
+    let under = hover.and_then(|at| {
+        let tile = sheet.tile_at(at[0].max(0.0) as usize, at[1].max(0.0) as usize)?;
+        let number = sheet.tiles.iter().position(|other| other.corner == tile.corner)?;
+        Some((number, sheet.point(tile, at)))
+    });
+    if let Some(line) = scene.curve_line(&sheet) {
+        draw(&line, is_chosen && work.is_none());
+        // Where on the line the pointer over the section is.
+        if let Some((_, place)) = under.filter(|(number, _)| sheet.tiles[*number].section.is_some()) {
+            let [x, y] = sheet.project(&sheet.tiles[line.tile], place).0.map(|v| v as f32);
+            let at = picture.min + vec2(x, y) / scale;
+            let painter = painter.with_clip_rect(area(line.tile).intersect(picture));
+            [Stroke::new(4.0, OUTLINE), Stroke::new(2.0, colours::of_scene(CURVE_COLOUR))].into_iter().for_each(
+                |stroke| {
+                    painter.circle_stroke(at, POINT + 2.0, stroke);
+                },
+            );
+        }
+    }
+    let Some(work) = work else { return };
+    // The line as it would be with a point under the pointer.
+    let under = under.filter(|(number, _)| scene.plane_of_tile(*number) == Some(work.plane));
+    let under = under.map(|(_, place)| scene.point_on_plane(work.plane, place));
+    let last = work.points.last();
+    let under = under.filter(|[x, y]| last.is_some_and(|last| (last[0] - x).hypot(last[1] - y) >= MIN_APART));
+    let points = work.points.iter().copied().chain(under).collect();
+    let shown = Curve { plane: work.plane, points };
+    if let Some(mut line) = scene.line_on_tile(&sheet, &shown) {
+        line.points.truncate(work.points.len());
+        draw(&line, true);
+    }
+}
+
+fn draw(painter: &Painter, picture: Rect, scale: f32, line: &CurveLine, has_points: bool) {
+    let colour = colours::of_scene(CURVE_COLOUR);
+    let at = |[x, y]: [f64; 2]| {
+        let near = |v: f64| (v / f64::from(scale)).clamp(-1e5, 1e5) as f32;
+        picture.min + vec2(near(x), near(y))
+    };
+    let mut strokes: Vec<[[f64; 2]; 2]> = line.line.windows(2).map(|ends| [ends[0], ends[1]]).collect();
+    strokes.extend(line.head().into_iter().flat_map(|head| overlay::arrow_head(head, HEAD * f64::from(scale))));
+    for stroke in [Stroke::new(4.0, OUTLINE), Stroke::new(1.5, colour)] {
+        strokes.iter().for_each(|ends| _ = painter.line_segment(ends.map(at), stroke));
+    }
+    if has_points {
+        for point in &line.points {
+            painter.circle_filled(at(*point), POINT + 2.0, OUTLINE);
+            painter.circle_filled(at(*point), POINT, TEXT);
+        }
+    }
+}
