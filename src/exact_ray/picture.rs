@@ -5,6 +5,7 @@ use super::field::segments;
 use super::projection::projected;
 use super::surface;
 use super::volume::Medium;
+use crate::passes::raycast::cap;
 use crate::passes::raycast::ray::span;
 use crate::passes::{Arrays, MISS, Texels, is_hit};
 use crate::scene::{Mode, Scene, SurfaceColour, View};
@@ -113,14 +114,16 @@ fn volume(scene: &Scene, reads: &Arrays, writes: &mut Arrays, effort: &mut Effor
         };
         let segments = segments(line, texels, view.window, ends);
         let light = Medium::of(scene, line, TOLERANCE).light(&segments);
-        (light, light.hit.map_or(MISS, |s| enter + s))
+        let is_cut = cap::cut_at(scene, reads, x, y).is_some();
+        (light, if is_cut { enter } else { light.hit.map_or(MISS, |s| enter + s) })
     });
     effort.estimate = effort.estimate.max(rms(lights.iter().map(|(light, _)| light.estimate)));
     effort.pieces += lights.iter().map(|(light, _)| light.pieces).sum::<u64>();
     effort.rays += lights.len() as u64;
     let pixels = lights.iter().enumerate().map(|(n, light)| ([n % size[0], n / size[0], 0], light));
     for (at, (light, hit)) in pixels {
-        writes.get_mut("picture").set(at, &light.rgba);
+        let cut = cap::cut_at(scene, reads, at[0], at[1]);
+        writes.get_mut("picture").set(at, &cut.map_or(light.rgba, |cut| cut.over([0.0; 4])));
         if scene.lights_volume() {
             writes.get_mut("distance_map").set(at, &[*hit]);
         }
@@ -147,7 +150,10 @@ fn projection(scene: &Scene, reads: &Arrays, writes: &mut Arrays, effort: &mut E
 fn surfaces(scene: &Scene, reads: &Arrays, writes: &mut Arrays, effort: &mut Effort) {
     let texels = reads.get("volume");
     let size = writes.get("distance_map").size;
-    let found = for_each_ray(scene, scene.surface_view(), size, |_, line, path, enter| {
+    let found = for_each_ray(scene, scene.surface_view(), size, |[x, y], line, path, enter| {
+        if cap::cut_at(scene, reads, x, y).is_some() {
+            return Some((enter, [0.0; 4], 0.0));
+        }
         let found = if path > 0.0 { surface::surface(line, texels, path, enter) } else { None };
         found.map(|f| (enter + f.place, [f.echo, 1.0, f.behind, 0.0], f.off))
     });
