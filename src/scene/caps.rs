@@ -1,22 +1,26 @@
 //! Caps: which cut faces of clip planes show their echoes, and from which echo on there is tissue.
 
-use super::{Mode, Scene, Sign, View, transfer};
+use super::{Mode, Scene, Settings, Sign, View, transfer};
 
-/// Share of the echo that a rendering shows from which on there is tissue: what is darker than this is fluid. The grey scale is
-/// logarithmic. The brain of a fetus has about half of the grey of its skin, a fifth in the shadow of bone; fluid has a
-/// tenth.
-const TISSUE: f64 = 1.0 / 4.0;
-/// A transfer function that draws echoes below this share of its opaque ones has a veil, which is to be seen through.
-const VEIL: f64 = 0.5;
 /// A value is opaque if a stretch of this share of the box's diagonal lets less than half of the light through.
 const STRETCH: f64 = 1.0 / 40.0;
 const OPAQUE: f64 = 0.5;
 
+impl Settings {
+    /// True if there is something that clip planes cut, whether or not their cut faces are shown.
+    pub fn can_cap(&self) -> bool {
+        let is_cut = match self.mode {
+            Mode::Surface | Mode::Mixed => self.surface.sign != Sign::Dark,
+            mode => mode == Mode::Volume,
+        };
+        is_cut && !self.clip.is_empty()
+    }
+}
+
 impl Scene {
-    /// True if clip planes have cut faces: there is a plane, and something is rendered that it cuts.
+    /// True if clip planes have cut faces. Whether anything is tissue (`cap_level`) is a number, and so no reason for another plan.
     pub fn has_caps(&self) -> bool {
-        let is_cut = matches!(self.settings.mode, Mode::Surface | Mode::Volume | Mode::Mixed);
-        is_cut && self.settings.cap.enabled && !self.settings.clip.is_empty()
+        self.settings.cap.enabled && self.settings.can_cap()
     }
 
     /// The region that is cut, with the grey window of planes. In mode mixed that of what begins first.
@@ -32,8 +36,8 @@ impl Scene {
     /// The echo from which on there is tissue, before any window. None if nothing is capped: what is dark is drawn, or everything lets
     /// light through.
     pub fn cap_level(&self) -> Option<f64> {
-        let from = self.drawn_from()?;
-        Some(self.settings.cap.level.unwrap_or(from))
+        let solid = self.solid_from()?;
+        Some(self.settings.cap.level.unwrap_or(solid))
     }
 
     /// Radius of the disc around a place of a cut face that tells tissue from fluid, mm: the length of an edge.
@@ -46,41 +50,31 @@ impl Scene {
         self.settings.mode == Mode::Volume && self.region_fade().is_some()
     }
 
-    /// The level where none is set.
-    fn drawn_from(&self) -> Option<f64> {
+    /// The level where none is set: the echo from which on what is rendered is solid.
+    fn solid_from(&self) -> Option<f64> {
         let surface = &self.settings.surface;
         let [low, high] = surface.window;
-        let detected = low + surface.threshold * (high - low);
-        let is_dark = surface.sign == Sign::Dark;
         match self.settings.mode {
-            Mode::Surface if !is_dark => Some(TISSUE * detected),
-            // The volume in front of the surface is a veil.
-            Mode::Mixed if !is_dark => Some(detected),
-            Mode::Volume => self.composited_from(),
-            _ => None,
+            Mode::Volume => self.opaque_from(),
+            // Of mode mixed the surface alone: the volume in front of it is a veil.
+            _ => Some(low + surface.threshold * (high - low)),
         }
     }
 
-    /// The same of volume rendering: a share of the least echo from which on all are opaque, or that echo itself where there is a veil of
-    /// darker ones.
-    fn composited_from(&self) -> Option<f64> {
+    /// The least echo from which on all are opaque in volume rendering; none if the brightest lets light through.
+    fn opaque_from(&self) -> Option<f64> {
         let volume = &self.settings.volume;
         let table = transfer::table_of(volume, self.reference_length(), self.transfer_entries());
         let stretch = STRETCH * (self.high - self.low).length() / self.reference_length();
         let is_opaque = |entry: &[f64; 4]| transfer::opacity(entry[3] * stretch) >= OPAQUE;
-        let clear = table.iter().rposition(|entry| !is_opaque(entry)).map_or(0, |last| last + 1);
-        let first = table.iter().position(|entry| entry[3] > 0.0)?;
-        if clear == table.len() {
-            return None;
-        }
+        let first = table.iter().rposition(|entry| !is_opaque(entry)).map_or(0, |last| last + 1);
         let [low, high] = volume.window;
-        // What is darker than the window has its first value.
-        let echo = |n: usize| match n {
-            0 => 0.0,
-            n => low + n as f64 / (table.len() - 1) as f64 * (high - low),
-        };
-        let (drawn, opaque) = (echo(first), echo(clear));
-        Some(if drawn < VEIL * opaque { opaque } else { TISSUE * opaque })
+        match first {
+            // What is darker than the window has its first value.
+            0 => Some(0.0),
+            n if n < table.len() => Some(low + n as f64 / (table.len() - 1) as f64 * (high - low)),
+            _ => None,
+        }
     }
 }
 
@@ -99,32 +93,33 @@ mod tests {
         let grid = Grid { size: [120; 3], spacing: [1.0; 3], origin: [-60.0, 0.0, -60.0] };
         let input = Input { stored: StoredType::U8, range: [0.0, 255.0] };
         let scene = Scene::new(Geometry::Cartesian(grid), input, layers.finish().unwrap()).unwrap();
-        assert!(scene.has_caps());
-        scene.cap_level()
+        scene.has_caps().then(|| scene.cap_level())?
     }
 
-    /// Prevents a head that is cut open and empty: the brain is darker than what a preset draws, and the fluid around it darker still.
+    /// Prevents a head that is cut open and empty: the brain is darker than what these presets draw, and the fluid around it darker still.
     #[test]
-    fn presets_that_show_skin_cap_the_brain_and_leave_the_fluid_open() {
-        for preset in ["face", "face-classic", "fetal"] {
+    fn presets_of_the_face_cap_the_brain_and_leave_the_fluid_open() {
+        for preset in ["face", "face-classic"] {
             for mode in ["mode='volume'", "mode='surface'"] {
-                let level = level(preset, &[mode]).unwrap();
-                assert!((0.1..0.25).contains(&level), "{preset}, {mode}: {level}");
+                assert_eq!(level(preset, &[mode]), Some(0.1), "{preset}, {mode}");
             }
         }
     }
 
-    /// Prevents an opaque face in front of what a look shows through something.
+    /// Prevents a face in front of what a look does not draw, or shows through something.
     #[test]
-    fn looks_that_are_seen_through_cap_what_is_opaque_alone() {
+    fn what_is_solid_is_capped_and_nothing_else() {
+        let [surface, mixed] = ["surface", "mixed"].map(|mode| level("bone", &[&format!("mode='{mode}'")]).unwrap());
+        assert!((surface - (0.235 + 0.08 * 0.765)).abs() < 1e-9 && surface == mixed, "{surface}: the threshold");
+        // The ramp of the default look begins at 0.42 and ends at 0.72.
+        let solid = level("face", &["cap.level='none'"]).unwrap();
+        assert!((0.44..0.6).contains(&solid), "{solid}");
         assert!((0.9..0.96).contains(&level("skeleton", &[]).unwrap()), "bone");
         assert_eq!(level("glass", &[]), None, "glass lets light through everywhere");
+        assert_eq!(level("glass", &["cap.level=0.2"]), None, "whatever the level is");
         assert_eq!(level("vessel", &[]), None, "fluid is what is drawn");
         assert_eq!(level("face-classic", &["surface.sign='dark'"]), None);
-        assert_eq!(level("face-classic", &["surface.sign='dark'", "cap.level=0.2"]), None, "whatever the level is");
-        let [surface, mixed] = ["surface", "mixed"].map(|mode| level("bone", &[&format!("mode='{mode}'")]).unwrap());
-        assert!((mixed - 4.0 * surface).abs() < 1e-9, "muscle before the bone is a veil");
         assert_eq!(level("bmode", &["mode='volume'"]), Some(0.0), "every sample is opaque");
-        assert_eq!(level("face", &["cap.level=0.07"]), Some(0.07));
+        assert_eq!(level("bone", &["cap.level=0.07"]), Some(0.07));
     }
 }

@@ -1,7 +1,7 @@
 //! The look of a scene: its mode, filters, transfer function, light and tone, without what belongs to one examination: region, camera, places of
-//! planes, clip planes and their cut faces, cuts, marks and measurements. A preset of a user keeps a look.
+//! planes, clip planes, cuts, marks and measurements. A preset of a user keeps a look.
 
-use super::{Cube, Planes, Projection, Region, Settings, Slices, Surface, Volume};
+use super::{Cap, Cube, Planes, Projection, Region, Settings, Slices, Surface, Volume};
 
 /// The paths of the settings that are no look.
 const OF_EXAMINATION: &[&str] = &[
@@ -11,7 +11,7 @@ const OF_EXAMINATION: &[&str] = &[
     "region.depth",
     "region.elevation",
     "clip",
-    "cap",
+    "cap.enabled",
     "cuts",
     "unveil",
     "camera",
@@ -47,7 +47,7 @@ impl Settings {
             samples: kept.samples,
             region: Region { fade: look.region.fade, ..kept.region },
             clip: kept.clip,
-            cap: kept.cap,
+            cap: Cap { level: look.cap.level, ..kept.cap },
             cuts: kept.cuts,
             unveil: kept.unveil,
             camera: kept.camera,

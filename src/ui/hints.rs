@@ -4,7 +4,7 @@ use super::command::{Tool, Viewpoint};
 use crate::scene::{Layout, MeasureKind, Mode};
 
 /// By name of a slider: what it does.
-const SLIDERS: [(&str, &str); 53] = [
+const SLIDERS: [(&str, &str); 55] = [
     ("Gain", "Makes the picture brighter or darker as a whole."),
     ("Contrast", "Spreads bright and dark apart."),
     ("Gamma", "Brightens (above 1) or darkens the middle tones; black and white stay."),
@@ -22,6 +22,14 @@ const SLIDERS: [(&str, &str); 53] = [
     ),
     ("Start offset", "How far behind the near face of the fluid rendering starts: more removes more."),
     ("Start smoothing", "Smooths the surface at which rendering starts."),
+    (
+        "Echoes on clip face",
+        "Tissue that a clip plane cuts shows its echoes there, as planes do. Off: what is behind it is drawn, lit. Fluid is open either way.",
+    ),
+    (
+        "Clip threshold",
+        "Weaker echoes stay open on the clip face: lower it to fill dark tissue, such as the brain. 0: what is rendered as solid is filled.",
+    ),
     ("Planes zoom", "Enlarges the planes."),
     ("Slab", "Thickness of the planes: a thick slab shows less speckle and more of what runs along it."),
     ("Spacing", "Distance between neighbouring slices. 0: they divide the region evenly."),

@@ -120,6 +120,10 @@ pub(super) const PLANES_ZOOM: usize = 7;
 /// The switch of the render start that follows the fluid.
 pub(super) const AUTO_START: &str = "Auto render start";
 pub(super) const START_OFFSET: &str = "Start offset";
+/// The switch of the cut faces of clip planes.
+pub(super) const ECHOES_ON_CLIP: &str = "Echoes on clip face";
+/// From which echo on there is tissue on them; 0 is as rendered.
+pub(super) const CLIP_THRESHOLD: &str = "Clip threshold";
 
 /// Greatest depth of a cut that the slider sets, mm.
 const DEEPEST: f64 = 200.0;
@@ -318,6 +322,16 @@ pub const SLIDERS: &[Slider] = &[
         unveils,
         |s| s.unveil.smoothing,
         |s, v| s.unveil.smoothing = v,
+    ),
+    slider(ECHOES_ON_CLIP, "", Image, [0.0, 1.0], 1.0).of(
+        |s| s.can_cap(),
+        |s| f64::from(u8::from(s.cap.enabled)),
+        |s, v| s.cap.enabled = v >= 0.5,
+    ),
+    slider(CLIP_THRESHOLD, "", Image, [0.0, 1.0], 0.01).of(
+        |s| s.can_cap() && s.cap.enabled,
+        |s| s.cap.level.unwrap_or(0.0),
+        |s, v| s.cap.level = above(v, 1e-9),
     ),
     slider("Step", "mm", Quality, [0.0, 2.0], 0.05).of(
         renders_rays,

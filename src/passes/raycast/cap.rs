@@ -21,7 +21,7 @@ pub const PASS: Pass = Pass {
     shader: |_, _| "raycast/cap",
     needed: |s| match (s.settings.clip.is_empty(), s.has_caps()) {
         (true, _) => Err("no clip plane cuts"),
-        (false, false) => Err("not asked for, or no cut face in this mode"),
+        (false, false) => Err("not asked for, or no bright tissue that they cut is drawn"),
         (false, true) => Ok("clip planes have cut faces"),
     },
     reads: |s, _| ray::reads(s),
@@ -31,7 +31,7 @@ pub const PASS: Pass = Pass {
     params: |s, _| {
         ray::params(s, s.cap_view(), s.step)
             // Beyond every mean where nothing is capped.
-            .f32("level", s.cap_level().unwrap_or(f64::MAX))
+            .f32("level", s.cap_level().unwrap_or(f64::from(f32::MAX)))
             .f32("radius", s.cap_radius())
             .f32("fade_density", s.region_fade().map_or(0.0, |fade| 1.0 / fade))
     },

@@ -83,8 +83,7 @@ pub const PASS: Pass = Pass {
                     }
                     Kind::Alone | Kind::Colour | Kind::Hit => {}
                 }
-                let developed =
-                    |light| light_volume::developed(scene, kind(scene) == Kind::Alone, light, [x, y]);
+                let developed = |light| light_volume::developed(scene, kind(scene) == Kind::Alone, light, [x, y]);
                 let (colour, hit) = match cap::cut_at(scene, reads, x, y) {
                     Some(cut) => (cut.over(developed([0.0; 4])), ray.enter),
                     None => {

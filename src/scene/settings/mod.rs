@@ -218,9 +218,9 @@ pub struct Clip {
 pub struct Cap {
     /// Show the echoes of cut faces.
     pub enabled: bool,
-    /// The echo from which on there is tissue, 0..1 before any grey window: a mean over the length of an edge (`surface.edge`). Absent: a
-    /// quarter of the echo at which the rendering shows a surface or is opaque; in mode mixed, and with a transfer function that draws a veil of much
-    /// darker echoes, that echo itself.
+    /// The echo from which on there is tissue, 0..1 before any grey window: a mean over the length of an edge (`surface.edge`). Absent: what is
+    /// rendered as solid, from the surface's threshold on, or from the echo on from which all are opaque. Less fills darker tissue too, such as the brain
+    /// within a skull.
     pub level: Option<f64>,
 }
 
