@@ -107,23 +107,30 @@ fn volume(scene: &Scene, reads: &Arrays, writes: &mut Arrays, effort: &mut Effor
     let surface = &scene.settings.surface;
     let map: Option<&Texels> = (scene.settings.mode == Mode::Mixed || is_behind).then(|| reads.get("distance_map"));
     let lights = for_each_ray(scene, view, size, |[x, y], line, path, enter| {
+        let cut = cap::cut_at(scene, reads, x, y);
         let ends = match map.map(|map| map.one(x, y, 0) - enter) {
+            _ if cut.is_some() => [0.0, 0.0],
             None => [0.0, path],
             Some(found) if is_behind => [found.max(0.0), path.min(found + surface.colour_depth)],
             Some(found) => [0.0, path.min(found)],
         };
         let segments = segments(line, texels, view.window, ends);
-        let light = Medium::of(scene, line, TOLERANCE).light(&segments);
-        let is_cut = cap::cut_at(scene, reads, x, y).is_some();
-        (light, if is_cut { enter } else { light.hit.map_or(MISS, |s| enter + s) })
+        let mut light = Medium::of(scene, line, TOLERANCE).light(&segments);
+        let hit = match cut {
+            Some(cut) => {
+                light.rgba = cut.over([0.0; 4]);
+                enter
+            }
+            None => light.hit.map_or(MISS, |s| enter + s),
+        };
+        (light, hit)
     });
     effort.estimate = effort.estimate.max(rms(lights.iter().map(|(light, _)| light.estimate)));
     effort.pieces += lights.iter().map(|(light, _)| light.pieces).sum::<u64>();
     effort.rays += lights.len() as u64;
     let pixels = lights.iter().enumerate().map(|(n, light)| ([n % size[0], n / size[0], 0], light));
     for (at, (light, hit)) in pixels {
-        let cut = cap::cut_at(scene, reads, at[0], at[1]);
-        writes.get_mut("picture").set(at, &cut.map_or(light.rgba, |cut| cut.over([0.0; 4])));
+        writes.get_mut("picture").set(at, &light.rgba);
         if scene.lights_volume() {
             writes.get_mut("distance_map").set(at, &[*hit]);
         }
