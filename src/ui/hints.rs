@@ -23,7 +23,7 @@ const SLIDERS: [(&str, &str); 55] = [
     ("Start offset", "How far behind the near face of the fluid rendering starts: more removes more."),
     ("Start smoothing", "Smooths the surface at which rendering starts."),
     (
-        "Echoes on clip face",
+        "Clip echoes",
         "Tissue that a clip plane cuts shows its echoes there, as planes do. Off: what is behind it is drawn, lit. Fluid is open either way.",
     ),
     (

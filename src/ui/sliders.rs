@@ -121,7 +121,7 @@ pub(super) const PLANES_ZOOM: usize = 7;
 pub(super) const AUTO_START: &str = "Auto render start";
 pub(super) const START_OFFSET: &str = "Start offset";
 /// The switch of the cut faces of clip planes.
-pub(super) const ECHOES_ON_CLIP: &str = "Echoes on clip face";
+pub(super) const CLIP_ECHOES: &str = "Clip echoes";
 /// From which echo on there is tissue on them; 0 is as rendered.
 pub(super) const CLIP_THRESHOLD: &str = "Clip threshold";
 
@@ -323,7 +323,7 @@ pub const SLIDERS: &[Slider] = &[
         |s| s.unveil.smoothing,
         |s, v| s.unveil.smoothing = v,
     ),
-    slider(ECHOES_ON_CLIP, "", Image, [0.0, 1.0], 1.0).of(
+    slider(CLIP_ECHOES, "", Image, [0.0, 1.0], 1.0).of(
         |s| s.can_cap(),
         |s| f64::from(u8::from(s.cap.enabled)),
         |s, v| s.cap.enabled = v >= 0.5,

@@ -348,7 +348,8 @@ fn cut_faces_end_exact_rays_too() {
         });
         let (mut ends, mut others) = (0, 0);
         for (n, face) in faces.values.chunks_exact(2).enumerate() {
-            let [a, b] = [&exact, &sampled].map(|texels| &texels.values[n * texels.channels..(n + 1) * texels.channels]);
+            let [a, b] =
+                [&exact, &sampled].map(|texels| &texels.values[n * texels.channels..(n + 1) * texels.channels]);
             match face[1] > 0.0 {
                 true => {
                     assert_eq!(a, b, "{mode}: pixel {n}");

@@ -12,7 +12,7 @@ use crate::ui::cine_player::{CineState, SPEEDS};
 use crate::ui::command::{Command, Tool};
 use crate::ui::controls::BRUSH_RADII;
 use crate::ui::hints;
-use crate::ui::sliders::{AUTO_START, CLIP_THRESHOLD, ECHOES_ON_CLIP, Group, SLIDERS, START_OFFSET, Slider as Control};
+use crate::ui::sliders::{AUTO_START, CLIP_ECHOES, CLIP_THRESHOLD, Group, SLIDERS, START_OFFSET, Slider as Control};
 use crate::ui::view;
 use egui::accesskit::Role;
 use egui::{
@@ -146,7 +146,7 @@ pub(super) fn show_modes(ui: &mut Ui, state: &PanelState, width: f32, execute: &
 
 /// The numbers of the controls of clip faces that are there.
 fn of_clip(settings: &Settings) -> [Option<usize>; 2] {
-    [ECHOES_ON_CLIP, CLIP_THRESHOLD].map(|name| front(&[name], settings))
+    [CLIP_ECHOES, CLIP_THRESHOLD].map(|name| front(&[name], settings))
 }
 
 /// While there are clip planes, whether their faces show echoes, and from which on.
@@ -459,7 +459,7 @@ fn slider(
     let space = if slider.unit.is_empty() || slider.unit == "°" { "" } else { " " };
     let shown = match slider.name {
         DEPTH_OF_CUT if before <= 0.0 => "through all".to_string(),
-        CLIP_THRESHOLD if before <= 0.0 => "as rendered".to_string(),
+        CLIP_THRESHOLD if before <= 0.0 => "auto".to_string(),
         _ => format!("{before:.digits$}{space}{}", slider.unit),
     };
     ui.horizontal(|ui| {
