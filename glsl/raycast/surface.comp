@@ -34,11 +34,11 @@ void main() {
     if (any(greaterThanEqual(pixel, imageSize(distance_map)))) return;
     Slices slices = no_slices();
     Ray ray = ray_of(pixel);
-    bool ends = is_capped(cap_at(pixel));
+    bool ends = is_capped(cap_at(pixel)), enters = ray.leave > ray.enter;
     if (ends) ray.leave = -1.0;
     vec3 echo;
     float distance = find_surface(ray, slices, echo);
-    if (ends) distance = ray.enter;
+    if (ends) distance = enters ? ray.enter : MISS;
     imageStore(distance_map, pixel, vec4(distance, 0.0, 0.0, 0.0));
     if (ECHO == 1) imageStore(surface, pixel, vec4(echo, 0.0));
 }

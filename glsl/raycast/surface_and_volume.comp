@@ -68,6 +68,7 @@ void main() {
     if (any(greaterThanEqual(pixel, imageSize(distance_map)))) return;
     Ray ray = ray_of(pixel);
     vec2 cut = cap_at(pixel);
+    bool enters = ray.leave > ray.enter;
     if (is_capped(cut)) ray.leave = -1.0;
     Slices slices = no_slices();
     complete = complete_steps(ray);
@@ -82,7 +83,7 @@ void main() {
         vec3 texel;
         if (locate(p, texel)) composite(ray, complete, p, raw_along(ray, complete, SAMPLE_AT, texel, slices));
     }
-    if (is_capped(cut)) distance = ray.enter;
+    if (is_capped(cut)) distance = enters ? ray.enter : MISS;
     imageStore(distance_map, pixel, vec4(distance, 0.0, 0.0, 0.0));
     if (ECHO == 1) imageStore(surface, pixel, vec4(echo, 0.0));
     vec4 rgba = developed(colour, opacity, pixel, imageSize(picture));

@@ -60,6 +60,7 @@ void main() {
         ray.leave = min(ray.leave, surface + colour_depth);
     }
     vec2 cut = cap_at(pixel);
+    bool enters = ray.leave > ray.enter;
     if (is_capped(cut)) ray.leave = -1.0;
     float path = ray.leave - ray.enter;
     vec3 colour = vec3(0.0);
@@ -146,7 +147,7 @@ void main() {
             if (front_known && i < to) front_inside = false;
         }
     }
-    if (is_capped(cut)) hit = ray.enter;
+    if (is_capped(cut)) hit = enters ? ray.enter : MISS;
     vec4 rgba = developed(colour, opacity, pixel, imageSize(picture));
     imageStore(picture, pixel, is_capped(cut) ? capped(cut, rgba) : rgba);
     if (PART == HIT) imageStore(hit_distance, pixel, vec4(hit, 0.0, 0.0, 0.0));

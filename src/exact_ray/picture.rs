@@ -119,7 +119,7 @@ fn volume(scene: &Scene, reads: &Arrays, writes: &mut Arrays, effort: &mut Effor
         let hit = match cut {
             Some(cut) => {
                 light.rgba = cut.over([0.0; 4]);
-                enter
+                if path > 0.0 { enter } else { MISS }
             }
             None => light.hit.map_or(MISS, |s| enter + s),
         };
@@ -159,7 +159,7 @@ fn surfaces(scene: &Scene, reads: &Arrays, writes: &mut Arrays, effort: &mut Eff
     let size = writes.get("distance_map").size;
     let found = for_each_ray(scene, scene.surface_view(), size, |[x, y], line, path, enter| {
         if cap::cut_at(scene, reads, x, y).is_some() {
-            return Some((enter, [0.0; 4], 0.0));
+            return (path > 0.0).then_some((enter, [0.0; 4], 0.0));
         }
         let found = if path > 0.0 { surface::surface(line, texels, path, enter) } else { None };
         found.map(|f| (enter + f.place, [f.echo, 1.0, f.behind, 0.0], f.off))

@@ -246,7 +246,7 @@ fn without_clip_planes_or_switched_off_nothing_changes() {
     let device = Device::new();
     let body = |p: DVec3| if p.distance(DVec3::new(0.0, 11.0, 0.0)) < 8.0 { tissue(p) } else { 0.02 };
     let clip = "clip = [{ at = [0, 8, 0], normal = [0, -1, 0] }]";
-    let view = "picture.size = [48, 44]\nsurface.threshold = 0.1\nvolume.threshold = 0.1";
+    let view = format!("picture.size = [48, 44]\nsurface.threshold = 0.1\nvolume.threshold = 0.1\n{SOLID}");
     for mode in
         ["mode = 'sr'", "mode = 'vr'", "mode = 'mixed'", "layout = 'pair'", "mode = 'vr'\nlight.volume = { cell = 3 }"]
     {

@@ -105,7 +105,7 @@ pub(super) fn reference_ray(scene: &Scene, reads: &Arrays, writes: &mut Arrays, 
     let found = detect(scene, &samples, first).map(|(place, echo)| (place + first as f64, echo));
     let is_capped = cap::cut_at(scene, reads, x, y).is_some();
     let (distance, surface) = match found.filter(|(place, _)| within(*place)) {
-        _ if is_capped => (ray.enter, [0.0; 4]),
+        _ if is_capped => (ray.enter_or_miss(), [0.0; 4]),
         Some((place, echo)) => {
             let distance = ray.enter + ray.offset(place + 0.5);
             (distance, [echo, 1.0, behind(scene, &ray, distance), 0.0])

@@ -85,7 +85,7 @@ pub const PASS: Pass = Pass {
                 }
                 let developed = |light| light_volume::developed(scene, kind(scene) == Kind::Alone, light, [x, y]);
                 let (colour, hit) = match cap::cut_at(scene, reads, x, y) {
-                    Some(cut) => (cut.over(developed([0.0; 4])), ray.enter),
+                    Some(cut) => (cut.over(developed([0.0; 4])), ray.enter_or_miss()),
                     None => {
                         let (light, hit) = composite(scene, &ray, &tables);
                         (developed(light), hit)
