@@ -42,6 +42,7 @@
     ("preprocess/load_slice", include_bytes!("preprocess/load_slice.spv")),
     ("preprocess/packed_neighbours", include_bytes!("preprocess/packed_neighbours.spv")),
     ("preprocess/scan_convert", include_bytes!("preprocess/scan_convert.spv")),
+    ("raycast/cap", include_bytes!("raycast/cap.spv")),
     ("raycast/cube", include_bytes!("raycast/cube.spv")),
     ("raycast/planes.plain", include_bytes!("raycast/planes.plain.spv")),
     ("raycast/planes.toned", include_bytes!("raycast/planes.toned.spv")),

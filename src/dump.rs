@@ -168,6 +168,10 @@ fn meaning(slot: Slot) -> (&'static [&'static str], &'static str) {
         Slot::Surface => {
             (&["echo", "found", "echo_behind", "unused"], "echo 0..1 after the grey window; found: 0 or 1")
         }
+        Slot::Cap => (
+            &["echo", "opacity"],
+            "echo 0..1 after the grey window of planes, where a ray ends at a cut face; opacity, 0..1",
+        ),
         Slot::SliceShares | Slot::PictureShares | Slot::Shadow | Slot::Occlusion => (GREY, "share, 0..1"),
         Slot::LightMatter => {
             (&["density", "echo"], "share of the densest matter; share of the range of the recording's samples")

@@ -82,10 +82,12 @@ float steps_to(Ray ray, float offset) {
     return n * decline_over(max(n * ray.growth, -0.999999));
 }
 
+vec4 clip_at(int i) { return i == 0 ? clip_0 : i == 1 ? clip_1 : i == 2 ? clip_2 : clip_3; }
+
 // The ray of a pixel, and its interval inside the box and on the near side of every clip plane; leave < enter is a miss. A ray
 // parallel to a face would divide by zero: min and max order the infinities correctly, and the smallest component of 1e-12
-// avoids the 0/0 of a ray within the face's plane.
-Ray ray_of(ivec2 pixel) {
+// avoids the 0/0 of a ray within the face's plane. `face` is the clip plane that the ray enters through, -1 if there is none.
+Ray ray_of(ivec2 pixel, out int face) {
     vec2 at = vec2(pixel) + 0.5;
     Ray ray;
     ray.origin = origin + origin_dx * at.x + origin_dy * at.y;
@@ -96,14 +98,18 @@ Ray ray_of(ivec2 pixel) {
     vec3 near = min(a, b), far = max(a, b);
     ray.enter = max(max(near.x, near.y), max(near.z, 0.0));
     ray.leave = min(far.x, min(far.y, far.z));
+    face = -1;
     for (int i = 0; i < CLIPS; ++i) {
-        vec4 plane = i == 0 ? clip_0 : i == 1 ? clip_1 : i == 2 ? clip_2 : clip_3;
+        vec4 plane = clip_at(i);
         float towards = dot(plane.xyz, ray.direction);
         float clearance = plane.w - dot(plane.xyz, ray.origin);
         // Parallel to the plane: keep all of the ray, or none.
         if (abs(towards) < 1e-12) ray.leave = clearance < 0.0 ? -1.0 : ray.leave;
         else if (towards > 0.0) ray.leave = min(ray.leave, clearance / towards);
-        else ray.enter = max(ray.enter, clearance / towards);
+        else if (clearance / towards > ray.enter) {
+            ray.enter = clearance / towards;
+            face = i;
+        }
     }
     ray.first = step_length;
     ray.growth = 0.0;
@@ -115,6 +121,11 @@ Ray ray_of(ivec2 pixel) {
         ray.first = step_length * low * growth_over(ray.growth);
     }
     return ray;
+}
+
+Ray ray_of(ivec2 pixel) {
+    int face;
+    return ray_of(pixel, face);
 }
 
 // Limits of a place's coordinates in the sector: range, line, entry of the sweep table or position in the sweep, slice. An index that rounding puts just

@@ -15,6 +15,7 @@ layout(scalar) uniform Params {
 const bool COMPOSITES = false;
 const int to_composite = NEVER;
 #include "surface_march.glsl"
+#include "cap.glsl"
 uniform writeonly image2D distance_map;
 uniform writeonly image2D surface; // echo at the surface, 1 where one was found, mean echo behind it
 
@@ -32,8 +33,12 @@ void main() {
     ivec2 pixel = ivec2(gl_GlobalInvocationID.xy);
     if (any(greaterThanEqual(pixel, imageSize(distance_map)))) return;
     Slices slices = no_slices();
+    Ray ray = ray_of(pixel);
+    bool ends = is_capped(cap_at(pixel)), enters = ray.leave > ray.enter;
+    if (ends) ray.leave = -1.0;
     vec3 echo;
-    float distance = find_surface(ray_of(pixel), slices, echo);
+    float distance = find_surface(ray, slices, echo);
+    if (ends) distance = enters ? ray.enter : MISS;
     imageStore(distance_map, pixel, vec4(distance, 0.0, 0.0, 0.0));
     if (ECHO == 1) imageStore(surface, pixel, vec4(echo, 0.0));
 }

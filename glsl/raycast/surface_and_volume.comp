@@ -20,6 +20,7 @@ layout(scalar) uniform Params {
 const bool COMPOSITES = true;
 int to_composite = NEVER;
 #include "surface_march.glsl"
+#include "cap.glsl"
 uniform writeonly image2D distance_map;
 uniform writeonly image2D surface; // echo at the surface, 1 where one was found, mean echo behind it
 uniform writeonly image2D picture; // the composited volume
@@ -66,6 +67,9 @@ void main() {
     ivec2 pixel = ivec2(gl_GlobalInvocationID.xy);
     if (any(greaterThanEqual(pixel, imageSize(distance_map)))) return;
     Ray ray = ray_of(pixel);
+    vec2 cut = cap_at(pixel);
+    bool enters = ray.leave > ray.enter;
+    if (is_capped(cut)) ray.leave = -1.0;
     Slices slices = no_slices();
     complete = complete_steps(ray);
     to_composite = complete > 0 ? 0 : NEVER;
@@ -79,7 +83,9 @@ void main() {
         vec3 texel;
         if (locate(p, texel)) composite(ray, complete, p, raw_along(ray, complete, SAMPLE_AT, texel, slices));
     }
+    if (is_capped(cut)) distance = enters ? ray.enter : MISS;
     imageStore(distance_map, pixel, vec4(distance, 0.0, 0.0, 0.0));
     if (ECHO == 1) imageStore(surface, pixel, vec4(echo, 0.0));
-    imageStore(picture, pixel, developed(colour, opacity, pixel, imageSize(picture)));
+    vec4 rgba = developed(colour, opacity, pixel, imageSize(picture));
+    imageStore(picture, pixel, is_capped(cut) ? capped(cut, rgba) : rgba);
 }

@@ -15,6 +15,7 @@ layout(scalar) uniform Params {
 #include "sliding.glsl"
 #include "empty_space.glsl"
 #include "compositing.glsl"
+#include "cap.glsl"
 uniform writeonly image2D picture;
 uniform texture2D distance_map;         // of LAYER and BEHIND
 uniform writeonly image2D hit_distance; // of HIT
@@ -58,6 +59,9 @@ void main() {
         ray.enter = max(ray.enter, surface);
         ray.leave = min(ray.leave, surface + colour_depth);
     }
+    vec2 cut = cap_at(pixel);
+    bool enters = ray.leave > ray.enter;
+    if (is_capped(cut)) ray.leave = -1.0;
     float path = ray.leave - ray.enter;
     vec3 colour = vec3(0.0);
     float opacity = 0.0;
@@ -143,6 +147,8 @@ void main() {
             if (front_known && i < to) front_inside = false;
         }
     }
-    imageStore(picture, pixel, developed(colour, opacity, pixel, imageSize(picture)));
+    if (is_capped(cut)) hit = enters ? ray.enter : MISS;
+    vec4 rgba = developed(colour, opacity, pixel, imageSize(picture));
+    imageStore(picture, pixel, is_capped(cut) ? capped(cut, rgba) : rgba);
     if (PART == HIT) imageStore(hit_distance, pixel, vec4(hit, 0.0, 0.0, 0.0));
 }

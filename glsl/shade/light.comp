@@ -33,10 +33,17 @@ uniform texture2D volume_layer; // of everything but a plain surface: colours ti
 uniform texture2D shadow;       // of SHADOWED: light that arrives, 0..1
 uniform texture2D occlusion;    // of OCCLUDED: ambient light that arrives, 0..1
 uniform writeonly image2D picture;
+#include "cap.glsl"
 
 void main() {
     ivec2 pixel = ivec2(gl_GlobalInvocationID.xy);
     if (any(greaterThanEqual(pixel, imageSize(picture)))) return;
+    vec2 cut = cap_at(pixel);
+    if (is_capped(cut)) {
+        // Echoes are not lit.
+        imageStore(picture, pixel, capped(cut, vec4(0.0)));
+        return;
+    }
     float distance = distance_at(pixel);
     vec4 before = vec4(0.0);
     if (SUBJECT == BEHIND_LAYER) before = layer_share * texelFetch(volume_layer, pixel, 0);

@@ -60,6 +60,9 @@ pub fn fault(scene: &Scene) -> Option<&'static str> {
             Some("ray.sliding filters samples, at distances of one step")
         }
         Mode::Volume if scene.takes_bspline() => Some("ray.elevation is not linear"),
+        Mode::Volume if scene.has_caps() && scene.cap_level().is_some() => {
+            Some("cap.enabled shows echoes where clip planes cut")
+        }
         Mode::Volume => None,
         _ => Some("only the integral of volume rendering (--mode vr) is bounded"),
     }

@@ -5,6 +5,7 @@ use super::field::segments;
 use super::projection::projected;
 use super::surface;
 use super::volume::Medium;
+use crate::passes::raycast::cap;
 use crate::passes::raycast::ray::span;
 use crate::passes::{Arrays, MISS, Texels, is_hit};
 use crate::scene::{Mode, Scene, SurfaceColour, View};
@@ -106,14 +107,23 @@ fn volume(scene: &Scene, reads: &Arrays, writes: &mut Arrays, effort: &mut Effor
     let surface = &scene.settings.surface;
     let map: Option<&Texels> = (scene.settings.mode == Mode::Mixed || is_behind).then(|| reads.get("distance_map"));
     let lights = for_each_ray(scene, view, size, |[x, y], line, path, enter| {
+        let cut = cap::cut_at(scene, reads, x, y);
         let ends = match map.map(|map| map.one(x, y, 0) - enter) {
+            _ if cut.is_some() => [0.0, 0.0],
             None => [0.0, path],
             Some(found) if is_behind => [found.max(0.0), path.min(found + surface.colour_depth)],
             Some(found) => [0.0, path.min(found)],
         };
         let segments = segments(line, texels, view.window, ends);
-        let light = Medium::of(scene, line, TOLERANCE).light(&segments);
-        (light, light.hit.map_or(MISS, |s| enter + s))
+        let mut light = Medium::of(scene, line, TOLERANCE).light(&segments);
+        let hit = match cut {
+            Some(cut) => {
+                light.rgba = cut.over([0.0; 4]);
+                if path > 0.0 { enter } else { MISS }
+            }
+            None => light.hit.map_or(MISS, |s| enter + s),
+        };
+        (light, hit)
     });
     effort.estimate = effort.estimate.max(rms(lights.iter().map(|(light, _)| light.estimate)));
     effort.pieces += lights.iter().map(|(light, _)| light.pieces).sum::<u64>();
@@ -147,7 +157,10 @@ fn projection(scene: &Scene, reads: &Arrays, writes: &mut Arrays, effort: &mut E
 fn surfaces(scene: &Scene, reads: &Arrays, writes: &mut Arrays, effort: &mut Effort) {
     let texels = reads.get("volume");
     let size = writes.get("distance_map").size;
-    let found = for_each_ray(scene, scene.surface_view(), size, |_, line, path, enter| {
+    let found = for_each_ray(scene, scene.surface_view(), size, |[x, y], line, path, enter| {
+        if cap::cut_at(scene, reads, x, y).is_some() {
+            return (path > 0.0).then_some((enter, [0.0; 4], 0.0));
+        }
         let found = if path > 0.0 { surface::surface(line, texels, path, enter) } else { None };
         found.map(|f| (enter + f.place, [f.echo, 1.0, f.behind, 0.0], f.off))
     });

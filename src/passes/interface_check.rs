@@ -11,10 +11,11 @@ use crate::spirv::volumes_to_layers::volumes_to_layers;
 use crate::spirv::{self, Access, Dimension, Kind, Member, Module};
 
 /// Textures and tables that a shader declares and a pass may not bind. Specialization constants say whether they are read or written.
-const OPTIONAL: [&str; 29] = [
+const OPTIONAL: [&str; 30] = [
     "back_light",
     "before",
     "bricks",
+    "cap",
     "composited",
     "curve_columns",
     "cuts",

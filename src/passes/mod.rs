@@ -27,6 +27,7 @@ pub mod filter {
     pub mod sigma;
 }
 pub mod raycast {
+    pub mod cap;
     pub mod composite;
     pub mod cube;
     mod detector;
@@ -75,6 +76,7 @@ pub const PASSES: &[Pass] = &[
     empty_space::BRICK_RANGES,
     empty_space::CLASSIFY_SURFACE,
     empty_space::DISTANCE_SURFACE,
+    raycast::cap::PASS,
     raycast::surface::PASS,
     empty_space::CLASSIFY_VOLUME,
     empty_space::DISTANCE_VOLUME,

@@ -2,6 +2,7 @@
 //! normals that its passes share.
 
 use crate::passes::pass::*;
+use crate::passes::raycast::cap;
 use crate::scene::{Dims, Mode, Scene, Skin, SurfaceColour};
 use glam::DVec3;
 
@@ -23,6 +24,7 @@ pub const LIGHT: Pass = Pass {
         reads.extend((lit_thing(s) != Lit::Surface).then_some(whole("volume_layer", Slot::VolumeLayer)));
         reads.extend(casts_shadow(s).then_some(whole("shadow", Slot::Shadow)));
         reads.extend(is_occluded(s).then_some(whole("occlusion", Slot::Occlusion)));
+        reads.extend(cap::reads(s));
         reads
     },
     writes: |s, _| vec![whole("picture", rendered(s))],
@@ -62,6 +64,7 @@ pub const LIGHT: Pass = Pass {
             ("SUBJECT", subject),
             ("SHADOWED", casts_shadow(s) as i32),
             ("OCCLUDED", is_occluded(s) as i32),
+            cap::constant(s),
         ]
     },
     tolerance: Tolerance {
@@ -75,8 +78,12 @@ pub const LIGHT: Pass = Pass {
         let picture = writes.get_mut("picture");
         for y in 0..picture.size[1] {
             for x in 0..picture.size[0] {
-                let light = lit(scene, reads, x, y);
-                picture.set([x, y, 0], &reference_pixel(scene, reads, light, x, y));
+                // Echoes are not lit.
+                let colour = match cap::cut_at(scene, reads, x, y) {
+                    Some(cut) => cut.over([0.0; 4]),
+                    None => reference_pixel(scene, reads, lit(scene, reads, x, y), x, y),
+                };
+                picture.set([x, y, 0], &colour);
             }
         }
     },

@@ -291,6 +291,8 @@ slots! {
     LightShade = D::image("light_shade", |s| Shape::Three(s.light_lattice().count), |_| Format::Rgba16f);
     /// Orientation of each cell, as long as it is certain, and the light for a highlight.
     LightNormals = D::image("light_normals", |s| Shape::Three(s.light_lattice().count), |_| Format::Rgba16f);
+    /// The cut faces of clip planes: echo where a ray ends at one, and its opacity.
+    Cap = D::image("cap", per_ray, |_| Format::Rg16f);
     /// Distance along each pixel's ray, mm; the largest float where nothing was hit.
     Distance = D::image("distance_map", per_ray, |_| Format::R32f);
     DistanceA = D::image("distance_a", per_ray, |_| Format::R32f);

@@ -25,6 +25,7 @@ pub(super) fn check(settings: &Settings) -> Result<(), SceneError> {
         return refuse("ray.sliding", format!("is {}, must be 0 (none), 3 or 5", settings.ray.sliding));
     }
     check_clip(&settings.clip)?;
+    within("cap.level", settings.cap.level.unwrap_or(0.0), 0.0, 1.0)?;
     within("ray.rays", f64::from(settings.ray.rays), 1.0, 4.0)?;
     for (key, is_set, pixels) in [("ray.half", settings.ray.half, "four"), ("ray.quarter", settings.ray.quarter, "16")]
     {

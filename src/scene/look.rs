@@ -1,7 +1,7 @@
 //! The look of a scene: its mode, filters, transfer function, light and tone, without what belongs to one examination: region, camera, places of
 //! planes, clip planes, cuts, marks and measurements. A preset of a user keeps a look.
 
-use super::{Cube, Planes, Projection, Region, Settings, Slices, Surface, Volume};
+use super::{Cap, Cube, Planes, Projection, Region, Settings, Slices, Surface, Volume};
 
 /// The paths of the settings that are no look.
 const OF_EXAMINATION: &[&str] = &[
@@ -11,6 +11,7 @@ const OF_EXAMINATION: &[&str] = &[
     "region.depth",
     "region.elevation",
     "clip",
+    "cap.enabled",
     "cuts",
     "unveil",
     "camera",
@@ -47,6 +48,7 @@ impl Settings {
             samples: kept.samples,
             region: Region { fade: look.region.fade, ..kept.region },
             clip: kept.clip,
+            cap: Cap { level: look.cap.level, ..kept.cap },
             cuts: kept.cuts,
             unveil: kept.unveil,
             camera: kept.camera,
@@ -122,6 +124,7 @@ mod tests {
                 "samples.range=[0,100]",
                 "unveil={enabled=true,offset=3,smoothing=4}",
                 "clip=[{at=[0,0,0],normal=[0,1,0]}]",
+                "cap={enabled=false,level=0.2}",
                 "cuts=[{contour=[[0,0],[1,0],[0,1]],view={at=[0,0,0],direction=[0,1,0],up=[0,0,1]}}]",
                 "measure=[{kind='distance',points=[[0,0,0],[1,0,0]]}]",
             ],

@@ -3,6 +3,7 @@
 
 mod bricks;
 pub mod camera;
+mod caps;
 mod check;
 mod check_measures;
 pub mod cube;

@@ -91,19 +91,24 @@ impl Stripped {
                 out.extend(encode(op::UNDEF, &[*of, *result]));
             }
             (op::IMAGE_WRITE, [image, ..]) if is_stripped(image) => {}
-            // Any other use: calls, stores, copies, samples, selections.
-            (
-                op::FUNCTION_CALL
-                | op::STORE..=op::PTR_ACCESS_CHAIN
-                | op::COPY_OBJECT
-                | op::SAMPLED_IMAGE..=op::IMAGE_QUERY_SAMPLES
-                | op::SELECT
-                | op::PHI,
-                _,
-            ) if a.iter().skip(if i.opcode == op::STORE { 0 } else { 2 }).any(is_stripped) => {
-                return error(format!("operation {} uses a texture or a table that is to be removed", i.opcode));
+            _ => {
+                // Any other use: calls, stores, copies, samples, selections.
+                let used = match i.opcode {
+                    op::STORE..=op::COPY_MEMORY_SIZED => a,
+                    op::FUNCTION_CALL
+                    | op::ACCESS_CHAIN..=op::PTR_ACCESS_CHAIN
+                    | op::COPY_OBJECT
+                    | op::SELECT
+                    | op::PHI => a.get(2..).unwrap_or_default(),
+                    // Only the image can be one. Behind the coordinates are flags, which may equal an identifier.
+                    op::SAMPLED_IMAGE..=op::IMAGE_QUERY_SAMPLES => a.get(2..3).unwrap_or_default(),
+                    _ => &[],
+                };
+                if used.iter().any(is_stripped) {
+                    return error(format!("operation {} uses a texture or a table that is to be removed", i.opcode));
+                }
+                out.extend(encode(i.opcode, a));
             }
-            _ => out.extend(encode(i.opcode, a)),
         }
         Ok(())
     }
@@ -126,6 +131,21 @@ mod tests {
         assert_eq!(new.bindings.iter().collect::<Vec<_>>(), kept);
         assert_eq!((old.params, old.constants, old.local_size), (new.params, new.constants, new.local_size));
         assert_eq!(strip_bindings(&before, &["nothing"]).unwrap(), before);
+    }
+
+    /// Prevents a module that is refused, or not, as the numbers of its identifiers happen to be: 8194 also says that a fetch names its level and
+    /// extends zeros.
+    #[test]
+    fn the_flags_of_a_fetch_are_no_identifiers() {
+        let (gone, kept) = (8194, 20);
+        let variable = |id| encode(op::VARIABLE, &[9, id, storage_class::UNIFORM_CONSTANT]);
+        let load = |id, from| encode(op::LOAD, &[8, id, from]);
+        let fetch = encode(op::IMAGE_FETCH, &[6, 22, 21, 5, 8194, 4]);
+        let name = encode(op::NAME, &[30, u32::from_le_bytes(*b"gon\0")]);
+        let stays = [variable(kept), load(21, kept), fetch].concat();
+        let header = [0x0723_0203, 0x0001_0300, 0, 9000, 0];
+        let module = [&header[..], &name, &variable(30), &load(gone, 30), &stays].concat();
+        assert_eq!(strip_bindings(&module, &["gon"]).unwrap(), [&header[..], &stays].concat());
     }
 
     #[test]

@@ -217,8 +217,8 @@ mod tests {
         assert_eq!(count(&before, op::IMAGE_FETCH), count(&after, op::IMAGE_FETCH) + count(&after, op::IMAGE_READ));
         assert_eq!(
             count(&after, op::IMAGE_FETCH),
-            5,
-            "surface, composited volume (three times) and occlusion stay textures"
+            6,
+            "cut faces, surface, composited volume (three times) and occlusion stay textures"
         );
     }
 

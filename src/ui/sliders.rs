@@ -340,6 +340,16 @@ pub const SLIDERS: &[Slider] = &[
         |s| s.unveil.smoothing,
         |s, v| s.unveil.smoothing = v,
     ),
+    slider(texts::CLIP_ECHOES, "", Image, [0.0, 1.0], 1.0).of(
+        |s| s.can_cap(),
+        |s| f64::from(u8::from(s.cap.enabled)),
+        |s, v| s.cap.enabled = v >= 0.5,
+    ),
+    slider(texts::CLIP_THRESHOLD, "", Image, [0.0, 1.0], 0.01).of(
+        |s| s.can_cap() && s.cap.enabled,
+        |s| s.cap.level.unwrap_or(0.0),
+        |s, v| s.cap.level = above(v, 1e-9),
+    ),
     slider(texts::STEP, "mm", Quality, [0.0, 2.0], 0.05).of(
         renders_rays,
         |s| s.ray.step.unwrap_or(0.0),

@@ -562,7 +562,18 @@ fn ray_scenes() -> Vec<SceneSpec> {
             "mode = 'vr'\nvolume = { shading = 'first-hit', hit = 0.1 }\nlight = { shadow = {}, occlusion = {} }\nslices = { pixels = 30 }
              clip = [{ at = [0, 25, 0], normal = [0.3, -1, 0.2] }, { at = [5, 0, 0], normal = [1, 0, 0] }]",
         ),
-        ("clipped surface", "slices = { pixels = 30 }\nclip = [{ at = [0, 25, 0], normal = [0.3, -1, 0.2] }]"),
+        ("clipped surface", "slices = { pixels = 30 }\nclip = [{ at = [0, 25, 0], normal = [0.3, -1, 0.2] }]\ncap = { level = 0.5 }"),
+        (
+            "clipped veil",
+            "mode = 'mixed'\nvolume = { veil = 0.5 }\nlight = { shadow = {} }\nslices = { pixels = 30 }\ncap = { level = 0.5 }
+             clip = [{ at = [0, 25, 0], normal = [-0.3, -1, 0.2] }]",
+        ),
+        (
+            "clipped, fading, light in the volume",
+            "mode = 'vr'\nlight = { volume = { cell = 5 } }\nregion = { fade = 6 }\nslices = { pixels = 30 }\ncap = { level = 0.48 }
+             volume = { transfer = [{ at = 0, colour = [1, 1, 1], opacity = 1 }] }\nplanes = { window = [0.2, 0.7] }
+             clip = [{ at = [0, 25, 0], normal = [0.3, -1, 0.2] }, { at = [5, 0, 0], normal = [1, 0, 0] }]",
+        ),
         ("veil over a surface", "mode = 'mixed'\nvolume = { veil = 0.5 }\nlight = { occlusion = {} }\nslices = { pixels = 30 }"),
         ("rendered colours", "mode = 'sr'\nsurface = { colour = 'rendered' }\nlight = { texture = 0.5 }\nslices = { pixels = 30 }"),
         (

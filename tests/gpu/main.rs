@@ -4,6 +4,7 @@
 mod any_scene;
 mod bands;
 mod batches;
+mod caps;
 #[path = "../common/mod.rs"]
 mod common;
 mod conditioning;

@@ -329,6 +329,39 @@ fn projections_and_surfaces_of_a_real_sweep_are_the_limits_of_their_samples() {
     }
 }
 
+/// Exact rays end at cut faces as sampled ones do, with the same colour and at the same place; the others are integrated.
+#[test]
+fn cut_faces_end_exact_rays_too() {
+    for (mode, slot) in [("vr", Slot::Picture), ("sr", Slot::Distance)] {
+        let (scene, frames) = wobbler_scene(&format!(
+            "mode = '{mode}'\nslices = {{ pixels = 48 }}\nray = {{ step = 0.5 }}\nsurface = {{ threshold = 0.08, edge = 3.0 }}\n\
+             volume = {{ transfer = [{{ at = 0.2, colour = [1, 1, 1], opacity = 0 }}, {{ at = 0.4, colour = [1, 0, 0], opacity = 1 }}] }}\n\
+             cap = {{ level = 0.15 }}\nclip = [{{ at = [3, 52, -2], normal = [0, 0, 1] }}]\ncamera = {{ elevation = -60 }}"
+        ));
+        assert_eq!(picture::fault(&scene), None);
+        let [(exact, faces), (sampled, _)] = [true, false].map(|exact| {
+            let mut effort = Effort::default();
+            let mut slots = reference::render_with(&scene, &frames, &mut |pass, reads, writes| {
+                exact && picture::replace(&scene, pass, reads, writes, &mut effort)
+            });
+            (slots.remove(&slot).expect("drawn"), slots.remove(&Slot::Cap).expect("faces"))
+        });
+        let (mut ends, mut others) = (0, 0);
+        for (n, face) in faces.values.chunks_exact(2).enumerate() {
+            let [a, b] =
+                [&exact, &sampled].map(|texels| &texels.values[n * texels.channels..(n + 1) * texels.channels]);
+            match face[1] > 0.0 {
+                true => {
+                    assert_eq!(a, b, "{mode}: pixel {n}");
+                    ends += 1;
+                }
+                false => others += usize::from(a != b),
+            }
+        }
+        assert!(ends > 100 && others > 20, "{mode}: {ends} rays end at the face, {others} others differ");
+    }
+}
+
 /// GK15 over pieces of equal length, which ignore where cells and the points of the transfer function are.
 fn without_breakpoints(line: &Line, volume: &Texels, points: &[TransferPoint], long: f64, pieces: usize) -> f64 {
     let half = long / pieces as f64 / 2.0;

@@ -366,6 +366,9 @@ fn scenes() -> Vec<Scene> {
             "mode = 'plane'\npost = { floats = true }",
             "mode = 'tomography'\nplanes = { lines = false, thickness = 3, slab = 'max' }",
             "mode = 'cube'\nclip = [{ at = [0, 0, 0], normal = [1, 0, 0] }]",
+            "mode = 'vr'\nlight = { volume = { cell = 8 } }\nregion = { fade = 3 }\nclip = [{ at = [0, 0, 0], normal = [1, 0, 0] }]",
+            "mode = 'sr'\nlight = { shadow = {} }\nclip = [{ at = [0, 0, 0], normal = [1, 0, 0] }]",
+            "mode = 'mixed'\nclip = [{ at = [0, 0, 0], normal = [1, 0, 0] }]",
         ] {
             scenes.push(scene(geometry.clone(), BYTES, sections));
         }

@@ -47,6 +47,30 @@ fn buttons_act_on_the_picture_and_reset_takes_it_all_back() {
     view.leave();
 }
 
+/// What a clip plane cuts, with the echoes of its face and without, by the switch in the column, and back by undo.
+#[test]
+fn a_switch_shows_the_echoes_of_the_clip_face_and_undo_takes_it_back() {
+    let desk = Desk::new(false);
+    let (_, size) = picture();
+    let clipped = ["--mode", "sr", "--set", "clip=[{at=[3,52,-2],normal=[0,0,1]}]", "--set", "camera.elevation=-60"];
+    let [on, off] =
+        ["true", "false"].map(|is| headless(size, &[&clipped[..], &["--set", &format!("cap.enabled={is}")]].concat()));
+    assert_ne!(on, off);
+    let view = desk.view(&[&["--size", "1000x700", "--source", SWEEP][..], &clipped].concat());
+    shows(&view, &on, "the echoes");
+    // The switch below the heading of the clip, the first of the column.
+    view.click(954, 56);
+    shows(&view, &off, "the lit inside");
+    let control_z = |view: &View| {
+        view.desk.press(CONTROL, true);
+        view.desk.tap('z');
+        view.desk.press(CONTROL, false);
+    };
+    control_z(&view);
+    shows(&view, &on, "the echoes again");
+    view.leave();
+}
+
 #[test]
 fn a_drag_on_the_picture_turns_it_and_one_on_a_panel_does_not() {
     let desk = Desk::new(false);

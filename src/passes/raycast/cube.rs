@@ -70,7 +70,7 @@ fn stride(scene: &Scene) -> f64 {
 }
 
 /// Where a ray is within all half-spaces, and which of them it enters last.
-fn entry(block: &[HalfSpace], origin: DVec3, direction: DVec3) -> Option<(f64, f64, Option<usize>)> {
+pub(super) fn entry(block: &[HalfSpace], origin: DVec3, direction: DVec3) -> Option<(f64, f64, Option<usize>)> {
     let (mut enter, mut leave, mut face) = (0.0f64, f64::MAX, None);
     for (i, half) in block.iter().enumerate() {
         let (towards, room) = (half.normal.dot(direction), half.room(origin));

@@ -235,6 +235,11 @@ impl<'a> Ray<'a> {
         self.leave - self.enter
     }
 
+    /// Where it enters the region; a miss if it does not.
+    pub fn enter_or_miss(&self) -> f64 {
+        if self.path() > 0.0 { self.enter } else { MISS }
+    }
+
     /// mm behind the entry after n steps: dt/dn = step (wider + widening t).
     pub fn offset(&self, n: f64) -> f64 {
         let rate = self.step * self.widening;

@@ -1,5 +1,6 @@
 //! SR: the first surface on each ray (thesis 4-3), as the detector of `detector.rs` finds it.
 
+use super::cap;
 use super::detector::{detect, polarity};
 use super::ray;
 use crate::passes::empty_space;
@@ -17,7 +18,11 @@ pub const PASS: Pass = Pass {
         (true, Ok(_)) => Err("found in the march that composites"),
         (true, Err(_)) => Ok("the mode shows a surface"),
     },
-    reads: |s, _| ray::marching_reads(s, empty_space::surface_skipping(s)),
+    reads: |s, _| {
+        let mut reads = ray::marching_reads(s, empty_space::surface_skipping(s));
+        reads.extend(cap::reads(s));
+        reads
+    },
     writes: |s, _| writes(s),
     extent: ray_extent,
     repeat: once,
@@ -31,10 +36,9 @@ pub const PASS: Pass = Pass {
               the threshold, two equal peaks, or a sample at the border of the sector may go either way and move the place",
     },
     reference: |scene, _, reads, writes| {
-        let volume = reads.get("volume");
         let size = writes.get("distance_map").size;
         for (x, y) in (0..size[1]).flat_map(|y| (0..size[0]).map(move |x| (x, y))) {
-            reference_ray(scene, volume, writes, x, y);
+            reference_ray(scene, reads, writes, x, y);
         }
     },
 };
@@ -81,13 +85,15 @@ pub(super) fn constants(scene: &Scene) -> Vec<(&'static str, i32)> {
         ("DETECTOR", detector),
         ("BEHIND", scene.samples_behind() as i32),
         ("ECHO", scene.lights_by_echo() as i32),
+        cap::constant(scene),
     ]);
     constants
 }
 
-/// Finds the surface on a pixel's ray, and writes its distance, and its echo where the scene stores it.
-pub(super) fn reference_ray(scene: &Scene, volume: &Texels, writes: &mut Arrays, x: usize, y: usize) {
-    let ray = ray::Ray::cast(scene, volume, scene.surface_view(), scene.ring.step, x, y);
+/// Finds the surface on a pixel's ray, and writes its distance, and its echo where the scene stores it. A ray that ends at a cut face has its
+/// surface there.
+pub(super) fn reference_ray(scene: &Scene, reads: &Arrays, writes: &mut Arrays, x: usize, y: usize) {
+    let ray = ray::Ray::cast(scene, reads.get("volume"), scene.surface_view(), scene.ring.step, x, y);
     let count = ray.steps_to(ray.path().max(0.0)).floor() as i64;
     // Half a rough ring before the region, and behind it that and a ring to follow an edge to its peak.
     let half = i64::from(scene.ring.half * scene.settings.surface.rough);
@@ -97,7 +103,9 @@ pub(super) fn reference_ray(scene: &Scene, volume: &Texels, writes: &mut Arrays,
         (first..end).map(|i| i as f64 + 0.5).map(|n| ray.sample(ray.offset(n), n)).collect();
     let within = |place: f64| (0.0..=ray.path()).contains(&ray.offset(place + 0.5));
     let found = detect(scene, &samples, first).map(|(place, echo)| (place + first as f64, echo));
+    let is_capped = cap::cut_at(scene, reads, x, y).is_some();
     let (distance, surface) = match found.filter(|(place, _)| within(*place)) {
+        _ if is_capped => (ray.enter_or_miss(), [0.0; 4]),
         Some((place, echo)) => {
             let distance = ray.enter + ray.offset(place + 0.5);
             (distance, [echo, 1.0, behind(scene, &ray, distance), 0.0])

@@ -2,7 +2,7 @@
 //! lie in the middles of the detector's steps, so opacities are corrected for that step. Compositing takes each of them once and in
 //! order, whatever the detector does, which steps back where it fires.
 
-use super::{ray, surface, volume};
+use super::{cap, ray, surface, volume};
 use crate::passes::empty_space;
 use crate::passes::light_volume;
 use crate::passes::pass::*;
@@ -17,6 +17,7 @@ pub const PASS: Pass = Pass {
         reads.extend(empty_space::volume_skipping(s).slot().map(|slot| whole("volume_bricks", slot)));
         reads.push(whole("transfer", Slot::Transfer));
         reads.extend(light_volume::reads(s));
+        reads.extend(cap::reads(s));
         reads
     },
     writes: |s, _| {
@@ -42,11 +43,13 @@ pub const PASS: Pass = Pass {
         why: "of distances, the tolerance of raycast_surface; of colours, that of raycast_volume, on the same samples",
     },
     reference: |scene, _, reads, writes| {
-        let texels = reads.get("volume");
         let size = writes.get("picture").size;
         for (x, y) in (0..size[1]).flat_map(|y| (0..size[0]).map(move |x| (x, y))) {
-            surface::reference_ray(scene, texels, writes, x, y);
-            let colour = volume::composited(scene, reads, scene.ring.step, [x, y]);
+            surface::reference_ray(scene, reads, writes, x, y);
+            let colour = match cap::cut_at(scene, reads, x, y) {
+                Some(cut) => cut.over([0.0; 4]),
+                None => volume::composited(scene, reads, scene.ring.step, [x, y]),
+            };
             writes.get_mut("picture").set([x, y, 0], &colour);
         }
     },

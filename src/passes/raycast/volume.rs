@@ -1,5 +1,6 @@
 //! VR: emission and absorption along each ray, front to back (thesis 4-1, 4-2), with opacity corrected for the step.
 
+use super::cap;
 use super::composite::{March, Medium, Place};
 use super::ray;
 use crate::passes::empty_space;
@@ -28,6 +29,7 @@ pub const PASS: Pass = Pass {
         });
         let needs_distance = matches!(kind(s), Kind::Layer | Kind::Behind);
         reads.extend(light_volume::reads(s));
+        reads.extend(cap::reads(s));
         reads.extend(needs_distance.then_some(whole("distance_map", Slot::Distance)));
         reads
     },
@@ -53,7 +55,7 @@ pub const PASS: Pass = Pass {
             Kind::Behind => 2,
             Kind::Hit => 3,
         };
-        constants.push(("PART", part));
+        constants.extend([("PART", part), cap::constant(s)]);
         constants
     },
     tolerance: Tolerance {
@@ -81,8 +83,14 @@ pub const PASS: Pass = Pass {
                     }
                     Kind::Alone | Kind::Colour | Kind::Hit => {}
                 }
-                let (light, hit) = composite(scene, &ray, &tables);
-                let colour = light_volume::developed(scene, kind(scene) == Kind::Alone, light, [x, y]);
+                let developed = |light| light_volume::developed(scene, kind(scene) == Kind::Alone, light, [x, y]);
+                let (colour, hit) = match cap::cut_at(scene, reads, x, y) {
+                    Some(cut) => (cut.over(developed([0.0; 4])), ray.enter_or_miss()),
+                    None => {
+                        let (light, hit) = composite(scene, &ray, &tables);
+                        (developed(light), hit)
+                    }
+                };
                 writes.get_mut("picture").set([x, y, 0], &colour);
                 if kind(scene) == Kind::Hit {
                     writes.get_mut("hit_distance").set([x, y, 0], &[hit]);

@@ -45,6 +45,8 @@ pub struct Settings {
     pub region: Region,
     /// Clip planes, at most 4. Each removes the side that its normal points to.
     pub clip: Vec<Clip>,
+    /// The cut faces of clip planes.
+    pub cap: Cap,
     /// Cuts: parts of the volume within contours drawn on a rendering, at most 32. Renderings lose them; planes and the block of mode cube show
     /// everything. Their edges are as fine as the texels of the volume.
     pub cuts: Vec<Cut>,
@@ -205,4 +207,25 @@ pub struct Clip {
     pub at: [f64; 3],
     /// Normal of the plane, of any length but 0.
     pub normal: [f64; 3],
+}
+
+/// Caps: the cut faces of clip planes in surface and volume rendering. Where a ray enters tissue through a clip plane, the picture shows the echo
+/// of the section there, as planes show it (`planes.window`), without light. Fluid stays open, so that one looks into a cavity. What is drawn
+/// translucent, such as preset glass, has no cut faces, and neither have renderings of what is dark. Cut faces show the volume that is rendered, with
+/// its filters.
+#[derive(Clone, Copy, Debug, PartialEq, Deserialize, Serialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct Cap {
+    /// Show the echoes of cut faces.
+    pub enabled: bool,
+    /// The echo from which on there is tissue, 0..1 before any grey window: a mean over the length of an edge (`surface.edge`). Absent: what is
+    /// rendered as solid, from the surface's threshold on, or from the echo on from which all are opaque. Less fills darker tissue too, such as the brain
+    /// within a skull.
+    pub level: Option<f64>,
+}
+
+impl Default for Cap {
+    fn default() -> Cap {
+        Cap { enabled: true, level: None }
+    }
 }

@@ -94,6 +94,7 @@ pub(super) fn show_modes(ui: &mut Ui, state: &PanelState, width: f32, execute: &
                 |t| execute(Command::Tool(t)),
             );
             if !state.has_column {
+                clip(ui, state, width - 16.0, execute);
                 cuts(ui, state, width - 16.0, execute);
             }
             if settings.mode.is_flat() && settings.mode != Mode::Orthogonal {
@@ -145,6 +146,26 @@ pub(super) fn show_modes(ui: &mut Ui, state: &PanelState, width: f32, execute: &
                 }
             });
         });
+    });
+}
+
+/// The numbers of the controls of clip faces that are there.
+fn of_clip(settings: &Settings) -> [Option<usize>; 2] {
+    [texts::CLIP_ECHOES, texts::CLIP_THRESHOLD].map(|name| front(&[name], settings))
+}
+
+/// While there are clip planes, whether their faces show echoes, and from which on.
+fn clip(ui: &mut Ui, state: &PanelState, width: f32, execute: &mut dyn FnMut(Command)) {
+    let there = of_clip(state.controls.settings());
+    if there == [None; 2] {
+        return;
+    }
+    names::group(ui, texts::CLIP, |ui| {
+        heading(ui, texts::CLIP);
+        ui.set_max_width(width);
+        for number in there.into_iter().flatten() {
+            slider(ui, state, number, SLIDERS[number].name, false, execute);
+        }
     });
 }
 
@@ -354,12 +375,14 @@ pub(super) fn show_controls(ui: &mut Ui, state: &PanelState, width: f32, execute
             ui.set_max_width(width - 32.0);
             ui.add_space(6.0);
             measures::show_results(ui, state, width - 40.0, execute);
+            clip(ui, state, width - 32.0, execute);
             cuts(ui, state, width - 32.0, execute);
             curve(ui, state, width - 32.0, execute);
             heading(ui, texts::CONTROLS);
             let in_front = FRONT.map(|(name, sliders)| (name, front(sliders, settings)));
             let with_cuts = depth_of_cut(state);
             let start = [texts::AUTO_RENDER_START, texts::START_OFFSET].map(|name| front(&[name], settings));
+            let elsewhere = [&start[..], &of_clip(settings)[..], &[with_cuts]].concat();
             for (name, number) in in_front {
                 match number {
                     Some(number) if name == texts::LIGHT => {
@@ -421,8 +444,7 @@ pub(super) fn show_controls(ui: &mut Ui, state: &PanelState, width: f32, execute
             for (group, name) in Group::ALL {
                 let is_there = |(number, s): &(usize, &Control)| {
                     let is_elsewhere =
-                        with_cuts == Some(*number) || in_front.iter().any(|(_, front)| *front == Some(*number));
-                    let is_elsewhere = is_elsewhere || start.contains(&Some(*number));
+                        elsewhere.contains(&Some(*number)) || in_front.iter().any(|(_, front)| *front == Some(*number));
                     s.group == group && s.applies(settings) && !is_elsewhere
                 };
                 let there: Vec<usize> = SLIDERS.iter().enumerate().filter(is_there).map(|(number, _)| number).collect();
@@ -477,9 +499,10 @@ fn slider(
     let mut value = before.clamp(low, high.max(low));
     let digits = (-slider.step.log10().floor()).clamp(0.0, 3.0) as usize;
     let space = if slider.unit.is_empty() || slider.unit == "°" { "" } else { " " };
-    let shown = match slider.name == texts::DEPTH_OF_CUT && before <= 0.0 {
-        true => texts::THROUGH_ALL.to_string(),
-        false => format!("{before:.digits$}{space}{}", slider.unit),
+    let shown = match slider.name {
+        texts::DEPTH_OF_CUT if before <= 0.0 => texts::THROUGH_ALL.to_string(),
+        texts::CLIP_THRESHOLD if before <= 0.0 => texts::AUTOMATIC.to_string(),
+        _ => format!("{before:.digits$}{space}{}", slider.unit),
     };
     ui.horizontal(|ui| {
         let text = RichText::new(name);

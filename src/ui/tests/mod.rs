@@ -1,6 +1,7 @@
 //! Gestures, keys and settings together, without a window; and known answers for what commands change.
 
 mod budget;
+mod clipping;
 mod colours;
 mod curving;
 mod cutting;

@@ -5,7 +5,7 @@ use crate::ui::command::{Tool, Viewpoint};
 use crate::ui::texts;
 
 /// By name of a slider: what it does.
-const SLIDERS: [(&str, &str); 53] = [
+const SLIDERS: [(&str, &str); 55] = [
     (texts::GAIN, "Makes the picture brighter or darker as a whole."),
     (texts::CONTRAST, "Spreads bright and dark apart."),
     (texts::GAMMA, "Brightens (above 1) or darkens the middle tones; black and white stay."),
@@ -20,6 +20,14 @@ const SLIDERS: [(&str, &str); 53] = [
     (
         texts::AUTO_RENDER_START,
         "Starts rendering at the fluid before the face: the wall in front of it goes. Where no fluid is found, nothing changes.",
+    ),
+    (
+        texts::CLIP_ECHOES,
+        "Tissue that a clip plane cuts shows its echoes there, as planes do. Off: what is behind it is drawn, lit. Fluid is open either way.",
+    ),
+    (
+        texts::CLIP_THRESHOLD,
+        "Weaker echoes stay open on the clip face: lower it to fill dark tissue, such as the brain. 0: what is rendered as solid is filled.",
     ),
     (texts::START_OFFSET, "How far behind the near face of the fluid rendering starts: more removes more."),
     (texts::START_SMOOTHING, "Smooths the surface at which rendering starts."),

@@ -88,6 +88,7 @@ pub fn advanced_group(name: impl Display) -> String {
     format!("Advanced: {name}")
 }
 pub const NO_SUCH_CONTROL: &str = "This mode has no such control.";
+pub const AUTOMATIC: &str = "auto";
 pub const THROUGH_ALL: &str = "through all";
 pub fn slider_hint(hint: impl Display) -> String {
     format!("{hint} Double click: as at the start.")
