@@ -78,7 +78,7 @@ pub fn measured(picture: &Picture, scene: &Scene, start: Option<&Unveiled>) -> R
     let mut measured = picture.clone();
     if [picture.width, picture.height] == scene.picture_size() {
         strokes::slices(&mut measured, scene)?;
-        start.iter().for_each(|start| strokes::start(&mut measured, &unveil::lines(scene, start)));
+        strokes::start(&mut measured, &unveil::lines(scene, start));
         strokes::draw(&mut measured, scene)?;
     }
     Ok(measured)

@@ -137,7 +137,7 @@ impl Scene {
 
     /// True if rays are cast through a volume without what is removed: by cuts, or in front of the render start.
     pub fn removes(&self) -> bool {
-        self.has_cuts() || self.unveils()
+        self.has_cuts() || self.unveils() || self.starts_at_curve()
     }
 
     /// Corners of all contours, and points of all brushes.

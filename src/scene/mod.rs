@@ -21,6 +21,7 @@ pub mod self_attenuation;
 pub mod settings;
 mod sizes;
 mod slice_index;
+pub mod start_curve;
 pub mod transfer;
 mod turntable;
 pub mod unveil;
@@ -346,6 +347,7 @@ impl Scene {
         floating::check_floating(&scene)?;
         cuts::check_drawn(&scene)?;
         unveil::check_unveiled(&scene)?;
+        start_curve::check_drawn(&scene)?;
         check::check_planes_resolved(&scene)?;
         scene.visible_bounds = visible_bounds::of(&scene);
         Ok(scene)

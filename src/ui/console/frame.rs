@@ -226,11 +226,9 @@ impl Console {
 
     /// Takes where the rendering of the picture starts, and says so when the fluid is lost.
     fn take_start(&mut self) {
-        let start = self.stream.renderer().and_then(|renderer| {
-            renderer.unveiled().map(|start| (start.outcome, unveil::lines(renderer.scene(), start)))
-        });
-        let (outcome, lines) = start.unzip();
-        self.start_lines = lines.unwrap_or_default();
+        let renderer = self.stream.renderer();
+        let outcome = renderer.as_ref().and_then(|renderer| renderer.unveiled()).map(|start| start.outcome);
+        self.start_lines = renderer.map_or(Vec::new(), |renderer| unveil::lines(renderer.scene(), renderer.unveiled()));
         let lost = outcome.filter(|outcome| !outcome.is_found());
         if let Some(outcome) = lost.filter(|_| !self.has_lost_fluid) {
             self.notify(&format!("{AUTO_START}: {outcome}."), false);

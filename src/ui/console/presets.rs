@@ -137,6 +137,7 @@ fn differs_much(a: &Settings, b: &Settings) -> bool {
         || is_zoomed
         || is_cropped
         || a.cuts != b.cuts
+        || a.region.start_curve != b.region.start_curve
         || a.clip != b.clip
         || a.planes.position != b.planes.position
 }
