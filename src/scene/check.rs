@@ -4,7 +4,7 @@ use super::planes::{MAX_SLAB, MAX_TILES};
 use super::{
     Bilateral, Clip, Compositing, Conditioning, Distance, Edge, Elevation, EnhancedSigma, Layout, Light, MAX_CLIPS,
     MAX_DEVIATION, MAX_PICTURE, MAX_WINDOW, Mode, Noise, PeronaMalik, Scene, SceneError, Scheme, Settings, Sigma,
-    Smooth, refuse, start_curve, transfer,
+    Smooth, refuse, transfer,
 };
 use crate::probe::Geometry;
 use glam::DVec3;
@@ -147,7 +147,6 @@ pub(super) fn check(settings: &Settings) -> Result<(), SceneError> {
     within("surface.colour_depth", f.colour_depth, 0.01, 1000.0)?;
     check_light(&settings.light)?;
     within("region.fade", settings.region.fade, 0.0, 100.0)?;
-    start_curve::check(settings)?;
     within("volume.extinction", settings.volume.extinction.unwrap_or(1.0), 1e-3, 1e3)?;
     if settings.volume.compositing == Compositing::Exponential {
         let table = "needs volume.compositing=riemann, corrected or pre-integrated: exponential takes the light of a step from a table";

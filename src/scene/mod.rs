@@ -226,6 +226,7 @@ impl Settings {
         check::check(self)?;
         check_measures::check_measures(&self.measure)?;
         cuts::check(&self.cuts)?;
+        start_curve::check(self)?;
         check::check_planes(self)
     }
 }

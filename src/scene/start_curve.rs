@@ -12,7 +12,7 @@ use glam::DVec3;
 const LARGEST: f64 = 1e7;
 
 /// Least lateral distance of neighbouring points, mm.
-pub const LEAST_START_GAP: f64 = 0.01;
+const LEAST_GAP: f64 = 0.01;
 
 /// A render start in space.
 #[derive(Clone, Debug, PartialEq)]
@@ -81,8 +81,7 @@ fn end_slope((h0, d0): (f64, f64), (h1, d1): (f64, f64)) -> f64 {
 impl Scene {
     /// True if a rendering starts at a curve. Planes and the block of mode cube show everything.
     pub fn starts_at_curve(&self) -> bool {
-        let is_rendered = self.composites() || self.detects_surface() || self.projects();
-        self.settings.region.start_curve.is_some() && is_rendered
+        self.settings.region.start_curve.is_some() && self.renders()
     }
 
     /// The curve at which renderings start, in space: depths are Y.
@@ -135,11 +134,11 @@ pub(super) fn check(settings: &Settings) -> Result<(), SceneError> {
     points.iter().flatten().try_for_each(|value| within(FIELD, *value, -LARGEST, LARGEST))?;
     for (n, two) in points.windows(2).enumerate() {
         let ([before, _], [lateral, _]) = (two[0], two[1]);
-        if lateral - before < LEAST_START_GAP {
+        if lateral - before < LEAST_GAP {
             return refuse(
                 FIELD,
                 format!(
-                    "point {}: lateral {lateral} mm must be at least {LEAST_START_GAP} mm more than that of the point before, {before} mm",
+                    "point {}: lateral {lateral} mm must be at least {LEAST_GAP} mm more than that of the point before, {before} mm",
                     n + 2
                 ),
             );
@@ -226,7 +225,7 @@ mod tests {
             let mut lateral = -20.0;
             let points: Vec<[f64; 2]> = (0..3 + case % 3)
                 .map(|_| {
-                    lateral += LEAST_START_GAP + 15.0 * random() * random();
+                    lateral += LEAST_GAP + 15.0 * random() * random();
                     [lateral, 60.0 * random()]
                 })
                 .collect();

@@ -31,6 +31,14 @@ pub enum Command {
     MoveFace(Face, f64),
     /// Moves the region: lateral, depth, elevation, mm.
     MoveRegion([f64; 3]),
+    /// Bends the start line of the region at handles, or makes it straight.
+    ToggleStartCurve,
+    /// Moves the handle of the start line with this index: lateral, depth, mm.
+    MoveStartHandle(usize, [f64; 2]),
+    /// Adds a handle to the start line at this lateral position, mm; none: in the widest gap.
+    AddStartHandle(Option<f64>),
+    /// Removes the handle of the start line with this index; none: the one that bends it the least.
+    RemoveStartHandle(Option<usize>),
     /// Moves the viewer's clip plane further into the volume, mm; negative values pull it back.
     MoveClip(f64),
     /// Selects the plane that is shown alone, stepped and moved.
@@ -197,6 +205,7 @@ impl Command {
                 | Command::MoveLight(_)
                 | Command::MoveFace(..)
                 | Command::MoveRegion(_)
+                | Command::MoveStartHandle(..)
                 | Command::MoveClip(_)
                 | Command::StepPlane(_)
                 | Command::MoveCrossing(_)
@@ -212,6 +221,7 @@ impl Command {
             (Command::SetSlider(a, _), Command::SetSlider(b, _)) => a == b,
             (Command::StepSlider(a, _), Command::StepSlider(b, _)) => a == b,
             (Command::MoveFace(a, _), Command::MoveFace(b, _)) => a == b,
+            (Command::MoveStartHandle(a, _), Command::MoveStartHandle(b, _)) => a == b,
             (Command::MovePoint(a, point, _), Command::MovePoint(b, other, _)) => (a, point) == (b, other),
             (Command::Type(_) | Command::Untype, Command::Type(_) | Command::Untype) => true,
             // Fingers move, turn and zoom at once.
@@ -282,6 +292,7 @@ pub const KEY_BINDINGS: &[Binding] = &[
     on(Char('t'), "drag rotates", Command::Tool(Tool::Rotate)),
     on(Char('l'), "drag moves the light", Command::Tool(Tool::Light)),
     on(Char('g'), "drag moves the region's faces", Command::Tool(Tool::Region)),
+    shift(Char('g'), "bend the start line, or straighten it", Command::ToggleStartCurve),
     on(Char('x'), "drag cuts from the front", Command::Tool(Tool::Clip)),
     on(Char('s'), "drag moves the planes (sections)", Command::Tool(Tool::Plane)),
     on(Char('f'), "drag round it cuts it away (freehand)", Command::Tool(Tool::Cut)),

@@ -86,11 +86,13 @@ fn it_is_set_by_a_flag_and_none_removes_it() {
         ("[[0,1],[2,3],[4,5],[6,7],[8,9],[10,11]]", "region.start_curve: has 6 points, must have 3 to 5"),
         ("[[0,1],[2,nan],[4,5]]", "region.start_curve: is NaN"),
         ("[[0,1],[4,3],[2,5]]", "region.start_curve: point 3: lateral 2 mm"),
-        ("[[0,1],[4,3],[2]]", "region.start_curve"),
     ] {
-        let fault = Layers::default().set(&format!("region.start_curve={wrong}")).expect_err(wrong).to_string();
+        let mut layers = Layers::default();
+        layers.set(&format!("region.start_curve={wrong}")).expect("of the right form");
+        let fault = layers.finish().expect("settings").check().expect_err(wrong).to_string();
         assert!(fault.contains(said) && !fault.contains('\n'), "{fault}");
     }
+    assert!(Layers::default().set("region.start_curve=[[0,1],[4,3],[2]]").is_err());
 }
 
 /// On the planes the line is the curve: an arc on A, level on B, and on C where the curve has the plane's depth.

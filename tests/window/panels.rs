@@ -325,3 +325,59 @@ fn the_volume_is_exported_as_the_commands_do() {
     view.terminate();
     is_clean();
 }
+
+/// The start line is bent by a drag on plane A: it is drawn in green, the rendering follows, the workspace keeps it, and undo takes it back.
+#[test]
+fn the_start_line_is_bent_on_plane_a_and_the_rendering_follows() {
+    let desk = Desk::new(false);
+    let folder = Folder::new("start-line");
+    let four = ["--mode", "vr", "--set", "layout=four", "--set", "region.depth=[20,80]"];
+    let kept = folder.path("kept");
+    let view = desk.view(&[&["--size", "1000x700", "--source", SWEEP, "--save-to", &kept][..], &four].concat());
+    let (corner, size) = picture();
+    // The middle of the rendering, in the last quarter of the picture; marks are at its edges.
+    let (from, middle) = (size.map(|n| n * 5 / 8), size.map(|n| n / 4));
+    let renders = |more: &[&str], what: &str| {
+        let wanted = headless(size, &[&four, more].concat());
+        view.shows_at(&wanted, [corner[0] + from[0], corner[1] + from[1]], from, middle, what);
+    };
+    renders(&[], "the start");
+    desk.tap('g');
+    desk.press(SHIFT, true);
+    desk.tap('g');
+    desk.press(SHIFT, false);
+    // Where its handles are.
+    let recording = echolume::source::open(SWEEP.as_ref(), None).expect("it opens");
+    let input = Input { stored: recording.stored_type(), range: recording.range() };
+    let toml = format!("mode='vr'\nlayout='four'\nregion.depth=[20,80]\npicture.size={size:?}");
+    let scene = Scene::new(recording.geometry(0), input, toml::from_str(&toml).expect("settings")).expect("a scene");
+    let sheet = scene.sheet();
+    let middle_handle = (scene.low + scene.high).with_y(2.0 * scene.low.y) / 2.0;
+    let at = sheet.project(&sheet.tiles[0], middle_handle).0;
+    let at: [i16; 2] = std::array::from_fn(|a| (f64::from(corner[a]) + at[a]).round() as i16);
+    let greens = |view: &View| {
+        let seen = crop(&view.look()?, corner, size.map(|n| n / 2))?;
+        let is_green = |p: &&[u8]| p[1] > 180 && p[0] < 110 && p[2] < 140;
+        Some(seen.rgba.chunks(4).filter(is_green).count()).filter(|count| *count > 300)
+    };
+    until("the line in green", || greens(&view));
+    view.drag(at, [at[0], at[1] + 60]);
+    let file = save_workspace(&desk, &folder);
+    let settings = until("the whole workspace", || Workspace::read(&file).ok()).layers.finish().expect("settings");
+    let curve = settings.region.start_curve.expect("a curve");
+    // The slop of a drag is 6 pixels.
+    let moved = (curve[1][1] - curve[0][1]) / sheet.pixel;
+    assert!(curve.len() == 3 && (53.0..60.5).contains(&moved) && (curve[0][1] - 20.0).abs() < 1e-3, "{curve:?}");
+    until("the line in green", || greens(&view));
+    if let Some(seen) = view.look() {
+        seen.save("/work/tmp/con_start_line.png".as_ref()).unwrap();
+    }
+    // Without the box over it.
+    desk.tap('t');
+    let set = format!("region.start_curve={curve:?}");
+    renders(&["--set", &set], "below the curve");
+    control(&desk, 'z');
+    control(&desk, 'z');
+    renders(&[], "the start again");
+    view.leave();
+}

@@ -9,6 +9,7 @@ mod options;
 mod presets;
 mod saving;
 
+use self::frame::LostFluid;
 use self::measuring::Counting;
 use self::opening::Opening;
 pub use self::options::{ConsoleOptions, OpenFile, StartupFault};
@@ -128,8 +129,8 @@ pub struct Console {
     saved_volume: Option<u32>,
     /// Where the rendering that is shown starts on planes beside it.
     start_lines: Vec<StartLine>,
-    /// The fluid at which rendering should start cannot be told.
-    has_lost_fluid: bool,
+    /// What is said of the fluid at which rendering should start.
+    fluid: LostFluid,
     /// Where to draw the pointer, pixels of the window.
     pointer: Option<[f64; 2]>,
     player: CinePlayer,
@@ -289,7 +290,7 @@ impl Console {
             is_full_screen: false,
             saved_volume: None,
             start_lines: Vec::new(),
-            has_lost_fluid: false,
+            fluid: LostFluid::default(),
             pointer: None,
             player: CinePlayer::default(),
             unsent_input: None,

@@ -14,11 +14,27 @@ pub const BRUSH_RADII: [f64; 2] = [0.5, 20.0];
 /// Why a mode or a control does nothing.
 pub const CUTS_IN_THE_WAY: &str =
     "That draws both what is dark and what is bright, of which nothing can be cut: remove the cuts first (Shift+F).";
+pub const UNVEILING_IN_THE_WAY: &str = "That draws both what is dark and what is bright, of which nothing can be removed: rendering cannot start at the fluid.";
+pub const CURVE_IN_THE_WAY: &str = "That draws both what is dark and what is bright, of which nothing can be removed: the start line has to be straight (Shift+G).";
+pub const SEVERAL_IN_THE_WAY: &str = "That draws both what is dark and what is bright, of which nothing can be removed: no cuts (Shift+F), a straight start line (Shift+G) and no automatic render start go with it.";
 
-/// True if settings cannot be drawn with their cuts, and can without.
-pub(super) fn is_in_the_way(now: &Scene, settings: Settings) -> bool {
-    let has_cuts = !settings.cuts.is_empty();
-    has_cuts && drawable(now, Settings { cuts: Vec::new(), ..settings }).is_some()
+/// What removes parts of renderings and keeps settings from being drawn: the first that alone is in the way, or all of it together.
+pub(super) fn in_the_way(now: &Scene, settings: &Settings) -> Option<&'static str> {
+    let no_cuts = |settings: &mut Settings| settings.cuts.clear();
+    let no_fluid = |settings: &mut Settings| settings.unveil.enabled = false;
+    let no_curve = |settings: &mut Settings| settings.region.start_curve = None;
+    let ways: [(&[&dyn Fn(&mut Settings)], &str); 4] = [
+        (&[&no_cuts], CUTS_IN_THE_WAY),
+        (&[&no_fluid], UNVEILING_IN_THE_WAY),
+        (&[&no_curve], CURVE_IN_THE_WAY),
+        (&[&no_cuts, &no_fluid, &no_curve], SEVERAL_IN_THE_WAY),
+    ];
+    let is_way = |(changes, _): &(&[&dyn Fn(&mut Settings)], &str)| {
+        let mut without = settings.clone();
+        changes.iter().for_each(|change| change(&mut without));
+        without != *settings && drawable(now, without).is_some()
+    };
+    ways.into_iter().find(is_way).map(|(_, why)| why)
 }
 
 impl Controls {
@@ -120,7 +136,7 @@ impl Controls {
         if self.settings.cuts.len() >= MAX_CUTS {
             return Change::Refused("There are as many cuts as a scene can have: remove them, or take one back.");
         }
-        if !(scene.composites() || scene.detects_surface() || scene.projects()) {
+        if !scene.renders() {
             return Change::Refused("Cuts are made on a rendering: the block shows all of the volume.");
         }
         let Some(cut) = scene.cut_along(outline, self.kept_side) else {

@@ -7,7 +7,9 @@ use super::colours::{
 use super::measures;
 use super::names::{self, Tell};
 use super::{PanelState, TEXT_SIZE, TOUCH_SIZE, heading};
-use crate::scene::{ColourMap, KeptSide, Layout, Mode, PlaneName, Settings, Transfer, TransferName};
+use crate::scene::{
+    ColourMap, KeptSide, Layout, MAX_START_POINTS, MIN_START_POINTS, Mode, PlaneName, Settings, Transfer, TransferName,
+};
 use crate::ui::cine_player::{CineState, SPEEDS};
 use crate::ui::command::{Command, Tool};
 use crate::ui::controls::BRUSH_RADII;
@@ -89,6 +91,7 @@ pub(super) fn show_modes(ui: &mut Ui, state: &PanelState, width: f32, execute: &
             );
             if !state.has_column {
                 cuts(ui, state, width - 16.0, execute);
+                start_line(ui, state, width - 16.0, execute);
             }
             if settings.mode.is_flat() && settings.mode != Mode::Orthogonal {
                 let hint = |_| "The plane that is shown and moved.";
@@ -185,25 +188,79 @@ fn cuts(ui: &mut Ui, state: &PanelState, width: f32, execute: &mut dyn FnMut(Com
     });
 }
 
+/// With the tool for the region, whether its start line is bent, how deep its handles are, and how many it has; without that tool, the switch of a line
+/// that is bent.
+fn start_line(ui: &mut Ui, state: &PanelState, width: f32, execute: &mut dyn FnMut(Command)) {
+    let Some(scene) = state.scene.filter(|scene| scene.renders()) else { return };
+    let points = state.controls.settings().region.start_curve.as_deref();
+    let is_chosen = state.controls.tool() == Tool::Region;
+    if !is_chosen && points.is_none() {
+        return;
+    }
+    names::group(ui, "Start line", |ui| {
+        heading(ui, "Start line");
+        ui.set_max_width(width);
+        let mut on = points.is_some();
+        let hint = "Bends the line at which rendering starts: drag its green handles on plane A of 4-up. Off: straight. (Shift+G)";
+        if switch(ui, &mut on, "Curved start line", hint) {
+            execute(Command::ToggleStartCurve);
+        }
+        let Some(points) = points.filter(|_| is_chosen) else { return };
+        let [low, high] = [scene.low, scene.high].map(|corner| view::below_face(scene, corner).y);
+        for (n, [lateral, depth]) in points.iter().enumerate() {
+            let hint = "How deep rendering starts at this handle of the start line, counted from the left.";
+            if let Some(depth) = plain_slider(ui, &format!("Depth of handle {}", n + 1), *depth, [low, high], hint) {
+                execute(Command::MoveStartHandle(n, [*lateral, depth]));
+            }
+        }
+        let half = vec2((width - ui.spacing().item_spacing.x) / 2.0, TOUCH_SIZE * 0.75);
+        ui.horizontal(|ui| {
+            for (command, name, is_there, hint) in [
+                (
+                    Command::AddStartHandle(None),
+                    "Add handle",
+                    points.len() < MAX_START_POINTS,
+                    "One more handle, in the widest gap; or double click the line where it is wanted. At most five.",
+                ),
+                (
+                    Command::RemoveStartHandle(None),
+                    "Remove handle",
+                    points.len() > MIN_START_POINTS,
+                    "One handle less: the one that bends the line the least; or double click one. At least three.",
+                ),
+            ] {
+                let button = ui.add_enabled(is_there, Button::new(name).min_size(half));
+                if button.tell(hint).on_disabled_hover_text(hint).clicked() {
+                    execute(command);
+                }
+            }
+        });
+    });
+}
+
 fn brush_radius(ui: &mut Ui, state: &PanelState, execute: &mut dyn FnMut(Command)) {
-    let before = state.controls.brush_radius();
-    let (mut value, [low, high]) = (before, BRUSH_RADII);
+    let hint = "How far from the surface under the pointer the brush removes.";
+    if let Some(radius) = plain_slider(ui, "Radius of brush", state.controls.brush_radius(), BRUSH_RADII, hint) {
+        execute(Command::BrushRadius(radius));
+    }
+}
+
+/// A slider in mm of what is no setting of its own. Returns the value that the user sets.
+fn plain_slider(ui: &mut Ui, name: &str, before: f64, [low, high]: [f64; 2], hint: &str) -> Option<f64> {
+    let mut value = before.clamp(low, high.max(low));
     let shown = format!("{before:.1} mm");
     ui.horizontal(|ui| {
-        ui.label("Radius of brush");
+        ui.label(name);
         ui.with_layout(egui::Layout::right_to_left(Align::Center), |ui| {
             ui.label(RichText::new(&shown).color(ACCENT));
         });
     });
     ui.spacing_mut().slider_width = ui.available_width();
     ui.spacing_mut().interact_size.y = TOUCH_SIZE * 0.5;
-    let slider = ui.add(Slider::new(&mut value, low..=high).show_value(false).step_by(0.5));
-    let hint = "How far from the surface under the pointer the brush removes.";
-    let slider = slider.tell(hint).named("Radius of brush").with_value(&shown);
+    let slider = ui.add(Slider::new(&mut value, low..=high.max(low)).show_value(false).step_by(0.5));
+    let slider = slider.tell(hint).named(name).with_value(&shown);
     let is_held = slider.dragged() || slider.clicked() || slider.is_pointer_button_down_on();
-    if (is_held || names::asks_for_value(ui, &slider)) && value != before {
-        execute(Command::BrushRadius(value));
-    }
+    ((is_held || names::asks_for_value(ui, &slider)) && value != before).then_some(value)
 }
 
 fn undo_and_redo(ui: &mut Ui, state: &PanelState, row: &Row, execute: &mut dyn FnMut(Command)) {
@@ -314,6 +371,7 @@ pub(super) fn show_controls(ui: &mut Ui, state: &PanelState, width: f32, execute
             ui.add_space(6.0);
             measures::show_results(ui, state, width - 40.0, execute);
             cuts(ui, state, width - 32.0, execute);
+            start_line(ui, state, width - 32.0, execute);
             heading(ui, "Controls");
             let in_front = FRONT.map(|(name, sliders)| (name, front(sliders, settings)));
             let with_cuts = depth_of_cut(state);

@@ -11,6 +11,7 @@ mod render_start;
 mod screen_reader;
 mod sequences;
 mod shown;
+mod start_line;
 
 use super::command::{Command, Face, Tool};
 use super::controls::{Change, Controls};
