@@ -117,7 +117,8 @@ fn a_rendering_is_that_of_a_volume_which_was_cut_before() {
             let cut = renderer.picture().expect("picture");
             assert!(cut == rendered(&device, whole.clone(), &before).picture().expect("picture"), "{case}");
             let plain = rendered(&device, whole.clone(), &frames).picture().expect("picture");
-            assert!(cut != plain, "{case}");
+            // The smallest echoes are those of the fluid, which reaches below the curve.
+            assert!(cut != plain || mode.contains("minip"), "{case}");
             let change = renderer.change(of(&geometry, &format!("{case}\n{flat}"))).expect("change");
             assert!(matches!(change, Rerun::Steps { .. }), "{case}: {change:?}");
             let level = body_frames(&whole, |p| if p.y < 5.0 { removed } else { body(p) });

@@ -225,8 +225,8 @@ fn only_what_changes_the_surface_makes_a_new_search() {
         (format!("{fluid}\n{cut}"), 0, 0),
         (format!("{fluid}\n{cut}\nregion.start_curve = [[-9, 3], [0, 9], [9, 3]]"), 0, 0),
         // A face that moves within half a column, and one that takes columns out of view.
-        (format!("{fluid}\nregion.lateral = [-14.9, 14.6]"), 0, 0),
-        (format!("{fluid}\nregion.lateral = [-9, 14.6]"), 1, 0),
+        (format!("{fluid}\nregion.lateral = [-15.2, 14.9]"), 0, 0),
+        (format!("{fluid}\nregion.lateral = [-9, 14.9]"), 1, 0),
         (format!("{fluid}, offset = 3").replace("unveil.enabled = true", "unveil = { enabled = true") + " }", 1, 0),
         // Parts are dropped from the volume that the surface is found in.
         (fluid.replace("floating = 1", "floating = 2"), 1, 1),

@@ -20,21 +20,21 @@ pub const SEVERAL_IN_THE_WAY: &str = "That draws both what is dark and what is b
 
 /// What removes parts of renderings and keeps settings from being drawn: the first that alone is in the way, or all of it together.
 pub(super) fn in_the_way(now: &Scene, settings: &Settings) -> Option<&'static str> {
-    let no_cuts = |settings: &mut Settings| settings.cuts.clear();
-    let no_fluid = |settings: &mut Settings| settings.unveil.enabled = false;
-    let no_curve = |settings: &mut Settings| settings.region.start_curve = None;
-    let ways: [(&[&dyn Fn(&mut Settings)], &str); 4] = [
-        (&[&no_cuts], CUTS_IN_THE_WAY),
-        (&[&no_fluid], UNVEILING_IN_THE_WAY),
-        (&[&no_curve], CURVE_IN_THE_WAY),
-        (&[&no_cuts, &no_fluid, &no_curve], SEVERAL_IN_THE_WAY),
+    // Cuts, the start at the fluid, the curved start line: what of them is left out.
+    let ways = [
+        ([true, false, false], CUTS_IN_THE_WAY),
+        ([false, true, false], UNVEILING_IN_THE_WAY),
+        ([false, false, true], CURVE_IN_THE_WAY),
+        ([true; 3], SEVERAL_IN_THE_WAY),
     ];
-    let is_way = |(changes, _): &(&[&dyn Fn(&mut Settings)], &str)| {
+    let can_be_drawn_without = |[cuts, fluid, curve]: [bool; 3]| {
         let mut without = settings.clone();
-        changes.iter().for_each(|change| change(&mut without));
+        without.cuts.retain(|_| !cuts);
+        without.unveil.enabled &= !fluid;
+        without.region.start_curve.take_if(|_| curve);
         without != *settings && drawable(now, without).is_some()
     };
-    ways.into_iter().find(is_way).map(|(_, why)| why)
+    ways.into_iter().find(|(left_out, _)| can_be_drawn_without(*left_out)).map(|(_, why)| why)
 }
 
 impl Controls {

@@ -241,7 +241,7 @@ fn small(ui: &mut Ui, text: String, colour: Color32) {
 }
 
 /// Gestures on the picture, for the help.
-const GESTURES: [(&str, &str); 13] = [
+const GESTURES: [(&str, &str); 14] = [
     ("drag", "use the tool: turn, light, region, clip, cut, planes"),
     ("Shift + drag, right or middle drag", "move the picture; over a plane: step it"),
     ("Ctrl + drag", "move the light"),
@@ -249,6 +249,7 @@ const GESTURES: [(&str, &str); 13] = [
     ("two fingers", "pinch to zoom, twist to roll, move to pan"),
     ("double click on a tile", "show that tile alone, and back"),
     ("Region, then drag", "move the nearest face of the box"),
+    ("Region, then double click the green line (4-up)", "bend it; add or remove a handle"),
     ("Region, then drag on a plane (4-up)", "move a side of the box; from within: all of it"),
     ("drag on the light ball (below Light)", "move the lamp"),
     ("Clip, then drag up", "cut away what is nearer to the viewer"),
