@@ -331,7 +331,8 @@ fn the_volume_is_exported_as_the_commands_do() {
 fn the_start_line_is_bent_on_plane_a_and_the_rendering_follows() {
     let desk = Desk::new(false);
     let folder = Folder::new("start-line");
-    let four = ["--mode", "vr", "--set", "layout=four", "--set", "region.depth=[20,80]"];
+    let smooth = "planes.smooth={lateral=1,depth=1}";
+    let four = ["--mode", "vr", "--set", "layout=four", "--set", "region.depth=[20,80]", "--set", smooth];
     let kept = folder.path("kept");
     let view = desk.view(&[&["--size", "1000x700", "--source", SWEEP, "--save-to", &kept][..], &four].concat());
     let (corner, size) = picture();
@@ -349,7 +350,7 @@ fn the_start_line_is_bent_on_plane_a_and_the_rendering_follows() {
     // Where its handles are.
     let recording = echolume::source::open(SWEEP.as_ref(), None).expect("it opens");
     let input = Input { stored: recording.stored_type(), range: recording.range() };
-    let toml = format!("mode='vr'\nlayout='four'\nregion.depth=[20,80]\npicture.size={size:?}");
+    let toml = format!("mode='vr'\nlayout='four'\nregion.depth=[20,80]\npicture.size={size:?}\n{smooth}");
     let scene = Scene::new(recording.geometry(0), input, toml::from_str(&toml).expect("settings")).expect("a scene");
     let sheet = scene.sheet();
     let middle_handle = (scene.low + scene.high).with_y(2.0 * scene.low.y) / 2.0;
@@ -362,6 +363,8 @@ fn the_start_line_is_bent_on_plane_a_and_the_rendering_follows() {
         let pixel = |x: usize, y: usize| &seen.rgba[4 * (16 * y + x)..4 * (16 * y + x) + 4];
         (is_green(pixel(0, 5)) && is_green(pixel(12, 0)) && !is_green(pixel(12, 5))).then_some(())
     };
+    std::thread::sleep(std::time::Duration::from_secs(4));
+    if let Some(seen) = view.look() { seen.save("/work/tmp/con_start_line0.png".as_ref()).unwrap(); }
     until("a handle in green", || has_handle(at));
     view.drag(at, [at[0], at[1] + 60]);
     let file = save_workspace(&desk, &folder);
