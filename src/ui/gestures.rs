@@ -227,7 +227,7 @@ impl Gestures {
                 (Tool::Plane, Some(scene)) if scene.shows_three() => return vec![Command::Recentre],
                 (Tool::Region, Some(scene)) => match start_at(scene, pane, at, viewport) {
                     Some(StartPart::Handle(index)) => return vec![Command::RemoveStartHandle(Some(index))],
-                    Some(StartPart::Line(_)) if scene.settings.region.start_curve.is_none() => {
+                    Some(StartPart::Line(_)) if viewport.start_line.is_empty() => {
                         return vec![Command::ToggleStartCurve];
                     }
                     Some(StartPart::Line(lateral)) => return vec![Command::AddStartHandle(Some(lateral))],
@@ -380,7 +380,7 @@ impl Press {
             (Pane::Plane(tile), Tool::Region) => {
                 let reach = [GRAB_LINE, GRAB].map(|reach| reach * viewport.scale());
                 let handle = start_at(scene, pane, at, viewport).and_then(|part| match part {
-                    StartPart::Handle(index) => Some((index, *scene.settings.region.start_curve.as_ref()?.get(index)?)),
+                    StartPart::Handle(index) => Some((index, *viewport.start_line.get(index)?)),
                     StartPart::Line(_) => None,
                 });
                 match region_box::part_at(scene, tile, pixel, reach) {
@@ -572,7 +572,7 @@ impl Press {
 fn start_at(scene: &Scene, pane: Pane, at: [f64; 2], viewport: &Viewport) -> Option<StartPart> {
     let Pane::Plane(tile) = pane else { return None };
     let reach = [GRAB_LINE, GRAB].map(|reach| reach * viewport.scale());
-    region_box::start_at(scene, tile, viewport.pixel_at(at)?.1, reach)
+    region_box::start_at(scene, tile, viewport.start_line, viewport.pixel_at(at)?.1, reach)
 }
 
 /// The point of the settings that a tile shows at a position in the window, mm.

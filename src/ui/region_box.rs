@@ -6,6 +6,7 @@ use super::picking::Picker;
 use super::view::{FACES, below_face, face_axis, outwards, start_depth};
 use crate::scene::Scene;
 use crate::scene::planes::{Plane, Sheet, Tile};
+use crate::scene::start_curve::StartCurve;
 use glam::DVec3;
 
 /// A shorter side of a section has no handle, pixels.
@@ -101,8 +102,9 @@ pub(super) enum StartPart {
     Line(f64),
 }
 
-/// The start line on a tile, if that shows plane A beside a rendering, not turned too far.
-pub(super) fn start_line(scene: &Scene, sheet: &Sheet, tile: usize) -> Option<StartLine> {
+/// The start line through points, lateral and depth in mm, or straight without any: on a tile, if that shows plane A beside a rendering, not turned
+/// too far. The points may be ahead of the scene, whose picture takes time.
+pub(super) fn start_line(scene: &Scene, sheet: &Sheet, tile: usize, points: &[[f64; 2]]) -> Option<StartLine> {
     let is_shown = tile == START_TILE && is_on_planes(scene) && scene.renders();
     let tile = sheet.tiles.get(tile).filter(|_| is_shown)?;
     let Plane { at, normal, .. } = tile.plane;
@@ -113,20 +115,25 @@ pub(super) fn start_line(scene: &Scene, sheet: &Sheet, tile: usize) -> Option<St
         let z = at.z - (normal.x * (x - at.x) + normal.y * (y - at.y)) / normal.z;
         sheet.project(tile, DVec3::new(x, y, z)).0
     };
-    let curve = scene.start_curve();
+    let offset = -below_face(scene, DVec3::ZERO).y;
+    let curve = (!points.is_empty()).then(|| StartCurve::new(points));
     let pieces = if curve.is_some() { PIECES } else { 1 };
     let across = |n: usize| scene.low.x + (scene.high.x - scene.low.x) * n as f64 / pieces as f64;
     let lateral: Vec<f64> = (0..=pieces).map(across).collect();
-    let depth = |x: f64| curve.as_ref().map_or_else(|| start_depth(scene), |curve| curve.depth(x));
-    let offset = -below_face(scene, DVec3::ZERO).y;
-    let points = scene.settings.region.start_curve.iter().flatten();
-    let handles = points.map(|[x, depth]| on_tile(*x, depth + offset)).collect();
+    let depth = |x: f64| curve.as_ref().map_or_else(|| start_depth(scene), |curve| curve.depth(x) + offset);
+    let handles = points.iter().map(|[x, depth]| on_tile(*x, depth + offset)).collect();
     Some(StartLine { line: lateral.iter().map(|x| on_tile(*x, depth(*x))).collect(), lateral, handles })
 }
 
-/// What of the start line is at a place of a tile, pixels of the picture. `reach`: of the line and of a handle, pixels.
-pub(super) fn start_at(scene: &Scene, tile: usize, at: [f64; 2], reach: [f64; 2]) -> Option<StartPart> {
-    let start = start_line(scene, &scene.sheet(), tile)?;
+/// What of the start line through points is at a place of a tile, pixels of the picture. `reach`: of the line and of a handle, pixels.
+pub(super) fn start_at(
+    scene: &Scene,
+    tile: usize,
+    points: &[[f64; 2]],
+    at: [f64; 2],
+    reach: [f64; 2],
+) -> Option<StartPart> {
+    let start = start_line(scene, &scene.sheet(), tile, points)?;
     let [of_line, of_handle] = reach;
     let away = |[x, y]: &[f64; 2]| (x - at[0]).hypot(y - at[1]);
     let handles = start.handles.iter().map(away).enumerate().filter(|(_, away)| *away <= of_handle);

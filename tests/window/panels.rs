@@ -363,8 +363,6 @@ fn the_start_line_is_bent_on_plane_a_and_the_rendering_follows() {
         let pixel = |x: usize, y: usize| &seen.rgba[4 * (16 * y + x)..4 * (16 * y + x) + 4];
         (is_green(pixel(0, 5)) && is_green(pixel(12, 0)) && !is_green(pixel(12, 5))).then_some(())
     };
-    std::thread::sleep(std::time::Duration::from_secs(4));
-    if let Some(seen) = view.look() { seen.save("/work/tmp/con_start_line0.png".as_ref()).unwrap(); }
     until("a handle in green", || has_handle(at));
     view.drag(at, [at[0], at[1] + 60]);
     let file = save_workspace(&desk, &folder);
@@ -373,9 +371,8 @@ fn the_start_line_is_bent_on_plane_a_and_the_rendering_follows() {
     // The slop of a drag is 6 pixels.
     let moved = (curve[1][1] - curve[0][1]) / sheet.pixel;
     assert!(curve.len() == 3 && (53.0..60.5).contains(&moved) && (curve[0][1] - 20.0).abs() < 1e-3, "{curve:?}");
-    if let Some(seen) = view.look() {
-        seen.save("/work/tmp/con_start_line.png".as_ref()).unwrap();
-    }
+    until("the handle where it was dragged to", || has_handle([at[0], at[1] + moved.round() as i16]));
+    std::thread::sleep(std::time::Duration::from_secs(4)); view.look().unwrap().save("/work/tmp/con_start_line.png".as_ref()).unwrap(); //SHOT
     // Without the box over it.
     desk.tap('t');
     let set = format!("region.start_curve={curve:?}");

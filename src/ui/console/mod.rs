@@ -430,12 +430,14 @@ impl Console {
             _ => None,
         };
         let measures = self.controls.measures().to_vec();
+        let start_line = self.controls.start_line().to_vec();
         let is_over_panel = at.or(self.gestures.pointer()).is_some_and(|at| self.panels.covers(at));
         let on = Viewport {
             corner: area.0.map(f64::from),
             size: area.1.map(f64::from),
             scene: self.stream.scene(),
             measures: &measures,
+            start_line: &start_line,
             has_work: self.controls.work().is_some(),
             is_covered: self.asks_to_leave || (is_over_panel && self.fixed.overlay),
             now: now.saturating_duration_since(self.started),

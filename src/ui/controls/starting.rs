@@ -1,5 +1,6 @@
 //! The start line of the region: bent at three to five handles, or straight, which is the region's near face.
 
+use super::Controls;
 use crate::scene::start_curve::StartCurve;
 use crate::scene::{MAX_START_POINTS, MIN_START_POINTS, Scene, Settings};
 use crate::ui::command::Command;
@@ -15,6 +16,13 @@ const FIRST: [f64; MIN_START_POINTS] = [0.1, 0.5, 0.9];
 const TOO_MANY: &str = "The start line has five handles, as many as it can have.";
 const TOO_FEW: &str = "The start line has three handles, as few as it can have: Shift+G makes it straight.";
 const NOTHING_STARTS: &str = "The start line is that of a rendering: planes and the block show everything.";
+
+impl Controls {
+    /// The points of the start line of the region: lateral and depth, mm. None while it is straight.
+    pub fn start_line(&self) -> &[[f64; 2]] {
+        self.settings.region.start_curve.as_deref().unwrap_or_default()
+    }
+}
 
 /// Why a command about the start line has no effect.
 pub(super) fn refusal(command: &Command, now: &Scene) -> Option<&'static str> {

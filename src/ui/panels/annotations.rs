@@ -50,10 +50,10 @@ pub(super) fn paint(ui: &Ui, state: &PanelState, scale: f32) {
             || text_at_one_of(&painter, &mut taken, places, Align2::RIGHT_TOP, short, WARNING);
     }
     // While it is bent, plane A has the line as it will be, not as the picture has it.
-    let is_bent = state.controls.tool() == Tool::Region
+    let is_shown = state.controls.tool() == Tool::Region
         && !scene.unveils()
-        && region_box::start_line(scene, &scene.sheet(), 0).is_some_and(|start| !start.handles.is_empty());
-    for line in state.start_lines.iter().skip(usize::from(is_bent)) {
+        && region_box::start_line(scene, &scene.sheet(), 0, state.controls.start_line()).is_some();
+    for line in state.start_lines.iter().skip(usize::from(is_shown)) {
         let [corner, size] = line.tile.map(|[x, y]| vec2(x as f32, y as f32) / scale);
         let painter = painter.with_clip_rect(Rect::from_min_size(picture.min + corner, size).intersect(picture));
         for ends in &line.pieces {

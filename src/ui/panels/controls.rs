@@ -202,35 +202,35 @@ fn start_line(ui: &mut Ui, state: &PanelState, width: f32, execute: &mut dyn FnM
         ui.set_max_width(width);
         let mut on = points.is_some();
         let hint = "Bends the line at which rendering starts: drag its green handles on plane A of 4-up. Off: straight. (Shift+G)";
-        if switch(ui, &mut on, "Curved start line", hint) {
+        if switch(ui, &mut on, "Curved line", hint) {
             execute(Command::ToggleStartCurve);
         }
         let Some(points) = points.filter(|_| is_chosen) else { return };
         let [low, high] = [scene.low, scene.high].map(|corner| view::below_face(scene, corner).y);
         for (n, [lateral, depth]) in points.iter().enumerate() {
             let hint = "How deep rendering starts at this handle of the start line, counted from the left.";
-            if let Some(depth) = plain_slider(ui, &format!("Depth of handle {}", n + 1), *depth, [low, high], hint) {
+            if let Some(depth) = plain_slider(ui, &format!("Handle {}", n + 1), *depth, [low, high], hint) {
                 execute(Command::MoveStartHandle(n, [*lateral, depth]));
             }
         }
         let half = vec2((width - ui.spacing().item_spacing.x) / 2.0, TOUCH_SIZE * 0.75);
         ui.horizontal(|ui| {
-            for (command, name, is_there, hint) in [
+            for (command, [word, name], is_there, hint) in [
                 (
                     Command::AddStartHandle(None),
-                    "Add handle",
+                    ["Add", "Add handle"],
                     points.len() < MAX_START_POINTS,
                     "One more handle, in the widest gap; or double click the line where it is wanted. At most five.",
                 ),
                 (
                     Command::RemoveStartHandle(None),
-                    "Remove handle",
+                    ["Remove", "Remove handle"],
                     points.len() > MIN_START_POINTS,
                     "One handle less: the one that bends the line the least; or double click one. At least three.",
                 ),
             ] {
-                let button = ui.add_enabled(is_there, Button::new(name).min_size(half));
-                if button.tell(hint).on_disabled_hover_text(hint).clicked() {
+                let button = ui.add_enabled(is_there, Button::new(word).min_size(half));
+                if button.tell(hint).on_disabled_hover_text(hint).named(name).clicked() {
                     execute(command);
                 }
             }

@@ -35,7 +35,7 @@ pub(super) fn paint(ui: &Ui, state: &PanelState, scale: f32) {
             let sides = region_box::section(scene, &sheet, tile);
             sides.iter().for_each(|side| line(&painter, side.ends.map(at), 1.5));
             sides.iter().filter_map(|side| side.handle).for_each(|place| handle(&painter, at(place)));
-            if let Some(start) = region_box::start_line(scene, &sheet, n) {
+            if let Some(start) = region_box::start_line(scene, &sheet, n, state.controls.start_line()) {
                 let ends: Vec<Pos2> = start.line.into_iter().map(at).collect();
                 for (width, colour) in [(2.0 + 2.5, OUTLINE), (2.0, START)] {
                     ends.windows(2).for_each(|two| {

@@ -127,7 +127,17 @@ impl TestWindow {
         let size = scene.picture_size().map(|n| f64::from(n) * self.enlarged);
         let (measures, has_work) = (self.controls.measures().to_vec(), self.controls.work().is_some());
         let (corner, scene_shown, now) = (self.corner, Some(&scene), self.now);
-        let on = Viewport { corner, size, scene: scene_shown, measures: &measures, has_work, is_covered: false, now };
+        let start_line = &self.controls.start_line().to_vec();
+        let on = Viewport {
+            corner,
+            size,
+            scene: scene_shown,
+            measures: &measures,
+            start_line,
+            has_work,
+            is_covered: false,
+            now,
+        };
         let commands = self.gestures.input(&input, &on, self.controls.tool(), self.held);
         for command in &commands {
             self.controls.apply(command, Some(&scene));

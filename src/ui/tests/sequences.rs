@@ -150,7 +150,10 @@ proptest! {
                     let scene = Some(&shown).filter(|_| now.as_millis() % 11 != 0);
                     let measures = controls.measures().to_vec();
                     let (corner, has_work) = ([60.0, 5.0], controls.work().is_some());
-                    let on = Viewport { corner, size, scene, measures: &measures, has_work, is_covered: !follows, now };
+                    let start_line = &controls.start_line().to_vec();
+                    let is_covered = !follows;
+                    let on =
+                        Viewport { corner, size, scene, measures: &measures, start_line, has_work, is_covered, now };
                     let mut commands = gestures.input(input, &on, *tool, keys.modifiers());
                     commands.extend(keys.input(input));
                     for command in commands {

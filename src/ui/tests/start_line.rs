@@ -21,7 +21,7 @@ fn curved() -> TestWindow {
 
 fn shown(window: &TestWindow) -> StartLine {
     let scene = window.scene();
-    start_line(&scene, &scene.sheet(), 0).expect("a line")
+    start_line(&scene, &scene.sheet(), 0, window.controls.start_line()).expect("a line")
 }
 
 fn points(window: &TestWindow) -> Vec<[f64; 2]> {
@@ -49,7 +49,7 @@ fn the_line_and_its_handles_are_on_plane_a_where_rendering_starts() {
             assert!((lateral - point[0]).abs() < 1e-9 && (depth - point[1]).abs() < 1e-9);
         }
         assert_eq!(start.handles.len(), 3);
-        let others = [1, 2].map(|tile| start_line(&scene, &sheet, tile));
+        let others = [1, 2].map(|tile| start_line(&scene, &sheet, tile, window.controls.start_line()));
         assert_eq!(others, [None, None]);
     }
     // A line that is straight is the near face, and has no handles.
@@ -66,7 +66,7 @@ fn the_line_and_its_handles_are_on_plane_a_where_rendering_starts() {
         FOUR.replace("layout='four'", "layout='single'"),
     ] {
         let scene = TestWindow::new(&toml).scene();
-        assert!(!scene.is_flat() && start_line(&scene, &scene.sheet(), 0).is_none(), "{toml}");
+        assert!(!scene.is_flat() && start_line(&scene, &scene.sheet(), 0, &[]).is_none(), "{toml}");
     }
 }
 
@@ -152,9 +152,9 @@ fn buttons_and_keys_bend_the_line_without_a_pointer() {
         shown.tree.values().filter_map(|node| node.label().map(str::to_string)).collect()
     };
     let has = |shown: &Shown, name: &str| labels(shown).iter().any(|known| known == name);
-    assert!(has(&shown, "Curved start line") && !has(&shown, "Add handle"), "a line that is bent can be straightened");
+    assert!(has(&shown, "Curved line") && !has(&shown, "Add handle"), "a line that is bent can be straightened");
     shown.apply(Command::Tool(Tool::Region));
-    for name in ["Depth of handle 1", "Depth of handle 2", "Depth of handle 3", "Add handle", "Remove handle"] {
+    for name in ["Handle 1", "Handle 2", "Handle 3", "Add handle", "Remove handle"] {
         assert!(has(&shown, name), "{name}: {:?}", labels(&shown));
     }
     let of = |shown: &Shown| shown.controls.settings().region.start_curve.clone().unwrap_or_default();
@@ -165,7 +165,7 @@ fn buttons_and_keys_bend_the_line_without_a_pointer() {
     shown.apply(Command::RemoveStartHandle(None));
     assert_eq!(of(&shown), [[-9.0, 34.0], [1.0, 48.0], [12.0, 36.0]]);
     shown.apply(Command::ToggleStartCurve);
-    assert!(of(&shown).is_empty() && has(&shown, "Curved start line") && !has(&shown, "Add handle"));
+    assert!(of(&shown).is_empty() && has(&shown, "Curved line") && !has(&shown, "Add handle"));
     shown.apply(Command::Undo);
     assert_eq!(of(&shown).len(), 3);
     // The line goes with the box, and stays where a face moves.
@@ -174,7 +174,7 @@ fn buttons_and_keys_bend_the_line_without_a_pointer() {
     shown.apply(Command::MoveFace(Face { axis: 1, high: false }, -3.0));
     assert_eq!(of(&shown), [[-8.0, 36.0], [2.0, 50.0], [13.0, 38.0]]);
     shown.apply(Command::Mode(Mode::Tomography));
-    assert!(!has(&shown, "Curved start line"));
+    assert!(!has(&shown, "Curved line"));
     let refused = shown.controls.apply(&Command::ToggleStartCurve, Some(&shown.scene));
     assert_eq!(refused, Change::Settings, "what is bent is made straight in any mode");
     let refused = shown.controls.apply(&Command::ToggleStartCurve, Some(&shown.scene));
