@@ -132,7 +132,7 @@ fn meaning(slot: Slot) -> (&'static [&'static str], &'static str) {
         | Slot::SectionVolume
         | Slot::Volume => (GREY, SHARE_OF_RANGE),
         Slot::Floating => (GREY, "1 in parts of the volume that float"),
-        Slot::StartSurface => (GREY, "row of the volume, by column and slice"),
+        Slot::StartSurface | Slot::StartCurve => (GREY, "row of the volume, by column and slice"),
         Slot::LineShares => (GREY, "share of the frame's lines that fired before"),
         Slot::TileRanges | Slot::BrickRanges => (&["smallest", "largest"], SHARE_OF_RANGE),
         Slot::Tgc => (GREY, "gain of a sample: a factor, or an addend where samples are log-compressed"),

@@ -5,6 +5,7 @@
 layout(constant_id = 0) const int SWEEP = 1;               // 0 Cartesian, 1 fan, 2 translated, 3 still
 layout(constant_id = 2) const int CUTS = 1;                // 1: there are some
 layout(constant_id = 3) const int UNVEILS = 0;             // 1: rendering starts at a surface
+layout(constant_id = 4) const int CURVED_START = 0;        // 1: rendering starts at a curve
 layout(constant_id = 36) const int INTRA_FRAME_MOTION = 0; // 1: the motor moves while a frame is acquired
 layout(scalar) uniform Params {
     float removed; // the value of what is removed
@@ -20,6 +21,7 @@ uniform texture2D line_shares; // of INTRA_FRAME_MOTION: share of the frame's li
 readonly buffer SlicePlaces { vec4 entry[]; } slice_places; // of a fan cosine and sine of the angle, otherwise z in y; then the motor's advance
 readonly buffer Cuts { vec4 entry[]; } cuts;                // each: HEADER entries, then an edge of its contour in each
 uniform texture2D start_surface; // of UNVEILS: by column and slice, the row at which rendering starts
+uniform texture2D start_curve;   // of CURVED_START: the same
 uniform writeonly image3D target;
 
 const int HEADER = 5;
@@ -102,6 +104,7 @@ void main() {
     if (any(greaterThanEqual(stored, imageSize(target)))) return;
     bool is_drawn = CUTS == 0 || !is_removed(place_of(at));
     if (UNVEILS == 1) is_drawn = is_drawn && float(at.y) >= texelFetch(start_surface, at.xz, 0).x;
+    if (CURVED_START == 1) is_drawn = is_drawn && float(at.y) >= texelFetch(start_curve, at.xz, 0).x;
     float value = is_drawn ? texelFetch(source, stored, 0).x : removed;
     imageStore(target, stored, vec4(value, 0.0, 0.0, 0.0));
 }

@@ -79,7 +79,7 @@ pub fn measured(picture: &Picture, scene: &Scene, start: Option<&Unveiled>) -> R
     if [picture.width, picture.height] == scene.picture_size() {
         strokes::slices(&mut measured, scene)?;
         strokes::curve(&mut measured, scene)?;
-        start.iter().for_each(|start| strokes::start(&mut measured, &unveil::lines(scene, start)));
+        strokes::start(&mut measured, &unveil::lines(scene, start));
         strokes::draw(&mut measured, scene)?;
     }
     Ok(measured)

@@ -1,5 +1,5 @@
 //! Cuts: the volume that rays are cast through, without what lies within (or outside of) the contours that the user drew, and in front of the
-//! render start that follows the fluid (`unveil`). The volume stays as it is beside it, so that a cut that is drawn, changed or taken back needs no
+//! render start that the user drew (`region.start_curve`) or that follows the fluid (`unveil`), whichever is deeper. The volume stays as it is beside it, so that a cut that is drawn, changed or taken back needs no
 //! frame again.
 //!
 //! A texel is removed if its centre is, and gets a value of which the rendering draws nothing. What skips empty space, packed neighbours and the light
@@ -8,7 +8,7 @@
 use super::lookup_tables;
 use super::pass::*;
 use crate::probe::{Geometry, Motion};
-use crate::scene::Scene;
+use crate::scene::{Scene, start_curve};
 
 pub const PASS: Pass = Pass {
     name: "cut",
@@ -16,11 +16,12 @@ pub const PASS: Pass = Pass {
     frequency: Frequency::Volume,
     link: Link::AfterSlices,
     shader: |_, _| "preprocess/cut",
-    needed: |s| match (s.has_cuts(), s.unveils()) {
-        (true, true) => Ok("what was cut away, and what is in front of the fluid, is not drawn"),
-        (true, false) => Ok("what was cut away is not drawn"),
-        (false, true) => Ok("what is in front of the fluid is not drawn"),
-        (false, false) => Err("nothing is cut away, or nothing is drawn that could be"),
+    needed: |s| match (s.has_cuts(), s.unveils(), s.starts_at_curve()) {
+        (true, false, false) => Ok("what was cut away is not drawn"),
+        (true, ..) => Ok("what was cut away, and what is in front of the render start, is not drawn"),
+        (false, true, false) => Ok("what is in front of the fluid is not drawn"),
+        (false, _, true) => Ok("what is in front of the render start is not drawn"),
+        (false, false, false) => Err("nothing is cut away, or nothing is drawn that could be"),
     },
     // A slice changes with the frames that are smoothed into it.
     reads: |s, _| {
@@ -30,6 +31,7 @@ pub const PASS: Pass = Pass {
             reads.extend(s.moves_in_frames().then_some(whole("line_shares", Slot::LineShares)));
         }
         reads.extend(s.unveils().then_some(whole("start_surface", Slot::StartSurface)));
+        reads.extend(s.starts_at_curve().then_some(whole("start_curve", Slot::StartCurve)));
         reads
     },
     writes: |_, _| vec![Bind { part: Part::Around(0), ..whole("target", Slot::CutVolume) }],
@@ -59,6 +61,7 @@ pub const PASS: Pass = Pass {
             ("INTRA_FRAME_MOTION", (s.has_cuts() && s.moves_in_frames()) as i32),
             ("CUTS", s.has_cuts() as i32),
             ("UNVEILS", s.unveils() as i32),
+            ("CURVED_START", s.starts_at_curve() as i32),
         ]
     },
     tolerance: Tolerance {
@@ -72,10 +75,12 @@ pub const PASS: Pass = Pass {
         let source = reads.get("source");
         let target = writes.get_mut("target");
         let cuts: Vec<_> = scene.cuts().collect();
+        let curve = scene.start_curve();
         for z in args.slice..args.slice + args.slices {
             for (x, y) in (0..source.size[1]).flat_map(|y| (0..source.size[0]).map(move |x| (x, y))) {
                 let place = scene.texel_place([x as u32, y as u32, z]);
                 let is_before = scene.unveils() && (y as f64) < reads.get("start_surface").one(x, z as usize, 0);
+                let is_before = is_before || curve.as_ref().is_some_and(|curve| start_curve::is_before(curve, place));
                 let is_removed = is_before || cuts.iter().any(|cut| cut.removes(place));
                 let value = if is_removed { removed(scene) } else { source.one(x, y, z as usize) };
                 target.set([x, y, z as usize], &[value]);
@@ -152,6 +157,11 @@ pub(super) fn slice_places(scene: &Scene) -> Vec<f32> {
         }
     };
     lookup_tables::floats((0..scene.slices()).flat_map(place))
+}
+
+/// Where the curved render start begins in each column and slice.
+pub(super) fn start_curve(scene: &Scene) -> Vec<f32> {
+    scene.start_curve_rows().into_iter().map(|row| row as f32).collect()
 }
 
 /// Share of the lines of a frame that fired before the one at each texel of a slice.

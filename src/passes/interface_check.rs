@@ -11,7 +11,7 @@ use crate::spirv::volumes_to_layers::volumes_to_layers;
 use crate::spirv::{self, Access, Dimension, Kind, Member, Module};
 
 /// Textures and tables that a shader declares and a pass may not bind. Specialization constants say whether they are read or written.
-const OPTIONAL: [&str; 30] = [
+const OPTIONAL: [&str; 31] = [
     "back_light",
     "before",
     "bricks",
@@ -34,6 +34,7 @@ const OPTIONAL: [&str; 30] = [
     "shadow",
     "slice_places",
     "slice_table",
+    "start_curve",
     "start_surface",
     "step_result",
     "surface",

@@ -175,6 +175,9 @@ slots! {
     StartSurface = D::image("start_surface", |s| Shape::Two([s.grid.size[0], s.slices()]), |_| Format::R32f)
         .by_volume(|a, b| a.unveil_basis() != b.unveil_basis())
         .multibuffered();
+    /// The first row of each column and slice of the volume that is not in front of the curved render start.
+    StartCurve = D::image("start_curve", |s| Shape::Two([s.grid.size[0], s.slices()]), |_| Format::R32f)
+        .by_scene(cut::start_curve, By(|a, b| a.start_curve_differs(b)));
     /// The cuts: the axes of their views, and the edges of their contours.
     Cuts = D::table("cuts", |s| Shape::Buffer(16 * cut::table_length(s) as u32), cut::table, ByContent);
     /// Where each slice is.

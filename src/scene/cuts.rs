@@ -132,12 +132,17 @@ impl Scene {
     /// True if a rendering has cuts: it casts rays through a volume without what they remove. Planes and the block of mode cube show the echoes as
     /// they are.
     pub fn has_cuts(&self) -> bool {
-        !self.settings.cuts.is_empty() && (self.composites() || self.detects_surface() || self.projects())
+        !self.settings.cuts.is_empty() && self.renders()
+    }
+
+    /// True if rays render the echoes of the volume: planes and the block of mode cube show them as they are.
+    pub fn renders(&self) -> bool {
+        self.composites() || self.detects_surface() || self.projects()
     }
 
     /// True if rays are cast through a volume without what is removed: by cuts, or in front of the render start.
     pub fn removes(&self) -> bool {
-        self.has_cuts() || self.unveils()
+        self.has_cuts() || self.unveils() || self.starts_at_curve()
     }
 
     /// Corners of all contours, and points of all brushes.

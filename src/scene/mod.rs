@@ -23,6 +23,7 @@ pub mod self_attenuation;
 pub mod settings;
 mod sizes;
 mod slice_index;
+pub mod start_curve;
 pub mod transfer;
 mod turntable;
 pub mod unveil;
@@ -227,6 +228,7 @@ impl Settings {
         check::check(self)?;
         check_measures::check_measures(&self.measure)?;
         cuts::check(&self.cuts)?;
+        start_curve::check(self)?;
         check::check_planes(self)
     }
 }
@@ -348,6 +350,7 @@ impl Scene {
         floating::check_floating(&scene)?;
         cuts::check_drawn(&scene)?;
         unveil::check_unveiled(&scene)?;
+        start_curve::check_drawn(&scene)?;
         check::check_planes_resolved(&scene)?;
         scene.visible_bounds = visible_bounds::of(&scene);
         Ok(scene)

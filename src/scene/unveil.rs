@@ -25,8 +25,7 @@ impl Scene {
     /// True if the render start follows the fluid: it is asked for, and something is rendered from a volume of several slices.
     pub fn unveils(&self) -> bool {
         let is_still = self.probe().is_some_and(|probe| matches!(probe.motion, Motion::Still { .. }));
-        let is_rendered = self.composites() || self.detects_surface() || self.projects();
-        self.settings.unveil.enabled && is_rendered && self.slices() > 1 && !is_still
+        self.settings.unveil.enabled && self.renders() && self.slices() > 1 && !is_still
     }
 
     /// The cells that fluid is looked for in.
@@ -93,9 +92,11 @@ impl Scene {
         (0..slices as u32).flat_map(|z| (0..columns).map(move |x| (x, z))).map(|(x, z)| is_in_view(x, z)).collect()
     }
 
-    /// What decides where rendering starts, besides the volume.
+    /// What decides where rendering starts, besides the volume: of the region only the columns that are in view.
     pub(crate) fn unveil_basis(&self) -> impl PartialEq + use<> {
-        (self.settings.unveil.offset, self.settings.unveil.smoothing, self.low, self.high, self.unveils())
+        let lattice = self.unveils().then(|| self.fluid_lattice());
+        let in_view = lattice.as_ref().map(|lattice| self.columns_in_view(lattice));
+        (self.settings.unveil, lattice, in_view)
     }
 }
 

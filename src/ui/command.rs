@@ -32,6 +32,14 @@ pub enum Command {
     MoveFace(Face, f64),
     /// Moves the region: lateral, depth, elevation, mm.
     MoveRegion([f64; 3]),
+    /// Bends the start line of the region at handles, or makes it straight.
+    ToggleStartCurve,
+    /// Moves the handle of the start line with this index: lateral, depth, mm.
+    MoveStartHandle(usize, [f64; 2]),
+    /// Adds a handle to the start line at this lateral position, mm; none: in the widest gap.
+    AddStartHandle(Option<f64>),
+    /// Removes the handle of the start line with this index; none: the one that bends it the least.
+    RemoveStartHandle(Option<usize>),
     /// Moves the viewer's clip plane further into the volume, mm; negative values pull it back.
     MoveClip(f64),
     /// Selects the plane that is shown alone, stepped and moved.
@@ -212,6 +220,7 @@ impl Command {
                 | Command::MoveLight(_)
                 | Command::MoveFace(..)
                 | Command::MoveRegion(_)
+                | Command::MoveStartHandle(..)
                 | Command::MoveClip(_)
                 | Command::StepPlane(_)
                 | Command::MoveCrossing(_)
@@ -229,6 +238,7 @@ impl Command {
             (Command::StepSlider(a, _), Command::StepSlider(b, _)) => a == b,
             (Command::MoveFace(a, _), Command::MoveFace(b, _)) => a == b,
             (Command::MoveCurvePoint(a, _), Command::MoveCurvePoint(b, _)) => a == b,
+            (Command::MoveStartHandle(a, _), Command::MoveStartHandle(b, _)) => a == b,
             (Command::MovePoint(a, point, _), Command::MovePoint(b, other, _)) => (a, point) == (b, other),
             (Command::Type(_) | Command::Untype, Command::Type(_) | Command::Untype) => true,
             // Fingers move, turn and zoom at once.
@@ -299,6 +309,7 @@ pub const KEY_BINDINGS: &[Binding] = &[
     on(Char('t'), keys::DRAG_ROTATES, Command::Tool(Tool::Rotate)),
     on(Char('l'), keys::DRAG_MOVES_LIGHT, Command::Tool(Tool::Light)),
     on(Char('g'), keys::DRAG_MOVES_REGION, Command::Tool(Tool::Region)),
+    shift(Char('g'), keys::BEND_START_LINE, Command::ToggleStartCurve),
     on(Char('x'), keys::DRAG_CLIPS, Command::Tool(Tool::Clip)),
     on(Char('s'), keys::DRAG_MOVES_PLANES, Command::Tool(Tool::Plane)),
     on(Char('f'), keys::DRAG_CUTS, Command::Tool(Tool::Cut)),

@@ -4,10 +4,10 @@
 use super::command::{Command, Face, Tool};
 use super::input::{Button, Input, Modifiers, Phase};
 use super::picking::{Pane, Picker, Viewport, closest_along};
-use super::region_box::{self, Part};
+use super::region_box::{self, Part, StartPart};
 use super::sliders::PLANES_ZOOM;
 use super::view;
-use crate::scene::{Layout, MeasureKind, Mode, PlaneName};
+use crate::scene::{Layout, MeasureKind, Mode, PlaneName, Scene};
 use glam::DVec3;
 use std::time::Duration;
 
@@ -226,6 +226,14 @@ impl Gestures {
                 (Tool::Measure(_), _) => return vec![Command::EndMeasure],
                 (Tool::Curve, _) => return vec![Command::EndCurve],
                 (Tool::Plane, Some(scene)) if scene.shows_three() => return vec![Command::Recentre],
+                (Tool::Region, Some(scene)) => match start_at(scene, pane, at, viewport) {
+                    Some(StartPart::Handle(index)) => return vec![Command::RemoveStartHandle(Some(index))],
+                    Some(StartPart::Line(_)) if viewport.start_line.is_empty() => {
+                        return vec![Command::ToggleStartCurve];
+                    }
+                    Some(StartPart::Line(lateral)) => return vec![Command::AddStartHandle(Some(lateral))],
+                    None => {}
+                },
                 _ => {}
             }
             return self.double_click(pane, viewport);
@@ -292,6 +300,12 @@ enum Drag {
         from: DVec3,
         travel: [DVec3; 2],
         moved: DVec3,
+    },
+    /// A handle of the start line. It is grabbed where it is: lateral and depth of the way there from the pointer, mm.
+    StartHandle {
+        tile: usize,
+        index: usize,
+        way: [f64; 2],
     },
     RotatePlanes,
     /// The point where three planes cross, dragged on one of their tiles. It is grabbed where it is: `way` from the pointer; `along`: only
@@ -380,7 +394,16 @@ impl Press {
             (Pane::Plane(_), _) if !is_plain => Drag::Nothing,
             (Pane::Plane(tile), Tool::Region) => {
                 let reach = [GRAB_LINE, GRAB].map(|reach| reach * viewport.scale());
+                let handle = start_at(scene, pane, at, viewport).and_then(|part| match part {
+                    StartPart::Handle(index) => Some((index, *viewport.start_line.get(index)?)),
+                    StartPart::Line(_) => None,
+                });
                 match region_box::part_at(scene, tile, pixel, reach) {
+                    _ if handle.is_some() => {
+                        let (index, [lateral, depth]) = handle?;
+                        let [x, y, _] = point_on(viewport, tile, at)?;
+                        Drag::StartHandle { tile, index, way: [lateral - x, depth - y] }
+                    }
                     Some(Part::Face(face)) => Drag::FaceOnPlane { tile, face },
                     Some(Part::Inside) => {
                         let from = viewport.point_on_plane(tile, at)?;
@@ -558,6 +581,10 @@ impl Press {
                 }
                 Command::MoveRegion(by.to_array())
             }
+            Drag::StartHandle { tile, index, way } => {
+                let [x, y, _] = point_on(viewport, tile, to)?;
+                Command::MoveStartHandle(index, [x + way[0], y + way[1]])
+            }
             Drag::Caliper { .. } | Drag::OnCurve(_) | Drag::Line { .. } => return None,
             Drag::Handle { tile, index } => Command::MoveCurvePoint(index, viewport.coordinates(tile, to)?.1),
             Drag::Cut => Command::CutAlong(pixel),
@@ -575,6 +602,13 @@ impl Press {
         };
         Some(command)
     }
+}
+
+/// What of the start line of the region is at a position in the window.
+fn start_at(scene: &Scene, pane: Pane, at: [f64; 2], viewport: &Viewport) -> Option<StartPart> {
+    let Pane::Plane(tile) = pane else { return None };
+    let reach = [GRAB_LINE, GRAB].map(|reach| reach * viewport.scale());
+    region_box::start_at(scene, tile, viewport.start_line, viewport.pixel_at(at)?.1, reach)
 }
 
 /// The point of the settings that a tile shows at a position in the window, mm.

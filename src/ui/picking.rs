@@ -26,6 +26,8 @@ pub(super) struct Viewport<'a> {
     pub(super) scene: Option<&'a Scene>,
     /// The measurements that are drawn over it.
     pub(super) measures: &'a [Measurement],
+    /// The points of the start line of the region that is drawn over it; none while that is straight.
+    pub(super) start_line: &'a [[f64; 2]],
     /// The points of a measurement or of a line are being set.
     pub(super) has_work: bool,
     /// The pointer is over a panel: a press there does not reach the picture.

@@ -3,9 +3,10 @@
 
 use super::command::Face;
 use super::picking::Picker;
-use super::view::{FACES, face_axis, outwards};
+use super::view::{FACES, below_face, face_axis, outwards, start_depth};
 use crate::scene::Scene;
-use crate::scene::planes::{Sheet, Tile};
+use crate::scene::planes::{Plane, Sheet, Tile};
+use crate::scene::start_curve::StartCurve;
 use glam::DVec3;
 
 /// A shorter side of a section has no handle, pixels.
@@ -75,6 +76,78 @@ pub(super) fn section(scene: &Scene, sheet: &Sheet, tile: &Tile) -> Vec<Side> {
     sides.collect()
 }
 
+/// The tile of plane A, on which the start line is drawn and bent.
+const START_TILE: usize = 0;
+/// A plane that is turned further towards the lateral and the depth axis does not show the line's form: the least share of elevation in its normal.
+const LEAST_FACING: f64 = 0.3;
+/// Straight pieces of a curved start line.
+const PIECES: usize = 96;
+
+/// The start line of the region on plane A, pixels of the picture.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct StartLine {
+    /// The ends of its pieces, from the left to the right side of the region.
+    pub(super) line: Vec<[f64; 2]>,
+    /// Lateral positions of these ends, mm.
+    lateral: Vec<f64>,
+    /// None while it is straight.
+    pub(super) handles: Vec<[f64; 2]>,
+}
+
+/// What of the start line is at a place of a tile.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) enum StartPart {
+    Handle(usize),
+    /// The lateral position there, mm.
+    Line(f64),
+}
+
+/// The start line through points, lateral and depth in mm, or straight without any: on a tile, if that shows plane A beside a rendering, not turned
+/// too far. The points may be ahead of the scene, whose picture takes time.
+pub(super) fn start_line(scene: &Scene, sheet: &Sheet, tile: usize, points: &[[f64; 2]]) -> Option<StartLine> {
+    let is_shown = tile == START_TILE && is_on_planes(scene) && scene.renders();
+    let tile = sheet.tiles.get(tile).filter(|_| is_shown)?;
+    let Plane { at, normal, .. } = tile.plane;
+    if normal.z.abs() < LEAST_FACING {
+        return None;
+    }
+    let on_tile = |x: f64, y: f64| {
+        let z = at.z - (normal.x * (x - at.x) + normal.y * (y - at.y)) / normal.z;
+        sheet.project(tile, DVec3::new(x, y, z)).0
+    };
+    let offset = -below_face(scene, DVec3::ZERO).y;
+    let curve = (!points.is_empty()).then(|| StartCurve::new(points));
+    let pieces = if curve.is_some() { PIECES } else { 1 };
+    let across = |n: usize| scene.low.x + (scene.high.x - scene.low.x) * n as f64 / pieces as f64;
+    let lateral: Vec<f64> = (0..=pieces).map(across).collect();
+    let depth = |x: f64| curve.as_ref().map_or_else(|| start_depth(scene), |curve| curve.depth(x) + offset);
+    let handles = points.iter().map(|[x, depth]| on_tile(*x, depth + offset)).collect();
+    Some(StartLine { line: lateral.iter().map(|x| on_tile(*x, depth(*x))).collect(), lateral, handles })
+}
+
+/// What of the start line through points is at a place of a tile, pixels of the picture. `reach`: of the line and of a handle, pixels.
+pub(super) fn start_at(
+    scene: &Scene,
+    tile: usize,
+    points: &[[f64; 2]],
+    at: [f64; 2],
+    reach: [f64; 2],
+) -> Option<StartPart> {
+    let start = start_line(scene, &scene.sheet(), tile, points)?;
+    let [of_line, of_handle] = reach;
+    let away = |[x, y]: &[f64; 2]| (x - at[0]).hypot(y - at[1]);
+    let handles = start.handles.iter().map(away).enumerate().filter(|(_, away)| *away <= of_handle);
+    if let Some((index, _)) = handles.min_by(|a, b| a.1.total_cmp(&b.1)) {
+        return Some(StartPart::Handle(index));
+    }
+    let pieces = start.line.windows(2).zip(start.lateral.windows(2)).map(|(ends, lateral)| {
+        let ends = [ends[0], ends[1]];
+        (distance(at, ends), lateral[0] + (lateral[1] - lateral[0]) * share(at, ends))
+    });
+    let nearest = pieces.min_by(|a, b| a.0.total_cmp(&b.0))?;
+    (nearest.0 <= of_line).then_some(StartPart::Line(nearest.1))
+}
+
 /// The middle of the part of a line that is on a tile, if that is long enough.
 fn handle(tile: &Tile, [from, to]: [[f64; 2]; 2]) -> Option<[f64; 2]> {
     let way = [to[0] - from[0], to[1] - from[1]];
@@ -120,11 +193,17 @@ pub(super) fn part_at(scene: &Scene, tile: usize, at: [f64; 2], reach: [f64; 2])
 }
 
 /// Distance of a point from a line between two ends.
-fn distance(at: [f64; 2], [from, to]: [[f64; 2]; 2]) -> f64 {
+fn distance(at: [f64; 2], ends: [[f64; 2]; 2]) -> f64 {
+    let [from, to] = ends;
+    let share = share(at, ends);
+    (at[0] - from[0] - share * (to[0] - from[0])).hypot(at[1] - from[1] - share * (to[1] - from[1]))
+}
+
+/// How far along a line between two ends the point of it lies that is nearest to another, 0..=1.
+fn share(at: [f64; 2], [from, to]: [[f64; 2]; 2]) -> f64 {
     let [way, off] = [[to[0] - from[0], to[1] - from[1]], [at[0] - from[0], at[1] - from[1]]];
     let length = (way[0] * way[0] + way[1] * way[1]).max(1e-30);
-    let share = ((off[0] * way[0] + off[1] * way[1]) / length).clamp(0.0, 1.0);
-    (off[0] - share * way[0]).hypot(off[1] - share * way[1])
+    ((off[0] * way[0] + off[1] * way[1]) / length).clamp(0.0, 1.0)
 }
 
 /// The edges of the region in the rendering. What is behind the camera is left out.

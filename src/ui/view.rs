@@ -20,7 +20,7 @@ pub(super) fn wrap_degrees(degrees: f64) -> f64 {
 }
 
 /// The deepest start depth that the mode draws from, as Y in space.
-fn start_depth(scene: &Scene) -> f64 {
+pub(super) fn start_depth(scene: &Scene) -> f64 {
     let (surface, volume, projection) = (scene.surface_view(), scene.volume_view(), scene.projection_view());
     match scene.settings.mode {
         Mode::Surface => surface.low.y,
@@ -259,7 +259,7 @@ pub(super) fn region_travel(scene: &Scene) -> [DVec3; 2] {
     [(low - scene.low).min(DVec3::ZERO), (high - scene.high).max(DVec3::ZERO)]
 }
 
-/// Settings whose region is moved, mm, as far as it can be.
+/// Settings whose region is moved, mm, as far as it can be, with its start line.
 pub(super) fn move_region(scene: &Scene, by: DVec3) -> Settings {
     let [least, most] = region_travel(scene);
     let by = by.clamp(least, most);
@@ -270,6 +270,9 @@ pub(super) fn move_region(scene: &Scene, by: DVec3) -> Settings {
         if by[axis] != 0.0 {
             *side = Some([low[axis] + by[axis], high[axis] + by[axis]]);
         }
+    }
+    for point in region.start_curve.iter_mut().flatten() {
+        *point = [point[0] + by.x, point[1] + by.y];
     }
     settings
 }

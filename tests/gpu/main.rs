@@ -52,6 +52,7 @@ mod self_test;
 mod shading;
 mod sizes_in_mm;
 mod sliding;
+mod start_curve;
 mod stored_volume;
 mod tiles;
 mod timing;

@@ -200,3 +200,58 @@ fn the_surface_follows_the_settings_and_the_volume() {
     renderer.change(of(&geometry, "mode = 'vr'")).expect("change");
     assert!(renderer.unveiled().is_none());
 }
+
+/// How often the CPU looked for the start surface, and for parts that float, since the last call.
+fn searches(renderer: &mut Renderer) -> [usize; 2] {
+    let spans = renderer.take_spans().expect("spans");
+    ["unveil", "floating"].map(|name| spans.iter().filter(|span| span.name == name && !span.on_device).count())
+}
+
+/// Prevents a wait for the device and a search at every stroke of a brush and every move of a face: only a volume that changed, and a setting that
+/// the search depends on, make a new one. Pictures are those of a fresh renderer.
+#[test]
+fn only_what_changes_the_surface_makes_a_new_search() {
+    let device = Device::new();
+    let geometry =
+        Geometry::Cartesian(Grid { size: [34, 40, 32], spacing: [0.9, 0.8, 0.9], origin: [-15.0, 0.4, -14.0] });
+    let fluid = "mode = 'vr'\nfloating = 1\nunveil.enabled = true";
+    let cut = "cuts = [{ contour = [[-3, -2], [4, -2], [0, 3]] }]";
+    let frames = body_frames(&of(&geometry, fluid), layers(&of(&geometry, fluid)));
+    let options = RendererOptions { volume_images: 2, spans: true, ..RendererOptions::default() };
+    let mut renderer = Renderer::new(&device, of(&geometry, fluid), &options).expect("renderer");
+    send(&mut renderer, &frames, 0);
+    for (toml, surfaces, parts) in [
+        (fluid.to_string(), 1, 1),
+        (format!("{fluid}\n{cut}"), 0, 0),
+        (format!("{fluid}\n{cut}\nregion.start_curve = [[-9, 3], [0, 9], [9, 3]]"), 0, 0),
+        // A face that moves within half a column, and one that takes columns out of view.
+        (format!("{fluid}\nregion.lateral = [-15.2, 14.9]"), 0, 0),
+        (format!("{fluid}\nregion.lateral = [-9, 14.9]"), 1, 0),
+        (format!("{fluid}, offset = 3").replace("unveil.enabled = true", "unveil = { enabled = true") + " }", 1, 0),
+        // Parts are dropped from the volume that the surface is found in.
+        (fluid.replace("floating = 1", "floating = 2"), 1, 1),
+        (fluid.replace("floating = 1", "floating = 2"), 0, 0),
+    ] {
+        renderer.change(of(&geometry, &toml)).expect("change");
+        let picture = renderer.picture().expect("picture");
+        assert_eq!(searches(&mut renderer), [surfaces, parts], "{toml}");
+        let fresh = rendered(&device, of(&geometry, &toml), &frames).picture().expect("picture");
+        assert!(picture == fresh, "{toml}");
+    }
+    // Of each volume what was found stays, and a frame that comes makes it anew.
+    let last = of(&geometry, &fluid.replace("floating = 1", "floating = 2"));
+    send(&mut renderer, &frames, 1);
+    renderer.picture().expect("picture");
+    assert_eq!(searches(&mut renderer), [1, 1]);
+    renderer.show(0).expect("show");
+    renderer.picture().expect("picture");
+    assert_eq!(searches(&mut renderer), [0, 0]);
+    let empty = frames[4].encode(frame_format(renderer.scene()));
+    renderer.frame(5, &empty, 0).expect("frame");
+    renderer.show(0).expect("show");
+    let picture = renderer.picture().expect("picture");
+    assert_eq!(searches(&mut renderer), [1, 1]);
+    let mut changed = frames;
+    changed[5] = changed[4].clone();
+    assert!(picture == rendered(&device, last, &changed).picture().expect("picture"));
+}

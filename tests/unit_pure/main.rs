@@ -27,6 +27,7 @@ mod rules;
 mod sampling;
 mod sizes_in_mm;
 mod soak;
+mod start_curve;
 mod supply;
 mod unveil;
 mod user_presets;

@@ -208,7 +208,7 @@ fn the_line_on_planes_is_where_the_surface_is() {
         }
     };
     let start = found(&scene, &volume(&scene, echo));
-    let lines = unveil::lines(&scene, &start);
+    let lines = unveil::lines(&scene, Some(&start));
     let sheet = scene.sheet();
     assert_eq!(lines.len(), 3);
     let mut lengths = [0.0; 3];
@@ -226,7 +226,7 @@ fn the_line_on_planes_is_where_the_surface_is() {
     // Across the volume, on A a little longer as it is tilted; C lies behind the surface.
     assert!((lengths[0] - 29.5 * 1.04f64.sqrt()).abs() < 2.0 && (lengths[1] - 29.0).abs() < 2.0, "{lengths:?}");
     assert_eq!(lengths[2], 0.0);
-    let without = |toml: &str| unveil::lines(&voxels([60, 60, 30], toml), &start);
+    let without = |toml: &str| unveil::lines(&voxels([60, 60, 30], toml), Some(&start));
     assert!(without("").is_empty() && without("layout = 'four'\nplanes.lines = false").is_empty());
-    assert!(unveil::lines(&scene, &Unveiled { outcome: Outcome::NoPocket, ..start.clone() }).is_empty());
+    assert!(unveil::lines(&scene, Some(&Unveiled { outcome: Outcome::NoPocket, ..start.clone() })).is_empty());
 }

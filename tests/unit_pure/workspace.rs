@@ -42,6 +42,7 @@ fn what_is_saved_is_read_again_exactly() {
                 ..Cut::default()
             },
         ];
+        settings.region.start_curve = Some(vec![[-9.0, 1.0 / 3.0], [1e-9, 20.0], [0.1, 1e-9]]);
         let mut origin = Origin::of(Some("sweep.mha".into()));
         origin.volume = 3;
         let (folder, file) = kept("workspace-exact", &text(&settings, &origin).expect("text"));
@@ -64,6 +65,7 @@ fn a_wrong_file_is_refused_in_one_line_that_names_it() {
             "[workspace]\nversion = 1\n[[cuts]]\ncontour = [[0, 0], [1, 0]]\n[cuts.view]\nat = [0, 0, 0]\ndirection = [0, 1, 0]\nup = [0, 0, 1]\n",
             "entry 1: has 2 corners",
         ),
+        ("[workspace]\nversion = 1\n[region]\nstart_curve = [[0, 1], [2, 3]]\n", "region.start_curve: has 2 points"),
         ("[workspace]\nversion = 1\n[planes]\nzom = 1\n", "zom"),
         ("\u{1}", "line 1"),
     ] {

@@ -403,3 +403,59 @@ fn the_volume_is_exported_as_the_commands_do() {
     view.terminate();
     is_clean();
 }
+
+/// The start line is bent by a drag on plane A: it is drawn in green, the rendering follows, the workspace keeps it, and undo takes it back.
+#[test]
+fn the_start_line_is_bent_on_plane_a_and_the_rendering_follows() {
+    let desk = Desk::new(false);
+    let folder = Folder::new("start-line");
+    let smooth = "planes.smooth={lateral=1,depth=1}";
+    let four = ["--mode", "vr", "--set", "layout=four", "--set", "region.depth=[20,80]", "--set", smooth];
+    let kept = folder.path("kept");
+    let view = desk.view(&[&["--size", "1000x700", "--source", SWEEP, "--save-to", &kept][..], &four].concat());
+    let (corner, size) = picture();
+    // The middle of the rendering, in the last quarter of the picture; marks are at its edges.
+    let (from, middle) = (size.map(|n| n * 5 / 8), size.map(|n| n / 4));
+    let renders = |more: &[&str], what: &str| {
+        let wanted = headless(size, &[&four, more].concat());
+        view.shows_at(&wanted, [corner[0] + from[0], corner[1] + from[1]], from, middle, what);
+    };
+    renders(&[], "the start");
+    desk.tap('g');
+    desk.press(SHIFT, true);
+    desk.tap('g');
+    desk.press(SHIFT, false);
+    // Where its handles are.
+    let recording = echolume::source::open(SWEEP.as_ref(), None).expect("it opens");
+    let input = Input { stored: recording.stored_type(), range: recording.range() };
+    let toml = format!("mode='vr'\nlayout='four'\nregion.depth=[20,80]\npicture.size={size:?}\n{smooth}");
+    let scene = Scene::new(recording.geometry(0), input, toml::from_str(&toml).expect("settings")).expect("a scene");
+    let sheet = scene.sheet();
+    let middle_handle = (scene.low + scene.high).with_y(2.0 * scene.low.y) / 2.0;
+    let at = sheet.project(&sheet.tiles[0], middle_handle).0;
+    let at: [i16; 2] = std::array::from_fn(|a| (f64::from(corner[a]) + at[a]).round() as i16);
+    // Its ring is green below the line.
+    let has_handle = |at: [i16; 2]| {
+        let is_green = |p: &[u8]| p[1] > 180 && p[0] < 110 && p[2] < 140;
+        let seen = crop(&view.look()?, [at[0] as u32, at[1] as u32], [16, 8])?;
+        let pixel = |x: usize, y: usize| &seen.rgba[4 * (16 * y + x)..4 * (16 * y + x) + 4];
+        (is_green(pixel(0, 5)) && !is_green(pixel(12, 5))).then_some(())
+    };
+    until("a handle in green", || has_handle(at));
+    view.drag(at, [at[0], at[1] + 60]);
+    let file = save_workspace(&desk, &folder);
+    let settings = until("the whole workspace", || Workspace::read(&file).ok()).layers.finish().expect("settings");
+    let curve = settings.region.start_curve.expect("a curve");
+    // The slop of a drag is 6 pixels.
+    let moved = (curve[1][1] - curve[0][1]) / sheet.pixel;
+    assert!(curve.len() == 3 && (53.0..60.5).contains(&moved) && (curve[0][1] - 20.0).abs() < 1e-3, "{curve:?}");
+    until("the handle where it was dragged to", || has_handle([at[0], at[1] + moved.round() as i16]));
+    // Without the box over it.
+    desk.tap('t');
+    let set = format!("region.start_curve={curve:?}");
+    renders(&["--set", &set], "below the curve");
+    control(&desk, 'z');
+    control(&desk, 'z');
+    renders(&[], "the start again");
+    view.leave();
+}

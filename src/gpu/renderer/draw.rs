@@ -4,8 +4,8 @@
 use super::*;
 #[cfg(feature = "view")]
 use crate::gpu::window::screen::{Drawn, Panels, PresentOutcome, Screen};
+use crate::passes::floating;
 use crate::passes::unveil::{self, Unveiled};
-use crate::passes::{cut, floating};
 use crate::plan::Work;
 
 impl Renderer {
@@ -126,7 +126,10 @@ impl Renderer {
         let done = self.timings.host("wait", || picture.wait(timelines));
         match done.is_ok() {
             true => self.drawing = false,
-            false => self.stale.iter_mut().for_each(|stale| *stale = true),
+            false => {
+                self.stale.iter_mut().for_each(|stale| *stale = true);
+                self.found.clear();
+            }
         }
         done
     }
@@ -143,6 +146,7 @@ impl Renderer {
         self.uploads.clear();
         let steps = self.plan.steps_of(Frequency::Volume).chain(self.plan.steps_of(Frequency::Picture));
         let stale: Vec<_> = steps.filter(|(i, _)| self.stale[*i]).map(|(i, step)| (i, *step)).collect();
+        let mut searched = Vec::new();
         for (i, step) in stale {
             let unprocessed = &self.unprocessed[self.shown as usize];
             let scene = &self.scene;
@@ -156,18 +160,22 @@ impl Renderer {
             };
             if step.pass.frequency == Frequency::Volume && !runs.is_empty() {
                 self.filtered_bounds = scene.visible_bounds;
-                let reads = step.reads(scene);
-                if reads.contains(&Slot::Floating) {
-                    self.find(Slot::WholeVolume, Slot::Floating, "floating", |_, scene, bytes| {
-                        floating::find(scene, bytes)
-                    })?;
+                let (reads, writes) = (step.reads(scene), step.writes(scene));
+                let is_due = |slot| reads.contains(&slot) && !self.found.contains(&(slot, self.shown));
+                let (of_parts, of_fluid) = (is_due(Slot::Floating), is_due(Slot::StartSurface));
+                if of_parts {
+                    searched.push(Slot::Floating);
+                    self.find(Slot::Floating, "floating", |_, scene, bytes| floating::find(scene, bytes))?;
                 }
-                if step.pass.name == cut::PASS.name && reads.contains(&Slot::StartSurface) {
-                    self.find(Slot::Volume, Slot::StartSurface, "unveil", |unveiled, scene, bytes| {
+                if of_fluid {
+                    searched.push(Slot::StartSurface);
+                    self.find(Slot::StartSurface, "unveil", |unveiled, scene, bytes| {
                         let found = unveiled.insert(unveil::find(scene, bytes));
                         bytemuck::cast_slice(&found.rows).to_vec()
                     })?;
                 }
+                // In a volume that changes it is looked for again.
+                self.found.retain(|(slot, image)| *image != self.shown || !writes.contains(&searched_in(*slot)));
             }
             let (slots, pipeline, scene) = (&self.slots, &*self.steps[i], &self.scene);
             for slices in runs {
@@ -190,6 +198,8 @@ impl Renderer {
         let (picture, barriers, timelines) = (&mut self.picture, &mut self.barriers, &mut self.timelines);
         self.timings.host("submit", || picture.submit(barriers, timelines))?;
         (self.drawing, self.drawn) = (true, true);
+        self.found.retain(|(slot, _)| slot.is_multibuffered() || !searched.contains(slot));
+        self.found.extend(searched.into_iter().map(|slot| (slot, self.shown)));
         // Frames that arrive from here on are processed with the next picture.
         if self.plan.steps_of(Frequency::Volume).all(|(i, _)| self.stale[i]) {
             self.unprocessed[self.shown as usize].iter_mut().for_each(|unprocessed| *unprocessed = false);
@@ -206,15 +216,14 @@ impl Renderer {
         found.filter(|_| self.scene.unveils())
     }
 
-    /// Finds something in the volume that is shown, from the texels of `source`, and uploads it to `target`. What was recorded before is done first; the
-    /// recording goes on afterwards. `search` gets what was found in the last volume of the image, which it may replace.
+    /// Finds something in the volume that is shown, and uploads it to `target`. What was recorded before is done first; the recording goes on afterwards. `search` gets what was found in the last volume of the image, which it may replace.
     fn find(
         &mut self,
-        source: Slot,
         target: Slot,
         name: &'static str,
         search: impl FnOnce(&mut Option<Unveiled>, &Scene, &[u8]) -> Vec<u8>,
     ) -> Result<(), GpuError> {
+        let source = searched_in(target);
         let Some(volume) = self.slots.image(source, self.shown) else { return Ok(()) };
         let readback = Readback::new(&self.context, name, volume.shape, volume.format.texel_bytes())?;
         self.picture.copy_out(&mut self.barriers, volume, source, self.shown, &readback);
@@ -236,6 +245,11 @@ impl Renderer {
         self.uploads.push(upload);
         Ok(())
     }
+}
+
+/// The volume that the CPU finds the content of a slot in.
+fn searched_in(target: Slot) -> Slot {
+    if target == Slot::Floating { Slot::WholeVolume } else { Slot::Volume }
 }
 
 #[cfg(feature = "view")]

@@ -201,6 +201,7 @@ impl Renderer {
             None => self.batch = Some(SliceBatch { image, first: slice, count: 1, is_descending: false }),
         }
         self.unprocessed[image as usize][slice as usize] = true;
+        self.found.retain(|(_, of)| *of != image);
         let visible = self.scene.visible_frames();
         let grows = |batch: &SliceBatch| batch.continuations(&self.staging).any(|next| visible.contains(&next));
         if self.batch.as_ref().is_some_and(grows) { Ok(()) } else { self.flush() }

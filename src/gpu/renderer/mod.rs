@@ -129,6 +129,8 @@ pub struct Renderer {
     unprocessed: Vec<Vec<bool>>,
     /// By volume image: what the CPU found of its volume, where the render start follows the fluid.
     unveiled: Vec<Option<Unveiled>>,
+    /// What the CPU found and the device has: the slot that holds it, and the volume image that it was found in.
+    found: Vec<(Slot, u32)>,
     /// The error that left the last change of scene incomplete.
     broken: Option<String>,
     /// Buffers of a single copy, kept until the device is done with them.
@@ -203,6 +205,7 @@ impl Renderer {
             contents: Contents::new(),
             unprocessed: Vec::new(),
             unveiled: Vec::new(),
+            found: Vec::new(),
             broken: None,
             uploads: Vec::new(),
             unread: Vec::new(),
@@ -271,6 +274,7 @@ impl Renderer {
     /// to be made again.
     fn fit(&mut self) -> Result<(), GpuError> {
         let new = self.slots.fit(&self.plan, &self.scene)?;
+        self.found.retain(|(slot, _)| self.plan.slots.contains(slot) && new.iter().all(|(made, _)| made != slot));
         let mut is_volume_lost = false;
         for (i, step) in self.plan.steps.iter().enumerate() {
             let is_lost = step.writes(&self.scene).iter().any(|slot| new.iter().any(|(made, _)| made == slot));
@@ -492,6 +496,7 @@ impl Renderer {
                 }
             }
             Rerun::Frames | Rerun::Everything => {
+                self.found.clear();
                 self.stale.iter_mut().for_each(|stale| *stale = true);
                 self.invalidate_volumes();
                 if *rerun == Rerun::Everything {
@@ -506,6 +511,7 @@ impl Renderer {
             }
         }
         self.fit()?;
+        self.found.retain(|(slot, _)| !changed.contains(slot));
         for slot in changed {
             self.fill(*slot)?;
         }

@@ -1,15 +1,16 @@
-//! The start surface as lines on the planes beside a rendering.
+//! Where rendering starts, as lines on the planes beside a rendering: at the start surface, at the curve that the user drew, or at the deeper of both.
 
 use super::Unveiled;
 use crate::passes::raycast::ray;
 use crate::scene::planes::{Sheet, Tile};
+use crate::scene::start_curve::StartCurve;
 use crate::scene::{Layout, Scene};
 use glam::DVec3;
 
-/// Cells along each edge of a tile between whose corners a line is straight: the surface is smooth.
+/// Cells along each edge of a tile between whose corners a line is straight: surface and curve are smooth.
 const CELLS: usize = 72;
 
-/// The line of the start surface on a tile, in straight pieces.
+/// The line of the render start on a tile, in straight pieces.
 #[derive(Clone, Debug, PartialEq)]
 pub struct StartLine {
     /// Corner and size of the tile, pixels of the picture.
@@ -18,16 +19,34 @@ pub struct StartLine {
     pub pieces: Vec<[[f64; 2]; 2]>,
 }
 
-/// Where the planes beside a rendering cut the start surface, by tile; nothing where the pocket of fluid cannot be told or nothing lies in front
-/// of it, and without lines over planes.
-pub fn lines(scene: &Scene, unveiled: &Unveiled) -> Vec<StartLine> {
-    let is_shown = scene.unveils() && scene.settings.layout == Layout::Four && scene.draws_lines();
-    let removes_nothing = !unveiled.outcome.is_found() || unveiled.rows.iter().all(|row| *row <= 0.0);
-    if !is_shown || removes_nothing {
+/// Where the planes beside a rendering cut the render start, by tile; nothing where nothing is removed, and without lines over planes. `unveiled`: what was
+/// found of the volume that is drawn.
+pub fn lines(scene: &Scene, unveiled: Option<&Unveiled>) -> Vec<StartLine> {
+    let removes = |unveiled: &&Unveiled| unveiled.outcome.is_found() && unveiled.rows.iter().any(|row| *row > 0.0);
+    let start = Start { surface: unveiled.filter(|_| scene.unveils()).filter(removes), curve: scene.start_curve() };
+    let is_shown = scene.settings.layout == Layout::Four && scene.draws_lines();
+    if !is_shown || (start.surface.is_none() && start.curve.is_none()) {
         return Vec::new();
     }
     let sheet = scene.sheet();
-    sheet.tiles.iter().map(|tile| on_tile(scene, unveiled, &sheet, tile)).collect()
+    sheet.tiles.iter().map(|tile| on_tile(scene, &start, &sheet, tile)).collect()
+}
+
+/// What rendering starts at.
+struct Start<'a> {
+    surface: Option<&'a Unveiled>,
+    curve: Option<StartCurve>,
+}
+
+impl Start<'_> {
+    /// How far a place is behind the render start, mm, negative in front of it; none outside the sector. The curve is within the region.
+    fn behind(&self, scene: &Scene, place: DVec3) -> Option<f64> {
+        let surface = self.surface.and_then(|surface| Some(behind(scene, surface, place)? * scene.grid.pitch[1]));
+        let within = |axis: usize| place[axis] >= scene.low[axis] && place[axis] <= scene.high[axis];
+        let is_there = within(0) && within(2) && ray::texel(scene, place).is_some();
+        let curve = self.curve.as_ref().filter(|_| is_there).map(|curve| place.y - curve.depth(place.x));
+        surface.into_iter().chain(curve).reduce(f64::min)
+    }
 }
 
 /// Rows from the start surface to a place, negative in front of it; none outside the sector.
@@ -45,7 +64,7 @@ fn behind(scene: &Scene, unveiled: &Unveiled, place: DVec3) -> Option<f64> {
 }
 
 /// Marching squares (Lorensen and Cline 1987, in the plane) over cells of the tile.
-fn on_tile(scene: &Scene, unveiled: &Unveiled, sheet: &Sheet, tile: &Tile) -> StartLine {
+fn on_tile(scene: &Scene, start: &Start, sheet: &Sheet, tile: &Tile) -> StartLine {
     let [corner, size] = [tile.corner, tile.size].map(|edge| edge.map(f64::from));
     let at = |x: usize, y: usize| -> [f64; 2] {
         let share = [x, y].map(|n| n as f64 / CELLS as f64);
@@ -54,7 +73,7 @@ fn on_tile(scene: &Scene, unveiled: &Unveiled, sheet: &Sheet, tile: &Tile) -> St
     let width = CELLS + 1;
     let points: Vec<[usize; 2]> = (0..width).flat_map(|y| (0..width).map(move |x| [x, y])).collect();
     let values: Vec<Option<f64>> =
-        points.iter().map(|[x, y]| behind(scene, unveiled, sheet.point(tile, at(*x, *y)))).collect();
+        points.iter().map(|[x, y]| start.behind(scene, sheet.point(tile, at(*x, *y)))).collect();
     let mut pieces = Vec::new();
     for (x, y) in (0..CELLS).flat_map(|y| (0..CELLS).map(move |x| (x, y))) {
         // Around the cell.

@@ -30,10 +30,33 @@ const PRESENT_RETRY: Duration = Duration::from_millis(100);
 const BLANK_INTERVAL: Duration = Duration::from_millis(20);
 /// Longest that the screen says less of the start than is known: each drawing of it takes the processor from what it tells of.
 const START_INTERVAL: Duration = Duration::from_millis(100);
+/// That fluid is lost is said at most so often: it may come and go with each live volume.
+const LOST_INTERVAL: Duration = Duration::from_secs(20);
 /// The help needs a window of this height, points.
 const MIN_HELP_HEIGHT: f32 = 200.0;
 /// Lines of a shader compiler's message that are shown.
 const MAX_SHADER_LINES: usize = 12;
+
+/// When it is said that the fluid at which rendering should start is lost: once each time, and not more often than every [`LOST_INTERVAL`].
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct LostFluid {
+    /// It is lost, and this was said.
+    is_told: bool,
+    told_at: Option<Instant>,
+}
+
+impl LostFluid {
+    /// True if it is to be said now, at a picture whose fluid is lost or found.
+    fn is_due(&mut self, is_lost: bool, now: Instant) -> bool {
+        self.is_told &= is_lost;
+        let is_rare = self.told_at.is_none_or(|at| now.saturating_duration_since(at) >= LOST_INTERVAL);
+        let is_due = is_lost && !self.is_told && is_rare;
+        if is_due {
+            (self.is_told, self.told_at) = (true, Some(now));
+        }
+        is_due
+    }
+}
 
 impl Console {
     /// Does what is due and returns what the event loop does next.
@@ -165,7 +188,7 @@ impl Console {
             }
             match self.stream.step(Duration::ZERO) {
                 Ok(Step::Picture(picture)) => {
-                    self.picture_finished(&picture);
+                    self.picture_finished(&picture, now);
                     self.device_faults = 0;
                     // It is presented before the next picture begins, which would replace it.
                     break;
@@ -210,9 +233,9 @@ impl Console {
         self.needs_redraw = true;
     }
 
-    fn picture_finished(&mut self, picture: &FinishedPicture) {
+    fn picture_finished(&mut self, picture: &FinishedPicture, now: Instant) {
         self.has_new_picture = true;
-        self.take_start();
+        self.take_start(now);
         // A coarse one says nothing of what a picture of this quality takes.
         if !picture.is_coarse {
             self.pace.picture_took(picture.work, self.quality, picture.took);
@@ -225,17 +248,15 @@ impl Console {
     }
 
     /// Takes where the rendering of the picture starts, and says so when the fluid is lost.
-    fn take_start(&mut self) {
-        let start = self.stream.renderer().and_then(|renderer| {
-            renderer.unveiled().map(|start| (start.outcome, unveil::lines(renderer.scene(), start)))
-        });
-        let (outcome, lines) = start.unzip();
-        self.start_lines = lines.unwrap_or_default();
+    fn take_start(&mut self, now: Instant) {
+        let renderer = self.stream.renderer();
+        let outcome = renderer.as_ref().and_then(|renderer| renderer.unveiled()).map(|start| start.outcome);
+        self.start_lines = renderer.map_or(Vec::new(), |renderer| unveil::lines(renderer.scene(), renderer.unveiled()));
         let lost = outcome.filter(|outcome| !outcome.is_found());
-        if let Some(outcome) = lost.filter(|_| !self.has_lost_fluid) {
+        let is_due = self.fluid.is_due(lost.is_some(), now);
+        if let Some(outcome) = lost.filter(|_| is_due) {
             self.notify(&texts::render_start(outcome), false);
         }
-        self.has_lost_fluid = lost.is_some();
     }
 
     /// Takes the statistics of the last interval.
@@ -484,5 +505,22 @@ impl Console {
             Some(StartStep::Picture) => Some(banner(texts::DRAWING_FIRST_PICTURE, "", false)),
             Some(StartStep::Source) | None => Some(banner(title, &text, is_fault)),
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Prevents a message at every other live volume, and that a loss during the pause is never said.
+    #[test]
+    fn lost_fluid_is_said_once_and_not_too_often() {
+        let begin = Instant::now();
+        let mut fluid = LostFluid::default();
+        let mut said = |seconds: u64, is_lost: bool| fluid.is_due(is_lost, begin + Duration::from_secs(seconds));
+        assert!(!said(0, false) && said(1, true) && !said(2, true) && !said(60, true), "once");
+        assert!(!said(61, false) && said(62, true), "each time");
+        assert!((63..81).all(|second| !said(second, second % 2 == 0)), "not at every change");
+        assert!(!said(81, true) && said(82, true) && !said(83, true), "later, if it is still lost then");
     }
 }

@@ -9,6 +9,7 @@ mod options;
 mod presets;
 mod saving;
 
+use self::frame::LostFluid;
 use self::measuring::Counting;
 use self::opening::Opening;
 pub use self::options::{ConsoleOptions, OpenFile, StartupFault};
@@ -129,8 +130,8 @@ pub struct Console {
     saved_volume: Option<u32>,
     /// Where the rendering that is shown starts on planes beside it.
     start_lines: Vec<StartLine>,
-    /// The fluid at which rendering should start cannot be told.
-    has_lost_fluid: bool,
+    /// What is said of the fluid at which rendering should start.
+    fluid: LostFluid,
     /// Where to draw the pointer, pixels of the window.
     pointer: Option<[f64; 2]>,
     player: CinePlayer,
@@ -290,7 +291,7 @@ impl Console {
             is_full_screen: false,
             saved_volume: None,
             start_lines: Vec::new(),
-            has_lost_fluid: false,
+            fluid: LostFluid::default(),
             pointer: None,
             player: CinePlayer::default(),
             unsent_input: None,
@@ -430,12 +431,14 @@ impl Console {
             _ => None,
         };
         let measures = self.controls.measures().to_vec();
+        let start_line = self.controls.start_line().to_vec();
         let is_over_panel = at.or(self.gestures.pointer()).is_some_and(|at| self.panels.covers(at));
         let on = Viewport {
             corner: area.0.map(f64::from),
             size: area.1.map(f64::from),
             scene: self.stream.scene(),
             measures: &measures,
+            start_line: &start_line,
             has_work: self.controls.work().is_some() || self.controls.line().is_some(),
             is_covered: self.asks_to_leave || (is_over_panel && self.fixed.overlay),
             now: now.saturating_duration_since(self.started),

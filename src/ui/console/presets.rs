@@ -138,6 +138,7 @@ fn differs_much(a: &Settings, b: &Settings) -> bool {
         || is_zoomed
         || is_cropped
         || a.cuts != b.cuts
+        || a.region.start_curve != b.region.start_curve
         || a.clip != b.clip
         || a.planes.position != b.planes.position
 }
@@ -163,13 +164,12 @@ impl Console {
     }
 
     fn with_preset(&self, n: usize, scene: &Scene) -> Result<Settings, String> {
-        let misfit = || texts::PRESET_DOES_NOT_FIT.to_string();
         if n < EXAMS.len() {
             let is_phantom = self.fixed.source == SourceKind::Demo;
-            return self.controls.with_exam(n, scene, is_phantom).ok_or_else(misfit);
+            return self.controls.with_exam(n, scene, is_phantom).map_err(str::to_string);
         }
-        let own = self.presets.own.get(n - EXAMS.len()).ok_or_else(misfit)?;
-        self.controls.with_look(&own.look()?, scene).ok_or_else(misfit)
+        let own = self.presets.own.get(n - EXAMS.len()).ok_or_else(|| texts::NO_SUCH_PRESET.to_string())?;
+        self.controls.with_look(&own.look()?, scene).map_err(str::to_string)
     }
 
     /// Takes the n-th preset of the list, and closes the list.

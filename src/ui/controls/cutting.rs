@@ -12,10 +12,23 @@ const MAX_OUTLINE: usize = 20_000;
 pub(super) const BRUSH_RADIUS: f64 = 4.0;
 pub const BRUSH_RADII: [f64; 2] = [0.5, 20.0];
 
-/// True if settings cannot be drawn with their cuts, and can without.
-pub(super) fn is_in_the_way(now: &Scene, settings: Settings) -> bool {
-    let has_cuts = !settings.cuts.is_empty();
-    has_cuts && drawable(now, Settings { cuts: Vec::new(), ..settings }).is_some()
+/// What removes parts of renderings and keeps settings from being drawn: the first that alone is in the way, or all of it together.
+pub(super) fn in_the_way(now: &Scene, settings: &Settings) -> Option<&'static str> {
+    // Cuts, the start at the fluid, the curved start line: what of them is left out.
+    let ways = [
+        ([true, false, false], texts::CUTS_IN_THE_WAY),
+        ([false, true, false], texts::UNVEILING_IN_THE_WAY),
+        ([false, false, true], texts::CURVE_IN_THE_WAY),
+        ([true; 3], texts::SEVERAL_IN_THE_WAY),
+    ];
+    let can_be_drawn_without = |[cuts, fluid, curve]: [bool; 3]| {
+        let mut without = settings.clone();
+        without.cuts.retain(|_| !cuts);
+        without.unveil.enabled &= !fluid;
+        without.region.start_curve.take_if(|_| curve);
+        without != *settings && drawable(now, without).is_some()
+    };
+    ways.into_iter().find(|(left_out, _)| can_be_drawn_without(*left_out)).map(|(_, why)| why)
 }
 
 impl Controls {
@@ -117,7 +130,7 @@ impl Controls {
         if self.settings.cuts.len() >= MAX_CUTS {
             return Change::Refused(texts::TOO_MANY_CUTS);
         }
-        if !(scene.composites() || scene.detects_surface() || scene.projects()) {
+        if !scene.renders() {
             return Change::Refused(texts::CUTS_NEED_RENDERING);
         }
         let Some(cut) = scene.cut_along(outline, self.kept_side) else {

@@ -5,6 +5,7 @@ mod cutting;
 mod history;
 mod measuring;
 mod presets;
+mod starting;
 
 use super::command::{Command, Tool};
 use super::sliders::SLIDERS;
@@ -16,7 +17,6 @@ use crate::scene::{
     Camera, Cube, Curve, Inset, KeptSide, Layout, MAX_PICTURE, Measurement, Mode, Planes, Scene, Settings, Shadow,
     Tilt, Transfer,
 };
-use crate::ui::texts;
 pub(super) use cutting::BRUSH_RADII;
 use glam::DVec3;
 use history::History;
@@ -262,6 +262,9 @@ impl Controls {
         }
         // The scene lags behind if several commands come between two pictures: each one builds on the settings of the one before.
         let Some(now) = scene.and_then(|scene| self.current(scene)) else { return Change::Nothing };
+        if let Some(why) = starting::refusal(command, &now) {
+            return Change::Refused(why);
+        }
         let wanted = self.changed(command, &now).map(|settings| self.switched(settings));
         match wanted.clone().and_then(|settings| drawable(&now, settings)) {
             Some(settings) if settings != self.settings => {
@@ -272,13 +275,11 @@ impl Controls {
                 self.history.record(before, command);
                 Change::Settings
             }
-            None if wanted.clone().is_some_and(|settings| cutting::is_in_the_way(&now, settings)) => {
-                Change::Refused(texts::CUTS_IN_THE_WAY)
+            None => {
+                let why = wanted.and_then(|settings| cutting::in_the_way(&now, &settings));
+                why.map_or(Change::Nothing, Change::Refused)
             }
-            None if wanted.is_some_and(|settings| is_unveiling_in_the_way(&now, settings)) => {
-                Change::Refused(texts::UNVEILING_IN_THE_WAY)
-            }
-            _ => Change::Nothing,
+            Some(_) => Change::Nothing,
         }
     }
 
@@ -338,6 +339,10 @@ impl Controls {
             Command::MoveRegion(by) if finite(&by) => {
                 return view::keep_scale(now, view::move_region(now, DVec3::from(by)));
             }
+            Command::ToggleStartCurve
+            | Command::MoveStartHandle(..)
+            | Command::AddStartHandle(_)
+            | Command::RemoveStartHandle(_) => return starting::changed(command, now),
             Command::MoveClip(by) if finite(&[by]) && !now.is_flat() => {
                 new.clip = view::move_clip(now, self.start.clip.len(), by)?
             }
@@ -429,12 +434,6 @@ fn drawable(now: &Scene, settings: Settings) -> Option<Settings> {
         relaxed.unveil.enabled = false;
     }
     can_draw(now, &relaxed).then_some(relaxed)
-}
-
-/// True if settings cannot be drawn with the automatic render start, and can without.
-fn is_unveiling_in_the_way(now: &Scene, mut settings: Settings) -> bool {
-    let is_on = std::mem::take(&mut settings.unveil.enabled);
-    is_on && drawable(now, settings).is_some()
 }
 
 /// Whether settings can be drawn with the volume of a scene.

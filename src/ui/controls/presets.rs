@@ -1,5 +1,6 @@
 //! Presets over the present settings: the look changes, and the region, the view, cuts and measurements stay.
 
+use super::cutting::in_the_way;
 use super::{Change, Controls, drawable};
 use crate::scene::load::Layers;
 use crate::scene::{Layout, Scene, Settings};
@@ -32,9 +33,18 @@ pub(in crate::ui) const EXAMS: [Exam; 6] = [
 /// The base of what the phantom is drawn with.
 const PHANTOM: &str = "face-classic";
 
+/// Why a preset is not taken, where nothing else is known.
+
 impl Controls {
     /// The settings after a built-in preset. Of the phantom, for which most of them are framed, region and camera change too.
-    pub(in crate::ui) fn with_exam(&self, n: usize, scene: &Scene, is_phantom: bool) -> Option<Settings> {
+    ///
+    /// # Errors
+    /// Why it cannot be drawn.
+    pub(in crate::ui) fn with_exam(&self, n: usize, scene: &Scene, is_phantom: bool) -> Result<Settings, &'static str> {
+        self.drawn_by(self.examined(n, scene, is_phantom).ok_or(texts::PRESET_DOES_NOT_FIT)?, scene)
+    }
+
+    fn examined(&self, n: usize, scene: &Scene, is_phantom: bool) -> Option<Settings> {
         let exam = EXAMS.get(n)?;
         let mut layers = Layers::default();
         if is_phantom {
@@ -49,11 +59,14 @@ impl Controls {
         if is_phantom && exam.is_framed {
             (settings.region, settings.camera) = (look.region, look.camera);
         }
-        self.drawn_by(settings, scene)
+        Some(settings)
     }
 
     /// The settings after a preset of the user.
-    pub(in crate::ui) fn with_look(&self, look: &Settings, scene: &Scene) -> Option<Settings> {
+    ///
+    /// # Errors
+    /// Why it cannot be drawn.
+    pub(in crate::ui) fn with_look(&self, look: &Settings, scene: &Scene) -> Result<Settings, &'static str> {
         self.drawn_by(look.look_over(&self.in_mode_of_look(look)), scene)
     }
 
@@ -62,8 +75,10 @@ impl Controls {
         self.switched(Settings { mode: look.mode, layout: look.layout, ..self.settings.clone() })
     }
 
-    fn drawn_by(&self, settings: Settings, scene: &Scene) -> Option<Settings> {
-        drawable(self.current(scene)?.as_ref(), settings)
+    fn drawn_by(&self, settings: Settings, scene: &Scene) -> Result<Settings, &'static str> {
+        let now = self.current(scene).ok_or(texts::PRESET_DOES_NOT_FIT)?;
+        drawable(&now, settings.clone())
+            .ok_or_else(|| in_the_way(&now, &settings).unwrap_or(texts::PRESET_DOES_NOT_FIT))
     }
 
     /// Takes the settings of a preset, as one step for undo.

@@ -7,6 +7,8 @@ use crate::measure::overlay;
 use crate::passes::postprocess;
 use crate::scene::marks::{BAR_LENGTHS, TileMarks};
 use crate::scene::{Layout, Mode, Scene, transfer};
+use crate::ui::command::Tool;
+use crate::ui::region_box;
 use crate::ui::texts;
 use egui::{Align2, Color32, FontId, Painter, Pos2, Rect, Stroke, Ui, Vec2, pos2, vec2};
 use glam::DVec3;
@@ -48,7 +50,11 @@ pub(super) fn paint(ui: &Ui, state: &PanelState, scale: f32) {
         _ = text_at_one_of(&painter, &mut taken, places.clone(), Align2::RIGHT_TOP, origin, WARNING)
             || text_at_one_of(&painter, &mut taken, places, Align2::RIGHT_TOP, short, WARNING);
     }
-    for line in state.start_lines {
+    // While it is bent, plane A has the line as it will be, not as the picture has it.
+    let is_shown = state.controls.tool() == Tool::Region
+        && !scene.unveils()
+        && region_box::start_line(scene, &scene.sheet(), 0, state.controls.start_line()).is_some();
+    for line in state.start_lines.iter().skip(usize::from(is_shown)) {
         let [corner, size] = line.tile.map(|[x, y]| vec2(x as f32, y as f32) / scale);
         let painter = painter.with_clip_rect(Rect::from_min_size(picture.min + corner, size).intersect(picture));
         for ends in &line.pieces {

@@ -7,7 +7,9 @@ use super::colours::{
 use super::measures;
 use super::names::{self, Tell};
 use super::{PanelState, SMALL_TEXT, TEXT_SIZE, TOUCH_SIZE, heading};
-use crate::scene::{ColourMap, KeptSide, Layout, Mode, PlaneName, Settings, Transfer, TransferName};
+use crate::scene::{
+    ColourMap, KeptSide, Layout, MAX_START_POINTS, MIN_START_POINTS, Mode, PlaneName, Settings, Transfer, TransferName,
+};
 use crate::ui::cine_player::{CineState, SPEEDS};
 use crate::ui::command::{Command, Tool};
 use crate::ui::controls::BRUSH_RADII;
@@ -96,6 +98,7 @@ pub(super) fn show_modes(ui: &mut Ui, state: &PanelState, width: f32, execute: &
             if !state.has_column {
                 clip(ui, state, width - 16.0, execute);
                 cuts(ui, state, width - 16.0, execute);
+                start_line(ui, state, width - 16.0, execute);
             }
             if settings.mode.is_flat() && settings.mode != Mode::Orthogonal {
                 let hint = |_| texts::PLANE_HINT;
@@ -247,25 +250,79 @@ fn curve(ui: &mut Ui, state: &PanelState, width: f32, execute: &mut dyn FnMut(Co
     });
 }
 
+/// With the tool for the region, whether its start line is bent, how deep its handles are, and how many it has; without that tool, the switch of a line
+/// that is bent.
+fn start_line(ui: &mut Ui, state: &PanelState, width: f32, execute: &mut dyn FnMut(Command)) {
+    let Some(scene) = state.scene.filter(|scene| scene.renders()) else { return };
+    let points = state.controls.settings().region.start_curve.as_deref();
+    let is_chosen = state.controls.tool() == Tool::Region;
+    if !is_chosen && points.is_none() {
+        return;
+    }
+    names::group(ui, texts::START_LINE, |ui| {
+        heading(ui, texts::START_LINE);
+        ui.set_max_width(width);
+        let mut on = points.is_some();
+        let hint = texts::CURVED_LINE_HINT;
+        if switch(ui, &mut on, texts::CURVED_LINE, hint) {
+            execute(Command::ToggleStartCurve);
+        }
+        let Some(points) = points.filter(|_| is_chosen) else { return };
+        let [low, high] = [scene.low, scene.high].map(|corner| view::below_face(scene, corner).y);
+        for (n, [lateral, depth]) in points.iter().enumerate() {
+            let hint = texts::START_HANDLE_HINT;
+            if let Some(depth) = plain_slider(ui, &texts::start_handle(n + 1), *depth, [low, high], hint) {
+                execute(Command::MoveStartHandle(n, [*lateral, depth]));
+            }
+        }
+        let half = vec2((width - ui.spacing().item_spacing.x) / 2.0, TOUCH_SIZE * 0.75);
+        ui.horizontal(|ui| {
+            for (command, [word, name], is_there, hint) in [
+                (
+                    Command::AddStartHandle(None),
+                    [texts::ADD, texts::ADD_HANDLE],
+                    points.len() < MAX_START_POINTS,
+                    texts::ADD_HANDLE_HINT,
+                ),
+                (
+                    Command::RemoveStartHandle(None),
+                    [texts::REMOVE, texts::REMOVE_HANDLE],
+                    points.len() > MIN_START_POINTS,
+                    texts::REMOVE_HANDLE_HINT,
+                ),
+            ] {
+                let button = ui.add_enabled(is_there, Button::new(word).min_size(half));
+                if button.tell(hint).on_disabled_hover_text(hint).named(name).clicked() {
+                    execute(command);
+                }
+            }
+        });
+    });
+}
+
 fn brush_radius(ui: &mut Ui, state: &PanelState, execute: &mut dyn FnMut(Command)) {
-    let before = state.controls.brush_radius();
-    let (mut value, [low, high]) = (before, BRUSH_RADII);
+    let hint = texts::RADIUS_OF_BRUSH_HINT;
+    if let Some(radius) = plain_slider(ui, texts::RADIUS_OF_BRUSH, state.controls.brush_radius(), BRUSH_RADII, hint) {
+        execute(Command::BrushRadius(radius));
+    }
+}
+
+/// A slider in mm of what is no setting of its own. Returns the value that the user sets.
+fn plain_slider(ui: &mut Ui, name: &str, before: f64, [low, high]: [f64; 2], hint: &str) -> Option<f64> {
+    let mut value = before.clamp(low, high.max(low));
     let shown = texts::millimetres(before);
     ui.horizontal(|ui| {
-        ui.label(texts::RADIUS_OF_BRUSH);
+        ui.label(name);
         ui.with_layout(egui::Layout::right_to_left(Align::Center), |ui| {
             ui.label(RichText::new(&shown).color(ACCENT));
         });
     });
     ui.spacing_mut().slider_width = ui.available_width();
     ui.spacing_mut().interact_size.y = TOUCH_SIZE * 0.5;
-    let slider = ui.add(Slider::new(&mut value, low..=high).show_value(false).step_by(0.5));
-    let hint = texts::RADIUS_OF_BRUSH_HINT;
-    let slider = slider.tell(hint).named(texts::RADIUS_OF_BRUSH).with_value(&shown);
+    let slider = ui.add(Slider::new(&mut value, low..=high.max(low)).show_value(false).step_by(0.5));
+    let slider = slider.tell(hint).named(name).with_value(&shown);
     let is_held = slider.dragged() || slider.clicked() || slider.is_pointer_button_down_on();
-    if (is_held || names::asks_for_value(ui, &slider)) && value != before {
-        execute(Command::BrushRadius(value));
-    }
+    ((is_held || names::asks_for_value(ui, &slider)) && value != before).then_some(value)
 }
 
 fn undo_and_redo(ui: &mut Ui, state: &PanelState, row: &Row, execute: &mut dyn FnMut(Command)) {
@@ -377,6 +434,7 @@ pub(super) fn show_controls(ui: &mut Ui, state: &PanelState, width: f32, execute
             measures::show_results(ui, state, width - 40.0, execute);
             clip(ui, state, width - 32.0, execute);
             cuts(ui, state, width - 32.0, execute);
+            start_line(ui, state, width - 32.0, execute);
             curve(ui, state, width - 32.0, execute);
             heading(ui, texts::CONTROLS);
             let in_front = FRONT.map(|(name, sliders)| (name, front(sliders, settings)));

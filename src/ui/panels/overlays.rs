@@ -230,7 +230,7 @@ fn small(ui: &mut Ui, text: String, colour: Color32) {
 }
 
 /// Gestures on the picture, for the help.
-const GESTURES: [(&str, &str); 15] = [
+const GESTURES: [(&str, &str); 16] = [
     (texts::DRAG_GESTURE, texts::DRAG_DOES),
     (texts::SHIFT_DRAG, texts::SHIFT_DRAG_DOES),
     (texts::CTRL_DRAG, texts::CTRL_DRAG_DOES),
@@ -238,6 +238,7 @@ const GESTURES: [(&str, &str); 15] = [
     (texts::TWO_FINGERS, texts::TWO_FINGERS_DO),
     (texts::DOUBLE_CLICK, texts::DOUBLE_CLICK_DOES),
     (texts::REGION_DRAG, texts::REGION_DRAG_DOES),
+    (texts::START_LINE_CLICK, texts::START_LINE_CLICK_DOES),
     (texts::REGION_DRAG_ON_PLANE, texts::REGION_DRAG_ON_PLANE_DOES),
     (texts::LIGHT_BALL_DRAG, texts::LIGHT_BALL_DRAG_DOES),
     (texts::CLIP_DRAG, texts::CLIP_DRAG_DOES),

@@ -1,7 +1,7 @@
-//! The region as a box, while its tool is chosen: its section on the planes beside a rendering with a handle on each side, and its edges in the
-//! rendering.
+//! The region as a box, while its tool is chosen: its section on the planes beside a rendering with a handle on each side, its start line in green on
+//! plane A, and its edges in the rendering.
 
-use super::colours::{OUTLINE, TEXT};
+use super::colours::{OUTLINE, START, TEXT};
 use super::{PanelState, picture_rect};
 use crate::ui::command::Tool;
 use crate::ui::region_box;
@@ -9,6 +9,8 @@ use egui::{Painter, Pos2, Rect, Stroke, Ui, pos2, vec2};
 
 /// Width of a handle, points.
 const HANDLE: f32 = 11.0;
+/// Radius of a handle of the start line, points: these are round.
+const START_HANDLE: f32 = 6.5;
 /// Length of a dash of an edge that is behind, and of what is between two, points.
 const DASH: f32 = 6.0;
 
@@ -26,13 +28,22 @@ pub(super) fn paint(ui: &Ui, state: &PanelState, scale: f32) {
     let painter = ui.ctx().layer_painter(egui::LayerId::background()).with_clip_rect(picture);
     if region_box::is_on_planes(scene) {
         let sheet = scene.sheet();
-        for tile in &sheet.tiles {
+        for (n, tile) in sheet.tiles.iter().enumerate() {
             let [corner, size] = [tile.corner, tile.size].map(|v| v.map(f64::from));
             let area = Rect::from_min_max(at(corner), at([corner[0] + size[0], corner[1] + size[1]]));
             let painter = painter.with_clip_rect(area.intersect(picture));
             let sides = region_box::section(scene, &sheet, tile);
             sides.iter().for_each(|side| line(&painter, side.ends.map(at), 1.5));
             sides.iter().filter_map(|side| side.handle).for_each(|place| handle(&painter, at(place)));
+            if let Some(start) = region_box::start_line(scene, &sheet, n, state.controls.start_line()) {
+                let ends: Vec<Pos2> = start.line.into_iter().map(at).collect();
+                for (width, colour) in [(2.0 + 2.5, OUTLINE), (2.0, START)] {
+                    ends.windows(2).for_each(|two| {
+                        painter.line_segment([two[0], two[1]], Stroke::new(width, colour));
+                    });
+                }
+                start.handles.into_iter().for_each(|place| start_handle(&painter, at(place)));
+            }
         }
     }
     let tile = scene.marks().into_iter().find(|tile| tile.is_rendering);
@@ -61,6 +72,12 @@ fn dashes(painter: &Painter, [from, to]: [Pos2; 2]) {
         let share = |along: f32| from + way * (along / count).min(1.0);
         line(painter, [share(n as f32), share(n as f32 + 0.5)], 1.0);
     }
+}
+
+fn start_handle(painter: &Painter, at: Pos2) {
+    painter.circle_filled(at, START_HANDLE + 2.0, OUTLINE);
+    painter.circle_filled(at, START_HANDLE, START);
+    painter.circle_filled(at, START_HANDLE - 4.0, OUTLINE);
 }
 
 fn handle(painter: &Painter, at: Pos2) {

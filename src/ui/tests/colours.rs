@@ -214,6 +214,12 @@ fn everything_that_is_drawn_has_the_contrast_that_wcag_demands() {
     let mut shown = Shown::new("mode='surface'\nlayout='four'\nplanes.smooth={lateral=1,depth=1}\ncamera.azimuth=30");
     shown.apply(Command::Tool(Tool::Region));
     check(&shown, "the box of the region");
+    // A window in which no control is half out of sight.
+    let four = "mode='surface'\nlayout='four'\nplanes.smooth={lateral=1,depth=1}";
+    let mut shown = Shown::sized(four, [1280, 1200], 1.0);
+    shown.apply(Command::Tool(Tool::Region));
+    shown.apply(Command::ToggleStartCurve);
+    check(&shown, "the start line of the region");
     let mut shown = Shown::new("mode='plane'\nplanes.reference=true");
     shown.apply(Command::Tool(Tool::Measure(crate::scene::MeasureKind::Distance)));
     for point in [[0.0, 30.0, 0.0], [0.0, 40.0, 0.0], [0.0, 50.0, 0.0]] {

@@ -13,6 +13,7 @@ mod render_start;
 mod screen_reader;
 mod sequences;
 mod shown;
+mod start_line;
 
 use super::command::{Command, Face, Tool};
 use super::controls::{Change, Controls};
@@ -129,7 +130,17 @@ impl TestWindow {
         let has_work = self.controls.work().is_some() || self.controls.line().is_some();
         let measures = self.controls.measures().to_vec();
         let (corner, scene_shown, now) = (self.corner, Some(&scene), self.now);
-        let on = Viewport { corner, size, scene: scene_shown, measures: &measures, has_work, is_covered: false, now };
+        let start_line = &self.controls.start_line().to_vec();
+        let on = Viewport {
+            corner,
+            size,
+            scene: scene_shown,
+            measures: &measures,
+            start_line,
+            has_work,
+            is_covered: false,
+            now,
+        };
         let commands = self.gestures.input(&input, &on, self.controls.tool(), self.held);
         for command in &commands {
             self.controls.apply(command, Some(&scene));

@@ -33,6 +33,11 @@ fn command() -> impl Strategy<Value = Command> {
         1 => two().prop_map(Command::Pan),
         1 => two().prop_map(Command::MoveLight),
         4 => (0usize..4, any::<bool>(), number()).prop_map(|(axis, high, by)| Command::MoveFace(Face { axis, high }, by)),
+        1 => [number(), number(), number()].prop_map(Command::MoveRegion),
+        2 => Just(Command::ToggleStartCurve),
+        4 => (0usize..5, two()).prop_map(|(n, to)| Command::MoveStartHandle(n, to)),
+        2 => prop::option::of(number()).prop_map(Command::AddStartHandle),
+        1 => prop::option::of(0usize..5).prop_map(Command::RemoveStartHandle),
         3 => number().prop_map(Command::MoveClip),
         1 => prop::sample::select(vec![PlaneName::A, PlaneName::B, PlaneName::C]).prop_map(Command::Plane),
         1 => number().prop_map(Command::StepPlane),
@@ -74,6 +79,8 @@ fn input() -> impl Strategy<Value = Input> {
 fn is_finite(command: &Command) -> bool {
     let all = |numbers: &[f64]| numbers.iter().all(|n| n.is_finite());
     match command {
+        Command::MoveStartHandle(_, n) => all(n),
+        Command::AddStartHandle(lateral) => lateral.is_none_or(f64::is_finite),
         Command::Rotate(n) | Command::Pan(n) | Command::MoveLight(n) | Command::RotatePlanes(n) => all(n),
         Command::Roll(n)
         | Command::Zoom(n)
@@ -147,7 +154,10 @@ proptest! {
                     let scene = Some(&shown).filter(|_| now.as_millis() % 11 != 0);
                     let measures = controls.measures().to_vec();
                     let (corner, has_work) = ([60.0, 5.0], controls.work().is_some());
-                    let on = Viewport { corner, size, scene, measures: &measures, has_work, is_covered: !follows, now };
+                    let start_line = &controls.start_line().to_vec();
+                    let is_covered = !follows;
+                    let on =
+                        Viewport { corner, size, scene, measures: &measures, start_line, has_work, is_covered, now };
                     let mut commands = gestures.input(input, &on, *tool, keys.modifiers());
                     commands.extend(keys.input(input));
                     for command in commands {

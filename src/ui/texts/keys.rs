@@ -24,6 +24,7 @@ pub const LAYOUT_SINGLE: &str = "one picture";
 pub const DRAG_ROTATES: &str = "drag rotates";
 pub const DRAG_MOVES_LIGHT: &str = "drag moves the light";
 pub const DRAG_MOVES_REGION: &str = "drag moves the region's faces";
+pub const BEND_START_LINE: &str = "bend the start line, or straighten it";
 pub const DRAG_CLIPS: &str = "drag cuts from the front";
 pub const DRAG_MOVES_PLANES: &str = "drag moves the planes (sections)";
 pub const DRAG_CUTS: &str = "drag round it cuts it away (freehand)";

@@ -97,6 +97,9 @@ pub const CONTOUR_TOO_SMALL: &str = "The contour is too small, or beside the vol
 pub const CANNOT_CUT_BOTH: &str = "Nothing can be cut where both what is dark and what is bright is drawn.";
 
 // The automatic render start.
+pub const CURVE_IN_THE_WAY: &str = "That draws both what is dark and what is bright, of which nothing can be removed: the start line has to be straight (Shift+G).";
+pub const SEVERAL_IN_THE_WAY: &str = "That draws both what is dark and what is bright, of which nothing can be removed: no cuts (Shift+F), a straight start line (Shift+G) and no automatic render start go with it.";
+pub const NO_SUCH_PRESET: &str = "There is no such preset";
 pub const UNVEILING_IN_THE_WAY: &str = "That draws both what is dark and what is bright, of which nothing can be removed: rendering cannot start at the fluid.";
 
 // The source: title and explanation.

@@ -263,6 +263,8 @@ pub const DOUBLE_CLICK: &str = "double click on a tile";
 pub const DOUBLE_CLICK_DOES: &str = "show that tile alone, and back";
 pub const REGION_DRAG: &str = "Region, then drag";
 pub const REGION_DRAG_DOES: &str = "move the nearest face of the box";
+pub const START_LINE_CLICK: &str = "Region, then double click the green line (4-up)";
+pub const START_LINE_CLICK_DOES: &str = "bend it; add or remove a handle";
 pub const REGION_DRAG_ON_PLANE: &str = "Region, then drag on a plane (4-up)";
 pub const REGION_DRAG_ON_PLANE_DOES: &str = "move a side of the box; from within: all of it";
 pub const LIGHT_BALL_DRAG: &str = "drag on the light ball (below Light)";
@@ -325,3 +327,26 @@ pub const END_CURVE_HINT: &str = "Shows the section along the line (Enter).";
 pub const END_CURVE: &str = "End the line";
 pub const REMOVE_CURVE_HINT: &str = "Shows the planes without it (Shift+Delete; undo brings it back).";
 pub const REMOVE_CURVE: &str = "Remove curved plane";
+
+// The start line.
+pub const START_LINE: &str = "Start line";
+pub const CURVED_LINE: &str = "Curved line";
+pub const CURVED_LINE_HINT: &str =
+    "Bends the line at which rendering starts: drag its green handles on plane A of 4-up. Off: straight. (Shift+G)";
+pub fn start_handle(number: impl Display) -> String {
+    format!("Handle {number}")
+}
+pub const START_HANDLE_HINT: &str =
+    "How deep rendering starts at this handle of the start line, counted from the left.";
+pub const ADD: &str = "Add";
+pub const ADD_HANDLE: &str = "Add handle";
+pub const ADD_HANDLE_HINT: &str =
+    "One more handle, in the widest gap; or double click the line where it is wanted. At most five.";
+pub const REMOVE: &str = "Remove";
+pub const REMOVE_HANDLE: &str = "Remove handle";
+pub const REMOVE_HANDLE_HINT: &str =
+    "One handle less: the one that bends the line the least; or double click one. At least three.";
+pub const START_LINE_FULL: &str = "The start line has five handles, as many as it can have.";
+pub const START_LINE_LEAST: &str =
+    "The start line has three handles, as few as it can have: Shift+G makes it straight.";
+pub const NOTHING_STARTS: &str = "The start line is that of a rendering: planes and the block show everything.";
