@@ -111,7 +111,7 @@ fn a_rendering_is_that_of_a_volume_which_was_cut_before() {
             // The wall is the brightest, so that the largest echoes miss it too.
             let of_layers = layers(&whole);
             let body = |p: DVec3| if of_layers(p) == 0.6 { 0.9 } else { of_layers(p) };
-            let frames = body_frames(&whole, &body);
+            let frames = body_frames(&whole, body);
             let before = body_frames(&whole, |p| if p.y < depth(p.x) { removed } else { body(p) });
             let mut renderer = rendered(&device, of(&geometry, &format!("{case}\n{curve}")), &frames);
             let cut = renderer.picture().expect("picture");
