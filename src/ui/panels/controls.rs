@@ -4,15 +4,12 @@
 use super::colours::{
     self, ABSENT, ACCENT, BUTTON, EDGE, ON_SELECTED, ON_WARNING, OUTLINE, SELECTED, TEXT, WARNING, WEAK_TEXT,
 };
-use super::measures;
 use super::names::{self, Tell};
-use super::{PanelState, SMALL_TEXT, TEXT_SIZE, TOUCH_SIZE, heading};
-use crate::scene::{
-    ColourMap, KeptSide, Layout, MAX_START_POINTS, MIN_START_POINTS, Mode, PlaneName, Settings, Transfer, TransferName,
-};
+use super::{PanelState, TEXT_SIZE, TOUCH_SIZE, heading};
+use super::{measures, tools};
+use crate::scene::{ColourMap, Layout, Mode, PlaneName, Settings, Transfer, TransferName};
 use crate::ui::cine_player::{CineState, SPEEDS};
 use crate::ui::command::{Command, Tool};
-use crate::ui::controls::BRUSH_RADII;
 use crate::ui::sliders::{Group, SLIDERS, Slider as Control};
 use crate::ui::texts;
 use crate::ui::texts::hints;
@@ -96,9 +93,9 @@ pub(super) fn show_modes(ui: &mut Ui, state: &PanelState, width: f32, execute: &
                 |t| execute(Command::Tool(t)),
             );
             if !state.has_column {
-                clip(ui, state, width - 16.0, execute);
-                cuts(ui, state, width - 16.0, execute);
-                start_line(ui, state, width - 16.0, execute);
+                tools::clip(ui, state, width - 16.0, execute);
+                tools::cuts(ui, state, width - 16.0, execute);
+                tools::start_line(ui, state, width - 16.0, execute);
             }
             if settings.mode.is_flat() && settings.mode != Mode::Orthogonal {
                 let hint = |_| texts::PLANE_HINT;
@@ -113,13 +110,13 @@ pub(super) fn show_modes(ui: &mut Ui, state: &PanelState, width: f32, execute: &
             }
             if settings.mode.is_flat() || settings.layout == Layout::Four {
                 let hint = texts::RECENTRE_PLANES_HINT;
-                let button = Button::new(texts::RECENTRE_PLANES).min_size(vec2(width - 16.0, TOUCH_SIZE * 0.75));
-                if ui.add(button).tell(hint).clicked() {
+                let size = vec2(width - 16.0, TOUCH_SIZE * 0.75);
+                if ui.add_sized(size, Button::new(texts::RECENTRE_PLANES)).tell(hint).clicked() {
                     execute(Command::Recentre);
                 }
             }
             if !state.has_column {
-                curve(ui, state, width - 16.0, execute);
+                tools::curve(ui, state, width - 16.0, execute);
             }
             names::group(ui, texts::MEASURE, |ui| {
                 heading(ui, texts::MEASURE);
@@ -144,185 +141,12 @@ pub(super) fn show_modes(ui: &mut Ui, state: &PanelState, width: f32, execute: &
                         }
                     }
                 });
-                if ui.add(Button::new(texts::EXPORT).min_size(whole)).tell(hint).clicked() {
+                if ui.add_sized(whole, Button::new(texts::EXPORT)).tell(hint).clicked() {
                     execute(Command::Exports);
                 }
             });
         });
     });
-}
-
-/// The numbers of the controls of clip faces that are there.
-fn of_clip(settings: &Settings) -> [Option<usize>; 2] {
-    [texts::CLIP_ECHOES, texts::CLIP_THRESHOLD].map(|name| front(&[name], settings))
-}
-
-/// While there are clip planes, whether their faces show echoes, and from which on.
-fn clip(ui: &mut Ui, state: &PanelState, width: f32, execute: &mut dyn FnMut(Command)) {
-    let there = of_clip(state.controls.settings());
-    if there == [None; 2] {
-        return;
-    }
-    names::group(ui, texts::CLIP, |ui| {
-        heading(ui, texts::CLIP);
-        ui.set_max_width(width);
-        for number in there.into_iter().flatten() {
-            slider(ui, state, number, SLIDERS[number].name, false, execute);
-        }
-    });
-}
-
-/// The number of the slider that is with the cuts while their tool is chosen, if it is there.
-fn depth_of_cut(state: &PanelState) -> Option<usize> {
-    let is_it = |slider: &Control| slider.name == texts::DEPTH_OF_CUT && slider.applies(state.controls.settings());
-    SLIDERS.iter().position(is_it).filter(|_| state.controls.tool() == Tool::Cut)
-}
-
-/// With the tool for cuts, which side of a contour stays, and how deep the last cut is; and what removes the cuts, while there are any.
-fn cuts(ui: &mut Ui, state: &PanelState, width: f32, execute: &mut dyn FnMut(Command)) {
-    let is_chosen = state.controls.tool() == Tool::Cut;
-    let is_brush = state.controls.tool() == Tool::Brush;
-    if !is_chosen && !is_brush && state.controls.settings().cuts.is_empty() {
-        return;
-    }
-    names::group(ui, texts::CUTS, |ui| {
-        heading(ui, texts::CUTS);
-        ui.set_max_width(width);
-        if is_chosen {
-            let mut on = state.controls.kept_side() == KeptSide::Inside;
-            let hint = texts::KEEP_INSIDE_HINT;
-            if switch(ui, &mut on, texts::KEEP_INSIDE, hint) {
-                execute(Command::KeepSide(if on { KeptSide::Inside } else { KeptSide::Outside }));
-            }
-        }
-        if is_brush {
-            brush_radius(ui, state, execute);
-        }
-        if let Some(number) = depth_of_cut(state) {
-            slider(ui, state, number, texts::DEPTH_OF_CUT, false, execute);
-        }
-        if !state.controls.settings().cuts.is_empty() {
-            let button = Button::new(texts::REMOVE_ALL_CUTS).min_size(vec2(width, TOUCH_SIZE * 0.75));
-            let hint = texts::REMOVE_ALL_CUTS_HINT;
-            if ui.add(button).tell(hint).clicked() {
-                execute(Command::ClearCuts);
-            }
-        }
-    });
-}
-
-/// With its tool, what to do next for a curved plane; and what removes it, while there is one.
-fn curve(ui: &mut Ui, state: &PanelState, width: f32, execute: &mut dyn FnMut(Command)) {
-    let (is_chosen, line) = (state.controls.tool() == Tool::Curve, state.controls.line());
-    let has_curve = state.controls.settings().planes.curve.is_some();
-    if !is_chosen && !has_curve {
-        return;
-    }
-    names::group(ui, texts::CURVED_PLANE, |ui| {
-        heading(ui, texts::CURVED_PLANE);
-        ui.set_max_width(width);
-        if is_chosen {
-            let step = match (line.map(|line| line.points.len()), has_curve) {
-                (Some(1), _) => texts::CURVE_STEP_SECOND,
-                (Some(_), _) => texts::CURVE_STEP_NEXT,
-                (None, true) => texts::CURVE_STEP_CHANGE,
-                (None, false) => texts::CURVE_STEP_FIRST,
-            };
-            names::group(ui, step, |ui| {
-                names::announce(ui, step, false);
-                ui.add(Label::new(RichText::new(step).size(SMALL_TEXT).color(ACCENT)).wrap());
-            });
-        }
-        let size = vec2(width, TOUCH_SIZE * 0.75);
-        if line.is_some_and(|line| line.points.len() > 1) {
-            let hint = texts::END_CURVE_HINT;
-            let button = super::overlays::first(RichText::new(texts::END_CURVE));
-            if ui.add_sized(size, button).tell(hint).clicked() {
-                execute(Command::EndCurve);
-            }
-        }
-        if has_curve {
-            let hint = texts::REMOVE_CURVE_HINT;
-            if ui.add_sized(size, Button::new(texts::REMOVE_CURVE)).tell(hint).clicked() {
-                execute(Command::ClearCurve);
-            }
-        }
-    });
-}
-
-/// With the tool for the region, whether its start line is bent, how deep its handles are, and how many it has; without that tool, the switch of a line
-/// that is bent.
-fn start_line(ui: &mut Ui, state: &PanelState, width: f32, execute: &mut dyn FnMut(Command)) {
-    let Some(scene) = state.scene.filter(|scene| scene.renders()) else { return };
-    let points = state.controls.settings().region.start_curve.as_deref();
-    let is_chosen = state.controls.tool() == Tool::Region;
-    if !is_chosen && points.is_none() {
-        return;
-    }
-    names::group(ui, texts::START_LINE, |ui| {
-        heading(ui, texts::START_LINE);
-        ui.set_max_width(width);
-        let mut on = points.is_some();
-        let hint = texts::CURVED_LINE_HINT;
-        if switch(ui, &mut on, texts::CURVED_LINE, hint) {
-            execute(Command::ToggleStartCurve);
-        }
-        let Some(points) = points.filter(|_| is_chosen) else { return };
-        let [low, high] = [scene.low, scene.high].map(|corner| view::below_face(scene, corner).y);
-        for (n, [lateral, depth]) in points.iter().enumerate() {
-            let hint = texts::START_HANDLE_HINT;
-            if let Some(depth) = plain_slider(ui, &texts::start_handle(n + 1), *depth, [low, high], hint) {
-                execute(Command::MoveStartHandle(n, [*lateral, depth]));
-            }
-        }
-        let half = vec2((width - ui.spacing().item_spacing.x) / 2.0, TOUCH_SIZE * 0.75);
-        ui.horizontal(|ui| {
-            for (command, [word, name], is_there, hint) in [
-                (
-                    Command::AddStartHandle(None),
-                    [texts::ADD, texts::ADD_HANDLE],
-                    points.len() < MAX_START_POINTS,
-                    texts::ADD_HANDLE_HINT,
-                ),
-                (
-                    Command::RemoveStartHandle(None),
-                    [texts::REMOVE, texts::REMOVE_HANDLE],
-                    points.len() > MIN_START_POINTS,
-                    texts::REMOVE_HANDLE_HINT,
-                ),
-            ] {
-                let button = ui.add_enabled(is_there, Button::new(word).min_size(half));
-                if button.tell(hint).on_disabled_hover_text(hint).named(name).clicked() {
-                    execute(command);
-                }
-            }
-        });
-    });
-}
-
-fn brush_radius(ui: &mut Ui, state: &PanelState, execute: &mut dyn FnMut(Command)) {
-    let hint = texts::RADIUS_OF_BRUSH_HINT;
-    if let Some(radius) = plain_slider(ui, texts::RADIUS_OF_BRUSH, state.controls.brush_radius(), BRUSH_RADII, hint) {
-        execute(Command::BrushRadius(radius));
-    }
-}
-
-/// A slider in mm of what is no setting of its own. Returns the value that the user sets.
-fn plain_slider(ui: &mut Ui, name: &str, before: f64, [low, high]: [f64; 2], hint: &str) -> Option<f64> {
-    let mut value = before.clamp(low, high.max(low));
-    let shown = texts::millimetres(before);
-    ui.horizontal(|ui| {
-        ui.label(name);
-        ui.with_layout(egui::Layout::right_to_left(Align::Center), |ui| {
-            ui.label(RichText::new(&shown).color(ACCENT));
-        });
-    });
-    ui.spacing_mut().slider_width = ui.available_width();
-    ui.spacing_mut().interact_size.y = TOUCH_SIZE * 0.5;
-    let slider = ui.add(Slider::new(&mut value, low..=high.max(low)).show_value(false).step_by(0.5));
-    let slider = slider.tell(hint).named(name).with_value(&shown);
-    let is_held = slider.dragged() || slider.clicked() || slider.is_pointer_button_down_on();
-    ((is_held || names::asks_for_value(ui, &slider)) && value != before).then_some(value)
 }
 
 fn undo_and_redo(ui: &mut Ui, state: &PanelState, row: &Row, execute: &mut dyn FnMut(Command)) {
@@ -432,15 +256,15 @@ pub(super) fn show_controls(ui: &mut Ui, state: &PanelState, width: f32, execute
             ui.set_max_width(width - 32.0);
             ui.add_space(6.0);
             measures::show_results(ui, state, width - 40.0, execute);
-            clip(ui, state, width - 32.0, execute);
-            cuts(ui, state, width - 32.0, execute);
-            start_line(ui, state, width - 32.0, execute);
-            curve(ui, state, width - 32.0, execute);
+            tools::clip(ui, state, width - 32.0, execute);
+            tools::cuts(ui, state, width - 32.0, execute);
+            tools::start_line(ui, state, width - 32.0, execute);
+            tools::curve(ui, state, width - 32.0, execute);
             heading(ui, texts::CONTROLS);
             let in_front = FRONT.map(|(name, sliders)| (name, front(sliders, settings)));
-            let with_cuts = depth_of_cut(state);
+            let with_cuts = tools::depth_of_cut(state);
             let start = [texts::AUTO_RENDER_START, texts::START_OFFSET].map(|name| front(&[name], settings));
-            let elsewhere = [&start[..], &of_clip(settings)[..], &[with_cuts]].concat();
+            let elsewhere = [&start[..], &tools::of_clip(settings)[..], &[with_cuts]].concat();
             for (name, number) in in_front {
                 match number {
                     Some(number) if name == texts::LIGHT => {
@@ -534,7 +358,7 @@ fn absent(ui: &mut Ui, name: &str) {
     ui.allocate_exact_size(size, Sense::hover()).1.on_hover_text(texts::NO_SUCH_CONTROL);
 }
 
-fn slider(
+pub(super) fn slider(
     ui: &mut Ui,
     state: &PanelState,
     number: usize,
@@ -630,7 +454,7 @@ fn light_ball(ui: &mut Ui, settings: &Settings, execute: &mut dyn FnMut(Command)
 }
 
 /// A switch with its name; the whole row reacts. True if the user changed it.
-fn switch(ui: &mut Ui, on: &mut bool, name: &str, hint: &str) -> bool {
+pub(super) fn switch(ui: &mut Ui, on: &mut bool, name: &str, hint: &str) -> bool {
     let (width, height) = (44.0, 24.0);
     // A long name has two lines, and ends before the switch.
     let room = (ui.available_width() - width - 6.0).max(0.0);

@@ -81,8 +81,8 @@ fn results(ui: &mut Ui, state: &PanelState, width: f32, execute: &mut dyn FnMut(
         } else {
             texts::CLOSE_CONTOUR
         };
-        let button = first(RichText::new(name)).min_size(vec2(width, TOUCH_SIZE * 0.65));
-        if ui.add(button).tell(texts::END_TRACING_HINT).clicked() {
+        let size = vec2(width, TOUCH_SIZE * 0.65);
+        if ui.add_sized(size, first(RichText::new(name))).tell(texts::END_TRACING_HINT).clicked() {
             execute(Command::EndMeasure);
         }
     }

@@ -15,6 +15,7 @@ mod names;
 mod overlays;
 mod presets;
 mod region;
+mod tools;
 
 use self::colours::{BACKGROUND, BUTTON, EDGE, ON_SELECTED, PANEL, SELECTED, TEXT, WEAK_TEXT};
 pub(super) use self::presets::{PresetTile, PresetsShown};
