@@ -19,6 +19,7 @@ pub mod marks;
 pub mod picker;
 pub mod planes;
 mod region;
+mod sampling;
 pub mod self_attenuation;
 pub mod settings;
 mod sizes;
@@ -53,29 +54,6 @@ pub const MAX_WINDOW: u32 = 63;
 
 /// Maximum number of clip planes.
 pub const MAX_CLIPS: usize = 4;
-
-/// Maximum number of texels for which packed neighbours are chosen automatically: four times as many values.
-const MAX_PACKED_TEXELS: u64 = 1 << 27;
-/// Samples per texel of one picture above which packed neighbours pay off.
-const SAMPLES_PER_PACKED_TEXEL: f64 = 6.0;
-
-// What bricks cost and save, ns: medians over the real bone, the simulated head and the phantom at 96^2 to 512^2, `render --timings`,
-// least of 3 runs, with and without bricks; llvmpipe (Mesa 22.3.6, LLVM 15), two shared cores, 2026-11-23.
-
-/// Range of the tile that a texel belongs to, per texel (1.3 to 1.5).
-const TEXEL_COST: f64 = 1.4;
-/// Range of a brick, per tile that it may touch (0.5 to 1.2).
-const TILE_COST: f64 = 1.0;
-/// Kind of a brick and its distance to the next of another kind, per brick (80 to 100).
-const BRICK_COST: f64 = 90.0;
-/// The dispatches of all of these, where there is little to do.
-const DISPATCHES_COST: f64 = 1e6;
-/// Saved per sample of a ray by compositing (1 to 10).
-const COMPOSITING_SAVING: f64 = 3.0;
-/// The same by the largest or the smallest value of a ray (1.2 to 1.6).
-const EXTREME_SAVING: f64 = 1.4;
-/// The same by the surface detector and the mean: between 1.9 lost and 1.1 saved, about nothing in the median.
-const NO_SAVING: f64 = 0.0;
 
 /// Type and value range of the samples of a source.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -708,96 +686,6 @@ impl Scene {
         let sections = if self.has_sections() { lateral.hypot(depth) } else { 0.0 };
         let slices = std::f64::consts::SQRT_2 * (median + estimator + sigma + enhanced) + diffusion + gaussian;
         slices.max(sections)
-    }
-}
-
-/// The choice of sampling: the device's filter, eight texels, or packed neighbours.
-impl Scene {
-    /// The scene with `auto` replaced by `fastest`, the fastest sampling of the device; and without bricks if they cost more than they
-    /// save. What they cost is known of a CPU only, whose fastest sampling is packed neighbours.
-    pub fn sampled(mut self, fastest: Sampling) -> Scene {
-        self.bricks_pay = fastest != Sampling::PackedNeighbours || self.settings.slices.still || {
-            let [cost, saving] = self.brick_balance();
-            saving >= cost
-        };
-        if self.settings.ray.sampling == Sampling::Auto {
-            let pays = fastest != Sampling::PackedNeighbours || self.packed_neighbours_pay();
-            self.sampling = if pays { fastest } else { Sampling::Exact };
-        }
-        self
-    }
-
-    /// True if packed neighbours save more time than packing takes. Packing one texel takes as long as three to six samples save.
-    fn packed_neighbours_pay(&self) -> bool {
-        let texels: u64 = self.volume_size().iter().map(|n| u64::from(*n)).product();
-        let enough = self.expected_samples() >= SAMPLES_PER_PACKED_TEXEL * self.visible_texels();
-        texels <= MAX_PACKED_TEXELS && (self.settings.slices.still || enough)
-    }
-
-    /// Samples of all rays of a picture, about.
-    fn expected_samples(&self) -> f64 {
-        // A moving view, whose rays are fewer, uses the same sampling and bricks as a still one.
-        let rays: u64 = camera::full_size(&self.settings).iter().map(|n| u64::from(*n)).product();
-        // Mean ray length: half the diagonal of the box, since some rays miss it and some end early.
-        rays as f64 * 0.5 * (self.high - self.low).length()
-            / self.shared.as_ref().map_or(self.step, |shared| shared.step)
-    }
-
-    fn visible_texels(&self) -> f64 {
-        self.volume_size().iter().map(|n| f64::from(*n)).product::<f64>() * self.visible_share()
-    }
-
-    /// What bricks cost one new volume and its one picture, and what they save of it, ns on a CPU.
-    fn brick_balance(&self) -> [f64; 2] {
-        let (bricks, [_, _, slices]) = (self.bricks(), self.volume_size());
-        let total = bricks.total() as f64;
-        // A brick may touch three tiles along both axes of a slice, and a slice on each side of its own.
-        let touched = 9.0 * (f64::from(slices) / f64::from(bricks.count[2]) + 2.0).min(f64::from(slices));
-        let cost = DISPATCHES_COST + TEXEL_COST * self.visible_texels() + total * (TILE_COST * touched + BRICK_COST);
-        let of_mode = match self.settings.mode {
-            Mode::Mip | Mode::MinIp => EXTREME_SAVING,
-            _ if self.composites() => COMPOSITING_SAVING,
-            _ => NO_SAVING,
-        };
-        [cost, of_mode * self.expected_samples()]
-    }
-
-    /// Why rays skip bricks, or why not, for `--explain`; none if no ray is cast.
-    pub fn brick_choice(&self) -> Option<String> {
-        if !(self.composites() || self.detects_surface() || self.projects()) {
-            return None;
-        }
-        let [cost, saving] = self.brick_balance().map(|ns| ns * 1e-6);
-        let balance = format!("on a CPU they cost {cost:.1} ms a volume and save {saving:.1} ms a picture, estimated");
-        Some(match (self.settings.ray.brick, self.skips()) {
-            (Some(0), _) => "bricks: none, as set".into(),
-            (Some(n), true) => format!("bricks: of {n} texels, as set; {balance}"),
-            (None, true) if self.settings.slices.still => format!("bricks: the volume is shown many times; {balance}"),
-            (None, true) => format!("bricks: they pay for one picture of a volume, or the device is no CPU; {balance}"),
-            (None, false) if !self.bricks_pay => format!("bricks: none for one picture of a volume; {balance}"),
-            (_, false) => "bricks: none, as places or the sweep's table are too coarse for them".into(),
-        })
-    }
-
-    /// The scene without packed neighbours, unless the setting requires them. For devices that lack the memory.
-    pub fn without_quads(mut self) -> Scene {
-        if self.settings.ray.sampling == Sampling::Auto && self.sampling == Sampling::PackedNeighbours {
-            self.sampling = Sampling::Exact;
-        }
-        self
-    }
-
-    /// True if samples use the device's trilinear filter.
-    pub fn filters_in_hardware(&self) -> bool {
-        matches!(self.sampling, Sampling::Auto | Sampling::Hardware)
-    }
-
-    /// True if rays sample packed neighbours: texels that hold four neighbours of a slice. Not for 32-bit floats, which would take 16 bytes.
-    pub fn packs(&self) -> bool {
-        let stored = self.settings.slices.format != VolumeFormat::R32f;
-        self.sampling == Sampling::PackedNeighbours
-            && stored
-            && (self.composites() || self.detects_surface() || self.projects())
     }
 }
 
