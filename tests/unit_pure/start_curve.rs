@@ -103,7 +103,7 @@ fn the_line_on_planes_is_the_curve_within_the_region() {
     let four = |toml: &str| {
         let toml =
             format!("mode = 'vr'\nlayout = 'four'\npicture.size = [300, 300]\nplanes.position = [0, 12, 0]\n{toml}");
-        scene(Geometry::Cartesian(grid.clone()), BYTES, &toml)
+        scene(Geometry::Cartesian(grid), BYTES, &toml)
     };
     let scene = four(curve);
     let lines = unveil::lines(&scene, None);

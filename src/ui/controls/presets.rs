@@ -33,8 +33,6 @@ pub(in crate::ui) const EXAMS: [Exam; 6] = [
 /// The base of what the phantom is drawn with.
 const PHANTOM: &str = "face-classic";
 
-/// Why a preset is not taken, where nothing else is known.
-
 impl Controls {
     /// The settings after a built-in preset. Of the phantom, for which most of them are framed, region and camera change too.
     ///
