@@ -5,6 +5,8 @@ use super::{Mode, Scene, Settings, Sign, View, transfer};
 /// A value is opaque if a stretch of this share of the box's diagonal lets less than half of the light through.
 const STRETCH: f64 = 1.0 / 40.0;
 const OPAQUE: f64 = 0.5;
+/// Least level where something is removed.
+const LEAST_LEVEL: f64 = 1e-6;
 
 impl Settings {
     /// True if there is something that clip planes cut, whether or not their cut faces are shown.
@@ -23,11 +25,10 @@ impl Scene {
         self.settings.cap.enabled && self.settings.can_cap()
     }
 
-    /// The region that is cut, with the grey window of planes. In mode mixed that of what begins first.
+    /// The region that is cut, with the grey window of planes. In mode mixed that of the surface, which ends at the faces.
     pub fn cap_view(&self) -> View {
         let low = match self.settings.mode {
-            Mode::Surface => self.surface_view().low,
-            Mode::Mixed => self.surface_view().low.min(self.volume_view().low),
+            Mode::Surface | Mode::Mixed => self.surface_view().low,
             _ => self.volume_view().low,
         };
         View { window: self.settings.planes.window, low, high: self.high }
@@ -37,7 +38,9 @@ impl Scene {
     /// light through.
     pub fn cap_level(&self) -> Option<f64> {
         let solid = self.solid_from()?;
-        Some(self.settings.cap.level.unwrap_or(solid))
+        let level = self.settings.cap.level.unwrap_or(solid);
+        // What is removed has the value 0, and is open whatever the level is.
+        Some(if self.removes() { level.max(LEAST_LEVEL) } else { level })
     }
 
     /// Radius of the disc around a place of a cut face that tells tissue from fluid, mm: the length of an edge.

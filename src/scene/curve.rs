@@ -51,6 +51,8 @@ pub struct Line {
     segments: Vec<Segment>,
     /// Distance along the line at the start of each piece, and its end; mm.
     starts: Vec<f64>,
+    /// The places there; none of a line without length.
+    places: Vec<DVec2>,
 }
 
 impl Line {
@@ -81,7 +83,11 @@ impl Line {
                 starts.push(starts.last().copied().unwrap_or(0.0) + segment.length(from, to));
             }
         }
-        Line { segments, starts }
+        let mut line = Line { segments, starts, places: Vec::new() };
+        if !line.segments.is_empty() {
+            line.places = (0..line.starts.len()).map(|n| line.place_of(n)).collect();
+        }
+        line
     }
 
     /// Its length, mm.
@@ -110,9 +116,28 @@ impl Line {
 
     /// The distance along the line of its place nearest to a point, and how far that is, mm.
     pub fn nearest(&self, point: DVec2) -> (f64, f64) {
-        let near = |(n, _): &(usize, &f64)| self.place_of(*n).distance_squared(point);
-        let nearest = self.starts.iter().enumerate().min_by(|a, b| near(a).total_cmp(&near(b))).map_or(0, |(n, _)| n);
-        // It is in one of the two pieces beside the nearest end of a piece, in each of which the distance has one minimum, unless the line turns sharply.
+        self.near(point, 0.0).into_iter().min_by(|a, b| a.1.total_cmp(&b.1)).unwrap_or((0.0, f64::INFINITY))
+    }
+
+    /// True if two passages of the line are within `reach` of a point, mm.
+    pub fn passes_twice(&self, point: DVec2, reach: f64) -> bool {
+        let near: Vec<f64> =
+            self.near(point, reach).into_iter().filter(|(_, off)| *off <= reach).map(|(along, _)| along).collect();
+        // Two pieces beside each other are one passage.
+        let [low, high] = [f64::min, f64::max].map(|of| near.iter().copied().reduce(of).unwrap_or(0.0));
+        high - low > 4.0 * reach
+    }
+
+    /// The place nearest to a point in each piece that may hold the nearest of all, or one that is farther than that by `more` at most: the distance along
+    /// the line and from the point. In a piece that distance has one minimum, unless the line turns sharply.
+    fn near(&self, point: DVec2, more: f64) -> Vec<(f64, f64)> {
+        let away: Vec<f64> = self.places.iter().map(|place| place.distance(point)).collect();
+        let nearest = away.iter().copied().fold(f64::INFINITY, f64::min);
+        let may_hold = |piece: &usize| {
+            // No place of a piece is nearer than an end by more than half its length.
+            let half = (self.starts[piece + 1] - self.starts[*piece]) / 2.0;
+            away[*piece].min(away[piece + 1]) - half <= nearest + more
+        };
         let within = |piece: usize| {
             let segment = self.segments.get(piece / PIECES)?;
             let start = (piece % PIECES) as f64 / PIECES as f64;
@@ -129,8 +154,7 @@ impl Line {
             let t = (low + high) / 2.0;
             Some((self.starts[piece] + segment.length(start, t), segment.at(t).distance(point)))
         };
-        let both = [nearest.checked_sub(1), Some(nearest)].into_iter().flatten().filter_map(within);
-        both.min_by(|a, b| a.1.total_cmp(&b.1)).unwrap_or((0.0, f64::INFINITY))
+        (0..self.places.len().saturating_sub(1)).filter(may_hold).filter_map(within).collect()
     }
 
     /// The place at the start of a piece, or at the end of the line.
@@ -227,5 +251,26 @@ mod tests {
             let (at, direction) = back.at(back.length() * f64::from(n) / 50.0);
             assert!(at.is_finite() && (direction.length() - 1.0).abs() < 1e-9);
         }
+    }
+
+    /// Prevents a length that is measured to the other passage of a line that crosses itself, or to the other end of one that is closed.
+    #[test]
+    fn the_nearest_place_is_found_where_strands_pass_each_other() {
+        // Nearer to a vertex of one strand than to any of the other, on which the point lies.
+        let line = Line::through(&[[0.0, 0.0], [40.0, 0.0], [44.0, 20.0], [20.0, 30.0], [19.0, 4.0], [19.5, -20.0]]);
+        for n in 0..=400 {
+            let along = line.length() * f64::from(n) / 400.0;
+            let (at, _) = line.at(along);
+            let (found, away) = line.nearest(at);
+            assert!(away < 1e-6, "{along}: {away}");
+            let twice = line.passes_twice(at, 0.5);
+            assert!(twice || (found - along).abs() < 1e-3, "{along}: {found}");
+        }
+        let crossing =
+            (0..2000).map(|n| line.length() * f64::from(n) / 2000.0).filter(|s| line.passes_twice(line.at(*s).0, 0.5));
+        let crossing: Vec<f64> = crossing.collect();
+        assert!(!crossing.is_empty() && crossing.len() < 100, "{crossing:?}");
+        let closed = Line::through(&[[0.0, 0.0], [30.0, 0.0], [15.0, 25.0], [0.0, 0.0]]);
+        assert!(closed.passes_twice(DVec2::ZERO, 0.5) && !closed.passes_twice(closed.at(40.0).0, 0.5));
     }
 }

@@ -10,6 +10,7 @@ const OF_EXAMINATION: &[&str] = &[
     "region.lateral",
     "region.depth",
     "region.elevation",
+    "region.start_curve",
     "clip",
     "cap.enabled",
     "cuts",

@@ -453,6 +453,18 @@ impl Scene {
         self.view(self.settings.projection.window, self.settings.projection.start_depth)
     }
 
+    /// Depth at which rendering starts, where nothing else is in front of it, mm: that of the surface and of the volume layer in mode mixed, whichever is deeper.
+    pub fn start_depth(&self) -> f64 {
+        let (surface, volume, projection) = (self.surface_view(), self.volume_view(), self.projection_view());
+        match self.settings.mode {
+            Mode::Surface => surface.low.y,
+            Mode::Volume => volume.low.y,
+            Mode::Mixed => surface.low.y.max(volume.low.y),
+            Mode::Mip | Mode::MinIp | Mode::Mean => projection.low.y,
+            _ => self.low.y,
+        }
+    }
+
     /// The whole region with a grey window.
     pub fn whole_view(&self, window: [f64; 2]) -> View {
         self.view(window, None)

@@ -131,9 +131,10 @@ impl Scene {
 
     /// A plane and the curved plane on it are beside each other or one above the other, whichever shows them larger. The line has no say: it may be dragged.
     fn grid_of_two(&self) -> [u32; 2] {
-        let plane = self.plane(self.settings.planes.plane);
+        // Not the turned ones: the tiles stay where they are while the planes turn.
+        let (right, down, normal) = axes(self.settings.planes.plane);
         let (low, high) = self.planes_box();
-        let [across, down, through] = [plane.right, plane.down, plane.normal].map(|axis| axis.abs().dot(high - low));
+        let [across, down, through] = [right, down, normal].map(|axis| axis.abs().dot(high - low));
         let ([width, height], down) = (self.picture_size().map(f64::from), down.max(through));
         let (beside, above) = ((2.0 * across / width).max(down / height), (across / width).max(2.0 * down / height));
         if beside <= above { [2, 1] } else { [1, 2] }
@@ -339,7 +340,10 @@ impl Scene {
         let tile = sheet.tiles.last().filter(|tile| tile.section.is_some())?;
         let section = tile.section.as_ref()?;
         let ends = [from, to].map(|place| section.coordinates(tile.plane.down, place));
-        if ends.iter().any(|(_, off)| *off > ON_SECTION) {
+        // Where the line passes twice, nothing says which passage is meant.
+        if ends.iter().any(|(_, off)| *off > ON_SECTION)
+            || [from, to].iter().any(|place| section.is_passed_twice(*place))
+        {
             return None;
         }
         let [(from, _), (to, _)] = ends;
@@ -415,12 +419,21 @@ impl Section {
         (self.origin + self.in_space(at), self.in_space(direction))
     }
 
+    /// True if two passages of the line are within reach of a place: at a crossing, and at the ends of a line that is closed.
+    fn is_passed_twice(&self, place: DVec3) -> bool {
+        self.line.passes_twice(self.in_plane(place), ON_SECTION)
+    }
+
+    fn in_plane(&self, place: DVec3) -> DVec2 {
+        let from = place - self.origin;
+        DVec2::new(from.dot(self.axes[0]), from.dot(self.axes[1]))
+    }
+
     /// Where a place is on the curved plane: the distance along the line and that from the middle of the tile down, and how far it is from the curved
     /// plane; mm.
     fn coordinates(&self, down: DVec3, place: DVec3) -> (DVec2, f64) {
-        let from = place - self.origin;
-        let (along, off) = self.line.nearest(DVec2::new(from.dot(self.axes[0]), from.dot(self.axes[1])));
-        (DVec2::new(along, from.dot(down)), off)
+        let (along, off) = self.line.nearest(self.in_plane(place));
+        (DVec2::new(along, (place - self.origin).dot(down)), off)
     }
 }
 
@@ -434,11 +447,13 @@ impl Tile {
     pub fn columns(&self) -> Vec<Option<Column>> {
         let Some(section) = &self.section else { return Vec::new() };
         let length = section.line.length();
+        // A line shorter than a column has one or two nevertheless.
+        let beyond = if length < self.pixel { self.pixel / 2.0 } else { 0.0 };
         let from_middle = |x: u32| (f64::from(x) + 0.5 - f64::from(self.size[0]) / 2.0) * self.pixel;
         let column = |x: u32| {
             let along = length / 2.0 + from_middle(x);
             let (place, direction) =
-                Some(along).filter(|along| (0.0..=length).contains(along)).map(|s| section.at(s))?;
+                Some(along).filter(|along| (-beyond..=length + beyond).contains(along)).map(|s| section.at(s))?;
             Some((place, direction.cross(self.plane.down)))
         };
         (0..self.size[0]).map(column).collect()

@@ -82,9 +82,9 @@ impl Gestures {
             Input::Touch { finger, phase, at } => self.touch(finger, phase, at, viewport, tool),
             Input::FocusLost => {
                 // The tile that is shown alone does not depend on what is pressed.
-                let is_cutting = self.presses().any(|press| matches!(press.drag, Drag::Cut));
+                let given_up = self.presses().flat_map(given_up).collect();
                 *self = Gestures { back: self.back, ..Gestures::default() };
-                if is_cutting { vec![Command::CancelCut] } else { Vec::new() }
+                given_up
             }
             _ => Vec::new(),
         }
@@ -168,7 +168,7 @@ impl Gestures {
                     self.fingers.push(Finger { id, at, pane });
                     let press = self.finger_press.take();
                     self.restart_press(viewport, tool);
-                    return given_up(press);
+                    return press.as_ref().and_then(given_up).into_iter().collect();
                 }
                 Vec::new()
             }
@@ -181,7 +181,7 @@ impl Gestures {
                 self.restart_press(viewport, tool);
                 match press {
                     Some(press) if is_tap => self.release(&press, viewport, tool, FINGER_SLOP),
-                    press => given_up(press),
+                    press => press.as_ref().and_then(given_up).into_iter().collect(),
                 }
             }
             (_, None) => Vec::new(),
@@ -414,7 +414,9 @@ impl Press {
             }
             (Pane::Plane(tile), Tool::Measure(kind)) => match (viewport.measure_point_at(tile, at, GRAB), kind) {
                 (Some((index, point)), _) => Drag::Point { tile, index, point },
-                (None, kind) if viewport.is_curved(tile) && !is_caliper(kind) => Drag::OnCurve(tile),
+                (None, kind) if viewport.is_curved(tile) && !is_caliper(kind) && kind != MeasureKind::Text => {
+                    Drag::OnCurve(tile)
+                }
                 (None, MeasureKind::Trace | MeasureKind::Volume) => Drag::Trace(tile),
                 (None, MeasureKind::Distance | MeasureKind::Arrow) => {
                     Drag::Caliper { tile, has_first: viewport.has_work }
@@ -632,9 +634,13 @@ fn is_caliper(kind: MeasureKind) -> bool {
     matches!(kind, MeasureKind::Distance | MeasureKind::Arrow)
 }
 
-/// What a press leaves behind that ends without a release: the contour that it drew.
-fn given_up(press: Option<Press>) -> Vec<Command> {
-    press.filter(|press| matches!(press.drag, Drag::Cut)).map_or(Vec::new(), |_| vec![Command::CancelCut])
+/// What a press leaves behind that ends without a release: the contour that it drew, the line or the caliper that it began.
+fn given_up(press: &Press) -> Option<Command> {
+    match press.drag {
+        Drag::Cut => Some(Command::CancelCut),
+        Drag::Line { is_next: false, .. } if press.is_drag => Some(Command::CancelCurve),
+        _ => None,
+    }
 }
 
 /// The commands for two fingers that moved from `old` to `new` positions in the window: what is under them stays under them. `pane` is

@@ -120,7 +120,8 @@ pub(super) fn start_line(scene: &Scene, sheet: &Sheet, tile: usize, points: &[[f
     let pieces = if curve.is_some() { PIECES } else { 1 };
     let across = |n: usize| scene.low.x + (scene.high.x - scene.low.x) * n as f64 / pieces as f64;
     let lateral: Vec<f64> = (0..=pieces).map(across).collect();
-    let depth = |x: f64| curve.as_ref().map_or_else(|| start_depth(scene), |curve| curve.depth(x) + offset);
+    let depth =
+        |x: f64| curve.as_ref().map_or(f64::NEG_INFINITY, |curve| curve.depth(x) + offset).max(start_depth(scene));
     let handles = points.iter().map(|[x, depth]| on_tile(*x, depth + offset)).collect();
     Some(StartLine { line: lateral.iter().map(|x| on_tile(*x, depth(*x))).collect(), lateral, handles })
 }

@@ -3,7 +3,7 @@
 
 use super::picking::Picker;
 use crate::probe::{Geometry, Motion};
-use crate::scene::{Camera, Clip, MAX_CLIPS, Mode, PlaneName, Scene, Settings, insonified_box};
+use crate::scene::{Camera, Clip, MAX_CLIPS, PlaneName, Scene, Settings, insonified_box};
 use glam::{DVec2, DVec3};
 
 /// Limits of the zoom for gestures and keys. A zoom beyond them that a scene file set stays reachable.
@@ -21,14 +21,7 @@ pub(super) fn wrap_degrees(degrees: f64) -> f64 {
 
 /// The deepest start depth that the mode draws from, as Y in space.
 pub(super) fn start_depth(scene: &Scene) -> f64 {
-    let (surface, volume, projection) = (scene.surface_view(), scene.volume_view(), scene.projection_view());
-    match scene.settings.mode {
-        Mode::Surface => surface.low.y,
-        Mode::Volume => volume.low.y,
-        Mode::Mixed => surface.low.y.max(volume.low.y),
-        Mode::Mip | Mode::MinIp | Mode::Mean => projection.low.y,
-        _ => scene.low.y,
-    }
+    scene.start_depth()
 }
 
 /// The elevation that looks along the depth axis. A single frame is shown from its side at elevation 0, 90 degrees further.

@@ -11,7 +11,7 @@ use crate::verify::report::{Figure, Level};
 
 /// Scenes that together need every pass, with pictures as large as a tile of a small display. A pass is timed in the first scene that
 /// needs it.
-const SCENES: [&str; 18] = [
+const SCENES: [&str; 19] = [
     "mode = 'sr'",
     "mode = 'vr'",
     "mode = 'vr'\nlight = { volume = {} }",
@@ -31,6 +31,7 @@ const SCENES: [&str; 18] = [
     "mode = 'sr'\nslices = { perona_malik = { scheme = 'aos-richardson', step = 2.0, repeat = 1 } }",
     "mode = 'sr'\nslices = { perona_malik = { scheme = 'rkl1', step = 2.0, repeat = 1 } }",
     ALL_FILTERS,
+    "mode = 'vr'\nclip = [{ at = [0, 30, 0], normal = [0.3, -1, 0.2] }]",
 ];
 
 fn probe() -> Probe {

@@ -163,6 +163,13 @@ impl Renderer {
                 let (reads, writes) = (step.reads(scene), step.writes(scene));
                 let is_due = |slot| reads.contains(&slot) && !self.found.contains(&(slot, self.shown));
                 let (of_parts, of_fluid) = (is_due(Slot::Floating), is_due(Slot::StartSurface));
+                // Nothing is known of what is about to be replaced, should this picture fail.
+                let is_replaced = |slot: Slot, image: u32| {
+                    let is_due = (slot == Slot::Floating && of_parts) || (slot == Slot::StartSurface && of_fluid);
+                    is_due && (image == self.shown || !slot.is_multibuffered())
+                };
+                let found = std::mem::take(&mut self.found);
+                self.found = found.into_iter().filter(|(slot, image)| !is_replaced(*slot, *image)).collect();
                 if of_parts {
                     searched.push(Slot::Floating);
                     self.find(Slot::Floating, "floating", |_, scene, bytes| floating::find(scene, bytes))?;

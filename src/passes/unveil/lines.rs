@@ -23,7 +23,11 @@ pub struct StartLine {
 /// found of the volume that is drawn.
 pub fn lines(scene: &Scene, unveiled: Option<&Unveiled>) -> Vec<StartLine> {
     let removes = |unveiled: &&Unveiled| unveiled.outcome.is_found() && unveiled.rows.iter().any(|row| *row > 0.0);
-    let start = Start { surface: unveiled.filter(|_| scene.unveils()).filter(removes), curve: scene.start_curve() };
+    let start = Start {
+        surface: unveiled.filter(|_| scene.unveils()).filter(removes),
+        curve: scene.start_curve(),
+        least: scene.start_depth(),
+    };
     let is_shown = scene.settings.layout == Layout::Four && scene.draws_lines();
     if !is_shown || (start.surface.is_none() && start.curve.is_none()) {
         return Vec::new();
@@ -36,15 +40,18 @@ pub fn lines(scene: &Scene, unveiled: Option<&Unveiled>) -> Vec<StartLine> {
 struct Start<'a> {
     surface: Option<&'a Unveiled>,
     curve: Option<StartCurve>,
+    /// The start depth, which counts where it is deeper than the curve.
+    least: f64,
 }
 
 impl Start<'_> {
-    /// How far a place is behind the render start, mm, negative in front of it; none outside the sector. The curve is within the region.
+    /// How far a place is behind the render start, mm, negative in front of it; none outside the sector.
     fn behind(&self, scene: &Scene, place: DVec3) -> Option<f64> {
         let surface = self.surface.and_then(|surface| Some(behind(scene, surface, place)? * scene.grid.pitch[1]));
         let within = |axis: usize| place[axis] >= scene.low[axis] && place[axis] <= scene.high[axis];
         let is_there = within(0) && within(2) && ray::texel(scene, place).is_some();
-        let curve = self.curve.as_ref().filter(|_| is_there).map(|curve| place.y - curve.depth(place.x));
+        let start = |curve: &StartCurve| curve.depth(place.x).max(self.least);
+        let curve = self.curve.as_ref().filter(|_| is_there).map(|curve| place.y - start(curve));
         surface.into_iter().chain(curve).reduce(f64::min)
     }
 }

@@ -230,6 +230,7 @@ impl Console {
         }
         self.source.ended(why, now);
         self.stream.replace_source(Feed::none());
+        self.fluid = LostFluid::default();
         self.needs_redraw = true;
     }
 
@@ -252,6 +253,10 @@ impl Console {
         let renderer = self.stream.renderer();
         let outcome = renderer.as_ref().and_then(|renderer| renderer.unveiled()).map(|start| start.outcome);
         self.start_lines = renderer.map_or(Vec::new(), |renderer| unveil::lines(renderer.scene(), renderer.unveiled()));
+        if outcome.is_none() {
+            // Switched off: the next time is another one.
+            self.fluid = LostFluid::default();
+        }
         let lost = outcome.filter(|outcome| !outcome.is_found());
         let is_due = self.fluid.is_due(lost.is_some(), now);
         if let Some(outcome) = lost.filter(|_| is_due) {

@@ -141,6 +141,7 @@ fn differs_much(a: &Settings, b: &Settings) -> bool {
         || a.region.start_curve != b.region.start_curve
         || a.clip != b.clip
         || a.planes.position != b.planes.position
+        || a.planes.curve != b.planes.curve
 }
 
 impl Console {

@@ -3,7 +3,7 @@
 use super::cutting::in_the_way;
 use super::{Change, Controls, drawable};
 use crate::scene::load::Layers;
-use crate::scene::{Layout, Scene, Settings};
+use crate::scene::{Layout, Region, Scene, Settings};
 use crate::ui::command::Command;
 use crate::ui::texts;
 
@@ -55,7 +55,8 @@ impl Controls {
         let look = layers.completed(&scene.geometry, None).ok()?.settings;
         let mut settings = look.look_over(&self.in_mode_of_look(&look));
         if is_phantom && exam.is_framed {
-            (settings.region, settings.camera) = (look.region, look.camera);
+            let start_curve = settings.region.start_curve.take();
+            (settings.region, settings.camera) = (Region { start_curve, ..look.region }, look.camera);
         }
         Some(settings)
     }

@@ -74,7 +74,8 @@ fn moved(now: &Scene, points: &[[f64; 2]], index: usize, to: [f64; 2]) -> Option
     let from = *points.get(index)?;
     let [low, high] = bounds(now, points, index);
     // Handles that are closer together than that, or outside of the region, move in depth alone.
-    let lateral = if low[0] <= high[0] { to[0].clamp(low[0], high[0]) } else { from[0] };
+    let is_inside = (low[0]..=high[0]).contains(&from[0]);
+    let lateral = if is_inside { to[0].clamp(low[0], high[0]) } else { from[0] };
     let mut moved = points.to_vec();
     moved[index] = short([lateral, to[1].max(low[1]).min(high[1])]);
     Some(moved)

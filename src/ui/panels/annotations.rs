@@ -218,7 +218,7 @@ fn bar(painter: &Painter, taken: &mut Taken, area: Rect, per_point: f64) {
     let max_length = f64::from(area.width()) * 0.3 * per_point;
     let Some(mm) = BAR_LENGTHS.into_iter().rev().find(|mm| *mm <= max_length) else { return };
     let width = (mm / per_point) as f32;
-    let label = texts::whole_millimetres(mm);
+    let label = texts::bar_length(mm);
     let words = painter.layout_no_wrap(label.clone(), FontId::proportional(SMALL_TEXT), TEXT).size();
     let places = (0..6).map(|n| area.right_bottom() - vec2(16.0, 16.0 + 24.0 * n as f32));
     let right = places.into_iter().find(|right| {

@@ -2,9 +2,10 @@
 //! every examination needs are in front; the others are below them, by stage.
 
 use super::colours::{
-    self, ABSENT, ACCENT, BUTTON, EDGE, ON_SELECTED, ON_WARNING, OUTLINE, SELECTED, TEXT, WARNING, WEAK_TEXT,
+    self, ABSENT, ACCENT, EDGE, ON_SELECTED, ON_WARNING, OUTLINE, SELECTED, TEXT, WARNING, WEAK_TEXT,
 };
 use super::names::{self, Tell};
+use super::widgets::{front, slider, switch};
 use super::{PanelState, TEXT_SIZE, TOUCH_SIZE, heading};
 use super::{measures, tools};
 use crate::scene::{ColourMap, Layout, Mode, PlaneName, Settings, Transfer, TransferName};
@@ -16,8 +17,7 @@ use crate::ui::texts::hints;
 use crate::ui::view;
 use egui::accesskit::Role;
 use egui::{
-    Align, Button, CollapsingHeader, FontId, Label, Panel, Rect, RichText, ScrollArea, Sense, Slider, Stroke,
-    StrokeKind, Ui, WidgetInfo, WidgetType, pos2, vec2,
+    Align, Button, CollapsingHeader, FontId, Label, Panel, RichText, ScrollArea, Sense, Slider, Stroke, Ui, vec2,
 };
 
 const TOOLS: [(Tool, &str); 8] = [
@@ -242,11 +242,6 @@ fn colours(settings: &Settings) -> &'static [(Colour, &'static str)] {
     }
 }
 
-/// The index of the slider of a control in front, if the mode has one.
-pub(super) fn front(sliders: &[&str], settings: &Settings) -> Option<usize> {
-    sliders.iter().find_map(|name| SLIDERS.iter().position(|s| s.name == *name && s.applies(settings)))
-}
-
 pub(super) fn show_controls(ui: &mut Ui, state: &PanelState, width: f32, execute: &mut dyn FnMut(Command)) {
     let settings = state.controls.settings();
     Panel::right("column").exact_size(width).resizable(false).show_separator_line(false).show(ui, |ui| {
@@ -358,58 +353,6 @@ fn absent(ui: &mut Ui, name: &str) {
     ui.allocate_exact_size(size, Sense::hover()).1.on_hover_text(texts::NO_SUCH_CONTROL);
 }
 
-pub(super) fn slider(
-    ui: &mut Ui,
-    state: &PanelState,
-    number: usize,
-    name: &str,
-    is_large: bool,
-    execute: &mut dyn FnMut(Command),
-) {
-    let slider = &SLIDERS[number];
-    let hint = hints::of_slider(slider.name);
-    let settings = state.controls.settings();
-    let [low, high] = state.scene.map_or(slider.range, |scene| slider.range_in(scene));
-    let before = slider.get(settings);
-    if slider.range == [0.0, 1.0] && slider.step == 1.0 {
-        let mut on = before >= 0.5;
-        if switch(ui, &mut on, name, hint) {
-            execute(Command::SetSlider(number, f64::from(u8::from(on))));
-        }
-        return;
-    }
-    let mut value = before.clamp(low, high.max(low));
-    let digits = (-slider.step.log10().floor()).clamp(0.0, 3.0) as usize;
-    let space = if slider.unit.is_empty() || slider.unit == "°" { "" } else { " " };
-    let shown = match slider.name {
-        texts::DEPTH_OF_CUT if before <= 0.0 => texts::THROUGH_ALL.to_string(),
-        texts::CLIP_THRESHOLD if before <= 0.0 => texts::AUTOMATIC.to_string(),
-        _ => format!("{before:.digits$}{space}{}", slider.unit),
-    };
-    ui.horizontal(|ui| {
-        let text = RichText::new(name);
-        ui.label(if is_large { text.strong() } else { text });
-        ui.with_layout(egui::Layout::right_to_left(Align::Center), |ui| {
-            ui.label(RichText::new(&shown).color(ACCENT));
-        });
-    });
-    ui.spacing_mut().slider_width = ui.available_width();
-    // Tall enough for a finger, although the rail is thin.
-    ui.spacing_mut().interact_size.y = TOUCH_SIZE * if is_large { 0.62 } else { 0.5 };
-    let response = ui.add(Slider::new(&mut value, low..=high.max(low)).show_value(false).step_by(slider.step));
-    let response = response.tell(&texts::slider_hint(hint)).named(name).with_value(&shown);
-    if response.double_clicked() {
-        execute(Command::ResetSlider(number));
-        return;
-    }
-    // egui also reports a change when it rounds a value to the step, without any input.
-    let is_held = response.dragged() || response.clicked() || response.is_pointer_button_down_on();
-    let is_asked = names::asks_for_value(ui, &response);
-    if (is_held || is_asked) && value != before {
-        execute(Command::SetSlider(number, value));
-    }
-}
-
 /// Width of the light ball, points.
 const BALL: f32 = 68.0;
 
@@ -451,34 +394,6 @@ fn light_ball(ui: &mut Ui, settings: &Settings, execute: &mut dyn FnMut(Command)
         // The width of the ball is that of the dome over which the lamp moves.
         execute(Command::MoveLight([by.x, by.y].map(|points| f64::from(points / (2.0 * radius)))));
     }
-}
-
-/// A switch with its name; the whole row reacts. True if the user changed it.
-pub(super) fn switch(ui: &mut Ui, on: &mut bool, name: &str, hint: &str) -> bool {
-    let (width, height) = (44.0, 24.0);
-    // A long name has two lines, and ends before the switch.
-    let room = (ui.available_width() - width - 6.0).max(0.0);
-    let label = ui.painter().layout(name.to_string(), FontId::proportional(TEXT_SIZE), TEXT, room);
-    let size = vec2(ui.available_width(), (TOUCH_SIZE * 0.75).max(label.size().y + 4.0));
-    let (area, response) = ui.allocate_exact_size(size, Sense::click());
-    if response.clicked() {
-        *on = !*on;
-    }
-    response.widget_info(|| WidgetInfo::selected(WidgetType::Checkbox, true, *on, name));
-    let response = response.tell(hint).with_role(Role::Switch);
-    let right = pos2(area.right() - width, area.center().y - height / 2.0);
-    let track = Rect::from_min_size(right, vec2(width, height));
-    let painter = ui.painter();
-    let fill = if *on { SELECTED } else { BUTTON };
-    painter.rect_filled(track, height / 2.0, fill);
-    let edge = if response.hovered() || response.has_focus() { TEXT } else { WEAK_TEXT };
-    painter.rect_stroke(track, height / 2.0, Stroke::new(1.0, edge), StrokeKind::Inside);
-    let x = if *on { track.right() - height / 2.0 } else { track.left() + height / 2.0 };
-    painter.circle_filled(pos2(x, track.center().y), height / 2.0 - 4.0, ON_SELECTED);
-    let at = pos2(area.left(), area.center().y - label.size().y / 2.0);
-    let clip = Rect::from_min_max(area.min, pos2(track.left() - 6.0, area.bottom()));
-    painter.with_clip_rect(clip).galley(at, label, TEXT);
-    response.clicked()
 }
 
 pub(super) fn show_cine_bar(ui: &mut Ui, state: &PanelState, height: f32, execute: &mut dyn FnMut(Command)) {

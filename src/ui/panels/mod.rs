@@ -16,6 +16,7 @@ mod overlays;
 mod presets;
 mod region;
 mod tools;
+mod widgets;
 
 use self::colours::{BACKGROUND, BUTTON, EDGE, ON_SELECTED, PANEL, SELECTED, TEXT, WEAK_TEXT};
 pub(super) use self::presets::{PresetTile, PresetsShown};

@@ -1,8 +1,8 @@
 //! What belongs to a tool, in the column of the controls: clip faces, cuts and the brush, the curved plane, the start line.
 
 use super::colours::ACCENT;
-use super::controls::{front, slider, switch};
 use super::names::{self, Tell};
+use super::widgets::{front, plain_slider, slider, switch};
 use super::{PanelState, SMALL_TEXT, TOUCH_SIZE, heading};
 use crate::scene::{KeptSide, MAX_START_POINTS, MIN_START_POINTS, Settings};
 use crate::ui::command::{Command, Tool};
@@ -10,7 +10,7 @@ use crate::ui::controls::BRUSH_RADII;
 use crate::ui::sliders::{SLIDERS, Slider as Control};
 use crate::ui::texts;
 use crate::ui::view;
-use egui::{Align, Button, Label, RichText, Slider, Ui, vec2};
+use egui::{Button, Label, RichText, Ui, vec2};
 
 /// The numbers of the controls of clip faces that are there.
 pub(super) fn of_clip(settings: &Settings) -> [Option<usize>; 2] {
@@ -165,22 +165,4 @@ fn brush_radius(ui: &mut Ui, state: &PanelState, execute: &mut dyn FnMut(Command
     if let Some(radius) = plain_slider(ui, texts::RADIUS_OF_BRUSH, state.controls.brush_radius(), BRUSH_RADII, hint) {
         execute(Command::BrushRadius(radius));
     }
-}
-
-/// A slider in mm of what is no setting of its own. Returns the value that the user sets.
-fn plain_slider(ui: &mut Ui, name: &str, before: f64, [low, high]: [f64; 2], hint: &str) -> Option<f64> {
-    let mut value = before.clamp(low, high.max(low));
-    let shown = texts::millimetres(before);
-    ui.horizontal(|ui| {
-        ui.label(name);
-        ui.with_layout(egui::Layout::right_to_left(Align::Center), |ui| {
-            ui.label(RichText::new(&shown).color(ACCENT));
-        });
-    });
-    ui.spacing_mut().slider_width = ui.available_width();
-    ui.spacing_mut().interact_size.y = TOUCH_SIZE * 0.5;
-    let slider = ui.add(Slider::new(&mut value, low..=high.max(low)).show_value(false).step_by(0.5));
-    let slider = slider.tell(hint).named(name).with_value(&shown);
-    let is_held = slider.dragged() || slider.clicked() || slider.is_pointer_button_down_on();
-    ((is_held || names::asks_for_value(ui, &slider)) && value != before).then_some(value)
 }

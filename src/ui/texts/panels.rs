@@ -55,6 +55,9 @@ pub const REMOVE_ALL_CUTS_HINT: &str = "Renderings show everything again (Shift+
 pub fn millimetres(length: impl Display) -> String {
     format!("{length:.1} mm")
 }
+pub fn bar_length(length: impl Display) -> String {
+    format!("{length} mm")
+}
 pub fn whole_millimetres(length: impl Display) -> String {
     format!("{length:.0} mm")
 }
@@ -175,7 +178,7 @@ pub const SAVE_PRESENT_LOOK_HINT: &str =
     "Keeps the present look under a name: mode, filters, colours and light, without region and view.";
 pub const SAVE_PRESENT_LOOK_BUTTON: &str = "Save present look  (S)";
 pub const SAVE_PRESENT_LOOK: &str = "Save present look";
-pub const UNDO_PRESETS_HINT: &str = "Brings your presets back as they were length the last change.";
+pub const UNDO_PRESETS_HINT: &str = "Brings your presets back as they were before the last change.";
 pub const UNDO_PRESETS_BUTTON: &str = "Undo  (Z)";
 pub const CLOSE_PRESETS_HINT: &str = "Changes nothing.";
 pub const RENAME: &str = "Rename";
