@@ -111,6 +111,7 @@ mod tests {
                 "surface.start_depth=33",
                 "volume.start_depth=34",
                 "projection.start_depth=35",
+                "region.start_curve=[[-9,34],[1,42],[12,36]]",
                 "planes.position=[1,2,3]",
                 "planes.azimuth=4",
                 "planes.tilt=5",
