@@ -87,5 +87,5 @@ void main() {
     imageStore(distance_map, pixel, vec4(distance, 0.0, 0.0, 0.0));
     if (ECHO == 1) imageStore(surface, pixel, vec4(echo, 0.0));
     vec4 rgba = developed(colour, opacity, pixel, imageSize(picture));
-    imageStore(picture, pixel, is_capped(cut) ? capped(cut, rgba) : rgba);
+    imageStore(picture, pixel, capped(cut, rgba));
 }

@@ -61,7 +61,7 @@ void main() {
     }
     vec2 cut = cap_at(pixel);
     bool enters = ray.leave > ray.enter;
-    if (is_capped(cut)) ray.leave = -1.0;
+    if (ends_ray(cut)) ray.leave = -1.0;
     float path = ray.leave - ray.enter;
     vec3 colour = vec3(0.0);
     float opacity = 0.0;
@@ -147,8 +147,9 @@ void main() {
             if (front_known && i < to) front_inside = false;
         }
     }
-    if (is_capped(cut)) hit = enters ? ray.enter : MISS;
+    if (ends_ray(cut)) hit = enters ? ray.enter : MISS;
     vec4 rgba = developed(colour, opacity, pixel, imageSize(picture));
-    imageStore(picture, pixel, is_capped(cut) ? capped(cut, rgba) : rgba);
+    // What is lit later is lit without its face.
+    imageStore(picture, pixel, PART == HIT ? rgba : capped(cut, rgba));
     if (PART == HIT) imageStore(hit_distance, pixel, vec4(hit, 0.0, 0.0, 0.0));
 }

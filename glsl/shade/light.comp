@@ -39,7 +39,7 @@ void main() {
     ivec2 pixel = ivec2(gl_GlobalInvocationID.xy);
     if (any(greaterThanEqual(pixel, imageSize(picture)))) return;
     vec2 cut = cap_at(pixel);
-    if (is_capped(cut)) {
+    if (ends_ray(cut)) {
         // Echoes are not lit.
         imageStore(picture, pixel, capped(cut, vec4(0.0)));
         return;
@@ -49,7 +49,7 @@ void main() {
     if (SUBJECT == BEHIND_LAYER) before = layer_share * texelFetch(volume_layer, pixel, 0);
     else if (SUBJECT == COMPOSITED) before = texelFetch(volume_layer, pixel, 0);
     if (!is_hit(distance)) {
-        imageStore(picture, pixel, before);
+        imageStore(picture, pixel, capped(cut, before));
         return;
     }
     vec3 along_ray = ray_direction(vec2(pixel) + 0.5);
@@ -109,5 +109,5 @@ void main() {
     vec4 rgba = SUBJECT == COMPOSITED
         ? vec4(before.rgb * mix(vec3(1.0), light_colour * sum, before.a) + before.a * light_colour * highlight, before.a)
         : vec4(before.rgb + (1.0 - before.a) * light_colour * (sum + highlight), 1.0);
-    imageStore(picture, pixel, rgba);
+    imageStore(picture, pixel, capped(cut, rgba));
 }

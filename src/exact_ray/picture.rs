@@ -109,20 +109,22 @@ fn volume(scene: &Scene, reads: &Arrays, writes: &mut Arrays, effort: &mut Effor
     let lights = for_each_ray(scene, view, size, |[x, y], line, path, enter| {
         let cut = cap::cut_at(scene, reads, x, y);
         let ends = match map.map(|map| map.one(x, y, 0) - enter) {
-            _ if cut.is_some() => [0.0, 0.0],
+            _ if cut.is_some_and(|cut| cut.ends_ray()) => [0.0, 0.0],
             None => [0.0, path],
             Some(found) if is_behind => [found.max(0.0), path.min(found + surface.colour_depth)],
             Some(found) => [0.0, path.min(found)],
         };
         let segments = segments(line, texels, view.window, ends);
         let mut light = Medium::of(scene, line, TOLERANCE).light(&segments);
-        let hit = match cut {
-            Some(cut) => {
-                light.rgba = cut.over([0.0; 4]);
-                if path > 0.0 { enter } else { MISS }
-            }
+        let hit = match cut.filter(|cut| cut.ends_ray()) {
+            Some(_) if path > 0.0 => enter,
+            Some(_) => MISS,
             None => light.hit.map_or(MISS, |s| enter + s),
         };
+        // What is lit later is lit without its face.
+        if let Some(cut) = cut.filter(|_| !scene.lights_volume()) {
+            light.rgba = cut.over(light.rgba);
+        }
         (light, hit)
     });
     effort.estimate = effort.estimate.max(rms(lights.iter().map(|(light, _)| light.estimate)));

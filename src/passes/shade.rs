@@ -79,10 +79,12 @@ pub const LIGHT: Pass = Pass {
         for y in 0..picture.size[1] {
             for x in 0..picture.size[0] {
                 // Echoes are not lit.
-                let colour = match cap::cut_at(scene, reads, x, y) {
-                    Some(cut) => cut.over([0.0; 4]),
+                let cut = cap::cut_at(scene, reads, x, y);
+                let behind = match cut.filter(|cut| cut.ends_ray()) {
+                    Some(_) => [0.0; 4],
                     None => reference_pixel(scene, reads, lit(scene, reads, x, y), x, y),
                 };
+                let colour = cut.map_or(behind, |cut| cut.over(behind));
                 picture.set([x, y, 0], &colour);
             }
         }

@@ -239,6 +239,33 @@ fn no_light_changes_a_cut_face() {
     }
 }
 
+/// A face that fades lies over what the ray finds behind it, which is lit as without the face. Prevents a rim of the region through which one
+/// sees the background although tissue is behind it.
+#[test]
+fn a_face_that_fades_covers_nothing_else() {
+    let device = Device::new();
+    let view = "picture.size = [64, 60]\nregion.fade = 6\ncamera = { azimuth = 35, elevation = 12 }\n\
+                clip = [{ at = [0, 8, 0], normal = [0.2, -1, 0] }]\nplanes.window = [0, 1]";
+    for mode in ["shading = 'none'", "shading = 'first-hit'", "shading = 'none'\nlight.volume = { cell = 4 }"] {
+        let made =
+            |is: &str| of(&voxels(), &format!("mode = 'vr'\n{SOLID}\nvolume.{mode}\n{view}\ncap.enabled = {is}"));
+        let frames = body_frames(&made("true"), tissue);
+        let (got, faces) = capped(&device, made("true"), &frames);
+        let plain = picture(&device, made("false"), &frames);
+        let (mut faded, mut worst) = (0, 0.0f64);
+        for (n, face) in faces.values.chunks_exact(2).enumerate().filter(|(_, face)| face[1] > 0.0) {
+            faded += usize::from((0.05..0.95).contains(&face[1]));
+            for c in 0..3 {
+                let behind = f64::from(plain.rgba[4 * n + c]) / 255.0;
+                let expected = face[1] * face[0] + (1.0 - face[1]) * behind;
+                worst = worst.max((f64::from(got.rgba[4 * n + c]) / 255.0 - expected).abs());
+            }
+        }
+        println!("{mode}: {faded} pixels that fade, {worst:.4} off");
+        assert!(faded > 200 && worst < 1.6 / 255.0, "{mode}: {faded} pixels, {worst} off");
+    }
+}
+
 /// Without clip planes there is no such pass, whatever the settings of caps are, and the picture is the same to the last bit. With them, switched
 /// off, no pass knows of them, and a volume is the one that begins at the plane.
 #[test]

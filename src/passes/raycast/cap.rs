@@ -68,7 +68,7 @@ pub(in crate::passes) fn constant(scene: &Scene) -> (&'static str, i32) {
     ("CAPPED", scene.has_caps() as i32)
 }
 
-/// The cut face that the ray of a pixel ends at, if it does.
+/// The cut face of the ray of a pixel, if it has one.
 pub(crate) fn cut_at(scene: &Scene, reads: &Arrays, x: usize, y: usize) -> Option<Cut> {
     let cut = scene.has_caps().then(|| reads.get("cap").get([x, y, 0]))?;
     (cut[1] > 0.0).then_some(Cut { echo: cut[0], opacity: cut[1] })
@@ -82,6 +82,11 @@ pub(crate) struct Cut {
 }
 
 impl Cut {
+    /// True if the ray ends here: nothing shines through.
+    pub fn ends_ray(self) -> bool {
+        self.opacity >= 1.0
+    }
+
     /// The colour over what is behind. Both are premultiplied.
     pub fn over(self, behind: [f64; 4]) -> [f64; 4] {
         let front = [self.echo, self.echo, self.echo, 1.0];

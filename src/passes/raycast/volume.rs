@@ -84,12 +84,18 @@ pub const PASS: Pass = Pass {
                     Kind::Alone | Kind::Colour | Kind::Hit => {}
                 }
                 let developed = |light| light_volume::developed(scene, kind(scene) == Kind::Alone, light, [x, y]);
-                let (colour, hit) = match cap::cut_at(scene, reads, x, y) {
-                    Some(cut) => (cut.over(developed([0.0; 4])), ray.enter_or_miss()),
+                let cut = cap::cut_at(scene, reads, x, y);
+                let (colour, hit) = match cut.filter(|cut| cut.ends_ray()) {
+                    Some(_) => (developed([0.0; 4]), ray.enter_or_miss()),
                     None => {
                         let (light, hit) = composite(scene, &ray, &tables);
                         (developed(light), hit)
                     }
+                };
+                // What is lit later is lit without its face.
+                let colour = match cut.filter(|_| kind(scene) != Kind::Hit) {
+                    Some(cut) => cut.over(colour),
+                    None => colour,
                 };
                 writes.get_mut("picture").set([x, y, 0], &colour);
                 if kind(scene) == Kind::Hit {
