@@ -352,11 +352,26 @@ fn check_brush(n: usize, cut: &Cut, brush: &Brush) -> Result<(), SceneError> {
 /// # Errors
 /// Nothing can be removed where everything is drawn.
 pub(super) fn check_drawn(scene: &Scene) -> Result<(), SceneError> {
-    match scene.has_cuts() && scene.removed_value().is_none() {
+    check_removal(scene, scene.has_cuts(), "cuts", "remove the cuts")
+}
+
+/// Of a setting that removes parts of a rendering, with what to do where it cannot.
+///
+/// # Errors
+/// The rendering draws both what is dark and what is bright.
+pub(super) fn check_removal(
+    scene: &Scene,
+    removes: bool,
+    setting: &'static str,
+    remedy: &str,
+) -> Result<(), SceneError> {
+    match removes && scene.removed_value().is_none() {
         true => refuse(
-            "cuts",
-            "remove the volume by a value of which nothing is drawn, and here both what is dark and what is bright is drawn (surface.sign, or a \
-             transfer function that is opaque at 0 and at 1): remove the cuts",
+            setting,
+            format!(
+                "the rendering draws both what is dark and what is bright, so nothing can be removed from it (surface.sign=dark, or a \
+                 transfer function that is opaque at 0 and at 1): {remedy}"
+            ),
         ),
         false => Ok(()),
     }

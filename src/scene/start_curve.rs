@@ -5,7 +5,7 @@
 //! neighbours have the same depth it is level, and it turns at points only. Beyond its ends it stays at their depths.
 
 use super::check::within;
-use super::{MAX_START_POINTS, MIN_START_POINTS, Scene, SceneError, Settings, refuse, region};
+use super::{MAX_START_POINTS, MIN_START_POINTS, Scene, SceneError, Settings, cuts, refuse, region};
 use glam::DVec3;
 
 /// The largest coordinates of a point, mm.
@@ -150,14 +150,7 @@ pub(super) fn check(settings: &Settings) -> Result<(), SceneError> {
 /// # Errors
 /// The rendering draws both what is dark and what is bright.
 pub(super) fn check_drawn(scene: &Scene) -> Result<(), SceneError> {
-    match scene.starts_at_curve() && scene.removed_value().is_none() {
-        true => refuse(
-            "region.start_curve",
-            "the rendering draws both what is dark and what is bright, so nothing can be removed from it (surface.sign=dark, or a \
-             transfer function that is opaque at 0 and at 1): set region.start_curve=none",
-        ),
-        false => Ok(()),
-    }
+    cuts::check_removal(scene, scene.starts_at_curve(), "region.start_curve", "set region.start_curve=none")
 }
 
 #[cfg(test)]

@@ -1,6 +1,6 @@
 //! Unveiling, resolved to the volume: the cells that fluid is looked for in, and which of their columns are in view.
 
-use super::{Scene, SceneError, refuse};
+use super::{Scene, SceneError, cuts};
 use crate::probe::{Geometry, Motion};
 
 /// Edge of a cell, mm: a pocket of fluid has several, and speckle that is left averages out.
@@ -103,12 +103,5 @@ impl Scene {
 /// # Errors
 /// The rendering draws both what is dark and what is bright.
 pub(super) fn check_unveiled(scene: &Scene) -> Result<(), SceneError> {
-    match scene.unveils() && scene.removed_value().is_none() {
-        true => refuse(
-            "unveil.enabled",
-            "the rendering draws both what is dark and what is bright, so nothing can be removed from it (surface.sign=dark, or a \
-             transfer function that is opaque at 0 and at 1): set unveil.enabled=false",
-        ),
-        false => Ok(()),
-    }
+    cuts::check_removal(scene, scene.unveils(), "unveil.enabled", "set unveil.enabled=false")
 }

@@ -5,8 +5,9 @@ use echolume::gpu::{Context, ContextOptions, Deadline, DeviceChoice, Renderer, R
 use echolume::passes::slots::Format;
 use echolume::passes::{Slot, Texels, is_hit};
 use echolume::picture::Picture;
-use echolume::scene::Scene;
+use echolume::scene::{Scene, insonified_box};
 use echolume::verify::built_in;
+use glam::DVec3;
 use std::ops::Deref;
 use std::sync::atomic::Ordering;
 use std::sync::{Arc, Mutex};
@@ -163,4 +164,14 @@ pub fn sphere_error(scene: &Scene, distances: &Texels, centre: glam::DVec3, radi
         }
     }
     (hits, worst)
+}
+
+/// A wall, fluid and tissue, by the share of the depth.
+pub fn layers(scene: &Scene) -> impl Fn(DVec3) -> f64 + use<> {
+    let (low, high) = insonified_box(&scene.geometry);
+    move |p| match (p.y - low.y) / (high.y - low.y) + 0.05 * (0.3 * p.x).sin() {
+        share if share < 0.35 => 0.6,
+        share if share < 0.65 => 0.1,
+        _ => 0.8,
+    }
 }

@@ -15,16 +15,6 @@ fn of(geometry: &Geometry, toml: &str) -> Scene {
     scene(geometry.clone(), BYTES, &toml)
 }
 
-/// A wall, fluid and tissue, by the share of the depth.
-fn layers(scene: &Scene) -> impl Fn(DVec3) -> f64 + use<> {
-    let (low, high) = insonified_box(&scene.geometry);
-    move |p| match (p.y - low.y) / (high.y - low.y) + 0.05 * (0.3 * p.x).sin() {
-        share if share < 0.35 => 0.6,
-        share if share < 0.65 => 0.1,
-        _ => 0.8,
-    }
-}
-
 /// An arc across the volume: a parabola, whose depth this gives at any place in space, and its points.
 fn arc(geometry: &Geometry) -> (impl Fn(f64) -> f64 + use<>, String) {
     let scene = of(geometry, "mode = 'vr'");

@@ -6,9 +6,8 @@ use echolume::passes::Slot;
 use echolume::passes::unveil::{self, Outcome};
 use echolume::plan::Rerun;
 use echolume::probe::{Geometry, Grid};
-use echolume::scene::{Scene, insonified_box};
+use echolume::scene::Scene;
 use echolume::source::phantom::{Label, Phantom, PhantomOptions};
-use glam::DVec3;
 
 /// The head behind its wall, as preset face filters it, in a region that begins at the probe.
 const FACE: &str = "mode = 'vr'\nslices = { smooth = { lateral = 1.1, depth = 1.1, elevation = 1.1 }, pixels = 128 }\n\
@@ -101,16 +100,6 @@ fn the_wall_goes_and_the_face_stays() {
                 _ => assert!(outcome.is_found() && removed <= 1.0 && left <= 2.0, "{case}: {outcome}"),
             }
         }
-    }
-}
-
-/// A wall, fluid and tissue, by the share of the depth.
-fn layers(scene: &Scene) -> impl Fn(DVec3) -> f64 + use<> {
-    let (low, high) = insonified_box(&scene.geometry);
-    move |p| match (p.y - low.y) / (high.y - low.y) + 0.05 * (0.3 * p.x).sin() {
-        share if share < 0.35 => 0.6,
-        share if share < 0.65 => 0.1,
-        _ => 0.8,
     }
 }
 

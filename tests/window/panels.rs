@@ -241,14 +241,7 @@ fn a_cut_is_shown_saved_and_taken_back() {
     view.button(1, false);
     let file = save_workspace(&desk, &folder);
     until("the whole workspace", || Workspace::read(&file).ok());
-    let png = folder.path("cut.png");
-    let size_of_picture = format!("{}x{}", size[0], size[1]);
-    let run = std::process::Command::new(PROGRAM)
-        .args(["render", &file.to_string_lossy(), "-o", &png, "--size", &size_of_picture])
-        .output()
-        .expect("the program runs");
-    assert!(run.status.success(), "{}", String::from_utf8_lossy(&run.stderr));
-    let cut = Picture::load(png.as_ref()).expect("a picture");
+    let cut = of_workspace(&file, &folder.path("cut.png"), size);
     let changed = cut.rgba.chunks(4).zip(start.rgba.chunks(4)).filter(|(a, b)| a != b).count();
     assert!(changed > 1000, "{changed} pixels differ from those without the cut");
     shows(&view, &cut, "the cut");
@@ -301,14 +294,7 @@ fn a_curved_plane_is_drawn_shown_saved_and_taken_back() {
         let off = (x - f64::from(clicked[0])).hypot(y - f64::from(clicked[1]));
         assert!(off < 0.6, "{off} pixels beside {clicked:?}");
     }
-    let png = folder.path("curve.png");
-    let size_of_picture = format!("{}x{}", size[0], size[1]);
-    let run = std::process::Command::new(PROGRAM)
-        .args(["render", &file.to_string_lossy(), "-o", &png, "--size", &size_of_picture])
-        .output()
-        .expect("the program runs");
-    assert!(run.status.success(), "{}", String::from_utf8_lossy(&run.stderr));
-    let curved = Picture::load(png.as_ref()).expect("a picture");
+    let curved = of_workspace(&file, &folder.path("curve.png"), size);
     part(&curved, "the section");
     control(&desk, 'z');
     part(&start, "taken back");
@@ -458,4 +444,14 @@ fn the_start_line_is_bent_on_plane_a_and_the_rendering_follows() {
     control(&desk, 'z');
     renders(&[], "the start again");
     view.leave();
+}
+
+/// The picture that `render` makes of a workspace.
+fn of_workspace(file: &std::path::Path, png: &str, size: [u32; 2]) -> Picture {
+    let run = std::process::Command::new(PROGRAM)
+        .args(["render", &file.to_string_lossy(), "-o", png, "--size", &format!("{}x{}", size[0], size[1])])
+        .output()
+        .expect("the program runs");
+    assert!(run.status.success(), "{}", String::from_utf8_lossy(&run.stderr));
+    Picture::load(png.as_ref()).expect("a picture")
 }
