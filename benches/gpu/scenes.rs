@@ -151,6 +151,8 @@ pub const SCENES: &[Stated] = &[
         ],
         &["cut"],
     ),
+    // Through the middle of the preset's region, on the side away from the camera.
+    sweep("a clip with its echoes", &["clip=[{ at = [0, 60, 0], normal = [0.3, -1, 0.2] }]"], &["raycast_cap"]),
     Stated {
         name: "Cartesian, 4-up, planes of their own volume",
         set: &[
