@@ -221,6 +221,8 @@ pub mod probe;
 #[forbid(unsafe_code)]
 pub mod profile;
 #[forbid(unsafe_code)]
+mod progress_lines;
+#[forbid(unsafe_code)]
 pub mod queues;
 #[forbid(unsafe_code)]
 pub mod reference;

@@ -1,5 +1,6 @@
 //! What a command says to the terminal: lines on standard output, and the one line that ends a command that failed.
 
+use crate::progress_lines;
 use indicatif::ProgressBar;
 use std::io::{ErrorKind, IsTerminal, Write};
 use std::sync::Mutex;
@@ -125,8 +126,12 @@ fn is_dumb() -> bool {
     std::env::var_os("TERM").is_some_and(|name| name == "dumb")
 }
 
-/// A bar of the progress to `count` on standard error. It draws nothing unless that is a terminal that can move its cursor.
+/// A bar of the progress to `count` on standard error. It draws nothing unless that is a terminal that can move its cursor, or lines are asked
+/// for.
 pub fn progress_bar(count: u64) -> ProgressBar {
+    if progress_lines::is_asked() {
+        return progress_lines::bar(count);
+    }
     if is_dumb() { ProgressBar::hidden() } else { ProgressBar::new(count) }
 }
 

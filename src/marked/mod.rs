@@ -27,7 +27,7 @@ pub fn time_line(now: SystemTime) -> String {
     now.replace('T', " ").replace('Z', " UTC")
 }
 
-/// A picture of the scene as its settings ask for it to be saved: with its measurements, and with marks and a bar if `marks.bar` is set. `start`:
+/// A picture of the scene as its settings ask for it to be saved: with its measurements and body marks, and with marks and a bar if `marks.bar` is set. `start`:
 /// where its rendering starts, if that follows the fluid.
 ///
 /// # Errors
@@ -35,7 +35,9 @@ pub fn time_line(now: SystemTime) -> String {
 pub fn as_set<'a>(picture: &'a Picture, scene: &Scene, start: Option<&Unveiled>) -> Result<Cow<'a, Picture>, String> {
     let has_lines = scene.has_reference() || scene.has_curve() || start.is_some();
     match scene.settings.marks.bar {
-        false if scene.settings.measure.is_empty() && !has_lines => Ok(Cow::Borrowed(picture)),
+        false if scene.settings.clone().without_drawings() == scene.settings && !has_lines => {
+            Ok(Cow::Borrowed(picture))
+        }
         false => measured(picture, scene, start).map(Cow::Owned),
         true => marked(picture, scene, start, &time_line(SystemTime::now()), None).map(Cow::Owned),
     }
@@ -70,7 +72,7 @@ pub fn marked(
     Ok(marked)
 }
 
-/// A picture of the scene with its measurements and annotations, the lines of its reference tile, and the line at which rendering starts.
+/// A picture of the scene with its measurements, annotations and body marks, the lines of its reference tile, and the line at which rendering starts.
 ///
 /// # Errors
 /// One line: the drawing failed.
@@ -81,6 +83,7 @@ pub fn measured(picture: &Picture, scene: &Scene, start: Option<&Unveiled>) -> R
         strokes::curve(&mut measured, scene)?;
         strokes::start(&mut measured, &unveil::lines(scene, start));
         strokes::draw(&mut measured, scene)?;
+        strokes::body_marks(&mut measured, scene);
     }
     Ok(measured)
 }
@@ -277,6 +280,19 @@ mod tests {
     }
 
     #[test]
+    fn the_bar_says_what_the_picture_shows_and_that_this_is_no_medical_device() {
+        for (mode, title) in [("volume", "Volume"), ("plane", "Plane"), ("mean", "X-ray")] {
+            let scene = scene(&[&format!("mode='{mode}'"), "region.depth=[4,17]"]);
+            let bar = Bar::new(&scene, &scene.marks(), 900, "2026-11-23 20:00:00 UTC", Some("Demo data"));
+            let expected =
+                ["depth 4 to 17 mm", "Demo data", "2026-11-23 20:00:00 UTC", "Echolume", "not a medical device"];
+            assert_eq!(bar.lines.join("  ·  "), [&[title][..], &expected].concat().join("  ·  "));
+            let (mm, pixels, _) = bar.scale.expect("a scale");
+            assert!((mm / pixels - scene.marks()[0].pixel).abs() < 1e-9, "{mm} mm are {pixels} pixels");
+        }
+    }
+
+    #[test]
     fn measurements_are_drawn_where_they_lie_and_without_a_bar_too() {
         let caliper = "measure=[{ kind = 'distance', points = [[-5, 14.5, 0], [5, 14.5, 0]] }]";
         let scene = scene(&["mode='plane'", caliper]);
@@ -289,6 +305,47 @@ mod tests {
         assert_eq!(pixel(0), [100; 3], "nothing elsewhere");
         let bright = drawn.rgba.chunks_exact(4).filter(|p| p[2] > 200).count();
         assert!(bright > 20, "{bright} pixels of the label");
+    }
+
+    #[test]
+    fn texts_and_arrows_are_drawn_into_saved_pictures() {
+        let plain = scene(&["mode='plane'"]);
+        for (kind, points, at) in [
+            ("text", "[[0,15,0]]", [0.55, 0.47]),
+            // Its tip is in the middle of the plane.
+            ("arrow", "[[0,15,0],[8,20,0]]", [0.5, 0.5]),
+        ] {
+            let measure = format!("measure=[{{ kind = '{kind}', points = {points}, text = 'lip' }}]");
+            let grey = grey([120, 96]);
+            let drawn = as_set(&grey, &scene(&["mode='plane'", &measure]), None).expect("drawn");
+            assert!(is_marked(&drawn, at) && !is_marked(&drawn, [0.1, 0.1]), "{kind}");
+            assert_ne!(*as_set(&grey, &plain, None).expect("drawn"), *drawn, "{kind}");
+        }
+    }
+
+    #[test]
+    fn a_body_mark_is_drawn_in_its_square_and_nowhere_else_in_every_mode() {
+        for mode in ["surface", "volume", "plane", "orthogonal", "cube"] {
+            let mark = "body_marks=[{ body = 'neck', at = [0.75, 0.25], size = 0.4, probe = [0.5, 0.5], angle = 90 }]";
+            let scene = scene(&[&format!("mode='{mode}'"), mark]);
+            let grey = grey([120, 96]);
+            let drawn = as_set(&grey, &scene, None).expect("drawn");
+            assert_eq!((drawn.width, drawn.height), (120, 96));
+            // Edge 38 pixels around (90, 24), and the reach of the probe's dot.
+            let at = |n: usize| [(n % 120) as f64 + 0.5, (n / 120) as f64 + 0.5];
+            let changed: Vec<[f64; 2]> = drawn
+                .rgba
+                .chunks_exact(4)
+                .enumerate()
+                .filter(|(_, pixel)| pixel[..3] != [100; 3])
+                .map(|(n, _)| at(n))
+                .collect();
+            assert!(changed.len() > 200, "{mode}: {}", changed.len());
+            assert!(changed.iter().all(|[x, y]| (x - 90.0).abs() < 21.0 && (y - 24.0).abs() < 21.0), "{mode}");
+            // The marker of the probe is right of its middle.
+            let dot = 4 * (33 * 120 + 104) as usize;
+            assert_eq!(drawn.rgba[dot..dot + 3], strokes::LINE, "{mode}");
+        }
     }
 
     /// Prevents letters that a bright picture hides: contrast of 4.5 (WCAG 2.2, AA) with what is behind them.

@@ -1,8 +1,8 @@
-//! Measurements on a saved picture: smooth lines with a dark edge, crosses at their points, heads of arrows, and labels.
+//! Measurements and body marks on a saved picture: smooth lines with a dark edge, crosses at their points, heads of arrows, and labels.
 
 use super::blend;
 use crate::canvas::{self, Canvas, Drawing, Drawn};
-use crate::measure::overlay;
+use crate::measure::{body_marks as bodies, overlay};
 use crate::passes::unveil::StartLine;
 use crate::picture::Picture;
 use crate::scene::Scene;
@@ -10,9 +10,11 @@ use crate::scene::planes::CURVE_COLOUR;
 use plotters::prelude::{BLACK, DrawingBackend, ShapeStyle, WHITE};
 
 /// Colour of lines: yellow, which no tissue has.
-const LINE: [u8; 3] = [255, 214, 64];
+pub(super) const LINE: [u8; 3] = [255, 214, 64];
 /// Colour of the line at which rendering starts: green, as on scanners.
 const START: [u8; 3] = [64, 235, 96];
+/// Colour of the body of a body mark.
+const BODY: [u8; 3] = [235, 235, 235];
 const EDGE: [u8; 3] = [0, 0, 0];
 /// Half the width of a line, and of its dark edge, pixels.
 const HALF: f64 = 0.8;
@@ -99,6 +101,29 @@ pub(super) fn curve(picture: &mut Picture, scene: &Scene) -> Result<(), String> 
         blend(picture, &label, [tile.corner[0].round() as i64 + 2, bottom.round() as i64]);
     }
     Ok(())
+}
+
+/// Draws the body marks: the body as a thin line, the probe as a bar with a dot at its marker.
+pub(super) fn body_marks(picture: &mut Picture, scene: &Scene) {
+    let size = [picture.width, picture.height].map(f64::from);
+    for mark in bodies::drawn(&scene.settings.body_marks, size) {
+        // Thinner where the mark is small: its lines must not run into each other.
+        let half = (mark.edge / 130.0).clamp(0.5, 1.5);
+        let lines = mark.outline.iter().flat_map(|line| line.windows(2).map(|ends| [ends[0], ends[1]]));
+        let outline: Vec<[[f64; 2]; 2]> = lines.collect();
+        let [marker, _] = mark.probe;
+        let whole = [[0.0; 2], size];
+        for (strokes, half, colour) in [
+            (&outline[..], half + 1.0, EDGE),
+            (&outline[..], half, BODY),
+            (&[mark.probe][..], 2.0 * half + 1.0, EDGE),
+            (&[[marker; 2]][..], mark.dot + 1.0, EDGE),
+            (&[mark.probe][..], 2.0 * half, LINE),
+            (&[[marker; 2]][..], mark.dot, LINE),
+        ] {
+            strokes.iter().for_each(|ends| stroke(picture, whole, *ends, half, colour));
+        }
+    }
 }
 
 /// Draws where rendering starts on the planes.

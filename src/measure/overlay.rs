@@ -270,6 +270,38 @@ mod tests {
         assert!(!scene(&["mode='tomography'"]).has_reference(), "only if asked for");
     }
 
+    /// An arrow points with its head to its first point, its text is at the tail; a text is at its point.
+    #[test]
+    fn an_arrow_points_to_what_was_clicked_and_texts_stand_where_they_were_put() {
+        let scene = scene(&["mode='plane'"]);
+        let points = vec![[2.0, 12.0, 0.0], [8.0, 20.0, 0.0]];
+        let arrow = Measurement { kind: MeasureKind::Arrow, points, text: "lip".into(), ..Measurement::default() };
+        let text = Measurement {
+            kind: MeasureKind::Text,
+            points: vec![[-5.0, 9.0, 0.0]],
+            text: "nose".into(),
+            ..Measurement::default()
+        };
+        let found = drawn(&scene, &[arrow.clone(), text]);
+        let pixel = |point: [f64; 3]| scene.sheet().project(&scene.sheet().tiles[0], scene.place_of(point)).0;
+        let [tip, tail] = [arrow.points[0], arrow.points[1]].map(pixel);
+        let (drawn, head) = (&found[0], found[0].head.expect("a head"));
+        assert_eq!((head, &drawn.lines[..], drawn.label.as_str()), ([tip, tail], &[vec![tip, tail]][..], "lip"));
+        assert!((drawn.at[0] - tail[0]).hypot(drawn.at[1] - tail[1]) < 10.0, "at the tail");
+        for [from, to] in arrow_head(head, 12.0) {
+            assert_eq!(from, tip);
+            // The strokes go back along the shaft, to both sides of it.
+            let (along, across) = ([tail[0] - tip[0], tail[1] - tip[1]], [to[0] - tip[0], to[1] - tip[1]]);
+            let cosine =
+                (along[0] * across[0] + along[1] * across[1]) / (along[0].hypot(along[1]) * across[0].hypot(across[1]));
+            assert!((cosine - 1.0 / (1.0 + 0.45_f64.powi(2)).sqrt()).abs() < 1e-9, "{cosine}");
+        }
+        assert_eq!((arrow_head(head, 12.0).len(), arrow_head([tip, tip], 12.0).len()), (2, 0));
+        let at = pixel([-5.0, 9.0, 0.0]);
+        assert_eq!((found[1].points[0].1, found[1].label.as_str(), found[1].head), (at, "nose", None));
+        assert!((found[1].at[0] - at[0]).hypot(found[1].at[1] - at[1]) < 10.0);
+    }
+
     #[test]
     fn what_is_on_the_surface_is_drawn_on_the_rendering_alone() {
         let on = Measurement { on_surface: true, ..caliper([0.0, 10.0, 0.0], [4.0, 10.0, 0.0]) };

@@ -1,5 +1,5 @@
 //! The look of a scene: its mode, filters, transfer function, light and tone, without what belongs to one examination: region, camera, places of
-//! planes, clip planes, cuts, marks and measurements. A preset of a user keeps a look.
+//! planes, clip planes, cuts, marks, measurements and body marks. A preset of a user keeps a look.
 
 use super::{Cap, Cube, Planes, Projection, Region, Settings, Slices, Surface, Volume};
 
@@ -31,6 +31,7 @@ const OF_EXAMINATION: &[&str] = &[
     "slices.still",
     "marks",
     "measure",
+    "body_marks",
 ];
 
 /// True if a setting belongs to a look.
@@ -69,6 +70,7 @@ impl Settings {
             slices: Slices { everything: kept.slices.everything, still: kept.slices.still, ..look.slices },
             marks: kept.marks,
             measure: kept.measure,
+            body_marks: kept.body_marks,
             ..look
         }
     }
@@ -129,6 +131,7 @@ mod tests {
                 "cap={enabled=false,level=0.2}",
                 "cuts=[{contour=[[0,0],[1,0],[0,1]],view={at=[0,0,0],direction=[0,1,0],up=[0,0,1]}}]",
                 "measure=[{kind='distance',points=[[0,0,0],[1,0,0]]}]",
+                "body_marks=[{body='neck'}]",
             ],
         );
         let look = settings("glass", &["cube.shading=0.3", "planes.window=[0.1,0.9]", "region.fade=3"]);

@@ -5,6 +5,7 @@ mod bricks;
 pub mod camera;
 mod caps;
 mod check;
+mod check_body_marks;
 mod check_measures;
 pub mod cube;
 pub mod curve;
@@ -205,6 +206,7 @@ impl Settings {
     pub fn check(&self) -> Result<(), SceneError> {
         check::check(self)?;
         check_measures::check_measures(&self.measure)?;
+        check_body_marks::check_body_marks(&self.body_marks)?;
         cuts::check(&self.cuts)?;
         start_curve::check(self)?;
         check::check_planes(self)

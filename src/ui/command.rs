@@ -5,7 +5,7 @@ pub use super::view::{Face, Viewpoint};
 
 use super::input::{Input, Key, Modifiers};
 use super::sliders::{GAIN, THRESHOLD};
-use crate::scene::{ColourMap, KeptSide, Layout, MeasureKind, Mode, PlaneName, TransferName};
+use crate::scene::{Body, BodyMark, ColourMap, KeptSide, Layout, MeasureKind, Mode, PlaneName, TransferName};
 use crate::ui::texts::keys;
 use Key::{Char, Function};
 
@@ -20,6 +20,8 @@ pub enum Command {
     Rotate([f64; 2]),
     /// Shows a rendering from one side, upright.
     LookFrom(Viewpoint),
+    /// Turns the rendering by itself, or stops it.
+    Turntable,
     /// Rotates the picture clockwise, degrees.
     Roll(f64),
     /// Multiplies the zoom; above 1 is closer.
@@ -113,6 +115,13 @@ pub enum Command {
     ClearCurve,
     /// Sets a point of the tool's measurement on the curved plane: lateral, depth, elevation, mm.
     PointOnCurve([f64; 3]),
+    /// Adds a body mark in a corner of the picture.
+    AddBodyMark(Body),
+    /// Gives the body mark with this index another place, size, probe, direction or part of the body.
+    ChangeBodyMark(usize, BodyMark),
+    /// Chooses the body mark that controls are about.
+    SelectBodyMark(usize),
+    RemoveBodyMark(usize),
     /// Counts the voxels of the region whose echo reaches the threshold.
     CountVoxels,
     /// Copies the results as CSV.
@@ -204,6 +213,8 @@ pub enum Tool {
     Plane,
     /// Draws the line of a curved plane.
     Curve,
+    /// Moves body marks, and the probe on them.
+    BodyMark,
     /// Sets the points of a measurement.
     Measure(MeasureKind),
 }
@@ -239,6 +250,9 @@ impl Command {
             (Command::MoveFace(a, _), Command::MoveFace(b, _)) => a == b,
             (Command::MoveCurvePoint(a, _), Command::MoveCurvePoint(b, _)) => a == b,
             (Command::MoveStartHandle(a, _), Command::MoveStartHandle(b, _)) => a == b,
+            (Command::ChangeBodyMark(a, mark), Command::ChangeBodyMark(b, other)) => {
+                (a, mark.body, mark.mirrored) == (b, other.body, other.mirrored)
+            }
             (Command::MovePoint(a, point, _), Command::MovePoint(b, other, _)) => (a, point) == (b, other),
             (Command::Type(_) | Command::Untype, Command::Type(_) | Command::Untype) => true,
             // Fingers move, turn and zoom at once.
@@ -325,6 +339,7 @@ pub const KEY_BINDINGS: &[Binding] = &[
     control(Char('2'), keys::FROM_THE_LEFT, Command::LookFrom(Viewpoint::Left)),
     control(Char('3'), keys::FROM_THE_RIGHT, Command::LookFrom(Viewpoint::Right)),
     control(Char('4'), keys::FROM_THE_TOP, Command::LookFrom(Viewpoint::Top)),
+    shift(Char('t'), keys::TURNTABLE, Command::Turntable),
     on(Char(','), keys::ROLL, Command::Roll(-5.0)).repeating(),
     on(Char('.'), keys::ROLL, Command::Roll(5.0)).repeating(),
     on(Char('+'), keys::CLOSER, Command::Zoom(1.1)).repeating(),
@@ -358,6 +373,7 @@ pub const KEY_BINDINGS: &[Binding] = &[
     on(Char('k'), keys::VOLUME_BY_THRESHOLD, Command::CountVoxels),
     on(Char('i'), keys::TEXT, Command::Tool(Tool::Measure(MeasureKind::Text))),
     on(Char('y'), keys::ARROW, Command::Tool(Tool::Measure(MeasureKind::Arrow))),
+    shift(Char('b'), keys::BODY_MARK, Command::Tool(Tool::BodyMark)),
     on(Key::Delete, keys::DELETE_LAST_MEASUREMENT, Command::DeleteMeasure(usize::MAX)),
     control(Char('c'), keys::COPY_RESULTS, Command::CopyMeasures),
     // The look.
@@ -496,9 +512,18 @@ mod tests {
     fn every_mode_layout_tool_and_plane_has_a_key() {
         use Mode::*;
         let modes = [Volume, Surface, Mixed, Mip, MinIp, Mean, Plane, Orthogonal, Tomography, Cube].map(Command::Mode);
-        let tools =
-            [Tool::Rotate, Tool::Light, Tool::Region, Tool::Clip, Tool::Cut, Tool::Brush, Tool::Plane, Tool::Curve]
-                .map(Command::Tool);
+        let tools = [
+            Tool::Rotate,
+            Tool::Light,
+            Tool::Region,
+            Tool::Clip,
+            Tool::Cut,
+            Tool::Brush,
+            Tool::Plane,
+            Tool::Curve,
+            Tool::BodyMark,
+        ]
+        .map(Command::Tool);
         let layouts = [Layout::Single, Layout::Four, Layout::Pair].map(Command::Layout);
         let planes = [PlaneName::A, PlaneName::B, PlaneName::C].map(Command::Plane);
         for command in modes.iter().chain(&tools).chain(&layouts).chain(&planes) {

@@ -5,6 +5,7 @@ use crate::files;
 use crate::gpu::Wake;
 use crate::live::cine::CineVolume;
 use crate::picture::Picture;
+use crate::progress_lines::Progress;
 use crate::source::recorder::Header;
 use crate::ui::texts;
 use std::path::{Path, PathBuf};
@@ -112,6 +113,12 @@ impl Exporter {
         // The thread also ends without any work, if there is no folder for it.
         let is_at_work = |export: &Export, thread: &JoinHandle<()>| !export.is_finished() && !thread.is_finished();
         self.export.as_ref().filter(|(_, export, thread)| is_at_work(export, thread)).map(|(name, ..)| *name)
+    }
+
+    /// How far the export in work is, as far as it says so.
+    pub(super) fn progress(&self) -> Option<Progress> {
+        self.exporting()?;
+        self.export.as_ref().and_then(|(_, export, _)| export.progress())
     }
 
     /// Ends the export in work, if there is one.

@@ -7,7 +7,8 @@ use super::picking::{Pane, Picker, Viewport, closest_along};
 use super::region_box::{self, Part, StartPart};
 use super::sliders::PLANES_ZOOM;
 use super::view;
-use crate::scene::{Layout, MeasureKind, Mode, PlaneName, Scene};
+use crate::measure::body_marks::{self, Part as MarkPart};
+use crate::scene::{BodyMark, Layout, MeasureKind, Mode, PlaneName, Scene};
 use glam::DVec3;
 use std::time::Duration;
 
@@ -18,6 +19,8 @@ const FINGER_SLOP: f64 = 12.0;
 const DOUBLE_CLICK: Duration = Duration::from_millis(400);
 /// Zoom factor of one notch of the wheel.
 const NOTCH_ZOOM: f64 = 1.1;
+/// Turn of the probe on a body mark for one notch of the wheel, degrees.
+const NOTCH_TURN: f64 = 15.0;
 /// Step of a plane for one notch of the wheel, mm.
 const NOTCH_MM: f64 = 1.0;
 /// Fingers beyond these are ignored.
@@ -137,6 +140,11 @@ impl Gestures {
         let (Some(at), Some(scene), false) = (self.pointer, viewport.scene, viewport.is_covered) else {
             return Vec::new();
         };
+        let mark = viewport.body_mark_at(at, GRAB).filter(|_| tool == Tool::BodyMark);
+        if let Some((index, mark)) = mark.and_then(|(index, _)| Some((index, *viewport.body_marks.get(index)?))) {
+            let turned = BodyMark { angle: mark.angle + notches * NOTCH_TURN, ..mark };
+            return vec![Command::ChangeBodyMark(index, turned)];
+        }
         let Some(pane) = viewport.pane_at(at) else { return Vec::new() };
         let factor = NOTCH_ZOOM.powf(notches);
         match pane {
@@ -216,6 +224,9 @@ impl Gestures {
     /// Ends a press. It was a click if it did not move.
     fn release(&mut self, press: &Press, viewport: &Viewport, tool: Tool, slop: f64) -> Vec<Command> {
         let Some((at, pane)) = press.click() else { return press.end(viewport) };
+        if let Drag::BodyMark { index, .. } = press.drag {
+            return probe_to(viewport, index, at).into_iter().collect();
+        }
         let is_second = self.last_click.take().is_some_and(|first| {
             (at[0] - first.at[0]).hypot(at[1] - first.at[1]) < 2.0 * slop
                 && viewport.now.saturating_sub(first.time) <= DOUBLE_CLICK
@@ -344,6 +355,12 @@ enum Drag {
     },
     /// The contour of a cut along the drag, on the rendering.
     Cut,
+    /// A body mark, or the probe on it. It is grabbed where it is: `way` from the pointer, pixels of the picture.
+    BodyMark {
+        index: usize,
+        part: MarkPart,
+        way: [f64; 2],
+    },
 }
 
 /// A button or a finger that is down.
@@ -367,16 +384,28 @@ struct Press {
 impl Press {
     /// A press of a button; a finger is the left one.
     fn new(button: Button, tool: Tool, held: Modifiers, slop: f64, at: [f64; 2], viewport: &Viewport) -> Option<Press> {
-        let pane = viewport.pane_at(at)?;
         let (scene, mut pixel) = viewport.pixel_at(at)?;
+        let mark = viewport.body_mark_at(at, GRAB).filter(|_| tool == Tool::BodyMark && button == Button::Left);
+        let mark = mark.and_then(|(index, part)| {
+            let (mark, size) = (viewport.body_marks.get(index)?, scene.picture_size().map(f64::from));
+            let [x, y] = match part {
+                MarkPart::Probe => body_marks::probe_of(mark, size),
+                MarkPart::Body => body_marks::centre_of(mark, size),
+            };
+            Some(Drag::BodyMark { index, part, way: [x - pixel[0], y - pixel[1]] })
+        });
+        // A mark may lie where no tile is. Beside marks their tool turns the view.
+        let pane = viewport.pane_at(at).or(mark.as_ref().map(|_| Pane::Rendering))?;
+        let tool = if tool == Tool::BodyMark { Tool::Rotate } else { tool };
         let columns_to_surface = viewport.columns_to_surface(at);
         pixel[0] += columns_to_surface;
         // Only a plain press can be a click: any other one drags at once.
         let is_plain = button == Button::Left && !held.shift && !held.control;
         let drag = match (pane, tool) {
+            _ if mark.is_some() => mark?,
             (Pane::Rendering, _) if button != Button::Left || held.shift => Drag::Pan,
             (Pane::Rendering, _) if held.control => Drag::Light,
-            (Pane::Rendering, Tool::Rotate) => Drag::Rotate,
+            (Pane::Rendering, Tool::Rotate | Tool::BodyMark) => Drag::Rotate,
             (Pane::Rendering, Tool::Light) => Drag::Light,
             (Pane::Rendering, Tool::Clip) => Drag::Clip,
             (Pane::Rendering, Tool::Cut | Tool::Brush) => Drag::Cut,
@@ -530,12 +559,22 @@ impl Press {
     }
 
     fn dragged(&mut self, from: [f64; 2], to: [f64; 2], viewport: &Viewport) -> Option<Command> {
+        if let Drag::BodyMark { index, part, way } = self.drag {
+            let (scene, [x, y]) = viewport.pixel_at(to)?;
+            let (mark, size) = (viewport.body_marks.get(index)?, scene.picture_size().map(f64::from));
+            let place = [x + way[0], y + way[1]];
+            let moved = match part {
+                MarkPart::Probe => body_marks::with_probe_at(mark, size, place),
+                MarkPart::Body => body_marks::moved_to(mark, size, place),
+            };
+            return Some(Command::ChangeBodyMark(index, moved));
+        }
         let (scene, pixel) = viewport.pixel_at(to).map(|(scene, pixel)| (scene, self.to_surface(pixel)))?;
         let [x, y] = [to[0] - from[0], to[1] - from[1]];
         let of_picture = |n: f64| n / viewport.size[1];
         let degrees = |x: f64, y: f64| [x, y].map(|n| n / viewport.pane_height(self.pane) * DEGREES_PER_HEIGHT);
         let command = match self.drag {
-            Drag::Nothing => return None,
+            Drag::Nothing | Drag::BodyMark { .. } => return None,
             Drag::Pan => Command::Pan([x, y].map(of_picture)),
             Drag::Light => Command::MoveLight([x, y].map(of_picture)),
             Drag::Rotate => {
@@ -616,6 +655,14 @@ fn start_at(scene: &Scene, pane: Pane, at: [f64; 2], viewport: &Viewport) -> Opt
 /// The point of the settings that a tile shows at a position in the window, mm.
 fn point_on(viewport: &Viewport, tile: usize, at: [f64; 2]) -> Option<[f64; 3]> {
     Some(view::below_face(viewport.scene?, viewport.point_on_plane(tile, at)?).to_array())
+}
+
+/// The command that puts the probe of a body mark at a position in the window.
+fn probe_to(viewport: &Viewport, index: usize, at: [f64; 2]) -> Option<Command> {
+    let (scene, pixel) = viewport.pixel_at(at)?;
+    let mark = viewport.body_marks.get(index)?;
+    let size = scene.picture_size().map(f64::from);
+    Some(Command::ChangeBodyMark(index, body_marks::with_probe_at(mark, size, pixel)))
 }
 
 /// The command that sets a point of a measurement at a position on a tile.

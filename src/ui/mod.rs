@@ -27,6 +27,7 @@ mod picking;
 mod recovery;
 mod region_box;
 mod screen_reader;
+mod silence;
 pub mod sliders;
 pub mod source_supervisor;
 mod texts;

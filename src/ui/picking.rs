@@ -2,8 +2,8 @@
 
 pub(super) use crate::scene::picker::Picker;
 
-use crate::measure::overlay;
-use crate::scene::{MeasureKind, Measurement, PlaneName, Scene};
+use crate::measure::{body_marks, overlay};
+use crate::scene::{BodyMark, MeasureKind, Measurement, PlaneName, Scene};
 use glam::DVec3;
 use std::time::Duration;
 
@@ -26,6 +26,8 @@ pub(super) struct Viewport<'a> {
     pub(super) scene: Option<&'a Scene>,
     /// The measurements that are drawn over it.
     pub(super) measures: &'a [Measurement],
+    /// The body marks that are drawn over it.
+    pub(super) body_marks: &'a [BodyMark],
     /// The points of the start line of the region that is drawn over it; none while that is straight.
     pub(super) start_line: &'a [[f64; 2]],
     /// The points of a measurement or of a line are being set.
@@ -92,6 +94,12 @@ impl<'a> Viewport<'a> {
         let (scene, pixel) = self.pixel_at(at)?;
         let sheet = scene.sheet();
         Some(sheet.point(sheet.tiles.get(tile)?, pixel))
+    }
+
+    /// The body mark at a position in the window, and what of it: the probe is grabbed from `reach` pixels of the window.
+    pub(super) fn body_mark_at(&self, at: [f64; 2], reach: f64) -> Option<(usize, body_marks::Part)> {
+        let (scene, pixel) = self.pixel_at(at)?;
+        body_marks::part_at(self.body_marks, scene.picture_size().map(f64::from), pixel, reach * self.scale())
     }
 
     /// The point of a measurement that is drawn within `reach` pixels of the window of a position on a tile of planes: index of the

@@ -229,6 +229,7 @@ fn thumbnail(settings: &Settings) -> Settings {
         post: Post { sigma: None, enhanced_sigma: None, perona_malik: None, ..of.post },
         marks: Marks::default(),
         measure: Vec::new(),
+        body_marks: Vec::new(),
         ..of
     }
 }

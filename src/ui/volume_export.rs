@@ -4,19 +4,21 @@
 use crate::files::WorkFolder;
 use crate::files::signals::Writing;
 use crate::live::cine::CineVolume;
+use crate::progress_lines::{self, Progress};
 use crate::source::recorder::{Header, Writer};
 use crate::text::printable;
 use crate::ui::texts;
 use crate::workspace::{self, Origin};
-use std::io::Read;
+use std::io::{BufRead, BufReader, Read};
 use std::path::{Path, PathBuf};
-use std::process::{Command, Stdio};
-use std::sync::{Mutex, MutexGuard, PoisonError};
+use std::process::{Child, Command, ExitStatus, Stdio};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::thread;
 use std::time::Duration;
 
-/// Most of what the process says of a fault, bytes.
-const MAX_MESSAGE: u64 = 1 << 16;
+/// Most of what the process says of a fault, and of one line, bytes.
+const MAX_MESSAGE: usize = 1 << 16;
+const MAX_LINE: u64 = 1 << 12;
 /// How often it is checked whether the process has ended.
 const POLL: Duration = Duration::from_millis(20);
 /// Pictures of a turntable: one every five degrees.
@@ -79,6 +81,8 @@ pub const FORMATS: &[Format] = &[
 #[derive(Debug, Default)]
 pub(super) struct Export {
     state: Mutex<State>,
+    /// How far the process says that it is.
+    progress: Arc<Mutex<Option<Progress>>>,
 }
 
 #[derive(Debug, Default)]
@@ -89,7 +93,7 @@ struct State {
 
 impl Export {
     fn lock(&self) -> MutexGuard<'_, State> {
-        self.state.lock().unwrap_or_else(PoisonError::into_inner)
+        lock(&self.state)
     }
 
     /// Ends the work; nothing of it stays.
@@ -103,6 +107,11 @@ impl Export {
 
     pub(super) fn is_finished(&self) -> bool {
         self.lock().is_finished
+    }
+
+    /// How far the work is, once the process has said so.
+    pub(super) fn progress(&self) -> Option<Progress> {
+        *lock(&self.progress)
     }
 
     /// Writes a volume to `file`, which does not exist before, whole or not at all. `settings`: the scene of a turntable as TOML.
@@ -124,26 +133,14 @@ impl Export {
     /// `must_stop`: true if the work is to end early.
     fn process(&self, command: &mut Command, must_stop: &dyn Fn() -> bool) -> Result<(), String> {
         command.stdin(Stdio::null()).stdout(Stdio::null()).stderr(Stdio::piped());
+        command.env(progress_lines::ASKED_BY.0, progress_lines::ASKED_BY.1);
         let child = command.spawn().map_err(texts::why_export_not_started);
         let mut child = child?;
         let messages = child.stderr.take();
-        let said = thread::spawn(move || messages.map_or_else(String::new, last_words));
-        let status = loop {
-            if self.lock().is_cancelled || must_stop() {
-                // It may have ended by itself.
-                let _ = child.kill();
-                let _ = child.wait();
-                return Err("cancelled".into());
-            }
-            match child.try_wait() {
-                Ok(Some(status)) => break status,
-                Ok(None) => thread::sleep(POLL),
-                Err(e) => {
-                    let _ = child.kill();
-                    return Err(texts::why_export_lost(e));
-                }
-            }
-        };
+        let progress = self.progress.clone();
+        // Not waited for where the work is cancelled: what the process left running may hold the pipe.
+        let said = thread::spawn(move || messages.map_or_else(String::new, |messages| listen(messages, &progress)));
+        let status = self.wait(&mut child, must_stop)?;
         let said = said.join().unwrap_or_default();
         match status.success() {
             true => Ok(()),
@@ -156,15 +153,48 @@ impl Export {
             }
         }
     }
+
+    /// Waits for the process, and ends it where it has to stop.
+    fn wait(&self, child: &mut Child, must_stop: &dyn Fn() -> bool) -> Result<ExitStatus, String> {
+        loop {
+            if self.lock().is_cancelled || must_stop() {
+                // It may have ended by itself.
+                let _ = child.kill();
+                let _ = child.wait();
+                return Err("cancelled".into());
+            }
+            match child.try_wait() {
+                Ok(Some(status)) => return Ok(status),
+                Ok(None) => thread::sleep(POLL),
+                Err(e) => {
+                    let _ = child.kill();
+                    return Err(texts::why_export_lost(e));
+                }
+            }
+        }
+    }
 }
 
-/// What a process says, up to a limit.
-fn last_words(mut messages: impl Read) -> String {
-    let mut bytes = Vec::new();
-    let _ = (&mut messages).take(MAX_MESSAGE).read_to_end(&mut bytes);
-    // A full pipe would block it.
-    let _ = std::io::copy(&mut messages, &mut std::io::sink());
-    String::from_utf8_lossy(&bytes).into_owned()
+/// Takes the progress of a process, and returns what else it says: the end of it, up to a limit.
+fn listen(messages: impl Read, progress: &Mutex<Option<Progress>>) -> String {
+    let mut said: Vec<u8> = Vec::new();
+    let mut messages = BufReader::new(messages);
+    let mut line = Vec::new();
+    // A line of any length is read in pieces; a full pipe would block the process.
+    while (&mut messages).take(MAX_LINE).read_until(b'\n', &mut line).is_ok_and(|read| read > 0) {
+        match std::str::from_utf8(&line).ok().and_then(|line| progress_lines::parse(line.trim_end())) {
+            Some(found) => *lock(progress) = Some(found),
+            None => said.extend(&line),
+        }
+        // The last words say why.
+        said.drain(..said.len().saturating_sub(MAX_MESSAGE));
+        line.clear();
+    }
+    String::from_utf8_lossy(&said).into_owned()
+}
+
+fn lock<T>(shared: &Mutex<T>) -> MutexGuard<'_, T> {
+    shared.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
 /// Writes volumes as a recording, whole or not at all.
@@ -261,6 +291,29 @@ mod tests {
         assert_eq!(run("yes abc | head -c 400000 >&2; exit 0"), Ok(()));
         let gone = process(&mut Command::new("/no/such/program"));
         assert!(gone.is_err_and(|fault| fault.contains("cannot be started")));
+        // Of a long complaint, its end.
+        let long = run("yes abc | head -c 400000 >&2; echo 'error: no room' >&2; exit 1");
+        assert_eq!(long, Err("no room".into()));
+    }
+
+    /// Prevents an export of minutes that says nothing, and progress that is taken for a fault.
+    #[test]
+    fn progress_is_read_while_the_process_works_and_is_no_fault() {
+        let export = Export::default();
+        assert_eq!(export.progress(), None);
+        let script = "echo 'progress: 3/72 pictures' >&2; exec sleep 600";
+        thread::scope(|scope| {
+            let running = scope.spawn(|| export.process(Command::new("bash").args(["-c", script]), &|| false));
+            while export.progress().is_none() && !running.is_finished() {
+                thread::sleep(POLL);
+            }
+            assert_eq!(export.progress(), Some(Progress { done: 3, of: 72 }));
+            export.cancel();
+            assert_eq!(running.join().expect("no panic"), Err("cancelled".into()));
+        });
+        let script = "echo \"$ECHOLUME_PROGRESS\" >&2; echo 'progress: 1/2' >&2; exit 1";
+        let failed = Export::default().process(Command::new("sh").args(["-c", script]), &|| false);
+        assert_eq!(failed, Err("lines".into()), "asked for, and not the last word");
     }
 
     #[test]

@@ -390,6 +390,56 @@ fn the_volume_is_exported_as_the_commands_do() {
     is_clean();
 }
 
+/// A turntable and a loop are finished, with how far they are on the window, marks as the switch says, and the pictures that the command makes.
+#[test]
+fn a_turntable_and_a_loop_are_exported_with_marks_as_asked() {
+    let desk = Desk::new(false);
+    let folder = Folder::new("series");
+    let [sweep, kept] = ["two.mha", "kept"].map(|name| folder.path(name));
+    let run = |args: &[&str]| {
+        let run = std::process::Command::new(PROGRAM).args(args).output().expect("the program runs");
+        assert!(run.status.success(), "{}", String::from_utf8_lossy(&run.stderr));
+    };
+    run(&["phantom", "--volumes", "2", "--frames", "12", "--lines", "32", "-o", &sweep]);
+    let view =
+        desk.view(&["-v", "--size", "700x500", "--source", &sweep, "--save-to", &kept, "--mode", "mip", "--cine", "9"]);
+    let (corner, size) = echolume::ui::panels::picture_area([700, 500], 1.0, true);
+    until("a picture", || {
+        let seen = crop(&view.look()?, corner, size)?;
+        (seen.rgba.chunks(4).filter(|pixel| pixel[..3].iter().all(|c| *c > 60)).count() > 2000).then_some(())
+    });
+    let all = || std::fs::read_dir(&kept).into_iter().flatten().flatten().map(|entry| entry.path());
+    let exported = |format: char, ending: &str| {
+        control(&desk, 'e');
+        desk.tap(format);
+        until("the export", || all().find(|path| path.extension().is_some_and(|end| end == ending)))
+    };
+    let pictures = |folder: &std::path::Path| -> Vec<Picture> {
+        let mut files: Vec<PathBuf> =
+            std::fs::read_dir(folder).expect("a folder").flatten().map(|e| e.path()).collect();
+        files.sort();
+        files.iter().map(|file| Picture::load(file).expect("a picture")).collect()
+    };
+    let edge = format!("{}x{}", size[0], size[1]);
+    for (format, ending, series, count) in
+        [('8', "turntable", ["--turntable", "72"], 72), ('9', "loop", ["--volumes", "all"], 2)]
+    {
+        let got = pictures(&exported(format, ending));
+        let wanted = folder.path(ending) + "/";
+        run(&[&["render", &sweep, "--mode", "mip", "--size", &edge][..], &series, &["-o", &wanted]].concat());
+        let wanted = pictures(wanted.as_ref());
+        assert_eq!([got.len(), wanted.len()], [count; 2], "{ending}");
+        assert_ne!(wanted[0], wanted[count / 2], "{ending}");
+        for (got, wanted) in got.iter().zip(&wanted) {
+            // The bar is below, and marks are at the edges.
+            assert!(got.width == wanted.width && got.height > wanted.height, "{ending}");
+            let middle = |picture: &Picture| crop(picture, size.map(|n| n / 4), size.map(|n| n / 2)).expect("inside");
+            assert_eq!(middle(got), middle(wanted), "{ending}");
+        }
+    }
+    view.leave();
+}
+
 /// The start line is bent by a drag on plane A: it is drawn in green, the rendering follows, the workspace keeps it, and undo takes it back.
 #[test]
 fn the_start_line_is_bent_on_plane_a_and_the_rendering_follows() {

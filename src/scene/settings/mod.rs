@@ -1,6 +1,7 @@
 //! The settings of a scene: keys, types, defaults and units of the TOML scene file. Lengths are in mm, angles in degrees, samples and
 //! opacities in 0..1. Every struct refuses unknown keys, so that a typing error does not silently become a default.
 
+mod body_marks;
 mod cuts;
 mod marks;
 mod measure;
@@ -10,6 +11,7 @@ mod raycast;
 mod shading;
 mod unveil;
 
+pub use body_marks::*;
 pub use cuts::*;
 pub use marks::*;
 pub use measure::*;
@@ -80,12 +82,24 @@ pub struct Settings {
     pub marks: Marks,
     /// Measurements and annotations, at most 64. The viewer makes them; `render` draws them.
     pub measure: Vec<Measurement>,
+    /// Body marks, at most 4: a part of the body with the place of the probe. The viewer and `render` draw them.
+    pub body_marks: Vec<BodyMark>,
 }
 
 impl Settings {
     /// The settings while the view moves: one ray for four pixels. Stage 1 stays the same.
     pub fn moving(&self) -> Settings {
         Settings { ray: Ray { half: true, rays: 1, ..self.ray.clone() }, ..self.clone() }
+    }
+
+    /// These settings with what others draw over the picture: measurements, annotations and body marks. No pass reads them.
+    pub fn with_drawings_of(self, other: &Settings) -> Settings {
+        Settings { measure: other.measure.clone(), body_marks: other.body_marks.clone(), ..self }
+    }
+
+    /// These settings without anything that is drawn over the picture.
+    pub fn without_drawings(self) -> Settings {
+        self.with_drawings_of(&Settings::default())
     }
 
     /// Changes the mode, and the layout where it does not fit the mode: planes have no layout, and a pair is of mode surface.

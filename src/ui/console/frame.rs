@@ -18,10 +18,6 @@ use std::time::{Duration, Instant};
 const STREAM_SLICE: Duration = Duration::from_millis(4);
 /// The device is opened again after so many faults without a picture in between.
 const MAX_DEVICE_FAULTS: u32 = 5;
-/// A warning is shown if no frame comes for so long.
-const SILENCE: Duration = Duration::from_secs(3);
-/// An update that takes so long does not count as silence of the source.
-const LONG_UPDATE: Duration = Duration::from_millis(100);
 /// While the next picture is not ready, the window keeps the old content for so long: less disturbing than a black moment.
 const BLANK_DELAY: Duration = Duration::from_millis(400);
 /// Interval of the attempts to present while there is no surface.
@@ -32,6 +28,8 @@ const BLANK_INTERVAL: Duration = Duration::from_millis(20);
 const START_INTERVAL: Duration = Duration::from_millis(100);
 /// That fluid is lost is said at most so often: it may come and go with each live volume.
 const LOST_INTERVAL: Duration = Duration::from_secs(20);
+/// How often it is asked how far an export is.
+const EXPORT_POLL: Duration = Duration::from_millis(300);
 /// The help needs a window of this height, points.
 const MIN_HELP_HEIGHT: f32 = 200.0;
 /// Lines of a shader compiler's message that are shown.
@@ -73,8 +71,7 @@ impl Console {
 
     fn advance(&mut self, now: Instant) -> Result<LoopRequest, ConsoleError> {
         let begun = Instant::now();
-        let busy = self.busy_since.take().map_or(Duration::ZERO, |since| now.saturating_duration_since(since));
-        self.last_arrival += busy;
+        self.silence.begin_update(now);
         if let Some((fault, at)) = &mut self.startup_fault
             && now >= *at
         {
@@ -83,7 +80,8 @@ impl Console {
         }
         if let Some(feed) = self.source.poll(now).filter(|_| self.startup_fault.is_none()) {
             self.stream.replace_source(feed);
-            (self.last_arrival, self.needs_redraw) = (now, true);
+            self.silence.frames_came(now);
+            self.needs_redraw = true;
         }
         while let Some(saved) = self.exporter.poll() {
             let ends = saved.complete_to.is_some() && saved.complete_to == self.leaves_when_saved;
@@ -105,6 +103,8 @@ impl Console {
         self.poll_opening();
         self.poll_counting();
         self.poll_thumbnails(now);
+        self.poll_export();
+        self.turn(now);
         self.advance_cine(now);
         self.send_settings(now);
         self.run_stream(now)?;
@@ -121,10 +121,8 @@ impl Console {
         self.needs_redraw |= self.notes.len() != before || stall_ends || self.repaint_at.is_some_and(|at| at <= now);
         self.present(now)?;
         self.write_metrics(now);
-        // What takes long here keeps no frame from coming, but from being taken.
-        self.last_arrival += Some(begun.elapsed()).filter(|took| *took >= LONG_UPDATE).unwrap_or_default();
         let is_busy = self.stream.is_drawing() || !self.stream.is_idle();
-        self.busy_since = is_busy.then_some(now);
+        self.silence.end_update(now, begun.elapsed(), is_busy);
         Ok(LoopRequest { wake_at: self.next_wake(now), ..std::mem::take(&mut self.request) })
     }
 
@@ -218,7 +216,8 @@ impl Console {
         self.needs_redraw |= gone != self.disconnected;
         self.disconnected = gone;
         if frames != self.frames {
-            (self.frames, self.last_arrival) = (frames, now);
+            self.frames = frames;
+            self.silence.frames_came(now);
         }
         Ok(())
     }
@@ -316,7 +315,7 @@ impl Console {
         }
         let notes = self.notes.iter().map(|(until, _)| *until);
         let is_listening = matches!(self.source.state(), SourceState::Open) && !self.stream.is_frozen();
-        let silence = Some(self.last_arrival + SILENCE).filter(|at| is_listening && *at > now);
+        let silence = Some(self.silence.due()).filter(|at| is_listening && *at > now);
         let has_pictures = self.times.pictures.newest().is_some();
         let statistics =
             self.shows_times.then_some(self.statistics_at + self.statistics_interval).filter(|_| has_pictures);
@@ -332,6 +331,8 @@ impl Console {
             self.metrics.as_ref().map(LiveMetrics::due),
             self.warms_at(now),
             self.thumbnails_at(now),
+            self.turns_at(),
+            self.exporter.exporting().map(|_| now + EXPORT_POLL),
             silence,
             statistics,
         ]
@@ -433,7 +434,8 @@ impl Console {
 
     /// Lays out the panels and executes the commands that they give.
     fn lay_out_panels(&mut self, now: Instant, has_drawn: bool) -> gpu::window::Panels {
-        let notes: Vec<_> = self.notes.iter().map(|(_, note)| note.clone()).collect();
+        let notes: Vec<_> =
+            self.export_note().into_iter().chain(self.notes.iter().map(|(_, note)| note.clone())).collect();
         let quality = frame_budget::label(self.quality, &self.rungs);
         let exit_key = match (&self.fixed.exit, self.fixed.is_kiosk) {
             (Some(chord), true) => chord.to_string(),
@@ -449,7 +451,9 @@ impl Console {
             has_column: panels::has_column(self.size, self.panels.scale(), self.shows_panels),
             files: self.opening.shown(),
             shows_exports: self.shows_exports,
+            is_turning: self.turning.is_some(),
             exporting: self.exporter.exporting(),
+            export_progress: self.export_progress,
             presets: self.presets.shown(),
             // egui panics if a list has a negative height.
             shows_help: self.shows_help && self.size[1] as f32 > MIN_HELP_HEIGHT * self.panels.scale(),
@@ -493,7 +497,7 @@ impl Console {
             let text = texts::DEVICE_STALLED_ABOUT;
             return Some(banner(texts::DEVICE_STALLED, text, true));
         }
-        let is_silent = now.saturating_duration_since(self.last_arrival) >= SILENCE && !self.stream.is_frozen();
+        let is_silent = self.silence.is_silent(now) && !self.stream.is_frozen();
         let (state, gone) = (self.source.state(), self.stream.disconnected());
         let has_shown = self.stream.volumes_shown() > 0;
         let (title, text, is_fault) = self.fixed.source.notice(state, gone.as_deref(), is_silent, has_shown)?;

@@ -42,6 +42,7 @@ impl Console {
             _ => None,
         };
         let measures = self.controls.measures().to_vec();
+        let body_marks = self.controls.body_marks().to_vec();
         let start_line = self.controls.start_line().to_vec();
         let is_over_panel = at.or(self.gestures.pointer()).is_some_and(|at| self.panels.covers(at));
         let on = Viewport {
@@ -49,6 +50,7 @@ impl Console {
             size: area.1.map(f64::from),
             scene: self.stream.scene(),
             measures: &measures,
+            body_marks: &body_marks,
             start_line: &start_line,
             has_work: self.controls.work().is_some() || self.controls.line().is_some(),
             is_covered: self.asks_to_leave || (is_over_panel && self.fixed.overlay),

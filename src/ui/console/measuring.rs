@@ -237,7 +237,7 @@ impl Console {
             self.execute(&Command::CancelCurve, Instant::now());
             return true;
         }
-        let is_measuring = matches!(self.controls.tool(), Tool::Measure(_) | Tool::Curve);
+        let is_measuring = matches!(self.controls.tool(), Tool::Measure(_) | Tool::Curve | Tool::BodyMark);
         if is_measuring {
             self.execute(&Command::Tool(Tool::default()), Instant::now());
         }

@@ -9,6 +9,7 @@ mod opening;
 mod options;
 mod presets;
 mod saving;
+mod turning;
 
 use self::frame::LostFluid;
 use self::measuring::Counting;
@@ -24,6 +25,7 @@ use super::frame_budget::{self, Pace, Quality, Rung};
 use super::gestures::Gestures;
 use super::panels::accesskit::{ActionRequest, TreeUpdate};
 use super::panels::{self, Note, Panels};
+use super::silence::Silence;
 use super::source_supervisor::{OpenSource, SourceSupervisor};
 use super::times::Times;
 use crate::gpu::shader_reload::{ShaderFolder, Watch};
@@ -34,6 +36,7 @@ use crate::live::metrics::LiveMetrics;
 use crate::live::{self, Feed, StartStep, Stream, StreamError};
 use crate::passes::unveil::StartLine;
 use crate::plan::Work;
+use crate::progress_lines::Progress;
 use crate::scene::{Layout, Scene, Settings, variants};
 use crate::source::live::SourceKind;
 use crate::ui::texts;
@@ -118,6 +121,10 @@ pub struct Console {
     /// What the help is searched for; none while it is not.
     help_search: Option<String>,
     shows_exports: bool,
+    /// When the turntable of the view turned last, while it does.
+    turning: Option<Instant>,
+    /// How far the export in work is, as far as it says so.
+    export_progress: Option<Progress>,
     /// Asks whether to save the loop before leaving.
     asks_to_leave: bool,
     /// Leaves when the loop up to this volume is saved.
@@ -144,12 +151,9 @@ pub struct Console {
     /// When statistics were taken last.
     statistics_at: Instant,
     statistics_interval: Duration,
-    /// When a frame or a source came last.
-    last_arrival: Instant,
+    silence: Silence,
     /// Why the source is not connected, as it was shown last.
     disconnected: Option<String>,
-    /// Since when the program is busy with what came: silence is not counted meanwhile.
-    busy_since: Option<Instant>,
     frames: u64,
     metrics: Option<LiveMetrics>,
     /// Faults of the device since the last picture.
@@ -283,6 +287,8 @@ impl Console {
             saves_bar: options.bar,
             help_search: None,
             shows_exports: false,
+            turning: None,
+            export_progress: None,
             asks_to_leave: false,
             leaves_when_saved: None,
             is_full_screen: false,
@@ -298,9 +304,8 @@ impl Console {
             warmed: None,
             statistics_at: now,
             statistics_interval: options.statistics_interval,
-            last_arrival: now,
+            silence: Silence::new(now),
             disconnected: None,
-            busy_since: None,
             frames: 0,
             metrics,
             device_faults: 0,
@@ -460,6 +465,7 @@ impl Console {
     pub fn execute(&mut self, command: &Command, now: Instant) {
         tracing::debug!("{command:?}");
         self.user_acts(now);
+        self.stop_turning_for(command);
         let before = is_of_tone(command).then(|| self.controls.settings().clone());
         if now.saturating_duration_since(self.last_change) > STEP_PAUSE {
             self.controls.seal();
@@ -547,6 +553,7 @@ impl Console {
             Command::SaveWorkspace => self.save_workspace(),
             Command::OpenFiles => self.toggle_files(),
             Command::OpenFile(n) => self.open_entry(n),
+            Command::Turntable => self.toggle_turning(now),
             Command::Exports => self.shows_exports = !self.shows_exports,
             Command::Export(n) => self.export_volume(n),
             Command::CancelExport => self.exporter.cancel_export(),
@@ -608,6 +615,8 @@ impl Console {
         } else if self.shows_times {
             self.shows_times = false;
         } else if self.leave_measuring() {
+            self.needs_redraw = true;
+        } else if self.turning.take().is_some() {
             self.needs_redraw = true;
         } else if self.is_full_screen && !self.fixed.is_kiosk {
             self.request.toggle_full_screen = true;
@@ -679,8 +688,7 @@ impl Console {
 
     /// The settings of a view at rest.
     fn full_settings(&self) -> Settings {
-        // Measurements are drawn over the picture.
-        let mut full = Settings { measure: Vec::new(), ..self.controls.settings().clone() };
+        let mut full = self.controls.settings().clone().without_drawings();
         // A region that grows and a plane that moves show slices that were left out. With all of them processed, dragging needs no frame
         // again.
         let cuts_planes = full.mode.is_flat() || full.layout == Layout::Four;

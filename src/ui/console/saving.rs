@@ -3,6 +3,8 @@
 use super::Console;
 use crate::live::cine::CineVolume;
 use crate::marked;
+use crate::progress_lines::Progress;
+use crate::ui::panels::Note;
 use crate::ui::texts;
 use crate::ui::volume_export::{FORMATS, Job};
 use std::time::SystemTime;
@@ -14,7 +16,7 @@ impl Console {
             Some(renderer) => match renderer.end_picture() {
                 Ok(picture) => {
                     let mut scene = renderer.scene().clone();
-                    scene.settings.measure = self.controls.measures().to_vec();
+                    scene.settings = scene.settings.with_drawings_of(self.controls.settings());
                     Ok((picture, scene, renderer.unveiled().cloned()))
                 }
                 Err(fault) => Err(fault.to_string()),
@@ -86,5 +88,17 @@ impl Console {
             Ok(()) => self.notify(&texts::exporting(format.name), false),
             Err(fault) => self.notify(&texts::not_exported(fault), true),
         }
+    }
+    /// Takes how far the export in work is.
+    pub(super) fn poll_export(&mut self) {
+        let progress = self.exporter.progress();
+        self.needs_redraw |= std::mem::replace(&mut self.export_progress, progress) != progress;
+    }
+
+    /// A note about the export in work that stays as long as that, once it says how far it is. Where its list is shown, that says so.
+    pub(super) fn export_note(&self) -> Option<Note> {
+        let name = self.exporter.exporting().filter(|_| !self.shows_exports)?;
+        let Progress { done, of } = self.export_progress?;
+        Some(Note { text: texts::export_so_far(name, done, of), is_fault: false })
     }
 }

@@ -1,5 +1,6 @@
 //! The settings of the view, and how commands change them. After any command the settings can be drawn with the current volume.
 
+mod body_marks;
 mod curving;
 mod cutting;
 mod history;
@@ -61,6 +62,8 @@ pub struct Controls {
     kept_side: KeptSide,
     /// Of the brush, mm.
     brush_radius: f64,
+    /// The index of the body mark that controls are about.
+    body_mark: usize,
 }
 
 impl Controls {
@@ -80,6 +83,7 @@ impl Controls {
             outline: Vec::new(),
             kept_side: KeptSide::default(),
             brush_radius: cutting::BRUSH_RADIUS,
+            body_mark: 0,
         }
     }
 
@@ -91,13 +95,10 @@ impl Controls {
         self.tool
     }
 
-    /// Restores the settings of the start, except for the size of the picture and the measurements.
+    /// Restores the settings of the start, except for the size of the picture and what is drawn over it.
     pub(super) fn reset(&mut self) {
-        let again = Settings {
-            picture: self.settings.picture.clone(),
-            measure: self.settings.measure.clone(),
-            ..self.start.clone()
-        };
+        let again = Settings { picture: self.settings.picture.clone(), ..self.start.clone() };
+        let again = again.with_drawings_of(&self.settings);
         let before = std::mem::replace(&mut self.settings, again);
         if before != self.settings {
             self.history.record(before, &Command::Reset);
@@ -130,7 +131,7 @@ impl Controls {
             if settings == self.settings || scene.is_some_and(|now| !can_draw(now, &settings)) {
                 continue;
             }
-            let is_marks = Settings { measure: self.settings.measure.clone(), ..settings.clone() } == self.settings;
+            let is_marks = settings.clone().with_drawings_of(&self.settings) == self.settings;
             if !settings.mode.is_flat() {
                 self.rendered = settings.mode;
             }
@@ -245,6 +246,7 @@ impl Controls {
             | Command::SaveWorkspace
             | Command::OpenFiles
             | Command::OpenFile(_)
+            | Command::Turntable
             | Command::Exports
             | Command::Export(_)
             | Command::CancelExport
@@ -257,7 +259,7 @@ impl Controls {
             | Command::RestorePresets => return Change::Caller(*command),
             _ => {}
         }
-        if let Some(change) = self.measure(command) {
+        if let Some(change) = self.measure(command).or_else(|| self.mark_body(command)) {
             return change;
         }
         // The scene lags behind if several commands come between two pictures: each one builds on the settings of the one before.
@@ -288,8 +290,8 @@ impl Controls {
         if scene.settings == self.settings {
             return Some(Cow::Borrowed(scene));
         }
-        // The picture knows nothing of measurements.
-        if (Settings { measure: scene.settings.measure.clone(), ..self.settings.clone() }) == scene.settings {
+        // The picture knows nothing of what is drawn over it.
+        if self.settings.clone().with_drawings_of(&scene.settings) == scene.settings {
             return Some(Cow::Owned(Scene { settings: self.settings.clone(), ..scene.clone() }));
         }
         Scene::new(scene.geometry.clone(), scene.input, self.settings.clone()).ok().map(Cow::Owned)

@@ -2,7 +2,7 @@
 //! bar.
 
 use super::colours::{self, ACCENT, AXES, BACKING, MEASURE, ON_PLANE, OUTLINE, SIDES, START, TEXT, WARNING, WEAK_TEXT};
-use super::{PanelState, SMALL_TEXT, picture_rect};
+use super::{PanelState, SMALL_TEXT, body_marks, picture_rect};
 use crate::measure::overlay;
 use crate::passes::postprocess;
 use crate::scene::marks::{BAR_LENGTHS, TileMarks};
@@ -35,7 +35,7 @@ pub(super) fn paint(ui: &Ui, state: &PanelState, scale: f32) {
     let tiles = || marks.iter().enumerate().map(|(n, tile)| (n, tile, area_of(tile)));
     let tiles = || tiles().filter(|(.., area)| has_room(area, MIN_FOR_SCALE));
     // What tells the sides goes before what tells sizes: that gives way.
-    let mut taken = Taken::default();
+    let mut taken = Taken(body_marks::areas(state, scale));
     tiles().for_each(|(_, tile, area)| sides(&painter, &mut taken, area, tile));
     if let Some(origin) = state.origin {
         // Between the letter of the upper edge and a marker in the corner; in a narrow picture further down.

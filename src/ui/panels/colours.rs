@@ -41,6 +41,8 @@ pub(in crate::ui) const OUTLINE: Color32 = Color32::from_black_alpha(225);
 pub(in crate::ui) const BACKING: Color32 = Color32::from_black_alpha(190);
 /// The letters of the patient's sides.
 pub(in crate::ui) const SIDES: Color32 = Color32::WHITE;
+/// The body of a body mark.
+pub(in crate::ui) const BODY: Color32 = Color32::from_gray(235);
 /// The letter of a plane, on the plane's colour.
 pub(in crate::ui) const ON_PLANE: Color32 = Color32::BLACK;
 /// Measurements: yellow, which no tissue has and every kind of colour vision sees on grey. Plane A has a similar yellow; a measurement has crosses at its points

@@ -7,7 +7,7 @@ use super::colours::{
 use super::names::{self, Tell};
 use super::widgets::{front, slider, switch};
 use super::{PanelState, TEXT_SIZE, TOUCH_SIZE, heading};
-use super::{measures, tools};
+use super::{body_marks, measures, tools};
 use crate::scene::{ColourMap, Layout, Mode, PlaneName, Settings, Transfer, TransferName};
 use crate::ui::cine_player::{CineState, SPEEDS};
 use crate::ui::command::{Command, Tool};
@@ -83,6 +83,11 @@ pub(super) fn show_modes(ui: &mut Ui, state: &PanelState, width: f32, execute: &
                 let is_there = |v| state.scene.is_some_and(|scene| view::is_seen_from(scene, v));
                 row.titled(texts::VIEW_FROM)
                     .show(ui, &names::VIEWPOINTS, 2, is_there, hints::of_viewpoint, |v| execute(Command::LookFrom(v)));
+                let size = vec2(width - 16.0, TOUCH_SIZE * 0.75);
+                let turntable = Button::selectable(state.is_turning, texts::TURNTABLE).frame_when_inactive(true);
+                if ui.add(turntable.min_size(size)).tell(texts::TURNTABLE_HINT).clicked() {
+                    execute(Command::Turntable);
+                }
             }
             row.titled(texts::DRAG).show(
                 ui,
@@ -123,6 +128,7 @@ pub(super) fn show_modes(ui: &mut Ui, state: &PanelState, width: f32, execute: &
                 measures::show_tools(ui, state, width - 16.0, execute);
             });
             if !state.has_column {
+                body_marks::show(ui, state, width - 16.0, execute);
                 measures::show_results(ui, state, width - 24.0, execute);
             }
             let files = [
@@ -255,6 +261,7 @@ pub(super) fn show_controls(ui: &mut Ui, state: &PanelState, width: f32, execute
             tools::cuts(ui, state, width - 32.0, execute);
             tools::start_line(ui, state, width - 32.0, execute);
             tools::curve(ui, state, width - 32.0, execute);
+            body_marks::show(ui, state, width - 32.0, execute);
             heading(ui, texts::CONTROLS);
             let in_front = FRONT.map(|(name, sliders)| (name, front(sliders, settings)));
             let with_cuts = tools::depth_of_cut(state);

@@ -72,6 +72,17 @@ fn add(clip: Area, shape: &Shape, found: &mut Vec<Drawn>) {
         Shape::LineSegment { points, stroke } => {
             Kind::Line { ends: points.map(Into::into), width: stroke.width, colour: stroke.color.to_array() }
         }
+        // A line of several pieces.
+        Shape::Path(path) if !path.closed && path.fill == egui::Color32::TRANSPARENT => {
+            let egui::epaint::ColorMode::Solid(colour) = path.stroke.color else { return };
+            let line = |ends: &[egui::Pos2]| Kind::Line {
+                ends: [ends[0], ends[1]].map(Into::into),
+                width: path.stroke.width,
+                colour: colour.to_array(),
+            };
+            found.extend(path.points.windows(2).map(|ends| Drawn { clip, kind: line(ends) }));
+            return;
+        }
         Shape::Path(path) => {
             Kind::Polygon { corners: path.points.iter().map(|p| (*p).into()).collect(), fill: path.fill.to_array() }
         }

@@ -4,6 +4,7 @@ use super::colours::{ACCENT, PANEL, WEAK_TEXT};
 use super::names::{self, Tell};
 use super::overlays::LOW_WINDOW;
 use super::{SMALL_TEXT, TOUCH_SIZE};
+use crate::progress_lines::Progress;
 use crate::ui::command::Command;
 use crate::ui::texts;
 use crate::ui::volume_export::FORMATS;
@@ -31,9 +32,18 @@ pub(super) fn show_files(ui: &Ui, files: (&str, &[String]), execute: &mut dyn Fn
     list.show(ui, entries, |n, execute| execute(Command::OpenFile(n)), |_, _| {}, execute);
 }
 
-/// Shows the formats of an export. `running`: the name of the one in work.
-pub(super) fn show_exports(ui: &Ui, running: Option<&str>, execute: &mut dyn FnMut(Command)) {
-    let about = running.map_or(texts::VOLUME_SHOWN.into(), texts::is_being_exported);
+/// Shows the formats of an export. `running`: the name of the one in work; `progress`: how far it is.
+pub(super) fn show_exports(
+    ui: &Ui,
+    running: Option<&str>,
+    progress: Option<Progress>,
+    execute: &mut dyn FnMut(Command),
+) {
+    let about = match (running, progress) {
+        (Some(name), Some(progress)) => texts::is_exported_so_far(name, progress.done, progress.of),
+        (Some(name), None) => texts::is_being_exported(name),
+        (None, _) => texts::VOLUME_SHOWN.into(),
+    };
     let list =
         List { title: texts::EXPORT, about: &about, close: (texts::CLOSE_EXPORT_HINT, Command::Exports), empty: "" };
     let entries = FORMATS.iter().map(|format| (format.name, format.hint));

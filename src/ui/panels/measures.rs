@@ -53,6 +53,12 @@ pub(super) fn show_tools(ui: &mut Ui, state: &PanelState, width: f32, execute: &
     for (kind, name) in wide {
         button(ui, kind, name, width, execute);
     }
+    let is_on = state.controls.tool() == Tool::BodyMark;
+    let marks = Button::selectable(is_on, texts::BODY_MARK).frame_when_inactive(true);
+    let marks = ui.add(marks.min_size(vec2(width, TOUCH_SIZE * 0.75))).tell(hints::of_tool(Tool::BodyMark));
+    if marks.clicked() {
+        execute(Command::Tool(if is_on { Tool::default() } else { Tool::BodyMark }));
+    }
 }
 
 /// The list of results in this width, points; nothing while there is none.

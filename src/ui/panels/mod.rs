@@ -4,6 +4,7 @@
 //! The theme is dark, so that the picture is the brightest part of the screen, and large enough for gloves and for reading from 2 m.
 
 mod annotations;
+mod body_marks;
 pub(super) mod colours;
 mod controls;
 mod curve;
@@ -24,6 +25,7 @@ use super::command::Command;
 use super::input::{Button, Input, Key, Modifiers, Phase};
 use crate::gpu;
 use crate::passes::unveil::StartLine;
+use crate::progress_lines::Progress;
 use crate::scene::Scene;
 use crate::ui::cine_player::CineState;
 use crate::ui::controls::Controls;
@@ -215,6 +217,7 @@ impl Panels {
                 region::paint(ui, state, self.scale);
                 curve::paint(ui, state, self.scale);
                 measures::paint(ui, state, self.scale);
+                body_marks::paint(ui, state, self.scale);
             }
             if state.shows_times {
                 overlays::show_times(ui, state, self.scale);
@@ -227,7 +230,7 @@ impl Panels {
                 lists::show_files(ui, files, execute);
             }
             if state.shows_exports {
-                lists::show_exports(ui, state.exporting, execute);
+                lists::show_exports(ui, state.exporting, state.export_progress, execute);
             }
             if let Some(shown) = &state.presets {
                 presets::show(ui, shown, &thumbnails, execute);
@@ -411,7 +414,11 @@ pub(super) struct PanelState<'a> {
     /// The list of presets, while it is shown.
     pub(super) presets: Option<PresetsShown<'a>>,
     /// The name of the export in work.
+    /// The view turns by itself.
+    pub(super) is_turning: bool,
     pub(super) exporting: Option<&'a str>,
+    /// How far it is.
+    pub(super) export_progress: Option<Progress>,
     pub(super) is_frozen: bool,
     pub(super) cine: CineState,
     /// True after the first picture.

@@ -230,7 +230,7 @@ fn small(ui: &mut Ui, text: String, colour: Color32) {
 }
 
 /// Gestures on the picture, for the help.
-const GESTURES: [(&str, &str); 16] = [
+const GESTURES: [(&str, &str); 17] = [
     (texts::DRAG_GESTURE, texts::DRAG_DOES),
     (texts::SHIFT_DRAG, texts::SHIFT_DRAG_DOES),
     (texts::CTRL_DRAG, texts::CTRL_DRAG_DOES),
@@ -247,6 +247,7 @@ const GESTURES: [(&str, &str); 16] = [
     (texts::PLANES_CLICK, texts::PLANES_CLICK_DOES),
     (texts::CURVE_CLICKS, texts::CURVE_CLICKS_DO),
     (texts::CURVE_DRAG, texts::CURVE_DRAG_DOES),
+    (texts::BODY_MARK_DRAG, texts::BODY_MARK_DRAG_DOES),
 ];
 
 /// A line of the help: keys or gesture, and what it does.

@@ -69,9 +69,21 @@ pub(super) fn slider(
 }
 
 /// A slider in mm of what is no setting of its own. Returns the value that the user sets.
-pub(super) fn plain_slider(ui: &mut Ui, name: &str, before: f64, [low, high]: [f64; 2], hint: &str) -> Option<f64> {
+pub(super) fn plain_slider(ui: &mut Ui, name: &str, before: f64, range: [f64; 2], hint: &str) -> Option<f64> {
+    scale_slider(ui, name, before, (range, 0.5), texts::millimetres(before), hint)
+}
+
+/// A slider of what is no setting of its own, with its range and its step; `shown`: the value as the user reads it. Returns the value that the user
+/// sets.
+pub(super) fn scale_slider(
+    ui: &mut Ui,
+    name: &str,
+    before: f64,
+    ([low, high], step): ([f64; 2], f64),
+    shown: String,
+    hint: &str,
+) -> Option<f64> {
     let mut value = before.clamp(low, high.max(low));
-    let shown = texts::millimetres(before);
     ui.horizontal(|ui| {
         ui.label(name);
         ui.with_layout(egui::Layout::right_to_left(Align::Center), |ui| {
@@ -80,7 +92,7 @@ pub(super) fn plain_slider(ui: &mut Ui, name: &str, before: f64, [low, high]: [f
     });
     ui.spacing_mut().slider_width = ui.available_width();
     ui.spacing_mut().interact_size.y = TOUCH_SIZE * 0.5;
-    let slider = ui.add(Slider::new(&mut value, low..=high.max(low)).show_value(false).step_by(0.5));
+    let slider = ui.add(Slider::new(&mut value, low..=high.max(low)).show_value(false).step_by(step));
     let slider = slider.tell(hint).named(name).with_value(&shown);
     let is_held = slider.dragged() || slider.clicked() || slider.is_pointer_button_down_on();
     ((is_held || names::asks_for_value(ui, &slider)) && value != before).then_some(value)

@@ -238,6 +238,7 @@ fn a_press_outside_of_the_picture_and_a_lost_focus_drag_nothing() {
         size: [512.0; 2],
         scene: Some(&scene),
         measures: &[],
+        body_marks: &[],
         start_line: &[],
         has_work: false,
         is_covered: true,

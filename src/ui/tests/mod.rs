@@ -1,5 +1,6 @@
 //! Gestures, keys and settings together, without a window; and known answers for what commands change.
 
+mod body_marks;
 mod budget;
 mod clipping;
 mod colours;
@@ -129,6 +130,7 @@ impl TestWindow {
         let size = scene.picture_size().map(|n| f64::from(n) * self.enlarged);
         let has_work = self.controls.work().is_some() || self.controls.line().is_some();
         let measures = self.controls.measures().to_vec();
+        let body_marks = self.controls.body_marks().to_vec();
         let (corner, scene_shown, now) = (self.corner, Some(&scene), self.now);
         let start_line = &self.controls.start_line().to_vec();
         let on = Viewport {
@@ -136,6 +138,7 @@ impl TestWindow {
             size,
             scene: scene_shown,
             measures: &measures,
+            body_marks: &body_marks,
             start_line,
             has_work,
             is_covered: false,

@@ -1,7 +1,7 @@
 //! Property tests: after any sequence of commands and inputs the settings can be drawn, and numbers are finite.
 
 use super::*;
-use crate::scene::{ColourMap, TransferName};
+use crate::scene::{Body, BodyMark, ColourMap, TransferName};
 use crate::ui::command::{HeldKeys, KEY_BINDINGS, Viewpoint};
 use crate::ui::input::Phase;
 use proptest::prelude::*;
@@ -17,7 +17,9 @@ fn mode() -> impl Strategy<Value = Mode> {
 }
 
 fn tool() -> impl Strategy<Value = Tool> {
-    prop::sample::select(vec![Tool::Rotate, Tool::Light, Tool::Region, Tool::Clip, Tool::Cut, Tool::Plane, Tool::Curve])
+    let all =
+        [Tool::Rotate, Tool::Light, Tool::Region, Tool::Clip, Tool::Cut, Tool::Plane, Tool::Curve, Tool::BodyMark];
+    prop::sample::select(all.to_vec())
 }
 
 fn command() -> impl Strategy<Value = Command> {
@@ -27,6 +29,11 @@ fn command() -> impl Strategy<Value = Command> {
         2 => prop::sample::select(vec![Layout::Single, Layout::Four, Layout::Pair]).prop_map(Command::Layout),
         1 => tool().prop_map(Command::Tool),
         1 => two().prop_map(Command::Rotate),
+        1 => prop::sample::select(Body::ALL.to_vec()).prop_map(Command::AddBodyMark),
+        1 => (0usize..6, two(), two(), number(), number()).prop_map(|(n, at, probe, size, angle)| {
+            Command::ChangeBodyMark(n, BodyMark { at, probe, size, angle, ..BodyMark::default() })
+        }),
+        1 => (0usize..6).prop_map(Command::RemoveBodyMark),
         1 => prop::sample::select(vec![Viewpoint::Left, Viewpoint::Top]).prop_map(Command::LookFrom),
         1 => number().prop_map(Command::Roll),
         1 => number().prop_map(Command::Zoom),
@@ -80,6 +87,7 @@ fn is_finite(command: &Command) -> bool {
     let all = |numbers: &[f64]| numbers.iter().all(|n| n.is_finite());
     match command {
         Command::MoveStartHandle(_, n) => all(n),
+        Command::ChangeBodyMark(_, mark) => all(&mark.at) && all(&mark.probe) && all(&[mark.size, mark.angle]),
         Command::AddStartHandle(lateral) => lateral.is_none_or(f64::is_finite),
         Command::Rotate(n) | Command::Pan(n) | Command::MoveLight(n) | Command::RotatePlanes(n) => all(n),
         Command::Roll(n)
@@ -146,18 +154,19 @@ proptest! {
     ) {
         for geometry in geometries() {
             for preset in ["", "fetal", "bone"] {
-                let mut controls = Controls::new(settings(preset, ""));
+                let mut controls = Controls::new(settings(preset, "body_marks=[{at=[0.4,0.5],size=0.5}]"));
                 let Ok(mut shown) = Scene::new(geometry.clone(), BYTES, controls.settings().clone()) else { continue };
                 let (mut gestures, mut keys, mut now) = (Gestures::default(), HeldKeys::default(), Duration::ZERO);
                 for (input, tool, follows) in &inputs {
                     now += Duration::from_millis(30);
                     let scene = Some(&shown).filter(|_| now.as_millis() % 11 != 0);
                     let measures = controls.measures().to_vec();
+                    let body_marks = controls.body_marks().to_vec();
                     let (corner, has_work) = ([60.0, 5.0], controls.work().is_some());
                     let start_line = &controls.start_line().to_vec();
                     let is_covered = !follows;
                     let on =
-                        Viewport { corner, size, scene, measures: &measures, start_line, has_work, is_covered, now };
+                        Viewport { corner, size, scene, measures: &measures, body_marks: &body_marks, start_line, has_work, is_covered, now };
                     let mut commands = gestures.input(input, &on, *tool, keys.modifiers());
                     commands.extend(keys.input(input));
                     for command in commands {

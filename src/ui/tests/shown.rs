@@ -4,6 +4,7 @@ use super::*;
 use crate::live::cine::CineVolume;
 use crate::passes::unveil::StartLine;
 use crate::picture::Picture;
+use crate::progress_lines::Progress;
 use crate::source::phantom::{Phantom, PhantomOptions};
 use crate::ui::cine_player::{CinePlayer, CineState};
 use crate::ui::controls::EXAMS;
@@ -121,7 +122,9 @@ impl Shown {
             asks_to_leave,
             files: self.files.as_ref().map(|(title, names)| (title.as_str(), names.as_slice())),
             shows_exports,
+            is_turning: false,
             exporting: Some("Surface"),
+            export_progress: Some(Progress { done: 12, of: 72 }),
             presets: self.presets.as_ref().map(|(own, naming)| presets(own, naming.as_deref())),
             is_frozen: self.is_frozen,
             cine: self.cine.clone(),

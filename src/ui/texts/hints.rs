@@ -122,6 +122,9 @@ pub fn of_tool(tool: Tool) -> &'static str {
         Tool::Curve => {
             "Curved plane: click the points of a line on A, B or C, then Enter or double click; or drag a straight one. (Shift+C)"
         }
+        Tool::BodyMark => {
+            "Body mark: a part of the body with the place of the probe. Drag it, or the probe on it; the wheel turns the probe. (Shift+B)"
+        }
         Tool::Measure(kind) => of_measure(kind),
     }
 }

@@ -76,6 +76,33 @@ pub fn workspace_not_saved(fault: impl Display) -> String {
     format!("The workspace was not saved: {fault}")
 }
 
+// Body marks.
+pub const BODY_MARK: &str = "Body mark";
+pub fn body_mark(number: impl Display) -> String {
+    format!("Body mark {number}")
+}
+pub const TOO_MANY_BODY_MARKS: &str = "There are as many body marks as a picture can have: remove one first.";
+pub const BODY_MARK_FIRST_STEP: &str = "Choose a part of the body.";
+pub const BODY_MARK_STEP: &str = "Click or drag the probe on it; the wheel turns it. Drag the body to move the mark.";
+pub const MIRRORED: &str = "Mirrored";
+pub const MIRRORED_HINT: &str = "Exchanges left and right: the left breast, the back of the fetus on the other side.";
+pub const TURN_OF_PROBE: &str = "Probe's direction";
+pub const TURN_OF_PROBE_HINT: &str =
+    "Where the marker of the probe points: 0° to the head, -90° to the right side of the patient.";
+pub const PROBE_ACROSS: &str = "Probe across";
+pub const PROBE_DOWN: &str = "Probe down";
+pub const PROBE_ON_BODY_HINT: &str = "Where on the body the probe is, from its middle.";
+pub const SIZE_OF_MARK: &str = "Size";
+pub const SIZE_OF_MARK_HINT: &str = "How large the mark is, of the picture's shorter edge.";
+pub const MARK_ACROSS: &str = "Mark across";
+pub const MARK_DOWN: &str = "Mark down";
+pub const PLACE_OF_MARK_HINT: &str = "Where on the picture the mark is.";
+pub const SELECT_BODY_MARK_HINT: &str = "The controls are about this one.";
+pub const ADD_BODY_MARK: &str = "Add body mark";
+pub const ADD_BODY_MARK_HINT: &str = "One more mark, in another corner of the picture. At most four.";
+pub const REMOVE_BODY_MARK: &str = "Remove body mark";
+pub const REMOVE_BODY_MARK_HINT: &str = "Removes this one (undo brings it back).";
+
 // On the curved plane.
 pub const CURVE_NEEDS_BOTH_ENDS: &str = "A distance on the curved plane needs both of its ends there.";
 pub const CURVE_MEASURES: &str =

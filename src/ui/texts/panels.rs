@@ -157,6 +157,12 @@ pub const VOLUME_SHOWN: &str = "The volume that is shown";
 pub fn is_being_exported(name: impl Display) -> String {
     format!("{name} is being exported")
 }
+pub fn is_exported_so_far(name: impl Display, done: impl Display, of: impl Display) -> String {
+    format!("{name} is being exported: {done} of {of}")
+}
+pub fn export_so_far(name: impl Display, done: impl Display, of: impl Display) -> String {
+    format!("{name}: {done} of {of} (Ctrl+E)")
+}
 pub const CLOSE_EXPORT_HINT: &str = "Exports nothing more.";
 pub const CANCEL_EXPORT_HINT: &str = "Ends the export in work; nothing of it stays.";
 pub const CANCEL_EXPORT: &str = "Cancel the export";
@@ -284,6 +290,8 @@ pub const CURVE_CLICKS: &str = "Curve, then clicks on a plane, Enter";
 pub const CURVE_CLICKS_DO: &str = "curved plane along them; a drag: a straight line";
 pub const CURVE_DRAG: &str = "Curve, then drag a point of the line";
 pub const CURVE_DRAG_DOES: &str = "move it";
+pub const BODY_MARK_DRAG: &str = "Body mark, then drag, click or wheel on it";
+pub const BODY_MARK_DRAG_DOES: &str = "move it; put the probe there; turn the probe";
 pub const QUIT: &str = "quit";
 pub const KEYS: &str = "Keys";
 pub const GESTURES: &str = "Gestures";
@@ -315,6 +323,9 @@ pub const BONE_HINT: &str = "A bright surface under soft tissue.";
 pub const B_MODE: &str = "B-mode";
 pub const B_MODE_HINT: &str = "The scan plane in grey.";
 
+pub const TURNTABLE: &str = "Turntable";
+pub const TURNTABLE_HINT: &str = "The view turns by itself, until you turn it. (Shift+T)";
+pub const NOTHING_TURNS: &str = "The turntable turns renderings: choose Surface, Volume or another of them";
 // The curved plane.
 pub const CURVE_ON_ANOTHER_PLANE: &str =
     "The line was begun on another plane: end it there (Enter), or leave it (Esc).";

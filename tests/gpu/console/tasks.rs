@@ -3,6 +3,7 @@
 
 use super::*;
 use echolume::gpu::RendererOptions;
+use echolume::measure::body_marks::{centre_of, probe_of};
 use echolume::measure::outcome;
 use echolume::passes::{Slot, is_hit};
 use echolume::scene::load::Layers;
@@ -37,6 +38,7 @@ const TASKS: &[(&str, Perform)] = &[
     ("the volume of all bright tissue in the region", bright_tissue),
     ("name a structure", structure),
     ("point at a structure", arrow),
+    ("mark where the probe was", body_mark),
     ("name a measurement", measurement),
     ("correct a caliper", caliper),
     ("take a wrong trace back", wrong_trace),
@@ -451,6 +453,22 @@ fn arrow(user: &mut User) -> String {
     user.types("lip");
     user.key(Key::Enter);
     assert_eq!((user.texts(), user.console.controls().typing()), (vec!["lip".to_string()], None));
+    user.count()
+}
+
+fn body_mark(user: &mut User) -> String {
+    user.shift('b');
+    let button = user.shown(Role::Button, "Fetus, breech").expect("a button");
+    user.click(button);
+    let picture = user.scene().picture_size().map(f64::from);
+    let mark = user.console.controls().body_marks()[0];
+    let [x, y] = centre_of(&mark, picture);
+    let place = [x + 0.2 * mark.size * picture[1], y];
+    user.click(in_window(place));
+    let mark = user.console.controls().body_marks()[0];
+    assert_eq!(mark.body, echolume::scene::Body::FetusBreech);
+    let off = probe_of(&mark, picture);
+    assert!((off[0] - place[0]).hypot(off[1] - place[1]) < 0.1, "{off:?}, {place:?}");
     user.count()
 }
 

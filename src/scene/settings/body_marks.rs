@@ -1,0 +1,93 @@
+//! Settings of body marks: small outlines of a part of the body with the place and the direction of the probe. No pass reads them: the viewer draws
+//! them over the picture, and `render` into the picture that it writes.
+
+use serde::{Deserialize, Serialize};
+
+/// Most body marks of a scene.
+pub const MAX_BODY_MARKS: usize = 4;
+/// Smallest and largest edge of a body mark, as a share of the picture's shorter edge.
+pub const BODY_MARK_SIZES: [f64; 2] = [0.06, 0.5];
+
+/// A body mark. It keeps its place on the picture whatever the view.
+#[derive(Clone, Copy, Debug, PartialEq, Deserialize, Serialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct BodyMark {
+    /// The part of the body.
+    pub body: Body,
+    /// Left and right are exchanged: the left breast, a fetus whose back is on the other side.
+    #[serde(skip_serializing_if = "std::ops::Not::not")]
+    pub mirrored: bool,
+    /// Its centre, as shares of the picture's width and height from the upper left corner, 0..=1. The whole mark stays on the picture.
+    pub at: [f64; 2],
+    /// Its edge, as a share of the picture's shorter edge, 0.06..=0.5.
+    pub size: f64,
+    /// Where on the body the probe is: right and down from the centre of the mark, -1..=1 from edge to edge.
+    pub probe: [f64; 2],
+    /// Where the marker of the probe points, degrees clockwise from up, -360..=360. The body is seen from the front: -90 is its right side.
+    pub angle: f64,
+}
+
+impl Default for BodyMark {
+    fn default() -> BodyMark {
+        BodyMark {
+            body: Body::default(),
+            mirrored: false,
+            at: [0.12, 0.8],
+            size: 0.18,
+            probe: [0.0, 0.0],
+            // Transverse, as most examinations begin.
+            angle: -90.0,
+        }
+    }
+}
+
+/// The part of the body that a body mark shows, seen from the front.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Body {
+    /// The trunk from the ribs to the groins.
+    #[default]
+    Abdomen,
+    /// A pregnant abdomen, the fetus with its head down.
+    FetusCephalic,
+    /// A pregnant abdomen, the fetus with its head up.
+    FetusBreech,
+    /// A pregnant abdomen, the fetus across.
+    FetusTransverse,
+    /// Uterus, tubes and ovaries.
+    Uterus,
+    /// The head of an infant from above, with the great fontanelle; the nose is up.
+    Head,
+    /// Neck and thyroid.
+    Neck,
+    /// The right breast.
+    Breast,
+}
+
+impl Body {
+    /// All parts, in the order of their buttons.
+    pub const ALL: [Body; 8] = [
+        Body::Abdomen,
+        Body::FetusCephalic,
+        Body::FetusBreech,
+        Body::FetusTransverse,
+        Body::Uterus,
+        Body::Head,
+        Body::Neck,
+        Body::Breast,
+    ];
+
+    /// Its name for the user.
+    pub fn title(self) -> &'static str {
+        match self {
+            Body::Abdomen => "Abdomen",
+            Body::FetusCephalic => "Fetus, cephalic",
+            Body::FetusBreech => "Fetus, breech",
+            Body::FetusTransverse => "Fetus, transverse",
+            Body::Uterus => "Uterus",
+            Body::Head => "Infant head",
+            Body::Neck => "Neck",
+            Body::Breast => "Breast",
+        }
+    }
+}

@@ -1,0 +1,81 @@
+//! Body marks: one is added, moved, turned, changed and removed. The last one that was touched is the one that controls are about.
+
+use super::{Change, Controls};
+use crate::scene::{BODY_MARK_SIZES, BodyMark, MAX_BODY_MARKS, Settings};
+use crate::ui::command::Command;
+use crate::ui::texts;
+use crate::ui::view;
+
+/// Where marks are put that are added: the corners of the picture, the one on the lower left first. Shares of the picture.
+const PLACES: [[f64; 2]; MAX_BODY_MARKS] = [[0.12, 0.8], [0.88, 0.8], [0.12, 0.2], [0.88, 0.2]];
+
+impl Controls {
+    /// The body marks, in the order in which they are drawn.
+    pub fn body_marks(&self) -> &[BodyMark] {
+        &self.settings.body_marks
+    }
+
+    /// The body mark that controls are about, and its index.
+    pub fn body_mark(&self) -> Option<(usize, BodyMark)> {
+        let last = self.settings.body_marks.len().checked_sub(1)?;
+        let index = self.body_mark.min(last);
+        Some((index, self.settings.body_marks[index]))
+    }
+
+    /// Applies a command about body marks; none if it is about something else.
+    pub(super) fn mark_body(&mut self, command: &Command) -> Option<Change> {
+        let marks = &self.settings.body_marks;
+        Some(match *command {
+            Command::AddBodyMark(_) if marks.len() >= MAX_BODY_MARKS => Change::Refused(texts::TOO_MANY_BODY_MARKS),
+            Command::AddBodyMark(body) => {
+                let at = PLACES.into_iter().find(|at| marks.iter().all(|mark| mark.at != *at));
+                let new = BodyMark { body, at: at.unwrap_or(PLACES[0]), ..BodyMark::default() };
+                self.body_mark = marks.len();
+                self.change_body_marks(command, |all| all.push(new))
+            }
+            Command::ChangeBodyMark(index, new) => {
+                let Some(valid) = marks.get(index).and_then(|_| checked(new)) else { return Some(Change::Nothing) };
+                let is_same = marks[index] == valid;
+                let was_about = std::mem::replace(&mut self.body_mark, index);
+                match is_same {
+                    true if was_about == index => Change::Nothing,
+                    true => Change::Marks,
+                    false => self.change_body_marks(command, |all| all[index] = valid),
+                }
+            }
+            Command::SelectBodyMark(index) if index < marks.len() => {
+                self.history.seal();
+                self.body_mark = index;
+                Change::Marks
+            }
+            Command::RemoveBodyMark(index) if index < marks.len() => {
+                self.change_body_marks(command, |all| _ = all.remove(index))
+            }
+            Command::SelectBodyMark(_) | Command::RemoveBodyMark(_) => Change::Nothing,
+            _ => return None,
+        })
+    }
+
+    /// Changes the list as a step that can be undone.
+    fn change_body_marks(&mut self, command: &Command, change: impl FnOnce(&mut Vec<BodyMark>)) -> Change {
+        let before: Settings = self.settings.clone();
+        change(&mut self.settings.body_marks);
+        self.history.record(before, command);
+        Change::Marks
+    }
+}
+
+/// A mark within its limits; none if one of its numbers is none.
+fn checked(mark: BodyMark) -> Option<BodyMark> {
+    let BodyMark { at, size, probe, angle, .. } = mark;
+    if !at.iter().chain(&probe).chain([&size, &angle]).all(|number| number.is_finite()) {
+        return None;
+    }
+    Some(BodyMark {
+        at: at.map(|share| share.clamp(0.0, 1.0)),
+        size: size.clamp(BODY_MARK_SIZES[0], BODY_MARK_SIZES[1]),
+        probe: probe.map(|share| share.clamp(-1.0, 1.0)),
+        angle: view::wrap_degrees(angle),
+        ..mark
+    })
+}

@@ -1,0 +1,195 @@
+//! Body marks over the picture, and their controls while their tool is chosen.
+
+use super::colours::{BODY, MEASURE, OUTLINE, SELECTED, TEXT, WEAK_TEXT};
+use super::names::{self, Tell};
+use super::widgets::{scale_slider, switch};
+use super::{PanelState, SMALL_TEXT, TOUCH_SIZE, heading, picture_rect};
+use crate::measure::body_marks::{self, Drawn};
+use crate::scene::{BODY_MARK_SIZES, Body, BodyMark, MAX_BODY_MARKS};
+use crate::ui::command::{Command, Tool};
+use crate::ui::texts;
+use egui::{Button, Label, Painter, Pos2, Rect, RichText, Sense, Stroke, StrokeKind, Ui, WidgetInfo, WidgetType, vec2};
+
+/// Columns of the buttons of parts of the body.
+const COLUMNS: usize = 4;
+
+/// Draws the marks; while their tool is chosen also their squares, the one that controls are about brighter.
+pub(super) fn paint(ui: &Ui, state: &PanelState, scale: f32) {
+    let picture = picture_rect(state, scale);
+    let painter = ui.ctx().layer_painter(egui::LayerId::background()).with_clip_rect(picture);
+    let is_chosen = state.controls.tool() == Tool::BodyMark;
+    let about = state.controls.body_mark().map(|(index, _)| index);
+    for drawn in body_marks::drawn(state.controls.body_marks(), state.picture.1.map(f64::from)) {
+        if is_chosen {
+            let colour = if about == Some(drawn.index) { MEASURE } else { WEAK_TEXT };
+            let edge = vec2(1.0, 1.0) * drawn.edge as f32 / scale;
+            let area = Rect::from_min_size(at(&picture, scale, drawn.corner), edge);
+            painter.rect_stroke(area, 3.0, Stroke::new(1.0, colour), StrokeKind::Inside);
+        }
+        draw(&painter, |place| at(&picture, scale, place), scale, &drawn);
+    }
+}
+
+/// The squares that the marks take from other marks of the picture, points.
+pub(super) fn areas(state: &PanelState, scale: f32) -> Vec<Rect> {
+    let picture = picture_rect(state, scale);
+    let marks = body_marks::drawn(state.controls.body_marks(), state.picture.1.map(f64::from));
+    let area = |drawn: Drawn| {
+        Rect::from_min_size(at(&picture, scale, drawn.corner), vec2(1.0, 1.0) * drawn.edge as f32 / scale)
+    };
+    marks.into_iter().map(area).collect()
+}
+
+fn at(picture: &Rect, scale: f32, [x, y]: [f64; 2]) -> Pos2 {
+    picture.min + vec2(x as f32, y as f32) / scale
+}
+
+/// Draws a mark: the body as a thin line, the probe as a bar with a dot at its marker, all with a dark edge.
+fn draw(painter: &Painter, place: impl Fn([f64; 2]) -> Pos2, scale: f32, drawn: &Drawn) {
+    let edge = drawn.edge as f32 / scale;
+    let width = (edge / 65.0).clamp(1.0, 3.0);
+    let lines: Vec<Vec<Pos2>> =
+        drawn.outline.iter().map(|line| line.iter().map(|point| place(*point)).collect()).collect();
+    for stroke in [Stroke::new(width + 2.0, OUTLINE), Stroke::new(width, BODY)] {
+        lines.iter().for_each(|line| _ = painter.line(line.clone(), stroke));
+    }
+    let [marker, other] = drawn.probe.map(place);
+    for (wider, colour) in [(2.0, OUTLINE), (0.0, MEASURE)] {
+        painter.line_segment([marker, other], Stroke::new(2.0 * width + wider, colour));
+        painter.circle_filled(marker, drawn.dot as f32 / scale + wider / 2.0, colour);
+    }
+}
+
+/// With the tool, what the marks show and where, and what removes them.
+pub(super) fn show(ui: &mut Ui, state: &PanelState, width: f32, execute: &mut dyn FnMut(Command)) {
+    if state.controls.tool() != Tool::BodyMark {
+        return;
+    }
+    let about = state.controls.body_mark();
+    names::group(ui, texts::BODY_MARK, |ui| {
+        heading(ui, texts::BODY_MARK);
+        ui.set_max_width(width);
+        let step = if about.is_some() { texts::BODY_MARK_STEP } else { texts::BODY_MARK_FIRST_STEP };
+        names::group(ui, step, |ui| {
+            names::announce(ui, step, false);
+            ui.add(Label::new(RichText::new(step).size(SMALL_TEXT).color(TEXT)).wrap());
+        });
+        bodies(ui, about, width, execute);
+        let Some((index, mark)) = about else { return };
+        let mut is_mirrored = mark.mirrored;
+        if switch(ui, &mut is_mirrored, texts::MIRRORED, texts::MIRRORED_HINT) {
+            execute(Command::ChangeBodyMark(index, BodyMark { mirrored: is_mirrored, ..mark }));
+        }
+        let whole = |value: f64, unit: &str| format!("{value:.0}{unit}");
+        let mut change = |new: BodyMark| execute(Command::ChangeBodyMark(index, new));
+        let (turn, hint) = (texts::TURN_OF_PROBE, texts::TURN_OF_PROBE_HINT);
+        if let Some(angle) = scale_slider(ui, turn, mark.angle, ([-180.0, 180.0], 5.0), whole(mark.angle, "°"), hint) {
+            change(BodyMark { angle, ..mark });
+        }
+        let percent = |share: f64| whole(share * 100.0, " %");
+        for (axis, name) in [texts::PROBE_ACROSS, texts::PROBE_DOWN].into_iter().enumerate() {
+            let (value, hint) = (mark.probe[axis], texts::PROBE_ON_BODY_HINT);
+            if let Some(value) = scale_slider(ui, name, value, ([-1.0, 1.0], 0.05), percent(value), hint) {
+                let mut probe = mark.probe;
+                probe[axis] = value;
+                change(BodyMark { probe, ..mark });
+            }
+        }
+        let hint = texts::SIZE_OF_MARK_HINT;
+        let size = percent(mark.size);
+        if let Some(size) = scale_slider(ui, texts::SIZE_OF_MARK, mark.size, (BODY_MARK_SIZES, 0.01), size, hint) {
+            change(BodyMark { size, ..mark });
+        }
+        for (axis, name) in [texts::MARK_ACROSS, texts::MARK_DOWN].into_iter().enumerate() {
+            let (value, hint) = (mark.at[axis], texts::PLACE_OF_MARK_HINT);
+            if let Some(value) = scale_slider(ui, name, value, ([0.0, 1.0], 0.01), percent(value), hint) {
+                let mut at = mark.at;
+                at[axis] = value;
+                change(BodyMark { at, ..mark });
+            }
+        }
+        others(ui, state, (index, mark), width, execute);
+    });
+}
+
+/// Buttons with the parts of the body: a press gives the mark that part, or adds the first mark.
+fn bodies(ui: &mut Ui, about: Option<(usize, BodyMark)>, width: f32, execute: &mut dyn FnMut(Command)) {
+    let gap = ui.spacing().item_spacing.x;
+    let edge = ((width - gap * (COLUMNS - 1) as f32) / COLUMNS as f32).min(TOUCH_SIZE);
+    for some in Body::ALL.chunks(COLUMNS) {
+        ui.horizontal(|ui| {
+            for body in some {
+                let is_on = about.is_some_and(|(_, mark)| mark.body == *body);
+                let (area, response) = ui.allocate_exact_size(vec2(edge, edge), Sense::click());
+                let name = body.title();
+                response.widget_info(|| WidgetInfo::selected(WidgetType::SelectableLabel, true, is_on, name));
+                let response = response.tell(name);
+                let visuals = ui.style().interact_selectable(&response, is_on);
+                let painter = ui.painter();
+                let fill = if is_on { SELECTED } else { visuals.weak_bg_fill };
+                painter.rect(area, 4.0, fill, visuals.bg_stroke, StrokeKind::Inside);
+                let inner = area.shrink(edge * 0.1);
+                // As the mark will be: alone in a picture that it fills.
+                let mirrored = about.is_some_and(|(_, mark)| mark.mirrored);
+                let shown = BodyMark { body: *body, mirrored, at: [0.5; 2], size: 1.0, ..BodyMark::default() };
+                for drawn in body_marks::drawn(&[shown], [f64::from(inner.width()); 2]) {
+                    for line in &drawn.outline {
+                        let line = line.iter().map(|place| at(&inner, 1.0, *place)).collect();
+                        painter.line(line, Stroke::new(1.0, visuals.text_color()));
+                    }
+                }
+                if response.clicked() {
+                    execute(match about {
+                        Some((index, mark)) => Command::ChangeBodyMark(index, BodyMark { body: *body, ..mark }),
+                        None => Command::AddBodyMark(*body),
+                    });
+                }
+            }
+        });
+    }
+}
+
+/// The numbers of several marks, and buttons that add one and remove this one.
+fn others(
+    ui: &mut Ui,
+    state: &PanelState,
+    (index, mark): (usize, BodyMark),
+    width: f32,
+    execute: &mut dyn FnMut(Command),
+) {
+    let (count, gap) = (state.controls.body_marks().len(), ui.spacing().item_spacing.x);
+    if count > 1 {
+        let each = vec2((width - gap * (count - 1) as f32) / count as f32, TOUCH_SIZE * 0.65);
+        ui.horizontal(|ui| {
+            for n in 0..count {
+                let name = texts::body_mark(n + 1);
+                let button = Button::selectable(n == index, (n + 1).to_string()).frame_when_inactive(true);
+                if ui.add(button.min_size(each)).tell(texts::SELECT_BODY_MARK_HINT).named(&name).clicked() {
+                    execute(Command::SelectBodyMark(n));
+                }
+            }
+        });
+    }
+    let half = vec2((width - gap) / 2.0, TOUCH_SIZE * 0.75);
+    ui.horizontal(|ui| {
+        for (command, [word, name], is_there, hint) in [
+            (
+                Command::AddBodyMark(mark.body),
+                [texts::ADD, texts::ADD_BODY_MARK],
+                count < MAX_BODY_MARKS,
+                texts::ADD_BODY_MARK_HINT,
+            ),
+            (
+                Command::RemoveBodyMark(index),
+                [texts::REMOVE, texts::REMOVE_BODY_MARK],
+                true,
+                texts::REMOVE_BODY_MARK_HINT,
+            ),
+        ] {
+            let button = ui.add_enabled(is_there, Button::new(word).min_size(half));
+            if button.tell(hint).on_disabled_hover_text(hint).named(name).clicked() {
+                execute(command);
+            }
+        }
+    });
+}
