@@ -5,7 +5,9 @@ pub use super::view::{Face, Viewpoint};
 
 use super::input::{Input, Key, Modifiers};
 use super::sliders::{GAIN, THRESHOLD};
-use crate::scene::{ColourMap, KeptSide, Layout, MeasureKind, Mode, PlaneName, TransferName};
+use crate::scene::{
+    ColourMap, KeptSide, Layout, MeasureKind, Mode, PlaneName, ProbeMarker, Sides, TransferName, VolumeAxis,
+};
 use crate::ui::texts::keys;
 use Key::{Char, Function};
 
@@ -113,6 +115,12 @@ pub enum Command {
     ClearCurve,
     /// Sets a point of the tool's measurement on the curved plane: lateral, depth, elevation, mm.
     PointOnCurve([f64; 3]),
+    /// States the patient's sides at the ends of an axis.
+    Sides(VolumeAxis, Sides),
+    /// Exchanges the letters L and R.
+    ExchangeLeftAndRight,
+    /// States where the marker of the probe is.
+    ProbeMarker(ProbeMarker),
     /// Counts the voxels of the region whose echo reaches the threshold.
     CountVoxels,
     /// Copies the results as CSV.

@@ -88,6 +88,16 @@ impl Settings {
         Settings { ray: Ray { half: true, rays: 1, ..self.ray.clone() }, ..self.clone() }
     }
 
+    /// These settings with what others draw over the picture: measurements, annotations and marks. No pass reads them.
+    pub fn with_drawings_of(self, other: &Settings) -> Settings {
+        Settings { measure: other.measure.clone(), marks: other.marks.clone(), ..self }
+    }
+
+    /// These settings without anything that is drawn over the picture.
+    pub fn without_drawings(self) -> Settings {
+        self.with_drawings_of(&Settings::default())
+    }
+
     /// Changes the mode, and the layout where it does not fit the mode: planes have no layout, and a pair is of mode surface.
     pub fn set_mode(&mut self, mode: Mode) {
         self.mode = mode;

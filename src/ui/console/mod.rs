@@ -679,8 +679,7 @@ impl Console {
 
     /// The settings of a view at rest.
     fn full_settings(&self) -> Settings {
-        // Measurements are drawn over the picture.
-        let mut full = Settings { measure: Vec::new(), ..self.controls.settings().clone() };
+        let mut full = self.controls.settings().clone().without_drawings();
         // A region that grows and a plane that moves show slices that were left out. With all of them processed, dragging needs no frame
         // again.
         let cuts_planes = full.mode.is_flat() || full.layout == Layout::Four;

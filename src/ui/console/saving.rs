@@ -14,7 +14,7 @@ impl Console {
             Some(renderer) => match renderer.end_picture() {
                 Ok(picture) => {
                     let mut scene = renderer.scene().clone();
-                    scene.settings.measure = self.controls.measures().to_vec();
+                    scene.settings = scene.settings.with_drawings_of(self.controls.settings());
                     Ok((picture, scene, renderer.unveiled().cloned()))
                 }
                 Err(fault) => Err(fault.to_string()),

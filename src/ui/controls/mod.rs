@@ -5,6 +5,7 @@ mod cutting;
 mod history;
 mod measuring;
 mod presets;
+mod sides;
 mod starting;
 
 use super::command::{Command, Tool};
@@ -130,7 +131,7 @@ impl Controls {
             if settings == self.settings || scene.is_some_and(|now| !can_draw(now, &settings)) {
                 continue;
             }
-            let is_marks = Settings { measure: self.settings.measure.clone(), ..settings.clone() } == self.settings;
+            let is_marks = settings.clone().with_drawings_of(&self.settings) == self.settings;
             if !settings.mode.is_flat() {
                 self.rendered = settings.mode;
             }
@@ -217,6 +218,7 @@ impl Controls {
             }
             Command::Undo => return self.travel(true, scene),
             Command::Redo => return self.travel(false, scene),
+            Command::Sides(..) | Command::ExchangeLeftAndRight | Command::ProbeMarker(_) => return self.mark_sides(command),
             Command::Freeze
             | Command::StepCine(_)
             | Command::SeekCine(_)
@@ -288,8 +290,8 @@ impl Controls {
         if scene.settings == self.settings {
             return Some(Cow::Borrowed(scene));
         }
-        // The picture knows nothing of measurements.
-        if (Settings { measure: scene.settings.measure.clone(), ..self.settings.clone() }) == scene.settings {
+        // The picture knows nothing of what is drawn over it.
+        if self.settings.clone().with_drawings_of(&scene.settings) == scene.settings {
             return Some(Cow::Owned(Scene { settings: self.settings.clone(), ..scene.clone() }));
         }
         Scene::new(scene.geometry.clone(), scene.input, self.settings.clone()).ok().map(Cow::Owned)

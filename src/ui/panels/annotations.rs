@@ -26,7 +26,7 @@ pub(super) fn paint(ui: &Ui, state: &PanelState, scale: f32) {
         return;
     }
     let painter = ui.ctx().layer_painter(egui::LayerId::background()).with_clip_rect(picture);
-    let marks = scene.marks();
+    let marks = scene.marks_with(&state.controls.settings().marks);
     let area_of = |tile: &TileMarks| {
         let [corner, size] = [tile.corner, tile.size].map(|[x, y]| vec2(x as f32, y as f32) / scale);
         Rect::from_min_size(picture.min + corner, size)

@@ -7,7 +7,7 @@ use super::colours::{
 use super::names::{self, Tell};
 use super::widgets::{front, slider, switch};
 use super::{PanelState, TEXT_SIZE, TOUCH_SIZE, heading};
-use super::{measures, tools};
+use super::{measures, sides, tools};
 use crate::scene::{ColourMap, Layout, Mode, PlaneName, Settings, Transfer, TransferName};
 use crate::ui::cine_player::{CineState, SPEEDS};
 use crate::ui::command::{Command, Tool};
@@ -124,6 +124,7 @@ pub(super) fn show_modes(ui: &mut Ui, state: &PanelState, width: f32, execute: &
             });
             if !state.has_column {
                 measures::show_results(ui, state, width - 24.0, execute);
+                sides::show(ui, state, width - 24.0, execute);
             }
             let files = [
                 (Command::OpenFiles, texts::OPEN, texts::OPEN_HINT),
@@ -316,6 +317,7 @@ pub(super) fn show_controls(ui: &mut Ui, state: &PanelState, width: f32, execute
             if switch(ui, &mut saves_bar, texts::BAR_ON_SAVED_PICTURES, hint) {
                 execute(Command::SavesBar(saves_bar));
             }
+            sides::show(ui, state, width - 32.0, execute);
             ui.add_space(8.0);
             heading(ui, texts::ADVANCED);
             for (group, name) in Group::ALL {

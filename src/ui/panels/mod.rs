@@ -15,6 +15,7 @@ mod names;
 mod overlays;
 mod presets;
 mod region;
+mod sides;
 mod tools;
 mod widgets;
 

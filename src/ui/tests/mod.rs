@@ -13,6 +13,7 @@ mod render_start;
 mod screen_reader;
 mod sequences;
 mod shown;
+mod sides;
 mod start_line;
 
 use super::command::{Command, Face, Tool};

@@ -11,7 +11,7 @@ use crate::ui::panels::{self, Banner, Note};
 use std::collections::{BTreeMap, BTreeSet};
 
 impl Shown {
-    fn key(&mut self, key: Key, shift: bool) -> Vec<Command> {
+    pub(super) fn key(&mut self, key: Key, shift: bool) -> Vec<Command> {
         assert!(self.panels.key(key, Modifiers { shift, ..Modifiers::default() }), "{key:?} is not taken");
         let commands = self.lay_out();
         // The focus moves back with the layout that follows.
@@ -19,7 +19,7 @@ impl Shown {
     }
 
     /// The control of this role and name in the group of this name.
-    fn find(&self, group: &str, role: Role, name: &str) -> NodeId {
+    pub(super) fn find(&self, group: &str, role: Role, name: &str) -> NodeId {
         let all = self.groups();
         let found: Vec<_> =
             all.get(group).into_iter().flatten().filter(|id| is_named(&self.tree[id], role, name)).collect();
@@ -57,7 +57,7 @@ impl Shown {
     }
 
     /// Every control has a name and a role, and no two of a group share both.
-    fn check(&self, what: &str) {
+    pub(super) fn check(&self, what: &str) {
         for (group, members) in self.groups() {
             let mut seen = BTreeSet::new();
             for id in members {

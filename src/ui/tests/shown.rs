@@ -57,7 +57,7 @@ impl Shown {
         let geometry = Geometry::Sweep(phantom.probe(0).clone());
         let mut controls = Controls::new(settings("fetal", toml));
         controls.resize(panels::picture_area(size, scale, true).1);
-        let scene = scene(&geometry, controls.settings());
+        let scene = scene(&geometry, &controls.settings().clone().without_drawings());
         let mut panels = Panels::new(scale);
         panels.describe(true);
         let mut shown = Shown {
@@ -97,7 +97,7 @@ impl Shown {
 
     pub(super) fn apply(&mut self, command: Command) {
         self.controls.apply(&command, Some(&self.scene));
-        self.scene = scene(&self.scene.geometry, self.controls.settings());
+        self.scene = scene(&self.scene.geometry, &self.controls.settings().clone().without_drawings());
         self.settle();
     }
 
@@ -145,7 +145,7 @@ impl Shown {
         for command in &commands {
             self.controls.apply(command, Some(&self.scene));
         }
-        self.scene = scene(&self.scene.geometry, self.controls.settings());
+        self.scene = scene(&self.scene.geometry, &self.controls.settings().clone().without_drawings());
         commands
     }
 

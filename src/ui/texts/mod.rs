@@ -7,10 +7,12 @@ pub mod keys;
 mod measures;
 mod messages;
 mod panels;
+mod sides;
 mod sliders;
 
 pub use exports::*;
 pub use measures::*;
 pub use messages::*;
 pub use panels::*;
+pub use sides::*;
 pub use sliders::*;
