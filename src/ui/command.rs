@@ -173,6 +173,8 @@ pub enum Command {
     /// Saves the volumes of the cine loop as a recording.
     SaveLoop,
     ToggleHelp,
+    /// Closes the hints of the first start.
+    CloseHints,
     /// Starts a search of the help.
     SearchHelp,
     /// Saves pictures with a bar, or without.

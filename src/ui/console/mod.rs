@@ -2,6 +2,7 @@
 //! time and a screen (which may be missing) are passed in, so that everything a window can do is tested without one.
 
 mod brushing;
+mod first_steps;
 mod frame;
 mod input;
 mod measuring;
@@ -10,6 +11,7 @@ mod options;
 mod presets;
 mod saving;
 
+use self::first_steps::FirstSteps;
 use self::frame::LostFluid;
 use self::measuring::Counting;
 use self::opening::Opening;
@@ -120,6 +122,7 @@ pub struct Console {
     shows_exports: bool,
     /// Asks whether to save the loop before leaving.
     asks_to_leave: bool,
+    first_steps: FirstSteps,
     /// Leaves when the loop up to this volume is saved.
     leaves_when_saved: Option<u32>,
     is_full_screen: bool,
@@ -284,6 +287,7 @@ impl Console {
             help_search: None,
             shows_exports: false,
             asks_to_leave: false,
+            first_steps: FirstSteps::new(options.first_steps),
             leaves_when_saved: None,
             is_full_screen: false,
             saved_volume: None,
@@ -460,6 +464,9 @@ impl Console {
     pub fn execute(&mut self, command: &Command, now: Instant) {
         tracing::debug!("{command:?}");
         self.user_acts(now);
+        if self.end_first_steps(command) {
+            return;
+        }
         let before = is_of_tone(command).then(|| self.controls.settings().clone());
         if now.saturating_duration_since(self.last_change) > STEP_PAUSE {
             self.controls.seal();

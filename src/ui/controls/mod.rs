@@ -218,7 +218,9 @@ impl Controls {
             }
             Command::Undo => return self.travel(true, scene),
             Command::Redo => return self.travel(false, scene),
-            Command::Sides(..) | Command::ExchangeLeftAndRight | Command::ProbeMarker(_) => return self.mark_sides(command),
+            Command::Sides(..) | Command::ExchangeLeftAndRight | Command::ProbeMarker(_) => {
+                return self.mark_sides(command);
+            }
             Command::Freeze
             | Command::StepCine(_)
             | Command::SeekCine(_)
@@ -230,6 +232,7 @@ impl Controls {
             | Command::SavePicture
             | Command::SaveLoop
             | Command::ToggleHelp
+            | Command::CloseHints
             | Command::SearchHelp
             | Command::SavesBar(_)
             | Command::ToggleTimes

@@ -337,7 +337,8 @@ pub(super) fn show_controls(ui: &mut Ui, state: &PanelState, width: f32, execute
                     }
                 });
                 // A control in front may have the name of a stage.
-                shown.header_response.expanded(shown.openness > 0.5).named(&texts::advanced_group(name));
+                let header = shown.header_response.expanded(shown.openness > 0.5);
+                header.tell(&texts::advanced_hint(name)).named(&texts::advanced_group(name));
             }
         });
     });

@@ -5,6 +5,7 @@ mod clipping;
 mod colours;
 mod curving;
 mod cutting;
+mod first_steps;
 mod gestures;
 mod layout;
 mod measuring;

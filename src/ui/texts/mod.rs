@@ -2,6 +2,7 @@
 //! panels pass on are of the modules that found them.
 
 mod exports;
+mod first_steps;
 pub mod hints;
 pub mod keys;
 mod measures;
@@ -11,6 +12,7 @@ mod sides;
 mod sliders;
 
 pub use exports::*;
+pub use first_steps::*;
 pub use measures::*;
 pub use messages::*;
 pub use panels::*;

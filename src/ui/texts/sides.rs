@@ -4,7 +4,8 @@ use crate::scene::{ProbeMarker, Sides, VolumeAxis};
 use std::fmt::Display;
 
 pub const SIDES: &str = "Sides";
-pub const SIDES_HINT: &str = "The patient's sides as letters on every tile and in saved pictures, and the probe's marker.";
+pub const SIDES_HINT: &str =
+    "The patient's sides as letters on every tile and in saved pictures, and the probe's marker.";
 pub fn sides_in_short(sides: impl Display) -> String {
     format!("Sides: {sides}")
 }
