@@ -76,7 +76,7 @@
 //!                 let grid = Grid { size: [16, 16, 8], spacing: [1.0; 3], origin: [0.0; 3] };
 //!                 let (forward, backward) = (Geometry::Cartesian(grid), Geometry::Cartesian(grid));
 //!                 let (stored, range) = (StoredType::U8, [0.0, 255.0]);
-//!                 Event::Begin(Box::new(Header { forward, backward, stored, range, posed: false }))
+//!                 Event::Begin(Box::new(Header { forward, backward, stored, range, posed: false, synthetic: false }))
 //!             }
 //!             n @ 2..10 => {
 //!                 let slice = n - 2;

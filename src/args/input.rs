@@ -7,6 +7,7 @@ use crate::files::signals;
 use crate::files::{check_target, replace};
 use crate::gpu::context::list;
 use crate::gpu::{Context, ContextOptions, Deadline, DeviceChoice, GpuError, TexelAccess, device_selection};
+use crate::marked::Demo;
 use crate::probe::Geometry;
 use crate::scene::default_look::block_edge;
 use crate::scene::load::{Layers, LoadError};
@@ -139,6 +140,12 @@ impl InputArgs {
     /// Refuses outputs that would replace an input: the files of the source or of the settings. See [`check_outputs`].
     pub fn check_outputs(&self, outputs: &[Output], source: &dyn Source) -> Result<(), Failure> {
         check_outputs(outputs, self.read_files(source).iter().map(PathBuf::as_path))
+    }
+
+    /// If the volumes are of the phantom: when pictures say so. A workspace is of the viewer, whose pictures always do.
+    pub fn demo(&self, source: &dyn Source) -> Option<Demo> {
+        let is_workspace = self.input.as_deref().is_some_and(workspace::is_named);
+        source.is_synthetic().then_some(if is_workspace { Demo::Always } else { Demo::WithOthers })
     }
 
     /// Every file that is read: of the source and of the settings.

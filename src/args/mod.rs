@@ -18,4 +18,4 @@ pub use picture_series::{PictureSeries, SeriesTarget};
 pub use recording::{GeometryArgs, open_recording};
 pub use source::{SourceArgs, StreamArgs};
 #[cfg(feature = "view")]
-pub use user_files::{pipeline_folder, presets_file, recent_list};
+pub use user_files::{first_steps, pipeline_folder, presets_file, recent_list};

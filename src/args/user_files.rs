@@ -39,6 +39,20 @@ pub fn recent_list() -> Option<PathBuf> {
     RECENT.path(|name| std::env::var_os(name))
 }
 
+/// The file that keeps that the hints of the first start were shown, if this is that start: neither it, nor a list of recent files beside it, nor
+/// presets of the user exist. None too where no list of recent files is kept.
+#[cfg(feature = "view")]
+pub fn first_steps() -> Option<PathBuf> {
+    first_steps_beside(recent_list()?, presets_file())
+}
+
+#[cfg(feature = "view")]
+fn first_steps_beside(recent: PathBuf, presets: Option<PathBuf>) -> Option<PathBuf> {
+    let shown = recent.with_file_name("hints-shown");
+    let is_used = recent.exists() || shown.exists() || presets.is_some_and(|presets| presets.exists());
+    (!is_used).then_some(shown)
+}
+
 impl Place {
     fn path(&self, variable: impl Fn(&str) -> Option<OsString>) -> Option<PathBuf> {
         if let Some(asked) = variable(self.variable) {
@@ -59,6 +73,22 @@ impl Place {
 mod tests {
     use super::*;
     use std::path::Path;
+
+    #[cfg(feature = "view")]
+    #[test]
+    fn only_the_first_start_of_a_user_has_hints() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let [recent, presets] = ["recent", "presets.toml"].map(|name| folder.path().join(name));
+        let shown = folder.path().join("hints-shown");
+        let hints = |presets: Option<&PathBuf>| first_steps_beside(recent.clone(), presets.cloned());
+        assert_eq!(hints(Some(&presets)), Some(shown.clone()));
+        assert_eq!(hints(None), Some(shown.clone()));
+        for file in [&recent, &shown, &presets] {
+            std::fs::write(file, "").expect("written");
+            assert_eq!(hints(Some(&presets)), None, "{}", file.display());
+            std::fs::remove_file(file).expect("removed");
+        }
+    }
 
     #[cfg(all(unix, feature = "view"))]
     #[test]

@@ -261,7 +261,8 @@ impl Convert {
         let mut frame = recording.next_frame().map_err(input)?;
         let is_backward = frame.as_ref().is_some_and(|frame| frame.backward);
         let (forward, backward) = if is_backward { (second, first) } else { (first, second) };
-        let header = Header { forward, backward, stored: recording.stored_type(), range: recording.range(), posed };
+        let (stored, range, synthetic) = (recording.stored_type(), recording.range(), recording.is_synthetic());
+        let header = Header { forward, backward, stored, range, posed, synthetic };
         // A signal ends the process only after the incomplete file is deleted.
         let signals = Writing::begin();
         let mut writer = Writer::create(&self.output, header).map_err(failed)?;

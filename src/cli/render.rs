@@ -140,7 +140,8 @@ impl Render {
             },
         )?;
         let compared = finer.map(|finer| (scene, finer));
-        let shown = marked::as_set(&picture, renderer.scene(), renderer.unveiled()).map_err(failed)?;
+        let shown = marked::as_set(&picture, renderer.scene(), renderer.unveiled(), self.input.demo(&*source))
+            .map_err(failed)?;
         output.write(|format| shown.encoded(format))?;
         if let Some(outcome) =
             renderer.unveiled().map(|unveiled| unveiled.outcome).filter(|outcome| !outcome.is_found())

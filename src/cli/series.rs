@@ -5,7 +5,7 @@ use super::one_colour;
 use crate::args::{InputArgs, PictureSeries, SeriesTarget, check_volume};
 use crate::files::signals::Writing;
 use crate::gpu::{Context, Renderer, RendererOptions};
-use crate::marked;
+use crate::marked::{self, Demo};
 use crate::passes::Slot;
 use crate::plan::Rerun;
 use crate::probe::Probe;
@@ -163,7 +163,8 @@ impl SeriesArgs {
         let bar = progress_bar(views.count() as u64).with_message("pictures");
         let (chosen, rate) = (job.input.volume()?, self.rate.unwrap_or(RATE));
         let written = PictureSeries::new(target, rate);
-        let mut series = Series { views, scene, chosen, signals, bar, written, times: None };
+        let demo = job.input.demo(&*source);
+        let mut series = Series { views, scene, demo, chosen, signals, bar, written, times: None };
         let reopen = || job.input.open_device(job.validate);
         let progress = Cell::new(0);
         let finished = || progress.get();
@@ -231,6 +232,8 @@ struct Series<'a> {
     views: Views,
     /// Of the first picture.
     scene: Scene,
+    /// If the volumes are of the phantom: when pictures say so.
+    demo: Option<Demo>,
     /// The volume of a turn.
     chosen: usize,
     signals: &'a Writing,
@@ -278,7 +281,7 @@ impl Series<'_> {
                 renderer.show(0)?;
             }
             let picture = renderer.picture()?;
-            let shown = marked::as_set(&picture, renderer.scene(), renderer.unveiled())
+            let shown = marked::as_set(&picture, renderer.scene(), renderer.unveiled(), self.demo)
                 .map_err(|e| DrawFault::Source(failed(e)))?;
             // Before the picture is written: a device that is lost here draws it again.
             let why = match one_colour::of(&picture).filter(|_| n == 0) {

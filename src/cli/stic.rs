@@ -6,7 +6,7 @@ use crate::files::signals::Writing;
 use crate::files::{quoted, read_text};
 use crate::probe::Geometry;
 use crate::source::cardiac::{Cycle, CycleOptions, Motion, Rhythm};
-use crate::source::recorder::Writer;
+use crate::source::recorder::{Header, Writer};
 use crate::source::{Frame, Source};
 use crate::terminal::{Failure, failed, input, progress_bar, say};
 use std::path::{Path, PathBuf};
@@ -96,7 +96,7 @@ impl Stic {
         let (count, cycles, height) = (frames.len(), rhythm.cycles(), rhythm.height);
         let options = CycleOptions { phases: self.phases, slices: self.slices };
         let cycle = Cycle::new(&probe, recording.stored_type(), frames, rhythm, rate, options).map_err(at_fault)?;
-        self.write(&cycle, recording.range())?;
+        self.write(&cycle, Header { synthetic: recording.is_synthetic(), ..cycle.header(recording.range()) })?;
         let from = height.map_or("from the R waves".into(), |h| format!("{h:.0} dB above its surroundings"));
         say!("heart rate: {:.1} a minute, {cycles:.1} cycles in {count} frames; {from}", 60.0 / cycle.seconds);
         let (phases, slices) = (cycle.phases, cycle.probe.slices.len());
@@ -156,10 +156,10 @@ impl Stic {
         }
     }
 
-    fn write(&self, cycle: &Cycle, range: [f64; 2]) -> Result<(), Failure> {
+    fn write(&self, cycle: &Cycle, header: Header) -> Result<(), Failure> {
         // A signal ends the process only after the incomplete file is deleted.
         let signals = Writing::begin();
-        let mut writer = Writer::create(&self.output, cycle.header(range)).map_err(failed)?;
+        let mut writer = Writer::create(&self.output, header).map_err(failed)?;
         let bar = progress_bar(cycle.phases as u64).with_message("volumes");
         let mut copy = || {
             for phase in 0..cycle.phases {

@@ -9,7 +9,7 @@ use crate::live::feed::Observer;
 use crate::live::metrics::{LiveMetrics, SourceStatus};
 use crate::live::{Feed, FinishedPicture, Statistics, Step, Stream as Live, StreamError, StreamOptions, Update};
 use crate::machine::resident_bytes;
-use crate::marked;
+use crate::marked::{self, Demo};
 use crate::passes::Slot;
 use crate::passes::unveil::Unveiled;
 use crate::picture;
@@ -152,7 +152,9 @@ impl Stream {
                         remark(&format!("unveil: {}", start.outcome));
                     }
                     was_found = is_found;
-                    let file = self.write_picture(&shown, stream.scene(), start.as_ref(), update, pictures)?;
+                    let is_demo = stream.header().is_some_and(|header| header.synthetic);
+                    let demo = is_demo.then_some(Demo::WithOthers);
+                    let file = self.write_picture(&shown, stream.scene(), start.as_ref(), demo, update, pictures)?;
                     if !explained && let Some(file) = file {
                         explained = explain_one_colour(stream, &shown, &file)?;
                     }
@@ -241,6 +243,7 @@ impl Stream {
         shown: &FinishedPicture,
         scene: Option<&Scene>,
         start: Option<&Unveiled>,
+        demo: Option<Demo>,
         update: Update,
         number: u64,
     ) -> Result<Option<PathBuf>, Failure> {
@@ -251,7 +254,7 @@ impl Stream {
         };
         let file = folder.join(name);
         if let (Some(picture), Some(scene)) = (&shown.picture, scene) {
-            marked::as_set(picture, scene, start).and_then(|picture| picture.save(&file)).map_err(failed)?;
+            marked::as_set(picture, scene, start, demo).and_then(|picture| picture.save(&file)).map_err(failed)?;
         }
         Ok(Some(file))
     }

@@ -2,7 +2,9 @@
 
 use super::view_config::{ConsoleConfig, WindowConfig, rungs};
 use super::view_open::{Opened, Shown};
-use crate::args::{SceneArgs, SourceArgs, StreamArgs, check_outputs, device_failure, presets_file, recent_list};
+use crate::args::{
+    SceneArgs, SourceArgs, StreamArgs, check_outputs, device_failure, first_steps, presets_file, recent_list,
+};
 use crate::error_report::command::parse_nanoseconds;
 use crate::gpu::shader_reload::ShaderFolder;
 use crate::gpu::window::{MonitorChoice, PresentMode};
@@ -232,6 +234,7 @@ impl View {
             origin: Some(source.origin()),
             plays_once: source.plays_once(),
             recent: recent_list().filter(|_| !self.kiosk),
+            first_steps: first_steps().filter(|_| !self.kiosk && !self.no_ui && !self.no_panels),
             presets: presets_file().filter(|_| !self.kiosk),
             update: self.stream.update()?,
             cine: CineLimits { volumes: self.cine as usize, bytes: (self.cine_memory as usize) << 20 },

@@ -111,7 +111,14 @@ mod tests {
 
     fn header() -> Header {
         let grid = Geometry::Cartesian(Grid { origin: [0.0; 3], spacing: [1.0; 3], size: [32, 32, 2] });
-        Header { forward: grid.clone(), backward: grid, stored: StoredType::U8, range: [0.0, 255.0], posed: false }
+        Header {
+            forward: grid.clone(),
+            backward: grid,
+            stored: StoredType::U8,
+            range: [0.0, 255.0],
+            posed: false,
+            synthetic: false,
+        }
     }
 
     fn frame(volume: u32, slice: usize, tissue: u8) -> Frame {

@@ -8,6 +8,7 @@ use crate::passes::unveil::{self, Unveiled};
 use crate::picture::Picture;
 use crate::scene::Scene;
 use crate::scene::marks::TileMarks;
+use crate::source::phantom::DEMO_DATA;
 use plotters::prelude::{BLACK, DrawingBackend, RGBColor, ShapeStyle, WHITE};
 use std::borrow::Cow;
 use std::time::{SystemTime, UNIX_EPOCH};
@@ -27,19 +28,34 @@ pub fn time_line(now: SystemTime) -> String {
     now.replace('T', " ").replace('Z', " UTC")
 }
 
+/// What a written picture is of, where that is no patient but the phantom: when it says so without a bar.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Demo {
+    /// If something else is drawn on it. Otherwise it has the rendered pixels and nothing else.
+    WithOthers,
+    /// Always.
+    Always,
+}
+
 /// A picture of the scene as its settings ask for it to be saved: with its measurements and body marks, and with marks and a bar if `marks.bar` is set. `start`:
-/// where its rendering starts, if that follows the fluid.
+/// where its rendering starts, if that follows the fluid. `demo`: None if the volume may be of a patient.
 ///
 /// # Errors
 /// One line: the picture is not of this scene's size, or the drawing failed.
-pub fn as_set<'a>(picture: &'a Picture, scene: &Scene, start: Option<&Unveiled>) -> Result<Cow<'a, Picture>, String> {
+pub fn as_set<'a>(
+    picture: &'a Picture,
+    scene: &Scene,
+    start: Option<&Unveiled>,
+    demo: Option<Demo>,
+) -> Result<Cow<'a, Picture>, String> {
     let has_lines = scene.has_reference() || scene.has_curve() || start.is_some();
+    let is_annotated = !scene.settings.measure.is_empty() || !scene.settings.body_marks.is_empty();
+    let is_drawn_on = is_annotated || has_lines || demo == Some(Demo::Always);
+    let origin = demo.map(|_| DEMO_DATA);
     match scene.settings.marks.bar {
-        false if scene.settings.clone().without_drawings() == scene.settings && !has_lines => {
-            Ok(Cow::Borrowed(picture))
-        }
-        false => measured(picture, scene, start).map(Cow::Owned),
-        true => marked(picture, scene, start, &time_line(SystemTime::now()), None).map(Cow::Owned),
+        false if !is_drawn_on => Ok(Cow::Borrowed(picture)),
+        false => measured(picture, scene, start, origin).map(Cow::Owned),
+        true => marked(picture, scene, start, &time_line(SystemTime::now()), origin).map(Cow::Owned),
     }
 }
 
@@ -59,7 +75,7 @@ pub fn marked(
         return Err(format!("a picture of {} x {} is no scene of {width} x {height}", picture.width, picture.height));
     }
     let marks = scene.marks();
-    let mut marked = measured(picture, scene, start)?;
+    let mut marked = measured(picture, scene, start, None)?;
     let square = LETTER_SHARE * f64::from(picture.width.min(picture.height));
     let square = square.clamp(LETTER[0], LETTER[1]).round() as u32;
     for tile in &marks {
@@ -73,10 +89,16 @@ pub fn marked(
 }
 
 /// A picture of the scene with its measurements, annotations and body marks, the lines of its reference tile, and the line at which rendering starts.
+/// `origin`: what it shows, small in a corner.
 ///
 /// # Errors
 /// One line: the drawing failed.
-pub fn measured(picture: &Picture, scene: &Scene, start: Option<&Unveiled>) -> Result<Picture, String> {
+pub fn measured(
+    picture: &Picture,
+    scene: &Scene,
+    start: Option<&Unveiled>,
+    origin: Option<&str>,
+) -> Result<Picture, String> {
     let mut measured = picture.clone();
     if [picture.width, picture.height] == scene.picture_size() {
         strokes::slices(&mut measured, scene)?;
@@ -85,7 +107,25 @@ pub fn measured(picture: &Picture, scene: &Scene, start: Option<&Unveiled>) -> R
         strokes::draw(&mut measured, scene)?;
         strokes::body_marks(&mut measured, scene);
     }
+    origin.map_or(Ok(()), |origin| label(&mut measured, origin))?;
     Ok(measured)
+}
+
+/// Writes what the picture is of into its lower left corner; in a narrow one without what stands in brackets.
+fn label(picture: &mut Picture, origin: &str) -> Result<(), String> {
+    let text = text_height(picture.width);
+    let width = |words: &str| ((words.chars().count() as f64 * CHARACTER + 1.0) * f64::from(text)).ceil() as u32;
+    let words = if width(origin) <= picture.width { origin } else { origin.split(" (").next().unwrap_or(origin) };
+    let size = [width(words).min(picture.width), (f64::from(text) * 1.5).ceil() as u32];
+    let glyph = canvas::picture(size, &Glyph::Words(words, text))?;
+    let below = i64::from(picture.height) - i64::from(glyph.height);
+    blend(picture, &glyph, [0, below]);
+    Ok(())
+}
+
+/// Height of the text of a bar or a label, pixels.
+fn text_height(width: u32) -> u32 {
+    (width / 70).clamp(11, 26)
 }
 
 /// Draws the letters and the dot of a tile, where it has room for them.
@@ -139,6 +179,8 @@ enum Glyph<'a> {
     Dot,
     /// The letter of a plane, in a frame: it is no side of the patient.
     Plane(&'a str),
+    /// A text and its height, pixels.
+    Words(&'a str, u32),
 }
 
 impl Drawing for Glyph<'_> {
@@ -152,6 +194,9 @@ impl Drawing for Glyph<'_> {
             Glyph::Plane(letter) => {
                 canvas.boxed([1.0, 1.0, width - 2.0, height - 2.0], ShapeStyle::from(&WHITE).stroke_width(1))?;
                 canvas.text(letter, [width / 2.0, height / 2.0], (height * 0.7) as u32, WHITE, [1, 1])
+            }
+            Glyph::Words(words, text) => {
+                canvas.text(words, [f64::from(*text) * 0.5, height / 2.0], *text, WHITE, [0, 1])
             }
             Glyph::Dot => {
                 canvas.ring([width / 2.0, height / 2.0], (height * 0.3) as i32, ShapeStyle::from(&WHITE).filled())
@@ -171,7 +216,7 @@ struct Bar {
 
 impl Bar {
     fn new(scene: &Scene, marks: &[TileMarks], width: u32, time: &str, origin: Option<&str>) -> Bar {
-        let text = (width / 70).clamp(11, 26);
+        let text = text_height(width);
         let scaled = marks.iter().rev().find(|tile| tile.is_rendering).or(marks.first());
         let has_several = marks.iter().any(|tile| tile.is_rendering) && marks.len() > 1;
         let of = if has_several { " (rendering)" } else { "" };
@@ -296,7 +341,7 @@ mod tests {
     fn measurements_are_drawn_where_they_lie_and_without_a_bar_too() {
         let caliper = "measure=[{ kind = 'distance', points = [[-5, 14.5, 0], [5, 14.5, 0]] }]";
         let scene = scene(&["mode='plane'", caliper]);
-        let drawn = measured(&grey([120, 96]), &scene, None).expect("drawn");
+        let drawn = measured(&grey([120, 96]), &scene, None, None).expect("drawn");
         assert_eq!((drawn.width, drawn.height), (120, 96));
         // The middle of the line is in the middle of the plane.
         let middle = 4 * (48 * 120 + 60) as usize;
@@ -317,9 +362,9 @@ mod tests {
         ] {
             let measure = format!("measure=[{{ kind = '{kind}', points = {points}, text = 'lip' }}]");
             let grey = grey([120, 96]);
-            let drawn = as_set(&grey, &scene(&["mode='plane'", &measure]), None).expect("drawn");
+            let drawn = as_set(&grey, &scene(&["mode='plane'", &measure]), None, None).expect("drawn");
             assert!(is_marked(&drawn, at) && !is_marked(&drawn, [0.1, 0.1]), "{kind}");
-            assert_ne!(*as_set(&grey, &plain, None).expect("drawn"), *drawn, "{kind}");
+            assert_ne!(*as_set(&grey, &plain, None, None).expect("drawn"), *drawn, "{kind}");
         }
     }
 
@@ -329,7 +374,7 @@ mod tests {
             let mark = "body_marks=[{ body = 'neck', at = [0.75, 0.25], size = 0.4, probe = [0.5, 0.5], angle = 90 }]";
             let scene = scene(&[&format!("mode='{mode}'"), mark]);
             let grey = grey([120, 96]);
-            let drawn = as_set(&grey, &scene, None).expect("drawn");
+            let drawn = as_set(&grey, &scene, None, None).expect("drawn");
             assert_eq!((drawn.width, drawn.height), (120, 96));
             // Edge 38 pixels around (90, 24), and the reach of the probe's dot.
             let at = |n: usize| [(n % 120) as f64 + 0.5, (n / 120) as f64 + 0.5];
@@ -346,6 +391,38 @@ mod tests {
             let dot = 4 * (33 * 120 + 104) as usize;
             assert_eq!(drawn.rgba[dot..dot + 3], strokes::LINE, "{mode}");
         }
+    }
+
+    /// Prevents pictures of the phantom that pass for a patient's, and rendered pixels that are no longer those of the device.
+    #[test]
+    fn pictures_of_demo_data_say_so_unless_they_are_rendered_pixels_alone() {
+        let caliper = "measure=[{ kind = 'distance', points = [[-5, 14.5, 0], [5, 14.5, 0]] }]";
+        let bare = grey([120, 96]);
+        let shown = |lines: &[&str], demo| as_set(&bare, &scene(lines), None, demo).expect("drawn").into_owned();
+        let corner = |picture: &Picture| -> usize {
+            let is_in = |n: usize| n % 120 < 70 && (n / 120) >= 80 && n / 120 < 96;
+            let pixels = picture.rgba.chunks_exact(4).enumerate().filter(|(n, _)| is_in(*n));
+            pixels.filter(|(_, pixel)| pixel[0] > 180).count()
+        };
+        assert_eq!(shown(&["mode='plane'"], Some(Demo::WithOthers)), bare);
+        assert_eq!(shown(&["mode='plane'"], None), bare);
+        for (lines, demo, is_labelled) in [
+            (&["mode='plane'"][..], Some(Demo::Always), true),
+            (&["mode='plane'", caliper], Some(Demo::WithOthers), true),
+            (&["mode='plane'", caliper], None, false),
+        ] {
+            let drawn = shown(lines, demo);
+            assert_eq!((drawn.width, drawn.height), (120, 96));
+            assert_eq!(corner(&drawn) > 40, is_labelled, "{lines:?} {demo:?}: {}", corner(&drawn));
+        }
+        let bar = |demo| shown(&["mode='plane'", "marks.bar=true"], demo);
+        let [with, without] = [bar(Some(Demo::WithOthers)), bar(None)];
+        assert!(with.height > without.height || with.rgba != without.rgba, "the bar says it");
+        assert_eq!((corner(&with), corner(&bar(Some(Demo::Always)))), (0, 0), "and only the bar");
+        // The smallest picture has room for the short words.
+        let mut small = grey([64, 64]);
+        label(&mut small, DEMO_DATA).expect("drawn");
+        assert!(small.rgba.chunks_exact(4).filter(|pixel| pixel[0] > 180).count() > 40);
     }
 
     /// Prevents letters that a bright picture hides: contrast of 4.5 (WCAG 2.2, AA) with what is behind them.

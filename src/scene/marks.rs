@@ -3,11 +3,11 @@
 
 use super::planes::{CURVE_COLOUR, cell, colour};
 use super::region::depth_offset;
-use super::{Layout, Mode, PlaneName, ProbeMarker, Scene};
+use super::{Layout, Marks, Mode, PlaneName, ProbeMarker, Scene};
 use glam::DVec3;
 
-/// Share of an axis that must lie along an edge's normal for its letters to stand there: beyond 45 degrees another axis has them.
-const ALONG: f64 = 0.7;
+/// Directions whose components differ by less are as far from one edge as from the other.
+const SAME: f64 = 1e-6;
 /// Lengths that a scale bar may have, mm.
 pub const BAR_LENGTHS: [f64; 9] = [0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0, 200.0];
 
@@ -65,13 +65,18 @@ pub struct TileMarks {
 impl Scene {
     /// The marks of every tile, in the order of the tiles; a rendering comes last.
     pub fn marks(&self) -> Vec<TileMarks> {
+        self.marks_with(&self.settings.marks)
+    }
+
+    /// The same with other settings of the marks: those of a picture that is shown may be newer than its own.
+    pub fn marks_with(&self, marks: &Marks) -> Vec<TileMarks> {
         let mut all = Vec::new();
         if self.cuts_planes() {
             let sheet = self.sheet();
             all.extend(sheet.tiles.iter().enumerate().map(|(n, tile)| {
                 // Along a line that bends away, left and right are no sides of the patient.
                 let heading = tile.section.as_ref().map_or(tile.plane.right, |section| section.heading());
-                let (letters, probe) = self.sides(heading, tile.plane.down);
+                let (letters, probe) = sides(marks, heading, tile.plane.down);
                 let middle = tile.plane.at.y - depth_offset(&self.geometry);
                 let is_upright = tile.plane.down.y > 0.99;
                 TileMarks {
@@ -94,12 +99,12 @@ impl Scene {
             }));
         }
         if !self.is_flat() {
-            all.push(self.marks_of_rendering());
+            all.push(self.marks_of_rendering(marks));
         }
         all
     }
 
-    fn marks_of_rendering(&self) -> TileMarks {
+    fn marks_of_rendering(&self, marks: &Marks) -> TileMarks {
         let size = self.picture_size();
         let corner = match self.settings.layout {
             Layout::Single => [0, 0],
@@ -111,7 +116,7 @@ impl Scene {
             true => rays.direction_dx.length() * (rays.target - rays.origin).dot(rays.forward),
             false => rays.origin_dx.length(),
         };
-        let (letters, probe) = self.sides(rays.right, -rays.up);
+        let (letters, probe) = sides(marks, rays.right, -rays.up);
         TileMarks {
             corner: corner.map(f64::from),
             size: size.map(f64::from),
@@ -124,33 +129,41 @@ impl Scene {
             along: None,
         }
     }
+}
 
-    /// Letters and the marker's edge of a tile with these directions in space.
-    fn sides(&self, right: DVec3, down: DVec3) -> (Vec<(Edge, &'static str)>, Option<Edge>) {
-        let marks = &self.settings.marks;
-        let high_end = |axis: DVec3| {
-            let [across, along] = [axis.dot(right), axis.dot(down)];
-            match (across.abs() >= ALONG, along.abs() >= ALONG) {
-                (true, _) => Some(if across > 0.0 { Edge::Right } else { Edge::Left }),
-                (_, true) => Some(if along > 0.0 { Edge::Bottom } else { Edge::Top }),
-                _ => None,
-            }
-        };
-        let mut letters: Vec<(Edge, &'static str)> = Vec::new();
-        for (axis, sides) in [(DVec3::X, marks.lateral), (DVec3::Z, marks.elevation), (DVec3::Y, marks.depth)] {
-            let (Some([low, high]), Some(edge)) = (sides.letters(), high_end(axis)) else { continue };
-            if letters.iter().all(|(taken, _)| *taken != edge && *taken != edge.opposite()) {
-                letters.extend([(edge.opposite(), low), (edge, high)]);
-            }
-        }
-        let last = high_end(DVec3::X);
-        let probe = match marks.probe {
-            ProbeMarker::First => last.map(Edge::opposite),
-            ProbeMarker::Last => last,
-            ProbeMarker::Hidden => None,
-        };
-        (letters, probe)
+/// The edges to which a direction of the volume points, on a tile with these directions in space: one, or two that are as near. None if it points
+/// more towards or away from the viewer than to any edge: then it has no side on the picture.
+fn edges_of(axis: DVec3, right: DVec3, down: DVec3) -> Vec<Edge> {
+    let [across, along] = [axis.dot(right), axis.dot(down)];
+    let away = (1.0 - across * across - along * along).max(0.0).sqrt();
+    let nearest = across.abs().max(along.abs());
+    if nearest + SAME < away {
+        return Vec::new();
     }
+    let edges = [
+        (across.abs(), if across > 0.0 { Edge::Right } else { Edge::Left }),
+        (along.abs(), if along > 0.0 { Edge::Bottom } else { Edge::Top }),
+    ];
+    edges.into_iter().filter(|(share, _)| share + SAME >= nearest).map(|(_, edge)| edge).collect()
+}
+
+/// Letters and the marker's edge of a tile with these directions in space.
+fn sides(marks: &Marks, right: DVec3, down: DVec3) -> (Vec<(Edge, &'static str)>, Option<Edge>) {
+    let mut letters: Vec<(Edge, &'static str)> = Vec::new();
+    for (axis, sides) in [(DVec3::X, marks.lateral), (DVec3::Z, marks.elevation), (DVec3::Y, marks.depth)] {
+        let Some([low, high]) = sides.letters() else { continue };
+        let is_free = |edge: &Edge| letters.iter().all(|(taken, _)| taken != edge && *taken != edge.opposite());
+        if let Some(edge) = edges_of(axis, right, down).into_iter().find(is_free) {
+            letters.extend([(edge.opposite(), low), (edge, high)]);
+        }
+    }
+    let last = edges_of(DVec3::X, right, down).first().copied();
+    let probe = match marks.probe {
+        ProbeMarker::First => last.map(Edge::opposite),
+        ProbeMarker::Last => last,
+        ProbeMarker::Hidden => None,
+    };
+    (letters, probe)
 }
 
 impl PlaneName {
@@ -207,6 +220,7 @@ impl Mode {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::scene::Sides;
     use crate::scene::load::block;
 
     fn scene(lines: &[&str]) -> Scene {
@@ -227,6 +241,43 @@ mod tests {
         let turned = scene(&[SIDES[0], "mode='plane'", "planes.azimuth=180", "marks.probe='last'"]).marks();
         assert_eq!(turned[0].letters, [(Edge::Right, "R"), (Edge::Left, "L")], "seen from behind");
         assert_eq!(turned[0].probe, Some(Edge::Left));
+    }
+
+    /// Prevents tiles that lose the marker and the letters at some angle within the picture, and letters at an edge to which nothing points.
+    #[test]
+    fn a_direction_has_the_edge_it_points_to_most_unless_it_points_at_the_viewer() {
+        let [x, y] = [DVec3::X, DVec3::Y];
+        let at = |degrees: f64, axis: DVec3| {
+            let (sin, cos) = degrees.to_radians().sin_cos();
+            edges_of(axis, x * cos + y * sin, y * cos - x * sin)
+        };
+        for degrees in 0..360 {
+            let edge = at(f64::from(degrees), x);
+            let expected: &[Edge] = match degrees {
+                45 => &[Edge::Right, Edge::Top],
+                135 => &[Edge::Left, Edge::Top],
+                225 => &[Edge::Left, Edge::Bottom],
+                315 => &[Edge::Right, Edge::Bottom],
+                46..135 => &[Edge::Top],
+                136..225 => &[Edge::Left],
+                226..315 => &[Edge::Bottom],
+                _ => &[Edge::Right],
+            };
+            assert_eq!(edge, expected, "{degrees} degrees in the picture");
+            assert!(at(f64::from(degrees), DVec3::Z).is_empty(), "it points at the viewer");
+        }
+        // Turned in the picture and tilted out of it: the share along the edge decides.
+        let marks = Marks { lateral: Sides::RightLeft, depth: Sides::FrontBack, ..Marks::default() };
+        for roll in [0.0, 30.0, 44.0, 45.0, 46.0, 90.0] {
+            let (sin, cos) = f64::to_radians(roll).sin_cos();
+            let (letters, probe) = super::sides(&marks, x * cos + y * sin, y * cos - x * sin);
+            assert_eq!((letters.len(), probe.is_some()), (4, true), "{roll}: {letters:?}");
+        }
+        let probe = |lines: &[&str]| scene(lines).marks()[0].probe;
+        assert_eq!(probe(&["camera.azimuth=0"]), Some(Edge::Left));
+        assert_eq!(probe(&["camera.azimuth=40", "camera.roll=30"]), Some(Edge::Left));
+        assert_eq!(probe(&["camera.azimuth=50"]), None, "it points more at the viewer than to an edge");
+        assert_eq!(probe(&["camera.azimuth=90", "camera.roll=45"]), None);
     }
 
     #[test]

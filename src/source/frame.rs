@@ -53,6 +53,9 @@ pub struct Header {
     /// Frames may have poses.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub posed: bool,
+    /// The frames are of the phantom, not of a patient. A recording says so in its frames.
+    #[serde(skip)]
+    pub synthetic: bool,
 }
 
 /// Size of a pose as it is stored, bytes: the upper three rows of a 4 x 4 matrix, row by row, f64.
@@ -180,6 +183,10 @@ pub trait Source: Send {
     fn probe_file(&self) -> Option<&Path> {
         None
     }
+    /// True if the frames are of the phantom, not of a patient.
+    fn is_synthetic(&self) -> bool {
+        false
+    }
     /// When the last frame that was returned had arrived, s on the recorder's clock; None if that was not recorded.
     fn arrival(&self) -> Option<f64> {
         None
@@ -191,8 +198,8 @@ fn header_of<S: Source + ?Sized>(source: &S) -> Header {
     let forward = source.geometry(0);
     let second = if source.volumes() > 1 { source.geometry(1) } else { forward.clone() };
     let (forward, backward) = if goes_back(&forward) { (second, forward) } else { (forward, second) };
-    let posed = source.pose().is_some();
-    Header { forward, backward, stored: source.stored_type(), range: source.range(), posed }
+    let (posed, synthetic) = (source.pose().is_some(), source.is_synthetic());
+    Header { forward, backward, stored: source.stored_type(), range: source.range(), posed, synthetic }
 }
 
 /// True if this geometry is of a backward sweep.

@@ -104,6 +104,7 @@ pub(super) fn read(file: &InputFile) -> Result<Layout, InputError> {
         states_geometry: true,
         poses: Poses::default(),
         times: BTreeMap::new(),
+        synthetic: false,
         remarks,
     };
     layout.check(path, "C000 (size)")?;

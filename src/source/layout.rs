@@ -33,6 +33,8 @@ pub(super) struct Layout {
     pub poses: Poses,
     /// Time stamps by frame, s.
     pub times: BTreeMap<usize, f64>,
+    /// The file says that its samples are of the phantom.
+    pub synthetic: bool,
     /// Remarks for users: title and text. Never a patient field.
     pub remarks: Vec<(String, String)>,
 }

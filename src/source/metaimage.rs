@@ -2,7 +2,9 @@
 
 use super::layout::{Cartesian, Layout, LineOrder, StoredGeometry, extent};
 use super::packed::{Encoding, InputFile, Pixels};
+use super::phantom::DEMO_DATA;
 use super::pixel::{Number, PixelFormat};
+use super::sequence::COMMENT;
 use super::transforms::{Poses, TransformName, matrix};
 use crate::files::{InputError, quoted};
 use crate::probe::file::SLAB;
@@ -83,6 +85,7 @@ pub(super) fn read(file: &InputFile) -> Result<Layout, InputError> {
         states_geometry,
         poses: std::mem::take(&mut header.poses),
         times: header.times.range(..frames).map(|(k, t)| (*k, *t)).collect(),
+        synthetic: header.synthetic,
         remarks,
     };
     find_pixels(file, &header, &mut layout)?;
@@ -300,6 +303,8 @@ struct Header<'a> {
     not_ok: usize,
     /// There are `Seq_` fields: frames in time.
     sequence: bool,
+    /// A comment says that the file is of the phantom. Other comments are skipped.
+    synthetic: bool,
     /// Length up to and including the line of `ElementDataFile`, bytes.
     length: u64,
 }
@@ -316,6 +321,7 @@ impl<'a> Header<'a> {
             poses: Poses::default(),
             not_ok: 0,
             sequence: false,
+            synthetic: false,
             length: 0,
         };
         // Transforms whose status is not OK: the status may stand before its transform.
@@ -341,6 +347,8 @@ impl<'a> Header<'a> {
                 if header.fields.insert(known, value.to_string()).is_some() {
                     return header.fault(known, "is given twice");
                 }
+            } else if key == COMMENT {
+                header.synthetic |= value == DEMO_DATA;
             } else if let Some(of_frame) = key.strip_prefix("Seq_Frame") {
                 header.sequence = true;
                 header.frame_field(of_frame, value, &mut invalid)?;

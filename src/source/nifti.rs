@@ -139,6 +139,7 @@ pub(super) fn read(file: &InputFile) -> Result<Layout, InputError> {
         states_geometry: true,
         poses: Poses::default(),
         times: times(&header, size[2], volumes),
+        synthetic: false,
         remarks,
     };
     let claimed = layout.frame_bytes() * frames;

@@ -108,6 +108,7 @@ pub(super) fn read(file: &InputFile) -> Result<Layout, InputError> {
         states_geometry,
         poses: Poses::default(),
         times: header.times.range(..frames as usize).map(|(k, t)| (*k, *t)).collect(),
+        synthetic: false,
         remarks: Vec::new(),
     };
     find_pixels(file, &header, &mut layout)?;

@@ -211,7 +211,7 @@ impl StreamHeader {
             (None, SampleType::U16 | SampleType::I16) => [0.0, 65535.0],
             (None, SampleType::F32) => return fault("range", "is missing: f32 needs the values that are 0 and 1"),
         };
-        let header = Header { forward, backward, stored: sample.stored(), range, posed };
+        let header = Header { forward, backward, stored: sample.stored(), range, posed, synthetic: false };
         header.check().or_else(|(key, wrong)| fault(key, wrong))?;
         let lines = size[1];
         let lines_at_once = match keys.lines_at_once {

@@ -8,7 +8,7 @@
 //! | 4 | length n of what follows, at most 16 MiB |
 //! | n | JSON of [`Header`]: geometry of forward and backward sweeps, stored type, stored values shown as 0 and 1 |
 //! | 4 | CRC-32 (ISO-HDLC, zlib's) of everything so far |
-//! | ... | frames, each `FRAM`, volume, number, slice, flags (bit 0 backward, bit 1 stamped), length m (six words of 4 in all), time stamp and time of arrival in s (two f64), a pose if the header says `posed`, m bytes of samples, CRC-32 of all preceding bytes of the frame |
+//! | ... | frames, each `FRAM`, volume, number, slice, flags (bit 0 backward, bit 1 stamped, bit 2 of the phantom), length m (six words of 4 in all), time stamp and time of arrival in s (two f64), a pose if the header says `posed`, m bytes of samples, CRC-32 of all preceding bytes of the frame |
 //! | ... | at a clean end: `INDX`, count (4), for each frame its offset (8) and volume (4), CRC-32 of the index, offset of `INDX` (8), `XEND` |
 //!
 //! A pose is the upper three rows of a 4 x 4 matrix, row by row (12 f64; NaN for none): from the space of the geometry, mm, to the world or the
@@ -38,6 +38,12 @@ const INDEX: &[u8; 4] = b"INDX";
 const END: &[u8; 4] = b"XEND";
 /// Length of a frame before its pose, or else its samples, bytes.
 const FRAME_HEAD: usize = 40;
+/// Offset of the flags of a frame, bytes.
+const FLAGS_AT: u64 = 16;
+/// The flags of a frame. Other bits are not read.
+const BACKWARD: u32 = 1;
+const STAMPED: u32 = 1 << 1;
+const SYNTHETIC: u32 = 1 << 2;
 /// Longest header, bytes. It may have tables of lines and slices.
 const MAX_HEADER_BYTES: u32 = 16 << 20;
 
@@ -109,7 +115,10 @@ impl Writer {
         if self.index.last().is_some_and(|(_, volume)| frame.volume < *volume) {
             return fault("volume", format!("is {}, after a later one", frame.volume));
         }
-        let flags = u32::from(frame.backward) | u32::from(frame.time.is_some()) << 1;
+        let flag = |is: bool, flag: u32| if is { flag } else { 0 };
+        let flags = flag(frame.backward, BACKWARD)
+            | flag(frame.time.is_some(), STAMPED)
+            | flag(self.header.synthetic, SYNTHETIC);
         self.frame.clear();
         self.frame.extend(FRAME);
         for word in [frame.volume, frame.number, frame.slice as u32, flags, frame.bytes.len() as u32] {
@@ -270,6 +279,8 @@ impl Reader {
                 replay.volumes.push(n);
             }
         }
+        // All frames say the same of this.
+        replay.header.synthetic = !replay.index.is_empty() && replay.flags(0) & SYNTHETIC != 0;
         Ok(replay)
     }
 
@@ -401,8 +412,8 @@ fn parsed(record: &[u8], posed: bool) -> Option<(Frame, f64)> {
         volume: word(1)?,
         number: word(2)?,
         slice: word(3)? as usize,
-        backward: flags & 1 != 0,
-        time: if flags & 2 != 0 { Some(time(24)?) } else { None },
+        backward: flags & BACKWARD != 0,
+        time: if flags & STAMPED != 0 { Some(time(24)?) } else { None },
         pose,
         bytes: samples.to_vec(),
     };
@@ -456,6 +467,10 @@ impl Source for Reader {
         self.header.clone()
     }
 
+    fn is_synthetic(&self) -> bool {
+        self.header.synthetic
+    }
+
     fn files(&self) -> Vec<PathBuf> {
         vec![self.path.clone()]
     }
@@ -483,12 +498,17 @@ impl Source for Reader {
 impl Reader {
     /// True if a frame was swept backwards; false if it cannot be read.
     fn backward(&self, n: usize) -> bool {
+        self.flags(n) & BACKWARD != 0
+    }
+
+    /// The flags of a frame, read without moving the position; none if it cannot be read.
+    fn flags(&self, n: usize) -> u32 {
         let mut flags = [0; 4];
         let read = File::open(&self.path).and_then(|mut file| {
-            file.seek(SeekFrom::Start(self.index[n].0 + 16))?;
+            file.seek(SeekFrom::Start(self.index[n].0 + FLAGS_AT))?;
             file.read_exact(&mut flags)
         });
-        read.is_ok() && flags[0] & 1 != 0
+        read.map_or(0, |()| u32::from_le_bytes(flags))
     }
 
     /// Where the first of these frames that has a pose places the lattice.

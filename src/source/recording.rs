@@ -498,6 +498,10 @@ impl Source for Recording {
         self.next_frame()
     }
 
+    fn is_synthetic(&self) -> bool {
+        self.layout.synthetic
+    }
+
     fn files(&self) -> Vec<PathBuf> {
         self.files()
     }

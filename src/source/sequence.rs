@@ -1,6 +1,7 @@
 //! Polar frames as a PLUS sequence (.mha), with their geometry in a probe file (NAME.probe.toml).
 
 use super::frame::Source;
+use super::phantom::DEMO_DATA;
 use super::samples::SampleType;
 use crate::files::{InputError, Unfinished};
 use crate::probe::{Geometry, ProbeFile, Volumes};
@@ -10,6 +11,8 @@ use std::path::{Path, PathBuf};
 /// Most frames of one file. Their time stamps are in its header, of which readers accept 1 MiB.
 pub(super) const MAX_FRAMES: usize = 20_000;
 const MAX_HEADER_BYTES: usize = 1 << 20;
+/// The field for remarks of a MetaImage.
+pub(super) const COMMENT: &str = "Comment";
 
 /// A selection of the volumes of a source that a sequence can represent.
 pub struct Sequence {
@@ -52,7 +55,7 @@ impl Sequence {
         let times = kept.iter().flat_map(|v| &v.times).enumerate();
         let times = times.filter_map(|(n, time)| time.map(|t| (n, format!("{t:?}"))));
         let size = [probe.samples, probe.lines.len(), frames * kept.len()];
-        let header = header(size, source.stored_type().into(), "", times);
+        let header = header(size, source.stored_type().into(), &comment(source.is_synthetic()), times);
         if header.len() > MAX_HEADER_BYTES {
             return Err(fault(
                 "time stamps",
@@ -148,6 +151,11 @@ fn volume(source: &mut dyn Source, place: usize) -> Result<Option<CompleteVolume
         volume.times.push(frame.time.filter(|t| t.is_finite()));
     }
     Ok(kept)
+}
+
+/// The line that says that a sequence is of the phantom; empty if it is not.
+pub(super) fn comment(is_synthetic: bool) -> String {
+    if is_synthetic { format!("{COMMENT} = {DEMO_DATA}\n") } else { String::new() }
 }
 
 /// The header of a PLUS sequence. `more`: additional lines. `times`: time stamps by frame, s.

@@ -108,6 +108,7 @@ pub(super) fn read(path: &Path, options: &OpenOptions) -> Result<Layout, InputEr
         states_geometry,
         poses: Poses::default(),
         times: BTreeMap::new(),
+        synthetic: false,
         remarks,
     };
     layout.check(path, "pictures")?;

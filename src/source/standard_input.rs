@@ -97,6 +97,10 @@ impl Source for FromInput {
         self.0.header()
     }
 
+    fn is_synthetic(&self) -> bool {
+        self.0.is_synthetic()
+    }
+
     fn files(&self) -> Vec<PathBuf> {
         // No output can replace what was read.
         self.0.probe_file().map(Path::to_path_buf).into_iter().collect()

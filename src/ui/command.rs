@@ -5,7 +5,9 @@ pub use super::view::{Face, Viewpoint};
 
 use super::input::{Input, Key, Modifiers};
 use super::sliders::{GAIN, THRESHOLD};
-use crate::scene::{Body, BodyMark, ColourMap, KeptSide, Layout, MeasureKind, Mode, PlaneName, TransferName};
+use crate::scene::{
+    Body, BodyMark, ColourMap, KeptSide, Layout, MeasureKind, Mode, PlaneName, ProbeMarker, Sides, TransferName, VolumeAxis,
+};
 use crate::ui::texts::keys;
 use Key::{Char, Function};
 
@@ -122,6 +124,12 @@ pub enum Command {
     /// Chooses the body mark that controls are about.
     SelectBodyMark(usize),
     RemoveBodyMark(usize),
+    /// States the patient's sides at the ends of an axis.
+    Sides(VolumeAxis, Sides),
+    /// Exchanges the letters L and R.
+    ExchangeLeftAndRight,
+    /// States where the marker of the probe is.
+    ProbeMarker(ProbeMarker),
     /// Counts the voxels of the region whose echo reaches the threshold.
     CountVoxels,
     /// Copies the results as CSV.
@@ -174,6 +182,8 @@ pub enum Command {
     /// Saves the volumes of the cine loop as a recording.
     SaveLoop,
     ToggleHelp,
+    /// Closes the hints of the first start.
+    CloseHints,
     /// Starts a search of the help.
     SearchHelp,
     /// Saves pictures with a bar, or without.

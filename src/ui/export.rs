@@ -212,7 +212,8 @@ mod tests {
     fn job() -> Job {
         let grid = Grid { size: [1; 3], spacing: [1.0; 3], origin: [0.0; 3] };
         let (forward, backward) = (Geometry::Cartesian(grid), Geometry::Cartesian(grid));
-        let header = Header { forward, backward, stored: StoredType::U8, range: [0.0, 255.0], posed: false };
+        let header =
+            Header { forward, backward, stored: StoredType::U8, range: [0.0, 255.0], posed: false, synthetic: false };
         let volumes = vec![CineVolume::default()];
         Job { format: FORMATS[0], header, volumes, rate: 1.0, settings: Settings::default(), device: String::new() }
     }

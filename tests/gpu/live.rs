@@ -66,6 +66,7 @@ pub fn header(share: f64) -> Header {
         stored: StoredType::U8,
         range: [0.0, 255.0],
         posed: false,
+        synthetic: false,
     }
 }
 

@@ -168,7 +168,14 @@ fn pictures_with_poses_become_a_volume_in_the_tracker_s_space() {
 
 fn header(posed: bool) -> Header {
     let geometry = Geometry::Cartesian(Grid { size: [4, 3, 2], spacing: [1.0; 3], origin: [0.0, 5.0, 0.0] });
-    Header { forward: geometry.clone(), backward: geometry, stored: StoredType::U8, range: [0.0, 255.0], posed }
+    Header {
+        forward: geometry.clone(),
+        backward: geometry,
+        stored: StoredType::U8,
+        range: [0.0, 255.0],
+        posed,
+        synthetic: false,
+    }
 }
 
 /// A file without poses has the bytes that it had before there were any, and a damaged frame hides none of those with poses.
@@ -295,7 +302,8 @@ fn pictures_that_are_left_out_are_counted_on_few_lines() {
     let [x, y] = SIZE;
     let grid = Grid { size: [x, y, 1], spacing: [SPACING[0], SPACING[1], 1.0], origin: ORIGIN };
     let (forward, backward) = (Geometry::Cartesian(grid), Geometry::Cartesian(grid));
-    let header = Header { forward, backward, stored: StoredType::F32, range: [0.0, 900.0], posed: true };
+    let header =
+        Header { forward, backward, stored: StoredType::F32, range: [0.0, 900.0], posed: true, synthetic: false };
     let begun = || {
         let mut stream = Posed::new(CompoundingOptions::default());
         assert!(stream.take(Event::Begin(Box::new(header.clone()))).is_empty());

@@ -29,6 +29,7 @@ fn header() -> Header {
         stored: StoredType::U16,
         range: [3.0, 60_000.0],
         posed: false,
+        synthetic: false,
     }
 }
 

@@ -19,6 +19,50 @@ pub struct Marks {
     pub bar: bool,
 }
 
+impl Marks {
+    /// The patient's sides along an axis of the volume.
+    pub fn sides(&self, axis: VolumeAxis) -> Sides {
+        match axis {
+            VolumeAxis::Lateral => self.lateral,
+            VolumeAxis::Depth => self.depth,
+            VolumeAxis::Elevation => self.elevation,
+        }
+    }
+
+    /// These marks with other sides along an axis. A pair of sides lies along one axis: another axis that had it has none then.
+    pub fn with_sides(mut self, axis: VolumeAxis, sides: Sides) -> Marks {
+        for other in [&mut self.lateral, &mut self.depth, &mut self.elevation] {
+            if *other == sides || *other == sides.exchanged() {
+                *other = Sides::None;
+            }
+        }
+        *match axis {
+            VolumeAxis::Lateral => &mut self.lateral,
+            VolumeAxis::Depth => &mut self.depth,
+            VolumeAxis::Elevation => &mut self.elevation,
+        } = sides;
+        self
+    }
+
+    /// These marks with L in place of R, and R in place of L.
+    pub fn left_and_right_exchanged(mut self) -> Marks {
+        for sides in [&mut self.lateral, &mut self.depth, &mut self.elevation] {
+            if matches!(sides, Sides::LeftRight | Sides::RightLeft) {
+                *sides = sides.exchanged();
+            }
+        }
+        self
+    }
+}
+
+/// An axis of the volume.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum VolumeAxis {
+    Lateral,
+    Depth,
+    Elevation,
+}
+
 /// Where the marker of the probe is.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize)]
 #[serde(rename_all = "kebab-case")]
@@ -54,6 +98,19 @@ pub enum Sides {
 }
 
 impl Sides {
+    /// The same sides, each at the other end.
+    pub fn exchanged(self) -> Sides {
+        match self {
+            Sides::None => Sides::None,
+            Sides::LeftRight => Sides::RightLeft,
+            Sides::RightLeft => Sides::LeftRight,
+            Sides::HeadFeet => Sides::FeetHead,
+            Sides::FeetHead => Sides::HeadFeet,
+            Sides::FrontBack => Sides::BackFront,
+            Sides::BackFront => Sides::FrontBack,
+        }
+    }
+
     /// The letters at the two ends of the axis.
     pub fn letters(self) -> Option<[&'static str; 2]> {
         Some(match self {

@@ -92,9 +92,10 @@ impl Settings {
         Settings { ray: Ray { half: true, rays: 1, ..self.ray.clone() }, ..self.clone() }
     }
 
-    /// These settings with what others draw over the picture: measurements, annotations and body marks. No pass reads them.
+    /// These settings with what others draw over the picture: measurements, annotations, body marks and marks. No pass reads them.
     pub fn with_drawings_of(self, other: &Settings) -> Settings {
-        Settings { measure: other.measure.clone(), body_marks: other.body_marks.clone(), ..self }
+        let (measure, body_marks) = (other.measure.clone(), other.body_marks.clone());
+        Settings { measure, body_marks, marks: other.marks.clone(), ..self }
     }
 
     /// These settings without anything that is drawn over the picture.

@@ -77,7 +77,14 @@ impl Cycle {
     /// The header of a recording of the volumes; `range`: stored values that are shown as 0 and 1.
     pub fn header(&self, range: [f64; 2]) -> Header {
         let geometry = crate::probe::Geometry::Sweep(self.probe.clone());
-        Header { forward: geometry.clone(), backward: geometry, stored: self.stored, range, posed: false }
+        Header {
+            forward: geometry.clone(),
+            backward: geometry,
+            stored: self.stored,
+            range,
+            posed: false,
+            synthetic: false,
+        }
     }
 
     /// The frames of a volume of the cycle, 0..phases, by slice. All have the time of the phase.

@@ -63,6 +63,7 @@ pub(super) fn layout(
         states_geometry: has_spacing,
         poses: Poses::default(),
         times,
+        synthetic: false,
         remarks,
     };
     if let Some(direct) = direct {

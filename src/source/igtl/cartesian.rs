@@ -98,7 +98,14 @@ impl CartesianVolume {
 
     pub(super) fn header(&self) -> Header {
         let geometry = Geometry::Cartesian(self.grid);
-        Header { forward: geometry.clone(), backward: geometry, stored: self.stored, range: self.range, posed: true }
+        Header {
+            forward: geometry.clone(),
+            backward: geometry,
+            stored: self.stored,
+            range: self.range,
+            posed: true,
+            synthetic: false,
+        }
     }
 
     /// A slice; None beyond the last.

@@ -362,7 +362,7 @@ impl TrackedImages {
     fn header(&self) -> Option<Header> {
         let geometry = Geometry::Cartesian(self.sweep.lattice()?.grid);
         let (forward, backward, stored) = (geometry.clone(), geometry, self.sweep.stored());
-        Some(Header { forward, backward, stored, range: self.range, posed: true })
+        Some(Header { forward, backward, stored, range: self.range, posed: true, synthetic: false })
     }
 
     /// Where the volume lies (LPS). The space of trackers is RAS in this protocol, that of images is stated.

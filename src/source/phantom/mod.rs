@@ -74,6 +74,9 @@ impl Speckle {
     }
 }
 
+/// What pictures of the phantom say of themselves, and recordings where their format has a comment.
+pub const DEMO_DATA: &str = "Demo data (phantom)";
+
 /// What to simulate.
 #[derive(Clone, Debug, PartialEq)]
 pub struct PhantomOptions {
@@ -307,7 +310,7 @@ fn header(phantom: &Phantom) -> String {
     let options = phantom.options();
     let probe = phantom.probe(0);
     let frames = options.frames * phantom.volumes();
-    let mut more = String::new();
+    let mut more = sequence::comment(true);
     if phantom.volumes() == 1 && options.speed_ratio == 0.0 {
         // Metres and radians. Writing to a String cannot fail.
         let _ = write!(

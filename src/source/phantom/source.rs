@@ -80,6 +80,10 @@ impl Source for CachedPhantom {
         self.phantom.options().frames
     }
 
+    fn is_synthetic(&self) -> bool {
+        true
+    }
+
     fn skip_to_volume(&mut self, volume: usize) -> Result<(), InputError> {
         self.next = (volume, 0);
         Ok(())
@@ -115,6 +119,10 @@ impl Source for PhantomSource {
         self.phantom.options().frames
     }
 
+    fn is_synthetic(&self) -> bool {
+        true
+    }
+
     fn skip_to_volume(&mut self, volume: usize) -> Result<(), InputError> {
         self.waiting.clear();
         self.next = volume;
@@ -134,6 +142,9 @@ impl Source for PhantomSource {
 mod tests {
     use super::*;
     use crate::source::phantom::PhantomOptions;
+    use crate::source::recorder::Writer;
+    use crate::source::sequence::Sequence;
+    use crate::source::{self, Header};
 
     fn all(source: &mut dyn Source) -> Vec<Frame> {
         std::iter::from_fn(|| source.next_frame().expect("frames")).collect()
@@ -166,5 +177,45 @@ mod tests {
             let (a, b) = (all(&mut cached), all(&mut plain));
             assert!(a == b && a.len() == 16);
         }
+    }
+
+    /// Prevents recordings of the phantom that pass for a patient's, and bytes of other recordings that change.
+    #[test]
+    fn recordings_of_the_phantom_say_so() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let [sweep, copy, frames, other] =
+            ["sweep.mha", "copy.mha", "sweep.frames", "other.frames"].map(|name| folder.path().join(name));
+        let options = PhantomOptions { frames: 4, lines: 8, samples: 64, ..PhantomOptions::default() };
+        let phantom = Phantom::new(options).expect("options");
+        phantom.write(&sweep).expect("written");
+        let text = String::from_utf8_lossy(&std::fs::read(&sweep).expect("the file")).into_owned();
+        assert!(text.contains("\nComment = Demo data (phantom)\n"));
+        let opened = |path: &std::path::Path| source::open(path, None).expect("a recording");
+        assert!(opened(&sweep).is_synthetic());
+        // Frames as they arrive, of the phantom and of what is the same but for its origin.
+        let mut source = PhantomSource::new(phantom);
+        let kept = all(&mut source);
+        let write = |path: &std::path::Path, header: Header| {
+            let mut writer = Writer::create(path, header).expect("created");
+            kept.iter().for_each(|frame| writer.frame(frame, 0.0).expect("appended"));
+            writer.finish().expect("finished");
+        };
+        write(&frames, source.header());
+        write(&other, Header { synthetic: false, ..source.header() });
+        assert_eq!([opened(&frames), opened(&other)].map(|source| source.is_synthetic()), [true, false]);
+        assert_eq!(opened(&frames).header(), source.header());
+        let same = all(&mut *opened(&frames)) == all(&mut *opened(&other));
+        assert!(same, "the frames are the same");
+        // And as a sequence again.
+        let mut recorded = opened(&frames);
+        let sequence = Sequence::of(&mut *recorded, &frames).expect("a sequence");
+        sequence.write(&mut *recorded, &copy, || ()).expect("written");
+        assert!(opened(&copy).is_synthetic());
+        // Other comments say nothing of the kind, and may be there twice.
+        let mut bytes = std::fs::read(&sweep).expect("the file");
+        let at = text.find("Demo data (phantom)").expect("the comment");
+        bytes.splice(at..at + 19, *b"Frame 3\nComment = x");
+        std::fs::write(&copy, bytes).expect("written");
+        assert!(!opened(&copy).is_synthetic());
     }
 }

@@ -363,7 +363,9 @@ impl Console {
             }
         }
         self.blank_since = None;
-        let panels = self.fixed.overlay.then(|| self.lay_out_panels(now, has_drawn));
+        // Demo data is named even where there are no panels.
+        let is_laid_out = self.fixed.overlay || self.origin().is_some();
+        let panels = is_laid_out.then(|| self.lay_out_panels(now, has_drawn));
         if !self.fixed.overlay && !has_drawn && self.screen.as_ref().is_some_and(|s| s.shown() > 0) {
             self.needs_redraw = false;
             return Ok(());
@@ -434,6 +436,8 @@ impl Console {
 
     /// Lays out the panels and executes the commands that they give.
     fn lay_out_panels(&mut self, now: Instant, has_drawn: bool) -> gpu::window::Panels {
+        let banner = self.banner(now);
+        let shows_first_steps = self.shows_first_steps(has_drawn && banner.is_none());
         let notes: Vec<_> =
             self.export_note().into_iter().chain(self.notes.iter().map(|(_, note)| note.clone())).collect();
         let quality = frame_budget::label(self.quality, &self.rungs);
@@ -443,6 +447,7 @@ impl Console {
             (_, false) => String::new(),
         };
         let state = PanelState {
+            shows_first_steps,
             controls: &self.controls,
             scene: self.stream.scene(),
             times: &self.times,
@@ -460,14 +465,15 @@ impl Console {
             shows_times: self.shows_times,
             help_search: self.help_search.as_deref(),
             saves_bar: self.saves_bar,
-            origin: self.fixed.source.origin(),
+            origin: self.origin(),
+            shows_only_origin: !self.fixed.overlay,
             asks_to_leave: self.asks_to_leave,
             is_frozen: self.stream.is_frozen(),
             cine: self.player.state(self.stream.cine().volumes(), self.stream.cine_position()),
             has_drawn,
             quality,
             budget: self.pace.budget(),
-            banner: self.banner(now),
+            banner,
             notes: &notes,
             exit_key: &exit_key,
             start_lines: &self.start_lines,

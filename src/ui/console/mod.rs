@@ -2,6 +2,7 @@
 //! time and a screen (which may be missing) are passed in, so that everything a window can do is tested without one.
 
 mod brushing;
+mod first_steps;
 mod frame;
 mod input;
 mod measuring;
@@ -11,6 +12,7 @@ mod presets;
 mod saving;
 mod turning;
 
+use self::first_steps::FirstSteps;
 use self::frame::LostFluid;
 use self::measuring::Counting;
 use self::opening::Opening;
@@ -127,6 +129,7 @@ pub struct Console {
     export_progress: Option<Progress>,
     /// Asks whether to save the loop before leaving.
     asks_to_leave: bool,
+    first_steps: FirstSteps,
     /// Leaves when the loop up to this volume is saved.
     leaves_when_saved: Option<u32>,
     is_full_screen: bool,
@@ -290,6 +293,7 @@ impl Console {
             turning: None,
             export_progress: None,
             asks_to_leave: false,
+            first_steps: FirstSteps::new(options.first_steps),
             leaves_when_saved: None,
             is_full_screen: false,
             saved_volume: None,
@@ -465,6 +469,9 @@ impl Console {
     pub fn execute(&mut self, command: &Command, now: Instant) {
         tracing::debug!("{command:?}");
         self.user_acts(now);
+        if self.end_first_steps(command) {
+            return;
+        }
         self.stop_turning_for(command);
         let before = is_of_tone(command).then(|| self.controls.settings().clone());
         if now.saturating_duration_since(self.last_change) > STEP_PAUSE {

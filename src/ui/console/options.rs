@@ -61,6 +61,8 @@ pub struct ConsoleOptions {
     pub open_file: Option<OpenFile>,
     /// The file with the list of recent files.
     pub recent: Option<PathBuf>,
+    /// The file that keeps that the hints of the first start were shown. None: they are not to be shown.
+    pub first_steps: Option<PathBuf>,
     /// The file with the presets of the user.
     pub presets: Option<PathBuf>,
     /// Called when [`Console::update`] has something to do.
@@ -102,6 +104,7 @@ impl Default for ConsoleOptions {
             plays_once: false,
             open_file: None,
             recent: None,
+            first_steps: None,
             presets: None,
             wake: Arc::new(|| ()),
             startup_fault: None,

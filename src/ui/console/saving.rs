@@ -10,6 +10,12 @@ use crate::ui::volume_export::{FORMATS, Job};
 use std::time::SystemTime;
 
 impl Console {
+    /// What the pictures are of, if that is no patient: the phantom, also where a recording of it is played.
+    pub(super) fn origin(&self) -> Option<&'static str> {
+        let is_synthetic = self.stream.header().is_some_and(|header| header.synthetic);
+        self.fixed.source.origin().or(is_synthetic.then_some(texts::DEMO_DATA))
+    }
+
     /// Saves the picture that is shown, with its measurements, and its bar if that is switched on.
     pub(super) fn save_picture(&mut self) {
         let picture = match self.stream.renderer().filter(|renderer| renderer.has_drawn()) {
@@ -24,11 +30,11 @@ impl Console {
             None => Err(texts::WHY_NO_PICTURE.into()),
         };
         let (has_bar, time) = (self.saves_bar, marked::time_line(SystemTime::now()));
-        let origin = self.fixed.source.origin();
+        let origin = self.origin();
         let saved = picture.and_then(|(picture, scene, start)| {
             self.exporter.picture(move || match has_bar {
                 true => marked::marked(&picture, &scene, start.as_ref(), &time, origin),
-                false => marked::measured(&picture, &scene, start.as_ref()),
+                false => marked::measured(&picture, &scene, start.as_ref(), origin),
             })
         });
         if let Err(fault) = saved {

@@ -6,6 +6,7 @@ mod cutting;
 mod history;
 mod measuring;
 mod presets;
+mod sides;
 mod starting;
 
 use super::command::{Command, Tool};
@@ -218,6 +219,9 @@ impl Controls {
             }
             Command::Undo => return self.travel(true, scene),
             Command::Redo => return self.travel(false, scene),
+            Command::Sides(..) | Command::ExchangeLeftAndRight | Command::ProbeMarker(_) => {
+                return self.mark_sides(command);
+            }
             Command::Freeze
             | Command::StepCine(_)
             | Command::SeekCine(_)
@@ -229,6 +233,7 @@ impl Controls {
             | Command::SavePicture
             | Command::SaveLoop
             | Command::ToggleHelp
+            | Command::CloseHints
             | Command::SearchHelp
             | Command::SavesBar(_)
             | Command::ToggleTimes

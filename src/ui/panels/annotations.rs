@@ -26,7 +26,7 @@ pub(super) fn paint(ui: &Ui, state: &PanelState, scale: f32) {
         return;
     }
     let painter = ui.ctx().layer_painter(egui::LayerId::background()).with_clip_rect(picture);
-    let marks = scene.marks();
+    let marks = scene.marks_with(&state.controls.settings().marks);
     let area_of = |tile: &TileMarks| {
         let [corner, size] = [tile.corner, tile.size].map(|[x, y]| vec2(x as f32, y as f32) / scale);
         Rect::from_min_size(picture.min + corner, size)
@@ -37,19 +37,7 @@ pub(super) fn paint(ui: &Ui, state: &PanelState, scale: f32) {
     // What tells the sides goes before what tells sizes: that gives way.
     let mut taken = Taken(body_marks::areas(state, scale));
     tiles().for_each(|(_, tile, area)| sides(&painter, &mut taken, area, tile));
-    if let Some(origin) = state.origin {
-        // Between the letter of the upper edge and a marker in the corner; in a narrow picture further down.
-        let lower = (5..40).map(|n| vec2(-6.0, 6.0 + 5.0 * n as f32));
-        // On the right or the left of that letter, or of the lower edge's.
-        let [left, low] = [-picture.width() / 2.0 - 12.0, picture.height() - 24.0];
-        let beside = [vec2(-6.0, 4.0), vec2(left, 4.0), vec2(-6.0, low), vec2(left, low)];
-        let places = [vec2(-32.0, 6.0)].into_iter().chain(lower).chain(beside);
-        let places = places.map(|away| picture.right_top() + away);
-        // In the smallest pictures without what stands in brackets.
-        let short = origin.split(" (").next().unwrap_or(origin);
-        _ = text_at_one_of(&painter, &mut taken, places.clone(), Align2::RIGHT_TOP, origin, WARNING)
-            || text_at_one_of(&painter, &mut taken, places, Align2::RIGHT_TOP, short, WARNING);
-    }
+    state.origin.iter().for_each(|origin| name_origin(&painter, &mut taken, picture, origin));
     // While it is bent, plane A has the line as it will be, not as the picture has it.
     let is_shown = state.controls.tool() == Tool::Region
         && !scene.unveils()
@@ -86,6 +74,29 @@ pub(super) fn paint(ui: &Ui, state: &PanelState, scale: f32) {
             None => bar(&painter, &mut taken, area, tile.pixel * f64::from(scale)),
         }
     }
+}
+
+/// Says what the picture is of, if that is no patient, where nothing else is drawn over it.
+pub(super) fn paint_origin(ui: &Ui, state: &PanelState, scale: f32) {
+    let Some(origin) = state.origin else { return };
+    let picture = picture_rect(state, scale);
+    let painter = ui.ctx().layer_painter(egui::LayerId::background()).with_clip_rect(picture);
+    name_origin(&painter, &mut Taken::default(), picture, origin);
+}
+
+/// Says what the picture is of, near its upper right corner.
+fn name_origin(painter: &Painter, taken: &mut Taken, picture: Rect, origin: &str) {
+    // Between the letter of the upper edge and a marker in the corner; in a narrow picture further down.
+    let lower = (5..40).map(|n| vec2(-6.0, 6.0 + 5.0 * n as f32));
+    // On the right or the left of that letter, or of the lower edge's.
+    let [left, low] = [-picture.width() / 2.0 - 12.0, picture.height() - 24.0];
+    let beside = [vec2(-6.0, 4.0), vec2(left, 4.0), vec2(-6.0, low), vec2(left, low)];
+    let places = [vec2(-32.0, 6.0)].into_iter().chain(lower).chain(beside);
+    let places = places.map(|away| picture.right_top() + away);
+    // In the smallest pictures without what stands in brackets.
+    let short = origin.split(" (").next().unwrap_or(origin);
+    _ = text_at_one_of(painter, taken, places.clone(), Align2::RIGHT_TOP, origin, WARNING)
+        || text_at_one_of(painter, taken, places, Align2::RIGHT_TOP, short, WARNING);
 }
 
 /// The areas that marks have taken: no other is drawn there.

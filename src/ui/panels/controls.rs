@@ -7,7 +7,7 @@ use super::colours::{
 use super::names::{self, Tell};
 use super::widgets::{front, slider, switch};
 use super::{PanelState, TEXT_SIZE, TOUCH_SIZE, heading};
-use super::{body_marks, measures, tools};
+use super::{body_marks, measures, sides, tools};
 use crate::scene::{ColourMap, Layout, Mode, PlaneName, Settings, Transfer, TransferName};
 use crate::ui::cine_player::{CineState, SPEEDS};
 use crate::ui::command::{Command, Tool};
@@ -130,6 +130,7 @@ pub(super) fn show_modes(ui: &mut Ui, state: &PanelState, width: f32, execute: &
             if !state.has_column {
                 body_marks::show(ui, state, width - 16.0, execute);
                 measures::show_results(ui, state, width - 24.0, execute);
+                sides::show(ui, state, width - 24.0, execute);
             }
             let files = [
                 (Command::OpenFiles, texts::OPEN, texts::OPEN_HINT),
@@ -323,6 +324,7 @@ pub(super) fn show_controls(ui: &mut Ui, state: &PanelState, width: f32, execute
             if switch(ui, &mut saves_bar, texts::BAR_ON_SAVED_PICTURES, hint) {
                 execute(Command::SavesBar(saves_bar));
             }
+            sides::show(ui, state, width - 32.0, execute);
             ui.add_space(8.0);
             heading(ui, texts::ADVANCED);
             for (group, name) in Group::ALL {
@@ -342,7 +344,8 @@ pub(super) fn show_controls(ui: &mut Ui, state: &PanelState, width: f32, execute
                     }
                 });
                 // A control in front may have the name of a stage.
-                shown.header_response.expanded(shown.openness > 0.5).named(&texts::advanced_group(name));
+                let header = shown.header_response.expanded(shown.openness > 0.5);
+                header.tell(&texts::advanced_hint(name)).named(&texts::advanced_group(name));
             }
         });
     });

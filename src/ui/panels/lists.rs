@@ -28,7 +28,13 @@ pub(super) fn show_files(ui: &Ui, files: (&str, &[String]), execute: &mut dyn Fn
         close: (texts::CLOSE_OPEN_HINT, Command::OpenFiles),
         empty: texts::NO_RECORDING_HERE,
     };
-    let entries = files.1.iter().map(|name| (name.as_str(), name.as_str()));
+    let hint = |name: &String| match name.as_str() {
+        texts::FOLDER_ABOVE => texts::FOLDER_ABOVE_HINT.into(),
+        name if name.ends_with('/') => texts::open_folder_hint(name),
+        name => texts::open_file_hint(name),
+    };
+    let hints: Vec<String> = files.1.iter().map(hint).collect();
+    let entries = files.1.iter().zip(&hints).map(|(name, hint)| (name.as_str(), hint.as_str()));
     list.show(ui, entries, |n, execute| execute(Command::OpenFile(n)), |_, _| {}, execute);
 }
 

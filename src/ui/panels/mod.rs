@@ -10,12 +10,14 @@ mod controls;
 mod curve;
 #[cfg(test)]
 pub(super) mod drawn;
+pub(super) mod first_steps;
 mod lists;
 mod measures;
 mod names;
 mod overlays;
 mod presets;
 mod region;
+mod sides;
 mod tools;
 mod widgets;
 
@@ -198,6 +200,12 @@ impl Panels {
         let output = self.context.run_ui(input, |ui| {
             let from_panels = commands.len();
             let execute = &mut |command| commands.push(command);
+            if state.shows_only_origin {
+                if state.has_drawn {
+                    annotations::paint_origin(ui, state, self.scale);
+                }
+                return;
+            }
             names::picture(ui, state, self.scale);
             let shows_panels = state.shows_panels && state.picture.1 != size;
             if shows_panels {
@@ -210,8 +218,10 @@ impl Panels {
                     controls::show_controls(ui, state, right, execute);
                 }
             }
-            if state.has_drawn && state.shows_panels {
-                annotations::paint(ui, state, self.scale);
+            match state.shows_panels {
+                true if state.has_drawn => annotations::paint(ui, state, self.scale),
+                false if state.has_drawn => annotations::paint_origin(ui, state, self.scale),
+                _ => {}
             }
             if state.has_drawn {
                 region::paint(ui, state, self.scale);
@@ -223,6 +233,9 @@ impl Panels {
                 overlays::show_times(ui, state, self.scale);
             }
             overlays::show_notes(ui, state, self.scale);
+            if state.shows_first_steps {
+                first_steps::show(ui, state, self.scale, execute);
+            }
             if state.shows_help {
                 overlays::show_help(ui, state, execute);
             }
@@ -406,6 +419,10 @@ pub(super) struct PanelState<'a> {
     pub(super) saves_bar: bool,
     /// What the pictures show, if that is no patient.
     pub(super) origin: Option<&'a str>,
+    /// Shows the hints of the first start.
+    pub(super) shows_first_steps: bool,
+    /// Shows nothing over the picture but what it is of, if that is no patient.
+    pub(super) shows_only_origin: bool,
     /// Asks whether to save the loop before leaving.
     pub(super) asks_to_leave: bool,
     /// The list of files to open, while it is shown: its title and its entries.

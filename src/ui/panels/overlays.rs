@@ -258,7 +258,9 @@ fn found(exit_key: &str, search: &str) -> Vec<(&'static str, Vec<HelpLine>)> {
     let keys = command::help().map(|(key, label)| (key, label.to_string()));
     let exit = (!exit_key.is_empty()).then(|| (exit_key.to_string(), texts::QUIT.to_string()));
     let gestures = GESTURES.iter().map(|(gesture, label)| (gesture.to_string(), label.to_string()));
-    let controls = SLIDERS.iter().map(|slider| (slider.name.to_string(), hints::of_slider(slider.name).to_string()));
+    let controls = SLIDERS.iter().map(|slider| (slider.name, hints::of_slider(slider.name)));
+    let controls = controls.chain([(texts::SIDES, texts::SIDES_HINT)]);
+    let controls = controls.map(|(name, hint)| (name.to_string(), hint.to_string()));
     // Without a search all of it has to fit one page.
     let controls: Vec<HelpLine> = if search.is_empty() { Vec::new() } else { controls.collect() };
     let wanted: Vec<String> = search.split_whitespace().map(str::to_lowercase).collect();
@@ -294,7 +296,7 @@ pub(super) fn show_help(ui: &mut Ui, state: &PanelState, execute: &mut dyn FnMut
                 ui.horizontal(|ui| {
                     ui.heading(texts::KEYS_AND_GESTURES);
                     ui.with_layout(egui::Layout::right_to_left(egui::Align::Center), |ui| {
-                        is_closed = ui.button(texts::CLOSE).clicked();
+                        is_closed = ui.button(texts::CLOSE).tell(texts::CLOSE_HELP_HINT).clicked();
                         let label = match state.help_search {
                             Some(text) => texts::searching_for(text),
                             None => texts::SEARCH_BUTTON.into(),
@@ -406,15 +408,15 @@ pub(super) fn ask_to_leave(ui: &Ui, execute: &mut dyn FnMut(Command)) {
                 ui.add_space(8.0);
             }
             let answers = [
-                (texts::SAVE_AND_LEAVE, true, Command::SaveAndExit),
-                (texts::LEAVE_WITHOUT_SAVING, false, Command::Discard),
-                (texts::STAY, false, Command::Back),
+                (texts::SAVE_AND_LEAVE, texts::SAVE_AND_LEAVE_HINT, true, Command::SaveAndExit),
+                (texts::LEAVE_WITHOUT_SAVING, texts::LEAVE_WITHOUT_SAVING_HINT, false, Command::Discard),
+                (texts::STAY, texts::STAY_HINT, false, Command::Back),
             ];
-            for (answer, is_first, command) in answers {
+            for (answer, hint, is_first, command) in answers {
                 let shown = RichText::new(answer).size(text);
                 let button = if is_first { first(shown) } else { Button::new(shown) };
                 let button = button.truncate().min_size(vec2(ui.available_width(), height));
-                if ui.add(button).clicked() {
+                if ui.add(button).tell(hint).clicked() {
                     execute(command);
                 }
             }
@@ -462,6 +464,7 @@ mod tests {
         };
         assert!(names("save picture").contains(&"P".to_string()));
         assert!(names("SPECKLE").contains(&"Smoothing".to_string()), "controls are found by what they do");
+        assert_eq!(names("patient's sides"), ["Sides"]);
         assert_eq!(names("ctrl+alt quit"), ["Ctrl+Alt+Q"]);
         assert!(names("no such thing").is_empty());
     }

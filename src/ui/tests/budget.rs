@@ -30,7 +30,8 @@ fn no_rung_needs_stage_1_again() {
             let settings = settings(preset, toml);
             let Ok(full) = Scene::new(geometry.clone(), BYTES, settings.clone()) else { continue };
             let (forward, backward) = (geometry.clone(), geometry.clone());
-            let header = Header { forward, backward, stored: BYTES.stored, range: BYTES.range, posed: false };
+            let header =
+                Header { forward, backward, stored: BYTES.stored, range: BYTES.range, posed: false, synthetic: false };
             let shared = |of: &Settings| {
                 let views = Views::new(&header, of, Update::Whole).expect("views");
                 let views = views.sharing(&header, &settings, &|scene| lowered(&rungs, scene));

@@ -6,6 +6,7 @@ mod clipping;
 mod colours;
 mod curving;
 mod cutting;
+mod first_steps;
 mod gestures;
 mod layout;
 mod measuring;
@@ -14,6 +15,7 @@ mod render_start;
 mod screen_reader;
 mod sequences;
 mod shown;
+mod sides;
 mod start_line;
 
 use super::command::{Command, Face, Tool};

@@ -11,7 +11,7 @@ use crate::ui::panels::{self, Banner, Note};
 use std::collections::{BTreeMap, BTreeSet};
 
 impl Shown {
-    fn key(&mut self, key: Key, shift: bool) -> Vec<Command> {
+    pub(super) fn key(&mut self, key: Key, shift: bool) -> Vec<Command> {
         assert!(self.panels.key(key, Modifiers { shift, ..Modifiers::default() }), "{key:?} is not taken");
         let commands = self.lay_out();
         // The focus moves back with the layout that follows.
@@ -19,7 +19,7 @@ impl Shown {
     }
 
     /// The control of this role and name in the group of this name.
-    fn find(&self, group: &str, role: Role, name: &str) -> NodeId {
+    pub(super) fn find(&self, group: &str, role: Role, name: &str) -> NodeId {
         let all = self.groups();
         let found: Vec<_> =
             all.get(group).into_iter().flatten().filter(|id| is_named(&self.tree[id], role, name)).collect();
@@ -56,8 +56,8 @@ impl Shown {
         }
     }
 
-    /// Every control has a name and a role, and no two of a group share both.
-    fn check(&self, what: &str) {
+    /// Every control has a name and a role, of which no two of a group share both, and a tooltip that says more than the name.
+    pub(super) fn check(&self, what: &str) {
         for (group, members) in self.groups() {
             let mut seen = BTreeSet::new();
             for id in members {
@@ -72,6 +72,8 @@ impl Shown {
                     "{what}: {name:?} is a {:?}",
                     node.role()
                 );
+                let about = node.description().unwrap_or_default();
+                assert!(about.len() > 8 && about != name, "{what}: {name:?} in {group:?} has no tooltip: {about:?}");
                 assert!(seen.insert(name.to_string()), "{what}: two controls {name:?} in {group:?}");
             }
         }
@@ -90,7 +92,7 @@ fn is_named(node: &Node, role: Role, name: &str) -> bool {
 
 /// Prevents a control that a screen reader calls "button" and nothing else, or two that sound the same.
 #[test]
-fn every_control_has_a_name_of_its_own_in_every_mode_and_list() {
+fn every_control_has_a_name_of_its_own_and_a_tooltip_in_every_mode_and_list() {
     for mode in Mode::ALL {
         for layout in [Layout::Single, Layout::Four, Layout::Pair] {
             let mut shown = Shown::new("");
@@ -118,6 +120,27 @@ fn every_control_has_a_name_of_its_own_in_every_mode_and_list() {
         assert!(measured.iter().any(|found| found == name), "{name}: {measured:?}");
     }
     assert!(shown.groups().contains_key("Click the first end."), "the next step is read");
+}
+
+/// The same of what tools add to the column, and of what is folded.
+#[test]
+fn what_tools_add_and_what_is_folded_has_names_and_tooltips() {
+    for tool in [Tool::Clip, Tool::Cut, Tool::Brush, Tool::Region, Tool::Curve] {
+        let mut shown = Shown::new("mode='surface'\nlayout='four'");
+        [Command::Tool(tool), Command::MoveClip(5.0), Command::ToggleStartCurve].map(|command| shown.apply(command));
+        shown.check(&format!("{tool:?}"));
+    }
+    for mode in ["surface", "volume", "mixed", "orthogonal", "tomography", "cube"] {
+        let mut shown = Shown::new(&format!("mode='{mode}'"));
+        let is_folded = |node: &&Node| node.is_expanded() == Some(false);
+        while let Some(name) = shown.tree.values().find(is_folded).and_then(|node| node.label()).map(str::to_string) {
+            let header = shown.find("Controls", Role::Button, &name);
+            shown.ask(header, Action::Click, None);
+            shown.settle();
+        }
+        assert!(shown.names("Filters").len() > 1 && shown.names("Sides").len() > 1, "{mode}");
+        shown.check(&format!("{mode}, all unfolded"));
+    }
 }
 
 /// Prevents a tool or a control in front that cannot be found by what it is called.

@@ -27,6 +27,8 @@ pub(super) struct Shown {
     pub(super) budget: Option<Duration>,
     pub(super) time: f64,
     pub(super) shows_panels: bool,
+    pub(super) shows_first_steps: bool,
+    pub(super) shows_only_origin: bool,
     pub(super) has_drawn: bool,
     pub(super) is_frozen: bool,
     pub(super) cine: CineState,
@@ -58,7 +60,7 @@ impl Shown {
         let geometry = Geometry::Sweep(phantom.probe(0).clone());
         let mut controls = Controls::new(settings("fetal", toml));
         controls.resize(panels::picture_area(size, scale, true).1);
-        let scene = scene(&geometry, controls.settings());
+        let scene = scene(&geometry, &controls.settings().clone().without_drawings());
         let mut panels = Panels::new(scale);
         panels.describe(true);
         let mut shown = Shown {
@@ -70,6 +72,8 @@ impl Shown {
             budget: None,
             time: 0.0,
             shows_panels: true,
+            shows_first_steps: false,
+            shows_only_origin: false,
             has_drawn: true,
             is_frozen: false,
             cine: CinePlayer::default().state(&(0..20).map(|_| CineVolume::default()).collect(), Some(2)),
@@ -98,7 +102,7 @@ impl Shown {
 
     pub(super) fn apply(&mut self, command: Command) {
         self.controls.apply(&command, Some(&self.scene));
-        self.scene = scene(&self.scene.geometry, self.controls.settings());
+        self.scene = scene(&self.scene.geometry, &self.controls.settings().clone().without_drawings());
         self.settle();
     }
 
@@ -119,6 +123,8 @@ impl Shown {
             help_search: None,
             saves_bar: true,
             origin: Some("Demo data (phantom)"),
+            shows_first_steps: self.shows_first_steps,
+            shows_only_origin: self.shows_only_origin,
             asks_to_leave,
             files: self.files.as_ref().map(|(title, names)| (title.as_str(), names.as_slice())),
             shows_exports,
@@ -148,7 +154,7 @@ impl Shown {
         for command in &commands {
             self.controls.apply(command, Some(&self.scene));
         }
-        self.scene = scene(&self.scene.geometry, self.controls.settings());
+        self.scene = scene(&self.scene.geometry, &self.controls.settings().clone().without_drawings());
         commands
     }
 

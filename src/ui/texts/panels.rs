@@ -90,6 +90,9 @@ pub const ADVANCED: &str = "Advanced";
 pub fn advanced_group(name: impl Display) -> String {
     format!("Advanced: {name}")
 }
+pub fn advanced_hint(name: impl Display) -> String {
+    format!("More controls: {name}. A click opens or closes the group.")
+}
 pub const NO_SUCH_CONTROL: &str = "This mode has no such control.";
 pub const AUTOMATIC: &str = "auto";
 pub const THROUGH_ALL: &str = "through all";
@@ -151,6 +154,13 @@ pub fn loop_rate(rate: impl Display) -> String {
 }
 
 // Lists of files and formats.
+pub fn open_file_hint(name: impl Display) -> String {
+    format!("Opens {name} in place of what is shown.")
+}
+pub fn open_folder_hint(name: impl Display) -> String {
+    format!("Lists the folder {name}")
+}
+pub const FOLDER_ABOVE_HINT: &str = "Lists the folder above.";
 pub const CLOSE_OPEN_HINT: &str = "Opens nothing.";
 pub const NO_RECORDING_HERE: &str = "There is no recording and no workspace here.";
 pub const VOLUME_SHOWN: &str = "The volume that is shown";
@@ -259,7 +269,7 @@ pub fn more_passes(more: impl Display) -> String {
 }
 pub const TIMES_LEGEND: &str = "ms per run; bars: share of the device time";
 pub const DRAG_GESTURE: &str = "drag";
-pub const DRAG_DOES: &str = "use the tool: turn, light, region, clip, cut, planes";
+pub const DRAG_DOES: &str = "use the tool: turn, light, region, clip, cut, brush, planes, curve";
 pub const SHIFT_DRAG: &str = "Shift + drag, right or middle drag";
 pub const SHIFT_DRAG_DOES: &str = "move the picture; over a plane: step it";
 pub const CTRL_DRAG: &str = "Ctrl + drag";
@@ -309,6 +319,10 @@ pub const LOOP_NOT_SAVED_ABOUT: &str = "Its volumes are lost when the program en
 pub const SAVE_AND_LEAVE: &str = "Save and leave  (Enter)";
 pub const LEAVE_WITHOUT_SAVING: &str = "Leave without saving  (L)";
 pub const STAY: &str = "Stay  (Esc)";
+pub const SAVE_AND_LEAVE_HINT: &str = "Saves all volumes of the loop as a recording, then ends the program.";
+pub const LEAVE_WITHOUT_SAVING_HINT: &str = "Ends the program; the volumes are lost.";
+pub const STAY_HINT: &str = "Goes on as before.";
+pub const CLOSE_HELP_HINT: &str = "Closes the help (H).";
 
 // Presets of examinations.
 pub const FACE: &str = "Face";

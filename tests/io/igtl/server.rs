@@ -198,7 +198,7 @@ fn sweeps(geometry: &Geometry, stored: StoredType, pose: Option<DAffine3>) -> Sw
     let frames = (0..geometry.slices()).map(frame).collect();
     let (forward, backward) = (geometry.clone(), geometry.clone());
     Sweeps {
-        header: Header { forward, backward, stored, range: [10.0, 200.0], posed: pose.is_some() },
+        header: Header { forward, backward, stored, range: [10.0, 200.0], posed: pose.is_some(), synthetic: false },
         frames,
         next: 0,
     }

@@ -36,7 +36,14 @@ fn probe() -> Probe {
 
 fn header(probe: Probe) -> Header {
     let forward = Geometry::Sweep(probe);
-    Header { backward: forward.clone(), forward, stored: StoredType::U8, range: [0.0, 255.0], posed: false }
+    Header {
+        backward: forward.clone(),
+        forward,
+        stored: StoredType::U8,
+        range: [0.0, 255.0],
+        posed: false,
+        synthetic: false,
+    }
 }
 
 /// A free-running probe on the simulated array.

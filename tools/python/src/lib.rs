@@ -117,7 +117,7 @@ fn completed(layers: &Layers, geometry: &Geometry, stored: Stored, frames: &[Fra
 /// The picture as `echolume render` saves it: with its measurements, and with marks and a bar if the settings ask for them. Its bytes, RGBA, and
 /// its height and width.
 fn saved(picture: &Picture, renderer: &echolume::Renderer) -> PyResult<(Vec<u8>, [usize; 2])> {
-    let picture = marked::as_set(picture, renderer.scene(), renderer.unveiled()).map_err(of_device)?.into_owned();
+    let picture = marked::as_set(picture, renderer.scene(), renderer.unveiled(), None).map_err(of_device)?.into_owned();
     Ok((picture.rgba, [picture.height as usize, picture.width as usize]))
 }
 

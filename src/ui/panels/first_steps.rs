@@ -1,0 +1,50 @@
+//! The hints of the first start: a card over the lower part of the picture.
+
+use super::colours::{ACCENT, MESSAGE, TEXT};
+use super::names::{self, Tell};
+use super::{PanelState, SMALL_TEXT, TEXT_SIZE, TOUCH_SIZE, picture_rect};
+use crate::ui::command::Command;
+use crate::ui::texts;
+use egui::accesskit::Role;
+use egui::{Align2, Area, Button, Frame, Id, Label, Margin, Order, RichText, Stroke, Ui, vec2};
+
+/// A smaller picture has no hints, points: they would hide it.
+const MIN_PICTURE: [f32; 2] = [360.0, 280.0];
+/// Width of the card without its margins, points.
+const WIDTH: f32 = 320.0;
+/// Between the card and the lower edge of the picture, where the letter of that edge is, points.
+const BELOW: f32 = 40.0;
+
+/// True if a picture of this size, pixels, has room for the hints.
+pub(in crate::ui) fn has_room(picture: [u32; 2], scale: f32) -> bool {
+    let [width, height] = picture.map(|edge| edge as f32 / scale);
+    width >= MIN_PICTURE[0] && height >= MIN_PICTURE[1]
+}
+
+pub(super) fn show(ui: &Ui, state: &PanelState, scale: f32, execute: &mut dyn FnMut(Command)) {
+    let at = picture_rect(state, scale).center_bottom() - vec2(0.0, BELOW);
+    let area = Area::new(Id::new(texts::FIRST_STEPS)).order(Order::Middle).pivot(Align2::CENTER_BOTTOM).fixed_pos(at);
+    area.show(ui.ctx(), |ui| {
+        names::name(ui, Role::Group, texts::FIRST_STEPS);
+        let frame = Frame::new().fill(MESSAGE).inner_margin(Margin::symmetric(14, 10)).corner_radius(8);
+        frame.stroke(Stroke::new(2.0, ACCENT)).show(ui, |ui| {
+            ui.set_width(WIDTH);
+            ui.spacing_mut().item_spacing.y = 4.0;
+            for (action, effect) in texts::HINTS {
+                ui.horizontal(|ui| {
+                    let size = vec2(64.0, TEXT_SIZE + 4.0);
+                    let action = RichText::new(action).color(ACCENT).size(SMALL_TEXT);
+                    ui.allocate_ui_with_layout(size, egui::Layout::left_to_right(egui::Align::Center), |ui| {
+                        ui.set_min_width(size.x);
+                        ui.add(Label::new(action));
+                    });
+                    ui.add(Label::new(RichText::new(effect).color(TEXT).size(SMALL_TEXT)));
+                });
+            }
+            let close = Button::new(texts::CLOSE_BUTTON).min_size(vec2(WIDTH, TOUCH_SIZE * 0.7));
+            if ui.add(close).tell(texts::CLOSE_HINTS_HINT).named(texts::CLOSE).clicked() {
+                execute(Command::CloseHints);
+            }
+        });
+    });
+}

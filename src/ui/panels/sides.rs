@@ -1,0 +1,94 @@
+//! The patient's sides along the axes of the volume, and the place of the probe's marker: what the user states of both.
+
+use super::names::{self, Tell};
+use super::{PanelState, SMALL_TEXT, TOUCH_SIZE, heading};
+use crate::scene::{Marks, ProbeMarker, Sides, VolumeAxis};
+use crate::ui::command::Command;
+use crate::ui::texts;
+use egui::accesskit::Role;
+use egui::{Button, CollapsingHeader, RichText, Ui, vec2};
+
+/// In the order in which letters go before each other on a tile.
+const AXES: [VolumeAxis; 3] = [VolumeAxis::Lateral, VolumeAxis::Elevation, VolumeAxis::Depth];
+/// Each pair above the same the other way round.
+const CHOICES: [[Option<Sides>; 4]; 2] = [
+    [Some(Sides::None), Some(Sides::LeftRight), Some(Sides::HeadFeet), Some(Sides::FrontBack)],
+    [None, Some(Sides::RightLeft), Some(Sides::FeetHead), Some(Sides::BackFront)],
+];
+const MARKERS: [ProbeMarker; 3] = [ProbeMarker::First, ProbeMarker::Last, ProbeMarker::Hidden];
+
+pub(super) fn show(ui: &mut Ui, state: &PanelState, width: f32, execute: &mut dyn FnMut(Command)) {
+    let marks = &state.controls.settings().marks;
+    let shown = CollapsingHeader::new(title(marks)).id_salt(texts::SIDES).show_unindented(ui, |ui| {
+        names::name(ui, Role::Group, texts::SIDES);
+        ui.spacing_mut().item_spacing.x = 4.0;
+        ui.spacing_mut().button_padding.x = 3.0;
+        let has = |axis| matches!(marks.sides(axis), Sides::LeftRight | Sides::RightLeft);
+        let exchange = Button::new(texts::EXCHANGE_LEFT_AND_RIGHT).min_size(vec2(width, TOUCH_SIZE * 0.75));
+        let hint = texts::EXCHANGE_LEFT_AND_RIGHT_HINT;
+        let exchange = ui.add_enabled(AXES.into_iter().any(has), exchange);
+        if exchange.tell(hint).on_disabled_hover_text(hint).clicked() {
+            execute(Command::ExchangeLeftAndRight);
+        }
+        for axis in AXES {
+            names::group(ui, texts::axis(axis), |ui| {
+                heading(ui, texts::axis(axis));
+                for row in CHOICES {
+                    ui.horizontal(|ui| {
+                        let size = size_in(ui, width, row.len());
+                        for sides in row {
+                            let Some(sides) = sides else {
+                                ui.add_space(size.x + ui.spacing().item_spacing.x);
+                                continue;
+                            };
+                            let is_chosen = marks.sides(axis) == sides;
+                            let (text, name) = (in_short(sides), texts::sides(sides));
+                            if choice(ui, is_chosen, &text, size, &texts::sides_hint(axis, sides), name) {
+                                execute(Command::Sides(axis, sides));
+                            }
+                        }
+                    });
+                }
+            });
+        }
+        names::group(ui, texts::PROBE_MARKER, |ui| {
+            heading(ui, texts::PROBE_MARKER);
+            ui.horizontal(|ui| {
+                let size = size_in(ui, width, MARKERS.len());
+                for marker in MARKERS {
+                    let name = texts::probe_marker(marker);
+                    if choice(ui, marks.probe == marker, name, size, texts::probe_marker_hint(marker), name) {
+                        execute(Command::ProbeMarker(marker));
+                    }
+                }
+            });
+        });
+    });
+    let header = shown.header_response.expanded(shown.openness > 0.5);
+    header.tell(texts::SIDES_HINT).named(texts::SIDES);
+}
+
+/// The title, with the sides that are known.
+fn title(marks: &Marks) -> String {
+    let known = AXES.map(|axis| marks.sides(axis)).into_iter().filter(|sides| *sides != Sides::None).map(in_short);
+    match known.collect::<Vec<_>>() {
+        none if none.is_empty() => texts::SIDES.into(),
+        known => texts::sides_in_short(known.join(", ")),
+    }
+}
+
+fn in_short(sides: Sides) -> String {
+    sides.letters().map_or(texts::NO_SIDES_SHORT.into(), |[low, high]| format!("{low}-{high}"))
+}
+
+/// The size of one of so many buttons in a row.
+fn size_in(ui: &Ui, width: f32, count: usize) -> egui::Vec2 {
+    let gaps = ui.spacing().item_spacing.x * count.saturating_sub(1) as f32;
+    vec2((width - gaps) / count.max(1) as f32, TOUCH_SIZE * 0.75)
+}
+
+/// A button of which one is chosen. True if it is clicked.
+fn choice(ui: &mut Ui, is_chosen: bool, text: &str, size: egui::Vec2, hint: &str, name: &str) -> bool {
+    let button = Button::selectable(is_chosen, RichText::new(text).size(SMALL_TEXT)).frame_when_inactive(true);
+    ui.add(button.min_size(size)).tell(hint).named(name).clicked()
+}
