@@ -7,9 +7,10 @@ use crate::picture::Picture;
 use crate::source::phantom::{Phantom, PhantomOptions};
 use crate::ui::cine_player::{CinePlayer, CineState};
 use crate::ui::controls::EXAMS;
+use crate::ui::keyboard_pointer::PointerMark;
 use crate::ui::panels::accesskit::{Action, ActionData, ActionRequest, Node, NodeId, TreeId, TreeUpdate};
 use crate::ui::panels::drawn::Drawn;
-use crate::ui::panels::{self, Banner, Note, PanelOutput, PanelState, Panels, PresetTile, PresetsShown};
+use crate::ui::panels::{self, Banner, Note, PanelOutput, PanelState, Panels, PresetTile, PresetsShown, Rail};
 use crate::ui::times::Times;
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -26,6 +27,7 @@ pub(super) struct Shown {
     pub(super) budget: Option<Duration>,
     pub(super) time: f64,
     pub(super) shows_panels: bool,
+    pub(super) rail: Rail,
     pub(super) has_drawn: bool,
     pub(super) is_frozen: bool,
     pub(super) cine: CineState,
@@ -38,6 +40,7 @@ pub(super) struct Shown {
     pub(super) open: [bool; 4],
     pub(super) start_lines: Vec<StartLine>,
     pub(super) pointer: Option<[f64; 2]>,
+    pub(super) keyboard_pointer: Option<PointerMark>,
     /// What the last layout said.
     pub(super) tree: BTreeMap<NodeId, Node>,
     pub(super) focus: Option<NodeId>,
@@ -69,6 +72,7 @@ impl Shown {
             budget: None,
             time: 0.0,
             shows_panels: true,
+            rail: Rail::default(),
             has_drawn: true,
             is_frozen: false,
             cine: CinePlayer::default().state(&(0..20).map(|_| CineVolume::default()).collect(), Some(2)),
@@ -79,6 +83,7 @@ impl Shown {
             open: [false; 4],
             start_lines: Vec::new(),
             pointer: None,
+            keyboard_pointer: None,
             tree: BTreeMap::new(),
             focus: None,
             corners: Vec::new(),
@@ -113,6 +118,8 @@ impl Shown {
             picture: panels::picture_area(self.size, scale, self.shows_panels),
             shows_panels: self.shows_panels,
             has_column: panels::has_column(self.size, scale, self.shows_panels),
+            has_drawer: panels::has_drawer(self.size, scale, self.shows_panels),
+            rail: self.rail,
             shows_help,
             shows_times,
             help_search: None,
@@ -133,6 +140,7 @@ impl Shown {
             exit_key: "",
             start_lines: &self.start_lines,
             pointer: self.pointer,
+            keyboard_pointer: self.keyboard_pointer,
         };
         let output = self.panels.lay_out(&state, self.size, self.time);
         self.corners = output.corners();
@@ -144,6 +152,7 @@ impl Shown {
         self.focus = Some(focus).filter(|focus| *focus != root);
         for command in &commands {
             self.controls.apply(command, Some(&self.scene));
+            self.rail.apply(command, panels::has_drawer(self.size, scale, self.shows_panels));
         }
         self.scene = scene(&self.scene.geometry, self.controls.settings());
         commands
