@@ -194,6 +194,14 @@ pub enum Command {
     TogglePanels,
     /// Gives the keyboard to the panels, or back to the picture.
     FocusPanels,
+    /// Shows modes and tools, or the controls, in a window without a column.
+    RailTab(RailTab),
+    /// Shows the other of both; where they are in a drawer, opens, turns or closes it.
+    SwitchRail,
+    /// Opens or closes the drawer of a small window.
+    ToggleDrawer,
+    /// Turns the pointer by keyboard on or off.
+    KeyboardPointer,
     ToggleFullScreen,
     /// Closes what is open, else leaves full screen, else leaves the program.
     Back,
@@ -227,6 +235,14 @@ pub enum Tool {
     BodyMark,
     /// Sets the points of a measurement.
     Measure(MeasureKind),
+}
+
+/// What the rail on the left shows in a window that has no column of controls.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum RailTab {
+    #[default]
+    Tools,
+    Controls,
 }
 
 impl Command {
@@ -429,7 +445,9 @@ pub const KEY_BINDINGS: &[Binding] = &[
     on(Function(1), keys::THIS_HELP, Command::ToggleHelp),
     on(Function(2), keys::TIMES_OF_THE_PASSES, Command::ToggleTimes),
     on(Function(3), keys::SLIDERS, Command::TogglePanels),
+    shift(Function(3), keys::SWITCH_RAIL, Command::SwitchRail),
     control(Key::Tab, keys::FOCUS_PANELS, Command::FocusPanels),
+    shift(Char('m'), keys::KEYBOARD_POINTER, Command::KeyboardPointer),
     on(Function(11), keys::FULL_SCREEN, Command::ToggleFullScreen),
     on(Key::Escape, keys::BACK, Command::Back),
     on(Char('q'), keys::QUIT, Command::Exit),
@@ -481,6 +499,10 @@ pub(super) struct HeldKeys {
 impl HeldKeys {
     pub(super) fn modifiers(&self) -> Modifiers {
         self.modifiers
+    }
+
+    pub(super) fn is_held(&self, key: Key) -> bool {
+        self.held.contains(&key)
     }
 
     /// The command that an input gives, if any.

@@ -21,6 +21,7 @@ pub mod export;
 pub mod frame_budget;
 mod gestures;
 pub mod input;
+mod keyboard_pointer;
 mod open_list;
 pub mod panels;
 mod picking;

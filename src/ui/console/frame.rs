@@ -454,6 +454,8 @@ impl Console {
             picture: self.picture_area(),
             shows_panels: self.shows_panels,
             has_column: panels::has_column(self.size, self.panels.scale(), self.shows_panels),
+            has_drawer: self.has_drawer(),
+            rail: self.rail,
             files: self.opening.shown(),
             shows_exports: self.shows_exports,
             is_turning: self.turning.is_some(),
@@ -478,6 +480,7 @@ impl Console {
             exit_key: &exit_key,
             start_lines: &self.start_lines,
             pointer: self.pointer,
+            keyboard_pointer: self.keyboard_pointer.mark(self.picture_area()),
         };
         let time = now.saturating_duration_since(self.started).as_secs_f64();
         let output = self.panels.lay_out(&state, self.size, time);

@@ -2,8 +2,10 @@
 
 use super::Console;
 use crate::ui::command::Command;
-use crate::ui::input::{Input, Key};
+use crate::ui::input::{Input, Key, Modifiers};
+use crate::ui::keyboard_pointer::Pointed;
 use crate::ui::picking::Viewport;
+use crate::ui::texts::keys;
 use std::time::Instant;
 
 /// Longest text that the help is searched for, characters.
@@ -25,9 +27,11 @@ impl Console {
         {
             self.request.exit = true;
         }
+        self.keyboard_pointer.other_input(input);
         let is_search = self.search_help(input);
         let is_of_panels = self.key_of_panels(input);
-        let typed = if is_of_panels { Some(Vec::new()) } else { self.typed(input) };
+        let is_taken = is_of_panels || (!is_search && self.key_of_pointer(input, now));
+        let typed = if is_taken { Some(Vec::new()) } else { self.typed(input) };
         if typed.is_some() {
             // The keys go on to be held, and give nothing else.
             self.keys.input(input);
@@ -36,6 +40,11 @@ impl Console {
             let command = if self.asks_to_leave { answer(input) } else { Some(command) };
             command.iter().for_each(|command| self.execute(command, now));
         }
+        self.gesture(input, self.keys.modifiers(), now);
+    }
+
+    /// Executes what an input does on the picture.
+    fn gesture(&mut self, input: &Input, modifiers: Modifiers, now: Instant) {
         let area = self.picture_area();
         let at = match input {
             Input::Moved(at) | Input::Touch { at, .. } => Some(*at),
@@ -56,16 +65,63 @@ impl Console {
             is_covered: self.asks_to_leave || (is_over_panel && self.fixed.overlay),
             now: now.saturating_duration_since(self.started),
         };
-        for command in self.gestures.input(input, &on, self.controls.tool(), self.keys.modifiers()) {
+        for command in self.gestures.input(input, &on, self.controls.tool(), modifiers) {
             self.execute(&command, now);
         }
+    }
+
+    /// Turns the pointer by keyboard on or off. Without panels nobody would see it.
+    pub(super) fn toggle_keyboard_pointer(&mut self, now: Instant) {
+        if !self.fixed.overlay {
+            return;
+        }
+        let pointed = self.keyboard_pointer.toggle(self.gestures.pointer(), self.picture_area());
+        self.point(&pointed, now);
+        let is_on = self.keyboard_pointer.is_on();
+        self.notify(if is_on { keys::POINTER_IS_ON } else { keys::POINTER_IS_OFF }, false);
+    }
+
+    /// Takes a key for the pointer by keyboard. True if it is none of the view's own.
+    fn key_of_pointer(&mut self, input: &Input, now: Instant) -> bool {
+        let Input::Key { key, pressed: true } = *input else { return false };
+        if !self.keyboard_pointer.is_on() || self.asks_to_leave || self.controls.typing().is_some() || self.shows_list()
+        {
+            return false;
+        }
+        let was_held = self.keyboard_pointer.is_held();
+        if let Some(pointed) = self.keyboard_pointer.key(key, &self.keys, self.picture_area()) {
+            if self.keyboard_pointer.is_held() && !was_held {
+                self.controls.seal();
+            }
+            self.point(&pointed, now);
+            return true;
+        }
+        let modifiers = self.keys.modifiers();
+        let ends = modifiers == Modifiers { control: true, ..Modifiers::default() } && key == Key::Enter;
+        let command = self.what_enter_ends().filter(|_| ends);
+        command.iter().for_each(|command| self.execute(command, now));
+        command.is_some()
+    }
+
+    /// Does what the pointer by keyboard does, as if a mouse did it.
+    fn point(&mut self, pointed: &[Pointed], now: Instant) {
+        for (input, modifiers) in pointed {
+            self.panels.input(input);
+            self.gesture(input, *modifiers, now);
+        }
+        self.needs_redraw = true;
     }
 
     /// Takes a key for the control that has the keyboard. True if it is none of the view's own.
     fn key_of_panels(&mut self, input: &Input) -> bool {
         let Input::Key { key, pressed: true } = *input else { return false };
+        let (modifiers, shows_list) = (self.keys.modifiers(), self.shows_list());
         let has_keys_of_its_own = self.asks_to_leave || self.controls.typing().is_some();
-        self.fixed.overlay && !has_keys_of_its_own && self.panels.key(key, self.keys.modifiers())
+        if !self.fixed.overlay || has_keys_of_its_own || (shows_list && key == Key::Escape) {
+            return false;
+        }
+        let walks = shows_list && !self.presets.is_naming();
+        (walks && self.panels.walk(key, modifiers, self.presets.is_shown())) || self.panels.key(key, modifiers)
     }
 
     /// Takes a key for the search of the help. True if it is none of the view's own.

@@ -272,12 +272,21 @@ impl Console {
                 _ => Vec::new(),
             });
         }
-        let ends = match (self.controls.work(), self.controls.line()) {
+        self.what_enter_ends().filter(|_| key == Key::Enter).map(|command| vec![command])
+    }
+
+    /// Ends the contour or the line in work.
+    pub(super) fn what_enter_ends(&self) -> Option<Command> {
+        match (self.controls.work(), self.controls.line()) {
             (Some(_), _) => Some(Command::EndMeasure),
             (None, Some(_)) => Some(Command::EndCurve),
             (None, None) => None,
-        };
-        ends.filter(|_| key == Key::Enter).map(|command| vec![command])
+        }
+    }
+
+    /// True while a list is open whose entries have keys.
+    pub(super) fn shows_list(&self) -> bool {
+        self.opening.is_shown() || self.shows_exports || self.presets.is_shown()
     }
 }
 

@@ -25,8 +25,9 @@ use super::controls::{Change, Controls};
 use super::export::Exporter;
 use super::frame_budget::{self, Pace, Quality, Rung};
 use super::gestures::Gestures;
+use super::keyboard_pointer::KeyboardPointer;
 use super::panels::accesskit::{ActionRequest, TreeUpdate};
-use super::panels::{self, Note, Panels};
+use super::panels::{self, Note, Panels, Rail};
 use super::silence::Silence;
 use super::source_supervisor::{OpenSource, SourceSupervisor};
 use super::times::Times;
@@ -92,6 +93,7 @@ pub struct Console {
     controls: Controls,
     gestures: Gestures,
     keys: HeldKeys,
+    keyboard_pointer: KeyboardPointer,
     exporter: Exporter,
     pace: Pace,
     rungs: Arc<Vec<Rung>>,
@@ -118,6 +120,7 @@ pub struct Console {
     shows_help: bool,
     shows_times: bool,
     shows_panels: bool,
+    rail: Rail,
     /// Saves pictures with a bar.
     saves_bar: bool,
     /// What the help is searched for; none while it is not.
@@ -254,6 +257,7 @@ impl Console {
             controls,
             gestures: Gestures::default(),
             keys: HeldKeys::default(),
+            keyboard_pointer: KeyboardPointer::default(),
             opening: Opening::new(options.open_file, options.recent, options.wake.clone()),
             presets: Presets::new(options.presets, options.wake.clone()),
             clipboard: Clipboard::default(),
@@ -287,6 +291,7 @@ impl Console {
             shows_help: false,
             shows_times: false,
             shows_panels,
+            rail: Rail::default(),
             saves_bar: options.bar,
             help_search: None,
             shows_exports: false,
@@ -405,6 +410,11 @@ impl Console {
         panels::picture_area(self.size, self.panels.scale(), self.shows_panels)
     }
 
+    /// True if tools and controls are in a drawer.
+    fn has_drawer(&self) -> bool {
+        panels::has_drawer(self.size, self.panels.scale(), self.shows_panels)
+    }
+
     /// Describes the panels to a screen reader from now on, or no longer.
     pub fn describe(&mut self, is_described: bool) {
         self.panels.describe(is_described && self.fixed.overlay);
@@ -474,7 +484,8 @@ impl Console {
         }
         self.stop_turning_for(command);
         let before = is_of_tone(command).then(|| self.controls.settings().clone());
-        if now.saturating_duration_since(self.last_change) > STEP_PAUSE {
+        // A drag by keyboard is one step, however long it rests.
+        if now.saturating_duration_since(self.last_change) > STEP_PAUSE && !self.keyboard_pointer.is_held() {
             self.controls.seal();
         }
         match self.controls.apply(command, self.stream.scene()) {
@@ -551,6 +562,11 @@ impl Console {
                 self.resize_picture();
                 self.panels.toggle_focus();
             }
+            Command::RailTab(_) | Command::SwitchRail | Command::ToggleDrawer => {
+                let has_drawer = self.has_drawer();
+                self.rail.apply(command, has_drawer);
+            }
+            Command::KeyboardPointer => self.toggle_keyboard_pointer(now),
             Command::ToggleFullScreen => self.request.toggle_full_screen |= !self.fixed.is_kiosk,
             Command::EndCut => self.end_stroke(now),
             Command::PickSurface(at) => self.pick_surface(at),
@@ -621,6 +637,10 @@ impl Console {
             self.shows_help = false;
         } else if self.shows_times {
             self.shows_times = false;
+        } else if self.rail.is_open && self.has_drawer() {
+            self.rail.is_open = false;
+        } else if self.keyboard_pointer.is_on() && self.controls.work().is_none() && self.controls.line().is_none() {
+            self.toggle_keyboard_pointer(Instant::now());
         } else if self.leave_measuring() {
             self.needs_redraw = true;
         } else if self.turning.take().is_some() {

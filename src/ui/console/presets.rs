@@ -72,6 +72,10 @@ impl Presets {
         self.is_shown
     }
 
+    pub(super) fn is_naming(&self) -> bool {
+        self.naming.is_some()
+    }
+
     /// The thumbnails are made again: their device is gone.
     pub(super) fn device_lost(&mut self) {
         self.thumbnails.stop();
@@ -210,6 +214,8 @@ impl Console {
                 None => return,
             },
         };
+        // Space and Enter are the name's.
+        self.panels.drop_focus();
         self.presets.naming = Some(Naming { text: of.clone().unwrap_or_default(), of });
     }
 

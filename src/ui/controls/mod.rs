@@ -239,6 +239,10 @@ impl Controls {
             | Command::ToggleTimes
             | Command::TogglePanels
             | Command::FocusPanels
+            | Command::RailTab(_)
+            | Command::SwitchRail
+            | Command::ToggleDrawer
+            | Command::KeyboardPointer
             | Command::ToggleFullScreen
             | Command::Back
             | Command::Exit

@@ -5,9 +5,9 @@ use super::colours::{
     self, ABSENT, ACCENT, EDGE, ON_SELECTED, ON_WARNING, OUTLINE, SELECTED, TEXT, WARNING, WEAK_TEXT,
 };
 use super::names::{self, Tell};
-use super::widgets::{front, slider, switch};
+use super::widgets::{front, name_and_value, slider, switch};
 use super::{PanelState, TEXT_SIZE, TOUCH_SIZE, heading};
-use super::{body_marks, measures, sides, tools};
+use super::{body_marks, measures, rail, sides, tools};
 use crate::scene::{ColourMap, Layout, Mode, PlaneName, Settings, Transfer, TransferName};
 use crate::ui::cine_player::{CineState, SPEEDS};
 use crate::ui::command::{Command, Tool};
@@ -31,6 +31,9 @@ const TOOLS: [(Tool, &str); 8] = [
     (Tool::Curve, texts::CURVE),
 ];
 
+/// In less width two buttons stand beside each other, not three, points.
+const NARROW: f32 = 220.0;
+
 const PLANES: [(PlaneName, &str); 3] = [(PlaneName::A, "A"), (PlaneName::B, "B"), (PlaneName::C, "C")];
 
 /// The controls in front: their names, and the sliders of which the first that the mode has is meant.
@@ -44,7 +47,16 @@ const FRONT: [(&str, &[&str]); 6] = [
 ];
 
 pub(super) fn show_modes(ui: &mut Ui, state: &PanelState, width: f32, execute: &mut dyn FnMut(Command)) {
-    Panel::left("rail").exact_size(width).resizable(false).show_separator_line(false).show(ui, |ui| {
+    rail::show_rail(ui, state, width, execute, |ui, execute| show_tools(ui, state, width, execute));
+}
+
+/// Modes, tools and controls over the picture of a small window.
+pub(super) fn show_drawer(ui: &mut Ui, state: &PanelState, size: [f32; 2], execute: &mut dyn FnMut(Command)) {
+    rail::show_drawer(ui, state, size, execute, |ui, execute| show_tools(ui, state, size[0], execute));
+}
+
+fn show_tools(ui: &mut Ui, state: &PanelState, width: f32, execute: &mut dyn FnMut(Command)) {
+    ui.scope(|ui| {
         names::name(ui, Role::Toolbar, texts::MODES_AND_TOOLS);
         // A low window scrolls.
         ScrollArea::vertical().auto_shrink(false).show(ui, |ui| {
@@ -249,20 +261,20 @@ fn colours(settings: &Settings) -> &'static [(Colour, &'static str)] {
     }
 }
 
+pub(super) fn show_column(ui: &mut Ui, state: &PanelState, width: f32, execute: &mut dyn FnMut(Command)) {
+    let column = Panel::right("column").exact_size(width).resizable(false).show_separator_line(false);
+    column.show(ui, |ui| show_controls(ui, state, width, execute));
+}
+
+/// The controls in a panel of this width, points. In the column, what belongs to the tool follows the controls in front, which keep their places.
 pub(super) fn show_controls(ui: &mut Ui, state: &PanelState, width: f32, execute: &mut dyn FnMut(Command)) {
     let settings = state.controls.settings();
-    Panel::right("column").exact_size(width).resizable(false).show_separator_line(false).show(ui, |ui| {
+    ui.scope(|ui| {
         names::name(ui, Role::Group, texts::CONTROLS);
-        ScrollArea::vertical().auto_shrink(false).show(ui, |ui| {
+        ScrollArea::vertical().id_salt("controls").auto_shrink(false).show(ui, |ui| {
             // Leaves room for the scroll bar, which covers the edge.
             ui.set_max_width(width - 32.0);
             ui.add_space(6.0);
-            measures::show_results(ui, state, width - 40.0, execute);
-            tools::clip(ui, state, width - 32.0, execute);
-            tools::cuts(ui, state, width - 32.0, execute);
-            tools::start_line(ui, state, width - 32.0, execute);
-            tools::curve(ui, state, width - 32.0, execute);
-            body_marks::show(ui, state, width - 32.0, execute);
             heading(ui, texts::CONTROLS);
             let in_front = FRONT.map(|(name, sliders)| (name, front(sliders, settings)));
             let with_cuts = tools::depth_of_cut(state);
@@ -284,6 +296,14 @@ pub(super) fn show_controls(ui: &mut Ui, state: &PanelState, width: f32, execute
                     None => absent(ui, name),
                 }
             }
+            if state.has_column {
+                measures::show_results(ui, state, width - 40.0, execute);
+                tools::clip(ui, state, width - 32.0, execute);
+                tools::cuts(ui, state, width - 32.0, execute);
+                tools::start_line(ui, state, width - 32.0, execute);
+                tools::curve(ui, state, width - 32.0, execute);
+                body_marks::show(ui, state, width - 32.0, execute);
+            }
             let colours = colours(settings);
             ui.add_space(4.0);
             let is = |colour| match colour {
@@ -294,7 +314,7 @@ pub(super) fn show_controls(ui: &mut Ui, state: &PanelState, width: f32, execute
             Row { width: width - 24.0, height: TOUCH_SIZE * 0.8, title: texts::COLOUR, is_large_title: true }.show(
                 ui,
                 colours,
-                3,
+                if width < NARROW { 2 } else { 3 },
                 is,
                 hint,
                 |colour| match colour {
@@ -353,12 +373,7 @@ pub(super) fn show_controls(ui: &mut Ui, state: &PanelState, width: f32, execute
 
 /// A control in front that the mode has not: it keeps its place.
 fn absent(ui: &mut Ui, name: &str) {
-    ui.horizontal(|ui| {
-        ui.label(RichText::new(name).color(ABSENT));
-        ui.with_layout(egui::Layout::right_to_left(Align::Center), |ui| {
-            ui.label(RichText::new("-").color(ABSENT));
-        });
-    });
+    name_and_value(ui, RichText::new(name).color(ABSENT), RichText::new("-").color(ABSENT));
     let size = vec2(ui.available_width(), TOUCH_SIZE * 0.62);
     ui.allocate_exact_size(size, Sense::hover()).1.on_hover_text(texts::NO_SUCH_CONTROL);
 }
@@ -428,13 +443,19 @@ pub(super) fn show_cine_bar(ui: &mut Ui, state: &PanelState, height: f32, execut
             let mut left = room - width - ui.spacing().item_spacing.x;
             let loop_room = LoopRoom::of(ui, state);
             // In the order in which they give way to a narrow window; the first is always there.
+            let drawer = match (is_narrow, room < NARROW) {
+                (true, true) => (texts::DRAWER_SIGN, 32.0),
+                (true, false) => (texts::DRAWER_SIGN, 44.0),
+                (false, _) => (texts::CONTROLS, 96.0),
+            };
+            let save = (
+                if is_narrow { texts::SAVE } else { texts::SAVE_PICTURE },
+                if is_narrow { 64.0 } else { 124.0 },
+                Command::SavePicture,
+                texts::SAVE_PICTURE_HINT,
+            );
+            let drawer = (drawer.0, drawer.1, Command::ToggleDrawer, texts::DRAWER_HINT);
             let buttons = [
-                (
-                    if is_narrow { texts::SAVE } else { texts::SAVE_PICTURE },
-                    if is_narrow { 64.0 } else { 124.0 },
-                    Command::SavePicture,
-                    texts::SAVE_PICTURE_HINT,
-                ),
                 ("?", 44.0, Command::ToggleHelp, texts::HELP_HINT),
                 (texts::SAVE_LOOP, 100.0, Command::SaveLoop, texts::SAVE_LOOP_HINT),
                 (texts::RESET, 70.0, Command::Reset, texts::RESET_HINT),
@@ -442,36 +463,51 @@ pub(super) fn show_cine_bar(ui: &mut Ui, state: &PanelState, height: f32, execut
                 (texts::TIMES, 70.0, Command::ToggleTimes, texts::TIMES_HINT),
             ];
             let mut shown = Vec::new();
-            for (n, (label, width, command, hint)) in buttons.into_iter().enumerate() {
-                let wanted = width + ui.spacing().item_spacing.x;
+            let between = ui.spacing().item_spacing.x;
+            for (label, width, command, hint) in
+                [save].into_iter().chain(state.has_drawer.then_some(drawer)).chain(buttons)
+            {
+                let wanted = width + between;
                 // The loop needs its buttons and some of its slider.
-                let kept = match n {
-                    0 => 0.0,
-                    1 => 60.0,
-                    2 => loop_room.steps,
+                let kept = match command {
+                    Command::SavePicture => f32::NEG_INFINITY,
+                    Command::ToggleDrawer => -between,
+                    Command::ToggleHelp if left < LoopRoom::LEAST => 0.0,
+                    Command::ToggleHelp => 60.0,
+                    Command::SaveLoop => loop_room.steps,
                     _ => loop_room.steps + LoopRoom::TOOLS,
                 };
-                if n == 0 || left >= wanted + kept {
+                if left >= wanted + kept {
                     left -= wanted;
                     shown.push((label, width, command, hint));
                 }
             }
-            if left >= 150.0 {
+            if left >= LoopRoom::LEAST {
                 cine(ui, state, left, touch, &loop_room, execute);
             }
             ui.with_layout(egui::Layout::right_to_left(Align::Center), |ui| {
                 // From the right: help first, the picture next to the loop.
-                shown.sort_by_key(|(label, ..)| match *label {
-                    "?" => 0,
-                    texts::FULL_SCREEN => 1,
-                    texts::TIMES => 2,
-                    texts::RESET => 3,
-                    texts::SAVE_LOOP => 4,
-                    _ => 5,
+                shown.sort_by_key(|(.., command, _)| match command {
+                    Command::ToggleHelp => 0,
+                    Command::ToggleFullScreen => 1,
+                    Command::ToggleTimes => 2,
+                    Command::Reset => 3,
+                    Command::SaveLoop => 4,
+                    Command::ToggleDrawer => 5,
+                    _ => 6,
                 });
                 for (label, width, command, hint) in shown {
-                    let name = if label == "?" { texts::HELP } else { label };
-                    if ui.add(Button::new(label).min_size(vec2(width, touch))).tell(hint).named(name).clicked() {
+                    let name = match command {
+                        Command::ToggleHelp => texts::HELP,
+                        Command::ToggleDrawer => texts::DRAWER,
+                        _ => label,
+                    };
+                    let button = ui.add(Button::new(label).min_size(vec2(width, touch))).tell(hint).named(name);
+                    let button = match command {
+                        Command::ToggleDrawer => button.expanded(state.rail.is_open),
+                        _ => button,
+                    };
+                    if button.clicked() {
                         execute(command);
                     }
                 }
@@ -493,6 +529,8 @@ impl LoopRoom {
     /// In addition for the speed and the marks.
     const TOOLS: f32 = 268.0;
     const SHORTEST_SLIDER: f32 = 50.0;
+    /// With less, the bar says nothing of the loop.
+    const LEAST: f32 = 150.0;
 
     fn of(ui: &Ui, state: &PanelState) -> LoopRoom {
         let text = cine_text(&state.cine);

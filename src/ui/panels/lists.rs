@@ -3,6 +3,7 @@
 use super::colours::{ACCENT, PANEL, WEAK_TEXT};
 use super::names::{self, Tell};
 use super::overlays::LOW_WINDOW;
+use super::walking::Walk;
 use super::{SMALL_TEXT, TOUCH_SIZE};
 use crate::progress_lines::Progress;
 use crate::ui::command::Command;
@@ -100,11 +101,14 @@ impl List<'_> {
                         if entries.len() == 0 {
                             ui.label(self.empty);
                         }
+                        let walk = Walk::new(ui, self.title, entries.len(), 1);
                         for (n, (name, hint)) in entries.enumerate() {
                             let key = if n < 9 { format!("{}   ", n + 1) } else { "     ".into() };
                             let button = Button::new(format!("{key}{name}")).truncate();
                             let button = button.min_size(vec2(width - 20.0, TOUCH_SIZE * 0.7));
-                            if ui.add(button).tell(hint).named(name).clicked() {
+                            let entry = ui.add(button).tell(hint).named(name);
+                            walk.entry(n, &entry);
+                            if entry.clicked() {
                                 choose(n, execute);
                             }
                         }

@@ -16,13 +16,16 @@ mod measures;
 mod names;
 mod overlays;
 mod presets;
+mod rail;
 mod region;
 mod sides;
 mod tools;
+mod walking;
 mod widgets;
 
 use self::colours::{BACKGROUND, BUTTON, EDGE, ON_SELECTED, PANEL, SELECTED, TEXT, WEAK_TEXT};
 pub(super) use self::presets::{PresetTile, PresetsShown};
+pub(super) use self::rail::Rail;
 use super::command::Command;
 use super::input::{Button, Input, Key, Modifiers, Phase};
 use crate::gpu;
@@ -31,6 +34,7 @@ use crate::progress_lines::Progress;
 use crate::scene::Scene;
 use crate::ui::cine_player::CineState;
 use crate::ui::controls::Controls;
+use crate::ui::keyboard_pointer::PointerMark;
 use crate::ui::times::Times;
 pub use egui::accesskit;
 use egui::accesskit::{ActionRequest, TreeUpdate};
@@ -161,6 +165,20 @@ impl Panels {
         true
     }
 
+    /// Takes a key that walks through the list that is open. `is_grid`: its entries stand beside each other too. False if it is no such key.
+    pub(super) fn walk(&mut self, key: Key, modifiers: Modifiers, is_grid: bool) -> bool {
+        let Some(key) = walking::key(key, is_grid).filter(|_| modifiers == Modifiers::default()) else { return false };
+        self.gets_focus = true;
+        self.egui_input.press(key, EguiModifiers::NONE);
+        true
+    }
+
+    /// Takes the keyboard from the control that has it.
+    pub(super) fn drop_focus(&mut self) {
+        self.gets_focus = false;
+        self.context.memory_mut(|memory| memory.focused().iter().for_each(|id| memory.surrender_focus(*id)));
+    }
+
     pub(super) fn input(&mut self, input: &Input) {
         self.egui_input.input(input, self.scale);
     }
@@ -213,9 +231,11 @@ impl Panels {
                 controls::show_cine_bar(ui, state, below, execute);
                 if left > 0.0 {
                     controls::show_modes(ui, state, left, execute);
+                } else if state.rail.is_open {
+                    controls::show_drawer(ui, state, rail::drawer_size(points.into(), below), execute);
                 }
                 if right > 0.0 {
-                    controls::show_controls(ui, state, right, execute);
+                    controls::show_column(ui, state, right, execute);
                 }
             }
             match state.shows_panels {
@@ -411,6 +431,9 @@ pub(super) struct PanelState<'a> {
     pub(super) shows_panels: bool,
     /// There is a column of controls on the right.
     pub(super) has_column: bool,
+    /// Tools and controls are in a drawer.
+    pub(super) has_drawer: bool,
+    pub(super) rail: Rail,
     pub(super) shows_help: bool,
     pub(super) shows_times: bool,
     /// What the help is searched for, while it is.
@@ -451,6 +474,8 @@ pub(super) struct PanelState<'a> {
     pub(super) start_lines: &'a [StartLine],
     /// Where to draw a pointer, pixels of the window. None if the windowing system draws it.
     pub(super) pointer: Option<[f64; 2]>,
+    /// The pointer by keyboard, while it is on.
+    pub(super) keyboard_pointer: Option<PointerMark>,
 }
 
 /// A message that lasts.
@@ -478,6 +503,12 @@ pub fn picture_area(size: [u32; 2], scale: f32, shows_panels: bool) -> ([u32; 2]
 /// True if a window of this size has a column of controls on the right.
 pub(super) fn has_column(size: [u32; 2], scale: f32, shows_panels: bool) -> bool {
     Edges::of(size.map(|n| n as f32 / scale), shows_panels).right > 0.0
+}
+
+/// True if a window of this size has its tools and controls in a drawer: there is no room for a rail.
+pub(super) fn has_drawer(size: [u32; 2], scale: f32, shows_panels: bool) -> bool {
+    let Edges { left, below, .. } = Edges::of(size.map(|n| n as f32 / scale), shows_panels);
+    left == 0.0 && below > 0.0
 }
 
 /// A small heading above a group of controls.

@@ -34,6 +34,8 @@ pub(super) trait Tell {
     fn with_value(self, value: &str) -> Response;
     /// Whether what it opens is open.
     fn expanded(self, is_open: bool) -> Response;
+    /// Whether it is the tab whose content is shown.
+    fn chosen(self, is_chosen: bool) -> Response;
 }
 
 impl Tell for Response {
@@ -61,6 +63,14 @@ impl Tell for Response {
     fn expanded(self, is_open: bool) -> Response {
         keep_in_view(&self);
         node(&self.ctx, self.id, |node| node.set_expanded(is_open));
+        self
+    }
+
+    fn chosen(self, is_chosen: bool) -> Response {
+        node(&self.ctx, self.id, |node| {
+            node.clear_toggled();
+            node.set_selected(is_chosen);
+        });
         self
     }
 }

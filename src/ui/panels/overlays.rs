@@ -1,7 +1,7 @@
 //! What is drawn over the picture: banner and notes, times, help, a question with its answers, and the pointer where no windowing system draws one.
 
 use super::colours::{
-    ACCENT, BAR, FAULT, FOCUS_EDGE, GOOD, MESSAGE, ON_SELECTED, PANEL, POINTER, SELECTED, SHADE, TEXT, WARNING,
+    ACCENT, BAR, FAULT, FOCUS, FOCUS_EDGE, GOOD, MESSAGE, ON_SELECTED, PANEL, POINTER, SELECTED, SHADE, TEXT, WARNING,
     WEAK_TEXT, WHOLE_BAR,
 };
 use super::names::{self, Tell};
@@ -9,7 +9,7 @@ use super::{LARGE_TEXT, Note, PanelState, SMALL_TEXT, TEXT_SIZE, TOUCH_SIZE, pic
 use crate::ui::command::{self, Command};
 use crate::ui::sliders::SLIDERS;
 use crate::ui::texts;
-use crate::ui::texts::hints;
+use crate::ui::texts::{hints, keys};
 use egui::accesskit::Role;
 use egui::text::LayoutJob;
 use egui::{
@@ -254,8 +254,8 @@ const GESTURES: [(&str, &str); 17] = [
 type HelpLine = (String, String);
 
 /// The groups of the help that contain a text, with those of their lines that do; all for an empty text.
-fn found(exit_key: &str, search: &str) -> Vec<(&'static str, Vec<HelpLine>)> {
-    let keys = command::help().map(|(key, label)| (key, label.to_string()));
+fn found(exit_key: &str, search: &str, has_keyboard_pointer: bool) -> Vec<(&'static str, Vec<HelpLine>)> {
+    let in_table = command::help().map(|(key, label)| (key, label.to_string()));
     let exit = (!exit_key.is_empty()).then(|| (exit_key.to_string(), texts::QUIT.to_string()));
     let gestures = GESTURES.iter().map(|(gesture, label)| (gesture.to_string(), label.to_string()));
     let controls = SLIDERS.iter().map(|slider| (slider.name, hints::of_slider(slider.name)));
@@ -264,8 +264,12 @@ fn found(exit_key: &str, search: &str) -> Vec<(&'static str, Vec<HelpLine>)> {
     // Without a search all of it has to fit one page.
     let controls: Vec<HelpLine> = if search.is_empty() { Vec::new() } else { controls.collect() };
     let wanted: Vec<String> = search.split_whitespace().map(str::to_lowercase).collect();
+    let has_pointer = has_keyboard_pointer || !search.is_empty();
+    let of_pointer = keys::POINTER_KEYS.iter().filter(|_| has_pointer);
+    let of_pointer = of_pointer.map(|(key, label)| ((*key).to_string(), (*label).to_string()));
     let groups = [
-        (texts::KEYS, keys.chain(exit).collect::<Vec<_>>()),
+        (keys::BY_KEYBOARD, of_pointer.collect()),
+        (texts::KEYS, in_table.chain(exit).collect::<Vec<_>>()),
         (texts::GESTURES, gestures.collect()),
         (texts::CONTROLS, controls),
     ];
@@ -308,7 +312,11 @@ pub(super) fn show_help(ui: &mut Ui, state: &PanelState, execute: &mut dyn FnMut
                     });
                 });
                 let height = (screen.height() - 110.0).max(0.0);
-                let lines = lines_of(&found(state.exit_key, state.help_search.unwrap_or_default()));
+                let lines = lines_of(&found(
+                    state.exit_key,
+                    state.help_search.unwrap_or_default(),
+                    state.keyboard_pointer.is_some(),
+                ));
                 ScrollArea::vertical().max_height(height).min_scrolled_height(height).show(ui, |ui| {
                     let columns = ((width / 330.0) as usize).clamp(1, 3);
                     let each = lines.len().div_ceil(columns).max(1);
@@ -437,11 +445,22 @@ const CORNERS: [Vec2; 7] = [
 /// The triangles that fill the pointer: it is not convex.
 const TRIANGLES: [[u32; 3]; 5] = [[0, 1, 2], [0, 2, 5], [0, 5, 6], [2, 3, 4], [2, 4, 5]];
 
+/// Radius of the ring around the pointer by keyboard, points, and of the one within it while the button is held.
+const RING: [f32; 2] = [16.0, 8.0];
+
 pub(super) fn paint_pointer(ui: &Ui, state: &PanelState, scale: f32) {
-    let Some([x, y]) = state.pointer else { return };
-    let tip = pos2(x as f32 / scale, y as f32 / scale);
+    let at = |[x, y]: [f64; 2]| pos2(x as f32 / scale, y as f32 / scale);
     // On top of everything, in a layer that receives no clicks.
     let painter = ui.ctx().layer_painter(LayerId::new(Order::Debug, Id::new("pointer")));
+    if let Some(mark) = state.keyboard_pointer {
+        for radius in &RING[..=usize::from(mark.is_held)] {
+            for stroke in [Stroke::new(5.0, FOCUS_EDGE), Stroke::new(2.5, FOCUS)] {
+                painter.circle_stroke(at(mark.at), *radius, stroke);
+            }
+        }
+    }
+    let by_keyboard = state.keyboard_pointer.filter(|mark| mark.has_arrow).map(|mark| mark.at);
+    let Some(tip) = by_keyboard.or(state.pointer).map(at) else { return };
     let corners = CORNERS.map(|corner| tip + corner);
     let mut mesh = Mesh::default();
     corners.iter().for_each(|corner| mesh.colored_vertex(*corner, POINTER));
@@ -457,15 +476,18 @@ mod tests {
 
     #[test]
     fn the_help_is_searched_by_all_of_its_words() {
-        let all: usize = found("", "").iter().map(|(_, lines)| lines.len()).sum();
+        let all: usize = found("", "", false).iter().map(|(_, lines)| lines.len()).sum();
         assert_eq!(all, command::help().count() + GESTURES.len());
+        let first = found("", "", true).swap_remove(0);
+        assert_eq!((first.0, first.1.len()), (keys::BY_KEYBOARD, keys::POINTER_KEYS.len()), "while it is on");
         let names = |search: &str| -> Vec<String> {
-            found("Ctrl+Alt+Q", search).into_iter().flat_map(|(_, lines)| lines).map(|(key, _)| key).collect()
+            found("Ctrl+Alt+Q", search, false).into_iter().flat_map(|(_, lines)| lines).map(|(key, _)| key).collect()
         };
         assert!(names("save picture").contains(&"P".to_string()));
         assert!(names("SPECKLE").contains(&"Smoothing".to_string()), "controls are found by what they do");
         assert_eq!(names("patient's sides"), ["Sides"]);
         assert_eq!(names("ctrl+alt quit"), ["Ctrl+Alt+Q"]);
+        assert!(names("double click").contains(&"Shift+Enter".to_string()));
         assert!(names("no such thing").is_empty());
     }
 

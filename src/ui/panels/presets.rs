@@ -3,13 +3,14 @@
 use super::colours::{ACCENT, BACKGROUND, BUTTON, EDGE, FAULT, PANEL, TEXT, UNCOLOURED, WEAK_TEXT};
 use super::names::{self, Tell};
 use super::overlays::{LOW_WINDOW, first};
+use super::walking::Walk;
 use super::{SMALL_TEXT, TEXT_SIZE, TOUCH_SIZE};
 use crate::picture::Picture;
 use crate::ui::command::Command;
 use crate::ui::texts;
 use egui::accesskit::Role;
 use egui::{
-    Align2, Area, Button, ColorImage, Context, FontId, Frame, Id, Label, Margin, Order, Pos2, Rect, RichText,
+    Align2, Area, Button, ColorImage, Context, FontId, Frame, Id, Label, Margin, Order, Pos2, Rect, Response, RichText,
     ScrollArea, Sense, Stroke, StrokeKind, TextureHandle, TextureId, TextureOptions, Ui, WidgetInfo, WidgetType, pos2,
     vec2,
 };
@@ -153,12 +154,15 @@ fn tiles(
     let each = (width - GAP * (columns - 1) as f32) / columns as f32;
     ui.spacing_mut().item_spacing = vec2(GAP, GAP);
     let all: Vec<(usize, &PresetTile)> = shown.tiles.iter().enumerate().collect();
+    let walk = Walk::new(ui, texts::PRESETS, all.len(), columns);
     for row in all.chunks(columns) {
         ui.horizontal_top(|ui| {
             for (n, tile) in row {
                 ui.vertical(|ui| {
                     ui.set_width(each);
-                    if button(ui, *n, tile, textures.get(*n).copied().flatten(), each) {
+                    let entry = button(ui, *n, tile, textures.get(*n).copied().flatten(), each);
+                    walk.entry(*n, &entry);
+                    if entry.clicked() {
                         execute(Command::Preset(*n));
                     }
                     if let Some(own) = tile.own {
@@ -170,8 +174,8 @@ fn tiles(
     }
 }
 
-/// A picture with a name. True if it was clicked.
-fn button(ui: &mut Ui, n: usize, tile: &PresetTile, texture: Option<TextureId>, width: f32) -> bool {
+/// A picture with a name.
+fn button(ui: &mut Ui, n: usize, tile: &PresetTile, texture: Option<TextureId>, width: f32) -> Response {
     let edge = 4.0;
     let picture = vec2(width - 2.0 * edge, (width - 2.0 * edge) / SHAPE);
     let (area, response) = ui.allocate_exact_size(vec2(width, picture.y + NAME + 2.0 * edge), Sense::CLICK);
@@ -196,7 +200,7 @@ fn button(ui: &mut Ui, n: usize, tile: &PresetTile, texture: Option<TextureId>, 
     let galley = painter.layout_job(job);
     let at = pos2(area.left() + 2.0 * edge, inside.bottom() + (NAME + edge - galley.size().y) / 2.0);
     painter.galley(at, galley, TEXT);
-    response.tell(tile.hint).named(tile.name).clicked()
+    response.tell(tile.hint).named(tile.name)
 }
 
 /// What renames and deletes a preset of the user.

@@ -44,13 +44,8 @@ pub(super) fn slider(
         texts::CLIP_THRESHOLD if before <= 0.0 => texts::AUTOMATIC.to_string(),
         _ => format!("{before:.digits$}{space}{}", slider.unit),
     };
-    ui.horizontal(|ui| {
-        let text = RichText::new(name);
-        ui.label(if is_large { text.strong() } else { text });
-        ui.with_layout(egui::Layout::right_to_left(Align::Center), |ui| {
-            ui.label(RichText::new(&shown).color(ACCENT));
-        });
-    });
+    let text = RichText::new(name);
+    name_and_value(ui, if is_large { text.strong() } else { text }, RichText::new(&shown).color(ACCENT));
     ui.spacing_mut().slider_width = ui.available_width();
     // Tall enough for a finger, although the rail is thin.
     ui.spacing_mut().interact_size.y = TOUCH_SIZE * if is_large { 0.62 } else { 0.5 };
@@ -66,6 +61,19 @@ pub(super) fn slider(
     if (is_held || is_asked) && value != before {
         execute(Command::SetSlider(number, value));
     }
+}
+
+/// The name of a slider and its value, in a row as low as its text: every control in front is to be in sight.
+pub(super) fn name_and_value(ui: &mut Ui, name: RichText, value: RichText) {
+    let finger = std::mem::replace(&mut ui.spacing_mut().interact_size.y, TEXT_SIZE);
+    ui.horizontal(|ui| {
+        ui.label(name);
+        ui.with_layout(egui::Layout::right_to_left(Align::Center), |ui| {
+            ui.label(value);
+        });
+    });
+    ui.spacing_mut().interact_size.y = finger;
+    ui.add_space(-ui.spacing().item_spacing.y / 2.0);
 }
 
 /// A slider in mm of what is no setting of its own. Returns the value that the user sets.
@@ -84,12 +92,7 @@ pub(super) fn scale_slider(
     hint: &str,
 ) -> Option<f64> {
     let mut value = before.clamp(low, high.max(low));
-    ui.horizontal(|ui| {
-        ui.label(name);
-        ui.with_layout(egui::Layout::right_to_left(Align::Center), |ui| {
-            ui.label(RichText::new(&shown).color(ACCENT));
-        });
-    });
+    name_and_value(ui, RichText::new(name), RichText::new(&shown).color(ACCENT));
     ui.spacing_mut().slider_width = ui.available_width();
     ui.spacing_mut().interact_size.y = TOUCH_SIZE * 0.5;
     let slider = ui.add(Slider::new(&mut value, low..=high.max(low)).show_value(false).step_by(step));

@@ -8,9 +8,10 @@ use crate::progress_lines::Progress;
 use crate::source::phantom::{Phantom, PhantomOptions};
 use crate::ui::cine_player::{CinePlayer, CineState};
 use crate::ui::controls::EXAMS;
+use crate::ui::keyboard_pointer::PointerMark;
 use crate::ui::panels::accesskit::{Action, ActionData, ActionRequest, Node, NodeId, TreeId, TreeUpdate};
 use crate::ui::panels::drawn::Drawn;
-use crate::ui::panels::{self, Banner, Note, PanelOutput, PanelState, Panels, PresetTile, PresetsShown};
+use crate::ui::panels::{self, Banner, Note, PanelOutput, PanelState, Panels, PresetTile, PresetsShown, Rail};
 use crate::ui::times::Times;
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -29,6 +30,7 @@ pub(super) struct Shown {
     pub(super) shows_panels: bool,
     pub(super) shows_first_steps: bool,
     pub(super) shows_only_origin: bool,
+    pub(super) rail: Rail,
     pub(super) has_drawn: bool,
     pub(super) is_frozen: bool,
     pub(super) cine: CineState,
@@ -41,6 +43,7 @@ pub(super) struct Shown {
     pub(super) open: [bool; 4],
     pub(super) start_lines: Vec<StartLine>,
     pub(super) pointer: Option<[f64; 2]>,
+    pub(super) keyboard_pointer: Option<PointerMark>,
     /// What the last layout said.
     pub(super) tree: BTreeMap<NodeId, Node>,
     pub(super) focus: Option<NodeId>,
@@ -74,6 +77,7 @@ impl Shown {
             shows_panels: true,
             shows_first_steps: false,
             shows_only_origin: false,
+            rail: Rail::default(),
             has_drawn: true,
             is_frozen: false,
             cine: CinePlayer::default().state(&(0..20).map(|_| CineVolume::default()).collect(), Some(2)),
@@ -84,6 +88,7 @@ impl Shown {
             open: [false; 4],
             start_lines: Vec::new(),
             pointer: None,
+            keyboard_pointer: None,
             tree: BTreeMap::new(),
             focus: None,
             corners: Vec::new(),
@@ -118,6 +123,8 @@ impl Shown {
             picture: panels::picture_area(self.size, scale, self.shows_panels),
             shows_panels: self.shows_panels,
             has_column: panels::has_column(self.size, scale, self.shows_panels),
+            has_drawer: panels::has_drawer(self.size, scale, self.shows_panels),
+            rail: self.rail,
             shows_help,
             shows_times,
             help_search: None,
@@ -142,6 +149,7 @@ impl Shown {
             exit_key: "",
             start_lines: &self.start_lines,
             pointer: self.pointer,
+            keyboard_pointer: self.keyboard_pointer,
         };
         let output = self.panels.lay_out(&state, self.size, self.time);
         self.corners = output.corners();
@@ -153,6 +161,7 @@ impl Shown {
         self.focus = Some(focus).filter(|focus| *focus != root);
         for command in &commands {
             self.controls.apply(command, Some(&self.scene));
+            self.rail.apply(command, panels::has_drawer(self.size, scale, self.shows_panels));
         }
         self.scene = scene(&self.scene.geometry, &self.controls.settings().clone().without_drawings());
         commands

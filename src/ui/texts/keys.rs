@@ -97,7 +97,25 @@ pub const PRESETS: &str = "presets";
 pub const THIS_HELP: &str = "this help";
 pub const TIMES_OF_THE_PASSES: &str = "times of the passes";
 pub const SLIDERS: &str = "sliders";
+pub const SWITCH_RAIL: &str = "tools or controls, where a window has not both";
 pub const FOCUS_PANELS: &str = "keyboard to the buttons and sliders, and back";
+pub const KEYBOARD_POINTER: &str = "pointer by keyboard, on and off";
 pub const FULL_SCREEN: &str = "full screen";
 pub const BACK: &str = "close what is open, leave full screen, quit";
 pub const QUIT: &str = "quit";
+
+// The pointer by keyboard: its keys, and what they do while it is on.
+pub const BY_KEYBOARD: &str = "Pointer by keyboard";
+pub const POINTER_IS_ON: &str =
+    "Pointer by keyboard: the arrows move it (Shift: one pixel), Enter clicks, Space holds and releases, Esc leaves";
+pub const POINTER_IS_OFF: &str = "Pointer by keyboard: off";
+pub const POINTER_KEYS: [(&str, &str); 8] = [
+    ("Left, Right, Up, Down", "move the pointer; two at once: aslant"),
+    ("Shift + arrows", "one pixel"),
+    ("Enter", "click"),
+    ("Shift+Enter", "double click"),
+    ("Ctrl+Enter", "end the contour, the volume or the line"),
+    ("Space", "hold the button, and release it: arrows drag meanwhile"),
+    ("Shift+Space, Ctrl+Space", "the same as Shift + drag, Ctrl + drag"),
+    ("Esc", "give the drag up; else leave the pointer"),
+];
