@@ -102,7 +102,7 @@ impl Console {
                 }
             }
         }
-        self.poll_opening();
+        self.poll_opening(now);
         self.poll_counting();
         self.poll_thumbnails(now);
         self.advance_cine(now);
@@ -110,6 +110,7 @@ impl Console {
         self.run_stream(now)?;
         self.follow_volumes(now);
         self.follow_start(now);
+        self.refreeze();
         self.warm(now);
         let shader_fault = self.shaders.as_ref().and_then(|folder| folder.fault());
         self.needs_redraw |= shader_fault != self.shader_fault;
@@ -332,6 +333,7 @@ impl Console {
             self.metrics.as_ref().map(LiveMetrics::due),
             self.warms_at(now),
             self.thumbnails_at(now),
+            self.reading_wakes_at(now),
             silence,
             statistics,
         ]
@@ -408,6 +410,14 @@ impl Console {
         }
     }
 
+    /// Why there was nothing to show: the source could not be opened.
+    pub fn source_fault(&self) -> Option<String> {
+        match self.source.state() {
+            SourceState::Ended(why) if self.source.not_opened() > 0 => why.clone(),
+            _ => None,
+        }
+    }
+
     /// A summary of the run in one line.
     pub fn summary(&mut self) -> String {
         let ms = |value: Option<f64>| value.map_or("-".into(), |ms| format!("{ms:.1}"));
@@ -434,6 +444,7 @@ impl Console {
     /// Lays out the panels and executes the commands that they give.
     fn lay_out_panels(&mut self, now: Instant, has_drawn: bool) -> gpu::window::Panels {
         let notes: Vec<_> = self.notes.iter().map(|(_, note)| note.clone()).collect();
+        let recordings = self.opening.named();
         let quality = frame_budget::label(self.quality, &self.rungs);
         let exit_key = match (&self.fixed.exit, self.fixed.is_kiosk) {
             (Some(chord), true) => chord.to_string(),
@@ -448,6 +459,8 @@ impl Console {
             shows_panels: self.shows_panels,
             has_column: panels::has_column(self.size, self.panels.scale(), self.shows_panels),
             files: self.opening.shown(),
+            recordings: &recordings,
+            reading: self.opening.told(),
             shows_exports: self.shows_exports,
             exporting: self.exporter.exporting(),
             presets: self.presets.shown(),
@@ -496,6 +509,10 @@ impl Console {
         let is_silent = now.saturating_duration_since(self.last_arrival) >= SILENCE && !self.stream.is_frozen();
         let (state, gone) = (self.source.state(), self.stream.disconnected());
         let has_shown = self.stream.volumes_shown() > 0;
+        // What is being read says it itself.
+        if *state == SourceState::Opening && self.opening.told().is_some() {
+            return None;
+        }
         let (title, text, is_fault) = self.fixed.source.notice(state, gone.as_deref(), is_silent, has_shown)?;
         let is_start = !is_fault && text.is_empty() && matches!(state, SourceState::Open);
         match self.start_step.filter(|_| is_start) {

@@ -91,6 +91,13 @@ impl Controls {
         self.tool
     }
 
+    /// All of it for a later time, without what is in work and with the last steps that can be undone.
+    pub(super) fn set_aside(&self) -> Controls {
+        let mut aside = Controls { work: None, typing: None, line: None, outline: Vec::new(), ..self.clone() };
+        aside.history.shorten();
+        aside
+    }
+
     /// Restores the settings of the start, except for the size of the picture and the measurements.
     pub(super) fn reset(&mut self) {
         let again = Settings {
@@ -245,6 +252,10 @@ impl Controls {
             | Command::SaveWorkspace
             | Command::OpenFiles
             | Command::OpenFile(_)
+            | Command::ShowRecording(_)
+            | Command::StepRecording(_)
+            | Command::CloseRecording(_)
+            | Command::CancelReading
             | Command::Exports
             | Command::Export(_)
             | Command::CancelExport

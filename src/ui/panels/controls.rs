@@ -7,7 +7,7 @@ use super::colours::{
 use super::names::{self, Tell};
 use super::widgets::{front, slider, switch};
 use super::{PanelState, TEXT_SIZE, TOUCH_SIZE, heading};
-use super::{measures, tools};
+use super::{measures, recordings, tools};
 use crate::scene::{ColourMap, Layout, Mode, PlaneName, Settings, Transfer, TransferName};
 use crate::ui::cine_player::{CineState, SPEEDS};
 use crate::ui::command::{Command, Tool};
@@ -51,6 +51,7 @@ pub(super) fn show_modes(ui: &mut Ui, state: &PanelState, width: f32, execute: &
             let settings = state.controls.settings();
             let row = Row { width, height: TOUCH_SIZE * 0.92, title: "", is_large_title: false };
             ui.add_space(6.0);
+            recordings::show_list(ui, state, width - 16.0, execute);
             undo_and_redo(ui, state, &row, execute);
             let hint = texts::PRESETS_HINT;
             let size = vec2(width - 16.0, TOUCH_SIZE * 0.75);
