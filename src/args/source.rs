@@ -195,7 +195,8 @@ impl SourceArgs {
             Box::new(network.map_err(|e| failed(format!("{}: {e}", self.source)))?)
         } else {
             let options = OpenOptions { freehand: self.freehand()?, ..self.geometry.options() };
-            let recording = open_recording(self.path(), options)?;
+            let mut recording = open_recording(self.path(), options)?;
+            recording.prepare().map_err(input)?;
             // The frame rate of a free-running probe is limited by the speed of sound.
             let rate = self.rate.or(sweep.as_ref().and_then(|_| acoustic_rate(&*recording)));
             Box::new(PlaybackSource::new(recording, self.playback(rate)?, self.rounds))

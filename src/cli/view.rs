@@ -1,7 +1,7 @@
 //! `echolume view`.
 
-use super::view_config::{ConsoleConfig, WindowConfig, rungs};
-use super::view_open::{Opened, Shown};
+use super::view_config::{ConsoleConfig, First, WindowConfig, rungs};
+use super::view_open::{OpenedInWindow, Shown, check_later};
 use crate::args::{
     SceneArgs, SourceArgs, StreamArgs, check_outputs, device_failure, first_steps, presets_file, recent_list,
 };
@@ -12,7 +12,8 @@ use crate::gpu::{Context, Wake};
 use crate::kiosk::config::{self, Config};
 use crate::live::cine::CineLimits;
 use crate::terminal::{Failure, failed, input, say};
-use crate::ui::console::{Console, ConsoleOptions, OpenFile, StartupFault};
+use crate::ui::console::{Console, ConsoleOptions, OpenFile, Opened, StartupFault};
+use crate::ui::recordings::{MAX_OPEN, Recordings};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::Duration;
@@ -23,6 +24,7 @@ use std::time::Duration;
                   --set, each overriding the one before.\n\nExamples:\n  \
                   echolume view\n  \
                   echolume view echolume-20261123-2312-1.toml    (a workspace that was saved with Ctrl+S)\n  \
+                  echolume view before.mha after.mha\n  \
                   echolume view --source sweep.frames --real-time --rounds 100\n  \
                   echolume view --source igtl://localhost:18944 --full-screen\n  \
                   echolume view --source phantom --rate 3 --budget 16ms --report error.json\n  \
@@ -30,16 +32,17 @@ use std::time::Duration;
                   echolume view --kiosk --config /etc/echolume/echolume.toml"
 )]
 pub struct View {
-    /// A recording, or a workspace (.toml) that was saved in the view; as --source
+    /// A recording, or a workspace (.toml) that was saved in the view; as --source. Of several the first is shown; Ctrl+Page down shows the
+    /// next
     #[arg(conflicts_with_all = ["source", "config"])]
-    file: Option<PathBuf>,
+    files: Vec<PathBuf>,
     #[command(flatten)]
     source: SourceArgs,
     #[command(flatten)]
     scene: SceneArgs,
     /// What was opened in the window since.
     #[arg(skip)]
-    opened: Opened,
+    opened: OpenedInWindow,
     /// Kiosk mode: only the configured keys (Ctrl+Alt+Q) end it. A failing source or configuration is shown and retried for ever
     #[arg(long)]
     kiosk: bool,
@@ -145,10 +148,14 @@ impl View {
             place.device.device = device;
         }
         let shaders = self.glsl.as_deref().map(ShaderFolder::open).transpose().map_err(input)?;
+        if self.files.len() > MAX_OPEN {
+            return Err(input(format!("{} files: at most {MAX_OPEN} are open at once", self.files.len())));
+        }
+        self.files.iter().skip(1).try_for_each(|file| check_later(file))?;
         let mut first = match kiosk {
             true => None,
-            // Open the source before the window: a fault is then reported in the terminal.
-            false => Some(self.console_config()?.opened()?),
+            // The source is opened before the window: a fault is then reported in the terminal.
+            false => Some(self.console_config()?.begun()?),
         };
         let view = Arc::new(self);
         let make = move |context: &Arc<Context>, size: [u32; 2], factor: f32, wake: Wake| {
@@ -165,9 +172,11 @@ impl View {
                     (nothing, Some(view.startup_fault(why)))
                 }
             };
+            view.list(wanted.source.as_ref());
             let (open, options) = wanted.options(factor, wake, startup_fault);
             let open_file = Some(view.open_file()).filter(|_| !view.kiosk);
-            Console::new(context, open, ConsoleOptions { shaders: shaders.clone(), open_file, ..options }, size)
+            let (shaders, recordings) = (shaders.clone(), view.opened.recordings.clone());
+            Console::new(context, open, ConsoleOptions { shaders, open_file, recordings, ..options }, size)
         };
         let ran = place.run(Box::new(make)).map_err(device_failure);
         finish(ran?)
@@ -205,17 +214,44 @@ impl View {
         Ok(wanted)
     }
 
+    /// Begins the list of open recordings with what the program is started with. `source`: of the first console.
+    fn list(&self, source: Option<&SourceArgs>) {
+        let mut recordings = self.opened.recordings.lock().unwrap_or_else(|e| e.into_inner());
+        if let Some(source) = source.filter(|_| recordings.is_empty()) {
+            *recordings = Recordings::of(source.kind(), self.files.first().map_or(source.path(), PathBuf::as_path));
+            self.files.iter().skip(1).for_each(|file| _ = recordings.add(file));
+        }
+    }
+
     /// Opens a file for the next console.
     fn open_file(self: &Arc<View>) -> OpenFile {
         let view = self.clone();
-        Arc::new(move |file| view.opened.open(&view.source, file).map_err(Failure::message))
+        Arc::new(move |file, _| view.open(file).map_err(Failure::message))
+    }
+
+    /// Opens a recording of the list, or a file.
+    fn open(&self, file: &Path) -> Result<Opened, Failure> {
+        let is_it = |given: &Path| given == file || std::path::absolute(given).is_ok_and(|given| given == file);
+        let shown = match self.files.iter().find(|given| is_it(given)) {
+            Some(given) => Shown::of(&self.source, Some(given))?,
+            None if self.config.is_none() && is_it(self.source.path()) => Shown::of(&self.source, None)?,
+            None => match self.config().transpose().map_err(input)? {
+                // The source of the configuration is shown with its settings.
+                Some(config) if is_it(SourceArgs::from_config(&config)?.path()) => {
+                    return Ok(self.opened.next(None, SourceArgs::from_config(&config)?.open()?));
+                }
+                _ => Shown::opened(&self.source, file)?,
+            },
+        };
+        let source = shown.source.open()?;
+        Ok(self.opened.next(Some(shown), source))
     }
 
     /// The configuration of the console from the flags alone.
     fn config_from_flags(&self) -> Result<ConsoleConfig, Failure> {
-        let Shown { source, workspace } = match self.opened.shown() {
+        let Shown { source, workspace, is_given } = match self.opened.shown() {
             Some(shown) => shown,
-            None => Shown::of(&self.source, self.file.as_deref())?,
+            None => Shown::of(&self.source, self.files.first().map(PathBuf::as_path))?,
         };
         if let Some(file) = &self.record {
             super::stream::check_record(file, source.path())?;
@@ -223,7 +259,7 @@ impl View {
         let is_complete = workspace.is_some();
         let layers = match workspace {
             // The flags are about what the program was started with.
-            Some(layers) if self.opened.is_some() => layers,
+            Some(layers) if !is_given => layers,
             Some(layers) => self.scene.layers_over(layers, &[])?,
             None => self.scene.layers(source.is_phantom(), &[])?,
         };
@@ -246,7 +282,8 @@ impl View {
             scale: self.scale,
             ..ConsoleOptions::default()
         };
-        Ok(ConsoleConfig { source: Some(source), first: self.opened.take_source(), options })
+        let first = self.opened.take_source().map(First::Open);
+        Ok(ConsoleConfig { source: Some(source), first, options })
     }
 
     fn place(&self) -> Result<WindowConfig, Failure> {
@@ -295,10 +332,13 @@ impl View {
 /// Prints the summary. Fails on lost recordings and on validation messages.
 fn finish((mut console, context): (Console, Arc<Context>)) -> Result<(), Failure> {
     console.end_metrics();
-    let line = console.summary();
+    let (line, not_opened) = (console.summary(), console.source_fault());
     let unrecorded = console.stream().feed_counts().unrecorded;
     drop(console);
     say!("{line}");
+    if let Some(why) = not_opened {
+        return Err(input(why));
+    }
     if unrecorded > 0 {
         return Err(failed(format!("--record: {unrecorded} frames could not be written")));
     }

@@ -14,11 +14,16 @@ use crate::ui::frame_budget::{Rung, built_in_ladder, measured_ladder};
 use crate::ui::source_supervisor::OpenSource;
 use crate::ui::window::{self, MakeConsole, WindowOptions};
 use std::path::Path;
+use std::sync::mpsc::{Receiver, RecvTimeoutError, channel};
 use std::sync::{Arc, Mutex};
-use std::time::SystemTime;
+use std::time::{Duration, SystemTime};
 
 /// Default size of the window, pixels.
 const DEFAULT_SIZE: [u32; 2] = [1280, 800];
+
+/// A source that takes longer to be opened is waited for in the window. What opens sooner and cannot be opened is a fault in the terminal.
+const WINDOW_AFTER: Duration = Duration::from_secs(1);
+const PANICKED: &str = "the thread that opens the source panicked";
 
 /// The device and the window. They stay the same for the whole run.
 pub struct WindowConfig {
@@ -91,12 +96,19 @@ impl WindowConfig {
     }
 }
 
+/// A source that need not be opened any more.
+pub enum First {
+    Open(Box<dyn Live>),
+    /// By another thread.
+    BeingOpened(Receiver<Result<Box<dyn Live>, Failure>>),
+}
+
 /// The source and the console. A kiosk reads them anew after a fault.
 pub struct ConsoleConfig {
     /// None: the console shows only a message.
     pub source: Option<SourceArgs>,
-    /// The source, if it was opened before the window.
-    pub first: Option<Box<dyn Live>>,
+    /// The source, if it was opened before the window, or begun to be.
+    pub first: Option<First>,
     pub options: ConsoleOptions,
 }
 
@@ -132,14 +144,25 @@ impl ConsoleConfig {
         Ok(ConsoleConfig { source: Some(SourceArgs::from_config(config)?), first: None, options })
     }
 
-    /// The same with its source open.
+    /// The same with its source open, or being opened if that takes long: then the window shows how far it is.
     ///
     /// # Errors
     /// The source cannot be opened.
-    pub fn opened(mut self) -> Result<ConsoleConfig, Failure> {
-        if self.first.is_none() {
-            self.first = self.source.as_ref().map(SourceArgs::open).transpose()?;
-        }
+    pub fn begun(mut self) -> Result<ConsoleConfig, Failure> {
+        let Some(source) = self.source.clone().filter(|_| self.first.is_none()) else { return Ok(self) };
+        let (sender, opened) = channel();
+        let progress = self.options.progress.clone();
+        let work = move || {
+            // The receiver may be gone.
+            let _ = sender.send(progress.during(|| source.open()));
+        };
+        let thread = std::thread::Builder::new().name("opening".into()).spawn(work);
+        thread.map_err(|e| failed(format!("a thread cannot be started: {e}")))?;
+        self.first = Some(match opened.recv_timeout(WINDOW_AFTER) {
+            Ok(source) => First::Open(source?),
+            Err(RecvTimeoutError::Timeout) => First::BeingOpened(opened),
+            Err(RecvTimeoutError::Disconnected) => return Err(failed(PANICKED)),
+        });
         Ok(self)
     }
 
@@ -147,13 +170,16 @@ impl ConsoleConfig {
     pub fn options(self, factor: f32, wake: Wake, startup_fault: Option<StartupFault>) -> (OpenSource, ConsoleOptions) {
         let scale = self.options.scale * factor;
         let kind = self.source.as_ref().map_or(SourceKind::default(), SourceArgs::kind);
-        let (source, first) = (self.source, Mutex::new(self.first));
-        let open: OpenSource = Arc::new(move || match first.lock().unwrap_or_else(|e| e.into_inner()).take() {
-            Some(source) => Ok(source),
-            None => match source.as_ref().map(SourceArgs::open) {
-                Some(opened) => opened.map_err(Failure::message),
-                None => Err("there is no source".into()),
-            },
+        let (source, first, progress) = (self.source, Mutex::new(self.first), self.options.progress.clone());
+        let open: OpenSource = Arc::new(move || {
+            let first = first.lock().unwrap_or_else(|e| e.into_inner()).take();
+            let opened = match (first, &source) {
+                (Some(First::Open(source)), _) => Ok(source),
+                (Some(First::BeingOpened(opened)), _) => opened.recv().unwrap_or_else(|_| Err(failed(PANICKED))),
+                (None, Some(source)) => progress.during(|| source.open()),
+                (None, None) => Err(failed("there is no source")),
+            };
+            opened.map_err(Failure::message)
         });
         (open, ConsoleOptions { scale, source: kind, wake, startup_fault, ..self.options })
     }

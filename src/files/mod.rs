@@ -1,8 +1,9 @@
-//! Files: bounded reading, atomic replacement, and signal handling while a file is written.
+//! Files: bounded reading and its progress, atomic replacement, and signal handling while a file is written.
 //!
 //! [`Unfinished`] is a file that is either complete or absent. [`InputError`] is an error of an input file: one line that names the file,
 //! the field and the fault. Some errors omit the file's name, because the caller adds it.
 
+pub mod progress;
 pub mod signals;
 mod spool;
 

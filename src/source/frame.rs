@@ -5,6 +5,7 @@ use crate::files::InputError;
 use crate::probe::{Advance, Geometry, World, is_rigid};
 use glam::{DAffine3, DMat4, DVec3};
 use serde::{Deserialize, Serialize};
+use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
 /// Most frames a volume, for every reader.
@@ -155,6 +156,13 @@ pub trait Source: Send {
     /// # Errors
     /// Data that cannot be read.
     fn next_frame(&mut self) -> Result<Option<Frame>, InputError>;
+    /// Reads ahead what the first frame needs, if that is more than the frame: it may take long.
+    ///
+    /// # Errors
+    /// Data that cannot be read.
+    fn prepare(&mut self) -> Result<(), InputError> {
+        Ok(())
+    }
     /// What all frames have in common.
     fn header(&self) -> Header {
         header_of(self)
@@ -191,6 +199,12 @@ pub trait Source: Send {
     fn arrival(&self) -> Option<f64> {
         None
     }
+}
+
+/// Bytes of all files of a source.
+pub(super) fn file_bytes(source: &dyn Source) -> u64 {
+    let files: BTreeSet<PathBuf> = source.files().into_iter().collect();
+    files.iter().filter_map(|file| file.metadata().ok()).filter(|about| about.is_file()).map(|about| about.len()).sum()
 }
 
 /// The header of the frames of a source. If all volumes are swept in one direction, both geometries are the same.

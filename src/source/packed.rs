@@ -4,6 +4,7 @@
 
 use super::dicom::{Coding, FrameStream, Frames};
 use super::pictures::{PictureStream, Pictures};
+use crate::files::progress::CountedFile;
 use crate::files::{InputError, quoted};
 use bzip2::bufread::MultiBzDecoder;
 use flate2::bufread::MultiGzDecoder;
@@ -158,7 +159,7 @@ pub(super) struct Pixels {
 
 /// The samples as a stream.
 pub(super) enum PixelStream {
-    Raw(BufReader<File>),
+    Raw(BufReader<CountedFile>),
     Packed(Box<dyn Read + Send>),
 }
 
@@ -208,7 +209,7 @@ impl Pixels {
         if let Some(frames) = &self.frames {
             return Ok(PixelStream::Packed(Box::new(FrameStream::new(frames, skip)?)));
         }
-        let mut file = File::open(&self.path)?;
+        let mut file = CountedFile::open(&self.path)?;
         if !self.is_compressed() {
             file.seek(SeekFrom::Start(self.offset.saturating_add(skip)))?;
             return Ok(PixelStream::Raw(BufReader::new(file)));
@@ -267,7 +268,7 @@ impl Read for PixelStream {
 
 /// A zlib stream. Unlike flate2's own reader it detects a stream that is cut short.
 struct Inflate {
-    input: BufReader<io::Take<File>>,
+    input: BufReader<io::Take<CountedFile>>,
     state: Decompress,
     ended: bool,
 }

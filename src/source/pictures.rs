@@ -1,6 +1,7 @@
 //! Pictures of one size as a stream of samples.
 
 use crate::files::escaped;
+use crate::files::progress::CountedFile;
 use image::{DynamicImage, ImageDecoder, ImageReader};
 use std::io::{self, Read};
 use std::path::{Path, PathBuf};
@@ -43,9 +44,9 @@ impl About {
 }
 
 /// A reader for the format of a file's content, with the library's limits of memory.
-fn reader(picture: &Path) -> Result<ImageReader<io::BufReader<std::fs::File>>, String> {
+fn reader(picture: &Path) -> Result<ImageReader<io::BufReader<CountedFile>>, String> {
     // Not by the name of the file.
-    let file = std::fs::File::open(picture).map(|file| ImageReader::new(io::BufReader::new(file)));
+    let file = CountedFile::open(picture).map(|file| ImageReader::new(io::BufReader::new(file)));
     let reader = file.and_then(ImageReader::with_guessed_format);
     let reader = reader.map_err(|e| format!("cannot be read: {e}"))?;
     match reader.format().is_some_and(|format| format.reading_enabled()) {

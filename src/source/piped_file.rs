@@ -5,6 +5,7 @@ use super::frame::{Frame, Header, POSE_BYTES, Source, read_pose};
 use super::piped::{StreamHeader, first_line};
 use super::samples::{self, SampleType, StoredType};
 use crate::files::InputError;
+use crate::files::progress::CountedFile;
 use crate::probe::{Geometry, ProbeFile, World};
 use glam::DAffine3;
 use std::fs::File;
@@ -17,7 +18,7 @@ pub(super) struct PipedFile {
     path: PathBuf,
     probe_file: Option<PathBuf>,
     stream: StreamHeader,
-    input: BufReader<File>,
+    input: BufReader<CountedFile>,
     /// Offset of the first frame, bytes.
     start: u64,
     /// Whole volumes.
@@ -39,7 +40,7 @@ impl PipedFile {
     /// A file that cannot be read, a first line that is not a header, no whole volume.
     pub fn open(path: &Path, probe: Option<&Path>) -> Result<PipedFile, InputError> {
         let unreadable = |e: std::io::Error| InputError::unreadable(path, &e);
-        let file = File::open(path).map_err(unreadable)?;
+        let file = CountedFile::open(path).map_err(unreadable)?;
         let length = file.metadata().map_err(unreadable)?.len();
         let mut input = BufReader::new(file);
         let line = first_line(&mut input)?;

@@ -1,11 +1,11 @@
 //! Pictures that each carry a pose, as a freehand volume: while they arrive ([`Posed`]), and from a file ([`Opened`]).
 
-use super::frame::{Frame, Header, Source};
+use super::frame::{Frame, Header, Source, file_bytes};
 use super::freehand::{
     CompoundingOptions, FreehandArguments, FreehandFile, PlacedPicture, PlacedPictures, Pose, Refusal, Schedule, Sweep,
 };
 use super::live::Event;
-use crate::files::InputError;
+use crate::files::{InputError, progress};
 use crate::probe::{Geometry, Grid};
 use glam::{DAffine3, DMat3, DVec3};
 use std::path::Path;
@@ -216,6 +216,8 @@ impl Opened {
             _ => return Opened::unchanged(path, frames, said),
         };
         let (mut poses, mut first, mut is_moved) = (Vec::new(), None, false);
+        // For their poses, and again to be compounded.
+        progress::expect_bytes(2 * file_bytes(&*frames));
         while let Some(frame) = frames.next_frame()? {
             is_moved |= frame.pose.is_some_and(|pose| *first.get_or_insert(pose) != pose);
             poses.push(frame.pose.map(|pose| placed(&grid, &pose)));

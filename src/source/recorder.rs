@@ -22,7 +22,8 @@ pub use super::frame::Header;
 use super::describe::{self, number};
 use super::frame::{Frame, POSE_BYTES, Source, read_pose, stored_pose};
 use super::samples::{SampleType, StoredType};
-use crate::files::InputError;
+use crate::files::progress::CountedFile;
+use crate::files::{InputError, progress};
 use crate::probe::{Geometry, World};
 use crc::{CRC_32_ISO_HDLC, Crc, Table};
 use glam::{DAffine3, DQuat};
@@ -201,7 +202,7 @@ const MAX_GAP: u64 = 1 << 30;
 /// Reads a `.frames` file.
 pub struct Reader {
     path: PathBuf,
-    file: File,
+    file: CountedFile,
     header: Header,
     /// Offset and volume of each valid frame.
     index: Vec<(u64, u32)>,
@@ -227,7 +228,7 @@ impl Reader {
     pub fn open(path: &Path) -> Result<Reader, InputError> {
         let unreadable = |e: std::io::Error| InputError::unreadable(path, &e);
         let fault = |field: &str, fault: String| InputError::new(path, field, fault);
-        let mut file = File::open(path).map_err(unreadable)?;
+        let mut file = CountedFile::open(path).map_err(unreadable)?;
         let length = file.metadata().map_err(unreadable)?.len();
         let mut start = [0; 16];
         file.read_exact(&mut start).map_err(|_| fault("header", "the file ends before it".into()))?;
@@ -351,6 +352,7 @@ impl Reader {
     /// Rebuilds the index from the frames. All have the same length, so a damaged one does not hide those after it.
     fn rebuild(&mut self, first: u64, length: u64) -> std::io::Result<()> {
         self.rebuilt = true;
+        progress::expect_bytes(length.saturating_sub(first));
         let record = self.record_bytes();
         // A header may claim frames that are larger than the file.
         let mut bytes = vec![0; if first + record <= length { record as usize } else { 0 }];

@@ -9,7 +9,7 @@ use super::samples::{Replaced, SampleType, StoredType};
 use super::transforms::Poses;
 use super::value_range::ValueRange;
 use super::{OpenOptions, describe};
-use crate::files::InputError;
+use crate::files::{InputError, progress};
 use crate::probe::file::geometry_error;
 use crate::probe::{Geometry, Probe, ProbeFile, Volumes, World};
 use std::io;
@@ -359,6 +359,7 @@ impl Recording {
     /// Reads all frames once for the smallest and largest value that is no outlier.
     fn measure(&mut self) -> Result<(), InputError> {
         let mut values = ValueRange::new(self.stored_type());
+        progress::expect_bytes(self.layout.pixels.length);
         while let Some(frame) = self.next_frame()? {
             values.take(&frame.bytes);
         }
@@ -500,6 +501,17 @@ impl Source for Recording {
 
     fn is_synthetic(&self) -> bool {
         self.layout.synthetic
+    }
+
+    /// Slices that are no stored frames need the whole first volume.
+    fn prepare(&mut self) -> Result<(), InputError> {
+        if !self.is_turned() || self.turned.is_some() {
+            return Ok(());
+        }
+        progress::expect_bytes(self.layout.pixels.length / self.volumes.count.max(1) as u64);
+        let first = self.next_turned();
+        self.next_drawn = 0;
+        first.map(drop)
     }
 
     fn files(&self) -> Vec<PathBuf> {

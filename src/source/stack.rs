@@ -6,7 +6,7 @@ use super::pictures::{About, Pictures};
 use super::pixel::{Number, PixelFormat};
 use super::transforms::Poses;
 use super::{OpenOptions, describe};
-use crate::files::{self, InputError, escaped, quoted};
+use crate::files::{self, InputError, escaped, progress, quoted};
 use crate::probe::{AxisOrder, Grid, World};
 use serde::Deserialize;
 use std::collections::{BTreeMap, BTreeSet};
@@ -43,8 +43,10 @@ pub(super) fn read(path: &Path, options: &OpenOptions) -> Result<Layout, InputEr
     let order = order(&names).map_err(|why| fault("pictures", why))?;
     let pictures: Arc<[PathBuf]> = order.into_iter().map(|n| folder.join(&names[n])).collect();
     let (mut size, mut is_colour, mut length) = (None, false, 0);
+    progress::expect_files(pictures.len() as u64);
     for picture in pictures.iter() {
         let about = About::of(picture).map_err(|why| InputError::new(picture, "file", why))?;
+        progress::file_read();
         let ([width, height], deep) = *size.get_or_insert((about.size, about.deep));
         if about.size != [width, height] {
             let [a, b] = about.size;

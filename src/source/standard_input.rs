@@ -93,6 +93,10 @@ impl Source for FromInput {
         self.0.next_frame().map_err(renamed)
     }
 
+    fn prepare(&mut self) -> Result<(), InputError> {
+        self.0.prepare().map_err(renamed)
+    }
+
     fn header(&self) -> Header {
         self.0.header()
     }

@@ -9,7 +9,7 @@
 use super::describe;
 use super::frame::{Frame, Source};
 use super::samples::{SampleType, StoredType};
-use crate::files::{InputError, quoted};
+use crate::files::{InputError, progress, quoted};
 use crate::probe::file::SLAB;
 use crate::probe::{Advance, Array, Axis, Geometry, Motion, Probe};
 use hdf5_reader::group::Group;
@@ -187,7 +187,12 @@ impl Beamformed {
             return Ok(Scale::Grey);
         }
         let (mut low, mut high) = (f64::INFINITY, f64::NEG_INFINITY);
-        for number in 0..self.volumes * self.probe.slices.len() {
+        let frames = self.volumes * self.probe.slices.len();
+        // The library reads the file: each frame counts for its share of it.
+        let each = std::fs::metadata(&self.path).map_or(0, |about| about.len()) / frames.max(1) as u64;
+        progress::expect_bytes(each * frames as u64);
+        for number in 0..frames {
+            progress::add_bytes(each).map_err(|e| InputError::unreadable(&self.path, &e))?;
             for value in self.values(number)?.into_iter().filter(|value| value.is_finite()) {
                 (low, high) = (low.min(value), high.max(value));
             }

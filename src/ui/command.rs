@@ -6,7 +6,8 @@ pub use super::view::{Face, Viewpoint};
 use super::input::{Input, Key, Modifiers};
 use super::sliders::{GAIN, THRESHOLD};
 use crate::scene::{
-    Body, BodyMark, ColourMap, KeptSide, Layout, MeasureKind, Mode, PlaneName, ProbeMarker, Sides, TransferName, VolumeAxis,
+    Body, BodyMark, ColourMap, KeptSide, Layout, MeasureKind, Mode, PlaneName, ProbeMarker, Sides, TransferName,
+    VolumeAxis,
 };
 use crate::ui::texts::keys;
 use Key::{Char, Function};
@@ -142,6 +143,14 @@ pub enum Command {
     OpenFiles,
     /// Opens the n-th entry of that list.
     OpenFile(usize),
+    /// Shows the n-th of the recordings that are open.
+    ShowRecording(usize),
+    /// Shows the recording so many places further in their list.
+    StepRecording(i32),
+    /// Closes the n-th recording, or the one that is shown.
+    CloseRecording(usize),
+    /// Ends the reading of a file.
+    CancelReading,
     /// Shows or hides the menu of exports.
     Exports,
     /// Exports the volume that is shown in the n-th format of that menu.
@@ -438,6 +447,9 @@ pub const KEY_BINDINGS: &[Binding] = &[
     on(Char('r'), keys::SAVE_THE_RECORDING, Command::SaveLoop),
     control(Char('s'), keys::SAVE_WORKSPACE, Command::SaveWorkspace),
     control(Char('o'), keys::OPEN, Command::OpenFiles),
+    control(Key::PageUp, keys::STEP_RECORDING, Command::StepRecording(-1)),
+    control(Key::PageDown, keys::STEP_RECORDING, Command::StepRecording(1)),
+    control(Char('w'), keys::CLOSE_RECORDING, Command::CloseRecording(usize::MAX)),
     control(Char('e'), keys::EXPORT_THE_VOLUME, Command::Exports),
     control(Char('p'), keys::PRESETS, Command::Presets),
     // The screen.

@@ -3,7 +3,7 @@
 //! - [`input`] is what a window, a touch screen or an input device reports. `gestures` and the keys of [`command`] turn inputs
 //!   into commands, and `controls` applies these to the settings.
 //! - [`console`] connects inputs, stream and screen. [`frame_budget`] keeps the time of a picture on the rungs of the
-//!   quality ladder, [`source_supervisor`] keeps the source open, [`export`] saves files (`volume_export` in the formats of other programs), and [`panels`] lays out what is
+//!   quality ladder, [`source_supervisor`] keeps the source open, [`recordings`] lists what else is open, [`export`] saves files (`volume_export` in the formats of other programs), and [`panels`] lays out what is
 //!   drawn over the picture. None of these depends on a window, so all of them are tested without one.
 //! - [`window`] shows the console in a window, and `screen_reader` tells the desktop's screen readers what its panels are. Without a windowing system, `direct` shows it on a monitor and `devices` reads
 //!   input devices from the kernel.
@@ -25,6 +25,7 @@ mod keyboard_pointer;
 mod open_list;
 pub mod panels;
 mod picking;
+pub mod recordings;
 mod recovery;
 mod region_box;
 mod screen_reader;

@@ -12,7 +12,7 @@ const MAX_LISTED: usize = 200;
 /// Longest list of recent files, bytes.
 const MAX_BYTES: u64 = 1 << 16;
 /// Endings of recordings.
-const ENDINGS: [&str; 10] = ["mha", "mhd", "nrrd", "nhdr", "nii", "hdr", "vol", "uff", "frames", "gz"];
+const ENDINGS: [&str; 11] = ["mha", "mhd", "nrrd", "nhdr", "nii", "hdr", "dcm", "vol", "uff", "frames", "gz"];
 
 /// The recent files that still exist, the newest first. A list that cannot be read is empty.
 pub(super) fn recent(list: &Path) -> Vec<PathBuf> {

@@ -46,6 +46,9 @@ impl SourceKind {
         match (state, disconnected) {
             (SourceState::Opening, _) => Some((waiting, String::new(), false)),
             (SourceState::Retrying(why), _) => Some((again, why.clone(), true)),
+            (SourceState::Cancelled, _) => {
+                Some((texts::READING_CANCELLED, texts::READING_CANCELLED_ABOUT.into(), false))
+            }
             (SourceState::Ended(why), _) => Some((texts::SOURCE_ENDED, why.clone()?, true)),
             (SourceState::Open, Some(why)) => Some((texts::NOT_CONNECTED, why.into(), true)),
             // Files and the phantom are read by this program: if they take long, it is busy.
@@ -70,6 +73,8 @@ pub(super) enum SourceState {
     Retrying(String),
     /// It ended for good, with the reason if that was unexpected.
     Ended(Option<String>),
+    /// The user ended it before it was open.
+    Cancelled,
 }
 
 /// Keeps a source open.
@@ -148,6 +153,15 @@ impl SourceSupervisor {
                 None
             }
         }
+    }
+
+    /// Waits no longer for the source that is being opened. False if none is.
+    pub(super) fn cancel(&mut self) -> bool {
+        let is_opening = self.opening.take().is_some();
+        if is_opening {
+            self.state = SourceState::Cancelled;
+        }
+        is_opening
     }
 
     /// Records the end of the source, with the reason if it was unexpected.
@@ -277,6 +291,23 @@ mod tests {
         supervisor.ended(Some("cut".into()), Instant::now());
         assert_eq!(supervisor.state(), &SourceState::Ended(Some("cut".into())));
         assert!(!poll(&mut supervisor, Duration::from_secs(100)) && supervisor.wakes_at().is_none());
+    }
+
+    #[test]
+    fn a_source_that_is_being_opened_can_be_left() {
+        let (open, gate) = channel::<()>();
+        let gate = std::sync::Mutex::new(gate);
+        let waits: OpenSource = Arc::new(move || {
+            let _ = gate.lock().map(|gate| gate.recv());
+            Ok(Box::new(Silent))
+        });
+        let mut supervisor = SourceSupervisor::new(waits, None, None, Arc::new(|| ()));
+        assert!(!supervisor.cancel(), "nothing has begun");
+        assert!(supervisor.poll(Instant::now()).is_none() && supervisor.cancel());
+        drop(open);
+        assert!(!poll(&mut supervisor, Duration::from_secs(100)) && supervisor.state() == &SourceState::Cancelled);
+        let notice = SourceKind::Recording.notice(supervisor.state(), None, false, false);
+        assert_eq!(notice, Some(("Reading was cancelled", "Ctrl+O opens a recording.".into(), false)));
     }
 
     #[test]

@@ -267,7 +267,7 @@ impl ApplicationHandler<()> for WindowLoop<'_> {
             _ => {}
         }
         if let WindowEvent::DroppedFile(file) = &event {
-            console.open_path(file);
+            console.drop_file(file);
         }
         if let Some(input) = input(&event) {
             console.input(&input);

@@ -11,6 +11,7 @@ mod interrupted;
 mod motor;
 mod piped;
 mod posed;
+mod progress;
 mod recorder;
 mod signals;
 mod sources;

@@ -7,5 +7,6 @@ mod desktop;
 mod kiosk;
 mod panels;
 mod pictures;
+mod recordings;
 mod shapes;
 mod start;

@@ -1,7 +1,7 @@
 //! The frames of DICOM files as one stream of samples: native, RLE (PS3.5 annex G) or one of the JPEGs, in any order, cut to a part of the picture.
 
 use super::jpeg::{self, Expected};
-use std::fs::File;
+use crate::files::progress::CountedFile;
 use std::io::{self, Cursor, Read, Seek, SeekFrom};
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -96,7 +96,7 @@ impl Frames {
         else {
             return Ok(Vec::new());
         };
-        let mut file = File::open(path)?;
+        let mut file = CountedFile::open(path)?;
         let mut bytes = Vec::new();
         for (offset, length) in parts {
             file.seek(SeekFrom::Start(*offset))?;

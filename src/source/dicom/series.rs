@@ -12,7 +12,7 @@ use super::image::Image;
 use super::placed::{Placed, layout};
 use super::planes::{Plane, sorted};
 use super::regions::{Flat, flat, in_patient, of_pictures, spacing_text};
-use crate::files::InputError;
+use crate::files::{InputError, progress};
 use crate::probe::{AxisOrder, World};
 use glam::DVec3;
 use std::collections::{BTreeMap, BTreeSet};
@@ -55,8 +55,10 @@ pub(in super::super) fn read_series(folder: &Path, options: &OpenOptions) -> Res
     // The order of a folder is any.
     paths.sort();
     let mut slices = Vec::new();
+    progress::expect_files(paths.len() as u64);
     for path in paths {
         let elements = Elements::read(&InputFile::new(&path)?)?;
+        progress::file_read();
         if elements.class == DIRECTORY {
             continue;
         }

@@ -1,10 +1,10 @@
 //! Pictures of a file with places in space, as one freehand volume.
 
 use super::{Compounder, CompoundingOptions, Lattice, Pose, TrackedFrame};
-use crate::files::InputError;
+use crate::files::{InputError, progress};
 use crate::probe::{Geometry, World};
 use crate::source::describe;
-use crate::source::frame::{Frame, Source};
+use crate::source::frame::{Frame, Source, file_bytes};
 use crate::source::samples::{SampleType, StoredType};
 use std::path::{Path, PathBuf};
 
@@ -152,9 +152,7 @@ impl<P: PlacedPictures> Source for FreehandFile<P> {
     }
 
     fn next_frame(&mut self) -> Result<Option<Frame>, InputError> {
-        if self.compounder.is_none() {
-            self.compounder = Some(self.compound()?);
-        }
+        self.prepare()?;
         let slice = self.next;
         let Some(bytes) = self.compounder.as_ref().and_then(|compounder| compounder.slice(slice)) else {
             return Ok(None);
@@ -162,6 +160,14 @@ impl<P: PlacedPictures> Source for FreehandFile<P> {
         let bytes = bytes.to_vec();
         self.next += 1;
         Ok(Some(Frame::of_slice(0, slice, bytes)))
+    }
+
+    fn prepare(&mut self) -> Result<(), InputError> {
+        if self.compounder.is_none() {
+            progress::expect_bytes(file_bytes(self.placed.pictures()));
+            self.compounder = Some(self.compound()?);
+        }
+        Ok(())
     }
 
     fn files(&self) -> Vec<PathBuf> {

@@ -100,7 +100,7 @@ impl Console {
                 }
             }
         }
-        self.poll_opening();
+        self.poll_opening(now);
         self.poll_counting();
         self.poll_thumbnails(now);
         self.poll_export();
@@ -110,6 +110,7 @@ impl Console {
         self.run_stream(now)?;
         self.follow_volumes(now);
         self.follow_start(now);
+        self.refreeze();
         self.warm(now);
         let shader_fault = self.shaders.as_ref().and_then(|folder| folder.fault());
         self.needs_redraw |= shader_fault != self.shader_fault;
@@ -333,6 +334,7 @@ impl Console {
             self.thumbnails_at(now),
             self.turns_at(),
             self.exporter.exporting().map(|_| now + EXPORT_POLL),
+            self.reading_wakes_at(now),
             silence,
             statistics,
         ]
@@ -411,6 +413,14 @@ impl Console {
         }
     }
 
+    /// Why there was nothing to show: the source could not be opened.
+    pub fn source_fault(&self) -> Option<String> {
+        match self.source.state() {
+            SourceState::Ended(why) if self.source.not_opened() > 0 => why.clone(),
+            _ => None,
+        }
+    }
+
     /// A summary of the run in one line.
     pub fn summary(&mut self) -> String {
         let ms = |value: Option<f64>| value.map_or("-".into(), |ms| format!("{ms:.1}"));
@@ -440,6 +450,7 @@ impl Console {
         let shows_first_steps = self.shows_first_steps(has_drawn && banner.is_none());
         let notes: Vec<_> =
             self.export_note().into_iter().chain(self.notes.iter().map(|(_, note)| note.clone())).collect();
+        let recordings = self.opening.named();
         let quality = frame_budget::label(self.quality, &self.rungs);
         let exit_key = match (&self.fixed.exit, self.fixed.is_kiosk) {
             (Some(chord), true) => chord.to_string(),
@@ -457,6 +468,8 @@ impl Console {
             has_drawer: self.has_drawer(),
             rail: self.rail,
             files: self.opening.shown(),
+            recordings: &recordings,
+            reading: self.opening.told(),
             shows_exports: self.shows_exports,
             is_turning: self.turning.is_some(),
             exporting: self.exporter.exporting(),
@@ -509,6 +522,10 @@ impl Console {
         let is_silent = self.silence.is_silent(now) && !self.stream.is_frozen();
         let (state, gone) = (self.source.state(), self.stream.disconnected());
         let has_shown = self.stream.volumes_shown() > 0;
+        // What is being read says it itself.
+        if *state == SourceState::Opening && self.opening.told().is_some() {
+            return None;
+        }
         let (title, text, is_fault) = self.fixed.source.notice(state, gone.as_deref(), is_silent, has_shown)?;
         let is_start = !is_fault && text.is_empty() && matches!(state, SourceState::Open);
         match self.start_step.filter(|_| is_start) {

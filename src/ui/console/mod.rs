@@ -16,7 +16,7 @@ use self::first_steps::FirstSteps;
 use self::frame::LostFluid;
 use self::measuring::Counting;
 use self::opening::Opening;
-pub use self::options::{ConsoleOptions, OpenFile, StartupFault};
+pub use self::options::{ConsoleOptions, OpenFile, Opened, StartupFault};
 use self::presets::Presets;
 use super::cine_player::CinePlayer;
 use super::clipboard::Clipboard;
@@ -186,6 +186,10 @@ pub struct Console {
     request: LoopRequest,
     /// What can be opened, and what is being opened.
     opening: Opening,
+    /// The volume of a recording that was frozen when it was left, until it is there again.
+    frozen_volume: Option<u32>,
+    /// The settings are those with which the recording was left.
+    is_kept: bool,
     presets: Presets,
     clipboard: Clipboard,
     /// Counts voxels in the background.
@@ -211,14 +215,21 @@ struct FixedOptions {
     /// What a workspace keeps of the source.
     origin: Option<Origin>,
     plays_once: bool,
+    /// Most volumes of the cine loop.
+    cine_volumes: usize,
 }
 
 impl Console {
     /// `size`: of the window, pixels.
     pub fn new(context: &Arc<Context>, open: OpenSource, options: ConsoleOptions, size: [u32; 2]) -> Console {
         let now = Instant::now();
-        let shows_panels = options.panels && options.overlay;
-        let mut controls = Controls::new(options.settings);
+        let (kept, display) = options.recordings.lock().unwrap_or_else(|e| e.into_inner()).take_kept();
+        let shows_panels = display.map_or(options.panels, |display| display.panels) && options.overlay;
+        let (kept, frozen_volume) = kept.map_or((None, None), |kept| (Some(kept.controls), kept.frozen));
+        // Settings that were kept are complete.
+        let is_kept = kept.is_some();
+        let chosen = options.chosen.filter(|_| !is_kept);
+        let mut controls = kept.unwrap_or_else(|| Controls::new(options.settings));
         controls.resize(panels::picture_area(size, options.scale, shows_panels).1);
         let (rungs, records) = (Arc::new(options.rungs), options.record.is_some());
         let lowered = options.budget.map(|_| {
@@ -234,7 +245,7 @@ impl Console {
             cine: options.cine,
             wake: Some(options.wake.clone()),
             shaders: options.shaders.clone(),
-            chosen: options.chosen,
+            chosen,
             lowered,
             prepares: true,
             // Full quality always means the first picture too.
@@ -258,7 +269,15 @@ impl Console {
             gestures: Gestures::default(),
             keys: HeldKeys::default(),
             keyboard_pointer: KeyboardPointer::default(),
-            opening: Opening::new(options.open_file, options.recent, options.wake.clone()),
+            opening: Opening::new(
+                options.open_file,
+                options.recent,
+                options.recordings,
+                options.progress,
+                options.wake.clone(),
+            ),
+            frozen_volume,
+            is_kept,
             presets: Presets::new(options.presets, options.wake.clone()),
             clipboard: Clipboard::default(),
             counting: Counting::new(options.wake.clone()),
@@ -277,6 +296,7 @@ impl Console {
                 records,
                 origin: options.origin,
                 plays_once: options.plays_once,
+                cine_volumes: options.cine.volumes,
             },
             size,
             started: now,
@@ -289,10 +309,10 @@ impl Console {
             live_volumes: 0,
             shown_between: 0,
             shows_help: false,
-            shows_times: false,
+            shows_times: display.is_some_and(|display| display.times),
             shows_panels,
             rail: Rail::default(),
-            saves_bar: options.bar,
+            saves_bar: display.map_or(options.bar, |display| display.bar),
             help_search: None,
             shows_exports: false,
             turning: None,
@@ -335,6 +355,9 @@ impl Console {
         };
         for fault in watch_fault.into_iter().chain(metrics_fault) {
             console.notify(&fault, true);
+        }
+        if display.is_some_and(|display| display.has_focus) && console.shows_panels {
+            console.panels.toggle_focus();
         }
         console
     }
@@ -522,6 +545,9 @@ impl Console {
     /// Executes a command that does not concern settings.
     fn execute_own(&mut self, command: &Command, now: Instant) {
         let count = self.stream.cine().volumes().len();
+        if matches!(*command, Command::Freeze | Command::StepCine(_) | Command::SeekCine(_) | Command::PlayCine) {
+            self.frozen_volume = None;
+        }
         match *command {
             Command::Freeze => {
                 self.player.stop();
@@ -577,6 +603,10 @@ impl Console {
             Command::OpenFiles => self.toggle_files(),
             Command::OpenFile(n) => self.open_entry(n),
             Command::Turntable => self.toggle_turning(now),
+            Command::ShowRecording(n) => self.show_recording(n),
+            Command::StepRecording(by) => self.step_recording(by),
+            Command::CloseRecording(n) => self.close_recording(n),
+            Command::CancelReading => _ = self.cancel_reading(),
             Command::Exports => self.shows_exports = !self.shows_exports,
             Command::Export(n) => self.export_volume(n),
             Command::CancelExport => self.exporter.cancel_export(),
@@ -635,6 +665,8 @@ impl Console {
             self.help_search = None;
         } else if self.shows_help {
             self.shows_help = false;
+        } else if self.cancel_reading() {
+            self.needs_redraw = true;
         } else if self.shows_times {
             self.shows_times = false;
         } else if self.rail.is_open && self.has_drawer() {

@@ -1,5 +1,6 @@
 //! The options of a console.
 
+use crate::files::progress::Progress;
 use crate::gpu::shader_reload::ShaderFolder;
 use crate::gpu::{TimeStamps, Wake};
 use crate::kiosk::chord::Chord;
@@ -9,6 +10,7 @@ use crate::scene::Settings;
 use crate::scene::load::Layers;
 use crate::source::live::SourceKind;
 use crate::ui::frame_budget::{Rung, built_in_ladder};
+use crate::ui::recordings::OpenRecordings;
 use crate::workspace::Origin;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -59,6 +61,10 @@ pub struct ConsoleOptions {
     pub plays_once: bool,
     /// How another recording or workspace is opened. None: none is.
     pub open_file: Option<OpenFile>,
+    /// The recordings that are open, of which one is shown.
+    pub recordings: OpenRecordings,
+    /// How far the source of the console is read while it is being opened.
+    pub progress: Progress,
     /// The file with the list of recent files.
     pub recent: Option<PathBuf>,
     /// The file that keeps that the hints of the first start were shown. None: they are not to be shown.
@@ -103,6 +109,8 @@ impl Default for ConsoleOptions {
             origin: None,
             plays_once: false,
             open_file: None,
+            recordings: OpenRecordings::default(),
+            progress: Progress::default(),
             recent: None,
             first_steps: None,
             presets: None,
@@ -114,9 +122,12 @@ impl Default for ConsoleOptions {
     }
 }
 
-/// Opens a recording or a workspace in place of what is shown, which the console asks to be replaced for; or returns the reason in one line. It
-/// may take long.
-pub type OpenFile = Arc<dyn Fn(&Path) -> Result<(), String> + Send + Sync>;
+/// Opens a recording or a workspace, or returns the reason in one line. It may take long; how far it is is in the progress, by which it can be
+/// ended.
+pub type OpenFile = Arc<dyn Fn(&Path, &Progress) -> Result<Opened, String> + Send + Sync>;
+
+/// What was opened. Called when the console asks to be replaced: the next one shows it. Dropped, nothing changes.
+pub type Opened = Box<dyn FnOnce() + Send>;
 
 /// A fault that prevents the view, such as a wrong configuration, and how to find out that it is resolved.
 pub struct StartupFault {

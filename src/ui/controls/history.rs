@@ -5,6 +5,8 @@ use crate::ui::command::Command;
 
 /// Most steps that can be undone.
 const MAX_STEPS: usize = 100;
+/// Most steps of a recording that is not shown: settings with many cuts take up to 400 KiB each.
+const MAX_KEPT: usize = 20;
 
 /// The settings of earlier and of undone steps.
 #[derive(Clone, Debug, Default)]
@@ -54,6 +56,15 @@ impl History {
     /// Whether there is something to undo, and to redo.
     pub(super) fn has(&self) -> [bool; 2] {
         [!self.past.is_empty(), !self.future.is_empty()]
+    }
+
+    /// Forgets all but the last steps.
+    pub(super) fn shorten(&mut self) {
+        for steps in [&mut self.past, &mut self.future] {
+            steps.drain(..steps.len().saturating_sub(MAX_KEPT));
+            steps.shrink_to_fit();
+        }
+        self.last = None;
     }
 
     /// Forgets everything: the settings follow from another source.

@@ -96,6 +96,13 @@ impl Controls {
         self.tool
     }
 
+    /// All of it for a later time, without what is in work and with the last steps that can be undone.
+    pub(super) fn set_aside(&self) -> Controls {
+        let mut aside = Controls { work: None, typing: None, line: None, outline: Vec::new(), ..self.clone() };
+        aside.history.shorten();
+        aside
+    }
+
     /// Restores the settings of the start, except for the size of the picture and what is drawn over it.
     pub(super) fn reset(&mut self) {
         let again = Settings { picture: self.settings.picture.clone(), ..self.start.clone() };
@@ -256,6 +263,10 @@ impl Controls {
             | Command::OpenFiles
             | Command::OpenFile(_)
             | Command::Turntable
+            | Command::ShowRecording(_)
+            | Command::StepRecording(_)
+            | Command::CloseRecording(_)
+            | Command::CancelReading
             | Command::Exports
             | Command::Export(_)
             | Command::CancelExport

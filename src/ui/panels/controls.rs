@@ -7,7 +7,7 @@ use super::colours::{
 use super::names::{self, Tell};
 use super::widgets::{front, name_and_value, slider, switch};
 use super::{PanelState, TEXT_SIZE, TOUCH_SIZE, heading};
-use super::{body_marks, measures, rail, sides, tools};
+use super::{body_marks, measures, rail, recordings, sides, tools};
 use crate::scene::{ColourMap, Layout, Mode, PlaneName, Settings, Transfer, TransferName};
 use crate::ui::cine_player::{CineState, SPEEDS};
 use crate::ui::command::{Command, Tool};
@@ -63,6 +63,7 @@ fn show_tools(ui: &mut Ui, state: &PanelState, width: f32, execute: &mut dyn FnM
             let settings = state.controls.settings();
             let row = Row { width, height: TOUCH_SIZE * 0.92, title: "", is_large_title: false };
             ui.add_space(6.0);
+            recordings::show_list(ui, state, width - 16.0, execute);
             undo_and_redo(ui, state, &row, execute);
             let hint = texts::PRESETS_HINT;
             let size = vec2(width - 16.0, TOUCH_SIZE * 0.75);

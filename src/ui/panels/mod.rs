@@ -17,6 +17,7 @@ mod names;
 mod overlays;
 mod presets;
 mod rail;
+mod recordings;
 mod region;
 mod sides;
 mod tools;
@@ -26,6 +27,7 @@ mod widgets;
 use self::colours::{BACKGROUND, BUTTON, EDGE, ON_SELECTED, PANEL, SELECTED, TEXT, WEAK_TEXT};
 pub(super) use self::presets::{PresetTile, PresetsShown};
 pub(super) use self::rail::Rail;
+pub(super) use self::recordings::Reading;
 use super::command::Command;
 use super::input::{Button, Input, Key, Modifiers, Phase};
 use crate::gpu;
@@ -35,6 +37,7 @@ use crate::scene::Scene;
 use crate::ui::cine_player::CineState;
 use crate::ui::controls::Controls;
 use crate::ui::keyboard_pointer::PointerMark;
+use crate::ui::recordings::Named;
 use crate::ui::times::Times;
 pub use egui::accesskit;
 use egui::accesskit::{ActionRequest, TreeUpdate};
@@ -252,7 +255,8 @@ impl Panels {
             if state.shows_times {
                 overlays::show_times(ui, state, self.scale);
             }
-            overlays::show_notes(ui, state, self.scale);
+            let taken = recordings::show_reading(ui, state, self.scale, execute);
+            overlays::show_notes(ui, state, self.scale, taken);
             if state.shows_first_steps {
                 first_steps::show(ui, state, self.scale, execute);
             }
@@ -450,6 +454,9 @@ pub(super) struct PanelState<'a> {
     pub(super) asks_to_leave: bool,
     /// The list of files to open, while it is shown: its title and its entries.
     pub(super) files: Option<(&'a str, &'a [String])>,
+    /// The recordings that are open, and what is being read.
+    pub(super) recordings: &'a [Named],
+    pub(super) reading: Option<&'a Reading>,
     pub(super) shows_exports: bool,
     /// The list of presets, while it is shown.
     pub(super) presets: Option<PresetsShown<'a>>,

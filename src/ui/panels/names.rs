@@ -75,6 +75,18 @@ impl Tell for Response {
     }
 }
 
+/// How much of something is done, 0 to 1, if that is known.
+pub(super) fn progress(bar: &Response, share: Option<f32>) {
+    node(&bar.ctx, bar.id, |node| {
+        node.set_min_numeric_value(0.0);
+        node.set_max_numeric_value(100.0);
+        match share {
+            Some(share) => node.set_numeric_value(f64::from(share * 100.0).round()),
+            None => node.clear_numeric_value(),
+        }
+    });
+}
+
 /// Gives what a [`Ui`] holds a role and a name.
 pub(super) fn name(ui: &Ui, role: Role, name: &str) {
     node(ui.ctx(), ui.unique_id(), |node| {

@@ -25,9 +25,9 @@ const SMALL_MESSAGE_TEXT: [f32; 2] = [TEXT_SIZE, SMALL_TEXT];
 const MIN_FOR_LARGE_MESSAGES: [f32; 2] = [340.0, 260.0];
 /// Frame and margins of a message, together on two sides; and what is between messages.
 const MESSAGE_FRAME: [f32; 2] = [36.0, 24.0];
-const BETWEEN_MESSAGES: f32 = 8.0;
+pub(super) const BETWEEN_MESSAGES: f32 = 8.0;
 /// Between messages and the upper and the lower edge of the picture.
-const MESSAGE_EDGES: [f32; 2] = [12.0, 14.0];
+pub(super) const MESSAGE_EDGES: [f32; 2] = [12.0, 14.0];
 
 /// A message whose text is laid out.
 struct Message {
@@ -81,12 +81,12 @@ impl Message {
 }
 
 /// Shows banner and notes in the picture, one above the other. The newest notes go before the older ones, and where there is no room for both, before the banner,
-/// which comes back when they have gone.
-pub(super) fn show_notes(ui: &mut Ui, state: &PanelState, scale: f32) {
+/// which comes back when they have gone. `taken`: height at the lower edge of the picture that is not theirs.
+pub(super) fn show_notes(ui: &mut Ui, state: &PanelState, scale: f32, taken: f32) {
     let picture = picture_rect(state, scale);
     let is_large = picture.width() >= MIN_FOR_LARGE_MESSAGES[0] && picture.height() >= MIN_FOR_LARGE_MESSAGES[1];
     let [title_size, text_size] = if is_large { MESSAGE_TEXT } else { SMALL_MESSAGE_TEXT };
-    let [above, below] = MESSAGE_EDGES;
+    let [above, below] = [MESSAGE_EDGES[0], MESSAGE_EDGES[1] + taken];
     let room = vec2(picture.width() - 24.0, picture.height() - above - below);
     let note = |note: &Note| {
         let texts = [(note.text.as_str(), text_size, TEXT)];
@@ -132,7 +132,7 @@ pub(super) fn show_notes(ui: &mut Ui, state: &PanelState, scale: f32) {
     });
 }
 
-fn message_frame(edge: Color32) -> Frame {
+pub(super) fn message_frame(edge: Color32) -> Frame {
     Frame::new().fill(MESSAGE).inner_margin(Margin::symmetric(16, 10)).corner_radius(8).stroke(Stroke::new(2.0, edge))
 }
 

@@ -260,6 +260,14 @@ fn everything_that_is_drawn_has_the_contrast_that_wcag_demands() {
         check(&shown, "presets");
     }
     shown.presets = None;
+    shown.recordings = ["a.mha", "b.mha"].map(String::from).to_vec();
+    for share in [None, Some(0.6), Some(1.0)] {
+        let text = share.map_or(String::new(), |share| format!("{:.0} %", share * 100.0));
+        shown.reading = Some(crate::ui::panels::Reading { name: "c.mha".into(), share, text });
+        shown.settle();
+        check(&shown, "reading");
+    }
+    shown.reading = None;
     for is_fault in [true, false] {
         let (title, text) = ("No frames from the probe".to_string(), "Connection refused".to_string());
         shown.banner = Some(Banner { title, text, is_fault });

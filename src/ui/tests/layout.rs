@@ -5,7 +5,7 @@ use super::*;
 use crate::ui::panels::accesskit::{Node, Role};
 use crate::ui::panels::colours::{BACKING, MESSAGE, OUTLINE, PANEL};
 use crate::ui::panels::drawn::{Area, Kind};
-use crate::ui::panels::{self, Banner, Note};
+use crate::ui::panels::{self, Banner, Note, Reading};
 
 const SIZES: [[u32; 2]; 8] =
     [[640, 480], [800, 600], [1024, 768], [1280, 720], [1280, 1024], [1920, 1080], [2560, 1440], [3840, 2160]];
@@ -177,6 +177,10 @@ fn nothing_covers_anything_in_any_window_mode_and_layout() {
             shown.apply(Command::Layout(layout));
             check(&shown, &format!("{size:?} at {scale}, {mode:?} {layout:?}"));
         }
+        shown.recordings = (0..4).map(|n| format!("recording of a rather long name {n}.mha")).collect();
+        shown.settle();
+        check(&shown, &format!("{size:?} at {scale}, several recordings"));
+        shown.recordings.clear();
         shown.apply(Command::Tool(Tool::Curve));
         let points = [[-20.0, 50.0], [0.0, 60.0], [30.0, 52.0]];
         points.into_iter().for_each(|at| shown.apply(Command::CurvePoint(PlaneName::A, at)));
@@ -204,8 +208,13 @@ fn messages_stay_in_the_picture_and_apart() {
             note("Saved /home/operator/pictures/echolume-20261123-231205-2.frames", false),
         ];
         // An area is placed by its size of the layout before.
+        shown.reading = Some(Reading { name: "recording.nii.gz".into(), share: Some(0.4), text: "40 %".into() });
         (0..3).for_each(|_| shown.settle());
         let [window, picture] = places(&shown);
+        let has = |text: &str| {
+            shown.drawn.iter().any(|drawn| matches!(&drawn.kind, Kind::Text { text: own, .. } if own.contains(text)))
+        };
+        assert!(has("Reading recording") && has("40 %"), "{size:?} at {scale}: what is read is not said");
         let messages: Vec<Area> = shown
             .drawn
             .iter()

@@ -7,7 +7,7 @@ use crate::scene::MeasureKind;
 use crate::ui::command::Viewpoint;
 use crate::ui::input::Key;
 use crate::ui::panels::accesskit::{Action, ActionData, Node, NodeId, Role, Toggled};
-use crate::ui::panels::{self, Banner, Note};
+use crate::ui::panels::{self, Banner, Note, Reading};
 use std::collections::{BTreeMap, BTreeSet};
 
 impl Shown {
@@ -220,6 +220,25 @@ fn messages_are_read_when_they_appear_and_faults_at_once() {
     shown.check("messages");
 }
 
+/// Prevents a screen reader that says every per cent, and one that cannot end the reading.
+#[test]
+fn what_is_being_read_is_announced_once_and_its_share_is_a_value() {
+    use panels::accesskit::Live;
+    let mut shown = Shown::new("");
+    for (share, text, value) in [(None, "", None), (Some(0.25), "25 %", Some(25.0)), (Some(0.26), "26 %", Some(26.0))] {
+        shown.reading = Some(Reading { name: "big.mha".into(), share, text: text.into() });
+        shown.settle();
+        shown.check("reading");
+        let status = shown.tree.values().find(|node| node.label() == Some("Reading big.mha")).expect("a message");
+        assert_eq!((status.role(), status.live()), (Role::Status, Some(Live::Polite)));
+        let bar = shown.tree.values().find(|node| node.role() == Role::ProgressIndicator).expect("a bar");
+        assert_eq!((bar.numeric_value(), bar.label()), (value, Some("Read so far")), "{bar:?}");
+        assert!(text.is_empty() || bar.value() == Some(text));
+    }
+    let cancel = shown.find("Reading big.mha", Role::Button, "Cancel");
+    assert_eq!(shown.ask(cancel, Action::Click, None), [Command::CancelReading]);
+}
+
 /// Prevents a list or a question that a screen reader cannot answer, and one that reaches what is behind the question.
 #[test]
 fn lists_and_questions_are_answered_by_a_screen_reader() {
@@ -231,6 +250,21 @@ fn lists_and_questions_are_answered_by_a_screen_reader() {
     let file = shown.find("/data", Role::Button, "b.toml");
     assert_eq!(shown.ask(file, Action::Click, None), [Command::OpenFile(2)]);
     shown.files = None;
+    shown.recordings = ["a.mha", "b.mha", "1/c.mha"].map(String::from).to_vec();
+    shown.settle();
+    shown.check("recordings");
+    for (name, command) in [
+        ("1/c.mha", Command::ShowRecording(2)),
+        ("Close a.mha", Command::CloseRecording(0)),
+        ("Close b.mha", Command::CloseRecording(1)),
+    ] {
+        let button = shown.find("Recordings", Role::Button, name);
+        let about = shown.tree[&button].description().unwrap_or_default().to_string();
+        assert!(about.contains("Ctrl+"), "{name} is not explained: {about}");
+        assert_eq!(shown.ask(button, Action::Click, None), [command], "{name}");
+    }
+    let state = |shown: &Shown, name: &str| shown.tree[&shown.find("Recordings", Role::Button, name)].toggled();
+    assert_eq!([state(&shown, "a.mha"), state(&shown, "b.mha")], [Some(Toggled::False), Some(Toggled::True)]);
     for (n, what) in ["help", "times", "exports"].into_iter().enumerate() {
         shown.open = std::array::from_fn(|open| open == n);
         shown.lay_out();
@@ -318,6 +352,9 @@ fn a_screen_reader_sets_a_slider_and_presses_buttons() {
 #[test]
 fn tab_reaches_every_control_and_marks_it() {
     let mut shown = Shown::new("mode='surface'");
+    shown.recordings = ["a.mha", "b.mha"].map(String::from).to_vec();
+    shown.reading = Some(Reading { name: "c.mha".into(), share: Some(0.5), text: "50 %".into() });
+    shown.settle();
     let controls: BTreeSet<NodeId> =
         shown.tree.iter().filter(|(_, node)| is_control(node) && !node.is_disabled()).map(|(id, _)| *id).collect();
     assert!(controls.len() > 40, "{}", controls.len());

@@ -11,7 +11,8 @@ use crate::ui::controls::EXAMS;
 use crate::ui::keyboard_pointer::PointerMark;
 use crate::ui::panels::accesskit::{Action, ActionData, ActionRequest, Node, NodeId, TreeId, TreeUpdate};
 use crate::ui::panels::drawn::Drawn;
-use crate::ui::panels::{self, Banner, Note, PanelOutput, PanelState, Panels, PresetTile, PresetsShown, Rail};
+use crate::ui::panels::{self, Banner, Note, PanelOutput, PanelState, Panels, PresetTile, PresetsShown, Rail, Reading};
+use crate::ui::recordings::Named;
 use crate::ui::times::Times;
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -37,6 +38,9 @@ pub(super) struct Shown {
     pub(super) banner: Option<Banner>,
     pub(super) notes: Vec<Note>,
     pub(super) files: Option<(String, Vec<String>)>,
+    /// Names of the recordings that are open; the second is shown.
+    pub(super) recordings: Vec<String>,
+    pub(super) reading: Option<Reading>,
     /// The names of the presets of the user, while the list of presets is shown; and the name that is being typed.
     pub(super) presets: Option<(Vec<String>, Option<String>)>,
     /// Help, times, exports, the question whether to leave.
@@ -84,6 +88,8 @@ impl Shown {
             banner: None,
             notes: Vec::new(),
             files: None,
+            recordings: Vec::new(),
+            reading: None,
             presets: None,
             open: [false; 4],
             start_lines: Vec::new(),
@@ -116,6 +122,9 @@ impl Shown {
         self.time += 0.1;
         let scale = self.panels.scale();
         let [shows_help, shows_times, shows_exports, asks_to_leave] = self.open;
+        let named =
+            |(n, name): (usize, &String)| Named { name: name.clone(), path: format!("/data/{name}"), is_shown: n == 1 };
+        let recordings: Vec<Named> = self.recordings.iter().enumerate().map(named).collect();
         let state = PanelState {
             controls: &self.controls,
             scene: Some(&self.scene),
@@ -134,6 +143,8 @@ impl Shown {
             shows_only_origin: self.shows_only_origin,
             asks_to_leave,
             files: self.files.as_ref().map(|(title, names)| (title.as_str(), names.as_slice())),
+            recordings: &recordings,
+            reading: self.reading.as_ref(),
             shows_exports,
             is_turning: false,
             exporting: Some("Surface"),

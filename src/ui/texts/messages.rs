@@ -29,11 +29,32 @@ pub const DEVICE_OPENED_AGAIN: &str = "The device was lost and opened again";
 // Opening files.
 pub const FOLDER_ABOVE: &str = "..  (the folder above)";
 pub const OPENS_NO_OTHER_FILES: &str = "This view opens no other files";
-pub const STILL_OPENING: &str = "A file is being opened: wait a moment";
 pub const SAVE_THE_LOOP_FIRST: &str = "The loop is not saved: save it first (R)";
-pub fn opening(name: impl Display) -> String {
-    format!("Opening {name}")
+pub fn reading(name: impl Display) -> String {
+    format!("Reading {name}")
 }
+pub fn percent(share: impl Display) -> String {
+    format!("{share} %")
+}
+pub fn files_of_folder(done: impl Display, count: impl Display) -> String {
+    format!("{done} of {count} files")
+}
+pub const READING_SHARE: &str = "Read so far";
+pub const CANCEL_READING: &str = "Cancel";
+pub const CANCEL_READING_HINT: &str = "Reads no further; what is shown stays (Esc).";
+pub fn not_read_further(name: impl Display) -> String {
+    format!("{name} is not read further")
+}
+pub const READING_CANCELLED: &str = "Reading was cancelled";
+pub const READING_CANCELLED_ABOUT: &str = "Ctrl+O opens a recording.";
+pub fn too_many_recordings(most: impl Display) -> String {
+    format!("{most} recordings are open: close one first")
+}
+pub fn is_closed(name: impl Display) -> String {
+    format!("{name} is closed")
+}
+pub const ONLY_RECORDING: &str = "No other recording is open";
+pub const STANDARD_INPUT: &str = "Standard input";
 pub fn cannot_be_opened(name: impl Display, e: impl Display) -> String {
     format!("{name} cannot be opened: {e}")
 }

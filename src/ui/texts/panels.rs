@@ -45,6 +45,15 @@ pub const SAVE_WORKSPACE_HINT: &str = "Saves settings, recording and measurement
 pub const EXPORT_HINT: &str =
     "Exports the volume that is shown: as a volume, a surface to print, or a turntable (Ctrl+E).";
 pub const WORKSPACE: &str = "Workspace";
+pub const RECORDINGS: &str = "Recordings";
+pub fn recording_hint(path: impl Display) -> String {
+    format!("{path}: shows it as it was left (Ctrl+Page up, Ctrl+Page down).")
+}
+pub fn close_recording(name: impl Display) -> String {
+    format!("Close {name}")
+}
+pub const CLOSE_RECORDING_HINT: &str = "Takes it from the list; its file stays, its settings and measurements are forgotten (Ctrl+W: the one that is shown).";
+pub const CLOSE_RECORDING_BUTTON: &str = "x";
 pub const EXPORT: &str = "Export";
 pub const DEPTH_OF_CUT: &str = "Depth of cut";
 pub const CUTS: &str = "Cuts";

@@ -8,6 +8,7 @@ mod keyboard;
 mod metrics;
 mod monkey;
 mod presets;
+mod recordings;
 mod render_start;
 mod shaders;
 mod tasks;
@@ -70,6 +71,8 @@ pub fn options() -> ConsoleOptions {
         origin: None,
         plays_once: false,
         open_file: None,
+        recordings: Arc::default(),
+        progress: echolume::files::progress::Progress::default(),
         recent: None,
         presets: None,
         startup_fault: None,

@@ -51,6 +51,8 @@ const TASKS: &[(&str, Perform)] = &[
     ("the volume for 3D Slicer", |user| export(user, '1', "Volume, NRRD")),
     ("go on tomorrow", tomorrow),
     ("another recording", another),
+    ("two recordings in turn", in_turn),
+    ("go back to the first recording", first_again),
     ("the look of bone", bone),
     ("keep a look for the next patient", kept_look),
     ("the planes through a point", point),
@@ -132,9 +134,9 @@ impl User {
         let all = opened.clone();
         let options = ConsoleOptions {
             origin: Some(Origin::of(Some(PathBuf::from("phantom")))),
-            open_file: Some(Arc::new(move |path: &Path| {
+            open_file: Some(Arc::new(move |path, _| {
                 all.lock().expect("lock").push(path.to_path_buf());
-                Ok(())
+                Ok(Box::new(|| ()))
             })),
             recent: Some(folder.0.join("recent")),
             presets: Some(folder.0.join("presets.toml")),
@@ -722,6 +724,35 @@ fn another(user: &mut User) -> String {
     user.console.open_path(&dropped);
     user.until("file that is opened", |user| user.request.restart.then_some(()));
     assert_eq!(*user.opened.lock().expect("lock"), [dropped]);
+    user.count()
+}
+
+impl User {
+    /// Waits until the console asks to be replaced, as a window would do at once, by one that shows this.
+    fn opens(&mut self, path: &Path) {
+        self.until("file that is opened", |user| user.request.restart.then_some(()));
+        self.request.restart = false;
+        assert_eq!(self.opened.lock().expect("lock").drain(..).last().as_deref(), Some(path));
+    }
+}
+
+fn in_turn(user: &mut User) -> String {
+    user.actions += 1;
+    for path in ["/data/before.mha", "/data/after.mha"] {
+        user.console.drop_file(Path::new(path));
+    }
+    user.opens(Path::new("/data/before.mha"));
+    user.actions += 1;
+    user.press(Modifiers { control: true, ..Modifiers::default() }, Key::PageDown);
+    user.opens(Path::new("/data/after.mha"));
+    user.count()
+}
+
+/// tests/gpu/console/recordings.rs holds that it comes back as it was left.
+fn first_again(user: &mut User) -> String {
+    user.actions += 1;
+    user.press(Modifiers { control: true, ..Modifiers::default() }, Key::PageUp);
+    user.opens(Path::new("/data/before.mha"));
     user.count()
 }
 

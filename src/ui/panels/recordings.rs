@@ -1,0 +1,104 @@
+//! The recordings that are open, as a list of which one is chosen, and the file that is being read.
+
+use super::colours::{ACCENT, BAR, EDGE, TEXT, WHOLE_BAR};
+use super::names::{self, Tell};
+use super::overlays::{BETWEEN_MESSAGES, MESSAGE_EDGES, message_frame};
+use super::{PanelState, SMALL_TEXT, TEXT_SIZE, TOUCH_SIZE, heading, picture_rect};
+use crate::ui::command::Command;
+use crate::ui::texts;
+use egui::accesskit::Role;
+use egui::{
+    Align2, Area, Button, FontId, Id, Label, Order, Rect, RichText, Sense, Stroke, StrokeKind, Ui, WidgetInfo,
+    WidgetType, vec2,
+};
+
+/// What is being read.
+#[derive(Clone, Debug, PartialEq)]
+pub(in crate::ui) struct Reading {
+    pub(in crate::ui) name: String,
+    /// How far it is, if that is known, and the same in words.
+    pub(in crate::ui) share: Option<f32>,
+    pub(in crate::ui) text: String,
+}
+
+/// Width of the button that closes a recording, points.
+const CLOSE: f32 = 36.0;
+
+/// The list, while more than one recording is open.
+pub(super) fn show_list(ui: &mut Ui, state: &PanelState, width: f32, execute: &mut dyn FnMut(Command)) {
+    if state.recordings.len() < 2 {
+        return;
+    }
+    let height = TOUCH_SIZE * 0.75;
+    let name = vec2(width - CLOSE - ui.spacing().item_spacing.x, height);
+    names::group(ui, texts::RECORDINGS, |ui| {
+        heading(ui, texts::RECORDINGS);
+        for (n, recording) in state.recordings.iter().enumerate() {
+            ui.horizontal(|ui| {
+                let button = Button::selectable(recording.is_shown, &recording.name).frame_when_inactive(true);
+                let button = ui.add_sized(name, button.truncate());
+                if button.tell(&texts::recording_hint(&recording.path)).named(&recording.name).clicked() {
+                    execute(Command::ShowRecording(n));
+                }
+                let close = ui.add_sized(vec2(CLOSE, height), Button::new(texts::CLOSE_RECORDING_BUTTON));
+                let close = close.tell(texts::CLOSE_RECORDING_HINT);
+                if close.named(&texts::close_recording(&recording.name)).clicked() {
+                    execute(Command::CloseRecording(n));
+                }
+            });
+        }
+    });
+}
+
+/// Height of what [`show_reading`] draws, with and without bar and button, points.
+const HEIGHTS: [f32; 2] = [102.0, 44.0];
+/// A picture of less height has the name and how far it is alone, points.
+const MIN_FOR_BAR: f32 = 240.0;
+const CANCEL: f32 = 96.0;
+
+/// Shows what is being read, below the messages. Returns the height that it takes of their room.
+pub(super) fn show_reading(ui: &mut Ui, state: &PanelState, scale: f32, execute: &mut dyn FnMut(Command)) -> f32 {
+    let Some(reading) = state.reading else { return 0.0 };
+    let picture = picture_rect(state, scale);
+    let has_bar = picture.height() >= MIN_FOR_BAR;
+    let height = HEIGHTS[usize::from(!has_bar)];
+    let width = (picture.width() - 60.0).clamp(60.0, 420.0);
+    let is_alone = !state.has_drawn && state.notes.is_empty() && state.banner.is_none();
+    let middle = picture.center_bottom() - vec2(0.0, MESSAGE_EDGES[1] + height);
+    let at = if is_alone { picture.center() - vec2(0.0, height / 2.0) } else { middle };
+    let area = Area::new(Id::new("reading")).order(Order::Middle).pivot(Align2::CENTER_TOP).fixed_pos(at);
+    area.interactable(has_bar).show(ui.ctx(), |ui| {
+        message_frame(ACCENT).show(ui, |ui| {
+            ui.set_width(width);
+            names::announce(ui, &texts::reading(&reading.name), false);
+            let short = [texts::reading(&reading.name), reading.text.clone()].join("  ");
+            let title = if has_bar { texts::reading(&reading.name) } else { short };
+            let size = if has_bar { TEXT_SIZE } else { SMALL_TEXT };
+            ui.add(Label::new(RichText::new(title).size(size).color(TEXT)).truncate());
+            if has_bar {
+                ui.horizontal(|ui| {
+                    bar(ui, reading, width - CANCEL - ui.spacing().item_spacing.x);
+                    let cancel = Button::new(texts::CANCEL_READING);
+                    let cancel = ui.add_sized(vec2(CANCEL, TOUCH_SIZE * 0.75), cancel);
+                    if cancel.tell(texts::CANCEL_READING_HINT).clicked() {
+                        execute(Command::CancelReading);
+                    }
+                });
+            }
+        });
+    });
+    if is_alone { 0.0 } else { height + BETWEEN_MESSAGES }
+}
+
+fn bar(ui: &mut Ui, reading: &Reading, width: f32) {
+    let (area, response) = ui.allocate_exact_size(vec2(width, TOUCH_SIZE * 0.5), Sense::hover());
+    response.widget_info(|| WidgetInfo::labeled(WidgetType::ProgressIndicator, true, texts::READING_SHARE));
+    let response = response.with_role(Role::ProgressIndicator).with_value(&reading.text);
+    names::progress(&response, reading.share);
+    let painter = ui.painter();
+    painter.rect_filled(area, 3.0, WHOLE_BAR);
+    let filled = Rect::from_min_size(area.min, vec2(area.width() * reading.share.unwrap_or(0.0), area.height()));
+    painter.rect_filled(filled, 3.0, BAR);
+    painter.rect_stroke(area, 3.0, Stroke::new(1.0, EDGE), StrokeKind::Inside);
+    painter.text(area.center(), Align2::CENTER_CENTER, &reading.text, FontId::proportional(TEXT_SIZE), TEXT);
+}
