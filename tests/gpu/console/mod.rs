@@ -71,6 +71,7 @@ pub fn options() -> ConsoleOptions {
         origin: None,
         plays_once: false,
         open_file: None,
+        first_steps: None,
         recordings: Arc::default(),
         progress: echolume::files::progress::Progress::default(),
         recent: None,
