@@ -127,7 +127,9 @@ fn every_control_has_a_name_of_its_own_and_a_tooltip_in_every_mode_and_list() {
 fn what_tools_add_and_what_is_folded_has_names_and_tooltips() {
     for tool in [Tool::Clip, Tool::Cut, Tool::Brush, Tool::Region, Tool::Curve] {
         let mut shown = Shown::new("mode='surface'\nlayout='four'");
-        [Command::Tool(tool), Command::MoveClip(5.0), Command::ToggleStartCurve].map(|command| shown.apply(command));
+        for command in [Command::Tool(tool), Command::MoveClip(5.0), Command::ToggleStartCurve] {
+            shown.apply(command);
+        }
         shown.check(&format!("{tool:?}"));
     }
     for mode in ["surface", "volume", "mixed", "orthogonal", "tomography", "cube"] {
