@@ -65,16 +65,21 @@ pub(super) fn show(ui: &mut Ui, state: &PanelState, width: f32, execute: &mut dy
         });
     });
     let header = shown.header_response.expanded(shown.openness > 0.5);
-    header.tell(texts::SIDES_HINT).named(texts::SIDES);
+    header.tell(texts::SIDES_HINT).named(texts::SIDES).with_value(&known(marks));
 }
 
 /// The title, with the sides that are known.
 fn title(marks: &Marks) -> String {
-    let known = AXES.map(|axis| marks.sides(axis)).into_iter().filter(|sides| *sides != Sides::None).map(in_short);
-    match known.collect::<Vec<_>>() {
+    match known(marks) {
         none if none.is_empty() => texts::SIDES.into(),
-        known => texts::sides_in_short(known.join(", ")),
+        known => texts::sides_in_short(known),
     }
+}
+
+/// The sides that are known, such as "R-L, H-F".
+fn known(marks: &Marks) -> String {
+    let known = AXES.map(|axis| marks.sides(axis)).into_iter().filter(|sides| *sides != Sides::None);
+    known.map(in_short).collect::<Vec<_>>().join(", ")
 }
 
 fn in_short(sides: Sides) -> String {

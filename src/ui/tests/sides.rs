@@ -29,7 +29,7 @@ fn press(shown: &mut Shown, group: &str, name: &str) -> Vec<Command> {
 /// The letters over the picture, and the number of dots.
 fn marks(shown: &Shown) -> (Vec<String>, usize) {
     let letters = shown.drawn.iter().filter_map(|drawn| match &drawn.kind {
-        Kind::Text { text, colours, .. } if colours[0] == SIDES.to_array() => Some(text.clone()),
+        Kind::Text { text, colours, .. } if text.len() == 1 && colours[0] == SIDES.to_array() => Some(text.clone()),
         _ => None,
     });
     let is_dot = |kind: &Kind| matches!(kind, Kind::Circle { radius: 5.0, fill, .. } if *fill == ACCENT.to_array());
@@ -52,7 +52,8 @@ fn the_user_states_the_sides_by_controls_and_takes_them_back() {
     let (mut letters, dots) = marks(&shown);
     letters.sort();
     assert_eq!((letters.concat().as_str(), dots), ("LLLRRR", 3), "on each tile that shows the axis");
-    assert!(shown.drawn.iter().any(|drawn| matches!(&drawn.kind, Kind::Text { text, .. } if text == "Sides: R-L")));
+    let header = shown.find("Controls", Role::Button, "Sides");
+    assert_eq!(shown.tree[&header].value(), Some("R-L"));
     let saved = text(shown.controls.settings(), &Origin::of(None)).expect("a workspace");
     assert!(saved.contains("lateral = \"right-left\""), "{saved}");
     for (command, sides, count) in [
