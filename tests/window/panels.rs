@@ -58,8 +58,8 @@ fn a_switch_shows_the_echoes_of_the_clip_face_and_undo_takes_it_back() {
     assert_ne!(on, off);
     let view = desk.view(&[&["--size", "1000x700", "--source", SWEEP][..], &clipped].concat());
     shows(&view, &on, "the echoes");
-    // The switch below the heading of the clip, the first of the column.
-    view.click(954, 56);
+    // The switch below the heading of the clip, which follows the controls in front.
+    view.click(954, 486);
     shows(&view, &off, "the lit inside");
     let control_z = |view: &View| {
         view.desk.press(CONTROL, true);

@@ -59,7 +59,7 @@ fn show_tools(ui: &mut Ui, state: &PanelState, width: f32, execute: &mut dyn FnM
     ui.scope(|ui| {
         names::name(ui, Role::Toolbar, texts::MODES_AND_TOOLS);
         // A low window scrolls.
-        ScrollArea::vertical().auto_shrink(false).show(ui, |ui| {
+        ScrollArea::vertical().auto_shrink(false).min_scrolled_height(0.0).show(ui, |ui| {
             let settings = state.controls.settings();
             let row = Row { width, height: TOUCH_SIZE * 0.92, title: "", is_large_title: false };
             ui.add_space(6.0);
@@ -272,7 +272,7 @@ pub(super) fn show_controls(ui: &mut Ui, state: &PanelState, width: f32, execute
     let settings = state.controls.settings();
     ui.scope(|ui| {
         names::name(ui, Role::Group, texts::CONTROLS);
-        ScrollArea::vertical().id_salt("controls").auto_shrink(false).show(ui, |ui| {
+        ScrollArea::vertical().id_salt("controls").auto_shrink(false).min_scrolled_height(0.0).show(ui, |ui| {
             // Leaves room for the scroll bar, which covers the edge.
             ui.set_max_width(width - 32.0);
             ui.add_space(6.0);

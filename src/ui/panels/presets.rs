@@ -178,7 +178,7 @@ fn tiles(
 fn button(ui: &mut Ui, n: usize, tile: &PresetTile, texture: Option<TextureId>, width: f32) -> Response {
     let edge = 4.0;
     let picture = vec2(width - 2.0 * edge, (width - 2.0 * edge) / SHAPE);
-    let (area, response) = ui.allocate_exact_size(vec2(width, picture.y + NAME + 2.0 * edge), Sense::CLICK);
+    let (area, response) = ui.allocate_exact_size(vec2(width, picture.y + NAME + 2.0 * edge), Sense::click());
     response.widget_info(|| WidgetInfo::labeled(WidgetType::Button, true, tile.name));
     let painter = ui.painter();
     let stroke = Stroke::new(if response.hovered() { 2.0 } else { 1.0 }, if response.hovered() { TEXT } else { EDGE });

@@ -9,7 +9,10 @@ use crate::ui::sliders::SLIDERS;
 use crate::ui::texts;
 use crate::ui::texts::hints;
 use egui::accesskit::Role;
-use egui::{Align, FontId, Rect, RichText, Sense, Slider, Stroke, StrokeKind, Ui, WidgetInfo, WidgetType, pos2, vec2};
+use egui::{
+    Align, FontId, PointerButton, Rect, RichText, Sense, Slider, Stroke, StrokeKind, Ui, WidgetInfo, WidgetType, pos2,
+    vec2,
+};
 
 /// The index of the slider of a control in front, if the mode has one.
 pub(super) fn front(sliders: &[&str], settings: &Settings) -> Option<usize> {
@@ -51,7 +54,9 @@ pub(super) fn slider(
     ui.spacing_mut().interact_size.y = TOUCH_SIZE * if is_large { 0.62 } else { 0.5 };
     let response = ui.add(Slider::new(&mut value, low..=high.max(low)).show_value(false).step_by(slider.step));
     let response = response.tell(&texts::slider_hint(hint)).named(name).with_value(&shown);
-    if response.double_clicked() {
+    // egui's sliders are dragged, not clicked.
+    let is_on_it = response.drag_stopped() || response.contains_pointer();
+    if is_on_it && ui.input(|input| input.pointer.button_double_clicked(PointerButton::Primary)) {
         execute(Command::ResetSlider(number));
         return;
     }

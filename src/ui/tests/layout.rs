@@ -2,7 +2,8 @@
 
 use super::shown::Shown;
 use super::*;
-use crate::ui::panels::accesskit::{Node, Role};
+use crate::ui::command::RailTab;
+use crate::ui::panels::accesskit::{Action, Node, Role};
 use crate::ui::panels::colours::{BACKING, MESSAGE, OUTLINE, PANEL};
 use crate::ui::panels::drawn::{Area, Kind};
 use crate::ui::panels::{self, Banner, Note, Reading};
@@ -46,7 +47,10 @@ fn controls(shown: &Shown) -> Vec<(String, Area)> {
     let [window, picture] = places(shown);
     let columns = [[0.0, 0.0, picture[0], picture[3]], [picture[2], 0.0, window[2], picture[3]]];
     let bar = [0.0, picture[3], window[2], window[3]];
-    let controls = shown.tree.values().filter(|node| matches!(node.role(), Role::Button | Role::Slider | Role::Switch));
+    let controls = shown
+        .tree
+        .values()
+        .filter(|node| matches!(node.role(), Role::Button | Role::Slider | Role::Switch | Role::Tab));
     let seen = controls.filter_map(|node| {
         let area = place(node)?;
         // Of a row of a column, the middle decides where it belongs.
@@ -187,6 +191,47 @@ fn nothing_covers_anything_in_any_window_mode_and_layout() {
         shown.apply(Command::EndCurve);
         assert!(shown.scene.has_curve());
         check(&shown, &format!("{size:?} at {scale}, a curved plane"));
+    }
+}
+
+/// Prevents a small window or a large scale without the controls that every examination needs: they are in a column, under a tab, or in a drawer.
+#[test]
+fn the_controls_in_front_are_reached_in_every_window() {
+    for (size, scale) in windows() {
+        let what = format!("{size:?} at {scale}");
+        let mut shown = Shown::sized("mode='surface'", size, scale);
+        let press = |shown: &mut Shown, group: &str, role: Role, name: &str| {
+            let control = shown.find(group, role, name);
+            let [left, top, right, bottom] = place(&shown.tree[&control]).expect("its place");
+            let at = [(left + right) / 2.0, (top + bottom) / 2.0].map(|n| f64::from(n * scale));
+            let button = |pressed| Input::Button { button: Button::Left, pressed };
+            for input in [Input::Moved(at), button(true), button(false)] {
+                shown.panels.input(&input);
+                shown.lay_out();
+            }
+            shown.settle();
+        };
+        if panels::has_drawer(size, scale, true) {
+            press(&mut shown, "Cine loop", Role::Button, "Tools and controls");
+            assert!(shown.rail.is_open, "{what}");
+        }
+        if !panels::has_column(size, scale, true) {
+            press(&mut shown, "Tools or controls", Role::Tab, "Controls");
+        }
+        if !panels::has_drawer(size, scale, true) {
+            check(&shown, &format!("{what}, the controls"));
+        }
+        assert_eq!(shown.rail.tab == RailTab::Controls, !panels::has_column(size, scale, true), "{what}");
+        let [window, picture] = places(&shown);
+        let above_bar = [0.0, 0.0, window[2], picture[3]];
+        for name in ["Threshold", "Gain", "Smooth", "Brightness", "Light", "Depth"] {
+            let control = shown.find("Controls", Role::Slider, name);
+            shown.ask(control, Action::Focus, None);
+            (0..3).for_each(|_| shown.settle());
+            let area = place(&shown.tree[&control]).expect("its place");
+            assert!(is_inside(area, above_bar), "{what}: {name} at {area:?} is not in {above_bar:?}");
+            assert!(area[2] - area[0] > 60.0 && area[3] - area[1] > 20.0, "{what}: {name} at {area:?}");
+        }
     }
 }
 

@@ -4,7 +4,7 @@
 use super::shown::{SIZE, Shown};
 use super::*;
 use crate::scene::MeasureKind;
-use crate::ui::command::Viewpoint;
+use crate::ui::command::{RailTab, Viewpoint};
 use crate::ui::input::Key;
 use crate::ui::panels::accesskit::{Action, ActionData, Node, NodeId, Role, Toggled};
 use crate::ui::panels::{self, Banner, Note, Reading};
@@ -47,7 +47,14 @@ impl Shown {
         let node = &self.tree[&from];
         let is_group = matches!(
             node.role(),
-            Role::Group | Role::Toolbar | Role::List | Role::Dialog | Role::AlertDialog | Role::Alert | Role::Status
+            Role::Group
+                | Role::Toolbar
+                | Role::TabList
+                | Role::List
+                | Role::Dialog
+                | Role::AlertDialog
+                | Role::Alert
+                | Role::Status
         );
         let own = node.label().filter(|_| is_group).map_or(group.to_string(), str::to_string);
         for child in node.children() {
@@ -68,7 +75,7 @@ impl Shown {
                 let name = node.label().unwrap_or_default();
                 assert!(!name.trim().is_empty(), "{what}: a control without a name in {group:?}: {node:?}");
                 assert!(
-                    matches!(node.role(), Role::Button | Role::Slider | Role::Switch),
+                    matches!(node.role(), Role::Button | Role::Slider | Role::Switch | Role::Tab),
                     "{what}: {name:?} is a {:?}",
                     node.role()
                 );
@@ -357,48 +364,192 @@ fn tab_reaches_every_control_and_marks_it() {
     shown.recordings = ["a.mha", "b.mha"].map(String::from).to_vec();
     shown.reading = Some(Reading { name: "c.mha".into(), share: Some(0.5), text: "50 %".into() });
     shown.settle();
-    let controls: BTreeSet<NodeId> =
-        shown.tree.iter().filter(|(_, node)| is_control(node) && !node.is_disabled()).map(|(id, _)| *id).collect();
-    assert!(controls.len() > 40, "{}", controls.len());
-    assert!(
-        !shown.panels.key(Key::Tab, Modifiers::default()),
-        "Tab belongs to the view until a control has the keyboard"
-    );
-    let rest = shown.corners.clone();
-    shown.panels.toggle_focus();
-    assert!(shown.panels.has_focus());
-    shown.lay_out();
-    let mut reached = Vec::new();
-    for _ in 0..controls.len() {
-        let focus = shown.focus.expect("a control has the keyboard");
-        assert!(controls.contains(&focus), "{:?} takes the keyboard", shown.tree[&focus]);
-        if reached.contains(&focus) {
-            break;
-        }
-        let name = shown.tree[&focus].label().unwrap_or_default().to_string();
-        shown.lay_out();
-        let bounds = shown.tree[&focus].bounds().expect("its place");
-        let edges = [bounds.x0, bounds.y0, bounds.x1, bounds.y1].map(|n| n as f32);
-        let is_at_edge = |[x, y]: [f32; 2]| {
-            let [left, top, right, bottom] = edges;
-            let out = (left - x).max(x - right).max(top - y).max(y - bottom);
-            out.abs() < 5.0
-        };
-        let bright = shown.corners.iter().filter(|corner| corner.1 == [255; 4] && is_at_edge(corner.0));
-        let new = bright.filter(|corner| !rest.contains(corner)).count();
-        assert!(new >= 8, "{name} is not marked: {new} corners at {edges:?}");
-        assert!(edges[1] >= 0.0 && edges[3] <= SIZE[1] as f32, "{name} is out of sight: {edges:?}");
-        reached.push(focus);
-        shown.key(Key::Tab, false);
-    }
-    let missed: Vec<_> = controls.iter().filter(|id| !reached.contains(id)).map(|id| &shown.tree[id]).collect();
-    assert!(missed.is_empty(), "not reached: {missed:?}");
+    let last = shown.tab_reaches_all("surface");
     // Back, and out.
     shown.key(Key::Tab, true);
-    assert_eq!(shown.focus, reached.last().copied());
+    assert_eq!(shown.focus, Some(last));
     shown.key(Key::Escape, false);
     assert_eq!((shown.focus, shown.panels.has_focus()), (None, false));
     assert!(!shown.panels.key(Key::Space, Modifiers::default()), "the keys are those of the view again");
+    let mut shown = Shown::new("mode='volume'\nlayout='four'");
+    shown.apply(Command::Tool(Tool::Region));
+    shown.apply(Command::ToggleStartCurve);
+    shown.tab_reaches_all("4-up with the region");
+    let mut shown = Shown::new("mode='plane'");
+    shown.apply(Command::Tool(Tool::Measure(MeasureKind::Distance)));
+    for n in 0..12 {
+        shown.apply(Command::Point([0.0, 30.0 + f64::from(n), 0.0], false));
+    }
+    shown.tab_reaches_all("measurements");
+    let mut shown = Shown::new("mode='surface'");
+    shown.files = Some(("/data".into(), (0..20).map(|n| format!("recording-{n}.mha")).collect()));
+    shown.settle();
+    shown.tab_reaches_all("the files to open");
+    shown.files = None;
+    shown.open = [false, false, true, false];
+    shown.settle();
+    shown.tab_reaches_all("the exports");
+    shown.open = [false; 4];
+    shown.presets = Some((vec!["Profile".into()], None));
+    shown.settle();
+    shown.tab_reaches_all("the presets");
+    for (size, commands) in [
+        ([800, 600], &[][..]),
+        ([800, 600], &[Command::SwitchRail]),
+        ([480, 400], &[Command::SwitchRail]),
+        ([480, 400], &[Command::SwitchRail, Command::SwitchRail]),
+    ] {
+        let mut shown = Shown::sized("mode='surface'", size, 1.0);
+        commands.iter().for_each(|command| shown.rail_does(command));
+        shown.tab_reaches_all(&format!("{size:?} {commands:?}"));
+    }
+}
+
+impl Shown {
+    /// Goes by Tab from control to control, and returns the last one.
+    fn tab_reaches_all(&mut self, what: &str) -> NodeId {
+        let controls: BTreeSet<NodeId> =
+            self.tree.iter().filter(|(_, node)| is_control(node) && !node.is_disabled()).map(|(id, _)| *id).collect();
+        assert!(controls.len() > 20, "{what}: {}", controls.len());
+        self.panels.drop_focus();
+        self.settle();
+        assert!(
+            !self.panels.key(Key::Tab, Modifiers::default()),
+            "Tab belongs to the view until a control has the keyboard"
+        );
+        let rest = self.corners.clone();
+        self.panels.toggle_focus();
+        assert!(self.panels.has_focus());
+        self.lay_out();
+        let mut reached = Vec::new();
+        for _ in 0..controls.len() {
+            let focus = self.focus.unwrap_or_else(|| panic!("{what}: no control has the keyboard after {reached:?}"));
+            assert!(controls.contains(&focus), "{what}: {:?} takes the keyboard", self.tree[&focus]);
+            if reached.contains(&focus) {
+                break;
+            }
+            let name = self.tree[&focus].label().unwrap_or_default().to_string();
+            // A panel scrolls to it.
+            let is_far = |shown: &Shown| {
+                shown.tree[&focus].bounds().is_some_and(|b| b.y0 < 0.0 || b.y1 > f64::from(shown.size[1]))
+            };
+            self.settle();
+            (0..8).for_each(|_| {
+                if is_far(self) {
+                    self.settle()
+                }
+            });
+            let bounds = self.tree[&focus].bounds().expect("its place");
+            let edges = [bounds.x0, bounds.y0, bounds.x1, bounds.y1].map(|n| n as f32);
+            let is_at_edge = |[x, y]: [f32; 2]| {
+                let [left, top, right, bottom] = edges;
+                let out = (left - x).max(x - right).max(top - y).max(y - bottom);
+                out.abs() < 5.0
+            };
+            let bright = self.corners.iter().filter(|corner| corner.1 == [255; 4] && is_at_edge(corner.0));
+            let new = bright.filter(|corner| !rest.contains(corner)).count();
+            assert!(new >= 8, "{what}: {name} is not marked: {new} corners at {edges:?}");
+            let is_in_sight = edges[1] >= 0.0 && edges[3] <= self.size[1] as f32;
+            assert!(is_in_sight, "{what}: {name} is out of sight: {edges:?}");
+            reached.push(focus);
+            self.key(Key::Tab, false);
+        }
+        let missed: Vec<_> = controls.iter().filter(|id| !reached.contains(id)).map(|id| &self.tree[id]).collect();
+        assert!(missed.is_empty(), "{what}: not reached: {missed:?}");
+        *reached.last().expect("a control")
+    }
+
+    /// Executes a command for the rail, as the console does.
+    pub(super) fn rail_does(&mut self, command: &Command) {
+        assert!(self.rail.apply(command, panels::has_drawer(self.size, self.panels.scale(), true)));
+        self.settle();
+    }
+
+    /// Walks through the list that is open, and returns the name of the entry that has the keyboard then.
+    fn walked(&mut self, keys: &[Key], is_grid: bool) -> String {
+        for key in keys {
+            assert!(self.panels.walk(*key, Modifiers::default(), is_grid), "{key:?}");
+        }
+        // One key a layout, and a scroll to the entry.
+        (0..keys.len() + 8).for_each(|_| _ = self.lay_out());
+        let focus = self.focus.unwrap_or_else(|| panic!("no entry has the keyboard after {keys:?}"));
+        let bounds = self.tree[&focus].bounds().expect("its place");
+        assert!(bounds.y0 >= 0.0 && bounds.y1 <= f64::from(SIZE[1]), "{bounds:?} is out of sight");
+        self.tree[&focus].label().unwrap_or_default().to_string()
+    }
+}
+
+/// Prevents entries from the tenth on that need a Tab for each control before them.
+#[test]
+fn arrows_walk_through_lists_and_enter_chooses() {
+    use Key::{Down, End, Home, PageDown, PageUp, Right, Up};
+    let mut shown = Shown::new("mode='surface'");
+    shown.files = Some(("/data".into(), (0..30).map(|n| format!("{n}.mha")).collect()));
+    shown.settle();
+    assert_eq!(shown.walked(&[Down], false), "0.mha");
+    assert_eq!(shown.walked(&[Down], false), "1.mha");
+    assert_eq!(shown.walked(&[PageDown], false), "11.mha");
+    assert_eq!(shown.walked(&[Down, Down, Up], false), "12.mha", "keys that come faster than pictures");
+    assert_eq!(shown.walked(&[PageUp, PageUp], false), "0.mha");
+    assert_eq!(shown.walked(&[Up], false), "0.mha");
+    assert_eq!(shown.walked(&[End], false), "29.mha");
+    assert_eq!(shown.walked(&[Down], false), "29.mha");
+    assert!(!shown.panels.walk(Key::Right, Modifiers::default(), false), "there is nothing beside it");
+    assert_eq!(shown.key(Key::Enter, false), [Command::OpenFile(29)]);
+    assert_eq!(shown.walked(&[Home], false), "0.mha");
+    shown.key(Key::Tab, false);
+    assert_eq!(shown.tree[&shown.focus.expect("the next one")].label(), Some("1.mha"), "Tab goes on from there");
+    shown.files = None;
+    shown.open = [false, false, true, false];
+    shown.settle();
+    let names: Vec<&str> = crate::ui::volume_export::FORMATS.iter().map(|format| format.name).collect();
+    assert_eq!(shown.walked(&[End], false), names[names.len() - 1]);
+    // Enter follows at once.
+    for key in [Home, Down] {
+        assert!(shown.panels.walk(key, Modifiers::default(), false));
+    }
+    assert!(shown.panels.key(Key::Enter, Modifiers::default()));
+    let commands: Vec<Command> = (0..4).flat_map(|_| shown.lay_out()).collect();
+    assert_eq!(commands, [Command::Export(1)]);
+    shown.open = [false; 4];
+    shown.presets = Some(((0..8).map(|n| format!("Own {n}")).collect(), None));
+    shown.settle();
+    assert_eq!(shown.walked(&[Down], true), "Face");
+    assert_eq!(shown.walked(&[Right], true), "Skeleton");
+    assert_eq!(shown.walked(&[Down], true), "Bone", "three stand beside each other");
+    assert_eq!(shown.walked(&[End], true), "Own 7");
+    assert_eq!(shown.key(Key::Enter, false), [Command::Preset(13)]);
+    shown.panels.drop_focus();
+    assert!(!shown.panels.has_focus(), "a name has the keys");
+}
+
+/// Prevents a window without a column that says nothing of its tabs.
+#[test]
+fn tabs_and_drawer_say_what_they_show() {
+    let mut shown = Shown::sized("mode='surface'", [800, 600], 1.0);
+    let tabs = |shown: &Shown| {
+        ["Tools", "Controls"].map(|name| shown.tree[&shown.find("Tools or controls", Role::Tab, name)].is_selected())
+    };
+    shown.check("tools");
+    assert_eq!(tabs(&shown), [Some(true), Some(false)]);
+    let controls = shown.find("Tools or controls", Role::Tab, "Controls");
+    assert_eq!(shown.ask(controls, Action::Click, None), [Command::RailTab(RailTab::Controls)]);
+    shown.settle();
+    shown.check("controls");
+    assert_eq!(tabs(&shown), [Some(false), Some(true)]);
+    shown.find("Controls", Role::Slider, "Threshold");
+    assert!(shown.names("Measure").is_empty());
+    let mut shown = Shown::sized("mode='surface'", [480, 400], 1.0);
+    let drawer = shown.find("Cine loop", Role::Button, "Tools and controls");
+    assert_eq!(shown.tree[&drawer].is_expanded(), Some(false));
+    assert_eq!(shown.ask(drawer, Action::Click, None), [Command::ToggleDrawer]);
+    shown.settle();
+    shown.check("the drawer");
+    assert_eq!(shown.tree[&drawer].is_expanded(), Some(true));
+    assert_eq!(tabs(&shown), [Some(true), Some(false)]);
+    shown.find("Measure", Role::Button, "Caliper");
+    // Where there is a column, there are no tabs.
+    assert!(Shown::new("").names("Tools or controls").is_empty());
 }
 
 #[test]

@@ -82,3 +82,122 @@ fn what_a_screen_reader_asks_is_done() {
     desk.rest();
     assert!(desk.console.take_tree().is_none(), "nothing is made while nobody listens");
 }
+
+const SHIFT: Modifiers = Modifiers { shift: true, control: false, alt: false };
+
+fn press(desk: &mut Desk, key: Key, times: usize) {
+    (0..times).for_each(|_| desk.press(key));
+}
+
+/// Requirement: whoever has no mouse sets points and drags by keys, and the keys mean what they did before as soon as the pointer is left.
+#[test]
+fn the_pointer_by_keyboard_does_what_the_mouse_does() {
+    let device = Device::new();
+    let [mut mouse, mut keys] = [(); 2].map(|()| {
+        let mut desk = Desk::new(&device, options());
+        desk.begin();
+        desk.live(0);
+        desk
+    });
+    // The light, with its tool: from the middle, a pixel a step in a picture this small.
+    for desk in [&mut mouse, &mut keys] {
+        desk.press(Key::Char('l'));
+    }
+    mouse.drag([40.0, 36.0], [60.0, 36.0]);
+    keys.held(SHIFT, Key::Char('m'));
+    keys.press(Key::Space);
+    press(&mut keys, Key::Right, 12);
+    // A drag that pauses is one step for undo.
+    std::thread::sleep(Duration::from_millis(600));
+    press(&mut keys, Key::Right, 8);
+    keys.press(Key::Space);
+    let light = |desk: &Desk| desk.console.controls().settings().light.direction;
+    assert!((light(&keys) - light(&mouse)).length() < 1e-9, "{} {}", light(&keys), light(&mouse));
+    assert!((light(&keys) - plain().light.direction).length() > 0.1);
+    assert!(!keys.console.stream().is_frozen(), "Space is the pointer's");
+    keys.held(CONTROL, Key::Char('z'));
+    assert_eq!(light(&keys), plain().light.direction);
+    // A caliper: Enter clicks.
+    for desk in [&mut mouse, &mut keys] {
+        desk.press(Key::Char('7'));
+        desk.rest();
+        desk.press(Key::Char('m'));
+    }
+    let click = |desk: &mut Desk, at: [f64; 2]| {
+        desk.console.input(&Input::Moved(at));
+        for pressed in [true, false] {
+            desk.console.input(&Input::Button { button: Button::Left, pressed });
+        }
+    };
+    click(&mut mouse, [30.0, 30.0]);
+    click(&mut mouse, [50.0, 44.0]);
+    press(&mut keys, Key::Left, 30);
+    press(&mut keys, Key::Up, 6);
+    keys.press(Key::Enter);
+    press(&mut keys, Key::Right, 20);
+    press(&mut keys, Key::Down, 14);
+    keys.press(Key::Enter);
+    let measured = |desk: &Desk| desk.console.controls().settings().measure.clone();
+    assert_eq!((measured(&keys).len(), measured(&keys)), (1, measured(&mouse)));
+    // An outline of three clicks ends by Ctrl+Enter.
+    keys.press(Key::Char('o'));
+    for way in [Key::Left, Key::Up, Key::Right] {
+        press(&mut keys, way, 12);
+        keys.press(Key::Enter);
+    }
+    assert!(keys.console.controls().work().is_some());
+    keys.held(CONTROL, Key::Enter);
+    assert_eq!(measured(&keys).last().map(|measured| measured.points.len()), Some(3));
+    // A text: while it is typed, the keys are letters.
+    keys.press(Key::Char('i'));
+    keys.press(Key::Enter);
+    for key in [Key::Char('a'), Key::Space, Key::Char('b'), Key::Enter] {
+        keys.press(key);
+    }
+    assert_eq!(measured(&keys).last().map(|measured| measured.text.clone()).as_deref(), Some("a b"));
+    // Escape gives the drag up, then leaves the pointer, then the tool; and never the program.
+    keys.press(Key::Char('t'));
+    keys.press(Key::Char('1'));
+    keys.rest();
+    keys.press(Key::Space);
+    press(&mut keys, Key::Right, 8);
+    keys.press(Key::Escape);
+    let camera = keys.console.controls().settings().camera.clone();
+    press(&mut keys, Key::Right, 8);
+    assert_eq!(keys.console.controls().settings().camera, camera, "the drag was given up");
+    keys.press(Key::Escape);
+    assert!(!keys.rest().exit);
+    keys.press(Key::Space);
+    keys.rest();
+    assert!(keys.console.stream().is_frozen(), "the keys are those of the view again");
+}
+
+/// Prevents entries of a list that no key but Tab reaches, and keys of it that are lost because several come between two pictures.
+#[test]
+fn arrows_walk_through_a_list_and_escape_closes_it() {
+    let device = Device::new();
+    let mut desk = desk(&device);
+    let before = desk.console.controls().settings().clone();
+    desk.held(CONTROL, Key::Char('p'));
+    desk.press(Key::Down);
+    desk.press(Key::Right);
+    assert_eq!(focused(&mut desk).as_deref(), Some("Skeleton"));
+    desk.press(Key::Escape);
+    assert_eq!(focused(&mut desk), None, "one Escape closes the list");
+    desk.held(CONTROL, Key::Char('p'));
+    for key in [Key::End, Key::Left, Key::Enter] {
+        desk.press(key);
+    }
+    desk.rest();
+    let taken = desk.console.controls().settings().clone();
+    assert_ne!(taken, before);
+    desk.held(CONTROL, Key::Char('z'));
+    desk.held(CONTROL, Key::Char('p'));
+    desk.press(Key::Char('5'));
+    desk.rest();
+    assert_eq!(desk.console.controls().settings(), &taken, "the fifth of six");
+    // Without a list the arrows are the view's.
+    desk.press(Key::Left);
+    desk.rest();
+    assert!(desk.console.stream().is_frozen());
+}
