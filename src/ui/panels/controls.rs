@@ -143,7 +143,6 @@ fn show_tools(ui: &mut Ui, state: &PanelState, width: f32, execute: &mut dyn FnM
             if !state.has_column {
                 body_marks::show(ui, state, width - 16.0, execute);
                 measures::show_results(ui, state, width - 24.0, execute);
-                sides::show(ui, state, width - 24.0, execute);
             }
             let files = [
                 (Command::OpenFiles, texts::OPEN, texts::OPEN_HINT),

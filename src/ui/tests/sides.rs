@@ -105,7 +105,8 @@ fn the_group_is_reached_by_the_keyboard_and_in_a_window_without_a_column() {
     shown.ask(button, Action::Focus, None);
     assert_eq!(shown.key(crate::ui::input::Key::Space, false), [Command::Sides(VolumeAxis::Lateral, Sides::LeftRight)]);
     let mut narrow = Shown::sized("mode='plane'", [640, 480], 1.0);
-    press(&mut narrow, "Modes and tools", "Sides");
+    narrow.rail_does(&Command::SwitchRail);
+    press(&mut narrow, "Controls", "Sides");
     narrow.settle();
     narrow.check("a narrow window");
     assert_eq!(press(&mut narrow, LATERAL, "right to left"), [Command::Sides(VolumeAxis::Lateral, Sides::RightLeft)]);
