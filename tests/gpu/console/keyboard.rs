@@ -150,6 +150,8 @@ fn the_pointer_by_keyboard_does_what_the_mouse_does() {
     assert_eq!(measured(&keys).last().map(|measured| measured.points.len()), Some(3));
     // A text: while it is typed, the keys are letters.
     keys.press(Key::Char('i'));
+    // Not there again, which would be a double click.
+    press(&mut keys, Key::Down, 14);
     keys.press(Key::Enter);
     for key in [Key::Char('a'), Key::Space, Key::Char('b'), Key::Enter] {
         keys.press(key);
