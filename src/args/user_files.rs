@@ -77,9 +77,10 @@ mod tests {
     #[cfg(feature = "view")]
     #[test]
     fn only_the_first_start_of_a_user_has_hints() {
-        let folder = tempfile::tempdir().expect("a folder");
-        let [recent, presets] = ["recent", "presets.toml"].map(|name| folder.path().join(name));
-        let shown = folder.path().join("hints-shown");
+        let folder = std::env::temp_dir().join(format!("echolume-first-start-{}", std::process::id()));
+        std::fs::create_dir_all(&folder).expect("a folder");
+        let [recent, presets] = ["recent", "presets.toml"].map(|name| folder.join(name));
+        let shown = folder.join("hints-shown");
         let hints = |presets: Option<&PathBuf>| first_steps_beside(recent.clone(), presets.cloned());
         assert_eq!(hints(Some(&presets)), Some(shown.clone()));
         assert_eq!(hints(None), Some(shown.clone()));
@@ -88,6 +89,7 @@ mod tests {
             assert_eq!(hints(Some(&presets)), None, "{}", file.display());
             std::fs::remove_file(file).expect("removed");
         }
+        std::fs::remove_dir_all(&folder).expect("removed");
     }
 
     #[cfg(all(unix, feature = "view"))]

@@ -8,7 +8,7 @@ use crate::passes::unveil::{self, Unveiled};
 use crate::picture::Picture;
 use crate::scene::Scene;
 use crate::scene::marks::TileMarks;
-use crate::source::phantom::DEMO_DATA;
+use crate::source::DEMO_DATA;
 use plotters::prelude::{BLACK, DrawingBackend, RGBColor, ShapeStyle, WHITE};
 use std::borrow::Cow;
 use std::time::{SystemTime, UNIX_EPOCH};

@@ -59,6 +59,9 @@ pub struct Header {
     pub synthetic: bool,
 }
 
+/// What pictures of the phantom say of themselves, and recordings where their format has a comment.
+pub const DEMO_DATA: &str = "Demo data (phantom)";
+
 /// Size of a pose as it is stored, bytes: the upper three rows of a 4 x 4 matrix, row by row, f64.
 pub(super) const POSE_BYTES: usize = 96;
 

@@ -1,8 +1,8 @@
 //! MetaImage (`.mha`, `.mhd`): plain volumes, the sequences of the PLUS toolkit, and UsTK's pre-scan sweeps.
 
+use super::frame::DEMO_DATA;
 use super::layout::{Cartesian, Layout, LineOrder, StoredGeometry, extent};
 use super::packed::{Encoding, InputFile, Pixels};
-use super::phantom::DEMO_DATA;
 use super::pixel::{Number, PixelFormat};
 use super::sequence::COMMENT;
 use super::transforms::{Poses, TransformName, matrix};

@@ -45,7 +45,7 @@ pub mod volume_file;
 
 pub use crate::files::InputError;
 pub use crate::probe::{DepthAxis, Geometry, Grid};
-pub use frame::{Frame, Header, Source};
+pub use frame::{DEMO_DATA, Frame, Header, Source};
 pub use recording::Recording;
 pub use samples::{SampleType, StoredType};
 pub use transforms::Calibration;

@@ -1,7 +1,7 @@
 //! Polar frames as a PLUS sequence (.mha), with their geometry in a probe file (NAME.probe.toml).
 
+use super::frame::DEMO_DATA;
 use super::frame::Source;
-use super::phantom::DEMO_DATA;
 use super::samples::SampleType;
 use crate::files::{InputError, Unfinished};
 use crate::probe::{Geometry, ProbeFile, Volumes};

@@ -74,9 +74,6 @@ impl Speckle {
     }
 }
 
-/// What pictures of the phantom say of themselves, and recordings where their format has a comment.
-pub const DEMO_DATA: &str = "Demo data (phantom)";
-
 /// What to simulate.
 #[derive(Clone, Debug, PartialEq)]
 pub struct PhantomOptions {

@@ -10,7 +10,7 @@ use super::{PanelState, TEXT_SIZE, TOUCH_SIZE, heading};
 use super::{body_marks, measures, rail, recordings, sides, tools};
 use crate::scene::{ColourMap, Layout, Mode, PlaneName, Settings, Transfer, TransferName};
 use crate::ui::cine_player::{CineState, SPEEDS};
-use crate::ui::command::{Command, Tool};
+use crate::ui::command::{Command, RailTab, Tool};
 use crate::ui::sliders::{Group, SLIDERS, Slider as Control};
 use crate::ui::texts;
 use crate::ui::texts::hints;
@@ -47,12 +47,22 @@ const FRONT: [(&str, &[&str]); 6] = [
 ];
 
 pub(super) fn show_modes(ui: &mut Ui, state: &PanelState, width: f32, execute: &mut dyn FnMut(Command)) {
-    rail::show_rail(ui, state, width, execute, |ui, execute| show_tools(ui, state, width, execute));
+    let tab = |ui: &mut Ui, tab, execute: &mut dyn FnMut(Command)| show_tab(ui, state, tab, width, execute);
+    rail::show_rail(ui, state, width, execute, tab);
 }
 
 /// Modes, tools and controls over the picture of a small window.
 pub(super) fn show_drawer(ui: &mut Ui, state: &PanelState, size: [f32; 2], execute: &mut dyn FnMut(Command)) {
-    rail::show_drawer(ui, state, size, execute, |ui, execute| show_tools(ui, state, size[0], execute));
+    let tab = |ui: &mut Ui, tab, execute: &mut dyn FnMut(Command)| show_tab(ui, state, tab, size[0], execute);
+    rail::show_drawer(ui, state, size, execute, tab);
+}
+
+/// What a tab of the rail has.
+fn show_tab(ui: &mut Ui, state: &PanelState, tab: RailTab, width: f32, execute: &mut dyn FnMut(Command)) {
+    match tab {
+        RailTab::Tools => show_tools(ui, state, width, execute),
+        RailTab::Controls => show_controls(ui, state, width, execute),
+    }
 }
 
 fn show_tools(ui: &mut Ui, state: &PanelState, width: f32, execute: &mut dyn FnMut(Command)) {

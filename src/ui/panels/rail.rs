@@ -3,7 +3,7 @@
 
 use super::colours::{EDGE, PANEL};
 use super::names::{self, Tell};
-use super::{MODES_WIDTH, PanelState, TOUCH_SIZE, controls};
+use super::{MODES_WIDTH, PanelState, TOUCH_SIZE};
 use crate::ui::command::{Command, RailTab};
 use crate::ui::texts;
 use egui::accesskit::Role;
@@ -46,24 +46,21 @@ impl Rail {
     }
 }
 
-/// Shows the rail at the edge of the window. `tools`: what shows modes and tools.
+/// Shows the rail at the edge of the window. `show`: shows what a tab has.
 pub(super) fn show_rail(
     ui: &mut Ui,
     state: &PanelState,
     width: f32,
     execute: &mut dyn FnMut(Command),
-    tools: impl FnOnce(&mut Ui, &mut dyn FnMut(Command)),
+    show: impl FnOnce(&mut Ui, RailTab, &mut dyn FnMut(Command)),
 ) {
     Panel::left("rail").exact_size(width).resizable(false).show_separator_line(false).show(ui, |ui| {
         if state.has_column {
-            return tools(ui, execute);
+            return show(ui, RailTab::Tools, execute);
         }
         ui.add_space(6.0);
         tabs(ui, state, [width, TOUCH_SIZE * 0.75], execute);
-        match state.rail.tab {
-            RailTab::Tools => tools(ui, execute),
-            RailTab::Controls => controls::show_controls(ui, state, width, execute),
-        }
+        show(ui, state.rail.tab, execute);
     });
 }
 
@@ -78,7 +75,7 @@ pub(super) fn show_drawer(
     state: &PanelState,
     [width, height]: [f32; 2],
     execute: &mut dyn FnMut(Command),
-    tools: impl FnOnce(&mut Ui, &mut dyn FnMut(Command)),
+    show: impl FnOnce(&mut Ui, RailTab, &mut dyn FnMut(Command)),
 ) {
     let area = Area::new(Id::new("drawer")).order(Order::Middle).fixed_pos(pos2(0.0, 0.0)).constrain(false);
     area.show(ui.ctx(), |ui| {
@@ -89,10 +86,7 @@ pub(super) fn show_drawer(
             ui.set_max_size(inner);
             let tab = if height < LOW_DRAWER { 28.0 } else { TOUCH_SIZE * 0.75 };
             tabs(ui, state, [width, tab], execute);
-            match state.rail.tab {
-                RailTab::Tools => tools(ui, execute),
-                RailTab::Controls => controls::show_controls(ui, state, width, execute),
-            }
+            show(ui, state.rail.tab, execute);
         });
     });
 }

@@ -124,7 +124,7 @@ pub const NO_SUCH_PRESET: &str = "There is no such preset";
 pub const UNVEILING_IN_THE_WAY: &str = "That draws both what is dark and what is bright, of which nothing can be removed: rendering cannot start at the fluid.";
 
 // The source: title and explanation.
-pub const DEMO_DATA: &str = crate::source::phantom::DEMO_DATA;
+pub const DEMO_DATA: &str = crate::source::DEMO_DATA;
 pub const COMPUTING_DEMO_DATA: &str = "Computing the demo data";
 pub const READING_RECORDING: &str = "Reading the recording";
 pub const WAITING_FOR_STANDARD_INPUT: &str = "Waiting for frames on standard input";
