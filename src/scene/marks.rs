@@ -3,13 +3,57 @@
 
 use super::planes::{CURVE_COLOUR, cell, colour};
 use super::region::depth_offset;
-use super::{Layout, Marks, Mode, PlaneName, ProbeMarker, Scene};
+use super::{Layout, Marks, Mode, PlaneName, ProbeMarker, Scene, Sides};
 use glam::DVec3;
 
 /// Directions whose components differ by less are as far from one edge as from the other.
 const SAME: f64 = 1e-6;
 /// Lengths that a scale bar may have, mm.
 pub const BAR_LENGTHS: [f64; 9] = [0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0, 200.0];
+
+/// An axis of the volume.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum VolumeAxis {
+    Lateral,
+    Depth,
+    Elevation,
+}
+
+impl Marks {
+    /// The patient's sides along an axis of the volume.
+    pub fn sides(&self, axis: VolumeAxis) -> Sides {
+        match axis {
+            VolumeAxis::Lateral => self.lateral,
+            VolumeAxis::Depth => self.depth,
+            VolumeAxis::Elevation => self.elevation,
+        }
+    }
+
+    /// These marks with other sides along an axis. A pair of sides lies along one axis: another axis that had it has none then.
+    pub fn with_sides(mut self, axis: VolumeAxis, sides: Sides) -> Marks {
+        for other in [&mut self.lateral, &mut self.depth, &mut self.elevation] {
+            if *other == sides || *other == sides.exchanged() {
+                *other = Sides::None;
+            }
+        }
+        *match axis {
+            VolumeAxis::Lateral => &mut self.lateral,
+            VolumeAxis::Depth => &mut self.depth,
+            VolumeAxis::Elevation => &mut self.elevation,
+        } = sides;
+        self
+    }
+
+    /// These marks with L in place of R, and R in place of L.
+    pub fn left_and_right_exchanged(mut self) -> Marks {
+        for sides in [&mut self.lateral, &mut self.depth, &mut self.elevation] {
+            if matches!(sides, Sides::LeftRight | Sides::RightLeft) {
+                *sides = sides.exchanged();
+            }
+        }
+        self
+    }
+}
 
 /// An edge of a tile.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -220,7 +264,6 @@ impl Mode {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::scene::Sides;
     use crate::scene::load::block;
 
     fn scene(lines: &[&str]) -> Scene {

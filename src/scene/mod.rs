@@ -36,6 +36,7 @@ pub use bricks::{Bricks, Reach, Side, TILE};
 pub use camera::Rays;
 pub use echo_levels::{EchoHistogram, EchoLevels};
 pub use light_lattice::{LightLattice, Propagation};
+pub use marks::VolumeAxis;
 pub use region::{depth_offset, insonified_box};
 pub use settings::*;
 pub use visible_bounds::{Rectangle, Shared, VisibleBounds};

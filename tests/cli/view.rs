@@ -18,6 +18,8 @@ fn impossible_views_are_refused_in_one_line_before_a_window_opens() {
     for (arguments, code, named) in [
         (&["--source", "/nowhere.mha"][..], 2, &["/nowhere.mha"][..]),
         (&["--source", &cut], 2, &["cut.mha", "cut short"]),
+        (&[SWEEP, "/nowhere.mha"], 2, &["/nowhere.mha"]),
+        (&[SWEEP; 17], 2, &["17 files", "16"]),
         (&["--scale", "9"], 2, &["--scale 9", "0.5..=4"]),
         (&["--budget", "soon"], 2, &["--budget soon", "16ms"]),
         (&["--update", "slowly"], 2, &["--update slowly", "whole or rolling"]),

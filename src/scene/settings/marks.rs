@@ -19,50 +19,6 @@ pub struct Marks {
     pub bar: bool,
 }
 
-impl Marks {
-    /// The patient's sides along an axis of the volume.
-    pub fn sides(&self, axis: VolumeAxis) -> Sides {
-        match axis {
-            VolumeAxis::Lateral => self.lateral,
-            VolumeAxis::Depth => self.depth,
-            VolumeAxis::Elevation => self.elevation,
-        }
-    }
-
-    /// These marks with other sides along an axis. A pair of sides lies along one axis: another axis that had it has none then.
-    pub fn with_sides(mut self, axis: VolumeAxis, sides: Sides) -> Marks {
-        for other in [&mut self.lateral, &mut self.depth, &mut self.elevation] {
-            if *other == sides || *other == sides.exchanged() {
-                *other = Sides::None;
-            }
-        }
-        *match axis {
-            VolumeAxis::Lateral => &mut self.lateral,
-            VolumeAxis::Depth => &mut self.depth,
-            VolumeAxis::Elevation => &mut self.elevation,
-        } = sides;
-        self
-    }
-
-    /// These marks with L in place of R, and R in place of L.
-    pub fn left_and_right_exchanged(mut self) -> Marks {
-        for sides in [&mut self.lateral, &mut self.depth, &mut self.elevation] {
-            if matches!(sides, Sides::LeftRight | Sides::RightLeft) {
-                *sides = sides.exchanged();
-            }
-        }
-        self
-    }
-}
-
-/// An axis of the volume.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum VolumeAxis {
-    Lateral,
-    Depth,
-    Elevation,
-}
-
 /// Where the marker of the probe is.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize)]
 #[serde(rename_all = "kebab-case")]

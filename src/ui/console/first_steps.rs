@@ -56,7 +56,8 @@ impl Console {
             || self.shows_exports
             || self.asks_to_leave
             || self.opening.is_shown()
-            || self.presets.is_shown();
+            || self.presets.is_shown()
+            || (self.rail.is_open && self.has_drawer());
         is_free && is_seen && has_room && !is_open && self.notes.is_empty() && self.first_steps.show()
     }
 

@@ -56,6 +56,8 @@ const STALL_TIME: Duration = Duration::from_secs(10);
 const FAULT_CHECK_INTERVAL: Duration = Duration::from_secs(2);
 /// Largest number of notes that are shown at once; the newest ones win.
 const MAX_NOTES: usize = 4;
+/// Escape leaves the program no sooner after another recording came: it was meant for the reading of it.
+const ESCAPE_PAUSE: Duration = Duration::from_secs(1);
 /// How long after the last input pipelines that may be needed next are compiled.
 const REST_BEFORE_WARMING: Duration = Duration::from_secs(1);
 /// A pause after which the same drag or key is another step for undo.
@@ -190,6 +192,8 @@ pub struct Console {
     frozen_volume: Option<u32>,
     /// The settings are those with which the recording was left.
     is_kept: bool,
+    /// It came in place of another one.
+    follows_another: bool,
     presets: Presets,
     clipboard: Clipboard,
     /// Counts voxels in the background.
@@ -278,6 +282,7 @@ impl Console {
             ),
             frozen_volume,
             is_kept,
+            follows_another: display.is_some(),
             presets: Presets::new(options.presets, options.wake.clone()),
             clipboard: Clipboard::default(),
             counting: Counting::new(options.wake.clone()),
@@ -673,13 +678,11 @@ impl Console {
             self.rail.is_open = false;
         } else if self.keyboard_pointer.is_on() && self.controls.work().is_none() && self.controls.line().is_none() {
             self.toggle_keyboard_pointer(Instant::now());
-        } else if self.leave_measuring() {
-            self.needs_redraw = true;
-        } else if self.turning.take().is_some() {
+        } else if self.leave_measuring() || self.turning.take().is_some() {
             self.needs_redraw = true;
         } else if self.is_full_screen && !self.fixed.is_kiosk {
             self.request.toggle_full_screen = true;
-        } else {
+        } else if !self.follows_another || self.started.elapsed() >= ESCAPE_PAUSE {
             self.execute_own(&Command::Exit, Instant::now());
         }
     }

@@ -732,7 +732,7 @@ impl User {
     fn opens(&mut self, path: &Path) {
         self.until("file that is opened", |user| user.request.restart.then_some(()));
         self.request.restart = false;
-        assert_eq!(self.opened.lock().expect("lock").drain(..).last().as_deref(), Some(path));
+        assert_eq!(self.opened.lock().expect("lock").drain(..).next_back().as_deref(), Some(path));
     }
 }
 
