@@ -53,7 +53,7 @@ fn recordings_workspaces_and_exports_of_the_phantom_say_so_and_rendered_pixels_s
     };
     for (recording, is_named) in [("phantom", true), ("sweep.mha", true), ("sweep.frames", true), ("other.mha", false)]
     {
-        let (workspace, out) = (folder.write("exam.toml", &text(recording)), folder.path("out/"));
+        let (workspace, out) = (folder.write("exam.toml", text(recording)), folder.path("out/"));
         done(&["render", &workspace, "--turntable", "2", "-o", &out]);
         let picture = Picture::load(&Path::new(&out).join("picture-000001.png")).expect("a picture");
         let found = bright(&picture, 184..200);
