@@ -182,7 +182,7 @@ mod tests {
     /// Prevents recordings of the phantom that pass for a patient's, and bytes of other recordings that change.
     #[test]
     fn recordings_of_the_phantom_say_so() {
-        let folder = tempfile::tempdir().expect("a folder");
+        let folder = crate::files::WorkFolder::new(&std::env::temp_dir(), "echolume-test-").expect("a folder");
         let [sweep, copy, frames, other] =
             ["sweep.mha", "copy.mha", "sweep.frames", "other.frames"].map(|name| folder.path().join(name));
         let options = PhantomOptions { frames: 4, lines: 8, samples: 64, ..PhantomOptions::default() };

@@ -76,7 +76,7 @@ mod tests {
     /// Prevents hints that come again, that outlive the first action, or that are shown where nothing is kept.
     #[test]
     fn hints_are_shown_once_and_go_with_the_first_action() {
-        let folder = tempfile::tempdir().expect("a folder");
+        let folder = crate::files::WorkFolder::new(&std::env::temp_dir(), "echolume-test-").expect("a folder");
         let file = folder.path().join("state/hints-shown");
         for (command, is_for_them) in
             [(Command::CloseHints, true), (Command::Back, true), (Command::Freeze, false), (Command::ToggleHelp, false)]
