@@ -189,6 +189,15 @@ fn meaning(slot: Slot) -> (&'static [&'static str], &'static str) {
         | Slot::BackFrontB
         | Slot::LightAmbient
         | Slot::LightShade => (COLOUR, "light; 1 is that of an unshadowed light of strength 1"),
+        Slot::NetSamples | Slot::NetValues | Slot::NetSmoothed | Slot::NetFilled => {
+            (GREY, "as stored; the smallest float where nothing is known")
+        }
+        Slot::NetLines => (GREY, "rad or mm"),
+        Slot::NetSlices => (&["position", "advance"], "rad or mm"),
+        Slot::NetDepths => (GREY, "row; -1 where nothing is inside"),
+        Slot::NetCounts | Slot::NetFirsts => (GREY, "cells"),
+        Slot::NetCrossed | Slot::NetAsked => (&["column", "row"], "bits of cells, and of their corners or edges"),
+        Slot::NetOffsets => (&["x", "y", "z", "unused"], "voxels from the first corner of a cell"),
         Slot::VolumeLayer
         | Slot::VolumeBesideSurface
         | Slot::Rendered

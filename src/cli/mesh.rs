@@ -1,18 +1,24 @@
 //! `echolume mesh`: the surface of a recording as triangles.
 
 use super::recordings::{OUTPUT, read_with_threshold, share_of, target_grid};
-use crate::args::{GeometryArgs, check_outputs, open_recording};
+use crate::args::{GeometryArgs, check_outputs, open_device, open_recording};
+use crate::gpu::surface_net::{NetError, SurfaceNet};
+use crate::gpu::{Context, DeviceChoice};
 use crate::mesh::Mesh;
 use crate::mesh::base::Base;
 use crate::mesh::files::MeshFile;
 use crate::mesh::nets::{Surface, surface_net};
 use crate::mesh::simplify::simplified;
 use crate::mesh::smooth::Smoother;
-use crate::probe::{Geometry, World};
+use crate::probe::{Geometry, Grid, World};
 use crate::scene::default_look::smoothing;
-use crate::scene::{Input, depth_offset};
-use crate::terminal::{self, Failure, failed, input, say};
+use crate::scene::{Input, Lattice, depth_offset};
+use crate::source::StoredType;
+use crate::source::convert::Volume;
+use crate::terminal::{self, Failure, failed, input, remark, say};
+use indicatif::ProgressBar;
 use std::path::PathBuf;
+use std::sync::Arc;
 
 #[derive(clap::Args)]
 #[command(
@@ -60,6 +66,13 @@ pub struct MakeMesh {
     /// Volume of the recording to use, counted from 0
     #[arg(long, value_name = "N", default_value_t = 0)]
     volume: usize,
+    /// Vulkan device, by number or part of its name (see `echolume devices`). The CPU computes, in f64, what it cannot hold [default: the
+    /// best one, or the CPU]
+    #[arg(long, value_name = "N|NAME")]
+    device: Option<DeviceChoice>,
+    /// Compute on the CPU, in f64: the reference of what devices compute
+    #[arg(long, conflicts_with = "device")]
+    cpu: bool,
     #[command(flatten)]
     geometry: GeometryArgs,
 }
@@ -106,57 +119,17 @@ impl MakeMesh {
             _ => World::of(&grid),
         };
         let deviation = self.deviation(&geometry, &grid.spacing)?;
-        let bar = terminal::progress_bar(grid.size[2] as u64).with_message("slices");
         let start = self.start.or(self.base.and(found.as_ref()).and_then(|levels| levels.start));
         // Depths are stated below the probe's face.
         let face = depth_offset(&geometry);
-        // Voxels of a slice that are left out.
+        // Rows of a slice that are left out.
         let rows = start.map_or(0.0, |depth| ((depth + face - grid.origin[1]) / grid.spacing[1]).ceil());
-        let above = rows.clamp(0.0, grid.size[1] as f64) as usize * grid.size[0];
-        let reader = || {
-            let mut smoother = Smoother::new(grid.size, grid.spacing, deviation);
-            let (volume, grid, bar) = (&volume, &grid, &bar);
-            move |z: usize, out: &mut [f64]| {
-                smoother.slice(z, out, |z, out| {
-                    volume.slice(grid, z, out);
-                    out.iter_mut().take(above).for_each(|value| *value = f64::NAN);
-                });
-                bar.inc(1);
-            }
+        let left_out = rows.clamp(0.0, grid.size[1] as f64) as usize;
+        let asked = Asked { grid, world, deviation, left_out, threshold, stored: samples.stored };
+        let (mesh, rows) = match self.device()? {
+            Some(context) => self.on_device(&context, &asked, &volume)?,
+            None => self.on_cpu(&asked, &volume)?,
         };
-        let mut size = grid.size;
-        let mut base = None;
-        let mut own = vec![0.0; size[0] * size[1]];
-        if let Some(mm) = self.base {
-            bar.set_length(2 * size[2] as u64);
-            let (mut found, mut read) = (Base::new(size[0], threshold), reader());
-            for z in 0..size[2] {
-                read(z, &mut own);
-                found.survey(&own);
-            }
-            let rows = (mm / grid.spacing[1]).ceil() as usize;
-            size[1] = found.rows(rows).unwrap_or(size[1]);
-            if size[1] > MAX_ROWS {
-                let fault =
-                    format!("--base {mm}: makes {} rows of {} mm, at most {MAX_ROWS}", size[1], grid.spacing[1]);
-                return Err(input(format!("{fault}; give a thinner base or a larger --spacing")));
-            }
-            base = Some(found);
-        }
-        let mut read = reader();
-        let slice = |z: usize, out: &mut [f64]| {
-            match &base {
-                None => read(z, out),
-                Some(base) => {
-                    read(z, &mut own);
-                    base.fill(&own, out);
-                }
-            }
-            Ok::<(), String>(())
-        };
-        let surface = Surface { threshold, closed: !self.open };
-        let mesh = surface_net(size, surface, slice, |at| world.at(at)).map_err(failed)?;
-        bar.finish_and_clear();
         let in_file = threshold - shift;
         if mesh.triangles.is_empty() {
             let fault =
@@ -169,7 +142,7 @@ impl MakeMesh {
         }
         if self.base.is_some() {
             // Half a voxel below the last row.
-            let depth = grid.origin[1] - face + (size[1] as f64 - 0.5) * grid.spacing[1];
+            let depth = grid.origin[1] - face + (rows as f64 - 0.5) * grid.spacing[1];
             how += &format!(", filled down to a base at a depth of {depth:.2} mm");
         }
         let mesh = match self.simplify {
@@ -187,6 +160,122 @@ impl MakeMesh {
         format.write(&mesh, *colour, &self.output).map_err(failed)?;
         self.say(&mesh, &how);
         Ok(())
+    }
+
+    /// The device to compute on; none: the CPU.
+    fn device(&self) -> Result<Option<Arc<Context>>, Failure> {
+        if self.cpu {
+            return Ok(None);
+        }
+        match open_device(self.device.clone(), false) {
+            Ok(context) => Ok(Some(context)),
+            Err(failure) if self.device.is_some() => Err(failure),
+            Err(Failure::NoDevice(fault) | Failure::Failed(fault)) => {
+                remark(&format!("{fault}; the mesh is computed on the CPU"));
+                Ok(None)
+            }
+            Err(failure) => Err(failure),
+        }
+    }
+
+    /// The mesh, and the rows of its lattice. Where the device cannot do it, on the CPU.
+    fn on_device(&self, context: &Arc<Context>, asked: &Asked, volume: &Volume) -> Result<(Mesh, usize), Failure> {
+        match self.net(context, asked, volume) {
+            Ok(Ok(made)) => Ok(made),
+            Ok(Err(failure)) => Err(failure),
+            Err(NetError::Device(fault)) => {
+                remark(&format!("{fault}; the mesh is computed on the CPU"));
+                self.on_cpu(asked, volume)
+            }
+            Err(error) => Err(failed(error)),
+        }
+    }
+
+    fn net(
+        &self,
+        context: &Arc<Context>,
+        asked: &Asked,
+        volume: &Volume,
+    ) -> Result<Result<(Mesh, usize), Failure>, NetError> {
+        let Asked { grid, world, .. } = asked;
+        let bar = self.bar(grid);
+        let mut net = SurfaceNet::new(context, asked.lattice(volume, !self.open), volume.frames())?;
+        let mut filled = None;
+        if let Some(mm) = self.base {
+            match self.rows(grid, mm, net.deepest(|| bar.inc(1))?) {
+                Ok(rows) => filled = Some(rows),
+                Err(failure) => return Ok(Err(failure)),
+            }
+        }
+        let mesh = net.mesh(filled, |at| world.at(at), || bar.inc(1))?;
+        bar.finish_and_clear();
+        for time in net.take_times() {
+            tracing::info!("{}: {:.3} ms in {} runs", time.name, time.total / 1e6, time.runs);
+        }
+        tracing::info!("read back: {:.3} MB", net.read_back as f64 / 1e6);
+        Ok(Ok((mesh, filled.unwrap_or(grid.size[1]))))
+    }
+
+    /// The same on the CPU.
+    fn on_cpu(&self, asked: &Asked, volume: &Volume) -> Result<(Mesh, usize), Failure> {
+        let Asked { grid, world, deviation, left_out, threshold, .. } = asked;
+        let bar = self.bar(grid);
+        let above = left_out * grid.size[0];
+        let reader = || {
+            let mut smoother = Smoother::new(grid.size, grid.spacing, *deviation);
+            let bar = &bar;
+            move |z: usize, out: &mut [f64]| {
+                smoother.slice(z, out, |z, out| {
+                    volume.slice(grid, z, out);
+                    out.iter_mut().take(above).for_each(|value| *value = f64::NAN);
+                });
+                bar.inc(1);
+            }
+        };
+        let mut size = grid.size;
+        let mut base = None;
+        let mut own = vec![0.0; size[0] * size[1]];
+        if let Some(mm) = self.base {
+            let (mut found, mut read) = (Base::new(size[0], *threshold), reader());
+            for z in 0..size[2] {
+                read(z, &mut own);
+                found.survey(&own);
+            }
+            size[1] = self.rows(grid, mm, found.deepest())?;
+            base = Some(found);
+        }
+        let mut read = reader();
+        let slice = |z: usize, out: &mut [f64]| {
+            match &base {
+                None => read(z, out),
+                Some(base) => {
+                    read(z, &mut own);
+                    base.fill(&own, out);
+                }
+            }
+            Ok::<(), String>(())
+        };
+        let surface = Surface { threshold: *threshold, closed: !self.open };
+        let mesh = surface_net(size, surface, slice, |at| world.at(at)).map_err(failed)?;
+        bar.finish_and_clear();
+        Ok((mesh, size[1]))
+    }
+
+    /// A bar of the slices to go; with a base each is read twice.
+    fn bar(&self, grid: &Grid) -> ProgressBar {
+        let times = if self.base.is_some() { 2 } else { 1 };
+        terminal::progress_bar((times * grid.size[2]) as u64).with_message("slices")
+    }
+
+    /// Rows of a lattice with a base `mm` thick. `deepest`: the last row at which a column is inside for the first time.
+    fn rows(&self, grid: &Grid, mm: f64, deepest: Option<usize>) -> Result<usize, Failure> {
+        let thickness = (mm / grid.spacing[1]).ceil() as usize;
+        let rows = deepest.map_or(grid.size[1], |row| row.saturating_add(1 + thickness));
+        if rows > MAX_ROWS {
+            let fault = format!("--base {mm}: makes {rows} rows of {} mm, at most {MAX_ROWS}", grid.spacing[1]);
+            return Err(input(format!("{fault}; give a thinner base or a larger --spacing")));
+        }
+        Ok(rows)
     }
 
     /// Standard deviation of the smoothing, mm.
@@ -213,6 +302,36 @@ impl MakeMesh {
             _ => format!("open at the border, {area:.3} cm2"),
         };
         say!("mesh: {}, {triangles} triangles of {vertices} vertices, {extent}; {how}", self.output.display());
+    }
+}
+
+/// What a mesh is made of.
+struct Asked {
+    grid: Grid,
+    world: World,
+    /// Standard deviation of the smoothing, mm.
+    deviation: f64,
+    /// Rows of a slice.
+    left_out: usize,
+    threshold: f64,
+    stored: StoredType,
+}
+
+impl Asked {
+    fn lattice(&self, volume: &Volume, closed: bool) -> Lattice {
+        Lattice {
+            source: volume.geometry().clone(),
+            stored: self.stored,
+            grid: self.grid,
+            deviation: self.deviation,
+            threshold: self.threshold,
+            closed,
+            left_out: self.left_out,
+            filled_rows: None,
+            most: Lattice::MOST,
+            first: 0,
+            count: self.grid.size[2],
+        }
     }
 }
 

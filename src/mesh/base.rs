@@ -26,12 +26,12 @@ impl Base {
         }
     }
 
-    /// Rows of a slice with a base of `thickness` rows below the deepest place of the surface. None if nothing is inside.
-    pub fn rows(&self, thickness: usize) -> Option<usize> {
-        self.deepest.map(|row| row.saturating_add(1 + thickness))
+    /// The deepest row at which a column is inside for the first time. None if nothing is inside.
+    pub fn deepest(&self) -> Option<usize> {
+        self.deepest
     }
 
-    /// Fills `out`, of as many rows as [`Base::rows`] says, from a slice. NaN where nothing is known and nothing is filled.
+    /// Fills `out`, which has rows below the deepest place, from a slice. NaN where nothing is known and nothing is filled.
     pub fn fill(&self, slice: &[f64], out: &mut [f64]) {
         for column in 0..self.width {
             let mut values = slice.iter().skip(column).step_by(self.width);
@@ -66,13 +66,13 @@ mod tests {
             }
         };
         let (mut base, mut raw) = (Base::new(N, 0.0), vec![0.0; N * N]);
-        assert_eq!(base.rows(3), None);
+        assert_eq!(base.deepest(), None);
         for z in 0..N {
             slice(z, &mut raw);
             base.survey(&raw);
         }
         // The deepest first crossing is that of a column near the equator, at most its row and the next.
-        let rows = base.rows(30).expect("something is inside");
+        let rows = base.deepest().expect("something is inside") + 31;
         assert!((47..=48).contains(&rows), "{rows}");
         let filled = |z: usize, out: &mut [f64]| {
             slice(z, &mut raw);
@@ -102,7 +102,7 @@ mod tests {
         let slice = [0.2, 0.1, 0.9, f64::NAN, 0.3, 0.2, f64::NAN, 0.4];
         let mut base = Base::new(2, 0.5);
         base.survey(&slice);
-        let mut out = vec![0.0; 2 * base.rows(4).expect("inside")];
+        let mut out = vec![0.0; 2 * (base.deepest().expect("inside") + 5)];
         base.fill(&slice, &mut out);
         let column = |n: usize| out.iter().skip(n).step_by(2).copied().collect::<Vec<_>>();
         assert_eq!(column(0), [0.2, 0.9, 0.9, 0.9, 0.9, 0.9]);

@@ -8,6 +8,7 @@ pub mod base;
 mod cell;
 pub mod files;
 pub mod nets;
+pub mod polygons;
 pub mod simplify;
 pub mod smooth;
 

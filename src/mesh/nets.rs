@@ -6,15 +6,14 @@
 //! Visualization 2004. Two patches that meet on both sides of a face would still share one edge four times: there a vertex is put on the
 //! face. So the mesh is a manifold for any values.
 //!
-//! The lattice comes slice by slice. Memory: two slices of values and of cells, and the mesh.
+//! The lattice comes slice by slice. Memory: two slices of values, the crossed cells of two layers, and the mesh. This is the reference of
+//! the passes that do the same on a device ([`crate::passes::net`]): which cells are crossed, and where their vertices lie. What follows
+//! from that is [`super::polygons`] for both.
 
 use super::Mesh;
-use super::cell::{self, Patches};
+use super::cell;
+use super::polygons::{Builder, Cell, Vertex, cells_of};
 use glam::DVec3;
-use std::collections::HashMap;
-
-/// Most triangles of a mesh: 5 GB as STL.
-const MAX_TRIANGLES: usize = 100_000_000;
 
 /// The surface to find.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -23,17 +22,6 @@ pub struct Surface {
     pub threshold: f64,
     /// Closes the surface at the border of the lattice and of what is known, half a voxel outside of the last one. Otherwise it ends there.
     pub closed: bool,
-}
-
-/// A cell that has been visited.
-#[derive(Clone, Copy, Default)]
-struct Cell {
-    /// A bit for each corner that is inside.
-    inside: u8,
-    /// All corners are known.
-    known: bool,
-    /// Vertex of the first patch.
-    first: u32,
 }
 
 /// The surface of the values of a lattice of `size` voxels. `slice` fills a slice with values, NaN where they are not known; slices are asked
@@ -48,12 +36,13 @@ pub fn surface_net<E: From<String>>(
     mut slice: impl FnMut(usize, &mut [f64]) -> Result<(), E>,
     place: impl Fn(DVec3) -> DVec3,
 ) -> Result<Mesh, E> {
-    // A closed surface has a layer of unknown voxels all around.
-    let pad = usize::from(surface.closed);
-    let [width, height, depth] = size.map(|n| n + 2 * pad);
-    if width < 2 || height < 2 || depth < 2 || size.contains(&0) {
+    let cells = cells_of(size, surface.closed);
+    if cells.contains(&0) {
         return Ok(Mesh::default());
     }
+    // A closed surface has a layer of unknown voxels all around.
+    let pad = usize::from(surface.closed);
+    let (width, height) = (cells[0] + 1, cells[1] + 1);
     let mut own = vec![f64::NAN; size[0] * size[1]];
     let mut fill = |z: usize, out: &mut Vec<f64>| -> Result<(), E> {
         out.clear();
@@ -68,265 +57,87 @@ pub fn surface_net<E: From<String>>(
         }
         Ok(())
     };
-    let turned = place(DVec3::X) - place(DVec3::ZERO);
-    let turned = turned.cross(place(DVec3::Y) - place(DVec3::ZERO)).dot(place(DVec3::Z) - place(DVec3::ZERO));
-    let mut builder = Builder {
-        surface,
-        width,
-        height,
-        mirrored: turned < 0.0,
-        table: cell::patches(),
-        values: [Vec::new(), Vec::new()],
-        cells: [Vec::new(), Vec::new()],
-        on_faces: HashMap::new(),
-        mesh: Mesh::default(),
-    };
-    let shift = DVec3::splat(pad as f64);
-    let place = |at: DVec3| place(at - shift);
-    fill(0, &mut builder.values[1])?;
-    for z in 0..depth {
-        builder.values.swap(0, 1);
-        builder.cells.swap(0, 1);
-        // Beyond the last slice there are no cells, only the edges within it.
-        if z + 1 < depth {
-            fill(z + 1, &mut builder.values[1])?;
-            builder.vertices(z, &place);
-            builder.face_vertices(z, &place);
-        } else {
-            builder.cells[1].clear();
-        }
-        builder.polygons(z, depth);
-        if builder.mesh.triangles.len() > MAX_TRIANGLES || builder.mesh.vertices.len() > MAX_TRIANGLES {
-            let fault =
-                format!("makes more than {MAX_TRIANGLES} triangles; take a larger spacing or another threshold");
-            return Err(fault.into());
-        }
+    let mut builder = Builder::new(surface.closed, place);
+    let mut slices = Slices { surface, width, values: [Vec::new(), Vec::new()] };
+    fill(0, &mut slices.values[1])?;
+    for z in 0..cells[2] {
+        slices.values.swap(0, 1);
+        fill(z + 1, &mut slices.values[1])?;
+        builder.take(vec![slices.crossed()], |vertices| {
+            Ok::<_, E>(vertices.iter().map(|vertex| slices.offset(vertex)).collect())
+        })?;
     }
-    Ok(builder.mesh)
+    Ok(builder.finish())
 }
 
-struct Builder {
+/// The slices below and above a layer of cells.
+struct Slices {
     surface: Surface,
     width: usize,
-    height: usize,
-    mirrored: bool,
-    table: &'static [Patches; 256],
-    /// The slice below the current layer of cells, and the one above.
     values: [Vec<f64>; 2],
-    /// The layer of cells before the current one, and the current one; empty if there is none.
-    cells: [Vec<Cell>; 2],
-    /// Vertices on faces that two patches share with the same two patches. There are few.
-    on_faces: HashMap<Arc, u32>,
-    mesh: Mesh,
 }
 
-/// A pair of crossed edges that are joined on a face of four.
-#[derive(Clone, Copy, PartialEq, Eq, Hash)]
-struct Arc {
-    /// The corner of the face nearest to the first voxel.
-    face: [usize; 3],
-    normal: usize,
-    /// The voxel that the pair cuts off, which is inside.
-    inside: [usize; 3],
-}
-
-impl Builder {
-    fn is_inside(&self, value: f64) -> bool {
-        // Not for NaN.
-        value >= self.surface.threshold
-    }
-
-    /// Share of the way from an inside value to another at which the surface is.
-    fn crossing(&self, a: f64, b: f64) -> f64 {
-        // Of the unknown nothing is known but that the border is between.
-        if a.is_nan() || b.is_nan() {
-            return 0.5;
-        }
-        let share = (self.surface.threshold - a) / (b - a);
-        // Values near the limits of f64 overflow.
-        if share.is_finite() { share.clamp(0.0, 1.0) } else { 0.5 }
-    }
-
-    /// The point where the surface crosses an edge of the cell at (x, y), in the current layer, from the cell's first corner.
-    fn crossing_of(&self, x: usize, y: usize, edge: usize) -> DVec3 {
-        let ends = cell::corners_of(edge);
-        let [a, b] = ends.map(|corner| self.corner(x, y, corner));
-        let [from, to] = ends.map(|corner| DVec3::from([0, 1, 2].map(|axis| (corner >> axis & 1) as f64)));
-        from.lerp(to, self.crossing(a, b))
-    }
-
+impl Slices {
     fn corner(&self, x: usize, y: usize, corner: usize) -> f64 {
         self.values[corner >> 2][(y + (corner >> 1 & 1)) * self.width + x + (corner & 1)]
     }
 
-    /// Makes the vertices of the cells between slices z and z + 1.
-    fn vertices(&mut self, z: usize, place: &impl Fn(DVec3) -> DVec3) {
+    /// The cells that the surface crosses.
+    fn crossed(&self) -> Vec<Cell> {
         let across = self.width - 1;
-        let mut cells = std::mem::take(&mut self.cells[1]);
-        cells.clear();
-        cells.resize(across * (self.height - 1), Cell::default());
-        for (n, target) in cells.iter_mut().enumerate() {
-            let (x, y) = (n % across, n / across);
+        let rows = self.values[0].len() / self.width - 1;
+        let mut found = Vec::new();
+        for (x, y) in (0..rows).flat_map(|y| (0..across).map(move |x| (x, y))) {
             let values: [f64; 8] = std::array::from_fn(|corner| self.corner(x, y, corner));
-            let inside = (0..8).filter(|n| self.is_inside(values[*n])).fold(0u8, |bits, n| bits | 1 << n);
-            let known = self.surface.closed || !values.iter().any(|value| value.is_nan());
-            *target = Cell { inside, known, first: self.mesh.vertices.len() as u32 };
-            let patches = self.table[usize::from(inside)];
-            if !known {
-                continue;
-            }
-            for patch in 0..patches.count {
-                let edges = (0..12).filter(|e| cell::is_crossed(inside, *e) && patches.of_edge[*e] == patch);
-                let (sum, count) = edges
-                    .fold((DVec3::ZERO, 0.0), |(sum, count), edge| (sum + self.crossing_of(x, y, edge), count + 1.0));
-                let first = DVec3::new(x as f64, y as f64, z as f64);
-                self.mesh.vertices.push(place(first + sum / count));
+            // Not for NaN.
+            let is_inside = |n: &usize| values[*n] >= self.surface.threshold;
+            let inside = (0..8).filter(is_inside).fold(0u8, |bits, n| bits | 1 << n);
+            if inside != 0 && inside != u8::MAX {
+                let is_known = self.surface.closed || !values.iter().any(|value| value.is_nan());
+                found.push(Cell { x: x as u32, y: y as u32, inside, is_known });
             }
         }
-        self.cells[1] = cells;
+        found
     }
 
-    /// Makes the vertices on the faces of the current layer of cells, and on those between it and the one before.
-    fn face_vertices(&mut self, z: usize, place: &impl Fn(DVec3) -> DVec3) {
-        // Those of the layer before are still needed.
-        self.on_faces.retain(|arc, _| arc.face[2] + 1 >= z);
-        let across = self.width - 1;
-        for n in 0..self.cells[1].len() {
-            let here = self.cells[1][n];
-            let (x, y) = (n % across, n / across);
-            let faces = [
-                (0, x.checked_sub(1).map(|_| self.cells[1][n - 1])),
-                (1, y.checked_sub(1).map(|_| self.cells[1][n - across])),
-                (2, self.cells[0].get(n).copied()),
-            ];
-            for (normal, before) in faces {
-                let Some(before) = before.filter(|before| before.known && here.known) else { continue };
-                if !self.is_doubled(&before, &here, normal) {
-                    continue;
-                }
-                for edge in cell::edges_of_face(normal, 0) {
-                    let other = cell::partner(here.inside, normal, 0, edge);
-                    // Each pair once.
-                    if other < edge {
-                        continue;
-                    }
-                    let on_face = (self.crossing_of(x, y, edge) + self.crossing_of(x, y, other)) / 2.0;
-                    let first = DVec3::new(x as f64, y as f64, z as f64);
-                    let arc = arc([x, y, z], here.inside, normal, 0, edge);
-                    self.on_faces.insert(arc, self.mesh.vertices.len() as u32);
-                    self.mesh.vertices.push(place(first + on_face));
-                }
-            }
-        }
-    }
-
-    /// True if both pairs of edges of the face between two cells belong to one patch on each side.
-    fn is_doubled(&self, before: &Cell, after: &Cell, normal: usize) -> bool {
-        let is_one = |cell: &Cell, side: usize| {
-            let patches = &self.table[usize::from(cell.inside)];
-            let [first, others @ ..] = cell::edges_of_face(normal, side).map(|edge| patches.of_edge[edge]);
-            others.iter().all(|patch| *patch == first)
-        };
-        cell::is_ambiguous(after.inside, normal, 0) && is_one(before, 1) && is_one(after, 0)
-    }
-
-    /// Makes the polygons around the edges in slice z and of those from it to the next.
-    fn polygons(&mut self, z: usize, depth: usize) {
-        let (width, height) = (self.width, self.height);
-        for y in 0..height {
-            for x in 0..width {
-                let inside = self.is_inside(self.values[0][y * width + x]);
-                let ends = [
-                    (x + 1 < width).then(|| self.values[0][y * width + x + 1]),
-                    (y + 1 < height).then(|| self.values[0][(y + 1) * width + x]),
-                    (z + 1 < depth).then(|| self.values[1][y * width + x]),
-                ];
-                for (axis, end) in ends.into_iter().enumerate() {
-                    if end.is_some_and(|end| self.is_inside(end) != inside) {
-                        self.polygon(axis, [x, y, z], inside);
-                    }
-                }
-            }
-        }
-    }
-
-    /// The cell that begins one voxel before another or at it, along each axis. Its layer is the current one or the one before.
-    fn cell_at(&self, [x, y, _]: [usize; 3], before: [usize; 3]) -> Option<Cell> {
-        let (x, y) = (x.checked_sub(before[0])?, y.checked_sub(before[1])?);
-        let layer = &self.cells[1 - before[2]];
-        let is_there = x + 1 < self.width && y + 1 < self.height;
-        layer.get(y * (self.width - 1) + x).copied().filter(|cell| is_there && cell.known)
-    }
-
-    /// The polygon around the edge from a voxel along `axis`, whose first end is inside or not.
-    fn polygon(&mut self, axis: usize, voxel: [usize; 3], inside: bool) {
-        let axes = [(axis + 1) % 3, (axis + 2) % 3];
-        // Steps back along both other axes: anticlockwise as seen from where the edge points to.
-        const AROUND: [[usize; 2]; 4] = [[1, 1], [0, 1], [0, 0], [1, 0]];
-        let mut around = [(Cell::default(), [0; 3], 0); 4];
-        for (target, back) in around.iter_mut().zip(AROUND) {
-            let mut before = [0; 3];
-            (before[axes[0]], before[axes[1]]) = (back[0], back[1]);
-            let Some(cell) = self.cell_at(voxel, before) else {
-                self.mesh.open_edges += 1;
-                return;
-            };
-            // In a cell that begins before the edge, it lies on the far side.
-            *target = (cell, before, cell::edge_at(axis, back[0], back[1]));
-        }
-        let (mut corners, mut on_face) = (Vec::with_capacity(8), None);
-        for n in 0..4 {
-            let ((cell, before, edge), (other, other_before, _)) = (around[n], around[(n + 1) % 4]);
-            let patch = self.table[usize::from(cell.inside)].of_edge[edge];
-            corners.push(cell.first + u32::from(patch));
-            // The face between this cell and the next one round the edge.
-            let normal = if before[axes[0]] != other_before[axes[0]] { axes[0] } else { axes[1] };
-            let is_first = before[normal] > other_before[normal];
-            let (first, second) = if is_first { (&cell, &other) } else { (&other, &cell) };
-            if self.is_doubled(first, second, normal) {
-                let start = [0, 1, 2].map(|axis| voxel[axis] - before[axis]);
-                let arc = arc(start, cell.inside, normal, usize::from(is_first), edge);
-                if let Some(vertex) = self.on_faces.get(&arc) {
-                    on_face = Some(corners.len());
-                    corners.push(*vertex);
-                }
-            }
-        }
-        if inside == self.mirrored {
-            corners.reverse();
-            on_face = on_face.map(|n| corners.len() - 1 - n);
-        }
-        // A vertex on a face belongs to two polygons only, so that its diagonals are no other polygon's edges.
-        let start = on_face.unwrap_or_else(|| self.shorter_diagonal(&corners));
-        corners.rotate_left(start);
-        for pair in corners[1..].windows(2) {
-            self.mesh.triangles.push([corners[0], pair[0], pair[1]]);
-        }
-    }
-
-    /// Where the shorter diagonal of a quadrangle begins.
-    fn shorter_diagonal(&self, corners: &[u32]) -> usize {
-        let length = |a: usize, b: usize| {
-            let at = |n: usize| self.mesh.vertices[corners[n] as usize];
-            at(a).distance_squared(at(b))
-        };
-        usize::from(length(1, 3) < length(0, 2))
+    /// Where a vertex is, from the first corner of its cell, voxels.
+    fn offset(&self, vertex: &Vertex) -> DVec3 {
+        let [x, y, _] = vertex.cell.map(|n| n as usize);
+        let values = std::array::from_fn(|corner| self.corner(x, y, corner));
+        mean_crossing(&values, self.surface.threshold, vertex.edges)
     }
 }
 
-/// The pair that an edge belongs to on an ambiguous face of the cell that begins at `start`.
-fn arc(start: [usize; 3], inside: u8, normal: usize, side: usize, edge: usize) -> Arc {
-    let mut face = start;
-    face[normal] += side;
-    let ends = cell::corners_of(edge);
-    let cut_off = if inside >> ends[0] & 1 == 1 { ends[0] } else { ends[1] };
-    Arc { face, normal, inside: [0, 1, 2].map(|axis| start[axis] + (cut_off >> axis & 1)) }
+/// The mean of the points at which the surface crosses some edges of a cell, from its first corner, voxels. `values`: of the corners, NaN
+/// where they are not known. `edges`: a bit for each.
+fn mean_crossing(values: &[f64; 8], threshold: f64, edges: u16) -> DVec3 {
+    let of_edge = |edge: usize| {
+        let ends = cell::corners_of(edge);
+        let [a, b] = ends.map(|corner| values[corner]);
+        let [from, to] = ends.map(|corner| DVec3::from([0, 1, 2].map(|axis| (corner >> axis & 1) as f64)));
+        from.lerp(to, crossing(threshold, a, b))
+    };
+    let edges = (0..12).filter(|edge| edges >> edge & 1 == 1);
+    let (sum, count) = edges.fold((DVec3::ZERO, 0.0), |(sum, count), edge| (sum + of_edge(edge), count + 1.0));
+    sum / count
+}
+
+/// Share of the way from an inside value to another at which the surface is.
+fn crossing(threshold: f64, a: f64, b: f64) -> f64 {
+    // Of the unknown nothing is known but that the border is between.
+    if a.is_nan() || b.is_nan() {
+        return 0.5;
+    }
+    let share = (threshold - a) / (b - a);
+    // Values near the limits of f64 overflow.
+    if share.is_finite() { share.clamp(0.0, 1.0) } else { 0.5 }
 }
 
 #[cfg(test)]
 pub(super) mod tests {
     use super::*;
     use proptest::prelude::*;
+    use std::collections::HashMap;
 
     /// The net of a function of the voxel, with voxels `h` apart.
     pub fn net(size: [usize; 3], threshold: f64, closed: bool, h: f64, value: impl Fn(DVec3) -> f64) -> Mesh {

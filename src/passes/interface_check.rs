@@ -11,7 +11,7 @@ use crate::spirv::volumes_to_layers::volumes_to_layers;
 use crate::spirv::{self, Access, Dimension, Kind, Member, Module};
 
 /// Textures and tables that a shader declares and a pass may not bind. Specialization constants say whether they are read or written.
-const OPTIONAL: [&str; 31] = [
+const OPTIONAL: [&str; 33] = [
     "back_light",
     "before",
     "bricks",
@@ -26,6 +26,8 @@ const OPTIONAL: [&str; 31] = [
     "light_shade",
     "line_lut",
     "line_shares",
+    "net_lines",
+    "net_slices",
     "occlusion",
     "opaque_before",
     "packed_neighbours",

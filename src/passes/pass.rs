@@ -338,6 +338,12 @@ impl Params {
         self
     }
 
+    /// One that may be negative.
+    pub(super) fn signed(mut self, name: &'static str, value: i64) -> Params {
+        self.0.push((name, Value::I32(value as i32)));
+        self
+    }
+
     /// The texel of the volume that its image begins with.
     pub(super) fn first_stored(self, scene: &Scene) -> Params {
         let [column, row, slice] = Slot::Volume.first_texel(scene);

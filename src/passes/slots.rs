@@ -1,7 +1,7 @@
 //! Slots: the GPU resources that passes read and write. Each is declared once, in the table below; its shape and format
 //! follow from the scene. A slot that no pass of a plan names does not exist.
 
-use super::{cut, lookup_tables};
+use super::{cut, lookup_tables, net};
 use crate::scene::planes::{TILE_VECTORS, cell};
 use crate::scene::{Layout, Propagation, Scene, SurfaceColour, VolumeFormat};
 use crate::source::StoredType;
@@ -322,6 +322,26 @@ slots! {
     PictureShares = D::image("picture_shares", per_pixel, |_| Format::R32f);
     PictureForward = D::image("picture_forward", per_pixel, |_| Format::Rgba32f);
     PictureRows = D::image("picture_rows", per_pixel, |_| Format::Rgba32f);
+    /// The stored samples of a volume that a mesh is made of: samples, lines, frames.
+    NetSamples = D::image("net_samples", |s| Shape::Three(net::samples(s)), frame_format).by_frames();
+    /// Positions of its lines, and of its slices with the motor's advance.
+    NetLines = D::table("net_lines", |s| Shape::Buffer(4 * net::table_lengths(s)[0]), net::lines, ByContent);
+    NetSlices = D::table("net_slices", |s| Shape::Buffer(8 * net::table_lengths(s)[1]), net::slices_of, ByContent);
+    /// Values of a slab of a lattice; while it is smoothed, in turn with the next.
+    NetValues = D::image("net_values", |s| Shape::Three(net::values(s)), |_| Format::R32f);
+    NetSmoothed = D::image("net_smoothed", |s| Shape::Three(net::values(s)), |_| Format::R32f);
+    /// The same filled behind the surface, with the rows of a base.
+    NetFilled = D::image("net_filled", |s| Shape::Three(net::filled(s)), |_| Format::R32f);
+    /// First row of each column of the slab that is inside.
+    NetDepths = D::image("net_depths", |s| Shape::Two(net::depths(s)), |_| Format::R32f);
+    /// Crossed cells of each row of each layer, and where they begin in the list.
+    NetCounts = D::image("net_counts", |s| Shape::Two(net::rows(s)), |_| Format::R32u);
+    NetFirsts = D::image("net_firsts", |s| Shape::Two(net::rows(s)), |_| Format::R32u);
+    /// The list of crossed cells.
+    NetCrossed = D::image("net_crossed", |s| Shape::Two(net::list(s)), |_| Format::Rg32u);
+    /// The list of vertices by their cells and edges, and their places.
+    NetAsked = D::image("net_asked", |s| Shape::Two(net::list(s)), |_| Format::Rg32u);
+    NetOffsets = D::image("net_offsets", |s| Shape::Two(net::list(s)), |_| Format::Rgba32f);
     /// 8-bit result.
     Screen = D::image("screen", per_pixel, |s| if s.is_deep { Format::Rgba16f } else { Format::Rgba8 });
 }

@@ -13,6 +13,7 @@ pub mod cuts;
 pub mod default_look;
 mod echo_levels;
 mod floating;
+mod lattice;
 mod light_lattice;
 pub mod load;
 pub mod look;
@@ -35,6 +36,7 @@ pub mod visible_bounds;
 pub use bricks::{Bricks, Reach, Side, TILE};
 pub use camera::Rays;
 pub use echo_levels::{EchoHistogram, EchoLevels};
+pub use lattice::Lattice;
 pub use light_lattice::{LightLattice, Propagation};
 pub use marks::VolumeAxis;
 pub use region::{depth_offset, insonified_box};
@@ -186,6 +188,8 @@ pub struct Scene {
     pub kept_bounds: visible_bounds::VisibleBounds,
     /// What stage 1 prepares for other pictures of the same volume: [`Scene::sharing`].
     pub shared: Option<Shared>,
+    /// Where a surface is found for a mesh. No picture has one.
+    pub lattice: Option<Lattice>,
 }
 
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -299,6 +303,7 @@ impl Scene {
             visible_bounds: VisibleBounds::default(),
             kept_bounds: VisibleBounds::default(),
             shared: None,
+            lattice: None,
         };
         let fields = [
             ["slices.smooth.lateral", "slices.smooth.depth", "slices.smooth.elevation"],

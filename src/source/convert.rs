@@ -134,6 +134,11 @@ impl Volume {
         &self.geometry
     }
 
+    /// The bytes of each slice, in geometric order; none of a missing frame, which is zero.
+    pub fn frames(&self) -> &[Vec<u8>] {
+        &self.frames
+    }
+
     /// True if every frame is there.
     pub fn is_whole(&self) -> bool {
         self.frames.iter().all(|frame| !frame.is_empty())

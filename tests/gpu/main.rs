@@ -54,6 +54,7 @@ mod sizes_in_mm;
 mod sliding;
 mod start_curve;
 mod stored_volume;
+mod surface_net;
 mod tiles;
 mod timing;
 mod truth;

@@ -4,11 +4,14 @@
 use crate::common::files::repository;
 use crate::common::probes::{voxels, wobbler};
 use crate::common::scenes::{BYTES, FLOATS, scene};
+use echolume::passes::net::NETS;
 use echolume::passes::{DispatchArgs, PASSES, Pass, interface_check, measure};
-use echolume::probe::{Advance, Axis, Geometry, Motion, Probe};
-use echolume::scene::Scene;
+use echolume::probe::{Advance, Axis, Geometry, Grid, Motion, Probe};
+use echolume::scene::{Lattice, Scene};
 use echolume::shader_source;
+use echolume::source::StoredType;
 use echolume::spirv;
+use echolume::verify::built_in::geometries;
 use sha2::{Digest, Sha256};
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
@@ -382,13 +385,37 @@ fn scenes() -> Vec<Scene> {
     scenes
 }
 
+/// Scenes of the passes of meshes: in every variant of the geometry, closed and filled or neither.
+fn net_scenes() -> Vec<Scene> {
+    let scene = |source: &Geometry, filled: bool| {
+        let grid = Grid { size: [9, 8, 7], spacing: [1.0; 3], origin: [0.0; 3] };
+        let lattice = Lattice {
+            source: source.clone(),
+            stored: StoredType::U8,
+            grid,
+            deviation: 1.0,
+            threshold: 100.0,
+            closed: filled,
+            left_out: 0,
+            filled_rows: filled.then_some(12),
+            most: Lattice::MOST,
+            first: 0,
+            count: 7,
+        };
+        lattice.scene().expect("a scene")
+    };
+    geometries().iter().flat_map(|(_, geometry)| [false, true].map(|filled| scene(geometry, filled))).collect()
+}
+
 #[test]
 fn every_pass_agrees_with_every_shader_it_may_use() {
     let mut used = Vec::new();
     // All that a check depends on: many scenes declare the same.
     let mut checked = BTreeSet::new();
-    for scene in scenes() {
-        for pass in PASSES.iter().filter(|p| p.is_needed(&scene)) {
+    let nets = net_scenes().into_iter().map(|scene| (NETS.iter().collect(), scene));
+    let needed = |scene: &Scene| PASSES.iter().filter(|p| p.is_needed(scene)).collect::<Vec<_>>();
+    for (passes, scene) in scenes().into_iter().map(|scene| (needed(&scene), scene)).chain(nets) {
+        for pass in passes {
             for iteration in 0..(pass.repeat)(&scene) {
                 let args = DispatchArgs { iteration, ..DispatchArgs::default() };
                 let shader = pass.shader(&scene, &args);
