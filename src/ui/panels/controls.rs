@@ -277,7 +277,7 @@ pub(super) fn show_column(ui: &mut Ui, state: &PanelState, width: f32, execute: 
 }
 
 /// The controls in a panel of this width, points. In the column, what belongs to the tool follows the controls in front, which keep their places.
-pub(super) fn show_controls(ui: &mut Ui, state: &PanelState, width: f32, execute: &mut dyn FnMut(Command)) {
+fn show_controls(ui: &mut Ui, state: &PanelState, width: f32, execute: &mut dyn FnMut(Command)) {
     let settings = state.controls.settings();
     ui.scope(|ui| {
         names::name(ui, Role::Group, texts::CONTROLS);

@@ -190,15 +190,15 @@ fn buttons_choose_the_body_and_sliders_place_it_without_a_pointer() {
 #[test]
 fn a_mark_is_drawn_over_the_picture_where_saved_pictures_have_it() {
     let mut shown = Shown::new(MARK);
-    let is = |kind: &Kind, wanted: egui::Color32| match kind {
-        Kind::Line { colour, .. } | Kind::Circle { fill: colour, .. } => *colour == wanted.to_array(),
+    let is = |kind: &Kind, wanted: [u8; 4]| match kind {
+        Kind::Line { colour, .. } | Kind::Circle { fill: colour, .. } => *colour == wanted,
         _ => false,
     };
-    let count = |shown: &Shown, colour| shown.drawn.iter().filter(|drawn| is(&drawn.kind, colour)).count();
+    let count = |shown: &Shown, colour: [u8; 4]| shown.drawn.iter().filter(|drawn| is(&drawn.kind, colour)).count();
     let lines = drawn(shown.controls.body_marks(), shown.scene.picture_size().map(f64::from))[0].outline.len();
-    assert!(count(&shown, BODY) >= lines, "{} of {lines}", count(&shown, BODY));
-    assert_eq!(count(&shown, MEASURE), 2, "bar and dot of the probe");
+    assert!(count(&shown, BODY.to_array()) >= lines, "{} of {lines}", count(&shown, BODY.to_array()));
+    assert_eq!(count(&shown, MEASURE.to_array()), 2, "bar and dot of the probe");
     shown.has_drawn = false;
     shown.settle();
-    assert_eq!(count(&shown, BODY), 0, "nothing over no picture");
+    assert_eq!(count(&shown, BODY.to_array()), 0, "nothing over no picture");
 }
