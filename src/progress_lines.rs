@@ -13,6 +13,7 @@ const PREFIX: &str = "progress: ";
 const RATE: u8 = 10;
 
 /// How far a piece of work is.
+#[cfg(any(feature = "view", test))]
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Progress {
     pub done: u64,
@@ -20,6 +21,7 @@ pub struct Progress {
 }
 
 /// What a line says of the progress; none if it says something else.
+#[cfg(any(feature = "view", test))]
 pub fn parse(line: &str) -> Option<Progress> {
     let (done, rest) = line.strip_prefix(PREFIX)?.split_once('/')?;
     let of = rest.split_whitespace().next()?;

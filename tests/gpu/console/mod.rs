@@ -12,6 +12,7 @@ mod recordings;
 mod render_start;
 mod shaders;
 mod tasks;
+mod turning;
 mod warming;
 
 use crate::common::gpu::*;
@@ -143,9 +144,7 @@ impl Desk {
 
     /// The settings of the idle picture.
     pub fn drawn(&self) -> Settings {
-        // Measurements are drawn over the picture.
-        let shown = self.console.controls().settings().clone();
-        let mut settings = Settings { measure: Vec::new(), ..shown };
+        let mut settings = self.console.controls().settings().clone().without_drawings();
         let cuts_planes = settings.mode.is_flat() || settings.layout == Layout::Four;
         settings.slices.everything |=
             cuts_planes || matches!(self.console.controls().tool(), Tool::Region | Tool::Clip);
