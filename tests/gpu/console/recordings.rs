@@ -144,8 +144,14 @@ impl Window {
     /// The names in the list of recordings, the shown one with a mark.
     fn listed(&mut self) -> Vec<String> {
         (0..3).for_each(|_| self.update());
-        let close: Vec<String> =
-            self.tree.iter().filter_map(|node| node.label()?.strip_prefix("Close ").map(str::to_string)).collect();
+        let name = |node: &Node| {
+            let name = node.label()?.strip_prefix("Close ")?.to_string();
+            Some((node.bounds().unwrap_or_default().y0, name))
+        };
+        // The nodes of a tree have no order: from the top of the list to its end.
+        let mut close: Vec<(f64, String)> = self.tree.iter().filter_map(name).collect();
+        close.sort_by(|a, b| a.0.total_cmp(&b.0));
+        let close: Vec<String> = close.into_iter().map(|(_, name)| name).collect();
         let is_shown = |name: &String| {
             let node = self.find(Role::Button, name).unwrap_or_else(|| panic!("{name}: {:?}", self.tree));
             node.toggled() == Some(echolume::ui::panels::accesskit::Toggled::True)

@@ -205,6 +205,8 @@ impl Monkey {
         self.calm.store(true, Ordering::Relaxed);
         self.desk.console.input(&Input::FocusLost);
         self.desk.console.input(&Input::Modifiers(Modifiers::default()));
+        // Closes the list of presets, whose small pictures have a volume and a renderer of their own; the reset takes the preset back.
+        self.desk.console.execute(&Command::Preset(0), Instant::now());
         self.desk.console.execute(&Command::Reset, Instant::now());
         self.desk.console.execute(&Command::Tool(Tool::Rotate), Instant::now());
         if self.desk.console.stream().is_frozen() {
