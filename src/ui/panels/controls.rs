@@ -108,7 +108,7 @@ fn show_tools(ui: &mut Ui, state: &PanelState, width: f32, execute: &mut dyn FnM
                     .show(ui, &names::VIEWPOINTS, 2, is_there, hints::of_viewpoint, |v| execute(Command::LookFrom(v)));
                 let size = vec2(width - 16.0, TOUCH_SIZE * 0.75);
                 let turntable = Button::selectable(state.is_turning, texts::TURNTABLE).frame_when_inactive(true);
-                if ui.add(turntable.min_size(size)).tell(texts::TURNTABLE_HINT).clicked() {
+                if ui.add_sized(size, turntable).tell(texts::TURNTABLE_HINT).clicked() {
                     execute(Command::Turntable);
                 }
             }

@@ -55,7 +55,7 @@ pub(super) fn show_tools(ui: &mut Ui, state: &PanelState, width: f32, execute: &
     }
     let is_on = state.controls.tool() == Tool::BodyMark;
     let marks = Button::selectable(is_on, texts::BODY_MARK).frame_when_inactive(true);
-    let marks = ui.add(marks.min_size(vec2(width, TOUCH_SIZE * 0.75))).tell(hints::of_tool(Tool::BodyMark));
+    let marks = ui.add_sized(vec2(width, TOUCH_SIZE * 0.75), marks).tell(hints::of_tool(Tool::BodyMark));
     if marks.clicked() {
         execute(Command::Tool(if is_on { Tool::default() } else { Tool::BodyMark }));
     }
