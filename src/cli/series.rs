@@ -16,7 +16,6 @@ use crate::terminal::{Failure, failed, input, progress_bar, remark, say};
 use indicatif::ProgressBar;
 use std::cell::Cell;
 use std::collections::BTreeSet;
-use std::ops::RangeInclusive;
 use std::path::Path;
 use std::str::FromStr;
 use std::sync::Arc;
@@ -28,7 +27,8 @@ pub struct SeriesArgs {
     /// (face/), a pattern (face-%03d.png) or, in a program with films, face.mp4
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(2..=3600), conflicts_with = "volumes")]
     turntable: Option<u32>,
-    /// Draw a picture of each of these volumes in time: FIRST:LAST, counted from 0, or all. -o as with --turntable
+    /// Draw a picture of each of these volumes in time: FIRST:LAST, counted from 0, all, or loop: those between the marks of the cine loop in the
+    /// settings (cine.first, cine.last), in a film back as well if cine.back_and_forth says so. -o as with --turntable
     #[arg(long, value_name = "FIRST:LAST")]
     volumes: Option<Volumes>,
     /// Pictures of a film in a second, 0.1..=240 [default: 25]
@@ -43,6 +43,7 @@ const RATE: f64 = 25.0;
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Volumes {
     All,
+    Loop,
     Range(usize, usize),
 }
 
@@ -53,10 +54,13 @@ impl FromStr for Volumes {
         if text.eq_ignore_ascii_case("all") {
             return Ok(Volumes::All);
         }
+        if text.eq_ignore_ascii_case("loop") {
+            return Ok(Volumes::Loop);
+        }
         let ends = text.split_once(':').and_then(|(a, b)| Some((a.trim().parse().ok()?, b.trim().parse().ok()?)));
         match ends {
             Some((first, last)) if first <= last => Ok(Volumes::Range(first, last)),
-            _ => Err("must read FIRST:LAST, such as 0:9, or all".into()),
+            _ => Err("must read FIRST:LAST, such as 0:9, all or loop".into()),
         }
     }
 }
@@ -81,15 +85,15 @@ pub struct Job<'a> {
 enum Views {
     /// Settings of each picture of one volume.
     Turn(Vec<Settings>),
-    /// The same settings for each of these volumes.
-    Time(RangeInclusive<usize>),
+    /// The same settings for each of these volumes. In a film a volume may come twice.
+    Time(Vec<usize>),
 }
 
 impl Views {
     fn count(&self) -> usize {
         match self {
             Views::Turn(settings) => settings.len(),
-            Views::Time(volumes) => volumes.end() + 1 - volumes.start(),
+            Views::Time(volumes) => volumes.len(),
         }
     }
 
@@ -97,7 +101,7 @@ impl Views {
     fn number(&self, n: usize) -> usize {
         match self {
             Views::Turn(_) => n,
-            Views::Time(volumes) => volumes.start() + n,
+            Views::Time(volumes) => volumes[n],
         }
     }
 }
@@ -127,6 +131,7 @@ impl SeriesArgs {
         }
         match self.volumes {
             Some(Volumes::All) => job.input.check_volumes("--volumes all", |_| true)?,
+            Some(Volumes::Loop) => job.input.check_volumes("--volumes loop", |_| true)?,
             Some(Volumes::Range(first, last)) => {
                 job.input
                     .check_volumes(&format!("--volumes {first}:{last}"), |volume| (first..=last).contains(&volume))?;
@@ -152,7 +157,7 @@ impl SeriesArgs {
         opened: &mut Option<Arc<Context>>,
     ) -> Result<(), Failure> {
         let (mut source, scene) = self.open(job)?;
-        let views = self.views(&*source, &scene, job)?;
+        let views = self.views(&*source, &scene, job, target)?;
         let numbers = (0..views.count()).map(|n| views.number(n));
         target.check(numbers, &job.input.read_files(&*source))?;
         if let Some(cut) = scene.probe().and_then(Probe::folded) {
@@ -204,13 +209,12 @@ impl SeriesArgs {
     fn open(&self, job: &Job) -> Result<(Box<dyn Source>, Scene), Failure> {
         match self.volumes {
             Some(Volumes::Range(first, _)) => job.input.open_volumes(first),
-            Some(Volumes::All) => job.input.open_volumes(0),
+            Some(Volumes::All | Volumes::Loop) => job.input.open_volumes(0),
             None => job.input.open_to_show(&[]),
         }
     }
 
-    fn views(&self, source: &dyn Source, scene: &Scene, job: &Job) -> Result<Views, Failure> {
-        let last = source.volumes().saturating_sub(1);
+    fn views(&self, source: &dyn Source, scene: &Scene, job: &Job, target: &SeriesTarget) -> Result<Views, Failure> {
         match (self.turntable, self.volumes) {
             (Some(count), _) => {
                 let cameras =
@@ -220,9 +224,20 @@ impl SeriesArgs {
             }
             (None, Some(Volumes::Range(first, end))) => {
                 check_volume(source, "--volumes", end, job.input.name())?;
-                Ok(Views::Time(first..=end))
+                Ok(Views::Time((first..=end).collect()))
             }
-            (None, _) => Ok(Views::Time(0..=last)),
+            (None, Some(Volumes::Loop)) => {
+                let (cine, count) = (scene.settings.cine, source.volumes());
+                let first = cine.first.unwrap_or_default();
+                let volumes = match target {
+                    SeriesTarget::Film(_) => cine.film(count),
+                    SeriesTarget::Files { .. } => cine.volumes(count),
+                };
+                let beyond =
+                    || format!("--volumes loop: cine.first is {first}, {} has {count} volumes", job.input.name());
+                if volumes.is_empty() { Err(input(beyond())) } else { Ok(Views::Time(volumes)) }
+            }
+            (None, _) => Ok(Views::Time((0..source.volumes().max(1)).collect())),
         }
     }
 }
@@ -258,7 +273,7 @@ impl Series<'_> {
         let mut renderer = Renderer::new(context, self.scene_of(self.written.count(), source)?, options)?;
         let volume = |series: &Self, n: usize| match &series.views {
             Views::Turn(_) => None,
-            Views::Time(volumes) => Some(volumes.start() + n),
+            Views::Time(volumes) => Some(volumes[n]),
         };
         let mut is_empty = true;
         // Said when the fluid is lost, not of every picture without it.
@@ -310,7 +325,7 @@ impl Series<'_> {
     fn scene_of(&self, n: usize, source: &dyn Source) -> Result<Scene, DrawFault> {
         let (geometry, settings) = match &self.views {
             Views::Turn(settings) => (self.scene.geometry.clone(), settings[n].clone()),
-            Views::Time(volumes) => (source.geometry(volumes.start() + n), self.scene.settings.clone()),
+            Views::Time(volumes) => (source.geometry(volumes[n]), self.scene.settings.clone()),
         };
         Scene::new(geometry, self.scene.input, settings).map_err(|e| DrawFault::Source(input(e)))
     }
@@ -335,7 +350,7 @@ mod tests {
 
     #[test]
     fn volumes_and_rates_are_read_or_refused() {
-        assert_eq!("ALL".parse(), Ok(Volumes::All));
+        assert_eq!(["ALL", "Loop"].map(str::parse), [Ok(Volumes::All), Ok(Volumes::Loop)]);
         assert_eq!("2:5".parse(), Ok(Volumes::Range(2, 5)));
         assert_eq!("3:3".parse(), Ok(Volumes::Range(3, 3)));
         for wrong in ["", "3", "5:2", "-1:2", "a:b", "1:2:3", ":"] {

@@ -2,9 +2,9 @@
 
 use super::planes::{MAX_SLAB, MAX_TILES, MIN_APART};
 use super::{
-    Bilateral, Clip, Compositing, Conditioning, Curve, Distance, Edge, Elevation, EnhancedSigma, Layout, Light,
-    MAX_CLIPS, MAX_CURVE_POINTS, MAX_DEVIATION, MAX_PICTURE, MAX_WINDOW, Mode, Noise, PeronaMalik, Scene, SceneError,
-    Scheme, Settings, Sigma, Smooth, refuse, transfer,
+    Bilateral, CINE_SPEEDS, Cine, Clip, Compositing, Conditioning, Curve, Distance, Edge, Elevation, EnhancedSigma,
+    Layout, Light, MAX_CLIPS, MAX_CURVE_POINTS, MAX_DEVIATION, MAX_PICTURE, MAX_WINDOW, Mode, Noise, PeronaMalik,
+    Scene, SceneError, Scheme, Settings, Sigma, Smooth, refuse, transfer,
 };
 use crate::probe::Geometry;
 use glam::DVec3;
@@ -291,6 +291,16 @@ fn check_light(l: &Light) -> Result<(), SceneError> {
         ("light.volume.ground.edge", volume.ground.unwrap_or_default().edge),
     ];
     colours.iter().try_for_each(|(field, colour)| colour.iter().try_for_each(|v| within(field, *v, 0.0, 10.0)))
+}
+
+pub(super) fn check_cine(cine: &Cine) -> Result<(), SceneError> {
+    within("cine.speed", cine.speed, CINE_SPEEDS[0], CINE_SPEEDS[1])?;
+    match (cine.first, cine.last) {
+        (Some(first), Some(last)) if first > last => {
+            refuse("cine.last", format!("is {last}, must not be below cine.first, {first}"))
+        }
+        _ => Ok(()),
+    }
 }
 
 pub(super) fn within(field: &'static str, value: f64, low: f64, high: f64) -> Result<(), SceneError> {

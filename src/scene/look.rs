@@ -1,5 +1,5 @@
 //! The look of a scene: its mode, filters, transfer function, light and tone, without what belongs to one examination: region, camera, places of
-//! planes, clip planes, cuts, marks, measurements and body marks. A preset of a user keeps a look.
+//! planes, clip planes, cuts, marks, measurements, body marks and the cine loop. A preset of a user keeps a look.
 
 use super::{Cap, Cube, Planes, Projection, Region, Settings, Slices, Surface, Volume};
 
@@ -32,6 +32,7 @@ const OF_EXAMINATION: &[&str] = &[
     "marks",
     "measure",
     "body_marks",
+    "cine",
 ];
 
 /// True if a setting belongs to a look.
@@ -71,6 +72,7 @@ impl Settings {
             marks: kept.marks,
             measure: kept.measure,
             body_marks: kept.body_marks,
+            cine: kept.cine,
             ..look
         }
     }
@@ -132,6 +134,7 @@ mod tests {
                 "cuts=[{contour=[[0,0],[1,0],[0,1]],view={at=[0,0,0],direction=[0,1,0],up=[0,0,1]}}]",
                 "measure=[{kind='distance',points=[[0,0,0],[1,0,0]]}]",
                 "body_marks=[{body='neck'}]",
+                "cine={first=1,last=2,speed=0.5,back_and_forth=true}",
             ],
         );
         let look = settings("glass", &["cube.shading=0.3", "planes.window=[0.1,0.9]", "region.fade=3"]);

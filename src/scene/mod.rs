@@ -212,6 +212,7 @@ impl Settings {
         check::check(self)?;
         check_measures::check_measures(&self.measure)?;
         check_body_marks::check_body_marks(&self.body_marks)?;
+        check::check_cine(&self.cine)?;
         cuts::check(&self.cuts)?;
         start_curve::check(self)?;
         check::check_planes(self)

@@ -81,6 +81,11 @@ pub fn open(path: &Path, probe: Option<&Path>) -> Result<Box<dyn Source>, InputE
     open_with(path, OpenOptions { probe, ..OpenOptions::default() })
 }
 
+/// True if a file is DICOM, whatever its name. Reads its first 132 bytes.
+pub fn is_dicom(path: &Path) -> bool {
+    dicom::is_dicom(path)
+}
+
 /// Opens a `.frames` file, a stream of frames in a file, or any other recording; the content decides which. `-` is standard input.
 ///
 /// # Errors

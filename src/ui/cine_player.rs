@@ -1,30 +1,69 @@
-//! Plays the volumes of a cine loop: a part of it, at a speed, in one direction or back and forth. Pure: the volumes and the clock are passed in.
+//! Plays the volumes of a cine loop: a part of it, at a speed, in one direction or back and forth, as its settings say. Pure: settings, volumes and
+//! the clock are passed in.
 
 use crate::live::cine::CineVolume;
+use crate::scene::Cine;
 use std::collections::VecDeque;
 use std::ops::RangeInclusive;
 use std::time::{Duration, Instant};
 
-/// The speeds, as multiples of that of the acquisition.
+/// The speeds of its button, as multiples of that of the acquisition.
 pub(super) const SPEEDS: [f64; 7] = [0.1, 0.25, 0.5, 1.0, 2.0, 4.0, 8.0];
-/// The index of 1 in them.
-const NORMAL: i32 = 3;
 /// Time from a volume to the next where their time stamps do not say it, s.
 const UNKNOWN_INTERVAL: f64 = 0.2;
 /// Intervals that time stamps can state, s. Longer ones are pauses of the acquisition.
 const INTERVALS: RangeInclusive<f64> = 1e-3..=5.0;
 
-/// What is played, and how.
+/// Where a loop is that plays.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(super) struct CinePlayer {
     /// When the next volume is due, while the loop plays.
     next: Option<Instant>,
-    /// Steps along [`SPEEDS`] from the speed of the acquisition.
-    speed: i32,
-    goes_back_and_forth: bool,
     is_backwards: bool,
-    /// Numbers of the first and the last volume that are played. The loop may lose volumes meanwhile.
-    marks: [Option<u32>; 2],
+}
+
+/// What a loop is played of.
+#[derive(Clone, Copy)]
+pub(super) struct Loop<'a> {
+    pub(super) cine: &'a Cine,
+    pub(super) volumes: &'a VecDeque<CineVolume>,
+}
+
+/// The speed so many steps along [`SPEEDS`] from another one.
+pub(super) fn stepped(speed: f64, by: i32) -> f64 {
+    let last = SPEEDS.len() as i32 - 1;
+    let at = match by >= 0 {
+        true => SPEEDS.iter().rposition(|step| *step <= speed).map_or(-1, |at| at as i32),
+        false => SPEEDS.iter().position(|step| *step >= speed).map_or(last + 1, |at| at as i32),
+    };
+    SPEEDS[at.saturating_add(by).clamp(0, last) as usize]
+}
+
+/// The loop begins (`end` false) or ends with the volume of this number. A mark that leaves nothing takes the other one away.
+pub(super) fn marked(cine: Cine, volume: u32, end: bool) -> Cine {
+    match end {
+        false => Cine { first: Some(volume), last: cine.last.filter(|last| *last >= volume), ..cine },
+        true => Cine { last: Some(volume), first: cine.first.filter(|first| *first <= volume), ..cine },
+    }
+}
+
+impl Loop<'_> {
+    /// Indices of the volumes between the marks; of all where none of them is left: the loop may lose volumes meanwhile.
+    pub(super) fn range(&self) -> RangeInclusive<usize> {
+        let Loop { cine, volumes } = self;
+        let all = 0..=volumes.len().saturating_sub(1);
+        let low = cine.first.map_or(Some(0), |first| volumes.iter().position(|v| v.volume >= first));
+        let high = cine.last.map_or(Some(*all.end()), |last| volumes.iter().rposition(|v| v.volume <= last));
+        match (low, high) {
+            (Some(low), Some(high)) if low <= high => low..=high,
+            _ => all,
+        }
+    }
+
+    /// Volumes a second as they are played.
+    pub(super) fn played_rate(&self) -> f64 {
+        CinePlayer::default().state(*self, None).rate.unwrap_or(1.0 / UNKNOWN_INTERVAL) * self.cine.speed
+    }
 }
 
 /// What the panel shows of a loop.
@@ -61,63 +100,17 @@ impl CinePlayer {
     }
 
     /// Plays from `now` on, or stops.
-    pub(super) fn toggle(&mut self, volumes: &VecDeque<CineVolume>, now: Instant) {
+    pub(super) fn toggle(&mut self, of: Loop, now: Instant) {
         self.next = match self.next {
-            None if self.range(volumes).count() > 1 => Some(now),
+            None if of.range().count() > 1 => Some(now),
             _ => None,
         };
     }
 
-    /// Moves so many steps along [`SPEEDS`].
-    pub(super) fn step_speed(&mut self, by: i32) {
-        self.speed = self.speed.saturating_add(by).clamp(-NORMAL, SPEEDS.len() as i32 - 1 - NORMAL);
-    }
-
-    fn speed(&self) -> f64 {
-        SPEEDS[(NORMAL + self.speed) as usize]
-    }
-
-    pub(super) fn set_back_and_forth(&mut self, on: bool) {
-        (self.goes_back_and_forth, self.is_backwards) = (on, false);
-    }
-
-    /// The loop begins (`end` false) or ends with this volume. A mark that leaves nothing takes the other one away.
-    pub(super) fn mark(&mut self, volumes: &VecDeque<CineVolume>, index: usize, end: bool) {
-        let Some(volume) = volumes.get(index) else { return };
-        self.marks[usize::from(end)] = Some(volume.volume);
-        if let [Some(first), Some(last)] = self.marks
-            && first > last
-        {
-            self.marks[usize::from(!end)] = None;
-        }
-    }
-
-    /// Plays the complete loop again.
-    pub(super) fn unmark(&mut self) {
-        self.marks = [None; 2];
-    }
-
-    /// Indices of the volumes between the marks; of all where none of them is left.
-    pub(super) fn range(&self, volumes: &VecDeque<CineVolume>) -> RangeInclusive<usize> {
-        let [first, last] = self.marks;
-        let all = 0..=volumes.len().saturating_sub(1);
-        let low = first.map_or(Some(0), |first| volumes.iter().position(|v| v.volume >= first));
-        let high = last.map_or(Some(*all.end()), |last| volumes.iter().rposition(|v| v.volume <= last));
-        match (low, high) {
-            (Some(low), Some(high)) if low <= high => low..=high,
-            _ => all,
-        }
-    }
-
     /// The next volume to show, if one is due.
-    pub(super) fn advance(
-        &mut self,
-        volumes: &VecDeque<CineVolume>,
-        shown: Option<usize>,
-        now: Instant,
-    ) -> Option<usize> {
+    pub(super) fn advance(&mut self, of: Loop, shown: Option<usize>, now: Instant) -> Option<usize> {
         let due = self.next.filter(|due| now >= *due)?;
-        let range = self.range(volumes);
+        let range = of.range();
         let (low, high) = (*range.start(), *range.end());
         if low >= high {
             self.next = None;
@@ -125,9 +118,9 @@ impl CinePlayer {
         }
         let Some(at) = shown.filter(|at| range.contains(at)) else {
             self.is_backwards = false;
-            return self.show(volumes, low, (due, now));
+            return self.show(of, low, (due, now));
         };
-        self.is_backwards = match self.goes_back_and_forth {
+        self.is_backwards = match of.cine.back_and_forth {
             true if at == low => false,
             true if at == high => true,
             true => self.is_backwards,
@@ -138,23 +131,23 @@ impl CinePlayer {
             false if at == high => low,
             false => at + 1,
         };
-        self.show(volumes, next, (due, now))
+        self.show(of, next, (due, now))
     }
 
     /// Shows a volume for as long as it lasted.
-    fn show(&mut self, volumes: &VecDeque<CineVolume>, index: usize, (due, now): (Instant, Instant)) -> Option<usize> {
-        let range = self.range(volumes);
+    fn show(&mut self, of: Loop, index: usize, (due, now): (Instant, Instant)) -> Option<usize> {
+        let range = of.range();
         // The last lasts as long as the one before it: nothing follows it.
         let from = if self.is_backwards { index.saturating_sub(1) } else { index };
         let from = from.clamp(*range.start(), range.end().saturating_sub(1));
-        let seconds = interval(volumes, from).unwrap_or(UNKNOWN_INTERVAL) / self.speed();
+        let seconds = interval(of.volumes, from).unwrap_or(UNKNOWN_INTERVAL) / of.cine.speed;
         // Time that was lost is not caught up.
         self.next = Some((due + Duration::from_secs_f64(seconds)).max(now));
         Some(index)
     }
 
-    pub(super) fn state(&self, volumes: &VecDeque<CineVolume>, shown: Option<usize>) -> CineState {
-        let range = self.range(volumes);
+    pub(super) fn state(&self, of: Loop, shown: Option<usize>) -> CineState {
+        let (range, volumes) = (of.range(), of.volumes);
         // A recording or the phantom that is played again begins its time stamps again: nothing states how long that took.
         let step = |n: usize| Some((begins(volumes.get(n + 1)?)? - begins(volumes.get(n)?)?).max(0.0));
         let since = |index: usize| -> Option<f64> {
@@ -171,16 +164,11 @@ impl CinePlayer {
             is_trimmed: range.clone().count() < volumes.len(),
             range,
             is_playing: self.is_playing(),
-            speed: self.speed(),
-            goes_back_and_forth: self.goes_back_and_forth,
+            speed: of.cine.speed,
+            goes_back_and_forth: of.cine.back_and_forth,
             seconds: shown.and_then(since).filter(|s| s.is_finite() && *s >= 0.0),
             rate: intervals.map(|intervals| intervals.len() as f64 / intervals.iter().sum::<f64>()),
         }
-    }
-
-    /// Volumes a second as they are played.
-    pub(super) fn played_rate(&self, volumes: &VecDeque<CineVolume>) -> f64 {
-        self.state(volumes, None).rate.unwrap_or(1.0 / UNKNOWN_INTERVAL) * self.speed()
     }
 }
 
@@ -217,19 +205,20 @@ mod tests {
 
     /// What is shown when, ms after the start, over so many steps.
     fn played(
-        player: &mut CinePlayer,
+        cine: &Cine,
         volumes: &VecDeque<CineVolume>,
         mut shown: Option<usize>,
         steps: usize,
     ) -> Vec<(usize, u128)> {
         let begun = Instant::now();
         let mut now = begun;
-        player.toggle(volumes, now);
+        let (mut player, of) = (CinePlayer::default(), Loop { cine, volumes });
+        player.toggle(of, now);
         let mut seen = Vec::new();
         for _ in 0..steps {
             let Some(due) = player.due() else { break };
             now = now.max(due);
-            let Some(index) = player.advance(volumes, shown, now) else { break };
+            let Some(index) = player.advance(of, shown, now) else { break };
             shown = Some(index);
             seen.push((index, (now - begun).as_micros().div_ceil(1000)));
         }
@@ -239,86 +228,93 @@ mod tests {
     #[test]
     fn volumes_last_as_long_as_they_were_acquired() {
         let loop_of = volumes(&[Some(10.0), Some(10.25), Some(10.35), Some(10.65)]);
-        let mut player = CinePlayer::default();
+        let as_acquired = Cine::default();
         // The last one has no successor: it lasts as long as the one before.
         let expected = [(0, 0), (1, 250), (2, 350), (3, 650), (0, 950), (1, 1200)];
-        assert_eq!(played(&mut player, &loop_of, None, 6), expected);
-        let mut fast = CinePlayer::default();
-        fast.step_speed(1);
-        assert_eq!(played(&mut fast, &loop_of, Some(3), 3), [(0, 0), (1, 125), (2, 175)]);
-        let mut slow = CinePlayer::default();
-        slow.step_speed(-9);
-        assert_eq!(played(&mut slow, &loop_of, None, 2), [(0, 0), (1, 2500)]);
+        assert_eq!(played(&as_acquired, &loop_of, None, 6), expected);
+        let fast = Cine { speed: stepped(1.0, 1), ..as_acquired };
+        assert_eq!(played(&fast, &loop_of, Some(3), 3), [(0, 0), (1, 125), (2, 175)]);
+        let slow = Cine { speed: stepped(1.0, -9), ..as_acquired };
+        assert_eq!(played(&slow, &loop_of, None, 2), [(0, 0), (1, 2500)]);
     }
 
     #[test]
     fn without_times_and_across_pauses_a_volume_lasts_a_fifth_of_a_second() {
         for times in [[None, None, None], [Some(5.0), Some(2.0), None], [Some(0.0), Some(3600.0), Some(f64::NAN)]] {
-            let seen = played(&mut CinePlayer::default(), &volumes(&times), None, 4);
+            let seen = played(&Cine::default(), &volumes(&times), None, 4);
             assert_eq!(seen, [(0, 0), (1, 200), (2, 400), (0, 600)], "{times:?}");
         }
     }
 
     #[test]
     fn back_and_forth_shows_the_ends_once() {
-        let mut player = CinePlayer::default();
-        player.set_back_and_forth(true);
+        let back_and_forth = Cine { back_and_forth: true, ..Cine::default() };
         let loop_of = volumes(&[Some(0.0), Some(0.1), Some(0.3)]);
         // On the way back a volume lasts as long as the one that it leads to lasted.
         let expected = [(0, 0), (1, 100), (2, 300), (1, 500), (0, 600), (1, 700)];
-        assert_eq!(played(&mut player, &loop_of, None, 6), expected);
+        assert_eq!(played(&back_and_forth, &loop_of, None, 6), expected);
     }
 
     #[test]
     fn only_what_is_between_the_marks_is_played() {
         let mut loop_of = volumes(&[None; 6]);
-        let mut player = CinePlayer::default();
-        player.mark(&loop_of, 2, false);
-        player.mark(&loop_of, 4, true);
+        // The first of them has the number 7.
+        let cine = marked(marked(Cine::default(), 9, false), 11, true);
+        assert_eq!((cine.first, cine.last), (Some(9), Some(11)));
         let indices = |seen: Vec<(usize, u128)>| seen.into_iter().map(|(index, _)| index).collect::<Vec<_>>();
-        assert_eq!(indices(played(&mut player.clone(), &loop_of, Some(0), 5)), [2, 3, 4, 2, 3]);
-        let state = player.state(&loop_of, Some(3));
+        assert_eq!(indices(played(&cine, &loop_of, Some(0), 5)), [2, 3, 4, 2, 3]);
+        let state = CinePlayer::default().state(Loop { cine: &cine, volumes: &loop_of }, Some(3));
         assert_eq!((state.range, state.is_trimmed, state.count), (2..=4, true, 6));
         // The marks stay on their volumes when the loop moves on.
         loop_of.drain(..3);
-        assert_eq!(player.range(&loop_of), 0..=1);
+        let range = |cine: &Cine, volumes: &VecDeque<CineVolume>| Loop { cine, volumes }.range();
+        assert_eq!(range(&cine, &loop_of), 0..=1);
         loop_of.drain(..2);
-        assert_eq!(player.range(&loop_of), 0..=0, "none is left: all of them");
+        assert_eq!(range(&cine, &loop_of), 0..=0, "none is left: all of them");
         let loop_of = volumes(&[None; 6]);
-        player.mark(&loop_of, 5, false);
-        assert_eq!(player.range(&loop_of), 5..=5, "the end went");
-        player.toggle(&loop_of, Instant::now());
+        let later = marked(cine, 12, false);
+        assert_eq!((later.first, later.last), (Some(12), None), "the end went");
+        assert_eq!(range(&later, &loop_of), 5..=5);
+        assert_eq!(marked(cine, 8, true).first, None, "the beginning went");
+        let mut player = CinePlayer::default();
+        player.toggle(Loop { cine: &later, volumes: &loop_of }, Instant::now());
         assert!(!player.is_playing(), "one volume is no loop");
-        player.unmark();
-        assert_eq!(player.range(&loop_of), 0..=5);
+        assert_eq!(range(&Cine::default(), &loop_of), 0..=5);
+    }
+
+    /// Prevents a button that is stuck at a speed from a file.
+    #[test]
+    fn speeds_step_from_wherever_they_are() {
+        assert_eq!([stepped(1.0, 1), stepped(1.0, -1), stepped(8.0, 1), stepped(0.1, -1)], [2.0, 0.5, 8.0, 0.1]);
+        assert_eq!([stepped(0.7, 1), stepped(0.7, -1), stepped(8.0, -7)], [1.0, 0.5, 0.1]);
     }
 
     #[test]
     fn rate_and_time_are_those_of_the_time_stamps() {
         let loop_of = volumes(&[Some(2.0), Some(2.25), Some(2.5), Some(3.0)]);
-        let mut player = CinePlayer::default();
-        let state = player.state(&loop_of, Some(2));
-        assert_eq!((state.seconds, state.rate, state.speed), (Some(0.5), Some(3.0), 1.0));
-        player.mark(&loop_of, 2, true);
-        player.step_speed(1);
-        assert_eq!(player.state(&loop_of, None).rate, Some(4.0));
-        assert_eq!(player.played_rate(&loop_of), 8.0);
+        let state = |cine: &Cine, volumes: &VecDeque<CineVolume>, shown| {
+            CinePlayer::default().state(Loop { cine, volumes }, shown)
+        };
+        let whole = Cine::default();
+        let shown = state(&whole, &loop_of, Some(2));
+        assert_eq!((shown.seconds, shown.rate, shown.speed), (Some(0.5), Some(3.0), 1.0));
+        let short = Cine { speed: stepped(1.0, 1), ..marked(whole, 9, true) };
+        assert_eq!(state(&short, &loop_of, None).rate, Some(4.0));
+        assert_eq!(Loop { cine: &short, volumes: &loop_of }.played_rate(), 8.0);
         let unknown = volumes(&[Some(2.0), None, Some(2.5)]);
-        assert_eq!(
-            player.state(&unknown, Some(1)),
-            CineState { seconds: None, rate: None, ..player.state(&unknown, Some(1)) }
-        );
+        let shown = state(&short, &unknown, Some(1));
+        assert_eq!((shown.seconds, shown.rate), (None, None));
         // Played twice, and with a pause.
         let again = volumes(&[Some(0.0), Some(0.5), Some(1.0), Some(0.0), Some(0.5)]);
-        let state = CinePlayer::default().state(&again, Some(4));
-        assert_eq!((state.seconds, state.rate), (Some(1.5), Some(2.0)));
-        assert_eq!(CinePlayer::default().state(&again, Some(3)).seconds, Some(1.0));
+        let shown = state(&whole, &again, Some(4));
+        assert_eq!((shown.seconds, shown.rate), (Some(1.5), Some(2.0)));
+        assert_eq!(state(&whole, &again, Some(3)).seconds, Some(1.0));
         let paused = volumes(&[Some(0.0), Some(0.5), Some(100.0), Some(100.5)]);
-        let state = CinePlayer::default().state(&paused, Some(3));
-        assert_eq!((state.seconds, state.rate), (Some(100.5), Some(2.0)));
-        let first = CinePlayer::default().state(&again, Some(0)).seconds;
+        let shown = state(&whole, &paused, Some(3));
+        assert_eq!((shown.seconds, shown.rate), (Some(100.5), Some(2.0)));
+        let first = state(&whole, &again, Some(0)).seconds;
         assert_eq!(first.map(|seconds| format!("{seconds:.1}")), Some("0.0".into()), "not -0.0");
-        let none = CinePlayer::default().state(&VecDeque::new(), None);
+        let none = state(&whole, &VecDeque::new(), None);
         assert_eq!((none.count, none.rate, none.is_trimmed), (0, None, false));
     }
 
@@ -328,15 +324,15 @@ mod tests {
         fn what_is_shown_is_in_the_range(
             times in prop::collection::vec(prop::option::of(any::<f64>()), 0..7),
             marks in prop::collection::vec((0usize..8, any::<bool>()), 0..3),
-            (forth, speed, shown) in (any::<bool>(), -9i32..9, prop::option::of(0usize..9)),
+            (back_and_forth, speed, shown) in (any::<bool>(), -9i32..9, prop::option::of(0usize..9)),
         ) {
             let loop_of = volumes(&times);
-            let mut player = CinePlayer::default();
-            marks.iter().for_each(|(index, end)| player.mark(&loop_of, *index, *end));
-            player.set_back_and_forth(forth);
-            player.step_speed(speed);
-            let range = player.range(&loop_of);
-            let seen = played(&mut player, &loop_of, shown, 12);
+            let mut cine = Cine { back_and_forth, speed: stepped(1.0, speed), ..Cine::default() };
+            for (volume, end) in marks.iter().filter_map(|(index, end)| Some((loop_of.get(*index)?, *end))) {
+                cine = marked(cine, volume.volume, end);
+            }
+            let range = Loop { cine: &cine, volumes: &loop_of }.range();
+            let seen = played(&cine, &loop_of, shown, 12);
             prop_assert!(seen.iter().all(|(index, _)| range.contains(index) && *index < loop_of.len()));
             prop_assert!(seen.windows(2).all(|pair| pair[0].1 <= pair[1].1 && pair[0].0 != pair[1].0));
             prop_assert_eq!(seen.is_empty(), range.clone().count() < 2);

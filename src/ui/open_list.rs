@@ -1,6 +1,7 @@
 //! The list of files to open: the recent ones and what a folder has, and the file that keeps the recent ones.
 
 use crate::files;
+use crate::source;
 use crate::workspace;
 use std::path::{Path, PathBuf};
 
@@ -9,15 +10,28 @@ const MAX_RECENT: usize = 8;
 /// Most entries of a folder that are read and listed.
 const MAX_READ: usize = 10_000;
 const MAX_LISTED: usize = 200;
+/// Most files of a folder whose beginning is read, to tell whether they are DICOM.
+const MAX_LOOKED_AT: usize = 2000;
 /// Longest list of recent files, bytes.
 const MAX_BYTES: u64 = 1 << 16;
 /// Endings of recordings.
 const ENDINGS: [&str; 11] = ["mha", "mhd", "nrrd", "nhdr", "nii", "hdr", "dcm", "vol", "uff", "frames", "gz"];
 
-/// The recent files that still exist, the newest first. A list that cannot be read is empty.
+/// What an entry of the list is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Kind {
+    /// A recording or a workspace.
+    File,
+    /// The DICOM files of the folder that is listed, so many, as one recording.
+    Series(usize),
+    Folder,
+    FolderAbove,
+}
+
+/// The recent files, and folders of one series, that still exist, the newest first. A list that cannot be read is empty.
 pub(super) fn recent(list: &Path) -> Vec<PathBuf> {
     let text = files::read_text(list, MAX_BYTES, "list").unwrap_or_default();
-    let there = text.lines().map(PathBuf::from).filter(|file| file.is_absolute() && file.is_file());
+    let there = text.lines().map(PathBuf::from).filter(|file| file.is_absolute() && file.exists());
     there.take(MAX_RECENT).collect()
 }
 
@@ -37,23 +51,45 @@ pub(super) fn remember(list: &Path, file: &Path) {
     }
 }
 
-/// What can be opened in a folder: the folder above, folders, then recordings and workspaces, by name. At most 200.
-pub(super) fn entries(folder: &Path) -> Vec<PathBuf> {
+/// What can be opened in a folder: the folder above, its DICOM files as one recording, folders, then recordings and workspaces, by name. At most
+/// 200.
+pub(super) fn entries(folder: &Path) -> Vec<(Kind, PathBuf)> {
     let is_hidden = |path: &Path| path.file_name().is_none_or(|name| name.to_string_lossy().starts_with('.'));
     let read = std::fs::read_dir(folder).into_iter().flatten().take(MAX_READ);
     let there = read.flatten().map(|entry| entry.path()).filter(|path| !is_hidden(path));
-    let (mut folders, others): (Vec<_>, Vec<_>) = there.partition(|path| path.is_dir());
-    let mut recordings: Vec<_> = others.into_iter().filter(|path| can_be_opened(path)).collect();
+    let (mut folders, mut others): (Vec<_>, Vec<_>) = there.partition(|path| path.is_dir());
     folders.sort();
-    recordings.sort();
-    let above = folder.parent().map(Path::to_path_buf);
-    above.into_iter().chain(folders).chain(recordings).take(MAX_LISTED).collect()
+    others.sort();
+    let (mut looked_at, mut of_series) = (0, 0);
+    others.retain(|path| {
+        // Scanners and discs name DICOM files in any way, also without an ending.
+        let is_dicom = may_be_dicom(path) && looked_at < MAX_LOOKED_AT && {
+            looked_at += 1;
+            source::is_dicom(path)
+        };
+        of_series += usize::from(is_dicom);
+        is_dicom || can_be_opened(path)
+    });
+    let series = (of_series > 1).then(|| (Kind::Series(of_series), folder.to_path_buf()));
+    let above = folder.parent().map(|above| (Kind::FolderAbove, above.to_path_buf()));
+    let folders = folders.into_iter().map(|path| (Kind::Folder, path));
+    let files = others.into_iter().map(|path| (Kind::File, path));
+    above.into_iter().chain(series).chain(folders).chain(files).take(MAX_LISTED).collect()
+}
+
+fn ending(path: &Path) -> Option<String> {
+    path.extension().map(|end| end.to_string_lossy().to_lowercase())
 }
 
 /// True if a file is named like a recording, or begins like a workspace.
 fn can_be_opened(path: &Path) -> bool {
-    let ending = path.extension().map(|end| end.to_string_lossy().to_lowercase());
-    ending.is_some_and(|end| ENDINGS.contains(&end.as_str())) || workspace::is_workspace(path)
+    ending(path).is_some_and(|end| ENDINGS.contains(&end.as_str())) || workspace::is_workspace(path)
+}
+
+/// False if a file is named as something else. The numbers of a UID in a name end with one that looks like an ending.
+fn may_be_dicom(path: &Path) -> bool {
+    let is_number = |end: &str| end.chars().all(|letter| letter.is_ascii_digit());
+    ending(path).is_none_or(|end| is_number(&end) || ["dcm", "dicom", "ima"].contains(&end.as_str()))
 }
 
 #[cfg(test)]
@@ -74,9 +110,22 @@ mod tests {
         ] {
             std::fs::write(folder.join(name), text).expect("file");
         }
-        let names: Vec<_> = entries(&folder)[1..].iter().map(|p| p.file_name().expect("a name").to_owned()).collect();
+        let listed =
+            || entries(&folder).into_iter().map(|(kind, path)| (kind, path.file_name().expect("a name").to_owned()));
+        let names: Vec<_> = listed().skip(1).map(|(_, name)| name).collect();
         assert_eq!(names, ["inside", "a.nii.gz", "b.mha", "work.toml"]);
-        assert_eq!(entries(&folder)[0], std::env::temp_dir());
+        assert_eq!(entries(&folder)[0], (Kind::FolderAbove, std::env::temp_dir()));
+        // DICOM files are told by their beginning, and several may be one recording.
+        let dicom = [&[0; 128][..], b"DICM"].concat();
+        std::fs::write(folder.join("IM_0001"), &dicom).expect("file");
+        assert!(listed().all(|(kind, _)| !matches!(kind, Kind::Series(_))));
+        for name in ["1.2.840.113", "I2.dcm", "picture.png", "IM_0002"] {
+            let text = if name == "IM_0002" { &[7; 200][..] } else { &dicom };
+            std::fs::write(folder.join(name), text).expect("file");
+        }
+        assert_eq!(entries(&folder)[1], (Kind::Series(3), folder.clone()));
+        let files: Vec<_> = listed().filter(|(kind, _)| *kind == Kind::File).map(|(_, name)| name).collect();
+        assert_eq!(files, ["1.2.840.113", "I2.dcm", "IM_0001", "a.nii.gz", "b.mha", "work.toml"]);
         assert!(entries(&folder.join("nowhere")).len() <= 1);
         let list = folder.join("state").join("recent");
         assert!(recent(&list).is_empty());
@@ -90,6 +139,8 @@ mod tests {
         assert_eq!((kept.len(), &kept[0], &kept[1]), (MAX_RECENT, &folder.join("9.mha"), &folder.join("11.mha")));
         std::fs::remove_file(folder.join("9.mha")).expect("remove");
         assert_eq!(recent(&list)[0], folder.join("11.mha"), "what is gone is not listed");
+        remember(&list, &folder.join("inside"));
+        assert_eq!(recent(&list)[0], folder.join("inside"), "a folder of one series");
         std::fs::remove_dir_all(&folder).expect("remove");
     }
 }

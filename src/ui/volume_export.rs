@@ -253,7 +253,7 @@ impl Job {
             }
             Work::Loop => {
                 let scene = self.workspace(recording)?;
-                command.arg("render").arg(scene).args(["--volumes", "all"]);
+                command.arg("render").arg(scene).args(["--volumes", "loop"]);
                 // Pictures have no rate.
                 if self.format.ending == "mp4" {
                     command.args(["--rate", &self.rate.clamp(FILM_RATES[0], FILM_RATES[1]).to_string()]);
@@ -271,7 +271,10 @@ impl Job {
 
     fn workspace(&self, recording: &Path) -> Result<PathBuf, String> {
         let file = recording.with_file_name("scene.toml");
-        let text = workspace::text(&self.settings, &Origin::of(Some(RECORDING.into())))?;
+        // The recording holds what is between the marks.
+        let mut settings = self.settings.clone();
+        (settings.cine.first, settings.cine.last) = (None, None);
+        let text = workspace::text(&settings, &Origin::of(Some(RECORDING.into())))?;
         std::fs::write(&file, text).map_err(|e| format!("{}: {e}", file.display()))?;
         Ok(file)
     }

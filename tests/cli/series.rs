@@ -53,6 +53,12 @@ fn volumes_in_time_are_those_that_are_drawn_alone() {
         assert!(drawn.expect("a picture") == alone, "volume {n}");
     }
     assert!(!folder.names().contains("loop-00.png"));
+    // Between the marks of a cine loop, each once: pictures in files are not repeated.
+    let (marked, marks) = (folder.path("marked-%02d.png"), "cine={first=1,back_and_forth=true}");
+    done(&[&["render", &sweep, "--volumes", "loop", "--set", marks, "-o", &marked][..], &look].concat());
+    let of_loop = |name: &str| fs::read(folder.path(name)).expect("a picture");
+    assert!(of_loop("marked-01.png") == of_loop("loop-01.png") && of_loop("marked-02.png") == of_loop("loop-02.png"));
+    assert!(!folder.names().contains("marked-00.png"));
 }
 
 #[test]
@@ -73,6 +79,9 @@ fn a_series_that_would_be_wrong_is_not_begun() {
         (vec!["--volumes", "0:1", "-o", &out], "--volumes 1: there are 1"),
         (vec!["--volumes", "all", "--volume", "1", "-o", &out], "give one of them"),
         (vec!["--volumes", "all", "--volume", "0", "-o", &out], "give one of them"),
+        (vec!["--volumes", "loop", "--set", "cine.first=4", "-o", &out], "cine.first is 4"),
+        (vec!["--set", "cine={first=4,last=3}", "-o", &one], "cine.last: is 3, must not be below cine.first, 4"),
+        (vec!["--set", "cine.speed=9", "-o", &one], "cine.speed: is 9, must lie in 0.1..=8"),
         (vec!["--volumes", "5:6", "-o", &out], "--volumes 5: there are 1"),
         (vec!["--turntable", "3", "-o", &out, "--rate", "8"], "--rate: is for a film (-o face.mp4)"),
         (vec!["-o", &one, "--rate", "8"], "--rate: is for a film of several pictures"),
@@ -193,4 +202,29 @@ fn a_film_has_the_pictures_of_its_series() {
         assert!((40.5..46.5).contains(&psnr), "picture {n}: {psnr:.1} dB");
         eprintln!("picture {n}: {psnr:.1} dB");
     }
+}
+
+/// Prevents a film of a loop that is played back and forth which goes forwards only.
+#[cfg(feature = "video")]
+#[test]
+fn a_film_goes_back_where_the_loop_does() {
+    let folder = Folder::new("film-loop");
+    let (sweep, film) = (folder.path("sweep.mha"), folder.path("loop.mp4"));
+    done(&["phantom", "-o", &sweep, "--volumes", "4", "--both-ways", "--frames", "9", "--lines", "24"]);
+    let loop_of = |marks: &str| {
+        let said = done(&["render", &sweep, "--volumes", "loop", "--set", marks, "--size", "24x20", "-o", &film]);
+        let count = said.trim_end().strip_prefix(&format!("film: {film}, ")).map(str::to_string);
+        count.unwrap_or_else(|| panic!("{said}"))
+    };
+    assert_eq!(loop_of("cine={first=1}"), "3 pictures, 25 a second");
+    assert_eq!(loop_of("cine={back_and_forth=true}"), "6 pictures, 25 a second");
+    let decoded = decoder("ffmpeg", &["-v", "error", "-i", &film, "-f", "rawvideo", "-pix_fmt", "rgb24", "-"]);
+    let pictures: Vec<&[u8]> = decoded.chunks_exact(24 * 20 * 3).collect();
+    let mean = |a: usize, b: usize| {
+        let sum: u32 = pictures[a].iter().zip(pictures[b]).map(|(a, b)| u32::from(a.abs_diff(*b))).sum();
+        f64::from(sum) / pictures[a].len() as f64
+    };
+    // The way back shows the volumes of the way there; the loss of the film is all that differs.
+    assert_eq!(pictures.len(), 6);
+    assert!(mean(4, 2) < 0.5 * mean(4, 3) && mean(5, 1) < 0.5 * mean(5, 4), "{}, {}", mean(4, 2), mean(4, 3));
 }

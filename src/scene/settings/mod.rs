@@ -2,6 +2,7 @@
 //! opacities in 0..1. Every struct refuses unknown keys, so that a typing error does not silently become a default.
 
 mod body_marks;
+mod cine;
 mod cuts;
 mod marks;
 mod measure;
@@ -12,6 +13,7 @@ mod shading;
 mod unveil;
 
 pub use body_marks::*;
+pub use cine::*;
 pub use cuts::*;
 pub use marks::*;
 pub use measure::*;
@@ -84,6 +86,8 @@ pub struct Settings {
     pub measure: Vec<Measurement>,
     /// Body marks, at most 4: a part of the body with the place of the probe. The viewer and `render` draw them.
     pub body_marks: Vec<BodyMark>,
+    /// The cine loop.
+    pub cine: Cine,
 }
 
 impl Settings {
@@ -92,10 +96,11 @@ impl Settings {
         Settings { ray: Ray { half: true, rays: 1, ..self.ray.clone() }, ..self.clone() }
     }
 
-    /// These settings with what others draw over the picture: measurements, annotations, body marks and marks. No pass reads them.
+    /// These settings with what no pass reads of others: measurements, annotations, body marks and marks, which are drawn over the picture, and how
+    /// the cine loop is played.
     pub fn with_drawings_of(self, other: &Settings) -> Settings {
         let (measure, body_marks) = (other.measure.clone(), other.body_marks.clone());
-        Settings { measure, body_marks, marks: other.marks.clone(), ..self }
+        Settings { measure, body_marks, marks: other.marks.clone(), cine: other.cine, ..self }
     }
 
     /// These settings without anything that is drawn over the picture.

@@ -28,10 +28,11 @@ const DIRECTORY: &str = "1.2.840.10008.1.3.10";
 /// True if a folder holds a DICOM file.
 pub(in super::super) fn is_series(folder: &Path) -> bool {
     let Ok(entries) = fs::read_dir(folder) else { return false };
-    entries.take(MAX_FILES).flatten().any(|entry| is_file(&entry.path()))
+    entries.take(MAX_FILES).flatten().any(|entry| is_dicom(&entry.path()))
 }
 
-fn is_file(path: &Path) -> bool {
+/// True if a path is a DICOM file, whatever its name. Reads its first 132 bytes.
+pub(in super::super) fn is_dicom(path: &Path) -> bool {
     let mut start = Vec::new();
     let is_regular = fs::metadata(path).is_ok_and(|about| about.is_file());
     is_regular && File::open(path).and_then(|file| file.take(132).read_to_end(&mut start)).is_ok() && is_one(&start)
@@ -51,7 +52,7 @@ struct Slice {
 pub(in super::super) fn read_series(folder: &Path, options: &OpenOptions) -> Result<Layout, InputError> {
     let fault = |fault: String| Err(InputError::new(folder, "folder", fault));
     let entries = fs::read_dir(folder).map_err(|e| InputError::unreadable(folder, &e))?;
-    let mut paths: Vec<PathBuf> = entries.take(MAX_FILES).flatten().map(|e| e.path()).filter(|p| is_file(p)).collect();
+    let mut paths: Vec<PathBuf> = entries.take(MAX_FILES).flatten().map(|e| e.path()).filter(|p| is_dicom(p)).collect();
     // The order of a folder is any.
     paths.sort();
     let mut slices = Vec::new();

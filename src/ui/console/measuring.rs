@@ -216,7 +216,12 @@ impl Console {
             let shown = self.stream.cine_position().and_then(|at| volumes.get(at)).filter(|_| self.fixed.plays_once);
             origin.volume = shown.map_or(0, |kept| kept.volume as usize);
             let is_live = origin.recording.is_none();
-            let text = workspace::text(self.controls.settings(), &origin)?;
+            let mut settings = self.controls.settings().clone();
+            // Other numbers of volumes mean nothing in the recording.
+            if !self.fixed.plays_once {
+                (settings.cine.first, settings.cine.last) = (None, None);
+            }
+            let text = workspace::text(&settings, &origin)?;
             self.exporter.text("toml", text).map(|()| is_live)
         });
         match saved {

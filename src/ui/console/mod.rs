@@ -18,7 +18,7 @@ use self::measuring::Counting;
 use self::opening::Opening;
 pub use self::options::{ConsoleOptions, OpenFile, Opened, StartupFault};
 use self::presets::Presets;
-use super::cine_player::CinePlayer;
+use super::cine_player::{CinePlayer, Loop};
 use super::clipboard::Clipboard;
 use super::command::{Command, HeldKeys, Tool};
 use super::controls::{Change, Controls};
@@ -124,7 +124,6 @@ pub struct Console {
     shows_panels: bool,
     rail: Rail,
     /// Saves pictures with a bar.
-    saves_bar: bool,
     /// What the help is searched for; none while it is not.
     help_search: Option<String>,
     shows_exports: bool,
@@ -232,8 +231,15 @@ impl Console {
         let (kept, frozen_volume) = kept.map_or((None, None), |kept| (Some(kept.controls), kept.frozen));
         // Settings that were kept are complete.
         let is_kept = kept.is_some();
-        let chosen = options.chosen.filter(|_| !is_kept);
-        let mut controls = kept.unwrap_or_else(|| Controls::new(options.settings));
+        let mut chosen = options.chosen.filter(|_| !is_kept);
+        let mut settings = options.settings;
+        // Saved pictures have their bar unless a file says otherwise, or the window shows another recording without.
+        if let Some(layers) = chosen.as_mut().filter(|layers| !layers.has("marks.bar")) {
+            settings.marks.bar = display.is_none_or(|display| display.bar);
+            // It is a setting: it is not refused.
+            let _ = layers.set(&format!("marks.bar={}", settings.marks.bar));
+        }
+        let mut controls = kept.unwrap_or_else(|| Controls::new(settings));
         controls.resize(panels::picture_area(size, options.scale, shows_panels).1);
         let (rungs, records) = (Arc::new(options.rungs), options.record.is_some());
         let lowered = options.budget.map(|_| {
@@ -317,7 +323,6 @@ impl Console {
             shows_times: display.is_some_and(|display| display.times),
             shows_panels,
             rail: Rail::default(),
-            saves_bar: display.map_or(options.bar, |display| display.bar),
             help_search: None,
             shows_exports: false,
             turning: None,
@@ -569,20 +574,20 @@ impl Console {
             }
             Command::PlayCine => {
                 self.stream.freeze(true);
-                self.player.toggle(self.stream.cine().volumes(), now);
+                let of = Loop { cine: &self.controls.settings().cine, volumes: self.stream.cine().volumes() };
+                self.player.toggle(of, now);
             }
             Command::MarkCine(end) => {
                 let at = self.stream.cine_position().unwrap_or(count.saturating_sub(1));
-                self.player.mark(self.stream.cine().volumes(), at, end);
+                let volume = self.stream.cine().volumes().get(at).map(|kept| kept.volume);
+                if volume.is_some_and(|volume| self.controls.mark_cine(volume, end) == Change::Marks) {
+                    self.last_change = now;
+                }
             }
-            Command::WholeCine => self.player.unmark(),
-            Command::CineSpeed(by) => self.player.step_speed(by),
-            Command::BackAndForth(on) => self.player.set_back_and_forth(on),
             Command::SavePicture => self.save_picture(),
             Command::SaveLoop => _ = self.save_loop(),
             Command::ToggleHelp => (self.shows_help, self.help_search) = (!self.shows_help, None),
             Command::SearchHelp => self.help_search = Some(String::new()),
-            Command::SavesBar(saves_bar) => self.saves_bar = saves_bar,
             Command::ToggleTimes => self.shows_times = !self.shows_times,
             Command::TogglePanels => {
                 self.shows_panels = !self.shows_panels && self.fixed.overlay;
@@ -631,7 +636,7 @@ impl Console {
             Command::SaveAndExit => {
                 self.asks_to_leave = false;
                 // The question names all volumes.
-                self.player.unmark();
+                self.controls.apply(&Command::WholeCine, None);
                 let newest = self.stream.cine().volumes().back().map(|newest| newest.volume);
                 self.leaves_when_saved = newest.filter(|_| self.save_loop());
             }
@@ -645,13 +650,19 @@ impl Console {
         self.stream.show_cine_volume(index);
     }
 
+    /// The cine loop as it is played.
+    fn cine_loop(&self) -> Loop<'_> {
+        Loop { cine: &self.controls.settings().cine, volumes: self.stream.cine().volumes() }
+    }
+
     /// Shows the next volume of the cine loop when it is due.
     fn advance_cine(&mut self, now: Instant) {
         if self.stream.is_replaying() {
             return;
         }
         let shown = self.stream.cine_position();
-        if let Some(next) = self.player.advance(self.stream.cine().volumes(), shown, now) {
+        let of = Loop { cine: &self.controls.settings().cine, volumes: self.stream.cine().volumes() };
+        if let Some(next) = self.player.advance(of, shown, now) {
             self.stream.show_cine_volume(next);
         }
     }

@@ -5,7 +5,7 @@ use super::{Console, OpenFile, Opened};
 use crate::files::progress::{Progress, Share};
 use crate::gpu::Wake;
 use crate::source::live::SourceKind;
-use crate::ui::open_list;
+use crate::ui::open_list::{self, Kind};
 use crate::ui::panels::Reading;
 use crate::ui::recordings::{Display, Kept, MAX_OPEN, Named, OpenRecordings, Recordings};
 use crate::ui::source_supervisor::SourceState;
@@ -70,7 +70,7 @@ impl Drop for Opening {
 struct List {
     /// What the list says of itself.
     title: String,
-    paths: Vec<PathBuf>,
+    entries: Vec<(Kind, PathBuf)>,
     names: Vec<String>,
 }
 
@@ -118,20 +118,19 @@ impl Opening {
     fn list(&self, folder: &Path, with_recent: bool) -> List {
         let folder = std::path::absolute(folder).unwrap_or_else(|_| folder.to_path_buf());
         let recent = self.recent.as_deref().filter(|_| with_recent).map(open_list::recent).unwrap_or_default();
-        let named = recent.iter().map(|file| file.display().to_string());
-        let mut names: Vec<String> = named.collect();
-        let mut paths = recent;
-        for (n, path) in open_list::entries(&folder).into_iter().enumerate() {
+        let mut names: Vec<String> = recent.iter().map(|file| file.display().to_string()).collect();
+        let mut entries: Vec<_> = recent.into_iter().map(|file| (Kind::File, file)).collect();
+        for (kind, path) in open_list::entries(&folder) {
             let name = path.file_name().map_or(String::new(), |name| name.to_string_lossy().into_owned());
-            let is_above = n == 0 && folder.parent() == Some(&path);
-            names.push(match (is_above, path.is_dir()) {
-                (true, _) => texts::FOLDER_ABOVE.into(),
-                (_, true) => format!("{name}/"),
-                (_, false) => name,
+            names.push(match kind {
+                Kind::FolderAbove => texts::FOLDER_ABOVE.into(),
+                Kind::Series(count) => texts::files_as_series(count),
+                Kind::Folder => format!("{name}/"),
+                Kind::File => name,
             });
-            paths.push(path);
+            entries.push((kind, path));
         }
-        List { title: folder.display().to_string(), paths, names }
+        List { title: folder.display().to_string(), entries, names }
     }
 }
 
@@ -156,8 +155,9 @@ impl Console {
 
     /// Opens the n-th entry of the list: a file, or a folder, whose list is shown then.
     pub(super) fn open_entry(&mut self, n: usize) {
-        let Some(path) = self.opening.list.as_ref().and_then(|list| list.paths.get(n)).cloned() else { return };
-        if path.is_dir() {
+        let chosen = self.opening.list.as_ref().and_then(|list| list.entries.get(n)).cloned();
+        let Some((kind, path)) = chosen else { return };
+        if matches!(kind, Kind::Folder | Kind::FolderAbove) {
             self.opening.list = Some(self.opening.list(&path, false));
             self.needs_redraw = true;
         } else {
@@ -366,7 +366,7 @@ impl Console {
     }
 
     fn display(&self) -> Display {
-        let (panels, times, bar) = (self.shows_panels, self.shows_times, self.saves_bar);
+        let (panels, times, bar) = (self.shows_panels, self.shows_times, self.controls.settings().marks.bar);
         Display { panels, times, bar, has_focus: self.panels.has_focus() }
     }
 

@@ -46,8 +46,6 @@ pub struct ConsoleOptions {
     pub folder: PathBuf,
     /// Draws panels, notes and marks over the picture.
     pub overlay: bool,
-    /// Saves pictures with the patient's sides and a bar: scale, depth, mode, time.
-    pub bar: bool,
     /// Shows sliders and buttons at the start.
     pub panels: bool,
     /// Pixels per point.
@@ -101,7 +99,6 @@ impl Default for ConsoleOptions {
             prometheus: None,
             folder: ".".into(),
             overlay: true,
-            bar: true,
             panels: true,
             scale: 1.0,
             exit: None,

@@ -29,7 +29,7 @@ impl Console {
             },
             None => Err(texts::WHY_NO_PICTURE.into()),
         };
-        let (has_bar, time) = (self.saves_bar, marked::time_line(SystemTime::now()));
+        let (has_bar, time) = (self.controls.settings().marks.bar, marked::time_line(SystemTime::now()));
         let origin = self.origin();
         let saved = picture.and_then(|(picture, scene, start)| {
             self.exporter.picture(move || match has_bar {
@@ -44,8 +44,9 @@ impl Console {
 
     /// The volumes between the marks of the cine loop.
     fn marked_volumes(&self) -> Vec<CineVolume> {
-        let volumes = self.stream.cine().volumes();
-        volumes.range(self.player.range(volumes).start()..).take(self.player.range(volumes).count()).cloned().collect()
+        // There may be none.
+        let range = self.cine_loop().range();
+        self.stream.cine().volumes().iter().skip(*range.start()).take(range.count()).cloned().collect()
     }
 
     /// Saves the cine loop, from its first mark to its last. False if it cannot be.
@@ -74,11 +75,10 @@ impl Console {
         let cine = self.stream.cine().volumes();
         let shown = || self.stream.cine_position().and_then(|at| cine.get(at)).or(cine.back()).cloned();
         let volumes = if format.takes_the_loop() { self.marked_volumes() } else { shown().into_iter().collect() };
-        let rate = self.player.played_rate(cine);
+        let rate = self.cine_loop().played_rate();
         let begun = match self.stream.header().cloned() {
             Some(header) if !volumes.is_empty() => {
-                let mut settings = self.controls.settings().clone();
-                settings.marks.bar = self.saves_bar;
+                let settings = self.controls.settings().clone();
                 self.exporter.export(Job {
                     format,
                     header,

@@ -1,6 +1,7 @@
 //! The settings of the view, and how commands change them. After any command the settings can be drawn with the current volume.
 
 mod body_marks;
+mod cine;
 mod curving;
 mod cutting;
 mod history;
@@ -226,7 +227,7 @@ impl Controls {
             }
             Command::Undo => return self.travel(true, scene),
             Command::Redo => return self.travel(false, scene),
-            Command::Sides(..) | Command::ExchangeLeftAndRight | Command::ProbeMarker(_) => {
+            Command::Sides(..) | Command::ExchangeLeftAndRight | Command::ProbeMarker(_) | Command::SavesBar(_) => {
                 return self.mark_sides(command);
             }
             Command::Freeze
@@ -234,15 +235,11 @@ impl Controls {
             | Command::SeekCine(_)
             | Command::PlayCine
             | Command::MarkCine(_)
-            | Command::WholeCine
-            | Command::CineSpeed(_)
-            | Command::BackAndForth(_)
             | Command::SavePicture
             | Command::SaveLoop
             | Command::ToggleHelp
             | Command::CloseHints
             | Command::SearchHelp
-            | Command::SavesBar(_)
             | Command::ToggleTimes
             | Command::TogglePanels
             | Command::FocusPanels
@@ -279,7 +276,7 @@ impl Controls {
             | Command::RestorePresets => return Change::Caller(*command),
             _ => {}
         }
-        if let Some(change) = self.measure(command).or_else(|| self.mark_body(command)) {
+        if let Some(change) = self.measure(command).or_else(|| self.mark_body(command)).or_else(|| self.play(command)) {
             return change;
         }
         // The scene lags behind if several commands come between two pictures: each one builds on the settings of the one before.

@@ -1,16 +1,18 @@
-//! The patient's sides and the probe's marker, as the user states them. They are drawn over the picture, which stays as it is.
+//! The patient's sides and the probe's marker, as the user states them, and the bar of saved pictures. They are drawn over and below the picture,
+//! which stays as it is.
 
 use super::{Change, Controls};
 use crate::ui::command::Command;
 
 impl Controls {
-    /// Applies a command about sides and marker.
+    /// Applies a command about sides, marker and bar.
     pub(super) fn mark_sides(&mut self, command: &Command) -> Change {
         let mut marks = self.settings.marks.clone();
         match *command {
             Command::Sides(axis, sides) => marks = marks.with_sides(axis, sides),
             Command::ExchangeLeftAndRight => marks = marks.left_and_right_exchanged(),
             Command::ProbeMarker(marker) => marks.probe = marker,
+            Command::SavesBar(on) => marks.bar = on,
             _ => {}
         }
         if marks == self.settings.marks {

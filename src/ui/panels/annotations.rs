@@ -2,7 +2,7 @@
 //! bar.
 
 use super::colours::{self, ACCENT, AXES, BACKING, MEASURE, ON_PLANE, OUTLINE, SIDES, START, TEXT, WARNING, WEAK_TEXT};
-use super::{PanelState, SMALL_TEXT, body_marks, picture_rect};
+use super::{PanelState, SMALL_TEXT, body_marks, picture_rect, recordings};
 use crate::measure::overlay;
 use crate::passes::postprocess;
 use crate::scene::marks::{BAR_LENGTHS, TileMarks};
@@ -13,8 +13,10 @@ use crate::ui::texts;
 use egui::{Align2, Color32, FontId, Painter, Pos2, Rect, Stroke, Ui, Vec2, pos2, vec2};
 use glam::DVec3;
 
-/// A smaller tile has no axes and no colour bar, points: they would lie over the anatomy.
-const MIN_FOR_AXES: f32 = 300.0;
+/// A smaller tile has no axes, points: they would lie over the anatomy.
+const MIN_FOR_AXES: f32 = 400.0;
+/// A smaller picture has no colour bar, points.
+const MIN_FOR_COLOURS: f32 = 300.0;
 /// A smaller tile has no scale either, points.
 const MIN_FOR_SCALE: f32 = 90.0;
 
@@ -36,6 +38,7 @@ pub(super) fn paint(ui: &Ui, state: &PanelState, scale: f32) {
     let tiles = || tiles().filter(|(.., area)| has_room(area, MIN_FOR_SCALE));
     // What tells the sides goes before what tells sizes: that gives way.
     let mut taken = Taken(body_marks::areas(state, scale));
+    taken.0.extend(recordings::reading_area(state, scale));
     tiles().for_each(|(_, tile, area)| sides(&painter, &mut taken, area, tile));
     state.origin.iter().for_each(|origin| name_origin(&painter, &mut taken, picture, origin));
     // While it is bent, plane A has the line as it will be, not as the picture has it.
@@ -57,7 +60,7 @@ pub(super) fn paint(ui: &Ui, state: &PanelState, scale: f32) {
             axes(&painter, &mut taken, area, scene);
         }
     }
-    if has_room(&picture, MIN_FOR_AXES) && scene.settings.layout != Layout::Four {
+    if has_room(&picture, MIN_FOR_COLOURS) && scene.settings.layout != Layout::Four {
         colour_bar(&painter, &mut taken, picture, scene);
     }
     for (n, tile, area) in tiles() {
@@ -231,7 +234,7 @@ fn bar(painter: &Painter, taken: &mut Taken, area: Rect, per_point: f64) {
     let width = (mm / per_point) as f32;
     let label = texts::bar_length(mm);
     let words = painter.layout_no_wrap(label.clone(), FontId::proportional(SMALL_TEXT), TEXT).size();
-    let places = (0..6).map(|n| area.right_bottom() - vec2(16.0, 16.0 + 24.0 * n as f32));
+    let places = (0..8).map(|n| area.right_bottom() - vec2(16.0, 16.0 + 24.0 * n as f32));
     let right = places.into_iter().find(|right| {
         let half = width.max(words.x) / 2.0;
         let middle = right.x - width / 2.0;

@@ -17,7 +17,8 @@ use crate::ui::texts::hints;
 use crate::ui::view;
 use egui::accesskit::Role;
 use egui::{
-    Align, Button, CollapsingHeader, FontId, Label, Panel, RichText, ScrollArea, Sense, Slider, Stroke, Ui, vec2,
+    Align, Button, CollapsingHeader, FontId, Label, Panel, RichText, ScrollArea, Sense, Slider, Stroke, Ui, WidgetInfo,
+    WidgetType, vec2,
 };
 
 const TOOLS: [(Tool, &str); 8] = [
@@ -349,7 +350,7 @@ fn show_controls(ui: &mut Ui, state: &PanelState, width: f32, execute: &mut dyn 
                     execute(Command::Reference(on));
                 }
             }
-            let mut saves_bar = state.saves_bar;
+            let mut saves_bar = settings.marks.bar;
             let hint = texts::BAR_ON_SAVED_PICTURES_HINT;
             if switch(ui, &mut saves_bar, texts::BAR_ON_SAVED_PICTURES, hint) {
                 execute(Command::SavesBar(saves_bar));
@@ -394,9 +395,11 @@ const BALL: f32 = 68.0;
 /// A ball under the lamp, which a drag on it moves.
 fn light_ball(ui: &mut Ui, settings: &Settings, execute: &mut dyn FnMut(Command)) {
     let (area, response) = ui.allocate_exact_size(vec2(BALL, BALL), Sense::DRAG);
-    let response = response.tell(texts::LIGHT_BALL_HINT).named(texts::LIGHT_BALL);
-    let (centre, radius) = (area.center(), BALL / 2.0 - 2.0);
     let light = settings.light.position.unwrap_or(settings.light.direction).normalize_or(glam::DVec3::Z);
+    response.widget_info(|| WidgetInfo::labeled(WidgetType::Image, true, texts::LIGHT_BALL));
+    let [right, up] = [light.x.atan2(light.z), light.y.clamp(-1.0, 1.0).asin()].map(|angle| angle.to_degrees().round());
+    let response = response.tell(texts::LIGHT_BALL_HINT).with_value(&texts::lamp_place(right, up));
+    let (centre, radius) = (area.center(), BALL / 2.0 - 2.0);
     // The ball in rings, lit as a matt one is.
     const RINGS: u32 = 8;
     const SPOKES: u32 = 24;

@@ -443,7 +443,6 @@ pub(super) struct PanelState<'a> {
     /// What the help is searched for, while it is.
     pub(super) help_search: Option<&'a str>,
     /// Saves pictures with a bar.
-    pub(super) saves_bar: bool,
     /// What the pictures show, if that is no patient.
     pub(super) origin: Option<&'a str>,
     /// Shows the hints of the first start.

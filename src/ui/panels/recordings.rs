@@ -8,7 +8,7 @@ use crate::ui::command::Command;
 use crate::ui::texts;
 use egui::accesskit::Role;
 use egui::{
-    Align2, Area, Button, FontId, Id, Label, Order, Rect, RichText, Sense, Stroke, StrokeKind, Ui, WidgetInfo,
+    Align2, Area, Button, FontId, Id, Label, Order, Pos2, Rect, RichText, Sense, Stroke, StrokeKind, Ui, WidgetInfo,
     WidgetType, vec2,
 };
 
@@ -56,17 +56,41 @@ const HEIGHTS: [f32; 2] = [102.0, 44.0];
 const MIN_FOR_BAR: f32 = 240.0;
 const CANCEL: f32 = 96.0;
 
-/// Shows what is being read, below the messages. Returns the height that it takes of their room.
-pub(super) fn show_reading(ui: &mut Ui, state: &PanelState, scale: f32, execute: &mut dyn FnMut(Command)) -> f32 {
-    let Some(reading) = state.reading else { return 0.0 };
+/// What [`show_reading`] draws over a picture.
+struct ReadingPlace {
+    has_bar: bool,
+    height: f32,
+    width: f32,
+    /// The middle of its upper edge.
+    top: Pos2,
+    /// Nothing else is there: it is in the middle of the picture.
+    is_alone: bool,
+}
+
+fn reading_place(state: &PanelState, scale: f32) -> ReadingPlace {
     let picture = picture_rect(state, scale);
     let has_bar = picture.height() >= MIN_FOR_BAR;
     let height = HEIGHTS[usize::from(!has_bar)];
     let width = (picture.width() - 60.0).clamp(60.0, 420.0);
     let is_alone = !state.has_drawn && state.notes.is_empty() && state.banner.is_none();
-    let middle = picture.center_bottom() - vec2(0.0, MESSAGE_EDGES[1] + height);
-    let at = if is_alone { picture.center() - vec2(0.0, height / 2.0) } else { middle };
-    let area = Area::new(Id::new("reading")).order(Order::Middle).pivot(Align2::CENTER_TOP).fixed_pos(at);
+    let low = picture.center_bottom() - vec2(0.0, MESSAGE_EDGES[1] + height);
+    let top = if is_alone { picture.center() - vec2(0.0, height / 2.0) } else { low };
+    ReadingPlace { has_bar, height, width, top, is_alone }
+}
+
+/// The area of the picture that [`show_reading`] covers, if anything is being read.
+pub(super) fn reading_area(state: &PanelState, scale: f32) -> Option<Rect> {
+    state.reading?;
+    let ReadingPlace { height, width, top, .. } = reading_place(state, scale);
+    // With its frame.
+    Some(Rect::from_min_size(top - vec2(width / 2.0, 0.0), vec2(width, height)).expand2(vec2(16.0, 0.0)))
+}
+
+/// Shows what is being read, below the messages. Returns the height that it takes of their room.
+pub(super) fn show_reading(ui: &mut Ui, state: &PanelState, scale: f32, execute: &mut dyn FnMut(Command)) -> f32 {
+    let Some(reading) = state.reading else { return 0.0 };
+    let ReadingPlace { has_bar, height, width, top, is_alone } = reading_place(state, scale);
+    let area = Area::new(Id::new("reading")).order(Order::Middle).pivot(Align2::CENTER_TOP).fixed_pos(top);
     area.interactable(has_bar).show(ui.ctx(), |ui| {
         message_frame(ACCENT).show(ui, |ui| {
             ui.set_width(width);

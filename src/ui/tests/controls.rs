@@ -100,6 +100,9 @@ fn a_drag_on_the_light_ball_moves_the_lamp() {
         light.position.unwrap_or(light.direction).normalize()
     };
     let before = light(&shown);
+    let of_ball =
+        |shown: &Shown| shown.tree[&shown.find("Controls", Role::Image, "Light ball")].value().map(str::to_string);
+    let told = of_ball(&shown);
     input(&mut shown, &[Input::Moved([x, y]), button(true)]);
     assert_eq!(light(&shown), before);
     let mut moved = Vec::new();
@@ -111,6 +114,8 @@ fn a_drag_on_the_light_ball_moves_the_lamp() {
     // The lamp stays under the pointer: 16 and 12 points of a ball with a radius of 32.
     let by = light(&shown) - before;
     assert!((by.x - 0.5).abs() < 0.1 && (by.y - 0.375).abs() < 0.1, "{by}");
+    // A screen reader says where the lamp is.
+    assert!(told.as_ref().is_some_and(|told| told.contains("° above")) && told != of_ball(&shown), "{told:?}");
     let rests = input(&mut shown, &[Input::Moved([x - 20.0, y])]);
     assert_eq!(rests, [], "the button is up");
 }

@@ -187,7 +187,7 @@ fn nothing_covers_anything_in_any_window_mode_and_layout() {
         shown.recordings.clear();
         shown.apply(Command::Tool(Tool::Curve));
         let points = [[-20.0, 50.0], [0.0, 60.0], [30.0, 52.0]];
-        points.into_iter().for_each(|at| shown.apply(Command::CurvePoint(PlaneName::A, at)));
+        points.into_iter().for_each(|at| _ = shown.apply(Command::CurvePoint(PlaneName::A, at)));
         shown.apply(Command::EndCurve);
         assert!(shown.scene.has_curve());
         check(&shown, &format!("{size:?} at {scale}, a curved plane"));
@@ -279,6 +279,34 @@ fn messages_stay_in_the_picture_and_apart() {
             shown.drawn.iter().any(|drawn| matches!(&drawn.kind, Kind::Text { text, .. } if *text == confirmed));
         assert!(newest, "the newest message is shown: {what}");
     }
+}
+
+/// Prevents a scale bar of which what is being read hides an end.
+#[test]
+fn the_scale_stays_in_sight_while_a_file_is_read() {
+    let mut scales = 0;
+    for (size, scale) in windows() {
+        let mut shown = Shown::sized("mode='surface'", size, scale);
+        shown.reading = Some(Reading { name: "recording.nii.gz".into(), share: Some(0.4), text: "40 %".into() });
+        (0..3).for_each(|_| shown.settle());
+        let areas = |chosen: &dyn Fn(&Kind) -> Option<Area>| -> Vec<Area> {
+            shown.drawn.iter().filter_map(|drawn| chosen(&drawn.kind)).collect()
+        };
+        let message = areas(&|kind| match kind {
+            Kind::Rect { area, fill, .. } if *fill == MESSAGE.to_array() => Some(*area),
+            _ => None,
+        });
+        let [_, picture] = places(&shown);
+        let labels = areas(&|kind| match kind {
+            Kind::Text { area, text, .. } if text.ends_with(" mm") && is_inside(*area, picture) => Some(*area),
+            _ => None,
+        });
+        scales += labels.len();
+        for label in labels {
+            assert!(!message.iter().any(|area| overlap(*area, label)), "{size:?} at {scale}: {label:?}, {message:?}");
+        }
+    }
+    assert!(scales > 0);
 }
 
 /// Prevents a list, a question or the help of which a part is out of the window.

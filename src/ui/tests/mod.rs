@@ -2,6 +2,7 @@
 
 mod body_marks;
 mod budget;
+mod cine;
 mod clipping;
 mod colours;
 mod controls;

@@ -5,8 +5,9 @@ use crate::live::cine::CineVolume;
 use crate::passes::unveil::StartLine;
 use crate::picture::Picture;
 use crate::progress_lines::Progress;
+use crate::scene::Cine;
 use crate::source::phantom::{Phantom, PhantomOptions};
-use crate::ui::cine_player::{CinePlayer, CineState};
+use crate::ui::cine_player::{CinePlayer, CineState, Loop};
 use crate::ui::controls::EXAMS;
 use crate::ui::keyboard_pointer::PointerMark;
 use crate::ui::panels::accesskit::{Action, ActionData, ActionRequest, Node, NodeId, TreeId, TreeUpdate};
@@ -84,7 +85,10 @@ impl Shown {
             rail: Rail::default(),
             has_drawn: true,
             is_frozen: false,
-            cine: CinePlayer::default().state(&(0..20).map(|_| CineVolume::default()).collect(), Some(2)),
+            cine: CinePlayer::default().state(
+                Loop { cine: &Cine::default(), volumes: &(0..20).map(|_| CineVolume::default()).collect() },
+                Some(2),
+            ),
             banner: None,
             notes: Vec::new(),
             files: None,
@@ -111,10 +115,11 @@ impl Shown {
         self.lay_out();
     }
 
-    pub(super) fn apply(&mut self, command: Command) {
-        self.controls.apply(&command, Some(&self.scene));
+    pub(super) fn apply(&mut self, command: Command) -> Change {
+        let change = self.controls.apply(&command, Some(&self.scene));
         self.scene = scene(&self.scene.geometry, &self.controls.settings().clone().without_drawings());
         self.settle();
+        change
     }
 
     /// Lays the panels out, applies their commands, and returns these.
@@ -137,7 +142,6 @@ impl Shown {
             shows_help,
             shows_times,
             help_search: None,
-            saves_bar: true,
             origin: Some("Demo data (phantom)"),
             shows_first_steps: self.shows_first_steps,
             shows_only_origin: self.shows_only_origin,

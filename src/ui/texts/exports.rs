@@ -28,8 +28,7 @@ pub const LOOP_PICTURES_HINT: &str =
 #[cfg(feature = "video")]
 pub const LOOP_FILM: &str = "Loop, film";
 #[cfg(feature = "video")]
-pub const LOOP_FILM_HINT: &str =
-    "The same as AV1 in MP4, forwards, at the mean rate times the speed of the loop (0.1 to 240 pictures a second).";
+pub const LOOP_FILM_HINT: &str = "The same as AV1 in MP4, back as well if the loop plays so, at the mean rate times its speed (0.1 to 240 pictures a second).";
 pub fn why_export_not_started(e: impl Display) -> String {
     format!("the export cannot be started: {e}")
 }

@@ -28,6 +28,9 @@ pub const DEVICE_OPENED_AGAIN: &str = "The device was lost and opened again";
 
 // Opening files.
 pub const FOLDER_ABOVE: &str = "..  (the folder above)";
+pub fn files_as_series(count: usize) -> String {
+    format!("all {count} DICOM files of this folder as one recording")
+}
 pub const OPENS_NO_OTHER_FILES: &str = "This view opens no other files";
 pub const SAVE_THE_LOOP_FIRST: &str = "The loop is not saved: save it first (R)";
 pub fn reading(name: impl Display) -> String {

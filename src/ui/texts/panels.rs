@@ -117,6 +117,12 @@ pub fn slider_hint(hint: impl Display) -> String {
 }
 pub const LIGHT_BALL_HINT: &str = "Drag here to move the lamp; on the picture, drag with Ctrl.";
 pub const LIGHT_BALL: &str = "Light ball";
+/// Degrees from the front.
+pub fn lamp_place(right: f64, up: f64) -> String {
+    let side = if right < 0.0 { "left" } else { "right" };
+    let height = if up < 0.0 { "below" } else { "above" };
+    format!("from {}° {side}, {}° {height}", right.abs(), up.abs())
+}
 pub const CINE_LOOP: &str = "Cine loop";
 pub const FROZEN: &str = "FROZEN";
 pub const FREEZE: &str = "Freeze";

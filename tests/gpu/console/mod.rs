@@ -63,7 +63,6 @@ pub fn options() -> ConsoleOptions {
         prometheus: None,
         folder: std::env::temp_dir(),
         overlay: true,
-        bar: false,
         panels: false,
         scale: 1.0,
         exit: None,

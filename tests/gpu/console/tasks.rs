@@ -121,9 +121,9 @@ fn source(phantom: fn() -> Phantom) -> OpenSource {
 fn ball_options(folder: &Folder) -> ConsoleOptions {
     let Truth::Sphere { centre, .. } = ball().truth() else { panic!("a ball") };
     let around = format!("planes.position = [{}, {}, {}]", centre.x, centre.y - 40.0, centre.z);
-    let settings = settings(&format!("mode = 'sr'\nsurface.threshold = 0.4\n{around}"));
+    let settings = settings(&format!("mode = 'sr'\nsurface.threshold = 0.4\nmarks.bar = true\n{around}"));
     let folder = folder.0.join("kept");
-    ConsoleOptions { settings, source: SourceKind::Recording, panels: true, folder, bar: true, ..options() }
+    ConsoleOptions { settings, source: SourceKind::Recording, panels: true, folder, ..options() }
 }
 
 impl User {

@@ -1,0 +1,62 @@
+//! Settings of the cine loop: what of it is played, and how. No pass reads them.
+
+use serde::{Deserialize, Serialize};
+
+/// Slowest and fastest play of a cine loop, as multiples of the speed of the acquisition.
+pub const CINE_SPEEDS: [f64; 2] = [0.1, 8.0];
+
+/// The cine loop. The viewer plays it; `render --volumes loop` draws it.
+#[derive(Clone, Copy, Debug, PartialEq, Deserialize, Serialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct Cine {
+    /// The first volume that is played, by its number in the recording, from 0. Absent: the first one.
+    pub first: Option<u32>,
+    /// The last volume that is played. Absent: the last one.
+    pub last: Option<u32>,
+    /// How fast the viewer plays it, as a multiple of the speed of the acquisition, 0.1..=8.
+    pub speed: f64,
+    /// The loop is played to its last volume and back, also in a film. Otherwise it begins again after the last volume.
+    pub back_and_forth: bool,
+}
+
+impl Default for Cine {
+    fn default() -> Cine {
+        Cine { first: None, last: None, speed: 1.0, back_and_forth: false }
+    }
+}
+
+impl Cine {
+    /// The numbers of the volumes of a recording of `count` that are played, ascending; none if the marks are not among them.
+    pub fn volumes(&self, count: usize) -> Vec<usize> {
+        let first = self.first.map_or(0, |first| first as usize);
+        let last = self.last.map_or(count.saturating_sub(1), |last| last as usize);
+        (first..count.min(last.saturating_add(1))).collect()
+    }
+
+    /// The same in the order of a film that is repeated: back as well, if the loop is played so. The ends are there once.
+    pub fn film(&self, count: usize) -> Vec<usize> {
+        let mut order = self.volumes(count);
+        if self.back_and_forth {
+            let between = order.get(1..order.len().saturating_sub(1)).unwrap_or_default();
+            order.extend(between.to_vec().iter().rev());
+        }
+        order
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_film_repeats_without_a_volume_twice() {
+        let forth = Cine { first: Some(2), last: Some(5), ..Cine::default() };
+        assert_eq!((forth.volumes(9), forth.film(9)), (vec![2, 3, 4, 5], vec![2, 3, 4, 5]));
+        let back = Cine { back_and_forth: true, ..forth };
+        assert_eq!((back.volumes(9), back.film(9)), (vec![2, 3, 4, 5], vec![2, 3, 4, 5, 4, 3]));
+        assert_eq!(back.film(4), [2, 3], "of two, none is between");
+        assert!(back.film(2).is_empty(), "the loop begins behind the recording");
+        let all = Cine { back_and_forth: true, ..Cine::default() };
+        assert_eq!((all.film(3), all.film(1), all.film(0)), (vec![0, 1, 2, 1], vec![0], vec![]));
+    }
+}

@@ -1,0 +1,35 @@
+//! How the cine loop is played: its marks, its speed and its direction. The picture stays as it is.
+
+use super::{Change, Controls};
+use crate::scene::Cine;
+use crate::ui::cine_player::{marked, stepped};
+use crate::ui::command::Command;
+
+impl Controls {
+    /// Applies a command about the cine loop that needs none of its volumes; none if it is about something else.
+    pub(super) fn play(&mut self, command: &Command) -> Option<Change> {
+        let now = self.settings.cine;
+        let cine = match *command {
+            Command::WholeCine => Cine { first: None, last: None, ..now },
+            Command::CineSpeed(by) => Cine { speed: stepped(now.speed, by), ..now },
+            Command::BackAndForth(on) => Cine { back_and_forth: on, ..now },
+            _ => return None,
+        };
+        Some(self.play_as(cine, command))
+    }
+
+    /// The cine loop begins or ends with the volume of this number.
+    pub(in crate::ui) fn mark_cine(&mut self, volume: u32, end: bool) -> Change {
+        self.play_as(marked(self.settings.cine, volume, end), &Command::MarkCine(end))
+    }
+
+    fn play_as(&mut self, cine: Cine, command: &Command) -> Change {
+        if cine == self.settings.cine {
+            return Change::Nothing;
+        }
+        let before = self.settings.clone();
+        self.settings.cine = cine;
+        self.history.record(before, command);
+        Change::Marks
+    }
+}
