@@ -313,14 +313,17 @@ pub fn crop(picture: &Picture, from: [u32; 2], size: [u32; 2]) -> Option<Picture
 
 /// The picture of the sweep that `echolume render` makes.
 pub fn headless(size: [u32; 2], more: &[&str]) -> Picture {
-    let folder = Folder::new(&format!("headless-{}x{}-{}", size[0], size[1], more.concat().replace('/', "")));
+    rendered(SWEEP, size, more)
+}
+
+/// The picture of a recording or a workspace that `echolume render` makes.
+pub fn rendered(source: &str, size: [u32; 2], more: &[&str]) -> Picture {
+    let name = source.rsplit('/').next().unwrap_or_default();
+    let folder = Folder::new(&format!("headless-{name}-{}x{}-{}", size[0], size[1], more.concat().replace('/', "")));
     let file = folder.path("picture.png");
     let size = format!("{}x{}", size[0], size[1]);
-    let output = Command::new(PROGRAM)
-        .args(["render", SWEEP, "-o", &file, "--size", &size])
-        .args(more)
-        .output()
-        .expect("start the program");
+    let output = Command::new(PROGRAM).args(["render", source, "-o", &file, "--size", &size]).args(more).output();
+    let output = output.expect("start the program");
     assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
     Picture::load(&PathBuf::from(file)).expect("the picture")
 }

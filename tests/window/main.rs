@@ -10,3 +10,4 @@ mod pictures;
 mod recordings;
 mod shapes;
 mod start;
+mod tools;

@@ -492,12 +492,14 @@ fn the_start_line_is_bent_on_plane_a_and_the_rendering_follows() {
     view.leave();
 }
 
-/// The picture that `render` makes of a workspace.
+/// The picture that `render` makes of a workspace, without the bar below: saved pictures have one.
 fn of_workspace(file: &std::path::Path, png: &str, size: [u32; 2]) -> Picture {
     let run = std::process::Command::new(PROGRAM)
         .args(["render", &file.to_string_lossy(), "-o", png, "--size", &format!("{}x{}", size[0], size[1])])
         .output()
         .expect("the program runs");
     assert!(run.status.success(), "{}", String::from_utf8_lossy(&run.stderr));
-    Picture::load(png.as_ref()).expect("a picture")
+    let whole = Picture::load(png.as_ref()).expect("a picture");
+    assert!(whole.height > size[1], "{} rows", whole.height);
+    crop(&whole, [0, 0], size).expect("a picture of this size")
 }
