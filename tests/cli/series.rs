@@ -213,7 +213,8 @@ fn a_film_goes_back_where_the_loop_does() {
     done(&["phantom", "-o", &sweep, "--volumes", "4", "--both-ways", "--frames", "9", "--lines", "24"]);
     let loop_of = |marks: &str| {
         let said = done(&["render", &sweep, "--volumes", "loop", "--set", marks, "--size", "24x20", "-o", &film]);
-        let count = said.trim_end().strip_prefix(&format!("film: {film}, ")).map(str::to_string);
+        let last = said.lines().last().and_then(|last| last.strip_prefix(&format!("film: {film}, ")));
+        let count = last.map(str::to_string);
         count.unwrap_or_else(|| panic!("{said}"))
     };
     assert_eq!(loop_of("cine={first=1}"), "3 pictures, 25 a second");
