@@ -1,5 +1,5 @@
-//! The groups of `echolume verify` that check the complete program: each detects its faults. The tests of `cli` check that all of
-//! them pass.
+//! The groups of `echolume verify` that check the complete program: each passes on this device, or does so in the tests of `cli`, and detects its
+//! faults.
 
 use crate::common::gpu::*;
 use echolume::gpu::{Context, ContextOptions, GpuError, Renderer, RendererOptions};
@@ -40,6 +40,31 @@ fn failures(bench: &mut DeviceUnderTest, checks: &[Check]) -> Vec<String> {
     let run = verify::run(bench, checks, || None, tell);
     let faults = |o: &Outcome| o.faults.iter().map(|f| format!("{}: {f:?}", o.name)).collect::<Vec<_>>();
     run.outcomes.iter().filter(|o| o.verdict == Verdict::Failed).flat_map(faults).collect()
+}
+
+/// The quick checks of groups whose time is that of compiling pipelines. The program leaves constants to the driver, for which validation takes
+/// twice as long: tests/cli/verify.rs runs the other groups in this way, every mode among them.
+fn all_pass(groups: &[&str]) {
+    let mut bench = bench();
+    // Some checks run it.
+    bench.program = Some(PathBuf::from(env!("CARGO_BIN_EXE_echolume")));
+    let checks: Vec<Check> =
+        verify::checks(Level::Quick).into_iter().filter(|check| groups.contains(&check.group)).collect();
+    assert!(groups.iter().all(|group| checks.iter().any(|check| check.group == *group)), "{groups:?}");
+    assert!(bench.watched(), "the tests need the validation layer");
+    let count = checks.len();
+    let faults = failures(&mut bench, &checks);
+    assert!(faults.is_empty(), "{count} checks: {}", faults.join("\n"));
+}
+
+#[test]
+fn quick_checks_of_determinism_hazards_and_stress_pass_on_this_device() {
+    all_pass(&["determinism", "hazards", "stress"]);
+}
+
+#[test]
+fn quick_checks_of_failures_formats_and_memory_pass_on_this_device() {
+    all_pass(&["failures", "formats", "memory"]);
 }
 
 /// Spans of a picture: the host's, and two passes of the device.

@@ -118,10 +118,12 @@ fn source(phantom: fn() -> Phantom) -> OpenSource {
     })
 }
 
+/// Renderings of a ray for 16 pixels, because most tasks need none or one of any resolution: they took half of the time. Planes are whole.
 fn ball_options(folder: &Folder) -> ConsoleOptions {
     let Truth::Sphere { centre, .. } = ball().truth() else { panic!("a ball") };
     let around = format!("planes.position = [{}, {}, {}]", centre.x, centre.y - 40.0, centre.z);
-    let settings = settings(&format!("mode = 'sr'\nsurface.threshold = 0.4\nmarks.bar = true\n{around}"));
+    let settings =
+        settings(&format!("mode = 'sr'\nsurface.threshold = 0.4\nmarks.bar = true\nray.quarter = true\n{around}"));
     let folder = folder.0.join("kept");
     ConsoleOptions { settings, source: SourceKind::Recording, panels: true, folder, ..options() }
 }
@@ -167,6 +169,16 @@ impl User {
         }
         self.settle();
         (self.task, self.actions, self.request) = (task.to_string(), 0, LoopRequest::default());
+    }
+
+    /// Goes to another console with these settings. Returns the one before.
+    fn at_another(&mut self, settings: Settings, phantom: fn() -> Phantom) -> Console {
+        let options = ConsoleOptions { settings, ..ball_options(&self.folder) };
+        let console = Console::new(&self.device, source(phantom), options, WINDOW);
+        let kept = std::mem::replace(&mut self.console, console);
+        self.until("a volume", |user| (user.console.stream().volumes_shown() > 0).then_some(()));
+        self.settle();
+        kept
     }
 
     fn on_planes(&mut self) {
@@ -392,6 +404,10 @@ fn shadow(user: &mut User) -> String {
 /// The path along the ball between two places half a radian to the left and to the right of its front. The surface that is found lies within
 /// the width of a sample and of a slice of the ball.
 fn cheek(user: &mut User) -> String {
+    // A length on the surface is as exact as the rays are dense.
+    let mut settings = ball_options(&user.folder).settings;
+    settings.ray.quarter = false;
+    let kept = user.at_another(settings, ball);
     user.on_planes();
     user.letter('1');
     user.letter('u');
@@ -403,6 +419,7 @@ fn cheek(user: &mut User) -> String {
         user.click(in_window(at));
     }
     user.measured(0, radius, LENGTH);
+    user.console = kept;
     user.count()
 }
 
@@ -515,7 +532,7 @@ fn head() -> Phantom {
 /// What each ray of a rendering meets first, by the phantom's labels: what the surface is at the place that mode surface finds.
 fn met(device: &Arc<Context>, phantom: &Phantom, scene: &Scene) -> Vec<Option<Label>> {
     let mut settings = Settings { mode: Mode::Surface, ..scene.settings.clone() };
-    settings.surface.threshold = 0.18;
+    (settings.surface.threshold, settings.ray.quarter) = (0.18, false);
     let scene = Scene::new(scene.geometry.clone(), scene.input, settings).expect("a scene");
     let mut renderer = Renderer::new(device, scene.clone(), &RendererOptions::default()).expect("a renderer");
     for frame in phantom.volume(0) {
@@ -602,11 +619,9 @@ fn cord(user: &mut User) -> String {
     let phantom = head();
     let mut layers = Layers::default();
     layers.preset("face").expect("the preset");
-    let options = ConsoleOptions { settings: layers.finish().expect("settings"), ..ball_options(&user.folder) };
-    let console = Console::new(&user.device, source(head), options, WINDOW);
-    let kept = std::mem::replace(&mut user.console, console);
-    user.until("a volume", |user| (user.console.stream().volumes_shown() > 0).then_some(()));
-    user.settle();
+    let mut settings = layers.finish().expect("settings");
+    settings.ray.quarter = true;
+    let kept = user.at_another(settings, head);
     let scene = user.scene();
     let before = met(&user.device, &phantom, &scene);
     let [width, height] = scene.picture_size().map(|n| n as usize);
