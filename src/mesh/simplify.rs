@@ -307,8 +307,19 @@ mod tests {
             let [a, b, c] = corners(from, t);
             [a, (a + b) / 2.0, (a + b + c) / 3.0, (a + 3.0 * b) / 4.0]
         });
-        let distance =
-            |p: DVec3| to.triangles.iter().map(|t| from_triangle(p, corners(to, t))).fold(f64::INFINITY, f64::min);
+        // Most triangles lie further away than the nearest one so far, as a ball round them tells: the distance from them is not computed.
+        let balls: Vec<_> = to
+            .triangles
+            .iter()
+            .map(|t| corners(to, t))
+            .map(|t| (t, t[0].distance(t[1]).max(t[0].distance(t[2]))))
+            .collect();
+        let distance = |p: DVec3| {
+            balls.iter().fold(f64::INFINITY, |nearest, (triangle, radius)| match p.distance(triangle[0]) - radius {
+                least if least >= nearest => nearest,
+                _ => nearest.min(from_triangle(p, *triangle)),
+            })
+        };
         points.map(distance).reduce(|| 0.0, f64::max)
     }
 

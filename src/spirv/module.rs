@@ -143,6 +143,27 @@ pub fn embedded(name: &str) -> Option<&'static [u8]> {
     EMBEDDED.iter().find(|(n, _)| *n == name).map(|(_, bytes)| *bytes)
 }
 
+/// Small modules and every so many words of a ray caster, because the time is that of the square of their length: cut before a word and with
+/// that word changed, `read` ends without a panic. It is given a texture that the module has and a table, if it has one, and returns whether it is read.
+#[cfg(test)]
+pub(super) fn malformed(read: impl Fn(&[u32], &str, &str) -> bool) {
+    let modules = [
+        ("measure/positions", "volume", "nothing", 1),
+        ("net/sample", "net_samples", "net_lines", 1),
+        ("raycast/planes.plain", "volume", "sweep_lut", 24),
+    ];
+    for (name, texture, other, every) in modules {
+        let intact = words(embedded(name).expect("a shader"));
+        assert!(read(&intact, texture, other), "{name}");
+        for at in (1..intact.len()).step_by(every) {
+            read(&intact[..at], texture, other);
+            let mut corrupted = intact.clone();
+            corrupted[at] ^= 0x0003_0001;
+            read(&corrupted, texture, other);
+        }
+    }
+}
+
 pub(super) fn error<T>(fault: impl Into<String>) -> Result<T, SpirvError> {
     Err(SpirvError(fault.into()))
 }

@@ -230,7 +230,7 @@ impl Rewrite {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::spirv::module::{embedded, words};
+    use crate::spirv::module::{embedded, malformed, words};
     use crate::spirv::reflect::{Access, Dimension, Kind, reflect};
 
     fn table_names(words: &[u32]) -> Vec<String> {
@@ -271,15 +271,6 @@ mod tests {
 
     #[test]
     fn a_malformed_module_is_an_error() {
-        // A small ray caster, cut at every seventh word: the time is that of its square.
-        let intact = words(embedded("raycast/planes.plain").unwrap());
-        for cut in (1..intact.len()).step_by(7) {
-            let _ = storage_to_texel_buffer(&intact[..cut], |_| true);
-        }
-        for at in 3..intact.len() {
-            let mut corrupted = intact.clone();
-            corrupted[at] ^= 0x0003_0001;
-            let _ = storage_to_texel_buffer(&corrupted, |_| true);
-        }
+        malformed(|words, _, _| storage_to_texel_buffer(words, |_| true).is_ok());
     }
 }

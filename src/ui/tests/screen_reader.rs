@@ -418,7 +418,8 @@ impl Shown {
             !self.panels.key(Key::Tab, Modifiers::default()),
             "Tab belongs to the view until a control has the keyboard"
         );
-        let rest = self.corners.clone();
+        // Marks are white.
+        let rest: Vec<_> = self.corners.iter().filter(|corner| corner.1 == [255; 4]).copied().collect();
         self.panels.toggle_focus();
         assert!(self.panels.has_focus());
         self.lay_out();
