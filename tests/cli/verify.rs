@@ -22,7 +22,7 @@ fn kept(folder: &Folder, name: &str, more: &[&str]) -> (String, Run) {
 }
 
 /// All groups but the passes, which are checked one by one by tests/gpu: they would take half of the gate's time for this command.
-const GROUPS: [&str; 10] = [
+const GROUPS: [&str; 11] = [
     "determinism",
     "failures",
     "formats",
@@ -33,6 +33,7 @@ const GROUPS: [&str; 10] = [
     "sampling",
     "speed",
     "stress",
+    "surface nets",
 ];
 
 /// All quick checks of these groups pass on this device, and every report file says so.
