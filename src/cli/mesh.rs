@@ -6,7 +6,7 @@ use crate::gpu::surface_net::{NetError, SurfaceNet};
 use crate::gpu::{Context, DeviceChoice};
 use crate::mesh::Mesh;
 use crate::mesh::base::Base;
-use crate::mesh::files::MeshFile;
+use crate::mesh::files::{Colours, MeshFile};
 use crate::mesh::nets::{Surface, surface_net};
 use crate::mesh::simplify::simplified;
 use crate::mesh::smooth::Smoother;
@@ -24,7 +24,8 @@ use std::sync::Arc;
 #[command(
     after_help = "The surface is where the volume, between 0 and 1 of its sample range, passes the threshold. It is closed at the border of the \
                         volume, half a voxel outside, so that it can be printed; with --open it ends there. Coordinates are mm, those of the \
-                        world (LPS) where the recording states them. STL has neither colours nor a unit.\n\nExamples:\n  \
+                        world (LPS) where the recording states them. STL has neither colours nor a unit. With a base or closed it is \
+                        watertight. What a picture shows, an open sheet from its distance map in its colours, is written by render --mesh.\n\nExamples:\n  \
                         echolume mesh sweep.mha face.stl\n  \
                         echolume mesh sweep.mha face.stl --simplify 0.1\n  \
                         echolume mesh sweep.mha relief.stl --base 3\n  \
@@ -157,7 +158,7 @@ impl MakeMesh {
                 simple
             }
         };
-        format.write(&mesh, *colour, &self.output).map_err(failed)?;
+        format.write(&mesh, Colours::One(*colour), &self.output).map_err(failed)?;
         self.say(&mesh, &how);
         Ok(())
     }

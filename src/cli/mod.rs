@@ -15,6 +15,7 @@ mod recordings;
 mod render;
 mod series;
 mod serve;
+mod sheet;
 mod stic;
 mod stream;
 #[cfg(feature = "view")]

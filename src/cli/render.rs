@@ -3,6 +3,7 @@
 use super::drawing::{DrawFault, draw_despite_losses, send_volume};
 use super::one_colour;
 use super::series::{Job, SeriesArgs};
+use super::sheet;
 use crate::args::{InputArgs, Output, PictureFile, check_outputs};
 use crate::dump;
 use crate::error_report::choose::Bound;
@@ -12,6 +13,7 @@ use crate::files;
 use crate::gpu::shader_reload::ShaderFolder;
 use crate::gpu::{Context, Renderer, RendererOptions, TimeStamps};
 use crate::marked;
+use crate::mesh::files::MeshFile;
 use crate::passes::{PassTime, Slot, Texels};
 use crate::picture::{Picture, PictureFormat};
 use crate::plan::Plan;
@@ -57,6 +59,10 @@ pub struct Render {
     /// The error.json that `echolume report error -o DIR` wrote for this recording on this device
     #[arg(long, value_name = "FILE", requires = "budget")]
     report: Option<PathBuf>,
+    /// Write the surface that the picture shows as a mesh too (.glb, .ply, .stl): an open sheet, a vertex for each ray, in the picture's
+    /// colours. For modes sr and mixed; echolume mesh writes closed surfaces
+    #[arg(long, value_name = "FILE")]
+    mesh: Option<PathBuf>,
     /// Write the difference of every pixel from the picture of half the step as a map too; hatched where it exceeds
     /// --error-tolerance
     #[arg(long, value_name = "FILE")]
@@ -82,6 +88,7 @@ impl Render {
         if self.series.is_given() && !self.explain {
             let alone = [
                 ("--dump", self.dump.is_some()),
+                ("--mesh", self.mesh.is_some()),
                 ("--error-map", self.error_map.is_some()),
                 ("--budget", self.budget.is_some()),
             ];
@@ -98,7 +105,10 @@ impl Render {
             });
         }
         let output = PictureFile::new("-o", &self.output)?;
-        let targets: [Output; 2] = [("-o", output.path()), ("--error-map", self.error_map.as_deref())];
+        let targets: [Output; 3] =
+            [("-o", output.path()), ("--mesh", self.mesh.as_deref()), ("--error-map", self.error_map.as_deref())];
+        let mesh = self.mesh.as_deref().map(|path| Ok::<_, Failure>((MeshFile::of(path).map_err(input)?, path)));
+        let mesh = mesh.transpose()?;
         if !self.explain {
             if let Some(map) = &self.error_map {
                 PictureFormat::of(map).map_err(|fault| input(format!("--error-map {fault}")))?;
@@ -117,6 +127,9 @@ impl Render {
         self.input.check_outputs(&targets, &*source)?;
         if let Some(cut) = scene.probe().and_then(Probe::folded) {
             remark(&cut);
+        }
+        if mesh.is_some() && !Plan::new(&scene).slots.contains(&Slot::Distance) {
+            return Err(input("--mesh: this mode has no distance map; use --mode sr or mixed"));
         }
         let finer = self.finer(&scene)?;
         if let Some(folder) = &self.dump {
@@ -158,6 +171,10 @@ impl Render {
         }
         if self.timings {
             say!("{}", pass_time_table(&measured, renderer.scene()).trim_end());
+        }
+        if let Some((format, path)) = mesh {
+            let volume = self.input.volume()?;
+            sheet::write(&mut renderer, &picture, source.world_of(volume), format, path)?;
         }
         if let Some(folder) = &self.dump {
             self.write_dump(folder, &mut renderer)?;

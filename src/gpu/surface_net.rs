@@ -69,8 +69,21 @@ impl SurfaceNet {
     /// # Errors
     /// A volume that the device cannot hold, a device that fails.
     pub fn new(context: &Arc<Context>, lattice: Lattice, frames: &[Vec<u8>]) -> Result<SurfaceNet, NetError> {
+        SurfaceNet::in_bands(context, lattice, frames, Bands::default())
+    }
+
+    /// As [`SurfaceNet::new`], with dispatches divided in a given way.
+    ///
+    /// # Errors
+    /// As [`SurfaceNet::new`].
+    pub fn in_bands(
+        context: &Arc<Context>,
+        lattice: Lattice,
+        frames: &[Vec<u8>],
+        bands: Bands,
+    ) -> Result<SurfaceNet, NetError> {
         let mut net = SurfaceNet {
-            limit: BandLimit::new(Bands::default(), context.candidate.is_software()),
+            limit: BandLimit::new(bands, context.candidate.is_software()),
             timings: Timings::new(context, false),
             read_back: 0,
             recorder: Recorder::new(context, 0, "surface net", TimeStamps::EachPass, false)?,

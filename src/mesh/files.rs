@@ -18,6 +18,24 @@ pub enum MeshFile {
     Glb,
 }
 
+/// Colours of vertices, sRGB.
+#[derive(Clone, Copy, Debug)]
+pub enum Colours<'a> {
+    /// One for all, to be lit by who shows the mesh.
+    One([u8; 3]),
+    /// By vertex, those of a picture: lit already.
+    OfPicture(&'a [[u8; 3]]),
+}
+
+impl Colours<'_> {
+    fn of(&self, vertex: usize) -> [u8; 3] {
+        match self {
+            Colours::One(colour) => *colour,
+            Colours::OfPicture(colours) => colours.get(vertex).copied().unwrap_or_default(),
+        }
+    }
+}
+
 /// The endings of file names, and their formats.
 const ENDINGS: [(&str, MeshFile); 3] = [("stl", MeshFile::Stl), ("ply", MeshFile::Ply), ("glb", MeshFile::Glb)];
 
@@ -34,25 +52,25 @@ impl MeshFile {
         }
     }
 
-    /// Writes a mesh. `colour`: of all vertices, sRGB.
+    /// Writes a mesh.
     ///
     /// # Errors
     /// A mesh that is too large for the format, a full disk. No file is left then.
-    pub fn write(self, mesh: &Mesh, colour: [u8; 3], path: &Path) -> Result<(), InputError> {
+    pub fn write(self, mesh: &Mesh, colours: Colours, path: &Path) -> Result<(), InputError> {
         let write = || {
             let mut file = Unfinished::create(path)?;
-            self.put(mesh, colour, &mut file)?;
+            self.put(mesh, colours, &mut file)?;
             file.finish()?;
             file.rename()
         };
         write().map_err(|e: io::Error| InputError::unwritable(path, &e))
     }
 
-    fn put(self, mesh: &Mesh, colour: [u8; 3], out: &mut impl Write) -> io::Result<()> {
+    fn put(self, mesh: &Mesh, colours: Colours, out: &mut impl Write) -> io::Result<()> {
         match self {
             MeshFile::Stl => stl(mesh, out),
-            MeshFile::Ply => ply(mesh, colour, out),
-            MeshFile::Glb => glb(mesh, colour, out),
+            MeshFile::Ply => ply(mesh, colours, out),
+            MeshFile::Glb => glb(mesh, colours, out),
         }
     }
 }
@@ -85,7 +103,7 @@ fn stl(mesh: &Mesh, file: &mut impl Write) -> io::Result<()> {
     Ok(())
 }
 
-fn ply(mesh: &Mesh, colour: [u8; 3], file: &mut impl Write) -> io::Result<()> {
+fn ply(mesh: &Mesh, colours: Colours, file: &mut impl Write) -> io::Result<()> {
     let (vertices, faces) = (mesh.vertices.len(), mesh.triangles.len());
     write!(
         file,
@@ -94,10 +112,10 @@ fn ply(mesh: &Mesh, colour: [u8; 3], file: &mut impl Write) -> io::Result<()> {
          property uchar blue\nelement face {faces}\nproperty list uchar int vertex_indices\nend_header\n"
     )?;
     count(vertices, "vertices")?;
-    for (vertex, normal) in mesh.vertices.iter().zip(mesh.normals()) {
+    for (n, (vertex, normal)) in mesh.vertices.iter().zip(mesh.normals()).enumerate() {
         file.write_all(&three(*vertex))?;
         file.write_all(&three(normal))?;
-        file.write_all(&colour)?;
+        file.write_all(&colours.of(n))?;
     }
     for triangle in &mesh.triangles {
         file.write_all(&[3])?;
@@ -109,7 +127,7 @@ fn ply(mesh: &Mesh, colour: [u8; 3], file: &mut impl Write) -> io::Result<()> {
 /// Bytes of a vertex in a GLB: position, normal, and colour with alpha.
 const GLB_VERTEX: usize = 28;
 
-fn glb(mesh: &Mesh, colour: [u8; 3], file: &mut impl Write) -> io::Result<()> {
+fn glb(mesh: &Mesh, colours: Colours, file: &mut impl Write) -> io::Result<()> {
     let (vertices, indices) = (mesh.vertices.len(), 3 * mesh.triangles.len());
     let all = |first: DVec3, f: fn(DVec3, DVec3) -> DVec3| mesh.vertices.iter().copied().fold(first, f);
     // The bounds of what is stored: rounded as the vertices are.
@@ -124,7 +142,7 @@ fn glb(mesh: &Mesh, colour: [u8; 3], file: &mut impl Write) -> io::Result<()> {
         { "bufferView": 0, "byteOffset": 24, "componentType": 5121, "normalized": true, "count": vertices, "type": "VEC4" },
         { "bufferView": 1, "byteOffset": 0, "componentType": 5125, "count": indices, "type": "SCALAR" }
     ]);
-    let scene = json!({
+    let mut scene = json!({
         "asset": { "version": "2.0", "generator": "Echolume" },
         "scene": 0,
         "scenes": [{ "nodes": [0] }],
@@ -141,6 +159,14 @@ fn glb(mesh: &Mesh, colour: [u8; 3], file: &mut impl Write) -> io::Result<()> {
         ],
         "accessors": accessors
     });
+    if matches!(colours, Colours::OfPicture(_)) {
+        // They are lit already, and an open sheet is seen from behind as well.
+        scene["extensionsUsed"] = json!(["KHR_materials_unlit"]);
+        scene["materials"] = json!([{
+            "extensions": { "KHR_materials_unlit": {} }, "doubleSided": true,
+            "pbrMetallicRoughness": { "metallicFactor": 0.0, "roughnessFactor": 0.9 }
+        }]);
+    }
     // A buffer of no bytes is not allowed.
     let empty = json!({ "asset": scene["asset"], "scene": 0, "scenes": [{}] });
     let mut text = if has_mesh { scene } else { empty }.to_string().into_bytes();
@@ -158,8 +184,8 @@ fn glb(mesh: &Mesh, colour: [u8; 3], file: &mut impl Write) -> io::Result<()> {
     }
     file.write_all(&count(length, "bytes")?.to_le_bytes())?;
     file.write_all(b"BIN\0")?;
-    let [r, g, b] = colour.map(linear);
-    for (vertex, normal) in mesh.vertices.iter().zip(mesh.normals()) {
+    for (n, (vertex, normal)) in mesh.vertices.iter().zip(mesh.normals()).enumerate() {
+        let [r, g, b] = colours.of(n).map(linear);
         file.write_all(&three(*vertex))?;
         file.write_all(&three(normal))?;
         file.write_all(&[r, g, b, 255])?;
@@ -195,7 +221,7 @@ mod tests {
     fn written(ending: &str, mesh: &Mesh) -> Vec<u8> {
         let format = MeshFile::of(Path::new(&format!("mesh.{ending}"))).expect("known");
         let mut bytes = Vec::new();
-        format.put(mesh, [255, 128, 0], &mut bytes).expect("written");
+        format.put(mesh, Colours::One([255, 128, 0]), &mut bytes).expect("written");
         bytes
     }
 
@@ -248,6 +274,27 @@ mod tests {
         let empty = written("glb", &Mesh::default());
         assert_eq!(word(&empty, 8), empty.len());
         assert!(serde_json::from_slice::<serde_json::Value>(&empty[20..]).is_ok());
+    }
+
+    #[test]
+    fn colours_of_a_picture_are_those_of_their_vertices_and_not_lit_again() {
+        let colours = [[255, 128, 0], [0, 0, 255], [1, 2, 3], [255; 3]];
+        let mut ply = Vec::new();
+        MeshFile::Ply.put(&tetrahedron(), Colours::OfPicture(&colours), &mut ply).expect("written");
+        let end = ply.windows(11).position(|w| w == b"end_header\n").expect("a header") + 11;
+        let of = |n: usize| [0, 1, 2].map(|c| ply[end + 27 * n + 24 + c]);
+        assert_eq!([0, 1, 2, 3].map(of), colours);
+        let mut glb = Vec::new();
+        MeshFile::Glb.put(&tetrahedron(), Colours::OfPicture(&colours), &mut glb).expect("written");
+        let length = word(&glb, 12);
+        let scene: serde_json::Value = serde_json::from_slice(&glb[20..20 + length]).expect("JSON");
+        assert_eq!(scene["extensionsUsed"], json!(["KHR_materials_unlit"]));
+        assert!(scene["materials"][0]["extensions"]["KHR_materials_unlit"].is_object());
+        let first = 20 + length + 8 + 24;
+        assert_eq!(
+            (&glb[first..first + 4], &glb[first + 28..first + 32]),
+            (&[255, 55, 0, 255][..], &[0, 0, 255, 255][..])
+        );
     }
 
     #[test]

@@ -65,6 +65,12 @@ impl<'a> Picker<'a> {
         is_in.then(|| (place.map(|n| n as usize), self.rays.at(place[0] + 0.5, place[1] + 0.5)))
     }
 
+    /// The column and row of the picture that a ray's centre is in. It may be the first outside of the picture, where rays are coarser than
+    /// pixels.
+    pub fn pixel_of_ray(&self, ray: [usize; 2]) -> [usize; 2] {
+        std::array::from_fn(|a| ((ray[a] as f64 + 0.5) / self.rays_per_pixel + self.corner[a]) as usize)
+    }
+
     /// The position on the picture of a point in space; none behind the camera.
     pub fn project(&self, point: DVec3) -> Option<[f64; 2]> {
         let r = self.rays;

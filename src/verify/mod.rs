@@ -27,6 +27,7 @@ pub mod sampling;
 pub mod self_test;
 mod speed;
 pub mod stress;
+pub mod surface_nets;
 pub mod time_stamps;
 
 pub use compare::{Comparison, ExtraTolerance, compare_outputs, compare_picture, expect_same_picture};
@@ -47,6 +48,7 @@ use std::time::Instant;
 pub fn checks(level: Level) -> Vec<Check> {
     let groups = [
         passes::checks,
+        surface_nets::checks,
         sampling::checks,
         known_answers::checks,
         modes::checks,

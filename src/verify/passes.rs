@@ -126,7 +126,7 @@ pub(crate) fn in_scene(dut: &mut DeviceUnderTest, n: usize, scene: usize) -> Res
 
 /// Results of many dispatches of a pass.
 #[derive(Default)]
-struct PassSummary {
+pub(super) struct PassSummary {
     findings: Findings,
     runs: u32,
     failed: usize,
@@ -148,41 +148,46 @@ impl PassSummary {
             }
             for iteration in 0..(pass.repeat)(scene) {
                 let result = run_with_reference(dut.pass_runner(), scene, pass, iteration, kind, seed_of(pass, k))?;
-                let of = &result.comparison;
-                (self.largest, self.used) = (self.largest.max(of.largest), self.used.max(of.used));
-                (self.outliers, self.runs) = (self.outliers.max(of.outliers), self.runs + 1);
-                self.bias = self.bias.max(of.bias);
-                let is_biased = of.bias > MAX_BIAS;
-                if of.worst.is_none() && !is_biased {
-                    continue;
-                }
-                self.failed += 1;
-                if self.failed > MAX_FAULTS {
-                    continue;
-                }
-                let what = match &of.worst {
-                    Some(worst) => format!("{} texels of {} beyond tolerance", worst.beyond, worst.texels),
-                    None => format!("errors go one way: their mean is {:.2} of what is allowed of each", of.bias),
-                };
-                if let Some(worst) = &of.worst {
-                    let (e, g) = (result.expected.get(&worst.output), result.got.get(&worst.output));
-                    let mut picture = texel_comparison(&format!("{} of '{name}'", worst.output), e, g, worst.at[2]);
-                    picture.fault = Some(self.findings.faults.len());
-                    self.findings.pictures.push(picture);
-                }
-                self.findings.faults.push(Fault {
-                    what,
-                    pass: Some(pass.name.into()),
-                    input: format!("'{name}', iteration {iteration}, {kind}"),
-                    worst: of.worst.clone(),
-                    files: Vec::new(),
-                });
+                self.record(pass, name, iteration, kind, &result);
             }
         }
         Ok(())
     }
 
-    fn into_findings(self, pass: &Pass) -> Findings {
+    /// Adds one dispatch. `name`: of its scene; `kind`: of its inputs.
+    pub(super) fn record(&mut self, pass: &Pass, name: &str, iteration: u32, kind: &str, result: &DispatchComparison) {
+        let of = &result.comparison;
+        (self.largest, self.used) = (self.largest.max(of.largest), self.used.max(of.used));
+        (self.outliers, self.runs) = (self.outliers.max(of.outliers), self.runs + 1);
+        self.bias = self.bias.max(of.bias);
+        let is_biased = of.bias > MAX_BIAS;
+        if of.worst.is_none() && !is_biased {
+            return;
+        }
+        self.failed += 1;
+        if self.failed > MAX_FAULTS {
+            return;
+        }
+        let what = match &of.worst {
+            Some(worst) => format!("{} texels of {} beyond tolerance", worst.beyond, worst.texels),
+            None => format!("errors go one way: their mean is {:.2} of what is allowed of each", of.bias),
+        };
+        if let Some(worst) = &of.worst {
+            let (e, g) = (result.expected.get(&worst.output), result.got.get(&worst.output));
+            let mut picture = texel_comparison(&format!("{} of '{name}'", worst.output), e, g, worst.at[2]);
+            picture.fault = Some(self.findings.faults.len());
+            self.findings.pictures.push(picture);
+        }
+        self.findings.faults.push(Fault {
+            what,
+            pass: Some(pass.name.into()),
+            input: format!("'{name}', iteration {iteration}, {kind}"),
+            worst: of.worst.clone(),
+            files: Vec::new(),
+        });
+    }
+
+    pub(super) fn into_findings(self, pass: &Pass) -> Findings {
         let PassSummary { mut findings, runs, failed, largest, used, outliers, bias } = self;
         findings.expect(runs > 0, || format!("no scene needs '{}'", pass.name));
         findings.expect(failed <= MAX_FAULTS, || format!("{} more inputs beyond tolerance", failed - MAX_FAULTS));

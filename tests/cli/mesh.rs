@@ -9,6 +9,11 @@ const CENTRE: [f64; 3] = [3.0, -2.0, 11.0];
 
 /// Distances from the surface of a ball, positive within, on 21 x 19 x 18 voxels. `matrix`: directions of the axes.
 fn ball(folder: &Folder, name: &str, mirrored: bool) -> String {
+    volume(folder, name, mirrored, |depth| depth)
+}
+
+/// A volume of a function of the depth below the surface of the ball.
+fn volume(folder: &Folder, name: &str, mirrored: bool, value: impl Fn(f64) -> f64) -> String {
     let (size, spacing) = ([21, 19, 18], [0.8, 0.9, 1.0]);
     let hand = if mirrored { -1.0 } else { 1.0 };
     let origin = [CENTRE[0] - 8.0, CENTRE[1] - 8.0, CENTRE[2] - 8.4 * hand];
@@ -18,7 +23,7 @@ fn ball(folder: &Folder, name: &str, mirrored: bool) -> String {
         let steps = [1.0, 1.0, hand];
         let offset = (0..3).map(|a| origin[a] + steps[a] * spacing[a] * cell[a] as f64 - CENTRE[a]);
         let distance = offset.map(|d| d * d).sum::<f64>().sqrt();
-        samples.extend(((RADIUS - distance) as f32).to_le_bytes());
+        samples.extend((value(RADIUS - distance) as f32).to_le_bytes());
     }
     let [x, y, z] = origin;
     let header = format!(
@@ -184,4 +189,70 @@ fn a_segmentation_labels_the_voxels_from_the_threshold_on() {
         let all = [&["convert", &input], arguments].concat();
         refuses(&all, &run(&all), 2, &[named]);
     }
+}
+
+/// Vertices with their normals and colours, and the triangles, of a PLY file.
+type Ply = (Vec<([f64; 3], [f64; 3], [u8; 3])>, Vec<[usize; 3]>);
+
+fn ply(file: &str) -> Ply {
+    let bytes = fs::read(file).expect("a mesh");
+    let end = bytes.windows(11).position(|w| w == b"end_header\n").expect("a header") + 11;
+    let head = String::from_utf8_lossy(&bytes[..end]).into_owned();
+    let count = |what: &str| -> usize {
+        let line = head.lines().find_map(|line| line.strip_prefix(&format!("element {what} ")));
+        line.expect("a count").parse().expect("a number")
+    };
+    let split = end + 27 * count("vertex");
+    let float = |part: &[u8], n: usize| f64::from(f32::from_le_bytes(part[4 * n..4 * n + 4].try_into().expect("four")));
+    let vertex = |part: &[u8]| {
+        let three = |from: usize| [0, 1, 2].map(|n| float(part, from + n));
+        (three(0), three(3), [part[24], part[25], part[26]])
+    };
+    let corner =
+        |part: &[u8], n: usize| u32::from_le_bytes(part[1 + 4 * n..5 + 4 * n].try_into().expect("four")) as usize;
+    let triangle = |part: &[u8]| [0, 1, 2].map(|n| corner(part, n));
+    assert_eq!(bytes.len(), split + 13 * count("face"));
+    (bytes[end..split].chunks_exact(27).map(vertex).collect(), bytes[split..].chunks_exact(13).map(triangle).collect())
+}
+
+#[test]
+fn what_a_picture_shows_is_an_open_sheet_in_its_place_and_colours() {
+    let folder = Folder::new("sheet");
+    for (name, mirrored) in [("ball.mha", false), ("mirrored.mha", true)] {
+        let input = volume(&folder, name, mirrored, |depth| (0.5 + depth).clamp(0.0, 1.0));
+        let [sheet, picture] = ["sheet.ply", "p.png"].map(|file| folder.path(file));
+        let arguments = ["render", &input, "--mode", "sr", "--size", "90x90", "-o", &picture, "--mesh", &sheet];
+        let (code, out, err) = run(&arguments);
+        assert_eq!(code, Some(0), "{out}{err}");
+        let said = out.lines().find(|line| line.starts_with("mesh:")).unwrap_or_default();
+        assert!(said.contains("an open sheet of"), "{out}");
+        let (vertices, triangles) = ply(&sheet);
+        assert!(vertices.len() > 1000 && triangles.len() > 2000, "{said}");
+        let from_centre = |v: &[f64; 3]| [0, 1, 2].map(|axis| v[axis] - CENTRE[axis]);
+        let length = |v: [f64; 3]| v.iter().map(|v| v * v).sum::<f64>().sqrt();
+        let dot = |a: [f64; 3], b: [f64; 3]| (0..3).map(|n| a[n] * b[n]).sum::<f64>();
+        // The edge is 1 mm wide: the detector's peak lies where it ends, 0.5 mm inside, and further out on the rays that graze the ball.
+        let off: Vec<f64> = vertices.iter().map(|(v, ..)| length(from_centre(v)) - RADIUS).collect();
+        let mean = off.iter().sum::<f64>() / off.len() as f64;
+        assert!((-0.6..-0.4).contains(&mean), "{name}: {mean} mm off");
+        assert!(off.iter().all(|off| (-0.75..0.1).contains(off)), "{name}: {off:?}");
+        // It faces outwards, so that no triangle of the mirrored volume is turned round.
+        let outwards = vertices.iter().filter(|(v, normal, _)| dot(from_centre(v), *normal) > 0.0).count();
+        assert!(outwards * 100 > vertices.len() * 99, "{name}: {outwards} of {} face outwards", vertices.len());
+        // Half of the ball, from the probe's side: rows of the volume go along the second axis.
+        assert!(vertices.iter().all(|(v, ..)| from_centre(v)[1] < 1.5), "{name}: what is behind is in it");
+        let drawn = image::open(&picture).expect("a picture").to_rgb8();
+        let colours: HashSet<[u8; 3]> = drawn.pixels().map(|pixel| pixel.0).collect();
+        assert!(vertices.iter().all(|(.., colour)| colours.contains(colour)), "a colour that the picture has not");
+        let shades: HashSet<[u8; 3]> = vertices.iter().map(|(.., colour)| *colour).collect();
+        assert!(shades.len() > 20, "{} colours", shades.len());
+
+        let (code, _, err) = run(&["render", &input, "--mode", "mip", "-o", &picture, "--mesh", &sheet]);
+        assert!(code == Some(2) && err.contains("--mesh: this mode has no distance map"), "{err}");
+    }
+    let input = folder.path("ball.mha");
+    let (code, _, err) = run(&["render", &input, "--mesh", &folder.path("sheet.obj")]);
+    assert!(code == Some(2) && err.contains("must end in .stl, .ply or .glb"), "{err}");
+    let (code, _, err) = run(&["render", &input, "--turntable", "3", "-o", &folder.path("turn"), "--mesh", "x.ply"]);
+    assert!(code == Some(2) && err.contains("--mesh: is for one picture"), "{err}");
 }

@@ -3,38 +3,27 @@
 use crate::common::gpu::*;
 use echolume::gpu::pass_runner::PassRunner;
 use echolume::gpu::surface_net::{NetError, SurfaceNet};
+use echolume::gpu::{Bands, ContextOptions};
 use echolume::mesh::Mesh;
 use echolume::mesh::base::Base;
 use echolume::mesh::nets::{Surface, surface_net};
 use echolume::mesh::smooth::Smoother;
+use echolume::passes::fault_injection::Change;
 use echolume::passes::net::{self, NETS};
 use echolume::passes::{Arrays, DispatchArgs, Slot, Texels};
 use echolume::probe::{Geometry, Grid};
-use echolume::scene::{Lattice, Scene};
+use echolume::scene::default_look::{block_edge, smoothing};
+use echolume::scene::{EchoHistogram, Lattice};
 use echolume::source::convert::{Volume, lattice};
+use echolume::source::phantom::{Phantom, PhantomOptions};
 use echolume::source::{Frame, StoredType};
-
-use echolume::verify::passes::POISON;
-use echolume::verify::{self, ExtraTolerance};
-use glam::DVec3;
-use std::collections::{BTreeMap, HashMap};
+use echolume::verify::report::Level;
+use echolume::verify::surface_nets::whole;
+use echolume::verify::{self, DeviceUnderTest};
+use glam::{DVec3, I64Vec3};
+use std::collections::HashMap;
 use std::f64::consts::PI;
-
-fn whole(source: Geometry, stored: StoredType, grid: Grid, threshold: f64) -> Lattice {
-    Lattice {
-        source,
-        stored,
-        grid,
-        deviation: 0.0,
-        threshold,
-        closed: true,
-        left_out: 0,
-        filled_rows: None,
-        most: Lattice::MOST,
-        first: 0,
-        count: grid.size[2],
-    }
-}
+use std::sync::atomic::Ordering;
 
 /// A Cartesian volume of a function of the voxel, as floats, on its own lattice. Its frames.
 fn volume(size: [usize; 3], h: f64, value: impl Fn(DVec3) -> f64) -> (Lattice, Vec<Vec<u8>>) {
@@ -54,10 +43,7 @@ fn on_device(device: &Device, lattice: &Lattice, frames: &[Vec<u8>], base: Optio
 
 /// The same on the CPU in f64.
 fn on_cpu(lattice: &Lattice, frames: &[Vec<u8>], base: Option<usize>) -> Mesh {
-    let mut volume = Volume::new(lattice.source.clone(), lattice.stored);
-    for (slice, bytes) in frames.iter().enumerate() {
-        volume.take(Frame::of_slice(0, slice, bytes.clone()));
-    }
+    let volume = volume_of(lattice, frames);
     let grid = &lattice.grid;
     let reader = || {
         let mut smoother = Smoother::new(grid.size, grid.spacing, lattice.deviation);
@@ -93,6 +79,14 @@ fn on_cpu(lattice: &Lattice, frames: &[Vec<u8>], base: Option<usize>) -> Mesh {
     surface_net(size, surface, slice, |at| place(lattice, at)).expect("a mesh")
 }
 
+fn volume_of(lattice: &Lattice, frames: &[Vec<u8>]) -> Volume {
+    let mut volume = Volume::new(lattice.source.clone(), lattice.stored);
+    for (slice, bytes) in frames.iter().enumerate() {
+        volume.take(Frame::of_slice(0, slice, bytes.clone()));
+    }
+    volume
+}
+
 fn place(lattice: &Lattice, at: DVec3) -> DVec3 {
     DVec3::from(lattice.grid.origin) + at * DVec3::from(lattice.grid.spacing)
 }
@@ -118,126 +112,46 @@ fn same(a: &Mesh, b: &Mesh, far: f64, name: &str) {
     assert!(turned * 100 <= a.triangles.len(), "{name}: {turned} of {} triangles", a.triangles.len());
 }
 
-/// Every pass of a mesh, on the outputs of the references before it, in a scene.
-fn check_passes(runner: &mut PassRunner, scene: &Scene, name: &str) {
-    let lattice = scene.lattice.as_ref().expect("a lattice");
-    let mut noise = Noise(7);
-    let mut slots: BTreeMap<Slot, Texels> = BTreeMap::new();
-    let size = Slot::NetSamples.shape(scene).size();
-    let mut samples = Texels::from_fn(size, 1, |_, _| 0.0);
-    samples.values.iter_mut().for_each(|v| *v = noise.next());
-    slots.insert(Slot::NetSamples, samples);
-    for pass in NETS.iter().filter(|pass| pass.name != net::FILL.name || lattice.filled_rows.is_some()) {
-        for iteration in 0..(pass.repeat)(scene) {
-            let layers = lattice.cells()[2];
-            let mut args = DispatchArgs { iteration, ..DispatchArgs::default() };
-            if pass.name == net::CELLS.name {
-                // Neither the first layer nor the last.
-                args = DispatchArgs { slice: 1, slices: (layers - 1).min(layers.max(3) - 2), ..args };
-                let counts: Vec<u32> = slots[&Slot::NetCounts].values.iter().map(|n| *n as u32).collect();
-                let (firsts, fitting) = net::firsts(scene, &counts, 1);
-                assert_eq!(fitting, layers as usize - 1);
-                let [rows, layers, _] = Slot::NetFirsts.shape(scene).size();
-                slots.insert(
-                    Slot::NetFirsts,
-                    Texels::from_fn([rows, layers, 1], 1, |[x, y, _], _| f64::from(firsts[y * rows + x])),
-                );
-            }
-            if pass.name == net::VERTICES.name {
-                args.slices = 3;
-                slots.insert(Slot::NetAsked, asked(scene, &slots[&Slot::NetCrossed]));
-            }
-            let mut inputs = Arrays::default();
-            for bind in pass.reads(scene, &args) {
-                if let Some(texels) = slots.get(&bind.slot) {
-                    // What the format stores, for both.
-                    let format = bind.slot.format(scene);
-                    inputs.insert(bind.name, Texels::decode(texels.size, format, &texels.encode(format)));
-                }
-            }
-            let writes = pass.writes(scene, &args);
-            let mut expected = Arrays::default();
-            for bind in &writes {
-                let channels = bind.slot.format(scene).channels();
-                expected.insert(bind.name, Texels::untouched(bind.slot.array_size(scene), channels));
-            }
-            pass.reference(scene, &args, &inputs, &mut expected);
-            let got = runner.run(scene, pass, &args, &inputs, poison(pass.name)).expect("dispatch");
-            let compared = verify::compare_outputs(
-                pass,
-                scene,
-                ExtraTolerance::default(),
-                poison(pass.name),
-                &expected,
-                &got,
-                &writes,
-            );
-            println!("{name}, {} {iteration}: {:.2e}, {:.1e} off", pass.name, compared.largest, compared.outliers);
-            assert!(compared.worst.is_none(), "{name}, {}: {:?}", pass.name, compared.worst);
-            for bind in &writes {
-                let texels = expected.get(bind.name).clone();
-                let known = texels.values.iter().map(|v| if v.is_nan() { 0.0 } else { *v }).collect();
-                slots.insert(bind.slot, Texels { values: known, ..texels });
-            }
-        }
-    }
-}
-
-/// Integers cannot hold every number.
-fn poison(pass: &str) -> f64 {
-    if pass == net::COUNT.name || pass == net::CELLS.name { 77.0 } else { POISON }
-}
-
-/// The crossed edges of listed cells.
-fn asked(scene: &Scene, crossed: &Texels) -> Texels {
-    let size = Slot::NetAsked.shape(scene).size();
-    let mut asked = Texels::from_fn(size, 2, |_, _| 0.0);
-    for (n, cell) in crossed.values.chunks_exact(2).enumerate().take(3 * size[0]) {
-        let (column, inside) = (cell[0] as u32 & 0xffff, cell[0] as u32 >> 16 & 0xff);
-        let corner = |edge: u32| {
-            let axis = edge / 4;
-            (edge & 1) << ((axis + 1) % 3) | (edge >> 1 & 1) << ((axis + 2) % 3)
-        };
-        let is_crossed = |edge: &u32| {
-            let low = corner(*edge);
-            (inside >> low ^ inside >> (low | 1 << (edge / 4))) & 1 == 1
-        };
-        let edges = (0..12).filter(is_crossed).fold(0, |bits, edge| bits | 1 << edge);
-        asked.values[2 * n] = f64::from(column | edges << 16);
-        asked.values[2 * n + 1] = cell[1];
-    }
-    asked
-}
-
+/// The checks of `echolume verify --full`: every pass in every geometry, and a ball.
 #[test]
 fn every_pass_of_a_mesh_matches_its_reference() {
     let device = Device::new();
-    let mut runner = PassRunner::new(&device).expect("a runner");
-    for (name, geometry) in geometries() {
-        let (low, high) = match &geometry {
-            Geometry::Sweep(probe) => probe.bounds(),
-            Geometry::Cartesian(grid) => {
-                let last = DVec3::from_array(grid.size.map(|n| (n - 1) as f64)) * DVec3::from(grid.spacing);
-                (DVec3::from(grid.origin), DVec3::from(grid.origin) + last)
-            }
-        };
-        let spacing = (high - low).max_element() / 37.0;
-        let grid = lattice(&geometry, spacing).expect("a lattice");
-        let all = whole(geometry.clone(), StoredType::F32, grid, 0.5);
-        check_passes(&mut runner, &all.clone().scene().expect("a scene"), &format!("{name}, closed"));
-        let more = Lattice {
-            deviation: 1.3 * spacing,
-            closed: false,
-            left_out: 3,
-            filled_rows: Some(grid.size[1] + 5),
-            ..all
-        };
-        check_passes(&mut runner, &more.clone().scene().expect("a scene"), &format!("{name}, smoothed and filled"));
-        // A slab in the middle.
-        let slab = more.slab((grid.size[2] / 2 - 1, 3.min(grid.size[2] / 2 + 1)));
-        if grid.size[2] > 8 {
-            check_passes(&mut runner, &slab.scene().expect("a scene"), &format!("{name}, a slab"));
-        }
+    println!("device: {}", device.describe());
+    let options = ContextOptions { device: chosen(), validation: true, specialize: true, ..ContextOptions::default() };
+    let mut bench = DeviceUnderTest::new(&options, Level::Full).expect("bench");
+    let checks = verify::surface_nets::checks(Level::Full);
+    assert_eq!(checks.len(), NETS.len() + 1);
+    let run = verify::run(&mut bench, &checks, || None, |_| ());
+    for outcome in &run.outcomes {
+        let figures = outcome.figures.iter().map(|figure| format!("{} {:.2e}", figure.what, figure.value));
+        println!("{:14} {}; {}", outcome.name, figures.collect::<Vec<_>>().join(", "), outcome.notes.join(" "));
+    }
+    let failures: Vec<_> = run.failures().map(|o| format!("{}: {:?}", o.name, o.faults)).collect();
+    assert!(failures.is_empty(), "{}", failures.join("\n"));
+}
+
+/// Faults of a device that the quick checks notice, each by the pass that it is in.
+#[test]
+fn a_wrong_pass_of_a_mesh_is_noticed() {
+    let options = ContextOptions { device: chosen(), ..ContextOptions::default() };
+    let sound = DeviceUnderTest::new(&options, Level::Quick).expect("bench");
+    let faults = [
+        ("net_sample", Change::Constant { pass: "net_sample", name: "ARRAY", by: |array| 1 - array }),
+        ("net_smooth", Change::Constant { pass: "net_smooth", name: "AXIS", by: |axis| (axis + 1) % 3 }),
+        ("net_survey", Change::Extent { pass: "net_survey", by: |extent| extent[1] = 1 }),
+        ("net_fill", Change::LeftOut { pass: "net_fill", which: |_, _| true }),
+        ("net_count", Change::Constant { pass: "net_count", name: "CLOSED", by: |closed| 1 - closed }),
+        ("net_cells", Change::DispatchArgs { pass: "net_cells", by: |_, args| args.slices -= 1 }),
+        ("net_vertices", Change::LeftOut { pass: "net_vertices", which: |_, _| true }),
+    ];
+    assert_eq!(faults.each_ref().map(|(pass, _)| *pass).to_vec(), NETS.iter().map(|p| p.name).collect::<Vec<_>>());
+    for (pass, change) in faults {
+        let mut faulty = sound.with_fault(change).expect("bench");
+        let checks = verify::surface_nets::checks(Level::Quick);
+        let run = verify::run(&mut faulty, &checks, || None, |_| ());
+        let noticed: Vec<_> = run.failures().map(|o| o.name.as_str()).collect();
+        assert!(noticed.contains(&pass), "{pass}: {noticed:?}");
+        assert!(noticed.iter().all(|name| [pass, "a ball"].contains(name)), "{pass}: {noticed:?}");
     }
 }
 
@@ -344,17 +258,30 @@ fn a_body_in_a_sweep_is_the_mesh_of_the_cpu() {
     }
 }
 
+/// Vertices by the cube of 0.5 mm that they are in.
+type Bins = HashMap<I64Vec3, Vec<DVec3>>;
+
+fn bin(v: DVec3) -> I64Vec3 {
+    (v / 0.5).floor().as_i64vec3()
+}
+
+fn bins(mesh: &Mesh) -> Bins {
+    let mut bins = Bins::new();
+    mesh.vertices.iter().for_each(|v| bins.entry(bin(*v)).or_default().push(*v));
+    bins
+}
+
+/// Distance to the nearest vertex, at most 0.5 mm.
+fn nearest(bins: &Bins, v: DVec3) -> f64 {
+    let around = (0..27).map(|n| bin(v) + I64Vec3::new(n % 3 - 1, n / 3 % 3 - 1, n / 9 - 1));
+    around.filter_map(|b| bins.get(&b)).flatten().map(|other| other.distance(v)).fold(0.5, f64::min)
+}
+
 /// Two meshes of values that are about equal. A place at the border of the sector may be known to one alone, and a value at the threshold
 /// inside of one alone: few vertices may have no other near, and no share of the surface is missing.
 fn near(a: &Mesh, b: &Mesh, name: &str) {
-    let bin = |v: DVec3| (v / 0.5).floor().as_i64vec3();
-    let mut bins: HashMap<_, Vec<DVec3>> = HashMap::new();
-    b.vertices.iter().for_each(|v| bins.entry(bin(*v)).or_default().push(*v));
-    let nearest = |v: DVec3| {
-        let around = (0..27).map(|n| bin(v) + glam::I64Vec3::new(n % 3 - 1, n / 3 % 3 - 1, n / 9 - 1));
-        around.filter_map(|b| bins.get(&b)).flatten().map(|other| other.distance(v)).fold(0.5, f64::min)
-    };
-    let mut far: Vec<f64> = a.vertices.iter().map(|v| nearest(*v)).collect();
+    let bins = bins(b);
+    let mut far: Vec<f64> = a.vertices.iter().map(|v| nearest(&bins, *v)).collect();
     far.sort_by(f64::total_cmp);
     let at = |share: f64| far[((far.len() - 1) as f64 * share) as usize];
     let area = a.area() / b.area() - 1.0;
@@ -371,6 +298,212 @@ fn near(a: &Mesh, b: &Mesh, name: &str) {
     let count = a.vertices.len() as f64 / b.vertices.len() as f64 - 1.0;
     assert!(count.abs() < 2e-3 && area.abs() < 2e-3, "{name}: {count}, {area}");
     assert!(at(0.98) < 5e-3, "{name}: {}", at(0.98));
+}
+
+/// Every pass in bands of one row of workgroups leaves the mesh of undivided dispatches.
+#[test]
+fn bands_leave_the_mesh_of_one_dispatch() {
+    let device = Device::alone();
+    let geometry = Geometry::Sweep(wobbler());
+    let scene = scene(geometry.clone(), BYTES, "mode = 'vr'");
+    let body = |p: DVec3| 0.5 + 0.2 * (0.4 * p.x).sin() + 0.2 * (0.31 * p.y).cos() + 0.1 * (0.5 * p.z).sin();
+    let frames: Vec<Vec<u8>> =
+        body_frames(&scene, body).iter().map(|frame| frame.encode(frame_format(&scene))).collect();
+    let grid = lattice(&geometry, 1.7).expect("a lattice");
+    let lattice = Lattice { deviation: 1.8, ..whole(geometry, StoredType::U8, grid, 100.3) };
+    let made = |bands: Bands| {
+        let before = device.counts.dispatches.load(Ordering::Relaxed);
+        let mut net = SurfaceNet::in_bands(&device, lattice.clone(), &frames, bands).expect("a device that can");
+        let rows = net.deepest(|| ()).expect("a survey").expect("something is inside") + 3;
+        let mesh = net.mesh(Some(rows), |at| place(&lattice, at), || ()).expect("a mesh");
+        let times: Vec<_> = net.take_times().iter().map(|time| (time.name, time.runs)).collect();
+        (mesh, times, device.counts.dispatches.load(Ordering::Relaxed) - before)
+    };
+    let (whole, times, dispatches) = made(Bands::default());
+    assert!(whole.triangles.len() > 1000, "{} triangles", whole.triangles.len());
+    let (parts, in_bands, more) = made(Bands::Fixed(64));
+    println!("{dispatches} and {more} dispatches; {times:?}; {in_bands:?}");
+    assert!(whole == parts, "bands change the mesh");
+    for pass in NETS {
+        let runs = |times: &[(&str, u32)]| times.iter().find(|(name, _)| *name == pass.name).map(|(_, runs)| *runs);
+        assert!(runs(&in_bands) > runs(&times), "{} is not divided", pass.name);
+    }
+}
+
+/// Why vertices of a device and of the CPU lie apart.
+#[derive(Debug, Default)]
+struct Apart {
+    vertices: usize,
+    /// Without a vertex of the other within [`FAR`].
+    far: usize,
+    /// Of them in a cell with a corner whose value depends on whether a place at the border of the sector is known.
+    at_border: usize,
+    /// Of the others in a cell with a corner whose value is near the threshold.
+    at_threshold: usize,
+    /// Of neither kind.
+    unexplained: usize,
+    /// Largest difference of a value that is not at the border, stored units.
+    largest: f64,
+    /// How near the threshold is near, stored units.
+    near: f64,
+}
+
+/// Distance of vertices that counts as far, mm.
+const FAR: f64 = 0.01;
+
+/// Looks for the reason of every vertex that is far from those of the other mesh.
+///
+/// Values of a device differ by at most e from those of the CPU, except at the border of the sector. Let two ends of an edge be p below and q
+/// above the threshold, both by more than n > e. Then their signs are the same on both, so that the same edges are crossed. A crossing at the
+/// share p / (p + q) of the edge moves by at most e / (p + q - 2 e) < e / (2 n - 2 e). With n = e (1 + 1 / (2 s)) that is the share s. A vertex,
+/// as a mean of crossings, moves by no more: by at most [`FAR`] with s = FAR / spacing. So a vertex that moves further belongs to a cell with a
+/// corner within n of the threshold.
+fn apart(device: &Device, lattice: &Lattice, frames: &[Vec<u8>]) -> Apart {
+    let [ours, theirs] = [values_on_device(device, lattice, frames), values_on_cpu(lattice, frames)];
+    let sharp = Lattice { deviation: 0.0, ..lattice.clone() };
+    let [known, expected] = [values_on_device(device, &sharp, frames), values_on_cpu(&sharp, frames)];
+    let [width, height, depth] = lattice.grid.size;
+    let index = |[x, y, z]: [usize; 3]| x + width * (y + height * z);
+    // Known to one alone, and what smoothing makes of that.
+    let mut at_border = vec![false; known.len()];
+    let reach = lattice.reach();
+    for z in 0..depth {
+        for (x, y) in (0..height).flat_map(|y| (0..width).map(move |x| (x, y))) {
+            let at = index([x, y, z]);
+            if known[at].is_nan() == expected[at].is_nan() {
+                continue;
+            }
+            assert!(is_at_border(lattice, [x, y, z]), "{:?} is known to one alone", [x, y, z]);
+            let range = |n: usize, reach: usize, size: usize| n.saturating_sub(reach)..(n + reach + 1).min(size);
+            for k in range(z, reach[2], depth) {
+                for j in range(y, reach[1], height) {
+                    range(x, reach[0], width).for_each(|i| at_border[index([i, j, k])] = true);
+                }
+            }
+        }
+    }
+    let differences = ours.iter().zip(&theirs).zip(&at_border).filter(|(_, at_border)| !**at_border);
+    let largest = differences.fold(0.0, |most: f64, ((a, b), _)| {
+        assert_eq!(a.is_nan(), b.is_nan(), "a voxel that is known to one alone");
+        if a.is_nan() { most } else { most.max((a - b).abs()) }
+    });
+    let spacing = lattice.grid.spacing.into_iter().fold(0.0, f64::max);
+    let near = largest * (1.0 + spacing / (2.0 * FAR));
+
+    let meshes = [on_device(device, lattice, frames, None), on_cpu(lattice, frames, None)];
+    let mut apart = Apart { largest, near, ..Apart::default() };
+    for (mesh, other) in [(&meshes[0], &meshes[1]), (&meshes[1], &meshes[0])] {
+        let bins = bins(other);
+        for vertex in &mesh.vertices {
+            apart.vertices += 1;
+            if nearest(&bins, *vertex) <= FAR {
+                continue;
+            }
+            apart.far += 1;
+            // The corners of every cell that the vertex may belong to: it may lie on a face.
+            let at = (*vertex - DVec3::from(lattice.grid.origin)) / DVec3::from(lattice.grid.spacing);
+            let [low, high] = [(at - 1e-4).floor(), (at + 1e-4).floor() + 1.0].map(|v| v.to_array());
+            let range = |axis: usize| {
+                let last = lattice.grid.size[axis] as f64 - 1.0;
+                low[axis].clamp(0.0, last) as usize..=high[axis].clamp(0.0, last) as usize
+            };
+            let (mut border, mut threshold) = (false, false);
+            for z in range(2) {
+                for (x, y) in range(1).flat_map(|y| range(0).map(move |x| (x, y))) {
+                    let corner = index([x, y, z]);
+                    border |= at_border[corner];
+                    threshold |= (theirs[corner] - lattice.threshold).abs() <= near;
+                }
+            }
+            match (border, threshold) {
+                (true, _) => apart.at_border += 1,
+                (false, true) => apart.at_threshold += 1,
+                (false, false) => apart.unexplained += 1,
+            }
+        }
+    }
+    apart
+}
+
+/// True for a voxel whose place is within 1e-3 of a sample of the border of the sector.
+fn is_at_border(lattice: &Lattice, at: [usize; 3]) -> bool {
+    let Geometry::Sweep(probe) = &lattice.source else { return false };
+    let index = probe.to_indices(place(lattice, DVec3::from_array(at.map(|n| n as f64))));
+    let last = lattice.samples().map(|n| f64::from(n) - 1.0);
+    let near = |index: f64, last: f64| index.abs().min((index - last).abs()) < 1e-3;
+    near(index.sample, last[0]) || near(index.line, last[1]) || near(index.slice, last[2])
+}
+
+/// The values of a lattice as the passes make them, NaN where they are not known.
+fn values_on_device(device: &Device, lattice: &Lattice, frames: &[Vec<u8>]) -> Vec<f64> {
+    let mut runner = PassRunner::new(device).expect("a runner");
+    let scene = lattice.clone().scene().expect("a scene");
+    let (slot, args) = (Slot::NetSamples, DispatchArgs::default());
+    let samples = Texels::decode(slot.shape(&scene).size(), slot.format(&scene), &frames.concat());
+    let mut inputs = Arrays::default();
+    inputs.insert("net_samples", samples);
+    let made = runner.run(&scene, &net::SAMPLE, &args, &inputs, 0.0).expect("a dispatch");
+    let mut values = made.get("net_values").clone();
+    for iteration in 0..(net::SMOOTH.repeat)(&scene) {
+        let mut inputs = Arrays::default();
+        inputs.insert("source", values);
+        let made = runner.run(&scene, &net::SMOOTH, &DispatchArgs { iteration, ..args }, &inputs, 0.0);
+        values = made.expect("a dispatch").get("target").clone();
+    }
+    values.values.into_iter().map(|value| if value < -3e38 { f64::NAN } else { value }).collect()
+}
+
+fn values_on_cpu(lattice: &Lattice, frames: &[Vec<u8>]) -> Vec<f64> {
+    let volume = volume_of(lattice, frames);
+    let grid = &lattice.grid;
+    let mut smoother = Smoother::new(grid.size, grid.spacing, lattice.deviation);
+    let mut values = vec![0.0; grid.size.iter().product()];
+    for (z, out) in values.chunks_exact_mut(grid.size[0] * grid.size[1]).enumerate() {
+        smoother.slice(z, out, |z, out| volume.slice(grid, z, out));
+    }
+    values
+}
+
+/// A plateau at the threshold itself, slopes on both sides of it, and the border of the sector.
+#[test]
+fn a_vertex_far_from_the_cpus_has_a_corner_at_the_threshold_or_at_the_border() {
+    let device = Device::new();
+    let geometry = Geometry::Sweep(wobbler());
+    let scene = scene(geometry.clone(), BYTES, "mode = 'vr'");
+    let body = |p: DVec3| {
+        let wave = 0.2 * (0.4 * p.x).sin() + 0.2 * (0.31 * p.y).cos() + 0.1 * (0.5 * p.z).sin();
+        (100.0 + 255.0 * wave.signum() * (wave.abs() - 0.05).max(0.0)) / 255.0
+    };
+    let frames: Vec<Vec<u8>> =
+        body_frames(&scene, body).iter().map(|frame| frame.encode(frame_format(&scene))).collect();
+    let grid = lattice(&geometry, 0.7).expect("a lattice");
+    for (deviation, threshold) in [(0.0, 100.0), (0.0, 103.4), (1.2, 100.0), (1.2, 90.0)] {
+        let lattice = Lattice { deviation, ..whole(geometry.clone(), StoredType::U8, grid, threshold) };
+        let found = apart(&device, &lattice, &frames);
+        println!("{deviation} mm, threshold {threshold}: {found:?}");
+        assert_eq!(found.unexplained, 0, "{found:?}");
+        assert!(found.vertices > 10_000 && found.largest < 2e-4 * 255.0 && found.near < 2.0, "{found:?}");
+        assert!(deviation > 0.0 || threshold > 100.0 || found.at_threshold > 100, "{found:?}");
+    }
+}
+
+/// The mesh of docs/performance.md. It takes minutes: run with --ignored.
+#[test]
+#[ignore = "takes minutes"]
+fn far_vertices_of_the_phantom_are_at_the_threshold_or_at_the_border() {
+    let device = Device::watched(false);
+    let phantom = Phantom::new(PhantomOptions::default()).expect("a phantom");
+    let geometry = Geometry::Sweep(phantom.probe(0));
+    let grid = lattice(&geometry, 0.6).expect("a lattice");
+    let frames: Vec<Vec<u8>> = phantom.volume(0).into_iter().map(|frame| frame.bytes).collect();
+    let mut histogram = EchoHistogram::new(&geometry, BYTES, block_edge(&geometry));
+    frames.iter().for_each(|frame| histogram.take(frame));
+    let threshold = 255.0 * histogram.levels().expect("two classes").threshold;
+    let deviation = smoothing(&geometry);
+    let lattice = Lattice { deviation, ..whole(geometry, StoredType::U8, grid, threshold) };
+    let found = apart(&device, &lattice, &frames);
+    println!("threshold {threshold}, {deviation} mm: {found:?}");
+    assert_eq!(found.unexplained, 0, "{found:?}");
 }
 
 #[test]
