@@ -24,7 +24,7 @@ use std::collections::{BTreeMap, HashMap, HashSet};
 use std::f64::consts::PI;
 
 /// Rows of a list that the dispatch of vertices fills.
-const LIST_ROWS: u32 = 3;
+const LIST_ROWS: u32 = 48;
 
 /// One check per pass, and a ball.
 pub fn checks(_: Level) -> Vec<Check> {
