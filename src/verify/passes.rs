@@ -265,13 +265,21 @@ fn input(scene: &Scene, bind: &Bind, slices: u32, kind: &str, noise: &mut Noise)
     Texels::decode(size, format, &texels.encode(format))
 }
 
+/// The mean of 5 x 5 x 5 samples, with more contrast. One axis after another: 15 samples each instead of 125.
 fn blurred(noise: &Texels) -> Texels {
+    let along = |texels: &Texels, axis: usize| {
+        Texels::from_fn(texels.size, 1, |at, _| {
+            let near = (-2..=2).map(|by| {
+                let mut at = at.map(|n| n as i64);
+                at[axis] += by;
+                texels.clamped(at[0], at[1], at[2])
+            });
+            near.sum()
+        })
+    };
+    let sums = (0..3).fold(noise.clone(), |sums, axis| along(&sums, axis));
     Texels::from_fn(noise.size, 1, |[x, y, z], _| {
-        let mut sum = 0.0;
-        for (dx, dy, dz) in (0..125).map(|i| (i % 5 - 2, i / 5 % 5 - 2, i / 25 - 2)) {
-            sum += noise.clamped(x as i64 + dx, y as i64 + dy, z as i64 + dz);
-        }
-        (0.5 + 4.0 * (sum / 125.0 - 0.5)).clamp(0.0, 1.0)
+        (0.5 + 4.0 * (sums.clamped(x as i64, y as i64, z as i64) / 125.0 - 0.5)).clamp(0.0, 1.0)
     })
 }
 
