@@ -14,7 +14,7 @@ use egui::{Align2, Color32, FontId, Painter, Pos2, Rect, Stroke, Ui, Vec2, pos2,
 use glam::DVec3;
 
 /// A smaller tile has no axes, points: they would lie over the anatomy.
-const MIN_FOR_AXES: f32 = 400.0;
+const MIN_FOR_AXES: f32 = 480.0;
 /// A smaller picture has no colour bar, points.
 const MIN_FOR_COLOURS: f32 = 300.0;
 /// A smaller tile has no scale either, points.
