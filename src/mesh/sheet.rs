@@ -5,8 +5,8 @@ use super::Mesh;
 use glam::DVec3;
 use std::collections::HashSet;
 
-/// Steepest surface that is not torn: its slope across a ray, tan 80 deg. A surface that is seen more edge-on than that is hardly seen.
-const STEEPEST: f64 = 5.67;
+/// Steepest surface between rays that is one surface: its slope across a ray, tan 80 deg. A surface that is seen more edge-on than that is hardly seen.
+pub(crate) const STEEPEST: f64 = 5.67;
 
 /// The sheet of a distance map of `size` rays. `ray`: origin and unit direction of the ray in a column and row, mm. `distances`: along the
 /// rays in rows, mm; none where nothing was hit. Returns the mesh, anticlockwise as seen along the rays, and the ray of each vertex.

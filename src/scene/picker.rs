@@ -52,6 +52,11 @@ impl<'a> Picker<'a> {
         self.rays.at(x, y)
     }
 
+    /// Origin and unit direction of the ray of a column and row.
+    pub fn ray_at(&self, [x, y]: [usize; 2]) -> (DVec3, DVec3) {
+        self.rays.at(x as f64 + 0.5, y as f64 + 0.5)
+    }
+
     /// A position on the picture in rays from the first.
     fn in_rays(&self, at: [f64; 2]) -> [f64; 2] {
         std::array::from_fn(|a| (at[a] - self.corner[a]) * self.rays_per_pixel)
@@ -63,6 +68,14 @@ impl<'a> Picker<'a> {
         let place = self.in_rays(at).map(f64::floor);
         let is_in = (0..2).all(|a| place[a] >= 0.0 && place[a] < f64::from(rays[a]));
         is_in.then(|| (place.map(|n| n as usize), self.rays.at(place[0] + 0.5, place[1] + 0.5)))
+    }
+
+    /// The column and row of the first of the four rays around a position on the picture, and how far it is from that to the others, 0..1; none
+    /// where one of them is not there. `rays`: their number along each axis.
+    pub fn rays_around(&self, at: [f64; 2], rays: [u32; 2]) -> Option<([usize; 2], [f64; 2])> {
+        let place = self.in_rays(at).map(|n| n - 0.5);
+        let is_in = (0..2).all(|a| place[a] >= 0.0 && place[a] + 1.0 < f64::from(rays[a]));
+        is_in.then(|| (place.map(|n| n as usize), place.map(f64::fract)))
     }
 
     /// The column and row of the picture that a ray's centre is in. It may be the first outside of the picture, where rays are coarser than

@@ -60,9 +60,18 @@ impl Loop<'_> {
         }
     }
 
+    /// Volumes a second as they were acquired, between the marks. A rate that some of the volumes do not state would be a guess.
+    fn rate(&self) -> Option<f64> {
+        let (range, volumes) = (self.range(), self.volumes);
+        let has_times = range.clone().all(|index| volumes.get(index).and_then(begins).is_some());
+        let intervals = (*range.start()..*range.end()).filter_map(|index| interval(volumes, index));
+        let known = Some(intervals.collect::<Vec<f64>>()).filter(|known| has_times && !known.is_empty());
+        known.map(|intervals| intervals.len() as f64 / intervals.iter().sum::<f64>())
+    }
+
     /// Volumes a second as they are played.
     pub(super) fn played_rate(&self) -> f64 {
-        CinePlayer::default().state(*self, None).rate.unwrap_or(1.0 / UNKNOWN_INTERVAL) * self.cine.speed
+        self.rate().unwrap_or(1.0 / UNKNOWN_INTERVAL) * self.cine.speed
     }
 }
 
@@ -154,10 +163,6 @@ impl CinePlayer {
             begins(volumes.get(index)?)?;
             (0..index).map(step).try_fold(0.0, |sum, step| Some(sum + step?))
         };
-        // A rate that some of the volumes do not state would be a guess.
-        let has_times = range.clone().all(|index| volumes.get(index).and_then(begins).is_some());
-        let intervals = (*range.start()..*range.end()).filter_map(|index| interval(volumes, index));
-        let intervals = Some(intervals.collect::<Vec<f64>>()).filter(|known| has_times && !known.is_empty());
         CineState {
             count: volumes.len(),
             shown,
@@ -167,7 +172,7 @@ impl CinePlayer {
             speed: of.cine.speed,
             goes_back_and_forth: of.cine.back_and_forth,
             seconds: shown.and_then(since).filter(|s| s.is_finite() && *s >= 0.0),
-            rate: intervals.map(|intervals| intervals.len() as f64 / intervals.iter().sum::<f64>()),
+            rate: of.rate(),
         }
     }
 }

@@ -146,6 +146,24 @@ impl Desk {
     }
 }
 
+impl Desk {
+    /// Presses a key while Ctrl is held.
+    pub fn control(&self, key: impl Into<u32>) {
+        self.press(CONTROL, true);
+        self.tap(key);
+        self.press(CONTROL, false);
+    }
+
+    /// Saves a workspace into this folder, which has none yet.
+    pub fn save_workspace(&self, folder: &str) -> PathBuf {
+        self.control('s');
+        until("the workspace", || {
+            let entries = std::fs::read_dir(folder).into_iter().flatten().flatten();
+            entries.map(|entry| entry.path()).find(|path| path.extension().is_some_and(|end| end == "toml"))
+        })
+    }
+}
+
 impl Drop for Desk {
     fn drop(&mut self) {
         for child in self.manager.iter_mut().chain([&mut self.server]) {
@@ -205,6 +223,15 @@ impl View<'_> {
     /// Waits until a part of the window shows exactly the same part, from `from` on, of the expected picture.
     pub fn shows_part(&self, wanted: &Picture, from: [u32; 2], size: [u32; 2], what: &str) {
         self.shows_at(wanted, from, from, size, what);
+    }
+
+    /// Waits until the middle of the picture between the panels, which has no marks, equals that of a headless one.
+    pub fn shows_middle(&self, wanted: &Picture, what: &str) {
+        let (_, window) = self.place();
+        let (corner, size) = echolume::ui::panels::picture_area(window.map(u32::from), 1.0, true);
+        assert_eq!([wanted.width, wanted.height], size);
+        let (from, middle) = (size.map(|n| n / 4), size.map(|n| n / 2));
+        self.shows_at(wanted, [corner[0] + from[0], corner[1] + from[1]], from, middle, what);
     }
 
     pub fn shows_at(&self, wanted: &Picture, corner: [u32; 2], from: [u32; 2], size: [u32; 2], what: &str) {

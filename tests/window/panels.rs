@@ -14,15 +14,6 @@ fn picture() -> ([u32; 2], [u32; 2]) {
     echolume::ui::panels::picture_area(WINDOW, 1.0, true)
 }
 
-/// Waits until the middle of the picture, which has no marks, equals that of a headless one.
-fn shows(view: &View, wanted: &Picture, what: &str) {
-    let (corner, size) = picture();
-    assert_eq!([wanted.width, wanted.height], size);
-    let from = size.map(|n| n / 4);
-    let middle = size.map(|n| n / 2);
-    view.shows_at(wanted, [corner[0] + from[0], corner[1] + from[1]], from, middle, what);
-}
-
 fn open(desk: &Desk) -> View<'_> {
     desk.view(&["--size", "1000x700", "--source", SWEEP])
 }
@@ -33,17 +24,17 @@ fn buttons_act_on_the_picture_and_reset_takes_it_all_back() {
     let view = open(&desk);
     let (_, size) = picture();
     let start = headless(size, &[]);
-    shows(&view, &start, "the start");
+    view.shows_middle(&start, "the start");
     // The second button of the first row of modes, below undo, redo and presets.
     view.click(155, 151);
-    shows(&view, &headless(size, &["--mode", "vr"]), "volume");
+    view.shows_middle(&headless(size, &["--mode", "vr"]), "volume");
     // Reset, by its key: Backspace; undo and redo by their buttons.
     desk.tap(0xff08_u32);
-    shows(&view, &start, "reset");
+    view.shows_middle(&start, "reset");
     view.click(54, 28);
-    shows(&view, &headless(size, &["--mode", "vr"]), "what was before the reset");
+    view.shows_middle(&headless(size, &["--mode", "vr"]), "what was before the reset");
     view.click(155, 28);
-    shows(&view, &start, "reset again");
+    view.shows_middle(&start, "reset again");
     view.leave();
 }
 
@@ -57,17 +48,17 @@ fn a_switch_shows_the_echoes_of_the_clip_face_and_undo_takes_it_back() {
         ["true", "false"].map(|is| headless(size, &[&clipped[..], &["--set", &format!("cap.enabled={is}")]].concat()));
     assert_ne!(on, off);
     let view = desk.view(&[&["--size", "1000x700", "--source", SWEEP][..], &clipped].concat());
-    shows(&view, &on, "the echoes");
+    view.shows_middle(&on, "the echoes");
     // The switch below the heading of the clip, which follows the controls in front.
     view.click(954, 486);
-    shows(&view, &off, "the lit inside");
+    view.shows_middle(&off, "the lit inside");
     let control_z = |view: &View| {
         view.desk.press(CONTROL, true);
         view.desk.tap('z');
         view.desk.press(CONTROL, false);
     };
     control_z(&view);
-    shows(&view, &on, "the echoes again");
+    view.shows_middle(&on, "the echoes again");
     view.leave();
 }
 
@@ -77,10 +68,10 @@ fn a_drag_on_the_picture_turns_it_and_one_on_a_panel_does_not() {
     let view = open(&desk);
     let (corner, size) = picture();
     let start = headless(size, &[]);
-    shows(&view, &start, "the start");
+    view.shows_middle(&start, "the start");
     // Over the headings of the sliders, where nothing reacts.
     view.drag([(WINDOW[0] - 200) as i16, 8], [(WINDOW[0] - 120) as i16, 8]);
-    shows(&view, &start, "as before");
+    view.shows_middle(&start, "as before");
     let middle = [corner[0] + size[0] / 2, corner[1] + size[1] / 2].map(|n| n as i16);
     view.drag(middle, [middle[0] + 60, middle[1]]);
     until("another picture", || {
@@ -97,7 +88,7 @@ fn help_and_times_overlay_the_picture_and_disappear() {
     let view = open(&desk);
     let (_, size) = picture();
     let start = headless(size, &[]);
-    shows(&view, &start, "the start");
+    view.shows_middle(&start, "the start");
     // Escape closes the help, and does not leave.
     for (key, back) in [(u32::from('h'), u32::from('h')), (F1, ESCAPE)] {
         desk.tap(key);
@@ -110,7 +101,7 @@ fn help_and_times_overlay_the_picture_and_disappear() {
             (dark * 2 > seen.rgba.len() / 4).then_some(())
         });
         desk.tap(back);
-        shows(&view, &start, "without the help");
+        view.shows_middle(&start, "without the help");
     }
     view.leave();
 }
@@ -122,7 +113,7 @@ fn saved_pictures_and_loops_have_names_without_patient_data() {
     let view = desk.view(&["--size", "1000x700", "--source", SWEEP, "--save-to", &folder.path("kept")]);
     let (_, size) = picture();
     let start = headless(size, &[]);
-    shows(&view, &start, "the start");
+    view.shows_middle(&start, "the start");
     let names = || -> Vec<String> {
         let entries = std::fs::read_dir(folder.path("kept")).into_iter().flatten().flatten();
         entries.map(|e| e.file_name().to_string_lossy().into_owned()).filter(|n| !n.starts_with('.')).collect()
@@ -148,14 +139,14 @@ fn panels_are_presented_while_a_picture_is_drawn() {
     let view = desk.view(&["--size", "1000x700", "--source", SWEEP, "--budget", "none"]);
     let (_, size) = picture();
     let start = headless(size, &[]);
-    shows(&view, &start, "the start");
+    view.shows_middle(&start, "the start");
     // The help is asked for while the picture is drawn, and closed again.
     desk.tap('1');
     for _ in 0..40 {
         desk.tap('h');
         std::thread::sleep(std::time::Duration::from_millis(50));
     }
-    shows(&view, &headless(size, &["--mode", "sr"]), "the surface");
+    view.shows_middle(&headless(size, &["--mode", "sr"]), "the surface");
     let said = view.leave();
     let between = said.split(" shown on the window, ").nth(1).and_then(|rest| rest.split(' ').next());
     let between: u64 = between.and_then(|count| count.parse().ok()).expect("a count");
@@ -173,8 +164,8 @@ fn presets_are_pictures_and_show_what_the_command_renders() {
     let view = desk.view_by(&mut command, &["--size", "1000x700", "--source", SWEEP]);
     let (_, size) = picture();
     let start = headless(size, &[]);
-    shows(&view, &start, "the start");
-    control(&desk, 'p');
+    view.shows_middle(&start, "the start");
+    desk.control('p');
     until("the picture of B-mode in the list", || {
         let seen = view.look()?;
         // The list is in the middle of the window, and B-mode the third of its second row.
@@ -186,36 +177,22 @@ fn presets_are_pictures_and_show_what_the_command_renders() {
     });
     desk.tap('6');
     let plane = headless(size, &["--preset", "bmode"]);
-    shows(&view, &plane, "B-mode");
-    control(&desk, 'p');
+    view.shows_middle(&plane, "B-mode");
+    desk.control('p');
     desk.tap('s');
     "mine".chars().for_each(|letter| desk.tap(letter));
     desk.tap(RETURN);
     until("the preset", || echolume::user_presets::read(file.as_ref()).ok().filter(|kept| kept.len() == 1));
     desk.tap(ESCAPE);
-    control(&desk, 'z');
-    shows(&view, &start, "taken back");
-    control(&desk, 'p');
+    desk.control('z');
+    view.shows_middle(&start, "taken back");
+    desk.control('p');
     desk.tap('7');
-    shows(&view, &plane, "the preset of the user");
+    view.shows_middle(&plane, "the preset of the user");
     view.leave();
 }
 
 /// Saves a workspace by its key; the only one in the folder.
-fn save_workspace(desk: &Desk, folder: &Folder) -> PathBuf {
-    control(desk, 's');
-    until("the workspace", || {
-        let entries = std::fs::read_dir(folder.path("kept")).into_iter().flatten().flatten();
-        entries.map(|entry| entry.path()).find(|path| path.extension().is_some_and(|end| end == "toml"))
-    })
-}
-
-fn control(desk: &Desk, key: char) {
-    desk.press(CONTROL, true);
-    desk.tap(key);
-    desk.press(CONTROL, false);
-}
-
 /// What is drawn round is removed at once, stays removed in the workspace, and comes back.
 #[test]
 fn a_cut_is_shown_saved_and_taken_back() {
@@ -224,7 +201,7 @@ fn a_cut_is_shown_saved_and_taken_back() {
     let view = desk.view(&["--size", "1000x700", "--source", SWEEP, "--save-to", &folder.path("kept")]);
     let (corner, size) = picture();
     let start = headless(size, &[]);
-    shows(&view, &start, "the start");
+    view.shows_middle(&start, "the start");
     desk.tap('f');
     let round = |n: i32| {
         let (sin, cos) = (f64::from(n) * std::f64::consts::TAU / 40.0).sin_cos();
@@ -239,20 +216,20 @@ fn a_cut_is_shown_saved_and_taken_back() {
         std::thread::sleep(std::time::Duration::from_millis(10));
     }
     view.button(1, false);
-    let file = save_workspace(&desk, &folder);
+    let file = desk.save_workspace(&folder.path("kept"));
     until("the whole workspace", || Workspace::read(&file).ok());
     let cut = of_workspace(&file, &folder.path("cut.png"), size);
     let changed = cut.rgba.chunks(4).zip(start.rgba.chunks(4)).filter(|(a, b)| a != b).count();
     assert!(changed > 1000, "{changed} pixels differ from those without the cut");
-    shows(&view, &cut, "the cut");
-    control(&desk, 'z');
-    shows(&view, &start, "taken back");
-    control(&desk, 'y');
-    shows(&view, &cut, "done again");
+    view.shows_middle(&cut, "the cut");
+    desk.control('z');
+    view.shows_middle(&start, "taken back");
+    desk.control('y');
+    view.shows_middle(&cut, "done again");
     desk.press(SHIFT, true);
     desk.tap('f');
     desk.press(SHIFT, false);
-    shows(&view, &start, "no cuts");
+    view.shows_middle(&start, "no cuts");
     view.leave();
 }
 
@@ -263,7 +240,7 @@ fn a_curved_plane_is_drawn_shown_saved_and_taken_back() {
     let folder = Folder::new("curve");
     let view = desk.view(&["--size", "1000x700", "--source", SWEEP, "--save-to", &folder.path("kept")]);
     let (corner, size) = picture();
-    shows(&view, &headless(size, &[]), "the start");
+    view.shows_middle(&headless(size, &[]), "the start");
     desk.tap('8');
     let start = headless(size, &["--mode", "orthogonal"]);
     // The lower right tile, without its borders and labels.
@@ -282,7 +259,7 @@ fn a_curved_plane_is_drawn_shown_saved_and_taken_back() {
         std::thread::sleep(std::time::Duration::from_millis(500));
     }
     desk.tap(0xff0d_u32);
-    let file = save_workspace(&desk, &folder);
+    let file = desk.save_workspace(&folder.path("kept"));
     let workspace = until("the whole workspace", || Workspace::read(&file).ok());
     let settings = workspace.layers.clone().finish().expect("settings");
     let recording = echolume::source::open(workspace.recording(&file).expect("a recording"), None).expect("it opens");
@@ -296,9 +273,9 @@ fn a_curved_plane_is_drawn_shown_saved_and_taken_back() {
     }
     let curved = of_workspace(&file, &folder.path("curve.png"), size);
     part(&curved, "the section");
-    control(&desk, 'z');
+    desk.control('z');
     part(&start, "taken back");
-    control(&desk, 'y');
+    desk.control('y');
     part(&curved, "done again");
     view.leave();
 }
@@ -307,14 +284,14 @@ fn a_curved_plane_is_drawn_shown_saved_and_taken_back() {
 fn measure_on_a_plane(desk: &Desk, view: &View, folder: &Folder) {
     let (corner, size) = picture();
     desk.tap('7');
-    shows(view, &headless(size, &["--mode", "mpr"]), "the plane");
+    view.shows_middle(&headless(size, &["--mode", "mpr"]), "the plane");
     let at = |x: i16, y: i16| view.click(corner[0] as i16 + x, corner[1] as i16 + y);
     desk.tap('m');
     at(200, 60);
     at(300, 60);
     desk.tap('n');
     [(200, 80), (200, 180), (300, 180)].iter().for_each(|(x, y)| at(*x, *y));
-    let file = save_workspace(desk, folder);
+    let file = desk.save_workspace(&folder.path("kept"));
     let workspace = until("the whole workspace", || Workspace::read(&file).ok());
     let settings = workspace.layers.clone().finish().expect("settings");
     let recording = echolume::source::open(workspace.recording(&file).expect("a recording"), None).expect("it opens");
@@ -359,7 +336,7 @@ fn the_volume_is_exported_as_the_commands_do() {
     };
     let view = open();
     let export = |format: char| {
-        control(&desk, 'e');
+        desk.control('e');
         desk.tap(format);
     };
     let all = || std::fs::read_dir(folder.path("kept")).into_iter().flatten().flatten().map(|entry| entry.path());
@@ -413,7 +390,7 @@ fn a_turntable_and_a_loop_are_exported_with_marks_as_asked() {
             // Before the first volume there is nothing to export.
             if made.is_none() && !is_at_work && asked.is_none_or(|at| at.elapsed().as_secs() >= 3) {
                 asked = Some(std::time::Instant::now());
-                control(&desk, 'e');
+                desk.control('e');
                 desk.tap(format);
             }
             made
@@ -475,7 +452,7 @@ fn the_start_line_is_bent_on_plane_a_and_the_rendering_follows() {
     };
     until("a handle in green", || has_handle(at));
     view.drag(at, [at[0], at[1] + 60]);
-    let file = save_workspace(&desk, &folder);
+    let file = desk.save_workspace(&folder.path("kept"));
     let settings = until("the whole workspace", || Workspace::read(&file).ok()).layers.finish().expect("settings");
     let curve = settings.region.start_curve.expect("a curve");
     // The slop of a drag is 6 pixels.
@@ -486,8 +463,8 @@ fn the_start_line_is_bent_on_plane_a_and_the_rendering_follows() {
     desk.tap('t');
     let set = format!("region.start_curve={curve:?}");
     renders(&["--set", &set], "below the curve");
-    control(&desk, 'z');
-    control(&desk, 'z');
+    desk.control('z');
+    desk.control('z');
     renders(&[], "the start again");
     view.leave();
 }

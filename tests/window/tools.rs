@@ -2,7 +2,6 @@
 
 use crate::desktop::*;
 use echolume::measure::outcome;
-use echolume::picture::Picture;
 use echolume::scene::{Input, MeasureKind, Scene};
 use echolume::workspace::Workspace;
 use glam::DVec3;
@@ -27,19 +26,6 @@ const WHEEL_DOWN: u8 = 5;
 
 fn picture() -> ([u32; 2], [u32; 2]) {
     echolume::ui::panels::picture_area(WINDOW, 1.0, true)
-}
-
-/// Waits until the middle of the picture, which has no marks, equals that of a headless one.
-fn shows(view: &View, wanted: &Picture, what: &str) {
-    let (corner, size) = picture();
-    let (from, middle) = (size.map(|n| n / 4), size.map(|n| n / 2));
-    view.shows_at(wanted, [corner[0] + from[0], corner[1] + from[1]], from, middle, what);
-}
-
-fn control(desk: &Desk, key: char) {
-    desk.press(CONTROL, true);
-    desk.tap(key);
-    desk.press(CONTROL, false);
 }
 
 /// A point of the picture in the window.
@@ -204,7 +190,7 @@ fn what_is_drawn_by_the_mouse_is_measured_kept_and_copied() {
     let kept = folder.path("kept");
     let view = desk.view(&[&SIZE[..], &["--source", SWEEP, "--mode", "mpr", "--save-to", &kept]].concat());
     let (_, size) = picture();
-    shows(&view, &headless(size, &["--mode", "mpr"]), "the plane");
+    view.shows_middle(&headless(size, &["--mode", "mpr"]), "the plane");
     let middle = size.map(|n| f64::from(n) / 2.0);
     desk.tap('e');
     clicks(&view, &[[-60.0, 0.0], [60.0, 0.0], [0.0, 40.0]].map(|[x, y]| [middle[0] + x, middle[1] + y]));
@@ -217,11 +203,7 @@ fn what_is_drawn_by_the_mouse_is_measured_kept_and_copied() {
     apart();
     draws(&view, square(120.0));
     desk.tap(RETURN);
-    control(&desk, 's');
-    let file = until("the workspace", || {
-        let entries = std::fs::read_dir(&kept).into_iter().flatten().flatten().map(|entry| entry.path());
-        entries.into_iter().find(|path| path.extension().is_some_and(|end| end == "toml"))
-    });
+    let file = desk.save_workspace(&kept);
     let workspace = until("the whole workspace", || Workspace::read(&file).ok());
     let settings = workspace.layers.clone().finish().expect("settings");
     let recording = echolume::source::open(SWEEP.as_ref(), None).expect("it opens");
@@ -244,7 +226,7 @@ fn what_is_drawn_by_the_mouse_is_measured_kept_and_copied() {
     for ((kind, found), (wanted, value)) in measured.iter().zip(truth) {
         assert!(*kind == wanted && (found - value).abs() < 0.03 * value, "{kind:?}: {found}, not {value}");
     }
-    control(&desk, 'c');
+    desk.control('c');
     let table = clipboard(&desk);
     assert_eq!(table, outcome::csv(&settings.measure));
     for (n, (_, found)) in measured.iter().enumerate() {
@@ -262,7 +244,7 @@ fn the_wheel_and_the_right_button_change_the_view_without_a_tool() {
     let view = desk.view(&[&SIZE[..], &["--source", SWEEP]].concat());
     let (_, size) = picture();
     let start = headless(size, &[]);
-    shows(&view, &start, "the start");
+    view.shows_middle(&start, "the start");
     let [x, y] = place(size.map(|n| f64::from(n) / 2.0));
     let looks = |what: &str| {
         let (corner, _) = picture();
@@ -277,8 +259,8 @@ fn the_wheel_and_the_right_button_change_the_view_without_a_tool() {
     view.button(4, true);
     view.button(4, false);
     looks("closer by the wheel");
-    control(&desk, 'z');
-    shows(&view, &start, "taken back");
+    desk.control('z');
+    view.shows_middle(&start, "taken back");
     view.button(3, true);
     for n in 1..=8 {
         view.hover(x + 4 * n, y);
@@ -286,8 +268,8 @@ fn the_wheel_and_the_right_button_change_the_view_without_a_tool() {
     }
     view.button(3, false);
     looks("moved by the right button");
-    control(&desk, 'z');
-    shows(&view, &start, "taken back again");
+    desk.control('z');
+    view.shows_middle(&start, "taken back again");
     view.leave();
 }
 
@@ -316,19 +298,19 @@ fn volumes_dropped_files_and_folders_of_the_list_are_shown() {
     let of = |n: &str| rendered(&sweep, size, &[&mip[..], &["--volume", n]].concat());
     let volumes = ["0", "1", "2"].map(of);
     assert!(volumes[0] != volumes[1] && volumes[1] != volumes[2]);
-    shows(&view, &volumes[2], "the newest volume");
+    view.shows_middle(&volumes[2], "the newest volume");
     for (key, n, what) in [(HOME, 0, "the oldest"), (RIGHT, 1, "the next"), (RIGHT, 2, "the last"), (LEFT, 1, "back")] {
         desk.tap(key);
-        shows(&view, &volumes[n], what);
+        view.shows_middle(&volumes[n], what);
     }
     drop_file(&view, &other.replace(' ', "%20"));
-    shows(&view, &rendered(&other, size, &mip), "the dropped file");
-    control(&desk, 'o');
+    view.shows_middle(&rendered(&other, size, &mip), "the dropped file");
+    desk.control('o');
     // The folder above, then its DICOM files as one recording.
     let wanted = rendered(&series.to_string_lossy(), size, &mip);
     apart();
     desk.tap('2');
-    shows(&view, &wanted, "the folder of DICOM files");
+    view.shows_middle(&wanted, "the folder of DICOM files");
     let said = view.leave();
     assert!(!said.contains("validation"), "{said}");
 }

@@ -574,8 +574,7 @@ impl Console {
             }
             Command::PlayCine => {
                 self.stream.freeze(true);
-                let of = Loop { cine: &self.controls.settings().cine, volumes: self.stream.cine().volumes() };
-                self.player.toggle(of, now);
+                self.player.toggle(loop_of(&self.controls, &self.stream), now);
             }
             Command::MarkCine(end) => {
                 let at = self.stream.cine_position().unwrap_or(count.saturating_sub(1));
@@ -652,7 +651,7 @@ impl Console {
 
     /// The cine loop as it is played.
     fn cine_loop(&self) -> Loop<'_> {
-        Loop { cine: &self.controls.settings().cine, volumes: self.stream.cine().volumes() }
+        loop_of(&self.controls, &self.stream)
     }
 
     /// Shows the next volume of the cine loop when it is due.
@@ -661,8 +660,7 @@ impl Console {
             return;
         }
         let shown = self.stream.cine_position();
-        let of = Loop { cine: &self.controls.settings().cine, volumes: self.stream.cine().volumes() };
-        if let Some(next) = self.player.advance(of, shown, now) {
+        if let Some(next) = self.player.advance(loop_of(&self.controls, &self.stream), shown, now) {
             self.stream.show_cine_volume(next);
         }
     }
@@ -780,6 +778,11 @@ impl Console {
         };
         (quality, frame_budget::shaded(lowered, quality.shading))
     }
+}
+
+/// The cine loop as it is played.
+fn loop_of<'a>(controls: &'a Controls, stream: &'a Stream) -> Loop<'a> {
+    Loop { cine: &controls.settings().cine, volumes: stream.cine().volumes() }
 }
 
 /// True for continuous commands that may leave the rays as they are.
