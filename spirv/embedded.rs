@@ -29,6 +29,7 @@
     ("light_volume/diffuse", include_bytes!("light_volume/diffuse.spv")),
     ("light_volume/matter", include_bytes!("light_volume/matter.spv")),
     ("light_volume/propagate", include_bytes!("light_volume/propagate.spv")),
+    ("light_volume/propagate_layers", include_bytes!("light_volume/propagate_layers.spv")),
     ("light_volume/reduce", include_bytes!("light_volume/reduce.spv")),
     ("light_volume/shade", include_bytes!("light_volume/shade.spv")),
     ("measure/copy", include_bytes!("measure/copy.spv")),

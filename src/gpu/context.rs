@@ -5,7 +5,7 @@ use super::budget::MemoryBudget;
 use super::device_selection::{self, Candidate, DeviceChoice, QueueInfo};
 use super::error::{ErrorContext, GpuError};
 use super::faults::{Faults, InjectionPoint};
-use super::lost_device::LossReporting;
+use super::lost_device::{LossReport, LossReporting};
 use super::pipeline_cache::PipelineCache;
 use super::validation::{self, Layer, Messenger};
 use super::watchdog::{Deadline, Watchdog};
@@ -15,7 +15,7 @@ use ash::vk;
 use gpu_allocator::vulkan::{Allocator, AllocatorCreateDesc};
 use std::any::Any;
 use std::collections::{BTreeSet, HashMap};
-use std::ffi::CString;
+use std::ffi::{CStr, CString};
 use std::path::PathBuf;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, Weak};
@@ -156,7 +156,7 @@ pub fn list() -> Result<Vec<Candidate>, GpuError> {
     let instance = create_instance(&entry, None, false, None)?;
     let candidates = device_selection::candidates(&entry, &instance);
     // SAFETY: nothing made from the instance is left.
-    unsafe { instance.destroy_instance(None) };
+    unsafe { end_instance(&entry, &instance) };
     candidates
 }
 
@@ -193,7 +193,7 @@ impl Context {
         let made = Context::on_instance(entry.clone(), &instance, options, debug_utils, layer, target);
         if made.is_err() {
             // SAFETY: `on_instance` leaves nothing alive when it fails.
-            unsafe { instance.destroy_instance(None) };
+            unsafe { end_instance(&entry, &instance) };
         }
         made
     }
@@ -444,6 +444,10 @@ impl Context {
     pub(super) fn explain(&self, error: GpuError) -> GpuError {
         let GpuError::Vulkan { operation, result: vk::Result::ERROR_DEVICE_LOST } = error else { return error };
         let report = self.faults.loss_report().unwrap_or_else(|| {
+            // A driver may only be asked about a device that it has lost itself.
+            if self.faults.pretends_loss() || self.is_given_up() {
+                return LossReport::default();
+            }
             let queues: Vec<_> = self.queues.iter().map(|q| q.lock().unwrap_or_else(|e| e.into_inner())).collect();
             self.loss.read(self.device.handle(), &queues.iter().map(|q| **q).collect::<Vec<_>>())
         });
@@ -562,7 +566,7 @@ impl Drop for Context {
             drop(self.allocator.lock().unwrap_or_else(|e| e.into_inner()).take());
             self.device.destroy_device(None);
             drop(self.messenger.take());
-            self.instance.destroy_instance(None);
+            end_instance(&self.entry, &self.instance);
         }
     }
 }
@@ -570,6 +574,22 @@ impl Drop for Context {
 fn load() -> Result<ash::Entry, GpuError> {
     // SAFETY: loading libvulkan runs its initialisers; it is the system's own Vulkan loader.
     unsafe { ash::Entry::load() }.map_err(|e| GpuError::NoLoader(e.to_string()))
+}
+
+/// Destroys an instance, but for the first of the process. The loader unloads drivers with the last instance and loads them again for the next,
+/// and what NVIDIA's driver 580 takes of the memory for thread-local variables is lost each time: after some 40 contexts, one after the other, no
+/// device was left. A kiosk that lost its device as often would have ended.
+///
+/// # Safety
+/// Nothing made from the instance is left.
+unsafe fn end_instance(entry: &ash::Entry, instance: &ash::Instance) {
+    static HAS_KEPT_ONE: AtomicBool = AtomicBool::new(false);
+    if HAS_KEPT_ONE.swap(true, Ordering::Relaxed) {
+        // SAFETY: as the function demands.
+        unsafe { instance.destroy_instance(None) };
+    } else {
+        std::mem::forget(entry.clone());
+    }
 }
 
 /// `target`: where pictures will be presented, if anywhere.
@@ -606,7 +626,11 @@ fn create_instance(
     match instance {
         // The loader returns this if no driver is installed.
         Err(vk::Result::ERROR_INCOMPATIBLE_DRIVER) => Err(GpuError::NoDevice),
-        other => other.context(|| "create instance".into()),
+        other => other.context(|| {
+            // SAFETY: names of extensions, which end with a zero.
+            let names = extensions.iter().map(|name| unsafe { CStr::from_ptr(*name) }.to_string_lossy());
+            format!("create instance with {}", names.collect::<Vec<_>>().join(", "))
+        }),
     }
 }
 

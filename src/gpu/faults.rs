@@ -9,7 +9,7 @@ use crate::passes::{DispatchArgs, Params, Pass, Slot};
 use crate::scene::Scene;
 use ash::vk;
 use std::borrow::Cow;
-use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::sync::{Mutex, OnceLock};
 
 /// A kind of driver call that can be made to fail.
@@ -85,6 +85,8 @@ pub struct Faults {
     budget: Mutex<Option<MemoryBudget>>,
     change: OnceLock<Change>,
     changes: AtomicU64,
+    /// A loss was injected that the driver knows nothing of.
+    has_lost: AtomicBool,
 }
 
 impl Faults {
@@ -99,6 +101,7 @@ impl Faults {
             Some((at, 0, result)) if *at == point => {
                 let result = *result;
                 *planned = None;
+                self.has_lost.fetch_or(result == vk::Result::ERROR_DEVICE_LOST, Ordering::Relaxed);
                 Err(result)
             }
             Some((at, left, _)) if *at == point => {
@@ -135,6 +138,11 @@ impl Faults {
     /// From now on the driver reports this of a lost device.
     pub fn report_loss(&self, report: LossReport) {
         *self.loss.lock().unwrap_or_else(|e| e.into_inner()) = Some(report);
+    }
+
+    /// True if the device was only said to be lost: the driver must not be asked why.
+    pub(super) fn pretends_loss(&self) -> bool {
+        self.has_lost.load(Ordering::Relaxed)
     }
 
     pub(super) fn loss_report(&self) -> Option<LossReport> {

@@ -16,6 +16,9 @@ const CERTAIN_SLOPE: f64 = 0.04;
 const FLUID: f64 = 0.0015;
 /// Smallest and largest variance of the kernel of propagate.comp, cells^2, for which no weight is negative.
 const VARIANCES: [f64; 2] = [0.25, 0.75];
+/// Layers of a dispatch of propagate_layers.comp, and the shared memory that it takes, bytes: a float for each of three colours, in 32 x 32 cells.
+const LAYERS: u32 = 8;
+const LAYERS_MEMORY: u32 = 3 * 4 * 32 * 32;
 /// mm along a cone of ambient light, and the length that each place stands for: REACH and LENGTH of ambient.comp.
 const REACH: [f64; 4] = [2.5, 5.0, 10.0, 20.0];
 const LENGTH: [f64; 4] = [2.5, 3.5, 7.0, 12.0];
@@ -201,10 +204,25 @@ impl Beam {
         self.cells(scene)[self.propagation(scene).axis]
     }
 
-    /// The layer that a dispatch lights: the light's end of the axis comes first.
-    fn layer(&self, scene: &Scene, args: &DispatchArgs) -> u32 {
-        let n = args.iteration;
-        if self.propagation(scene).from_high { self.layers(scene) - 1 - n } else { n }
+    /// Several layers a dispatch where workgroups have memory of their own: on a GPU.
+    fn layers_at_once(&self, scene: &Scene) -> u32 {
+        if LAYERS_MEMORY <= scene.shared_memory { LAYERS } else { 1 }
+    }
+
+    fn shader(&self, scene: &Scene) -> &'static str {
+        if self.layers_at_once(scene) > 1 { "light_volume/propagate_layers" } else { "light_volume/propagate" }
+    }
+
+    fn dispatches(&self, scene: &Scene) -> u32 {
+        self.layers(scene).div_ceil(self.layers_at_once(scene))
+    }
+
+    /// The layers that a dispatch lights, in order: the light's end of the axis comes first.
+    fn lit_layers(&self, scene: &Scene, args: &DispatchArgs) -> Vec<u32> {
+        let (all, each) = (self.layers(scene), self.layers_at_once(scene));
+        let first = args.iteration * each;
+        let from_high = self.propagation(scene).from_high;
+        (first..(first + each).min(all)).map(|n| if from_high { all - 1 - n } else { n }).collect()
     }
 
     fn reads(&self, args: &DispatchArgs) -> Vec<Bind> {
@@ -240,16 +258,19 @@ impl Beam {
     }
 
     fn params(&self, scene: &Scene, args: &DispatchArgs) -> Params {
-        Params::default()
-            .i32("layer", self.layer(scene, args))
-            .vec2("shift", self.propagation(scene).shift)
+        let (found, layers) = (self.propagation(scene), self.lit_layers(scene, args));
+        let mut params = Params::default().i32("layer", layers.first().copied().unwrap_or(0));
+        if self.layers_at_once(scene) > 1 {
+            params = params.i32("from_high", found.from_high.into()).i32("count", layers.len() as u32);
+        }
+        params
+            .vec2("shift", found.shift)
             .f32("variance", self.variance(scene))
             .vec3("absorption", self.absorption(scene))
     }
 
     fn reference(&self, scene: &Scene, args: &DispatchArgs, reads: &Arrays, writes: &mut Arrays) {
         let found = self.propagation(scene);
-        let layer = self.layer(scene, args) as usize;
         let [width, height, _] = self.extent(scene).map(|n| n as usize);
         let (absorption, variance) = (self.absorption(scene), self.variance(scene));
         // The share of each of three cells, with the mean and the variance asked for.
@@ -259,49 +280,60 @@ impl Beam {
         };
         let whole = found.shift.map(|shift| (shift + 0.5).floor());
         let [across, down] = [0, 1].map(|a| shares(found.shift[a] - whole[a]));
-        for (u, v) in (0..height).flat_map(|v| (0..width).map(move |u| (u, v))) {
-            let cell = match found.axis {
-                0 => [layer, u, v],
-                1 => [u, layer, v],
-                _ => [u, v, layer],
-            };
-            let mut light = [1.0; 3];
-            if args.iteration > 0 {
-                let front = reads.get("front");
-                light = [0.0; 3];
-                for (i, j) in (0..3).flat_map(|j| (0..3).map(move |i| (i, j))) {
-                    let tap = |at: usize, whole: f64, n: usize, size: usize| {
-                        (at as i64 + whole as i64 + n as i64 - 1).clamp(0, size as i64 - 1) as usize
-                    };
-                    let from = front.get([tap(u, whole[0], i, width), tap(v, whole[1], j, height), 0]);
-                    light.iter_mut().zip(from).for_each(|(light, from)| *light += across[i] * down[j] * from);
+        let mut front = (args.iteration > 0).then(|| reads.get("front").clone());
+        for layer in self.lit_layers(scene, args) {
+            let mut next = Texels::untouched([width, height, 1], 4);
+            for (u, v) in (0..height).flat_map(|v| (0..width).map(move |u| (u, v))) {
+                let layer = layer as usize;
+                let cell = match found.axis {
+                    0 => [layer, u, v],
+                    1 => [u, layer, v],
+                    _ => [u, v, layer],
+                };
+                let mut light = [1.0; 3];
+                if let Some(front) = &front {
+                    light = [0.0; 3];
+                    for (i, j) in (0..3).flat_map(|j| (0..3).map(move |i| (i, j))) {
+                        let tap = |at: usize, whole: f64, n: usize, size: usize| {
+                            (at as i64 + whole as i64 + n as i64 - 1).clamp(0, size as i64 - 1) as usize
+                        };
+                        let from = front.get([tap(u, whole[0], i, width), tap(v, whole[1], j, height), 0]);
+                        light.iter_mut().zip(from).for_each(|(light, from)| *light += across[i] * down[j] * from);
+                    }
                 }
+                let dense = reads.get("matter").get(cell)[0];
+                let half: [f64; 3] = absorption.map(|a| (-0.5 * a * dense).exp());
+                let there: [f64; 3] = std::array::from_fn(|c| light[c] * half[c]);
+                let on: [f64; 3] = std::array::from_fn(|c| there[c] * half[c]);
+                writes.get_mut("arriving").set(cell, &[there[0], there[1], there[2], dense]);
+                next.set([u, v, 0], &[on[0], on[1], on[2], 1.0]);
             }
-            let dense = reads.get("matter").get(cell)[0];
-            let half: [f64; 3] = absorption.map(|a| (-0.5 * a * dense).exp());
-            let there: [f64; 3] = std::array::from_fn(|c| light[c] * half[c]);
-            let on: [f64; 3] = std::array::from_fn(|c| there[c] * half[c]);
-            writes.get_mut("arriving").set(cell, &[there[0], there[1], there[2], dense]);
-            writes.get_mut("next_front").set([u, v, 0], &[on[0], on[1], on[2], 1.0]);
+            front = Some(next);
+        }
+        if let Some(front) = front {
+            let target = writes.get_mut("next_front");
+            for (u, v) in (0..height).flat_map(|v| (0..width).map(move |u| (u, v))) {
+                target.set([u, v, 0], front.get([u, v, 0]));
+            }
         }
     }
 }
 
-/// The light that `light.direction` names, layer by layer.
+/// The light that `light.direction` names, layer by layer, or several layers at once.
 pub const PROPAGATE: Pass = Pass {
     name: "light_propagate",
-    shader: |_, _| "light_volume/propagate",
+    shader: |s, _| KEY.shader(s),
     reads: |_, t| KEY.reads(t),
     writes: |_, t| KEY.writes(t),
     extent: |s, _| KEY.extent(s),
-    repeat: |s| KEY.layers(s),
+    repeat: |s| KEY.dispatches(s),
     params: |s, t| KEY.params(s, t),
     constants: |s, t| KEY.constants(s, t),
     tolerance: Tolerance {
         absolute: 1e-6,
         relative: 6e-4,
         outliers: 0.0,
-        why: "nine terms in f32, none negative; then RGBA16F",
+        why: "nine terms in f32 a layer, none negative; then RGBA16F",
     },
     reference: |s, t, reads, writes| KEY.reference(s, t, reads, writes),
     ..MATTER
@@ -314,7 +346,8 @@ pub const PROPAGATE_BACK: Pass = Pass {
     reads: |_, t| BACK.reads(t),
     writes: |_, t| BACK.writes(t),
     extent: |s, _| BACK.extent(s),
-    repeat: |s| BACK.layers(s),
+    shader: |s, _| BACK.shader(s),
+    repeat: |s| BACK.dispatches(s),
     params: |s, t| BACK.params(s, t),
     constants: |s, t| BACK.constants(s, t),
     reference: |s, t, reads, writes| BACK.reference(s, t, reads, writes),

@@ -12,9 +12,11 @@ pub const BATCHES_IN_FLIGHT: u32 = 4;
 /// Most frames that go through stage 1 at once. Submitting a batch of so many costs little more than a single frame.
 const MAX_FRAMES: u64 = 16;
 
-/// Maximum bytes of the samples of a batch, and of each slot between its filters, unless a single frame is larger. So many texels
-/// occupy every device, and submitting them takes far less time than working on them.
-pub(crate) const BATCH_BYTES: u64 = 4 << 20;
+/// Maximum bytes of the samples of a batch, and of each slot between its filters, unless a single frame is larger: what stays in the caches of a
+/// CPU, and what takes a GPU several times longer than the host needs to submit it.
+pub(crate) fn batch_bytes(scene: &Scene) -> u64 {
+    if scene.shared_memory > 0 { 16 << 20 } else { 4 << 20 }
+}
 
 /// Consecutive frames that go through stage 1 at once, each pass in one dispatch.
 pub fn frames_per_batch(scene: &Scene) -> u32 {
@@ -23,7 +25,7 @@ pub fn frames_per_batch(scene: &Scene) -> u32 {
     let largest = bytes(scene.frame_size(), frame_format(scene)).max(bytes(scene.grid.size, Format::R32f));
     let largest = if scene.conditions() { largest.max(bytes(scene.line_lattice(), Format::R32f)) } else { largest };
     let most = MAX_FRAMES.min(scene.slices().into()).min(scene.frames_at_once.max(1).into());
-    (BATCH_BYTES / largest).clamp(1, most) as u32
+    (batch_bytes(scene) / largest).clamp(1, most) as u32
 }
 
 /// What a slot is.

@@ -160,8 +160,8 @@ pub struct Scene {
     pub bricks_pay: bool,
     /// The picture has more than 8 bits a channel, because the window shows them. The device resolves this.
     pub is_deep: bool,
-    /// Bytes of shared memory that a workgroup may use to solve a row or a column under AOS; 0 if a single invocation solves it, as is
-    /// faster on a CPU. The device resolves this.
+    /// Bytes of shared memory of a workgroup of a GPU, which solves a row or a column under AOS in it, and propagates light through several layers;
+    /// 0 on a CPU, where a single invocation does either faster. The device resolves this.
     pub shared_memory: u32,
     /// Maximum number of frames that go through stage 1 at once, 1... The device resolves this.
     pub frames_at_once: u32,

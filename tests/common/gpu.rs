@@ -107,6 +107,40 @@ impl Drop for Device {
     }
 }
 
+/// True if values are the same bit for bit on a software device, where each operation is rounded by itself. The compiler of a GPU makes one operation of
+/// a product and a sum in one shader and not in another, and its filter rounds weights to 8 bits: there all but 1 % may differ by `tolerance` at
+/// most, and the others by anything, as a threshold then decides otherwise now and then.
+pub fn same_values<T: Copy + Into<f64>>(device: &Device, a: &[T], b: &[T], tolerance: f64) -> bool {
+    let pairs = || a.iter().zip(b).map(|(a, b)| ((*a).into(), (*b).into()));
+    let is_same = |a: f64, b: f64| a.to_bits() == b.to_bits();
+    if a.len() != b.len() || device.candidate.is_software() {
+        return a.len() == b.len() && pairs().all(|(a, b)| is_same(a, b));
+    }
+    let is_near = |a: f64, b: f64| is_same(a, b) || (a - b).abs() <= tolerance;
+    let far = pairs().filter(|(a, b)| !is_near(*a, *b)).count();
+    if far > 0 {
+        println!("{far} of {} values differ by more than {tolerance}", a.len());
+    }
+    far * 100 <= a.len().max(200)
+}
+
+/// Levels of 255 that pictures, and mm that distances on GPUs may differ by.
+pub const GPU_LEVELS: f64 = 1.0;
+pub const GPU_MM: f64 = 1e-3;
+
+/// The same for pictures.
+pub fn same_picture(device: &Device, a: &Picture, b: &Picture) -> bool {
+    [a.width, a.height] == [b.width, b.height] && same_values(device, &a.rgba, &b.rgba, GPU_LEVELS)
+}
+
+/// The same for slots, which both pictures have or both lack.
+pub fn same_slot(device: &Device, a: &Option<Texels>, b: &Option<Texels>, tolerance: f64) -> bool {
+    match (a, b) {
+        (Some(a), Some(b)) => a.size == b.size && same_values(device, &a.values, &b.values, tolerance),
+        (a, b) => a.is_none() && b.is_none(),
+    }
+}
+
 /// Scenes by name that together need every pass.
 pub fn scenes() -> Vec<(String, Scene)> {
     built_in::scenes().iter().map(|asked| (asked.name.clone(), asked.build().expect("scene"))).collect()

@@ -196,8 +196,13 @@ fn each_band_is_a_submission_and_all_are_ordered() {
 
 /// A renderer whose bands are held back, each until the one before is done.
 fn paced(device: &Device, scene: &Scene) -> Renderer {
-    let options =
-        RendererOptions { bands: Bands::Fixed(INVOCATIONS), paced: true, volume_images: 2, ..Default::default() };
+    let options = RendererOptions {
+        bands: Bands::Fixed(INVOCATIONS),
+        paced: true,
+        volume_images: 2,
+        queues: Some(1),
+        ..Default::default()
+    };
     renderer(device, scene, &options)
 }
 

@@ -21,7 +21,7 @@ fn head(device: &Device, parts: f64) -> Texels {
         "mode = 'sr'\npicture = {{ size = [64, 64] }}\nslices = {{ smooth = {{ lateral = 1.4, depth = 0.8, elevation = 1.4 }} }}
          region = {{ lateral = [-26, 34], depth = [24, 56], elevation = [-28, 22] }}
          camera = {{ azimuth = 10, elevation = -10, zoom = 1.25, target = [3, 50, -2] }}
-         surface = {{ window = [0.5, 1.0], threshold = 0.08, edge = {EDGE} }}\nray = {{ step = {} }}",
+         surface = {{ window = [0.5, 1.0], threshold = 0.08, edge = {EDGE} }}\nray = {{ step = {}, sampling = 'exact' }}",
         EDGE / parts
     ));
     let scene = Scene::new(recording.geometry(0), input, settings).expect("scene");

@@ -5,6 +5,7 @@ use crate::common::probes::voxels;
 use crate::common::scenes::{BYTES, scene};
 use echolume::gpu::Renderer;
 use echolume::passes::{Slot, Texels};
+use echolume::plan::Plan;
 use echolume::scene::Scene;
 use glam::DVec3;
 
@@ -116,6 +117,37 @@ fn shadows_of_two_spheres_multiply_and_do_not_depend_on_the_view() {
     (turned.camera.azimuth, turned.camera.elevation) = (70.0, 30.0);
     let turned = Scene::new(scene.geometry.clone(), scene.input, turned).expect("scene");
     assert_eq!(lit(&device, &turned, |p| first(p).max(second(p)), Slot::LightArriving).values, both.values);
+}
+
+/// Prevents a seam between the tiles of workgroups that bring light through several layers, wherever the light comes from: over the middle of a
+/// cell, nearly along the diagonal, from either end of any axis.
+#[test]
+fn light_through_several_layers_at_once_is_that_of_layer_by_layer() {
+    let device = Device::new();
+    let body = |p: DVec3| (0.5 + 0.5 * (0.3 * p.x).sin() * (0.4 * p.y).cos() * (0.35 * p.z + 0.2 * p.x).sin()).powi(3);
+    for direction in [
+        "[0, 1, 0]",
+        "[0.6, 0.8, 0.4]",
+        "[-0.69, 0.7, -0.68]",
+        "[0.2, -0.9, 0.5]",
+        "[1, 0.45, -0.55]",
+        "[0.66, 0.1, -0.7]",
+    ] {
+        let light = format!("follows = 'region', direction = {direction}");
+        let each = look(&light, &GREY.replace("back = 0", "back = 0.5"));
+        let mut several = each.clone();
+        several.shared_memory = 16 << 10;
+        let dispatches = |scene| Plan::new(scene).steps.len();
+        assert!(3 * dispatches(&several) < dispatches(&each), "several layers a dispatch");
+        for slot in [Slot::LightArriving, Slot::BackLight] {
+            let [a, b] = [&each, &several].map(|scene| lit(&device, scene, body, slot));
+            assert_eq!(a.size, b.size);
+            for (n, (a, b)) in a.values.iter().zip(&b.values).enumerate() {
+                // Either is rounded to 16 bits.
+                assert!((a - b).abs() <= 1e-3 * a.abs() + 1e-6, "{direction}, {slot:?}, value {n}: {b} instead of {a}");
+            }
+        }
+    }
 }
 
 /// A camera that turns needs no new light, unless the light follows it.

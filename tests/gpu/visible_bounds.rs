@@ -281,7 +281,10 @@ fn the_picture_equals_that_of_the_completely_filtered_volume() {
             assert_eq!(whole, 1.0);
             smallest = smallest.min(share);
             assert!(a_drawn.values.iter().any(|v| *v > 0.0), "{name}, {filter}: a black picture shows nothing");
-            assert!(a == b && a_drawn == b_drawn && a_distance == b_distance, "{name}, {filter}, {window}");
+            let is_same = same_picture(&device, &a, &b)
+                && same_values(&device, &a_drawn.values, &b_drawn.values, GPU_LEVELS / 255.0)
+                && same_slot(&device, &a_distance, &b_distance, GPU_MM);
+            assert!(is_same, "{name}, {filter}, {window}");
         }
     }
     assert!(smallest < 0.1, "{smallest}: the windows hide too little");
@@ -410,8 +413,9 @@ fn nothing_outside_the_visible_bounds_is_dispatched_uploaded_or_written() {
 fn a_region_that_shrinks_needs_no_frames_and_one_that_grows_does() {
     let device = Device::new();
     let smooth = ", smooth = { lateral = 1.0, elevation = 0.8 }";
+    // Bricks, which a GPU always skips, know the ranges of what was visible alone: a region that grows back needs frames for them.
     let [small, middle, large] = ["[-3, 4]", "[-6, 7]", "[-10, 12]"]
-        .map(|side| with(&format!("region = {{ lateral = {side}, elevation = {side} }}"), smooth));
+        .map(|side| with(&format!("ray.brick = 0\nregion = {{ lateral = {side}, elevation = {side} }}"), smooth));
     let frames = speckle(&small);
     let fresh = |scene: &Scene| rendered(&device, scene.clone(), &frames).picture().expect("picture");
     let without_frames = |rerun: &Rerun| matches!(rerun, Rerun::Steps { .. });

@@ -57,6 +57,35 @@ fn every_sampler_that_vulkan_allows_is_within_the_bounds() {
     }
 }
 
+/// A sampler as an H100 has it: the unit that eight texels share is divided along each axis in turn, in whole 256ths.
+#[test]
+fn weights_rounded_to_the_bits_of_a_position_are_within_them_and_are_counted() {
+    for format in FORMATS {
+        let volume = volume([7, 5, 4], format);
+        let got = Texels::from_fn([64, 48, 1], 1, |[x, y, _], _| {
+            let share = sample_position([x, y], [64, 48]);
+            let at: [f64; 3] =
+                std::array::from_fn(|a| ((share[a] * volume.size[a] as f64 - 0.5) * 256.0).round() / 256.0);
+            let upper = |units: f64, axis: usize| (units * (at[axis] - at[axis].floor())).round();
+            let divided = |units: f64, axis: usize| [units - upper(units, axis), upper(units, axis)];
+            let [i, j, k] = at.map(|at| at.floor() as i64);
+            let mut sum = 0.0;
+            for (c, slice) in (0..).zip(divided(256.0, 2)) {
+                for (b, row) in (0..).zip(divided(slice, 1)) {
+                    for (a, units) in (0..).zip(divided(row, 0)) {
+                        sum += units / 256.0 * volume.clamped(i + a, j + b, k + c);
+                    }
+                }
+            }
+            sum
+        });
+        let judged = judge(FilterPrecision { bits: 8, format }, &volume, &got);
+        assert_eq!(judged.outside, 0, "{format:?}: {judged:?}");
+        // In bytes, a result is as coarse as a weight.
+        assert!(judged.rounded > 0 || format == Format::R8, "{format:?}: {judged:?}");
+    }
+}
+
 #[test]
 fn a_wrong_sampler_is_outside_of_them() {
     for format in FORMATS {

@@ -26,7 +26,7 @@ impl Staging {
         let bytes = staged_bytes(scene);
         let copied = chain::copied(scene);
         let frames = match copied {
-            Some(_) => (BATCH_BYTES / bytes).clamp(1, scene.slices().into()) as u32,
+            Some(_) => (batch_bytes(scene) / bytes).clamp(1, scene.slices().into()) as u32,
             None => frames_per_batch(scene),
         };
         let frames = u64::from(frames).min(max_buffer / bytes.max(1)).max(1) as u32;

@@ -15,7 +15,7 @@ use super::recorder::{BarrierRecorder, BufferLayout, Dispatch, Recorder, SlotPar
 use super::resources::SlotResources;
 use super::timeline::Timelines;
 use super::timing::{TimeStamps, Timings};
-use crate::passes::slots::{BATCH_BYTES, BATCHES_IN_FLIGHT, Format, Initializer, frames_per_batch};
+use crate::passes::slots::{BATCHES_IN_FLIGHT, Format, Initializer, batch_bytes, frames_per_batch};
 use crate::passes::unveil::Unveiled;
 use crate::passes::{DispatchArgs, Frequency, PassTime, Slot, Span, Stage, Texels};
 use crate::passes::{chain, cut};

@@ -27,6 +27,8 @@ const SPILLS: &[&str] = &[
     "Local Memory Size",
     "scratchMemUsageInBytes",
 ];
+/// No invocation has so much memory, bytes: NVIDIA's driver 580 states 64 GiB of local memory for every pipeline of an H100.
+const UNLIKELY_MEMORY: f64 = (1u64 << 24) as f64;
 const INSTRUCTIONS: &[&str] = &["Instruction count", "Instructions", "Instruction Count"];
 /// Shared memory of a workgroup, bytes.
 const SHARED: &[&str] = &["SLM size", "LDS size", "Workgroup Memory Size", "ldsUsageSizeInBytes", "Shared Memory Size"];
@@ -56,11 +58,12 @@ impl Columns {
             let values = statistics.iter().zip(&executable.values).filter(|(name, _)| names.contains(&name.as_str()));
             values.filter_map(|(_, value)| *value).reduce(|a, b| a + b)
         };
+        let spills = |executable: &Executable| sum(executable, SPILLS).filter(|spills| *spills < UNLIKELY_MEMORY);
         let most = |names: &[&str]| executables.iter().filter_map(|e| sum(e, names)).reduce(f64::max);
         Columns {
             registers: most(REGISTERS),
             waves: executables.iter().filter_map(|e| sum(e, WAVES)).reduce(f64::min),
-            spills: most(SPILLS),
+            spills: executables.iter().filter_map(spills).reduce(f64::max),
             instructions: most(INSTRUCTIONS),
             shared: most(SHARED),
             subgroup: executables.iter().map(|e| e.subgroup).min(),
