@@ -379,8 +379,8 @@ fn scenes() -> Vec<Scene> {
     // Values that a filter cannot read from the frames.
     scenes.push(scene(voxels([8, 8, 8]), FLOATS, "slices = { median = true }"));
     // With the shared memory of a GPU.
-    let diffused = scenes.iter().filter(|s| s.settings.slices.perona_malik.is_some());
-    let in_workgroups: Vec<_> = diffused.map(|s| Scene { shared_memory: 16 << 10, ..s.clone() }).collect();
+    let use_it = scenes.iter().filter(|s| s.settings.slices.perona_malik.is_some() || s.lit_by_volume().is_some());
+    let in_workgroups: Vec<_> = use_it.map(|s| Scene { shared_memory: 16 << 10, ..s.clone() }).collect();
     scenes.extend(in_workgroups);
     scenes
 }
