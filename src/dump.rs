@@ -189,6 +189,14 @@ fn meaning(slot: Slot) -> (&'static [&'static str], &'static str) {
         | Slot::BackFrontB
         | Slot::LightAmbient
         | Slot::LightShade => (COLOUR, "light; 1 is that of an unshadowed light of strength 1"),
+        Slot::StillMedium => {
+            (&["red", "green", "blue", "extinction"], "albedo of scattering, 0..1; extinction, 1/mm")
+        }
+        Slot::StillMajorants => (GREY, "largest extinction of a brick, 1/mm"),
+        Slot::StillSumsA | Slot::StillSumsB => {
+            (&["red", "green", "blue", "collided"], "light of all paths of a pixel; how many of them collided")
+        }
+        Slot::StillSquaresA | Slot::StillSquaresB => (GREY, "squares of the luminance of all paths of a pixel"),
         Slot::NetSamples | Slot::NetValues | Slot::NetSmoothed | Slot::NetFilled => {
             (GREY, "as stored; the smallest float where nothing is known")
         }

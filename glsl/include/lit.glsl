@@ -1,10 +1,10 @@
 // Light of the light volume on matter: what its cells scatter, a sheen towards the silhouette, and a highlight.
 const float SHEEN = 0.3;
 layout(constant_id = 34) const int LIT = 0; // 1: the light volume lights what is composited
-layout(constant_id = 35) const int GROUND = 0; // 1: there is a ground behind the volume
 uniform sampler3D light_shade;   // light that is scattered, and its ambient share
 uniform sampler3D light_normals; // orientation, as long as it is certain; light for the highlight
 #include "light_lattice.glsl"
+#include "film.glsl"
 
 vec3 lit(vec3 albedo, vec3 p, vec3 along) {
     vec3 at = (p - light_low) * light_density;
@@ -28,20 +28,7 @@ vec3 lit(vec3 albedo, vec3 p, vec3 along) {
     return albedo * (shade.rgb + shade.a * SHEEN * grazing * grazing * grazing) + specular * shine * certain * oriented.w * light_colour;
 }
 
-// Narkowicz's fit of the ACES film curve, and a gamma of 2.2.
-vec3 film(vec3 light) {
-    vec3 c = exposure * light;
-    c = clamp(c * (2.51 * c + 0.03) / (c * (2.43 * c + 0.59) + 0.14), 0.0, 1.0);
-    return mix(pow(max(c, vec3(1e-8)), vec3(1.0 / 2.2)), vec3(0.0), lessThanEqual(c, vec3(1e-8)));
-}
-
-// The light of a ray as it is shown, premultiplied. The ground is brightest a little above the middle of the picture.
+// The light of a ray as it is shown, premultiplied.
 vec4 developed(vec3 light, float opacity, ivec2 pixel, ivec2 size) {
-    if (LIT == 0) return vec4(light, opacity);
-    if (GROUND == 1) {
-        vec2 at = (vec2(pixel) + 0.5 - 0.5 * vec2(size)) / float(min(size.x, size.y)) + vec2(0.0, 0.05);
-        vec3 ground = mix(ground_edge, ground_middle, clamp(1.0 - 2.6 * dot(at, at), 0.0, 1.0));
-        return vec4(film(light + (1.0 - opacity) * ground), 1.0);
-    }
-    return opacity > 0.0 ? vec4(opacity * film(light / opacity), opacity) : vec4(0.0);
+    return LIT == 0 ? vec4(light, opacity) : on_film(light, opacity, pixel, size);
 }

@@ -55,6 +55,7 @@ impl PictureBounds {
 /// Why a scene has no bounds, as the end of a sentence; none if it has.
 pub fn fault(scene: &Scene) -> Option<&'static str> {
     match scene.settings.mode {
+        Mode::Volume if scene.still().is_some() => Some("a still is a mean of random paths"),
         Mode::Volume if scene.lights_volume() => Some("volume.shading=first-hit is lit by stage 3"),
         Mode::Volume if scene.settings.ray.sliding != 0 => {
             Some("ray.sliding filters samples, at distances of one step")

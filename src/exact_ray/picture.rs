@@ -31,6 +31,9 @@ pub fn fault(scene: &Scene) -> Option<String> {
     if scene.is_flat() || s.mode == Mode::Cube {
         return Some("the mode casts no ray".into());
     }
+    if scene.still().is_some() {
+        return Some("a still is a mean of random paths".into());
+    }
     if scene.lit_by_volume().is_some() {
         return Some("light.volume takes light from a lattice".into());
     }

@@ -199,6 +199,7 @@ pub const CLASSIFY_SURFACE: Pass = Pass {
 pub const CLASSIFY_VOLUME: Pass = Pass {
     name: "classify_bricks_volume",
     needed: |s| match (s.composites(), s.settings.mode, need(s)) {
+        _ if s.still().is_some() => Err("paths take the majorants of bricks"),
         (true, _, Ok(_)) => Ok("what is transparent or outside is left out"),
         (_, Mode::Mean, Ok(_)) => Ok("what is zero or outside is counted without looking"),
         (true, _, not) | (_, Mode::Mean, not) => not,
@@ -245,7 +246,7 @@ fn constants(entries: usize, from_zero: bool) -> Vec<(&'static str, i32)> {
 }
 
 /// The slots that every kind follows from.
-fn ranges() -> Vec<Bind> {
+pub(super) fn ranges() -> Vec<Bind> {
     vec![whole("brick_table", Slot::BrickTable), whole("brick_ranges", Slot::BrickRanges)]
 }
 
@@ -264,11 +265,11 @@ fn between_samples(scene: &Scene) -> bool {
 }
 
 /// Ratio by which rounding may raise a sample above its largest texel: for a weighted mean, some ulps.
-fn beyond(scene: &Scene) -> f64 {
+pub(super) fn beyond(scene: &Scene) -> f64 {
     if scene.settings.ray.sliding > 0 || scene.takes_bspline() { 1.0 + 1e-5 } else { 1.0 }
 }
 
-fn window(scene: &Scene, view: View) -> Params {
+pub(super) fn window(scene: &Scene, view: View) -> Params {
     let [low, high] = view.window;
     Params::default().f32("window_low", low).f32("window_scale", 1.0 / (high - low)).f32("beyond", beyond(scene))
 }

@@ -11,7 +11,7 @@ use crate::spirv::volumes_to_layers::volumes_to_layers;
 use crate::spirv::{self, Access, Dimension, Kind, Member, Module};
 
 /// Textures and tables that a shader declares and a pass may not bind. Specialization constants say whether they are read or written.
-const OPTIONAL: [&str; 33] = [
+const OPTIONAL: [&str; 34] = [
     "back_light",
     "before",
     "bricks",
@@ -26,6 +26,7 @@ const OPTIONAL: [&str; 33] = [
     "light_shade",
     "line_lut",
     "line_shares",
+    "majorants",
     "net_lines",
     "net_slices",
     "occlusion",

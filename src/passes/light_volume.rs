@@ -609,7 +609,7 @@ fn for_cells(count: [u32; 3], mut of: impl FnMut([usize; 3])) {
 }
 
 /// Reciprocal of the length over which matter fades towards the faces of the region; 0 if it does not.
-fn fade_density(scene: &Scene) -> f64 {
+pub(super) fn fade_density(scene: &Scene) -> f64 {
     scene.region_fade().map_or(0.0, |fade| 1.0 / fade)
 }
 
@@ -661,13 +661,26 @@ fn ground_of(scene: &Scene, is_alone: bool) -> Option<Ground> {
 
 /// The light of a ray as it is shown: through the response curve, premultiplied.
 pub(super) fn developed(scene: &Scene, is_alone: bool, rgba: [f64; 4], pixel: [usize; 2]) -> [f64; 4] {
-    let Some(volume) = scene.lit_by_volume() else { return rgba };
+    match scene.lit_by_volume() {
+        Some(volume) => on_film(scene, volume.exposure, ground_of(scene, is_alone), rgba, pixel),
+        None => rgba,
+    }
+}
+
+/// Linear light of a ray, premultiplied, through the response curve and over the ground.
+pub(super) fn on_film(
+    scene: &Scene,
+    exposure: f64,
+    ground: Option<Ground>,
+    rgba: [f64; 4],
+    pixel: [usize; 2],
+) -> [f64; 4] {
     let film = |light: f64| {
-        let c = light * volume.exposure;
+        let c = light * exposure;
         (c * (2.51 * c + 0.03) / (c * (2.43 * c + 0.59) + 0.14)).clamp(0.0, 1.0).powf(1.0 / 2.2)
     };
     let opacity = rgba[3];
-    let Some(ground) = ground_of(scene, is_alone) else {
+    let Some(ground) = ground else {
         let shown = |c: usize| if opacity > 0.0 { opacity * film(rgba[c] / opacity) } else { 0.0 };
         return [shown(0), shown(1), shown(2), opacity];
     };

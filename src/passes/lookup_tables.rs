@@ -171,6 +171,11 @@ pub(super) fn transfer_of(scene: &Scene) -> Vec<[f64; 4]> {
     transfer::table_of(&scene.settings.volume, scene.reference_length(), scene.transfer_entries())
 }
 
+/// The medium of a still over the sample value: albedo of red, green and blue, and extinction, 1/mm.
+pub(super) fn still_medium(scene: &Scene) -> Vec<f32> {
+    floats(scene.still_medium(&transfer_of(scene)).into_iter().flatten())
+}
+
 /// The tiles of a picture of planes, as `Sheet::table` lays them out, relative to [`Scene::local_origin`].
 pub(super) fn tile_table(scene: &Scene) -> Vec<f32> {
     let mut sheet = scene.sheet();

@@ -35,6 +35,7 @@ pub mod raycast {
     pub mod planes;
     pub mod projection;
     pub mod ray;
+    pub mod still;
     pub mod surface;
     pub mod surface_and_volume;
     pub mod survey;
@@ -90,6 +91,10 @@ pub const PASSES: &[Pass] = &[
     light_volume::SHADE,
     raycast::surface_and_volume::PASS,
     raycast::volume::PASS,
+    raycast::still::MAJORANTS,
+    raycast::still::BEGIN,
+    raycast::still::PATHS,
+    raycast::still::RESOLVE,
     raycast::projection::PASS,
     raycast::planes::PASS,
     raycast::planes::TONED,

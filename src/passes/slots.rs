@@ -296,6 +296,20 @@ slots! {
     LightShade = D::image("light_shade", |s| Shape::Three(s.light_lattice().count), |_| Format::Rgba16f);
     /// Orientation of each cell, as long as it is certain, and the light for a highlight.
     LightNormals = D::image("light_normals", |s| Shape::Three(s.light_lattice().count), |_| Format::Rgba16f);
+    /// The medium of a still: albedo and extinction over the sample value.
+    StillMedium = D::table(
+        "still_medium",
+        |s| Shape::Buffer(16 * s.transfer_entries() as u32),
+        lookup_tables::still_medium,
+        ByContent,
+    );
+    /// The largest extinction in each brick.
+    StillMajorants = D::image("still_majorants", per_brick, |_| Format::R32f);
+    /// Sums of light and collisions of the paths of each pixel, and of the squares of their luminance; the dispatches alternate.
+    StillSumsA = D::image("still_sums_a", per_ray, |_| Format::Rgba32f);
+    StillSumsB = D::image("still_sums_b", per_ray, |_| Format::Rgba32f);
+    StillSquaresA = D::image("still_squares_a", per_ray, |_| Format::R32f);
+    StillSquaresB = D::image("still_squares_b", per_ray, |_| Format::R32f);
     /// The cut faces of clip planes: echo where a ray ends at one, and its opacity.
     Cap = D::image("cap", per_ray, |_| Format::Rg16f);
     /// Distance along each pixel's ray, mm; the largest float where nothing was hit.

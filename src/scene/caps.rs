@@ -20,9 +20,9 @@ impl Settings {
 }
 
 impl Scene {
-    /// True if clip planes have cut faces. Whether anything is tissue (`cap_level`) is a number, and so no reason for another plan.
+    /// True if clip planes have cut faces: in a still what they cut is lit. Whether anything is tissue (`cap_level`) is a number, and so no reason for another plan.
     pub fn has_caps(&self) -> bool {
-        self.settings.cap.enabled && self.settings.can_cap()
+        self.settings.cap.enabled && self.settings.can_cap() && self.still().is_none()
     }
 
     /// The region that is cut, with the grey window of planes. In mode mixed that of the surface, which ends at the faces.

@@ -102,9 +102,9 @@ impl LightVolume {
 }
 
 impl Scene {
-    /// The light volume, if something is composited that it lights.
+    /// The light volume, if something is composited that it lights. A still follows light itself.
     pub fn lit_by_volume(&self) -> Option<LightVolume> {
-        self.settings.light.volume.filter(|_| self.composites())
+        self.settings.light.volume.filter(|_| self.composites() && self.still().is_none())
     }
 
     /// The lattice of the light volume over the box that is composited. Cells are larger than asked for where there would be too many.

@@ -27,6 +27,7 @@ pub mod settings;
 mod sizes;
 mod slice_index;
 pub mod start_curve;
+mod still;
 pub mod transfer;
 mod turntable;
 pub mod unveil;
@@ -41,6 +42,7 @@ pub use light_lattice::{LightLattice, Propagation};
 pub use marks::VolumeAxis;
 pub use region::{depth_offset, insonified_box};
 pub use settings::*;
+pub use still::{DistantLight, StillLights};
 pub use visible_bounds::{Rectangle, Shared, VisibleBounds};
 
 use crate::probe::{Array, Geometry, Probe};
@@ -213,6 +215,7 @@ impl Settings {
         check_measures::check_measures(&self.measure)?;
         check_body_marks::check_body_marks(&self.body_marks)?;
         check::check_cine(&self.cine)?;
+        still::check(self)?;
         cuts::check(&self.cuts)?;
         start_curve::check(self)?;
         check::check_planes(self)

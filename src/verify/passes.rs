@@ -287,7 +287,7 @@ fn blurred(noise: &Texels) -> Texels {
 fn empty_space_of(scene: &Scene, slot: Slot, volume: &Texels) -> Texels {
     let mut slots = std::collections::BTreeMap::from([(Slot::of_rays(scene), volume.clone())]);
     let made = |name: &str| {
-        ["tile_ranges", "brick_ranges", "classify_bricks", "brick_distance"].iter().any(|p| name.starts_with(p))
+        ["tile_ranges", "brick_ranges", "classify_bricks", "brick_distance", "still_majorants"].iter().any(|p| name.starts_with(p))
     };
     for step in Plan::new(scene).steps.iter().filter(|s| made(s.pass.name)) {
         let args = DispatchArgs { slices: scene.slices(), ..step.args() };
@@ -333,7 +333,7 @@ pub fn inputs_of(scene: &Scene, pass: &Pass, args: &DispatchArgs, kind: &str, se
         let made = reads[..n].iter().find(|b| b.slot == bind.slot).map(|b| inputs.get(b.name).clone());
         inputs.insert(bind.name, made.unwrap_or_else(|| input(scene, bind, args.slices, kind, &mut noise)));
     }
-    for bricks in reads.iter().filter(|b| matches!(b.name, "bricks" | "volume_bricks")) {
+    for bricks in reads.iter().filter(|b| matches!(b.name, "bricks" | "volume_bricks" | "majorants")) {
         // Empty space must be consistent with the volume.
         let distances = empty_space_of(scene, bricks.slot, inputs.get("volume"));
         inputs.insert(bricks.name, distances);

@@ -16,6 +16,7 @@ pub const PASS: Pass = Pass {
     link: Link::None,
     shader: |_, _| "raycast/volume",
     needed: |s| match (s.composites(), s.marches_once()) {
+        _ if s.still().is_some() => Err("a still is drawn in its place"),
         (false, _) => Err("nothing is composited in this mode"),
         (true, Ok(_)) if kind(s) == Kind::Colour => Err("composited in the march that finds the surface"),
         (true, _) => Ok("samples are composited"),

@@ -10,6 +10,7 @@ mod planes;
 mod preprocess;
 mod raycast;
 mod shading;
+mod still;
 mod unveil;
 
 pub use body_marks::*;
@@ -21,6 +22,7 @@ pub use planes::*;
 pub use preprocess::*;
 pub use raycast::*;
 pub use shading::*;
+pub use still::*;
 pub use unveil::*;
 
 use serde::{Deserialize, Serialize};
@@ -78,6 +80,8 @@ pub struct Settings {
     pub distance: Distance,
     /// Stage 3: light, shadow, occlusion and skin.
     pub light: Light,
+    /// Stage 2: volume rendering by paths of light. Absent: by emission and absorption.
+    pub still: Option<Still>,
     /// Stage 4: filters, tone and colour of the picture.
     pub post: Post,
     /// Marks beside the picture.

@@ -1,0 +1,49 @@
+//! Settings of stills: volume rendering by paths of light.
+
+use serde::{Deserialize, Serialize};
+
+/// A still: mode volume by paths of light that collide many times, without a denoiser. The transfer function is the medium: opacities are
+/// its extinction, colours those of a half-space of it. The key light is `light.diffuse` in `light.direction`, the back light that of `light.volume`, and
+/// light comes from all around with the radiance `light.ambient`. Exposure and ground are those of `light.volume`. Specular light, cut faces of clip
+/// planes and early ray termination have no place in it.
+#[derive(Clone, Copy, Debug, PartialEq, Deserialize, Serialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct Still {
+    /// Paths of a pixel, 1..=65536. The standard error of the picture goes as one over the root of it.
+    pub samples: u32,
+    /// Seed of the random numbers. The same seed and number of samples give the same picture.
+    pub seed: u32,
+    /// Factor of the extinction, 0..=100.
+    pub extinction: f64,
+    /// Factor of the albedo, 0..=1.
+    pub albedo: f64,
+    /// Anisotropy: the mean cosine of Henyey and Greenstein's phase function, -0.95..=0.95; 0 scatters evenly.
+    pub anisotropy: f64,
+    /// Most collisions of a path, 1..=1024; what light would do after them is missing.
+    pub events: u32,
+    /// Samples of a dispatch, 1..=64. It changes no bit of the picture.
+    pub batch: u32,
+}
+
+impl Default for Still {
+    fn default() -> Still {
+        Still { samples: 64, seed: 0, extinction: 1.0, albedo: 1.0, anisotropy: 0.0, events: 128, batch: 4 }
+    }
+}
+
+impl Still {
+    /// Most samples of a pixel: their sums are 32-bit floats.
+    pub const MAX_SAMPLES: u32 = 65536;
+    /// Most dispatches of a picture.
+    const MAX_DISPATCHES: u32 = 4096;
+
+    /// Samples of each dispatch but the last.
+    pub fn samples_at_once(&self) -> u32 {
+        self.batch.max(self.samples.div_ceil(Still::MAX_DISPATCHES))
+    }
+
+    /// Dispatches of a picture.
+    pub fn dispatches(&self) -> u32 {
+        self.samples.div_ceil(self.samples_at_once())
+    }
+}

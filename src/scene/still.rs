@@ -1,0 +1,129 @@
+//! Stills: the medium that a transfer function stands for, the lights, and what cannot be drawn as a still.
+
+use super::check::within;
+use super::{Mode, Scene, SceneError, Settings, Shading, Still, refuse};
+use glam::DVec3;
+use std::f64::consts::PI;
+
+/// Largest extinction, 1/mm: a mean free path of 10 micrometres, far below any texel.
+pub const MAX_EXTINCTION: f64 = 100.0;
+
+/// A distant light.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct DistantLight {
+    /// Unit direction to the light.
+    pub towards: DVec3,
+    /// Irradiance of what faces it.
+    pub irradiance: [f64; 3],
+}
+
+/// The lights of a still.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct StillLights {
+    pub key: DistantLight,
+    pub back: DistantLight,
+    /// Radiance from all around.
+    pub environment: [f64; 3],
+}
+
+impl StillLights {
+    /// The probability with which a collision takes light from the back light: its share of both.
+    pub fn back_share(&self) -> f64 {
+        let [key, back] = [self.key, self.back].map(|light| light.irradiance.into_iter().fold(0.0, f64::max));
+        if back > 0.0 { back / (key + back) } else { 0.0 }
+    }
+}
+
+/// Checks a still and what it is asked to show.
+pub(super) fn check(settings: &Settings) -> Result<(), SceneError> {
+    let Some(still) = &settings.still else { return Ok(()) };
+    within("still.samples", f64::from(still.samples), 1.0, f64::from(Still::MAX_SAMPLES))?;
+    within("still.extinction", still.extinction, 0.0, 100.0)?;
+    within("still.albedo", still.albedo, 0.0, 1.0)?;
+    within("still.anisotropy", still.anisotropy, -0.95, 0.95)?;
+    within("still.events", f64::from(still.events), 1.0, 1024.0)?;
+    within("still.batch", f64::from(still.batch), 1.0, 64.0)?;
+    let refused = |what: &str| refuse("still", format!("is for mode volume in the colours of its transfer function: {what}"));
+    if settings.mode != Mode::Volume {
+        return refused("set mode=volume, or leave it out");
+    }
+    if settings.volume.shading != Shading::None {
+        return refused("leave volume.shading out");
+    }
+    if settings.ray.sliding != 0 {
+        return refused("leave ray.sliding out, which filters along rays");
+    }
+    if settings.light.position.is_some() {
+        return refused("its lights are distant, leave light.position out");
+    }
+    Ok(())
+}
+
+/// The albedo of scattering of a medium of which a half-space has this colour under even light (Kulla and Conty 2017, "Revisiting physically based
+/// shading at Imageworks"), with the similarity relation for the mean cosine g.
+pub fn albedo_of(colour: f64, g: f64) -> f64 {
+    let c = colour.clamp(0.0, 1.0);
+    let s = 4.09712 + 4.20863 * c - (9.59217 + 41.6808 * c + 17.7126 * c * c).sqrt();
+    let square = s.clamp(0.0, 1.0).powi(2);
+    ((1.0 - square) / (1.0 - g * square)).clamp(0.0, 1.0)
+}
+
+impl Scene {
+    /// The still that the scene shows, if it is one.
+    pub fn still(&self) -> Option<&Still> {
+        self.settings.still.as_ref()
+    }
+
+    /// The medium over the sample value: albedo of red, green and blue, and extinction, 1/mm.
+    pub fn still_medium(&self, transfer: &[[f64; 4]]) -> Vec<[f64; 4]> {
+        let still = self.still().copied().unwrap_or_default();
+        let of = |[r, g, b, absorption]: &[f64; 4]| {
+            let albedo = [r, g, b].map(|c| still.albedo * albedo_of(*c, still.anisotropy));
+            let extinction = (still.extinction * absorption / self.reference_length()).min(MAX_EXTINCTION);
+            [albedo[0], albedo[1], albedo[2], extinction]
+        };
+        transfer.iter().map(of).collect()
+    }
+
+    /// The lights of a still. A light of strength 1 gives a white diffuse surface that faces it the radiance 1.
+    pub fn still_lights(&self) -> StillLights {
+        let light = &self.settings.light;
+        let of = |direction, strength: f64, colour: [f64; 3]| DistantLight {
+            towards: self.light_direction(direction),
+            irradiance: colour.map(|c| PI * strength * c),
+        };
+        let volume = light.volume.unwrap_or_default();
+        // Without a light volume there is no back light.
+        let back = if light.volume.is_some() { volume.back } else { 0.0 };
+        StillLights {
+            key: of(light.direction, light.diffuse, light.colour),
+            back: of(volume.back_direction, back, volume.back_colour),
+            environment: light.colour.map(|c| light.ambient * c),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// What scatters all light is white, what absorbs all is black, and brighter media scatter more.
+    #[test]
+    fn the_albedo_of_a_colour_rises_from_0_to_1() {
+        for g in [-0.9, 0.0, 0.5, 0.9] {
+            assert!(albedo_of(0.0, g) < 1e-5 && albedo_of(1.0, g) > 1.0 - 1e-9, "{g}");
+            let all: Vec<f64> = (0..=100).map(|n| albedo_of(f64::from(n) / 100.0, g)).collect();
+            assert!(all.windows(2).all(|pair| pair[0] < pair[1] + 1e-12), "{g}");
+        }
+    }
+
+    #[test]
+    fn dispatches_hold_all_samples() {
+        for (samples, batch) in [(1, 4), (64, 4), (65, 4), (65536, 1), (65535, 64)] {
+            let still = Still { samples, batch, ..Still::default() };
+            assert!(still.dispatches() * still.samples_at_once() >= samples);
+            assert!((still.dispatches() - 1) * still.samples_at_once() < samples);
+            assert!(still.dispatches() <= 4096);
+        }
+    }
+}
