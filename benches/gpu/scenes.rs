@@ -124,6 +124,11 @@ pub const SCENES: &[Stated] = &[
     sweep("every sample, surface", &["ray.brick=0"], &["raycast_surface"]),
     sweep("pre-integrated", &["mode=vr", "volume.compositing=pre-integrated"], &["raycast_volume"]),
     sweep("first hit", &["mode=vr", "volume.shading=first-hit"], &["raycast_volume", "light"]),
+    sweep(
+        "still",
+        &["mode=vr", "still.samples=2"],
+        &["still_majorants", "still_begin", "still_paths", "still_resolve"],
+    ),
     sweep("largest", &["mode=mip"], &["raycast_projection"]),
     sweep("mean", &["mode=mean"], &["raycast_projection"]),
     sweep("three planes", &["mode=orthogonal"], &["raycast_planes_toned"]),

@@ -21,6 +21,9 @@ use std::collections::HashSet;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
+/// A flag as it was typed, and the assignment of a setting that it stands for.
+pub type Assigned = (String, String);
+
 /// The arguments of every command that renders a recording.
 #[derive(clap::Args)]
 pub struct InputArgs {
@@ -45,7 +48,7 @@ impl InputArgs {
 
     /// Like [`InputArgs::open`], to show a picture: settings that nobody chose follow from the recording. What measures takes the settings as
     /// they are. `chosen` assignments are a layer below the flags and `--set`.
-    pub fn open_to_show(&self, chosen: &[String]) -> Result<(Box<dyn Source>, Scene), Failure> {
+    pub fn open_to_show(&self, chosen: &[Assigned]) -> Result<(Box<dyn Source>, Scene), Failure> {
         self.open_scene(chosen, true, None)
     }
 
@@ -57,7 +60,7 @@ impl InputArgs {
     /// `asked`: the volume, if the arguments do not say it.
     fn open_scene(
         &self,
-        chosen: &[String],
+        chosen: &[Assigned],
         to_show: bool,
         asked: Option<usize>,
     ) -> Result<(Box<dyn Source>, Scene), Failure> {
@@ -126,6 +129,11 @@ impl InputArgs {
             ))),
             _ => Ok(()),
         }
+    }
+
+    /// True if the recording comes by standard input, which is read once.
+    pub fn is_standard(&self) -> bool {
+        self.input.as_deref().is_some_and(|file| file.as_os_str() == STANDARD)
     }
 
     /// The recording as it was typed, or `phantom`.
@@ -211,7 +219,7 @@ impl InputArgs {
         self.layers_with(&[])
     }
 
-    fn layers_with(&self, chosen: &[String]) -> Result<Layers, Failure> {
+    fn layers_with(&self, chosen: &[Assigned]) -> Result<Layers, Failure> {
         match self.workspace()? {
             Some((_, workspace)) => self.scene.layers_over(workspace.layers, chosen),
             None => self.scene.layers(self.input.is_none(), chosen),
@@ -262,7 +270,7 @@ pub struct SceneArgs {
 
 impl SceneArgs {
     /// The layers of settings before they are resolved. `chosen` assignments form a layer below the flags and `--set`.
-    pub fn layers(&self, is_phantom: bool, chosen: &[String]) -> Result<Layers, Failure> {
+    pub fn layers(&self, is_phantom: bool, chosen: &[Assigned]) -> Result<Layers, Failure> {
         let mut layers = Layers::default();
         if is_phantom {
             // The pair shows a surface.
@@ -276,15 +284,15 @@ impl SceneArgs {
     }
 
     /// Adds the presets, files and flags on top of `layers`.
-    pub fn layers_over(&self, mut layers: Layers, chosen: &[String]) -> Result<Layers, Failure> {
+    pub fn layers_over(&self, mut layers: Layers, chosen: &[Assigned]) -> Result<Layers, Failure> {
         for preset in &self.preset {
             add_preset(&mut layers, preset)?;
         }
         if let Some(file) = &self.scene {
             layers.file(file).map_err(input)?;
         }
-        for assignment in chosen {
-            layers.set_by(&format!("--budget, {assignment}"), assignment).map_err(input)?;
+        for (flag, assignment) in chosen {
+            layers.set_by(flag, assignment).map_err(input)?;
         }
         for (flag, assignment) in self.assignments()? {
             layers.set_by(&flag, &assignment).map_err(input)?;
@@ -307,7 +315,7 @@ impl SceneArgs {
     }
 
     /// Each flag as it was typed, with the assignment that it stands for.
-    fn assignments(&self) -> Result<Vec<(String, String)>, Failure> {
+    fn assignments(&self) -> Result<Vec<Assigned>, Failure> {
         let mut set = Vec::new();
         set.extend(self.mode.as_ref().map(|mode| (format!("--mode {mode}"), mode_setting(mode))));
         for (name, key, value) in

@@ -19,6 +19,11 @@ impl From<GpuError> for DrawFault {
 }
 
 impl DrawFault {
+    /// The failure of what is drawn to be measured.
+    pub fn failed(self) -> Failure {
+        self.failure(false)
+    }
+
     /// The failure that ends the command. With shaders of the user one that does not compile is a fault of the input.
     fn failure(self, own_shaders: bool) -> Failure {
         match self {

@@ -17,6 +17,7 @@ mod series;
 mod serve;
 mod sheet;
 mod stic;
+mod still;
 mod stream;
 #[cfg(feature = "view")]
 mod view;

@@ -4,6 +4,7 @@ use super::drawing::{DrawFault, draw_despite_losses, send_volume};
 use super::one_colour;
 use super::series::{Job, SeriesArgs};
 use super::sheet;
+use super::still::{self, StillArgs};
 use crate::args::{InputArgs, Output, PictureFile, check_outputs};
 use crate::dump;
 use crate::error_report::choose::Bound;
@@ -19,11 +20,12 @@ use crate::picture::{Picture, PictureFormat};
 use crate::plan::Plan;
 use crate::probe::Probe;
 use crate::profile::export::pass_time_table;
-use crate::scene::{Mode, Scene};
+use crate::scene::{Mode, Scene, Still};
 use crate::source::{Frame, Source};
 use crate::terminal::{Failure, failed, input, progress_bar, remark, say};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
+use std::time::Instant;
 
 #[derive(clap::Args)]
 #[command(
@@ -31,6 +33,7 @@ use std::sync::Arc;
                         before.\n\nExamples:\n  \
                         echolume render sweep.mha --preset fetal\n  \
                         echolume render sweep.vol --mode vr --camera azimuth=30,zoom=1.5 -o view.png\n  \
+                        echolume render sweep.mha --preset face --still samples=64\n  \
                         echolume render bone.mha --preset bone --roi depth=20:50 --explain\n  \
                         echolume render sweep.mha --turntable 120 -o turn/\n  \
                         echolume render loop.mha --volumes all -o loop-%03d.png\n  \
@@ -70,6 +73,10 @@ pub struct Render {
     /// Largest difference of a pixel that --error-map does not hatch, 0..=1
     #[arg(long, value_name = "ERROR", default_value_t = 0.01, requires = "error_map")]
     error_tolerance: f64,
+    /// Draw a still: volume rendering (mode vr) by paths of light that collide many times in the tissue. samples=N paths of a pixel, or a time such as
+    /// 20s, which chooses N and prints it; further settings of the table still, such as seed=1 or extinction=4
+    #[arg(long, value_name = "KEY=VALUE,...|TIME")]
+    still: Option<String>,
     /// Print the time of every pass
     #[arg(long)]
     timings: bool,
@@ -91,6 +98,7 @@ impl Render {
                 ("--mesh", self.mesh.is_some()),
                 ("--error-map", self.error_map.is_some()),
                 ("--budget", self.budget.is_some()),
+                ("--still", self.still.is_some()),
             ];
             if let Some((flag, _)) = alone.iter().find(|(_, is_given)| *is_given) {
                 return Err(input(format!("{flag}: is for one picture; leave --turntable and --volumes out")));
@@ -138,6 +146,7 @@ impl Render {
         }
         let mut context = self.input.open_device(self.validate)?;
         let mut options = options;
+        let scene = self.with_samples(&context, scene, &options)?;
         let reopen = || self.input.open_device(self.validate);
         let Drawn { mut renderer, picture, kept } = draw_despite_losses(
             &mut context,
@@ -162,6 +171,9 @@ impl Render {
             remark(&format!("unveil: {outcome}"));
         }
         let measured = renderer.take_times().map_err(failed)?;
+        if let Some(noise) = still::noise(&mut renderer).map_err(failed)? {
+            say!("{noise}");
+        }
         self.judge_budget(&measured)?;
         if let Some(colour) = one_colour::of(&picture) {
             let shift = source.sample_type().shift();
@@ -215,7 +227,8 @@ impl Render {
 
     /// Opens the recording and builds its scene, with the settings that keep the budget if there is one.
     fn open(&self) -> Result<(Box<dyn Source>, Scene), Failure> {
-        let (Some(budget), Some(file)) = (&self.budget, &self.report) else { return self.input.open_to_show(&[]) };
+        let still = self.still_args()?.map_or_else(Vec::new, |still| still.set);
+        let (Some(budget), Some(file)) = (&self.budget, &self.report) else { return self.input.open_to_show(&still) };
         let time = parse_nanoseconds("--budget", budget)?;
         let report = read_report(file)?;
         let (_, scene) = self.input.open()?;
@@ -236,7 +249,42 @@ impl Render {
         let choice = &report.choices[chosen];
         let of = if report.is_of(&scene) { "this scene" } else { "another scene, whose error it is" };
         say!("budget {budget}: {}, measured on {} with {of}", choice.describe(measure), report.device);
-        self.input.open_to_show(&choice.set)
+        let chosen = choice.set.iter().map(|set| (format!("--budget, {set}"), set.clone())).chain(still);
+        self.input.open_to_show(&chosen.collect::<Vec<_>>())
+    }
+
+    fn still_args(&self) -> Result<Option<StillArgs>, Failure> {
+        self.still.as_deref().map(StillArgs::parse).transpose()
+    }
+
+    /// The scene, with the samples that the time of `--still` is enough for, if it gives a time.
+    fn with_samples(
+        &self,
+        context: &Arc<Context>,
+        scene: Scene,
+        options: &RendererOptions,
+    ) -> Result<Scene, Failure> {
+        let Some(time) = self.still_args()?.and_then(|still| still.time) else { return Ok(scene) };
+        if self.input.is_standard() {
+            return Err(input("--still: standard input is read once: give samples=N in place of a time"));
+        }
+        let with = |samples: u32| {
+            let mut scene = scene.clone();
+            scene.settings.still = scene.settings.still.map(|still| Still { samples, ..still });
+            scene
+        };
+        let samples = still::samples_within(time, |samples| {
+            let (mut source, _) = self.open()?;
+            let mut renderer = Renderer::new(context, with(samples), options).map_err(failed)?;
+            send_volume(&mut renderer, &mut *source, self.input.volume()?, |_| Ok(())).map_err(DrawFault::failed)?;
+            renderer.show(0).map_err(failed)?;
+            let begin = Instant::now();
+            renderer.picture().map_err(failed)?;
+            Ok(begin.elapsed().as_secs_f64())
+        })?;
+        let seed = scene.still().map_or(0, |still| still.seed);
+        say!("still: {time} s are enough for {samples} samples: --still samples={samples},seed={seed} draws this picture again");
+        Ok(with(samples))
     }
 
     /// Says whether the picture kept the budget.
@@ -274,7 +322,7 @@ impl Render {
         if !(0.0..=1.0).contains(&self.error_tolerance) {
             return Err(input(format!("--error-tolerance {}: must lie in 0..=1", self.error_tolerance)));
         }
-        if scene.is_flat() || scene.settings.mode == Mode::Cube {
+        if scene.is_flat() || scene.settings.mode == Mode::Cube || scene.still().is_some() {
             return Err(input("--error-map: this mode takes no steps along rays"));
         }
         let mut settings = scene.settings.clone();

@@ -54,7 +54,8 @@ impl Scene {
         // A moving view, whose rays are fewer, uses the same sampling and bricks as a still one.
         let rays: u64 = camera::full_size(&self.settings).iter().map(|n| u64::from(*n)).product();
         // Mean ray length: half the diagonal of the box, since some rays miss it and some end early.
-        rays as f64 * 0.5 * (self.high - self.low).length()
+        let paths = self.still().map_or(1.0, |still| f64::from(still.samples));
+        rays as f64 * paths * 0.5 * (self.high - self.low).length()
             / self.shared.as_ref().map_or(self.step, |shared| shared.step)
     }
 

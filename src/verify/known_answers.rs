@@ -5,6 +5,7 @@ use super::compare::{ExtraTolerance, compare_outputs, picture_comparison, texel_
 use super::passes::POISON;
 use super::{Check, DeviceUnderTest, Findings, render};
 use crate::gpu::{GpuError, Renderer, RendererOptions};
+use crate::passes::raycast::still::final_sums;
 use crate::passes::shade::SHADOW;
 use crate::passes::slots::Format;
 use crate::passes::{Arrays, DispatchArgs, MISS, Slot, Texels, is_hit};
@@ -30,6 +31,7 @@ pub fn checks(_: Level) -> Vec<Check> {
         of("a ramp of space through scan conversion", ramp_in_space),
         of("ten thousand thin samples", thin_samples),
         of("light through a constant medium", constant_medium),
+        of("paths of a still through a constant medium", paths),
     ]
 }
 
@@ -94,6 +96,36 @@ fn constant_medium(dut: &mut DeviceUnderTest) -> Result<Findings, GpuError> {
         }
     }
     findings.figures.push(Figure::error("share of the tolerance", largest, 1.0, Unit::Share));
+    Ok(findings)
+}
+
+/// Of the paths of a still as many collide in a constant medium as Beer and Lambert's law says, within the confidence interval of 99.9 %; and where
+/// nothing is absorbed and light comes from everywhere, each brings exactly that light.
+fn paths(dut: &mut DeviceUnderTest) -> Result<Findings, GpuError> {
+    let (mut findings, mut largest) = (Findings::default(), 0.0f64);
+    for extinction in [0.01f64, 0.1, 0.5] {
+        let toml = format!(
+            "mode = 'vr'\npicture = {{ size = [8, 8] }}\nstill = {{ samples = 64, batch = 16, events = 1024 }}\n\
+             light = {{ diffuse = 0.0, ambient = 1.0 }}\n[volume]\nextinction = {extinction}\n\
+             transfer = [{{ at = 0.0, colour = [1.0, 1.0, 1.0], opacity = 1.0 }}]"
+        );
+        let scene = made(block(0.5, [20, 20, 20]), &toml)?;
+        let sums = render::slot(&dut.context, &scene, &frames(&scene, |_| 0.6), final_sums(&scene)[0])?;
+        let expected = 1.0 - (-10.0 * extinction).exp();
+        let inside: Vec<[usize; 3]> = (2..6).flat_map(|y| (2..6).map(move |x| [x, y, 0])).collect();
+        let count = 64.0 * inside.len() as f64;
+        let got = inside.iter().map(|at| sums.get(*at)[3]).sum::<f64>() / count;
+        let error = (got - expected).abs() / (3.29 * (expected * (1.0 - expected) / count).sqrt());
+        let input = format!("extinction of {extinction} a mm");
+        if error.is_nan() || error > 1.0 {
+            let what = "another share of the paths collides";
+            findings.faults.push(fault(input.clone(), what, "sums", [4, 4, 0], [expected, got]));
+        }
+        let uneven = inside.iter().map(|at| (sums.get(*at)[1] - sums.get(*at)[3]).abs()).fold(0.0, f64::max);
+        findings.expect(uneven <= 1e-3, || format!("{input}: light is lost in a white furnace: {uneven} of 64 paths"));
+        largest = largest.max(error);
+    }
+    findings.figures.push(Figure::error("share of the confidence interval", largest, 1.0, Unit::Share));
     Ok(findings)
 }
 

@@ -183,7 +183,8 @@ fn every_scene(dut: &mut DeviceUnderTest) -> Result<Findings, GpuError> {
     let (scenes, step) = (dut.scenes(), if dut.level == Level::Full { 1 } else { 11 });
     // One renderer after another on one context.
     let isolated = IsolatedContext::of_changes(dut)?;
-    for (name, scene) in scenes.iter().step_by(step) {
+    // A path of a still that takes another turn is another path: its pass is checked alone, and its mean by known answers.
+    for (name, scene) in scenes.iter().step_by(step).filter(|(_, scene)| scene.still().is_none()) {
         let frames = body_frames(scene, ball);
         let expected = reference_picture(scene, &frames);
         let got = render::picture(&isolated.context, scene, &frames)?;

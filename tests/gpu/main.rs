@@ -53,6 +53,7 @@ mod shading;
 mod sizes_in_mm;
 mod sliding;
 mod start_curve;
+mod still;
 mod stored_volume;
 mod surface_net;
 mod tiles;

@@ -1,0 +1,106 @@
+//! `echolume render --still`: how many paths a still has, and how far its mean is from its expectation.
+
+use crate::error_report::command::parse_nanoseconds;
+use crate::gpu::{GpuError, Renderer};
+use crate::passes::raycast::still::{final_sums, luminance};
+use crate::scene::Still;
+use crate::terminal::{Failure, input};
+
+/// What `--still` asks for.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct StillArgs {
+    /// Assignments of settings, each with the part of the flag that it stands for.
+    pub set: Vec<(String, String)>,
+    /// Time that the paths may take, s, in place of their number.
+    pub time: Option<f64>,
+}
+
+impl StillArgs {
+    pub fn parse(text: &str) -> Result<StillArgs, Failure> {
+        let mut args = StillArgs::default();
+        for part in text.split(',') {
+            let flag = format!("--still {part}");
+            match part.split_once('=') {
+                Some(("time", time)) => args.time = Some(1e-9 * parse_nanoseconds("--still time", time)?),
+                Some((key, value)) => args.set.push((flag, format!("still.{key}={value}"))),
+                None => args.time = Some(1e-9 * parse_nanoseconds("--still", part)?),
+            }
+        }
+        let has_samples = args.set.iter().any(|(_, set)| set.starts_with("still.samples="));
+        match (args.time, has_samples) {
+            (Some(_), true) => Err(input(format!("--still {text}: give the samples or a time that chooses them"))),
+            (None, false) => Err(input(format!("--still {text}: must give samples=N, or a time such as 20s"))),
+            (Some(_), false) => {
+                args.set.push(("--still".into(), "still.samples=1".into()));
+                Ok(args)
+            }
+            (None, true) => Ok(args),
+        }
+    }
+}
+
+/// The number of samples that a time is enough for, by the time that each number of them took: `taken` draws so many and says how long that was, s.
+/// First one is drawn, then more, as long as that takes a small part of the time: what does not depend on their number should not count.
+pub fn samples_within(time: f64, mut taken: impl FnMut(u32) -> Result<f64, Failure>) -> Result<u32, Failure> {
+    let (mut samples, mut each) = (1, taken(1)?);
+    while each * f64::from(samples) < time / 64.0 && samples < Still::MAX_SAMPLES / 16 {
+        samples *= 16;
+        each = taken(samples)? / f64::from(samples);
+    }
+    // The conversion saturates.
+    Ok(((time / each.max(1e-12)) as u32).clamp(1, Still::MAX_SAMPLES))
+}
+
+/// The standard error of a still, for people: of the luminance of the pixels that have light, as a share of it.
+pub fn noise(renderer: &mut Renderer) -> Result<Option<String>, GpuError> {
+    let Some(still) = renderer.scene().still().copied() else { return Ok(None) };
+    let [light, squares] = final_sums(renderer.scene());
+    let (Some(light), Some(squares)) = (renderer.read(light)?, renderer.read(squares)?) else { return Ok(None) };
+    let n = f64::from(still.samples);
+    let error = |(sum, square): (&[f64], &f64)| {
+        let mean = luminance([sum[0], sum[1], sum[2], sum[3]]) / n;
+        let variance = (square / n - mean * mean).max(0.0) / (n - 1.0);
+        (mean > 0.0).then(|| variance.sqrt() / mean)
+    };
+    let mut errors: Vec<f64> = light.values.chunks_exact(4).zip(&squares.values).filter_map(error).collect();
+    errors.sort_by(f64::total_cmp);
+    let at = |share: f64| errors.get(((errors.len() as f64 - 1.0) * share) as usize).map(|e| 100.0 * e);
+    let said = format!("still: {} samples a pixel, seed {}", still.samples, still.seed);
+    Ok(Some(match (at(0.5), at(0.95)) {
+        (Some(half), Some(most)) if still.samples > 1 => {
+            format!("{said}; standard error of a pixel's luminance: median {half:.1} %, 95 % of the pixels below {most:.1} %")
+        }
+        _ => said,
+    }))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_still_is_asked_for_by_samples_or_by_a_time() {
+        let of = |text: &str| StillArgs::parse(text);
+        let set = |text: &str| of(text).expect("args").set.into_iter().map(|(_, set)| set).collect::<Vec<_>>();
+        assert_eq!(set("samples=64"), ["still.samples=64"]);
+        assert_eq!(set("samples=64,seed=3,extinction=4"), ["still.samples=64", "still.seed=3", "still.extinction=4"]);
+        for text in ["20s", "time=20s", "seed=2,20s"] {
+            assert_eq!(of(text).expect("args").time, Some(20.0), "{text}");
+        }
+        for text in ["", "seed=3", "samples=4,20s", "20", "time=-1s"] {
+            assert!(of(text).is_err(), "{text}");
+        }
+    }
+
+    /// A device of 10 ms a sample and 3 s of everything else: what is chosen does not take more than asked, nor much less.
+    #[test]
+    fn the_samples_chosen_fill_the_time() {
+        for time in [0.1, 1.0, 20.0, 300.0, 1e9] {
+            let chosen = samples_within(time, |n| Ok(0.01 * f64::from(n))).expect("samples");
+            let fitting = (time / 0.01).clamp(1.0, f64::from(Still::MAX_SAMPLES));
+            assert!((f64::from(chosen) - fitting).abs() <= 1.0, "{time}: {chosen}");
+        }
+        let chosen = samples_within(300.0, |n| Ok(3.0 + 0.01 * f64::from(n))).expect("samples");
+        assert!((10_000..=30_000).contains(&chosen), "{chosen}");
+    }
+}
