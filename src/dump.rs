@@ -189,9 +189,7 @@ fn meaning(slot: Slot) -> (&'static [&'static str], &'static str) {
         | Slot::BackFrontB
         | Slot::LightAmbient
         | Slot::LightShade => (COLOUR, "light; 1 is that of an unshadowed light of strength 1"),
-        Slot::StillMedium => {
-            (&["red", "green", "blue", "extinction"], "albedo of scattering, 0..1; extinction, 1/mm")
-        }
+        Slot::StillMedium => (&["red", "green", "blue", "extinction"], "albedo of scattering, 0..1; extinction, 1/mm"),
         Slot::StillMajorants => (GREY, "largest extinction of a brick, 1/mm"),
         Slot::StillSumsA | Slot::StillSumsB => {
             (&["red", "green", "blue", "collided"], "light of all paths of a pixel; how many of them collided")

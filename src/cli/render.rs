@@ -258,12 +258,7 @@ impl Render {
     }
 
     /// The scene, with the samples that the time of `--still` is enough for, if it gives a time.
-    fn with_samples(
-        &self,
-        context: &Arc<Context>,
-        scene: Scene,
-        options: &RendererOptions,
-    ) -> Result<Scene, Failure> {
+    fn with_samples(&self, context: &Arc<Context>, scene: Scene, options: &RendererOptions) -> Result<Scene, Failure> {
         let Some(time) = self.still_args()?.and_then(|still| still.time) else { return Ok(scene) };
         if self.input.is_standard() {
             return Err(input("--still: standard input is read once: give samples=N in place of a time"));
@@ -283,7 +278,9 @@ impl Render {
             Ok(begin.elapsed().as_secs_f64())
         })?;
         let seed = scene.still().map_or(0, |still| still.seed);
-        say!("still: {time} s are enough for {samples} samples: --still samples={samples},seed={seed} draws this picture again");
+        say!(
+            "still: {time} s are enough for {samples} samples: --still samples={samples},seed={seed} draws this picture again"
+        );
         Ok(with(samples))
     }
 

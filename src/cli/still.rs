@@ -68,7 +68,9 @@ pub fn noise(renderer: &mut Renderer) -> Result<Option<String>, GpuError> {
     let said = format!("still: {} samples a pixel, seed {}", still.samples, still.seed);
     Ok(Some(match (at(0.5), at(0.95)) {
         (Some(half), Some(most)) if still.samples > 1 => {
-            format!("{said}; standard error of a pixel's luminance: median {half:.1} %, 95 % of the pixels below {most:.1} %")
+            format!(
+                "{said}; standard error of a pixel's luminance: median {half:.1} %, 95 % of the pixels below {most:.1} %"
+            )
         }
         _ => said,
     }))

@@ -43,7 +43,8 @@ pub(super) fn check(settings: &Settings) -> Result<(), SceneError> {
     within("still.anisotropy", still.anisotropy, -0.95, 0.95)?;
     within("still.events", f64::from(still.events), 1.0, 1024.0)?;
     within("still.batch", f64::from(still.batch), 1.0, 64.0)?;
-    let refused = |what: &str| refuse("still", format!("is for mode volume in the colours of its transfer function: {what}"));
+    let refused =
+        |what: &str| refuse("still", format!("is for mode volume in the colours of its transfer function: {what}"));
     if settings.mode != Mode::Volume {
         return refused("set mode=volume, or leave it out");
     }

@@ -400,6 +400,9 @@ fn ray_scenes() -> Vec<SceneSpec> {
     }
     let toml = "mode = 'vr'\nstill = { samples = 1, events = 8, albedo = 0.9 }\npicture = { size = [17, 11] }\nray = { brick = 0 }";
     add("still of a Cartesian volume without bricks", &cartesian([17, 23, 9]), BYTES, toml);
+    let toml = "mode = 'vr'\nstill = { samples = 1, events = 4, anisotropy = -0.6, extinction = 0.5 }\npicture = { size = [16, 16] }\n\
+                slices = { pixels = 24, format = 'r8' }\nray = { sampling = 'quads', elevation = 'bspline' }";
+    add("still of packed neighbours, B-spline between slices", &sweep, BYTES, toml);
     // So many slices that the digits of the table show.
     let many = Probe { slices: Axis::centred(1.2 / 200.0, 201), ..wobbler() };
     let toml = "mode = 'vr'\nslices = { pixels = 33 }\npicture = { size = [19, 33] }\nvolume = { shading = 'first-hit' }\ncamera = { azimuth = -30, elevation = 25 }
@@ -580,12 +583,7 @@ fn ray_scenes() -> Vec<SceneSpec> {
             "still, clipped, fading, two lights",
             "mode = 'vr'\nstill = { samples = 3, batch = 2, events = 6, anisotropy = 0.4, seed = 7 }\nregion = { fade = 6 }
              light = { ambient = 0.3, volume = { back = 0.5, ground = {} } }\nvolume = { extinction = 0.4 }
-             slices = { pixels = 30 }\npicture = { size = [19, 33] }\nclip = [{ at = [0, 25, 0], normal = [0.3, -1, 0.2] }]",
-        ),
-        (
-            "still of packed neighbours, B-spline between slices",
-            "mode = 'vr'\nstill = { samples = 1, events = 4, anisotropy = -0.6, extinction = 0.5 }\npicture = { size = [16, 16] }
-             slices = { pixels = 24, format = 'r8' }\nray = { sampling = 'quads', elevation = 'bspline' }",
+             slices = { pixels = 30 }\nclip = [{ at = [0, 25, 0], normal = [0.3, -1, 0.2] }]",
         ),
         ("veil over a surface", "mode = 'mixed'\nvolume = { veil = 0.5 }\nlight = { occlusion = {} }\nslices = { pixels = 30 }"),
         ("rendered colours", "mode = 'sr'\nsurface = { colour = 'rendered' }\nlight = { texture = 0.5 }\nslices = { pixels = 30 }"),

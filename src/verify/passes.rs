@@ -287,7 +287,9 @@ fn blurred(noise: &Texels) -> Texels {
 fn empty_space_of(scene: &Scene, slot: Slot, volume: &Texels) -> Texels {
     let mut slots = std::collections::BTreeMap::from([(Slot::of_rays(scene), volume.clone())]);
     let made = |name: &str| {
-        ["tile_ranges", "brick_ranges", "classify_bricks", "brick_distance", "still_majorants"].iter().any(|p| name.starts_with(p))
+        ["tile_ranges", "brick_ranges", "classify_bricks", "brick_distance", "still_majorants"]
+            .iter()
+            .any(|p| name.starts_with(p))
     };
     for step in Plan::new(scene).steps.iter().filter(|s| made(s.pass.name)) {
         let args = DispatchArgs { slices: scene.slices(), ..step.args() };

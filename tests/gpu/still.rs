@@ -100,7 +100,11 @@ fn a_slab_transmits_what_the_law_of_beer_and_lambert_says() {
         let collided: f64 = pixels.iter().map(|[x, y]| light.get([*x, *y, 0])[3]).sum();
         let expected = -(-extinction * length).exp_m1();
         let error = (expected * (1.0 - expected) / n).sqrt();
-        assert!((collided / n - expected).abs() < Z * error, "{extinction}, bricks of {brick}: {} {expected}", collided / n);
+        assert!(
+            (collided / n - expected).abs() < Z * error,
+            "{extinction}, bricks of {brick}: {} {expected}",
+            collided / n
+        );
         assert!(light.values.chunks_exact(4).all(|p| p[..3] == [0.0; 3]), "what absorbs all is black");
     }
 }
@@ -305,7 +309,8 @@ fn no_division_into_dispatches_changes_a_bit() {
 #[test]
 fn no_sample_in_a_brick_exceeds_its_majorant() {
     let device = Device::new();
-    let geometries = [Geometry::Sweep(wobbler()), Geometry::Sweep(linear()), Geometry::Sweep(radial()), cartesian([24, 20, 9])];
+    let geometries =
+        [Geometry::Sweep(wobbler()), Geometry::Sweep(linear()), Geometry::Sweep(radial()), cartesian([24, 20, 9])];
     let (mut checked, mut lower) = (0, 0);
     for (n, geometry) in geometries.into_iter().enumerate() {
         for elevation in ["linear", "bspline"] {
@@ -336,13 +341,19 @@ fn no_sample_in_a_brick_exceeds_its_majorant() {
                 }
                 let bound = majorants.one(cell.x as usize, cell.y as usize, cell.z as usize);
                 let (_, extinction) = medium.at(place);
-                assert!(extinction <= bound * (1.0 + 1e-5) + 1e-6, "{n}, {elevation}: {extinction} in a brick of {bound}");
+                assert!(
+                    extinction <= bound * (1.0 + 1e-5) + 1e-6,
+                    "{n}, {elevation}: {extinction} in a brick of {bound}"
+                );
                 checked += 1;
                 lower += u32::from(bound < largest);
             }
         }
     }
-    assert!(checked > 50_000 && lower > 1000, "{checked} places, {lower} of them in bricks with less than the largest majorant");
+    assert!(
+        checked > 50_000 && lower > 1000,
+        "{checked} places, {lower} of them in bricks with less than the largest majorant"
+    );
 }
 
 /// Finite light in media that are empty, opaque, or do not absorb, and validation that says nothing.
@@ -352,13 +363,19 @@ fn extreme_media_have_finite_light() {
     let media = [
         ("empty", "volume = { transfer = [{ at = 0, colour = [1, 1, 1], opacity = 0 }] }\nstill = { samples = 2 }"),
         ("no extinction", "volume.transfer = 'skin'\nstill = { samples = 2, extinction = 0 }"),
-        ("opaque", "volume = { transfer = [{ at = 0, colour = [1, 1, 1], opacity = 1 }] }\nstill = { samples = 2, extinction = 100 }"),
+        (
+            "opaque",
+            "volume = { transfer = [{ at = 0, colour = [1, 1, 1], opacity = 1 }] }\nstill = { samples = 2, extinction = 100 }",
+        ),
         (
             "grains of the largest extinction",
             "volume = { transfer = [{ at = 0.9, colour = [1, 1, 1], opacity = 0 }, { at = 1, colour = [1, 1, 1], opacity = 1 }] }\n\
              still = { samples = 2, anisotropy = 0.95, events = 1024 }",
         ),
-        ("backwards", "volume.transfer = 'bone'\nstill = { samples = 2, anisotropy = -0.95, events = 1 }\nlight = { diffuse = 10, ambient = 10 }"),
+        (
+            "backwards",
+            "volume.transfer = 'bone'\nstill = { samples = 2, anisotropy = -0.95, events = 1 }\nlight = { diffuse = 10, ambient = 10 }",
+        ),
     ];
     for (name, toml) in media {
         for brick in [0, 8] {

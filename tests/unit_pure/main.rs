@@ -28,6 +28,7 @@ mod sampling;
 mod sizes_in_mm;
 mod soak;
 mod start_curve;
+mod still;
 mod supply;
 mod unveil;
 mod user_presets;
