@@ -22,7 +22,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 /// A flag as it was typed, and the assignment of a setting that it stands for.
-pub type Assigned = (String, String);
+type Assigned = (String, String);
 
 /// The arguments of every command that renders a recording.
 #[derive(clap::Args)]

@@ -6,7 +6,7 @@ use glam::DVec3;
 use std::f64::consts::PI;
 
 /// Largest extinction, 1/mm: a mean free path of 10 micrometres, far below any texel.
-pub const MAX_EXTINCTION: f64 = 100.0;
+const MAX_EXTINCTION: f64 = 100.0;
 
 /// A distant light.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -62,7 +62,7 @@ pub(super) fn check(settings: &Settings) -> Result<(), SceneError> {
 
 /// The albedo of scattering of a medium of which a half-space has this colour under even light (Kulla and Conty 2017, "Revisiting physically based
 /// shading at Imageworks"), with the similarity relation for the mean cosine g.
-pub fn albedo_of(colour: f64, g: f64) -> f64 {
+fn albedo_of(colour: f64, g: f64) -> f64 {
     let c = colour.clamp(0.0, 1.0);
     let s = 4.09712 + 4.20863 * c - (9.59217 + 41.6808 * c + 17.7126 * c * c).sqrt();
     let square = s.clamp(0.0, 1.0).powi(2);

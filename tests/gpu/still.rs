@@ -262,17 +262,16 @@ fn the_mean_of_speckle_lies_within_its_confidence_interval_of_the_expectation() 
     let (mut outside, mut judged, mut apart, mut variance) = (0, 0, 0.0, 0.0);
     for (pixel, (expected, spread)) in pixels.iter().zip(&expected) {
         let (mean, error) = mean_luminance(&scene, &sums, &[*pixel]);
-        assert!((*expected > 0.0) || mean == 0.0, "light where there is none: {pixel:?}");
-        if *spread == 0.0 || error == 0.0 {
-            continue;
-        }
         let total = error * error + spread;
-        judged += 1;
-        outside += u32::from((mean - expected).abs() > Z * total.sqrt());
         (apart, variance) = (apart + mean - expected, variance + total);
+        // A mean of fewer paths is not distributed normally.
+        if sums[0].get([pixel[0], pixel[1], 0])[3] >= 30.0 {
+            judged += 1;
+            outside += u32::from((mean - expected).abs() > Z * total.sqrt());
+        }
     }
-    // Of 100 to 256 pixels one in a thousand is expected outside; four or more have a probability below 2e-4.
-    assert!(judged > 100 && outside <= 3, "{outside} of {judged} pixels outside");
+    // Of at most 324 pixels one in a thousand is expected outside; four or more have a probability below 4e-4.
+    assert!(judged > 80 && outside <= 3, "{outside} of {judged} pixels outside");
     // All pixels together: a bias that no single pixel shows.
     assert!(apart.abs() < Z * variance.sqrt(), "all pixels: {apart} +- {}", variance.sqrt());
     println!("{outside} of {judged} pixels outside; sum off by {:.2} standard errors", apart / variance.sqrt());

@@ -355,6 +355,7 @@ fn scenes() -> Vec<Scene> {
                 "'mixed'",
                 "'vr'\nvolume = { shading = 'first-hit' }",
                 "'vr'\nlayout = 'four'",
+                "'vr'\nstill = { samples = 2, batch = 1 }",
                 "'vr'\nfloating = 20",
                 "'vr'\ncuts = [{ contour = [[0, 0], [1, 0], [0, 1]], view = { at = [0, 0, 0], direction = [0, 1, 0], up = [0, 0, 1] } }]",
                 "'vr'\nlayout = 'four'\nplanes = { smooth = { lateral = 1.0, depth = 1.0, elevation = 1.0 } }",

@@ -125,7 +125,7 @@ impl<'a> Medium<'a> {
     }
 
     /// An estimate of the transmittance from a place to the end of the region, by ratio tracking (Novak, Selle and Jarosz 2014).
-    pub fn transmittance(&self, from: DVec3, towards: DVec3, stream: &mut Stream) -> f64 {
+    fn transmittance(&self, from: DVec3, towards: DVec3, stream: &mut Stream) -> f64 {
         let mut transmitted = 1.0;
         let is_ended = self.collide(from, towards, stream, |_, _, real, u| {
             transmitted *= 1.0 - real;
@@ -183,7 +183,7 @@ impl<'a> Medium<'a> {
 }
 
 /// Henyey and Greenstein's phase function (1941): the density over solid angle of a change of direction with this cosine. Its mean cosine is g.
-pub fn phase(g: f64, cosine: f64) -> f64 {
+fn phase(g: f64, cosine: f64) -> f64 {
     (1.0 - g * g) / (4.0 * PI * (1.0 + g * g - 2.0 * g * cosine).powf(1.5))
 }
 
