@@ -5,6 +5,7 @@ use crate::common::gpu::*;
 use echolume::gpu::{Bands, Renderer, RendererOptions};
 use echolume::passes::raycast::still::{Medium, final_sums, luminance};
 use echolume::passes::{Slot, Texels};
+use echolume::plan::Plan;
 use echolume::probe::{Geometry, Grid};
 use echolume::scene::Scene;
 use glam::DVec3;
@@ -302,6 +303,17 @@ fn no_division_into_dispatches_changes_a_bit() {
         assert!(of(batch, 1, bands) == whole, "{batch} samples a dispatch");
     }
     assert!(of(8, 2, Bands::default()) != whole, "another seed");
+}
+
+/// Prevents a still of many samples that fails because its dispatches have more parameters than a command buffer takes.
+#[test]
+fn as_many_samples_as_anybody_asks_for_fit_into_a_picture() {
+    let device = Device::new();
+    let (scene, frames) = speckle(&format!("{MANY}still = {{ samples = 600, batch = 1 }}"), 8);
+    let mut renderer = rendered(&device, scene, &frames);
+    renderer.picture().expect("a picture");
+    let many = speckle("still = { samples = 65536, batch = 1 }", 8).0;
+    assert!(Plan::new(&many).steps.len() < 200, "its parameters fit too");
 }
 
 /// No extinction within a brick exceeds its majorant, in every geometry, with both interpolations between slices.

@@ -21,7 +21,7 @@ pub struct Still {
     pub anisotropy: f64,
     /// Most collisions of a path, 1..=1024; what light would do after them is missing.
     pub events: u32,
-    /// Samples of a dispatch, 1..=64. It changes no bit of the picture.
+    /// Samples of a dispatch, 1..=64; more where all of them would take over 64 dispatches. It changes no bit of the picture.
     pub batch: u32,
 }
 
@@ -34,8 +34,8 @@ impl Default for Still {
 impl Still {
     /// Most samples of a pixel: their sums are 32-bit floats.
     pub const MAX_SAMPLES: u32 = 65536;
-    /// Most dispatches of a picture.
-    const MAX_DISPATCHES: u32 = 4096;
+    /// Most dispatches of a picture: the parameters of so many fit into a command buffer's (64 KiB), where each begins at a multiple of 256 bytes.
+    const MAX_DISPATCHES: u32 = 64;
 
     /// Samples of each dispatch but the last.
     pub fn samples_at_once(&self) -> u32 {
