@@ -340,14 +340,13 @@ const CEILING_REPEATS: u32 = 15;
 /// Measures the device's roofline ceilings with the loops of [`crate::passes::measure`]; None if it has no time stamps.
 ///
 /// # Errors
-/// The device cannot hold a volume of 128^3 and two pictures of 4096^2 (2048^2 in software), or fails.
+/// The device cannot hold a volume of 128^3 and pictures of 2048^2, or fails.
 fn measure_ceilings(context: &Arc<Context>) -> Result<Option<Ceilings>, GpuError> {
     let broken = |e: crate::scene::SceneError| GpuError::Broken(format!("the scene that measures: {e}"));
-    // On a software device the smallest sizes with steady times. Pictures that are copied are larger than the caches of a GPU (60 MB of an H200), and
-    // take far longer than a dispatch to start: of 2048^2 pixels, 34 MB each, a copy took an H200 three times as long as its memory needs.
-    let (pixels, copied) = if context.candidate.is_software() { (256, 2048) } else { (2048, 4096) };
+    // Larger than the caches of a GPU; on a software device the smallest size with steady times.
+    let pixels = if context.candidate.is_software() { 256 } else { 2048 };
     let sampled = loops::scene(128, pixels).map_err(broken)?;
-    let copied = loops::scene(2, copied).map_err(broken)?;
+    let copied = loops::scene(2, 2048).map_err(broken)?;
     let rate = |pass: &'static Pass, scene: &Scene, count: f64| -> Result<Option<Ceiling>, GpuError> {
         let rates: Vec<f64> = pass_runner::time_pass(context, scene, pass, CEILING_REPEATS)?
             .iter()

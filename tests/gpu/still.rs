@@ -312,7 +312,7 @@ fn as_many_samples_as_anybody_asks_for_fit_into_a_picture() {
     let (scene, frames) = speckle(&format!("{MANY}still = {{ samples = 600, batch = 1 }}"), 8);
     let mut renderer = rendered(&device, scene, &frames);
     renderer.picture().expect("a picture");
-    let many = speckle("still = { samples = 65536, batch = 1 }", 8).0;
+    let many = speckle(&format!("{MANY}still = {{ samples = 65536, batch = 1 }}"), 8).0;
     assert!(Plan::new(&many).steps.len() < 200, "its parameters fit too");
 }
 
