@@ -39,16 +39,24 @@ impl StillArgs {
     }
 }
 
-/// The number of samples that a time is enough for, by the time that each number of them took: `taken` draws so many and says how long that was, s.
-/// First one is drawn, then more, as long as that takes a small part of the time: what does not depend on their number should not count.
+/// The number of samples that a time is enough for: `taken` draws so many and says how long that was, s. The first picture takes what does not
+/// depend on their number too, such as the compilation of shaders; a sample takes what a picture of more of them takes longer.
 pub fn samples_within(time: f64, mut taken: impl FnMut(u32) -> Result<f64, Failure>) -> Result<u32, Failure> {
-    let (mut samples, mut each) = (1, taken(1)?);
-    while each * f64::from(samples) < time / 64.0 && samples < Still::MAX_SAMPLES / 16 {
-        samples *= 16;
-        each = taken(samples)? / f64::from(samples);
+    let first = taken(1)?;
+    if first >= time {
+        return Ok(1);
     }
+    let mut samples = 5;
+    let each = loop {
+        let longer = taken(samples)? - first;
+        // Far more than times vary by, and a small part of the whole.
+        if longer > time / 64.0 || samples > Still::MAX_SAMPLES / 16 {
+            break longer / f64::from(samples - 1);
+        }
+        samples *= 8;
+    };
     // The conversion saturates.
-    Ok(((time / each.max(1e-12)) as u32).clamp(1, Still::MAX_SAMPLES))
+    Ok((1.0 + (time - first) / each.max(1e-12)).clamp(1.0, f64::from(Still::MAX_SAMPLES)) as u32)
 }
 
 /// The standard error of a still, for people: of the luminance of the pixels that have light, as a share of it.
