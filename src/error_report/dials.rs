@@ -343,7 +343,7 @@ pub fn dial(name: &str, scene: &Scene) -> Result<Dial, String> {
         "half" => {
             need(!scene.is_flat(), "casts no ray")?;
             need(s.ray.rays == 1, "casts several rays for each pixel")?;
-            need(!s.ray.quarter, "casts one ray for 16 pixels")?;
+            need(s.ray.apart() <= 2, "casts one ray for 16 pixels or more")?;
             // Assigning `ray.rays` too keeps the two dials from being combined.
             let half = |on: bool| [format!("ray.half={on}"), "ray.rays=1".to_string()];
             let (word, value) = if s.ray.half { ("half", 0.25) } else { ("whole", 1.0) };

@@ -44,7 +44,7 @@ pub fn ray_size(settings: &Settings) -> [u32; 2] {
 }
 
 /// The same where every pixel has a ray.
-pub(super) fn full_size(settings: &Settings) -> [u32; 2] {
+pub(crate) fn full_size(settings: &Settings) -> [u32; 2] {
     let tile = match settings.layout {
         Layout::Single => settings.picture.size,
         Layout::Four => settings.picture.size.map(|n| n.div_ceil(2)),

@@ -27,7 +27,9 @@ pub(super) fn check(settings: &Settings) -> Result<(), SceneError> {
     check_clip(&settings.clip)?;
     within("cap.level", settings.cap.level.unwrap_or(0.0), 0.0, 1.0)?;
     within("ray.rays", f64::from(settings.ray.rays), 1.0, 4.0)?;
-    for (key, is_set, pixels) in [("ray.half", settings.ray.half, "four"), ("ray.quarter", settings.ray.quarter, "16")]
+    let ray = &settings.ray;
+    for (key, is_set, pixels) in
+        [("ray.half", ray.half, "four"), ("ray.quarter", ray.quarter, "16"), ("ray.eighth", ray.eighth, "64")]
     {
         if is_set && settings.ray.rays > 1 {
             let rays = settings.ray.rays;

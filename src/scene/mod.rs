@@ -276,12 +276,8 @@ impl Scene {
         let is_four = settings.layout == Layout::Four;
         let section_smooth = settings.planes.smooth.filter(|_| is_four);
         let section_smooth = section_smooth.map(|smooth| resolver.smooth("planes.smooth.elevation_mm", smooth));
-        let distance = resolver.distance(&settings.distance);
-        let distance = match settings.ray.apart() {
-            4 => distance.halved().halved(),
-            2 => distance.halved(),
-            _ => distance,
-        };
+        let halvings = settings.ray.apart().ilog2();
+        let distance = (0..halvings).fold(resolver.distance(&settings.distance), |distance, _| distance.halved());
         let mut scene = Scene {
             geometry,
             input,

@@ -34,7 +34,7 @@ const MODES: [(Mode, &str); 10] = [
 const SAMPLINGS: [&str; 3] = ["hardware", "exact", "quads"];
 
 /// Filters, lights and other choices that are structure: each line is a table of a scene file.
-const CHOICES: [&str; 47] = [
+const CHOICES: [&str; 48] = [
     "slices.median = true",
     "slices.sigma = {}",
     "slices.enhanced_sigma = { window = 5, largest = 19, sigma = 0.1 }",
@@ -68,6 +68,7 @@ const CHOICES: [&str; 47] = [
     "surface.colour = 'behind'",
     "ray.half = true",
     "ray.quarter = true",
+    "ray.eighth = true",
     "ray.rays = 2",
     "ray.elevation = 'bspline'",
     "ray.slice_index = 'table'",

@@ -7,7 +7,7 @@
 use crate::error_report::{Combination, Measure, Report, choose};
 use crate::plan::Work;
 use crate::scene::load::Layers;
-use crate::scene::{Ray, Scene, Settings, Transfer};
+use crate::scene::{Mode, Ray, Scene, Settings, camera};
 use crate::ui::texts;
 use std::time::{Duration, Instant};
 
@@ -170,8 +170,8 @@ pub(super) fn label(quality: Quality, rungs: &[Rung]) -> &str {
 pub(super) fn lowered(rungs: &[Rung], scene: &Scene) -> Vec<Settings> {
     let mut all: Vec<Settings> = Vec::new();
     for rung in rungs.iter().skip(1) {
-        let settings = rung.apply(&scene.settings, voxel(scene));
-        let ray = Ray { half: false, quarter: false, rays: 1, ..settings.ray };
+        let settings = rung.apply(&scene.settings);
+        let ray = Ray { half: false, quarter: false, eighth: false, rays: 1, ..settings.ray };
         let (distance, light, post) = Default::default();
         let plain = Settings { ray, distance, light, post, ..settings };
         if !all.contains(&plain) {
@@ -179,11 +179,6 @@ pub(super) fn lowered(rungs: &[Rung], scene: &Scene) -> Vec<Settings> {
         }
     }
     all
-}
-
-/// Edge of a slice pixel, mm: the step unless one is set.
-pub(super) fn voxel(scene: &Scene) -> f64 {
-    scene.grid.pitch[0].min(scene.grid.pitch[1])
 }
 
 /// Chooses the rung for a view that moves. Rung 0 is full quality; each one after it is faster.
@@ -289,6 +284,16 @@ impl FrameBudget {
     }
 }
 
+/// Fewest rays along the shorter edge of a rendering, unless half the rays are fewer. With fewer a rung may hide or close a gap that the full picture
+/// shows: tests/gpu/ladder.rs.
+fn min_rays(settings: &Settings) -> u32 {
+    let distance = &settings.distance;
+    let is_rough =
+        matches!(settings.mode, Mode::Surface | Mode::Mixed) && distance.median == 0 && distance.median_mm.is_none();
+    // Of a surface without a median, single rays miss what their neighbours hit.
+    if is_rough { 180 } else { 90 }
+}
+
 /// Largest number of rungs of a measured ladder.
 const MAX_RUNGS: usize = 6;
 
@@ -306,47 +311,22 @@ pub struct Rung {
 #[derive(Clone, Debug, PartialEq)]
 enum Change {
     None,
-    BuiltIn {
-        rays: Rays,
-        step_factor: f64,
-        filters: Filters,
-    },
+    /// So many pixels from ray to ray along each axis.
+    Apart(u32),
     /// Assignments as of `--set`, from an error report.
     Measured(Vec<String>),
 }
 
-/// The rays of a rung of the built-in ladder, along each axis.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Rays {
-    Half,
-    Quarter,
-}
-
-/// What a rung of the built-in ladder leaves of the filters and of the shading.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Filters {
-    All,
-    /// Smaller filters of the distance map, no occlusion.
-    Small,
-    /// No filter of stages 3 and 4, no occlusion, no shadow.
-    None,
-}
-
-/// The built-in ladder. No rung only lengthens the step, which makes no surface faster: the detector takes at least eight samples of an edge
-/// whatever the step. The time shares are a first estimate, from the phantom's face on two cores; the frame
-/// budget corrects them with measurements.
+/// The built-in ladder. It takes rays away and nothing else: without its filters a surface has holes that are not there, a longer step loses thin
+/// tissue, and neither saves as much as half the rays. The time shares are a first estimate, from the phantom's face on two cores; the frame budget
+/// corrects them with measurements.
 pub fn built_in_ladder() -> Vec<Rung> {
-    let rung = |label: &str, time_share, rays, step_factor, filters| Rung {
-        label: label.into(),
-        time_share,
-        change: Change::BuiltIn { rays, step_factor, filters },
-    };
+    let rung = |label: &str, time_share, apart| Rung { label: label.into(), time_share, change: Change::Apart(apart) };
     vec![
         Rung { label: texts::FULL_QUALITY.into(), time_share: 1.0, change: Change::None },
-        rung(texts::HALF_RAYS, 0.24, Rays::Half, 1.0, Filters::All),
-        rung(texts::HALF_RAYS_SMALL_FILTERS, 0.21, Rays::Half, 1.5, Filters::Small),
-        rung(texts::HALF_RAYS_NO_FILTERS, 0.16, Rays::Half, 2.0, Filters::None),
-        rung(texts::QUARTER_RAYS, 0.055, Rays::Quarter, 2.0, Filters::None),
+        rung(texts::HALF_RAYS, 0.24, 2),
+        rung(texts::QUARTER_RAYS, 0.065, 4),
+        rung(texts::EIGHTH_RAYS, 0.02, 8),
     ]
 }
 
@@ -378,29 +358,27 @@ pub fn measured_ladder(report: &Report) -> Result<Vec<Rung>, String> {
 }
 
 impl Rung {
-    /// The settings on this rung; unchanged if a measured change does not fit them. `voxel`: edge of a slice pixel, mm, which is the step
-    /// unless one is set.
-    pub(super) fn apply(&self, settings: &Settings, voxel: f64) -> Settings {
+    /// A rung of an error report with these assignments.
+    #[cfg(test)]
+    pub(super) fn measured(set: &str) -> Rung {
+        Rung { label: set.into(), time_share: 0.01, change: Change::Measured(vec![set.into()]) }
+    }
+
+    /// Description for the display of times.
+    pub fn label(&self) -> &str {
+        &self.label
+    }
+
+    /// The settings on this rung; unchanged if a measured change does not fit them.
+    pub fn apply(&self, settings: &Settings) -> Settings {
         let mut changed = settings.clone();
         match &self.change {
             Change::None => return changed,
-            Change::BuiltIn { rays, step_factor, filters } => {
+            Change::Apart(apart) => {
                 changed = changed.moving();
-                changed.ray.quarter |= *rays == Rays::Quarter;
-                // With a steep transfer function a longer step is visible as rings.
-                let steep = matches!(&settings.volume.transfer, Transfer::Points(p) if p.len() > 8);
-                if *step_factor > 1.0 && !steep {
-                    changed.ray.step = Some(settings.ray.step.unwrap_or(voxel) * step_factor);
-                }
-                if *filters != Filters::All {
-                    changed.distance = changed.distance.halved();
-                    changed.light.occlusion = None;
-                }
-                if *filters == Filters::None {
-                    changed.light.shadow = None;
-                    changed.distance = Default::default();
-                    (changed.post.sigma, changed.post.enhanced_sigma, changed.post.perona_malik) = (None, None, None);
-                }
+                let [width, height] = camera::full_size(&changed);
+                let most = width.min(height) / min_rays(settings);
+                (changed.ray.quarter, changed.ray.eighth) = (*apart >= 4 && most >= 4, *apart >= 8 && most >= 8);
             }
             Change::Measured(set) => {
                 let apply = || -> Option<Settings> {
@@ -474,7 +452,7 @@ mod tests {
     fn live_volumes_are_drawn_as_fast_as_they_come_and_no_faster() {
         let rungs = built_in_ladder();
         // Full quality takes so long, ms; the quality while volumes come every 200 ms, and after the last.
-        for (full, budget, live) in [(150, 33, 0), (500, 33, 1), (1500, 33, 4), (150, 300, 0), (1000, 300, 1)] {
+        for (full, budget, live) in [(150, 33, 0), (500, 33, 1), (1500, 33, 2), (150, 300, 0), (1000, 300, 1)] {
             let mut pace = Pace::new(Some(Duration::from_millis(budget)), &rungs);
             let mut now = Instant::now();
             for _ in 0..30 {
@@ -520,30 +498,42 @@ mod tests {
             layers.preset(preset).expect("preset");
             let settings = layers.finish().expect("settings");
             let rungs = built_in_ladder();
-            assert_eq!(rungs[0].apply(&settings, 0.3), settings);
+            assert_eq!(rungs[0].apply(&settings), settings);
             for pair in rungs.windows(2) {
                 assert!(pair[1].time_share < pair[0].time_share);
-                let changed = pair[1].apply(&settings, 0.3);
+                let changed = pair[1].apply(&settings);
                 assert!(changed.ray.half && changed.slices == settings.slices, "{preset}: {}", pair[1].label);
             }
         }
     }
 
-    /// The surface detector takes at least eight samples of an edge, whatever the step: a longer step alone makes no picture faster.
+    /// Prevents anatomy that is not there: a rung leaves everything but the number of rays as it is.
     #[test]
-    fn every_rung_does_more_than_lengthen_the_step() {
-        let mut layers = Layers::default();
-        layers.preset("face-classic").expect("preset");
-        let settings = layers.finish().expect("settings");
-        let without_step = |rung: &Rung| {
-            let mut changed = rung.apply(&settings, 0.3);
-            changed.ray.step = None;
-            changed
-        };
-        let pictures: Vec<Settings> = built_in_ladder().iter().map(without_step).collect();
-        assert!(pictures.windows(2).all(|w| w[0] != w[1]));
-        let apart: Vec<u32> = pictures.iter().map(|s| s.ray.apart()).collect();
-        assert_eq!((apart[0], apart[1], apart.last()), (1, 2, Some(&4)));
+    fn a_rung_takes_rays_away_and_nothing_else() {
+        for (preset, _) in crate::scene::load::PRESETS {
+            let mut layers = Layers::default();
+            layers.preset(preset).expect("preset");
+            let mut settings = layers.finish().expect("settings");
+            let rungs = built_in_ladder();
+            for (size, all) in [
+                ([742, 724], [1, 2, 4, 8]),
+                ([1000, 719], [1, 2, 4, 4]),
+                ([370, 362], [1, 2, 4, 4]),
+                ([40, 30], [1, 2, 2, 2]),
+            ] {
+                (settings.picture.size, settings.distance.median) = (size, 15);
+                let apart: Vec<u32> = rungs.iter().map(|rung| rung.apply(&settings).ray.apart()).collect();
+                assert_eq!(apart, all, "{preset} {size:?}");
+            }
+            (settings.mode, settings.picture.size, settings.distance.median) = (Mode::Surface, [742, 724], 0);
+            assert_eq!(rungs[3].apply(&settings).ray.apart(), 4, "{preset} without a median");
+            for rung in &rungs[1..] {
+                let mut changed = rung.apply(&settings);
+                changed.ray = Ray { half: false, quarter: false, eighth: false, ..changed.ray };
+                let one_ray = Settings { ray: Ray { rays: 1, ..settings.ray.clone() }, ..settings.clone() };
+                assert_eq!(changed, one_ray, "{preset}: {}", rung.label());
+            }
+        }
     }
 
     #[test]

@@ -69,6 +69,7 @@ const SETTINGS: &[(&str, &[&str])] = &[
     ("ray.rays", &["2", "3"]),
     ("ray.half", &["true"]),
     ("ray.quarter", &["true"]),
+    ("ray.eighth", &["true"]),
     ("ray.spread", &["0.5", "1"]),
     ("ray.sliding", &["3", "5"]),
     ("ray.entries", &["2", "65536"]),

@@ -56,7 +56,7 @@ fn filters_span_as_much_of_the_picture_with_half_the_rays() {
     let diffused = half.perona_malik.expect("diffusion");
     assert!((diffused.step * f64::from(diffused.repeat) - 0.25).abs() < 1e-12 && diffused.step <= 0.2);
     assert_eq!(Distance::default().halved(), Distance::default());
-    for key in ["half", "quarter"] {
+    for key in ["half", "quarter", "eighth"] {
         let refused = settings(&format!("ray = {{ {key} = true, rays = 2 }}"));
         let error = Scene::new(Geometry::Sweep(wobbler()), BYTES, refused).unwrap_err().to_string();
         assert!(error.contains(&format!("ray.{key}")), "{error}");

@@ -29,6 +29,8 @@ mod goldens;
 mod growth;
 mod half_resolution;
 mod known_answers;
+#[cfg(feature = "view")]
+mod ladder;
 mod light_volume;
 mod live;
 mod live_control;

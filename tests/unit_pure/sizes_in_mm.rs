@@ -39,7 +39,9 @@ fn windows_are_the_nearest_odd_number_of_pixels() {
 
 #[test]
 fn sizes_in_mm_cover_the_same_part_of_a_picture_of_any_size() {
-    for more in ["", "camera.field_of_view = 40", "ray.rays = 2", "ray.half = true", "ray.quarter = true"] {
+    for more in
+        ["", "camera.field_of_view = 40", "ray.rays = 2", "ray.half = true", "ray.quarter = true", "ray.eighth = true"]
+    {
         let covers = |size: u32| {
             let filters =
                 "distance = { median_mm = 6, bilateral = { mm = 1, distance = 1 }, perona_malik = { width_mm = 3 } }";

@@ -63,15 +63,18 @@ pub struct Ray {
     pub half: bool,
     /// Quarter resolution: one ray for 16 pixels, otherwise like `half`, which then changes nothing.
     pub quarter: bool,
+    /// An eighth of the resolution: one ray for 64 pixels, otherwise like `half`, which then changes nothing, as `quarter` does.
+    pub eighth: bool,
 }
 
 impl Ray {
     /// Pixels between two rays along each axis, where a pixel has at most one ray.
     pub fn apart(&self) -> u32 {
-        match (self.half, self.quarter) {
-            (_, true) => 4,
-            (true, false) => 2,
-            (false, false) => 1,
+        match (self.half, self.quarter, self.eighth) {
+            (.., true) => 8,
+            (_, true, _) => 4,
+            (true, ..) => 2,
+            _ => 1,
         }
     }
 }
@@ -92,6 +95,7 @@ impl Default for Ray {
             brick: None,
             half: false,
             quarter: false,
+            eighth: false,
         }
     }
 }

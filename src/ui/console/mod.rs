@@ -741,10 +741,9 @@ impl Console {
         if !is_due || is_done || !has_drawn {
             return;
         }
-        let voxel = self.stream.scene().map_or(0.5, frame_budget::voxel);
         let (_, settings) = self.effective_settings(now);
         let lowered = self.rungs.iter().skip(1).filter(|_| self.pace.budget().is_some());
-        let lowered = lowered.map(|rung| (rung.apply(&settings, voxel), Some(settings.clone())));
+        let lowered = lowered.map(|rung| (rung.apply(&settings), Some(settings.clone())));
         let switches = variants::switches(&settings, |to| self.controls.switched(to)).into_iter();
         let next = lowered.chain(switches.map(|variant| (variant.settings, None))).collect();
         self.stream.warm(next);
@@ -770,10 +769,9 @@ impl Console {
     /// The quality that keeps the frame budget now, and the settings of it.
     fn effective_settings(&self, now: Instant) -> (Quality, Settings) {
         let quality = self.pace.quality(now);
-        let voxel = self.stream.scene().map_or(0.5, frame_budget::voxel);
         let full = self.full_settings();
         let lowered = match self.rungs.get(quality.rays) {
-            Some(rung) => rung.apply(&full, voxel),
+            Some(rung) => rung.apply(&full),
             None => full,
         };
         (quality, frame_budget::shaded(lowered, quality.shading))

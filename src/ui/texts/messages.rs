@@ -167,9 +167,8 @@ pub const FULL_QUALITY: &str = "full quality";
 pub const NO_OCCLUSION: &str = "no occlusion";
 pub const NO_OCCLUSION_NO_SHADOW: &str = "no occlusion, no shadow";
 pub const HALF_RAYS: &str = "half the rays each way";
-pub const HALF_RAYS_SMALL_FILTERS: &str = "half the rays, steps x 1.5, small filters";
-pub const HALF_RAYS_NO_FILTERS: &str = "half the rays, steps x 2, no shadow, no filters";
-pub const QUARTER_RAYS: &str = "a quarter of the rays each way, steps x 2, no shadow, no filters";
+pub const QUARTER_RAYS: &str = "a quarter of the rays each way";
+pub const EIGHTH_RAYS: &str = "an eighth of the rays each way";
 
 pub fn render_start(outcome: impl Display) -> String {
     format!("{}: {outcome}.", super::AUTO_RENDER_START)
