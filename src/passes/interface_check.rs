@@ -11,7 +11,7 @@ use crate::spirv::volumes_to_layers::volumes_to_layers;
 use crate::spirv::{self, Access, Dimension, Kind, Member, Module};
 
 /// Textures and tables that a shader declares and a pass may not bind. Specialization constants say whether they are read or written.
-const OPTIONAL: [&str; 34] = [
+const OPTIONAL: [&str; 35] = [
     "back_light",
     "before",
     "bricks",
@@ -21,6 +21,7 @@ const OPTIONAL: [&str; 34] = [
     "cuts",
     "distance_map",
     "front",
+    "guide",
     "hit_distance",
     "light_normals",
     "light_shade",

@@ -1,5 +1,6 @@
 //! Stage 4: the picture from the rendering, toned to 8 bits.
 
+use crate::passes::chain;
 use crate::passes::pass::*;
 use crate::scene::planes::{Frame, Plane, Sheet, Tile};
 use crate::scene::{ColourMap, Layout, Scene, transfer};
@@ -126,8 +127,14 @@ fn distance(plane: &Plane, other: &Plane, place: DVec3) -> f64 {
     (place - on_line).cross(along.normalize()).length()
 }
 
+/// What tells edges between rays that are pixels apart: the distance of the surface on each. Compositing and projections blend what lies behind each
+/// other: their pictures are smooth between rays.
+fn guide(scene: &Scene) -> Option<Slot> {
+    (scene.settings.ray.apart() > 1 && scene.has_distance()).then(|| chain::distance_end(scene))
+}
+
 /// The picture from the rendering: the mean of several rays per pixel, or interpolation between the rays where one ray makes
-/// several pixels; in a 4-up picture, the rendering next to the planes; in a pair, the composited volume next to the lit surface.
+/// several pixels, without mixing what is near with what lies far behind it; in a 4-up picture, the rendering next to the planes; in a pair, the composited volume next to the lit surface.
 pub const ASSEMBLE: Pass = Pass {
     name: "assemble",
     stage: Stage::Postprocess,
@@ -145,25 +152,29 @@ pub const ASSEMBLE: Pass = Pass {
         let mut reads = vec![whole("rendered", Slot::Rendered)];
         reads.extend((s.settings.layout == Layout::Four).then_some(whole("planes", Slot::Planes)));
         reads.extend(s.is_pair().then_some(whole("composited", composited_beside_surface(s))));
+        reads.extend(guide(s).map(|slot| whole("guide", slot)));
         reads
     },
     writes: |_, _| vec![whole("picture", Slot::Picture)],
     extent: picture_extent,
     repeat: once,
-    params: |_, _| Params::default(),
+    params: |s, _| Params::default().f32("cliff", s.cliff()),
     constants: |s, _| {
         let layout = match s.settings.layout {
             Layout::Single => 0,
             Layout::Four => 1,
             Layout::Pair => 2,
         };
-        vec![("RAYS", s.settings.ray.rays as i32), ("APART", s.settings.ray.apart() as i32), ("LAYOUT", layout)]
+        let ray = &s.settings.ray;
+        let guided = guide(s).is_some();
+        vec![("RAYS", ray.rays as i32), ("APART", ray.apart() as i32), ("LAYOUT", layout), ("GUIDED", guided as i32)]
     },
     tolerance: Tolerance {
         absolute: 1e-3,
         relative: 0.0,
-        outliers: 0.0,
-        why: "a mean of at most 16 colours in f32; R16F stores 1 to 4.9e-4",
+        outliers: 2e-3,
+        why: "a mean of at most 16 colours in f32; R16F stores 1 to 4.9e-4; a gap that is as wide as a cliff, two that are as wide as each other, or a \
+              mean of sides that is nearly even in all directions may put a pixel on either side of an edge",
     },
     reference: |scene, _, reads, writes| {
         let picture = writes.get_mut("picture");
@@ -189,7 +200,8 @@ pub const ASSEMBLE: Pass = Pass {
                 };
                 if scene.settings.ray.apart() > 1 {
                     let apart = f64::from(scene.settings.ray.apart());
-                    picture.set([x, y, 0], &between(shown, apart, x - corner[0], y - corner[1]));
+                    let guide = guide(scene).filter(|_| is_rendering).map(|_| (reads.get("guide"), scene.cliff()));
+                    picture.set([x, y, 0], &between(shown, guide, apart, [x - corner[0], y - corner[1]]));
                     continue;
                 }
                 let mut mean = [0.0; 4];
@@ -203,17 +215,66 @@ pub const ASSEMBLE: Pass = Pass {
     },
 };
 
-/// Linear interpolation between the rays around a pixel. Ray i goes through the middle of the `apart` pixels from `apart` i on. Beyond
-/// the outermost ray its value repeats.
-fn between(rendered: &Texels, apart: f64, x: usize, y: usize) -> [f64; 4] {
-    let along = |pixel: usize, rays: usize| {
-        let at = ((pixel as f64 + 0.5) / apart - 0.5).clamp(0.0, (rays - 1) as f64);
-        let low = at.floor() as usize;
-        (low, (low + 1).min(rays - 1), at - at.floor())
+/// The colour of a pixel between the rays around it. Ray i goes through the middle of the `apart` pixels from `apart` i on; beyond the outermost ray its
+/// value repeats. It is linear interpolation, except where the guide has a cliff between the four rays.
+fn between(rendered: &Texels, guide: Option<(&Texels, f64)>, apart: f64, pixel: [usize; 2]) -> [f64; 4] {
+    let place: [f64; 2] =
+        std::array::from_fn(|a| ((pixel[a] as f64 + 0.5) / apart - 0.5).clamp(0.0, (rendered.size[a] - 1) as f64));
+    let low = place.map(f64::floor);
+    let ray = |offset: [i32; 2]| -> [usize; 3] {
+        let [x, y] =
+            [0, 1].map(|a| (low[a] as i64 + i64::from(offset[a])).clamp(0, rendered.size[a] as i64 - 1) as usize);
+        [x, y, 0]
     };
-    let ((x0, x1, u), (y0, y1, v)) = (along(x, rendered.size[0]), along(y, rendered.size[1]));
-    std::array::from_fn(|c| {
-        let at = |x, y| rendered.get([x, y, 0])[c];
-        (1.0 - v) * ((1.0 - u) * at(x0, y0) + u * at(x1, y0)) + v * ((1.0 - u) * at(x0, y1) + u * at(x1, y1))
-    })
+    let rays = [[0, 0], [1, 0], [0, 1], [1, 1]];
+    let weight =
+        |offset: [i32; 2]| -> f64 { (0..2).map(|a| 1.0 - (place[a] - low[a] - f64::from(offset[a])).abs()).product() };
+    let mean = |weight: &dyn Fn([i32; 2]) -> f64| -> [f64; 4] {
+        let all: f64 = rays.iter().map(|offset| weight(*offset)).sum();
+        std::array::from_fn(|c| rays.iter().map(|o| weight(*o) * rendered.get(ray(*o))[c]).sum::<f64>() / all)
+    };
+    let Some((limit, reach, distances)) = guide.and_then(|(distances, cliff)| {
+        let around = rays.map(|offset| distances.get(ray(offset))[0]);
+        cliff_between(around, cliff).map(|(limit, reach)| (limit, reach, distances))
+    }) else {
+        return mean(&weight);
+    };
+
+    let is_near = |offset: [i32; 2]| distances.get(ray(offset))[0] < limit;
+    // Near less far, in a mean over more rays, and how it rises per ray.
+    let (mut sum, mut slope) = (0.0, [0.0; 2]);
+    for (i, j) in (1 - reach..=reach).flat_map(|j| (1 - reach..=reach).map(move |i| (i, j))) {
+        let x: [f64; 2] = std::array::from_fn(|a| (f64::from([i, j][a]) - (place[a] - low[a])) / f64::from(reach));
+        let [u, v] = x.map(|x| (1.0 - x * x).max(0.0));
+        let side = if is_near([i, j]) { 0.5 } else { -0.5 };
+        sum += side * (u * v).powi(2);
+        slope[0] += side * 4.0 / f64::from(reach) * x[0] * u * v * v;
+        slope[1] += side * 4.0 / f64::from(reach) * x[1] * u * u * v;
+    }
+    // Where that straight edge has one of the four rays on the wrong side by more than half a ray, the four decide.
+    let steep = slope[0].hypot(slope[1]);
+    let straight = sum / steep.max(1e-6);
+    let inside_of = |offset: [i32; 2]| {
+        let by = |a: usize| slope[a] / steep.max(1e-6) * (f64::from(offset[a]) - (place[a] - low[a]));
+        straight + by(0) + by(1)
+    };
+    let is_wrong = |offset: &[i32; 2]| (if is_near(*offset) { -1.0 } else { 1.0 }) * inside_of(*offset) > 0.5;
+    let inside = match rays.iter().any(is_wrong) {
+        true => rays.iter().filter(|o| is_near(**o)).map(|o| weight(*o)).sum::<f64>() - 0.5,
+        false => straight,
+    };
+    let coverage = (0.5 + inside * apart).clamp(0.0, 1.0);
+    let near = mean(&|offset| if is_near(offset) { weight(offset) + 1e-3 } else { 0.0 });
+    let far = mean(&|offset| if is_near(offset) { 0.0 } else { weight(offset) + 1e-3 });
+    std::array::from_fn(|c| far[c] + (near[c] - far[c]) * coverage)
+}
+
+/// The distance that parts what is near from what is far, in the widest gap between four distances, if that is a cliff; and how many rays away others
+/// tell where the edge is. Around an outline, what is near is all that is hit; between two surfaces only the nearest rays tell.
+fn cliff_between(mut distances: [f64; 4], cliff: f64) -> Option<(f64, i32)> {
+    distances.sort_by(f64::total_cmp);
+    let gaps: Vec<f64> = distances.windows(2).map(|pair| pair[1] - pair[0]).collect();
+    let widest = (0..3).rev().max_by(|a, b| gaps[*a].total_cmp(&gaps[*b]))?;
+    let limit = 0.5 * distances[widest] + 0.5 * distances[widest + 1];
+    (gaps[widest] > cliff).then_some((limit, if is_hit(distances[3]) { 2 } else { 4 }))
 }

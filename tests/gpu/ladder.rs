@@ -1,7 +1,7 @@
 //! The quality ladder of a moving view: no rung shows a hole or a part that the full picture has not.
 
 use crate::common::gpu::*;
-use echolume::gpu::{Renderer, RendererOptions};
+use echolume::gpu::{Renderer, RendererOptions, TimeStamps};
 use echolume::passes::{chain, is_hit, slots};
 use echolume::probe::Geometry;
 use echolume::scene::load::Layers;
@@ -87,19 +87,19 @@ impl Mask {
 }
 
 /// A volume of the phantom, and what draws it.
-struct Stage {
+pub struct Stage {
     device: Device,
     phantom: Phantom,
 }
 
 impl Stage {
-    fn new() -> Stage {
+    pub fn new() -> Stage {
         let options = PhantomOptions { still: true, ..PhantomOptions::default() };
         Stage { device: Device::new(), phantom: Phantom::new(options).expect("phantom") }
     }
 
     /// The phantom in a look: preset, mode and size of the picture. A ground behind the volume would make every ray opaque.
-    fn scene(&self, (preset, mode, size): (&str, &str, [u32; 2]), view: &str) -> Scene {
+    pub fn scene(&self, (preset, mode, size): (&str, &str, [u32; 2]), view: &str) -> Scene {
         let mut layers = Layers::default();
         layers.preset(preset).expect("preset");
         let look = [format!("mode={mode}"), format!("picture.size={size:?}"), "slices.everything=true".into()];
@@ -112,8 +112,9 @@ impl Stage {
         Scene::new(geometry, BYTES, layers.finish().expect("settings")).expect("scene")
     }
 
-    fn renderer(&self, scene: Scene) -> Renderer {
-        let mut renderer = Renderer::new(&self.device, scene, &RendererOptions::default()).expect("renderer");
+    pub fn renderer(&self, scene: Scene) -> Renderer {
+        let options = RendererOptions { time_stamps: TimeStamps::EachPass, ..RendererOptions::default() };
+        let mut renderer = Renderer::new(&self.device, scene, &options).expect("renderer");
         for frame in self.phantom.volume(0) {
             renderer.frame(frame.slice as u32, &frame.bytes, 0).expect("frame");
         }

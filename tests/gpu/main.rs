@@ -62,6 +62,8 @@ mod tiles;
 mod timing;
 mod truth;
 mod unveil;
+#[cfg(feature = "view")]
+mod upscale;
 mod verify_groups;
 mod visible_bounds;
 mod volume_storage;

@@ -58,7 +58,7 @@ pub struct Ray {
     /// that it stays the same bit for bit. Absent: 8; a CPU skips only where one picture of a volume saves more time than the ranges of
     /// the bricks take, or with `slices.still`.
     pub brick: Option<u32>,
-    /// Half resolution: one ray for four pixels, and the picture is enlarged, for a view that moves. The filters of the distance map
+    /// Half resolution: one ray for four pixels, and the picture is enlarged, along the edges of surfaces, for a view that moves. The filters of the distance map
     /// cover the same part of the picture with half as many rays per axis. `rays` must be 1.
     pub half: bool,
     /// Quarter resolution: one ray for 16 pixels, otherwise like `half`, which then changes nothing.
