@@ -181,16 +181,12 @@ fn coarse_pictures_come_nearer_to_the_full_one_than_by_linear_interpolation() {
             settings.ray.quarter = key == "quarter";
             let coarse = Scene::new(full.geometry.clone(), full.input, settings).expect("scene");
             renderer.change(coarse.clone()).expect("change");
-            renderer.take_times().expect("times");
             renderer.picture().expect("picture");
-            let times = renderer.take_times().expect("times");
-            let [all, own] = ["", "assemble"]
-                .map(|name| -> f64 { times.iter().filter(|t| t.name.starts_with(name)).map(|t| t.total / 1e6).sum() });
             let made = renderer.read(Slot::Picture).expect("read").expect("there");
             let plain = linear(&renderer.read(Slot::Rendered).expect("read").expect("there"), apart, whole.size);
             let (before, after) = (likeness(&whole, &plain), likeness(&whole, &made));
             println!(
-                "{preset} {mode} {key}: mean {:.2} -> {:.2} levels, SSIM {:.4} -> {:.4}; {own:.2} of {all:.1} ms",
+                "{preset} {mode} {key}: mean {:.2} -> {:.2} levels, SSIM {:.4} -> {:.4}",
                 before.0, after.0, before.1, after.1,
             );
             match coarse.has_distance() {
