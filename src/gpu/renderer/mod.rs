@@ -431,9 +431,13 @@ impl Renderer {
         let touched = |slots: &[Slot]| {
             plan.steps_of(Frequency::Frame).any(|(_, s)| s.reads(&scene).iter().any(|r| slots.contains(r)))
         };
+        // Frames in flight may run a pass that the new plan leaves out, such as that of packed neighbours for a picture with fewer rays: its
+        // pipeline ends with the old plan.
+        let old = self.plan.steps.iter().zip(&self.steps).filter(|(step, _)| step.pass.frequency != Frequency::Picture);
+        let ends_a_pipeline = old.clone().any(|(_, old)| !steps.iter().any(|new| Arc::ptr_eq(old, new)));
         self.wait_presented()?;
         match &rerun {
-            Rerun::Steps { slots, .. } if !touched(slots) => self.wait_drawn()?,
+            Rerun::Steps { slots, .. } if !touched(slots) && !ends_a_pipeline => self.wait_drawn()?,
             _ => self.collect()?,
         }
         // Of slots that are made again with the images, `fit` uploads the content.
