@@ -35,17 +35,15 @@ fn an_injected_slow_pass_is_found_and_no_other_pass_blamed_as_much() {
             println!("{:20} {:?} {:?}", line.name, line.verdict, line.ratio.as_ref().map(|r| r.estimate));
         }
         let is_found = compared.regressions().any(|l| l.name == "median_distance");
-        is_found.then_some((old, new, compared))
+        // On a software device a longer pass leaves colder caches to the following passes: they may be slower, but not nearly as much.
+        let ratio = |name: &str| compared.lines.iter().find(|l| l.name == name)?.ratio.as_ref().map(|r| r.estimate);
+        let slow = ratio("median_distance")?;
+        let others = ["scan_convert", "sigma_slice", "raycast_surface", "light", "sigma_picture", "tone"];
+        let is_clear = slow > 3.0 && others.iter().all(|pass| ratio(pass).is_none_or(|r| r < slow / 1.5));
+        (is_found && is_clear).then_some((old, new, compared))
     };
-    // Noise of a busy machine may hide it from a pair of runs, but not from each of five.
-    let (old, new, compared) = (0..5).find_map(|_| pair()).expect("not found");
-    // On a software device a longer pass leaves colder caches to the following passes: they may be slower, but not nearly as much.
-    let ratio = |name: &str| compared.lines.iter().find(|l| l.name == name)?.ratio.as_ref().map(|r| r.estimate);
-    let slow = ratio("median_distance").expect("a ratio");
-    assert!(slow > 3.0, "{slow} for six times the work");
-    for pass in ["scan_convert", "sigma_slice", "raycast_surface", "light", "sigma_picture", "tone"] {
-        assert!(ratio(pass).is_none_or(|r| r < slow / 1.5), "{pass} is blamed: {:?}", ratio(pass));
-    }
+    // Noise of a busy machine may hide it from a pair of runs, or slow another pass, but not in each of five.
+    let (old, new, _) = (0..5).find_map(|_| pair()).expect("not found, or another pass is blamed, in each of five");
     let back = compare(&new, &old, &CompareOptions::default()).expect("comparison");
     let line = back.lines.iter().find(|l| l.name == "median_distance").expect("line");
     // On a busy machine the range of the quick runs may hide that they are faster, but not turn it round.
