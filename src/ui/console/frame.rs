@@ -124,7 +124,10 @@ impl Console {
         self.write_metrics(now);
         let is_busy = self.stream.is_drawing() || !self.stream.is_idle();
         self.silence.end_update(now, begun.elapsed(), is_busy);
-        Ok(LoopRequest { wake_at: self.next_wake(now), ..std::mem::take(&mut self.request) })
+        let request = std::mem::take(&mut self.request);
+        // The console that replaces this one is updated at once: nothing else may wake it. What this one waits for is not its concern.
+        let wake_at = if request.restart { Some(now) } else { self.next_wake(now) };
+        Ok(LoopRequest { wake_at, ..request })
     }
 
     /// Gives the stream the settings that are to be drawn now.

@@ -79,12 +79,14 @@ impl Window {
     }
 
     fn update(&mut self) {
-        let request = self.console.update(Instant::now() + LATER).expect("the device is there");
+        let now = Instant::now() + LATER;
+        let request = self.console.update(now).expect("the device is there");
         self.exits |= request.exit;
         if let Some(tree) = self.console.take_tree() {
             self.tree = tree.nodes.into_iter().map(|(_, node)| node).collect();
         }
         if request.restart {
+            assert!(request.wake_at.is_some_and(|at| at <= now), "nothing else may wake the new console");
             let source: OpenSource = Arc::new(phantom_source);
             let progress = Progress::default();
             self.console = Window::console(&self.device, &self.recordings, &self.read, &self.next, source, progress);
