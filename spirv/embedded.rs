@@ -52,6 +52,7 @@
     ("preprocess/scan_convert", include_bytes!("preprocess/scan_convert.spv")),
     ("raycast/cap", include_bytes!("raycast/cap.spv")),
     ("raycast/cube", include_bytes!("raycast/cube.spv")),
+    ("raycast/mark_edges", include_bytes!("raycast/mark_edges.spv")),
     ("raycast/planes.plain", include_bytes!("raycast/planes.plain.spv")),
     ("raycast/planes.toned", include_bytes!("raycast/planes.toned.spv")),
     ("raycast/projection", include_bytes!("raycast/projection.spv")),

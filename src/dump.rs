@@ -204,8 +204,10 @@ fn meaning(slot: Slot) -> (&'static [&'static str], &'static str) {
         Slot::NetCounts | Slot::NetFirsts => (GREY, "cells"),
         Slot::NetCrossed | Slot::NetAsked => (&["column", "row"], "bits of cells, and of their corners or edges"),
         Slot::NetOffsets => (&["x", "y", "z", "unused"], "voxels from the first corner of a cell"),
+        Slot::EdgeMarks => (GREY, "1 in pixels that have several rays"),
         Slot::VolumeLayer
         | Slot::VolumeBesideSurface
+        | Slot::PixelRays
         | Slot::Rendered
         | Slot::Planes
         | Slot::Picture

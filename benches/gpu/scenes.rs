@@ -130,6 +130,11 @@ pub const SCENES: &[Stated] = &[
         &["mode=vr", "still.samples=3", "still.batch=1"],
         &["still_majorants", "still_begin", "still_paths", "still_resolve"],
     ),
+    sweep(
+        "several rays at edges",
+        &["mode=vr", "ray.rays=2", "ray.adaptive=true"],
+        &["raycast_volume", "mark_edges", "raycast_refined", "assemble"],
+    ),
     sweep("largest", &["mode=mip"], &["raycast_projection"]),
     sweep("mean", &["mode=mean"], &["raycast_projection"]),
     sweep("three planes", &["mode=orthogonal"], &["raycast_planes_toned"]),

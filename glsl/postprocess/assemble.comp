@@ -7,6 +7,7 @@ layout(constant_id = 0) const int RAYS = 1; // along each edge of a pixel
 layout(constant_id = 1) const int APART = 1; // pixels between two rays along each axis
 layout(constant_id = 2) const int LAYOUT = 0;
 const int FOUR = 1, PAIR = 2; // 0 the rendering alone
+layout(constant_id = 4) const int REFINED = 0; // 1: only marked pixels have several rays
 layout(constant_id = 3) const int GUIDED = 0; // 1: between rays, edges are where distances differ
 layout(scalar) uniform Params {
     float cliff; // distances that differ by more belong to different things, mm
@@ -14,6 +15,8 @@ layout(scalar) uniform Params {
 uniform texture2D rendered;
 uniform texture2D planes;     // of a 4-up picture
 uniform texture2D composited; // of a pair
+uniform texture2D marks;      // of REFINED: 1 in pixels that have several rays
+uniform texture2D single;     // of REFINED: the colour of one ray through the middle of each pixel
 uniform texture2D guide;      // of GUIDED: the distance that each ray goes, MISS where it hits nothing
 uniform writeonly image2D picture;
 
@@ -106,6 +109,10 @@ void main() {
     // Colours are already multiplied by their opacity.
     if (APART > 1) {
         imageStore(picture, pixel, between(at));
+        return;
+    }
+    if (REFINED == 1 && texelFetch(marks, at, 0).x == 0.0) {
+        imageStore(picture, pixel, texelFetch(single, at, 0));
         return;
     }
     vec4 sum = vec4(0.0);

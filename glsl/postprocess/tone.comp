@@ -13,6 +13,7 @@ uniform texture2D picture;
 uniform writeonly image2D screen;
 #include "tiles.glsl"
 #include "tone.glsl"
+#include "cross_lines.glsl"
 
 void main() {
     ivec2 pixel = ivec2(gl_GlobalInvocationID.xy);

@@ -27,6 +27,7 @@ layout(scalar) uniform Params {
 readonly buffer CurveColumns { vec4 entry[]; } curve_columns;
 #ifdef TONED
 #include "tone.glsl"
+#include "cross_lines.glsl"
 uniform writeonly image2D screen;
 #define TARGET screen
 #else

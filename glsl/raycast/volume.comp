@@ -5,6 +5,8 @@ const int LAYER = 1;  // the ray ends at the surface; the result is a layer in f
 const int BEHIND = 2; // the ray begins at the surface and ends at a depth behind it; the result is the surface's colour
 const int HIT = 3;    // the position where the ray becomes opaque enough is stored, to be lit
 layout(constant_id = 3) const int PART = 0; // 0: the whole ray, or one of the above
+layout(constant_id = 42) const int MIDDLE_OF = 1; // rays along each edge of a pixel, in place of which the one in the middle is cast
+layout(constant_id = 43) const int REFINED = 0;   // more than 0: so many along each edge of the pixels that are marked, none of the others
 layout(scalar) uniform Params {
 #include "ray_params.glsl"
 #include "compositing_params.glsl"
@@ -19,6 +21,7 @@ layout(scalar) uniform Params {
 uniform writeonly image2D picture;
 uniform texture2D distance_map;         // of LAYER and BEHIND
 uniform writeonly image2D hit_distance; // of HIT
+uniform texture2D marks;                // of REFINED: 1 in pixels that have several rays
 
 vec4 looked_up_between(float front, float back) {
     vec2 e = vec2(front, back) * float(ENTRIES - 1);
@@ -50,7 +53,9 @@ vec4 short_step(float front, float back, float y) {
 void main() {
     ivec2 pixel = ivec2(gl_GlobalInvocationID.xy);
     if (any(greaterThanEqual(pixel, imageSize(picture)))) return;
-    Ray ray = ray_of(pixel);
+    if (REFINED > 0 && texelFetch(marks, pixel / max(REFINED, 1), 0).x == 0.0) return;
+    int face;
+    Ray ray = ray_through((vec2(pixel) + 0.5) * float(MIDDLE_OF), face);
     if (PART == LAYER) {
         ray.leave = min(ray.leave, texelFetch(distance_map, pixel, 0).x);
     } else if (PART == BEHIND) {

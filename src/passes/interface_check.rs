@@ -11,7 +11,7 @@ use crate::spirv::volumes_to_layers::volumes_to_layers;
 use crate::spirv::{self, Access, Dimension, Kind, Member, Module};
 
 /// Textures and tables that a shader declares and a pass may not bind. Specialization constants say whether they are read or written.
-const OPTIONAL: [&str; 35] = [
+const OPTIONAL: [&str; 37] = [
     "back_light",
     "before",
     "bricks",
@@ -28,6 +28,7 @@ const OPTIONAL: [&str; 35] = [
     "line_lut",
     "line_shares",
     "majorants",
+    "marks",
     "net_lines",
     "net_slices",
     "occlusion",
@@ -36,6 +37,7 @@ const OPTIONAL: [&str; 35] = [
     "planes",
     "rows",
     "shadow",
+    "single",
     "slice_places",
     "slice_table",
     "start_curve",

@@ -659,22 +659,16 @@ fn ground_of(scene: &Scene, is_alone: bool) -> Option<Ground> {
     scene.lit_by_volume().filter(|_| is_alone)?.ground
 }
 
-/// The light of a ray as it is shown: through the response curve, premultiplied.
-pub(super) fn developed(scene: &Scene, is_alone: bool, rgba: [f64; 4], pixel: [usize; 2]) -> [f64; 4] {
+/// The light of a ray through a place of the picture, rays from its corner, as it is shown: through the response curve, premultiplied.
+pub(super) fn developed(scene: &Scene, is_alone: bool, rgba: [f64; 4], at: [f64; 2]) -> [f64; 4] {
     match scene.lit_by_volume() {
-        Some(volume) => on_film(scene, volume.exposure, ground_of(scene, is_alone), rgba, pixel),
+        Some(volume) => on_film(scene, volume.exposure, ground_of(scene, is_alone), rgba, at),
         None => rgba,
     }
 }
 
-/// Linear light of a ray, premultiplied, through the response curve and over the ground.
-pub(super) fn on_film(
-    scene: &Scene,
-    exposure: f64,
-    ground: Option<Ground>,
-    rgba: [f64; 4],
-    pixel: [usize; 2],
-) -> [f64; 4] {
+/// Linear light of a ray through a place of the picture, rays from its corner, premultiplied: through the response curve and over the ground.
+pub(super) fn on_film(scene: &Scene, exposure: f64, ground: Option<Ground>, rgba: [f64; 4], at: [f64; 2]) -> [f64; 4] {
     let film = |light: f64| {
         let c = light * exposure;
         (c * (2.51 * c + 0.03) / (c * (2.43 * c + 0.59) + 0.14)).clamp(0.0, 1.0).powf(1.0 / 2.2)
@@ -686,8 +680,7 @@ pub(super) fn on_film(
     };
     let size = scene.ray_size().map(f64::from);
     let edge = size[0].min(size[1]);
-    let [right, down] =
-        [0, 1].map(|a| (pixel[a] as f64 + 0.5 - size[a] / 2.0) / edge + if a == 1 { 0.05 } else { 0.0 });
+    let [right, down] = [0, 1].map(|a| (at[a] - size[a] / 2.0) / edge + if a == 1 { 0.05 } else { 0.0 });
     let share = (1.0 - 2.6 * (right * right + down * down)).clamp(0.0, 1.0);
     let shown =
         |c: usize| film(rgba[c] + (1.0 - opacity) * (ground.edge[c] + (ground.middle[c] - ground.edge[c]) * share));

@@ -35,6 +35,7 @@ pub mod raycast {
     pub mod planes;
     pub mod projection;
     pub mod ray;
+    pub mod refine;
     pub mod still;
     pub mod surface;
     pub mod surface_and_volume;
@@ -91,6 +92,8 @@ pub const PASSES: &[Pass] = &[
     light_volume::SHADE,
     raycast::surface_and_volume::PASS,
     raycast::volume::PASS,
+    raycast::refine::MARK_EDGES,
+    raycast::volume::REFINED,
     raycast::still::MAJORANTS,
     raycast::still::BEGIN,
     raycast::still::PATHS,

@@ -300,6 +300,11 @@ pub(super) fn ray_extent(scene: &Scene, _: &DispatchArgs) -> [u32; 3] {
     [scene.ray_size()[0], scene.ray_size()[1], 1]
 }
 
+/// One invocation per pixel of the rendering.
+pub(super) fn rendering_extent(scene: &Scene, _: &DispatchArgs) -> [u32; 3] {
+    [scene.rendering_size()[0], scene.rendering_size()[1], 1]
+}
+
 /// Neighbours that one invocation of some filters makes, because their windows share most texels: RUN of glsl/filter.
 pub const RUN: u32 = 4;
 

@@ -146,12 +146,16 @@ pub const ASSEMBLE: Pass = Pass {
         (_, Layout::Four) => Ok("the rendering stands beside three planes"),
         (_, Layout::Pair) => Ok("the volume stands beside the surface"),
         (_, Layout::Single) if s.settings.ray.apart() > 1 => Ok("one ray makes several pixels"),
+        (_, Layout::Single) if s.adapts_rays() => Ok("several rays make a pixel at an edge"),
         (_, Layout::Single) => Ok("several rays make a pixel"),
     },
     reads: |s, _| {
         let mut reads = vec![whole("rendered", Slot::Rendered)];
         reads.extend((s.settings.layout == Layout::Four).then_some(whole("planes", Slot::Planes)));
         reads.extend(s.is_pair().then_some(whole("composited", composited_beside_surface(s))));
+        if s.adapts_rays() {
+            reads.extend([whole("marks", Slot::EdgeMarks), whole("single", Slot::PixelRays)]);
+        }
         reads.extend(guide(s).map(|slot| whole("guide", slot)));
         reads
     },
@@ -167,7 +171,14 @@ pub const ASSEMBLE: Pass = Pass {
         };
         let ray = &s.settings.ray;
         let guided = guide(s).is_some();
-        vec![("RAYS", ray.rays as i32), ("APART", ray.apart() as i32), ("LAYOUT", layout), ("GUIDED", guided as i32)]
+        let refined = s.adapts_rays();
+        vec![
+            ("RAYS", ray.rays as i32),
+            ("APART", ray.apart() as i32),
+            ("LAYOUT", layout),
+            ("GUIDED", guided as i32),
+            ("REFINED", refined as i32),
+        ]
     },
     tolerance: Tolerance {
         absolute: 1e-3,
@@ -204,9 +215,15 @@ pub const ASSEMBLE: Pass = Pass {
                     picture.set([x, y, 0], &between(shown, guide, apart, [x - corner[0], y - corner[1]]));
                     continue;
                 }
+                let at = [x - corner[0], y - corner[1]];
+                if scene.adapts_rays() && reads.get("marks").one(at[0], at[1], 0) == 0.0 {
+                    let single = reads.get("single").get([at[0], at[1], 0]).to_vec();
+                    picture.set([x, y, 0], &single);
+                    continue;
+                }
                 let mut mean = [0.0; 4];
                 for (i, j) in (0..rays * rays).map(|n| (n % rays, n / rays)) {
-                    let ray = shown.get([(x - corner[0]) * rays + i, (y - corner[1]) * rays + j, 0]);
+                    let ray = shown.get([at[0] * rays + i, at[1] * rays + j, 0]);
                     mean.iter_mut().zip(ray).for_each(|(m, v)| *m += v / (rays * rays) as f64);
                 }
                 picture.set([x, y, 0], &mean);

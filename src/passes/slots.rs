@@ -328,6 +328,9 @@ slots! {
     VolumeBesideSurface = D::image("volume_beside_surface", per_ray, |_| Format::Rgba16f);
     /// What stages 2 and 3 render, where it becomes the picture only by averaging or next to planes.
     Rendered = D::image("rendered", per_ray, |_| Format::Rgba16f);
+    /// With adaptive supersampling: one ray through the middle of each pixel of the rendering, and 1 in pixels that have all rays.
+    PixelRays = D::image("pixel_rays", per_pixel_of_rendering, |_| Format::Rgba16f);
+    EdgeMarks = D::image("edge_marks", per_pixel_of_rendering, |_| Format::R8);
     /// The planes of a 4-up picture; black where the rendering goes.
     Planes = D::image("planes", per_pixel, |_| Format::Rgba16f);
     /// The picture of stages 2 and 3 before the filters of stage 4.
@@ -439,6 +442,10 @@ fn entries(scene: &Scene) -> Shape {
 
 fn per_ray(scene: &Scene) -> Shape {
     Shape::Two(scene.ray_size())
+}
+
+fn per_pixel_of_rendering(scene: &Scene) -> Shape {
+    Shape::Two(scene.rendering_size())
 }
 
 /// Two vectors for each column of the last tile.

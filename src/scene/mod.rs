@@ -420,6 +420,18 @@ impl Scene {
         camera::ray_size(&self.settings)
     }
 
+    /// Pixels of the rendering along each axis, where each has one ray or more.
+    pub fn rendering_size(&self) -> [u32; 2] {
+        self.ray_size().map(|n| n / self.settings.ray.rays)
+    }
+
+    /// True if only pixels at edges have several rays: where the colour along each ray is all that makes the picture.
+    pub fn adapts_rays(&self) -> bool {
+        let ray = &self.settings.ray;
+        let is_alone = self.settings.mode == Mode::Volume && !self.lights_volume();
+        ray.adaptive && ray.rays > 1 && is_alone && self.still().is_none() && !self.has_caps()
+    }
+
     /// Entries of the table of the transfer function; its points were checked.
     pub fn transfer_entries(&self) -> usize {
         transfer::entries(&self.settings.volume).unwrap_or(transfer::ENTRIES)

@@ -640,6 +640,11 @@ fn ray_scenes() -> Vec<SceneSpec> {
         ("Riemann", "mode = 'vr'\nvolume = { compositing = 'riemann', transfer = 'cool' }\nslices = { pixels = 30 }"),
         ("pre-integrated", "mode = 'vr'\nvolume = { compositing = 'pre-integrated', threshold = 0.5 }\nslices = { pixels = 30 }"),
         ("two rays", "mode = 'vr'\nslices = { pixels = 12 }\nray = { rays = 2 }"),
+        ("two rays at edges", "mode = 'vr'\nslices = { pixels = 12 }\nray = { rays = 2, adaptive = true }"),
+        (
+            "4-up, three rays at edges, toned",
+            "mode = 'vr'\nlayout = 'four'\nslices = { pixels = 12 }\nray = { rays = 3, adaptive = true }\npost = { contrast = 1.5, gamma = 1.8, colour_map = 'skin' }",
+        ),
         ("half the rays", "mode = 'vr'\nslices = { pixels = 12 }\nray = { half = true }"),
         (
             "4-up, half the rays, filters in their pixels",

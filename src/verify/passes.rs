@@ -255,6 +255,9 @@ fn input(scene: &Scene, bind: &Bind, slices: u32, kind: &str, noise: &mut Noise)
         // The passes write alpha as 0 or 1.
         texels.values.chunks_exact_mut(4).for_each(|p| p[3] = p[3].round());
     }
+    if bind.slot == Slot::EdgeMarks {
+        texels.values.iter_mut().for_each(|v| *v = v.round());
+    }
     if bind.slot == Slot::Surface || bind.slot == Slot::Cap {
         texels.values.chunks_exact_mut(2).for_each(|p| p[1] = p[1].round());
     }

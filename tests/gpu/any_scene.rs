@@ -67,6 +67,7 @@ const SETTINGS: &[(&str, &[&str])] = &[
     ("ray.sampling", &["auto", "hardware", "exact", "quads"]),
     ("ray.elevation", &["linear", "bspline", "bspline-sharp"]),
     ("ray.rays", &["2", "3"]),
+    ("ray.adaptive", &["true"]),
     ("ray.half", &["true"]),
     ("ray.quarter", &["true"]),
     ("ray.eighth", &["true"]),

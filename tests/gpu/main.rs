@@ -1,6 +1,7 @@
 //! Everything that needs a device. No device is a failure, never a skip; validation and synchronization validation are on in
 //! every test, and any message fails the test that caused it.
 
+mod adaptive;
 mod any_scene;
 mod bands;
 mod batches;

@@ -195,6 +195,11 @@ fn sector(params: Params, [range_low, range_high, line_low, line_high]: [f64; 4]
         .f32("line_high", line_high)
 }
 
+/// Where the ray of a pixel goes through the picture, rays from its corner.
+pub(super) fn middle_of(x: usize, y: usize) -> [f64; 2] {
+    [x as f64 + 0.5, y as f64 + 0.5]
+}
+
 /// A pixel's ray in f64, and the volume that it goes through.
 pub(super) struct Ray<'a> {
     scene: &'a Scene,
@@ -216,7 +221,12 @@ pub(super) struct Ray<'a> {
 
 impl<'a> Ray<'a> {
     pub fn cast(scene: &'a Scene, volume: &'a Texels, view: View, step: f64, x: usize, y: usize) -> Ray<'a> {
-        let (origin, direction) = scene.rays.at(x as f64 + 0.5, y as f64 + 0.5);
+        Ray::through(scene, volume, view, step, middle_of(x, y))
+    }
+
+    /// The ray through a place of the picture, rays from its corner.
+    pub fn through(scene: &'a Scene, volume: &'a Texels, view: View, step: f64, [x, y]: [f64; 2]) -> Ray<'a> {
+        let (origin, direction) = scene.rays.at(x, y);
         let (enter, leave) = span(scene, view, origin, direction);
         let sideways = scene.rays.origin_dx + scene.rays.direction_dx;
         let across = sideways.reject_from_normalized(direction).normalize();

@@ -35,11 +35,15 @@ pub const PASS: Pass = Pass {
         reads
     },
     writes: |s, _| match kind(s) {
+        Kind::Alone if s.adapts_rays() => vec![whole("picture", Slot::PixelRays)],
         Kind::Alone => vec![whole("picture", rendered(s))],
         Kind::Layer | Kind::Colour | Kind::Behind => vec![whole("picture", Slot::VolumeLayer)],
         Kind::Hit => vec![whole("picture", Slot::VolumeLayer), whole("hit_distance", Slot::Distance)],
     },
-    extent: ray_extent,
+    extent: |s, args| match s.adapts_rays() {
+        true => rendering_extent(s, args),
+        false => ray_extent(s, args),
+    },
     repeat: once,
     params: |s, _| {
         let params = ray::params(s, s.volume_view(), s.step);
@@ -56,7 +60,8 @@ pub const PASS: Pass = Pass {
             Kind::Behind => 2,
             Kind::Hit => 3,
         };
-        constants.extend([("PART", part), cap::constant(s)]);
+        let middle_of = if s.adapts_rays() { s.settings.ray.rays as i32 } else { 1 };
+        constants.extend([("PART", part), cap::constant(s), ("MIDDLE_OF", middle_of), ("REFINED", 0)]);
         constants
     },
     tolerance: Tolerance {
@@ -68,44 +73,78 @@ pub const PASS: Pass = Pass {
               either side",
     },
     reference: |scene, _, reads, writes| {
-        let volume = reads.get("volume");
-        let table = reads.get("transfer");
-        let tables = Tables { of_steps: table, curve: curve(scene, table), lit: Lit::new(scene, reads) };
-        let size = writes.get("picture").size;
-        for y in 0..size[1] {
-            for x in 0..size[0] {
-                let mut ray = ray::Ray::cast(scene, volume, scene.volume_view(), scene.step, x, y);
-                match kind(scene) {
-                    Kind::Layer => ray.leave = ray.leave.min(reads.get("distance_map").one(x, y, 0)),
-                    Kind::Behind => {
-                        let distance = reads.get("distance_map").one(x, y, 0);
-                        ray.enter = ray.enter.max(distance);
-                        ray.leave = ray.leave.min(distance + scene.settings.surface.colour_depth);
-                    }
-                    Kind::Alone | Kind::Colour | Kind::Hit => {}
-                }
-                let developed = |light| light_volume::developed(scene, kind(scene) == Kind::Alone, light, [x, y]);
-                let cut = cap::cut_at(scene, reads, x, y);
-                let (colour, hit) = match cut.filter(|cut| cut.ends_ray()) {
-                    Some(_) => (developed([0.0; 4]), ray.enter_or_miss()),
-                    None => {
-                        let (light, hit) = composite(scene, &ray, &tables);
-                        (developed(light), hit)
-                    }
-                };
-                // What is lit later is lit without its face.
-                let colour = match cut.filter(|_| kind(scene) != Kind::Hit) {
-                    Some(cut) => cut.over(colour),
-                    None => colour,
-                };
-                writes.get_mut("picture").set([x, y, 0], &colour);
-                if kind(scene) == Kind::Hit {
-                    writes.get_mut("hit_distance").set([x, y, 0], &[hit]);
-                }
-            }
-        }
+        let middle_of = if scene.adapts_rays() { f64::from(scene.settings.ray.rays) } else { 1.0 };
+        reference_rays(scene, reads, writes, |x, y| Some(ray::middle_of(x, y).map(|n| n * middle_of)));
     },
 };
+
+/// With adaptive supersampling, the rays of the pixels that are marked.
+pub const REFINED: Pass = Pass {
+    name: "raycast_refined",
+    needed: |s| match s.adapts_rays() {
+        true => Ok("pixels at edges have several rays"),
+        false => Err("no pixel has more rays than another"),
+    },
+    reads: |s, dispatch| [(PASS.reads)(s, dispatch), vec![whole("marks", Slot::EdgeMarks)]].concat(),
+    writes: |s, _| vec![whole("picture", rendered(s))],
+    extent: ray_extent,
+    constants: |s, dispatch| {
+        let mut constants = (PASS.constants)(s, dispatch);
+        constants.retain(|(name, _)| !matches!(*name, "MIDDLE_OF" | "REFINED"));
+        constants.extend([("MIDDLE_OF", 1), ("REFINED", s.settings.ray.rays as i32)]);
+        constants
+    },
+    reference: |scene, _, reads, writes| {
+        let (marks, rays) = (reads.get("marks"), scene.settings.ray.rays as usize);
+        let is_marked = |x: usize, y: usize| marks.one(x / rays, y / rays, 0) != 0.0;
+        reference_rays(scene, reads, writes, |x, y| is_marked(x, y).then_some(ray::middle_of(x, y)));
+    },
+    ..PASS
+};
+
+/// What the pass makes of each texel, where its ray goes through the picture, rays from the corner; nothing where it has none.
+fn reference_rays(
+    scene: &Scene,
+    reads: &Arrays,
+    writes: &mut Arrays,
+    place: impl Fn(usize, usize) -> Option<[f64; 2]>,
+) {
+    let volume = reads.get("volume");
+    let table = reads.get("transfer");
+    let tables = Tables { of_steps: table, curve: curve(scene, table), lit: Lit::new(scene, reads) };
+    let size = writes.get("picture").size;
+    for (x, y) in (0..size[1]).flat_map(|y| (0..size[0]).map(move |x| (x, y))) {
+        let Some(at) = place(x, y) else { continue };
+        let mut ray = ray::Ray::through(scene, volume, scene.volume_view(), scene.step, at);
+        match kind(scene) {
+            Kind::Layer => ray.leave = ray.leave.min(reads.get("distance_map").one(x, y, 0)),
+            Kind::Behind => {
+                let distance = reads.get("distance_map").one(x, y, 0);
+                ray.enter = ray.enter.max(distance);
+                ray.leave = ray.leave.min(distance + scene.settings.surface.colour_depth);
+            }
+            Kind::Alone | Kind::Colour | Kind::Hit => {}
+        }
+        let developed = |light| light_volume::developed(scene, kind(scene) == Kind::Alone, light, at);
+        let cut = cap::cut_at(scene, reads, x, y);
+        let (colour, hit) = match cut.filter(|cut| cut.ends_ray()) {
+            Some(_) => (developed([0.0; 4]), ray.enter_or_miss()),
+            None => {
+                let (light, hit) = composite(scene, &ray, &tables);
+                (developed(light), hit)
+            }
+        };
+        // What is lit later is lit without its face.
+        let colour = match cut.filter(|_| kind(scene) != Kind::Hit) {
+            Some(cut) => cut.over(colour),
+            None => colour,
+        };
+        writes.get_mut("picture").set([x, y, 0], &colour);
+        if kind(scene) == Kind::Hit {
+            writes.get_mut("hit_distance").set([x, y, 0], &[hit]);
+        }
+    }
+}
 
 /// Adds the numbers of compositing with this step, mm, to those of a pass.
 pub(super) fn compositing_params(scene: &Scene, params: Params, step: f64) -> Params {
@@ -143,7 +182,7 @@ pub(super) fn compositing_constants(scene: &Scene, is_alone: bool) -> Vec<(&'sta
 pub(super) fn composited(scene: &Scene, reads: &Arrays, step: f64, [x, y]: [usize; 2]) -> [f64; 4] {
     let ray = ray::Ray::cast(scene, reads.get("volume"), scene.volume_view(), step, x, y);
     let tables = Tables { of_steps: reads.get("transfer"), curve: Vec::new(), lit: Lit::new(scene, reads) };
-    light_volume::developed(scene, false, composite(scene, &ray, &tables).0, [x, y])
+    light_volume::developed(scene, false, composite(scene, &ray, &tables).0, ray::middle_of(x, y))
 }
 
 #[derive(PartialEq)]

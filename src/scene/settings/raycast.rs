@@ -54,6 +54,10 @@ pub struct Ray {
     pub entries: u32,
     /// Rays per pixel along each axis, 1..=4: the picture is rendered larger and averaged.
     pub rays: u32,
+    /// Adaptive supersampling: all of `rays` only in pixels at edges, where the colour bends by more than two levels of 8 bits; one in each of the
+    /// others. The picture is that of all rays within a level. In mode volume without first-hit shading and without cut faces; other pictures have all
+    /// rays.
+    pub adaptive: bool,
     /// Brick size of empty-space skipping, texels: 4..=64; 0 takes every sample. Rays skip bricks that cannot change the picture, so
     /// that it stays the same bit for bit. Absent: 8; a CPU skips only where one picture of a volume saves more time than the ranges of
     /// the bricks take, or with `slices.still`.
@@ -92,6 +96,7 @@ impl Default for Ray {
             slice_index: SliceIndex::Auto,
             entries: 1025,
             rays: 1,
+            adaptive: false,
             brick: None,
             half: false,
             quarter: false,

@@ -227,7 +227,7 @@ pub const RESOLVE: Pass = Pass {
         for (x, y) in (0..sums.size[1]).flat_map(|y| (0..sums.size[0]).map(move |x| (x, y))) {
             let mut mean: [f64; 4] = std::array::from_fn(|c| sums.get([x, y, 0])[c] / samples);
             mean[3] = mean[3].min(1.0);
-            picture.set([x, y, 0], &light_volume::on_film(scene, exposure, ground, mean, [x, y]));
+            picture.set([x, y, 0], &light_volume::on_film(scene, exposure, ground, mean, ray::middle_of(x, y)));
         }
     },
     ..MAJORANTS

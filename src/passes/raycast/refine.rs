@@ -1,0 +1,54 @@
+//! Adaptive supersampling: one ray through the middle of each pixel tells which pixels lie at an edge, and only these have all the rays.
+//!
+//! A pixel is the mean of its rays. Where the picture is straight across a pixel the ray in its middle is that mean; where it bends evenly by d per
+//! pixel, the mean of 2 x 2 rays differs by d / 16 at most. At a step the pixels on both sides bend by its height, and a step of two levels makes a
+//! difference of one at most.
+
+use crate::passes::pass::*;
+use crate::passes::postprocess::{tone_constants, tone_params, toned};
+
+/// Second difference of a pixel's colour on the screen beyond which it has all rays: two levels of the screen.
+const THRESHOLD: f64 = 2.0 / 255.0;
+
+/// Which pixels have all rays.
+pub const MARK_EDGES: Pass = Pass {
+    name: "mark_edges",
+    stage: Stage::Raycast,
+    frequency: Frequency::Picture,
+    link: Link::None,
+    shader: |_, _| "raycast/mark_edges",
+    needed: |s| match s.adapts_rays() {
+        true => Ok("only pixels at edges have several rays"),
+        false => Err("no pixel has more rays than another"),
+    },
+    reads: |_, _| vec![whole("picture", Slot::PixelRays)],
+    writes: |_, _| vec![whole("marks", Slot::EdgeMarks)],
+    extent: rendering_extent,
+    repeat: once,
+    params: |s, _| tone_params(s, Params::default()).f32("threshold", THRESHOLD),
+    constants: |s, _| tone_constants(s).into_iter().filter(|(name, _)| *name != "CROSSING").collect(),
+    tolerance: Tolerance {
+        absolute: 0.0,
+        relative: 0.0,
+        outliers: 1e-3,
+        why: "a sum of three colours is off by 1e-6 in f32: a difference at the threshold itself may be on either side",
+    },
+    reference: |scene, _, reads, writes| {
+        let picture = reads.get("picture");
+        let marks = writes.get_mut("marks");
+        let [width, height, _] = marks.size;
+        for (x, y) in (0..height).flat_map(|y| (0..width).map(move |x| (x, y))) {
+            let at = |dx: i64, dy: i64| {
+                let inside = |n: usize, by: i64, size: usize| (n as i64 + by).clamp(0, size as i64 - 1) as usize;
+                let rgba = picture.get([inside(x, dx, width), inside(y, dy, height), 0]);
+                if rgba[3] > 0.0 { toned(scene, [rgba[0], rgba[1], rgba[2]]) } else { [0.0; 3] }
+            };
+            let bends = |(dx, dy): (i64, i64)| {
+                let (before, here, after) = (at(-dx, -dy), at(0, 0), at(dx, dy));
+                (0..3).any(|c| (before[c] + after[c] - 2.0 * here[c]).abs() > THRESHOLD)
+            };
+            let is_marked = [(1, 0), (0, 1), (1, 1), (1, -1)].into_iter().any(bends);
+            marks.set([x, y, 0], &[f64::from(u8::from(is_marked))]);
+        }
+    },
+};
