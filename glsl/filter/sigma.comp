@@ -1,6 +1,6 @@
 // Lee's sigma filter: the mean of the neighbours within `range` of the centre. Where at most `few` are, and not all that exist,
 // the mean of the four immediate neighbours. (Lee 1983; thesis 5.3.) An invocation makes four vertically adjacent pixels, whose
-// windows share most of their texels.
+// windows share most of their texels; of colours two, because four take twice the registers.
 // variants: slice; distance DISTANCE; picture PICTURE
 #version 460
 layout(constant_id = 0) const int RADIUS = 3;
@@ -15,30 +15,33 @@ layout(scalar) uniform Params {
 #include "filter.glsl"
 
 #ifdef PICTURE
+const int RUN = 2;
 #define SCARCE(count, enough) any(lessThanEqual(count, vec4(enough)))
 #define WHERE_CLOSE(away, within, value) mix(vec4(0.0), value, lessThanEqual(abs(away), within))
 #else
+const int RUN = 4;
 #define SCARCE(count, enough) ((count) <= (enough))
 #define WHERE_CLOSE(away, within, value) (abs(away) <= (within) ? (value) : 0.0)
 #endif
-const int RUN = 4;
 
 void main() {
     ivec3 at = made_run(1, RUN);
     ivec3 size = source_size();
     if (any(greaterThanEqual(at, size))) return;
     ivec2 last = size.xy - 1;
-    T centre[RUN], within[RUN];
+    // Sums of differences from the centre: a distance of 100 mm keeps its micrometres in f32.
+    T centre[RUN], within[RUN], sum[RUN], count[RUN];
+    float there[RUN];
     [[unroll]] for (int i = 0; i < RUN; ++i) {
         centre[i] = read_at(ivec3(at.x, min(at.y + i, last.y), at.z));
         within[i] = MULTIPLICATIVE != 0 ? range * abs(centre[i]) : T(range);
+        sum[i] = count[i] = T(0.0);
+        there[i] = 0.0;
     }
-    // Sums of differences from the centre: a distance of 100 mm keeps its micrometres in f32.
-    T sum[RUN] = T[RUN](T(0.0), T(0.0), T(0.0), T(0.0)), count[RUN] = sum;
-    float there[RUN] = float[RUN](0.0, 0.0, 0.0, 0.0);
     int top = max(at.y - RADIUS, 0), bottom = min(at.y + RUN - 1 + RADIUS, last.y);
     for (int y = top; y <= bottom; ++y) {
-        T row_sum[RUN] = T[RUN](T(0.0), T(0.0), T(0.0), T(0.0)), row_count[RUN] = row_sum;
+        T row_sum[RUN], row_count[RUN];
+        [[unroll]] for (int i = 0; i < RUN; ++i) row_sum[i] = row_count[i] = T(0.0);
         float row_there = 0.0;
         [[unroll]] for (int x = -RADIUS; x <= RADIUS; ++x) {
             int column = clamp(at.x + x, 0, last.x);

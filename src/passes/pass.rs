@@ -309,8 +309,13 @@ pub(super) fn rendering_extent(scene: &Scene, _: &DispatchArgs) -> [u32; 3] {
 pub const RUN: u32 = 4;
 
 /// Invocations that make so many texels in runs along an axis.
-pub fn in_runs(mut texels: [u32; 3], axis: usize) -> [u32; 3] {
-    texels[axis] = texels[axis].div_ceil(RUN);
+pub fn in_runs(texels: [u32; 3], axis: usize) -> [u32; 3] {
+    in_runs_of(RUN, texels, axis)
+}
+
+/// The same in runs of another length.
+pub fn in_runs_of(run: u32, mut texels: [u32; 3], axis: usize) -> [u32; 3] {
+    texels[axis] = texels[axis].div_ceil(run);
     texels
 }
 

@@ -51,13 +51,16 @@ pub const PICTURE: Pass = Pass {
     needed: |s| need(s.settings.post.sigma),
     reads: reads_source,
     writes: writes_target,
-    extent: |s, t| in_runs(picture_extent(s, t), 1),
+    extent: |s, t| in_runs_of(PICTURE_RUN, picture_extent(s, t), 1),
     repeat: once,
     params: |s, t| params(s.settings.post.sigma, t),
     constants: |s, _| constants(s.settings.post.sigma),
     tolerance: Tolerance { absolute: 6e-4, relative: 1e-3, outliers: 1e-3, why: WHY },
     reference: |s, t, reads, writes| reference(s.settings.post.sigma, t, reads, writes, |_| true),
 };
+
+/// Pixels that one invocation makes of a picture: RUN of the shader's variant.
+const PICTURE_RUN: u32 = 2;
 
 /// A sigma of 0 keeps every pixel: no pass.
 fn need(sigma: Option<scene::Sigma>) -> Need {
