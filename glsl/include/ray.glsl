@@ -237,7 +237,7 @@ bool locate(vec3 p, out vec3 texel, out vec4 place) {
     texel = vec3((vec2(x, y) - grid_origin) * grid_density, k);
     place = vec4(range, line, e, k);
     Sector limits = sector();
-    return all(greaterThanEqual(place, limits.low)) && all(lessThanEqual(place, limits.high));
+    return all(bvec2(all(greaterThanEqual(place, limits.low)), all(lessThanEqual(place, limits.high))));
 }
 
 // The same without the coordinates. Between lines less than 90 degrees off the axis, squares of ranges and the sides of the first and the
@@ -251,8 +251,10 @@ bool locate(vec3 p, out vec3 texel) {
     float k = slice_at(position, 0.0, e), square = dot(at, at);
     texel = vec3((at - grid_origin) * grid_density, k);
     float last = NON_UNIFORM == 1 ? float(slice_table.entry.length() - 1) : last_slice;
-    return square >= range_low * range_low && square <= range_high * range_high && dot(at, first_line) >= 0.0 && dot(at, last_line) >= 0.0
-        && k >= -1e-4 && k <= last + 1e-4;
+    // Not by `&&`, which branches at every comparison.
+    bvec4 low = greaterThanEqual(vec4(square, dot(at, first_line), dot(at, last_line), k), vec4(range_low * range_low, 0.0, 0.0, -1e-4));
+    bvec2 high = lessThanEqual(vec2(square, k), vec2(range_high * range_high, last + 1e-4));
+    return all(bvec2(all(low), all(high)));
 }
 
 // Share of a step that is inside the sector, between the coordinates of an end inside and of one outside: along a step each
