@@ -325,7 +325,7 @@ pub struct MakePhantom {
     #[arg(long, value_name = "N", default_value_t = 1)]
     seed: u64,
     /// head, or a body whose picture has a closed formula: sphere, step, wires, constant, ramp; or heart,
-    /// a beating chamber, of which one slow sweep has many cycles
+    /// a beating chamber, of which one slow sweep has many cycles; or vessels, a branching portal vein in a piece of liver
     #[arg(long, value_name = "NAME", default_value = "head")]
     body: String,
     /// Number of volumes in time; the head moves
@@ -370,8 +370,9 @@ pub struct MakePhantom {
     /// Body head: level of clutter (reverberations and side lobes) everywhere, dB re full scale, -60 to 0 [default: none]
     #[arg(long, value_name = "DB", allow_negative_numbers = true)]
     clutter: Option<f64>,
-    /// Also write what is where in the first volume of the head: labels to this file (.mha, or .seg.nrrd with their names for 3D Slicer), and the signed distance from the
-    /// skin, mm, to NAME.distance.mha. 0 fluid, 1 skin, 2 hand, 3 cord, 4 skull, 5 brain, 6 choroid plexus, 7 ventricle, 8 falx, 9 uterus
+    /// Also write what is where in the first volume of bodies head and vessels: labels to this file (.mha, or .seg.nrrd with their names for 3D Slicer), and the signed
+    /// distance from the skin (vessels: from the blood), mm, to NAME.distance.mha. 0 fluid, 1 skin, 2 hand, 3 cord, 4 skull, 5 brain, 6 choroid plexus, 7 ventricle, 8 falx,
+    /// 9 uterus, 10 blood, 11 vessel wall, 12 liver
     #[arg(long, value_name = "FILE")]
     truth: Option<PathBuf>,
     /// Voxel spacing of these files, mm
@@ -420,8 +421,9 @@ impl MakePhantom {
             // First: what it refuses is refused before the sweep is computed.
             let grid = phantom.truth_grid(self.truth_spacing).map_err(input)?;
             phantom.write_truth(truth, &grid).map_err(failed)?;
-            let labels = Label::ALL.map(|label| format!("{} {}", label as u8, label.name())).join(", ");
-            say!("labels: {}, {labels}", truth.display());
+            let named = |label: &Label| format!("{} {}", *label as u8, label.name());
+            let labels: Vec<String> = phantom.options().body.labels().iter().map(named).collect();
+            say!("labels: {}, {}", truth.display(), labels.join(", "));
             say!("distance: {}, mm, negative inside", distance_path(truth).display());
         }
         phantom.write(&self.output).map_err(failed)?;

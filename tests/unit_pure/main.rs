@@ -33,4 +33,5 @@ mod supply;
 mod unveil;
 mod user_presets;
 mod verify_report;
+mod vessels;
 mod workspace;

@@ -84,7 +84,7 @@ const ROUNDING: f64 = 0.501;
 
 #[test]
 fn greys_without_speckle_are_the_formula_on_every_sample_both_ways() {
-    for body in [Body::Sphere, Body::Step, Body::Wires, Body::Constant, Body::Ramp] {
+    for body in [Body::Sphere, Body::Step, Body::Wires, Body::Constant, Body::Ramp, Body::Vessels] {
         let options =
             PhantomOptions { speckle: Speckle::None, volumes: 2, both_ways: true, speed_ratio: 0.5, ..small(body) };
         let phantom = phantom(options);
@@ -105,6 +105,10 @@ fn greys_without_speckle_are_the_formula_on_every_sample_both_ways() {
                     Truth::Wires { wires, peak, per_mm2, outside } => {
                         let nearest = wires.iter().map(|w| w.distance(place)).fold(f64::MAX, f64::min);
                         outside.max(peak - per_mm2 * nearest * nearest)
+                    }
+                    Truth::Vessels(tree) => {
+                        let away = tree.distance(place);
+                        edge(away, tree.blood, edge(away - tree.wall, tree.muscle, tree.tissue))
                     }
                     Truth::Constant { grey } => *grey,
                     Truth::Ramp(ramp) => ramp.grey(
@@ -468,6 +472,7 @@ fn the_written_truth_reads_back_and_has_every_label() {
         }
     }
     assert!(counts.iter().all(|n| *n > 20), "{counts:?}");
+    assert_eq!(Body::Head.labels().len(), counts.len());
     for (n, label) in Label::ALL.into_iter().enumerate() {
         assert_eq!(label as usize, n);
     }

@@ -2,7 +2,9 @@
 
 use super::PhantomOptions;
 use super::head::{Head, Surroundings};
+use super::labels::Label;
 use super::speckle::{Beam, DYNAMIC_RANGE, Echo};
+use super::vessels::VesselTree;
 use crate::files::InputError;
 use crate::probe::Probe;
 use glam::DVec3;
@@ -28,11 +30,13 @@ pub enum Body {
     Ramp,
     /// A beating chamber: dark blood in a bright wall.
     Heart,
+    /// A piece of liver with a branching portal vein.
+    Vessels,
 }
 
 impl Body {
-    pub const ALL: [Body; 7] =
-        [Body::Head, Body::Sphere, Body::Step, Body::Wires, Body::Constant, Body::Ramp, Body::Heart];
+    pub const ALL: [Body; 8] =
+        [Body::Head, Body::Sphere, Body::Step, Body::Wires, Body::Constant, Body::Ramp, Body::Heart, Body::Vessels];
 
     pub fn name(self) -> &'static str {
         match self {
@@ -43,6 +47,16 @@ impl Body {
             Body::Constant => "constant",
             Body::Ramp => "ramp",
             Body::Heart => "heart",
+            Body::Vessels => "vessels",
+        }
+    }
+
+    /// Of what its truth consists; nothing where a formula says what is where.
+    pub fn labels(self) -> &'static [Label] {
+        match self {
+            Body::Head => &Label::ALL[..10],
+            Body::Vessels => &Label::ALL[10..],
+            _ => &[],
         }
     }
 }
@@ -130,6 +144,7 @@ pub enum Truth {
     },
     Ramp(RampTruth),
     Heart(HeartTruth),
+    Vessels(VesselTree),
 }
 
 /// A ball of blood in a wall, whose radius changes with time.
@@ -179,6 +194,8 @@ impl HeartTruth {
 const BRIGHT: f64 = 204.0;
 const DARK: f64 = 25.5;
 const CONSTANT: f64 = 255.0 * (1.0 - 15.0 / DYNAMIC_RANGE);
+/// Blood at rest reflects next to nothing: 47.5 dB below full scale, as noise does.
+const BLOOD: f64 = 12.75;
 const WIRE_PEAK: f64 = 250.0;
 /// Grey falls by this times the square of the distance: a wire is 2.9 mm wide in all, so that no frame pitch misses it.
 const WIRE_FALL: f64 = 107.0;
@@ -231,6 +248,7 @@ impl Scatterers {
                 muscle: BRIGHT,
                 outside: CONSTANT,
             }),
+            Body::Vessels => Truth::Vessels(VesselTree::new(face, [BLOOD, BRIGHT, CONSTANT])),
             Body::Ramp => {
                 // A third of the scale for each of the three, so that no corner clips.
                 let share = 80.0;
@@ -294,6 +312,10 @@ fn exact(truth: &Truth, beam: &Beam, sample: usize, pitch: f64) -> Echo {
         Truth::Heart(heart) => {
             let away = (place - heart.centre).length() - heart.radius(heart.cycles(beam.time));
             edge(away, heart.blood, edge(away - heart.wall, heart.muscle, heart.outside))
+        }
+        Truth::Vessels(tree) => {
+            let away = tree.distance(place);
+            edge(away, tree.blood, edge(away - tree.wall, tree.muscle, tree.tissue))
         }
         Truth::Constant { grey } => *grey,
         Truth::Ramp(ramp) => ramp.grey(beam.range + pitch * sample as f64, beam.line_angle, beam.motor_angle),

@@ -1,6 +1,6 @@
-//! The names of what the head's volume holds, as a label volume numbers them.
+//! The names of what the volumes of head and vessels hold, as a label volume numbers them.
 
-/// What is at a point of the fetal head's volume. The number of a label never changes.
+/// What is at a point of the fetal head's volume, or of the vessels'. The number of a label never changes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(u8)]
 pub enum Label {
@@ -19,10 +19,15 @@ pub enum Label {
     Falx = 8,
     /// The wall of the uterus and what is outside of it.
     Uterus = 9,
+    /// Of the vessels.
+    Blood = 10,
+    VesselWall = 11,
+    /// The tissue that the vessels lie in.
+    Liver = 12,
 }
 
 impl Label {
-    pub const ALL: [Label; 10] = [
+    pub const ALL: [Label; 13] = [
         Label::Fluid,
         Label::Skin,
         Label::Hand,
@@ -33,6 +38,9 @@ impl Label {
         Label::Ventricle,
         Label::Falx,
         Label::Uterus,
+        Label::Blood,
+        Label::VesselWall,
+        Label::Liver,
     ];
 
     pub fn name(self) -> &'static str {
@@ -47,6 +55,9 @@ impl Label {
             Label::Ventricle => "ventricle",
             Label::Falx => "falx",
             Label::Uterus => "uterus",
+            Label::Blood => "blood",
+            Label::VesselWall => "vessel wall",
+            Label::Liver => "liver",
         }
     }
 
@@ -63,6 +74,9 @@ impl Label {
             Label::Ventricle => [0.35, 0.65, 0.9],
             Label::Falx => [0.6, 0.75, 0.45],
             Label::Uterus => [0.6, 0.45, 0.65],
+            Label::Blood => [0.85, 0.34, 0.3],
+            Label::VesselWall => [0.0, 0.59, 0.81],
+            Label::Liver => [0.87, 0.51, 0.4],
         }
     }
 }

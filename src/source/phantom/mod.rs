@@ -17,6 +17,7 @@ mod speckle;
 #[cfg(test)]
 mod tests;
 mod truth;
+mod vessels;
 
 pub use body::{Body, HeartTruth, RampTruth, Truth, Wire};
 pub use labels::Label;
@@ -24,6 +25,7 @@ pub use sampling::{PointSpread, Sampling};
 pub use source::{CachedPhantom, PhantomSource};
 pub use speckle::DYNAMIC_RANGE;
 pub use truth::distance_path;
+pub use vessels::{Vessel, VesselTree};
 
 use crate::files::InputError;
 use crate::probe::{Advance, Array, Axis, Motion, Probe, Volumes};

@@ -1,9 +1,10 @@
-//! The truth of the fetal head as volume files: a label at each voxel, and the signed distance from the skin.
+//! The truth of head and vessels as volume files: a label at each voxel, and the signed distance from the skin, or from the blood.
 
 use super::Phantom;
-use super::body::{Scatterers, refusal};
+use super::body::{Scatterers, Truth, refusal};
 use super::head::Head;
 use super::labels::Label;
+use super::vessels::VesselTree;
 use crate::files::InputError;
 use crate::probe::{Geometry, Grid};
 use crate::source::convert::{lattice, write_grid, write_labels};
@@ -21,32 +22,46 @@ pub fn distance_path(labels: &Path) -> PathBuf {
     }
 }
 
+/// A body that has labels.
+enum Labelled<'a> {
+    Head(&'a Head),
+    Vessels(&'a VesselTree),
+}
+
 impl Phantom {
     /// The label at a place of the space of [`crate::probe::Probe`], mm, in a volume, at the time at which the beam passes there.
     ///
     /// # Errors
-    /// A body other than the head, which has a formula instead: [`Phantom::truth`].
+    /// A body other than head and vessels, which has a formula instead: [`Phantom::truth`].
     pub fn label(&self, volume: usize, place: DVec3) -> Result<Label, InputError> {
-        let head = self.head()?;
-        Ok(head.label(place.as_vec3(), self.time_at(volume, place)))
+        Ok(match self.labelled()? {
+            Labelled::Head(head) => head.label(place.as_vec3(), self.time_at(volume, place)),
+            Labelled::Vessels(tree) => match tree.distance(place) {
+                away if away <= 0.0 => Label::Blood,
+                away if away <= tree.wall => Label::VesselWall,
+                _ => Label::Liver,
+            },
+        })
     }
 
     /// Distance of such a place from the skin of head, trunk, hand or cord, mm, negative inside; to first order, so exact on
-    /// the skin itself. The uterus does not count.
+    /// the skin itself. The uterus does not count. Of vessels: from the blood.
     ///
     /// # Errors
     /// As [`Phantom::label`].
     pub fn distance(&self, volume: usize, place: DVec3) -> Result<f64, InputError> {
-        let head = self.head()?;
-        Ok(f64::from(head.distance(place.as_vec3(), self.time_at(volume, place))))
+        Ok(match self.labelled()? {
+            Labelled::Head(head) => f64::from(head.distance(place.as_vec3(), self.time_at(volume, place))),
+            Labelled::Vessels(tree) => tree.distance(place),
+        })
     }
 
     /// The grid of the truth: over the insonified region, as [`lattice`] of the sweep, `spacing` mm apart.
     ///
     /// # Errors
-    /// A body other than the head, a spacing that is no length or makes too many voxels.
+    /// A body other than head and vessels, a spacing that is no length or makes too many voxels.
     pub fn truth_grid(&self, spacing: f64) -> Result<Grid, InputError> {
-        self.head()?;
+        self.labelled()?;
         lattice(&Geometry::Sweep(self.probe(0)), spacing).map_err(|fault| refusal("truth_spacing", fault))
     }
 
@@ -54,14 +69,14 @@ impl Phantom {
     /// names, distances (f32, mm, as [`Phantom::distance`]) to [`distance_path`], a MetaImage. Both have values outside the sector, too.
     ///
     /// # Errors
-    /// A body other than the head, a path that does not end in .mha or .seg.nrrd, a file that cannot be written. A file that is there is
+    /// A body other than head and vessels, a path that does not end in .mha or .seg.nrrd, a file that cannot be written. A file that is there is
     /// complete.
     pub fn write_truth(&self, path: &Path, grid: &Grid) -> Result<(), InputError> {
-        self.head()?;
+        self.labelled()?;
         let label = |place| self.label(0, place).ok().map(|label| label as u8);
         if segmentation::is_one(path) {
             // Fluid is 0: no segment.
-            let segments = Label::ALL.iter().filter(|label| **label as u8 > 0);
+            let segments = self.options.body.labels().iter().filter(|label| **label as u8 > 0);
             let segments = segments.map(|l| Segment { label: *l as u8, name: l.name(), colour: l.colour() });
             write_labels(grid, &segments.collect::<Vec<_>>(), path, |place| label(place).unwrap_or(0))?;
         } else if VolumeFile::of(path).is_ok_and(|format| format == VolumeFile::MetaImage) {
@@ -72,10 +87,11 @@ impl Phantom {
         write_grid(grid, SampleType::F32, &distance_path(path), |place| self.distance(0, place).ok(), || ())
     }
 
-    fn head(&self) -> Result<&Head, InputError> {
+    fn labelled(&self) -> Result<Labelled<'_>, InputError> {
         match &self.scatterers {
-            Scatterers::Head(head) => Ok(head),
-            Scatterers::Exact { .. } => Err(refusal("body", "is not the head: only the head has labels")),
+            Scatterers::Head(head) => Ok(Labelled::Head(head)),
+            Scatterers::Exact { truth: Truth::Vessels(tree), .. } => Ok(Labelled::Vessels(tree)),
+            Scatterers::Exact { .. } => Err(refusal("body", "has no labels: only the head and the vessels do")),
         }
     }
 
