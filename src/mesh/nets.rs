@@ -137,7 +137,6 @@ fn crossing(threshold: f64, a: f64, b: f64) -> f64 {
 pub(super) mod tests {
     use super::*;
     use proptest::prelude::*;
-    use std::collections::HashMap;
 
     /// The net of a function of the voxel, with voxels `h` apart.
     pub fn net(size: [usize; 3], threshold: f64, closed: bool, h: f64, value: impl Fn(DVec3) -> f64) -> Mesh {
@@ -153,32 +152,58 @@ pub(super) mod tests {
     /// Checks that every edge belongs to two triangles that run along it in opposite directions, that the triangles around each vertex are one
     /// fan, and that no triangle has a vertex twice. Returns the Euler characteristic.
     pub fn closed_manifold(mesh: &Mesh) -> i64 {
-        let mut edges: HashMap<(u32, u32), u32> = HashMap::new();
-        let mut next: HashMap<(u32, u32), u32> = HashMap::new();
+        // The sides of triangles as they are run along, each with the corner opposite. Sorted: a hash of thousands of small meshes costs more.
+        let mut sides: Vec<[u32; 3]> = Vec::with_capacity(3 * mesh.triangles.len());
         for [a, b, c] in mesh.triangles.iter().copied() {
             assert!(a != b && b != c && a != c, "a triangle without three corners");
-            for (u, v, w) in [(a, b, c), (b, c, a), (c, a, b)] {
-                *edges.entry((u, v)).or_default() += 1;
-                assert!(next.insert((u, v), w).is_none(), "an edge is run along twice in one direction");
-            }
+            sides.extend([[a, b, c], [b, c, a], [c, a, b]]);
         }
-        assert!(edges.keys().all(|(u, v)| edges.contains_key(&(*v, *u))), "an edge has one triangle");
+        sides.sort_unstable();
+        assert!(sides.windows(2).all(|two| two[0][..2] != two[1][..2]), "an edge is run along twice in one direction");
+        let opposite = |u: u32, v: u32| {
+            let found = sides.binary_search_by_key(&(u, v), |side| (side[0], side[1]));
+            found.ok().map(|n| sides[n][2])
+        };
+        assert!(sides.iter().all(|[u, v, _]| opposite(*v, *u).is_some()), "an edge has one triangle");
         let mut degree = vec![0; mesh.vertices.len()];
-        edges.keys().for_each(|(u, _)| degree[*u as usize] += 1);
-        for (u, v) in edges.keys() {
-            // Round the vertex u, from triangle to triangle.
-            let (mut at, mut steps) = (*v, 0);
+        sides.iter().for_each(|[u, ..]| degree[*u as usize] += 1);
+        // Round each vertex once, from triangle to triangle: a fan has all its sides.
+        for fan in sides.chunk_by(|one, other| one[0] == other[0]) {
+            let [u, first, _] = fan[0];
+            let (mut at, mut steps) = (first, 0);
             loop {
-                at = next[&(*u, at)];
+                at = opposite(u, at).expect("a side of this vertex");
                 steps += 1;
-                if at == *v {
+                // A walk that never comes back is no fan either.
+                if at == first || steps > fan.len() {
                     break;
                 }
             }
-            assert_eq!(steps, degree[*u as usize], "two fans share a vertex");
+            assert_eq!(steps, degree[u as usize], "two fans share a vertex");
         }
         assert!(degree.iter().all(|d| *d > 0), "a vertex has no triangle");
-        mesh.vertices.len() as i64 - edges.len() as i64 / 2 + mesh.triangles.len() as i64
+        mesh.vertices.len() as i64 - sides.len() as i64 / 2 + mesh.triangles.len() as i64
+    }
+
+    #[test]
+    fn what_is_no_closed_manifold_is_noticed() {
+        let tetrahedron = |[a, b, c, d]: [u32; 4]| [[a, c, b], [a, b, d], [b, c, d], [c, a, d]];
+        let mesh = |triangles: Vec<[u32; 3]>| {
+            let most = triangles.iter().flatten().max().map_or(0, |n| *n as usize + 1);
+            Mesh { vertices: vec![DVec3::ZERO; most], triangles, ..Mesh::default() }
+        };
+        let is_one = |triangles: Vec<[u32; 3]>| std::panic::catch_unwind(|| closed_manifold(&mesh(triangles))).ok();
+        let one = tetrahedron([0, 1, 2, 3]).to_vec();
+        assert_eq!(is_one(one.clone()), Some(2));
+        let apart = [one.clone(), tetrahedron([4, 5, 6, 7]).to_vec()].concat();
+        assert_eq!(is_one(apart), Some(4));
+        let joined_at_a_vertex = [one.clone(), tetrahedron([0, 4, 5, 6]).to_vec()].concat();
+        let joined_at_an_edge = [one.clone(), tetrahedron([0, 1, 4, 5]).to_vec()].concat();
+        let [a, b, c] = one[3];
+        let (turned, twice) = ([&one[..3], &[[b, a, c]]].concat(), one.repeat(2));
+        for wrong in [one[..3].to_vec(), joined_at_a_vertex, joined_at_an_edge, turned, twice, vec![[0, 1, 1]]] {
+            assert_eq!(is_one(wrong.clone()), None, "{wrong:?}");
+        }
     }
 
     /// Distances from the surface of a ball, positive within, of a lattice of n^3 voxels.
