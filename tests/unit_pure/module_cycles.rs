@@ -2,6 +2,7 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
+use std::sync::LazyLock;
 use syn::visit::{self, Visit};
 use syn::{Attribute, Item, ItemUse, UseTree, Visibility};
 
@@ -140,7 +141,8 @@ fn cycles(graph: &BTreeMap<String, BTreeSet<String>>) -> Vec<Vec<String>> {
     found
 }
 
-fn dependencies() -> Vec<(Module, Module)> {
+/// From module to module. Shared by the tests: to parse all sources takes seconds.
+static DEPENDENCIES: LazyLock<Vec<(Module, Module)>> = LazyLock::new(|| {
     let mut all = BTreeMap::new();
     modules(&Path::new(env!("CARGO_MANIFEST_DIR")).join("src"), &[], &mut all);
     let mut found = BTreeSet::new();
@@ -151,7 +153,7 @@ fn dependencies() -> Vec<(Module, Module)> {
         found.extend(others.map(|to| (module.clone(), to)));
     }
     found.into_iter().collect()
-}
+});
 
 fn graph(edges: impl Iterator<Item = (String, String)>) -> BTreeMap<String, BTreeSet<String>> {
     let mut graph: BTreeMap<String, BTreeSet<String>> = BTreeMap::new();
@@ -164,7 +166,7 @@ fn graph(edges: impl Iterator<Item = (String, String)>) -> BTreeMap<String, BTre
 
 #[test]
 fn no_top_level_module_depends_on_itself_through_others() {
-    let edges = dependencies();
+    let edges = &*DEPENDENCIES;
     let tops = graph(edges.iter().map(|(from, to)| (from[0].clone(), to[0].clone())));
     assert!(tops.len() > 10, "the modules are read: {tops:?}");
     if let Some(cycle) = cycles(&tops).first() {
@@ -176,7 +178,7 @@ fn no_top_level_module_depends_on_itself_through_others() {
 
 #[test]
 fn no_file_depends_on_itself_through_others() {
-    let edges = dependencies();
+    let edges = &*DEPENDENCIES;
     let files = graph(edges.iter().map(|(from, to)| (from.join("::"), to.join("::"))));
     let found: Vec<String> = cycles(&files)
         .iter()

@@ -168,14 +168,13 @@ fn no_layer_uses_a_layer_above_it() {
         ("src/batch", &["crate::live", "crate::ui", "crate::kiosk", "crate::profile", "crate::cli", "ash::vk"]),
         ("src/cli", &["ash::vk", "use ash"]),
     ];
-    let all = sources("src");
+    let all: Vec<(String, String)> = sources("src").into_iter().map(|(name, text)| (name, code(&text))).collect();
     for (place, forbidden) in rules {
         let within: Vec<_> = all.iter().filter(|(name, _)| name.starts_with(place)).collect();
         assert!(!within.is_empty(), "{place} is gone");
-        for (name, text) in within {
+        for (name, code) in within {
             for word in *forbidden {
                 // `std::hash::` does not name `ash::`.
-                let code = code(text);
                 let is_named = code
                     .match_indices(word)
                     .any(|(at, _)| !code[..at].ends_with(|before: char| before.is_alphanumeric() || before == '_'));
@@ -200,7 +199,6 @@ fn no_layer_uses_a_layer_above_it() {
         ("Color32::", &["src/ui/panels/colours.rs", "src/ui/panels/drawn.rs"]),
     ];
     for (name, text) in &all {
-        let text = code(text);
         let in_gpu = name.starts_with("src/gpu/");
         assert!(in_gpu || !text.contains("use ash"), "{name} imports ash");
         assert!(in_gpu || !text.contains(UNSAFE), "{name} has unsafe code");
@@ -241,8 +239,6 @@ fn unsafe_code_is_forbidden_in_every_module_but_one_and_has_its_reasons_there() 
     }
 }
 
-/// The crate that `tools/mutants` makes is complete: no file in it names a module that is not copied.
-/// A wait for a queue waits for the picture in flight too, which may take seconds. egui-ash-renderer's own uploads of textures do that.
 /// The gate is compiled without debug assertions: what is worth an assertion is checked in every build.
 #[test]
 fn no_assertion_is_for_debug_builds_alone() {
@@ -255,6 +251,7 @@ fn no_assertion_is_for_debug_builds_alone() {
     }
 }
 
+/// A wait for a queue waits for the picture in flight too, which may take seconds. egui-ash-renderer's own uploads of textures do that.
 #[test]
 fn nothing_waits_for_a_whole_queue() {
     for (path, text) in sources("src") {
@@ -265,6 +262,7 @@ fn nothing_waits_for_a_whole_queue() {
     }
 }
 
+/// The crate that `tools/mutants` makes is complete: no file in it names a module that is not copied.
 #[test]
 fn the_crate_of_tools_mutants_is_complete() {
     let tool = std::fs::read_to_string(repository("tools/mutants")).expect("tools/mutants");
