@@ -213,7 +213,7 @@ fn filters_of_distance_maps_alternate_between_two_slots() {
     // It does not run unless requested; its parameters are defined all the same.
     assert_eq!(constants(&distances([4, 4], ""), "bilateral_distance", 0), [("RADIUS", 2)]);
     let picture = picture([21, 10], "sigma = {}, enhanced_sigma = {}, perona_malik = { repeat = 1 }");
-    assert_eq!(told(&picture, "sigma_picture", 0), "filter/sigma.picture: picture -> smooth_picture [21, 3, 1]");
+    assert_eq!(told(&picture, "sigma_picture", 0), "filter/sigma.picture: picture -> smooth_picture [21, 5, 1]");
     let second = "filter/enhanced_sigma.picture: smooth_picture -> smooth_picture_b [21, 10, 1]";
     assert_eq!(told(&picture, "enhanced_sigma_picture", 0), second);
     let third = "filter/perona_malik.picture: smooth_picture_b -> smooth_picture [21, 10, 1]";
