@@ -204,20 +204,25 @@ fn a_running_stream_allocates_and_compiles_nothing_and_never_stalls() {
         (Update::Whole, "mode = 'orthogonal'"),
     ] {
         let options = live::StreamOptions { update, ..live::StreamOptions::default() };
-        let mut stream = stream(&device, events(header(0.3), (0..10).flat_map(speckled)), settings(toml), options);
         let count = || {
             let counts = &device.counts;
             [&counts.allocations, &counts.pipelines, &counts.waits_idle].map(|c| c.load(Ordering::Relaxed))
         };
-        let (mut before, mut pictures) = (None, 0);
-        run(&mut stream, |_, shown| {
-            pictures += 1;
-            // Forward, backward, and mixed while rolling.
-            if shown.volume >= 2 {
-                assert_eq!(*before.get_or_insert_with(count), count(), "{update:?}: {toml}");
-            }
+        // The more is left out because the machine is busy, the longer it takes to see four pictures.
+        let enough = [10, 40, 160].into_iter().any(|volumes| {
+            let source = events(header(0.3), (0..volumes).flat_map(speckled));
+            let mut stream = stream(&device, source, settings(toml), options.clone());
+            let (mut before, mut pictures) = (None, 0);
+            run(&mut stream, |_, shown| {
+                pictures += 1;
+                // Forward, backward, and mixed while rolling.
+                if shown.volume >= 2 {
+                    assert_eq!(*before.get_or_insert_with(count), count(), "{update:?}: {toml}");
+                }
+            });
+            pictures > 3 && before.is_some()
         });
-        assert!(pictures > 3 && before.is_some(), "{update:?}: {pictures} pictures");
+        assert!(enough, "{update:?}: {toml}");
     }
 }
 
