@@ -23,7 +23,11 @@ impl StillArgs {
             match part.split_once('=') {
                 Some(("time", time)) => args.time = Some(1e-9 * parse_nanoseconds("--still time", time)?),
                 Some((key, value)) => args.set.push((flag, format!("still.{key}={value}"))),
-                None => args.time = Some(1e-9 * parse_nanoseconds("--still", part)?),
+                None => {
+                    let time = parse_nanoseconds("--still", part);
+                    let time = time.map_err(|_| input(format!("{flag}: must be samples=N, or a time such as 20s")))?;
+                    args.time = Some(1e-9 * time);
+                }
             }
         }
         let has_samples = args.set.iter().any(|(_, set)| set.starts_with("still.samples="));
@@ -100,6 +104,8 @@ mod tests {
         for text in ["", "seed=3", "samples=4,20s", "20", "time=-1s"] {
             assert!(of(text).is_err(), "{text}");
         }
+        let told = "--still bogus: must be samples=N, or a time such as 20s";
+        assert!(matches!(of("bogus"), Err(Failure::Input(said)) if said == told));
     }
 
     /// A device of 10 ms a sample and 3 s of everything else: what is chosen does not take more than asked, nor much less.
