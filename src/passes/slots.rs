@@ -326,7 +326,8 @@ slots! {
     VolumeLayer = D::image("volume_layer", per_ray, |_| Format::Rgba16f);
     /// The volume that is shown beside a surface, where the volume layer is the surface's colour.
     VolumeBesideSurface = D::image("volume_beside_surface", per_ray, |_| Format::Rgba16f);
-    /// What stages 2 and 3 render, where it becomes the picture only by averaging or next to planes.
+    /// What stages 2 and 3 render, where it becomes the picture only by averaging or next to planes. With adaptive supersampling the rays of marked
+    /// pixels: what was there stays in the others.
     Rendered = D::image("rendered", per_ray, |_| Format::Rgba16f);
     /// With adaptive supersampling: one ray through the middle of each pixel of the rendering, and 1 in pixels that have all rays.
     PixelRays = D::image("pixel_rays", per_pixel_of_rendering, |_| Format::Rgba16f);
