@@ -10,25 +10,29 @@ float distance_at(ivec2 pixel) {
     return texelFetch(distance_map, pixel, 0).x;
 }
 
-// Displacement over one pixel along `along`: central where both neighbours belong to the same surface, one-sided where one does,
-// and that of a plane facing the viewer where none does. No difference is taken across a cliff.
-vec3 slope(ivec2 pixel, ivec2 along, float here, vec3 facing) {
+// Displacement over one pixel along `along`: the mean of those on both sides, and where neither neighbour belongs to the same surface that of a plane
+// facing the viewer. No difference is taken across a cliff. A step that is no cliff yet is not a slope either: the sides are weighted as in a WENO scheme,
+// by the inverse square of their length, so that the side without the step counts.
+vec3 slope(ivec2 pixel, ivec2 along, float here, vec3 along_ray, vec3 origin_step, vec3 direction_step) {
+    vec3 facing = origin_step + direction_step * here;
+    float alike = dot(facing, facing); // a slope of 45 degrees
     float back = distance_at(pixel - along), on = distance_at(pixel + along);
-    bool use_back = abs(back - here) <= cliff, use_on = abs(on - here) <= cliff;
-    if (!use_back && !use_on) return facing;
-    ivec2 first = use_back ? pixel - along : pixel, second = use_on ? pixel + along : pixel;
-    float near = use_back ? back : here, far = use_on ? on : here;
-    vec3 first_ray = ray_direction(vec2(first) + 0.5), second_ray = ray_direction(vec2(second) + 0.5);
-    vec2 steps = vec2(second - first);
-    // The difference of two positions, term by term: subtracting the positions would cancel most of f32's digits.
-    return origin_dx * steps.x + origin_dy * steps.y + second_ray * (far - near) + (second_ray - first_ray) * near;
+    float rise = here - back, further = on - here;
+    float weight = 1.0 / (alike + rise * rise), other = 1.0 / (alike + further * further);
+    weight = abs(rise) <= cliff ? weight * weight : 0.0;
+    other = abs(further) <= cliff ? other * other : 0.0;
+    if (weight + other == 0.0) return facing;
+    vec3 back_ray = ray_direction(vec2(pixel - along) + 0.5), on_ray = ray_direction(vec2(pixel + along) + 0.5);
+    // The differences of positions, term by term: subtracting the positions would cancel most of f32's digits.
+    vec3 from_back = weight > 0.0 ? along_ray * rise + (along_ray - back_ray) * back : vec3(0.0);
+    vec3 to_on = other > 0.0 ? on_ray * further + (on_ray - along_ray) * here : vec3(0.0);
+    return origin_step + (weight * from_back + other * to_on) / (weight + other);
 }
 
 // Unit normal at a pixel with a surface, towards the viewer.
 vec3 normal_at(ivec2 pixel, float here, vec3 along_ray) {
-    // The pixel's axes in space at unit distance, for a surface that faces the viewer.
-    vec3 sx = slope(pixel, ivec2(1, 0), here, origin_dx + direction_dx);
-    vec3 sy = slope(pixel, ivec2(0, 1), here, origin_dy + direction_dy);
+    vec3 sx = slope(pixel, ivec2(1, 0), here, along_ray, origin_dx, direction_dx);
+    vec3 sy = slope(pixel, ivec2(0, 1), here, along_ray, origin_dy, direction_dy);
     vec3 normal = cross(sy, sx);
     float size = length(normal);
     normal = size > 1e-30 ? normal / size : -along_ray;

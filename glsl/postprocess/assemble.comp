@@ -1,5 +1,6 @@
-// The picture from the rendering: the mean of several rays per pixel, or interpolation between the rays where one ray makes several
-// pixels, without mixing what is near with what lies far behind it; in a 4-up picture, the rendering next to the planes; in a pair, the composited
+// The picture from the rendering: the mean of several rays per pixel; or what is near and what is far at an edge of a surface, by the share of the pixel
+// that each covers; or interpolation between the rays where one ray makes several pixels, without mixing what is near with what lies far behind it; in a
+// 4-up picture, the rendering next to the planes; in a pair, the composited
 // volume next to the lit surface.
 #version 460
 #include "common.glsl"
@@ -8,7 +9,7 @@ layout(constant_id = 1) const int APART = 1; // pixels between two rays along ea
 layout(constant_id = 2) const int LAYOUT = 0;
 const int FOUR = 1, PAIR = 2; // 0 the rendering alone
 layout(constant_id = 4) const int REFINED = 0; // 1: only marked pixels have several rays
-layout(constant_id = 3) const int GUIDED = 0; // 1: between rays, edges are where distances differ
+layout(constant_id = 3) const int GUIDED = 0; // 1: edges are where distances differ
 layout(scalar) uniform Params {
     float cliff; // distances that differ by more belong to different things, mm
 };
@@ -88,6 +89,37 @@ vec4 between(ivec2 at) {
     return mix(far, near, clamp(0.5 + inside * float(APART), 0.0, 1.0));
 }
 
+#include "edge_coverage.glsl"
+
+// The colour of a pixel with one ray, at an edge mixed with the colours beyond it. A step of half a cliff is no edge, one of a cliff is.
+vec4 antialiased(ivec2 at) {
+    vec4 own = ray_at(at);
+    ivec2 last = textureSize(guide, 0) - 1;
+    float here = texelFetch(guide, at, 0).x, jump = 0.0, limit = here;
+    for (int n = 0; n < 4; ++n) {
+        ivec2 offset = n < 2 ? ivec2(2 * n - 1, 0) : ivec2(0, 2 * n - 5);
+        float there = texelFetch(guide, clamp(at + offset, ivec2(0), last), 0).x;
+        if (abs(there - here) > jump) {
+            jump = abs(there - here);
+            limit = 0.5 * here + 0.5 * there;
+        }
+    }
+    if (jump <= 0.5 * cliff) return own;
+    bool is_outline = jump > 0.5 * MISS, is_own_near = here < limit;
+    vec4 beyond = vec4(0.0);
+    float sum = 0.0;
+    for (int n = 0; n < 9; ++n) {
+        ivec2 offset = ivec2(n % 3, n / 3) - 1, there = clamp(at + offset, ivec2(0), last);
+        if (is_near(there, limit) == is_own_near) continue;
+        float weight = offset.x == 0 || offset.y == 0 ? 2.0 : 1.0;
+        beyond += weight * ray_at(there);
+        sum += weight;
+    }
+    float near = near_share(at, is_outline ? 3 : 1, limit);
+    float share = (is_own_near ? 1.0 - near : near) * clamp(2.0 * (jump / cliff) - 1.0, 0.0, 1.0);
+    return mix(own, beyond / sum, share);
+}
+
 void main() {
     ivec2 pixel = ivec2(gl_GlobalInvocationID.xy);
     ivec2 size = imageSize(picture);
@@ -109,6 +141,10 @@ void main() {
     // Colours are already multiplied by their opacity.
     if (APART > 1) {
         imageStore(picture, pixel, between(at));
+        return;
+    }
+    if (GUIDED == 1 && !is_volume) {
+        imageStore(picture, pixel, antialiased(at));
         return;
     }
     if (REFINED == 1 && texelFetch(marks, at, 0).x == 0.0) {

@@ -4,6 +4,7 @@
 pub mod chain;
 pub mod components;
 pub mod cut;
+mod edge_coverage;
 pub mod fault_injection;
 pub mod floating;
 pub mod interface_check;

@@ -1,7 +1,7 @@
 //! Stage 4: the picture from the rendering, toned to 8 bits.
 
-use crate::passes::chain;
 use crate::passes::pass::*;
+use crate::passes::{chain, edge_coverage};
 use crate::scene::planes::{Frame, Plane, Sheet, Tile};
 use crate::scene::{ColourMap, Layout, Scene, transfer};
 use glam::DVec3;
@@ -127,14 +127,15 @@ fn distance(plane: &Plane, other: &Plane, place: DVec3) -> f64 {
     (place - on_line).cross(along.normalize()).length()
 }
 
-/// What tells edges between rays that are pixels apart: the distance of the surface on each. Compositing and projections blend what lies behind each
-/// other: their pictures are smooth between rays.
+/// What tells edges between rays that are pixels apart, or through pixels with one ray: the distance of the surface on each. Compositing and projections
+/// blend what lies behind each other: their pictures are smooth between rays.
 fn guide(scene: &Scene) -> Option<Slot> {
-    (scene.settings.ray.apart() > 1 && scene.has_distance()).then(|| chain::distance_end(scene))
+    let interpolates = scene.settings.ray.apart() > 1 && scene.has_distance();
+    (interpolates || scene.antialiases()).then(|| chain::distance_end(scene))
 }
 
-/// The picture from the rendering: the mean of several rays per pixel, or interpolation between the rays where one ray makes
-/// several pixels, without mixing what is near with what lies far behind it; in a 4-up picture, the rendering next to the planes; in a pair, the composited volume next to the lit surface.
+/// The picture from the rendering: the mean of several rays per pixel; what is near and what is far at an edge of a surface, by the share of the pixel that
+/// each covers; or interpolation between the rays where one ray makes several pixels, without mixing what is near with what lies far behind it; in a 4-up picture, the rendering next to the planes; in a pair, the composited volume next to the lit surface.
 pub const ASSEMBLE: Pass = Pass {
     name: "assemble",
     stage: Stage::Postprocess,
@@ -146,6 +147,7 @@ pub const ASSEMBLE: Pass = Pass {
         (_, Layout::Four) => Ok("the rendering stands beside three planes"),
         (_, Layout::Pair) => Ok("the volume stands beside the surface"),
         (_, Layout::Single) if s.settings.ray.apart() > 1 => Ok("one ray makes several pixels"),
+        (_, Layout::Single) if s.antialiases() => Ok("edges of a surface are antialiased"),
         (_, Layout::Single) if s.adapts_rays() => Ok("several rays make a pixel at an edge"),
         (_, Layout::Single) => Ok("several rays make a pixel"),
     },
@@ -216,6 +218,10 @@ pub const ASSEMBLE: Pass = Pass {
                     continue;
                 }
                 let at = [x - corner[0], y - corner[1]];
+                if scene.antialiases() && is_rendering {
+                    picture.set([x, y, 0], &antialiased(shown, reads.get("guide"), scene.cliff(), at));
+                    continue;
+                }
                 if scene.adapts_rays() && reads.get("marks").one(at[0], at[1], 0) == 0.0 {
                     let single = reads.get("single").get([at[0], at[1], 0]).to_vec();
                     picture.set([x, y, 0], &single);
@@ -231,6 +237,40 @@ pub const ASSEMBLE: Pass = Pass {
         }
     },
 };
+
+/// The colour of a pixel with one ray: at an edge, its own and the mean of those around it beyond the edge, by the share of the pixel that lies beyond. A step
+/// of half a cliff is no edge, one of a cliff is.
+fn antialiased(rendered: &Texels, distances: &Texels, cliff: f64, [x, y]: [usize; 2]) -> [f64; 4] {
+    let ray = |dx: i64, dy: i64| -> [usize; 3] {
+        let inside = |at: usize, by: i64, size: usize| (at as i64 + by).clamp(0, size as i64 - 1) as usize;
+        [inside(x, dx, rendered.size[0]), inside(y, dy, rendered.size[1]), 0]
+    };
+    let distance = |dx: i64, dy: i64| distances.get(ray(dx, dy))[0];
+    let own: [f64; 4] = std::array::from_fn(|c| rendered.get(ray(0, 0))[c]);
+    let here = distance(0, 0);
+    let mut jump = 0.0;
+    let mut limit = here;
+    for there in [(-1, 0), (1, 0), (0, -1), (0, 1)].map(|(dx, dy)| distance(dx, dy)) {
+        if (there - here).abs() > jump {
+            (jump, limit) = ((there - here).abs(), 0.5 * here + 0.5 * there);
+        }
+    }
+    if jump <= 0.5 * cliff {
+        return own;
+    }
+    let is_near = |dx: i64, dy: i64| distance(dx, dy) < limit;
+    let around = (-1..=1).flat_map(|dy| (-1..=1).map(move |dx| (dx, dy)));
+    let beyond = around.filter(|(dx, dy)| is_near(*dx, *dy) != is_near(0, 0));
+    let weighed: Vec<_> = beyond.map(|(dx, dy)| (if dx * dy == 0 { 2.0 } else { 1.0 }, ray(dx, dy))).collect();
+    let all: f64 = weighed.iter().map(|(weight, _)| weight).sum();
+    let reach = if is_hit(here.max(2.0 * limit - here)) { 1 } else { 3 };
+    let near = edge_coverage::near_share(&is_near, reach);
+    let beyond_share = if is_near(0, 0) { 1.0 - near } else { near } * (2.0 * jump / cliff - 1.0).clamp(0.0, 1.0);
+    std::array::from_fn(|c| {
+        let there = weighed.iter().map(|(weight, at)| weight * rendered.get(*at)[c]).sum::<f64>() / all;
+        own[c] + (there - own[c]) * beyond_share
+    })
+}
 
 /// The colour of a pixel between the rays around it. Ray i goes through the middle of the `apart` pixels from `apart` i on; beyond the outermost ray its
 /// value repeats. It is linear interpolation, except where the guide has a cliff between the four rays.

@@ -450,21 +450,28 @@ fn place(scene: &Scene, distances: &Texels, x: i64, y: i64) -> Option<(DVec3, f6
     Some((origin + direction * distance, distance))
 }
 
-/// Unit normal at a pixel, towards the viewer. No difference is taken across a cliff.
+/// Unit normal at a pixel, towards the viewer. No difference is taken across a cliff. A step that is no cliff yet is no slope either: of the two
+/// differences along an axis the steeper one counts less, by weights as in a WENO scheme of second order (Liu, Osher and Chan 1994).
 pub fn normal(scene: &Scene, distances: &Texels, x: i64, y: i64) -> Option<DVec3> {
     let (here, distance) = place(scene, distances, x, y)?;
     let slope = |dx: i64, dy: i64, facing: DVec3| {
-        let same = |p: &(DVec3, f64)| (p.1 - distance).abs() <= scene.cliff();
-        let back = place(scene, distances, x - dx, y - dy).filter(same);
-        let on = place(scene, distances, x + dx, y + dy).filter(same);
-        match (back, on) {
-            (None, None) => facing,
-            (back, on) => on.map_or(here, |p| p.0) - back.map_or(here, |p| p.0),
+        // Up to a slope of 45 degrees, the two sides count much alike.
+        let alike = facing.length_squared();
+        let side = |sign: i64| {
+            let (there, away) = place(scene, distances, x + sign * dx, y + sign * dy)?;
+            let rise = away - distance;
+            (rise.abs() <= scene.cliff()).then(|| ((alike + rise * rise).powi(-2), (there - here) * sign as f64))
+        };
+        let sides = [side(-1), side(1)];
+        let sum: f64 = sides.iter().flatten().map(|(weight, _)| weight).sum();
+        match sum > 0.0 {
+            true => sides.iter().flatten().map(|(weight, step)| *step * (*weight / sum)).sum(),
+            false => facing,
         }
     };
     let rays = &scene.rays;
-    let sx = slope(1, 0, rays.origin_dx + rays.direction_dx);
-    let sy = slope(0, 1, rays.origin_dy + rays.direction_dy);
+    let sx = slope(1, 0, rays.origin_dx + rays.direction_dx * distance);
+    let sy = slope(0, 1, rays.origin_dy + rays.direction_dy * distance);
     let (_, along) = rays.at(x as f64 + 0.5, y as f64 + 0.5);
     let normal = sy.cross(sx).try_normalize().unwrap_or(-along);
     Some(if normal.dot(along) > 0.0 { -normal } else { normal })

@@ -565,11 +565,12 @@ impl Slot {
     }
 }
 
-/// The slot that stages 2 and 3 render into: the picture itself, unless several rays make a pixel, one ray makes several, or planes
-/// or the volume are shown next to the rendering.
+/// The slot that stages 2 and 3 render into: the picture itself, unless several rays make a pixel, one ray makes several, edges
+/// are antialiased, or planes or the volume are shown next to the rendering.
 pub fn rendered(scene: &Scene) -> Slot {
+    let ray = &scene.settings.ray;
     let is_picture =
-        scene.settings.ray.rays == 1 && scene.settings.ray.apart() == 1 && scene.settings.layout == Layout::Single;
+        ray.rays == 1 && ray.apart() == 1 && scene.settings.layout == Layout::Single && !scene.antialiases();
     if is_picture || scene.is_flat() { Slot::Picture } else { Slot::Rendered }
 }
 

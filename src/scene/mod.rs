@@ -432,6 +432,12 @@ impl Scene {
         ray.adaptive && ray.rays > 1 && is_alone && self.still().is_none() && !self.has_caps()
     }
 
+    /// True if pixels at edges of a surface show what is near and what is far, by the share that each covers. Where several rays make a pixel they tell.
+    pub fn antialiases(&self) -> bool {
+        let ray = &self.settings.ray;
+        self.settings.post.antialias && self.detects_surface() && ray.rays == 1 && ray.apart() == 1
+    }
+
     /// Entries of the table of the transfer function; its points were checked.
     pub fn transfer_entries(&self) -> usize {
         transfer::entries(&self.settings.volume).unwrap_or(transfer::ENTRIES)

@@ -34,7 +34,7 @@ const MODES: [(Mode, &str); 10] = [
 const SAMPLINGS: [&str; 3] = ["hardware", "exact", "quads"];
 
 /// Filters, lights and other choices that are structure: each line is a table of a scene file.
-const CHOICES: [&str; 49] = [
+const CHOICES: [&str; 50] = [
     "slices.median = true",
     "slices.sigma = {}",
     "slices.enhanced_sigma = { window = 5, largest = 19, sigma = 0.1 }",
@@ -61,6 +61,7 @@ const CHOICES: [&str; 49] = [
     "post.perona_malik = {}",
     "post.perona_malik = { scheme = 'aos', step = 2 }",
     "post.floats = true",
+    "post.antialias = false",
     "light = { shadow = {}, occlusion = {}, skin = {} }",
     "surface.detector = 'adaptive'",
     "surface.detector = 'lasting'",

@@ -148,6 +148,7 @@ pub fn scene(conditions: &Conditions) -> Result<Scene, SceneError> {
     // The thesis takes every sample.
     settings.ray.brick = Some(0);
     settings.surface.rough = 1;
+    settings.post.antialias = false;
     settings.surface.place = Place::FirstCrossing;
     settings.distance.sigma = Some(Sigma { window: conditions.filter_2d, sigma: SIGMA, ..Sigma::default() });
     match conditions.filter_3d {

@@ -2,6 +2,7 @@
 //! every test, and any message fails the test that caused it.
 
 mod adaptive;
+mod antialias;
 mod any_scene;
 mod bands;
 mod batches;

@@ -101,9 +101,9 @@ fn a_filter_switched_on_keeps_the_volume_and_a_frame_goes_through_stage_one_alon
     let unfiltered = scene(Geometry::Sweep(wobbler()), BYTES, &plain);
     let names =
         renderer.dispatched_passes(|r| r.change(unfiltered.clone()).and_then(|_| r.picture())).expect("picture");
-    assert_eq!(names, ["light", "sigma_picture", "tone"]);
+    assert_eq!(names, ["light", "assemble", "sigma_picture", "tone"]);
     let names = renderer.dispatched_passes(|r| r.change(with("")).and_then(|_| r.picture())).expect("picture");
-    assert_eq!(names, ["median_distance", "bilateral_distance", "light", "sigma_picture", "tone"]);
+    assert_eq!(names, ["median_distance", "bilateral_distance", "light", "assemble", "sigma_picture", "tone"]);
 
     let frame = vec![0u8; renderer.frame_bytes()];
     let names = renderer.dispatched_passes(|r| r.frame(3, &frame, 0)).expect("frame");
@@ -137,11 +137,11 @@ fn a_scene_has_the_passes_and_slots_it_needs_and_no_others() {
     let (passes, slots) = names("mode = 'sr'\ndistance = { bilateral = { pixels = 1.0, distance = 1.0, repeat = 3 } }");
     assert_eq!(
         passes,
-        "scan_convert tile_ranges brick_ranges classify_bricks_surface brick_distance_surface brick_distance_surface brick_distance_surface raycast_surface bilateral_distance bilateral_distance bilateral_distance light tone"
+        "scan_convert tile_ranges brick_ranges classify_bricks_surface brick_distance_surface brick_distance_surface brick_distance_surface raycast_surface bilateral_distance bilateral_distance bilateral_distance light assemble tone"
     );
     assert_eq!(
         slots,
-        "frames scan_lut volume tile_ranges brick_table brick_ranges brick_kinds brick_distances_x brick_distances_xy surface_brick_distances distance_map distance_a distance_b picture screen"
+        "frames scan_lut volume tile_ranges brick_table brick_ranges brick_kinds brick_distances_x brick_distances_xy surface_brick_distances distance_map distance_a distance_b rendered picture screen"
     );
     // Texture and translucent skin take the echo at the surface, and nothing else does.
     for (light, is_read) in [

@@ -301,6 +301,9 @@ pub struct Post {
     pub enhanced_sigma: Option<EnhancedSigma>,
     /// Perona-Malik diffusion.
     pub perona_malik: Option<PeronaMalik>,
+    /// Antialiasing of a surface that has one ray a pixel: pixels at outlines and folds mix what is near and what is far by the share that each covers, by a
+    /// line through the edge's places in the distance map around them. Folds are steps of `light.cliff`.
+    pub antialias: bool,
     /// Added to the brightness, -1..1.
     pub brightness: f64,
     /// Contrast factor about middle grey, 0..10.
@@ -319,6 +322,7 @@ impl Default for Post {
             sigma: None,
             enhanced_sigma: None,
             perona_malik: None,
+            antialias: true,
             brightness: 0.0,
             contrast: 1.0,
             gamma: 1.0,

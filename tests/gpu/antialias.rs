@@ -1,0 +1,125 @@
+//! Antialiasing of surfaces by the distance map: outlines of many rays from one ray a pixel.
+
+use crate::common::gpu::*;
+use crate::shading::{map, plate, run};
+use echolume::gpu::pass_runner::PassRunner;
+use echolume::passes::{Arrays, DispatchArgs, MISS, Texels, by_name};
+use echolume::plan::Plan;
+use echolume::scene::Scene;
+
+/// A ball of 14 mm and the scene of its outline alone: one colour wherever it is hit.
+fn ball(rays: u32, antialias: bool) -> Scene {
+    let toml = format!(
+        "mode = 'surface'
+        picture.size = [120, 110]
+        camera = {{ field_of_view = 0, azimuth = 20, elevation = 15 }}
+        surface = {{ threshold = 0.2, window = [0, 1] }}
+        slices = {{ median = false }}
+        distance = {{ median = 0 }}
+        light = {{ ambient = 1, diffuse = 0, specular = 0, texture = 0, surface_colour = [1, 1, 1] }}
+        post.antialias = {antialias}
+        ray.rays = {rays}"
+    );
+    scene(cartesian([48, 48, 48]), BYTES, &toml)
+}
+
+/// A picture of a ball whose border is soft over two voxels: brightness, 0..1.
+fn outline(device: &Device, scene: Scene) -> Vec<f64> {
+    let frame = |z: usize| {
+        Texels::from_fn([48, 48, 1], 1, |[x, y, _], _| {
+            let from_middle = [x, y, z].map(|n| (n as f64 - 23.5).powi(2)).iter().sum::<f64>().sqrt();
+            (0.5 * (16.3 - from_middle)).clamp(0.0, 1.0)
+        })
+    };
+    let frames: Vec<Texels> = (0..48).map(frame).collect();
+    let picture = rendered(device, scene, &frames).picture().expect("picture");
+    picture.rgba.chunks_exact(4).map(|p| f64::from(p[1]) / 255.0).collect()
+}
+
+/// The error at a round outline is two thirds of that of one ray at most. The truth is the mean of 4 x 4.
+#[test]
+fn an_outline_is_that_of_many_rays() {
+    let device = Device::new();
+    let truth = outline(&device, ball(4, true));
+    let error = |rays, antialias| {
+        let picture = outline(&device, ball(rays, antialias));
+        let at_edges = truth.iter().zip(&picture).filter(|(t, p)| (0.02..0.98).contains(*t) || *t != *p);
+        let squares: Vec<f64> = at_edges.map(|(t, p)| (t - p).powi(2)).collect();
+        (squares.len(), (squares.iter().sum::<f64>() / squares.len() as f64).sqrt())
+    };
+    let [one, four, antialiased] = [error(1, false), error(2, false), error(1, true)];
+    println!("one ray {one:.3?}, 2 x 2 {four:.3?}, antialiased {antialiased:.3?}");
+    assert!(one.0 > 100 && antialiased.1 < 0.7 * one.1, "{antialiased:?} {one:?}");
+}
+
+/// A slanted edge is smooth from a step of a cliff on, and fades in from half a cliff.
+#[test]
+fn a_step_becomes_an_edge_between_half_a_cliff_and_a_cliff() {
+    let device = Device::new();
+    let scene = plate("mode = 'surface'\nlight.cliff = 2");
+    let is_near = |x: usize, y: usize| 5 * x < 500 + y;
+    let hard = Texels::from_fn([244, 244, 1], 4, |[x, y, _], c| if c == 3 || is_near(x, y) { 1.0 } else { 0.25 });
+    let mut runner = PassRunner::new(&device).expect("runner");
+    let mut drawn = |step: f64| {
+        let mut inputs = Arrays::default();
+        inputs.insert("guide", map(&scene, |x, y| if is_near(x, y) { 40.0 } else { 40.0 + step }));
+        inputs.insert("rendered", hard.clone());
+        let pass = by_name("assemble").expect("pass");
+        let outputs = runner.run(&scene, pass, &DispatchArgs::default(), &inputs, 0.5).expect("dispatch");
+        outputs.get("picture").clone()
+    };
+    let smooth = drawn(4.0);
+    let between = smooth.values.chunks_exact(4).filter(|c| (0.35..0.9).contains(&c[0])).count();
+    assert!(between > 80, "{between}");
+    for (step, share) in [(0.5, 0.0), (1.0, 0.0), (1.2, 0.2), (1.5, 0.5), (1.9, 0.9), (2.0, 1.0), (30.0, 1.0)] {
+        let picture = drawn(step);
+        for ((got, own), edge) in picture.values.iter().zip(&hard.values).zip(&smooth.values) {
+            // R16F stores 1 to 4.9e-4, and a distance of 40 mm to 4e-6.
+            assert!((got - (own + share * (edge - own))).abs() < 1e-3, "{step}: {got} {own} {edge}");
+        }
+    }
+}
+
+/// What is no surface, or has no ray through each pixel or several, is drawn as without.
+#[test]
+fn other_pictures_have_no_pass_for_it() {
+    for (toml, is_antialiased) in [
+        ("mode = 'sr'", true),
+        ("mode = 'mixed'", true),
+        ("mode = 'sr'\nlayout = '4up'", true),
+        ("mode = 'sr'\nlayout = 'pair'", true),
+        ("mode = 'sr'\nray.rays = 2", false),
+        ("mode = 'sr'\nray.half = true", false),
+        ("mode = 'vr'", false),
+        ("mode = 'vr'\nvolume.shading = 'first-hit'", false),
+        ("mode = 'mip'", false),
+        ("mode = 'cube'", false),
+        ("mode = 'mpr'", false),
+    ] {
+        let of = |antialias: bool| {
+            let scene = scene(cartesian([20, 20, 20]), BYTES, &format!("{toml}\npost.antialias = {antialias}"));
+            let steps: Vec<_> = Plan::new(&scene).steps.iter().map(|s| s.id()).collect();
+            (scene.antialiases(), steps)
+        };
+        assert_eq!(of(true).0, is_antialiased, "{toml}");
+        assert!(!of(false).0 && (is_antialiased || of(true).1 == of(false).1), "{toml}");
+    }
+}
+
+/// Folds of less than a cliff are no slopes: neither side of them is lit as if it were steep.
+#[test]
+fn a_step_below_a_cliff_draws_no_line() {
+    let device = Device::new();
+    let scene =
+        plate("light = { cliff = 1, ambient = 0.2, diffuse = 0.8, specular = 0, direction = [-0.5, 0.3, 0.8] }");
+    // 0.25 mm a pixel; a step of 0.9 mm over one pixel is a slope of 74 degrees.
+    for step in [0.6, 0.9, 1.1, 5.0] {
+        let sheet = |x: usize, y: usize| 40.0 + 0.02 * x as f64 + 0.03 * y as f64 + if x < 120 { 0.0 } else { step };
+        let picture = run(&device, &scene, "light", &map(&scene, sheet));
+        let [beside, away] = [119, 60].map(|x| picture.one(x, 100, 0));
+        assert!((beside - away).abs() < 0.04 * away, "{step}: {beside} {away}");
+        assert!((picture.one(120, 100, 0) - away).abs() < 0.04 * away, "{step}: {}", picture.one(120, 100, 0));
+    }
+    let holed = map(&scene, |x, y| if (x, y) == (120, 100) { MISS } else { 40.0 });
+    assert_eq!(run(&device, &scene, "light", &holed).get([120, 100, 0])[3], 0.0);
+}
