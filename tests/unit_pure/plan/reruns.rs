@@ -71,7 +71,7 @@ fn only_readers_of_a_changed_slot_run_again() {
     let Rerun::Steps { steps, .. } = rerun(&shorter, &with("")) else { panic!("the volume stays") };
     let plan = Plan::new(&with(""));
     let ids: Vec<_> = steps.iter().map(|i| plan.steps[*i].id()).collect();
-    assert_eq!(ids, [("bilateral_distance", 2), ("light", 0), ("tone", 0)]);
+    assert_eq!(ids, [("bilateral_distance", 2), ("light", 0), ("assemble", 0), ("tone", 0)]);
 }
 
 #[test]
