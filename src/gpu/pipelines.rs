@@ -11,6 +11,7 @@ use crate::passes::slots::{Format, Shape};
 use crate::passes::{DispatchArgs, Pass, Slot, interface_check};
 use crate::plan::Plan;
 use crate::scene::Scene;
+use crate::spirv::dead_code::remove_dead_code;
 use crate::spirv::specialize::specialize;
 use crate::spirv::{self, Kind, Module};
 use ash::vk;
@@ -304,7 +305,9 @@ impl Pipelines {
         let constants = self.context.faults.constants(pass.name, &key.1);
         if self.context.specializes {
             // The driver ignores values of constants that the module does not have.
-            words = specialize(&words, &by_id(&module, &constants)).map_err(|e| at_fault(e.to_string()))?;
+            words = specialize(&words, &by_id(&module, &constants))
+                .and_then(|words| remove_dead_code(&words))
+                .map_err(|e| at_fault(e.to_string()))?;
         }
         Ok(Prepared { words, module, constants })
     }

@@ -1,7 +1,8 @@
 //! The shaders as SPIR-V: [`reflect()`] reads the interface that a module declares. The other modules rewrite a shader when its
 //! pipeline is made: for a scene (`strip_bindings`, `volumes_to_layers`), for a software device (`hoist_uniforms`, `texture_to_storage`,
-//! `storage_to_texel_buffer`), for a validation layer (`specialize`), and for fault injection (`mutate`).
+//! `storage_to_texel_buffer`), for a validation layer (`specialize`, `dead_code`), and for fault injection (`mutate`).
 
+pub(crate) mod dead_code;
 pub(crate) mod hoist_uniforms;
 mod module;
 pub(crate) mod mutate;

@@ -34,6 +34,7 @@ pub(super) mod op {
     pub const SPEC_CONSTANT_COMPOSITE: u32 = 51;
     pub const SPEC_CONSTANT_OP: u32 = 52;
     pub const FUNCTION: u32 = 54;
+    pub const FUNCTION_END: u32 = 56;
     pub const FUNCTION_CALL: u32 = 57;
     pub const VARIABLE: u32 = 59;
     pub const LOAD: u32 = 61;
@@ -49,6 +50,7 @@ pub(super) mod op {
     pub const VECTOR_SHUFFLE: u32 = 79;
     pub const COMPOSITE_EXTRACT: u32 = 81;
     pub const COPY_OBJECT: u32 = 83;
+    pub const TRANSPOSE: u32 = 84;
     pub const SAMPLED_IMAGE: u32 = 86;
     pub const IMAGE_SAMPLE_EXPLICIT_LOD: u32 = 88;
     pub const IMAGE_FETCH: u32 = 95;
@@ -58,7 +60,9 @@ pub(super) mod op {
     pub const IMAGE_QUERY_SIZE_LOD: u32 = 103;
     pub const IMAGE_QUERY_SIZE: u32 = 104;
     pub const IMAGE_QUERY_SAMPLES: u32 = 107;
+    pub const CONVERT_F_TO_U: u32 = 109;
     pub const QUANTIZE_TO_F16: u32 = 116;
+    pub const BITCAST: u32 = 124;
     pub const S_NEGATE: u32 = 126;
     pub const I_ADD: u32 = 128;
     pub const F_ADD: u32 = 129;
@@ -69,6 +73,8 @@ pub(super) mod op {
     pub const S_DIV: u32 = 135;
     pub const F_DIV: u32 = 136;
     pub const VECTOR_TIMES_SCALAR: u32 = 142;
+    pub const S_MUL_EXTENDED: u32 = 152;
+    pub const ANY: u32 = 154;
     pub const LOGICAL_OR: u32 = 166;
     pub const LOGICAL_AND: u32 = 167;
     pub const LOGICAL_NOT: u32 = 168;
@@ -79,8 +85,20 @@ pub(super) mod op {
     pub const S_GREATER_THAN_EQUAL: u32 = 175;
     pub const S_LESS_THAN: u32 = 177;
     pub const S_LESS_THAN_EQUAL: u32 = 179;
+    pub const F_UNORD_GREATER_THAN_EQUAL: u32 = 191;
+    pub const SHIFT_RIGHT_LOGICAL: u32 = 194;
+    pub const BIT_COUNT: u32 = 205;
     pub const PHI: u32 = 245;
+    pub const LOOP_MERGE: u32 = 246;
+    pub const SELECTION_MERGE: u32 = 247;
     pub const LABEL: u32 = 248;
+    pub const BRANCH: u32 = 249;
+    pub const BRANCH_CONDITIONAL: u32 = 250;
+    pub const SWITCH: u32 = 251;
+    pub const KILL: u32 = 252;
+    pub const RETURN: u32 = 253;
+    pub const RETURN_VALUE: u32 = 254;
+    pub const UNREACHABLE: u32 = 255;
     pub const NO_LINE: u32 = 317;
     pub const EXECUTION_MODE_ID: u32 = 331;
 }
