@@ -16,16 +16,14 @@ struct Spread {
     wrong: f64,
 }
 
-fn spread(device: &Device, deviation: f64, threshold: f64, rough: u32) -> Spread {
+/// `noise`: of each voxel, for a deviation of 1.
+fn spread(device: &Device, noise: &[f64], deviation: f64, threshold: f64, rough: u32) -> Spread {
     // One voxel a sample: each has its own noise.
     let surface = format!("threshold = {threshold}\nrough = {rough}");
     let scene = columns([64, 100, 64], STEP, &surface);
-    let mut noise = Noise(7);
-    let mut normal = || (-2.0 * (1.0 - noise.next()).ln()).sqrt() * (std::f64::consts::TAU * noise.next()).cos();
-    let noise: Vec<f64> = (0..64 * 100 * 64).map(|_| deviation * normal()).collect();
     let edge = |x: usize, z: usize| STEP * (60.0 + ((7 * x + 3 * z) % 10) as f64 / 10.0);
     let frames = frames(&scene, |[x, y, z]| {
-        (ramp(y as f64 * STEP, edge(x, z), 2.0 * STEP) + noise[(z * 100 + y) * 64 + x]).clamp(0.0, 1.0)
+        (ramp(y as f64 * STEP, edge(x, z), 2.0 * STEP) + deviation * noise[(z * 100 + y) * 64 + x]).clamp(0.0, 1.0)
     });
     let found = depths(device, &scene, &frames);
     let rays = found.len() as f64;
@@ -48,6 +46,8 @@ fn spread(device: &Device, deviation: f64, threshold: f64, rough: u32) -> Spread
 #[test]
 fn noise_spreads_a_wall_within_the_measured_bounds() {
     let device = Device::new();
+    let mut noise = Noise(7);
+    let noise: Vec<f64> = (0..64 * 100 * 64).map(|_| normal(&mut noise)).collect();
     // Threshold, rough; then for noise of 0, 0.05, 0.1 and 0.2 of the wall: spread in steps, share of wrong places.
     let measured = [
         (0.1, 1, [(0.0, 0.0), (0.089, 0.0), (0.181, 0.330), (0.515, 0.986)]),
@@ -57,7 +57,7 @@ fn noise_spreads_a_wall_within_the_measured_bounds() {
     ];
     for (threshold, rough, levels) in measured {
         for (deviation, (steps, wrong)) in [0.0, 0.05, 0.1, 0.2].into_iter().zip(levels) {
-            let got = spread(&device, deviation, threshold, rough);
+            let got = spread(&device, &noise, deviation, threshold, rough);
             println!("threshold {threshold}, rough {rough}, noise {deviation}: {got:.4?}");
             let what = format!("threshold {threshold}, rough {rough}, noise {deviation}: {got:?}");
             assert!(got.steps <= 1.15 * steps + 0.005, "the wall is spread, {what}");
@@ -135,18 +135,23 @@ struct Found {
 }
 
 /// A wall in one column: its values by depth, in steps, and where it is.
-type Column<'a> = dyn FnMut() -> (Vec<f64>, f64) + 'a;
+type Column = (Vec<f64>, f64);
 
 const DEPTH: usize = 140;
 
-fn walls(device: &Device, surface: &str, column: &mut Column) -> Found {
+/// Columns of one seed: the same for every detector.
+fn walls_of(seed: u64, mut column: impl FnMut(&mut Noise) -> Column) -> Vec<Column> {
+    let mut noise = Noise(seed);
+    (0..48 * 48).map(|_| column(&mut noise)).collect()
+}
+
+fn walls(device: &Device, surface: &str, wall: &[Column]) -> Found {
     let scene = columns([48, DEPTH, 48], STEP, surface);
-    let columns: Vec<(Vec<f64>, f64)> = (0..48 * 48).map(|_| column()).collect();
-    let frames = frames(&scene, |[x, y, z]| columns[z * 48 + x].0[y]);
+    let frames = frames(&scene, |[x, y, z]| wall[z * 48 + x].0[y]);
     let mut found = Found { early: 0.0, missed: 0.0, steps: 0.0 };
-    let (mut right, all) = (0.0, columns.len() as f64);
+    let (mut right, all) = (0.0, wall.len() as f64);
     for ([x, z], depth) in depths(device, &scene, &frames) {
-        match depth.map(|d| d / STEP - columns[z * 48 + x].1) {
+        match depth.map(|d| d / STEP - wall[z * 48 + x].1) {
             Some(off) if off < -3.0 => found.early += 1.0 / all,
             Some(off) if off <= 4.0 => (right, found.steps) = (right + 1.0, found.steps + off * off),
             _ => found.missed += 1.0 / all,
@@ -161,7 +166,7 @@ fn normal(noise: &mut Noise) -> f64 {
 }
 
 /// White noise of a deviation, clamped to the window, on a wall two steps wide: fluid at `low`, tissue `height` above it.
-fn noisy(noise: &mut Noise, deviation: f64, low: f64, height: f64) -> (Vec<f64>, f64) {
+fn noisy(noise: &mut Noise, deviation: f64, low: f64, height: f64) -> Column {
     let edge = 60.0 + noise.next();
     let value = |i: usize| low + height * ramp(i as f64, edge, 2.0);
     ((0..DEPTH).map(|i| (value(i) + deviation * normal(noise)).clamp(0.0, 1.0)).collect(), edge)
@@ -171,7 +176,7 @@ fn noisy(noise: &mut Noise, deviation: f64, low: f64, height: f64) -> (Vec<f64>,
 /// function, magnitude, logarithm, and the mean of `looks` neighbours as a filter before the detector takes it. Fluid
 /// at -35 dB, tissue at -12. The wall is where the mean power crosses the middle in dB: compression makes its blurred
 /// front bright, some samples before the tissue begins.
-fn speckle(noise: &mut Noise, deviation: f64, looks: usize) -> (Vec<f64>, f64) {
+fn speckle(noise: &mut Noise, deviation: f64, looks: usize) -> Column {
     let (tissue, low, high) = (64.0 + noise.next(), -35.0, -12.0);
     let reach = (3.0 * deviation).ceil() as usize;
     let taps: Vec<f64> =
@@ -205,7 +210,7 @@ fn speckle(noise: &mut Noise, deviation: f64, looks: usize) -> (Vec<f64>, f64) {
 #[test]
 fn the_adaptive_detector_has_fewer_false_positives_and_no_more_misses() {
     let device = Device::new();
-    type Make<'a> = &'a dyn Fn(&mut Noise) -> (Vec<f64>, f64);
+    type Make<'a> = &'a dyn Fn(&mut Noise) -> Column;
     // Shares of early surfaces and of lost walls, by rough step 1 and 2.
     type Case<'a> = (&'a str, Make<'a>, [(f64, f64); 2]);
     let cases: [Case; 8] = [
@@ -219,11 +224,11 @@ fn the_adaptive_detector_has_fewer_false_positives_and_no_more_misses() {
         ("smoothed speckle of 3 samples", &|n| speckle(n, 3.0, 4), [(0.092, 0.009), (0.046, 0.009)]),
     ];
     for (name, make, limits) in cases {
+        let columns = walls_of(23, make);
         for (rough, (early, missed)) in [1, 2].into_iter().zip(limits) {
             let by = |detector: &str| {
                 let surface = format!("detector = '{detector}'\nthreshold = 0.1\nrough = {rough}");
-                let mut noise = Noise(23);
-                let found = walls(&device, &surface, &mut || make(&mut noise));
+                let found = walls(&device, &surface, &columns);
                 println!("{name}, rough {rough}, {detector}: {found:.4?}");
                 found
             };
@@ -266,15 +271,12 @@ fn the_lasting_detector_ignores_specks_but_not_a_thin_shell() {
         }
     }
     for (rough, thickness) in [(1, 2.0), (1, 3.0), (1, 5.0), (2, 2.0), (2, 4.0)] {
-        let by = |detector: &str| {
-            let mut noise = Noise(31);
-            let mut shell = || {
-                let edge = 60.0 + noise.next();
-                let value = |x: f64| 0.1 + 0.8 * (ramp(x, edge, 1.0) - ramp(x, edge + thickness, 1.0));
-                ((0..DEPTH).map(|i| value(i as f64)).collect(), edge)
-            };
-            walls(&device, &format!("detector = '{detector}'\nrough = {rough}"), &mut shell)
-        };
+        let columns = walls_of(31, |noise| {
+            let edge = 60.0 + noise.next();
+            let value = |x: f64| 0.1 + 0.8 * (ramp(x, edge, 1.0) - ramp(x, edge + thickness, 1.0));
+            ((0..DEPTH).map(|i| value(i as f64)).collect(), edge)
+        });
+        let by = |detector: &str| walls(&device, &format!("detector = '{detector}'\nrough = {rough}"), &columns);
         let (plain, lasting) = (by("threshold"), by("lasting"));
         println!("a shell of {thickness} steps, rough {rough}: plain {plain:.4?}, lasting {lasting:.4?}");
         assert!(lasting.missed <= plain.missed && lasting.early <= plain.early, "{lasting:?}, {plain:?}");
@@ -316,7 +318,7 @@ fn every_detector_matches_its_reference_in_noise() {
             let mut noise = Noise(n as u64);
             let [width, height, slices] = scene.volume_size().map(|n| n as usize);
             // Layers along the rays, alternately rough and smooth.
-            let columns: Vec<(Vec<f64>, f64)> = (0..width * slices).map(|_| speckle(&mut noise, 1.5, 1)).collect();
+            let columns: Vec<Column> = (0..width * slices).map(|_| speckle(&mut noise, 1.5, 1)).collect();
             let blob = |y: usize| 0.5 + 0.5 * (y as f64 * 0.35).sin();
             let value = |[x, y, z]: [usize; 3]| 0.6 * columns[z * width + x].0[(y + 17) % DEPTH] + 0.2 * blob(y);
             let mut inputs = Arrays::default();

@@ -3,11 +3,14 @@
 use crate::common::gpu::*;
 use echolume::gpu::{Renderer, RendererOptions, TimeStamps};
 use echolume::passes::{chain, is_hit, slots};
-use echolume::probe::Geometry;
+use echolume::plan::Rerun;
+use echolume::probe::{Geometry, Probe};
 use echolume::scene::load::Layers;
 use echolume::scene::{Mode, Scene, Settings};
+use echolume::source::Frame;
 use echolume::source::phantom::{Phantom, PhantomOptions};
 use echolume::ui::frame_budget::built_in_ladder;
+use std::sync::LazyLock;
 
 /// Largest part by which the hit mask of a rung may differ from that of the full picture, mm^2 in the picture plane.
 const LARGEST_MM2: f64 = 20.0;
@@ -86,16 +89,20 @@ impl Mask {
     }
 }
 
-/// A volume of the phantom, and what draws it.
+/// A volume of the phantom, computed once for all tests.
+static VOLUME: LazyLock<(Probe, Vec<Frame>)> = LazyLock::new(|| {
+    let phantom = Phantom::new(PhantomOptions { still: true, ..PhantomOptions::default() }).expect("phantom");
+    (phantom.probe(0), phantom.volume(0))
+});
+
+/// What draws it.
 pub struct Stage {
     device: Device,
-    phantom: Phantom,
 }
 
 impl Stage {
     pub fn new() -> Stage {
-        let options = PhantomOptions { still: true, ..PhantomOptions::default() };
-        Stage { device: Device::new(), phantom: Phantom::new(options).expect("phantom") }
+        Stage { device: Device::new() }
     }
 
     /// The phantom in a look: preset, mode and size of the picture. A ground behind the volume would make every ray opaque.
@@ -108,21 +115,34 @@ impl Stage {
             layers.set("light.volume.ground=none").expect("set");
         }
         view.split(';').filter(|set| !set.is_empty()).for_each(|set| layers.set(set).expect("set"));
-        let geometry = Geometry::Sweep(self.phantom.probe(0));
+        let geometry = Geometry::Sweep(VOLUME.0.clone());
         Scene::new(geometry, BYTES, layers.finish().expect("settings")).expect("scene")
     }
 
     pub fn renderer(&self, scene: Scene) -> Renderer {
         let options = RendererOptions { time_stamps: TimeStamps::EachPass, ..RendererOptions::default() };
         let mut renderer = Renderer::new(&self.device, scene, &options).expect("renderer");
-        for frame in self.phantom.volume(0) {
-            renderer.frame(frame.slice as u32, &frame.bytes, 0).expect("frame");
-        }
-        renderer.show(0).expect("show");
+        send(&mut renderer);
         renderer
     }
 }
 
+fn send(renderer: &mut Renderer) {
+    for frame in &VOLUME.1 {
+        renderer.frame(frame.slice as u32, &frame.bytes, 0).expect("frame");
+    }
+    renderer.show(0).expect("show");
+}
+
+/// Changes the scene, whatever its look, and draws it: one renderer for all looks compiles what they share once.
+pub fn draw(renderer: &mut Renderer, scene: &Scene) {
+    if !matches!(renderer.change(scene.clone()).expect("change"), Rerun::Steps { .. }) {
+        send(renderer);
+    }
+    renderer.picture().expect("picture");
+}
+
+/// Of a change that needs no frames again, as that to another rung.
 fn drawn(renderer: &mut Renderer, scene: &Scene) -> Mask {
     renderer.change(scene.clone()).expect("change");
     renderer.picture().expect("picture");
@@ -154,6 +174,7 @@ const VIEWS: [&str; 8] = [
 fn no_rung_shows_other_anatomy() {
     let stage = Stage::new();
     let (small, window) = ([370, 362], [742, 724]);
+    let mut renderer = stage.renderer(stage.scene(("face-classic", "sr", small), ""));
     for (preset, mode, size, views) in [
         ("face-classic", "sr", small, &VIEWS[..]),
         ("face-classic", "vr", small, &VIEWS[1..6]),
@@ -162,10 +183,10 @@ fn no_rung_shows_other_anatomy() {
         ("face-classic", "sr", window, &VIEWS[4..6]),
         ("face", "sr", window, &VIEWS[6..7]),
     ] {
-        let mut renderer = stage.renderer(stage.scene((preset, mode, size), ""));
         for view in views {
             let full = stage.scene((preset, mode, size), view);
-            let whole = drawn(&mut renderer, &full);
+            draw(&mut renderer, &full);
+            let whole = Mask::of(&mut renderer);
             let mut last = full.settings.clone();
             for rung in &built_in_ladder()[1..] {
                 let settings = rung.apply(&full.settings);
