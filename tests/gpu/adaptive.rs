@@ -25,7 +25,7 @@ fn the_picture_is_that_of_all_rays_within_a_level() {
         ("face-classic", "volume.shading=none", 2),
         ("face-classic", "volume.shading=none;layout=four", 2),
     ] {
-        let single = stage.scene((preset, "vr", [300, 280]), view);
+        let single = stage.scene((preset, "vr", [150, 140]), view);
         let all = with(&single, rays, false);
         let mut renderer = stage.renderer(all.clone());
         let wanted = renderer.picture().expect("picture");
