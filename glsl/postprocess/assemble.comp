@@ -29,64 +29,108 @@ vec4 ray_at(ivec2 at) {
 
 float sum_of(vec4 v) { return v.x + v.y + v.z + v.w; }
 
-// The colour between four rays around a pixel. Where their distances differ by a cliff, the near colours and the far ones stay apart, along an edge
-// that is smooth: where a mean over more rays, weighted by (1 - x^2)^2 along each axis, says that as many are near as far.
-vec4 between(ivec2 at) {
+// The pixels of one column between the same four rays. Where the distances of the rays differ by a cliff, the near colours and the far ones stay apart, along an
+// edge that is smooth: where a mean over more rays, weighted by (1 - x^2)^2 along each axis, says that as many are near as far. What depends on the rays
+// alone is found once for all of the pixels.
+void enlarge(ivec2 cell, ivec2 size) {
+    ivec2 corner = LAYOUT == FOUR ? size / 2 : ivec2(0); // of the rendering
+    if (LAYOUT == PAIR) {
+        // The volume is the left half.
+        is_volume = cell.x < size.x / 2;
+        corner.x = is_volume ? 0 : size.x / 2;
+    }
+    // Rays go through the middle of APART pixels: between two of them are as many, half of them before the first one.
+    int lead = (APART / 2 + APART - corner.y % APART) % APART, top = cell.y * APART - lead;
     ivec2 last = textureSize(rendered, 0) - 1;
-    vec2 place = clamp((vec2(at) + 0.5) / float(APART) - 0.5, vec2(0.0), vec2(last));
-    ivec2 low = ivec2(place), high = min(low + 1, last);
-    vec2 share = place - vec2(low);
-    ivec2 across = ivec2(high.x, low.y), down = ivec2(low.x, high.y);
-    vec4 a = ray_at(low), b = ray_at(across), c = ray_at(down), d = ray_at(high);
-    vec4 weights = vec4((1.0 - share.x) * (1.0 - share.y), share.x * (1.0 - share.y), (1.0 - share.x) * share.y, share.x * share.y);
-    vec4 plain = weights.x * a + weights.y * b + weights.z * c + weights.w * d;
-    if (GUIDED == 0 || is_volume) return plain;
+    float across = clamp((float(cell.x - corner.x) + 0.5) / float(APART) - 0.5, 0.0, float(last.x));
+    float first_place = (float(top - corner.y) + 0.5) / float(APART) - 0.5;
+    ivec2 low = ivec2(int(across), int(clamp(first_place, 0.0, float(last.y)))), high = min(low + 1, last);
+    vec2 share = vec2(across - float(low.x), 0.0);
+    ivec2 right = ivec2(high.x, low.y), below = ivec2(low.x, high.y);
+    vec4 a = ray_at(low), b = ray_at(right), c = ray_at(below), d = ray_at(high);
+    vec4 upper = (1.0 - share.x) * a + share.x * b, lower = (1.0 - share.x) * c + share.x * d;
 
-    vec4 distances = vec4(texelFetch(guide, low, 0).x, texelFetch(guide, across, 0).x, texelFetch(guide, down, 0).x, texelFetch(guide, high, 0).x);
-    // Sorted, and cut at the widest gap.
-    vec2 lesser = min(distances.xz, distances.yw), greater = max(distances.xz, distances.yw);
-    float first = min(lesser.x, lesser.y), fourth = max(greater.x, greater.y);
-    float mid = max(lesser.x, lesser.y), other = min(greater.x, greater.y);
-    float second = min(mid, other), third = max(mid, other);
-    float gap = second - first, limit = 0.5 * first + 0.5 * second;
-    if (third - second > gap) {
-        gap = third - second;
-        limit = 0.5 * second + 0.5 * third;
+    bool is_edge = false;
+    vec4 distances = vec4(0.0);
+    float limit = 0.0;
+    int reach = 2;
+    if (GUIDED == 1 && !is_volume) {
+        distances = vec4(texelFetch(guide, low, 0).x, texelFetch(guide, right, 0).x, texelFetch(guide, below, 0).x, texelFetch(guide, high, 0).x);
+        // Sorted, and cut at the widest gap.
+        vec2 lesser = min(distances.xz, distances.yw), greater = max(distances.xz, distances.yw);
+        float first = min(lesser.x, lesser.y), fourth = max(greater.x, greater.y);
+        float mid = max(lesser.x, lesser.y), other = min(greater.x, greater.y);
+        float second = min(mid, other), third = max(mid, other);
+        float gap = second - first;
+        limit = 0.5 * first + 0.5 * second;
+        if (third - second > gap) {
+            gap = third - second;
+            limit = 0.5 * second + 0.5 * third;
+        }
+        if (fourth - third > gap) {
+            gap = fourth - third;
+            limit = 0.5 * third + 0.5 * fourth;
+        }
+        is_edge = gap > cliff && cell.x >= corner.x;
+        // Around an outline, what is near is all that is hit. Between two surfaces only the nearest rays tell: further away both may have the distance
+        // of the other.
+        reach = is_hit(fourth) ? 2 : 4;
     }
-    if (fourth - third > gap) {
-        gap = fourth - third;
-        limit = 0.5 * third + 0.5 * fourth;
+    for (int n = 0; n < APART; ++n) {
+        int y = top + n;
+        float along = clamp(first_place + float(n) / float(APART), 0.0, float(last.y)) - float(low.y);
+        vec4 colour = (1.0 - along) * upper + along * lower;
+        bool is_plane = LAYOUT == FOUR && (cell.x < corner.x || y < corner.y);
+        if (is_plane) colour = texelFetch(planes, clamp(ivec2(cell.x, y), ivec2(0), size - 1), 0);
+        if ((is_plane || !is_edge) && y >= 0 && y < size.y) imageStore(picture, ivec2(cell.x, y), colour);
     }
-    bool is_edge = gap > cliff;
-    // Around an outline, what is near is all that is hit. Between two surfaces only the nearest rays tell: further away both may have the distance of
-    // the other.
-    int reach = is_hit(fourth) ? 2 : 4;
-    int count = is_edge ? 4 * reach * reach : 0;
-    float sum = 0.0;
-    vec2 slope = vec2(0.0);
-    for (int n = 0; n < count; ++n) {
-        ivec2 offset = ivec2(n % (2 * reach), n / (2 * reach)) - reach + 1;
-        float side = texelFetch(guide, clamp(low + offset, ivec2(0), last), 0).x < limit ? 0.5 : -0.5;
-        vec2 x = (vec2(offset) - share) / float(reach);
-        vec2 w = max(1.0 - x * x, vec2(0.0));
-        sum += side * w.x * w.x * w.y * w.y;
-        slope += side * w.x * w.y * x * w.yx;
+    if (GUIDED == 0) return;
+
+    // Which rays around are near: a byte for each row.
+    uvec2 near_rays = uvec2(0u);
+    int side = 2 * reach;
+    for (int n = 0; n < (is_edge ? side * side : 0); ++n) {
+        ivec2 at = ivec2(n & side - 1, n >> (reach == 2 ? 2 : 3));
+        bool is_near = texelFetch(guide, clamp(low + at - reach + 1, ivec2(0), last), 0).x < limit;
+        uint bit = is_near ? 1u << (8 * (at.y & 3) + at.x) : 0u;
+        near_rays |= at.y < 4 ? uvec2(bit, 0u) : uvec2(0u, bit);
     }
-    if (!is_edge) return plain;
     vec4 is_near = vec4(lessThan(distances, vec4(limit)));
-    // How far the pixel is on the near side of the edge, rays, and where the four rays are by the same straight edge. Where one of them is on the wrong
-    // side by more than half a ray, in what is thinner than the mean's reach or has a corner, the four decide.
-    float steep = length(slope);
-    float inside = sum / max(4.0 / float(reach) * steep, 1e-6);
-    vec2 inwards = slope / max(steep, 1e-6);
-    vec4 insides = inside + inwards.x * (vec4(0.0, 1.0, 0.0, 1.0) - share.x) + inwards.y * (vec4(0.0, 0.0, 1.0, 1.0) - share.y);
-    vec4 wrong = insides * (1.0 - 2.0 * is_near);
-    if (max(max(wrong.x, wrong.y), max(wrong.z, wrong.w)) > 0.5) inside = sum_of(weights * is_near) - 0.5;
-    // A ray that the pixel lies on has a side, but no weight for the other.
-    vec4 nears = (weights + 1e-3) * is_near, fars = (weights + 1e-3) * (1.0 - is_near);
-    vec4 near = (nears.x * a + nears.y * b + nears.z * c + nears.w * d) / sum_of(nears);
-    vec4 far = (fars.x * a + fars.y * b + fars.z * c + fars.w * d) / sum_of(fars);
-    return mix(far, near, clamp(0.5 + inside * float(APART), 0.0, 1.0));
+    for (int n = 0; n < (is_edge ? APART : 0); ++n) {
+        share.y = clamp(first_place + float(n) / float(APART), 0.0, float(last.y)) - float(low.y);
+        float sum = 0.0;
+        vec2 slope = vec2(0.0);
+        for (int row = 0; row < side; ++row) {
+            uint rays = (row < 4 ? near_rays.x : near_rays.y) >> (8 * (row & 3));
+            float rows = 0.0, rise = 0.0;
+            // Beyond the reach the weight is 0.
+            for (int i = 0; i < 8; ++i) {
+                float x = (float(i - reach + 1) - share.x) / float(reach), w = max(1.0 - x * x, 0.0);
+                float weight = (rays >> i & 1u) != 0u ? 0.5 * w : -0.5 * w;
+                rows += weight * w;
+                rise += weight * x;
+            }
+            float y = (float(row - reach + 1) - share.y) / float(reach), w = max(1.0 - y * y, 0.0);
+            sum += rows * w * w;
+            slope += vec2(rise * w, rows * y) * w;
+        }
+        vec4 weights = vec4((1.0 - share.x) * (1.0 - share.y), share.x * (1.0 - share.y), (1.0 - share.x) * share.y, share.x * share.y);
+        // How far the pixel is on the near side of the edge, rays, and where the four rays are by the same straight edge. Where one of them is on the
+        // wrong side by more than half a ray, in what is thinner than the mean's reach or has a corner, the four decide.
+        float steep = length(slope);
+        float inside = sum / max(4.0 / float(reach) * steep, 1e-6);
+        vec2 inwards = slope / max(steep, 1e-6);
+        vec4 insides = inside + inwards.x * (vec4(0.0, 1.0, 0.0, 1.0) - share.x) + inwards.y * (vec4(0.0, 0.0, 1.0, 1.0) - share.y);
+        vec4 wrong = insides * (1.0 - 2.0 * is_near);
+        if (max(max(wrong.x, wrong.y), max(wrong.z, wrong.w)) > 0.5) inside = sum_of(weights * is_near) - 0.5;
+        // A ray that the pixel lies on has a side, but no weight for the other.
+        vec4 nears = (weights + 1e-3) * is_near, fars = (weights + 1e-3) * (1.0 - is_near);
+        vec4 near = (nears.x * a + nears.y * b + nears.z * c + nears.w * d) / sum_of(nears);
+        vec4 far = (fars.x * a + fars.y * b + fars.z * c + fars.w * d) / sum_of(fars);
+        vec4 colour = mix(far, near, clamp(0.5 + inside * float(APART), 0.0, 1.0));
+        int y = top + n;
+        if (is_edge && y >= corner.y && y < size.y) imageStore(picture, ivec2(cell.x, y), colour);
+    }
 }
 
 #include "edge_coverage.glsl"
@@ -123,6 +167,10 @@ vec4 antialiased(ivec2 at) {
 void main() {
     ivec2 pixel = ivec2(gl_GlobalInvocationID.xy);
     ivec2 size = imageSize(picture);
+    if (APART > 1) {
+        if (pixel.x < size.x) enlarge(pixel, size);
+        return;
+    }
     if (any(greaterThanEqual(pixel, size))) return;
     ivec2 at = pixel;
     if (LAYOUT == FOUR) {
@@ -139,10 +187,6 @@ void main() {
         if (!is_volume) at.x -= size.x / 2;
     }
     // Colours are already multiplied by their opacity.
-    if (APART > 1) {
-        imageStore(picture, pixel, between(at));
-        return;
-    }
     if (GUIDED == 1 && !is_volume) {
         imageStore(picture, pixel, antialiased(at));
         return;

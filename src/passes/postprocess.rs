@@ -134,6 +134,19 @@ fn guide(scene: &Scene) -> Option<Slot> {
     (interpolates || scene.antialiases()).then(|| chain::distance_end(scene))
 }
 
+/// One invocation per pixel; where pixels are between rays, one for those of a column between the same two rows of rays, of which the first has half as many.
+fn assemble_extent(scene: &Scene, _: &DispatchArgs) -> [u32; 3] {
+    let [width, height] = scene.picture_size();
+    match scene.settings.ray.apart() {
+        1 => [width, height, 1],
+        apart => {
+            let upper = if scene.settings.layout == Layout::Four { height / 2 } else { 0 };
+            let lead = (apart / 2 + apart - upper % apart) % apart;
+            [width, (height + lead).div_ceil(apart), 1]
+        }
+    }
+}
+
 /// The picture from the rendering: the mean of several rays per pixel; what is near and what is far at an edge of a surface, by the share of the pixel that
 /// each covers; or interpolation between the rays where one ray makes several pixels, without mixing what is near with what lies far behind it; in a 4-up picture, the rendering next to the planes; in a pair, the composited volume next to the lit surface.
 pub const ASSEMBLE: Pass = Pass {
@@ -162,7 +175,7 @@ pub const ASSEMBLE: Pass = Pass {
         reads
     },
     writes: |_, _| vec![whole("picture", Slot::Picture)],
-    extent: picture_extent,
+    extent: assemble_extent,
     repeat: once,
     params: |s, _| Params::default().f32("cliff", s.cliff()),
     constants: |s, _| {

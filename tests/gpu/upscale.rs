@@ -5,6 +5,7 @@ use crate::ladder::{Stage, draw};
 use echolume::gpu::pass_runner::PassRunner;
 use echolume::passes::{Arrays, DispatchArgs, MISS, Slot, Texels, by_name};
 use echolume::scene::Scene;
+use echolume::verify::passes::run_with_reference;
 
 const SIDE: usize = 96;
 
@@ -65,6 +66,23 @@ fn constants_stay_and_planes_are_linear() {
                 assert!((picture.get([x, y, 0])[0] - plane(px, py).0).abs() < 1e-3, "{apart} {x} {y}");
             }
         }
+    }
+}
+
+/// Prevents pixels that no invocation has, where a rendering begins within the pixels of a ray: each has those of a column between two rows of rays.
+#[test]
+fn each_pixel_of_every_layout_is_that_of_the_reference() {
+    let device = Device::new();
+    let mut single = PassRunner::new(&device).expect("single");
+    let pass = by_name("assemble").expect("pass");
+    for (layout, key, size) in ["single", "four", "pair"].into_iter().flat_map(|layout| {
+        let sizes = [[96, 96], [97, 75], [62, 90], [71, 83]];
+        ["half", "quarter", "eighth"].into_iter().flat_map(move |key| sizes.map(|size| (layout, key, size)))
+    }) {
+        let toml = format!("mode = 'sr'\nlayout = '{layout}'\npicture.size = {size:?}\nray.{key} = true");
+        let scene = scene(cartesian([20, 20, 20]), BYTES, &toml);
+        let run = run_with_reference(&mut single, &scene, pass, 0, "noise", 7).expect("dispatch");
+        assert!(run.comparison.worst.is_none(), "{layout} {key} {size:?}: {:?}", run.comparison.worst);
     }
 }
 
