@@ -1,6 +1,7 @@
-//! Presents a picture and panels: copies them into the next image of the swapchain. One such drawing is in flight at a time: a copy
+//! Presents a picture and panels: composes them, and copies them into the next image of the swapchain. One such drawing is in flight at a time: a copy
 //! and a few triangles take little time compared with a picture.
 
+use super::composition::{self, Composition};
 use super::panel_textures::{PanelTextures, failed};
 use super::swapchain::{PresentMode, Swapchain};
 use super::target::{MonitorChoice, Target, choose_monitor};
@@ -53,6 +54,8 @@ enum Content<'a> {
 pub struct Screen {
     // Fields are dropped in this order, after `drop` has waited for the device.
     overlay: Option<Overlay>,
+    /// Picture and panels together. None without panels, where the picture is copied to the window at once.
+    composition: Option<Composition>,
     /// A copy of the last picture that was presented, in layout GENERAL, where it is shown again while the next one is drawn.
     kept: Option<Image>,
     chain: Swapchain,
@@ -90,6 +93,7 @@ impl Screen {
         let device = &context.device;
         let mut screen = Screen {
             overlay: None,
+            composition: None,
             kept: None,
             chain,
             pool: vk::CommandPool::null(),
@@ -181,6 +185,11 @@ impl Screen {
             if self.overlay.is_none() {
                 self.overlay = Some(Overlay::new(&self.context, self.chain.format)?);
             }
+            // What shows a texture that changed is drawn again.
+            let has_new_textures = !panels.textures.set.is_empty() || !panels.textures.free.is_empty();
+            if let Some(composition) = self.composition.as_mut().filter(|_| has_new_textures) {
+                composition.content = None;
+            }
             // Also if nothing can be presented: each change is reported only once.
             if let Some(overlay) = &mut self.overlay {
                 overlay.textures.take(&mut overlay.renderer, std::mem::take(&mut panels.textures))?;
@@ -195,8 +204,14 @@ impl Screen {
             match self.chain.acquire(ACQUIRE_TIMEOUT_NS, self.free) {
                 Ok(image) => {
                     self.unused_acquire = true;
-                    self.draw(image, &mut content, panels.as_ref())?;
+                    let picture = self.draw(image, &mut content, panels.as_ref())?;
                     self.unused_acquire = false;
+                    if let (Some(composition), Some(picture), Some(panels)) =
+                        (&mut self.composition, picture, &mut panels)
+                    {
+                        let (shapes, scale) = (std::mem::take(&mut panels.shapes), panels.scale);
+                        composition.content = Some(composition::Content { shapes, scale, picture });
+                    }
                     return self.present(image);
                 }
                 Err(vk::Result::TIMEOUT | vk::Result::NOT_READY) => return Ok(PresentOutcome::NotPresentable),
@@ -271,12 +286,31 @@ impl Screen {
         }
     }
 
-    fn draw(&mut self, image: u32, content: &mut Content, panels: Option<&Panels>) -> Result<(), GpuError> {
+    /// Makes the composition fit the window, and returns what it holds, which is not known from here on.
+    fn fit_composition(&mut self, has_panels: bool) -> Result<Option<composition::Content>, GpuError> {
+        let (format, size) = (self.chain.format, self.chain.size);
+        // Its last drawing is done.
+        self.composition = self.composition.take().filter(|composition| has_panels && composition.fits(format, size));
+        if has_panels && self.composition.is_none() {
+            self.composition = Some(Composition::new(&self.context, format, size)?);
+        }
+        Ok(self.composition.as_mut().and_then(|composition| composition.content.take()))
+    }
+
+    /// Composes and submits. Returns where the picture is in the composition, pixels: corner and size; None without a picture.
+    fn draw(
+        &mut self,
+        image: u32,
+        content: &mut Content,
+        panels: Option<&Panels>,
+    ) -> Result<Option<[[u32; 2]; 2]>, GpuError> {
         let (device, commands, size) = (self.context.device.clone(), self.commands, self.chain.size);
-        let (target, view, after) = {
+        let last = self.fit_composition(panels.is_some())?;
+        let (shown, after) = {
             let shown = &self.chain.images[image as usize];
-            (shown.handle, shown.view, shown.drawn)
+            (shown.handle, shown.drawn)
         };
+        let target = self.composition.as_ref().map_or(shown, |composition| composition.image);
         let begin = vk::CommandBufferBeginInfo::default().flags(vk::CommandBufferUsageFlags::ONE_TIME_SUBMIT);
         // SAFETY: the last drawing is done, so the pool's only command buffer is free.
         unsafe {
@@ -285,7 +319,8 @@ impl Screen {
                 .and_then(|()| device.begin_command_buffer(commands, &begin))
         }
         .context(|| "record the window".into())?;
-        let mut at = Stage::Acquired;
+        let is_laid_out = self.composition.as_ref().is_some_and(|composition| composition.is_laid_out);
+        let mut at = if is_laid_out { Stage::Composed } else { Stage::Acquired };
         let mut go = |to: Stage| {
             barrier(&device, commands, target, at, to);
             at = to;
@@ -297,7 +332,16 @@ impl Screen {
             (Content::Kept(at), Some(kept)) => Some(region(kept, *at, size)),
             (Content::Kept(_), None) | (Content::Nothing, _) => None,
         };
-        if region.is_none_or(|(_, [w, h])| [w, h] != size) {
+        let place = region.map(|(blit, covered)| {
+            let corner = blit.dst_offsets[0];
+            [[corner.x as u32, corner.y as u32], covered]
+        });
+        // Where the panels beside the picture stay, they are not drawn.
+        let over = match (last, place, panels) {
+            (Some(last), Some(place), Some(panels)) => last.over_picture(&panels.shapes, panels.scale, place),
+            _ => None,
+        };
+        if over.is_none() && region.is_none_or(|(_, [w, h])| [w, h] != size) {
             let colour = vk::ClearColorValue { float32: BACKGROUND };
             let layout = vk::ImageLayout::TRANSFER_DST_OPTIMAL;
             // SAFETY: the image is in this layout since the barrier above.
@@ -331,27 +375,49 @@ impl Screen {
             }
             Content::Nothing => {}
         }
-        if let (Some(panels), Some(overlay)) = (panels, &mut self.overlay) {
+        if let (Some(panels), Some(overlay), Some(composition)) = (panels, &mut self.overlay, &self.composition) {
             overlay.textures.record(commands);
             go(Stage::Drawn);
             let area = vk::Rect2D { extent: vk::Extent2D { width: size[0], height: size[1] }, ..Default::default() };
             let colour = [vk::RenderingAttachmentInfo::default()
-                .image_view(view)
+                .image_view(composition.view)
                 .image_layout(vk::ImageLayout::COLOR_ATTACHMENT_OPTIMAL)
                 .load_op(vk::AttachmentLoadOp::LOAD)
                 .store_op(vk::AttachmentStoreOp::STORE)];
             let rendering = vk::RenderingInfo::default().render_area(area).layer_count(1).color_attachments(&colour);
             // SAFETY: the view is alive and its image in this layout; what is recorded between is egui's drawing alone.
             unsafe { device.cmd_begin_rendering(commands, &rendering) };
-            let recorded = overlay.record(commands, size, panels);
+            let shapes = over.as_deref().unwrap_or(&panels.shapes);
+            let recorded = overlay.record(commands, size, shapes, panels.scale);
             // SAFETY: ends what was begun above.
             unsafe { device.cmd_end_rendering(commands) };
             recorded?;
         }
-        go(Stage::Shown);
+        match &self.composition {
+            None => go(Stage::Shown),
+            Some(_) => {
+                go(Stage::Composed);
+                barrier(&device, commands, shown, Stage::Acquired, Stage::Copied);
+                let (from, to) = (vk::ImageLayout::TRANSFER_SRC_OPTIMAL, vk::ImageLayout::TRANSFER_DST_OPTIMAL);
+                let layers = vk::ImageSubresourceLayers {
+                    aspect_mask: vk::ImageAspectFlags::COLOR,
+                    layer_count: 1,
+                    ..Default::default()
+                };
+                let extent = vk::Extent3D { width: size[0], height: size[1], depth: 1 };
+                let whole = [vk::ImageCopy::default().src_subresource(layers).dst_subresource(layers).extent(extent)];
+                // SAFETY: both images are alive, of this size and of one format, and in these layouts since the barriers above.
+                unsafe { device.cmd_copy_image(commands, target, from, shown, to, &whole) };
+                barrier(&device, commands, shown, Stage::Copied, Stage::Shown);
+            }
+        }
         // SAFETY: the command buffer is being recorded.
         unsafe { device.end_command_buffer(commands) }.context(|| "record the window".into())?;
-        self.submit(after, queued)
+        self.submit(after, queued)?;
+        if let Some(composition) = &mut self.composition {
+            composition.is_laid_out = true;
+        }
+        Ok(place)
     }
 
     fn submit(
@@ -412,7 +478,7 @@ impl Drop for Screen {
             std::mem::forget(self.overlay.take());
             return;
         }
-        self.overlay = None;
+        (self.overlay, self.composition) = (None, None);
         // SAFETY: the device is idle; null handles are allowed.
         unsafe {
             self.context.device.destroy_command_pool(self.pool, None);
@@ -456,6 +522,8 @@ enum Stage {
     Acquired,
     Copied,
     Drawn,
+    /// It is copied to the window.
+    Composed,
     Shown,
 }
 
@@ -465,6 +533,7 @@ impl Stage {
             Stage::Acquired => vk::ImageLayout::UNDEFINED,
             Stage::Copied => vk::ImageLayout::TRANSFER_DST_OPTIMAL,
             Stage::Drawn => vk::ImageLayout::COLOR_ATTACHMENT_OPTIMAL,
+            Stage::Composed => vk::ImageLayout::TRANSFER_SRC_OPTIMAL,
             Stage::Shown => vk::ImageLayout::PRESENT_SRC_KHR,
         }
     }
@@ -472,7 +541,7 @@ impl Stage {
     fn stages(self) -> vk::PipelineStageFlags2 {
         match self {
             // The stage of the wait for the semaphore of the acquired image.
-            Stage::Acquired | Stage::Copied => vk::PipelineStageFlags2::ALL_TRANSFER,
+            Stage::Acquired | Stage::Copied | Stage::Composed => vk::PipelineStageFlags2::ALL_TRANSFER,
             Stage::Drawn => vk::PipelineStageFlags2::COLOR_ATTACHMENT_OUTPUT,
             // The stage of the semaphore that presentation waits for.
             Stage::Shown => vk::PipelineStageFlags2::ALL_COMMANDS,
@@ -483,6 +552,7 @@ impl Stage {
         match self {
             Stage::Acquired | Stage::Shown => vk::AccessFlags2::NONE,
             Stage::Copied => vk::AccessFlags2::TRANSFER_WRITE,
+            Stage::Composed => vk::AccessFlags2::TRANSFER_READ,
             Stage::Drawn => vk::AccessFlags2::COLOR_ATTACHMENT_WRITE | vk::AccessFlags2::COLOR_ATTACHMENT_READ,
         }
     }
@@ -545,8 +615,14 @@ impl Overlay {
     }
 
     /// Records the drawing, inside dynamic rendering to an image of this size, pixels.
-    fn record(&mut self, commands: vk::CommandBuffer, size: [u32; 2], panels: &Panels) -> Result<(), GpuError> {
+    fn record(
+        &mut self,
+        commands: vk::CommandBuffer,
+        size: [u32; 2],
+        shapes: &[egui::ClippedPrimitive],
+        scale: f32,
+    ) -> Result<(), GpuError> {
         let extent = vk::Extent2D { width: size[0], height: size[1] };
-        self.renderer.cmd_draw(commands, extent, panels.scale, &panels.shapes).map_err(failed)
+        self.renderer.cmd_draw(commands, extent, scale, shapes).map_err(failed)
     }
 }

@@ -5,7 +5,6 @@ use super::target::Target;
 use crate::gpu::context::{Context, Presentation};
 use crate::gpu::error::{ErrorContext, GpuError};
 use crate::gpu::faults::InjectionPoint;
-use crate::gpu::resources::WHOLE;
 use ash::vk;
 use std::sync::Arc;
 use std::sync::atomic::Ordering;
@@ -51,7 +50,6 @@ pub struct Swapchain {
 /// An image of a swapchain.
 pub struct SwapchainImage {
     pub handle: vk::Image,
-    pub view: vk::ImageView,
     /// Signalled when the image has been drawn and can be presented.
     pub drawn: vk::Semaphore,
 }
@@ -115,7 +113,9 @@ impl Swapchain {
                 .get_physical_device_surface_formats(self.context.candidate.handle, self.surface)
         }
         .context(|| "list the formats of the surface".into())?;
-        let needed = vk::FormatFeatureFlags::BLIT_DST | vk::FormatFeatureFlags::COLOR_ATTACHMENT_BLEND;
+        let needed = vk::FormatFeatureFlags::BLIT_DST
+            | vk::FormatFeatureFlags::TRANSFER_SRC
+            | vk::FormatFeatureFlags::COLOR_ATTACHMENT_BLEND;
         let found = choose(&there, |format| self.context.format_features(format).contains(needed));
         let found = found.ok_or_else(|| {
             GpuError::Window(
@@ -161,9 +161,9 @@ impl Swapchain {
         if size.width == 0 || size.height == 0 {
             return Ok(false);
         }
-        let usage = vk::ImageUsageFlags::TRANSFER_DST | vk::ImageUsageFlags::COLOR_ATTACHMENT;
+        let usage = vk::ImageUsageFlags::TRANSFER_DST;
         if !can.supported_usage_flags.contains(usage) {
-            return Err(GpuError::Window("the surface's images cannot be copied into and drawn on".into()));
+            return Err(GpuError::Window("the surface's images cannot be copied into".into()));
         }
         let present_mode = match self.present_mode {
             PresentMode::Mailbox if modes.contains(&vk::PresentModeKHR::MAILBOX) => vk::PresentModeKHR::MAILBOX,
@@ -207,27 +207,11 @@ impl Swapchain {
     }
 
     fn image(&self, handle: vk::Image) -> Result<SwapchainImage, GpuError> {
-        let create = vk::ImageViewCreateInfo::default()
-            .image(handle)
-            .view_type(vk::ImageViewType::TYPE_2D)
-            .format(self.format)
-            .subresource_range(WHOLE);
-        let device = &self.context.device;
-        // SAFETY: the image belongs to the swapchain, which outlives the view; the structures are complete.
-        let view =
-            unsafe { device.create_image_view(&create, None) }.context(|| "view an image of the window".into())?;
-        // SAFETY: as above; a view without its semaphore is destroyed at once.
-        match unsafe { device.create_semaphore(&vk::SemaphoreCreateInfo::default(), None) } {
-            Ok(drawn) => {
-                self.context.name(handle, "window");
-                Ok(SwapchainImage { handle, view, drawn })
-            }
-            Err(result) => {
-                // SAFETY: nothing uses the view yet.
-                unsafe { device.destroy_image_view(view, None) };
-                Err(GpuError::Vulkan { operation: "create a semaphore".into(), result })
-            }
-        }
+        // SAFETY: the structure is complete.
+        let drawn = unsafe { self.context.device.create_semaphore(&vk::SemaphoreCreateInfo::default(), None) };
+        let drawn = drawn.context(|| "create a semaphore".into())?;
+        self.context.name(handle, "window");
+        Ok(SwapchainImage { handle, drawn })
     }
 
     /// Acquires the next image; waits at most so long. The semaphore is signalled when the image may be written.
@@ -270,8 +254,7 @@ impl Swapchain {
         self.waiter = None;
         // SAFETY: nothing is in flight.
         unsafe {
-            for SwapchainImage { view, drawn, .. } in self.images.drain(..) {
-                self.context.device.destroy_image_view(view, None);
+            for SwapchainImage { drawn, .. } in self.images.drain(..) {
                 self.context.device.destroy_semaphore(drawn, None);
             }
             if let (Some(presentation), false) = (&self.context.presentation, self.handle == vk::SwapchainKHR::null()) {

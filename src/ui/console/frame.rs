@@ -20,6 +20,9 @@ const STREAM_SLICE: Duration = Duration::from_millis(4);
 const MAX_DEVICE_FAULTS: u32 = 5;
 /// While the next picture is not ready, the window keeps the old content for so long: less disturbing than a black moment.
 const BLANK_DELAY: Duration = Duration::from_millis(400);
+/// Panels that changed wait so long for the picture that is being drawn: presented on their own they take the device from it, and a picture of a view that
+/// moves is done sooner.
+const PICTURE_PATIENCE: Duration = Duration::from_millis(100);
 /// Interval of the attempts to present while there is no surface.
 const PRESENT_RETRY: Duration = Duration::from_millis(100);
 /// Interval of the updates while there is no picture to show.
@@ -352,9 +355,11 @@ impl Console {
     fn present(&mut self, now: Instant) -> Result<(), ConsoleError> {
         let is_new = self.has_new_picture || self.needs_redraw;
         // While a picture is being drawn, its image is the device's: panels get the last one, of which the screen has a copy, if they can be
-        // drawn before the picture is done. Otherwise both are presented together.
+        // drawn before the picture is done, and if that takes long. Otherwise both are presented together.
         let is_between = self.stream.is_drawing();
-        let gets_between = self.has_started && self.stream.renderer().is_some_and(|renderer| renderer.is_paced());
+        let is_paced = self.stream.renderer().is_some_and(|renderer| renderer.is_paced());
+        let takes_long = self.stream.last_begun().is_some_and(|begun| begun.elapsed() >= PICTURE_PATIENCE);
+        let gets_between = self.has_started && is_paced && takes_long;
         let is_late = is_between && !gets_between;
         if !is_new || is_late || self.present_retry_at.is_some_and(|until| now < until) {
             return Ok(());

@@ -1,0 +1,264 @@
+//! The composed window: picture and panels in an image of their own, which is copied to the window. While only the picture changes, as in a drag, the
+//! panels beside it stay as they are: to draw them takes a software device as long as a coarse picture.
+
+use crate::gpu::context::Context;
+use crate::gpu::error::{ErrorContext, GpuError};
+use crate::gpu::memory::{self, Reserve};
+use crate::gpu::resources::WHOLE;
+use ash::vk;
+use egui::epaint::{Primitive, Vertex};
+use egui::{ClippedPrimitive, Pos2, Rect, TextureId};
+use gpu_allocator::MemoryLocation;
+use gpu_allocator::vulkan::Allocation;
+use std::sync::Arc;
+
+/// The image, and what was drawn into it last.
+pub(super) struct Composition {
+    context: Arc<Context>,
+    pub image: vk::Image,
+    pub view: vk::ImageView,
+    allocation: Option<Allocation>,
+    format: vk::Format,
+    size: [u32; 2],
+    /// It was drawn into, and has a layout.
+    pub is_laid_out: bool,
+    /// What it holds; None if that is not known.
+    pub content: Option<Content>,
+}
+
+/// What a composition holds.
+pub(super) struct Content {
+    /// The panels, with the pixels per point that they were drawn with.
+    pub shapes: Vec<ClippedPrimitive>,
+    pub scale: f32,
+    /// Where the picture is, pixels: its corner and size.
+    pub picture: [[u32; 2]; 2],
+}
+
+impl Composition {
+    /// # Errors
+    /// The device has no memory for it.
+    pub(super) fn new(context: &Arc<Context>, format: vk::Format, size: [u32; 2]) -> Result<Composition, GpuError> {
+        let device = &context.device;
+        let operation = || format!("create the image of the window ({}x{})", size[0], size[1]);
+        let usage = vk::ImageUsageFlags::TRANSFER_DST
+            | vk::ImageUsageFlags::TRANSFER_SRC
+            | vk::ImageUsageFlags::COLOR_ATTACHMENT;
+        let create = vk::ImageCreateInfo::default()
+            .image_type(vk::ImageType::TYPE_2D)
+            .format(format)
+            .extent(vk::Extent3D { width: size[0], height: size[1], depth: 1 })
+            .mip_levels(1)
+            .array_layers(1)
+            .samples(vk::SampleCountFlags::TYPE_1)
+            .tiling(vk::ImageTiling::OPTIMAL)
+            .usage(usage);
+        // SAFETY: the create structure is complete.
+        let image = unsafe { device.create_image(&create, None) }.context(operation)?;
+        // From here on, dropping it cleans up after a failure.
+        let mut made = Composition {
+            context: context.clone(),
+            image,
+            view: vk::ImageView::null(),
+            allocation: None,
+            format,
+            size,
+            is_laid_out: false,
+            content: None,
+        };
+        // SAFETY: the image was just made by this device.
+        let needs = unsafe { device.get_image_memory_requirements(image) };
+        let wanted =
+            Reserve { name: "composition", requirements: needs, location: MemoryLocation::GpuOnly, linear: false };
+        let allocation = memory::reserve(context, wanted, &operation)?;
+        // SAFETY: the allocation fits the requirements and lives as long as the image.
+        let bound = unsafe { device.bind_image_memory(image, allocation.memory(), allocation.offset()) };
+        made.allocation = Some(allocation);
+        bound.context(operation)?;
+        let create = vk::ImageViewCreateInfo::default()
+            .image(image)
+            .view_type(vk::ImageViewType::TYPE_2D)
+            .format(format)
+            .subresource_range(WHOLE);
+        // SAFETY: the image is bound to memory and alive.
+        made.view = unsafe { device.create_image_view(&create, None) }.context(operation)?;
+        context.name(image, "composition");
+        Ok(made)
+    }
+
+    /// True if it fits images of the window of this format and size, pixels.
+    pub(super) fn fits(&self, format: vk::Format, size: [u32; 2]) -> bool {
+        (self.format, self.size) == (format, size)
+    }
+}
+
+impl Drop for Composition {
+    fn drop(&mut self) {
+        if self.context.is_given_up() {
+            return;
+        }
+        // SAFETY: the owner waited for the last drawing; a null view is allowed.
+        unsafe {
+            self.context.device.destroy_image_view(self.view, None);
+            self.context.device.destroy_image(self.image, None);
+        }
+        memory::free(&self.context, self.allocation.take());
+    }
+}
+
+impl Content {
+    /// The shapes that have to be drawn over a new picture in the same place, if nothing beside it changes with these panels.
+    pub(super) fn over_picture(
+        &self,
+        shapes: &[ClippedPrimitive],
+        scale: f32,
+        picture: [[u32; 2]; 2],
+    ) -> Option<Vec<ClippedPrimitive>> {
+        let [low, size] = picture;
+        let high = [low[0] + size[0], low[1] + size[1]];
+        let points = |at: [u32; 2]| Pos2::new(at[0] as f32 / scale, at[1] as f32 / scale);
+        let area = Rect { min: points(low), max: points(high) };
+        let is_same = self.picture == picture && self.scale == scale;
+        if !is_same || !triangles_beside(&self.shapes, area).eq(triangles_beside(shapes, area)) {
+            return None;
+        }
+        let clipped = shapes.iter().filter_map(|shape| {
+            let clip_rect = within(shape.clip_rect, scale, [low, high])?;
+            Some(ClippedPrimitive { clip_rect, primitive: shape.primitive.clone() })
+        });
+        let clipped: Vec<_> = clipped.collect();
+        // The renderer of the panels multiplies and truncates: of some scales it would miss a pixel.
+        let is_exact = |at: Pos2| (at.x * scale).fract() == 0.0 && (at.y * scale).fract() == 0.0;
+        clipped.iter().all(|s| is_exact(s.clip_rect.min) && is_exact(s.clip_rect.max)).then_some(clipped)
+    }
+}
+
+/// The part of a clip rectangle that lies in an area of pixels (from, to), points; None if it is empty. It selects the same pixels there as the rectangle
+/// itself, whose corner and size the renderer of the panels truncates.
+fn within(clip: Rect, scale: f32, [low, high]: [[u32; 2]; 2]) -> Option<Rect> {
+    let along = |from: f32, to: f32, axis: usize| {
+        let (from, extent) = (from * scale, to * scale - from * scale);
+        let first = from.max(0.0).trunc();
+        let last = (first + extent.max(0.0).trunc()).min(high[axis] as f32);
+        let first = first.max(low[axis] as f32);
+        (last > first).then_some((first / scale, last / scale))
+    };
+    let (left, right) = along(clip.min.x, clip.max.x, 0)?;
+    let (top, bottom) = along(clip.min.y, clip.max.y, 1)?;
+    Some(Rect { min: Pos2::new(left, top), max: Pos2::new(right, bottom) })
+}
+
+/// The triangles that may cover pixels outside an area, points, in the order in which they are drawn, with their texture and where they are clipped.
+fn triangles_beside(
+    shapes: &[ClippedPrimitive],
+    area: Rect,
+) -> impl Iterator<Item = (Option<TextureId>, Rect, [Option<Vertex>; 3])> {
+    let beside = shapes.iter().filter(move |shape| !area.contains_rect(shape.clip_rect));
+    beside.flat_map(move |shape| {
+        let clip = shape.clip_rect;
+        let (mesh, other) = match &shape.primitive {
+            Primitive::Mesh(mesh) => (Some(mesh), None),
+            // Nobody knows what it draws, so that it equals none.
+            Primitive::Callback(_) => (None, Some((None, Rect::NAN, [None; 3]))),
+        };
+        let triangles = mesh.into_iter().flat_map(move |mesh| {
+            let corner = |i: u32| mesh.vertices.get(i as usize).copied();
+            let all = mesh.indices.chunks_exact(3).map(move |i| [corner(i[0]), corner(i[1]), corner(i[2])]);
+            let is_beside = move |t: &[Option<Vertex>; 3]| t.iter().flatten().any(|v| !area.contains(v.pos));
+            all.filter(is_beside).map(move |t| (Some(mesh.texture_id), clip, t))
+        });
+        triangles.chain(other)
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use egui::{Color32, Mesh, pos2};
+
+    const PICTURE: [[u32; 2]; 2] = [[100, 50], [200, 100]];
+
+    fn rect(x: f32, y: f32, w: f32, h: f32) -> Rect {
+        Rect { min: pos2(x, y), max: pos2(x + w, y + h) }
+    }
+
+    fn shape(clip: Rect, filled: &[(Rect, Color32)]) -> ClippedPrimitive {
+        let mut mesh = Mesh::default();
+        filled.iter().for_each(|(rect, colour)| mesh.add_colored_rect(*rect, *colour));
+        ClippedPrimitive { clip_rect: clip, primitive: Primitive::Mesh(mesh) }
+    }
+
+    fn content(shapes: &[ClippedPrimitive], scale: f32) -> Content {
+        Content { shapes: shapes.to_vec(), scale, picture: PICTURE }
+    }
+
+    /// Prevents panels that are not drawn again though they changed.
+    #[test]
+    fn only_what_changes_within_the_picture_leaves_the_panels_as_they_are() {
+        let window = rect(0.0, 0.0, 400.0, 200.0);
+        let (panel, mark) = (rect(310.0, 0.0, 90.0, 200.0), rect(120.0, 60.0, 10.0, 10.0));
+        let drawn = |panel_colour, mark_at: Rect| {
+            vec![
+                shape(panel, &[(panel, panel_colour)]),
+                shape(window, &[(mark_at, Color32::WHITE), (rect(0.0, 0.0, 20.0, 20.0), Color32::RED)]),
+            ]
+        };
+        let before = content(&drawn(Color32::GRAY, mark), 1.0);
+        let moved = mark.translate(egui::vec2(30.0, 5.0));
+        let over = before.over_picture(&drawn(Color32::GRAY, moved), 1.0, PICTURE).expect("the panels stay");
+        assert_eq!(over.len(), 1, "the panel itself is not drawn");
+        assert_eq!(over[0].clip_rect, rect(100.0, 50.0, 200.0, 100.0));
+        let more = [drawn(Color32::GRAY, moved), vec![shape(mark, &[(mark, Color32::BLUE)])]].concat();
+        assert_eq!(before.over_picture(&more, 1.0, PICTURE).map(|over| over.len()), Some(2));
+        let outwards = mark.translate(egui::vec2(-25.0, 0.0));
+        for (other, why) in [
+            (drawn(Color32::BLACK, mark), "a panel of another colour"),
+            (drawn(Color32::GRAY, outwards), "a mark that leaves the picture"),
+            (drawn(Color32::GRAY, mark)[..1].to_vec(), "a shape beside it that is gone"),
+        ] {
+            assert!(before.over_picture(&other, 1.0, PICTURE).is_none(), "{why}");
+        }
+        let same = drawn(Color32::GRAY, mark);
+        assert!(before.over_picture(&same, 2.0, PICTURE).is_none(), "another scale");
+        assert!(before.over_picture(&same, 1.0, [[100, 50], [200, 90]]).is_none(), "another size of the picture");
+        let mut whole = 0;
+        for scale in [1.1, 1.25, 1.3, 1.5, 1.7, 2.0, 3.0] {
+            let over = content(&same, scale).over_picture(&same, scale, PICTURE);
+            let clips: Vec<Rect> = over.iter().flatten().map(|shape| shape.clip_rect).collect();
+            let ends = clips.iter().flat_map(|clip| [clip.min.x, clip.min.y, clip.max.x, clip.max.y]);
+            ends.for_each(|end| assert_eq!((end * scale).fract(), 0.0, "{scale}: the renderer would truncate it"));
+            whole += u32::from(!clips.is_empty());
+        }
+        assert!(whole > 1, "{whole} scales");
+    }
+
+    /// Prevents a column of pixels at the picture's edge that is drawn twice or not at all.
+    #[test]
+    fn clipping_selects_the_pixels_of_the_whole_rectangle() {
+        // As the renderer of the panels computes it.
+        let pixels = |clip: Rect, scale: f32| {
+            let axis = |from: f32, to: f32| {
+                let first = ((from * scale) as i32).max(0);
+                (first, first + (to * scale - from * scale) as i32)
+            };
+            let ((left, right), (top, bottom)) = (axis(clip.min.x, clip.max.x), axis(clip.min.y, clip.max.y));
+            move |x: i32, y: i32| (left..right).contains(&x) && (top..bottom).contains(&y)
+        };
+        for scale in [1.0, 2.0] {
+            for n in 0..400 {
+                let part = |step: f32| (n as f32 * step) % 7.3;
+                let clip = rect(90.0 + part(1.37), 48.5 + part(0.61), 3.0 + 30.0 * part(0.77), 2.25 + 14.0 * part(1.9));
+                let clip =
+                    Rect { min: (clip.min.to_vec2() / scale).to_pos2(), max: (clip.max.to_vec2() / scale).to_pos2() };
+                let [low, size] = PICTURE;
+                let high = [low[0] + size[0], low[1] + size[1]];
+                let whole = pixels(clip, scale);
+                let part = within(clip, scale, [low, high]).map(|part| pixels(part, scale));
+                for (x, y) in (low[0]..high[0]).flat_map(|x| (low[1]..high[1]).map(move |y| (x as i32, y as i32))) {
+                    let is_in = part.as_ref().is_some_and(|part| part(x, y));
+                    assert_eq!(is_in, whole(x, y), "{clip:?} at {scale}: {x} {y}");
+                }
+            }
+        }
+    }
+}
