@@ -76,13 +76,20 @@ impl Live {
     }
 }
 
+/// The rung of the rays while nothing is measured: full quality on a GPU with memory of its own. One that shares the machine's memory, or a CPU, may take
+/// seconds for a picture of full quality, and nothing interrupts it.
+pub(super) fn first_rung(has_unified_memory: bool) -> usize {
+    usize::from(has_unified_memory)
+}
+
 impl Pace {
-    /// `rungs`: of the rays.
-    pub(super) fn new(budget: Option<Duration>, rungs: &[Rung]) -> Pace {
+    /// `rungs`: of the rays; `first`: the one of a view that moves before any picture was timed.
+    pub(super) fn new(budget: Option<Duration>, rungs: &[Rung], first: usize) -> Pace {
         let shares: Vec<f64> = rungs.iter().map(|rung| rung.time_share).collect();
         let shading = SHADING.map(|(_, share)| share);
-        let live = Live { pictures: FrameBudget::new(budget, &shares), least: budget, came: None };
-        Pace { rays: FrameBudget::new(budget, &shares), shading: FrameBudget::new(budget, &shading), live }
+        let of_rays = FrameBudget::new(budget, &shares).beginning_at(first);
+        let live = Live { pictures: of_rays.clone(), least: budget, came: None };
+        Pace { rays: of_rays, shading: FrameBudget::new(budget, &shading), live }
     }
 
     pub(super) fn budget(&self) -> Option<Duration> {
@@ -190,6 +197,8 @@ pub(super) struct FrameBudget {
     /// The same, corrected by measurements.
     measured: Vec<f64>,
     rung: usize,
+    /// No picture was timed yet: the rung is a guess by the kind of device.
+    is_guessed: bool,
     /// Mean time of the pictures on this rung, s, and their number.
     mean: f64,
     pictures: u32,
@@ -204,7 +213,25 @@ impl FrameBudget {
     pub(super) fn new(budget: Option<Duration>, time_shares: &[f64]) -> FrameBudget {
         let expected = if time_shares.is_empty() { vec![1.0] } else { time_shares.to_vec() };
         let measured = expected.clone();
-        FrameBudget { budget, expected, measured, rung: 0, mean: 0.0, pictures: 0, previous: None, moved: None }
+        let (rung, is_guessed) = (0, false);
+        FrameBudget {
+            budget,
+            expected,
+            measured,
+            rung,
+            is_guessed,
+            mean: 0.0,
+            pictures: 0,
+            previous: None,
+            moved: None,
+        }
+    }
+
+    /// On this rung, or the last one, until the first picture was timed.
+    fn beginning_at(mut self, rung: usize) -> FrameBudget {
+        self.rung = rung.min(self.expected.len() - 1);
+        self.is_guessed = self.rung > 0;
+        self
     }
 
     pub(super) fn budget(&self) -> Option<Duration> {
@@ -245,6 +272,10 @@ impl FrameBudget {
     pub(super) fn picture_took(&mut self, rung: usize, time: Duration) {
         let Some(budget) = self.budget.map(|b| b.as_secs_f64()) else { return };
         let time = time.as_secs_f64();
+        // Whatever rung the first time is of, it says more than a guess.
+        if std::mem::take(&mut self.is_guessed) {
+            self.rung = rung;
+        }
         if rung != self.rung {
             // Another mode takes less: it needs no ladder.
             if rung == 0 && time <= budget * MARGIN {
@@ -449,11 +480,33 @@ mod tests {
     }
 
     #[test]
+    fn a_device_that_shares_memory_begins_with_half_the_rays_until_a_picture_is_timed() {
+        assert_eq!([first_rung(false), first_rung(true)], [0, 1]);
+        let (rungs, now) = (built_in_ladder(), Instant::now());
+        let budget = Duration::from_millis(33);
+        let begun = |first| {
+            let mut pace = Pace::new(Some(budget), &rungs, first);
+            pace.moved(Work::Rays, now);
+            pace
+        };
+        assert_eq!(begun(first_rung(false)).quality(now).rays, 0);
+        let half = begun(first_rung(true)).quality(now).rays;
+        assert!(rungs[half].apply(&Settings::default()).ray.half);
+        // The picture at rest, ms, and the rung of the drag that follows.
+        for (full, rung) in [(10, 0), (60, 1), (400, 2), (3000, 3)] {
+            let mut pace = begun(first_rung(true));
+            pace.picture_took(Work::Rays, Quality::default(), Duration::from_millis(full));
+            assert_eq!(pace.quality(now).rays, rung, "{full} ms");
+        }
+        assert_eq!(FrameBudget::new(Some(budget), &[1.0]).beginning_at(1).rung, 0, "a ladder of one rung");
+    }
+
+    #[test]
     fn live_volumes_are_drawn_as_fast_as_they_come_and_no_faster() {
         let rungs = built_in_ladder();
         // Full quality takes so long, ms; the quality while volumes come every 200 ms, and after the last.
         for (full, budget, live) in [(150, 33, 0), (500, 33, 1), (1500, 33, 2), (150, 300, 0), (1000, 300, 1)] {
-            let mut pace = Pace::new(Some(Duration::from_millis(budget)), &rungs);
+            let mut pace = Pace::new(Some(Duration::from_millis(budget)), &rungs, 0);
             let mut now = Instant::now();
             for _ in 0..30 {
                 now += Duration::from_millis(200);
@@ -471,7 +524,7 @@ mod tests {
         }
         // A single volume, and full quality always.
         for budget in [Some(Duration::from_millis(1)), None] {
-            let (mut pace, now) = (Pace::new(budget, &rungs), Instant::now());
+            let (mut pace, now) = (Pace::new(budget, &rungs, 0), Instant::now());
             pace.volumes_came(1, now);
             pace.picture_took(Work::Rays, Quality::default(), Duration::from_secs(1));
             assert_eq!(pace.quality(now), Quality::default());

@@ -294,7 +294,7 @@ impl Console {
             counting: Counting::new(options.wake.clone()),
             surface_from: None,
             exporter: Exporter::new(options.folder, options.wake),
-            pace: Pace::new(options.budget, &rungs),
+            pace: Pace::new(options.budget, &rungs, frame_budget::first_rung(context.candidate.has_unified_memory())),
             rungs,
             panels: Panels::new(options.scale),
             times: Times::default(),
