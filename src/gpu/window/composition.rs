@@ -174,17 +174,18 @@ fn triangles_beside(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use egui::{Color32, Mesh, pos2};
+    use egui::{Mesh, Rgba, pos2};
 
     const PICTURE: [[u32; 2]; 2] = [[100, 50], [200, 100]];
+    const GREY: Rgba = Rgba::from_rgb(0.5, 0.5, 0.5);
 
     fn rect(x: f32, y: f32, w: f32, h: f32) -> Rect {
         Rect { min: pos2(x, y), max: pos2(x + w, y + h) }
     }
 
-    fn shape(clip: Rect, filled: &[(Rect, Color32)]) -> ClippedPrimitive {
+    fn shape(clip: Rect, filled: &[(Rect, Rgba)]) -> ClippedPrimitive {
         let mut mesh = Mesh::default();
-        filled.iter().for_each(|(rect, colour)| mesh.add_colored_rect(*rect, *colour));
+        filled.iter().for_each(|(rect, colour)| mesh.add_colored_rect(*rect, (*colour).into()));
         ClippedPrimitive { clip_rect: clip, primitive: Primitive::Mesh(mesh) }
     }
 
@@ -200,25 +201,25 @@ mod tests {
         let drawn = |panel_colour, mark_at: Rect| {
             vec![
                 shape(panel, &[(panel, panel_colour)]),
-                shape(window, &[(mark_at, Color32::WHITE), (rect(0.0, 0.0, 20.0, 20.0), Color32::RED)]),
+                shape(window, &[(mark_at, Rgba::WHITE), (rect(0.0, 0.0, 20.0, 20.0), Rgba::RED)]),
             ]
         };
-        let before = content(&drawn(Color32::GRAY, mark), 1.0);
+        let before = content(&drawn(GREY, mark), 1.0);
         let moved = mark.translate(egui::vec2(30.0, 5.0));
-        let over = before.over_picture(&drawn(Color32::GRAY, moved), 1.0, PICTURE).expect("the panels stay");
+        let over = before.over_picture(&drawn(GREY, moved), 1.0, PICTURE).expect("the panels stay");
         assert_eq!(over.len(), 1, "the panel itself is not drawn");
         assert_eq!(over[0].clip_rect, rect(100.0, 50.0, 200.0, 100.0));
-        let more = [drawn(Color32::GRAY, moved), vec![shape(mark, &[(mark, Color32::BLUE)])]].concat();
+        let more = [drawn(GREY, moved), vec![shape(mark, &[(mark, Rgba::BLUE)])]].concat();
         assert_eq!(before.over_picture(&more, 1.0, PICTURE).map(|over| over.len()), Some(2));
         let outwards = mark.translate(egui::vec2(-25.0, 0.0));
         for (other, why) in [
-            (drawn(Color32::BLACK, mark), "a panel of another colour"),
-            (drawn(Color32::GRAY, outwards), "a mark that leaves the picture"),
-            (drawn(Color32::GRAY, mark)[..1].to_vec(), "a shape beside it that is gone"),
+            (drawn(Rgba::BLACK, mark), "a panel of another colour"),
+            (drawn(GREY, outwards), "a mark that leaves the picture"),
+            (drawn(GREY, mark)[..1].to_vec(), "a shape beside it that is gone"),
         ] {
             assert!(before.over_picture(&other, 1.0, PICTURE).is_none(), "{why}");
         }
-        let same = drawn(Color32::GRAY, mark);
+        let same = drawn(GREY, mark);
         assert!(before.over_picture(&same, 2.0, PICTURE).is_none(), "another scale");
         assert!(before.over_picture(&same, 1.0, [[100, 50], [200, 90]]).is_none(), "another size of the picture");
         let mut whole = 0;
