@@ -1,25 +1,17 @@
 //! The composed window: picture and panels in an image of their own, which is copied to the window. While only the picture changes, as in a drag, the
 //! panels beside it stay as they are: to draw them takes a software device as long as a coarse picture.
 
+use super::flat_image::FlatImage;
 use crate::gpu::context::Context;
-use crate::gpu::error::{ErrorContext, GpuError};
-use crate::gpu::memory::{self, Reserve};
-use crate::gpu::resources::WHOLE;
+use crate::gpu::error::GpuError;
 use ash::vk;
 use egui::epaint::{Primitive, Vertex};
 use egui::{ClippedPrimitive, Pos2, Rect, TextureId};
-use gpu_allocator::MemoryLocation;
-use gpu_allocator::vulkan::Allocation;
 use std::sync::Arc;
 
 /// The image, and what was drawn into it last.
 pub(super) struct Composition {
-    context: Arc<Context>,
-    pub image: vk::Image,
-    pub view: vk::ImageView,
-    allocation: Option<Allocation>,
-    format: vk::Format,
-    size: [u32; 2],
+    pub image: FlatImage,
     /// It was drawn into, and has a layout.
     pub is_laid_out: bool,
     /// What it holds; None if that is not known.
@@ -39,70 +31,16 @@ impl Composition {
     /// # Errors
     /// The device has no memory for it.
     pub(super) fn new(context: &Arc<Context>, format: vk::Format, size: [u32; 2]) -> Result<Composition, GpuError> {
-        let device = &context.device;
-        let operation = || format!("create the image of the window ({}x{})", size[0], size[1]);
         let usage = vk::ImageUsageFlags::TRANSFER_DST
             | vk::ImageUsageFlags::TRANSFER_SRC
             | vk::ImageUsageFlags::COLOR_ATTACHMENT;
-        let create = vk::ImageCreateInfo::default()
-            .image_type(vk::ImageType::TYPE_2D)
-            .format(format)
-            .extent(vk::Extent3D { width: size[0], height: size[1], depth: 1 })
-            .mip_levels(1)
-            .array_layers(1)
-            .samples(vk::SampleCountFlags::TYPE_1)
-            .tiling(vk::ImageTiling::OPTIMAL)
-            .usage(usage);
-        // SAFETY: the create structure is complete.
-        let image = unsafe { device.create_image(&create, None) }.context(operation)?;
-        // From here on, dropping it cleans up after a failure.
-        let mut made = Composition {
-            context: context.clone(),
-            image,
-            view: vk::ImageView::null(),
-            allocation: None,
-            format,
-            size,
-            is_laid_out: false,
-            content: None,
-        };
-        // SAFETY: the image was just made by this device.
-        let needs = unsafe { device.get_image_memory_requirements(image) };
-        let wanted =
-            Reserve { name: "composition", requirements: needs, location: MemoryLocation::GpuOnly, linear: false };
-        let allocation = memory::reserve(context, wanted, &operation)?;
-        // SAFETY: the allocation fits the requirements and lives as long as the image.
-        let bound = unsafe { device.bind_image_memory(image, allocation.memory(), allocation.offset()) };
-        made.allocation = Some(allocation);
-        bound.context(operation)?;
-        let create = vk::ImageViewCreateInfo::default()
-            .image(image)
-            .view_type(vk::ImageViewType::TYPE_2D)
-            .format(format)
-            .subresource_range(WHOLE);
-        // SAFETY: the image is bound to memory and alive.
-        made.view = unsafe { device.create_image_view(&create, None) }.context(operation)?;
-        context.name(image, "composition");
-        Ok(made)
+        let image = FlatImage::new(context, "composed window", format, size, usage)?;
+        Ok(Composition { image, is_laid_out: false, content: None })
     }
 
     /// True if it fits images of the window of this format and size, pixels.
     pub(super) fn fits(&self, format: vk::Format, size: [u32; 2]) -> bool {
-        (self.format, self.size) == (format, size)
-    }
-}
-
-impl Drop for Composition {
-    fn drop(&mut self) {
-        if self.context.is_given_up() {
-            return;
-        }
-        // SAFETY: the owner waited for the last drawing; a null view is allowed.
-        unsafe {
-            self.context.device.destroy_image_view(self.view, None);
-            self.context.device.destroy_image(self.image, None);
-        }
-        memory::free(&self.context, self.allocation.take());
+        (self.image.format, self.image.size) == (format, size)
     }
 }
 

@@ -1,8 +1,10 @@
 //! Presentation: `target` is a window or a monitor, `swapchain` the images of its surface, `screen` copies the picture into
-//! `composition`, draws the panels over it, whose textures `panel_textures` keeps, and copies both into one of them. `present_wait` measures when a picture is seen. A build without the feature `view` has only a target that cannot exist.
+//! `composition`, draws the panels over it, whose textures `panel_textures` keeps, and copies both into one of them; `flat_image` is what both hold. `present_wait` measures when a picture is seen. A build without the feature `view` has only a target that cannot exist.
 
 #[cfg(feature = "view")]
 mod composition;
+#[cfg(feature = "view")]
+mod flat_image;
 #[cfg(feature = "view")]
 mod panel_textures;
 #[cfg(feature = "view")]

@@ -1,18 +1,16 @@
 //! The textures of the panels: glyphs and pictures that egui reports as they change. They are copied by the command buffer that draws
 //! the panels, so that nothing waits for the queue: a picture may take long, and egui adds a glyph at any time.
 
+use super::flat_image::FlatImage;
 use crate::gpu::buffers::{Buffer, Purpose};
 use crate::gpu::context::Context;
 use crate::gpu::error::{ErrorContext, GpuError};
-use crate::gpu::memory::{self, Reserve};
 use crate::gpu::resources::WHOLE;
 use ash::vk;
 use egui::epaint::{ImageData, ImageDelta, Primitive};
 use egui_ash_renderer::Renderer;
 use egui_ash_renderer::allocator::DefaultAllocator;
 use egui_ash_renderer::vulkan::{create_vulkan_descriptor_set, create_vulkan_descriptor_set_layout};
-use gpu_allocator::MemoryLocation;
-use gpu_allocator::vulkan::Allocation;
 use std::collections::HashMap;
 use std::sync::Arc;
 
@@ -37,10 +35,7 @@ pub(super) struct PanelTextures {
 }
 
 struct Texture {
-    context: Arc<Context>,
-    image: vk::Image,
-    view: vk::ImageView,
-    allocation: Option<Allocation>,
+    image: FlatImage,
     set: vk::DescriptorSet,
     /// The number under which the renderer draws it.
     drawn_as: egui::TextureId,
@@ -142,50 +137,12 @@ impl PanelTextures {
     }
 
     fn create(&self, renderer: &mut Renderer<DefaultAllocator>, size: [u32; 2]) -> Result<Texture, GpuError> {
+        let usage = vk::ImageUsageFlags::TRANSFER_DST | vk::ImageUsageFlags::SAMPLED;
+        let image = FlatImage::new(&self.context, "panel texture", FORMAT, size, usage)?;
         let device = &self.context.device;
-        let operation = || format!("create a texture of the panels ({}x{})", size[0], size[1]);
-        let create = vk::ImageCreateInfo::default()
-            .image_type(vk::ImageType::TYPE_2D)
-            .format(FORMAT)
-            .extent(vk::Extent3D { width: size[0], height: size[1], depth: 1 })
-            .mip_levels(1)
-            .array_layers(1)
-            .samples(vk::SampleCountFlags::TYPE_1)
-            .tiling(vk::ImageTiling::OPTIMAL)
-            .usage(vk::ImageUsageFlags::TRANSFER_DST | vk::ImageUsageFlags::SAMPLED);
-        // SAFETY: the create structure is complete.
-        let image = unsafe { device.create_image(&create, None) }.context(operation)?;
-        // From here on, dropping `texture` cleans up after a failure.
-        let mut texture = Texture {
-            context: self.context.clone(),
-            image,
-            view: vk::ImageView::null(),
-            allocation: None,
-            set: vk::DescriptorSet::null(),
-            drawn_as: egui::TextureId::default(),
-            is_filled: false,
-        };
-        // SAFETY: the image was just made by this device.
-        let needs = unsafe { device.get_image_memory_requirements(image) };
-        let (name, location) = ("panel texture", MemoryLocation::GpuOnly);
-        let wanted = Reserve { name, requirements: needs, location, linear: false };
-        let allocation = memory::reserve(&self.context, wanted, &operation)?;
-        // SAFETY: the allocation fits the requirements and lives as long as the image.
-        let bound = unsafe { device.bind_image_memory(image, allocation.memory(), allocation.offset()) };
-        texture.allocation = Some(allocation);
-        bound.context(operation)?;
-        let create = vk::ImageViewCreateInfo::default()
-            .image(image)
-            .view_type(vk::ImageViewType::TYPE_2D)
-            .format(FORMAT)
-            .subresource_range(WHOLE);
-        // SAFETY: the image is bound to memory and alive.
-        texture.view = unsafe { device.create_image_view(&create, None) }.context(operation)?;
-        texture.set =
-            create_vulkan_descriptor_set(device, self.layout, self.sets, texture.view, self.sampler).map_err(failed)?;
-        texture.drawn_as = renderer.add_user_texture(texture.set);
-        self.context.name(image, "panel texture");
-        Ok(texture)
+        let set =
+            create_vulkan_descriptor_set(device, self.layout, self.sets, image.view, self.sampler).map_err(failed)?;
+        Ok(Texture { image, set, drawn_as: renderer.add_user_texture(set), is_filled: false })
     }
 
     fn remove(&mut self, renderer: &mut Renderer<DefaultAllocator>, id: egui::TextureId) {
@@ -227,7 +184,7 @@ impl PanelTextures {
                     .new_layout(to)
                     .src_queue_family_index(vk::QUEUE_FAMILY_IGNORED)
                     .dst_queue_family_index(vk::QUEUE_FAMILY_IGNORED)
-                    .image(texture.image)
+                    .image(texture.image.handle)
                     .subresource_range(WHOLE)];
                 let dependency = vk::DependencyInfo::default().image_memory_barriers(&barrier);
                 // SAFETY: the command buffer is being recorded, outside dynamic rendering; the image is alive.
@@ -246,7 +203,7 @@ impl PanelTextures {
             // SAFETY: the staging buffer holds the bytes of the region, which egui places inside its texture; both live until the device
             // is done.
             unsafe {
-                device.cmd_copy_buffer_to_image(commands, staging.handle, texture.image, copied, &[region]);
+                device.cmd_copy_buffer_to_image(commands, staging.handle, texture.image.handle, copied, &[region]);
             }
             turn((copied, shown), written, read);
             texture.is_filled = true;
@@ -267,19 +224,5 @@ impl Drop for PanelTextures {
             self.context.device.destroy_descriptor_set_layout(self.layout, None);
             self.context.device.destroy_sampler(self.sampler, None);
         }
-    }
-}
-
-impl Drop for Texture {
-    fn drop(&mut self) {
-        if self.context.is_given_up() {
-            return;
-        }
-        // SAFETY: nothing drawn with the texture is in flight; null handles are allowed.
-        unsafe {
-            self.context.device.destroy_image_view(self.view, None);
-            self.context.device.destroy_image(self.image, None);
-        }
-        memory::free(&self.context, self.allocation.take());
     }
 }

@@ -310,7 +310,7 @@ impl Screen {
             let shown = &self.chain.images[image as usize];
             (shown.handle, shown.drawn)
         };
-        let target = self.composition.as_ref().map_or(shown, |composition| composition.image);
+        let target = self.composition.as_ref().map_or(shown, |composition| composition.image.handle);
         let begin = vk::CommandBufferBeginInfo::default().flags(vk::CommandBufferUsageFlags::ONE_TIME_SUBMIT);
         // SAFETY: the last drawing is done, so the pool's only command buffer is free.
         unsafe {
@@ -380,7 +380,7 @@ impl Screen {
             go(Stage::Drawn);
             let area = vk::Rect2D { extent: vk::Extent2D { width: size[0], height: size[1] }, ..Default::default() };
             let colour = [vk::RenderingAttachmentInfo::default()
-                .image_view(composition.view)
+                .image_view(composition.image.view)
                 .image_layout(vk::ImageLayout::COLOR_ATTACHMENT_OPTIMAL)
                 .load_op(vk::AttachmentLoadOp::LOAD)
                 .store_op(vk::AttachmentStoreOp::STORE)];
