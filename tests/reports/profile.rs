@@ -97,6 +97,7 @@ fn a_profile_is_consistent_and_round_trips() {
             "raycast_surface",
             "median_distance",
             "light",
+            "assemble",
             "sigma_picture",
             "tone",
             "readback"
