@@ -69,7 +69,7 @@ pub const SCENES: &[Stated] = &[
             "shadow",
             "occlusion",
             "light",
-            "tone",
+            "assemble_toned",
         ],
     ),
     sweep(
@@ -133,9 +133,9 @@ pub const SCENES: &[Stated] = &[
     sweep(
         "several rays at edges",
         &["mode=vr", "ray.rays=2", "ray.adaptive=true"],
-        &["raycast_volume", "mark_edges", "raycast_refined", "assemble"],
+        &["raycast_volume", "mark_edges", "raycast_refined", "assemble_toned"],
     ),
-    sweep("largest", &["mode=mip"], &["raycast_projection"]),
+    sweep("largest", &["mode=mip"], &["raycast_projection", "tone"]),
     sweep("mean", &["mode=mean"], &["raycast_projection"]),
     sweep("three planes", &["mode=orthogonal"], &["raycast_planes_toned"]),
     sweep("three planes in floats", &["mode=orthogonal", "post.floats=true"], &["raycast_planes"]),
@@ -146,8 +146,12 @@ pub const SCENES: &[Stated] = &[
         &["surface.colour=rendered", "ray.sliding=3"],
         &["raycast_surface_and_volume"],
     ),
-    sweep("pair, two rays", &["layout=pair", "ray.rays=2"], &["raycast_surface_and_volume", "assemble"]),
-    sweep("4-up, two rays", &["layout=four", "ray.rays=2"], &["assemble"]),
+    sweep(
+        "pair, two rays, in floats",
+        &["layout=pair", "ray.rays=2", "post.floats=true"],
+        &["raycast_surface_and_volume", "assemble"],
+    ),
+    sweep("4-up, two rays", &["layout=four", "ray.rays=2"], &["assemble_toned"]),
     sweep(
         "4-up, planes of their own volume",
         &["layout=four", "planes.smooth={ lateral = 1, depth = 1, elevation = 1 }"],

@@ -10,9 +10,9 @@ float distance_at(ivec2 pixel) {
     return texelFetch(distance_map, pixel, 0).x;
 }
 
-// Displacement over one pixel along `along`: the mean of those on both sides, and where neither neighbour belongs to the same surface that of a plane
-// facing the viewer. No difference is taken across a cliff. A step that is no cliff yet is not a slope either: the sides are weighted as in a WENO scheme,
-// by the inverse square of their length, so that the side without the step counts.
+// Displacement over one pixel along `along`: the mean of those on both sides. No difference is taken across a cliff. A step that is no cliff yet is not a slope
+// either: the sides are weighted as in a WENO scheme, by the inverse square of their length, so that the side without the step counts. Between two
+// cliffs that rise the same way the pixel lies on a flank as steep as the lower one; between two that do not, it faces the viewer.
 vec3 slope(ivec2 pixel, ivec2 along, float here, vec3 along_ray, vec3 origin_step, vec3 direction_step) {
     vec3 facing = origin_step + direction_step * here;
     float alike = dot(facing, facing); // a slope of 45 degrees
@@ -21,7 +21,11 @@ vec3 slope(ivec2 pixel, ivec2 along, float here, vec3 along_ray, vec3 origin_ste
     float weight = 1.0 / (alike + rise * rise), other = 1.0 / (alike + further * further);
     weight = abs(rise) <= cliff ? weight * weight : 0.0;
     other = abs(further) <= cliff ? other * other : 0.0;
-    if (weight + other == 0.0) return facing;
+    if (weight + other == 0.0) {
+        if ((rise < 0.0) != (further < 0.0)) return facing;
+        weight = abs(rise) <= abs(further) ? 1.0 : 0.0;
+        other = 1.0 - weight;
+    }
     vec3 back_ray = ray_direction(vec2(pixel - along) + 0.5), on_ray = ray_direction(vec2(pixel + along) + 0.5);
     // The differences of positions, term by term: subtracting the positions would cancel most of f32's digits.
     vec3 from_back = weight > 0.0 ? along_ray * rise + (along_ray - back_ray) * back : vec3(0.0);

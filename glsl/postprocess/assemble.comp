@@ -2,6 +2,8 @@
 // that each covers; or interpolation between the rays where one ray makes several pixels, without mixing what is near with what lies far behind it; in a
 // 4-up picture, the rendering next to the planes; in a pair, the composited
 // volume next to the lit surface.
+// TONED: writes the final 8 bits directly, where stage 4 only tones what was assembled.
+// variants: plain; toned TONED
 #version 460
 #include "common.glsl"
 layout(constant_id = 0) const int RAYS = 1; // along each edge of a pixel
@@ -10,8 +12,18 @@ layout(constant_id = 2) const int LAYOUT = 0;
 const int FOUR = 1, PAIR = 2; // 0 the rendering alone
 layout(constant_id = 4) const int REFINED = 0; // 1: only marked pixels have several rays
 layout(constant_id = 3) const int GUIDED = 0; // 1: edges are where distances differ
+#ifdef TONED
+#include "tone_constants.glsl"
+layout(constant_id = 33) const int LINES = 0; // 1: over planes
+#endif
 layout(scalar) uniform Params {
     float cliff; // distances that differ by more belong to different things, mm
+#ifdef TONED
+#include "tone_params.glsl"
+    int columns; // of planes
+    int rows;
+    float line_strength; // 0..1
+#endif
 };
 uniform texture2D rendered;
 uniform texture2D planes;     // of a 4-up picture
@@ -19,9 +31,36 @@ uniform texture2D composited; // of a pair
 uniform texture2D marks;      // of REFINED: 1 in pixels that have several rays
 uniform texture2D single;     // of REFINED: the colour of one ray through the middle of each pixel
 uniform texture2D guide;      // of GUIDED: the distance that each ray goes, MISS where it hits nothing
+#include "cap.glsl"
+#ifdef TONED
+uniform writeonly image2D screen;
+#define TARGET screen
+#include "tiles.glsl"
+#include "tone.glsl"
+#include "cross_lines.glsl"
+#else
 uniform writeonly image2D picture;
+#define TARGET picture
+#endif
 
-bool is_volume = false;
+void store(ivec2 pixel, vec4 colour) {
+#ifdef TONED
+    // Pixels without a hit stay black, whatever the brightness.
+    vec3 c = colour.a > 0.0 ? toned(colour.rgb) : vec3(0.0);
+    if (LINES == 1) c = with_lines(c, pixel, imageSize(TARGET));
+    colour = vec4(c, 1.0);
+#endif
+    imageStore(TARGET, pixel, colour);
+}
+
+bool is_volume = false; // of PAIR: the pixel shows the composited volume
+// The distance that tells edges. A cut face is nearer than all else: it has an edge where it meets the surface that it cuts, too.
+bool has_edges() { return CAPPED == 1 || (GUIDED == 1 && !is_volume); }
+float guide_at(ivec2 at) {
+    if (is_capped(cap_at(at))) return 0.0;
+    return GUIDED == 1 && !is_volume ? texelFetch(guide, at, 0).x : MISS;
+}
+
 vec4 ray_at(ivec2 at) {
     if (LAYOUT == PAIR && is_volume) return texelFetch(composited, at, 0);
     return texelFetch(rendered, at, 0);
@@ -54,8 +93,8 @@ void enlarge(ivec2 cell, ivec2 size) {
     vec4 distances = vec4(0.0);
     float limit = 0.0;
     int reach = 2;
-    if (GUIDED == 1 && !is_volume) {
-        distances = vec4(texelFetch(guide, low, 0).x, texelFetch(guide, right, 0).x, texelFetch(guide, below, 0).x, texelFetch(guide, high, 0).x);
+    if (has_edges()) {
+        distances = vec4(guide_at(low), guide_at(right), guide_at(below), guide_at(high));
         // Sorted, and cut at the widest gap.
         vec2 lesser = min(distances.xz, distances.yw), greater = max(distances.xz, distances.yw);
         float first = min(lesser.x, lesser.y), fourth = max(greater.x, greater.y);
@@ -72,9 +111,9 @@ void enlarge(ivec2 cell, ivec2 size) {
             limit = 0.5 * third + 0.5 * fourth;
         }
         is_edge = gap > cliff && cell.x >= corner.x;
-        // Around an outline, what is near is all that is hit. Between two surfaces only the nearest rays tell: further away both may have the distance
-        // of the other.
-        reach = is_hit(fourth) ? 2 : 4;
+        // Around an outline or a cut face, what is near is all that is hit or cut. Between two surfaces only the nearest rays tell: further away both may
+        // have the distance of the other.
+        reach = is_hit(fourth) && first > 0.0 ? 2 : 4;
     }
     for (int n = 0; n < APART; ++n) {
         int y = top + n;
@@ -82,16 +121,16 @@ void enlarge(ivec2 cell, ivec2 size) {
         vec4 colour = (1.0 - along) * upper + along * lower;
         bool is_plane = LAYOUT == FOUR && (cell.x < corner.x || y < corner.y);
         if (is_plane) colour = texelFetch(planes, clamp(ivec2(cell.x, y), ivec2(0), size - 1), 0);
-        if ((is_plane || !is_edge) && y >= 0 && y < size.y) imageStore(picture, ivec2(cell.x, y), colour);
+        if ((is_plane || !is_edge) && y >= 0 && y < size.y) store(ivec2(cell.x, y), colour);
     }
-    if (GUIDED == 0) return;
+    if (GUIDED == 0 && CAPPED == 0) return;
 
     // Which rays around are near: a byte for each row.
     uvec2 near_rays = uvec2(0u);
     int side = 2 * reach;
     for (int n = 0; n < (is_edge ? side * side : 0); ++n) {
         ivec2 at = ivec2(n & side - 1, n >> (reach == 2 ? 2 : 3));
-        bool is_near = texelFetch(guide, clamp(low + at - reach + 1, ivec2(0), last), 0).x < limit;
+        bool is_near = guide_at(clamp(low + at - reach + 1, ivec2(0), last)) < limit;
         uint bit = is_near ? 1u << (8 * (at.y & 3) + at.x) : 0u;
         near_rays |= at.y < 4 ? uvec2(bit, 0u) : uvec2(0u, bit);
     }
@@ -129,7 +168,7 @@ void enlarge(ivec2 cell, ivec2 size) {
         vec4 far = (fars.x * a + fars.y * b + fars.z * c + fars.w * d) / sum_of(fars);
         vec4 colour = mix(far, near, clamp(0.5 + inside * float(APART), 0.0, 1.0));
         int y = top + n;
-        if (is_edge && y >= corner.y && y < size.y) imageStore(picture, ivec2(cell.x, y), colour);
+        if (is_edge && y >= corner.y && y < size.y) store(ivec2(cell.x, y), colour);
     }
 }
 
@@ -138,35 +177,37 @@ void enlarge(ivec2 cell, ivec2 size) {
 // The colour of a pixel with one ray, at an edge mixed with the colours beyond it. A step of half a cliff is no edge, one of a cliff is.
 vec4 antialiased(ivec2 at) {
     vec4 own = ray_at(at);
-    ivec2 last = textureSize(guide, 0) - 1;
-    float here = texelFetch(guide, at, 0).x, jump = 0.0, limit = here;
+    ivec2 last = textureSize(rendered, 0) - 1;
+    float here = guide_at(at), jump = 0.0, limit = here;
     for (int n = 0; n < 4; ++n) {
         ivec2 offset = n < 2 ? ivec2(2 * n - 1, 0) : ivec2(0, 2 * n - 5);
-        float there = texelFetch(guide, clamp(at + offset, ivec2(0), last), 0).x;
+        float there = edge_distance(at + offset);
         if (abs(there - here) > jump) {
             jump = abs(there - here);
             limit = 0.5 * here + 0.5 * there;
         }
     }
     if (jump <= 0.5 * cliff) return own;
-    bool is_outline = jump > 0.5 * MISS, is_own_near = here < limit;
+    bool is_own_near = here < limit;
+    // The nearer of the two is a cut face, or the further one is nothing.
+    bool is_outline = limit <= 0.5 * jump || jump > 0.5 * MISS;
     vec4 beyond = vec4(0.0);
     float sum = 0.0;
     for (int n = 0; n < 9; ++n) {
         ivec2 offset = ivec2(n % 3, n / 3) - 1, there = clamp(at + offset, ivec2(0), last);
-        if (is_near(there, limit) == is_own_near) continue;
+        if ((guide_at(there) < limit) == is_own_near) continue;
         float weight = offset.x == 0 || offset.y == 0 ? 2.0 : 1.0;
         beyond += weight * ray_at(there);
         sum += weight;
     }
-    float near = near_share(at, is_outline ? 3 : 1, limit);
+    float near = near_share(at, is_outline, limit);
     float share = (is_own_near ? 1.0 - near : near) * clamp(2.0 * (jump / cliff) - 1.0, 0.0, 1.0);
     return mix(own, beyond / sum, share);
 }
 
 void main() {
     ivec2 pixel = ivec2(gl_GlobalInvocationID.xy);
-    ivec2 size = imageSize(picture);
+    ivec2 size = imageSize(TARGET);
     if (APART > 1) {
         if (pixel.x < size.x) enlarge(pixel, size);
         return;
@@ -177,7 +218,7 @@ void main() {
         // The rendering is the lower right tile.
         at = pixel - size / 2;
         if (any(lessThan(at, ivec2(0)))) {
-            imageStore(picture, pixel, texelFetch(planes, pixel, 0));
+            store(pixel, texelFetch(planes, pixel, 0));
             return;
         }
     }
@@ -187,15 +228,15 @@ void main() {
         if (!is_volume) at.x -= size.x / 2;
     }
     // Colours are already multiplied by their opacity.
-    if (GUIDED == 1 && !is_volume) {
-        imageStore(picture, pixel, antialiased(at));
+    if (RAYS == 1 && has_edges()) {
+        store(pixel, antialiased(at));
         return;
     }
     if (REFINED == 1 && texelFetch(marks, at, 0).x == 0.0) {
-        imageStore(picture, pixel, texelFetch(single, at, 0));
+        store(pixel, texelFetch(single, at, 0));
         return;
     }
     vec4 sum = vec4(0.0);
     for (int i = 0; i < RAYS * RAYS; ++i) sum += ray_at(at * RAYS + ivec2(i % RAYS, i / RAYS));
-    imageStore(picture, pixel, sum / float(RAYS * RAYS));
+    store(pixel, sum / float(RAYS * RAYS));
 }

@@ -1,44 +1,94 @@
-//! How much of a pixel the near side of an edge covers, from which rays around it are near: antialiasing from the distance map alone.
+//! How much of a pixel the near side of an edge covers, from the distances of the rays around it: antialiasing from the distance map alone.
 //!
-//! Across the edge, the number of near rays in a column is the edge's height there, to within half a ray. A straight line through the heights of seven
-//! columns, by weighted least squares, is the edge to a tenth of a ray; the area below it in the pixel is the share.
+//! An edge between rays is a staircase of runs of pixels. Where a run is short, the number of near rays in a column across the edge is the edge's height
+//! there, to within half a ray, and a straight line through the heights of seven columns, by weighted least squares, is the edge to a tenth of a ray. Where
+//! a run is longer than half of that window, or the heights lie on no line, the edge crosses the middles of the steps at the run's ends (Reshetov 2009,
+//! Morphological antialiasing): a straight line between a step up and a step down, a parabola between two steps the same way. The area below it in the pixel
+//! is the share.
 
-/// Columns on both sides of a pixel, and rays on both sides of it in each, that tell how much of it is near. Where the heights of the wider window are no
-/// line, three columns may be.
-const WINDOWS: [(i64, i64); 2] = [(3, 3), (1, 2)];
+/// Columns on both sides of a pixel, and rays on both sides of it in each, through whose heights a line is laid.
+const WINDOW: i64 = 3;
 /// Variance of the heights about a line, square rays, up to which they are one. Rounding to whole rays makes 1/12.
 const LINE: f64 = 0.16;
+/// Pixels of a run from which its ends tell more than seven columns.
+const LONG: i64 = 4;
+/// Pixels on both sides up to which a run's ends are looked for.
+const REACH: i64 = 16;
 
-/// The share of a pixel that is near, if rays at an offset from it are near as `is_near` says. The pixel keeps half of itself, at least: its ray tells
-/// where its middle lies; and all of itself where the rays around it lie on no line. `reach`: columns on both sides that may be looked at, 1..3.
-pub fn near_share(is_near: &dyn Fn(i64, i64) -> bool, reach: i64) -> f64 {
+/// The share of a pixel that is nearer than a limit, from the distances of rays at an offset from it. The pixel keeps half of itself, at least: its ray
+/// tells where its middle lies; and all of itself where no edge can be told. Around an outline what is near is all that is hit; between two surfaces both may
+/// have the distance of the other further away, so that only the run tells, whose limit follows the two surfaces.
+pub fn near_share(distance: &dyn Fn(i64, i64) -> f64, limit: f64, is_outline: bool) -> f64 {
+    let is_near = |dx: i64, dy: i64| distance(dx, dy) < limit;
     let side = |dx: i64, dy: i64| f64::from(u8::from(is_near(dx, dy)));
     let rise = |at: &dyn Fn(i64, i64) -> f64| -> f64 {
         [(-1, 1.0), (0, 2.0), (1, 1.0)].iter().map(|(across, weight)| weight * (at(1, *across) - at(-1, *across))).sum()
     };
     let is_upright = rise(&|d, a| side(d, a)).abs() > rise(&|d, a| side(a, d)).abs();
-    let turned = |i: i64, j: i64| if is_upright { is_near(j, i) } else { is_near(i, j) };
-    let share = WINDOWS.iter().filter(|w| w.0 <= reach).find_map(|w| share_of_line(&turned, *w));
-    match (share, is_near(0, 0)) {
+    let turned = |i: i64, j: i64| if is_upright { distance(j, i) } else { distance(i, j) };
+    let run = share_of_run(&turned, limit);
+    let is_long = run.is_some_and(|(_, length)| length >= LONG);
+    let line = (is_outline && !is_long).then(|| share_of_line(&|i, j| turned(i, j) < limit)).flatten();
+    match (line.or(run.map(|(share, _)| share)), is_near(0, 0)) {
         (Some(share), true) => share.max(0.5),
         (Some(share), false) => share.min(0.5),
         (None, own) => f64::from(u8::from(own)),
     }
 }
 
+/// The near share by the ends of the run that the pixel is in, and the run's length; none where the edge is on neither side of the pixel, or on both.
+fn share_of_run(distance: &dyn Fn(i64, i64) -> f64, limit: f64) -> Option<(f64, i64)> {
+    let is_near = distance(0, 0) < limit;
+    let is_beyond = |j: i64| (distance(0, j) < limit) != is_near;
+    let across = match (is_beyond(-1), is_beyond(1)) {
+        (true, false) => -1,
+        (false, true) => 1,
+        _ => return None,
+    };
+    // Columns to the end of the run, and which way its step goes: 1 where the pixel's side grows, 0 where the edge ends; none within the reach.
+    let end = |step: i64| -> (i64, Option<f64>) {
+        let mut limit = limit;
+        for columns in 1..=REACH {
+            let [own, other] = [distance(step * columns, 0), distance(step * columns, across)];
+            match [own, other].map(|d| (d < limit) == is_near) {
+                [true, false] => limit = 0.5 * own + 0.5 * other,
+                [true, true] => return (columns, Some(1.0)),
+                [false, false] => return (columns, Some(-1.0)),
+                [false, true] => return (columns, Some(0.0)),
+            }
+        }
+        (REACH + 1, None)
+    };
+    let ((left, before), (right, after)) = (end(-1), end(1));
+    // Of a run whose other end is out of reach, the edge is a straight line as far as it was seen.
+    let [before, after] = [before.or(after.map(|t| -t)), after.or(before.map(|t| -t))].map(|turn| turn.unwrap_or(0.0));
+    let half = 0.5 * (left + right - 1) as f64;
+    // The pixel's place between the ends, -1..1.
+    let at = 0.5 * (left - right) as f64 / half;
+    let (height, rise) = match before == -after {
+        true => (0.5 * after * at, 0.5 * after / half),
+        false => {
+            let turn = if at < 0.0 { before } else { after };
+            (0.5 * turn * at * at, turn * at / half)
+        }
+    };
+    let own = area(0.5 + height, rise.abs());
+    Some((if is_near { own } else { 1.0 - own }, left + right - 1))
+}
+
 /// The share below a line through the heights of the columns; none if they lie on no line.
-fn share_of_line(is_near: &dyn Fn(i64, i64) -> bool, (columns, rows): (i64, i64)) -> Option<f64> {
+fn share_of_line(is_near: &dyn Fn(i64, i64) -> bool) -> Option<f64> {
     let mut ends = [false; 2];
     let mut points = vec![];
-    for i in -columns..=columns {
-        let column: Vec<bool> = (-rows..=rows).map(|j| is_near(i, j)).collect();
+    for i in -WINDOW..=WINDOW {
+        let column: Vec<bool> = (-WINDOW..=WINDOW).map(|j| is_near(i, j)).collect();
         match column.windows(2).filter(|pair| pair[0] != pair[1]).count() {
             0 => {}
             1 => ends[usize::from(column[0])] = true,
             _ => return None,
         }
         let near = column.iter().filter(|n| **n).count() as f64;
-        points.push((((columns + 1).pow(2) - i * i) as f64, i as f64, near - column.len() as f64 / 2.0));
+        points.push((((WINDOW + 1).pow(2) - i * i) as f64, i as f64, near - column.len() as f64 / 2.0));
     }
     if ends == [true; 2] {
         return None;
@@ -65,6 +115,15 @@ fn area(height: f64, rise: f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::passes::MISS;
+
+    /// Whether a ray at an offset from a pixel is near.
+    type Side<'a> = &'a dyn Fn(i64, i64) -> bool;
+
+    /// The share at an outline.
+    fn of_outline(is_near: Side) -> f64 {
+        near_share(&|x, y| if is_near(x, y) { 1.0 } else { MISS }, 0.5 * MISS, true)
+    }
 
     /// Root of the mean square of the share's error at pixels that an edge goes through, the median over shapes that a function of a seed tells the inside
     /// of: of one ray a pixel, of the mean of 2 x 2, and of the share here. The truth is the mean of 32 x 32.
@@ -86,7 +145,7 @@ mod tests {
                     continue;
                 }
                 let truth = mean(x, y, 32);
-                let share = near_share(&|dx, dy| is_inside((x + dx) as f64, (y + dy) as f64), 3);
+                let share = of_outline(&|dx, dy| is_inside((x + dx) as f64, (y + dy) as f64));
                 for (square, share) in squares.iter_mut().zip([centre, mean(x, y, 2), share]) {
                     *square += (share - truth).powi(2);
                 }
@@ -100,13 +159,20 @@ mod tests {
         })
     }
 
-    /// Straight edges are better than with four rays, but for those along the rays' own rows, where the window sees no step; round and small shapes are
-    /// better than with one ray.
+    /// Straight edges are better than with four rays, in any direction and nearly along the rays' own rows; round, small and rough shapes are better than with
+    /// one ray.
     #[test]
     fn shares_of_straight_and_round_shapes_are_those_of_many_rays() {
+        let line = |sin: f64, cos: f64, at: f64| -> Box<dyn Fn(f64, f64) -> bool> {
+            Box::new(move |x, y| x * cos + y * sin < at)
+        };
         let straight = errors(&|seed| {
             let (sin, cos) = (seed * std::f64::consts::TAU).sin_cos();
-            Box::new(move |x, y| x * cos + y * sin < 7.3 * seed - 3.0)
+            line(sin, cos, 7.3 * seed - 3.0)
+        });
+        let flat = errors(&|seed| {
+            let (sin, cos) = (1.0 + 5.0 * seed).to_radians().sin_cos();
+            line(cos, sin, 7.3 * seed - 3.0)
         });
         let disc = |least: f64, most: f64| {
             move |seed: f64| -> Box<dyn Fn(f64, f64) -> bool> {
@@ -116,21 +182,60 @@ mod tests {
             }
         };
         let (round, small) = (errors(&disc(6.0, 20.0)), errors(&disc(2.0, 5.0)));
-        println!("one ray, 2 x 2, share: straight {straight:.3?}, round {round:.3?}, small {small:.3?}");
-        assert!(straight[2] < straight[1] && straight[2] < 0.25 * straight[0], "{straight:?}");
+        // Waves of 3 to 9 pixels, 0.6 high: as a surface of speckle.
+        let rough = errors(&|seed| {
+            let (sin, cos) = (seed * std::f64::consts::TAU).sin_cos();
+            Box::new(move |x, y| {
+                let along = x * sin - y * cos;
+                let wave = |pixels: f64| (along * std::f64::consts::TAU / pixels + 40.0 * seed).sin();
+                x * cos + y * sin < 0.3 * (wave(3.1) + wave(5.3) + wave(8.9))
+            })
+        });
+        println!(
+            "one ray, 2 x 2, share: straight {straight:.3?}, near the rows {flat:.3?}, round {round:.3?}, small {small:.3?}, rough {rough:.3?}"
+        );
+        assert!(straight[2] < 0.8 * straight[1] && straight[2] < 0.25 * straight[0], "{straight:?}");
+        assert!(flat[2] < 0.4 * flat[1] && flat[2] < 0.15 * flat[0], "{flat:?}");
         assert!(round[2] < 0.65 * round[0], "{round:?}");
         assert!(small[2] < 0.75 * small[0], "{small:?}");
+        assert!(rough[2] < 0.85 * rough[0], "{rough:?}");
     }
 
     /// A pixel without an edge around it, a speck and a checkerboard keep what their ray says.
     #[test]
     fn what_is_no_line_keeps_the_pixels_own_side() {
-        for reach in 1..=3 {
+        for is_outline in [false, true] {
             for own in [false, true] {
+                let share =
+                    |is_near: Side| near_share(&|x, y| if is_near(x, y) { 40.0 } else { 60.0 }, 50.0, is_outline);
                 let own_share = f64::from(u8::from(own));
-                assert_eq!(near_share(&|_, _| own, reach), own_share);
-                assert_eq!(near_share(&|x, y| ((x, y) == (0, 0)) == own, reach), own_share);
-                assert_eq!(near_share(&|x, y| ((x + y) % 2 == 0) == own, reach), own_share);
+                assert_eq!(share(&|_, _| own), own_share);
+                assert_eq!(share(&|x, y| ((x, y) == (0, 0)) == own), own_share);
+                assert_eq!(share(&|x, y| ((x + y) % 2 == 0) == own), own_share);
+            }
+        }
+    }
+
+    /// Along a fold, both surfaces come nearer or go away: its edge is where their distances differ, whatever the distances are.
+    #[test]
+    fn a_fold_of_tilted_surfaces_has_the_edge_of_level_ones() {
+        for slant in [0.09, 0.14, 0.31] {
+            let share = |x: i64, y: i64, tilt: f64| {
+                let distance = |dx: i64, dy: i64| {
+                    let [x, y] = [x + dx, y + dy].map(|n| n as f64);
+                    40.0 + tilt * x + if y < slant * x { 0.0 } else { 3.0 }
+                };
+                let beyond = [-1, 1].map(|dy| distance(0, dy)).into_iter().find(|d| (d - distance(0, 0)).abs() > 1.0);
+                near_share(&distance, 0.5 * (distance(0, 0) + beyond.unwrap_or(MISS)), false)
+            };
+            for x in -20..20_i64 {
+                let edge = (slant * x as f64).ceil() as i64 - 1;
+                for y in [edge, edge + 1] {
+                    let (level, tilted) = (share(x, y, 0.0), share(x, y, 0.8));
+                    assert_eq!(level, tilted, "{slant}: {x}, {y}");
+                    let line = area(slant * x as f64 - y as f64, slant);
+                    assert!((tilted - line).abs() < 0.2, "{slant}: {x}, {y}: {tilted} {line}");
+                }
             }
         }
     }

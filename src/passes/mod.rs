@@ -112,6 +112,7 @@ pub const PASSES: &[Pass] = &[
     shade::OCCLUSION,
     shade::LIGHT,
     postprocess::ASSEMBLE,
+    postprocess::ASSEMBLE_TONED,
     filter::sigma::PICTURE,
     filter::enhanced_sigma::PICTURE,
     filter::perona_malik::PICTURE,

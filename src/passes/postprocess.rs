@@ -1,6 +1,7 @@
 //! Stage 4: the picture from the rendering, toned to 8 bits.
 
 use crate::passes::pass::*;
+use crate::passes::raycast::cap;
 use crate::passes::{chain, edge_coverage};
 use crate::scene::planes::{Frame, Plane, Sheet, Tile};
 use crate::scene::{ColourMap, Layout, Scene, transfer};
@@ -16,9 +17,10 @@ pub const TONE: Pass = Pass {
     frequency: Frequency::Picture,
     link: Link::Observer(Chain::Pictures),
     shader: |_, _| "postprocess/tone",
-    needed: |s| match s.tones_planes() {
-        true => Err("planes are cut straight to 8 bits"),
-        false => Ok("every picture ends in 8 bits"),
+    needed: |s| match (s.tones_planes(), s.tones_assembled()) {
+        (true, _) => Err("planes are cut straight to 8 bits"),
+        (false, true) => Err("the picture is assembled straight to 8 bits"),
+        (false, false) => Ok("every picture ends in 8 bits"),
     },
     reads: |s, t| {
         let mut reads = vec![whole("picture", t.source())];
@@ -28,28 +30,34 @@ pub const TONE: Pass = Pass {
     writes: |_, _| vec![whole("screen", Slot::Screen)],
     extent: picture_extent,
     repeat: once,
-    params: |s, _| {
-        let [columns, rows] = s.tile_grid();
-        tone_params(s, Params::default()).i32("columns", columns).i32("rows", rows).f32("line_strength", LINE_STRENGTH)
-    },
-    constants: |s, _| [tone_constants(s), vec![("LINES", s.draws_lines() as i32)]].concat(),
+    params: |s, _| tone_and_lines_params(s, Params::default()),
+    constants: |s, _| tone_and_lines_constants(s),
     tolerance: Tolerance {
         absolute: 1.01 / 255.0,
         relative: 0.0,
         outliers: 0.0,
         why: "a value half-way between two levels may be stored as either",
     },
-    reference: |scene, _, reads, writes| {
-        let picture = reads.get("picture");
-        let screen = writes.get_mut("screen");
-        let sheet = scene.draws_lines().then(|| scene.sheet());
-        for (x, y) in (0..picture.size[1]).flat_map(|y| (0..picture.size[0]).map(move |x| (x, y))) {
-            let rgba = picture.get([x, y, 0]);
-            let colour = (rgba[3] > 0.0).then_some([rgba[0], rgba[1], rgba[2]]);
-            screen.set([x, y, 0], &reference_pixel(scene, sheet.as_ref(), colour, x, y));
-        }
-    },
+    reference: |scene, _, reads, writes| tone_picture(scene, reads.get("picture"), writes.get_mut("screen")),
 };
+
+fn tone_picture(scene: &Scene, picture: &Texels, screen: &mut Texels) {
+    let sheet = scene.draws_lines().then(|| scene.sheet());
+    for (x, y) in (0..picture.size[1]).flat_map(|y| (0..picture.size[0]).map(move |x| (x, y))) {
+        let rgba = picture.get([x, y, 0]);
+        let colour = (rgba[3] > 0.0).then_some([rgba[0], rgba[1], rgba[2]]);
+        screen.set([x, y, 0], &reference_pixel(scene, sheet.as_ref(), colour, x, y));
+    }
+}
+
+fn tone_and_lines_params(scene: &Scene, params: Params) -> Params {
+    let [columns, rows] = scene.tile_grid();
+    tone_params(scene, params).i32("columns", columns).i32("rows", rows).f32("line_strength", LINE_STRENGTH)
+}
+
+fn tone_and_lines_constants(scene: &Scene) -> Vec<(&'static str, i32)> {
+    [tone_constants(scene), vec![("LINES", scene.draws_lines() as i32)]].concat()
+}
 
 /// Adds the numbers of toning to those of a pass.
 pub fn tone_params(scene: &Scene, params: Params) -> Params {
@@ -127,11 +135,32 @@ fn distance(plane: &Plane, other: &Plane, place: DVec3) -> f64 {
     (place - on_line).cross(along.normalize()).length()
 }
 
-/// What tells edges between rays that are pixels apart, or through pixels with one ray: the distance of the surface on each. Compositing and projections
-/// blend what lies behind each other: their pictures are smooth between rays.
+/// True if edges are looked for: between rays that are pixels apart, or through pixels with one ray.
+fn has_edges(scene: &Scene) -> bool {
+    scene.settings.ray.apart() > 1 || scene.antialiases()
+}
+
+/// What tells edges: the distance of the surface on each ray. Compositing and projections blend what lies behind each other: their pictures are smooth between
+/// rays, but for cut faces.
 fn guide(scene: &Scene) -> Option<Slot> {
-    let interpolates = scene.settings.ray.apart() > 1 && scene.has_distance();
-    (interpolates || scene.antialiases()).then(|| chain::distance_end(scene))
+    (has_edges(scene) && scene.has_distance()).then(|| chain::distance_end(scene))
+}
+
+/// Cut faces, where they tell edges.
+fn cut_faces(scene: &Scene) -> Option<Bind> {
+    cap::reads(scene).filter(|_| has_edges(scene))
+}
+
+/// The distance of each ray that tells edges of the rendering, or of the composited half of a pair. A cut face is nearer than all else: it has an edge where it
+/// meets the surface that it cuts, too.
+fn edge_distances(scene: &Scene, reads: &Arrays, is_rendering: bool) -> Option<Texels> {
+    let distances = guide(scene).filter(|_| is_rendering).map(|_| reads.get("guide"));
+    let faces = cut_faces(scene).map(|_| reads.get("cap"));
+    let size = distances.or(faces)?.size;
+    Some(Texels::from_fn(size, 1, |at, _| match faces {
+        Some(faces) if faces.get(at)[1] > 0.0 => 0.0,
+        _ => distances.map_or(MISS, |d| d.get(at)[0]),
+    }))
 }
 
 /// One invocation per pixel; where pixels are between rays, one for those of a column between the same two rows of rays, of which the first has half as many.
@@ -154,47 +183,18 @@ pub const ASSEMBLE: Pass = Pass {
     stage: Stage::Postprocess,
     frequency: Frequency::Picture,
     link: Link::None,
-    shader: |_, _| "postprocess/assemble",
-    needed: |s| match (rendered(s), s.settings.layout) {
-        (Slot::Picture, _) => Err("one ray makes a pixel of the whole picture"),
-        (_, Layout::Four) => Ok("the rendering stands beside three planes"),
-        (_, Layout::Pair) => Ok("the volume stands beside the surface"),
-        (_, Layout::Single) if s.settings.ray.apart() > 1 => Ok("one ray makes several pixels"),
-        (_, Layout::Single) if s.antialiases() => Ok("edges of a surface are antialiased"),
-        (_, Layout::Single) if s.adapts_rays() => Ok("several rays make a pixel at an edge"),
-        (_, Layout::Single) => Ok("several rays make a pixel"),
+    shader: |_, _| "postprocess/assemble.plain",
+    needed: |s| match s.settings.layout {
+        _ if !s.assembles() => Err("one ray makes a pixel of the whole picture"),
+        _ if s.tones_assembled() => Err("the picture is assembled straight to 8 bits"),
+        layout => Ok(why_assembled(s, layout)),
     },
-    reads: |s, _| {
-        let mut reads = vec![whole("rendered", Slot::Rendered)];
-        reads.extend((s.settings.layout == Layout::Four).then_some(whole("planes", Slot::Planes)));
-        reads.extend(s.is_pair().then_some(whole("composited", composited_beside_surface(s))));
-        if s.adapts_rays() {
-            reads.extend([whole("marks", Slot::EdgeMarks), whole("single", Slot::PixelRays)]);
-        }
-        reads.extend(guide(s).map(|slot| whole("guide", slot)));
-        reads
-    },
+    reads: |s, _| assemble_reads(s),
     writes: |_, _| vec![whole("picture", Slot::Picture)],
     extent: assemble_extent,
     repeat: once,
-    params: |s, _| Params::default().f32("cliff", s.cliff()),
-    constants: |s, _| {
-        let layout = match s.settings.layout {
-            Layout::Single => 0,
-            Layout::Four => 1,
-            Layout::Pair => 2,
-        };
-        let ray = &s.settings.ray;
-        let guided = guide(s).is_some();
-        let refined = s.adapts_rays();
-        vec![
-            ("RAYS", ray.rays as i32),
-            ("APART", ray.apart() as i32),
-            ("LAYOUT", layout),
-            ("GUIDED", guided as i32),
-            ("REFINED", refined as i32),
-        ]
-    },
+    params: |s, _| assemble_params(s),
+    constants: |s, _| assemble_constants(s),
     tolerance: Tolerance {
         absolute: 1e-3,
         relative: 0.0,
@@ -202,54 +202,136 @@ pub const ASSEMBLE: Pass = Pass {
         why: "a mean of at most 16 colours in f32; R16F stores 1 to 4.9e-4; a gap that is as wide as a cliff, two that are as wide as each other, or a \
               mean of sides that is nearly even in all directions may put a pixel on either side of an edge",
     },
-    reference: |scene, _, reads, writes| {
-        let picture = writes.get_mut("picture");
-        let rays = scene.settings.ray.rays as usize;
-        let corner = match scene.settings.layout {
-            Layout::Single => [0, 0],
-            // The lower right tile.
-            Layout::Four => [picture.size[0] / 2, picture.size[1] / 2],
-            // The right half.
-            Layout::Pair => [picture.size[0] / 2, 0],
-        };
-        for y in 0..picture.size[1] {
-            for x in 0..picture.size[0] {
-                let is_rendering = x >= corner[0] && y >= corner[1];
-                if !is_rendering && scene.cuts_planes() {
-                    let plane = reads.get("planes").get([x, y, 0]).to_vec();
-                    picture.set([x, y, 0], &plane);
-                    continue;
-                }
-                let (shown, corner) = match is_rendering {
-                    true => (reads.get("rendered"), corner),
-                    false => (reads.get("composited"), [0, 0]),
-                };
-                if scene.settings.ray.apart() > 1 {
-                    let apart = f64::from(scene.settings.ray.apart());
-                    let guide = guide(scene).filter(|_| is_rendering).map(|_| (reads.get("guide"), scene.cliff()));
-                    picture.set([x, y, 0], &between(shown, guide, apart, [x - corner[0], y - corner[1]]));
-                    continue;
-                }
-                let at = [x - corner[0], y - corner[1]];
-                if scene.antialiases() && is_rendering {
-                    picture.set([x, y, 0], &antialiased(shown, reads.get("guide"), scene.cliff(), at));
-                    continue;
-                }
-                if scene.adapts_rays() && reads.get("marks").one(at[0], at[1], 0) == 0.0 {
-                    let single = reads.get("single").get([at[0], at[1], 0]).to_vec();
-                    picture.set([x, y, 0], &single);
-                    continue;
-                }
-                let mut mean = [0.0; 4];
-                for (i, j) in (0..rays * rays).map(|n| (n % rays, n / rays)) {
-                    let ray = shown.get([at[0] * rays + i, at[1] * rays + j, 0]);
-                    mean.iter_mut().zip(ray).for_each(|(m, v)| *m += v / (rays * rays) as f64);
-                }
-                picture.set([x, y, 0], &mean);
-            }
-        }
-    },
+    reference: |scene, _, reads, writes| assemble(scene, reads, writes.get_mut("picture")),
 };
+
+/// The same, toned and in 8 bits.
+pub const ASSEMBLE_TONED: Pass = Pass {
+    name: "assemble_toned",
+    shader: |_, _| "postprocess/assemble.toned",
+    needed: |s| match (s.assembles(), s.tones_assembled()) {
+        (true, true) => Ok(why_assembled(s, s.settings.layout)),
+        (true, false) => Err("the picture is filtered, or wanted in floats"),
+        (false, _) => Err("one ray makes a pixel of the whole picture"),
+    },
+    reads: |s, _| {
+        let mut reads = assemble_reads(s);
+        reads.extend(s.draws_lines().then_some(whole("tiles", Slot::Tiles)));
+        reads
+    },
+    writes: |_, _| vec![whole("screen", Slot::Screen)],
+    params: |s, _| tone_and_lines_params(s, assemble_params(s)),
+    constants: |s, _| [assemble_constants(s), tone_and_lines_constants(s)].concat(),
+    tolerance: Tolerance {
+        absolute: 2.01 / 255.0,
+        relative: 0.0,
+        outliers: 2e-3,
+        why: "a value half-way between two levels may be stored as either, after an error that contrast and gamma multiply; sides of an edge as without \
+              toning",
+    },
+    reference: |scene, _, reads, writes| {
+        let mut picture = Texels::untouched(writes.get_mut("screen").size, 4);
+        assemble(scene, reads, &mut picture);
+        tone_picture(scene, &picture, writes.get_mut("screen"));
+    },
+    ..ASSEMBLE
+};
+
+/// Why a pixel of the picture is not that of one ray.
+fn why_assembled(scene: &Scene, layout: Layout) -> &'static str {
+    match layout {
+        Layout::Four => "the rendering stands beside three planes",
+        Layout::Pair => "the volume stands beside the surface",
+        Layout::Single if scene.settings.ray.apart() > 1 => "one ray makes several pixels",
+        Layout::Single if scene.antialiases() => "edges are antialiased",
+        Layout::Single if scene.adapts_rays() => "several rays make a pixel at an edge",
+        Layout::Single => "several rays make a pixel",
+    }
+}
+
+fn assemble_reads(scene: &Scene) -> Vec<Bind> {
+    let mut reads = vec![whole("rendered", Slot::Rendered)];
+    reads.extend((scene.settings.layout == Layout::Four).then_some(whole("planes", Slot::Planes)));
+    reads.extend(scene.is_pair().then_some(whole("composited", composited_beside_surface(scene))));
+    if scene.adapts_rays() {
+        reads.extend([whole("marks", Slot::EdgeMarks), whole("single", Slot::PixelRays)]);
+    }
+    reads.extend(guide(scene).map(|slot| whole("guide", slot)));
+    reads.extend(cut_faces(scene));
+    reads
+}
+
+fn assemble_params(scene: &Scene) -> Params {
+    Params::default().f32("cliff", scene.cliff())
+}
+
+fn assemble_constants(scene: &Scene) -> Vec<(&'static str, i32)> {
+    let layout = match scene.settings.layout {
+        Layout::Single => 0,
+        Layout::Four => 1,
+        Layout::Pair => 2,
+    };
+    let ray = &scene.settings.ray;
+    let guided = guide(scene).is_some();
+    let refined = scene.adapts_rays();
+    vec![
+        ("RAYS", ray.rays as i32),
+        ("APART", ray.apart() as i32),
+        ("LAYOUT", layout),
+        ("GUIDED", guided as i32),
+        ("REFINED", refined as i32),
+        ("CAPPED", cut_faces(scene).is_some() as i32),
+    ]
+}
+
+fn assemble(scene: &Scene, reads: &Arrays, picture: &mut Texels) {
+    let rays = scene.settings.ray.rays as usize;
+    let [beside, of_rendering] = [false, true].map(|is_rendering| edge_distances(scene, reads, is_rendering));
+    let corner = match scene.settings.layout {
+        Layout::Single => [0, 0],
+        // The lower right tile.
+        Layout::Four => [picture.size[0] / 2, picture.size[1] / 2],
+        // The right half.
+        Layout::Pair => [picture.size[0] / 2, 0],
+    };
+    for y in 0..picture.size[1] {
+        for x in 0..picture.size[0] {
+            let is_rendering = x >= corner[0] && y >= corner[1];
+            if !is_rendering && scene.cuts_planes() {
+                let plane = reads.get("planes").get([x, y, 0]).to_vec();
+                picture.set([x, y, 0], &plane);
+                continue;
+            }
+            let (shown, corner) = match is_rendering {
+                true => (reads.get("rendered"), corner),
+                false => (reads.get("composited"), [0, 0]),
+            };
+            let distances = if is_rendering { &of_rendering } else { &beside };
+            if scene.settings.ray.apart() > 1 {
+                let apart = f64::from(scene.settings.ray.apart());
+                let guide = distances.as_ref().map(|distances| (distances, scene.cliff()));
+                picture.set([x, y, 0], &between(shown, guide, apart, [x - corner[0], y - corner[1]]));
+                continue;
+            }
+            let at = [x - corner[0], y - corner[1]];
+            if let Some(distances) = distances {
+                picture.set([x, y, 0], &antialiased(shown, distances, scene.cliff(), at));
+                continue;
+            }
+            if scene.adapts_rays() && reads.get("marks").one(at[0], at[1], 0) == 0.0 {
+                let single = reads.get("single").get([at[0], at[1], 0]).to_vec();
+                picture.set([x, y, 0], &single);
+                continue;
+            }
+            let mut mean = [0.0; 4];
+            for (i, j) in (0..rays * rays).map(|n| (n % rays, n / rays)) {
+                let ray = shown.get([at[0] * rays + i, at[1] * rays + j, 0]);
+                mean.iter_mut().zip(ray).for_each(|(m, v)| *m += v / (rays * rays) as f64);
+            }
+            picture.set([x, y, 0], &mean);
+        }
+    }
+}
 
 /// The colour of a pixel with one ray: at an edge, its own and the mean of those around it beyond the edge, by the share of the pixel that lies beyond. A step
 /// of half a cliff is no edge, one of a cliff is.
@@ -276,8 +358,10 @@ fn antialiased(rendered: &Texels, distances: &Texels, cliff: f64, [x, y]: [usize
     let beyond = around.filter(|(dx, dy)| is_near(*dx, *dy) != is_near(0, 0));
     let weighed: Vec<_> = beyond.map(|(dx, dy)| (if dx * dy == 0 { 2.0 } else { 1.0 }, ray(dx, dy))).collect();
     let all: f64 = weighed.iter().map(|(weight, _)| weight).sum();
-    let reach = if is_hit(here.max(2.0 * limit - here)) { 1 } else { 3 };
-    let near = edge_coverage::near_share(&is_near, reach);
+    let there = 2.0 * limit - here;
+    // The nearer of the two is a cut face, or the further one is nothing.
+    let is_outline = here.min(there) <= 0.0 || !is_hit(here.max(there));
+    let near = edge_coverage::near_share(&distance, limit, is_outline);
     let beyond_share = if is_near(0, 0) { 1.0 - near } else { near } * (2.0 * jump / cliff - 1.0).clamp(0.0, 1.0);
     std::array::from_fn(|c| {
         let there = weighed.iter().map(|(weight, at)| weight * rendered.get(*at)[c]).sum::<f64>() / all;
@@ -340,11 +424,12 @@ fn between(rendered: &Texels, guide: Option<(&Texels, f64)>, apart: f64, pixel: 
 }
 
 /// The distance that parts what is near from what is far, in the widest gap between four distances, if that is a cliff; and how many rays away others
-/// tell where the edge is. Around an outline, what is near is all that is hit; between two surfaces only the nearest rays tell.
+/// tell where the edge is. Around an outline or a cut face, what is near is all that is hit or cut; between two surfaces only the nearest rays tell.
 fn cliff_between(mut distances: [f64; 4], cliff: f64) -> Option<(f64, i32)> {
     distances.sort_by(f64::total_cmp);
     let gaps: Vec<f64> = distances.windows(2).map(|pair| pair[1] - pair[0]).collect();
     let widest = (0..3).rev().max_by(|a, b| gaps[*a].total_cmp(&gaps[*b]))?;
     let limit = 0.5 * distances[widest] + 0.5 * distances[widest + 1];
-    (gaps[widest] > cliff).then_some((limit, if is_hit(distances[3]) { 2 } else { 4 }))
+    let is_outline = distances[0] <= 0.0 || !is_hit(distances[3]);
+    (gaps[widest] > cliff).then_some((limit, if is_outline { 4 } else { 2 }))
 }

@@ -451,22 +451,26 @@ fn place(scene: &Scene, distances: &Texels, x: i64, y: i64) -> Option<(DVec3, f6
 }
 
 /// Unit normal at a pixel, towards the viewer. No difference is taken across a cliff. A step that is no cliff yet is no slope either: of the two
-/// differences along an axis the steeper one counts less, by weights as in a WENO scheme of second order (Liu, Osher and Chan 1994).
+/// differences along an axis the steeper one counts less, by weights as in a WENO scheme of second order (Liu, Osher and Chan 1994). Between two cliffs that
+/// rise the same way a pixel lies on a flank that is as steep as the lower one; between two that do not, it faces the viewer.
 pub fn normal(scene: &Scene, distances: &Texels, x: i64, y: i64) -> Option<DVec3> {
     let (here, distance) = place(scene, distances, x, y)?;
     let slope = |dx: i64, dy: i64, facing: DVec3| {
         // Up to a slope of 45 degrees, the two sides count much alike.
         let alike = facing.length_squared();
-        let side = |sign: i64| {
-            let (there, away) = place(scene, distances, x + sign * dx, y + sign * dy)?;
-            let rise = away - distance;
-            (rise.abs() <= scene.cliff()).then(|| ((alike + rise * rise).powi(-2), (there - here) * sign as f64))
-        };
-        let sides = [side(-1), side(1)];
-        let sum: f64 = sides.iter().flatten().map(|(weight, _)| weight).sum();
-        match sum > 0.0 {
-            true => sides.iter().flatten().map(|(weight, step)| *step * (*weight / sum)).sum(),
-            false => facing,
+        // Rise and displacement over one pixel; nothing is infinitely far.
+        let sides = [-1, 1].map(|sign| match place(scene, distances, x + sign * dx, y + sign * dy) {
+            Some((there, away)) => ((away - distance) * sign as f64, (there - here) * sign as f64),
+            None => (f64::INFINITY * sign as f64, facing),
+        });
+        let is_smooth = |rise: f64| rise.abs() <= scene.cliff();
+        let weights = sides.map(|(rise, _)| if is_smooth(rise) { (alike + rise * rise).powi(-2) } else { 0.0 });
+        let [(before, back), (after, on)] = sides;
+        match weights[0] + weights[1] {
+            0.0 if before.signum() != after.signum() => facing,
+            0.0 if before.abs() <= after.abs() => back,
+            0.0 => on,
+            sum => (back * weights[0] + on * weights[1]) / sum,
         }
     };
     let rays = &scene.rays;

@@ -3,7 +3,7 @@
 
 use super::{cut, lookup_tables, net};
 use crate::scene::planes::{TILE_VECTORS, cell};
-use crate::scene::{Layout, Propagation, Scene, SurfaceColour, VolumeFormat};
+use crate::scene::{Propagation, Scene, SurfaceColour, VolumeFormat};
 use crate::source::StoredType;
 
 /// Batches of frames that may be in flight at once: entries of the staging ring. The frame array has layers for each.
@@ -565,13 +565,9 @@ impl Slot {
     }
 }
 
-/// The slot that stages 2 and 3 render into: the picture itself, unless several rays make a pixel, one ray makes several, edges
-/// are antialiased, or planes or the volume are shown next to the rendering.
+/// The slot that stages 2 and 3 render into: the picture itself, unless it is assembled from what they render.
 pub fn rendered(scene: &Scene) -> Slot {
-    let ray = &scene.settings.ray;
-    let is_picture =
-        ray.rays == 1 && ray.apart() == 1 && scene.settings.layout == Layout::Single && !scene.antialiases();
-    if is_picture || scene.is_flat() { Slot::Picture } else { Slot::Rendered }
+    if scene.assembles() { Slot::Rendered } else { Slot::Picture }
 }
 
 /// The slot of whole rays that are composited for a picture or a colour of a surface: the volume layer, unless that holds what lies

@@ -432,10 +432,31 @@ impl Scene {
         ray.adaptive && ray.rays > 1 && is_alone && self.still().is_none() && !self.has_caps()
     }
 
-    /// True if pixels at edges of a surface show what is near and what is far, by the share that each covers. Where several rays make a pixel they tell.
+    /// True if pixels at edges of a surface, or of a cut face, show what is near and what is far, by the share that each covers. Where several rays make a
+    /// pixel they tell.
     pub fn antialiases(&self) -> bool {
         let ray = &self.settings.ray;
-        self.settings.post.antialias && self.detects_surface() && ray.rays == 1 && ray.apart() == 1
+        self.settings.post.antialias && (self.has_distance() || self.has_caps()) && ray.rays == 1 && ray.apart() == 1
+    }
+
+    /// True if stage 2 and 3 render beside the picture: several rays make a pixel, one ray makes several, edges are antialiased, or planes or the volume
+    /// are shown next to the rendering.
+    pub fn assembles(&self) -> bool {
+        let ray = &self.settings.ray;
+        let is_beside = ray.rays > 1 || ray.apart() > 1 || self.settings.layout != Layout::Single || self.antialiases();
+        is_beside && !self.is_flat()
+    }
+
+    /// True if a picture is converted to 8 bits when it is assembled, since no other pass of stage 4 reads it.
+    pub fn tones_assembled(&self) -> bool {
+        self.assembles() && self.only_tones()
+    }
+
+    /// True if nothing is done to a picture but toning.
+    fn only_tones(&self) -> bool {
+        let post = &self.settings.post;
+        let filtered = post.sigma.is_some() || post.enhanced_sigma.is_some() || post.perona_malik.is_some();
+        !filtered && !post.floats
     }
 
     /// Entries of the table of the transfer function; its points were checked.

@@ -159,9 +159,7 @@ impl Scene {
 
     /// True if planes are converted to 8 bits when they are cut, since no other pass of stage 4 reads them.
     pub fn tones_planes(&self) -> bool {
-        let post = &self.settings.post;
-        let filtered = post.sigma.is_some() || post.enhanced_sigma.is_some() || post.perona_malik.is_some();
-        self.is_flat() && !filtered && !post.floats
+        self.is_flat() && self.only_tones()
     }
 
     /// Number of samples through the slab, at most one slice pixel apart, both faces included.

@@ -196,7 +196,7 @@ fn no_light_changes_a_cut_face() {
     let clip = "clip = [{ at = [-3, 0, 0], normal = [-1, 0, 0] }]\ncamera.azimuth = 50\npicture.size = [56, 56]";
     // Antialiased, the face's border is mixed with what is beside it.
     let surface = "mode = 'sr'\nsurface.threshold = 0.1\npost.antialias = false";
-    let volume = format!("mode = 'vr'\n{SOLID}\nvolume.threshold = 0.15\ncap.level = 0.15");
+    let volume = format!("mode = 'vr'\n{SOLID}\nvolume.threshold = 0.15\ncap.level = 0.15\npost.antialias = false");
     for (mode, lights) in [
         (
             surface,
@@ -244,7 +244,8 @@ fn no_light_changes_a_cut_face() {
 #[test]
 fn a_face_that_fades_covers_nothing_else() {
     let device = Device::new();
-    let view = "picture.size = [64, 60]\nregion.fade = 6\ncamera = { azimuth = 35, elevation = 12 }\n\
+    // Antialiased, the face's border is mixed with what is beside it.
+    let view = "picture.size = [64, 60]\npost.antialias = false\nregion.fade = 6\ncamera = { azimuth = 35, elevation = 12 }\n\
                 clip = [{ at = [0, 8, 0], normal = [0.2, -1, 0] }]\nplanes.window = [0, 1]";
     for mode in ["shading = 'none'", "shading = 'first-hit'", "shading = 'none'\nlight.volume = { cell = 4 }"] {
         let made =
@@ -324,16 +325,16 @@ fn the_switch_runs_the_rays_again_and_nothing_before_them() {
         renderer.picture().expect("picture");
         names
     };
-    assert_eq!(after(|s| s.settings.cap.enabled = false), ["raycast_surface", "light", "assemble", "tone"]);
+    assert_eq!(after(|s| s.settings.cap.enabled = false), ["raycast_surface", "light", "assemble_toned"]);
     assert_eq!(
         after(|s| s.settings.cap.level = Some(0.5)),
-        ["raycast_cap", "raycast_surface", "light", "assemble", "tone"]
+        ["raycast_cap", "raycast_surface", "light", "assemble_toned"]
     );
     assert_eq!(
         after(|s| s.settings.planes.window = [0.2, 0.8]),
-        ["raycast_cap", "raycast_surface", "light", "assemble", "tone"]
+        ["raycast_cap", "raycast_surface", "light", "assemble_toned"]
     );
-    assert_eq!(after(|s| s.settings.light.ambient = 0.5), ["light", "assemble", "tone"]);
+    assert_eq!(after(|s| s.settings.light.ambient = 0.5), ["light", "assemble_toned"]);
 }
 
 /// What a cut removes is removed from the face too, and planes keep it. The faces of the region's box, and those of a cut, have no caps.

@@ -21,7 +21,8 @@ fn tissue(scene: &Scene) -> Vec<Texels> {
 }
 
 /// Draws a scene in volume mode and compares it with the f64 reference. Returns the share of lit pixels.
-fn drawn_as_the_reference(device: &Device, name: &str, scene: Scene) -> f64 {
+fn drawn_as_the_reference(device: &Device, name: &str, mut scene: Scene) -> f64 {
+    scene.settings.post.floats = true;
     let frames = tissue(&scene);
     let mut renderer = rendered(device, scene.clone(), &frames);
     renderer.picture().expect("picture");
@@ -41,7 +42,8 @@ fn quantised(scene: &Scene, frames: &[Texels]) -> Vec<Texels> {
 }
 
 /// The surface mode of the same: finite distances within the box, or misses.
-fn surface_is_finite(device: &Device, name: &str, scene: Scene) {
+fn surface_is_finite(device: &Device, name: &str, mut scene: Scene) {
+    scene.settings.post.floats = true;
     let frames = tissue(&scene);
     let mut renderer = rendered(device, scene.clone(), &frames);
     renderer.picture().expect("picture");

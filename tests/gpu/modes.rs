@@ -30,28 +30,28 @@ const MODES: &[(&str, &str, &str)] = &[
     ),
     (
         "mode = 'vr'\nvolume = { shading = 'first-hit' }",
-        "scan_convert tile_ranges brick_ranges classify_bricks_volume brick_distance_volume brick_distance_volume brick_distance_volume raycast_volume light tone",
-        "frames scan_lut volume tile_ranges brick_table brick_ranges brick_kinds brick_distances_x brick_distances_xy volume_brick_distances opaque_before transfer distance_map volume_layer picture screen",
+        "scan_convert tile_ranges brick_ranges classify_bricks_volume brick_distance_volume brick_distance_volume brick_distance_volume raycast_volume light assemble_toned",
+        "frames scan_lut volume tile_ranges brick_table brick_ranges brick_kinds brick_distances_x brick_distances_xy volume_brick_distances opaque_before transfer distance_map volume_layer rendered screen",
     ),
     (
         "mode = 'sr'",
-        "scan_convert tile_ranges brick_ranges classify_bricks_surface brick_distance_surface brick_distance_surface brick_distance_surface raycast_surface light assemble tone",
-        "frames scan_lut volume tile_ranges brick_table brick_ranges brick_kinds brick_distances_x brick_distances_xy surface_brick_distances distance_map rendered picture screen",
+        "scan_convert tile_ranges brick_ranges classify_bricks_surface brick_distance_surface brick_distance_surface brick_distance_surface raycast_surface light assemble_toned",
+        "frames scan_lut volume tile_ranges brick_table brick_ranges brick_kinds brick_distances_x brick_distances_xy surface_brick_distances distance_map rendered screen",
     ),
     (
         "mode = 'sr'\nsurface = { colour = 'rendered' }",
-        "scan_convert tile_ranges brick_ranges classify_bricks_surface brick_distance_surface brick_distance_surface brick_distance_surface raycast_surface classify_bricks_volume brick_distance_volume brick_distance_volume brick_distance_volume raycast_volume light assemble tone",
-        "frames scan_lut volume tile_ranges brick_table brick_ranges brick_kinds brick_distances_x brick_distances_xy surface_brick_distances volume_brick_distances opaque_before transfer distance_map volume_layer rendered picture screen",
+        "scan_convert tile_ranges brick_ranges classify_bricks_surface brick_distance_surface brick_distance_surface brick_distance_surface raycast_surface classify_bricks_volume brick_distance_volume brick_distance_volume brick_distance_volume raycast_volume light assemble_toned",
+        "frames scan_lut volume tile_ranges brick_table brick_ranges brick_kinds brick_distances_x brick_distances_xy surface_brick_distances volume_brick_distances opaque_before transfer distance_map volume_layer rendered screen",
     ),
     (
         "mode = 'sr'\nsurface = { colour = 'rendered' }\nray = { sliding = 3 }",
-        "scan_convert tile_ranges brick_ranges classify_bricks_surface brick_distance_surface brick_distance_surface brick_distance_surface classify_bricks_volume brick_distance_volume brick_distance_volume brick_distance_volume raycast_surface_and_volume light assemble tone",
-        "frames scan_lut volume tile_ranges brick_table brick_ranges brick_kinds brick_distances_x brick_distances_xy surface_brick_distances volume_brick_distances opaque_before transfer distance_map volume_layer rendered picture screen",
+        "scan_convert tile_ranges brick_ranges classify_bricks_surface brick_distance_surface brick_distance_surface brick_distance_surface classify_bricks_volume brick_distance_volume brick_distance_volume brick_distance_volume raycast_surface_and_volume light assemble_toned",
+        "frames scan_lut volume tile_ranges brick_table brick_ranges brick_kinds brick_distances_x brick_distances_xy surface_brick_distances volume_brick_distances opaque_before transfer distance_map volume_layer rendered screen",
     ),
     (
         "mode = 'mixed'",
-        "scan_convert tile_ranges brick_ranges classify_bricks_surface brick_distance_surface brick_distance_surface brick_distance_surface raycast_surface classify_bricks_volume brick_distance_volume brick_distance_volume brick_distance_volume raycast_volume light assemble tone",
-        "frames scan_lut volume tile_ranges brick_table brick_ranges brick_kinds brick_distances_x brick_distances_xy surface_brick_distances volume_brick_distances opaque_before transfer distance_map volume_layer rendered picture screen",
+        "scan_convert tile_ranges brick_ranges classify_bricks_surface brick_distance_surface brick_distance_surface brick_distance_surface raycast_surface classify_bricks_volume brick_distance_volume brick_distance_volume brick_distance_volume raycast_volume light assemble_toned",
+        "frames scan_lut volume tile_ranges brick_table brick_ranges brick_kinds brick_distances_x brick_distances_xy surface_brick_distances volume_brick_distances opaque_before transfer distance_map volume_layer rendered screen",
     ),
     (
         "mode = 'mip'",
@@ -70,8 +70,8 @@ const MODES: &[(&str, &str, &str)] = &[
     ),
     (
         "mode = 'mip'\nray = { rays = 2 }",
-        "scan_convert tile_ranges brick_ranges raycast_projection assemble tone",
-        "frames scan_lut volume tile_ranges brick_table brick_ranges rendered picture screen",
+        "scan_convert tile_ranges brick_ranges raycast_projection assemble_toned",
+        "frames scan_lut volume tile_ranges brick_table brick_ranges rendered screen",
     ),
     ("mode = 'plane'", "scan_convert raycast_planes_toned", "frames scan_lut volume tiles screen"),
     (
@@ -87,18 +87,18 @@ const MODES: &[(&str, &str, &str)] = &[
     ("mode = 'cube'", "scan_convert raycast_cube tone", "frames scan_lut volume block picture screen"),
     (
         "mode = 'sr'\nlayout = '4up'",
-        "scan_convert tile_ranges brick_ranges classify_bricks_surface brick_distance_surface brick_distance_surface brick_distance_surface raycast_surface raycast_planes light assemble tone",
-        "frames scan_lut volume tile_ranges brick_table brick_ranges brick_kinds brick_distances_x brick_distances_xy surface_brick_distances tiles distance_map rendered planes picture screen",
+        "scan_convert tile_ranges brick_ranges classify_bricks_surface brick_distance_surface brick_distance_surface brick_distance_surface raycast_surface raycast_planes light assemble_toned",
+        "frames scan_lut volume tile_ranges brick_table brick_ranges brick_kinds brick_distances_x brick_distances_xy surface_brick_distances tiles distance_map rendered planes screen",
     ),
     (
         "mode = 'sr'\nlayout = 'pair'",
-        "scan_convert tile_ranges brick_ranges classify_bricks_surface brick_distance_surface brick_distance_surface brick_distance_surface classify_bricks_volume brick_distance_volume brick_distance_volume brick_distance_volume raycast_surface_and_volume light assemble tone",
-        "frames scan_lut volume tile_ranges brick_table brick_ranges brick_kinds brick_distances_x brick_distances_xy surface_brick_distances volume_brick_distances opaque_before transfer distance_map volume_layer rendered picture screen",
+        "scan_convert tile_ranges brick_ranges classify_bricks_surface brick_distance_surface brick_distance_surface brick_distance_surface classify_bricks_volume brick_distance_volume brick_distance_volume brick_distance_volume raycast_surface_and_volume light assemble_toned",
+        "frames scan_lut volume tile_ranges brick_table brick_ranges brick_kinds brick_distances_x brick_distances_xy surface_brick_distances volume_brick_distances opaque_before transfer distance_map volume_layer rendered screen",
     ),
     (
         "mode = 'sr'\nlayout = 'pair'\nsurface = { colour = 'behind' }",
-        "scan_convert tile_ranges brick_ranges classify_bricks_surface brick_distance_surface brick_distance_surface brick_distance_surface classify_bricks_volume brick_distance_volume brick_distance_volume brick_distance_volume raycast_surface_and_volume raycast_volume light assemble tone",
-        "frames scan_lut volume tile_ranges brick_table brick_ranges brick_kinds brick_distances_x brick_distances_xy surface_brick_distances volume_brick_distances opaque_before transfer distance_map volume_layer volume_beside_surface rendered picture screen",
+        "scan_convert tile_ranges brick_ranges classify_bricks_surface brick_distance_surface brick_distance_surface brick_distance_surface classify_bricks_volume brick_distance_volume brick_distance_volume brick_distance_volume raycast_surface_and_volume raycast_volume light assemble_toned",
+        "frames scan_lut volume tile_ranges brick_table brick_ranges brick_kinds brick_distances_x brick_distances_xy surface_brick_distances volume_brick_distances opaque_before transfer distance_map volume_layer volume_beside_surface rendered screen",
     ),
 ];
 

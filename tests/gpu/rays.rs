@@ -28,7 +28,7 @@ fn a_clip_plane_cuts_each_ray_where_it_meets_it() {
     let device = Device::new();
     let (at, normal) = (DVec3::new(5.0, 6.0, 5.0), DVec3::new(0.9, -1.0, 0.3));
     let toml = format!(
-        "mode = 'vr'\npicture = {{ size = [16, 16] }}\nray = {{ step = 0.7, early_end = 0.0 }}\nvolume = {{ {} }}\n\
+        "mode = 'vr'\npicture = {{ size = [16, 16] }}\npost.floats = true\nray = {{ step = 0.7, early_end = 0.0 }}\nvolume = {{ {} }}\n\
          clip = [{{ at = {:?}, normal = {:?} }}]",
         even(0.05),
         at.to_array(),
@@ -195,7 +195,7 @@ fn a_hit_is_where_opacity_reaches_the_threshold_and_the_volume_layer_ends_there(
 fn several_rays_a_pixel_show_how_much_of_it_is_covered() {
     let device = Device::new();
     let toml = format!(
-        "mode = 'vr'\npicture = {{ size = [21, 21] }}\nray = {{ rays = 4 }}\ncamera = {{ zoom = 0.7 }}\nvolume = {{ {} }}",
+        "mode = 'vr'\npicture = {{ size = [21, 21] }}\npost.floats = true\nray = {{ rays = 4 }}\ncamera = {{ zoom = 0.7 }}\nvolume = {{ {} }}",
         even(1.0)
     );
     let scene = scene(block(20), BYTES, &toml);

@@ -137,11 +137,11 @@ fn a_scene_has_the_passes_and_slots_it_needs_and_no_others() {
     let (passes, slots) = names("mode = 'sr'\ndistance = { bilateral = { pixels = 1.0, distance = 1.0, repeat = 3 } }");
     assert_eq!(
         passes,
-        "scan_convert tile_ranges brick_ranges classify_bricks_surface brick_distance_surface brick_distance_surface brick_distance_surface raycast_surface bilateral_distance bilateral_distance bilateral_distance light assemble tone"
+        "scan_convert tile_ranges brick_ranges classify_bricks_surface brick_distance_surface brick_distance_surface brick_distance_surface raycast_surface bilateral_distance bilateral_distance bilateral_distance light assemble_toned"
     );
     assert_eq!(
         slots,
-        "frames scan_lut volume tile_ranges brick_table brick_ranges brick_kinds brick_distances_x brick_distances_xy surface_brick_distances distance_map distance_a distance_b rendered picture screen"
+        "frames scan_lut volume tile_ranges brick_table brick_ranges brick_kinds brick_distances_x brick_distances_xy surface_brick_distances distance_map distance_a distance_b rendered screen"
     );
     // Texture and translucent skin take the echo at the surface, and nothing else does.
     for (light, is_read) in [

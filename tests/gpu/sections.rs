@@ -129,6 +129,6 @@ fn a_camera_leaves_the_planes_and_a_plane_the_rendering() {
     };
     let drawn = passes(LIGHT, "camera.azimuth = 30");
     assert!(drawn.contains("raycast_volume") && !drawn.contains("planes"), "{drawn}");
-    assert_eq!(passes(LIGHT, "planes.roll = 20"), "raycast_planes assemble tone");
+    assert_eq!(passes(LIGHT, "planes.roll = 20"), "raycast_planes assemble_toned");
     assert_eq!(passes("{ lateral = 1.5, depth = 0.5, elevation = 0.7 }", ""), "Frames");
 }

@@ -191,7 +191,7 @@ fn coarse_pictures_come_nearer_to_the_full_one_than_by_linear_interpolation() {
     let stage = Stage::new();
     let mut one = None;
     for (preset, mode) in [("face-classic", "sr"), ("face-classic", "mixed"), ("face", "vr"), ("face-classic", "mip")] {
-        let full = stage.scene((preset, mode, [370, 362]), "camera.azimuth=20;camera.elevation=-15");
+        let full = stage.scene((preset, mode, [370, 362]), "camera.azimuth=20;camera.elevation=-15;post.floats=true");
         let renderer = one.get_or_insert_with(|| stage.renderer(full.clone()));
         draw(renderer, &full);
         let whole = renderer.read(Slot::Picture).expect("read").expect("there");

@@ -301,8 +301,8 @@ pub struct Post {
     pub enhanced_sigma: Option<EnhancedSigma>,
     /// Perona-Malik diffusion.
     pub perona_malik: Option<PeronaMalik>,
-    /// Antialiasing of a surface that has one ray a pixel: pixels at outlines and folds mix what is near and what is far by the share that each covers, by a
-    /// line through the edge's places in the distance map around them. Folds are steps of `light.cliff`.
+    /// Antialiasing of surfaces, and of cut faces, that have one ray a pixel: pixels at outlines and folds mix what is near and what is far by the share that
+    /// each covers, by the edge's places in the distance map around them. Folds are steps of `light.cliff`.
     pub antialias: bool,
     /// Added to the brightness, -1..1.
     pub brightness: f64,

@@ -5,7 +5,7 @@ use echolume::gpu::shader_reload::ShaderFolder;
 use echolume::shader_tools::Compiler;
 use std::path::Path;
 
-const TONE: &str = "postprocess/tone.comp";
+const TONE: &str = "postprocess/assemble.comp";
 const TONE_INCLUDE: &str = "include/tone.glsl";
 const SLICES: &str = "include/slice_target.glsl";
 
@@ -82,7 +82,7 @@ fn an_edited_shader_is_drawn_with_and_a_broken_one_leaves_the_last_good_picture(
     glsl.edit(TONE_INCLUDE, "vec3 toned", "vec3 nonsense;\nvec3 toned() { return unknown; }\nvec3 toned");
     until(&mut desk, "the fault is not reported", |desk| desk.console.shader_fault().is_some());
     let fault = desk.console.shader_fault().expect("a fault").to_string();
-    assert!(fault.contains("postprocess/tone") && fault.contains("include/tone.glsl:"), "{fault}");
+    assert!(fault.contains("postprocess/assemble") && fault.contains("include/tone.glsl:"), "{fault}");
     assert!(fault.contains("unknown"), "{fault}");
     desk.rest();
     assert!(desk.picture() == negated, "the last good picture is gone");
@@ -97,7 +97,7 @@ fn an_edited_shader_is_drawn_with_and_a_broken_one_leaves_the_last_good_picture(
     glsl.restore(TONE_INCLUDE);
     glsl.edit(TONE, "screen", "elsewhere");
     until(&mut desk, "the misfit is not reported", |desk| {
-        desk.console.shader_fault().is_some_and(|fault| fault.contains("tone: the pass writes 'screen'"))
+        desk.console.shader_fault().is_some_and(|fault| fault.contains("assemble_toned: the pass writes 'screen'"))
     });
 
     // A shader of the frames: they are sent again.

@@ -210,7 +210,13 @@ fn the_first_pipelines_compile_beside_the_steps_and_the_first_picture_has_few_ra
     assert_eq!(waited_for(&device), 0, "pipelines were made while everything waited");
     let quarter = of(&plain, &format!("{now}\nray.quarter = true"), 0);
     assert!(first.is_coarse && first.picture.expect("brought back") == quarter);
-    let last = bench.settle().pop().expect("the same in full");
+    // What only the full picture needs is compiled beside the first one and after it.
+    let last = loop {
+        assert!(begun.elapsed() < BOUND, "the same in full");
+        if let Some(picture) = bench.settle().pop() {
+            break picture;
+        }
+    };
     assert!(!last.is_coarse && last.picture.expect("brought back") == of(&plain, now, 0));
     // Later ones are drawn in full at once.
     assert!(bench.live(1) == of(&plain, now, 1));

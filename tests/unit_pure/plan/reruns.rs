@@ -51,10 +51,10 @@ fn a_change_of_nothing_runs_nothing() {
 
 #[test]
 fn only_readers_of_a_changed_slot_run_again() {
-    let lit = "light assemble tone";
+    let lit = "light assemble_toned";
     assert_eq!(passes(&with(""), &with("light = { direction = [1.0, 0.0, 0.5] }")), lit);
-    assert_eq!(passes(&with(""), &with("post = { gamma = 2.0 }")), "tone");
-    let filtered = "median_distance bilateral_distance light assemble tone";
+    assert_eq!(passes(&with(""), &with("post = { gamma = 2.0 }")), "assemble_toned");
+    let filtered = "median_distance bilateral_distance light assemble_toned";
     assert_eq!(passes(&with(""), &with("camera = { azimuth = 10 }")), format!("raycast_surface {filtered}"));
     assert_eq!(
         passes(&with(""), &with("surface = { threshold = 0.3 }")),
@@ -63,7 +63,7 @@ fn only_readers_of_a_changed_slot_run_again() {
     // Another median window is a constant of its pipeline; shadow is one more pass, whose slot the light reads.
     let wider = scene(fan(Advance::None), &SURFACE.replace("median = 3", "median = 5"));
     assert_eq!(passes(&with(""), &wider), filtered);
-    assert_eq!(passes(&with(""), &with("light = { shadow = {} }")), "shadow light assemble tone");
+    assert_eq!(passes(&with(""), &with("light = { shadow = {} }")), "shadow light assemble_toned");
     assert_eq!(passes(&with("light = { shadow = {} }"), &with("")), lit);
     // One repetition less: the remaining ones have run already, but the light reads the other of the two slots.
     let shorter = scene(fan(Advance::None), &SURFACE.replace("repeat = 3", "repeat = 2"));
@@ -71,7 +71,7 @@ fn only_readers_of_a_changed_slot_run_again() {
     let Rerun::Steps { steps, .. } = rerun(&shorter, &with("")) else { panic!("the volume stays") };
     let plan = Plan::new(&with(""));
     let ids: Vec<_> = steps.iter().map(|i| plan.steps[*i].id()).collect();
-    assert_eq!(ids, [("bilateral_distance", 2), ("light", 0), ("assemble", 0), ("tone", 0)]);
+    assert_eq!(ids, [("bilateral_distance", 2), ("light", 0), ("assemble_toned", 0)]);
 }
 
 #[test]
@@ -112,7 +112,7 @@ fn slots_of_another_shape_format_or_meaning_are_created_again() {
 fn smaller_visible_bounds_keep_the_volume_and_larger_ones_need_frames() {
     let (all, less) = (with(""), with("region = { depth = [10, 20] }"));
     assert!(all.visible_bounds.holds(&less.visible_bounds) && all.visible_bounds != less.visible_bounds);
-    let marched = "raycast_surface median_distance bilateral_distance light assemble tone";
+    let marched = "raycast_surface median_distance bilateral_distance light assemble_toned";
     let bricks = "brick_ranges classify_bricks_surface brick_distance_surface";
     assert_eq!(passes(&all, &less), format!("{bricks} {marched}"), "its bricks are fewer");
     let whole = SURFACE.replace("median = true", "median = true, everything = true");
@@ -190,7 +190,7 @@ fn a_filter_with_an_overwritten_input_reruns_the_filters_before_it() {
         contents.extend(step.writes(&scene).into_iter().map(|slot| (slot, step.id())));
     }
     let bilateral = |n| ("bilateral_distance", n);
-    let tail = [("light", 0), ("tone", 0)];
+    let tail = [("light", 0), ("assemble_toned", 0)];
     assert_eq!(stale_after(&tail, &contents), tail, "what they read is there");
     assert_eq!(stale_after(&[], &contents), []);
     // The third has overwritten the input of the second, so the first runs; the second has overwritten its input.
@@ -218,8 +218,8 @@ fn another_shader_runs_its_passes_and_what_reads_their_results() {
         other => format!("{other:?}"),
     };
     assert_eq!(again("raycast/volume"), "", "it is not used");
-    assert_eq!(again("postprocess/tone"), "tone");
-    assert_eq!(again("shade/light"), "light assemble tone");
-    assert_eq!(again("raycast/surface"), "raycast_surface median_distance bilateral_distance light assemble tone");
+    assert_eq!(again("postprocess/assemble"), "assemble_toned");
+    assert_eq!(again("shade/light"), "light assemble_toned");
+    assert_eq!(again("raycast/surface"), "raycast_surface median_distance bilateral_distance light assemble_toned");
     assert_eq!(again("preprocess/scan_convert"), "Frames");
 }
