@@ -44,9 +44,10 @@ pub struct ContextOptions {
     /// Pipelines can be asked for the driver's statistics of their compilation, if the device has
     /// VK_KHR_pipeline_executable_properties.
     pub compile_statistics: bool,
-    /// Gives the driver modules without specialization constants: their values are written into the module. Validation layers
-    /// then validate each module once instead of each pipeline, which takes half of the time of a test that draws small pictures.
-    pub specialize: bool,
+    /// Gives the driver modules without specialization constants and without the branches that their values never take. Validation layers
+    /// then validate each module once instead of each pipeline. `None`: on a software device. lavapipe looks at every instruction
+    /// of each pipeline, and a first picture takes less than half of the time; the compilers of some GPUs take more registers.
+    pub specialize: Option<bool>,
     /// Most pipelines kept that no plan uses, at least 1. Going back to what was forgotten compiles it again.
     pub max_unused_pipelines: usize,
 }
@@ -61,7 +62,7 @@ impl Default for ContextOptions {
             stop: None,
             pipeline_cache: None,
             compile_statistics: false,
-            specialize: false,
+            specialize: None,
             max_unused_pipelines: MAX_UNUSED_PIPELINES,
         }
     }
@@ -248,7 +249,7 @@ impl Context {
             executables: has_statistics
                 .then(|| ash::khr::pipeline_executable_properties::Device::new(instance, &device)),
             shared: Mutex::default(),
-            specializes: options.specialize,
+            specializes: options.specialize.unwrap_or(candidate.is_software()),
             max_unused_pipelines: options.max_unused_pipelines,
             pipeline_cache: PipelineCache::open(&device, &candidate.driver_identity, options.pipeline_cache.as_deref()),
             loss: LossReporting {

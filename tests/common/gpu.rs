@@ -44,9 +44,8 @@ impl Device {
         if let Some((context, runner)) = idle {
             return Device { context, provoked: false, runner: Some(runner) };
         }
-        // The driver specializes the shaders of the program, as the other tests run it. A pipeline takes 5 MiB on lavapipe with
-        // validation: those of all tests took 10 GiB.
-        let shared = ContextOptions { specialize: true, max_unused_pipelines: 64, ..ContextOptions::default() };
+        // A pipeline takes 5 MiB on lavapipe with validation: those of all tests took 10 GiB.
+        let shared = ContextOptions { specialize: Some(true), max_unused_pipelines: 64, ..ContextOptions::default() };
         let mut device = Device::watched_with(shared);
         device.runner = Some(PassRunner::new(&device).expect("a runner of passes"));
         device
@@ -59,7 +58,11 @@ impl Device {
 
     /// `validation` false switches the layers off: they keep some memory for every object ever created.
     pub fn watched(validation: bool) -> Device {
-        Device::opened(ContextOptions { validation, specialize: validation, ..ContextOptions::default() })
+        Device::opened(ContextOptions {
+            validation,
+            specialize: validation.then_some(true),
+            ..ContextOptions::default()
+        })
     }
 
     /// One of its own with options of its own, and validation.

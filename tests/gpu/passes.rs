@@ -18,7 +18,8 @@ use std::collections::HashSet;
 fn every_pass_matches_its_reference() {
     let device = Device::new();
     println!("device: {}", device.describe());
-    let options = ContextOptions { device: chosen(), validation: true, specialize: true, ..ContextOptions::default() };
+    let options =
+        ContextOptions { device: chosen(), validation: true, specialize: Some(true), ..ContextOptions::default() };
     let mut bench = DeviceUnderTest::new(&options, Level::Full).expect("bench");
     let checks = verify::passes::checks(Level::Full);
     assert_eq!(checks.len(), PASSES.len());

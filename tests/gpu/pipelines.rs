@@ -144,7 +144,7 @@ fn forgotten_pipelines_are_compiled_again_and_draw_the_same() {
 #[test]
 fn modules_specialized_here_draw_what_those_of_the_driver_draw() {
     let drawn = |specialize: bool| {
-        let device = Device::watched_with(ContextOptions { specialize, ..ContextOptions::default() });
+        let device = Device::watched_with(ContextOptions { specialize: Some(specialize), ..ContextOptions::default() });
         MODES.map(|mode| {
             let frames = body_frames(&in_mode(mode), |p| 0.5 + 0.4 * (0.3 * p.y).sin());
             rendered(&device, in_mode(mode), &frames).picture().expect("a picture").rgba

@@ -7,7 +7,7 @@ use echolume::verify::report::Verdict;
 use echolume::verify::self_test::{self, Detection};
 
 fn options() -> ContextOptions {
-    ContextOptions { device: chosen(), specialize: true, ..ContextOptions::default() }
+    ContextOptions { device: chosen(), specialize: Some(true), ..ContextOptions::default() }
 }
 
 /// For output with `--nocapture`: which check caught which fault.

@@ -117,7 +117,8 @@ fn same(a: &Mesh, b: &Mesh, far: f64, name: &str) {
 fn every_pass_of_a_mesh_matches_its_reference() {
     let device = Device::new();
     println!("device: {}", device.describe());
-    let options = ContextOptions { device: chosen(), validation: true, specialize: true, ..ContextOptions::default() };
+    let options =
+        ContextOptions { device: chosen(), validation: true, specialize: Some(true), ..ContextOptions::default() };
     let mut bench = DeviceUnderTest::new(&options, Level::Full).expect("bench");
     let checks = verify::surface_nets::checks(Level::Full);
     assert_eq!(checks.len(), NETS.len() + 1);

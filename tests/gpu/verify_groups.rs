@@ -18,7 +18,8 @@ fn bench() -> DeviceUnderTest {
 
 /// A bench with a fault in every context.
 fn prepared(wrong: Option<fn(&Context)>) -> DeviceUnderTest {
-    let options = ContextOptions { device: chosen(), validation: true, specialize: true, ..ContextOptions::default() };
+    let options =
+        ContextOptions { device: chosen(), validation: true, specialize: Some(true), ..ContextOptions::default() };
     DeviceUnderTest::prepared(&options, Level::Quick, wrong).expect("bench")
 }
 

@@ -253,7 +253,7 @@ impl Monkey {
 fn opened(validation: bool) -> Device {
     Device::opened(ContextOptions {
         validation,
-        specialize: validation,
+        specialize: validation.then_some(true),
         max_unused_pipelines: 8,
         ..ContextOptions::default()
     })
