@@ -52,6 +52,15 @@ bool second_look = false; // the rejected edge is being examined again
 bool lasts = true;
 bool after_speck = false; // just after a speck: the next edge may already be above the bar
 
+// What a setting fixes is a constant here: compilers do not see through a variable that the march carries, and it would take a register.
+int stride_now() { return ROUGH > 1 ? stride : 1; }
+bool looks_again() { return DETECTOR > 0 && second_look; }
+bool is_after_speck() { return DETECTOR == 2 && after_speck; }
+// The edge that crosses the bar is followed: otherwise the ray ends there.
+const bool FOLLOWS = PLACE > 0 || NUMBER > 1 || DETECTOR > 0;
+// The next surface is the one to report.
+bool is_wanted() { return NUMBER == 1 || surfaces_passed + 1 == NUMBER; }
+
 float variance_of(vec4 samples) {
     vec4 off = samples - dot(samples, QUARTER);
     return dot(off, off) / 3.0;
@@ -107,7 +116,7 @@ void restart(int i) {
 
 // Handles a sample i outside the insonified region. False: the ray is done.
 bool skip_sample(inout int i) {
-    bool searches = state < FOLLOW && !second_look;
+    bool searches = state < FOLLOW && !looks_again();
     if (searches) {
         i += ROUGH;
         restart(i);
@@ -147,7 +156,7 @@ float noise_bar_at(int i, float difference) {
         bool ready = filled >= RING;
         bool searches = ready && state == START;
         // A Cartesian volume repeats its border in front of the region: its constant value is no estimate of the noise.
-        if (searches && (SWEEP > 0 || i >= (RING - 1) * stride)) learn();
+        if (searches && (SWEEP > 0 || i >= (RING - 1) * stride_now())) learn();
         float height = START == SEARCH_ROUGH ? rough_threshold : threshold;
         // The bar is that of the noise only where the difference exceeds the other.
         if (difference > min(height, threshold)) {
@@ -174,7 +183,7 @@ bool is_event(float difference, float noise_bar) {
 // one way out: an early return becomes a loop of one iteration, for which some drivers keep the state twice.
 bool step_detector(float difference, float noise_bar, inout int i) {
     bool ready = filled >= RING, goes_on = true;
-    int next = i + stride;
+    int next = i + stride_now();
     if (ROUGH > 1 && state == SEARCH_ROUGH) {
         if (ready && difference > max(rough_threshold, noise_bar)) {
             limit = i + RING;
@@ -189,7 +198,7 @@ bool step_detector(float difference, float noise_bar, inout int i) {
     } else if (state == SEARCH_FINE) {
         float bar = max(threshold, noise_bar);
         // A crossing. An edge that was already above the bar before the region began is none.
-        if (ready && i >= HALF && difference > bar && (filled == RING || after_speck || previous <= bar)) {
+        if (ready && i >= HALF && difference > bar && (filled == RING || is_after_speck() || previous <= bar)) {
             state = FOLLOW;
             fired = i;
             best = difference;
@@ -201,8 +210,8 @@ bool step_detector(float difference, float noise_bar, inout int i) {
             lasts = true;
             confirmed = false;
             fallen_at = float(NEVER);
-            goes_on = PLACE > 0 || surfaces_passed + 1 < NUMBER || DETECTOR == 2 || second_look;
-        } else if (second_look && i >= limit) {
+            goes_on = PLACE > 0 || !is_wanted() || DETECTOR == 2 || looks_again();
+        } else if (looks_again() && i >= limit) {
             goes_on = false;
         } else if (ROUGH > 1 && i >= limit) {
             // A false alarm: refill the rough ring so that it next covers samples that the fine search has not covered.
@@ -214,7 +223,7 @@ bool step_detector(float difference, float noise_bar, inout int i) {
             fine_from = next;
         }
         after_speck = false;
-    } else {
+    } else if (FOLLOWS) {
         if (i == best_at + 1) {
             after = difference;
             found = true;
@@ -227,8 +236,8 @@ bool step_detector(float difference, float noise_bar, inout int i) {
         if (state == FOLLOW) {
             float level = FOLLOW_LEVEL * best;
             // In the second look a dip in front of the known peak is one of the noise.
-            bool falls = difference < level && (!second_look || i >= weak_at);
-            bool followed = falls || i >= (second_look ? max(fired + FOLLOW_LENGTH, weak_at + 2) : fired + FOLLOW_LENGTH);
+            bool falls = difference < level && (!looks_again() || i >= weak_at);
+            bool followed = falls || i >= (looks_again() ? max(fired + FOLLOW_LENGTH, weak_at + 2) : fired + FOLLOW_LENGTH);
             if (falls) fallen_at = float(i) - (level - difference) / max(previous - difference, level - difference);
             if (followed) {
                 state = FOLLOWED;
@@ -241,9 +250,10 @@ bool step_detector(float difference, float noise_bar, inout int i) {
                 if (PLACE > 0) found = false;
             }
         }
-        bool is_last = DETECTOR < 2 && !second_look && surfaces_passed + 1 == NUMBER;
-        if (state == FOLLOWED && (is_last || i >= fired + RING) && (DETECTOR < 2 || second_look || i >= best_at + HALF)) {
-            if (second_look) {
+        bool is_last = DETECTOR < 2 && !looks_again() && is_wanted();
+        if (state == FOLLOWED && (is_last || i >= fired + RING) && (DETECTOR < 2 || looks_again() || i >= best_at + HALF)) {
+            bool wanted = is_wanted();
+            if (looks_again()) {
                 found = found && confirmed;
                 ++surfaces_passed;
                 goes_on = false;
@@ -259,9 +269,11 @@ bool step_detector(float difference, float noise_bar, inout int i) {
                 limit = ROUGH > 1 ? i + RING * ROUGH : NEVER;
                 found = false;
                 after_speck = true;
-            } else if (++surfaces_passed == NUMBER) {
+            } else if (wanted) {
+                ++surfaces_passed;
                 goes_on = false;
             } else {
+                ++surfaces_passed;
                 // Search for the next surface from here.
                 restart(i);
                 found = false;
@@ -277,7 +289,7 @@ bool step_detector(float difference, float noise_bar, inout int i) {
 
 // At the end of the ray: true if the largest rejected edge is to be examined again, from i.
 bool look_again(inout int i) {
-    bool again = DETECTOR > 0 && !second_look && weak != 0.0 && surfaces_passed + 1 == NUMBER && !(state >= FOLLOW && found);
+    bool again = DETECTOR > 0 && !second_look && weak != 0.0 && is_wanted() && !(state >= FOLLOW && found);
     if (again) {
         second_look = true;
         found = false;

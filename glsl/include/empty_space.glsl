@@ -23,7 +23,7 @@ struct RaySegment {
 struct BrickPlace {
     float along; // distance from the ray's entry, mm
     vec3 q;      // in bricks
-    ivec3 cell;
+    vec3 cell;
     ivec3 clamped; // the nearest brick
     bool within;
 };
@@ -33,10 +33,10 @@ BrickPlace brick_place(Ray ray, int i, float at) {
     BrickPlace b;
     b.along = offset_of(ray, float(i) + at);
     b.q = (ray.origin + ray.direction * (ray.enter + b.along) - brick_low) * brick_density;
-    ivec3 size = textureSize(bricks, 0);
-    b.cell = ivec3(floor(b.q));
-    b.within = all(greaterThanEqual(b.cell, ivec3(0))) && all(lessThan(b.cell, size));
-    b.clamped = clamp(b.cell, ivec3(0), size - 1);
+    b.cell = floor(b.q);
+    vec3 nearest = clamp(b.cell, vec3(0.0), last_brick);
+    b.within = b.cell == nearest;
+    b.clamped = ivec3(nearest);
     return b;
 }
 
@@ -46,9 +46,10 @@ RaySegment segment_of(Ray ray, int i, float at, BrickPlace b, vec2 texel) {
     // All bricks nearer than this are of one kind.
     int apart = SKIP == 1 ? max(code & 63, 1) : 1;
     vec3 each = ray.direction * brick_density;
-    vec3 d = mix(each, vec3(1e-12), lessThan(abs(each), vec3(1e-12)));
-    vec3 ahead = vec3(b.cell) + mix(vec3(1 - apart), vec3(apart), greaterThan(d, vec3(0.0)));
-    vec3 steps_ahead = (ahead - b.q) / d;
+    // All that is kept from look-up to look-up: the sign of the quotient is that of the direction.
+    vec3 inverse = 1.0 / mix(each, vec3(1e-12), lessThan(abs(each), vec3(1e-12)));
+    vec3 ahead = b.cell + mix(vec3(1 - apart), vec3(apart), greaterThan(inverse, vec3(0.0)));
+    vec3 steps_ahead = (ahead - b.q) * inverse;
     float steps = steps_to(ray, b.along + min(steps_ahead.x, min(steps_ahead.y, steps_ahead.z))) - at - 1e-3;
     RaySegment s;
     s.kind = b.within && SKIP == 1 ? code >> 6 : ACTIVE;

@@ -11,6 +11,7 @@ layout(constant_id = 21) const int SPREAD = 0;  // 1: steps grow with the range,
 layout(constant_id = 36) const int INTRA_FRAME_MOTION = 0; // 1: the motor moves while a frame is acquired
 layout(constant_id = 37) const int NON_UNIFORM = 0; // 1: slices at non-uniform positions or of mixed directions
 layout(constant_id = 38) const int SWEEP_TERMS = 0; // of the polynomial from a sweep position to a slice; 0: the look-up table
+layout(constant_id = 44) const int MIRRORED = 0; // the sector is its own mirror image: 1 in the lines, 2 in the sweep, 3 in both
 layout(constant_id = 22) const int SLIDING = 0; // 3 or 5: edge of the Gaussian that slides along the ray
 
 #include "stored_volume.glsl"
@@ -21,9 +22,10 @@ readonly buffer LineLut { float entry[]; } line_lut;        // of INTRA_FRAME_MO
 readonly buffer SliceTable { vec2 entry[]; } slice_table;   // of NON_UNIFORM: position and advance, in mean pitches
 
 const bool SWEPT = SWEEP == 1 || SWEEP == 2; // fan or translated
+const bool LINES_MIRRORED = MIRRORED == 1 || MIRRORED == 3, SWEEP_MIRRORED = MIRRORED == 2 || MIRRORED == 3;
 
-// Queried once, because every sample needs it.
-ivec3 last_stored = first_stored + textureSize(volume, 0) - 1;
+// Not from the texture's size: what is queried is kept for every invocation, a parameter once for all.
+ivec3 last_stored = ivec3(last_stored_column, last_stored_row, last_stored_slice);
 
 struct Ray {
     vec3 origin;
@@ -166,8 +168,8 @@ float slice_at(float position, float line, out float e) {
     float k;
     if (SWEEP_TERMS > 0) {
         e = position;
-        // Odd in the position. What is beyond the limits is outside, and the polynomial is not meant for it.
-        float t = clamp(position, sweep_low, sweep_high), square = t * t, sum = 0.0;
+        // Odd in the position.
+        float t = position, square = t * t, sum = 0.0;
         if (SWEEP_TERMS > 9) sum = fma(sum, square, sweep_terms_2.y);
         if (SWEEP_TERMS > 8) sum = fma(sum, square, sweep_terms_2.x);
         if (SWEEP_TERMS > 7) sum = fma(sum, square, sweep_terms_1.w);
@@ -214,7 +216,8 @@ void in_frame(vec3 p, out float y, out float position) {
         float beyond = p.y - axis_depth;
         float rho = sqrt(beyond * beyond + p.z * p.z);
         y = rho + axis_depth;
-        position = p.z / max(rho + beyond, 1e-20);
+        // Opposite the sweep it is large, and with a polynomial its square is to be finite.
+        position = p.z / max(rho + beyond, SWEEP_TERMS > 0 ? 1e-12 : 1e-20);
     }
 }
 
@@ -233,7 +236,9 @@ bool locate(vec3 p, out vec3 texel, out vec4 place) {
         line = line_at(x, y, range);
     }
     float e = 0.0, k = 0.0;
-    if (SWEPT) k = slice_at(position, line, e);
+    // What is beyond the limits is outside, and the polynomial is not meant for it.
+    if (SWEPT) k = slice_at(SWEEP_TERMS > 0 ? clamp(position, sweep_low, sweep_high) : position, line, e);
+    if (SWEEP_TERMS > 0) e = position;
     texel = vec3((vec2(x, y) - grid_origin) * grid_density, k);
     place = vec4(range, line, e, k);
     Sector limits = sector();
@@ -248,13 +253,19 @@ bool locate(vec3 p, out vec3 texel) {
     float y, position, e;
     in_frame(p, y, position);
     vec2 at = vec2(p.x, y);
-    float k = slice_at(position, 0.0, e), square = dot(at, at);
+    // What the position leaves outside needs no index. Non-uniform slices decide by the index, which the polynomial gives within its limits.
+    float within = NON_UNIFORM == 1 ? clamp(position, sweep_low, sweep_high) : position;
+    float square = dot(at, at), k = slice_at(within, 0.0, e);
     texel = vec3((at - grid_origin) * grid_density, k);
-    float last = NON_UNIFORM == 1 ? float(slice_table.entry.length() - 1) : last_slice;
     // Not by `&&`, which branches at every comparison.
-    bvec4 low = greaterThanEqual(vec4(square, dot(at, first_line), dot(at, last_line), k), vec4(range_low * range_low, 0.0, 0.0, -1e-4));
-    bvec2 high = lessThanEqual(vec2(square, k), vec2(range_high * range_high, last + 1e-4));
-    return all(bvec2(all(low), all(high)));
+    bvec2 in_range = bvec2(square >= range_low_squared, square <= range_high_squared);
+    // The line on the same side decides alone where the other is its mirror image.
+    bvec2 in_lines = bvec2(LINES_MIRRORED ? dot(vec2(abs(at.x), at.y), last_line) >= 0.0 : dot(at, first_line) >= 0.0,
+                           LINES_MIRRORED || dot(at, last_line) >= 0.0);
+    bvec2 in_sweep = bvec2(SWEEP_MIRRORED ? abs(position) <= sweep_border_high : position >= sweep_border_low,
+                           SWEEP_MIRRORED || position <= sweep_border_high);
+    if (NON_UNIFORM == 1) in_sweep = bvec2(k >= -1e-4, k <= float(slice_table.entry.length() - 1) + 1e-4);
+    return all(bvec3(all(in_range), all(in_lines), all(in_sweep)));
 }
 
 // Share of a step that is inside the sector, between the coordinates of an end inside and of one outside: along a step each
@@ -285,7 +296,7 @@ vec4 plane_at(ivec2 low, ivec2 high, int slice) {
 }
 
 float filtered_by_device(vec3 texel) {
-    return textureLod(volume, (texel - vec3(first_stored) + 0.5) / vec3(last_stored - first_stored + 1), 0.0).x;
+    return textureLod(volume, (texel + texture_shift) * texture_scale, 0.0).x;
 }
 
 // The uniform cubic B-spline across the slices k - 1 to k + 2 around a place, without a prefilter; bilinear within a slice. The device's filter is

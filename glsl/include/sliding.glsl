@@ -2,6 +2,7 @@
 // cast. Each step adds the front slice only; the sums of the slices behind it are kept. Taps outside the insonified region are
 // omitted and the weights renormalised.
 
+#extension GL_EXT_control_flow_attributes : require
 const float SAMPLE_AT = 0.5; // samples are in the middle of their steps
 
 struct Slices {
@@ -21,7 +22,7 @@ vec2 front_slice(Ray ray, int i, float sample_at) {
     vec3 upwards = cross(across, ray.direction);
     float apart = length_of(ray, at - 0.5);
     vec2 sum = vec2(0.0);
-    for (int n = 0; n < SLIDING * SLIDING; ++n) {
+    [[dont_unroll]] for (int n = 0; n < SLIDING * SLIDING; ++n) {
         int x = n % SLIDING - SLIDING / 2, y = n / SLIDING - SLIDING / 2;
         vec3 texel;
         if (locate(p + (across * float(x) + upwards * float(y)) * apart, texel)) {

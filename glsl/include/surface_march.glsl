@@ -7,6 +7,7 @@
 //   take             takes sample i of the march: false if it is outside the insonified region. It composites sample `to_composite`.
 //   skip_transparent skips samples that are transparent, from `to_composite` on
 #extension GL_KHR_shader_subgroup_vote : require
+#extension GL_EXT_control_flow_attributes : require
 layout(constant_id = 6) const int BEHIND = 0; // samples averaged behind the surface
 
 bool take(Ray ray, int i, inout Slices slices, out float value);
@@ -49,21 +50,23 @@ float find_surface(Ray ray, inout Slices slices, out vec3 echo) {
     bool goes_on = first < end;
     do {
         if (SKIP == 1) {
-            RaySegment here = segment_at(ray, i, SAMPLE_AT);
-            bool may_skip = state == START && !second_look && goes_on;
-            int from = i;
-            while (may_skip && here.kind == EMPTY && i < end) {
-                i += (here.stop - i + ROUGH - 1) / ROUGH * ROUGH;
+            RaySegment here;
+            bool may_skip = state == START && !looks_again() && goes_on;
+            for (bool skips = true; skips;) {
                 here = segment_at(ray, i, SAMPLE_AT);
+                skips = may_skip && here.kind == EMPTY && i < end;
+                if (skips) {
+                    // The same as if each sample were outside.
+                    i += (here.stop - i + ROUGH - 1) / ROUGH * ROUGH;
+                    restart(i);
+                }
             }
-            // The same as if each sample were outside.
-            if (i > from) restart(i);
-            if (here.kind == HOMOGENEOUS && DETECTOR == 0 && state == START && !second_look && goes_on && filled >= RING) {
+            if (here.kind == HOMOGENEOUS && DETECTOR == 0 && state == START && !looks_again() && goes_on && filled >= RING) {
                 // Refill the ring with the last samples of the segment, so that it holds what it would hold without skipping.
                 int stop = min(here.stop, end);
-                int steps = (stop - i + stride - 1) / stride, left = stop == end ? 0 : RING;
+                int steps = (stop - i + stride_now() - 1) / stride_now(), left = stop == end ? 0 : RING;
                 if (is_quiet() && steps > left) {
-                    i += (steps - left) * stride;
+                    i += (steps - left) * stride_now();
                     filled = 0;
                 }
             }
@@ -75,7 +78,7 @@ float find_surface(Ray ray, inout Slices slices, out vec3 echo) {
         int n = SKIP == 1 ? SAMPLES_PER_LOOKUP : MAX_SEARCH_SAMPLES;
         bool waits = false;
         float difference = 0.0, noise_bar = 0.0;
-        bool searches = goes_on && state == START && !second_look && !after_speck;
+        bool searches = goes_on && state == START && !looks_again() && !is_after_speck();
         for (; n > 0 && (searches ? i < end : COMPOSITES && !goes_on && to_composite < NEVER); --n) {
             int at = COMPOSITES ? (searches ? min(i, to_composite) : to_composite) : i;
             float value;
@@ -89,15 +92,15 @@ float find_surface(Ray ray, inout Slices slices, out vec3 echo) {
                     searches = false;
                 } else {
                     previous = difference;
-                    i += stride;
+                    i += stride_now();
                 }
             } else {
                 i += ROUGH;
                 restart(i);
             }
         }
-        bool follows = waits || ((state != START || second_look || after_speck) && goes_on && n > 0 && i < end);
-        for (; follows; --n, follows = (state != START || second_look || after_speck) && goes_on && n > 0 && i < end) {
+        bool follows = waits || ((state != START || looks_again() || is_after_speck()) && goes_on && n > 0 && i < end);
+        for (; follows; --n, follows = (state != START || looks_again() || is_after_speck()) && goes_on && n > 0 && i < end) {
             float value = 0.0;
             if (waits || take(ray, i, slices, value)) {
                 if (!waits) {
@@ -113,15 +116,16 @@ float find_surface(Ray ray, inout Slices slices, out vec3 echo) {
         if (goes_on && i >= end) goes_on = look_again(i);
     } while (subgroupAny(goes_on || (COMPOSITES && to_composite < NEVER)));
     // The ray ended during the second look: nothing confirms that the echo lasts.
-    if (second_look && surfaces_passed < NUMBER) found = false;
+    if (looks_again() && surfaces_passed < NUMBER) found = false;
     float distance = MISS;
     float behind = 0.0;
-    if (found && surfaces_passed + 1 >= NUMBER) {
+    if (found && (NUMBER == 1 || surfaces_passed + 1 >= NUMBER)) {
         float at = offset_of(ray, surface_place(PLACE == 2 ? risen_at(ray, slices) : 0.0) + SAMPLE_AT);
         found = at >= 0.0 && at <= ray.leave - ray.enter;
         if (found) {
             distance = ray.enter + at;
-            for (int i = 1; i <= BEHIND; ++i) {
+            // Once a ray: unrolled it would be a third of the shader.
+            [[dont_unroll]] for (int i = 1; i <= BEHIND; ++i) {
                 vec3 texel;
                 if (locate(ray.origin + ray.direction * (distance + float(i) * behind_step), texel)) behind += sample_volume(texel);
             }

@@ -78,7 +78,7 @@ pub const MATTER: Pass = Pass {
     },
     constants: |s, _| {
         let mut constants = ray::constants(s);
-        constants.retain(|(name, _)| *name != "SPREAD");
+        constants.retain(|(name, _)| !["SPREAD", "MIRRORED"].contains(name));
         constants.push(("ENTRIES", s.transfer_entries() as i32));
         constants.push(("TAPS", light_of(s).taps as i32));
         constants

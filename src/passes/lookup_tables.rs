@@ -91,6 +91,12 @@ pub(super) fn sweep_span(probe: &Probe) -> (f64, f64) {
     (sweep_parameter(probe.motion, first), sweep_parameter(probe.motion, last))
 }
 
+/// What is in the sweep to a shader, as its parameter: a little beyond the outermost slices, where rounding puts places on them.
+pub(super) fn sweep_border(probe: &Probe) -> [f64; 2] {
+    let ((first, last), margin) = (probe.slice_bounds(), 1e-4 * probe.slices.pitch());
+    [first - margin, last + margin].map(|position| sweep_parameter(probe.motion, position))
+}
+
 /// Slice position in mean pitches from slice 0, over the sweep's parameter: the slice index for a uniform sweep.
 pub fn sweep_lut(scene: &Scene) -> Vec<f32> {
     let Some(probe) = scene.probe() else { return Vec::new() };

@@ -1,7 +1,7 @@
 //! Shared by the ray casters: the parameters of rays and sweep map, and in f64 the march of a ray through the volume.
 
 use crate::passes::empty_space::Skipping;
-use crate::passes::lookup_tables::{is_non_uniform, line_parameter, sweep_span};
+use crate::passes::lookup_tables::{is_non_uniform, line_parameter, sweep_border, sweep_span};
 use crate::passes::pass::*;
 use crate::passes::preprocess::packed_sampling;
 use crate::probe::{Advance, Array, Geometry, Motion, Probe};
@@ -67,6 +67,7 @@ pub(in crate::passes) fn constants(scene: &Scene) -> Vec<(&'static str, i32)> {
         ("INTRA_FRAME_MOTION", moving as i32),
         ("NON_UNIFORM", non_uniform as i32),
         ("SWEEP_TERMS", scene.slice_terms() as i32),
+        ("MIRRORED", scene.probe().map_or(0, mirrored)),
         ("CLIPS", scene.settings.clip.len() as i32),
         ("SPREAD", scene.spreads() as i32),
     ]
@@ -112,10 +113,12 @@ pub(super) fn params(scene: &Scene, view: View, step: f64) -> Params {
         *clip = [normal.x, normal.y, normal.z, scene.limit_to_local(normal, limit)];
     }
     let [clip_0, clip_1, clip_2, clip_3] = clips;
-    let bricks = scene.bricks();
+    let (bricks, stored) = (scene.bricks(), scene.stored_bounds());
+    let last_stored = stored.high.map(|end| end - 1);
     let params = sweep_params(ray_params(scene), scene)
         .vec3("brick_low", scene.to_local(bricks.low))
         .vec3("brick_density", bricks.edge.recip())
+        .vec3("last_brick", bricks.count.map(|n| f64::from(n) - 1.0))
         .f32("spread", scene.settings.ray.spread)
         .f32("spread_range", scene.probe().map_or(1.0, spread_range).max(1e-6))
         .vec4("clip_0", clip_0)
@@ -126,6 +129,11 @@ pub(super) fn params(scene: &Scene, view: View, step: f64) -> Params {
         .vec3("box_high", scene.to_local(view.high))
         .f32("step_length", step)
         .first_stored(scene)
+        .i32("last_stored_column", last_stored[0])
+        .i32("last_stored_row", last_stored[1])
+        .i32("last_stored_slice", last_stored[2])
+        .vec3("texture_shift", stored.low.map(|first| 0.5 - f64::from(first)))
+        .vec3("texture_scale", std::array::from_fn(|axis| 1.0 / f64::from(stored.high[axis] - stored.low[axis])))
         .f32("last_slice", f64::from(scene.slices() - 1))
         .f32("window_low", window_low)
         .f32("window_scale", 1.0 / (window_high - window_low))
@@ -160,6 +168,7 @@ pub(super) fn params(scene: &Scene, view: View, step: f64) -> Params {
 /// From the position in a sweep to the slice index, and the borders of the lines.
 fn sweep_params(params: Params, scene: &Scene) -> Params {
     let probe = scene.probe();
+    let [border_low, border_high] = probe.map_or([0.0; 2], sweep_border);
     let (first_position, last_position) = probe.filter(|_| tables(scene).0).map_or((0.0, 0.0), sweep_span);
     let polynomial = scene.slice_polynomial();
     let [low, high] = polynomial.as_ref().map_or([first_position, last_position], |polynomial| polynomial.limits);
@@ -169,15 +178,14 @@ fn sweep_params(params: Params, scene: &Scene) -> Params {
     };
     let term = |i: usize| polynomial.as_ref().and_then(|p| p.terms.get(i)).copied().unwrap_or(0.0);
     let four = |first: usize| std::array::from_fn(|i| term(first + i));
-    // Towards larger angles from the first line, towards smaller ones from the last.
-    let side = |angle: f64, towards: f64| [towards * angle.cos(), -towards * angle.sin()];
-    let curved = probe.filter(|p| matches!(p.array, Array::Curved { .. }));
-    let [first, last] = curved.map_or([0.0; 2], |p| [p.lines.first(), p.lines.last()]);
+    let [first_line, last_line] = border_lines(probe);
     params
-        .vec2("first_line", side(first, 1.0))
-        .vec2("last_line", side(last, -1.0))
+        .vec2("first_line", first_line)
+        .vec2("last_line", last_line)
         .f32("sweep_first", first_position)
         .f32("sweep_last", last_position)
+        .f32("sweep_border_low", border_low)
+        .f32("sweep_border_high", border_high)
         .f32("sweep_low", low)
         .f32("sweep_high", high)
         .f32("sweep_density", density)
@@ -187,10 +195,27 @@ fn sweep_params(params: Params, scene: &Scene) -> Params {
         .vec2("sweep_terms_2", [term(8), term(9)])
 }
 
+/// In-plane normals of the first and the last line of a curved array: towards larger angles from the first, towards smaller ones from the last.
+fn border_lines(probe: Option<&Probe>) -> [[f64; 2]; 2] {
+    let side = |angle: f64, towards: f64| [towards * angle.cos(), -towards * angle.sin()];
+    let curved = probe.filter(|p| matches!(p.array, Array::Curved { .. }));
+    let [first, last] = curved.map_or([0.0; 2], |p| [p.lines.first(), p.lines.last()]);
+    [side(first, 1.0), side(last, -1.0)]
+}
+
+/// The lines and the sweep are each their own mirror image, to the last bit of the parameters: bits 0 and 1.
+fn mirrored(probe: &Probe) -> i32 {
+    let [[first_x, first_y], [last_x, last_y]] = border_lines(Some(probe)).map(|line| line.map(|c| c as f32));
+    let [low, high] = sweep_border(probe).map(|position| position as f32);
+    i32::from(first_x == -last_x && first_y == last_y && last_x < 0.0) + 2 * i32::from(low == -high)
+}
+
 fn sector(params: Params, [range_low, range_high, line_low, line_high]: [f64; 4]) -> Params {
     params
         .f32("range_low", range_low)
         .f32("range_high", range_high)
+        .f32("range_low_squared", f64::from(range_low as f32 * range_low as f32))
+        .f32("range_high_squared", f64::from(range_high as f32 * range_high as f32))
         .f32("line_low", line_low)
         .f32("line_high", line_high)
 }
