@@ -249,7 +249,7 @@ fn picture(scene: &Scene, frames: &[Texels], exact: bool) -> (Texels, Effort) {
 fn wobbler_scene(settings: &str) -> (Scene, Vec<Texels>) {
     let mut recording = source::open(&data("wobbler-4dc7/sweep.mha"), None).expect("recording");
     let input = Input { stored: recording.stored_type(), range: recording.range() };
-    let toml = format!("picture = {{ size = [64, 64] }}\npost = {{ floats = true }}\n{settings}");
+    let toml = format!("picture = {{ size = [64, 64] }}\npost.floats = true\n{settings}");
     let scene = scene(recording.geometry(0), input, &toml);
     let [width, height] = scene.frame_size().map(|n| n as usize);
     recording.skip_to_volume(0).expect("volume");
@@ -336,7 +336,7 @@ fn cut_faces_end_exact_rays_too() {
         let (scene, frames) = wobbler_scene(&format!(
             "mode = '{mode}'\nslices = {{ pixels = 48 }}\nray = {{ step = 0.5 }}\nsurface = {{ threshold = 0.08, edge = 3.0 }}\n\
              volume = {{ transfer = [{{ at = 0.2, colour = [1, 1, 1], opacity = 0 }}, {{ at = 0.4, colour = [1, 0, 0], opacity = 1 }}] }}\n\
-             cap = {{ level = 0.15 }}\npost = {{ floats = true, antialias = false }}\nclip = [{{ at = [3, 52, -2], normal = [0, 0, 1] }}]\ncamera = {{ elevation = -60 }}"
+             cap = {{ level = 0.15 }}\npost.antialias = false\nclip = [{{ at = [3, 52, -2], normal = [0, 0, 1] }}]\ncamera = {{ elevation = -60 }}"
         ));
         assert_eq!(picture::fault(&scene), None);
         let [(exact, faces), (sampled, _)] = [true, false].map(|exact| {
