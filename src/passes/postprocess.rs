@@ -359,9 +359,7 @@ fn antialiased(rendered: &Texels, distances: &Texels, cliff: f64, [x, y]: [usize
     let weighed: Vec<_> = beyond.map(|(dx, dy)| (if dx * dy == 0 { 2.0 } else { 1.0 }, ray(dx, dy))).collect();
     let all: f64 = weighed.iter().map(|(weight, _)| weight).sum();
     let there = 2.0 * limit - here;
-    // The nearer of the two is a cut face, or the further one is nothing.
-    let is_outline = here.min(there) <= 0.0 || !is_hit(here.max(there));
-    let near = edge_coverage::near_share(&distance, limit, is_outline);
+    let near = edge_coverage::near_share(&distance, limit, is_outline(here.min(there), here.max(there)));
     let beyond_share = if is_near(0, 0) { 1.0 - near } else { near } * (2.0 * jump / cliff - 1.0).clamp(0.0, 1.0);
     std::array::from_fn(|c| {
         let there = weighed.iter().map(|(weight, at)| weight * rendered.get(*at)[c]).sum::<f64>() / all;
@@ -430,6 +428,10 @@ fn cliff_between(mut distances: [f64; 4], cliff: f64) -> Option<(f64, i32)> {
     let gaps: Vec<f64> = distances.windows(2).map(|pair| pair[1] - pair[0]).collect();
     let widest = (0..3).rev().max_by(|a, b| gaps[*a].total_cmp(&gaps[*b]))?;
     let limit = 0.5 * distances[widest] + 0.5 * distances[widest + 1];
-    let is_outline = distances[0] <= 0.0 || !is_hit(distances[3]);
-    (gaps[widest] > cliff).then_some((limit, if is_outline { 4 } else { 2 }))
+    (gaps[widest] > cliff).then_some((limit, if is_outline(distances[0], distances[3]) { 4 } else { 2 }))
+}
+
+/// True if an edge is that of a cut face, or of something in front of nothing.
+fn is_outline(nearest: f64, furthest: f64) -> bool {
+    nearest <= 0.0 || !is_hit(furthest)
 }
