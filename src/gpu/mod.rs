@@ -56,4 +56,5 @@ pub use pipelines::Shaders;
 pub use preparation::{Preparation, Prepared};
 pub use renderer::{Renderer, RendererOptions};
 pub use timing::TimeStamps;
+pub use validation::WRITERS_OF_RUNS;
 pub use watchdog::Deadline;

@@ -100,12 +100,25 @@ impl Drop for Messenger {
     }
 }
 
-/// Layers from 2024 on take every access through a view for one to the whole image. Dispatches of `tile_ranges` write different slices of
-/// one 3D image without a barrier between them, because none is needed: the layer reports a write after a write. Where two of them do write
-/// the same slice, the barrier oracle of the tests notices a missing barrier.
+/// Passes that write the slices near new frames, a dispatch for each run of them, and their shaders. Layers from 2024 on take every
+/// access through a view for one to the whole image. Such dispatches write different slices of one 3D image without a barrier between
+/// them, because none is needed: the layer reports a write after a write. Where two of them do write the same slice, the barrier oracle of
+/// the tests notices a missing barrier.
+pub const WRITERS_OF_RUNS: [(&str, &str); 6] = [
+    ("tile_ranges", "empty_space/tile_ranges"),
+    ("gaussian_elevation", "filter/gaussian"),
+    ("section_elevation", "filter/gaussian"),
+    ("drop_floating", "preprocess/drop_floating"),
+    ("cut", "preprocess/cut"),
+    ("packed_neighbours", "preprocess/packed_neighbours"),
+];
+
 fn is_known_false_positive(message: &str) -> bool {
     message.contains("WRITE_AFTER_WRITE hazard detected")
-        && message.contains("[tile_ranges], which was previously written by another vkCmdDispatch[tile_ranges] command")
+        && WRITERS_OF_RUNS.iter().any(|(pass, shader)| {
+            message.contains(&format!("previously written by another vkCmdDispatch[{pass}] command"))
+                && message.contains(&format!("[{shader}], image layout"))
+        })
 }
 
 unsafe extern "system" fn on_message(
@@ -140,20 +153,25 @@ mod tests {
     /// As the layer 1.4.363 words them.
     #[test]
     fn only_writes_of_one_pass_to_slices_of_its_image_are_ignored() {
-        let message = |hazard: &str, view: &str, by: &str| {
+        let message = |hazard: &str, shader: &str, by: &str| {
             format!(
                 "vkCmdDispatch(): {hazard} hazard detected. Shader stage VK_SHADER_STAGE_COMPUTE_BIT writes to VkImageView \
-                 0xa510000000a51[{view}], which was previously written by another vkCmdDispatch[{by}] command."
+                 0xa510000000a51[volume], which was previously written by another vkCmdDispatch[{by}] command. \nThe image is \
+                 referenced by descriptor binding 2 (VK_DESCRIPTOR_TYPE_STORAGE_IMAGE) from descriptor set 0 (VkDescriptorSet 0x0), \
+                 VkPipeline 0x1c000000001c[{shader}], image layout VK_IMAGE_LAYOUT_GENERAL."
             )
         };
-        assert!(is_known_false_positive(&message("WRITE_AFTER_WRITE", "tile_ranges", "tile_ranges")));
-        for (hazard, view, by) in [
-            ("READ_AFTER_WRITE", "tile_ranges", "tile_ranges"),
-            ("WRITE_AFTER_READ", "tile_ranges", "tile_ranges"),
-            ("WRITE_AFTER_WRITE", "volume", "volume"),
-            ("WRITE_AFTER_WRITE", "tile_ranges", "clear"),
+        let tiles = "empty_space/tile_ranges";
+        assert!(is_known_false_positive(&message("WRITE_AFTER_WRITE", tiles, "tile_ranges")));
+        assert!(is_known_false_positive(&message("WRITE_AFTER_WRITE", "filter/gaussian", "gaussian_elevation")));
+        for (hazard, shader, by) in [
+            ("READ_AFTER_WRITE", tiles, "tile_ranges"),
+            ("WRITE_AFTER_READ", tiles, "tile_ranges"),
+            ("WRITE_AFTER_WRITE", "filter/gaussian", "gaussian_depth"),
+            ("WRITE_AFTER_WRITE", "preprocess/cut", "gaussian_elevation"),
+            ("WRITE_AFTER_WRITE", tiles, "clear"),
         ] {
-            assert!(!is_known_false_positive(&message(hazard, view, by)), "{hazard} {view} {by}");
+            assert!(!is_known_false_positive(&message(hazard, shader, by)), "{hazard} {shader} {by}");
         }
     }
 }

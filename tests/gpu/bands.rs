@@ -18,7 +18,7 @@ const SCENES: [&str; 17] = [
     "mode = 'vr'\nray = { brick = 4 }\nfloating = 5.0",
     "mode = 'vr'\ncuts = [{ contour = [[-8, -6], [9, -5], [3, 9]], view = { at = [0, 20, 0], direction = [0.2, 1, 0], up = [0, 0, 1] } }]",
     "mode = 'sr'\nray = { brick = 4 }",
-    "mode = 'vr'\nlight = { volume = { cell = 3 } }",
+    "mode = 'vr'\nlight = { volume = { cell = 1.5 } }",
     "mode = 'vr'\nray = { brick = 4 }\nstill = { samples = 3, batch = 2, events = 4 }",
     "mode = 'vr'\nray = { rays = 2, adaptive = true }",
     "mode = 'mip'",

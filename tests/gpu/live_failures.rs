@@ -128,15 +128,16 @@ fn a_lost_device_costs_a_volume_and_not_the_stream() {
         last = Some((stream, other, device));
     }
     assert!(incomplete >= 1, "no frame was lost");
-    let (mut stream, _other, _device) = last.expect("four at least");
-    // It may have been lost to a watchdog: from then on pictures of 512 x 512 are drawn in bands, also where none were needed before.
+    let (mut stream, other, _device) = last.expect("four at least");
+    // It may have been lost to a watchdog: from then on a software device draws pictures of 512 x 512 in bands too. A GPU has measured that
+    // it needs none.
     let renderer = stream.renderer().expect("begun");
     let mut scene = renderer.scene().clone();
     scene.settings.picture.size = [512, 512];
     let large = Scene::new(scene.geometry, scene.input, scene.settings).expect("scene");
     let dispatched = renderer.dispatched_passes(|r| r.change(large).and_then(|_| r.picture())).expect("picture");
     let rays = dispatched.iter().filter(|name| **name == "raycast_projection").count();
-    assert!(rays > 1, "{dispatched:?}");
+    assert!(rays > 1 || !other.candidate.is_software(), "{dispatched:?}");
 }
 
 /// Prevents a stream that goes silent with a device that does not finish: whatever hangs, a picture, an upload or a pass over a frame, the

@@ -210,7 +210,8 @@ fn coarse_pictures_come_nearer_to_the_full_one_than_by_linear_interpolation() {
             );
             match coarse.has_distance() {
                 true => assert!(after.0 < 0.95 * before.0 && after.1 > before.1, "{key}: {before:?} {after:?}"),
-                false => assert!((after.0 - before.0).abs() < 0.01, "{key}: {before:?} {after:?}"),
+                // A GPU's filter rounds its weights to 1/256.
+                false => assert!((after.0 - before.0).abs() < 0.02, "{key}: {before:?} {after:?}"),
             }
         }
     }

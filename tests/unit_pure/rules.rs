@@ -4,8 +4,9 @@
 use crate::common::files::repository;
 use crate::common::probes::{voxels, wobbler};
 use crate::common::scenes::{BYTES, FLOATS, scene};
+use echolume::gpu::WRITERS_OF_RUNS;
 use echolume::passes::net::NETS;
-use echolume::passes::{DispatchArgs, PASSES, Pass, interface_check, measure};
+use echolume::passes::{DispatchArgs, Frequency, PASSES, Part, Pass, interface_check, measure};
 use echolume::probe::{Advance, Axis, Geometry, Grid, Motion, Probe};
 use echolume::scene::{Lattice, Scene};
 use echolume::shader_source;
@@ -405,6 +406,21 @@ fn net_scenes() -> Vec<Scene> {
         lattice.scene().expect("a scene")
     };
     geometries().iter().flat_map(|(_, geometry)| [false, true].map(|filled| scene(geometry, filled))).collect()
+}
+
+/// Prevents a pass over runs of slices whose writes a validation layer since 2024 takes for hazards, and one that is excused for nothing.
+#[test]
+fn the_writers_of_runs_of_slices_are_listed_for_validation() {
+    let over_volumes = PASSES.iter().filter(|p| p.frequency == Frequency::Volume);
+    let scenes = scenes();
+    let mut writers = BTreeSet::new();
+    for (pass, scene) in over_volumes.flat_map(|p| scenes.iter().filter(|s| p.is_needed(s)).map(move |s| (p, s))) {
+        let args = DispatchArgs::default();
+        if pass.writes(scene, &args).iter().any(|bind| matches!(bind.part, Part::Around(_))) {
+            writers.insert((pass.name, pass.shader(scene, &args)));
+        }
+    }
+    assert_eq!(writers, BTreeSet::from(WRITERS_OF_RUNS));
 }
 
 #[test]
