@@ -5,6 +5,7 @@
 #version 460
 #extension GL_EXT_scalar_block_layout : require
 #extension GL_EXT_samplerless_texture_functions : require
+#extension GL_EXT_control_flow_attributes : require
 const int TILE = 16;
 const int LAYERS = 8;
 const int REGION = TILE + 2 * LAYERS;
@@ -18,67 +19,73 @@ layout(scalar) uniform Params {
 };
 #include "propagation.glsl"
 
-shared float red[REGION * REGION];
-shared float green[REGION * REGION];
-shared float blue[REGION * REGION];
+// Of the last layer and of this one, in turns: one barrier a layer is enough.
+const int CELLS = REGION * REGION;
+shared float red[2 * CELLS];
+shared float green[2 * CELLS];
+shared float blue[2 * CELLS];
 
 // The cell of an invocation in the region.
 ivec2 mine(int i) { return ivec2(gl_LocalInvocationID.xy) + TILE * ivec2(i % (REGION / TILE), i / (REGION / TILE)); }
+
+void keep(int n, vec3 light) {
+    red[n] = light.r;
+    green[n] = light.g;
+    blue[n] = light.b;
+}
 
 void main() {
     ivec2 size = imageSize(next_front), tile = TILE * ivec2(gl_WorkGroupID.xy), whole = ivec2(floor(shift + 0.5));
     vec3 across = weights_of(shift.x - float(whole.x)), down = weights_of(shift.y - float(whole.y));
     // Where the region lies before the first layer; with every layer it goes back by `whole`.
     ivec2 low = tile - LAYERS + LAYERS * whole;
-    for (int i = 0; i < EACH; ++i) {
-        ivec2 cell = mine(i), at = clamp(low + cell, ivec2(0), size - 1);
-        int n = cell.y * REGION + cell.x;
+    float densities[EACH];
+    [[unroll]] for (int i = 0; i < EACH; ++i) {
+        ivec2 cell = mine(i);
         vec3 light = vec3(1.0);
-        if (FIRST == 0) light = texelFetch(front, at, 0).rgb;
-        red[n] = light.r;
-        green[n] = light.g;
-        blue[n] = light.b;
+        if (FIRST == 0) light = texelFetch(front, clamp(low + cell, ivec2(0), size - 1), 0).rgb;
+        keep(cell.y * REGION + cell.x, light);
+        densities[i] = texelFetch(matter, cell_of(layer, clamp(low - whole + cell, ivec2(0), size - 1)), 0).x;
     }
     for (int step = 1; step <= count; ++step) {
         ivec2 from = low;
         low -= whole;
+        int last = (step - 1) % 2 * CELLS, now = step % 2 * CELLS;
+        // Those of the next layer are on their way while this one is lit.
+        float next_densities[EACH];
+        int next = min(step + 1, count) - 1;
+        [[unroll]] for (int i = 0; i < EACH; ++i) {
+            ivec2 at = clamp(low - whole + mine(i), ivec2(0), size - 1);
+            next_densities[i] = texelFetch(matter, cell_of(from_high == 1 ? layer - next : layer + next, at), 0).x;
+        }
         barrier();
-        vec3 onward[EACH];
-        for (int i = 0; i < EACH; ++i) {
+        [[unroll]] for (int i = 0; i < EACH; ++i) {
             ivec2 cell = mine(i), at = low + cell;
-            onward[i] = vec3(0.0);
+            float density = densities[i];
+            densities[i] = next_densities[i];
             // What the light of the tile does not come from, and what is not there, is left out.
             bool is_needed = all(greaterThanEqual(cell, ivec2(step))) && all(lessThan(cell, ivec2(REGION - step)));
             if (!is_needed || any(lessThan(at, ivec2(0))) || any(greaterThanEqual(at, size))) continue;
-            ivec3 place = cell_of(from_high == 1 ? layer + 1 - step : layer - 1 + step, at);
-            float density = texelFetch(matter, place, 0).x;
             vec3 light = vec3(1.0);
             if (FIRST == 0 || step > 1) {
                 light = vec3(0.0);
-                for (int y = 0; y < 3; ++y) {
-                    for (int x = 0; x < 3; ++x) {
+                [[unroll]] for (int y = 0; y < 3; ++y) {
+                    [[unroll]] for (int x = 0; x < 3; ++x) {
                         // A place at the border takes the light of the nearest there is, which is one of the nine.
                         ivec2 tap = clamp(at + whole + ivec2(x, y) - 1, ivec2(0), size - 1) - from;
-                        int n = tap.y * REGION + tap.x;
+                        int n = last + tap.y * REGION + tap.x;
                         light += across[x] * down[y] * vec3(red[n], green[n], blue[n]);
                     }
                 }
             }
             vec3 absorbed = half_way(density);
             light *= absorbed;
-            onward[i] = light * absorbed;
+            vec3 onward = light * absorbed;
+            keep(now + cell.y * REGION + cell.x, onward);
             // Each cell belongs to one tile, wherever its light comes from.
             if (any(lessThan(at, tile)) || any(greaterThanEqual(at, tile + TILE))) continue;
-            imageStore(arriving, place, vec4(light, density));
-            if (step == count) imageStore(next_front, at, vec4(onward[i], 1.0));
-        }
-        barrier();
-        for (int i = 0; i < EACH; ++i) {
-            ivec2 cell = mine(i);
-            int n = cell.y * REGION + cell.x;
-            red[n] = onward[i].r;
-            green[n] = onward[i].g;
-            blue[n] = onward[i].b;
+            imageStore(arriving, cell_of(from_high == 1 ? layer + 1 - step : layer - 1 + step, at), vec4(light, density));
+            if (step == count) imageStore(next_front, at, vec4(onward, 1.0));
         }
     }
 }

@@ -111,7 +111,8 @@ pub fn copied(scene: &Scene) -> Option<Slot> {
     if requested.next().is_none() && (filter.copies)(scene) { Chain::Slices.last(scene) } else { None }
 }
 
-// A rectangle begins and ends with complete workgroups of the slices' filters, eight invocations of a run each.
+// A rectangle begins and ends with complete workgroups of the slices' filters, eight invocations of a run each. The Gaussian has longer
+// runs, and is told where the rectangle ends.
 const _: () = assert!(Rectangle::ALIGNMENT.is_multiple_of(8 * RUN));
 
 /// The columns and rows of the volume that are stored.
@@ -257,7 +258,8 @@ impl Pass {
         let extent = (self.extent)(scene, args);
         let Some(visible) = self.rectangle(scene, args) else { return extent };
         // Some make a run of neighbours each.
-        let run = |axis: usize| if extent[axis] < scene.grid.size[axis] { RUN } else { 1 };
+        let of_pass = if let Link::Filter(filter) = self.link { filter.run } else { RUN };
+        let run = |axis: usize| if extent[axis] < scene.grid.size[axis] { of_pass } else { 1 };
         [visible.size[0].div_ceil(run(0)), visible.size[1].div_ceil(run(1)), extent[2]]
     }
 
@@ -265,7 +267,9 @@ impl Pass {
     pub fn numbers(&self, scene: &Scene, args: &DispatchArgs) -> Params {
         let mut params = (self.params)(scene, args);
         if let Some(r) = self.rectangle(scene, args) {
+            let end = [0, 1].map(|axis| r.first[axis] + r.size[axis]);
             params = params.i32("first_column", r.first[0]).i32("first_row", r.first[1]);
+            params = params.i32("end_column", end[0]).i32("end_row", end[1]);
         }
         let of_slices = match self.link {
             Link::Filter(filter) => filter.chain.is_of_frames(),

@@ -196,6 +196,7 @@ fn fits(member: &Member, value: &Value) -> bool {
         Value::Vec2(_) => member.is_float && member.components == 2,
         Value::Vec3(_) => member.is_float && member.components == 3,
         Value::Vec4(_) => member.is_float && member.components == 4,
+        Value::Floats(v) => member.is_float && member.components as usize == v.len(),
     }
 }
 
@@ -221,6 +222,7 @@ pub fn pack(module: &Module, params: &Params) -> Vec<u8> {
             Value::Vec2(v) => bytemuck::bytes_of(v),
             Value::Vec3(v) => bytemuck::bytes_of(v),
             Value::Vec4(v) => bytemuck::bytes_of(v),
+            Value::Floats(v) => bytemuck::bytes_of(v),
         };
         let at = member.offset as usize;
         block[at..at + words.len()].copy_from_slice(words);

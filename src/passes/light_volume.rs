@@ -16,9 +16,10 @@ const CERTAIN_SLOPE: f64 = 0.04;
 const FLUID: f64 = 0.0015;
 /// Smallest and largest variance of the kernel of propagate.comp, cells^2, for which no weight is negative.
 const VARIANCES: [f64; 2] = [0.25, 0.75];
-/// Layers of a dispatch of propagate_layers.comp, and the shared memory that it takes, bytes: a float for each of three colours, in 32 x 32 cells.
+/// Layers of a dispatch of propagate_layers.comp, and the shared memory that it takes, bytes: a float for each of three colours, in
+/// 32 x 32 cells of two layers.
 const LAYERS: u32 = 8;
-const LAYERS_MEMORY: u32 = 3 * 4 * 32 * 32;
+const LAYERS_MEMORY: u32 = 2 * 3 * 4 * 32 * 32;
 /// mm along a cone of ambient light, and the length that each place stands for: REACH and LENGTH of ambient.comp.
 const REACH: [f64; 4] = [2.5, 5.0, 10.0, 20.0];
 const LENGTH: [f64; 4] = [2.5, 3.5, 7.0, 12.0];

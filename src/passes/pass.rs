@@ -217,6 +217,8 @@ pub struct Filter {
     /// How many columns and rows away one step on slices looks; none: from border to border. Filters before it make that much
     /// more than is visible.
     pub reach: fn(&Scene) -> Option<[u32; 2]>,
+    /// Adjacent texels that an invocation makes, along an axis that the pass's extent shortens.
+    pub run: u32,
     /// True if a step would store what it reads without loss: alone in its chain it is left out, and frames are copied.
     pub copies: fn(&Scene) -> bool,
     /// True if the next filter could as well read what a step reads: before another filter the step is left out.
@@ -226,7 +228,7 @@ pub struct Filter {
 impl Filter {
     /// A filter of that chain that reads one texel and takes one dispatch per step.
     pub const fn of(chain: Chain) -> Filter {
-        Filter { chain, dispatches: once, reach: |_| Some([0; 2]), copies: |_| false, is_identity: |_| false }
+        Filter { chain, dispatches: once, reach: |_| Some([0; 2]), run: RUN, copies: |_| false, is_identity: |_| false }
     }
 
     /// A filter of slices that looks that many columns and rows away.
@@ -326,7 +328,12 @@ pub enum Value {
     Vec2([f32; 2]),
     Vec3([f32; 3]),
     Vec4([f32; 4]),
+    /// An array, of which the first may be all that are set.
+    Floats([f32; MOST_FLOATS]),
 }
+
+/// The length of arrays of parameters.
+const MOST_FLOATS: usize = 32;
 
 /// Numbers of one dispatch, by the names that the shader gives them.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -367,6 +374,13 @@ impl Params {
 
     pub(super) fn vec4(mut self, name: &'static str, value: [f64; 4]) -> Params {
         self.0.push((name, Value::Vec4(value.map(finite))));
+        self
+    }
+
+    /// As many as the array has at most; the others are 0.
+    pub(super) fn floats(mut self, name: &'static str, values: &[f64]) -> Params {
+        let value = |n: usize| values.get(n).copied().map_or(0.0, finite);
+        self.0.push((name, Value::Floats(std::array::from_fn(value))));
         self
     }
 

@@ -4,7 +4,7 @@ use crate::gpu::{Context, GpuError, Renderer, RendererOptions, TimeStamps, pass_
 use crate::machine::{self, CpuTime};
 use crate::passes::measure as loops;
 use crate::passes::slots::Shape;
-use crate::passes::{Bind, DispatchArgs, Part, Pass, RUN, Slot, Span, chain, layers, slices};
+use crate::passes::{Bind, DispatchArgs, Part, Pass, RUN, Slot, Span, chain, filter, layers, slices};
 use crate::plan::{Plan, Rerun, Step};
 use crate::profile::export::{self, Track};
 use crate::profile::statistics::Sample;
@@ -325,10 +325,10 @@ fn fetches(pass: &Pass, scene: &Scene, step: &Step) -> Option<u64> {
     let radius = constants.iter().find(|(name, _)| *name == "RADIUS").map(|(_, r)| *r as u64)?;
     let edge = 2 * radius + 1;
     // One invocation filters a run of neighbours and shares their window.
-    let along = edge + u64::from(RUN) - 1;
+    let along = |run: u32| edge + u64::from(run) - 1;
     let window = match pass.name.split('_').next()? {
-        "gaussian" => along,
-        "sigma" => edge * along,
+        "gaussian" => along(filter::gaussian::RUN),
+        "sigma" => edge * along(RUN),
         _ => return None,
     };
     Some(dispatched(step, scene) * window)

@@ -110,6 +110,7 @@ pub(super) mod decoration {
     pub const NON_READABLE: u32 = 25;
     pub const BINDING: u32 = 33;
     pub const OFFSET: u32 = 35;
+    pub const ARRAY_STRIDE: u32 = 6;
 }
 
 /// Capabilities.
@@ -222,6 +223,7 @@ pub(super) fn decode(words: &[u32]) -> Result<Vec<Instruction<'_>>, SpirvError> 
             | op::DECORATE
             | op::EXECUTION_MODE_ID => 2,
             op::TYPE_VECTOR
+            | op::TYPE_ARRAY
             | op::TYPE_POINTER
             | op::CONSTANT
             | op::SPEC_CONSTANT

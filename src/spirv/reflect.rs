@@ -54,7 +54,7 @@ pub struct Binding {
     pub dimension: Dimension,
 }
 
-/// A scalar or vector of 32-bit words in the parameter block; `offset` is in bytes.
+/// A scalar, vector or array of 32-bit words in the parameter block; `offset` is in bytes.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Member {
     pub name: String,
@@ -92,10 +92,19 @@ const LOCAL_SIZE_ID: u32 = 38;
 
 #[derive(Clone, Debug)]
 enum Type {
-    Int { signed: bool },
+    Int {
+        signed: bool,
+    },
     Float,
     Vector(u32, u32),
-    Image { dimension: u32, arrayed: bool, sampled: u32, format: u32 },
+    /// Element type, the constant with its length.
+    Array(u32, u32),
+    Image {
+        dimension: u32,
+        arrayed: bool,
+        sampled: u32,
+        format: u32,
+    },
     SampledImage(u32),
     Struct(Vec<u32>),
     Pointer(u32),
@@ -112,6 +121,8 @@ struct Declarations {
     read_only_members: HashMap<u32, u32>,
     bindings: HashMap<u32, u32>,
     constant_ids: HashMap<u32, u32>,
+    /// Bytes from one element of an array to the next.
+    strides: HashMap<u32, u32>,
     not_writable: Vec<u32>,
     not_readable: Vec<u32>,
     types: HashMap<u32, Type>,
@@ -166,6 +177,7 @@ impl Declarations {
             op::TYPE_INT => drop(self.types.insert(a[0], Type::Int { signed: a.get(2) == Some(&1) })),
             op::TYPE_FLOAT => drop(self.types.insert(a[0], Type::Float)),
             op::TYPE_VECTOR => drop(self.types.insert(a[0], Type::Vector(a[1], a[2]))),
+            op::TYPE_ARRAY => drop(self.types.insert(a[0], Type::Array(a[1], a[2]))),
             op::TYPE_IMAGE => {
                 let image = Type::Image { dimension: a[2], arrayed: a[4] == 1, sampled: a[6], format: a[7] };
                 self.types.insert(a[0], image);
@@ -173,9 +185,7 @@ impl Declarations {
             op::TYPE_SAMPLED_IMAGE => drop(self.types.insert(a[0], Type::SampledImage(a[1]))),
             op::TYPE_STRUCT => drop(self.types.insert(a[0], Type::Struct(a[1..].to_vec()))),
             op::TYPE_POINTER => drop(self.types.insert(a[0], Type::Pointer(a[2]))),
-            op::TYPE_VOID | op::TYPE_BOOL | op::TYPE_SAMPLER | op::TYPE_ARRAY | op::TYPE_RUNTIME_ARRAY
-                if !a.is_empty() =>
-            {
+            op::TYPE_VOID | op::TYPE_BOOL | op::TYPE_SAMPLER | op::TYPE_RUNTIME_ARRAY if !a.is_empty() => {
                 self.types.insert(a[0], Type::Other);
             }
             op::CONSTANT | op::SPEC_CONSTANT => drop(self.constants.insert(a[1], a[2])),
@@ -183,6 +193,7 @@ impl Declarations {
             op::DECORATE => match (a[1], a.get(2)) {
                 (decoration::BINDING, Some(&binding)) => drop(self.bindings.insert(a[0], binding)),
                 (decoration::SPEC_ID, Some(&id)) => drop(self.constant_ids.insert(a[0], id)),
+                (decoration::ARRAY_STRIDE, Some(&stride)) => drop(self.strides.insert(a[0], stride)),
                 (decoration::NON_WRITABLE, _) => self.not_writable.push(a[0]),
                 (decoration::NON_READABLE, _) => self.not_readable.push(a[0]),
                 _ => {}
@@ -259,12 +270,20 @@ impl Declarations {
             let name = self.member_names.get(&key).cloned().unwrap_or_default();
             let (scalar, components) = match self.types.get(member) {
                 Some(Type::Vector(scalar, n)) => (self.types.get(scalar), *n),
+                // Without gaps, as the scalar layout has them.
+                Some(Type::Array(scalar, length)) if self.strides.get(member) == Some(&4) => {
+                    (self.types.get(scalar), self.constants.get(length).copied().unwrap_or(0))
+                }
                 scalar => (scalar, 1),
             };
             let (is_float, is_signed) = match scalar {
                 Some(Type::Float) => (true, true),
                 Some(Type::Int { signed }) => (false, *signed),
-                _ => return error(format!("parameter '{name}' is neither a scalar nor a vector")),
+                _ => {
+                    return error(format!(
+                        "parameter '{name}' is neither a scalar nor a vector, nor an array of scalars without gaps"
+                    ));
+                }
             };
             let Some(&offset) = self.offsets.get(&key) else {
                 return error(format!("parameter '{name}' has no offset"));
@@ -302,11 +321,16 @@ mod tests {
                 ("slice", 8, false),
                 ("first_column", 12, false),
                 ("first_row", 16, false),
-                ("first_stored_column", 20, false),
-                ("first_stored_row", 24, false),
-                ("first_stored_slice", 28, false)
+                ("end_column", 20, false),
+                ("end_row", 24, false),
+                ("first_stored_column", 28, false),
+                ("first_stored_row", 32, false),
+                ("first_stored_slice", 36, false)
             ]
         );
+        let gaussian = reflect(&words(embedded("filter/gaussian").unwrap())).unwrap();
+        let weights = gaussian.params.iter().find(|p| p.name == "weights").unwrap();
+        assert!(weights.components == 32 && weights.is_float, "{weights:?}");
         let target = module.bindings.iter().find(|b| b.name == "target").unwrap();
         assert_eq!((target.kind, target.access, target.dimension), (Kind::Storage, Access::Write, Dimension::Three));
         let source = module.bindings.iter().find(|b| b.name == "source").unwrap();

@@ -136,7 +136,7 @@ fn light_through_several_layers_at_once_is_that_of_layer_by_layer() {
         let light = format!("follows = 'region', direction = {direction}");
         let each = look(&light, &GREY.replace("back = 0", "back = 0.5"));
         let mut several = each.clone();
-        several.shared_memory = 16 << 10;
+        several.shared_memory = 32 << 10;
         let dispatches = |scene| Plan::new(scene).steps.len();
         assert!(3 * dispatches(&several) < dispatches(&each), "several layers a dispatch");
         for slot in [Slot::LightArriving, Slot::BackLight] {

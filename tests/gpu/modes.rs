@@ -2,7 +2,8 @@
 //! incremental update of the volume by slices.
 
 use crate::common::gpu::*;
-use echolume::passes::{Slot, in_runs};
+use echolume::passes::filter::gaussian;
+use echolume::passes::{Slot, in_runs_of};
 use echolume::plan::{Plan, affected};
 use echolume::probe::Geometry;
 use echolume::scene::Scene;
@@ -200,7 +201,7 @@ fn a_new_frame_refilters_only_the_slices_near_it() {
         slices.iter().for_each(|s| changed[*s] = true);
         let expected: Vec<_> = affected(&changed, reach)
             .iter()
-            .map(|run| ("gaussian_elevation", in_runs([size[0], size[1], run.end - run.start], 2)))
+            .map(|run| ("gaussian_elevation", in_runs_of(gaussian::RUN, [size[0], size[1], run.end - run.start], 2)))
             .collect();
         let got: Vec<_> = recorded.into_iter().filter(|(name, _)| *name == "gaussian_elevation").collect();
         assert_eq!(got, expected, "{slices:?}");

@@ -381,7 +381,7 @@ fn scenes() -> Vec<Scene> {
     scenes.push(scene(voxels([8, 8, 8]), FLOATS, "slices = { median = true }"));
     // With the shared memory of a GPU.
     let use_it = scenes.iter().filter(|s| s.settings.slices.perona_malik.is_some() || s.lit_by_volume().is_some());
-    let in_workgroups: Vec<_> = use_it.map(|s| Scene { shared_memory: 16 << 10, ..s.clone() }).collect();
+    let in_workgroups: Vec<_> = use_it.map(|s| Scene { shared_memory: 32 << 10, ..s.clone() }).collect();
     scenes.extend(in_workgroups);
     scenes
 }

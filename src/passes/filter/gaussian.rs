@@ -38,7 +38,10 @@ const VOLUMES: [Volume; 2] = [
 const RENDERED: usize = 0;
 const SECTIONS: usize = 1;
 
-const WHY: &str = "at most 63 weighted values in f32, exp to 3 ulp; R16F stores 1 to 4.9e-4";
+/// Neighbours along the axis that an invocation makes: RUN of glsl/filter/gaussian.comp.
+pub const RUN: u32 = 8;
+
+const WHY: &str = "at most 63 weighted values in f32; R16F stores 1 to 4.9e-4";
 const TOLERANCE: Tolerance = Tolerance { absolute: 6e-4, relative: 0.0, outliers: 0.0, why: WHY };
 
 pub const LATERAL: Pass = within_slices::<RENDERED, 0>("gaussian_lateral");
@@ -60,13 +63,14 @@ const fn within_slices<const VOLUME: usize, const AXIS: usize>(name: &'static st
                 reach[AXIS] = (VOLUMES[VOLUME].radius)(s)[AXIS];
                 Some(reach)
             },
+            run: RUN,
             ..Filter::of(VOLUMES[VOLUME].chain)
         }),
         shader: |_, _| "filter/gaussian",
         needed: |s| need(VOLUME, s, AXIS),
         reads: reads_source,
         writes: writes_target,
-        extent: |s, t| in_runs(slice_extent(s, t), AXIS),
+        extent: |s, t| in_runs_of(RUN, slice_extent(s, t), AXIS),
         repeat: once,
         params: |s, t| params(VOLUME, s, AXIS, t),
         constants: |s, _| constants(VOLUME, s, AXIS),
@@ -95,7 +99,7 @@ const fn across_slices<const VOLUME: usize>(name: &'static str) -> Pass {
             let target = VOLUMES[VOLUME].chain.volume(s).into_iter();
             target.map(|slot| Bind { part: Part::Around(0), ..whole("target", slot) }).collect()
         },
-        extent: |s, t| in_runs([s.grid.size[0], s.grid.size[1], t.slices], 2),
+        extent: |s, t| in_runs_of(RUN, [s.grid.size[0], s.grid.size[1], t.slices], 2),
         repeat: once,
         params: |s, t| params(VOLUME, s, 2, t),
         constants: |s, _| [constants(VOLUME, s, 2), vec![("LAYERED", 0)]].concat(),
@@ -113,15 +117,27 @@ fn need(volume: usize, scene: &Scene, axis: usize) -> Need {
 }
 
 fn params(volume: usize, scene: &Scene, axis: usize, args: &DispatchArgs) -> Params {
-    let deviation = (VOLUMES[volume].deviations)(scene)[axis];
-    // Without a Gaussian the shader has other weights, and no use for this one.
-    let narrowness = if deviation > 0.0 { 0.5 / (deviation * deviation) } else { 0.0 };
-    Params::default().f32("narrowness", narrowness).i32("slice", args.slice).i32("slices", args.slices)
+    let weights = match sharpens(scene, axis) {
+        true => vec![8.0 / 6.0, -1.0 / 6.0],
+        false => {
+            let deviation = (VOLUMES[volume].deviations)(scene)[axis];
+            let radius = (VOLUMES[volume].radius)(scene)[axis];
+            let bell: Vec<f64> = (0..=radius).map(|i| (-0.5 * (f64::from(i) / deviation).powi(2)).exp()).collect();
+            let sum = 2.0 * bell.iter().sum::<f64>() - bell[0];
+            bell.iter().map(|w| w / sum).collect()
+        }
+    };
+    Params::default().i32("slice", args.slice).i32("slices", args.slices).floats("weights", &weights)
+}
+
+/// True of the pass across slices that are sharpened.
+fn sharpens(scene: &Scene, axis: usize) -> bool {
+    axis == 2 && scene.sharpens()
 }
 
 fn constants(volume: usize, scene: &Scene, axis: usize) -> Vec<(&'static str, i32)> {
-    let sharpens = axis == 2 && scene.sharpens();
-    vec![("RADIUS", (VOLUMES[volume].radius)(scene)[axis] as i32), ("AXIS", axis as i32), ("SHARPENS", sharpens as i32)]
+    let radius = (VOLUMES[volume].radius)(scene)[axis];
+    vec![("RADIUS", radius as i32), ("AXIS", axis as i32), ("SHARPENS", i32::from(sharpens(scene, axis)))]
 }
 
 /// (-1, 8, -1)/6 across slices, the border repeated. The cubic B-spline passes 1 - w^2/6 of a slow wave of w radians a slice; this kernel
