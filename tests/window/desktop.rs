@@ -5,9 +5,11 @@ pub use crate::common::program::PROGRAM;
 pub use crate::common::wait::*;
 
 use echolume::picture::Picture;
+use std::collections::BTreeMap;
 use std::io::{BufRead, BufReader, Read};
 use std::path::PathBuf;
 use std::process::{Child, Command, Stdio};
+use std::sync::Mutex;
 use std::time::{Duration, Instant};
 use x11rb::connection::Connection;
 use x11rb::protocol::xproto::{
@@ -207,12 +209,20 @@ impl View<'_> {
 
     /// Its present picture; none while its size changes, or if it does not exist.
     pub fn look(&self) -> Option<Picture> {
-        let (_, [w, h]) = self.place();
-        let image = self.desk.connection.get_image(ImageFormat::Z_PIXMAP, self.window, 0, 0, w, h, !0).ok()?;
-        let bytes = image.reply().ok()?.data;
-        // Blue first, as every server on this byte order has it at 24 bits.
-        let rgba = bytes.chunks_exact(4).flat_map(|p| [p[2], p[1], p[0], 255]).collect();
-        Some(Picture { width: w.into(), height: h.into(), rgba })
+        self.look_at([0, 0], self.place().1.map(u32::from))
+    }
+
+    /// A part of its present picture, none if it is not inside: the server is asked for these pixels alone.
+    pub fn look_at(&self, corner: [u32; 2], size: [u32; 2]) -> Option<Picture> {
+        let ([x, y], [w, h]) = (corner.map(|n| i16::try_from(n).ok()), size.map(|n| u16::try_from(n).ok()));
+        let image = self.desk.connection.get_image(ImageFormat::Z_PIXMAP, self.window, x?, y?, w?, h?, !0).ok()?;
+        let mut rgba = image.reply().ok()?.data;
+        // Blue first, as every server on this byte order has it at 24 bits. In place: tests look many times a second, and are not optimised.
+        for pixel in rgba.chunks_exact_mut(4) {
+            pixel.swap(0, 2);
+            pixel[3] = 255;
+        }
+        Some(Picture { width: size[0], height: size[1], rgba })
     }
 
     /// Waits until it shows exactly this picture.
@@ -239,7 +249,7 @@ impl View<'_> {
         let begun = Instant::now();
         let mut seen = None;
         while begun.elapsed() < PATIENCE {
-            seen = self.look().and_then(|seen| crop(&seen, corner, size));
+            seen = self.look_at(corner, size);
             if seen.as_ref() == Some(&wanted) {
                 return;
             }
@@ -338,9 +348,21 @@ pub fn crop(picture: &Picture, from: [u32; 2], size: [u32; 2]) -> Option<Picture
     Some(Picture { width: size[0], height: size[1], rgba })
 }
 
-/// The picture of the sweep that `echolume render` makes.
+/// Volume rendering without a light volume, which takes most of the time of the default look's pictures on a CPU: for tests of anything else.
+pub const PLAIN: [&str; 2] = ["--set", "light.volume=none"];
+
+/// The picture of the sweep that `echolume render` makes. Many tests want the same one: it is drawn once.
 pub fn headless(size: [u32; 2], more: &[&str]) -> Picture {
-    rendered(SWEEP, size, more)
+    type Drawn = BTreeMap<([u32; 2], Vec<String>), Picture>;
+    static DRAWN: Mutex<Drawn> = Mutex::new(BTreeMap::new());
+    let key = (size, more.iter().map(|flag| flag.to_string()).collect());
+    let mut drawn = DRAWN.lock().unwrap_or_else(|e| e.into_inner());
+    drawn.entry(key).or_insert_with(|| rendered(SWEEP, size, more)).clone()
+}
+
+/// The same without a light volume.
+pub fn plain(size: [u32; 2], more: &[&str]) -> Picture {
+    headless(size, &[&PLAIN, more].concat())
 }
 
 /// The picture of a recording or a workspace that `echolume render` makes.

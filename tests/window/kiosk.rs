@@ -54,10 +54,10 @@ fn a_device_that_hangs_is_opened_again_under_a_banner() {
     let (file, fault) = (folder.path("cart.toml"), folder.path("fault"));
     fs::write(&file, format!("source = '{SWEEP}'\nloop = true\n[display]\npanels = false\n")).expect("write");
     let mut program = Command::new(PROGRAM);
-    let arguments = ["--kiosk", "--config", &file, "--device-timeout", "12s"];
+    let arguments = ["--kiosk", "--config", &file, "--device-timeout", "12s", PLAIN[0], PLAIN[1]];
     let mut view = desk.view_by(under_layer(&mut program, &[("FAULT", &fault)]), &arguments);
     let hung = view.window;
-    let full = headless([1024, 768], &[]);
+    let full = plain([1024, 768], &[]);
     let is_shown = |view: &View| view.shows_part(&full, [256, 192], [512, 384], "the source");
     is_shown(&view);
     fs::write(&fault, "h").expect("write");

@@ -15,7 +15,7 @@ fn picture() -> ([u32; 2], [u32; 2]) {
 }
 
 fn open(desk: &Desk) -> View<'_> {
-    desk.view(&["--size", "1000x700", "--source", SWEEP])
+    desk.view(&["--size", "1000x700", PLAIN[0], PLAIN[1], "--source", SWEEP])
 }
 
 #[test]
@@ -23,16 +23,16 @@ fn buttons_act_on_the_picture_and_reset_takes_it_all_back() {
     let desk = Desk::new(false);
     let view = open(&desk);
     let (_, size) = picture();
-    let start = headless(size, &[]);
+    let start = plain(size, &[]);
     view.shows_middle(&start, "the start");
     // The second button of the first row of modes, below undo, redo and presets.
     view.click(155, 151);
-    view.shows_middle(&headless(size, &["--mode", "vr"]), "volume");
+    view.shows_middle(&plain(size, &["--mode", "vr"]), "volume");
     // Reset, by its key: Backspace; undo and redo by their buttons.
     desk.tap(0xff08_u32);
     view.shows_middle(&start, "reset");
     view.click(54, 28);
-    view.shows_middle(&headless(size, &["--mode", "vr"]), "what was before the reset");
+    view.shows_middle(&plain(size, &["--mode", "vr"]), "what was before the reset");
     view.click(155, 28);
     view.shows_middle(&start, "reset again");
     view.leave();
@@ -45,9 +45,9 @@ fn a_switch_shows_the_echoes_of_the_clip_face_and_undo_takes_it_back() {
     let (_, size) = picture();
     let clipped = ["--mode", "sr", "--set", "clip=[{at=[3,52,-2],normal=[0,0,1]}]", "--set", "camera.elevation=-60"];
     let [on, off] =
-        ["true", "false"].map(|is| headless(size, &[&clipped[..], &["--set", &format!("cap.enabled={is}")]].concat()));
+        ["true", "false"].map(|is| plain(size, &[&clipped[..], &["--set", &format!("cap.enabled={is}")]].concat()));
     assert_ne!(on, off);
-    let view = desk.view(&[&["--size", "1000x700", "--source", SWEEP][..], &clipped].concat());
+    let view = desk.view(&[&["--size", "1000x700", PLAIN[0], PLAIN[1], "--source", SWEEP][..], &clipped].concat());
     view.shows_middle(&on, "the echoes");
     // The switch below the heading of the clip, which follows the controls in front.
     view.click(954, 486);
@@ -67,7 +67,7 @@ fn a_drag_on_the_picture_turns_it_and_one_on_a_panel_does_not() {
     let desk = Desk::new(false);
     let view = open(&desk);
     let (corner, size) = picture();
-    let start = headless(size, &[]);
+    let start = plain(size, &[]);
     view.shows_middle(&start, "the start");
     // Over the headings of the sliders, where nothing reacts.
     view.drag([(WINDOW[0] - 200) as i16, 8], [(WINDOW[0] - 120) as i16, 8]);
@@ -75,7 +75,7 @@ fn a_drag_on_the_picture_turns_it_and_one_on_a_panel_does_not() {
     let middle = [corner[0] + size[0] / 2, corner[1] + size[1] / 2].map(|n| n as i16);
     view.drag(middle, [middle[0] + 60, middle[1]]);
     until("another picture", || {
-        let seen = crop(&view.look()?, [corner[0] + size[0] / 4, corner[1] + size[1] / 4], size.map(|n| n / 2))?;
+        let seen = view.look_at([corner[0] + size[0] / 4, corner[1] + size[1] / 4], size.map(|n| n / 2))?;
         let before = crop(&start, size.map(|n| n / 4), size.map(|n| n / 2))?;
         (seen != before).then_some(())
     });
@@ -87,7 +87,7 @@ fn help_and_times_overlay_the_picture_and_disappear() {
     let desk = Desk::new(false);
     let view = open(&desk);
     let (_, size) = picture();
-    let start = headless(size, &[]);
+    let start = plain(size, &[]);
     view.shows_middle(&start, "the start");
     // Escape closes the help, and does not leave.
     for (key, back) in [(u32::from('h'), u32::from('h')), (F1, ESCAPE)] {
@@ -96,7 +96,7 @@ fn help_and_times_overlay_the_picture_and_disappear() {
         let middle = [corner[0] + size[0] / 2, corner[1] + size[1] / 2];
         // Nearly black, whatever the picture shows there.
         until("the help", || {
-            let seen = crop(&view.look()?, middle, [40, 4])?;
+            let seen = view.look_at(middle, [40, 4])?;
             let dark = seen.rgba.chunks(4).filter(|p| p[..3].iter().all(|c| *c < 60)).count();
             (dark * 2 > seen.rgba.len() / 4).then_some(())
         });
@@ -110,9 +110,10 @@ fn help_and_times_overlay_the_picture_and_disappear() {
 fn saved_pictures_and_loops_have_names_without_patient_data() {
     let desk = Desk::new(false);
     let folder = Folder::new("saved");
-    let view = desk.view(&["--size", "1000x700", "--source", SWEEP, "--save-to", &folder.path("kept")]);
+    let view =
+        desk.view(&["--size", "1000x700", PLAIN[0], PLAIN[1], "--source", SWEEP, "--save-to", &folder.path("kept")]);
     let (_, size) = picture();
-    let start = headless(size, &[]);
+    let start = plain(size, &[]);
     view.shows_middle(&start, "the start");
     let names = || -> Vec<String> {
         let entries = std::fs::read_dir(folder.path("kept")).into_iter().flatten().flatten();
@@ -136,9 +137,9 @@ fn saved_pictures_and_loops_have_names_without_patient_data() {
 #[test]
 fn panels_are_presented_while_a_picture_is_drawn() {
     let desk = Desk::new(false);
-    let view = desk.view(&["--size", "1000x700", "--source", SWEEP, "--budget", "none"]);
+    let view = desk.view(&["--size", "1000x700", PLAIN[0], PLAIN[1], "--source", SWEEP, "--budget", "none"]);
     let (_, size) = picture();
-    let start = headless(size, &[]);
+    let start = plain(size, &[]);
     view.shows_middle(&start, "the start");
     // The help is asked for while the picture is drawn, and closed again.
     desk.tap('1');
@@ -146,7 +147,7 @@ fn panels_are_presented_while_a_picture_is_drawn() {
         desk.tap('h');
         std::thread::sleep(std::time::Duration::from_millis(50));
     }
-    view.shows_middle(&headless(size, &["--mode", "sr"]), "the surface");
+    view.shows_middle(&plain(size, &["--mode", "sr"]), "the surface");
     let said = view.leave();
     let between = said.split(" shown on the window, ").nth(1).and_then(|rest| rest.split(' ').next());
     let between: u64 = between.and_then(|count| count.parse().ok()).expect("a count");
@@ -161,22 +162,21 @@ fn presets_are_pictures_and_show_what_the_command_renders() {
     let file = folder.path("presets.toml");
     let mut command = std::process::Command::new(PROGRAM);
     command.env("ECHOLUME_PRESETS", &file);
-    let view = desk.view_by(&mut command, &["--size", "1000x700", "--source", SWEEP]);
+    let view = desk.view_by(&mut command, &["--size", "1000x700", PLAIN[0], PLAIN[1], "--source", SWEEP]);
     let (_, size) = picture();
-    let start = headless(size, &[]);
+    let start = plain(size, &[]);
     view.shows_middle(&start, "the start");
     desk.control('p');
     until("the picture of B-mode in the list", || {
-        let seen = view.look()?;
         // The list is in the middle of the window, and B-mode the third of its second row.
-        let margin = crop(&seen, [131, 330], [4, 40])?;
+        let margin = view.look_at([131, 330], [4, 40])?;
         let is_list = margin.rgba.chunks(4).all(|pixel| pixel[..3] == [18, 21, 26]);
-        let tile = crop(&seen, [640, 390], [190, 110])?;
+        let tile = view.look_at([640, 390], [190, 110])?;
         let grey = tile.rgba.chunks(4).filter(|p| p[0] > 90 && p[0] == p[1] && p[1] == p[2]).count();
         (is_list && grey > 500).then_some(())
     });
     desk.tap('6');
-    let plane = headless(size, &["--preset", "bmode"]);
+    let plane = plain(size, &["--preset", "bmode"]);
     view.shows_middle(&plane, "B-mode");
     desk.control('p');
     desk.tap('s');
@@ -198,9 +198,10 @@ fn presets_are_pictures_and_show_what_the_command_renders() {
 fn a_cut_is_shown_saved_and_taken_back() {
     let desk = Desk::new(false);
     let folder = Folder::new("cut");
-    let view = desk.view(&["--size", "1000x700", "--source", SWEEP, "--save-to", &folder.path("kept")]);
+    let view =
+        desk.view(&["--size", "1000x700", PLAIN[0], PLAIN[1], "--source", SWEEP, "--save-to", &folder.path("kept")]);
     let (corner, size) = picture();
-    let start = headless(size, &[]);
+    let start = plain(size, &[]);
     view.shows_middle(&start, "the start");
     desk.tap('f');
     let round = |n: i32| {
@@ -238,11 +239,12 @@ fn a_cut_is_shown_saved_and_taken_back() {
 fn a_curved_plane_is_drawn_shown_saved_and_taken_back() {
     let desk = Desk::new(false);
     let folder = Folder::new("curve");
-    let view = desk.view(&["--size", "1000x700", "--source", SWEEP, "--save-to", &folder.path("kept")]);
+    let view =
+        desk.view(&["--size", "1000x700", PLAIN[0], PLAIN[1], "--source", SWEEP, "--save-to", &folder.path("kept")]);
     let (corner, size) = picture();
-    view.shows_middle(&headless(size, &[]), "the start");
+    view.shows_middle(&plain(size, &[]), "the start");
     desk.tap('8');
-    let start = headless(size, &["--mode", "orthogonal"]);
+    let start = plain(size, &["--mode", "orthogonal"]);
     // The lower right tile, without its borders and labels.
     let part = |wanted: &Picture, what: &str| {
         let from = size.map(|n| n / 2 + n / 8);
@@ -284,7 +286,7 @@ fn a_curved_plane_is_drawn_shown_saved_and_taken_back() {
 fn measure_on_a_plane(desk: &Desk, view: &View, folder: &Folder) {
     let (corner, size) = picture();
     desk.tap('7');
-    view.shows_middle(&headless(size, &["--mode", "mpr"]), "the plane");
+    view.shows_middle(&plain(size, &["--mode", "mpr"]), "the plane");
     let at = |x: i16, y: i16| view.click(corner[0] as i16 + x, corner[1] as i16 + y);
     desk.tap('m');
     at(200, 60);
@@ -328,7 +330,7 @@ fn the_volume_is_exported_as_the_commands_do() {
         let view = desk.view(&["--size", "700x500", "--source", &ball, "--save-to", &kept, "--mode", "mip"]);
         until("a picture", || {
             let (corner, size) = echolume::ui::panels::picture_area([700, 500], 1.0, true);
-            let seen = crop(&view.look()?, corner, size)?;
+            let seen = view.look_at(corner, size)?;
             let is_bright = |pixel: &[u8]| pixel[..3].iter().all(|c| *c > 150);
             (seen.rgba.chunks(4).filter(|pixel| is_bright(pixel)).count() > 5000).then_some(())
         });
@@ -378,8 +380,11 @@ fn a_turntable_and_a_loop_are_exported_with_marks_as_asked() {
         assert!(run.status.success(), "{}", String::from_utf8_lossy(&run.stderr));
     };
     run(&["phantom", "--volumes", "2", "--frames", "12", "--lines", "32", "-o", &sweep]);
-    let view =
-        desk.view(&["-v", "--size", "700x500", "--source", &sweep, "--save-to", &kept, "--mode", "mip", "--cine", "9"]);
+    // Coarse rays: 72 pictures are drawn.
+    let look = ["--mode", "mip", "--set", "ray.step=2"];
+    let view = desk.view(
+        &[&["-v", "--size", "700x500", "--source", &sweep, "--save-to", &kept, "--cine", "9"], &look[..]].concat(),
+    );
     let (_, size) = echolume::ui::panels::picture_area([700, 500], 1.0, true);
     let all = || std::fs::read_dir(&kept).into_iter().flatten().flatten().map(|entry| entry.path());
     let exported = |format: char, ending: &str| {
@@ -421,12 +426,14 @@ fn the_start_line_is_bent_on_plane_a_and_the_rendering_follows() {
     let smooth = "planes.smooth={lateral=1,depth=1}";
     let four = ["--mode", "vr", "--set", "layout=four", "--set", "region.depth=[20,80]", "--set", smooth];
     let kept = folder.path("kept");
-    let view = desk.view(&[&["--size", "1000x700", "--source", SWEEP, "--save-to", &kept][..], &four].concat());
+    let view = desk.view(
+        &[&["--size", "1000x700", PLAIN[0], PLAIN[1], "--source", SWEEP, "--save-to", &kept][..], &four].concat(),
+    );
     let (corner, size) = picture();
     // The middle of the rendering, in the last quarter of the picture; marks are at its edges.
     let (from, middle) = (size.map(|n| n * 5 / 8), size.map(|n| n / 4));
     let renders = |more: &[&str], what: &str| {
-        let wanted = headless(size, &[&four, more].concat());
+        let wanted = plain(size, &[&four, more].concat());
         view.shows_at(&wanted, [corner[0] + from[0], corner[1] + from[1]], from, middle, what);
     };
     renders(&[], "the start");
@@ -446,7 +453,7 @@ fn the_start_line_is_bent_on_plane_a_and_the_rendering_follows() {
     // Its ring is green below the line.
     let has_handle = |at: [i16; 2]| {
         let is_green = |p: &[u8]| p[1] > 180 && p[0] < 110 && p[2] < 140;
-        let seen = crop(&view.look()?, [at[0] as u32, at[1] as u32], [16, 8])?;
+        let seen = view.look_at([at[0] as u32, at[1] as u32], [16, 8])?;
         let pixel = |x: usize, y: usize| &seen.rgba[4 * (16 * y + x)..4 * (16 * y + x) + 4];
         (is_green(pixel(0, 5)) && !is_green(pixel(12, 5))).then_some(())
     };

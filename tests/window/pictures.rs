@@ -32,24 +32,24 @@ fn every_mode_in_a_window_is_the_headless_picture_byte_for_byte() {
 #[test]
 fn a_window_that_is_resized_shows_a_picture_of_its_size() {
     let desk = Desk::new(false);
-    let view = desk.view(&["--no-ui", "--size", "300x220", "--source", SWEEP]);
+    let view = desk.view(&["--no-ui", "--size", "300x220", PLAIN[0], PLAIN[1], "--source", SWEEP]);
     for size in [[300, 220], [417, 333], [128, 64], [640, 480]] {
         view.resize(size[0], size[1]);
-        view.shows(&headless(size, &[]), &format!("{size:?}"));
+        view.shows(&plain(size, &[]), &format!("{size:?}"));
     }
     // Smaller than any picture: nothing breaks, and the picture returns.
     view.resize(1, 1);
     until("the tiny window", || (view.place().1 == [1, 1]).then_some(()));
     view.resize(200, 160);
-    view.shows(&headless([200, 160], &[]), "back from one pixel");
+    view.shows(&plain([200, 160], &[]), "back from one pixel");
     view.leave();
 }
 
 #[test]
 fn an_idle_window_dispatches_nothing() {
     let desk = Desk::new(false);
-    let view = desk.view(&["--no-ui", "--size", "200x160", "--source", SWEEP]);
-    view.shows(&headless([200, 160], &[]), "the picture");
+    let view = desk.view(&["--no-ui", "--size", "200x160", PLAIN[0], PLAIN[1], "--source", SWEEP]);
+    view.shows(&plain([200, 160], &[]), "the picture");
     std::thread::sleep(std::time::Duration::from_millis(1500));
     let said = view.leave();
     let still = said.split("none in the last ").nth(1).and_then(|s| s.split(' ').next()?.parse::<f64>().ok());

@@ -16,8 +16,8 @@ fn recordings_are_shown_in_turn_and_come_back_as_they_were_left() {
     let second = folder.path("second.mha");
     std::fs::copy(SWEEP, &second).expect("a copy");
     std::fs::copy(Path::new(SWEEP).with_file_name("probe.toml"), folder.path("probe.toml")).expect("its probe");
-    let [start, volume] = [&[][..], &["--mode", "vr"]].map(|flags| headless(size, flags));
-    let view = desk.view(&["--size", "1000x700", SWEEP, &second]);
+    let [start, volume] = [&[][..], &["--mode", "vr"]].map(|flags| plain(size, flags));
+    let view = desk.view(&["--size", "1000x700", PLAIN[0], PLAIN[1], SWEEP, &second]);
     view.shows_middle(&start, "the first recording");
     desk.tap('2');
     view.shows_middle(&volume, "another mode");

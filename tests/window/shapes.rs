@@ -48,8 +48,8 @@ fn full_screen_and_minimised_windows_return_to_the_same_picture() {
 #[test]
 fn a_destroyed_window_ends_the_view_without_an_error() {
     let desk = Desk::new(false);
-    let view = desk.view(&["--no-ui", "--size", "300x220", "--source", SWEEP]);
-    view.shows(&headless([300, 220], &[]), "the window");
+    let view = desk.view(&["--no-ui", "--size", "300x220", PLAIN[0], PLAIN[1], "--source", SWEEP]);
+    view.shows(&plain([300, 220], &[]), "the window");
     desk.connection.destroy_window(view.window).expect("destroy");
     desk.connection.flush().expect("flush");
     view.ended();
@@ -58,8 +58,8 @@ fn a_destroyed_window_ends_the_view_without_an_error() {
 #[test]
 fn a_kiosk_stays_when_it_is_closed_and_comes_back_when_it_is_destroyed() {
     let desk = Desk::new(true);
-    let mut view = desk.view(&["--kiosk", "--no-ui", "--source", SWEEP]);
-    let full = headless([1024, 768], &[]);
+    let mut view = desk.view(&["--kiosk", "--no-ui", PLAIN[0], PLAIN[1], "--source", SWEEP]);
+    let full = plain([1024, 768], &[]);
     view.shows(&full, "a kiosk fills the screen");
     close(&view);
     for key in [ESCAPE, u32::from('q'), F1 + 10] {

@@ -241,9 +241,9 @@ fn what_is_drawn_by_the_mouse_is_measured_kept_and_copied() {
 #[test]
 fn the_wheel_and_the_right_button_change_the_view_without_a_tool() {
     let desk = Desk::new(false);
-    let view = desk.view(&[&SIZE[..], &["--source", SWEEP]].concat());
+    let view = desk.view(&[&SIZE[..], &PLAIN, &["--source", SWEEP]].concat());
     let (_, size) = picture();
-    let start = headless(size, &[]);
+    let start = plain(size, &[]);
     view.shows_middle(&start, "the start");
     let [x, y] = place(size.map(|n| f64::from(n) / 2.0));
     let looks = |what: &str| {
@@ -251,7 +251,7 @@ fn the_wheel_and_the_right_button_change_the_view_without_a_tool() {
         let (from, half) = (size.map(|n| n / 4), size.map(|n| n / 2));
         let wanted = crop(&start, from, half).expect("the middle");
         until(what, || {
-            let seen = crop(&view.look()?, [corner[0] + from[0], corner[1] + from[1]], half)?;
+            let seen = view.look_at([corner[0] + from[0], corner[1] + from[1]], half)?;
             (seen != wanted).then_some(())
         });
     };
