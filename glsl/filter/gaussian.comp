@@ -5,6 +5,7 @@
 layout(constant_id = 0) const int RADIUS = 3; // at most 31
 layout(constant_id = 1) const int AXIS = 0; // 2: across the slices of a volume; otherwise within those of a batch
 layout(constant_id = 2) const int SHARPENS = 0; // 1: (-1, 8, -1)/6 in place of the Gaussian, against the blur of the cubic B-spline between slices
+layout(constant_id = 3) const int TRANSPOSED = 0; // 1: a row of a workgroup is stored together, of axis 0 on devices with shared memory
 #extension GL_EXT_scalar_block_layout : require
 #extension GL_EXT_control_flow_attributes : require
 layout(scalar) uniform Params {
@@ -16,6 +17,9 @@ layout(scalar) uniform Params {
 #include "filter.glsl"
 
 const int RUN = 8;
+// Adjacent invocations make texels a run apart, which a GPU stores one by one. Through this they store adjacent ones. The rows lie in other banks.
+const int WIDTH = 8 * RUN;
+shared float made[8 * (WIDTH + 1)];
 
 void main() {
     ivec3 at = made_run(AXIS, RUN);
@@ -31,12 +35,13 @@ void main() {
         // A rectangle may end within a workgroup.
         size.xy = min(size.xy, ivec2(end_column, end_row));
     }
-    if (any(greaterThanEqual(at, size))) return;
+    if (TRANSPOSED == 0 && any(greaterThanEqual(at, size))) return;
     float sums[RUN];
     [[unroll]] for (int n = 0; n < RUN; ++n) sums[n] = 0.0;
     [[unroll]] for (int i = -RADIUS; i < RUN + RADIUS; ++i) {
-        ivec3 tap = at;
-        tap[AXIS] += i;
+        // Rows that are not there are read too where a workgroup stores together.
+        ivec3 tap = TRANSPOSED == 1 ? min(at, size - 1) : at;
+        tap[AXIS] = at[AXIS] + i;
         bool inside = SHARPENS == 1 || uint(tap[AXIS]) < uint(length);
         // What is further away than a texel to make can see may be on its way still.
         tap[AXIS] = clamp(tap[AXIS], 0, min(length, size[AXIS] + RADIUS) - 1);
@@ -55,9 +60,22 @@ void main() {
             there[n] -= (k > at[AXIS] + n ? weights[k] : 0.0) + (k >= length - at[AXIS] - n ? weights[k] : 0.0);
         }
     }
+    ivec2 here = ivec2(gl_LocalInvocationID.xy);
+    ivec3 to = at;
     [[unroll]] for (int n = 0; n < RUN; ++n) {
         float mean = SHARPENS == 1 ? clamp(sums[n], 0.0, 1.0) : sums[n] / there[n];
-        if (at[AXIS] < size[AXIS]) imageStore(target, at + to_target, STORED(mean));
-        ++at[AXIS];
+        if (TRANSPOSED == 1) {
+            made[here.y * (WIDTH + 1) + here.x * RUN + n] = mean;
+        } else if (to[AXIS] < size[AXIS]) {
+            imageStore(target, to + to_target, STORED(mean));
+        }
+        ++to[AXIS];
+    }
+    if (TRANSPOSED == 0) return;
+    barrier();
+    at.x -= here.x * (RUN - 1);
+    [[unroll]] for (int n = 0; n < RUN; ++n) {
+        if (all(lessThan(at, size))) imageStore(target, at + to_target, STORED(made[here.y * (WIDTH + 1) + here.x + 8 * n]));
+        at.x += 8;
     }
 }

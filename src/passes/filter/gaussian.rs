@@ -41,6 +41,9 @@ const SECTIONS: usize = 1;
 /// Neighbours along the axis that an invocation makes: RUN of glsl/filter/gaussian.comp.
 pub const RUN: u32 = 8;
 
+/// Shared memory of a workgroup that stores its rows together, bytes.
+const ROW_MEMORY: u32 = 4 * 8 * (8 * RUN + 1);
+
 const WHY: &str = "at most 63 weighted values in f32; R16F stores 1 to 4.9e-4";
 const TOLERANCE: Tolerance = Tolerance { absolute: 6e-4, relative: 0.0, outliers: 0.0, why: WHY };
 
@@ -137,7 +140,13 @@ fn sharpens(scene: &Scene, axis: usize) -> bool {
 
 fn constants(volume: usize, scene: &Scene, axis: usize) -> Vec<(&'static str, i32)> {
     let radius = (VOLUMES[volume].radius)(scene)[axis];
-    vec![("RADIUS", radius as i32), ("AXIS", axis as i32), ("SHARPENS", i32::from(sharpens(scene, axis)))]
+    let is_transposed = axis == 0 && scene.shared_memory >= ROW_MEMORY;
+    vec![
+        ("RADIUS", radius as i32),
+        ("AXIS", axis as i32),
+        ("SHARPENS", i32::from(sharpens(scene, axis))),
+        ("TRANSPOSED", i32::from(is_transposed)),
+    ]
 }
 
 /// (-1, 8, -1)/6 across slices, the border repeated. The cubic B-spline passes 1 - w^2/6 of a slow wave of w radians a slice; this kernel
