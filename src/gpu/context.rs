@@ -11,6 +11,7 @@ use super::validation::{self, Layer, Messenger};
 use super::watchdog::{Deadline, Watchdog};
 use super::window::target::Target;
 use crate::queues::MAX_QUEUES;
+use crate::scene::WindowTexels;
 use ash::vk;
 use gpu_allocator::vulkan::{Allocator, AllocatorCreateDesc};
 use std::any::Any;
@@ -108,8 +109,8 @@ pub struct Context {
     pub(super) allocator: Mutex<Option<Allocator>>,
     formats: Mutex<HashMap<vk::Format, vk::FormatFeatureFlags>>,
     pub(super) watchdog: Watchdog,
-    /// The window shows more than 8 bits a channel.
-    pub is_deep: AtomicBool,
+    /// How the window takes pictures without a conversion.
+    pub window_texels: Mutex<WindowTexels>,
     pub faults: Faults,
     pub counts: Counts,
 }
@@ -280,7 +281,7 @@ impl Context {
             allocator: Mutex::new(Some(allocator)),
             formats: Mutex::default(),
             watchdog,
-            is_deep: AtomicBool::new(false),
+            window_texels: Mutex::default(),
             faults: Faults::default(),
             counts: Counts::default(),
         });
@@ -361,6 +362,16 @@ impl Context {
         // SAFETY: the handle belongs to this instance; the call only reads.
         let query = || unsafe { self.instance.get_physical_device_format_properties(self.candidate.handle, format) };
         *known.entry(format).or_insert_with(|| query().optimal_tiling_features)
+    }
+
+    /// True if shaders that declare no format may store texels of this one.
+    pub(super) fn writes_without_format(&self, format: vk::Format) -> bool {
+        let mut features = vk::FormatProperties3::default();
+        let mut properties = vk::FormatProperties2::default().push_next(&mut features);
+        let device = self.candidate.handle;
+        // SAFETY: the handle belongs to this instance; the structures are complete, and the call only writes into them.
+        unsafe { self.instance.get_physical_device_format_properties2(device, format, &mut properties) };
+        features.optimal_tiling_features.contains(vk::FormatFeatureFlags2::STORAGE_WRITE_WITHOUT_FORMAT)
     }
 
     /// Fault injection: from now on a format has these features.

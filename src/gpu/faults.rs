@@ -66,7 +66,7 @@ impl Poison {
     pub fn texel_value(self, format: Format) -> f64 {
         match format {
             Format::R32u | Format::Rg32u => f64::from(self.integer),
-            Format::R8 | Format::Rgba8 => (255.0 * f64::from(self.normalized)).round() / 255.0,
+            Format::R8 | Format::Rgba8 | Format::Bgra8 => (255.0 * f64::from(self.normalized)).round() / 255.0,
             Format::R16 | Format::Rg16 => (65535.0 * f64::from(self.normalized)).round() / 65535.0,
             _ => f64::from(self.float),
         }

@@ -7,9 +7,8 @@ use super::faults::Poison;
 use crate::passes::Slot;
 use crate::passes::slots::{Format, Shape};
 use crate::plan::Plan;
-use crate::scene::{Sampling, Scene};
+use crate::scene::{Sampling, Scene, WindowTexels};
 use ash::vk;
-use std::sync::atomic::Ordering;
 
 /// How single texels are read.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -55,6 +54,7 @@ pub(super) fn vulkan(format: Format) -> vk::Format {
         Format::Rgba16f => vk::Format::R16G16B16A16_SFLOAT,
         Format::Rgba32f => vk::Format::R32G32B32A32_SFLOAT,
         Format::Rgba8 => vk::Format::R8G8B8A8_UNORM,
+        Format::Bgra8 => vk::Format::B8G8R8A8_UNORM,
     }
 }
 
@@ -62,7 +62,7 @@ pub(super) fn vulkan(format: Format) -> vk::Format {
 pub(super) fn clear_value(poison: Poison, format: Format) -> vk::ClearColorValue {
     match format {
         Format::R32u | Format::Rg32u => vk::ClearColorValue { uint32: [poison.integer; 4] },
-        Format::R8 | Format::R16 | Format::Rg16 | Format::Rgba8 => {
+        Format::R8 | Format::R16 | Format::Rg16 | Format::Rgba8 | Format::Bgra8 => {
             vk::ClearColorValue { float32: [poison.normalized; 4] }
         }
         _ => vk::ClearColorValue { float32: [poison.float; 4] },
@@ -95,7 +95,7 @@ fn features(context: &Context, slot: Slot, scene: &Scene) -> vk::FormatFeatureFl
 const FRAMES_IN_CACHE: u32 = 4;
 
 /// The scene with the fields that the device resolves: the fastest sampling, which reads eight texels if texels are loaded or the
-/// device cannot filter the volume's format; no packed neighbours if the device cannot hold them; a deep picture for a deep window; and the shared
+/// device cannot filter the volume's format; no packed neighbours if the device cannot hold them; a picture in the format of the window; and the shared
 /// memory of a GPU, for the solver of AOS. On a CPU few frames go through stage 1 at once: their slots stay in its caches.
 pub fn adapt_scene(context: &Context, texel_access: TexelAccess, scene: Scene) -> Scene {
     let filters = filters(context, Slot::Volume.format(&scene));
@@ -104,16 +104,30 @@ pub fn adapt_scene(context: &Context, texel_access: TexelAccess, scene: Scene) -
         true => scene.frames_at_once = FRAMES_IN_CACHE,
         false => scene.shared_memory = context.limits.max_compute_shared_memory_size,
     }
-    // It is copied to the window by a blit.
-    let wide = context.format_features(vulkan(Format::Rgba16f));
-    scene.is_deep = context.is_deep.load(Ordering::Relaxed)
-        && wide.contains(vk::FormatFeatureFlags::STORAGE_IMAGE | vk::FormatFeatureFlags::BLIT_SRC);
+    scene.window_texels = window_texels(context);
     let format = vulkan(Slot::PackedNeighbours.format(&scene));
     let fits = context.image_limits(format, vk::ImageType::TYPE_3D, usage(context, Slot::PackedNeighbours));
     let fits = fits.is_ok_and(|l| {
         Slot::PackedNeighbours.bytes(&scene) <= l.max_resource_size.min(context.candidate.max_allocation)
     });
     if fits { scene } else { scene.without_quads() }
+}
+
+/// The format in which the window takes pictures, if passes can store it.
+fn window_texels(context: &Context) -> WindowTexels {
+    let wanted = *context.window_texels.lock().unwrap_or_else(|e| e.into_inner());
+    let format = match wanted {
+        WindowTexels::Rgba8 => return wanted,
+        WindowTexels::Bgra8 => vulkan(Format::Bgra8),
+        WindowTexels::Deep => vulkan(Format::Rgba16f),
+    };
+    let needed = vk::FormatFeatureFlags::STORAGE_IMAGE
+        | vk::FormatFeatureFlags::SAMPLED_IMAGE
+        | vk::FormatFeatureFlags::BLIT_SRC
+        | vk::FormatFeatureFlags::TRANSFER_SRC
+        | vk::FormatFeatureFlags::TRANSFER_DST;
+    let is_stored = context.format_features(format).contains(needed);
+    if is_stored && context.writes_without_format(format) { wanted } else { WindowTexels::Rgba8 }
 }
 
 /// True if the device has a linear filter of images in this format.
@@ -204,6 +218,7 @@ pub fn format_support(context: &Context) -> Vec<FormatSupport> {
         Format::Rgba16f,
         Format::Rgba32f,
         Format::Rgba8,
+        Format::Bgra8,
     ];
     let uses = [
         ("sampled", vk::FormatFeatureFlags::SAMPLED_IMAGE),

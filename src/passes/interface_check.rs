@@ -108,7 +108,8 @@ fn image_format(format: Format) -> Option<ImageFormat> {
         Format::Rgba16f => ImageFormat::Rgba16f,
         Format::Rgba32f => ImageFormat::Rgba32f,
         Format::Rgba8 => ImageFormat::Rgba8,
-        Format::Floats => return None,
+        // No shader declares the order of most windows, and none reads what is shown.
+        Format::Bgra8 | Format::Floats => return None,
     })
 }
 

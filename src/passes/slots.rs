@@ -3,7 +3,7 @@
 
 use super::{cut, lookup_tables, net};
 use crate::scene::planes::{TILE_VECTORS, cell};
-use crate::scene::{Propagation, Scene, SurfaceColour, VolumeFormat};
+use crate::scene::{Propagation, Scene, SurfaceColour, VolumeFormat, WindowTexels};
 use crate::source::StoredType;
 
 /// Batches of frames that may be in flight at once: entries of the staging ring. The frame array has layers for each.
@@ -362,8 +362,12 @@ slots! {
     /// The list of vertices by their cells and edges, and their places.
     NetAsked = D::image("net_asked", |s| Shape::Two(net::list(s)), |_| Format::Rg32u);
     NetOffsets = D::image("net_offsets", |s| Shape::Two(net::list(s)), |_| Format::Rgba32f);
-    /// 8-bit result.
-    Screen = D::image("screen", per_pixel, |s| if s.is_deep { Format::Rgba16f } else { Format::Rgba8 });
+    /// The result: in 8 bits, or as the window shows it.
+    Screen = D::image("screen", per_pixel, |s| match s.window_texels {
+        WindowTexels::Rgba8 => Format::Rgba8,
+        WindowTexels::Bgra8 => Format::Bgra8,
+        WindowTexels::Deep => Format::Rgba16f,
+    });
 }
 
 fn frame_layers(scene: &Scene) -> Shape {
@@ -598,6 +602,8 @@ pub enum Format {
     Rgba16f,
     Rgba32f,
     Rgba8,
+    /// As most windows store their pixels.
+    Bgra8,
     /// Bits.
     R32u,
     Rg32u,
@@ -610,13 +616,13 @@ impl Format {
         match self {
             Format::R8 | Format::R16 | Format::R16f | Format::R32f | Format::R32u | Format::Floats => 1,
             Format::Rg16 | Format::Rg16f | Format::Rg32f | Format::Rg32u => 2,
-            Format::Rgba16f | Format::Rgba32f | Format::Rgba8 => 4,
+            Format::Rgba16f | Format::Rgba32f | Format::Rgba8 | Format::Bgra8 => 4,
         }
     }
 
     pub(crate) fn channel_bytes(self) -> usize {
         match self {
-            Format::R8 | Format::Rgba8 => 1,
+            Format::R8 | Format::Rgba8 | Format::Bgra8 => 1,
             Format::R16 | Format::Rg16 | Format::R16f | Format::Rg16f | Format::Rgba16f => 2,
             Format::R32f | Format::Rg32f | Format::Rgba32f | Format::Floats | Format::R32u | Format::Rg32u => 4,
         }

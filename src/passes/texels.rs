@@ -3,6 +3,7 @@
 use super::slots::{Format, Slot};
 use crate::scene::Scene;
 use half::f16;
+use std::borrow::Cow;
 
 /// Texels with `channels` values each; x fastest.
 #[derive(Clone, Debug, PartialEq)]
@@ -161,9 +162,9 @@ impl Texels {
     /// The bytes that a slot of this format stores, each value rounded as a driver rounds: to nearest, ties to even.
     pub fn encode(&self, format: Format) -> Vec<u8> {
         let mut bytes = Vec::with_capacity(self.values.len() * format.channel_bytes());
-        for &v in &self.values {
+        for &v in &in_order(format, &self.values)[..] {
             match format {
-                Format::R8 | Format::Rgba8 => bytes.push((v.clamp(0.0, 1.0) * 255.0).round_ties_even() as u8),
+                Format::R8 | Format::Rgba8 | Format::Bgra8 => bytes.push((v.clamp(0.0, 1.0) * 255.0).round_ties_even() as u8),
                 Format::R16 | Format::Rg16 => {
                     bytes.extend(((v.clamp(0.0, 1.0) * 65535.0).round_ties_even() as u16).to_le_bytes());
                 }
@@ -180,7 +181,7 @@ impl Texels {
     pub fn decode(size: [usize; 3], format: Format, bytes: &[u8]) -> Texels {
         let two = |b: &[u8]| [b[0], b[1]];
         let values = bytes.chunks_exact(format.channel_bytes()).map(|b| match format {
-            Format::R8 | Format::Rgba8 => f64::from(b[0]) / 255.0,
+            Format::R8 | Format::Rgba8 | Format::Bgra8 => f64::from(b[0]) / 255.0,
             Format::R16 | Format::Rg16 => f64::from(u16::from_le_bytes(two(b))) / 65535.0,
             Format::R16f | Format::Rg16f | Format::Rgba16f => f64::from(f16::from_le_bytes(two(b))),
             Format::R32f | Format::Rg32f | Format::Rgba32f | Format::Floats => {
@@ -188,7 +189,8 @@ impl Texels {
             }
             Format::R32u | Format::Rg32u => f64::from(u32::from_le_bytes([b[0], b[1], b[2], b[3]])),
         });
-        Texels { size, channels: format.channels(), values: values.collect() }
+        let values: Vec<f64> = values.collect();
+        Texels { size, channels: format.channels(), values: in_order(format, &values).into_owned() }
     }
 
     /// A value as the format stores it.
@@ -200,13 +202,21 @@ impl Texels {
     /// The distance between neighbouring values that the format stores near `value`.
     pub fn spacing(format: Format, value: f64) -> f64 {
         match format {
-            Format::R8 | Format::Rgba8 => 1.0 / 255.0,
+            Format::R8 | Format::Rgba8 | Format::Bgra8 => 1.0 / 255.0,
             // Integers are exact; the fraction of other numbers is lost.
             Format::R32u | Format::Rg32u => 0.9,
             Format::R16 | Format::Rg16 => 1.0 / 65535.0,
             Format::R16f | Format::Rg16f | Format::Rgba16f => value.abs().max(6.2e-5) / 1024.0,
             Format::R32f | Format::Rg32f | Format::Rgba32f | Format::Floats => value.abs().max(1.2e-38) / 8_388_608.0,
         }
+    }
+}
+
+/// Red, green and blue from or into the order in which the format stores them.
+fn in_order(format: Format, values: &[f64]) -> Cow<'_, [f64]> {
+    match format {
+        Format::Bgra8 => values.chunks_exact(4).flat_map(|c| [c[2], c[1], c[0], c[3]]).collect(),
+        _ => Cow::Borrowed(values),
     }
 }
 

@@ -144,6 +144,16 @@ impl Ring {
     }
 }
 
+/// How a window stores pixels. A picture that is stored so is copied to it as it is.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum WindowTexels {
+    #[default]
+    Rgba8,
+    Bgra8,
+    /// More than 8 bits a channel.
+    Deep,
+}
+
 #[derive(Clone, Debug)]
 pub struct Scene {
     pub geometry: Geometry,
@@ -160,8 +170,8 @@ pub struct Scene {
     pub ring: Ring,
     /// Whether rays skip bricks if no setting says so: true, or the last choice of [`Scene::sampled`].
     pub bricks_pay: bool,
-    /// The picture has more than 8 bits a channel, because the window shows them. The device resolves this.
-    pub is_deep: bool,
+    /// How the picture is stored: as the window takes it without a conversion. The device resolves this.
+    pub window_texels: WindowTexels,
     /// Bytes of shared memory of a workgroup of a GPU, which solves a row or a column under AOS in it, and propagates light through several layers;
     /// 0 on a CPU, where a single invocation does either faster. The device resolves this.
     pub shared_memory: u32,
@@ -289,7 +299,7 @@ impl Scene {
             step,
             ring,
             bricks_pay: true,
-            is_deep: false,
+            window_texels: WindowTexels::default(),
             shared_memory: 0,
             frames_at_once: u32::MAX,
             sampling,

@@ -5,11 +5,10 @@ use echolume::gpu::{Context, ContextOptions, Deadline, DeviceChoice, Renderer, R
 use echolume::passes::slots::Format;
 use echolume::passes::{Slot, Texels, is_hit};
 use echolume::picture::Picture;
-use echolume::scene::{Scene, insonified_box};
+use echolume::scene::{Scene, WindowTexels, insonified_box};
 use echolume::verify::built_in;
 use glam::DVec3;
 use std::ops::Deref;
-use std::sync::atomic::Ordering;
 use std::sync::{Arc, Mutex};
 use std::time::Duration;
 
@@ -104,7 +103,8 @@ impl Drop for Device {
         }
         if let Some(runner) = self.runner.take().filter(|_| !std::thread::panicking()) {
             assert!(!self.provoked, "a test that expects messages needs a device alone");
-            assert!(!self.context.is_deep.load(Ordering::Relaxed), "a test that changes its device needs one alone");
+            let window = *self.context.window_texels.lock().unwrap_or_else(|e| e.into_inner());
+            assert_eq!(window, WindowTexels::Rgba8, "a test that changes its device needs one alone");
             IDLE.lock().unwrap_or_else(|e| e.into_inner()).push((self.context.clone(), runner));
         }
     }

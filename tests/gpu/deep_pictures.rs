@@ -1,18 +1,19 @@
-//! Pictures for a window of 10 bits a channel: more levels, and the same picture wherever 8 bits are asked for.
+//! Pictures as a window stores them: of 10 bits a channel more levels, of another order of the channels the same values; and the same picture wherever 8 bits
+//! are asked for.
 
 use crate::common::gpu::*;
 use echolume::gpu::{Renderer, RendererOptions};
 use echolume::passes::Slot;
 use echolume::probe::Geometry;
+use echolume::scene::WindowTexels;
 use std::collections::BTreeSet;
-use std::sync::atomic::Ordering;
 
 /// Prevents a deep window that shows pictures of 256 levels, and saved pictures that differ because of it.
 #[test]
 fn a_deep_window_gets_more_levels_and_files_the_same_picture() {
     // Another test must not get the deep one.
     let (plain, deep) = (Device::new(), Device::alone());
-    deep.is_deep.store(true, Ordering::Relaxed);
+    *deep.window_texels.lock().expect("no panic") = WindowTexels::Deep;
     let toml = "mode = 'mip'\npicture = { size = [64, 48] }\nslices = { pixels = 64, format = 'r32f' }";
     let scene = scene(Geometry::Sweep(wobbler()), FLOATS, toml);
     let frames = body_frames(&scene, |p| (0.3 + 0.004 * p.x + 0.0007 * p.y).clamp(0.0, 1.0));
@@ -32,4 +33,39 @@ fn a_deep_window_gets_more_levels_and_files_the_same_picture() {
         assert!(difference(&usual, &same).1 <= 1.0);
         assert_eq!(usual.rgba.len(), same.rgba.len());
     }
+}
+
+/// Prevents red and blue that change places in what is saved, measured or shown of a window that stores blue first.
+#[test]
+fn a_window_that_stores_blue_first_gets_the_same_picture() {
+    let (plain, swapped) = (Device::new(), Device::alone());
+    *swapped.window_texels.lock().expect("no panic") = WindowTexels::Bgra8;
+    let mut coloured = 0;
+    for toml in [
+        "mode = 'volume'\nlight = { colour = [1.0, 0.6, 0.2] }",
+        "mode = 'surface'",
+        "mode = 'orthogonal'",
+        "mode = 'surface'\nlayout = '4up'",
+        "mode = 'volume'\nray = { half = true, eighth = true }",
+    ] {
+        let toml = format!("{toml}\npicture = {{ size = [90, 64] }}\nslices = {{ pixels = 64 }}");
+        let scene = scene(Geometry::Sweep(wobbler()), FLOATS, &toml);
+        let frames = body_frames(&scene, |p| (0.3 + 0.004 * p.x + 0.0007 * p.y).clamp(0.0, 1.0));
+        for readback in [true, false] {
+            let drawn = |device: &Device| {
+                let options = RendererOptions { readback, ..RendererOptions::default() };
+                let mut renderer = Renderer::new(device, scene.clone(), &options).expect("renderer");
+                send(&mut renderer, &frames, 0);
+                let picture = renderer.picture().expect("picture");
+                let stored = Slot::Screen.format(renderer.scene());
+                (picture, renderer.read(Slot::Screen).expect("read").expect("an image").values, stored)
+            };
+            let ((usual, values, format), (same, same_values, other)) = (drawn(&plain), drawn(&swapped));
+            assert_ne!(format, other, "{toml}: the order of the window");
+            assert_eq!(usual.rgba, same.rgba, "{toml}");
+            assert_eq!(values, same_values, "{toml}");
+            coloured += u32::from(usual.rgba.chunks_exact(4).any(|p| p[0] != p[2]));
+        }
+    }
+    assert!(coloured >= 4, "{coloured} pictures have colours: grey shows no order");
 }

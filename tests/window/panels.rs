@@ -154,6 +154,69 @@ fn panels_are_presented_while_a_picture_is_drawn() {
     assert!(between > 0 || !said.contains("software"), "{said}");
 }
 
+/// Prevents panels that stay in the window though they changed, and ones that are drawn again though only the picture did; and a picture that is converted
+/// on its way.
+#[test]
+fn what_is_kept_of_a_window_equals_what_is_drawn_whole() {
+    let (desk, folder) = (Desk::new(false), Folder::new("kept"));
+    let log = folder.path("log");
+    let view = desk.view(&["--size", "1000x700", "--source", SWEEP, "-vv", "--log-file", &log]);
+    let (corner, size) = picture();
+    view.shows_middle(&headless(size, &[]), "the start");
+    // It stays as it is until a picture of full quality would be there.
+    let settled = || {
+        let mut seen = view.look();
+        let mut same = 0;
+        until("a window that rests", || {
+            std::thread::sleep(std::time::Duration::from_millis(300));
+            let now = view.look();
+            same = if now == seen { same + 1 } else { 0 };
+            seen = now;
+            (same >= 5).then(|| seen.clone()).flatten()
+        })
+    };
+    let mut state = 7_u32;
+    let mut random = |below: u32| {
+        state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+        (state >> 8) % below
+    };
+    for round in 0..5 {
+        for _ in 0..5 {
+            let [x, y] = [0, 1].map(|axis| (corner[axis] + random(size[axis])) as i16);
+            match random(6) {
+                0 => desk.tap(['1', '2', '4', '8'][random(4) as usize]),
+                1 => desk.tap(TAB),
+                2 => desk.control('z'),
+                // Over the panels, which show what is under the pointer.
+                3 => (0..8).for_each(|_| view.hover(random(WINDOW[0]) as i16, random(WINDOW[1]) as i16)),
+                _ => view.drag([x, y], [(corner[0] + random(size[0])) as i16, (corner[1] + random(size[1])) as i16]),
+            }
+        }
+        view.hover((corner[0] + size[0] / 2) as i16, (corner[1] + size[1] / 2) as i16);
+        let kept = settled();
+        // A window of another size keeps nothing.
+        for height in [WINDOW[1] + 2, WINDOW[1]] {
+            view.resize(WINDOW[0], height);
+            until("the size", || (view.place().1.map(u32::from) == [WINDOW[0], height]).then_some(()));
+            settled();
+        }
+        let whole = settled();
+        let differ = kept.rgba.chunks(4).zip(whole.rgba.chunks(4)).filter(|(a, b)| a != b).count();
+        assert_eq!(differ, 0, "pixels after round {round}");
+    }
+    view.leave();
+    let said = std::fs::read_to_string(&log).expect("the log");
+    let presented: Vec<&str> = said.lines().filter_map(|line| line.split("window: the picture ").nth(1)).collect();
+    assert!(presented.len() > 20 && presented.iter().all(|how| how.starts_with("as it is")), "{presented:?}");
+    let drawn = presented.iter().filter_map(|how| {
+        let mut counts = how.split(", ").nth(1)?.split(" of ");
+        let drawn: u32 = counts.next()?.parse().ok()?;
+        Some((drawn, counts.next()?.split(' ').next()?.parse::<u32>().ok()?))
+    });
+    let few = drawn.filter(|(drawn, all)| 2 * drawn < *all).count();
+    assert!(few > 5, "{few} of {} presentations left panels as they were", presented.len());
+}
+
 /// Presets are pictures of the volume; one that is chosen shows what `render --preset` does, also one of the user's.
 #[test]
 fn presets_are_pictures_and_show_what_the_command_renders() {

@@ -90,6 +90,7 @@ impl Renderer {
         // A deep picture is rounded here, where a window shows more.
         let in_8_bits = |bytes: &[u8], format| match format {
             Format::Rgba8 => bytes.to_vec(),
+            Format::Bgra8 => bytes.chunks_exact(4).flat_map(|c| [c[2], c[1], c[0], c[3]]).collect(),
             _ => Texels::decode([width as usize, height as usize, 1], format, bytes).encode(Format::Rgba8),
         };
         let rgba = match &self.readback {

@@ -8,6 +8,7 @@ use super::target::{MonitorChoice, Target, choose_monitor};
 use crate::barriers::{Access, PipelineStage};
 use crate::gpu::context::Context;
 use crate::gpu::error::{ErrorContext, GpuError};
+use crate::gpu::formats;
 use crate::gpu::recorder::BarrierRecorder;
 use crate::gpu::resources::{Image, WHOLE};
 use crate::gpu::timeline::Timelines;
@@ -304,7 +305,8 @@ impl Screen {
         content: &mut Content,
         panels: Option<&Panels>,
     ) -> Result<Option<[[u32; 2]; 2]>, GpuError> {
-        let (device, commands, size) = (self.context.device.clone(), self.commands, self.chain.size);
+        let (device, commands) = (self.context.device.clone(), self.commands);
+        let (size, format) = (self.chain.size, self.chain.format);
         let last = self.fit_composition(panels.is_some())?;
         let (shown, after) = {
             let shown = &self.chain.images[image as usize];
@@ -332,8 +334,8 @@ impl Screen {
             (Content::Kept(at), Some(kept)) => Some(region(kept, *at, size)),
             (Content::Kept(_), None) | (Content::Nothing, _) => None,
         };
-        let place = region.map(|(blit, covered)| {
-            let corner = blit.dst_offsets[0];
+        let place = region.map(|(copy, covered)| {
+            let corner = copy.dst_offset;
             [[corner.x as u32, corner.y as u32], covered]
         });
         // Where the panels beside the picture stay, they are not drawn.
@@ -348,11 +350,10 @@ impl Screen {
             unsafe { device.cmd_clear_color_image(commands, target, layout, &colour, &[WHOLE]) };
             go(Stage::Copied);
         }
-        let blit = |from: &Image, region: vk::ImageBlit| {
-            let (layout, to) = (vk::ImageLayout::GENERAL, vk::ImageLayout::TRANSFER_DST_OPTIMAL);
-            // The size is the same: only the order of the channels changes.
-            // SAFETY: both images are alive and in these layouts; the region is inside both.
-            unsafe { device.cmd_blit_image(commands, from.handle, layout, target, to, &[region], vk::Filter::NEAREST) };
+        let mut is_converted = false;
+        let mut place_picture = |from: &Image, region: vk::ImageCopy| {
+            is_converted = formats::vulkan(from.format) != format;
+            put(&device, commands, from, target, region, is_converted);
         };
         let visible = region.filter(|(_, [w, h])| *w > 0 && *h > 0).map(|(region, _)| region);
         match content {
@@ -361,7 +362,7 @@ impl Screen {
                 let read = Access::of_slot(Slot::Screen, 0, 0..drawn.image.shape.parts(), false, PipelineStage::Copy);
                 drawn.barriers.before(&self.context, 0, commands, &[read]);
                 if let Some(region) = visible {
-                    blit(drawn.image, region);
+                    place_picture(drawn.image, region);
                 }
                 if let Some(kept) = self.kept.as_ref().filter(|_| drawn.is_kept) {
                     drawn.image.copy_to(&device, commands, kept);
@@ -370,7 +371,7 @@ impl Screen {
             }
             Content::Kept(_) => {
                 if let (Some(kept), Some(region)) = (&self.kept, visible) {
-                    blit(kept, region);
+                    place_picture(kept, region);
                 }
             }
             Content::Nothing => {}
@@ -410,6 +411,11 @@ impl Screen {
                 unsafe { device.cmd_copy_image(commands, target, from, shown, to, &whole) };
                 barrier(&device, commands, shown, Stage::Copied, Stage::Shown);
             }
+        }
+        if let Some(panels) = panels {
+            let shapes = over.as_deref().unwrap_or(&panels.shapes).len();
+            let how = if is_converted { "converted" } else { "as it is" };
+            tracing::debug!("window: the picture {how}, {shapes} of {} shapes", panels.shapes.len());
         }
         // SAFETY: the command buffer is being recorded.
         unsafe { device.end_command_buffer(commands) }.context(|| "record the window".into())?;
@@ -499,21 +505,48 @@ pub fn monitor_size(context: &Context, choice: &MonitorChoice) -> Result<[u32; 2
     Ok([region.width, region.height])
 }
 
-/// The blit that copies a picture to pixel `at` of a window of this size, and the size that it covers. Pictures are cropped, never
-/// scaled.
-fn region(image: &Image, at: [u32; 2], size: [u32; 2]) -> (vk::ImageBlit, [u32; 2]) {
+/// The copy of a picture to pixel `at` of a window of this size, and the size that it covers. Pictures are cropped, never scaled.
+fn region(image: &Image, at: [u32; 2], size: [u32; 2]) -> (vk::ImageCopy, [u32; 2]) {
     let from = [image.extent.width, image.extent.height];
     let [w, h] = std::array::from_fn(|i| from[i].min(size[i].saturating_sub(at[i])));
     let layers =
         vk::ImageSubresourceLayers { aspect_mask: vk::ImageAspectFlags::COLOR, layer_count: 1, ..Default::default() };
-    let corner = |x: u32, y: u32, z: i32| vk::Offset3D { x: x as i32, y: y as i32, z };
-    let blit = vk::ImageBlit {
+    let copy = vk::ImageCopy {
         src_subresource: layers,
-        src_offsets: [corner(0, 0, 0), corner(w, h, 1)],
         dst_subresource: layers,
-        dst_offsets: [corner(at[0], at[1], 0), corner(at[0] + w, at[1] + h, 1)],
+        dst_offset: vk::Offset3D { x: at[0] as i32, y: at[1] as i32, z: 0 },
+        extent: vk::Extent3D { width: w, height: h, depth: 1 },
+        ..Default::default()
     };
-    (blit, [w, h])
+    (copy, [w, h])
+}
+
+/// Records the copy of a picture in layout GENERAL into an image of the window in layout TRANSFER_DST_OPTIMAL. If their formats differ, a blit converts it,
+/// which takes a software device ten times as long.
+fn put(
+    device: &ash::Device,
+    commands: vk::CommandBuffer,
+    from: &Image,
+    to: vk::Image,
+    copy: vk::ImageCopy,
+    is_converted: bool,
+) {
+    let (layout, target) = (vk::ImageLayout::GENERAL, vk::ImageLayout::TRANSFER_DST_OPTIMAL);
+    let (corner, extent) = (copy.dst_offset, copy.extent);
+    let [width, height] = [extent.width as i32, extent.height as i32];
+    let blit = vk::ImageBlit {
+        src_subresource: copy.src_subresource,
+        src_offsets: [vk::Offset3D::default(), vk::Offset3D { x: width, y: height, z: 1 }],
+        dst_subresource: copy.dst_subresource,
+        dst_offsets: [corner, vk::Offset3D { x: corner.x + width, y: corner.y + height, z: 1 }],
+    };
+    // SAFETY: both images are alive and in these layouts; the region is inside both. A copy is between images of one format.
+    unsafe {
+        match is_converted {
+            false => device.cmd_copy_image(commands, from.handle, layout, to, target, &[copy]),
+            true => device.cmd_blit_image(commands, from.handle, layout, to, target, &[blit], vk::Filter::NEAREST),
+        }
+    };
 }
 
 /// The stages of an image of the window, in order.

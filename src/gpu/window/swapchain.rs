@@ -5,9 +5,9 @@ use super::target::Target;
 use crate::gpu::context::{Context, Presentation};
 use crate::gpu::error::{ErrorContext, GpuError};
 use crate::gpu::faults::InjectionPoint;
+use crate::scene::WindowTexels;
 use ash::vk;
 use std::sync::Arc;
-use std::sync::atomic::Ordering;
 use std::time::{Duration, Instant};
 
 /// When a picture is presented.
@@ -122,8 +122,13 @@ impl Swapchain {
                 "the surface supports no UNORM format of 8 or 10 bits that pictures can be copied to".into(),
             )
         })?;
-        // Pictures are made with as many bits from the next change of the scene on.
-        self.context.is_deep.store(DEEP.contains(&found), Ordering::Relaxed);
+        // Pictures are made so from the next change of the scene on.
+        let of_pictures = match found {
+            deep if DEEP.contains(&deep) => WindowTexels::Deep,
+            vk::Format::B8G8R8A8_UNORM => WindowTexels::Bgra8,
+            _ => WindowTexels::Rgba8,
+        };
+        *self.context.window_texels.lock().unwrap_or_else(|e| e.into_inner()) = of_pictures;
         Ok(found)
     }
 

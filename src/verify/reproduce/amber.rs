@@ -93,6 +93,7 @@ fn format_name(array: &Array) -> &'static str {
         (_, Format::Rgba16f) => "R16G16B16A16_SFLOAT",
         (_, Format::Rgba32f) => "R32G32B32A32_SFLOAT",
         (_, Format::Rgba8) => "R8G8B8A8_UNORM",
+        (_, Format::Bgra8) => "B8G8R8A8_UNORM",
         (_, Format::R32u) => "R32_UINT",
         (_, Format::Rg32u) => "R32G32_UINT",
     }
@@ -101,7 +102,7 @@ fn format_name(array: &Array) -> &'static str {
 /// Levels of a normalized format; None for other formats.
 fn levels(format: Format) -> Option<f64> {
     match format {
-        Format::R8 | Format::Rgba8 => Some(255.0),
+        Format::R8 | Format::Rgba8 | Format::Bgra8 => Some(255.0),
         Format::R16 | Format::Rg16 => Some(65535.0),
         _ => None,
     }
