@@ -164,7 +164,9 @@ impl Texels {
         let mut bytes = Vec::with_capacity(self.values.len() * format.channel_bytes());
         for &v in &in_order(format, &self.values)[..] {
             match format {
-                Format::R8 | Format::Rgba8 | Format::Bgra8 => bytes.push((v.clamp(0.0, 1.0) * 255.0).round_ties_even() as u8),
+                Format::R8 | Format::Rgba8 | Format::Bgra8 => {
+                    bytes.push((v.clamp(0.0, 1.0) * 255.0).round_ties_even() as u8)
+                }
                 Format::R16 | Format::Rg16 => {
                     bytes.extend(((v.clamp(0.0, 1.0) * 65535.0).round_ties_even() as u16).to_le_bytes());
                 }

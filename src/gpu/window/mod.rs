@@ -4,6 +4,8 @@
 #[cfg(feature = "view")]
 mod composition;
 #[cfg(feature = "view")]
+mod damage;
+#[cfg(feature = "view")]
 mod flat_image;
 #[cfg(feature = "view")]
 mod panel_textures;

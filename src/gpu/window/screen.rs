@@ -339,11 +339,11 @@ impl Screen {
             [[corner.x as u32, corner.y as u32], covered]
         });
         // Where the panels beside the picture stay, they are not drawn.
-        let over = match (last, place, panels) {
-            (Some(last), Some(place), Some(panels)) => last.over_picture(&panels.shapes, panels.scale, place),
+        let damage = match (last, place, panels) {
+            (Some(last), Some(place), Some(panels)) => last.damage(&panels.shapes, panels.scale, place, size),
             _ => None,
         };
-        if over.is_none() && region.is_none_or(|(_, [w, h])| [w, h] != size) {
+        if damage.is_none() && region.is_none_or(|(_, [w, h])| [w, h] != size) {
             let colour = vk::ClearColorValue { float32: BACKGROUND };
             let layout = vk::ImageLayout::TRANSFER_DST_OPTIMAL;
             // SAFETY: the image is in this layout since the barrier above.
@@ -388,7 +388,10 @@ impl Screen {
             let rendering = vk::RenderingInfo::default().render_area(area).layer_count(1).color_attachments(&colour);
             // SAFETY: the view is alive and its image in this layout; what is recorded between is egui's drawing alone.
             unsafe { device.cmd_begin_rendering(commands, &rendering) };
-            let shapes = over.as_deref().unwrap_or(&panels.shapes);
+            if let Some(damage) = &damage {
+                clear(&device, commands, &damage.cleared);
+            }
+            let shapes = damage.as_ref().map_or(&panels.shapes, |damage| &damage.shapes);
             let recorded = overlay.record(commands, size, shapes, panels.scale);
             // SAFETY: ends what was begun above.
             unsafe { device.cmd_end_rendering(commands) };
@@ -412,10 +415,13 @@ impl Screen {
                 barrier(&device, commands, shown, Stage::Copied, Stage::Shown);
             }
         }
-        if let Some(panels) = panels {
-            let shapes = over.as_deref().unwrap_or(&panels.shapes).len();
+        if panels.is_some() {
             let how = if is_converted { "converted" } else { "as it is" };
-            tracing::debug!("window: the picture {how}, {shapes} of {} shapes", panels.shapes.len());
+            let beside = match &damage {
+                Some(damage) => damage.cleared.iter().map(|[from, to]| (to[0] - from[0]) * (to[1] - from[1])).sum(),
+                None => size[0] * size[1],
+            };
+            tracing::debug!("window: the picture {how}, {beside} pixels of panels");
         }
         // SAFETY: the command buffer is being recorded.
         unsafe { device.end_command_buffer(commands) }.context(|| "record the window".into())?;
@@ -547,6 +553,24 @@ fn put(
             true => device.cmd_blit_image(commands, from.handle, layout, to, target, &[blit], vk::Filter::NEAREST),
         }
     };
+}
+
+/// Fills areas (from, to) of what is drawn to with the background, inside dynamic rendering.
+fn clear(device: &ash::Device, commands: vk::CommandBuffer, areas: &[[[u32; 2]; 2]]) {
+    if areas.is_empty() {
+        return;
+    }
+    let rects = areas.iter().map(|[from, to]| {
+        let offset = vk::Offset2D { x: from[0] as i32, y: from[1] as i32 };
+        let extent = vk::Extent2D { width: to[0] - from[0], height: to[1] - from[1] };
+        vk::ClearRect { rect: vk::Rect2D { offset, extent }, base_array_layer: 0, layer_count: 1 }
+    });
+    let rects: Vec<_> = rects.collect();
+    let clear_value = vk::ClearValue { color: vk::ClearColorValue { float32: BACKGROUND } };
+    let background =
+        [vk::ClearAttachment { aspect_mask: vk::ImageAspectFlags::COLOR, color_attachment: 0, clear_value }];
+    // SAFETY: the command buffer is being recorded, inside dynamic rendering to one attachment; the areas are inside it and none is empty.
+    unsafe { device.cmd_clear_attachments(commands, &background, &rects) };
 }
 
 /// The stages of an image of the window, in order.
