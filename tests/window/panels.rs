@@ -163,8 +163,8 @@ fn what_is_kept_of_a_window_equals_what_is_drawn_whole() {
     let view = desk.view(&["--size", "1000x700", "--source", SWEEP, "-vv", "--log-file", &log]);
     let (corner, size) = picture();
     view.shows_middle(&headless(size, &[]), "the start");
-    // It stays as it is until a picture of full quality would be there.
-    let settled = || {
+    // It stays as it is for so many looks: until a picture of full quality is there, and notes have gone.
+    let settled = |looks: u32| {
         let mut seen = view.look();
         let mut same = 0;
         until("a window that rests", || {
@@ -172,7 +172,7 @@ fn what_is_kept_of_a_window_equals_what_is_drawn_whole() {
             let now = view.look();
             same = if now == seen { same + 1 } else { 0 };
             seen = now;
-            (same >= 5).then(|| seen.clone()).flatten()
+            (same >= looks).then(|| seen.clone()).flatten()
         })
     };
     let mut state = 7_u32;
@@ -193,16 +193,21 @@ fn what_is_kept_of_a_window_equals_what_is_drawn_whole() {
             }
         }
         view.hover((corner[0] + size[0] / 2) as i16, (corner[1] + size[1] / 2) as i16);
-        let kept = settled();
+        let kept = settled(25);
         // A window of another size keeps nothing.
         for height in [WINDOW[1] + 2, WINDOW[1]] {
             view.resize(WINDOW[0], height);
             until("the size", || (view.place().1.map(u32::from) == [WINDOW[0], height]).then_some(()));
-            settled();
+            settled(5);
         }
-        let whole = settled();
+        let whole = settled(5);
         let differ = kept.rgba.chunks(4).zip(whole.rgba.chunks(4)).filter(|(a, b)| a != b).count();
-        assert_eq!(differ, 0, "pixels after round {round}");
+        if differ > 0 {
+            let folder = std::env::temp_dir();
+            [(&kept, "window-kept.png"), (&whole, "window-whole.png")]
+                .map(|(seen, name)| _ = seen.save(&folder.join(name)));
+            panic!("round {round}: {differ} pixels differ; see window-kept.png and window-whole.png in {folder:?}");
+        }
     }
     view.leave();
     let said = std::fs::read_to_string(&log).expect("the log");
