@@ -41,9 +41,10 @@ def arguments(row, n):
         return list(row.echolume)
     # VTK's fixed-point caster ends a ray at 1/128 of the light left, and that is no setting there.
     sets = ["slices.format=r8", f"ray.step={phantom.pitch(n)}", "ray.early_end=0.0078125", *view.PLANE]
-    # Grey values as they are, as the peers take them. By default the windows follow from the recording; surfaces keep theirs, since no
-    # peer finds edges.
+    # Grey values as they are, and all of the volume, as the peers take them. By default the windows follow from the recording, and a
+    # minimum projection takes a slab; surfaces keep their window, since no peer finds edges.
     sets += [f"{mode}.window=[0,1]" for mode in ("volume", "projection", "planes")]
+    sets.append(f"region.depth=[{-phantom.BOX / 2},{phantom.BOX / 2}]")
     sets += [f"light.ambient={view.AMBIENT}", f"light.diffuse={view.DIFFUSE}", f"light.specular={view.SPECULAR}"]
     if "vr" in row.echolume:
         sets.append(transfer(n))

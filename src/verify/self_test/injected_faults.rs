@@ -172,8 +172,17 @@ pub(super) const FAULTS: &[InjectedFault] = &[
     },
     InjectedFault {
         name: "NaN from a division",
-        what: "a Gaussian of width 0 divides by it",
-        change: Change::Numbers { pass: "gaussian_lateral", by: |_, params| set(params, "narrowness", f32::INFINITY) },
+        what: "the weights of a Gaussian of width 0 are divided by it",
+        change: Change::Numbers {
+            pass: "gaussian_lateral",
+            by: |_, params| {
+                number(params, "weights", |value| {
+                    if let Value::Floats(weights) = value {
+                        weights.fill(f32::NAN);
+                    }
+                });
+            },
+        },
     },
     InjectedFault {
         name: "last workgroup lost",
