@@ -4,6 +4,7 @@
 use crate::common::gpu::*;
 use crate::common::scenes::settings;
 use echolume::gpu::{Renderer, RendererOptions};
+use echolume::passes::filter::gaussian;
 use echolume::passes::{DispatchArgs, Slot, Texels, by_name};
 use echolume::plan::Rerun;
 use echolume::probe::{Advance, Geometry, Probe};
@@ -379,14 +380,16 @@ fn nothing_outside_the_visible_bounds_is_dispatched_uploaded_or_written() {
         let made =
             by_name(name).expect("pass").rectangle(&scene, &DispatchArgs::default()).expect("a pass over slices");
         let extents: Vec<[u32; 3]> = recorded.iter().filter(|(n, _)| *n == name).map(|(_, e)| *e).collect();
-        // Some passes write four texels an invocation.
-        let run = |axis: usize| {
-            if (name, axis) == ("median_slice", 1) || (name, axis) == ("gaussian_lateral", 0) { 4 } else { 1 }
+        // Some passes write several texels an invocation.
+        let run = |axis: usize| match (name, axis) {
+            ("median_slice", 1) => 4,
+            ("gaussian_lateral", 0) => gaussian::RUN,
+            _ => 1,
         };
         let each = extents.iter().all(|[x, y, _]| [x * run(0), y * run(1)] == made.size);
         assert!(each && made.size[0] < scene.grid.size[0] / 2, "{name}: {extents:?}, {made:?}");
         let slices = if name == "gaussian_elevation" { scene.visible_bounds.slices().len() } else { frames.len() };
-        let run = if name == "gaussian_elevation" { 4 } else { 1 };
+        let run = if name == "gaussian_elevation" { gaussian::RUN } else { 1 };
         assert_eq!(extents.iter().map(|e| e[2]).sum::<u32>(), (slices as u32).div_ceil(run), "{name}");
     }
     for (slot, pass, slices) in [

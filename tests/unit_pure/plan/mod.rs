@@ -91,8 +91,8 @@ fn a_plan_explains_itself() {
         assert_eq!(found.len(), 1, "{start}: {found:?}");
         found[0].split_whitespace().collect::<Vec<_>>().join(" ")
     };
-    // Runs of four slices: 5 of them in 2 invocations.
-    assert_eq!(line("+ gaussian_elevation"), "+ gaussian_elevation 6 x 8 x 2, each volume: asked for");
+    // Runs of eight slices: 5 of them in one invocation.
+    assert_eq!(line("+ gaussian_elevation"), "+ gaussian_elevation 6 x 8 x 1, each volume: asked for");
     assert_eq!(line("+ aos_slice"), "+ aos_slice 8 x 1 x 1, each frame, 8 times: asked for");
     assert_eq!(line("+ tone"), "+ tone 5 x 4 x 1, each picture: every picture ends in 8 bits");
     assert_eq!(line("- sigma_slice"), "- sigma_slice not asked for");

@@ -16,12 +16,14 @@ fn told(scene: &Scene, name: &str, iteration: u32) -> String {
 
 fn numbers(scene: &Scene, name: &str) -> Vec<(&'static str, f64)> {
     let of = |value: &Value| match value {
-        Value::F32(v) => f64::from(*v),
-        Value::I32(v) => f64::from(*v),
+        Value::F32(v) => vec![f64::from(*v)],
+        Value::I32(v) => vec![f64::from(*v)],
+        Value::Floats(v) => v.iter().map(|v| f64::from(*v)).collect(),
         other => panic!("{other:?}"),
     };
     let args = DispatchArgs { slice: 1, slices: 2, ..DispatchArgs::default() };
-    (pass(name).params)(scene, &args).0.iter().map(|(name, value)| (*name, of(value))).collect()
+    let params = (pass(name).params)(scene, &args);
+    params.0.iter().flat_map(|(name, value)| of(value).into_iter().map(|value| (*name, value))).collect()
 }
 
 /// The constants that a pass names; whether slices go to layers is seen by their slot.
@@ -43,8 +45,8 @@ fn filters_of_slices_go_from_slot_to_slot_and_the_last_into_the_volume() {
         ("growth_slice", "filter/enhanced_sigma.slice: slice_b -> growth [21, 10, 2]"),
         ("enhanced_sigma_slice", "filter/enhanced_sigma.slice: slice_b -> slice_a [21, 10, 2]"),
         ("perona_malik_slice", "filter/perona_malik.slice: slice_a -> slice_b [21, 10, 2]"),
-        ("gaussian_lateral", "filter/gaussian: slice_b -> slice_a [6, 10, 2]"),
-        ("gaussian_depth", "filter/gaussian: slice_a -> sharp_volume [21, 3, 2]"),
+        ("gaussian_lateral", "filter/gaussian: slice_b -> slice_a [3, 10, 2]"),
+        ("gaussian_depth", "filter/gaussian: slice_a -> sharp_volume [21, 2, 2]"),
         ("gaussian_elevation", "filter/gaussian: sharp_volume -> volume [21, 10, 1]"),
     ] {
         assert_eq!(told(&scene, name, 0), expected);
@@ -238,13 +240,22 @@ fn shaders_and_references_get_the_same_parameters() {
     assert_eq!(constants(&scene, "enhanced_sigma_slice", 0), expected);
     assert_eq!(numbers(&scene, "perona_malik_slice"), [("edge", 0.5), ("lambda", 0.125), ("slice", 1.0)]);
     assert_eq!(constants(&scene, "perona_malik_slice", 0), [("CONDUCTANCE", 1)]);
-    for (axis, name, radius, narrowness) in
-        [(0, "gaussian_lateral", 6, 0.125), (1, "gaussian_depth", 3, 0.5), (2, "gaussian_elevation", 2, 2.0)]
+    for (axis, name, radius, deviation) in
+        [(0, "gaussian_lateral", 6, 2.0), (1, "gaussian_depth", 3, 1.0), (2, "gaussian_elevation", 2, 0.5)]
     {
-        assert_eq!(constants(&scene, name, 0), [("RADIUS", radius), ("AXIS", axis), ("SHARPENS", 0)]);
-        assert_eq!(numbers(&scene, name)[..2], [("narrowness", narrowness), ("slice", 1.0)]);
+        let on_device = |shared_memory: u32| constants(&Scene { shared_memory, ..scene.clone() }, name, 0);
+        let expected = |transposed| [("RADIUS", radius), ("AXIS", axis), ("SHARPENS", 0), ("TRANSPOSED", transposed)];
+        assert_eq!(on_device(0), expected(0));
+        assert_eq!(on_device(16 << 10), expected(i32::from(axis == 0)));
+        let numbers = numbers(&scene, name);
+        assert_eq!(numbers[..2], [("slice", 1.0), ("slices", 2.0)]);
+        let bell = |n: usize| (-0.5 * (n as f64 / deviation).powi(2)).exp();
+        let sum: f64 = (1..=radius as usize).map(|n| 2.0 * bell(n)).sum::<f64>() + 1.0;
+        for (n, (name, weight)) in numbers[2..].iter().enumerate() {
+            let expected = if n <= radius as usize { bell(n) / sum } else { 0.0 };
+            assert!(*name == "weights" && (weight - expected).abs() < 1e-7, "{n}: {weight}");
+        }
     }
-    assert_eq!(numbers(&scene, "gaussian_elevation")[2], ("slices", 2.0));
     let estimators = ["median", "perona-malik", "gradient-inverse", "nagao-matsuyama"];
     for (n, estimator) in estimators.iter().enumerate() {
         let scene = slices([8, 8], &format!("estimator = '{estimator}'"));
