@@ -51,7 +51,7 @@ void main() {
             if (abs(i - n) <= RADIUS) sums[n] += weights[abs(i - n)] * value;
         }
     }
-    // Only at a border taps are missing. A loop that starts with none is left out by all devices, a branch is not.
+    // Only at a border taps are missing. A loop costs a software device one turn elsewhere, a branch all of it.
     float there[RUN];
     [[unroll]] for (int n = 0; n < RUN; ++n) there[n] = 1.0;
     int nearest = min(at[AXIS], length - RUN - at[AXIS]);

@@ -180,8 +180,8 @@ fn what_is_kept_of_a_window_equals_what_is_drawn_whole() {
         state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
         (state >> 8) % below
     };
-    for round in 0..5 {
-        for _ in 0..5 {
+    for round in 0..3 {
+        for _ in 0..8 {
             let [x, y] = [0, 1].map(|axis| (corner[axis] + random(size[axis])) as i16);
             match random(6) {
                 0 => desk.tap(['1', '2', '4', '8'][random(4) as usize]),
