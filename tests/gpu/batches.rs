@@ -66,6 +66,31 @@ fn send_in(renderer: &mut Renderer, frames: &[Vec<u8>], order: &[usize], at_once
     }
 }
 
+/// Prevents texels that are lost or exchanged where a workgroup of the lateral Gaussian stores its rows together, as on a GPU: slices that end
+/// within a workgroup, and parts of them. On a GPU both store so.
+#[test]
+fn rows_that_a_workgroup_stores_together_are_those_of_single_invocations() {
+    let device = Device::new();
+    for pixels in [77, 200] {
+        let lateral = "smooth = { lateral = 1.0 }";
+        for region in ["", "[region]\nlateral = [-3, 4]\ndepth = [20, 31]"] {
+            let single = swept(&format!("slices = {{ pixels = {pixels}, {lateral} }}\n{region}"));
+            let mut stored_together = single.clone();
+            stored_together.shared_memory = 16 << 10;
+            let volume = |scene: &Scene| {
+                let mut renderer = Renderer::new(&device, scene.clone(), &together()).expect("renderer");
+                let order: Vec<usize> = (0..SLICES).collect();
+                send_in(&mut renderer, &noise(scene), &order, SLICES);
+                renderer.picture().expect("picture");
+                renderer.read(Slot::Volume).expect("read").expect("there")
+            };
+            let (one, other) = (volume(&single), volume(&stored_together));
+            assert!(one.values.iter().any(|v| *v > 0.1), "{pixels}: an empty volume");
+            assert!(one == other, "{pixels} pixels, {region}");
+        }
+    }
+}
+
 #[test]
 fn batches_of_any_length_and_order_leave_the_same_bits() {
     let device = Device::new();
