@@ -93,15 +93,15 @@ fn around([low, high]: [[u32; 2]; 2], [inner_low, inner_high]: [[u32; 2]; 2]) ->
     let clamped = |at: u32, axis: usize| at.clamp(low[axis], high[axis].max(low[axis]));
     let (left, right) = (clamped(inner_low[0], 0), clamped(inner_high[0], 0));
     let (top, bottom) = (clamped(inner_low[1], 1), clamped(inner_high[1], 1));
-    if left >= right || top >= bottom {
-        return vec![[low, high]];
-    }
-    let parts = [
-        [low, [high[0], top]],
-        [[low[0], bottom], high],
-        [[low[0], top], [left, bottom]],
-        [[right, top], [high[0], bottom]],
-    ];
+    let parts = match left >= right || top >= bottom {
+        true => vec![[low, high]],
+        false => vec![
+            [low, [high[0], top]],
+            [[low[0], bottom], high],
+            [[low[0], top], [left, bottom]],
+            [[right, top], [high[0], bottom]],
+        ],
+    };
     parts.into_iter().filter(|[from, to]| from[0] < to[0] && from[1] < to[1]).collect()
 }
 
@@ -220,6 +220,11 @@ mod tests {
         ] {
             assert_eq!(damage(&other).cleared, [wanted], "{why}");
         }
+        // Beyond the window, where a renderer may clip it or not.
+        let beyond = rect(500.0, 20.0, 9.0, 9.0);
+        let everywhere = shape(Rect::EVERYTHING, &[(beyond, Rgba::RED)]);
+        let with_it = [drawn(GREY, mark), vec![everywhere]].concat();
+        assert_eq!(damage(&with_it).cleared, [[[0; 2]; 2]; 0], "a shape beyond the window");
         let same = drawn(GREY, mark);
         assert!(before.damage(&same, 2.0, PICTURE, SIZE).is_none(), "another scale");
         assert!(before.damage(&same, 1.0, [[100, 50], [200, 90]], SIZE).is_none(), "another size of the picture");
