@@ -3,10 +3,22 @@
 
 use crate::common::gpu::*;
 use echolume::gpu::{Renderer, RendererOptions};
-use echolume::passes::Slot;
+use echolume::passes::slots::Format;
+use echolume::passes::{Slot, Texels};
+use echolume::picture::Picture;
 use echolume::probe::Geometry;
-use echolume::scene::WindowTexels;
+use echolume::scene::{Scene, WindowTexels};
 use std::collections::BTreeSet;
+
+/// A picture, what the window takes of it, and the format of that.
+fn drawn(device: &Device, scene: &Scene, frames: &[Texels], readback: bool) -> (Picture, Texels, Format) {
+    let options = RendererOptions { readback, ..RendererOptions::default() };
+    let mut renderer = Renderer::new(device, scene.clone(), &options).expect("renderer");
+    send(&mut renderer, frames, 0);
+    let picture = renderer.picture().expect("picture");
+    let stored = Slot::Screen.format(renderer.scene());
+    (picture, renderer.read(Slot::Screen).expect("read").expect("an image"), stored)
+}
 
 /// Prevents a deep window that shows pictures of 256 levels, and saved pictures that differ because of it.
 #[test]
@@ -19,11 +31,7 @@ fn a_deep_window_gets_more_levels_and_files_the_same_picture() {
     let frames = body_frames(&scene, |p| (0.3 + 0.004 * p.x + 0.0007 * p.y).clamp(0.0, 1.0));
     for readback in [true, false] {
         let drawn = |device: &Device| {
-            let options = RendererOptions { readback, ..RendererOptions::default() };
-            let mut renderer = Renderer::new(device, scene.clone(), &options).expect("renderer");
-            send(&mut renderer, &frames, 0);
-            let picture = renderer.picture().expect("picture");
-            let screen = renderer.read(Slot::Screen).expect("read").expect("an image");
+            let (picture, screen, _) = drawn(device, &scene, &frames, readback);
             let levels: BTreeSet<u64> = screen.values.chunks_exact(4).map(|c| c[0].to_bits()).collect();
             (picture, levels.len())
         };
@@ -52,18 +60,11 @@ fn a_window_that_stores_blue_first_gets_the_same_picture() {
         let scene = scene(Geometry::Sweep(wobbler()), FLOATS, &toml);
         let frames = body_frames(&scene, |p| (0.3 + 0.004 * p.x + 0.0007 * p.y).clamp(0.0, 1.0));
         for readback in [true, false] {
-            let drawn = |device: &Device| {
-                let options = RendererOptions { readback, ..RendererOptions::default() };
-                let mut renderer = Renderer::new(device, scene.clone(), &options).expect("renderer");
-                send(&mut renderer, &frames, 0);
-                let picture = renderer.picture().expect("picture");
-                let stored = Slot::Screen.format(renderer.scene());
-                (picture, renderer.read(Slot::Screen).expect("read").expect("an image").values, stored)
-            };
+            let drawn = |device: &Device| drawn(device, &scene, &frames, readback);
             let ((usual, values, format), (same, same_values, other)) = (drawn(&plain), drawn(&swapped));
             assert_ne!(format, other, "{toml}: the order of the window");
             assert_eq!(usual.rgba, same.rgba, "{toml}");
-            assert_eq!(values, same_values, "{toml}");
+            assert!(values == same_values, "{toml}");
             coloured += u32::from(usual.rgba.chunks_exact(4).any(|p| p[0] != p[2]));
         }
     }
