@@ -1,10 +1,12 @@
 // Median of a square window; beyond the border the nearest pixel repeats. For distances, where more pixels are hits than misses,
 // the (lower) median of the hits: this closes pinholes and draws no rim towards a miss. An invocation makes four vertically
-// adjacent pixels, whose windows share most of their texels.
+// adjacent pixels, whose windows share most of their texels, of one column or of more.
 // variants: slice; distance DISTANCE
 #version 460
 #ifdef DISTANCE
 layout(constant_id = 0) const int RADIUS = 7;
+#else
+layout(constant_id = 0) const int COLUMNS = 1; // adjacent ones that an invocation makes, against loading texels more than once
 #endif
 #extension GL_EXT_scalar_block_layout : require
 #extension GL_EXT_control_flow_attributes : require
@@ -19,29 +21,20 @@ float tap(ivec2 at, ivec2 last) { return read_at(ivec3(clamp(at, ivec2(0), last)
 #ifdef DISTANCE
 #include "median.glsl"
 #else
-vec3 sorted(vec3 v) {
-    float low = min(v.x, v.y), high = max(v.x, v.y), rest = max(low, v.z);
-    return vec3(min(low, v.z), min(high, rest), max(high, rest));
+vec3 sorted(float a, float b, float c) {
+    float low = min(a, b), high = max(a, b), rest = max(low, c);
+    return vec3(min(low, c), min(high, rest), max(high, rest));
 }
 
-// Medians of 3x3 from sorted rows: the median of the largest minimum, the middle median and the smallest maximum.
-vec4 medians(ivec2 at, ivec2 last) {
-    vec3 row[RUN + 2];
-    for (int y = 0; y < RUN + 2; ++y) {
-        ivec2 tap_at = at + ivec2(0, y - 1);
-        row[y] = sorted(vec3(tap(tap_at - ivec2(1, 0), last), tap(tap_at, last), tap(tap_at + ivec2(1, 0), last)));
-    }
-    vec4 found;
-    [[unroll]] for (int i = 0; i < RUN; ++i) {
-        vec3 a = row[i], b = row[i + 1], c = row[i + 2];
-        float least = max(max(a.x, b.x), c.x), most = min(min(a.z, b.z), c.z);
-        float middle = max(min(a.y, b.y), min(max(a.y, b.y), c.y));
-        found[i] = max(min(least, middle), min(max(least, middle), most));
-    }
-    return found;
+// Of 3x3 from sorted rows: the median of the largest minimum, the middle median and the smallest maximum.
+float median_of(vec3 a, vec3 b, vec3 c) {
+    float least = max(max(a.x, b.x), c.x), most = min(min(a.z, b.z), c.z);
+    float middle = max(min(a.y, b.y), min(max(a.y, b.y), c.y));
+    return max(min(least, middle), min(max(least, middle), most));
 }
 #endif
 
+#ifdef DISTANCE
 void main() {
     ivec3 at = made_run(1, RUN);
     ivec3 size = source_size();
@@ -52,3 +45,25 @@ void main() {
         if (at.y + i <= last.y) write_at(at + ivec3(0, i, 0), found[i]);
     }
 }
+#else
+void main() {
+    ivec3 at = made_run(1, RUN);
+    at.x += int(gl_GlobalInvocationID.x) * (COLUMNS - 1);
+    ivec3 size = source_size();
+    ivec3 end = ivec3(min(size.xy, ivec2(end_column, end_row)), size.z);
+    if (any(greaterThanEqual(at, end))) return;
+    // Two rows above the one that is read, sorted, of each column.
+    vec3 above[COLUMNS], nearer[COLUMNS];
+    [[unroll]] for (int y = -1; y <= RUN; ++y) {
+        float row[COLUMNS + 2];
+        [[unroll]] for (int x = 0; x < COLUMNS + 2; ++x) row[x] = tap(at.xy + ivec2(x - 1, y), size.xy - 1);
+        [[unroll]] for (int x = 0; x < COLUMNS; ++x) {
+            vec3 below = sorted(row[x], row[x + 1], row[x + 2]);
+            ivec3 to = at + ivec3(x, y - 1, 0);
+            if (y > 0 && all(lessThan(to.xy, end.xy))) write_at(to, median_of(above[x], nearer[x], below));
+            above[x] = nearer[x];
+            nearer[x] = below;
+        }
+    }
+}
+#endif

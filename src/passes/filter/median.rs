@@ -1,6 +1,7 @@
 //! Median of a square window, on slices (3x3) and on distance maps.
 
 use crate::passes::pass::*;
+use crate::scene::Scene;
 
 pub const SLICE: Pass = Pass {
     name: "median_slice",
@@ -11,10 +12,13 @@ pub const SLICE: Pass = Pass {
     needed: |s| if s.settings.slices.median { Ok("asked for") } else { Err("not asked for") },
     reads: reads_source,
     writes: writes_target,
-    extent: |s, t| in_runs(slice_extent(s, t), 1),
+    extent: |s, t| {
+        let in_columns = in_runs(slice_extent(s, t), 1);
+        if columns(s) == RUN { in_runs(in_columns, 0) } else { in_columns }
+    },
     repeat: once,
     params: |_, t| Params::default().i32("slice", t.slice),
-    constants: no_constants,
+    constants: |s, _| vec![("COLUMNS", columns(s) as i32)],
     tolerance: Tolerance {
         absolute: 5e-4,
         relative: 0.0,
@@ -23,6 +27,12 @@ pub const SLICE: Pass = Pass {
     },
     reference: |_, args, reads, writes| reference(1, args, reads, writes, |_| true),
 };
+
+/// Adjacent columns that an invocation makes. A CPU then loads 36 texels for 16 instead of 72. A GPU has them in its cache, and stores a row of
+/// adjacent invocations together.
+fn columns(scene: &Scene) -> u32 {
+    if scene.shared_memory == 0 { RUN } else { 1 }
+}
 
 pub const DISTANCE: Pass = Pass {
     name: "median_distance",

@@ -39,7 +39,7 @@ const ALL: &str =
 fn filters_of_slices_go_from_slot_to_slot_and_the_last_into_the_volume() {
     let scene = slices([21, 10], &format!("{ALL}, smooth = {{ lateral = 1.0, depth = 2.0, elevation = 1.0 }}"));
     for (name, expected) in [
-        ("median_slice", "filter/median.slice: slice_a -> slice_b [21, 3, 2]"),
+        ("median_slice", "filter/median.slice: slice_a -> slice_b [6, 3, 2]"),
         ("estimator_slice", "filter/estimator: slice_b -> slice_a [21, 10, 2]"),
         ("sigma_slice", "filter/sigma.slice: slice_a -> slice_b [21, 3, 2]"),
         ("growth_slice", "filter/enhanced_sigma.slice: slice_b -> growth [21, 10, 2]"),
