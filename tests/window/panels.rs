@@ -138,16 +138,23 @@ fn saved_pictures_and_loops_have_names_without_patient_data() {
 fn panels_are_presented_while_a_picture_is_drawn() {
     let desk = Desk::new(false);
     let view = desk.view(&["--size", "1000x700", PLAIN[0], PLAIN[1], "--source", SWEEP, "--budget", "none"]);
-    let (_, size) = picture();
+    let (corner, size) = picture();
     let start = plain(size, &[]);
     view.shows_middle(&start, "the start");
-    // The help is asked for while the picture is drawn, and closed again.
+    let surface = plain(size, &["--mode", "sr"]);
+    let (from, middle) = (size.map(|n| n / 4), size.map(|n| n / 2));
+    let wanted = crop(&surface, from, middle);
+    let shown = || view.look_at([corner[0] + from[0], corner[1] + from[1]], middle);
+    // The help is asked for while the picture is drawn, and closed again: until it is there, however long its pipelines are compiled before.
     desk.tap('1');
-    for _ in 0..40 {
-        desk.tap('h');
-        std::thread::sleep(std::time::Duration::from_millis(50));
+    let begun = std::time::Instant::now();
+    while shown() != wanted && begun.elapsed() < PATIENCE {
+        for _ in 0..2 {
+            desk.tap('h');
+            std::thread::sleep(std::time::Duration::from_millis(50));
+        }
     }
-    view.shows_middle(&plain(size, &["--mode", "sr"]), "the surface");
+    view.shows_middle(&surface, "the surface");
     let said = view.leave();
     let between = said.split(" shown on the window, ").nth(1).and_then(|rest| rest.split(' ').next());
     let between: u64 = between.and_then(|count| count.parse().ok()).expect("a count");
