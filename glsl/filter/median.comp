@@ -52,17 +52,17 @@ void main() {
     ivec3 size = source_size();
     ivec3 end = ivec3(min(size.xy, ivec2(end_column, end_row)), size.z);
     if (any(greaterThanEqual(at, end))) return;
-    // Two rows above the one that is read, sorted, of each column.
-    vec3 above[COLUMNS], nearer[COLUMNS];
-    [[unroll]] for (int y = -1; y <= RUN; ++y) {
+    // All are read before any is stored: a device then waits once.
+    vec3 rows[COLUMNS][RUN + 2];
+    [[unroll]] for (int y = 0; y < RUN + 2; ++y) {
         float row[COLUMNS + 2];
-        [[unroll]] for (int x = 0; x < COLUMNS + 2; ++x) row[x] = tap(at.xy + ivec2(x - 1, y), size.xy - 1);
+        [[unroll]] for (int x = 0; x < COLUMNS + 2; ++x) row[x] = tap(at.xy + ivec2(x, y) - 1, size.xy - 1);
+        [[unroll]] for (int x = 0; x < COLUMNS; ++x) rows[x][y] = sorted(row[x], row[x + 1], row[x + 2]);
+    }
+    [[unroll]] for (int y = 0; y < RUN; ++y) {
         [[unroll]] for (int x = 0; x < COLUMNS; ++x) {
-            vec3 below = sorted(row[x], row[x + 1], row[x + 2]);
-            ivec3 to = at + ivec3(x, y - 1, 0);
-            if (y > 0 && all(lessThan(to.xy, end.xy))) write_at(to, median_of(above[x], nearer[x], below));
-            above[x] = nearer[x];
-            nearer[x] = below;
+            ivec3 to = at + ivec3(x, y, 0);
+            if (all(lessThan(to.xy, end.xy))) write_at(to, median_of(rows[x][y], rows[x][y + 1], rows[x][y + 2]));
         }
     }
 }
