@@ -66,13 +66,13 @@ fn send_in(renderer: &mut Renderer, frames: &[Vec<u8>], order: &[usize], at_once
     }
 }
 
-/// Prevents texels that are lost or exchanged where a workgroup of the lateral Gaussian stores its rows together, as on a GPU: slices that end
-/// within a workgroup, and parts of them. On a GPU both store so.
+/// Prevents texels that are lost or exchanged where a workgroup of the lateral Gaussian stores its rows together and an invocation of the median
+/// makes one column, as on a GPU: slices that end within a workgroup, and parts of them. On a GPU both are as there.
 #[test]
 fn rows_that_a_workgroup_stores_together_are_those_of_single_invocations() {
     let device = Device::new();
     for pixels in [77, 200] {
-        let lateral = "smooth = { lateral = 1.0 }";
+        let lateral = "median = true, smooth = { lateral = 1.0 }";
         for region in ["", "[region]\nlateral = [-3, 4]\ndepth = [20, 31]"] {
             let single = swept(&format!("slices = {{ pixels = {pixels}, {lateral} }}\n{region}"));
             let mut stored_together = single.clone();

@@ -12,10 +12,7 @@ pub const SLICE: Pass = Pass {
     needed: |s| if s.settings.slices.median { Ok("asked for") } else { Err("not asked for") },
     reads: reads_source,
     writes: writes_target,
-    extent: |s, t| {
-        let in_columns = in_runs(slice_extent(s, t), 1);
-        if columns(s) == RUN { in_runs(in_columns, 0) } else { in_columns }
-    },
+    extent: |s, t| in_runs_of(columns(s), in_runs(slice_extent(s, t), 1), 0),
     repeat: once,
     params: |_, t| Params::default().i32("slice", t.slice),
     constants: |s, _| vec![("COLUMNS", columns(s) as i32)],
@@ -28,7 +25,7 @@ pub const SLICE: Pass = Pass {
     reference: |_, args, reads, writes| reference(1, args, reads, writes, |_| true),
 };
 
-/// Adjacent columns that an invocation makes. A CPU then loads 36 texels for 16 instead of 72. A GPU has them in its cache, and stores a row of
+/// Adjacent columns that an invocation makes: one or RUN, which is the filter's run along both axes. A CPU then loads 36 texels for 16 instead of 72. A GPU has them in its cache, and stores a row of
 /// adjacent invocations together.
 fn columns(scene: &Scene) -> u32 {
     if scene.shared_memory == 0 { RUN } else { 1 }
