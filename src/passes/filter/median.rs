@@ -25,8 +25,8 @@ pub const SLICE: Pass = Pass {
     reference: |_, args, reads, writes| reference(1, args, reads, writes, |_| true),
 };
 
-/// Adjacent columns that an invocation makes: one or RUN, which is the filter's run along both axes. A CPU then loads 36 texels for 16 instead of 72. A GPU has them in its cache, and stores a row of
-/// adjacent invocations together.
+/// Adjacent columns that an invocation makes: one or RUN, which is the filter's run along both axes. A CPU then loads 36 texels for 16
+/// instead of 72. A GPU has them in its cache, and stores a row of adjacent invocations together.
 fn columns(scene: &Scene) -> u32 {
     if scene.shared_memory == 0 { RUN } else { 1 }
 }
