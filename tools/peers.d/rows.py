@@ -84,7 +84,7 @@ def volume_rows(new):
 
 # The slice that the peers show is cut, though a picture that small is hardly one. All slices are made, as by the peers, not only
 # those that the plane is cut from.
-TINY = ("--size", "16x16", "--mode", "mpr", "--set", "slices.format=r8", "--set", "slices.everything=true")
+TINY = ("--size", "16x16", "--mode", "mpr", "--set", "slices.format=r8", "--set", "slices.everything=true", "--set", "planes.window=[0,1]")
 
 
 def slice_row(name, title, peers, setting, **more):
