@@ -5,6 +5,11 @@
 #version 460
 layout(constant_id = 0) const int RADIUS = 3;
 layout(constant_id = 1) const int MULTIPLICATIVE = 0; // the range is a share of the centre
+#if defined(DISTANCE) || defined(PICTURE)
+const int TILED = 0;
+#else
+layout(constant_id = 2) const int TILED = 0; // 1: a workgroup reads its texels once into shared memory
+#endif
 #extension GL_EXT_scalar_block_layout : require
 #extension GL_EXT_control_flow_attributes : require
 layout(scalar) uniform Params {
@@ -17,18 +22,40 @@ layout(scalar) uniform Params {
 #ifdef PICTURE
 const int RUN = 2;
 #define SCARCE(count, enough) any(lessThanEqual(count, vec4(enough)))
-#define WHERE_CLOSE(away, within, value) mix(vec4(0.0), value, lessThanEqual(abs(away), within))
+#define IS_CLOSE(away, within) vec4(lessThanEqual(abs(away), within))
 #else
 const int RUN = 4;
 #define SCARCE(count, enough) ((count) <= (enough))
-#define WHERE_CLOSE(away, within, value) (abs(away) <= (within) ? (value) : 0.0)
+#define IS_CLOSE(away, within) float(abs(away) <= (within))
+#endif
+
+#if defined(DISTANCE) || defined(PICTURE)
+#define VALUE_AT(column, row) read_at(ivec3(column, row, at.z))
+#else
+const int TILE_COLUMNS = 8 + 2 * RADIUS, TILE_ROWS = 8 * RUN + 2 * RADIUS;
+// Invocations read four rows apart: with this pitch 8 x 4 of them read from 32 banks.
+const int TILE_GAP = 0, TILE_PITCH = (TILE_COLUMNS + 5) / 8 * 8 + 2;
+#include "workgroup_tile.glsl"
+
+// MISS, which is further from the centre than any `range`, beyond the border.
+float value_at(ivec3 at) {
+    ivec2 last = source_size().xy - 1;
+    float value = read_at(ivec3(clamp(at.xy, ivec2(0), last), at.z));
+    return any(lessThan(at.xy, ivec2(0))) || any(greaterThan(at.xy, last)) ? MISS : value;
+}
+#define VALUE_AT(column, row) (TILED == 1 ? tile[tile_place(column - first.x, row - first.y)] : read_at(ivec3(column, row, at.z)))
 #endif
 
 void main() {
     ivec3 at = made_run(1, RUN);
     ivec3 size = source_size();
-    if (any(greaterThanEqual(at, size))) return;
     ivec2 last = size.xy - 1;
+#if !defined(DISTANCE) && !defined(PICTURE)
+    // Of the tile, whose texels all lie in it.
+    ivec3 first = at - ivec3(gl_LocalInvocationID.xy * uvec2(1, RUN), 0) - ivec3(RADIUS, RADIUS, 0);
+    if (TILED == 1) FILL_TILE(first, value_at)
+#endif
+    if (any(greaterThanEqual(at, size))) return;
     // Sums of differences from the centre: a distance of 100 mm keeps its micrometres in f32.
     T centre[RUN], within[RUN], sum[RUN], count[RUN];
     float there[RUN];
@@ -44,16 +71,18 @@ void main() {
         [[unroll]] for (int i = 0; i < RUN; ++i) row_sum[i] = row_count[i] = T(0.0);
         float row_there = 0.0;
         [[unroll]] for (int x = -RADIUS; x <= RADIUS; ++x) {
-            int column = clamp(at.x + x, 0, last.x);
-            T value = read_at(ivec3(column, y, at.z));
-            bool is_there = column == at.x + x && VALID(value);
-            // Further from the centre than any `range`.
-            if (!is_there) value = T(MISS);
+            int column = TILED == 1 ? at.x + x : clamp(at.x + x, 0, last.x);
+            T value = VALUE_AT(column, y);
+            bool is_there = uint(at.x + x) <= uint(last.x) && VALID(value);
+            // Further from the centre than any `range`; in a tile it already is.
+            if (TILED == 0 && !is_there) value = T(MISS);
             row_there += is_there ? 1.0 : 0.0;
             [[unroll]] for (int i = 0; i < RUN; ++i) {
                 T away = value - centre[i];
-                row_sum[i] += WHERE_CLOSE(away, within[i], away);
-                row_count[i] += WHERE_CLOSE(away, within[i], T(1.0));
+                // As a factor: a GPU compares at half the rate that it multiplies and adds at.
+                T is_close = IS_CLOSE(away, within[i]);
+                row_sum[i] += is_close * away;
+                row_count[i] += is_close;
             }
         }
         [[unroll]] for (int i = 0; i < RUN; ++i) {

@@ -321,6 +321,19 @@ pub fn in_runs_of(run: u32, mut texels: [u32; 3], axis: usize) -> [u32; 3] {
     texels
 }
 
+/// Invocations along each edge of a workgroup: local_size of glsl/include/common.glsl.
+pub(super) const GROUP: u32 = 8;
+
+/// Largest tile of a workgroup, bytes. A multiprocessor of NVIDIA's Ada or Ampere has 100 KB of shared memory: for twelve workgroups, half of the
+/// subgroups that it holds.
+const LARGEST_TILE: u32 = 8 << 10;
+
+/// Whether a workgroup reads its texels once into shared memory, of which they take so many words: glsl/include/workgroup_tile.glsl. A CPU, which has none
+/// of its own, reads them once more as fast.
+pub(super) fn reads_tile(scene: &Scene, words: u32) -> bool {
+    4 * words <= LARGEST_TILE.min(scene.shared_memory)
+}
+
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Value {
     F32(f32),

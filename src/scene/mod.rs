@@ -172,8 +172,8 @@ pub struct Scene {
     pub bricks_pay: bool,
     /// How the picture is stored: as the window takes it without a conversion. The device resolves this.
     pub window_texels: WindowTexels,
-    /// Bytes of shared memory of a workgroup of a GPU, which solves a row or a column under AOS in it, and propagates light through several layers;
-    /// 0 on a CPU, where a single invocation does either faster. The device resolves this.
+    /// Bytes of shared memory of a workgroup of a GPU, which solves a row or a column under AOS in it, propagates light through several layers, and reads the
+    /// texels of filters once; 0 on a CPU, where single invocations do all that faster. The device resolves this.
     pub shared_memory: u32,
     /// Maximum number of frames that go through stage 1 at once, 1... The device resolves this.
     pub frames_at_once: u32,

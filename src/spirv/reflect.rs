@@ -309,7 +309,7 @@ mod tests {
     fn reflection_reads_names_types_offsets_and_workgroup() {
         let module = reflect(&words(embedded("filter/sigma.slice").unwrap())).unwrap();
         assert_eq!(module.local_size, [8, 8, 1]);
-        let constants = [("RADIUS", 0), ("MULTIPLICATIVE", 1), ("LAYERED", 40)]
+        let constants = [("RADIUS", 0), ("MULTIPLICATIVE", 1), ("TILED", 2), ("LAYERED", 40)]
             .map(|(name, id)| Constant { name: name.into(), id });
         assert_eq!(module.constants, constants);
         let names: Vec<_> = module.params.iter().map(|p| (p.name.as_str(), p.offset, p.is_float)).collect();

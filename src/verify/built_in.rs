@@ -16,7 +16,7 @@ pub struct SceneSpec {
     toml: String,
     /// Use pictures of floats, whatever the settings say.
     floats: bool,
-    /// Solve rows and columns under AOS, and propagate light, in workgroups, as on a GPU.
+    /// Solve rows and columns under AOS, propagate light and filter slices in workgroups, as on a GPU.
     shared_memory: u32,
 }
 
@@ -47,8 +47,9 @@ pub fn scenes() -> Vec<SceneSpec> {
         straight.map(|spec| SceneSpec { name: format!("{}, in floats", spec.name), floats: true, ..spec.clone() });
     let in_floats: Vec<SceneSpec> = in_floats.collect();
     let rays = ray_scenes();
-    // Rows and columns under AOS are solved, and light is propagated, in both ways on every device.
-    let in_both_ways = rays.iter().filter(|spec| ["'aos", "volume = { cell"].iter().any(|key| spec.toml.contains(key)));
+    // Rows and columns under AOS are solved, light is propagated and slices are filtered in both ways on every device.
+    let keys = ["'aos", "volume = { cell", "sigma = { window = 5, sigma = 0.08 }, smooth"];
+    let in_both_ways = rays.iter().filter(|spec| keys.iter().any(|key| spec.toml.contains(key)));
     let in_workgroups = in_both_ways.map(|spec| SceneSpec {
         name: format!("{}, in workgroups", spec.name),
         shared_memory: LEAST_SHARED_MEMORY,

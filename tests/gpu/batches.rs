@@ -66,17 +66,17 @@ fn send_in(renderer: &mut Renderer, frames: &[Vec<u8>], order: &[usize], at_once
     }
 }
 
-/// Prevents texels that are lost or exchanged where a workgroup of the lateral Gaussian stores its rows together and an invocation of the median
-/// makes one column, as on a GPU: slices that end within a workgroup, and parts of them. On a GPU both are as there.
+/// Prevents texels that are lost or exchanged where a workgroup of the Gaussian or the sigma filter reads its texels into shared memory, and an invocation of
+/// the median makes one column, as on a GPU: slices that end within a workgroup, and parts of them. On a GPU both are as there.
 #[test]
-fn rows_that_a_workgroup_stores_together_are_those_of_single_invocations() {
+fn texels_of_shared_memory_are_those_that_single_invocations_read() {
     let device = Device::new();
     for pixels in [77, 200] {
-        let lateral = "median = true, smooth = { lateral = 1.0 }";
+        let filters = "median = true, sigma = { window = 9, sigma = 0.2 }, smooth = { lateral = 1.0, depth = 2.0 }";
         for region in ["", "[region]\nlateral = [-3, 4]\ndepth = [20, 31]"] {
-            let single = swept(&format!("slices = {{ pixels = {pixels}, {lateral} }}\n{region}"));
-            let mut stored_together = single.clone();
-            stored_together.shared_memory = 16 << 10;
+            let single = swept(&format!("slices = {{ pixels = {pixels}, {filters} }}\n{region}"));
+            let mut shared = single.clone();
+            shared.shared_memory = 16 << 10;
             let volume = |scene: &Scene| {
                 let mut renderer = Renderer::new(&device, scene.clone(), &together()).expect("renderer");
                 let order: Vec<usize> = (0..SLICES).collect();
@@ -84,7 +84,7 @@ fn rows_that_a_workgroup_stores_together_are_those_of_single_invocations() {
                 renderer.picture().expect("picture");
                 renderer.read(Slot::Volume).expect("read").expect("there")
             };
-            let (one, other) = (volume(&single), volume(&stored_together));
+            let (one, other) = (volume(&single), volume(&shared));
             assert!(one.values.iter().any(|v| *v > 0.1), "{pixels}: an empty volume");
             assert!(one == other, "{pixels} pixels, {region}");
         }

@@ -20,7 +20,11 @@ pub const SLICE: Pass = Pass {
     extent: |s, t| in_runs(slice_extent(s, t), 1),
     repeat: once,
     params: |s, t| params(s.slice_filters.sigma, t),
-    constants: |s, _| constants(s.slice_filters.sigma),
+    constants: |s, _| {
+        let sigma = s.slice_filters.sigma;
+        let is_tiled = reads_tile(s, tile_words(radius(sigma)));
+        [constants(sigma), vec![("TILED", i32::from(is_tiled))]].concat()
+    },
     tolerance: Tolerance { absolute: 6e-4, relative: 0.0, outliers: 1e-3, why: WHY },
     reference: |s, t, reads, writes| reference(s.slice_filters.sigma, t, reads, writes, |_| true),
 };
@@ -90,6 +94,12 @@ fn params(sigma: Option<scene::Sigma>, args: &DispatchArgs) -> Params {
 /// Half the window's edge, texels.
 fn radius(sigma: Option<scene::Sigma>) -> u32 {
     sigma.unwrap_or_default().window / 2
+}
+
+/// Words of a workgroup's tile of a slice: TILE_PITCH and TILE_ROWS of glsl/filter/sigma.comp.
+fn tile_words(radius: u32) -> u32 {
+    let columns = GROUP + 2 * radius;
+    ((columns + 5) / 8 * 8 + 2) * (GROUP * RUN + 2 * radius)
 }
 
 fn constants(sigma: Option<scene::Sigma>) -> Vec<(&'static str, i32)> {

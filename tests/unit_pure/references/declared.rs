@@ -231,7 +231,14 @@ fn shaders_and_references_get_the_same_parameters() {
          perona_malik = { edge = 0.5, step = 0.125, conductance = 'exponential' }, smooth = { lateral = 2.0, depth = 1.0, elevation = 0.5 }",
     );
     assert_eq!(numbers(&scene, "sigma_slice"), [("range", 0.25), ("few", 4.0), ("slice", 1.0)]);
-    assert_eq!(constants(&scene, "sigma_slice", 0), [("RADIUS", 4), ("MULTIPLICATIVE", 1)]);
+    for (shared_memory, tiled) in [(0, 0), (4 << 10, 1)] {
+        let scene = Scene { shared_memory, ..scene.clone() };
+        assert_eq!(constants(&scene, "sigma_slice", 0), [("RADIUS", 4), ("MULTIPLICATIVE", 1), ("TILED", tiled)]);
+    }
+    // 16 KB of shared memory hold the tile of any window, but leave a GPU too few workgroups.
+    let wide = slices([8, 8], "sigma = { window = 41, sigma = 0.125 }");
+    let wide = Scene { shared_memory: 16 << 10, ..wide };
+    assert_eq!(constants(&wide, "sigma_slice", 0)[2], ("TILED", 0));
     let least = f64::from((1.0 / 510.0) as f32);
     let expected = [("range", 0.5), ("few", 3.0), ("edge", 0.5), ("least", least), ("slice", 1.0)];
     assert_eq!(numbers(&scene, "enhanced_sigma_slice"), expected);
@@ -244,7 +251,7 @@ fn shaders_and_references_get_the_same_parameters() {
         [(0, "gaussian_lateral", 6, 2.0), (1, "gaussian_depth", 3, 1.0), (2, "gaussian_elevation", 2, 0.5)]
     {
         let on_device = |shared_memory: u32| constants(&Scene { shared_memory, ..scene.clone() }, name, 0);
-        let expected = |transposed| [("RADIUS", radius), ("AXIS", axis), ("SHARPENS", 0), ("TRANSPOSED", transposed)];
+        let expected = |tiled| [("RADIUS", radius), ("AXIS", axis), ("SHARPENS", 0), ("TILED", tiled)];
         assert_eq!(on_device(0), expected(0));
         assert_eq!(on_device(16 << 10), expected(i32::from(axis == 0)));
         let numbers = numbers(&scene, name);
