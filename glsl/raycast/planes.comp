@@ -9,6 +9,7 @@ layout(constant_id = 4) const int SLAB = 0;    // 0 mean, 1 largest, 2 smallest
 layout(constant_id = 5) const int ONE_TILE = 0;
 // 1: the last tile is a curved plane, which has a place and a slab for each column.
 layout(constant_id = 6) const int CURVED = 0;
+layout(constant_id = 7) const int RUN = 1; // pixels of a column that an invocation makes: a CPU loads all parameters for every eight invocations
 #ifdef TONED
 #include "tone_constants.glsl"
 #endif
@@ -37,10 +38,7 @@ uniform writeonly image2D picture;
 
 #include "kept.glsl"
 
-void main() {
-    ivec2 pixel = ivec2(gl_GlobalInvocationID.xy);
-    ivec2 size = imageSize(TARGET);
-    if (any(greaterThanEqual(pixel, size))) return;
+void make(ivec2 pixel, ivec2 size) {
     vec3 corner = origin, dx = origin_dx, dy = origin_dy, slab = direction;
     ivec2 first = ivec2(0);
     bool is_covered = true, is_curved = false;
@@ -85,4 +83,12 @@ void main() {
 #else
     imageStore(TARGET, pixel, count > 0 ? vec4(vec3(value), 1.0) : vec4(0.0));
 #endif
+}
+
+void main() {
+    ivec2 pixel = ivec2(gl_GlobalInvocationID.xy) * ivec2(1, RUN);
+    ivec2 size = imageSize(TARGET);
+    if (pixel.x >= size.x) return;
+    int end = min(pixel.y + RUN, size.y);
+    for (; pixel.y < end; ++pixel.y) make(pixel, size);
 }

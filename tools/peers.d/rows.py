@@ -48,6 +48,9 @@ def arguments(row, n):
     sets += [f"light.ambient={view.AMBIENT}", f"light.diffuse={view.DIFFUSE}", f"light.specular={view.SPECULAR}"]
     if "vr" in row.echolume:
         sets.append(transfer(n))
+    # A plane needs few slices at first, and more as it turns: the pictures on which the volume grows are not those of a fixed or of a whole new one.
+    if "mpr" in row.echolume:
+        sets.append("slices.everything=true")
     return view.arguments() + list(row.echolume) + [word for s in sets for word in ("--set", s)]
 
 
