@@ -27,6 +27,13 @@ const bool LINES_MIRRORED = MIRRORED == 1 || MIRRORED == 3, SWEEP_MIRRORED = MIR
 // Not from the texture's size: what is queried is kept for every invocation, a parameter once for all.
 ivec3 last_stored = ivec3(last_stored_column, last_stored_row, last_stored_slice);
 
+// The pixel of an invocation. A CPU takes eight invocations of a row at once, for as long as the longest of their rays needs: as four by two pixels they are closer
+// to each other than in a row.
+ivec2 ray_pixel() {
+    ivec2 n = ivec2(gl_LocalInvocationID.xy);
+    return 8 * ivec2(gl_WorkGroupID.xy) + ivec2((n.x & 3) + 4 * (n.y & 1), (n.x >> 2) + 2 * (n.y >> 1));
+}
+
 struct Ray {
     vec3 origin;
     vec3 direction;

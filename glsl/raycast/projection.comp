@@ -19,7 +19,7 @@ bool below(RaySegment s, float kept) {
 }
 
 void main() {
-    ivec2 pixel = ivec2(gl_GlobalInvocationID.xy);
+    ivec2 pixel = ray_pixel();
     if (any(greaterThanEqual(pixel, imageSize(picture)))) return;
     Ray ray = ray_of(pixel);
     float path = ray.leave - ray.enter;

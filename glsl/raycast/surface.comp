@@ -30,7 +30,7 @@ bool take(Ray ray, int i, inout Slices slices, out float value) {
 void skip_transparent(Ray ray) {}
 
 void main() {
-    ivec2 pixel = ivec2(gl_GlobalInvocationID.xy);
+    ivec2 pixel = ray_pixel();
     if (any(greaterThanEqual(pixel, imageSize(distance_map)))) return;
     Slices slices = no_slices();
     Ray ray = ray_of(pixel);

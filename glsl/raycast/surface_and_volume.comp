@@ -64,7 +64,7 @@ void skip_transparent(Ray ray) {
 }
 
 void main() {
-    ivec2 pixel = ivec2(gl_GlobalInvocationID.xy);
+    ivec2 pixel = ray_pixel();
     if (any(greaterThanEqual(pixel, imageSize(distance_map)))) return;
     Ray ray = ray_of(pixel);
     vec2 cut = cap_at(pixel);

@@ -51,7 +51,7 @@ vec4 short_step(float front, float back, float y) {
 }
 
 void main() {
-    ivec2 pixel = ivec2(gl_GlobalInvocationID.xy);
+    ivec2 pixel = ray_pixel();
     if (any(greaterThanEqual(pixel, imageSize(picture)))) return;
     if (REFINED > 0 && texelFetch(marks, pixel / max(REFINED, 1), 0).x == 0.0) return;
     int face;
