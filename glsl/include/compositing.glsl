@@ -31,13 +31,17 @@ float middle_of(Ray ray, int i, float length, bool complete) {
 #include "region_fade.glsl"
 #include "lit.glsl"
 
-// Adds a step of this length, with the colour and absorption of place p, to the light of a ray in direction `along`.
-void add_step(vec4 entry, float length, vec3 p, vec3 along, inout vec3 colour, inout float opacity) {
+// Opacity of a step of this length, with the absorption at place p.
+float step_opacity(vec4 entry, float length, vec3 p) {
     float y = entry.a * faded(p) * absorption_scale * (length / step_length);
-    float a = COMPOSITING == 3 ? entry.a : COMPOSITING == 0 ? min(y, 1.0) : opacity_of(y);
+    return COMPOSITING == 3 ? entry.a : COMPOSITING == 0 ? min(y, 1.0) : opacity_of(y);
+}
+
+// Adds a step of this opacity, with the colour at place p under the light that was looked up, to the light of a ray.
+void add_step(vec4 entry, float a, vec3 p, inout vec3 colour, inout float opacity) {
     // The exponential rule's colour is premultiplied.
     float emitted = COMPOSITING == 3 ? 1.0 : a;
-    if (LIT == 1 && a > 0.0) entry.rgb = lit(entry.rgb, p, along);
+    if (LIT == 1) entry.rgb = entry.rgb * scattered + highlight * light_colour;
     if (DEPTH_CODED == 1) entry.rgb *= mix(near_tint, far_tint, clamp(dot(p, depth_axis) - depth_near, 0.0, 1.0));
     colour += (1.0 - opacity) * emitted * entry.rgb;
     opacity += (1.0 - opacity) * a;

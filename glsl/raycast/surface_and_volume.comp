@@ -32,7 +32,11 @@ int complete = 0; // steps of full length; one more may follow
 // Composites step i, with the sample before the window.
 void composite(Ray ray, int i, vec3 p, float raw) {
     float length = min(step_length, ray.leave - ray.enter - offset_of(ray, float(i)));
-    if (length > 0.0) add_step(looked_up(stretched(raw, volume_window_low, volume_window_scale)), length, p, ray.direction, colour, opacity);
+    vec4 entry = looked_up(stretched(raw, volume_window_low, volume_window_scale));
+    float a = length > 0.0 ? step_opacity(entry, length, p) : 0.0;
+    if (a <= 0.0) return;
+    if (LIT == 1) light_step(ray, i, p);
+    add_step(entry, a, p, colour, opacity);
 }
 
 bool is_opaque() { return EARLY_END == 1 && opacity >= opaque_enough; }

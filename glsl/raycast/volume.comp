@@ -1,5 +1,6 @@
 // VR: emission and absorption, front to back (thesis 4-1, 4-2).
 #version 460
+#extension GL_EXT_control_flow_attributes : require
 #include "common.glsl"
 const int LAYER = 1;  // the ray ends at the surface; the result is a layer in front of it
 const int BEHIND = 2; // the ray begins at the surface and ends at a depth behind it; the result is the surface's colour
@@ -100,7 +101,8 @@ void main() {
                 }
                 bool more = to < last;
                 if (!between) {
-                    i = to;
+                    // Rays next to each other look up light at the same turn of the loop. What is taken again is empty.
+                    i = max(i, to / LIT_STEPS * LIT_STEPS);
                 } else if (to > i) {
                     // A step also uses the sample in front of it: the first step after a visible sample is taken, and the last skipped
                     // step fetches the front sample of the next one.
@@ -110,43 +112,60 @@ void main() {
                 if (more) stop = min(stop, i + (front_known ? 1 : SAMPLES_PER_LOOKUP));
                 else if (front_known) stop = i + 1;
             }
-            for (; i < stop; ++i) {
-                // Midpoints of the steps, or their ends. The last step has the remaining length.
-                float from = offset_of(ray, float(i));
-                float length = min(length_of(ray, float(i)), path - from);
-                vec3 p = place_at(ray, between ? from + length : middle_of(ray, i, length, i < complete));
-                vec3 texel;
-                vec4 place;
-                bool inside = between ? locate(p, texel, place) : locate(p, texel);
-                if (length <= 0.0) continue;
-                vec4 entry;
-                if (between) {
-                    float back = inside ? sample_along(ray, i + 1, sample_at, texel, slices) : 0.0;
-                    bool any_inside = inside || front_inside;
-                    // A step over the sector's border is as long as its part inside, and has the value of the end inside.
-                    if (SWEEP > 0 && inside != front_inside) {
-                        float share = inside ? share_inside(place, front_place) : share_inside(front_place, place);
-                        if (inside) from += length * (1.0 - share);
-                        length *= share;
+            // Steps that share their light are taken together: a CPU looks it up whether a step adds something or not. `stop` is behind the last of them, or
+            // behind the end of the ray.
+            for (; i < stop; i += LIT_STEPS) {
+                vec4 entry[LIT_STEPS];
+                vec3 place_of[LIT_STEPS];
+                float begin[LIT_STEPS], length[LIT_STEPS], added[LIT_STEPS];
+                bool is_taken[LIT_STEPS], adds = false;
+                [[unroll]] for (int n = 0; n < LIT_STEPS; ++n) {
+                    int step = i + n;
+                    // Midpoints of the steps, or their ends. The last step has the remaining length.
+                    begin[n] = offset_of(ray, float(step));
+                    length[n] = min(length_of(ray, float(step)), path - begin[n]);
+                    vec3 p = place_at(ray, between ? begin[n] + length[n] : middle_of(ray, step, length[n], step < complete));
+                    place_of[n] = p;
+                    vec3 texel;
+                    vec4 place;
+                    bool inside = between ? locate(p, texel, place) : locate(p, texel);
+                    is_taken[n] = length[n] > 0.0 && (between || inside);
+                    added[n] = 0.0;
+                    entry[n] = vec4(0.0);
+                    if (is_taken[n] && between) {
+                        float back = inside ? sample_along(ray, step + 1, sample_at, texel, slices) : 0.0;
+                        is_taken[n] = inside || front_inside;
+                        // A step over the sector's border is as long as its part inside, and has the value of the end inside.
+                        if (SWEEP > 0 && inside != front_inside) {
+                            float share = inside ? share_inside(place, front_place) : share_inside(front_place, place);
+                            if (inside) begin[n] += length[n] * (1.0 - share);
+                            length[n] *= share;
+                        }
+                        float near = front_inside ? front : back, far = inside ? back : front;
+                        if (COMPOSITING == 3 && length[n] < step_length) entry[n] = short_step(near, far, absorption_scale * (length[n] / step_length));
+                        else entry[n] = looked_up_between(near, far);
+                        front = back;
+                        front_place = place;
+                        front_inside = inside;
+                    } else if (is_taken[n]) {
+                        entry[n] = looked_up(sample_along(ray, step, sample_at, texel, slices));
                     }
-                    float near = front_inside ? front : back, far = inside ? back : front;
-                    if (COMPOSITING == 3 && length < step_length) entry = short_step(near, far, absorption_scale * (length / step_length));
-                    else entry = looked_up_between(near, far);
-                    front = back;
-                    front_place = place;
-                    front_inside = inside;
-                    if (!any_inside) continue;
-                } else {
-                    if (!inside) continue;
-                    entry = looked_up(sample_along(ray, i, sample_at, texel, slices));
+                    if (is_taken[n]) added[n] = step_opacity(entry[n], length[n], p);
+                    adds = adds || added[n] > 0.0;
                 }
-                float before = opacity;
-                add_step(entry, length, p, ray.direction, colour, opacity);
-                // Interpolated between two samples, so that the surface has no terraces.
-                if (PART == HIT && hit == MISS && opacity >= hit_opacity) {
-                    hit = ray.enter + from + length * clamp((hit_opacity - before) / max(opacity - before, 1e-12), 0.0, 1.0);
+                if (LIT == 1 && adds) light_step(ray, i, place_of[0]);
+                [[unroll]] for (int n = 0; n < LIT_STEPS; ++n) {
+                    if (is_taken[n] && stop >= 0) {
+                        float before = opacity;
+                        add_step(entry[n], added[n], place_of[n], colour, opacity);
+                        // Interpolated between two samples, so that the surface has no terraces.
+                        if (PART == HIT && hit == MISS && opacity >= hit_opacity) {
+                            float share = (hit_opacity - before) / max(opacity - before, 1e-12);
+                            hit = ray.enter + begin[n] + length[n] * clamp(share, 0.0, 1.0);
+                        }
+                        if (EARLY_END == 1 && opacity >= opaque_enough) complete = stop = -1;
+                    }
                 }
-                if (EARLY_END == 1 && opacity >= opaque_enough) complete = stop = -1;
             }
             // What is skipped next ends with a sample that this ray has not taken yet.
             if (front_known && i < to) front_inside = false;

@@ -648,10 +648,11 @@ pub(super) fn params(scene: &Scene, params: Params) -> Params {
 }
 
 /// Constants of a pass that composites; `is_alone`: what it makes fills the picture.
-pub(super) fn constants(scene: &Scene, is_alone: bool) -> [(&'static str, i32); 3] {
+pub(super) fn constants(scene: &Scene, is_alone: bool) -> [(&'static str, i32); 4] {
     [
         ("FADE", scene.region_fade().is_some() as i32),
         ("LIT", scene.lit_by_volume().is_some() as i32),
+        ("LIT_STEPS", scene.lit_steps() as i32),
         ("GROUND", ground_of(scene, is_alone).is_some() as i32),
     ]
 }

@@ -1,7 +1,7 @@
 //! The light volume: its lattice of cells over the region, and the directions and colours of the lights that go through it.
 
 use super::region::is_still;
-use super::{Follows, LightVolume, Scene};
+use super::{Compositing, Follows, LightVolume, Scene};
 use glam::DVec3;
 
 /// Maximum number of cells of the lattice, nearly.
@@ -118,6 +118,13 @@ impl Scene {
         let count: [u32; 3] = std::array::from_fn(|a| 2 * ((extent[a] / cell / 2.0).ceil().max(1.0) as u32));
         let size = DVec3::from(count.map(f64::from)) * cell;
         LightLattice { low: low - (size - extent) / 2.0, cell, count }
+    }
+
+    /// Steps of a ray that share the light in their middle: two, where together they are no longer than a cell of the lattice, and each has one sample.
+    pub fn lit_steps(&self) -> u32 {
+        let has_one_sample = matches!(self.settings.volume.compositing, Compositing::Riemann | Compositing::Corrected);
+        let is_fine = !self.spreads() && 2.0 * self.step <= self.light_lattice().cell;
+        if self.lit_by_volume().is_some() && has_one_sample && is_fine { 2 } else { 1 }
     }
 
     /// A direction in the axes that `light.follows` names, in space, as a unit vector.

@@ -259,12 +259,17 @@ struct RayMedium<'a> {
 }
 
 impl RayMedium<'_> {
-    fn tinted(&self, rgba: [f64; 4], offset: f64) -> [f64; 4] {
+    /// Under the light and the tints of step n, with the colour of the place at an offset.
+    fn tinted(&self, rgba: [f64; 4], n: f64, offset: f64) -> [f64; 4] {
         let settings = &self.scene.settings.volume;
         let place = self.ray.place(offset);
         let rgba = match &self.tables.lit {
             Some(lit) => {
-                let [r, g, b] = lit.light(self.scene, [rgba[0], rgba[1], rgba[2]], place, self.ray.direction());
+                // Steps that share it are lit in their middle.
+                let steps = f64::from(self.scene.lit_steps());
+                let middle = ((n / steps).floor() + 0.5) * steps;
+                let lit_at = if steps > 1.0 { self.ray.place(middle * self.scene.step) } else { place };
+                let [r, g, b] = lit.light(self.scene, [rgba[0], rgba[1], rgba[2]], lit_at, self.ray.direction());
                 [r, g, b, rgba[3]]
             }
             None => rgba,
@@ -300,12 +305,12 @@ impl Medium for RayMedium<'_> {
 
     fn at(&self, place: Place) -> Option<[f64; 4]> {
         let value = self.ray.sample(place.offset, place.n)?;
-        Some(self.tinted(looked_up(self.tables.of_steps, self.entries, value), place.offset))
+        Some(self.tinted(looked_up(self.tables.of_steps, self.entries, value), place.n.floor(), place.offset))
     }
 
     fn between(&self, from: Place, to: Place) -> Option<[f64; 4]> {
         let (front, back) = (self.ray.sample(from.offset, from.n)?, self.ray.sample(to.offset, to.n)?);
-        Some(self.tinted(looked_up_between(self.tables.of_steps, self.entries, front, back), to.offset))
+        Some(self.tinted(looked_up_between(self.tables.of_steps, self.entries, front, back), from.n, to.offset))
     }
 
     fn self_attenuated(&self, from: Place, to: Place, length: f64) -> Option<[f64; 4]> {
@@ -316,7 +321,7 @@ impl Medium for RayMedium<'_> {
             true => looked_up_between(self.tables.of_steps, self.entries, front, back),
             false => self_attenuation::step(&self.tables.curve, front, back, length),
         };
-        Some(self.tinted(light, to.offset))
+        Some(self.tinted(light, from.n, to.offset))
     }
 }
 
