@@ -19,8 +19,7 @@ const int NEVER = 0x7fffffff;
 const vec4 QUARTER = vec4(0.25);
 
 int state = START;
-int stride = ROUGH;
-int limit = NEVER; // the fine search ends here
+int limit = NEVER; // the fine search ends here; where an edge is not followed, the sample that crossed the bar
 int segment = 0;   // first sample since the ray entered the insonified region
 int filled = 0;
 int fired = 0;
@@ -53,11 +52,12 @@ bool lasts = true;
 bool after_speck = false; // just after a speck: the next edge may already be above the bar
 
 // What a setting fixes is a constant here: compilers do not see through a variable that the march carries, and it would take a register.
-int stride_now() { return ROUGH > 1 ? stride : 1; }
+int stride_now() { return ROUGH > 1 && state == SEARCH_ROUGH ? ROUGH : 1; }
 bool looks_again() { return DETECTOR > 0 && second_look; }
 bool is_after_speck() { return DETECTOR == 2 && after_speck; }
 // The edge that crosses the bar is followed: otherwise the ray ends there.
 const bool FOLLOWS = PLACE > 0 || NUMBER > 1 || DETECTOR > 0;
+bool is_found() { return FOLLOWS ? found : state == FOLLOW; }
 // The next surface is the one to report.
 bool is_wanted() { return NUMBER == 1 || surfaces_passed + 1 == NUMBER; }
 
@@ -81,10 +81,10 @@ float newer_mean() { return HALF == 4 ? dot(newer, QUARTER) : float(newer_sum) /
 float older_variance() { return HALF == 4 ? variance_of(older) : variance_from(HALF, older_sum); }
 float newer_variance() { return HALF == 4 ? variance_of(newer) : variance_from(0, newer_sum); }
 
-// True if no sample of the ring can fire the detector.
+// True if no sample of the ring can fire the detector. The next sample drops the oldest of eight, which need not be kept for that.
 bool is_quiet() {
     vec4 most = max(older, newer);
-    return HALF == 4 ? max(max(most.x, most.y), max(most.z, most.w)) <= quiet_level : quiet_samples >= RING;
+    return HALF == 4 ? max(max(newer.x, most.y), max(most.z, most.w)) <= quiet_level : quiet_samples >= RING;
 }
 
 // Running mean and sample variance of the samples that left the newer half, over MEMORY samples.
@@ -106,7 +106,6 @@ void learn() {
 void restart(int i) {
     filled = 0;
     state = START;
-    stride = ROUGH;
     limit = NEVER;
     segment = i;
     fine_from = i;
@@ -114,14 +113,14 @@ void restart(int i) {
     noise_variance = 0.0;
 }
 
-// Handles a sample i outside the insonified region. False: the ray is done.
-bool skip_sample(inout int i) {
-    bool searches = state < FOLLOW && !looks_again();
-    if (searches) {
+// Handles a sample i outside the insonified region; moves i to the next sample to take.
+void skip_sample(inout int i) {
+    if (state < FOLLOW && !looks_again()) {
         i += ROUGH;
         restart(i);
+    } else {
+        i = NEVER;
     }
-    return searches;
 }
 
 // Adds a sample to the ring; returns the new difference.
@@ -179,9 +178,9 @@ bool is_event(float difference, float noise_bar) {
     return filled >= RING && difference > max(START == SEARCH_ROUGH ? rough_threshold : threshold, noise_bar);
 }
 
-// One step of the state machine after sample i entered the ring; moves i to the next sample to take. False: the ray is done. It has
+// One step of the state machine after sample i entered the ring; moves i to the next sample to take, NEVER if the ray is done. It has
 // one way out: an early return becomes a loop of one iteration, for which some drivers keep the state twice.
-bool step_detector(float difference, float noise_bar, inout int i) {
+void step_detector(float difference, float noise_bar, inout int i) {
     bool ready = filled >= RING, goes_on = true;
     int next = i + stride_now();
     if (ROUGH > 1 && state == SEARCH_ROUGH) {
@@ -192,7 +191,6 @@ bool step_detector(float difference, float noise_bar, inout int i) {
             next = max(i - back, segment);
             fine_from = next;
             state = SEARCH_FINE;
-            stride = 1;
             filled = 0;
         }
     } else if (state == SEARCH_FINE) {
@@ -200,13 +198,14 @@ bool step_detector(float difference, float noise_bar, inout int i) {
         // A crossing. An edge that was already above the bar before the region began is none.
         if (ready && i >= HALF && difference > bar && (filled == RING || is_after_speck() || previous <= bar)) {
             state = FOLLOW;
-            fired = i;
+            if (FOLLOWS) fired = i;
+            else limit = i;
             best = difference;
             best_at = i;
             before = filled > RING ? previous : difference;
             top = newer_mean();
             first_echo = top;
-            found = PLACE == 0;
+            if (FOLLOWS) found = PLACE == 0;
             lasts = true;
             confirmed = false;
             fallen_at = float(NEVER);
@@ -216,7 +215,6 @@ bool step_detector(float difference, float noise_bar, inout int i) {
         } else if (ROUGH > 1 && i >= limit) {
             // A false alarm: refill the rough ring so that it next covers samples that the fine search has not covered.
             state = SEARCH_ROUGH;
-            stride = ROUGH;
             filled = 0;
             next = limit - (RING - 2) * ROUGH;
             segment = next;
@@ -283,8 +281,7 @@ bool step_detector(float difference, float noise_bar, inout int i) {
         }
     }
     previous = difference;
-    i = next;
-    return goes_on;
+    i = goes_on ? next : NEVER;
 }
 
 // At the end of the ray: true if the largest rejected edge is to be examined again, from i.
@@ -297,7 +294,6 @@ bool look_again(inout int i) {
         segment = i;
         fine_from = i;
         state = SEARCH_FINE;
-        stride = 1;
         filled = 0;
         limit = weak_at + RING;
     }
@@ -306,7 +302,7 @@ bool look_again(inout int i) {
 
 // Position of the surface found, in samples. `risen_at`: where D rises above FOLLOW_LEVEL of the peak, or NEVER.
 float surface_place(float risen_at) {
-    if (PLACE == 0) return float(fired);
+    if (PLACE == 0) return float(FOLLOWS ? fired : limit);
     // The edge is in the middle of the ring where the difference is largest.
     const float middle_of_ring = 0.5 * float(RING - 1);
     if (PLACE == 2 && max(risen_at, fallen_at) < float(NEVER)) return 0.5 * (risen_at + fallen_at) - middle_of_ring;

@@ -93,13 +93,18 @@ float steps_to(Ray ray, float offset) {
 
 vec4 clip_at(int i) { return i == 0 ? clip_0 : i == 1 ? clip_1 : i == 2 ? clip_2 : clip_3; }
 
+// Lets a ray begin at a place of the picture.
+void aim(inout Ray ray, vec2 at) {
+    ray.origin = origin + origin_dx * at.x + origin_dy * at.y;
+    ray.direction = normalize(direction + direction_dx * at.x + direction_dy * at.y);
+}
+
 // The ray through a place of the picture, rays from its upper left corner, and its interval inside the box and on the near side of every clip plane; leave < enter is a miss. A ray
 // parallel to a face would divide by zero: min and max order the infinities correctly, and the smallest component of 1e-12
 // avoids the 0/0 of a ray within the face's plane. `face` is the clip plane that the ray enters through, -1 if there is none.
 Ray ray_through(vec2 at, out int face) {
     Ray ray;
-    ray.origin = origin + origin_dx * at.x + origin_dy * at.y;
-    ray.direction = normalize(direction + direction_dx * at.x + direction_dy * at.y);
+    aim(ray, at);
     vec3 d = mix(ray.direction, vec3(1e-12), lessThan(abs(ray.direction), vec3(1e-12)));
     vec3 a = (box_low - ray.origin) / d;
     vec3 b = (box_high - ray.origin) / d;

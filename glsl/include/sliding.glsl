@@ -7,14 +7,18 @@ const float SAMPLE_AT = 0.5; // samples are in the middle of their steps
 
 struct Slices {
     vec2 a, b, c, d, e; // weighted sums and weights of the last slices, the newest last
-    int newest;
+    int middle; // the sample that they surround
 };
 
+// The ray as a shader has it at sample i: a shader may compute its origin and direction again, instead of keeping them while taps are summed.
+Ray aimed(Ray ray, int i);
+
 // Deviation sqrt(n - 1) / 2 steps, as of the binomial of that length.
-float tap_weight(int away) { return exp(-float(away * away) * 2.0 / float(max(SLIDING - 1, 1))); }
+float tap_weight(float away) { return exp(-(away * away) * 2.0 / float(max(SLIDING - 1, 1))); }
 
 vec2 front_slice(Ray ray, int i, float sample_at) {
     float at = float(i) + sample_at;
+    ray = aimed(ray, i);
     vec3 p = ray.origin + ray.direction * (ray.enter + offset_of(ray, at));
     // Across the ray, with the same spacing as along it.
     vec3 sideways = origin_dx + direction_dx;
@@ -22,12 +26,16 @@ vec2 front_slice(Ray ray, int i, float sample_at) {
     vec3 upwards = cross(across, ray.direction);
     float apart = length_of(ray, at - 0.5);
     vec2 sum = vec2(0.0);
-    [[dont_unroll]] for (int n = 0; n < SLIDING * SLIDING; ++n) {
-        int x = n % SLIDING - SLIDING / 2, y = n / SLIDING - SLIDING / 2;
+    // The counters are what a tap needs: a place and weights. A single counter would be divided for each tap.
+    const float edge = float(SLIDING / 2);
+    [[dont_unroll]] for (float x = -edge, y = -edge; y <= edge;) {
         vec3 texel;
-        if (locate(p + (across * float(x) + upwards * float(y)) * apart, texel)) {
+        if (locate(p + (across * x + upwards * y) * apart, texel)) {
             sum += tap_weight(x) * tap_weight(y) * vec2(raw_volume(texel), 1.0);
         }
+        bool ends_row = x == edge;
+        y = ends_row ? y + 1.0 : y;
+        x = ends_row ? -edge : x + 1.0;
     }
     return sum;
 }
@@ -42,21 +50,21 @@ Slices no_slices() { return Slices(vec2(0.0), vec2(0.0), vec2(0.0), vec2(0.0), v
 // its source holds the next slice.
 float slid(Ray ray, int i, float sample_at, inout Slices s) {
     const int half_width = SLIDING / 2;
-    int missing = i + half_width - s.newest;
+    int missing = i - s.middle;
     if (missing < 0 || missing > SLIDING) missing = SLIDING;
     if ((missing & 1) != 0) s = Slices(s.b, s.c, s.d, s.e, s.e, 0);
     if ((missing & 2) != 0) s = Slices(s.c, s.d, s.e, s.e, s.e, 0);
     if ((missing & 4) != 0) s.a = s.e;
-    s.newest = i + half_width;
+    s.middle = i;
     for (int away = missing - 1; away >= 0; --away) {
-        vec2 sum = front_slice(ray, s.newest - away, sample_at);
+        vec2 sum = front_slice(ray, i + half_width - away, sample_at);
         s.a = away == 4 ? sum : s.a;
         s.b = away == 3 ? sum : s.b;
         s.c = away == 2 ? sum : s.c;
         s.d = away == 1 ? sum : s.d;
-        s.e = away == 0 ? sum : s.e;
+        s.e = sum; // of the last iteration; what is overwritten need not be kept for it
     }
-    float near = tap_weight(1), far = SLIDING == 5 ? tap_weight(2) : 0.0;
+    float near = tap_weight(1.0), far = SLIDING == 5 ? tap_weight(2.0) : 0.0;
     vec2 sum = SLIDING == 5 ? s.c + near * (s.b + s.d) + far * (s.a + s.e) : s.d + near * (s.c + s.e);
     return sum.y > 0.0 ? sum.x / sum.y : 0.0;
 }

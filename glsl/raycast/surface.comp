@@ -19,12 +19,11 @@ const int to_composite = NEVER;
 uniform writeonly image2D distance_map;
 uniform writeonly image2D surface; // echo at the surface, 1 where one was found, mean echo behind it
 
-bool take(Ray ray, int i, inout Slices slices, out float value) {
+float take(Ray ray, int i, inout Slices slices) {
     vec3 texel;
-    bool inside = locate(place_of(ray, i), texel);
-    value = 0.0;
-    if (inside) value = sample_along(ray, i, SAMPLE_AT, texel, slices);
-    return inside;
+    float value = OUTSIDE;
+    if (locate(place_of(ray, i), texel)) value = sample_along(ray, i, SAMPLE_AT, texel, slices);
+    return value;
 }
 
 void skip_transparent(Ray ray) {}
@@ -33,11 +32,13 @@ void main() {
     ivec2 pixel = ray_pixel();
     if (any(greaterThanEqual(pixel, imageSize(distance_map)))) return;
     Slices slices = no_slices();
+    keep_pixel(pixel);
     Ray ray = ray_of(pixel);
     bool ends = is_capped(cap_at(pixel)), enters = ray.leave > ray.enter;
     if (ends) ray.leave = -1.0;
     vec3 echo;
     float distance = find_surface(ray, slices, echo);
+    pixel = kept_pixel(complete);
     if (ends) distance = enters ? ray.enter : MISS;
     imageStore(distance_map, pixel, vec4(distance, 0.0, 0.0, 0.0));
     if (ECHO == 1) imageStore(surface, pixel, vec4(echo, 0.0));

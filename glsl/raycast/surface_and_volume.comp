@@ -27,7 +27,6 @@ uniform writeonly image2D picture; // the composited volume
 
 vec3 colour = vec3(0.0);
 float opacity = 0.0;
-int complete = 0; // steps of full length; one more may follow
 
 // Composites step i, with the sample before the window.
 void composite(Ray ray, int i, vec3 p, float raw) {
@@ -41,35 +40,36 @@ void composite(Ray ray, int i, vec3 p, float raw) {
 
 bool is_opaque() { return EARLY_END == 1 && opacity >= opaque_enough; }
 
-bool take(Ray ray, int i, inout Slices slices, out float value) {
+float take(Ray ray, int i, inout Slices slices) {
     vec3 p = place_of(ray, i);
     vec3 texel;
-    bool inside = locate(p, texel);
-    value = 0.0;
-    bool composited = i == to_composite;
-    if (inside) {
+    float value = OUTSIDE;
+    if (locate(p, texel)) {
         float raw = raw_along(ray, i, SAMPLE_AT, texel, slices);
         value = windowed(raw);
-        if (composited) composite(ray, i, p, raw);
+        if (i == to_composite) composite(ray, i, p, raw);
     }
-    if (composited) to_composite = i + 1 < complete && !is_opaque() ? i + 1 : NEVER;
-    return inside;
+    if (i == to_composite) to_composite = i + 1 < complete && !is_opaque() ? i + 1 : NEVER;
+    return value;
 }
 
 void skip_transparent(Ray ray) {
     // The last complete step is always taken, as in volume.comp.
     int last = complete - 1;
-    if (to_composite >= last) return;
-    RaySegment here = volume_segment_at(ray, to_composite, SAMPLE_AT);
-    while (here.kind == EMPTY && to_composite < last) {
-        to_composite = min(here.stop, last);
-        here = volume_segment_at(ray, to_composite, SAMPLE_AT);
+    for (bool skips = to_composite < last; skips;) {
+        RaySegment here = volume_segment_at(aimed(ray, to_composite), to_composite, SAMPLE_AT);
+        skips = here.kind == EMPTY;
+        if (skips) {
+            to_composite = min(here.stop, last);
+            skips = to_composite < last;
+        }
     }
 }
 
 void main() {
     ivec2 pixel = ray_pixel();
     if (any(greaterThanEqual(pixel, imageSize(distance_map)))) return;
+    keep_pixel(pixel);
     Ray ray = ray_of(pixel);
     vec2 cut = cap_at(pixel);
     bool enters = ray.leave > ray.enter;
@@ -83,10 +83,11 @@ void main() {
     float path = ray.leave - ray.enter;
     float left = min(step_length, path - offset_of(ray, float(complete)));
     if (path > 0.0 && left > 0.0 && !is_opaque()) {
-        vec3 p = place_at(ray, middle_of(ray, complete, left, false));
+        vec3 p = place_at(aimed(ray, complete), middle_of(ray, complete, left, false));
         vec3 texel;
         if (locate(p, texel)) composite(ray, complete, p, raw_along(ray, complete, SAMPLE_AT, texel, slices));
     }
+    pixel = kept_pixel(complete);
     if (is_capped(cut)) distance = enters ? ray.enter : MISS;
     imageStore(distance_map, pixel, vec4(distance, 0.0, 0.0, 0.0));
     if (ECHO == 1) imageStore(surface, pixel, vec4(echo, 0.0));

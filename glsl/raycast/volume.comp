@@ -16,6 +16,7 @@ layout(scalar) uniform Params {
 };
 #include "ray.glsl"
 #include "sliding.glsl"
+Ray aimed(Ray ray, int i) { return ray; }
 #include "empty_space.glsl"
 #include "compositing.glsl"
 #include "cap.glsl"
