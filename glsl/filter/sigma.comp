@@ -22,11 +22,20 @@ layout(scalar) uniform Params {
 #ifdef PICTURE
 const int RUN = 2;
 #define SCARCE(count, enough) any(lessThanEqual(count, vec4(enough)))
-#define IS_CLOSE(away, within) vec4(lessThanEqual(abs(away), within))
+#define ADD_IF_CLOSE(sum, count, away, within) { \
+    bvec4 is_close = lessThanEqual(abs(away), within); \
+    sum += mix(vec4(0.0), away, is_close); \
+    count += mix(vec4(0.0), vec4(1.0), is_close); \
+}
 #else
 const int RUN = 4;
 #define SCARCE(count, enough) ((count) <= (enough))
-#define IS_CLOSE(away, within) float(abs(away) <= (within))
+// As a factor: a GPU compares and selects at half the rate that it multiplies and adds at. Of colours it would take more registers.
+#define ADD_IF_CLOSE(sum, count, away, within) { \
+    float is_close = float(abs(away) <= (within)); \
+    sum += is_close * (away); \
+    count += is_close; \
+}
 #endif
 
 #if defined(DISTANCE) || defined(PICTURE)
@@ -79,10 +88,7 @@ void main() {
             row_there += is_there ? 1.0 : 0.0;
             [[unroll]] for (int i = 0; i < RUN; ++i) {
                 T away = value - centre[i];
-                // As a factor: a GPU compares at half the rate that it multiplies and adds at.
-                T is_close = IS_CLOSE(away, within[i]);
-                row_sum[i] += is_close * away;
-                row_count[i] += is_close;
+                ADD_IF_CLOSE(row_sum[i], row_count[i], away, within[i])
             }
         }
         [[unroll]] for (int i = 0; i < RUN; ++i) {

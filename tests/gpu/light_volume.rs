@@ -16,8 +16,12 @@ const LIGHT: &str = "follows = 'region', direction = [0, 1, 0]";
 const GREY: &str = "cell = 1, depth = 5, warmth = 0, scatter = 0, widening = 0, back = 0";
 
 fn look(light: &str, volume: &str) -> Scene {
+    look_with("", light, volume)
+}
+
+fn look_with(more: &str, light: &str, volume: &str) -> Scene {
     let toml = format!(
-        "mode = 'vr'\npicture.size = [32, 32]\nvolume.extinction = 0.2\nvolume.transfer = [{{ at = 0, colour = [1, 1, 1], opacity = 0 }}, \
+        "mode = 'vr'\n{more}\npicture.size = [32, 32]\nvolume.extinction = 0.2\nvolume.transfer = [{{ at = 0, colour = [1, 1, 1], opacity = 0 }}, \
          {{ at = 1, colour = [1, 1, 1], opacity = 1 }}]\nlight = {{ {light}, volume = {{ {volume} }} }}"
     );
     scene(voxels(SIZE), BYTES, &toml)
@@ -220,4 +224,28 @@ fn scattered_light_is_a_mean_of_what_arrives() {
     assert!(at(&scene, &scattered, deep)[1] > 1.05 * at(&scene, &arriving, deep)[1]);
     let empty = lit(&device, &scene, |_| 0.0, Slot::LightScattered);
     assert!(empty.values.chunks_exact(4).all(|c| c[..3].iter().all(|v| (v - 1.0).abs() < 1e-3)));
+}
+
+/// Prevents light from a wrong place where two steps of a ray share it: a step further it differs by a fifth here. The picture of a ball comes to within a quarter
+/// of a level of 8 bits (root of the mean square) of that of steps a tenth as long, whether steps share light or, with slightly smaller cells, do not.
+#[test]
+fn two_steps_that_share_their_light_have_that_of_their_middle() {
+    let device = Device::new();
+    let of = |step: f64, cell: f64| {
+        let grey = GREY.replace("cell = 1", &format!("cell = {cell}"));
+        look_with(
+            &format!("ray.step = {step}\npost.floats = true"),
+            "follows = 'region', direction = [0.6, 0.8, 0]",
+            &grey,
+        )
+    };
+    let picture = |scene: &Scene| lit(&device, scene, ball(DVec3::new(23.5, 19.5, 21.5), 14.0), Slot::Picture);
+    let error = |step: f64, cell: f64| {
+        let (coarse, fine) = (picture(&of(step, cell)), picture(&of(step / 10.0, cell)));
+        let squares: f64 = coarse.values.iter().zip(&fine.values).map(|(a, b)| (a - b).powi(2)).sum();
+        (squares / coarse.values.len() as f64).sqrt()
+    };
+    assert_eq!([of(0.5, 1.0), of(0.5, 0.99)].map(|scene| scene.lit_steps()), [2, 1]);
+    let (shared, single) = (error(0.5, 1.0), error(0.5, 0.99));
+    assert!(single > 0.0 && single.max(shared) < 1e-3, "shared {shared}, single {single}");
 }
