@@ -4,14 +4,13 @@
 // The shader that includes this file defines:
 //   COMPOSITES       a constant: whether samples are composited
 //   to_composite     the first sample that is still to be composited; NEVER if none is
-//   take             takes sample i of the march: OUTSIDE if it is outside the insonified region. It composites sample `to_composite`.
+//   take             takes sample i of the march: false if it is outside the insonified region. It composites sample `to_composite`.
 //   skip_transparent skips samples that are transparent, from `to_composite` on
 #extension GL_KHR_shader_subgroup_vote : require
 #extension GL_EXT_control_flow_attributes : require
 layout(constant_id = 6) const int BEHIND = 0; // samples averaged behind the surface
 
-const float OUTSIDE = -1.0; // below all samples after the window
-float take(Ray ray, int i, inout Slices slices);
+bool take(Ray ray, int i, inout Slices slices, out float value);
 void skip_transparent(Ray ray);
 
 // Samples of one search where no empty space is skipped.
@@ -33,6 +32,10 @@ Ray aimed(Ray ray, int i) {
     if (SLIDING > 0) aim(ray, vec2(kept_pixel(i)) + 0.5);
     return ray;
 }
+
+// What `take` returns. Where a sample has taps, its value alone is kept: OUTSIDE, or 0 and more.
+const float OUTSIDE = -1.0;
+bool taken(bool inside, float value) { return SLIDING > 0 ? value > OUTSIDE : inside; }
 
 // i + 1/2 without the number i, which compositing needs later.
 vec3 place_of(Ray ray, int i) { return place_at(aimed(ray, i), offset_of(ray, float(2 * i + 1) * SAMPLE_AT)); }
@@ -103,10 +106,11 @@ float find_surface(Ray ray, inout Slices slices, out vec3 echo) {
         float difference = 0.0, noise_bar = 0.0;
         for (; n > 0 && !waits && (is_in_reach(i) ? searches() : COMPOSITES && i == NEVER && to_composite < NEVER); --n) {
             int at = COMPOSITES ? min(i, to_composite) : i;
-            float value = take(ray, at, slices);
+            float value;
+            bool inside = take(ray, at, slices, value);
             difference = noise_bar = 0.0;
             if (at != i) continue;
-            if (value > OUTSIDE) {
+            if (inside) {
                 difference = push_sample(value);
                 noise_bar = noise_bar_at(i, difference);
                 waits = is_event(difference, noise_bar);
@@ -123,8 +127,8 @@ float find_surface(Ray ray, inout Slices slices, out vec3 echo) {
         for (; follows; --n, follows = !searches() && n > 0 && is_in_reach(i)) {
             bool inside = true;
             if (!waits) {
-                float value = take(ray, i, slices);
-                inside = value > OUTSIDE;
+                float value;
+                inside = take(ray, i, slices, value);
                 difference = inside ? push_sample(value) : 0.0;
                 noise_bar = inside ? noise_bar_at(i, difference) : 0.0;
             }

@@ -19,11 +19,12 @@ const int to_composite = NEVER;
 uniform writeonly image2D distance_map;
 uniform writeonly image2D surface; // echo at the surface, 1 where one was found, mean echo behind it
 
-float take(Ray ray, int i, inout Slices slices) {
+bool take(Ray ray, int i, inout Slices slices, out float value) {
     vec3 texel;
-    float value = OUTSIDE;
-    if (locate(place_of(ray, i), texel)) value = sample_along(ray, i, SAMPLE_AT, texel, slices);
-    return value;
+    bool inside = locate(place_of(ray, i), texel);
+    value = OUTSIDE;
+    if (inside) value = sample_along(ray, i, SAMPLE_AT, texel, slices);
+    return taken(inside, value);
 }
 
 void skip_transparent(Ray ray) {}

@@ -40,17 +40,18 @@ void composite(Ray ray, int i, vec3 p, float raw) {
 
 bool is_opaque() { return EARLY_END == 1 && opacity >= opaque_enough; }
 
-float take(Ray ray, int i, inout Slices slices) {
+bool take(Ray ray, int i, inout Slices slices, out float value) {
     vec3 p = place_of(ray, i);
     vec3 texel;
-    float value = OUTSIDE;
-    if (locate(p, texel)) {
+    bool inside = locate(p, texel);
+    value = OUTSIDE;
+    if (inside) {
         float raw = raw_along(ray, i, SAMPLE_AT, texel, slices);
         value = windowed(raw);
         if (i == to_composite) composite(ray, i, p, raw);
     }
     if (i == to_composite) to_composite = i + 1 < complete && !is_opaque() ? i + 1 : NEVER;
-    return value;
+    return taken(inside, value);
 }
 
 void skip_transparent(Ray ray) {
