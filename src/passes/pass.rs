@@ -322,7 +322,7 @@ pub fn in_runs_of(run: u32, mut texels: [u32; 3], axis: usize) -> [u32; 3] {
 }
 
 /// Invocations along each edge of a workgroup: local_size of glsl/include/common.glsl.
-pub(super) const GROUP: u32 = 8;
+pub const GROUP: u32 = 8;
 
 /// Largest tile of a workgroup, bytes. A multiprocessor of NVIDIA's Ada or Ampere has 100 KB of shared memory: for twelve workgroups, half of the
 /// subgroups that it holds.

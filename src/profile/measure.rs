@@ -4,7 +4,7 @@ use crate::gpu::{Context, GpuError, Renderer, RendererOptions, TimeStamps, pass_
 use crate::machine::{self, CpuTime};
 use crate::passes::measure as loops;
 use crate::passes::slots::Shape;
-use crate::passes::{Bind, DispatchArgs, Part, Pass, RUN, Slot, Span, chain, filter, layers, slices};
+use crate::passes::{Bind, DispatchArgs, GROUP, Part, Pass, RUN, Slot, Span, chain, filter, layers, slices};
 use crate::plan::{Plan, Rerun, Step};
 use crate::profile::export::{self, Track};
 use crate::profile::statistics::Sample;
@@ -322,16 +322,17 @@ fn dispatched(step: &Step, scene: &Scene) -> u64 {
 fn fetches(pass: &Pass, scene: &Scene, step: &Step) -> Option<u64> {
     let args = DispatchArgs { slices: pass.slices(scene), ..step.args() };
     let constants = pass.constants(scene, &args);
-    let radius = constants.iter().find(|(name, _)| *name == "RADIUS").map(|(_, r)| *r as u64)?;
-    let edge = 2 * radius + 1;
-    // One invocation filters a run of neighbours and shares their window.
-    let along = |run: u32| edge + u64::from(run) - 1;
+    let constant = |asked: &str| constants.iter().find(|(name, _)| *name == asked).map(|(_, value)| *value);
+    let radius = constant("RADIUS")? as u64;
+    // An invocation filters a run of neighbours and shares their window, a workgroup that of all its invocations where it has shared memory.
+    let sharing = if constant("TILED") == Some(1) { u64::from(GROUP) } else { 1 };
+    let seen = |made: u64| made + 2 * radius;
     let window = match pass.name.split('_').next()? {
-        "gaussian" => along(filter::gaussian::RUN),
-        "sigma" => edge * along(RUN),
+        "gaussian" => sharing * seen(sharing * u64::from(filter::gaussian::RUN)),
+        "sigma" => seen(sharing) * seen(sharing * u64::from(RUN)),
         _ => return None,
     };
-    Some(dispatched(step, scene) * window)
+    Some(dispatched(step, scene) * window / (sharing * sharing))
 }
 
 /// Repeats of each ceiling loop; the median is reported.
