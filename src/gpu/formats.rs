@@ -96,7 +96,7 @@ const FRAMES_IN_CACHE: u32 = 4;
 
 /// The scene with the fields that the device resolves: the fastest sampling, which reads eight texels if texels are loaded or the
 /// device cannot filter the volume's format; no packed neighbours if the device cannot hold them; a picture in the format of the window; and the shared
-/// memory of a GPU, for the solver of AOS. On a CPU few frames go through stage 1 at once: their slots stay in its caches.
+/// memory of a GPU. On a CPU few frames go through stage 1 at once: their slots stay in its caches.
 pub fn adapt_scene(context: &Context, texel_access: TexelAccess, scene: Scene) -> Scene {
     let filters = filters(context, Slot::Volume.format(&scene));
     let mut scene = scene.sampled(if filters { texel_access.sampling() } else { Sampling::Exact });

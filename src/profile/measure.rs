@@ -134,6 +134,8 @@ impl ProfileRun {
     pub fn finish(self) -> (Profile, Vec<export::Span>) {
         let device = machine::device(&self.context);
         let (scene, plan, repeats) = (&self.scene, self.renderer.plan(), self.repeats);
+        // What the device resolves decides what an invocation makes and reads.
+        let resolved = self.renderer.scene();
         let stamped = device.valid_bits > 0;
         let profile = Profile {
             format: FORMAT.into(),
@@ -154,14 +156,14 @@ impl ProfileRun {
             repeats: repeats.len(),
             warm_up: self.options.warm_up,
             turn: self.options.angle_step,
-            passes: passes(plan, scene, &repeats, stamped),
+            passes: passes(plan, resolved, &repeats, stamped),
             host: hosts(&repeats),
             wall_ns: repeats.iter().map(|r| r.wall).collect(),
             cpu_ns: repeats.iter().map(|r| r.cpu).collect::<Option<_>>().unwrap_or_default(),
             device_ns: if stamped { repeats.iter().map(Repeat::on_device).collect() } else { Vec::new() },
             device,
             ceilings: self.ceilings,
-            sampling: Some(format!("{}; {}", scene.sampling.words(), self.renderer.texel_access().describe())),
+            sampling: Some(format!("{}; {}", resolved.sampling.words(), self.renderer.texel_access().describe())),
             clock_deviation_ns: self.renderer.clock_deviation(),
         };
         let spans = repeats.into_iter().enumerate().flat_map(|(n, r)| r.spans.into_iter().map(move |s| traced(n, s)));

@@ -45,6 +45,23 @@ fn pipelines_are_measured_without_any_work_for_the_device() {
     assert_eq!(all.iter().map(key).collect::<BTreeSet<_>>().len(), all.len(), "one is listed twice");
 }
 
+/// Prevents a profile that counts what other devices would do: on a CPU an invocation makes eight pixels of a plane, and samples are no device's filter.
+#[test]
+fn a_profile_counts_what_this_device_does() {
+    let folder = Folder::new("counts");
+    let file = folder.path("p.json");
+    let arguments = ["profile", "--mode", "mpr", "--size", "64x60", "--repeat", "1", "--warm-up", "1", "--no-ceilings"];
+    done(&[&arguments[..], &["--json", &file]].concat());
+    let measured = json(&file);
+    let passes = measured["passes"].as_array().expect("a list");
+    let planes = passes.iter().find(|p| p["name"] == "raycast_planes_toned").expect("planes are cut");
+    let on_cpu = measured["device"]["is_software"].as_bool().expect("told");
+    assert_eq!(planes["dispatched"], if on_cpu { 64 * 8 } else { 64 * 60 });
+    let sampling = measured["sampling"].as_str().expect("told");
+    assert!(!sampling.contains("the fastest"), "{sampling}");
+    assert_eq!(sampling.contains("filter"), !on_cpu, "{sampling}");
+}
+
 /// A device without statistics says so in a line; comparing what it has not is refused.
 #[test]
 fn what_cannot_be_compared_is_refused_and_files_are_checked() {
