@@ -268,7 +268,7 @@ impl RayMedium<'_> {
                 // Steps that share it are lit in their middle.
                 let steps = f64::from(self.scene.lit_steps());
                 let middle = ((n / steps).floor() + 0.5) * steps;
-                let lit_at = if steps > 1.0 { self.ray.place(middle * self.scene.step) } else { place };
+                let lit_at = if steps > 1.0 { self.ray.place(self.ray.offset(middle)) } else { place };
                 let [r, g, b] = lit.light(self.scene, [rgba[0], rgba[1], rgba[2]], lit_at, self.ray.direction());
                 [r, g, b, rgba[3]]
             }
