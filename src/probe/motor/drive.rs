@@ -216,6 +216,8 @@ impl Drive {
                 }
             })?;
         }
+        // A position that equals the target may be read shortly before the motor is at rest.
+        self.wait_still()?;
         self.guard.at_rest();
         Ok(volumes)
     }

@@ -445,7 +445,11 @@ impl Module {
         self.shaft += self.speed * time;
         if let Some(end) = end {
             let crossed = (before - end) * (self.shaft - end) <= 0.0;
-            if (crossed || (self.shaft - end).abs() < 0.5) && self.speed.abs() <= 4.0 * acceleration * time {
+            // The counter shows the target from half a microstep before it on. The speed of braking is there below
+            // sqrt(acceleration), and a few steps of the integration may be missing. So the motor is at rest where its counter
+            // shows the target, however short or long a step is.
+            let slow = acceleration.sqrt() + 4.0 * acceleration * time;
+            if (crossed || (self.shaft - end).abs() < 0.5) && self.speed.abs() <= slow {
                 (self.shaft, self.speed) = (end, 0.0);
                 if self.activity == Activity::Search {
                     self.offset = 0.0;
@@ -565,5 +569,32 @@ impl Module {
             axis::LEFT_LIMIT => i32::from(self.closed(Side::Left)),
             other => *self.axes.get(&other).ok_or(BAD_TYPE)?,
         })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::probe::ProbeFile;
+
+    /// The counter and the shaft at rest are one state, whether the port is served every 10 us or every 20 ms.
+    #[test]
+    fn the_motor_is_at_rest_where_its_counter_shows_the_target() {
+        let probe = ProbeFile::read(Path::new("tests/data/motor/probe.toml")).expect("the example is right");
+        let table = probe.motor().expect("and has a motor");
+        for step in [1e-5, 3e-4, 5e-3, 2e-2].map(Duration::from_secs_f64) {
+            let mut module = Module::new(table);
+            for angle in [4.0, -12.0, 12.0] {
+                let target = table.position(angle);
+                module.activity = Activity::Position(f64::from(target));
+                let longest = (2.0 / step.as_secs_f64()) as usize;
+                let steps = (0..longest).take_while(|_| {
+                    module.pass(step, true);
+                    module.counter() != target
+                });
+                assert!(steps.count() < longest, "{step:?}: {angle} deg was not reached in 2 s");
+                assert!(!module.is_moving(), "{step:?}: at {angle} deg with {} microsteps/s", module.speed);
+            }
+        }
     }
 }

@@ -69,10 +69,12 @@ fn a_sweep_covers_its_angle_in_order_of_time_and_places_frames() {
         matches!(track.at((first + last) / 2.0), ArrayState::Sweeping { .. } | ArrayState::Reversing { .. }),
         "{count}"
     );
-    // The motor has reached its target: nothing to stop.
-    let before = simulator.received().len();
+    // The sweep ended with the motor at rest, as the module reported: nothing to stop.
+    let before = simulator.received();
+    let last = before.last().expect("requests");
+    assert_eq!((last.command, last.kind), (command::GET_AXIS, axis::SPEED));
     drop(drive);
-    assert_eq!(simulator.received().len(), before);
+    assert_eq!(simulator.received().len(), before.len());
     assert!(!simulator.is_moving() && (simulator.angle() - 12.0).abs() < 0.02);
 }
 
