@@ -5,13 +5,12 @@ use super::one_colour;
 use super::series::{Job, SeriesArgs};
 use super::sheet;
 use super::still::{self, StillArgs};
-use crate::args::{InputArgs, Output, PictureFile, check_outputs};
+use crate::args::{InputArgs, Output, PictureFile, ShaderArgs, check_outputs};
 use crate::dump;
 use crate::error_report::choose::Bound;
 use crate::error_report::command::{parse_nanoseconds, read_report};
 use crate::error_report::{Measure, choose, map};
 use crate::files;
-use crate::gpu::shader_reload::ShaderFolder;
 use crate::gpu::{Context, Renderer, RendererOptions, TimeStamps};
 use crate::marked;
 use crate::mesh::files::MeshFile;
@@ -83,9 +82,8 @@ pub struct Render {
     /// Run with Vulkan validation; any message is a failure
     #[arg(long)]
     validate: bool,
-    /// Compile the shaders from this folder instead of using the built-in ones (needs glslc or glslangValidator)
-    #[arg(long, value_name = "DIR")]
-    glsl: Option<PathBuf>,
+    #[command(flatten)]
+    shaders: ShaderArgs,
 }
 
 impl Render {
@@ -109,7 +107,7 @@ impl Render {
                 options,
                 validate: self.validate,
                 timings: self.timings,
-                own_shaders: self.glsl.is_some(),
+                own_shaders: self.shaders.are_given(),
             });
         }
         let output = PictureFile::new("-o", &self.output)?;
@@ -151,7 +149,7 @@ impl Render {
         let Drawn { mut renderer, picture, kept } = draw_despite_losses(
             &mut context,
             &mut options,
-            self.glsl.is_some(),
+            self.shaders.are_given(),
             reopen,
             || 0,
             |context, options, is_again| {
@@ -333,11 +331,7 @@ impl Render {
     fn options(&self) -> Result<RendererOptions, Failure> {
         let times_passes = self.timings || self.budget.is_some();
         let time_stamps = if times_passes { TimeStamps::EachPass } else { TimeStamps::None };
-        let mut options = RendererOptions { time_stamps, ..RendererOptions::default() };
-        if let Some(folder) = &self.glsl {
-            options.shaders = ShaderFolder::open(folder).map_err(input)?.shaders();
-        }
-        Ok(options)
+        Ok(RendererOptions { time_stamps, shaders: self.shaders.open()?, ..RendererOptions::default() })
     }
 
     fn write_dump(&self, folder: &Path, renderer: &mut Renderer) -> Result<(), Failure> {

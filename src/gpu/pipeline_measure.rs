@@ -5,7 +5,7 @@ use super::context::Context;
 use super::error::{ErrorContext, GpuError};
 use super::formats::{self, TexelAccess};
 use super::pipeline_cache;
-use super::pipelines::{Compile, Key, Pipelines, Prepared, embedded};
+use super::pipelines::{Compile, Key, Pipelines, Prepared, Shaders, embedded};
 use crate::passes::slots::Format;
 use crate::passes::{DispatchArgs, Pass};
 use crate::plan::Plan;
@@ -53,13 +53,17 @@ struct Target<'a> {
     args: DispatchArgs,
 }
 
-/// Measures every pipeline that these scenes need on a device, each once, in the order of the scenes.
+/// Measures every pipeline that these scenes need on a device, each once, in the order of the scenes, made of these shaders.
 ///
 /// # Errors
 /// A scene that the device cannot hold, a shader that does not compile.
-pub fn measure(context: &Arc<Context>, scenes: &[Scene]) -> Result<Vec<MeasuredPipeline>, GpuError> {
+pub fn measure(
+    context: &Arc<Context>,
+    scenes: &[Scene],
+    shaders: &Arc<Shaders>,
+) -> Result<Vec<MeasuredPipeline>, GpuError> {
     let texel_access = TexelAccess::for_device(&context.candidate);
-    let pipelines = Pipelines::new(context, embedded(), texel_access)?;
+    let pipelines = Pipelines::new(context, shaders.clone(), texel_access)?;
     let scenes: Vec<Scene> =
         scenes.iter().map(|scene| formats::adapt_scene(context, texel_access, scene.clone())).collect();
     let mut known = HashSet::new();

@@ -1,6 +1,6 @@
 //! `echolume profile`.
 
-use crate::args::{InputArgs, Output, check_outputs, open_device, write_report};
+use crate::args::{InputArgs, Output, ShaderArgs, check_outputs, open_device, write_report};
 use crate::files::{read_text, replace};
 use crate::gpu::DeviceChoice;
 use crate::profile as model;
@@ -20,7 +20,8 @@ const MAX_BYTES: u64 = 256 << 20;
                         echolume profile volume.mha --mode mip --still --turn 2    (the picture alone, each from another angle)\n  \
                         echolume profile --compare before.json after.json    (exit code 1 if a pass became slower)\n  \
                         echolume profile --pipelines --all --json gpu.json    (what the driver makes of every shader)\n  \
-                        echolume profile --pipelines --all --compare gpu.json    (exit code 1 on a spill or a loss of occupancy)")]
+                        echolume profile --pipelines --all --compare gpu.json    (exit code 1 on a spill or a loss of occupancy)\n  \
+                        echolume profile --pipelines --glsl glsl    (what an edited shader costs in registers, without a build)")]
 pub struct Profile {
     #[command(flatten)]
     input: InputArgs,
@@ -58,6 +59,8 @@ pub struct Profile {
     /// Measure on this device too, alternating with the other, and compare them
     #[arg(long, value_name = "N|NAME", conflicts_with = "compare")]
     against: Option<DeviceChoice>,
+    #[command(flatten)]
+    shaders: ShaderArgs,
     /// Compile the pipelines of the scene, and print what the driver makes of them: registers, occupancy, spills, instructions, time to
     /// compile without a cache and with one. Runs nothing on the device
     #[arg(long, conflicts_with_all = ["repeat", "warm_up", "still", "turn", "no_ceilings", "csv", "csv_samples", "trace", "against"])]
@@ -77,7 +80,8 @@ impl Profile {
     pub fn run(&self) -> Result<(), Failure> {
         if self.pipelines {
             let (json, compare) = (self.json.as_deref(), self.compare.as_slice());
-            return Request { input: &self.input, all: self.all, json, compare, force: self.force }.run();
+            let shaders = &self.shaders;
+            return Request { input: &self.input, all: self.all, json, compare, force: self.force, shaders }.run();
         }
         match self.compare.as_slice() {
             [old, new] => self.compare(old, new),
@@ -99,6 +103,7 @@ impl Profile {
         if !self.turn.is_finite() {
             return Err(input(format!("--turn {}: must be a finite angle in degrees", self.turn)));
         }
+        let shaders = self.shaders.open()?;
         let context = self.input.open_device(false)?;
         // All repeats use the same volume.
         let mut frames = Vec::new();
@@ -118,11 +123,12 @@ impl Profile {
             Some(choice) => Some(open_device(Some(choice.clone()), false)?),
             None => None,
         };
-        let run = |context| measure::ProfileRun::new(context, &scene, &options).map_err(failed);
+        let failure = |fault| self.shaders.failure(fault);
+        let run = |context| measure::ProfileRun::with_shaders(context, &scene, &options, &shaders).map_err(failure);
         let (mut first, mut second) = (run(&context)?, against.as_ref().map(run).transpose()?);
         while first.needs_more() {
-            first.repeat(&frames).map_err(failed)?;
-            second.as_mut().map_or(Ok(()), |s| s.repeat(&frames)).map_err(failed)?;
+            first.repeat(&frames).map_err(failure)?;
+            second.as_mut().map_or(Ok(()), |s| s.repeat(&frames)).map_err(failure)?;
         }
         let (profile, spans) = first.finish();
         say!("{}", export::profile_table(&profile).trim_end());

@@ -1,6 +1,6 @@
 //! Profiles a scene: renders it repeatedly and records where the time goes, pass by pass.
 
-use crate::gpu::{Context, GpuError, Renderer, RendererOptions, TimeStamps, pass_runner};
+use crate::gpu::{Context, GpuError, Renderer, RendererOptions, Shaders, TimeStamps, pass_runner};
 use crate::machine::{self, CpuTime};
 use crate::passes::measure as loops;
 use crate::passes::slots::Shape;
@@ -65,9 +65,26 @@ impl ProfileRun {
     /// # Errors
     /// The device cannot hold the scene, or fails.
     pub fn new(context: &Arc<Context>, scene: &Scene, options: &ProfileOptions) -> Result<ProfileRun, GpuError> {
+        ProfileRun::with_shaders(context, scene, options, &RendererOptions::default().shaders)
+    }
+
+    /// With these shaders instead of the embedded ones.
+    ///
+    /// # Errors
+    /// As of [`ProfileRun::new`]; a shader that does not compile.
+    pub fn with_shaders(
+        context: &Arc<Context>,
+        scene: &Scene,
+        options: &ProfileOptions,
+        shaders: &Arc<Shaders>,
+    ) -> Result<ProfileRun, GpuError> {
         let ceilings = if options.ceilings { measure_ceilings(context)? } else { None };
-        let renderer_options =
-            RendererOptions { spans: true, time_stamps: TimeStamps::EachPass, ..RendererOptions::default() };
+        let renderer_options = RendererOptions {
+            spans: true,
+            time_stamps: TimeStamps::EachPass,
+            shaders: shaders.clone(),
+            ..RendererOptions::default()
+        };
         Ok(ProfileRun {
             context: context.clone(),
             renderer: Renderer::new(context, scene.clone(), &renderer_options)?,

@@ -28,6 +28,8 @@ fn shaders_from_a_folder_are_drawn_with_and_what_is_wrong_with_them_is_one_line(
     let path = broken.path("");
     let nowhere = folder.path("nowhere");
     refuses(&["--glsl"], &render(&path, &nowhere), 2, &["is not in"]);
+    let measured = ["profile", BONE, "--size", "64x48", "--repeat", "1", "--warm-up", "1", "--no-ceilings", "--glsl"];
+    refuses(&["profile"], &run(&[&measured[..], &[&*path]].concat()), 2, &["is not in"]);
     fs::write(broken.join("postprocess/tone.comp"), "#version 460\n#include \"missing.glsl\"\n").expect("write");
     refuses(&["--glsl"], &render(&path, &nowhere), 2, &["include/missing.glsl"]);
     refuses(&["--glsl"], &render(&folder.path("absent"), &nowhere), 2, &["absent"]);
@@ -36,13 +38,42 @@ fn shaders_from_a_folder_are_drawn_with_and_what_is_wrong_with_them_is_one_line(
     assert!(!fs::exists(&nowhere).expect("exists"), "a picture of refused shaders");
 }
 
+/// What is measured are the folder's shaders: one that does not compile is named, with the compiler's words.
+#[test]
+fn a_profile_is_of_the_shaders_of_the_folder() {
+    let (folder, glsl) = (Folder::new("profiled"), repository("glsl"));
+    let mut pending = vec![glsl.clone()];
+    while let Some(from) = pending.pop() {
+        let to = folder.join(from.strip_prefix(&glsl).expect("below it").to_str().expect("a plain name"));
+        fs::create_dir_all(&to).expect("create");
+        for file in fs::read_dir(&from).expect("list").map(|e| e.expect("entry").path()) {
+            match file.is_dir() {
+                true => pending.push(file),
+                false => drop(fs::copy(&file, to.join(file.file_name().expect("a name"))).expect("copy")),
+            }
+        }
+    }
+    let path = folder.path("");
+    let repeats = ["--size", "64x48", "--repeat", "1", "--warm-up", "1", "--no-ceilings"];
+    let (code, out, err) = run(&[&["profile", BONE, "--glsl", &*path], &repeats[..]].concat());
+    assert!(code == Some(0) && out.contains("raycast_surface"), "{out}{err}");
+    let (code, out, err) = run(&["profile", BONE, "--pipelines", "--glsl", &path]);
+    assert!(code == Some(0) && out.contains("raycast/surface"), "{out}{err}");
+    // A shader that only the picture needs.
+    fs::write(folder.join("raycast/surface.comp"), "#version 460\nvoid main() { nothing; }\n").expect("write");
+    for how in [&repeats[..], &["--pipelines"]] {
+        let ran = run(&[&["profile", BONE, "--glsl", &*path], how].concat());
+        assert!(ran.0 == Some(2) && ran.2.contains("raycast/surface") && ran.2.contains("nothing"), "{}", ran.2);
+    }
+}
+
 /// A build with shaderc needs none.
 #[cfg(not(feature = "hot-reload"))]
 #[test]
 fn without_a_compiler_in_path_it_is_said_which_to_install() {
     let glsl = repository("glsl");
     let glsl = glsl.to_str().expect("a plain name");
-    for command in ["render", "view"] {
+    for command in ["render", "profile", "view"] {
         if command == "view" && !cfg!(feature = "view") {
             continue;
         }

@@ -3,7 +3,7 @@
 use super::compare::compare;
 use super::table::{comparison_table, table};
 use super::{PipelineProfile, measure};
-use crate::args::{InputArgs, Output, check_outputs, open_device_for_statistics, write_report};
+use crate::args::{InputArgs, Output, ShaderArgs, check_outputs, open_device_for_statistics, write_report};
 use crate::files::read_text;
 use crate::scene::Scene;
 use crate::scene::variants;
@@ -22,6 +22,7 @@ pub struct Request<'a> {
     /// Files to compare: one with what is measured now, two with each other; none.
     pub compare: &'a [PathBuf],
     pub force: bool,
+    pub shaders: &'a ShaderArgs,
 }
 
 impl Request<'_> {
@@ -45,6 +46,7 @@ impl Request<'_> {
         self.input.check_outputs(&[output], &*source)?;
         let (scenes, what) =
             if self.all { (every(&scene), ", every mode, preset and filter") } else { (vec![scene], "") };
+        let shaders = self.shaders.open()?;
         let context = open_device_for_statistics(self.input.device())?;
         if !context.candidate.compile_statistics {
             remark(&format!(
@@ -52,7 +54,8 @@ impl Request<'_> {
                 context.candidate.name
             ));
         }
-        let profile = measure(&context, &scenes, format!("{}{what}", self.input.name())).map_err(failed)?;
+        let profile = measure(&context, &scenes, &shaders, format!("{}{what}", self.input.name()))
+            .map_err(|fault| self.shaders.failure(fault))?;
         match context.messages().first() {
             None => Ok(profile),
             Some(first) => Err(failed(format!("validation: {first}"))),

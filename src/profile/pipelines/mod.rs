@@ -11,7 +11,7 @@ pub use columns::Columns;
 pub use table::table;
 
 use crate::gpu::pipeline_measure::{self, MeasuredPipeline};
-use crate::gpu::{Context, GpuError};
+use crate::gpu::{Context, GpuError, Shaders};
 use crate::machine;
 use crate::scene::Scene;
 use serde::{Deserialize, Serialize};
@@ -100,12 +100,17 @@ impl Pipeline {
     }
 }
 
-/// Compiles every pipeline that these scenes need, twice: without any cache, and from a pipeline cache. Submits nothing.
+/// Compiles every pipeline that these scenes need with these shaders, twice: without any cache, and from a pipeline cache. Submits nothing.
 ///
 /// # Errors
 /// A scene that the device cannot hold, a shader that does not compile.
-pub fn measure(context: &Arc<Context>, scenes: &[Scene], input: String) -> Result<PipelineProfile, GpuError> {
-    let measured = pipeline_measure::measure(context, scenes)?;
+pub fn measure(
+    context: &Arc<Context>,
+    scenes: &[Scene],
+    shaders: &Arc<Shaders>,
+    input: String,
+) -> Result<PipelineProfile, GpuError> {
+    let measured = pipeline_measure::measure(context, scenes, shaders)?;
     let mut statistics: Vec<String> = Vec::new();
     for (name, _) in measured.iter().flat_map(|p| &p.executables).flat_map(|e| &e.statistics) {
         if is_measure(name) && !statistics.contains(name) {

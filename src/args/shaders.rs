@@ -1,0 +1,40 @@
+//! `--glsl`: shaders of the user instead of the embedded ones.
+
+use crate::gpu::shader_reload::ShaderFolder;
+use crate::gpu::{GpuError, RendererOptions, Shaders};
+use crate::terminal::{Failure, failed, input};
+use std::path::PathBuf;
+use std::sync::Arc;
+
+#[derive(clap::Args)]
+pub struct ShaderArgs {
+    /// Compile the shaders from this folder instead of using the built-in ones (needs glslc or glslangValidator)
+    #[arg(long, value_name = "DIR")]
+    glsl: Option<PathBuf>,
+}
+
+impl ShaderArgs {
+    /// The shaders of the folder, or the embedded ones. A shader is compiled when a pipeline asks for it.
+    ///
+    /// # Errors
+    /// No compiler, a folder that cannot be read or holds no shader.
+    pub fn open(&self) -> Result<Arc<Shaders>, Failure> {
+        Ok(match &self.glsl {
+            Some(folder) => ShaderFolder::open(folder).map_err(input)?.shaders(),
+            None => RendererOptions::default().shaders,
+        })
+    }
+
+    /// True if the shaders are the user's.
+    pub fn are_given(&self) -> bool {
+        self.glsl.is_some()
+    }
+
+    /// The failure that ends the command. A shader of the user that does not compile is a fault of the input.
+    pub fn failure(&self, fault: GpuError) -> Failure {
+        match fault {
+            fault @ GpuError::Shader { .. } if self.are_given() => input(fault),
+            fault => failed(fault),
+        }
+    }
+}
