@@ -26,40 +26,54 @@ float brightness(T value) { return value; }
 float level(ivec2 at) { return brightness(read_at(ivec3(at, 0))); }
 #include "estimators.glsl"
 
+// Sums of the texels whose brightness is within the range of the centre. Of differences from the pixel: a distance of 100 mm keeps its
+// micrometres in f32.
+T here, sum = T(0.0);
+float centre, within, count = 0.0, start_count = 0.0;
+
+// Adds the texel at `place` if it is there.
+void add(ivec2 place, ivec2 last, bool is_there) {
+    T value = read_at(ivec3(clamp(place, ivec2(0), last), 0));
+    is_there = is_there && VALID(value);
+    float inside = is_there && abs(brightness(value) - centre) <= within ? 1.0 : 0.0;
+    sum += inside * (value - here);
+    count += inside;
+    start_count += is_there ? 1.0 : 0.0;
+}
+
 void main() {
     ivec3 at = made_texel();
     ivec3 size = source_size();
     if (any(greaterThanEqual(at, size))) return;
     ivec2 last = size.xy - 1;
-    T here = read_at(at);
+    here = read_at(at);
     if (!VALID(here)) {
         write_at(at, here);
         return;
     }
-    float centre = estimate(at.xy, last);
-    float within = MULTIPLICATIVE != 0 ? range * abs(centre) : range;
-    // Sums of differences from the pixel: a distance of 100 mm keeps its micrometres in f32.
-    T sum = T(0.0);
-    float count = 0.0, start_count = 0.0;
+    centre = estimate(at.xy, last);
+    within = MULTIPLICATIVE != 0 ? range * abs(centre) : range;
+    for (int y = at.y - RADIUS; y <= at.y + RADIUS; ++y) {
+        bool has_row = uint(y) <= uint(last.y);
+        for (int x = at.x - RADIUS; x <= at.x + RADIUS; ++x) add(ivec2(x, y), last, has_row && uint(x) <= uint(last.x));
+    }
+    // One ring at a time until as many texels are within the range as the starting window has.
+    float wanted = start_count;
     int rings = 0;
-    for (int r = 0; r <= MAX_RADIUS; ++r) {
-        // The complete starting window, then one ring at a time until enough pixels are within the range.
-        if (r > RADIUS && count >= start_count) break;
-        rings = max(r - RADIUS, 0);
-        for (int i = 0; i < max(8 * r, 1); ++i) {
-            // Around the ring of radius r: four sides of 2r pixels.
-            int side = r > 0 ? i / (2 * r) : 0, along = r > 0 ? i % (2 * r) : 0;
-            ivec2 away = side == 0 ? ivec2(along - r, -r) : side == 1 ? ivec2(r, along - r) : side == 2 ? ivec2(r - along, r) : ivec2(-r, r - along);
-            ivec2 tap = at.xy + away;
-            if (any(lessThan(tap, ivec2(0))) || any(greaterThan(tap, last))) continue;
-            T value = read_at(ivec3(tap, 0));
-            if (!VALID(value)) continue;
-            float inside = abs(brightness(value) - centre) <= within ? 1.0 : 0.0;
-            sum += inside * (value - here);
-            count += inside;
-            start_count += r <= RADIUS ? 1.0 : 0.0;
+    for (; rings < MAX_RADIUS - RADIUS && count < wanted; ++rings) {
+        int r = RADIUS + 1 + rings;
+        ivec2 low = at.xy - r, high = at.xy + r;
+        bvec2 has_low = greaterThanEqual(low, ivec2(0)), has_high = lessThanEqual(high, last);
+        // A texel of each side at once, all the way around.
+        for (int k = 0; k < 2 * r; ++k) {
+            ivec2 onwards = low + k, back = high - k;
+            add(ivec2(onwards.x, low.y), last, has_low.y && uint(onwards.x) <= uint(last.x));
+            add(ivec2(high.x, onwards.y), last, has_high.x && uint(onwards.y) <= uint(last.y));
+            add(ivec2(back.x, high.y), last, has_high.y && uint(back.x) <= uint(last.x));
+            add(ivec2(low.x, back.y), last, has_low.x && uint(back.y) <= uint(last.y));
         }
     }
+    start_count = wanted;
     if (GROWTH == 1) {
         write_at(at, T(rings));
         return;

@@ -26,9 +26,11 @@ vec2 front_slice(Ray ray, int i, float sample_at) {
     vec3 upwards = cross(across, ray.direction);
     float apart = length_of(ray, at - 0.5);
     vec2 sum = vec2(0.0);
-    // The counters are what a tap needs: a place and weights. A single counter would be divided for each tap.
+    // A tap needs its place and weights: a counter alone would be divided for each tap. The counter says how many there are, which a
+    // compiler cannot see from x and y.
     const float edge = float(SLIDING / 2);
-    [[dont_unroll]] for (float x = -edge, y = -edge; y <= edge;) {
+    float x = -edge, y = -edge;
+    [[dont_unroll]] for (int n = 0; n < SLIDING * SLIDING; ++n) {
         vec3 texel;
         if (locate(p + (across * x + upwards * y) * apart, texel)) {
             sum += tap_weight(x) * tap_weight(y) * vec2(raw_volume(texel), 1.0);

@@ -38,7 +38,7 @@ const float OUTSIDE = -1.0;
 bool taken(bool inside, float value) { return SLIDING > 0 ? value > OUTSIDE : inside; }
 
 // i + 1/2 without the number i, which compositing needs later.
-vec3 place_of(Ray ray, int i) { return place_at(aimed(ray, i), offset_of(ray, float(2 * i + 1) * SAMPLE_AT)); }
+vec3 place_of(Ray ray, int i) { return place_at(aimed(ray, i), offset_of(ray, SLIDING > 0 ? float(2 * i + 1) * SAMPLE_AT : float(i) + SAMPLE_AT)); }
 
 // Number of complete steps on a ray, and on this one.
 int complete_steps(Ray ray) { return ray.leave > ray.enter ? int(steps_to(ray, ray.leave - ray.enter)) : 0; }
@@ -104,17 +104,19 @@ float find_surface(Ray ray, inout Slices slices, out vec3 echo) {
         int n = SKIP == 1 ? SAMPLES_PER_LOOKUP : MAX_SEARCH_SAMPLES;
         bool waits = false;
         float difference = 0.0, noise_bar = 0.0;
-        for (; n > 0 && !waits && (is_in_reach(i) ? searches() : COMPOSITES && i == NEVER && to_composite < NEVER); --n) {
-            int at = COMPOSITES ? min(i, to_composite) : i;
+        bool searching = is_in_reach(i) && searches();
+        for (; n > 0 && (searching ? is_in_reach(i) : COMPOSITES && i == NEVER && to_composite < NEVER); --n) {
+            int at = COMPOSITES ? (searching ? min(i, to_composite) : to_composite) : i;
             float value;
             bool inside = take(ray, at, slices, value);
-            difference = noise_bar = 0.0;
-            if (at != i) continue;
+            if (COMPOSITES && !(searching && at == i)) continue;
             if (inside) {
                 difference = push_sample(value);
                 noise_bar = noise_bar_at(i, difference);
-                waits = is_event(difference, noise_bar);
-                if (!waits) {
+                if (is_event(difference, noise_bar)) {
+                    waits = true;
+                    searching = false;
+                } else {
                     previous = difference;
                     i += ROUGH;
                 }
@@ -125,16 +127,17 @@ float find_surface(Ray ray, inout Slices slices, out vec3 echo) {
         }
         bool follows = waits || (!searches() && n > 0 && is_in_reach(i));
         for (; follows; --n, follows = !searches() && n > 0 && is_in_reach(i)) {
-            bool inside = true;
-            if (!waits) {
-                float value;
-                inside = take(ray, i, slices, value);
-                difference = inside ? push_sample(value) : 0.0;
-                noise_bar = inside ? noise_bar_at(i, difference) : 0.0;
+            float value = 0.0;
+            if (waits || take(ray, i, slices, value)) {
+                if (!waits) {
+                    difference = push_sample(value);
+                    noise_bar = noise_bar_at(i, difference);
+                }
+                waits = false;
+                step_detector(difference, noise_bar, i);
+            } else {
+                skip_sample(i);
             }
-            waits = false;
-            if (inside) step_detector(difference, noise_bar, i);
-            else skip_sample(i);
         }
         if (i < NEVER && !is_in_reach(i) && !look_again(i)) i = NEVER;
     } while (subgroupAny(i < NEVER || (COMPOSITES && to_composite < NEVER)));

@@ -6,6 +6,7 @@ const int LAYER = 1;  // the ray ends at the surface; the result is a layer in f
 const int BEHIND = 2; // the ray begins at the surface and ends at a depth behind it; the result is the surface's colour
 const int HIT = 3;    // the position where the ray becomes opaque enough is stored, to be lit
 layout(constant_id = 3) const int PART = 0; // 0: the whole ray, or one of the above
+layout(constant_id = 46) const int STEPS_AT_ONCE = 1; // of a turn of the loop: LIT_STEPS where both sides of a branch cost, else 1
 layout(constant_id = 42) const int MIDDLE_OF = 1; // rays along each edge of a pixel, in place of which the one in the middle is cast
 layout(constant_id = 43) const int REFINED = 0;   // more than 0: so many along each edge of the pixels that are marked, none of the others
 layout(scalar) uniform Params {
@@ -113,14 +114,14 @@ void main() {
                 if (more) stop = min(stop, i + (front_known ? 1 : SAMPLES_PER_LOOKUP));
                 else if (front_known) stop = i + 1;
             }
-            // Steps that share their light are taken together: a CPU looks it up whether a step adds something or not. `stop` is behind the last of them, or
-            // behind the end of the ray.
-            for (; i < stop; i += LIT_STEPS) {
-                vec4 entry[LIT_STEPS];
-                vec3 place_of[LIT_STEPS];
-                float begin[LIT_STEPS], length[LIT_STEPS], added[LIT_STEPS];
-                bool is_taken[LIT_STEPS], adds = false;
-                [[unroll]] for (int n = 0; n < LIT_STEPS; ++n) {
+            // A CPU takes steps that share their light together: it looks light up whether a step adds something or not. `stop` is behind the last of them, or
+            // behind the end of the ray. A GPU needs more registers for that, and is no faster.
+            for (; i < stop; i += STEPS_AT_ONCE) {
+                vec4 entry[STEPS_AT_ONCE];
+                vec3 place_of[STEPS_AT_ONCE];
+                float begin[STEPS_AT_ONCE], length[STEPS_AT_ONCE], added[STEPS_AT_ONCE];
+                bool is_taken[STEPS_AT_ONCE], adds = false;
+                [[unroll]] for (int n = 0; n < STEPS_AT_ONCE; ++n) {
                     int step = i + n;
                     // Midpoints of the steps, or their ends. The last step has the remaining length.
                     begin[n] = offset_of(ray, float(step));
@@ -155,7 +156,7 @@ void main() {
                     adds = adds || added[n] > 0.0;
                 }
                 if (LIT == 1 && adds) light_step(ray, i, place_of[0]);
-                [[unroll]] for (int n = 0; n < LIT_STEPS; ++n) {
+                [[unroll]] for (int n = 0; n < STEPS_AT_ONCE; ++n) {
                     if (is_taken[n] && stop >= 0) {
                         float before = opacity;
                         add_step(entry[n], added[n], place_of[n], colour, opacity);

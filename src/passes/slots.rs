@@ -15,7 +15,7 @@ const MAX_FRAMES: u64 = 16;
 /// Maximum bytes of the samples of a batch, and of each slot between its filters, unless a single frame is larger: what stays in the caches of a
 /// CPU, and what takes a GPU several times longer than the host needs to submit it.
 pub(crate) fn batch_bytes(scene: &Scene) -> u64 {
-    if scene.shared_memory > 0 { 16 << 20 } else { 4 << 20 }
+    if scene.is_for_cpu() { 4 << 20 } else { 16 << 20 }
 }
 
 /// Consecutive frames that go through stage 1 at once, each pass in one dispatch.

@@ -397,6 +397,11 @@ impl Scene {
         self.geometry.frame_size().map(|n| n as u32)
     }
 
+    /// True for a device that executes both sides of every branch and has no shared memory: a CPU, or none that is known yet.
+    pub fn is_for_cpu(&self) -> bool {
+        self.shared_memory == 0
+    }
+
     /// True if lines are conditioned before scan conversion.
     pub fn conditions(&self) -> bool {
         let c = &self.conditioning;

@@ -248,4 +248,8 @@ fn two_steps_that_share_their_light_have_that_of_their_middle() {
     assert_eq!([of(0.5, 1.0), of(0.5, 0.99)].map(|scene| scene.lit_steps()), [2, 1]);
     let (shared, single) = (error(0.5, 1.0), error(0.5, 0.99));
     assert!(single > 0.0 && single.max(shared) < 1e-3, "shared {shared}, single {single}");
+    // A GPU takes one step after the other; too little shared memory for anything else to differ.
+    let together = of(0.5, 1.0);
+    let one_by_one = Scene { shared_memory: 1, ..together.clone() };
+    assert!(picture(&together) == picture(&one_by_one));
 }

@@ -28,7 +28,7 @@ pub const SLICE: Pass = Pass {
 /// Adjacent columns that an invocation makes: one or RUN, which is the filter's run along both axes. A CPU then loads 36 texels for 16
 /// instead of 72. A GPU has them in its cache, and stores a row of adjacent invocations together.
 fn columns(scene: &Scene) -> u32 {
-    if scene.shared_memory == 0 { RUN } else { 1 }
+    if scene.is_for_cpu() { RUN } else { 1 }
 }
 
 pub const DISTANCE: Pass = Pass {

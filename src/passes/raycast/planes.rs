@@ -107,7 +107,7 @@ fn constants(scene: &Scene) -> Vec<(&'static str, i32)> {
 /// Pixels of a column that an invocation makes. A CPU loads some sixty parameters for every eight invocations, which takes a fifth of the time of a pixel
 /// each.
 fn run(scene: &Scene) -> u32 {
-    if scene.shared_memory == 0 { 8 } else { 1 }
+    if scene.is_for_cpu() { 8 } else { 1 }
 }
 
 /// The sheet, and the columns of its curved plane.

@@ -62,6 +62,7 @@ pub const PASS: Pass = Pass {
         };
         let middle_of = if s.adapts_rays() { s.settings.ray.rays as i32 } else { 1 };
         constants.extend([("PART", part), cap::constant(s), ("MIDDLE_OF", middle_of), ("REFINED", 0)]);
+        constants.push(("STEPS_AT_ONCE", if s.is_for_cpu() { s.lit_steps() as i32 } else { 1 }));
         constants
     },
     tolerance: Tolerance {
