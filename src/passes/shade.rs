@@ -32,10 +32,11 @@ pub const LIGHT: Pass = Pass {
     repeat: once,
     params: |s, _| {
         let light = &s.settings.light;
+        let [ambient, diffuse] = coefficients(s);
         camera_params(s)
             .vec3("light_at", light_at(s))
-            .f32("ambient", light.ambient)
-            .f32("diffuse", light.diffuse)
+            .f32("ambient", ambient)
+            .f32("diffuse", diffuse)
             .f32("specular", light.specular)
             .f32("shininess", light.shininess)
             .vec3("light_colour", light.colour)
@@ -149,6 +150,14 @@ fn through(skin: Option<Skin>) -> DVec3 {
     skin.map_or(DVec3::ZERO, |s| DVec3::from(s.colour) * s.translucency)
 }
 
+/// Ambient and diffuse coefficient of a surface. Those of a light volume are made for its film curve, which takes any brightness. A surface has none, so
+/// there they are scaled to where one that faces the light has at most its own colour.
+fn coefficients(scene: &Scene) -> [f64; 2] {
+    let light = &scene.settings.light;
+    let most = light.volume.map_or(1.0, |_| (light.ambient + light.diffuse).max(1.0));
+    [light.ambient / most, light.diffuse / most]
+}
+
 /// Light from a pixel's surface: from its body, and its highlight.
 fn lit(scene: &Scene, reads: &Arrays, x: usize, y: usize) -> Option<(DVec3, DVec3)> {
     let distances = reads.get("distance_map");
@@ -201,7 +210,8 @@ fn lit(scene: &Scene, reads: &Arrays, x: usize, y: usize) -> Option<(DVec3, DVec
         }
     };
     let shine = if facing > 0.0 { light.specular * gloss * arrives } else { 0.0 };
-    let body = ambient_colour * light.ambient * open + colour * light.diffuse * diffused * (1.0 + 0.3 * (open - 1.0));
+    let [ambient, diffuse] = coefficients(scene);
+    let body = ambient_colour * ambient * open + colour * diffuse * diffused * (1.0 + 0.3 * (open - 1.0));
     let colour = DVec3::from(light.colour);
     Some((colour * (body + glow * open) * dimmed, colour * shine * dimmed))
 }

@@ -213,9 +213,9 @@ fn the_requested_surface_of_several_is_taken() {
 #[test]
 fn a_surface_is_lit_by_the_rendered_pixel() {
     let device = Device::new();
-    let lit = |toml: &str, light: &str| {
+    let lit_with = |[ambient, diffuse]: [f64; 2], toml: &str, light: &str| {
         let scene = plate(&format!(
-            "surface = {{ {toml} }}\nlight = {{ direction = [0, 0, 1], ambient = 0.3, diffuse = 0.4, specular = 0, \
+            "surface = {{ {toml} }}\nlight = {{ direction = [0, 0, 1], ambient = {ambient}, diffuse = {diffuse}, specular = 0, \
              surface_colour = [1, 0.5, 0.25]{light} }}"
         ));
         let distances = map(&scene, |_, _| 40.0);
@@ -235,6 +235,7 @@ fn a_surface_is_lit_by_the_rendered_pixel() {
         let outputs = runner.run(&scene, pass, &DispatchArgs::default(), &inputs, 0.5).expect("dispatch");
         outputs.get("picture").get([120, 120, 0])[..3].to_vec()
     };
+    let lit = |toml: &str, light: &str| lit_with([0.3, 0.4], toml, light);
     let near = |a: &[f64], b: [f64; 3]| a.iter().zip(b).all(|(a, b)| (a - b).abs() < 2e-3);
     let layer = [0.8, 0.6, 0.2];
     let constant = lit("", "");
@@ -248,6 +249,13 @@ fn a_surface_is_lit_by_the_rendered_pixel() {
     assert!(near(&light, layer.map(|c| 0.3 * c + 0.1)), "{light:?}");
     let pixel = lit("colour = 'rendered'", ", shadow = { strength = 1, dims = 'pixel' }");
     assert!(near(&pixel, layer.map(|c| 0.25 * (0.3 * c + 0.4))), "{pixel:?}");
+    // The light of a light volume is brighter than a surface takes without a film curve.
+    for ([ambient, diffuse], volume, brightness) in
+        [([0.2, 1.8], "", 2.0), ([0.2, 1.8], ", volume = {}", 1.0), ([0.3, 0.4], ", volume = {}", 0.7)]
+    {
+        let bright = lit_with([ambient, diffuse], "", volume);
+        assert!(near(&bright, [1.0, 0.5, 0.25].map(|c| brightness * c)), "{bright:?}");
+    }
 }
 
 /// Prevents a surface whose picture does not depend on the transfer function.

@@ -149,7 +149,8 @@ impl Default for Light {
 }
 
 /// Light volume: light is propagated through a lattice of cells over the region, absorbed by what the transfer function makes opaque, red least,
-/// spread as it goes, and scattered on in tissue. The coefficients of the light are those of `light`. Colours are linear light: Narkowicz's fit (2015)
+/// spread as it goes, and scattered on in tissue. The coefficients of the light are those of `light`; surfaces,
+/// which have no film curve, divide those by the sum of ambient and diffuse where that exceeds 1. Colours are linear light: Narkowicz's fit (2015)
 /// of the ACES film curve compresses them, so that no highlight is cut off, and a gamma of 2.2 encodes them for a screen.
 #[derive(Clone, Copy, Debug, PartialEq, Deserialize, Serialize)]
 #[serde(deny_unknown_fields, default)]
