@@ -11,6 +11,9 @@ use echolume::ui::command::KEY_BINDINGS;
 use echolume::ui::input::Phase;
 use echolume::ui::sliders::SLIDERS;
 use random_source::Wild;
+use std::collections::BTreeSet;
+use std::fs::File;
+use std::path::PathBuf;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 /// It runs in a process of its own, whose memory no other test uses.
@@ -37,13 +40,31 @@ fn of_environment(name: &str, unless: u64) -> u64 {
     std::env::var(name).map_or(unless, |value| value.parse().expect(name))
 }
 
-/// Says what to do again when a test fails.
-struct Told(u64, u64);
+/// Says what to do again when a test fails, and what the console noted last.
+struct Told {
+    seed: u64,
+    steps: u64,
+    log: PathBuf,
+}
+
+impl Told {
+    /// `folder`: where warnings are kept.
+    fn new(seed: u64, folder: &Folder) -> Told {
+        let log = folder.join("log");
+        let file = File::create(&log).expect("a log");
+        let to_file = tracing_subscriber::fmt().with_max_level(tracing::Level::WARN).with_ansi(false);
+        tracing::subscriber::set_global_default(to_file.with_writer(Mutex::new(file)).finish()).expect("the only one");
+        Told { seed, steps: 0, log }
+    }
+}
 
 impl Drop for Told {
     fn drop(&mut self) {
         if std::thread::panicking() {
-            eprintln!("MONKEY_SEED={} after {} steps", self.0, self.1);
+            let log = std::fs::read_to_string(&self.log).unwrap_or_default();
+            let lines: Vec<&str> = log.lines().collect();
+            eprintln!("{}", lines[lines.len().saturating_sub(30)..].join("\n"));
+            eprintln!("MONKEY_SEED={} after {} steps", self.seed, self.steps);
         }
     }
 }
@@ -239,12 +260,19 @@ impl Monkey {
 
     /// The picture that is shown can be saved, whatever was saved or failed before.
     fn save(&mut self) {
-        let before = self.folder.names().len();
+        // Folders of exports in work come and go; so their number says nothing.
+        let saved =
+            |names: BTreeSet<String>| names.into_iter().filter(|name| !name.starts_with('.')).collect::<BTreeSet<_>>();
+        let before = saved(self.folder.names());
         self.desk.console.execute(&Command::SavePicture, Instant::now());
         let begun = Instant::now();
-        while self.folder.names().len() == before {
+        while saved(self.folder.names()).is_subset(&before) {
             self.tick(Instant::now() + LATER);
-            assert!(begun.elapsed() < BOUND, "the picture at the end is not saved");
+            assert!(
+                begun.elapsed() < BOUND,
+                "the picture at the end is not saved: {before:?}, now {:?}",
+                self.folder.names()
+            );
         }
     }
 }
@@ -269,12 +297,13 @@ fn run() {
     let seed = of_environment("MONKEY_SEED", 7);
     let time = Duration::from_secs(of_environment("MONKEY_SECONDS", 7));
     let watched = of_environment("MONKEY_WATCHED", 1) == 1;
-    let mut told = Told(seed, 0);
+    let logs = Folder::new("monkey-log");
+    let mut told = Told::new(seed, &logs);
     let mut monkey = Monkey::new(seed, watched);
     let (begun, mut half) = (Instant::now(), None);
     while begun.elapsed() < time {
         monkey.step();
-        told.1 += 1;
+        told.steps += 1;
         if half.is_none() && begun.elapsed() > time / 2 {
             monkey.rest();
             half = Some((monkey.device.allocated(), resident()));
@@ -286,7 +315,7 @@ fn run() {
     let Monkey { seed, lost, .. } = monkey;
     println!(
         "monkey: seed {seed}, {} steps, {lost} devices lost; device {device} to {now} bytes, process {host} to {resident}",
-        told.1
+        told.steps
     );
     assert!(now <= device + device / 8 + (1 << 20), "device memory: {device}, then {now}");
     assert!(watched || resident <= host + GROWTH, "the process: {host}, then {resident}");
