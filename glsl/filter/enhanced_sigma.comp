@@ -26,10 +26,10 @@ float brightness(T value) { return value; }
 float level(ivec2 at) { return brightness(read_at(ivec3(at, 0))); }
 #include "estimators.glsl"
 
-// Sums of the texels whose brightness is within the range of the centre. Of differences from the pixel: a distance of 100 mm keeps its
-// micrometres in f32.
+// Sum and number of the texels whose brightness is within the range of the centre, and of all that are there. The sum is of differences
+// from the pixel: a distance of 100 mm keeps its micrometres in f32.
 T here, sum = T(0.0);
-float centre, within, count = 0.0, start_count = 0.0;
+float centre, within, count = 0.0, there = 0.0;
 
 // Adds the texel at `place` if it is there.
 void add(ivec2 place, ivec2 last, bool is_there) {
@@ -38,7 +38,7 @@ void add(ivec2 place, ivec2 last, bool is_there) {
     float inside = is_there && abs(brightness(value) - centre) <= within ? 1.0 : 0.0;
     sum += inside * (value - here);
     count += inside;
-    start_count += is_there ? 1.0 : 0.0;
+    there += is_there ? 1.0 : 0.0;
 }
 
 void main() {
@@ -58,9 +58,9 @@ void main() {
         for (int x = at.x - RADIUS; x <= at.x + RADIUS; ++x) add(ivec2(x, y), last, has_row && uint(x) <= uint(last.x));
     }
     // One ring at a time until as many texels are within the range as the starting window has.
-    float wanted = start_count;
+    float start_count = there;
     int rings = 0;
-    for (; rings < MAX_RADIUS - RADIUS && count < wanted; ++rings) {
+    for (; rings < MAX_RADIUS - RADIUS && count < start_count; ++rings) {
         int r = RADIUS + 1 + rings;
         ivec2 low = at.xy - r, high = at.xy + r;
         bvec2 has_low = greaterThanEqual(low, ivec2(0)), has_high = lessThanEqual(high, last);
@@ -73,7 +73,6 @@ void main() {
             add(ivec2(low.x, back.y), last, has_low.x && uint(back.y) <= uint(last.y));
         }
     }
-    start_count = wanted;
     if (GROWTH == 1) {
         write_at(at, T(rings));
         return;

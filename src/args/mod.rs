@@ -17,7 +17,7 @@ pub use motor::{SerialArgs, motor_failure, motor_table};
 pub use picture_file::PictureFile;
 pub use picture_series::{PictureSeries, SeriesTarget};
 pub use recording::{GeometryArgs, open_recording};
-pub use shaders::ShaderArgs;
+pub use shaders::{ShaderArgs, gpu_failure};
 pub use source::{SourceArgs, StreamArgs};
 #[cfg(feature = "view")]
 pub use user_files::{first_steps, pipeline_folder, presets_file, recent_list};

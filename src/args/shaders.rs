@@ -30,11 +30,16 @@ impl ShaderArgs {
         self.glsl.is_some()
     }
 
-    /// The failure that ends the command. A shader of the user that does not compile is a fault of the input.
+    /// The failure that ends the command.
     pub fn failure(&self, fault: GpuError) -> Failure {
-        match fault {
-            fault @ GpuError::Shader { .. } if self.are_given() => input(fault),
-            fault => failed(fault),
-        }
+        gpu_failure(fault, self.are_given())
+    }
+}
+
+/// The failure that ends a command. With shaders of the user one that does not compile is a fault of the input.
+pub fn gpu_failure(fault: GpuError, own_shaders: bool) -> Failure {
+    match fault {
+        fault @ GpuError::Shader { .. } if own_shaders => input(fault),
+        fault => failed(fault),
     }
 }

@@ -1,9 +1,9 @@
 //! What the commands that draw pictures of a recording share: how frames are sent, and another try after the device was lost.
 
-use crate::args::frames_of;
+use crate::args::{frames_of, gpu_failure};
 use crate::gpu::{Context, GpuError, Losses, Renderer, RendererOptions};
 use crate::source::{Frame, Source};
-use crate::terminal::{Failure, failed, input};
+use crate::terminal::{Failure, failed};
 use std::sync::Arc;
 
 /// Why a picture could not be drawn.
@@ -24,11 +24,9 @@ impl DrawFault {
         self.failure(false)
     }
 
-    /// The failure that ends the command. With shaders of the user one that does not compile is a fault of the input.
     fn failure(self, own_shaders: bool) -> Failure {
         match self {
-            DrawFault::Gpu(e @ GpuError::Shader { .. }) if own_shaders => input(e),
-            DrawFault::Gpu(e) => failed(e),
+            DrawFault::Gpu(fault) => gpu_failure(fault, own_shaders),
             DrawFault::Source(failure) => failure,
         }
     }
