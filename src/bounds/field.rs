@@ -1,9 +1,11 @@
-//! The range of the field over a part of a ray, proven: interval coordinates, and the extremes of a trilinear function.
+//! The range of the field over a part of a ray, proven: interval coordinates, and the extremes of the cell's function.
 //!
-//! Through a Cartesian volume the field within a cell is a cubic of the place. Its Bernstein coefficients are means of the trilinear
-//! function at mixed corners of the two ends (its polar form), and their hull contains it. Through a swept volume the coordinates over
-//! the part are intervals, and a trilinear function over a box is largest and smallest at corners of the box. A part that reaches over
-//! the face of a cell by the rounding of its ends is widened by what the field can change there.
+//! Across slices that function is linear, or a cubic B-spline (`ray.elevation=bspline`); within them it is bilinear. Both have Bernstein
+//! coefficients over the part: the values at its ends, or the cubic's polar form (its blossom) at mixed ends (Ramshaw 1989). Through a
+//! Cartesian volume the field within a cell is a polynomial of the place, of degree 3 or 5. Its Bernstein coefficients are means of the
+//! function at mixed corners of the two ends, and their hull contains it. Through a swept volume the coordinates over the part are
+//! intervals, and the function over a box lies in the hull of its coefficients at the corners of the box. A part that reaches over the face of
+//! a cell by the rounding of its ends is widened by what the field can change there.
 
 use super::interval::Interval;
 use crate::exact_ray::Line;
@@ -38,7 +40,7 @@ impl<'a> Field<'a> {
     /// The content between two places, mm, `from` at most `to`.
     pub fn content(&self, from: f64, to: f64) -> Content {
         match &self.line.scene.geometry {
-            Geometry::Cartesian(_) => Content::Within { values: self.along_a_cubic(from, to), surely_inside: true },
+            Geometry::Cartesian(_) => Content::Within { values: self.along_a_line(from, to), surely_inside: true },
             Geometry::Sweep(probe) => match self.sweep(probe, Interval::between(from, to)) {
                 None => Content::Outside,
                 Some((at, surely_inside)) => Content::Within { values: self.over_a_box(at), surely_inside },
@@ -55,12 +57,44 @@ impl<'a> Field<'a> {
         (Interval::of(value) - Interval::of(black)).over(Interval::of(white) - Interval::of(black))
     }
 
-    /// Stretched values of the corners of a cell; bit 0 of the index: the higher column, bit 1: row, bit 2: slice.
-    fn corners(&self, cell: [usize; 3]) -> [Interval; 8] {
-        std::array::from_fn(|corner| {
-            let at = |axis: usize| (cell[axis] + (corner >> axis & 1)) as i64;
-            self.windowed(self.volume.clamped(at(0), at(1), at(2)))
+    /// Stretched values of the texels of a cell, slice by slice: of two slices, or of four for a B-spline. Bit 0 of the index in a slice: the higher
+    /// column, bit 1: row.
+    fn texels(&self, cell: [i64; 3]) -> [[Interval; 4]; 4] {
+        let first = if self.is_spline() { -1 } else { 0 };
+        std::array::from_fn(|slice| {
+            std::array::from_fn(|corner| {
+                let at = |axis: usize, bit: usize| cell[axis] + (corner >> bit & 1) as i64;
+                self.windowed(self.volume.clamped(at(0, 0), at(1, 1), cell[2] + slice as i64 + first))
+            })
         })
+    }
+
+    fn is_spline(&self) -> bool {
+        self.line.scene.takes_bspline()
+    }
+
+    /// Bernstein coefficients of the cell's function across slices from one share to another, for each column and row: two, or four of a cubic.
+    fn across(&self, texels: &[[Interval; 4]; 4], ends: [Interval; 2]) -> Vec<[Interval; 4]> {
+        let each =
+            |of: &dyn Fn([Interval; 4]) -> Interval| std::array::from_fn(|n| of(std::array::from_fn(|k| texels[k][n])));
+        match self.is_spline() {
+            false => ends.iter().map(|share| each(&|[a, b, ..]| mix(a, b, *share))).collect(),
+            true => (0..4usize)
+                .map(|far| {
+                    let arguments = std::array::from_fn(|n| ends[usize::from(n < far)]);
+                    each(&|slices| blossom(slices, arguments))
+                })
+                .collect(),
+        }
+    }
+
+    /// By how much the field may be outside of the function of a part's cell, in largest steps of stretched values; `beyond`: by how much the part
+    /// reaches over a face, texels. None if the function's continuation is not bounded here.
+    fn slack(&self, beyond: f64) -> Option<f64> {
+        // Both the field and the cell's own function, continued, leave the face at no more than this slope. Beyond by 0.3 texels the weights
+        // of the cubic's derivative still have one sign, and those of the cubic magnitudes of less than 1 + 2 beyond.
+        let most = if self.is_spline() { 0.3 } else { 1.0 };
+        (beyond <= most).then(|| beyond * (1.0 + (1.0 + 2.0 * beyond).powi(2)) * 1.000_001)
     }
 
     /// How much stretched values may change from one texel to the next.
@@ -73,38 +107,50 @@ impl<'a> Field<'a> {
     }
 
     /// The cell of a coordinate interval along an axis.
-    fn cell(&self, axis: usize, at: Interval) -> usize {
+    fn cell(&self, axis: usize, at: Interval) -> i64 {
+        // A B-spline goes on beyond the outer slices, whose texels it repeats.
+        let reach = if self.goes_on(axis) { 1.0 } else { 0.0 };
         let last = self.volume.size[axis].saturating_sub(2) as f64;
-        (at.low / 2.0 + at.high / 2.0).floor().clamp(0.0, last) as usize
+        (at.low / 2.0 + at.high / 2.0).floor().clamp(-reach, last + reach) as i64
     }
 
-    fn along_a_cubic(&self, from: f64, to: f64) -> Interval {
+    /// True if the field changes beyond the outer texels of an axis.
+    fn goes_on(&self, axis: usize) -> bool {
+        axis == 2 && self.is_spline() && self.volume.size[axis] > 1
+    }
+
+    fn along_a_line(&self, from: f64, to: f64) -> Interval {
         let mut ends = [from, to].map(|s| self.cartesian(Interval::of(s)));
         let (mut cell, mut slack) = ([0; 3], 0.0);
         for axis in 0..3 {
             let last = (self.volume.size[axis] - 1) as f64;
             let hull = ends[0][axis].hull(ends[1][axis]);
             // Beyond the border the field repeats it.
-            if hull.high <= 0.0 || hull.low >= last {
+            if !self.goes_on(axis) && (hull.high <= 0.0 || hull.low >= last) {
                 let border = if hull.high <= 0.0 { 0.0 } else { last };
                 ends.iter_mut().for_each(|end| end[axis] = Interval::of(border));
             }
             let hull = ends[0][axis].hull(ends[1][axis]);
             cell[axis] = self.cell(axis, hull);
-            let beyond = overshoot(hull, cell[axis]);
-            if beyond > 1.0 {
-                return self.everything();
-            }
-            // Both the field and the cell's own function, continued, leave the face at no more than this slope.
-            slack += beyond * (1.0 + (1.0 + 2.0 * beyond).powi(2)) * 1.000_001;
+            let Some(more) = self.slack(overshoot(hull, cell[axis])) else { return self.everything() };
+            slack += more;
         }
-        let corners = self.corners(cell);
         let share = |end: usize, axis: usize| ends[end][axis] - Interval::of(cell[axis] as f64);
-        let value = |n: usize| trilinear(&corners, std::array::from_fn(|axis| share(n >> axis & 1, axis)));
-        // The polar form: b1 has one of the three coordinates at the far end, b2 two.
-        let third = |a: Interval, b: Interval, c: Interval| (a + b + c).over(Interval::of(3.0));
-        let bernstein = [value(0), third(value(1), value(2), value(4)), third(value(3), value(5), value(6)), value(7)];
-        let hull = bernstein.into_iter().reduce(Interval::hull).unwrap_or(Interval::ZERO);
+        let across = self.across(&self.texels(cell), [share(0, 2), share(1, 2)]);
+        // The polar form: of the arguments of all axes, as many as the coefficient's number are those of the far end.
+        let degree = across.len() + 1;
+        let coefficient = |number: usize| {
+            let mut sum = Interval::ZERO;
+            for (x, y) in [(0, 0), (1, 0), (0, 1), (1, 1)] {
+                let slices = number.checked_sub(x + y).and_then(|far| Some((far, across.get(far)?)));
+                if let Some((far, values)) = slices {
+                    let ways = Interval::of(choose(across.len() - 1, far));
+                    sum = sum + ways * bilinear(values, [share(x, 0), share(y, 1)]);
+                }
+            }
+            sum.over(Interval::of(choose(degree, number)))
+        };
+        let hull = (0..=degree).map(coefficient).reduce(Interval::hull).unwrap_or(Interval::ZERO);
         hull.widened((slack * self.steepest()).next_up()).clamped()
     }
 
@@ -114,7 +160,8 @@ impl<'a> Field<'a> {
         for axis in 0..3 {
             let last = (self.volume.size[axis] - 1) as f64;
             let inner = Interval { low: at[axis].low.clamp(0.0, last), high: at[axis].high.clamp(0.0, last) };
-            cell[axis] = self.cell(axis, inner);
+            let within = (last - 1.0).max(0.0);
+            cell[axis] = (inner.low / 2.0 + inner.high / 2.0).floor().clamp(0.0, within) as i64;
             let beyond = overshoot(inner, cell[axis]);
             if beyond > 1.0 {
                 return self.everything();
@@ -122,12 +169,11 @@ impl<'a> Field<'a> {
             slack += beyond * 1.000_001;
             shares[axis] = (inner - Interval::of(cell[axis] as f64)).clamped();
         }
-        let corners = self.corners(cell);
-        let corner = |n: usize| {
-            let end = |axis: usize| if n >> axis & 1 == 1 { shares[axis].high } else { shares[axis].low };
-            trilinear(&corners, [0, 1, 2].map(|axis| Interval::of(end(axis))))
-        };
-        let hull = (0..8).map(corner).reduce(Interval::hull).unwrap_or(Interval::ZERO);
+        let [x, y, z] = shares.map(|share| [share.low, share.high].map(Interval::of));
+        let corners = x.into_iter().flat_map(|x| y.map(|y| [x, y]));
+        let across = self.across(&self.texels(cell), z);
+        let values = corners.flat_map(|at| across.iter().map(move |values| bilinear(values, at)));
+        let hull = values.reduce(Interval::hull).unwrap_or(Interval::ZERO);
         hull.widened((slack * self.steepest()).next_up()).clamped()
     }
 
@@ -217,7 +263,7 @@ impl<'a> Field<'a> {
 }
 
 /// By how much an interval reaches out of its cell, in texels.
-fn overshoot(at: Interval, cell: usize) -> f64 {
+fn overshoot(at: Interval, cell: i64) -> f64 {
     let beyond = (cell as f64 - at.low).max(at.high - (cell + 1) as f64);
     if beyond > 0.0 { beyond.next_up() } else { 0.0 }
 }
@@ -238,10 +284,26 @@ fn index_on(axis: &Axis, at: Interval) -> Interval {
     Interval { low, high }.widened(slack_of_index(axis, at.magnitude(), low.abs().max(high.abs())))
 }
 
-/// The trilinear function of a cell at shares of its edges. Each share is used once for each pair of values, so that intervals as narrow
-/// as rounding stay so.
-fn trilinear(corners: &[Interval; 8], [x, y, z]: [Interval; 3]) -> Interval {
-    let mix = |a: Interval, b: Interval, share: Interval| a + (b - a) * share;
-    let row = |n: usize| mix(corners[n], corners[n + 1], x);
-    mix(mix(row(0), row(2), y), mix(row(4), row(6), y), z)
+/// Between two values. The share is used once, so that intervals as narrow as rounding stay so.
+fn mix(a: Interval, b: Interval, share: Interval) -> Interval {
+    a + (b - a) * share
+}
+
+fn bilinear(values: &[Interval; 4], [x, y]: [Interval; 2]) -> Interval {
+    mix(mix(values[0], values[1], x), mix(values[2], values[3], x), y)
+}
+
+/// The polar form of the uniform cubic B-spline between the second and the third of four slices, at three shares 0..1 of the way: of three
+/// equal ones its value (Ramshaw 1989, "Blossoms are polar forms").
+fn blossom([a, b, c, d]: [Interval; 4], [u, v, w]: [Interval; 3]) -> Interval {
+    let between = |from: Interval, to: Interval, share: Interval, more: f64, length: f64| {
+        mix(from, to, (share + Interval::of(more)).over(Interval::of(length)))
+    };
+    let [first, second, third] = [between(a, b, u, 2.0, 3.0), between(b, c, u, 1.0, 3.0), between(c, d, u, 0.0, 3.0)];
+    mix(between(first, second, v, 1.0, 2.0), between(second, third, v, 0.0, 2.0), w)
+}
+
+/// n over k.
+fn choose(n: usize, k: usize) -> f64 {
+    (0..k).fold(1.0, |product, i| product * (n - i) as f64 / (i + 1) as f64)
 }

@@ -56,6 +56,11 @@ impl Interval {
         Interval { low: self.low.clamp(0.0, 1.0), high: self.high.clamp(0.0, 1.0) }
     }
 
+    /// The smaller one of a number of each.
+    pub fn at_most(self, other: Interval) -> Interval {
+        Interval { low: self.low.min(other.low), high: self.high.min(other.high) }
+    }
+
     /// The largest magnitude.
     pub fn magnitude(self) -> f64 {
         self.low.abs().max(self.high.abs())
@@ -159,7 +164,7 @@ mod tests {
             let (x, y, u) = (inner(a, n), inner(b, 3 * n + 1), inner(unit, n));
             assert!((a + b).contains(x + y) && (a - b).contains(x - y) && (a * b).contains(x * y));
             assert!(a.over(b).contains(x / y) && a.square().contains(x * x) && b.root().contains(y.sqrt()));
-            assert!(a.angle(b).contains(x.atan2(y)) && (-a).contains(-x));
+            assert!(a.angle(b).contains(x.atan2(y)) && (-a).contains(-x) && a.at_most(b).contains(x.min(y)));
             assert!(b.opacity().contains(1.0 - (-y).exp()) && unit.absorption(1e6).contains(-(1.0 - u).ln()));
         }
         // The sum of 0.1 and 0.2 is no f64: it lies strictly between the ends.

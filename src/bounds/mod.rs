@@ -7,12 +7,14 @@ pub mod field;
 pub mod interval;
 pub mod ray;
 
+use crate::exact_ray::fade::Fade as Kinks;
 use crate::exact_ray::volume::{Medium as Hints, cut};
 use crate::exact_ray::{Line, segments};
 use crate::passes::Texels;
 use crate::passes::raycast::ray::span;
 use crate::passes::raycast::volume::{depth_axis, reference_length};
-use crate::scene::{Mode, Scene, Shading, transfer};
+use crate::scene::transfer::{self, Absorption};
+use crate::scene::{Mode, Scene, Shading};
 use glam::DVec3;
 use interval::Interval;
 use rayon::prelude::*;
@@ -52,17 +54,22 @@ impl PictureBounds {
     }
 }
 
-/// Why a scene has no bounds, as the end of a sentence; none if it has.
+/// Why a scene has no bounds, and what to set instead, as the end of a sentence; none if it has. Every setting that a ray of volume rendering
+/// reads is honoured by [`picture`] or named here (tests/unit_pure/ray_keys.rs).
 pub fn fault(scene: &Scene) -> Option<&'static str> {
     match scene.settings.mode {
-        Mode::Volume if scene.still().is_some() => Some("a still is a mean of random paths"),
-        Mode::Volume if scene.lights_volume() => Some("volume.shading=first-hit is lit by stage 3"),
-        Mode::Volume if scene.settings.ray.sliding != 0 => {
-            Some("ray.sliding filters samples, at distances of one step")
+        Mode::Volume if scene.still().is_some() => Some("a still is a mean of random paths: set still=none"),
+        Mode::Volume if scene.lights_volume() => {
+            Some("volume.shading=first-hit is lit by stage 3: set volume.shading=none or depth-coded")
         }
-        Mode::Volume if scene.takes_bspline() => Some("ray.elevation is not linear"),
+        Mode::Volume if scene.lit_by_volume().is_some() => {
+            Some("light.volume takes light from a lattice of cells: set light.volume=none")
+        }
+        Mode::Volume if scene.settings.ray.sliding != 0 => {
+            Some("ray.sliding filters samples, at distances of one step: set ray.sliding=0")
+        }
         Mode::Volume if scene.has_caps() && scene.cap_level().is_some() => {
-            Some("cap.enabled shows echoes where clip planes cut")
+            Some("cap.enabled shows echoes where clip planes cut: set cap.enabled=false")
         }
         Mode::Volume => None,
         _ => Some("only the integral of volume rendering (--mode vr) is bounded"),
@@ -97,7 +104,8 @@ fn bounds_of(line: &Line, volume: &Texels, range: [f64; 2], path: f64, effort: E
         return ray::Bounds { rgba: [Interval::ZERO; 4], parts: 0 };
     }
     let points = transfer::resolved(&settings.transfer);
-    let mut medium = ray::Medium::new(points, settings.threshold, reference_length(scene));
+    let absorption = Absorption::of(settings, reference_length(scene));
+    let mut medium = ray::Medium::new(points, settings.threshold, absorption).faded(ray::Fade::of(line));
     if settings.shading == Shading::DepthCoded {
         let (axis, near) = depth_axis(scene);
         let dot = |a: DVec3, b: DVec3| {
@@ -114,11 +122,12 @@ fn bounds_of(line: &Line, volume: &Texels, range: [f64; 2], path: f64, effort: E
     ray::bounds(&field, &medium, &hints(line, volume, path), effort.width, effort.parts)
 }
 
-/// Where parts should end: cells, the border of the region, and the points of the transfer function, to rounding.
+/// Where parts should end: cells, the border of the region, the points of the transfer function, and kinks of the fade, to rounding.
 fn hints(line: &Line, volume: &Texels, path: f64) -> Vec<f64> {
     let scene = line.scene;
     let medium = Hints::of(scene, line, 1.0);
     let mut places = line.breakpoints([0.0, path]);
+    places.extend(Kinks::of(line).map(|fade| fade.kinks([0.0, path])).into_iter().flatten());
     let mut cuts = Vec::new();
     for segment in segments(line, volume, scene.volume_view().window, [0.0, path]) {
         cut(&segment, medium.levels(), &mut cuts);

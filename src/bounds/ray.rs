@@ -3,27 +3,36 @@
 
 use super::field::{Content, Field};
 use super::interval::Interval;
-use crate::scene::{TransferPoint, transfer};
+use crate::exact_ray::Line;
+use crate::scene::TransferPoint;
+use crate::scene::transfer::{self, Absorption};
+use glam::DVec3;
 
 /// The transfer function as ranges.
 #[derive(Clone, Debug)]
 pub struct Medium {
     points: Vec<TransferPoint>,
     threshold: f64,
-    reference_length: f64,
+    absorption: Absorption,
     /// Factors of the colours at 0 mm along the ray, and their growth per mm.
     tint: Option<[[Interval; 3]; 2]>,
+    fade: Option<Fade>,
 }
 
 impl Medium {
-    /// `points` as of [`transfer::resolved`]; samples below `threshold` are transparent; opacities hold for `reference_length` mm.
-    pub fn new(points: Vec<TransferPoint>, threshold: f64, reference_length: f64) -> Medium {
-        Medium { points, threshold, reference_length, tint: None }
+    /// `points` as of [`transfer::resolved`]; samples below `threshold` are transparent.
+    pub fn new(points: Vec<TransferPoint>, threshold: f64, absorption: Absorption) -> Medium {
+        Medium { points, threshold, absorption, tint: None, fade: None }
     }
 
     /// With colours that are multiplied by a factor which is linear along the ray.
     pub fn tinted(self, start: [Interval; 3], rate: [Interval; 3]) -> Medium {
         Medium { tint: Some([start, rate]), ..self }
+    }
+
+    /// With matter that fades towards the faces of a box.
+    pub fn faded(self, fade: Option<Fade>) -> Medium {
+        Medium { fade, ..self }
     }
 
     /// Red, green, blue and absorption per mm over a range of values in 0..1.
@@ -34,14 +43,25 @@ impl Medium {
         for rgba in inner.chain([self.at(values.high)]) {
             all = std::array::from_fn(|c| all[c].hull(rgba[c]));
         }
-        let mut absorption = all[3].clamped().absorption(transfer::OPAQUE);
+        let per_mm = |opacity: Interval| {
+            let length = Interval::of(self.absorption.reference_length);
+            match self.absorption.extinction {
+                Some(extinction) => {
+                    (opacity * Interval::of(extinction)).at_most(Interval::of(transfer::OPAQUE).over(length))
+                }
+                None => opacity.absorption(transfer::OPAQUE).over(length),
+            }
+        };
+        let mut absorption = per_mm(all[3].clamped());
         if values.low < self.threshold {
             absorption.low = 0.0;
         }
         if values.high < self.threshold {
             absorption = Interval::ZERO;
         }
-        ([all[0], all[1], all[2]], absorption.over(Interval::of(self.reference_length)))
+        // Rounding outwards makes no matter.
+        absorption.low = absorption.low.max(0.0);
+        ([all[0], all[1], all[2]], absorption)
     }
 
     fn at(&self, value: f64) -> [Interval; 4] {
@@ -58,6 +78,46 @@ impl Medium {
             (Some(end), None) | (None, Some(end)) => rgba(end),
             (None, None) => [Interval::ZERO; 4],
         }
+    }
+}
+
+/// What `region.fade` leaves of the matter along a ray ([`Scene::faded`](crate::scene::Scene::faded)).
+#[derive(Clone, Copy, Debug)]
+pub struct Fade {
+    /// The place at 0 mm along the ray, and its unit direction.
+    base: DVec3,
+    direction: DVec3,
+    /// The box towards whose faces matter fades, mm.
+    low: DVec3,
+    high: DVec3,
+    /// mm.
+    length: f64,
+}
+
+impl Fade {
+    /// None if the line's scene has no fade.
+    pub fn of(line: &Line) -> Option<Fade> {
+        let (low, high) = (line.scene.volume_view().low, line.scene.high);
+        line.scene.region_fade().map(|length| Fade { base: line.base, direction: line.direction, low, high, length })
+    }
+
+    /// The shares that are left over a part of the ray.
+    fn over(&self, s: Interval) -> Interval {
+        let place = |axis: usize| Interval::of(self.base[axis]) + Interval::of(self.direction[axis]) * s;
+        let to_low = |axis: usize| place(axis) - Interval::of(self.low[axis]);
+        let to_high = |axis: usize| Interval::of(self.high[axis]) - place(axis);
+        let to_faces = [to_low(0).at_most(to_high(0)), to_high(1), to_low(2).at_most(to_high(2))];
+        let squares = to_faces.map(|distance| {
+            let beyond = Interval::ONE - distance.over(Interval::of(self.length));
+            Interval { low: beyond.low.max(0.0), high: beyond.high.max(0.0) }.square()
+        });
+        let left = (Interval::ONE - (squares[0] + squares[1] + squares[2]).root()).clamped();
+        // The smooth step rises: its extremes are at the ends.
+        let step = |t: f64| {
+            let t = Interval::of(t);
+            t * t * (Interval::of(3.0) - Interval::of(2.0) * t)
+        };
+        Interval { low: step(left.low).low, high: step(left.high).high }.clamped()
     }
 }
 
@@ -139,6 +199,10 @@ fn part(field: &Field, medium: &Medium, from: f64, to: f64) -> Option<Part> {
     }
     if !surely_inside {
         absorption.low = 0.0;
+    }
+    if let Some(fade) = &medium.fade {
+        absorption = absorption * fade.over(Interval::between(from, to));
+        absorption.low = absorption.low.max(0.0);
     }
     if let Some([start, rate]) = &medium.tint {
         let s = Interval::between(from, to);

@@ -19,7 +19,7 @@ use crate::picture::{Picture, PictureFormat};
 use crate::plan::Plan;
 use crate::probe::Probe;
 use crate::profile::export::pass_time_table;
-use crate::scene::{Mode, Scene, Still};
+use crate::scene::{Scene, Still};
 use crate::source::{Frame, Source};
 use crate::terminal::{Failure, failed, input, progress_bar, remark, say};
 use std::path::{Path, PathBuf};
@@ -317,15 +317,7 @@ impl Render {
         if !(0.0..=1.0).contains(&self.error_tolerance) {
             return Err(input(format!("--error-tolerance {}: must lie in 0..=1", self.error_tolerance)));
         }
-        if scene.is_flat() || scene.settings.mode == Mode::Cube || scene.still().is_some() {
-            return Err(input("--error-map: this mode takes no steps along rays"));
-        }
-        let mut settings = scene.settings.clone();
-        settings.ray.step = Some(scene.step / 2.0);
-        // An edge that is not set is four slice pixels long at any step.
-        Scene::new(scene.geometry.clone(), scene.input, settings)
-            .map(Some)
-            .map_err(|e| input(format!("--error-map: {e}")))
+        map::finer(scene).map(Some).map_err(|why| input(format!("--error-map: {why}")))
     }
 
     fn options(&self) -> Result<RendererOptions, Failure> {

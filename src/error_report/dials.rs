@@ -2,6 +2,7 @@
 //! accurately, and the dial has the settings of a reference. Others choose another look, such as another filter: their pictures differ from
 //! the scene as it is, and none of them is the right one.
 
+use super::map::step_fault;
 use crate::scene::{Compositing, Edge, Mode, PeronaMalik, Sampling, Scene, Scheme, Volume, VolumeFormat, transfer};
 
 /// One setting of a dial.
@@ -76,6 +77,10 @@ pub fn dial(name: &str, scene: &Scene) -> Result<Dial, String> {
     let marches = !scene.is_flat() && s.mode != Mode::Cube;
     let composites = scene.composites();
     let need = |there: bool, why: &str| if there { Ok(()) } else { Err(why.to_string()) };
+    let is_one_picture = || match step_fault(scene) {
+        Some(why) => Err(format!("is another picture at another step: {why}")),
+        None => Ok(()),
+    };
     let made = |name, unit, default: DialSetting, others: Vec<DialSetting>, best: &[String], nearly: &[String]| Dial {
         name,
         unit,
@@ -93,6 +98,7 @@ pub fn dial(name: &str, scene: &Scene) -> Result<Dial, String> {
     let dial = match name {
         "step" => {
             need(marches, "casts no ray")?;
+            is_one_picture()?;
             // From an eighth to four times the step; the reference is four times finer than the finest.
             let settings = [4.0, 2.83, 2.0, 1.41, 0.707, 0.5, 0.354, 0.25, 0.177, 0.125];
             // Steps with the same samples of the surface detector give the same picture.
@@ -115,6 +121,7 @@ pub fn dial(name: &str, scene: &Scene) -> Result<Dial, String> {
         }
         "compositing" => {
             need(composites, "composites nothing")?;
+            is_one_picture()?;
             let kinds = ["riemann", "corrected", "pre-integrated", "exponential"];
             let now = serde_word(&s.volume.compositing);
             // The table of pairs is refused for points that are very close.
@@ -261,6 +268,7 @@ pub fn dial(name: &str, scene: &Scene) -> Result<Dial, String> {
                 scene.probe().is_some_and(|p| matches!(p.array, crate::probe::Array::Curved { .. })),
                 "has no convex sweep",
             )?;
+            is_one_picture()?;
             let now = s.ray.spread;
             let others = [0.0, 0.25, 0.5, 0.75, 1.0].into_iter().filter(|v| *v != now);
             let others = others.map(|v| at(format!("{v:.2}"), &[format!("ray.spread={v:.2}")], v));

@@ -1,8 +1,10 @@
 //! A map of the error of a picture's step: each pixel's difference from the picture of half the step, which for a rule of order 1 is half
-//! of the error, and of order 2 three quarters.
+//! of the error, and of order 2 three quarters. Both pictures have the same `ray.early_end`, tables, formats and bricks, whose errors it
+//! does not show.
 
 use crate::passes::Texels;
 use crate::picture::Picture;
+use crate::scene::{Edge, EdgeName, Mode, Scene};
 
 /// The smallest and the largest difference that the colours tell apart; the scale is logarithmic.
 pub const SCALE: [f64; 2] = [1e-4, 1.0];
@@ -24,6 +26,58 @@ pub struct ErrorMap {
     pub largest: f64,
     /// Share of the pixels above the tolerance.
     pub share_above: f64,
+}
+
+/// Why a shorter step along rays makes another picture, not a more accurate one, and what to set instead, as the end of a sentence; none if
+/// it does not.
+pub fn step_fault(scene: &Scene) -> Option<&'static str> {
+    let settings = &scene.settings;
+    if scene.is_flat() || settings.mode == Mode::Cube || scene.still().is_some() {
+        return Some("this mode takes no steps along rays: set mode to volume, surface, mixed, mip, minip or mean");
+    }
+    if settings.ray.sliding != 0 {
+        return Some(
+            "ray.sliding filters samples at distances of one step, so that another step is another filter: set ray.sliding=0",
+        );
+    }
+    let has_edges = scene.detects_surface() || scene.has_caps();
+    let counts_steps = settings.surface.edge == Some(Edge::Named(EdgeName::Samples));
+    (has_edges && counts_steps).then_some(
+        "surface.edge=samples is four steps long, so that another step looks for other edges: set surface.edge to a length in mm",
+    )
+}
+
+/// The scene with rays of half the step; of surfaces alone, with half the step of their detector, which may be shorter than `ray.step`.
+///
+/// # Errors
+/// Why half the step says nothing of this picture's error, and what to set instead, as the end of a sentence.
+pub fn finer(scene: &Scene) -> Result<Scene, String> {
+    if let Some(why) = step_fault(scene) {
+        return Err(why.into());
+    }
+    let is_surface_alone = scene.detects_surface() && !scene.composites();
+    let mut settings = scene.settings.clone();
+    settings.ray.step = Some(if is_surface_alone { scene.ring.step } else { scene.step } / 2.0);
+    // An edge that is not set is four slice pixels long at any step.
+    let finer = Scene::new(scene.geometry.clone(), scene.input, settings).map_err(|e| e.to_string())?;
+    if scene.detects_surface() && finer.ring.half == scene.ring.half {
+        let (step, ring) = (scene.step, scene.ring);
+        let edge = ring.step * f64::from(ring.half);
+        return Err(match step > ring.step {
+            true => format!(
+                "surfaces are found in steps of {:.4} mm, a quarter of their edges, whether ray.step is {step:.4} mm or half of it: set \
+                 ray.step={:.4}",
+                ring.step,
+                edge / 4.0
+            ),
+            false => format!(
+                "surface.edge={edge:.4} mm already has the most samples, {}: set a longer ray.step, {:.4} at least",
+                ring.half,
+                2.0 * ring.step
+            ),
+        });
+    }
+    Ok(finer)
 }
 
 /// The difference of each pixel, the largest of red, green and blue, as a colour; hatched where it exceeds `tolerance` (0..1).
@@ -69,6 +123,11 @@ fn colour(difference: f64) -> [f64; 3] {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::error_report::dials::dial;
+    use crate::probe::{Geometry, Grid};
+    use crate::scene::Input;
+    use crate::scene::load::Layers;
+    use crate::source::StoredType;
 
     /// Lightness of CIELAB over sRGB (IEC 61966-2-1).
     fn lightness([r, g, b]: [f64; 3]) -> f64 {
@@ -81,6 +140,49 @@ mod tests {
     fn colours_rise_evenly_in_lightness() {
         let steps: Vec<f64> = COLOURS.map(lightness).windows(2).map(|p| p[1] - p[0]).collect();
         assert!(steps.iter().all(|s| (15.0..30.0).contains(s)), "{:?} rises by {steps:?}", COLOURS.map(lightness));
+    }
+
+    fn scene(assignments: &str) -> Scene {
+        let mut layers = Layers::default();
+        assignments.split_whitespace().for_each(|set| layers.set(set).expect("a setting"));
+        let grid = Grid { size: [20; 3], spacing: [1.0; 3], origin: [0.0; 3] };
+        let input = Input { stored: StoredType::U8, range: [0.0, 255.0] };
+        Scene::new(Geometry::Cartesian(grid), input, layers.finish().expect("settings")).expect("a scene")
+    }
+
+    /// Prevents a map of the difference of two different pictures, and one that is black because both pictures are the same.
+    #[test]
+    fn half_the_step_halves_the_step_of_what_is_shown_or_is_refused() {
+        for (set, step) in [("", 0.5), ("ray.step=0.8", 0.4), ("ray.samples_per_voxel=4", 0.125), ("ray.step=3", 1.5)] {
+            let of = |mode: &str| finer(&scene(&format!("mode={mode} {set}"))).expect("a finer scene");
+            assert!((of("volume").step - step).abs() < 1e-12 && (of("mip").step - step).abs() < 1e-12, "{set}");
+            // The detector takes a quarter of an edge of 4 mm at most.
+            let (coarse, fine) = (scene(&format!("mode=surface {set}")), of("surface"));
+            assert!(fine.ring.half >= 2 * coarse.ring.half - 1 && fine.ring.half > coarse.ring.half, "{set}");
+            let edge = |scene: &Scene| scene.ring.step * f64::from(scene.ring.half);
+            assert!((edge(&coarse) - edge(&fine)).abs() < 1e-12, "{set}: another edge");
+        }
+        let clip = "clip=[{at=[10,10,10],normal=[0,0,1]}]";
+        for (set, named) in [
+            ("mode=plane".to_string(), "no steps"),
+            ("mode=cube".into(), "no steps"),
+            ("mode=volume still={}".into(), "no steps"),
+            ("mode=volume ray.sliding=3".into(), "ray.sliding=0"),
+            ("mode=surface surface.edge=samples".into(), "surface.edge"),
+            (format!("mode=volume surface.edge=samples {clip}"), "surface.edge"),
+            ("mode=mixed ray.step=3".into(), "ray.step=1.0000"),
+            ("mode=surface surface.edge=4 ray.step=0.01".into(), "ray.step"),
+        ] {
+            let said = finer(&scene(&set)).expect_err(&set);
+            assert!(said.contains(named) && said.contains("set ") && !said.contains('\n'), "{set}: {said}");
+        }
+        assert!(finer(&scene(&format!("mode=volume surface.edge=samples {clip} cap.enabled=false"))).is_ok());
+        // Dials whose references have finer steps.
+        for name in ["step", "compositing"] {
+            let said = dial(name, &scene("mode=volume ray.sliding=3")).expect_err(name);
+            assert!(said.contains("ray.sliding=0"), "{said}");
+            assert!(dial(name, &scene("mode=volume")).is_ok(), "{name}");
+        }
     }
 
     #[test]

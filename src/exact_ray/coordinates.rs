@@ -109,7 +109,7 @@ impl Line<'_> {
 }
 
 /// The places within the ends, and the ends, in rising order. Places closer than rounding are one.
-fn sorted(mut found: Vec<f64>, [low, high]: [f64; 2]) -> Vec<f64> {
+pub(super) fn sorted(mut found: Vec<f64>, [low, high]: [f64; 2]) -> Vec<f64> {
     found.retain(|s| *s > low && *s < high);
     found.extend([low, high]);
     found.sort_by(f64::total_cmp);
@@ -119,14 +119,14 @@ fn sorted(mut found: Vec<f64>, [low, high]: [f64; 2]) -> Vec<f64> {
 }
 
 /// Where start + rate s has one of the values.
-fn crossings_of_a_line(start: f64, rate: f64, values: impl Iterator<Item = f64>, found: &mut Vec<f64>) {
+pub(super) fn crossings_of_a_line(start: f64, rate: f64, values: impl Iterator<Item = f64>, found: &mut Vec<f64>) {
     if rate != 0.0 {
         found.extend(values.map(|v| (v - start) / rate));
     }
 }
 
 /// Appends the real roots of a s^2 + b s + c without cancellation. A double root that rounding lifts off zero counts.
-fn quadratic(a: f64, b: f64, c: f64, found: &mut Vec<f64>) {
+pub(super) fn quadratic(a: f64, b: f64, c: f64, found: &mut Vec<f64>) {
     if a == 0.0 {
         found.extend((b != 0.0).then(|| -c / b));
         return;

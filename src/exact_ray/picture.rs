@@ -25,29 +25,27 @@ pub struct Effort {
     pub rays: u64,
 }
 
-/// Why there is no exact reference of a scene's stage 2, as the end of a sentence; none if there is one.
+/// Why there is no exact reference of a scene's stage 2, and what to set instead, as the end of a sentence; none if there is one. Every
+/// setting that a ray reads is honoured by [`replace`] or named here (tests/unit_pure/ray_keys.rs).
 pub fn fault(scene: &Scene) -> Option<String> {
+    fault_of(scene).map(str::to_string)
+}
+
+fn fault_of(scene: &Scene) -> Option<&'static str> {
     let s = &scene.settings;
     if scene.is_flat() || s.mode == Mode::Cube {
-        return Some("the mode casts no ray".into());
+        return Some("the mode casts no ray: set mode to volume, surface, mixed, mip, minip or mean");
     }
     if scene.still().is_some() {
-        return Some("a still is a mean of random paths".into());
+        return Some("a still is a mean of random paths: set still=none");
     }
     if scene.lit_by_volume().is_some() {
-        return Some("light.volume takes light from a lattice".into());
-    }
-    if scene.region_fade().is_some() && scene.composites() {
-        return Some("region.fade is no part of the field along a ray".into());
+        return Some("light.volume takes light from a lattice of cells: set light.volume=none");
     }
     if s.ray.sliding != 0 {
-        return Some("ray.sliding filters samples, at distances of one step".into());
+        return Some("ray.sliding filters samples, at distances of one step: set ray.sliding=0");
     }
-    if scene.takes_bspline() {
-        return Some("ray.elevation is not linear".into());
-    }
-    let surface = scene.detects_surface().then(|| surface::fault(scene)).flatten();
-    surface.map(str::to_string)
+    scene.detects_surface().then(|| surface::fault(scene)).flatten()
 }
 
 /// Number of segments of all rays of a scene, roughly: what the time is proportional to.
@@ -65,11 +63,18 @@ pub fn replace(scene: &Scene, pass: &str, reads: &Arrays, writes: &mut Arrays, e
         "raycast_volume" => {
             let surface = &scene.settings.surface;
             let is_behind = scene.settings.mode == Mode::Surface && surface.colour == SurfaceColour::Behind;
-            volume(scene, reads, writes, effort, is_behind);
+            // With adaptive supersampling, first one ray through the middle of each pixel.
+            let apart = if scene.adapts_rays() { f64::from(scene.settings.ray.rays) } else { 1.0 };
+            volume(scene, reads, writes, effort, is_behind, &|at| Some(middle(at, apart)));
+        }
+        "raycast_refined" => {
+            let (marks, rays) = (reads.get("marks"), scene.settings.ray.rays as usize);
+            let is_marked = |[x, y]: [usize; 2]| marks.one(x / rays, y / rays, 0) != 0.0;
+            volume(scene, reads, writes, effort, false, &|at| is_marked(at).then(|| middle(at, 1.0)));
         }
         "raycast_surface_and_volume" => {
             surfaces(scene, reads, writes, effort);
-            volume(scene, reads, writes, effort, false);
+            volume(scene, reads, writes, effort, false, &|at| Some(middle(at, 1.0)));
         }
         "raycast_projection" => projection(scene, reads, writes, effort),
         "raycast_surface" => surfaces(scene, reads, writes, effort),
@@ -78,38 +83,58 @@ pub fn replace(scene: &Scene, pass: &str, reads: &Arrays, writes: &mut Arrays, e
     true
 }
 
-/// Calls `each` with the line of every pixel of a picture, its path and the distance of its beginning, mm, in parallel. A line begins
-/// where its ray enters the region of the view.
+/// Where the ray of a texel goes through the picture, rays from its corner; `apart`: rays between two texels.
+fn middle([x, y]: [usize; 2], apart: f64) -> [f64; 2] {
+    [x, y].map(|n| (n as f64 + 0.5) * apart)
+}
+
+/// Calls `each` with the texel, the line of its ray through a place of the picture, its path and the distance of its beginning, mm, in
+/// parallel. A line begins where its ray enters the region of the view. Texels without a place have no ray.
 fn for_each_ray<T: Send>(
     scene: &Scene,
     view: View,
     size: [usize; 3],
+    place: &(dyn Fn([usize; 2]) -> Option<[f64; 2]> + Sync),
     each: impl Fn([usize; 2], &Line, f64, f64) -> T + Sync,
-) -> Vec<T> {
+) -> Vec<([usize; 3], T)> {
     let [width, height, _] = size;
     let one = |n: usize| {
-        let (x, y) = (n % width, n / width);
-        let (origin, direction) = scene.rays.at(x as f64 + 0.5, y as f64 + 0.5);
+        let at = [n % width, n / width];
+        let [x, y] = place(at)?;
+        let (origin, direction) = scene.rays.at(x, y);
         let (enter, leave) = span(scene, view, origin, direction);
         let line = Line { scene, base: origin + direction * enter, direction };
-        each([x, y], &line, leave - enter, enter)
+        Some(([at[0], at[1], 0], each(at, &line, leave - enter, enter)))
     };
-    (0..width * height).into_par_iter().with_min_len(8).map(one).collect()
+    (0..width * height).into_par_iter().with_min_len(8).filter_map(one).collect()
 }
 
-fn rms(errors: impl ExactSizeIterator<Item = f64>) -> f64 {
-    let count = errors.len().max(1) as f64;
-    (errors.map(|e| e * e).sum::<f64>() / count).sqrt()
+impl Effort {
+    /// Adds the rays of a pass: the estimated error of each and its parts.
+    fn add(&mut self, rays: impl ExactSizeIterator<Item = (f64, u64)>) {
+        let count = rays.len();
+        let (squares, pieces) = rays.fold((0.0, 0), |(sum, all), (error, pieces)| (sum + error * error, all + pieces));
+        self.estimate = self.estimate.max((squares / count.max(1) as f64).sqrt());
+        self.pieces += pieces;
+        self.rays += count as u64;
+    }
 }
 
-/// `is_behind`: only what lies behind the surface is composited.
-fn volume(scene: &Scene, reads: &Arrays, writes: &mut Arrays, effort: &mut Effort, is_behind: bool) {
+/// `is_behind`: only what lies behind the surface is composited. `place`: where the ray of a texel goes through the picture.
+fn volume(
+    scene: &Scene,
+    reads: &Arrays,
+    writes: &mut Arrays,
+    effort: &mut Effort,
+    is_behind: bool,
+    place: &(dyn Fn([usize; 2]) -> Option<[f64; 2]> + Sync),
+) {
     let texels = reads.get("volume");
     let view = scene.volume_view();
     let size = writes.get("picture").size;
     let surface = &scene.settings.surface;
     let map: Option<&Texels> = (scene.settings.mode == Mode::Mixed || is_behind).then(|| reads.get("distance_map"));
-    let lights = for_each_ray(scene, view, size, |[x, y], line, path, enter| {
+    let lights = for_each_ray(scene, view, size, place, |[x, y], line, path, enter| {
         let cut = cap::cut_at(scene, reads, x, y);
         let ends = match map.map(|map| map.one(x, y, 0) - enter) {
             _ if cut.is_some_and(|cut| cut.ends_ray()) => [0.0, 0.0],
@@ -130,14 +155,11 @@ fn volume(scene: &Scene, reads: &Arrays, writes: &mut Arrays, effort: &mut Effor
         }
         (light, hit)
     });
-    effort.estimate = effort.estimate.max(rms(lights.iter().map(|(light, _)| light.estimate)));
-    effort.pieces += lights.iter().map(|(light, _)| light.pieces).sum::<u64>();
-    effort.rays += lights.len() as u64;
-    let pixels = lights.iter().enumerate().map(|(n, light)| ([n % size[0], n / size[0], 0], light));
-    for (at, (light, hit)) in pixels {
+    effort.add(lights.iter().map(|(_, (light, _))| (light.estimate, light.pieces)));
+    for (at, (light, hit)) in lights {
         writes.get_mut("picture").set(at, &light.rgba);
         if scene.lights_volume() {
-            writes.get_mut("distance_map").set(at, &[*hit]);
+            writes.get_mut("hit_distance").set(at, &[hit]);
         }
     }
 }
@@ -146,33 +168,31 @@ fn projection(scene: &Scene, reads: &Arrays, writes: &mut Arrays, effort: &mut E
     let texels = reads.get("volume");
     let view = scene.projection_view();
     let picture = writes.get_mut("picture");
-    let values = for_each_ray(scene, view, picture.size, |_, line, path, _| {
+    let values = for_each_ray(scene, view, picture.size, &|at| Some(middle(at, 1.0)), |_, line, path, _| {
         let segments = segments(line, texels, view.window, [0.0, path]);
         let off = segments.iter().map(|s| s.off).fold(0.0, f64::max);
         (projected(&segments, scene.settings.mode), segments.len() as u64, off)
     });
-    effort.estimate = effort.estimate.max(rms(values.iter().map(|v| v.2)));
-    effort.pieces += values.iter().map(|v| v.1).sum::<u64>();
-    effort.rays += values.len() as u64;
-    for (n, (value, ..)) in values.iter().enumerate() {
-        picture.set([n % picture.size[0], n / picture.size[0], 0], &value.map_or([0.0; 4], |v| [v, v, v, 1.0]));
+    effort.add(values.iter().map(|(_, (_, pieces, off))| (*off, *pieces)));
+    for (at, (value, ..)) in values {
+        picture.set(at, &value.map_or([0.0; 4], |v| [v, v, v, 1.0]));
     }
 }
 
 fn surfaces(scene: &Scene, reads: &Arrays, writes: &mut Arrays, effort: &mut Effort) {
     let texels = reads.get("volume");
     let size = writes.get("distance_map").size;
-    let found = for_each_ray(scene, scene.surface_view(), size, |[x, y], line, path, enter| {
+    let view = scene.surface_view();
+    let found = for_each_ray(scene, view, size, &|at| Some(middle(at, 1.0)), |[x, y], line, path, enter| {
         if cap::cut_at(scene, reads, x, y).is_some() {
-            return (path > 0.0).then_some((enter, [0.0; 4], 0.0));
+            return ((path > 0.0).then_some((enter, [0.0; 4], 0.0)), 0);
         }
-        let found = if path > 0.0 { surface::surface(line, texels, path, enter) } else { None };
-        found.map(|f| (enter + f.place, [f.echo, 1.0, f.behind, 0.0], f.off))
+        let mut pieces = 0;
+        let found = if path > 0.0 { surface::surface(line, texels, path, enter, &mut pieces) } else { None };
+        (found.map(|f| (enter + f.place, [f.echo, 1.0, f.behind, 0.0], f.off)), pieces)
     });
-    effort.estimate = effort.estimate.max(rms(found.iter().map(|f| f.map_or(0.0, |f| f.2))));
-    effort.rays += found.len() as u64;
-    for (n, found) in found.iter().enumerate() {
-        let at = [n % size[0], n / size[0], 0];
+    effort.add(found.iter().map(|(_, (found, pieces))| (found.map_or(0.0, |f| f.2), *pieces)));
+    for (at, (found, _)) in found {
         let (distance, surface) = found.map(|f| (f.0, f.1)).filter(|f| is_hit(f.0)).unwrap_or((MISS, [0.0; 4]));
         writes.get_mut("distance_map").set(at, &[distance]);
         if scene.lights_by_echo() {

@@ -34,19 +34,24 @@ pub struct Found {
     pub off: f64,
 }
 
-/// Why the scene's detector has no form without samples; none if it has one.
+/// Why the scene's detector has no form without samples, and what to set instead; none if it has one.
 pub fn fault(scene: &Scene) -> Option<&'static str> {
     let surface = &scene.settings.surface;
     match surface {
-        _ if surface.edge == Some(Edge::Named(EdgeName::Samples)) => Some("surface.edge=samples counts steps"),
-        _ if surface.rough > 1 => Some("the rough search takes steps of its own (surface.rough=1 has none)"),
-        _ if surface.detector != Detector::Threshold => Some("the detector learns noise from samples"),
+        _ if surface.edge == Some(Edge::Named(EdgeName::Samples)) => {
+            Some("surface.edge=samples counts steps: set surface.edge to a length in mm")
+        }
+        _ if surface.rough > 1 => Some("surface.rough searches by steps of its own: set surface.rough=1"),
+        _ if surface.detector != Detector::Threshold => {
+            Some("surface.detector learns noise from samples: set surface.detector=threshold")
+        }
         _ => None,
     }
 }
 
-/// The scene's surface on a line from 0 to `path` mm. `before`: how far the line may be followed in front of 0, mm.
-pub fn surface(line: &Line, volume: &Texels, path: f64, before: f64) -> Option<Found> {
+/// The scene's surface on a line from 0 to `path` mm. `before`: how far the line may be followed in front of 0, mm. Adds the parts of the line
+/// that were integrated to `pieces`.
+pub fn surface(line: &Line, volume: &Texels, path: f64, before: f64, pieces: &mut u64) -> Option<Found> {
     let scene = line.scene;
     let edge = scene.ring.step * f64::from(scene.ring.half);
     let window = scene.surface_view().window;
@@ -56,12 +61,14 @@ pub fn surface(line: &Line, volume: &Texels, path: f64, before: f64) -> Option<F
     let segments = segments(line, volume, window, ends);
     let limit = path + 3.0 * edge;
     let mut seen = 0;
-    for run in runs(&segments) {
-        let search = Search { scene, run: &run, edge, limit };
+    let runs = runs(&segments);
+    *pieces += runs.iter().map(|run| run.parts.len() as u64).sum::<u64>();
+    for run in &runs {
+        let search = Search { scene, run, edge, limit };
         match search.surface(&mut seen) {
             End::Found(place, echo, off) if (0.0..=path).contains(&place) => {
                 let mean = |from: f64| {
-                    let inside = runs(&segments).iter().map(|r| r.between(from, from + behind)).sum::<f64>();
+                    let inside = runs.iter().map(|r| r.between(from, from + behind)).sum::<f64>();
                     if behind > 0.0 { inside / behind } else { 0.0 }
                 };
                 return Some(Found { place, echo, behind: mean(place), off });

@@ -4,18 +4,21 @@
 //! I = integral of c(v) kappa(v) exp(-K) ds, K(s) = integral of kappa(v) from the entry to s, opacity = 1 - exp(-K(end))
 //! ```
 //!
-//! with the transfer function itself, colour and opacity linear between its points and kappa = -ln(1 - opacity) per reference length, not
-//! its table. The rays of the program approximate this integral by a sum (`passes::raycast::composite`).
+//! with the transfer function itself, colour and opacity linear between its points, not its table. kappa is -ln(1 - opacity) per reference
+//! length, or the opacity times `volume.extinction`; it is multiplied by what `region.fade` leaves of the matter at the place. The rays
+//! of the program approximate this integral by a sum (`passes::raycast::composite`).
 //!
-//! A ray is cut where its field is that of a point of the transfer function, 0, 1 or the threshold. On a piece between two cuts the
-//! integrand is smooth: 15 Gauss-Kronrod nodes integrate it, with the depth K at the nodes by the polynomial through kappa at the same
+//! A ray is cut where its field is that of a point of the transfer function, 0, 1 or the threshold, and where the fade has a kink. On a piece
+//! between two cuts the integrand is smooth: 15 Gauss-Kronrod nodes integrate it, with the depth K at the nodes by the polynomial through kappa at the same
 //! nodes. A piece whose rules of 7 and 15 nodes differ is halved.
 
+use super::fade::Fade;
 use super::field::Segment;
 use super::gauss_kronrod::{COUNT, RULE};
 use super::polynomial::bracketed;
 use crate::passes::raycast::volume::{depth_axis, reference_length};
-use crate::scene::{Scene, Shading, TransferPoint, transfer};
+use crate::scene::transfer::{self, Absorption};
+use crate::scene::{Scene, Shading, TransferPoint};
 
 /// The light of a ray.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -43,13 +46,14 @@ struct Linear {
 
 /// What the values along a ray look like.
 #[derive(Clone, Debug)]
-pub struct Medium {
+pub struct Medium<'a> {
     /// Values at which colour or opacity have a kink or a step, in rising order.
     levels: Vec<f64>,
     /// Between two levels, below the first, above the last.
     linear: Vec<Linear>,
-    /// mm for which opacities are given.
-    reference_length: f64,
+    absorption: Absorption,
+    /// What is left of the matter along the ray; none if it does not fade.
+    fade: Option<Fade<'a>>,
     /// Factors of the colours at 0 mm along the ray, and their growth per mm; none if colours have no tint.
     tint: Option<[[f64; 3]; 2]>,
     hit_depth: f64,
@@ -57,12 +61,19 @@ pub struct Medium {
     tolerance: f64,
 }
 
-impl Medium {
-    /// A transfer function. `points` as in [`transfer::resolved`], at least one; samples below `threshold` are transparent; opacities
-    /// hold for `reference_length` mm; a piece is halved until its rules differ by no more than `tolerance`.
-    pub fn new(points: &[TransferPoint], threshold: f64, reference_length: f64, tolerance: f64) -> Medium {
+impl<'a> Medium<'a> {
+    /// A transfer function. `points` as in [`transfer::resolved`], at least one; samples below `threshold` are transparent; a piece is halved
+    /// until its rules differ by no more than `tolerance`.
+    pub fn new(points: &[TransferPoint], threshold: f64, absorption: Absorption, tolerance: f64) -> Medium<'a> {
         let mut levels: Vec<f64> = [0.0, 1.0].into_iter().chain(points.iter().map(|p| p.at)).collect();
         levels.extend((threshold > 0.0).then_some(threshold));
+        // Where the absorption ends to rise with the opacity.
+        let opaque = absorption.opaque_from();
+        levels.extend(points.windows(2).filter_map(|pair| {
+            let [low, high] = [&pair[0], &pair[1]];
+            let share = (opaque - low.opacity) / (high.opacity - low.opacity);
+            (share > 0.0 && share < 1.0).then(|| low.at + share * (high.at - low.at))
+        }));
         levels.sort_by(f64::total_cmp);
         levels.dedup();
         let linear = (0..=levels.len()).map(|n| {
@@ -80,14 +91,16 @@ impl Medium {
             Linear { base, rise, transparent: a < threshold || (at_a[3] == 0.0 && at_b[3] == 0.0) }
         });
         let linear = linear.collect();
-        Medium { levels, linear, reference_length, tint: None, hit_depth: f64::INFINITY, tolerance }
+        Medium { levels, linear, absorption, fade: None, tint: None, hit_depth: f64::INFINITY, tolerance }
     }
 
     /// The medium of a scene's ray that begins at `line.base`.
-    pub fn of(scene: &Scene, line: &super::Line, tolerance: f64) -> Medium {
+    pub fn of(scene: &'a Scene, line: &super::Line<'a>, tolerance: f64) -> Medium<'a> {
         let volume = &scene.settings.volume;
         let points = transfer::resolved(&volume.transfer);
-        let mut medium = Medium::new(&points, volume.threshold, reference_length(scene), tolerance);
+        let absorption = Absorption::of(volume, reference_length(scene));
+        let mut medium = Medium::new(&points, volume.threshold, absorption, tolerance);
+        medium.fade = Fade::of(line);
         if volume.shading == Shading::DepthCoded {
             let (axis, near) = depth_axis(scene);
             let (start, rate) = (line.base.dot(axis) - near, line.direction.dot(axis));
@@ -121,8 +134,13 @@ impl Medium {
     pub fn light(&self, segments: &[Segment]) -> Light {
         let mut sum = Sum::default();
         let mut cuts = Vec::new();
+        let kinks = match (&self.fade, segments.first(), segments.last()) {
+            (Some(fade), Some(first), Some(last)) => fade.kinks([first.from, last.to]),
+            _ => Vec::new(),
+        };
         for segment in segments {
             cut(segment, &self.levels, &mut cuts);
+            cut_at_places(segment, &kinks, &mut cuts);
             for pair in cuts.windows(2) {
                 let linear = self.linear_at(segment.field.at((pair[0] + pair[1]) / 2.0));
                 if !linear.transparent {
@@ -147,7 +165,7 @@ impl Medium {
         let (mut absorbed, mut colours) = ([0.0; COUNT], [[0.0; 3]; COUNT]);
         for n in 0..COUNT {
             let value = piece.segment.field.at(place(n));
-            absorbed[n] = piece.absorption(value) / self.reference_length;
+            absorbed[n] = self.absorbed(piece, place(n), value);
             colours[n] = self.tinted(piece.segment.place(place(n)), piece.colour(value));
         }
         let depths = RULE.running(&absorbed);
@@ -184,9 +202,17 @@ impl Medium {
     /// Depth of the part of a piece between two places in -1..1.
     fn depth(&self, piece: &Piece, from: f64, to: f64) -> f64 {
         let half = (to - from) / 2.0;
-        let values =
-            std::array::from_fn(|n| piece.absorption(piece.segment.field.at(from + half * (1.0 + RULE.nodes[n]))));
-        RULE.integrals(&values)[0] * half * piece.segment.half() / self.reference_length
+        let values = std::array::from_fn(|n| {
+            let place = from + half * (1.0 + RULE.nodes[n]);
+            self.absorbed(piece, place, piece.segment.field.at(place))
+        });
+        RULE.integrals(&values)[0] * half * piece.segment.half()
+    }
+
+    /// Absorption per mm at a place in -1..1 of a piece's segment, where the field has this value.
+    fn absorbed(&self, piece: &Piece, place: f64, value: f64) -> f64 {
+        let left = self.fade.map_or(1.0, |fade| fade.at(piece.segment.place(place)));
+        self.absorption.over_length(piece.opacity(value)) / self.absorption.reference_length * left
     }
 }
 
@@ -203,14 +229,25 @@ pub(crate) fn cut(segment: &Segment, levels: &[f64], cuts: &mut Vec<f64>) {
     cuts.dedup_by(|later, earlier| *later - *earlier <= 4.0 * f64::EPSILON);
 }
 
+/// Adds to the cuts of a segment those of the places, mm along the ray, that are within it.
+fn cut_at_places(segment: &Segment, places: &[f64], cuts: &mut Vec<f64>) {
+    let before = cuts.len();
+    let within = places.iter().filter(|s| **s > segment.from && **s < segment.to);
+    cuts.extend(within.map(|s| ((s - segment.middle()) / segment.half()).clamp(-1.0, 1.0)));
+    if cuts.len() > before {
+        cuts.sort_by(f64::total_cmp);
+        cuts.dedup_by(|later, earlier| *later - *earlier <= 4.0 * f64::EPSILON);
+    }
+}
+
 struct Piece<'a> {
     segment: &'a Segment,
     linear: &'a Linear,
 }
 
 impl Piece<'_> {
-    fn absorption(&self, value: f64) -> f64 {
-        transfer::absorption(self.linear.base[3] + self.linear.rise[3] * value)
+    fn opacity(&self, value: f64) -> f64 {
+        self.linear.base[3] + self.linear.rise[3] * value
     }
 
     fn colour(&self, value: f64) -> [f64; 3] {

@@ -18,6 +18,41 @@ pub fn absorption(opacity: f64) -> f64 {
     (-(-opacity.clamp(0.0, 1.0)).ln_1p()).min(OPAQUE)
 }
 
+/// How opacities of the transfer function become absorption, whatever the values between which they are interpolated: what tables, exact
+/// rays and proven bounds have in common.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Absorption {
+    /// Absorption per mm of opacity 1, in proportion to the opacity; none: opacities are those of one reference length.
+    pub extinction: Option<f64>,
+    /// mm.
+    pub reference_length: f64,
+}
+
+impl Absorption {
+    /// Of opacities of one reference length, mm.
+    pub fn of_length(reference_length: f64) -> Absorption {
+        Absorption { extinction: None, reference_length }
+    }
+
+    /// Of volume rendering, in which a reference length has so many mm.
+    pub fn of(volume: &Volume, reference_length: f64) -> Absorption {
+        Absorption { extinction: volume.extinction, reference_length }
+    }
+
+    /// Absorption of an opacity in 0..1 over one reference length, at most [`OPAQUE`].
+    pub fn over_length(self, opacity: f64) -> f64 {
+        match self.extinction {
+            Some(extinction) => (opacity * extinction * self.reference_length).min(OPAQUE),
+            None => absorption(opacity),
+        }
+    }
+
+    /// The opacity from which on the absorption is [`OPAQUE`] and rises no more; 1 or more if there is none.
+    pub fn opaque_from(self) -> f64 {
+        self.extinction.map_or(1.0, |extinction| OPAQUE / (extinction * self.reference_length))
+    }
+}
+
 /// Opacity of a step of absorption y = kappa ds / ds0: 1 - exp(-y).
 pub fn opacity(y: f64) -> f64 {
     -(-y).exp_m1()
@@ -77,26 +112,21 @@ pub fn entries(volume: &Volume) -> Result<usize, String> {
 /// Red, green, blue and absorption at `entries` equidistant sample values from 0 to 1 (at least 2). Below `threshold` the absorption
 /// is 0.
 pub fn table(transfer: &Transfer, threshold: f64, entries: usize) -> Vec<[f64; 4]> {
+    table_by(transfer, threshold, entries, Absorption::of_length(1.0))
+}
+
+/// The same for volume rendering: with [`Volume::extinction`] in place of opacities of one reference length, mm.
+pub fn table_of(volume: &Volume, reference_length: f64, entries: usize) -> Vec<[f64; 4]> {
+    table_by(&volume.transfer, volume.threshold, entries, Absorption::of(volume, reference_length))
+}
+
+fn table_by(transfer: &Transfer, threshold: f64, entries: usize, absorption: Absorption) -> Vec<[f64; 4]> {
     let points = resolved(transfer);
     (0..entries)
         .map(|i| {
             let value = i as f64 / (entries - 1) as f64;
             let [r, g, b, a] = at(&points, value);
-            [r, g, b, if value < threshold { 0.0 } else { absorption(a) }]
-        })
-        .collect()
-}
-
-/// The same for volume rendering: with [`Volume::extinction`] in place of opacities of one reference length, mm.
-pub fn table_of(volume: &Volume, reference_length: f64, entries: usize) -> Vec<[f64; 4]> {
-    let Some(extinction) = volume.extinction else { return table(&volume.transfer, volume.threshold, entries) };
-    let points = resolved(&volume.transfer);
-    (0..entries)
-        .map(|i| {
-            let value = i as f64 / (entries - 1) as f64;
-            let [r, g, b, a] = at(&points, value);
-            let absorption = (a * extinction * reference_length).min(OPAQUE);
-            [r, g, b, if value < volume.threshold { 0.0 } else { absorption }]
+            [r, g, b, if value < threshold { 0.0 } else { absorption.over_length(a) }]
         })
         .collect()
 }

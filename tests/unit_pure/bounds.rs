@@ -55,7 +55,8 @@ fn geometry(draw: &mut Draw) -> Geometry {
     Geometry::Sweep(Probe { array, lines, motion, slices, advance, ..wobbler() })
 }
 
-fn random_scene(draw: &mut Draw) -> Scene {
+/// `more`: further settings.
+fn random_scene(draw: &mut Draw, more: &str) -> Scene {
     let count = draw.of(4) + 1;
     let mut points: Vec<f64> = (0..count).map(|_| draw.unit()).collect();
     points.sort_by(f64::total_cmp);
@@ -71,7 +72,7 @@ fn random_scene(draw: &mut Draw) -> Scene {
     let shading = ["none", "depth-coded"][draw.of(2)];
     let threshold = [0.0, 0.4][draw.of(2)];
     let toml = format!(
-        "mode = 'vr'\npicture = {{ size = [8, 6] }}\nslices = {{ pixels = 16 }}\n\
+        "mode = 'vr'\npicture = {{ size = [8, 6] }}\nslices = {{ pixels = 16 }}\n{more}\n\
          volume = {{ transfer = [{}], threshold = {threshold}, shading = '{shading}', window = [{}, {}] }}\n\
          camera = {{ azimuth = {}, elevation = {}, roll = {}, zoom = {}, field_of_view = {} }}",
         points.join(", "),
@@ -118,7 +119,7 @@ fn the_integral_lies_within_its_bounds_on_every_pixel_of_fifty_scenes() {
     let mut draw = Draw(7);
     let (mut widths, mut parts) = (Vec::new(), 0);
     for n in 0..50 {
-        let scene = random_scene(&mut draw);
+        let scene = random_scene(&mut draw, "");
         assert_eq!(fault(&scene), None);
         let volume = noise(&scene, &mut draw);
         let (bounds, exact) = (picture(&scene, &volume, COARSE), integrated(&scene, &volume));
@@ -135,13 +136,47 @@ fn the_integral_lies_within_its_bounds_on_every_pixel_of_fifty_scenes() {
     assert!(at(0.5) <= 0.02 && at(0.95) < 0.05, "median {}, p95 {}", at(0.5), at(0.95));
 }
 
+/// The same with each setting that changes absorption or the field along a ray, and all of them.
+#[test]
+fn the_integral_lies_within_its_bounds_where_matter_fades_or_slices_are_splined() {
+    let mut draw = Draw(23);
+    for n in 0..32 {
+        let extinction = [0.02, 0.2, 1.0, 30.0][draw.of(4)];
+        let fade = format!("region.fade = {}", [0.4, 1.5, 6.0, 40.0][draw.of(4)]);
+        let elevation = "ray.elevation = 'bspline'".to_string();
+        let more = match n % 4 {
+            0 => String::new(),
+            1 => fade,
+            2 => elevation,
+            _ => [fade, elevation].join("\n"),
+        };
+        let mut scene = random_scene(&mut draw, &more);
+        // The table of the volume is closed in the text.
+        scene.settings.volume.extinction = matches!(n % 4, 0 | 3).then_some(extinction);
+        assert_eq!(fault(&scene), None);
+        let volume = noise(&scene, &mut draw);
+        let (bounds, exact) = (picture(&scene, &volume, COARSE), integrated(&scene, &volume));
+        assert_eq!(outside(&bounds, &exact), 0, "scene {n}, {more}: {:?}", scene.settings);
+        let widths = bounds.widths_of_hits();
+        let within = widths.iter().filter(|w| **w <= 4.0 * COARSE.width).count();
+        assert!(10 * within >= 9 * widths.len(), "scene {n}, {more}: {within} of {} are narrow", widths.len());
+        // The fault planted: the same picture without the setting.
+        if n % 4 < 2 && exact.values.iter().any(|v| *v > 0.1) {
+            let mut plain = scene.clone();
+            plain.settings.volume.extinction = None;
+            plain.settings.region.fade = 0.0;
+            assert!(outside(&bounds, &integrated(&plain, &volume)) > 0, "scene {n}: bounds without {more}");
+        }
+    }
+}
+
 /// The faults planted: bounds that are a tenth as wide, and those of a volume that differs in one of its texels.
 #[test]
 fn bounds_that_are_too_narrow_or_of_another_volume_are_noticed() {
     let mut draw = Draw(11);
     let (mut narrow, mut other) = (0, 0);
     for _ in 0..12 {
-        let scene = random_scene(&mut draw);
+        let scene = random_scene(&mut draw, "");
         let volume = noise(&scene, &mut draw);
         let exact = integrated(&scene, &volume);
         let mut bounds = picture(&scene, &volume, Effort { width: 1.0, parts: 16 });

@@ -13,7 +13,8 @@ use echolume::exact_ray::{Line, Segment, segments};
 use echolume::passes::{Slot, Texels};
 use echolume::probe::{Advance, Array, Axis, Geometry, Motion, Probe};
 use echolume::reference;
-use echolume::scene::{Input, Mode, Scene, TransferPoint, transfer};
+use echolume::scene::transfer::{self, Absorption};
+use echolume::scene::{Input, Mode, Scene, TransferPoint};
 use echolume::source;
 use glam::DVec3;
 
@@ -83,7 +84,12 @@ fn a_uniform_slab_has_the_opacity_of_its_length() {
     let line = line(&scene, [-0.5, 3.2, 2.9], [1.0, 0.0, 0.0]);
     for opacity in [1e-9, 0.05, 0.6, 0.999_999, 1.0] {
         let points = [point(0.0, [0.2, 0.4, 0.8], opacity)];
-        let light = Medium::new(&points, 0.0, 1.0, 1e-13).light(&segments(&line, &volume, WHOLE, [0.0, 7.25]));
+        let light = Medium::new(&points, 0.0, Absorption::of_length(1.0), 1e-13).light(&segments(
+            &line,
+            &volume,
+            WHOLE,
+            [0.0, 7.25],
+        ));
         let expected = transfer::opacity(transfer::absorption(opacity) * 7.25);
         for (value, factor) in light.rgba.iter().zip([0.2, 0.4, 0.8, 1.0]) {
             assert!((value - expected * factor).abs() < 2e-14 * 7.25, "{opacity}: {:?}", light.rgba);
@@ -99,11 +105,90 @@ fn a_ramp_of_opacity_has_the_depth_of_its_formula() {
     let line = line(&scene, [0.0, 3.0, 4.0], [1.0, 0.0, 0.0]);
     for a in [0.3, 0.9, 1.0] {
         let points = [point(0.0, [1.0; 3], 0.0), point(1.0, [1.0; 3], a)];
-        let light = Medium::new(&points, 0.0, 1.0, 1e-14).light(&segments(&line, &volume, WHOLE, [0.0, 7.0]));
+        let light = Medium::new(&points, 0.0, Absorption::of_length(1.0), 1e-14).light(&segments(
+            &line,
+            &volume,
+            WHOLE,
+            [0.0, 7.0],
+        ));
         // The integral of -ln(1 - a v) dv from 0 to 1 is 1 + (1 - a) ln(1 - a) / a.
         let depth = 7.0 * (1.0 + if a < 1.0 { (1.0 - a) * f64::ln_1p(-a) / a } else { 0.0 });
         assert!((light.rgba[3] - transfer::opacity(depth)).abs() < 1e-13, "{a}: {light:?}");
         assert!((light.rgba[0] - light.rgba[3]).abs() < 1e-12, "white light is the opacity: {light:?}");
+    }
+}
+
+/// The absorption of opacity a is a E per mm, and at most 1e6 a voxel, which an extinction of 1000 of voxels of 1e4 mm meets at a tenth.
+#[test]
+fn an_extinction_is_in_proportion_to_the_opacity() {
+    let scene = cube();
+    let volume = of_volume(&scene, |[x, ..]| x as f64 / 7.0);
+    let line = line(&scene, [0.0, 3.0, 4.0], [1.0, 0.0, 0.0]);
+    let points = [point(0.0, [1.0; 3], 0.0), point(1.0, [1.0; 3], 0.8)];
+    let segments = segments(&line, &volume, WHOLE, [0.0, 7.0]);
+    for extinction in [0.01, 0.3, 2.0] {
+        let absorption = Absorption { extinction: Some(extinction), reference_length: 0.7 };
+        let light = Medium::new(&points, 0.0, absorption, 1e-14).light(&segments);
+        assert!((light.rgba[3] - transfer::opacity(7.0 * 0.4 * extinction)).abs() < 1e-13, "{extinction}: {light:?}");
+    }
+    let thin = [point(0.0, [1.0; 3], 0.0), point(1.0, [1.0; 3], 1.0)];
+    let absorption = Absorption { extinction: Some(1e3), reference_length: 1e4 };
+    let medium = Medium::new(&thin, 0.0, absorption, 1e-14);
+    assert!((absorption.opaque_from() - 0.1).abs() < 1e-15);
+    assert!(medium.levels().iter().any(|level| (level - 0.1).abs() < 1e-15), "a kink at {:?}", medium.levels());
+    assert_eq!(absorption.over_length(0.1), absorption.over_length(1.0));
+}
+
+/// Along the middle of a box the smooth step takes half of the fade's length at each end. At half of its length beside a face half is left.
+#[test]
+fn matter_fades_towards_the_faces_as_its_formula_says() {
+    let fade = 4.0;
+    let transfer = "transfer = [{ at = 0.0, colour = [1, 1, 1], opacity = 0.02 }]";
+    let scene = scene(
+        voxels([30, 31, 32]),
+        FLOATS,
+        &format!("mode = 'vr'\nregion.fade = {fade}\nvolume = {{ {transfer}, threshold = 0.0 }}"),
+    );
+    let volume = of_volume(&scene, |_| 0.5);
+    let kappa = transfer::absorption(0.02);
+    let depth = |base: [f64; 3], direction: [f64; 3], long: f64| {
+        let line = line(&scene, base, direction);
+        let light = Medium::of(&scene, &line, 1e-13).light(&segments(&line, &volume, WHOLE, [0.0, long]));
+        assert!((light.rgba[0] - light.rgba[3]).abs() < 1e-12, "white light is the opacity: {light:?}");
+        -(-light.rgba[3]).ln_1p() / kappa
+    };
+    let near = |a: f64, b: f64| assert!((a - b).abs() < 1e-11, "{a} and {b}");
+    // The box begins half a voxel before the first one. Nothing fades towards the face that is nearest to the probe.
+    near(depth([-0.5, 15.0, 15.0], [1.0, 0.0, 0.0], 30.0), 30.0 - fade);
+    near(depth([15.0, -0.5, 15.0], [0.0, 1.0, 0.0], 31.0), 31.0 - fade / 2.0);
+    near(depth([15.0, 15.0, -0.5], [0.0, 0.0, 1.0], 32.0), 32.0 - fade);
+    // Beside a face, t = 1 - hypot(1/2, 1 - z / fade) at a distance z from the end.
+    let step = |t: f64| if t > 0.0 { t * t * (3.0 - 2.0 * t) } else { 0.0 };
+    let count = 1_000_000;
+    let at_end: f64 = (0..count).map(|n| step(1.0 - 0.5f64.hypot(1.0 - (f64::from(n) + 0.5) / f64::from(count)))).sum();
+    near(
+        depth([1.5, 15.0, -0.5], [0.0, 0.0, 1.0], 32.0),
+        0.5 * (32.0 - 2.0 * fade) + 2.0 * fade * at_end / f64::from(count),
+    );
+}
+
+/// A single bright slice: the B-spline is 2/3 at it, integrates to the distance of two slices and is nothing from two slices on; a ramp stays a ramp.
+#[test]
+fn a_cubic_across_slices_has_the_values_of_the_b_spline() {
+    let of = |mode: &str| scene(voxels([4, 4, 9]), FLOATS, &format!("mode = '{mode}'\nray.elevation = 'bspline'"));
+    for (mode, name) in [(Mode::Mip, "mip"), (Mode::Mean, "mean")] {
+        let scene = of(name);
+        let slice = of_volume(&scene, |[.., z]| f64::from(u8::from(z == 4)));
+        // Obliquely through one column and row.
+        let line = line(&scene, [1.2, 1.3, 0.0], [0.05, 0.05, 1.0]);
+        let long = 8.0 / line.direction.z;
+        let value = projected(&segments(&line, &slice, WHOLE, [0.0, long]), mode).expect("inside");
+        let expected = if mode == Mode::Mip { 2.0 / 3.0 } else { 1.0 / 8.0 };
+        assert!((value - expected).abs() < 1e-14, "{name}: {value}");
+        let ramp = of_volume(&scene, |[.., z]| z as f64 / 8.0);
+        let value = projected(&segments(&line, &ramp, WHOLE, [long / 4.0, long / 2.0]), mode).expect("inside");
+        let expected = if mode == Mode::Mip { 0.5 } else { 0.375 };
+        assert!((value - expected).abs() < 1e-14, "{name} of a ramp: {value}");
     }
 }
 
@@ -221,7 +306,7 @@ fn rays_through_noise_are_those_of_a_hundred_thousand_samples() {
     for (kind, geometry) in geometries.into_iter().enumerate() {
         let scene = scene(geometry, FLOATS, "mode = 'vr'\nslices = { pixels = 40 }");
         let volume = of_volume(&scene, noise);
-        let medium = Medium::new(&points, 0.0, 1.0, 1e-13);
+        let medium = Medium::new(&points, 0.0, Absorption::of_length(1.0), 1e-13);
         for turn in 0..3 {
             let (line, long) = through(&scene, f64::from(turn) * 1.7 + 0.2);
             let light = medium.light(&segments(&line, &volume, WHOLE, [0.0, long]));
@@ -385,8 +470,8 @@ fn breakpoints_at_cell_faces_and_points_are_what_makes_it_exact() {
     for turn in 0..8 {
         let (line, long) = through(&scene, f64::from(turn) * 0.9 + 0.1);
         let all = segments(&line, &volume, WHOLE, [0.0, long]);
-        let light = Medium::new(&points, 0.0, 1.0, 1e-12).light(&all);
-        let exact = Medium::new(&points, 0.0, 1.0, 1e-16).light(&all);
+        let light = Medium::new(&points, 0.0, Absorption::of_length(1.0), 1e-12).light(&all);
+        let exact = Medium::new(&points, 0.0, Absorption::of_length(1.0), 1e-16).light(&all);
         with = with.max((light.rgba[3] - exact.rgba[3]).abs());
         let equal = without_breakpoints(&line, &volume, &points, long, light.pieces as usize);
         without = without.max((equal - exact.rgba[3]).abs());
@@ -405,7 +490,12 @@ fn a_narrow_spike_of_opacity_is_met() {
     for half in [1e-3, 1e-6, 1e-9] {
         let top = 0.9;
         let points = [point(0.5 - half, [1.0; 3], 0.0), point(0.5, [1.0; 3], top), point(0.5 + half, [1.0; 3], 0.0)];
-        let light = Medium::new(&points, 0.0, 1e-3, 1e-14).light(&segments(&line, &volume, WHOLE, [0.0, 7.0]));
+        let light = Medium::new(&points, 0.0, Absorption::of_length(1e-3), 1e-14).light(&segments(
+            &line,
+            &volume,
+            WHOLE,
+            [0.0, 7.0],
+        ));
         let depth = 7e3 * 2.0 * half * (1.0 + (1.0 - top) * f64::ln_1p(-top) / top);
         let off = (light.rgba[3] / transfer::opacity(depth) - 1.0).abs();
         assert!(off < 1e-15 / half + 1e-12, "{half}: {off:.1e}");

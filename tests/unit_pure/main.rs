@@ -22,6 +22,7 @@ mod named_profiles;
 mod phantom;
 mod plan;
 mod profile;
+mod ray_keys;
 mod references;
 mod rules;
 mod sampling;

@@ -1,6 +1,7 @@
 //! AOS with Richardson's extrapolation: the error of a step of the first order is halved by two half steps, so that twice their result less that
-//! of one complete step is of second order in time. It stays stable, but a value may leave the range of its neighbours. Three steps
-//! of AOS, whose shaders and reference these are; the last dispatch also extrapolates.
+//! of one complete step is of second order in time, in the limit of short steps (docs/numerics.md has the orders at longer ones). It stays
+//! stable, but a value may leave the range of its neighbours. Three steps of AOS, whose shaders and reference these are; the last dispatch
+//! also extrapolates.
 
 use super::aos::{self, SLICES};
 use super::perona_malik::need;

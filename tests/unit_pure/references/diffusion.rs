@@ -1,6 +1,9 @@
 //! Perona and Malik's diffusion: explicit steps by hand, and semi-implicit ones put back into the equation that they solve.
 
 use super::*;
+use echolume::passes::Slot;
+use echolume::reference;
+use echolume::scene::PeronaMalik;
 
 const SCHEMES: [&str; 2] = ["quotient", "exponential"];
 
@@ -24,6 +27,72 @@ fn an_explicit_step_by_hand() {
         let column = Texels { size: [1, 3, 1], ..source.clone() };
         let scene = slices([1, 3], &explicit(name, "edge = 0.1, step = 0.2"));
         same(&filtered(&scene, "perona_malik_slice", &column), &Texels { size: [1, 3, 1], ..expected }, name);
+    }
+}
+
+/// What is left of a checkerboard after some explicit steps, where the border is too far away to be felt: of the difference of two neighbours, as a factor of
+/// the first one.
+fn left_of_a_checkerboard(lambda: f64, edge: f64, steps: usize) -> f64 {
+    let mut now = plane([40, 40], |x, y| if (x + y) % 2 == 0 { 0.75 } else { 0.25 });
+    let scene = slices([40, 40], &explicit("quotient", &format!("edge = {edge:?}, step = {lambda:?}")));
+    for _ in 0..steps {
+        now = filtered(&scene, "perona_malik_slice", &now);
+    }
+    (now.one(20, 20, 0) - now.one(21, 20, 0)) / 0.5
+}
+
+/// The explicit scheme multiplies a checkerboard, its highest frequency, by 1 - 8 lambda c for a conductance c. A step of 1/4 is the limit of its
+/// stability and damps nothing of it; the default of 1/5 leaves 3/5 a step; above 1/4 it would grow, and is refused.
+#[test]
+fn a_checkerboard_turns_over_at_the_limit_and_fades_below_it() {
+    for steps in [1, 2, 5, 16] {
+        let left = |lambda: f64| left_of_a_checkerboard(lambda, f64::INFINITY, steps);
+        let power = |factor: f64| factor.powi(steps as i32);
+        for (lambda, factor) in [(0.25, -1.0), (0.2, -0.6), (0.125, 0.0), (0.1, 0.2)] {
+            assert!(is_near(left(lambda), power(factor)), "{steps} steps of {lambda}: {}", left(lambda));
+        }
+    }
+    assert_eq!(PeronaMalik::default().step, 0.2, "the default damps it");
+    // An edge of the checkerboard's own height conducts half: the largest step then takes it away at once.
+    assert!(is_near(left_of_a_checkerboard(0.25, 0.5, 1), 0.0));
+    // A number beside the limit grows: (1 - 8 lambda)^16 is 1.6 at a hundredth more.
+    for (filters, step) in [("slices", 0.2501), ("distance", 0.3), ("post", 1.0)] {
+        let settings = scenes::settings(&format!("{filters}.perona_malik = {{ step = {step} }}"));
+        let refused = settings.check().expect_err("unstable").to_string();
+        assert!(refused.contains(filters) && refused.contains("0.25") && refused.contains("aos"), "{refused}");
+    }
+    assert!(scenes::settings("slices.perona_malik = { step = 0.25 }").check().is_ok());
+}
+
+/// Diffusion over the time 4 in some steps.
+fn diffused(source: &Texels, scheme: &str, steps: u32) -> Texels {
+    let [width, height, _] = source.size;
+    let filter = format!("scheme = '{scheme}', edge = 0.1, step = {:?}, repeat = {steps}", 4.0 / f64::from(steps));
+    let scene = scene([width, height, 1], &format!("mode = 'mip'\nslices = {{ {} }}", explicit("quotient", &filter)));
+    reference::render(&scene, std::slice::from_ref(source)).remove(&Slot::Volume).expect("a volume")
+}
+
+/// The orders of both semi-implicit schemes on smooth data, as docs/numerics.md states them. They are 1 and 2 in the limit. At steps that are worth
+/// taking the error of a step is no single power of it: Richardson's extrapolation of AOS gains 1.1 to 1.7.
+#[test]
+fn the_orders_of_aos_on_smooth_data_are_those_that_are_stated() {
+    let wave = |n: usize, pixels: f64| (std::f64::consts::TAU * n as f64 / pixels).sin();
+    let source = plane([32, 28], |x, y| 0.5 + 0.25 * wave(x, 21.0) * wave(y + 5, 26.0) + 0.15 * wave(x + 2 * y, 33.0));
+    let rmse = |a: &Texels, b: &Texels| {
+        let squares = a.values.iter().zip(&b.values).map(|(a, b)| (a - b).powi(2));
+        (squares.sum::<f64>() / a.values.len() as f64).sqrt()
+    };
+    let fine = diffused(&source, "aos-richardson", 128);
+    assert!(rmse(&source, &fine) > 0.02, "the filter does something");
+    // Another scheme comes to the same, up to its own error of the first order.
+    assert!(rmse(&diffused(&source, "explicit", 200), &fine) < 4e-4);
+    // Steps of 4, 2, 1, 1/2 and 1/4.
+    for (scheme, stated) in [("aos", [0.64, 0.78, 0.88, 0.94]), ("aos-richardson", [1.14, 1.34, 1.51, 1.67])] {
+        let errors = [1, 2, 4, 8, 16].map(|n| rmse(&diffused(&source, scheme, n), &fine));
+        let orders: Vec<f64> = errors.windows(2).map(|pair| (pair[0] / pair[1]).log2()).collect();
+        println!("{scheme}: {errors:?}, orders {orders:.2?}");
+        let is_as_stated = |(order, stated): (&f64, f64)| (order - stated).abs() < 0.05;
+        assert!(orders.iter().zip(stated).all(is_as_stated), "{scheme}: {orders:.2?}, stated {stated:?}");
     }
 }
 
