@@ -8,10 +8,9 @@ use crate::files::{check_target, replace};
 use crate::gpu::context::list;
 use crate::gpu::{Context, ContextOptions, Deadline, DeviceChoice, GpuError, TexelAccess, device_selection};
 use crate::marked::Demo;
-use crate::probe::Geometry;
-use crate::scene::default_look::block_edge;
+use crate::scene::default_look::Recorded;
 use crate::scene::load::{Layers, LoadError};
-use crate::scene::{EchoHistogram, EchoLevels, Input, Scene, Settings};
+use crate::scene::{Input, Scene};
 use crate::source::phantom::{self, Phantom, PhantomSource};
 use crate::source::{Frame, Source};
 use crate::terminal::{Failure, failed, input, progress_bar, say};
@@ -23,6 +22,15 @@ use std::sync::Arc;
 
 /// A flag as it was typed, and the assignment of a setting that it stands for.
 type Assigned = (String, String);
+
+/// A recording that was opened, and the scene of a volume of it.
+pub struct Opened {
+    pub source: Box<dyn Source>,
+    pub recorded: Recorded,
+    /// The settings before they are completed.
+    pub layers: Layers,
+    pub scene: Scene,
+}
 
 /// The arguments of every command that renders a recording.
 #[derive(clap::Args)]
@@ -41,65 +49,46 @@ pub struct InputArgs {
 }
 
 impl InputArgs {
-    /// Opens the recording and builds the scene of the chosen volume.
+    /// Opens the recording and builds the scene of the chosen volume: settings that nobody chose follow from the recording.
     pub fn open(&self) -> Result<(Box<dyn Source>, Scene), Failure> {
-        self.open_scene(&[], false, None)
+        self.open_with(&[])
     }
 
-    /// Like [`InputArgs::open`], to show a picture: settings that nobody chose follow from the recording. What measures takes the settings as
-    /// they are. `chosen` assignments are a layer below the flags and `--set`.
-    pub fn open_to_show(&self, chosen: &[Assigned]) -> Result<(Box<dyn Source>, Scene), Failure> {
-        self.open_scene(chosen, true, None)
+    /// Like [`InputArgs::open`]. `chosen` assignments are a layer below the flags and `--set`.
+    pub fn open_with(&self, chosen: &[Assigned]) -> Result<(Box<dyn Source>, Scene), Failure> {
+        let opened = self.open_recorded(chosen, None)?;
+        Ok((opened.source, opened.scene))
     }
 
-    /// Like [`InputArgs::open_to_show`], for the first of several volumes that are shown.
+    /// Like [`InputArgs::open`], for the first of several volumes that are shown.
     pub fn open_volumes(&self, first: usize) -> Result<(Box<dyn Source>, Scene), Failure> {
-        self.open_scene(&[], true, Some(first))
+        let opened = self.open_recorded(&[], Some(first))?;
+        Ok((opened.source, opened.scene))
     }
 
-    /// `asked`: the volume, if the arguments do not say it.
-    fn open_scene(
-        &self,
-        chosen: &[Assigned],
-        to_show: bool,
-        asked: Option<usize>,
-    ) -> Result<(Box<dyn Source>, Scene), Failure> {
+    /// Like [`InputArgs::open_with`], with all that other scenes of the same volume are made from. `asked`: the volume, if the arguments do not say it.
+    pub fn open_recorded(&self, chosen: &[Assigned], asked: Option<usize>) -> Result<Opened, Failure> {
         let mut source = self.source()?;
         let volume = asked.map_or_else(|| self.volume(), Ok)?;
         let flag = if asked.is_some() { "--volumes" } else { "--volume" };
         check_volume(&*source, flag, volume, self.name())?;
         let layers = self.layers_with(chosen)?;
+        let mut recorded = recorded(&*source, volume);
         // The settings of a workspace are complete.
-        let scene = match to_show && self.workspace()?.is_none() {
-            true => scene_to_show(&mut *source, volume, &layers, |source, geometry, samples| {
-                self.levels(source, volume, geometry, samples)
-            })?,
-            false => {
-                let settings = layers.finish().map_err(input)?;
-                let samples = samples_of(&*source, &settings);
-                Scene::new(source.geometry(volume), samples, settings).map_err(input)?
-            }
-        };
-        Ok((source, scene))
-    }
-
-    /// The levels of the echoes of the chosen volume, whose frames are read for it.
-    fn levels(
-        &self,
-        source: &mut dyn Source,
-        volume: usize,
-        geometry: &Geometry,
-        samples: Input,
-    ) -> Result<Option<EchoLevels>, Failure> {
-        let mut histogram = EchoHistogram::new(geometry, samples, block_edge(geometry));
-        let bar = progress_bar(source.frames_per_volume() as u64).with_message("frames");
-        frames_of(source, volume, |frame| {
-            histogram.take(&frame.bytes);
-            bar.inc(1);
-            Ok(())
-        })?;
-        bar.finish_and_clear();
-        Ok(histogram.levels())
+        recorded.is_completed = self.workspace()?.is_none();
+        if recorded.needs_levels(&layers) {
+            let mut histogram = recorded.histogram(&layers).map_err(input)?;
+            let bar = progress_bar(source.frames_per_volume() as u64).with_message("frames");
+            frames_of(&mut *source, volume, |frame| {
+                histogram.take(&frame.bytes);
+                bar.inc(1);
+                Ok(())
+            })?;
+            bar.finish_and_clear();
+            recorded.levels = histogram.levels();
+        }
+        let scene = recorded.scene(&layers).map_err(input)?;
+        Ok(Opened { source, recorded, layers, scene })
     }
 
     /// The workspace, if one was given in place of a recording, and its file.
@@ -212,11 +201,6 @@ impl InputArgs {
     /// The device that was asked for.
     pub fn device(&self) -> Option<DeviceChoice> {
         self.scene.device.clone()
-    }
-
-    /// The layers of settings before they are resolved.
-    pub fn layers(&self) -> Result<Layers, Failure> {
-        self.layers_with(&[])
     }
 
     fn layers_with(&self, chosen: &[Assigned]) -> Result<Layers, Failure> {
@@ -407,37 +391,15 @@ pub fn check_volume(
     }
 }
 
-/// The samples of a recording, with the range that the settings ask for.
-fn samples_of(source: &dyn Source, settings: &Settings) -> Input {
-    let stated = Input { stored: source.stored_type(), range: source.range() };
-    stated.in_range_of(settings, source.sample_type().shift())
-}
-
-/// The scene that shows a volume: settings that nobody chose follow from the recording, whose `levels` are asked for only if they matter.
-pub fn scene_to_show(
-    source: &mut dyn Source,
-    volume: usize,
-    layers: &Layers,
-    levels: impl FnOnce(&mut dyn Source, &Geometry, Input) -> Result<Option<EchoLevels>, Failure>,
-) -> Result<Scene, Failure> {
-    let geometry = source.geometry(volume);
-    let settings = layers.clone().finish().map_err(input)?;
-    let samples = samples_of(source, &settings);
-    let levels = match layers.needs_levels() {
-        true => levels(source, &geometry, samples)?,
-        false => None,
-    };
-    // Of a volume that is all the same nothing follows, and what was set explains the picture best.
-    let (settings, found) = match levels.is_some() || !layers.needs_levels() {
-        true => {
-            let completed = layers.completed(&geometry, levels.as_ref()).map_err(input)?;
-            (completed.settings, completed.said)
-        }
-        false => (settings, Vec::new()),
-    };
-    let mut scene = Scene::new(geometry, samples, settings).map_err(input)?;
-    scene.found = found;
-    Ok(scene)
+/// What the scenes of a volume of a recording have in common, but for the levels of its echoes.
+pub fn recorded(source: &dyn Source, volume: usize) -> Recorded {
+    Recorded {
+        geometry: source.geometry(volume),
+        stated: Input { stored: source.stored_type(), range: source.range() },
+        shift: source.sample_type().shift(),
+        levels: None,
+        is_completed: true,
+    }
 }
 
 /// Adds a preset: a built-in one, or else one of the user's.

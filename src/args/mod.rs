@@ -10,8 +10,8 @@ mod source;
 mod user_files;
 
 pub use input::{
-    InputArgs, Output, SceneArgs, check_outputs, check_volume, device_failure, frames_of, open_device,
-    open_device_for_statistics, open_device_until, scene_to_show, write_report,
+    InputArgs, Opened, Output, SceneArgs, check_outputs, check_volume, device_failure, frames_of, open_device,
+    open_device_for_statistics, open_device_until, recorded, write_report,
 };
 pub use motor::{SerialArgs, motor_failure, motor_table};
 pub use picture_file::PictureFile;

@@ -4,11 +4,10 @@ use super::digest_of;
 use super::manifest::Numbered;
 use super::results::{Record, read_record};
 use super::unit::{Key, Kind, Work};
-use crate::args::{check_volume, scene_to_show};
+use crate::args::{check_volume, recorded};
 use crate::files::escaped;
 use crate::probe::{Geometry, Grid, World};
-use crate::scene::default_look::block_edge;
-use crate::scene::{EchoHistogram, Scene};
+use crate::scene::Scene;
 use crate::source::convert::{Target, Volume, lattice};
 use crate::source::{self, Frame, Source, StoredType};
 use crate::terminal::{Failure, input};
@@ -146,11 +145,13 @@ fn frames(work: &Work, source: &mut dyn Source) -> Result<Vec<Frame>, Failure> {
 
 fn drawable(work: &Work, source: &mut dyn Source) -> Result<Contents, Failure> {
     let frames = frames(work, source)?;
-    let scene = scene_to_show(source, work.volume, &work.layers, |_, geometry, samples| {
-        let mut histogram = EchoHistogram::new(geometry, samples, block_edge(geometry));
+    let mut recorded = recorded(source, work.volume);
+    if recorded.needs_levels(&work.layers) {
+        let mut histogram = recorded.histogram(&work.layers).map_err(input)?;
         frames.iter().for_each(|frame| histogram.take(&frame.bytes));
-        Ok(histogram.levels())
-    })?;
+        recorded.levels = histogram.levels();
+    }
+    let scene = recorded.scene(&work.layers).map_err(input)?;
     let mut is_there = vec![false; scene.geometry.slices()];
     frames.iter().for_each(|frame| is_there.iter_mut().skip(frame.slice).take(1).for_each(|there| *there = true));
     let is_whole = is_there.iter().all(|there| *there);

@@ -1,28 +1,57 @@
-//! The line about a picture that is wholly one colour: why it is. Each cause is tested on what the rays meet, in the order in which a
-//! picture comes about.
+//! The line about a picture in which there is nothing: it is wholly one colour, or the ground alone. Each cause is tested on what the rays meet, in the order
+//! in which a picture comes about.
 
 use crate::passes::Texels;
+use crate::passes::light_volume::bare_ground;
+use crate::passes::postprocess::toned;
 use crate::passes::raycast::survey::{self, Survey, survey};
 use crate::picture::Picture;
-use crate::scene::{Mode, Scene, transfer};
+use crate::scene::{Layout, Mode, Scene, transfer};
 use crate::source::StoredType;
 
-/// The colour of a picture of two pixels and more that has only one: red, green, blue.
-pub fn of(picture: &Picture) -> Option<[u8; 3]> {
+/// What a picture without anything in it shows.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Nothing {
+    /// One colour: red, green, blue.
+    Colour([u8; 3]),
+    /// The ground behind a volume, which fills the picture.
+    Ground,
+}
+
+/// What a picture of two pixels and more shows that has nothing in it; none for another picture.
+pub fn of(scene: &Scene, picture: &Picture) -> Option<Nothing> {
     let mut pixels = picture.rgba.chunks_exact(4).map(|p| [p[0], p[1], p[2]]);
     let first = pixels.next().filter(|_| picture.rgba.len() > 4)?;
-    pixels.all(|p| p == first).then_some(first)
+    if pixels.all(|p| p == first) {
+        return Some(Nothing::Colour(first));
+    }
+    is_ground(scene, picture).then_some(Nothing::Ground)
+}
+
+/// True if every pixel has the colour of the ground, to a level.
+fn is_ground(scene: &Scene, picture: &Picture) -> bool {
+    // Where tiles share the picture, others are full.
+    if scene.settings.layout != Layout::Single || [picture.width, picture.height] != scene.picture_size() {
+        return false;
+    }
+    let [across, down] = [0, 1].map(|a| f64::from(scene.ray_size()[a]) / f64::from(scene.picture_size()[a]));
+    let width = picture.width as usize;
+    picture.rgba.chunks_exact(4).enumerate().all(|(n, pixel)| {
+        let at = [((n % width) as f64 + 0.5) * across, ((n / width) as f64 + 0.5) * down];
+        let shown = bare_ground(scene, at).map(|ground| toned(scene, ground));
+        shown.is_some_and(|shown| shown.iter().zip(pixel).all(|(c, byte)| (255.0 * c - f64::from(*byte)).abs() <= 1.0))
+    })
 }
 
 /// The line for standard error.
-pub fn line(file: &str, colour: [u8; 3], why: Option<&str>) -> String {
-    let [r, g, b] = colour;
-    let colour = match colour {
-        [0, 0, 0] => "black".into(),
-        [255, 255, 255] => "white".into(),
-        _ => format!("of one colour (red {r}, green {g}, blue {b})"),
+pub fn line(file: &str, nothing: Nothing, why: Option<&str>) -> String {
+    let shown = match nothing {
+        Nothing::Ground => "the ground alone (light.volume.ground)".into(),
+        Nothing::Colour([0, 0, 0]) => "wholly black".into(),
+        Nothing::Colour([255, 255, 255]) => "wholly white".into(),
+        Nothing::Colour([r, g, b]) => format!("wholly of one colour (red {r}, green {g}, blue {b})"),
     };
-    format!("{file}: is wholly {colour}: {}", why.unwrap_or("the scene has no volume"))
+    format!("{file}: is {shown}: {}", why.unwrap_or("the scene has no volume"))
 }
 
 /// The cause, in words. `volume`: the texels of the scene's volume. `shift`: stored sample minus the file's value.

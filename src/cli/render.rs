@@ -173,7 +173,7 @@ impl Render {
             say!("{noise}");
         }
         self.judge_budget(&measured)?;
-        if let Some(colour) = one_colour::of(&picture) {
+        if let Some(colour) = one_colour::of(renderer.scene(), &picture) {
             let shift = source.sample_type().shift();
             let volume = renderer.read(Slot::Volume).map_err(failed)?;
             let why = volume.map(|volume| one_colour::cause(renderer.scene(), &volume, shift));
@@ -226,7 +226,7 @@ impl Render {
     /// Opens the recording and builds its scene, with the settings that keep the budget if there is one.
     fn open(&self) -> Result<(Box<dyn Source>, Scene), Failure> {
         let still = self.still_args()?.map_or_else(Vec::new, |still| still.set);
-        let (Some(budget), Some(file)) = (&self.budget, &self.report) else { return self.input.open_to_show(&still) };
+        let (Some(budget), Some(file)) = (&self.budget, &self.report) else { return self.input.open_with(&still) };
         let time = parse_nanoseconds("--budget", budget)?;
         let report = read_report(file)?;
         let (_, scene) = self.input.open()?;
@@ -248,7 +248,7 @@ impl Render {
         let of = if report.is_of(&scene) { "this scene" } else { "another scene, whose error it is" };
         say!("budget {budget}: {}, measured on {} with {of}", choice.describe(measure), report.device);
         let chosen = choice.set.iter().map(|set| (format!("--budget, {set}"), set.clone())).chain(still);
-        self.input.open_to_show(&chosen.collect::<Vec<_>>())
+        self.input.open_with(&chosen.collect::<Vec<_>>())
     }
 
     fn still_args(&self) -> Result<Option<StillArgs>, Failure> {

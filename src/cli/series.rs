@@ -210,7 +210,7 @@ impl SeriesArgs {
         match self.volumes {
             Some(Volumes::Range(first, _)) => job.input.open_volumes(first),
             Some(Volumes::All | Volumes::Loop) => job.input.open_volumes(0),
-            None => job.input.open_to_show(&[]),
+            None => job.input.open(),
         }
     }
 
@@ -299,7 +299,7 @@ impl Series<'_> {
             let shown = marked::as_set(&picture, renderer.scene(), renderer.unveiled(), self.demo)
                 .map_err(|e| DrawFault::Source(failed(e)))?;
             // Before the picture is written: a device that is lost here draws it again.
-            let why = match one_colour::of(&picture).filter(|_| n == 0) {
+            let why = match one_colour::of(renderer.scene(), &picture).filter(|_| n == 0) {
                 Some(colour) => {
                     let volume = renderer.read(Slot::Volume)?;
                     let why = volume.map(|v| one_colour::cause(renderer.scene(), &v, source.sample_type().shift()));

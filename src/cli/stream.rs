@@ -262,8 +262,8 @@ impl Stream {
 
 /// Says why a picture is wholly one colour, if it is. True if something was said.
 fn explain_one_colour(stream: &mut Live, shown: &FinishedPicture, file: &Path) -> Result<bool, Failure> {
-    let Some(colour) = shown.picture.as_ref().and_then(one_colour::of) else { return Ok(false) };
-    let Some(renderer) = stream.renderer() else { return Ok(false) };
+    let (Some(picture), Some(renderer)) = (shown.picture.as_ref(), stream.renderer()) else { return Ok(false) };
+    let Some(colour) = one_colour::of(renderer.scene(), picture) else { return Ok(false) };
     let volume = renderer.read(Slot::Volume).map_err(failed)?;
     let why = volume.map(|volume| one_colour::cause(renderer.scene(), &volume, 0.0));
     remark(&one_colour::line(&file.display().to_string(), colour, why.as_deref()));

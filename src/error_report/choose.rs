@@ -6,7 +6,7 @@
 //!
 //! [`measure`]: super::measure
 
-use super::{Combination, Dial, Measure, Point, Report, Time, Times};
+use super::{Combination, Dial, Kind, Measure, Point, Report, Time, Times};
 use std::fmt::Write as _;
 
 /// Relative difference below which two predicted times count as equal. It bounds the number of proposals.
@@ -24,8 +24,11 @@ pub enum Bound {
     Time(f64),
 }
 
-/// The combination to take: with an error bound the fastest that keeps it, with a time bound the most accurate. Times whose ranges
-/// overlap are equal; of those the most accurate is taken. `refused`: combinations that are no choice, by index.
+/// Most combinations of which more runs tell the fastest.
+pub const MAX_CONTENDERS: usize = 6;
+
+/// The combination to take: with an error bound the fastest that keeps it, by the median, with a time bound the most accurate. `refused`: combinations
+/// that are no choice, by index.
 ///
 /// # Errors
 /// One line: nothing was timed, or no measured combination keeps the bound. It names the nearest.
@@ -44,12 +47,12 @@ pub fn choose(report: &Report, measure: Measure, bound: Bound, refused: &[usize]
     match bound {
         Bound::Error(error) => {
             let kept = |c: &&Candidate| c.error <= error && open(c);
-            let Some(fastest) = all.iter().filter(kept).min_by(by_time) else {
+            let fastest = |a: &&Candidate, b: &&Candidate| by_time(a, b).then(a.error.total_cmp(&b.error));
+            let found = all.iter().filter(kept).min_by(fastest).ok_or_else(|| {
                 let best = all.iter().min_by(by_error).map_or(String::new(), describe);
-                return Err(format!("no settings hold {}: the most accurate are {best}", measure.format(error)));
-            };
-            let as_fast = |c: &&Candidate| kept(c) && c.times[0] <= fastest.times[2];
-            Ok(all.iter().filter(as_fast).min_by(by_error).unwrap_or(fastest).index)
+                format!("no settings hold {}: the most accurate are {best}", measure.format(error))
+            })?;
+            Ok(found.index)
         }
         Bound::Time(time) => {
             let kept = |c: &&Candidate| c.p95 * (1.0 + TIME_MARGIN) <= time && open(c);
@@ -64,6 +67,16 @@ pub fn choose(report: &Report, measure: Measure, bound: Bound, refused: &[usize]
             Ok(found.index)
         }
     }
+}
+
+/// The combinations that may be the fastest within an error bound: those that keep it and whose interval of the time reaches that of the fastest, the
+/// fastest first, at most [`MAX_CONTENDERS`]. More runs tell which of them it is.
+pub fn contenders(report: &Report, measure: Measure, error: f64, refused: &[usize]) -> Vec<usize> {
+    let mut kept: Vec<Candidate> =
+        candidates(report, measure).filter(|c| c.error <= error && !refused.contains(&c.index)).collect();
+    kept.sort_by(|a, b| a.times[1].total_cmp(&b.times[1]).then(a.error.total_cmp(&b.error)));
+    let reach = kept.first().map_or(0.0, |fastest| fastest.times[2]);
+    kept.into_iter().filter(|c| c.times[0] <= reach).map(|c| c.index).take(MAX_CONTENDERS).collect()
 }
 
 /// The Pareto front of the measured combinations, from the fastest to the most accurate: indices into the report's choices.
@@ -83,17 +96,21 @@ struct Candidate {
 }
 
 fn candidates(report: &Report, measure: Measure) -> impl Iterator<Item = Candidate> {
-    report.choices.iter().enumerate().filter_map(move |(index, c)| {
+    report.choices.iter().enumerate().filter(|(_, c)| keeps_surfaces(report, c)).filter_map(move |(index, c)| {
         let (error, time) = (c.error_limit(measure)?, c.times?.total);
         Some(Candidate { index, error, times: [time.low, time.median, time.high], p95: time.p95 })
     })
 }
 
 impl Combination {
-    /// The error, and that of its reference in addition: an upper limit by the triangle inequality. For distances and normals, whose
-    /// reference has no estimate, the error alone.
+    /// The error, and that of its reference in addition: an upper limit by the triangle inequality, and of levels nearly one. For distances and normals,
+    /// whose reference has no estimate, the error alone.
     pub fn error_limit(&self, measure: Measure) -> Option<f64> {
-        let own = if measure == Measure::Rmse { self.reference_error } else { 0.0 };
+        let own = match measure {
+            Measure::Rmse => self.reference_error.rmse,
+            Measure::Levels => self.reference_error.levels,
+            Measure::Mm | Measure::Degrees => 0.0,
+        };
         measure.of(&self.errors).map(|error| error + own)
     }
 
@@ -112,6 +129,15 @@ impl Combination {
     }
 }
 
+/// Share of all pixels that find another surface than the reference, or none, which any choice may have: single rays at an edge.
+const FEW_RAYS: f64 = 1e-3;
+
+/// True if a choice has no more rays that find something else than the scene as it is: they are in no error of its picture.
+fn keeps_surfaces(report: &Report, choice: &Combination) -> bool {
+    let changed = |c: &Combination| c.errors.mm.map_or(0.0, |mm| mm.missed_hits + mm.false_hits + mm.jumps);
+    changed(choice) <= report.choices.first().map_or(0.0, changed).max(FEW_RAYS)
+}
+
 /// Changes of several dials at once: index of the dial and of its point.
 pub type Changes = Vec<(usize, usize)>;
 
@@ -120,7 +146,7 @@ pub type Changes = Vec<(usize, usize)>;
 /// bound, those near it come first.
 pub fn proposals(dials: &[Dial], bound: Option<Bound>, most: usize) -> Vec<Changes> {
     let turned: Vec<usize> =
-        (0..dials.len()).filter(|d| dials[*d].is_numerical && default(&dials[*d]).is_some()).collect();
+        (0..dials.len()).filter(|d| dials[*d].kind == Kind::Numerical && default(&dials[*d]).is_some()).collect();
     let mut all = vec![Proposal { changes: Vec::new(), square: 0.0, log_time: 0.0 }];
     for group in groups(dials, &turned) {
         let steps: Vec<Proposal> = group.iter().flat_map(|d| steps(*d, &dials[*d])).collect();

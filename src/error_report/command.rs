@@ -1,7 +1,8 @@
 //! `echolume report error`.
 
-use crate::args::InputArgs;
+use crate::args::{InputArgs, Opened};
 use crate::error_report::choose::Bound;
+use crate::error_report::plot::Figure;
 use crate::error_report::{self, Measure, choose, dials, export, measure, plot};
 use crate::files::read_text;
 use crate::picture::replace;
@@ -17,7 +18,7 @@ const MAX_REPORT: u64 = 64 << 20;
 
 #[derive(clap::Args)]
 #[command(
-    after_help = "Each dial is varied alone; the other settings stay as in the scene. Errors are those of the picture before the tone mapping of stage 4.\n\n\
+    after_help = "Each dial is varied alone; the other settings stay as in the scene. Errors are those of the picture before the tone mapping of stage 4 (RMSE, 0..1), and after it in levels of 255.\n\n\
                         Examples:\n  \
                         echolume report error --dial step --dial format --size 96x96 -o report\n  \
                         echolume report error sweep.mha --preset fetal --mode vr --under-error 0.01\n  \
@@ -26,21 +27,20 @@ const MAX_REPORT: u64 = 64 << 20;
 pub struct ErrorReport {
     #[command(flatten)]
     input: InputArgs,
-    /// step, compositing, format, sampling, filter3d, termination, sigma, perona-malik, adaptive, resolution, rays, lut, half, brick,
-    /// transfer, or all; may be repeated
-    #[arg(long, value_name = "NAME", default_value = "all")]
+    // The help comes from the list of dials.
+    #[arg(long, value_name = "NAME", default_value = "all", help = format!("{}, or all; may be repeated", dials::NAMES.join(", ")))]
     dial: Vec<String>,
-    /// Number of volumes timed at each setting of a dial
-    #[arg(long, value_name = "N", default_value_t = 3, value_parser = clap::value_parser!(u32).range(1..=1000))]
+    /// Number of volumes timed at each setting of a dial, in turn with the scene as it is; from 6 on an interval of 95 % is known
+    #[arg(long, value_name = "N", default_value_t = 10, value_parser = clap::value_parser!(u32).range(1..=1000))]
     repeat: u32,
     /// Reference: exact (rays integrated without steps), f64 on the CPU, converged (the device's best), or auto: exact for dials of rays,
     /// f64 for others, if it takes under a minute
     #[arg(long, value_name = "WHAT", default_value = "auto")]
     against: String,
-    /// Write error.json, error.csv, error.svg and error.png into this folder
+    /// Write error.json, error.csv, error.svg and error.png into this folder; and looks.svg and looks.png, if dials of another look were measured
     #[arg(short, long, value_name = "DIR")]
     output: Option<PathBuf>,
-    /// Error measure: rmse, mm (distance maps) or degrees (normals)
+    /// Error measure: rmse, levels (95th percentile of the pixels after tone, of 255), mm (distance maps) or degrees (normals)
     #[arg(long, value_name = "NAME", default_value = "rmse")]
     measure: String,
     /// Choose the fastest settings with an error below this; they are measured again before they are printed
@@ -58,9 +58,10 @@ impl ErrorReport {
     pub fn run(&self) -> Result<(), Failure> {
         let measure = match self.measure.as_str() {
             "rmse" => Measure::Rmse,
+            "levels" => Measure::Levels,
             "mm" => Measure::Mm,
             "degrees" => Measure::Degrees,
-            other => return Err(input(format!("--measure {other}: must be rmse, mm or degrees"))),
+            other => return Err(input(format!("--measure {other}: must be rmse, levels, mm or degrees"))),
         };
         let time = self.under_time.as_deref().map(|time| parse_nanoseconds("--under-time", time)).transpose()?;
         if let Some(error) = self.under_error.filter(|e| !(*e > 0.0 && e.is_finite())) {
@@ -95,7 +96,7 @@ impl ErrorReport {
             "converged" => measure::ReferenceChoice::Converged,
             other => return Err(input(format!("--against {other}: must be exact, f64, converged or auto"))),
         };
-        let (mut source, scene) = self.input.open()?;
+        let Opened { mut source, recorded, layers, scene } = self.input.open_recorded(&[], None)?;
         if let Some(folder) = &self.output {
             std::fs::create_dir_all(folder)
                 .map_err(|e| failed(format!("{}: cannot be written: {e}", folder.display())))?;
@@ -107,10 +108,10 @@ impl ErrorReport {
             frames.push(frame);
             Ok(())
         })?;
-        let layers = self.input.layers()?;
         let (repeats, frames, shown) = (self.repeat, &frames[..], self.input.name());
         let measurement = measure::ErrorMeasurement {
             context: &context,
+            recorded: &recorded,
             layers: &layers,
             scene: &scene,
             frames,
@@ -157,11 +158,12 @@ impl ErrorReport {
         say!("holds {wanted}: {what}; {VERIFYING_RUNS} runs of this scene at {w} x {h} on {}", report.device);
         if let Some((spread, mm)) = verified.choice.errors.mm.and_then(|mm| Some((mm.error?, mm))) {
             say!(
-                "  surface: median {:.1} um, 95th percentile {:.1} um; {:.2} % of the pixels lost, {:.2} % gained",
+                "  surface: median {:.1} um, 95th percentile {:.1} um; {:.2} % of the pixels lost, {:.2} % gained, {:.2} % on another surface",
                 1e3 * spread.median,
                 1e3 * spread.p95,
                 100.0 * mm.missed_hits,
-                100.0 * mm.false_hits
+                100.0 * mm.false_hits,
+                100.0 * mm.jumps
             );
         }
         Ok(())
@@ -191,12 +193,21 @@ impl ErrorReport {
 
 fn write(report: &error_report::Report, measure: Measure, folder: &Path) -> Result<(), Failure> {
     std::fs::create_dir_all(folder).map_err(|e| failed(format!("{}: cannot be written: {e}", folder.display())))?;
-    let size = plot::size(report);
     replace(&folder.join("error.json"), report.to_json().map_err(failed)?.as_bytes()).map_err(failed)?;
     replace(&folder.join("error.csv"), export::csv(report).as_bytes()).map_err(failed)?;
-    replace(&folder.join("error.svg"), plot::svg(report, measure, size).map_err(failed)?.as_bytes()).map_err(failed)?;
-    plot::picture(report, measure, size).map_err(failed)?.save(&folder.join("error.png")).map_err(failed)?;
-    say!("written: error.json, error.csv, error.svg, error.png in {}", folder.display());
+    let mut written = vec!["error.json".to_string(), "error.csv".into()];
+    for (figure, name) in [(Figure::Errors, "error"), (Figure::Looks, "looks")] {
+        if !figure.is_in(report) {
+            continue;
+        }
+        let size = plot::size(report, figure);
+        let drawn = plot::svg(report, figure, measure, size).map_err(failed)?;
+        replace(&folder.join(format!("{name}.svg")), drawn.as_bytes()).map_err(failed)?;
+        let picture = plot::picture(report, figure, measure, size).map_err(failed)?;
+        picture.save(&folder.join(format!("{name}.png"))).map_err(failed)?;
+        written.extend([format!("{name}.svg"), format!("{name}.png")]);
+    }
+    say!("written: {} in {}", written.join(", "), folder.display());
     Ok(())
 }
 

@@ -2,6 +2,7 @@
 //! accurately, and the dial has the settings of a reference. Others choose another look, such as another filter: their pictures differ from
 //! the scene as it is, and none of them is the right one.
 
+use super::Kind;
 use super::map::step_fault;
 use crate::scene::{Compositing, Edge, Mode, PeronaMalik, Sampling, Scene, Scheme, Volume, VolumeFormat, transfer};
 
@@ -23,8 +24,9 @@ pub struct Dial {
     pub unit: &'static str,
     /// The settings to measure. The first is the scene itself.
     pub settings: Vec<DialSetting>,
-    /// True if the settings differ in look: what is measured is then no error, but the difference from the scene as it is.
-    pub is_look: bool,
+    pub kind: Kind,
+    /// True if the values lie on an axis; false for names.
+    pub is_ordered: bool,
     /// Assignments that give the reference. Empty for a look.
     pub best: Vec<String>,
     /// Assignments of the next coarser setting. Its difference from the reference estimates the error of the reference if the device
@@ -33,15 +35,10 @@ pub struct Dial {
 }
 
 impl Dial {
-    /// True if all settings compute the same picture more or less accurately. The number of pixels and of rays in a pixel is another
-    /// picture.
-    pub fn is_numerical(&self) -> bool {
-        !self.is_look && !["resolution", "rays"].contains(&self.name)
-    }
-
     /// True if its settings are ways of taking samples along rays: then exact rays are its reference.
     pub fn samples_rays(&self) -> bool {
-        ["step", "compositing", "sampling", "termination", "adaptive", "lut", "brick", "transfer"].contains(&self.name)
+        ["step", "compositing", "sampling", "termination", "adaptive", "lut", "brick", "transfer", "pipeline"]
+            .contains(&self.name)
     }
 }
 
@@ -65,6 +62,7 @@ pub const NAMES: &[&str] = &[
     "light-cell",
     "light-taps",
     "light-widening",
+    "pipeline",
 ];
 
 /// The dial of that name.
@@ -85,13 +83,18 @@ pub fn dial(name: &str, scene: &Scene) -> Result<Dial, String> {
         name,
         unit,
         settings: std::iter::once(default).chain(others).collect(),
-        is_look: false,
+        kind: match name {
+            "resolution" | "rays" => Kind::Pixels,
+            "pipeline" => Kind::Several,
+            _ => Kind::Numerical,
+        },
+        is_ordered: !["compositing", "format", "sampling", "perona-malik", "half", "brick"].contains(&name),
         best: best.to_vec(),
         nearly: nearly.to_vec(),
     };
     let look = |name, unit, others: Vec<DialSetting>| {
         let as_it_is = DialSetting { label: "as it is".into(), set: Vec::new(), value: 0.0 };
-        Dial { is_look: true, ..made(name, unit, as_it_is, others, &[], &[]) }
+        Dial { kind: Kind::Look, is_ordered: false, ..made(name, unit, as_it_is, others, &[], &[]) }
     };
     let is = |label: String, value: f64| DialSetting { label, set: Vec::new(), value };
     let at = |label: String, set: &[String], value: f64| DialSetting { label, set: set.to_vec(), value };
@@ -381,6 +384,33 @@ pub fn dial(name: &str, scene: &Scene) -> Result<Dial, String> {
             let others = [0.0, 0.2, 0.35, 0.5, 0.7, 1.0].into_iter().filter(|w| (*w - light.widening).abs() > 1e-9);
             let others = others.map(|w| at(format!("{w} mm"), &[format!("light.volume.widening={w}")], w));
             look("light-widening", "mm after 1 mm", others.collect())
+        }
+        "pipeline" => {
+            need(marches, "casts no ray")?;
+            let format = s.slices.format;
+            let lit = scene.lit_by_volume().map(|_| scene.light_lattice().cell);
+            // Steps, cells of light and bits together: coarse ones are stored in 8 bits, fine ones in 32.
+            let set = |factor: f64| {
+                let format = match factor {
+                    f if f >= 4.0 => VolumeFormat::R8,
+                    f if f <= 0.25 => VolumeFormat::R32f,
+                    _ => format,
+                };
+                let mut set =
+                    vec![format!("ray.step={}", step * factor), format!("slices.format={}", serde_word(&format))];
+                set.extend(lit.map(|cell| format!("light.volume.cell={}", (cell * factor).clamp(0.2, 10.0))));
+                set
+            };
+            let others = [8.0, 4.0, 2.0, 0.5, 0.25, 0.125].map(|f| at(format!("x {f}"), &set(f), f));
+            let fine = |f: f64| set(f);
+            made(
+                "pipeline",
+                "times step and cell",
+                is("x 1".into(), 1.0),
+                others.into(),
+                &fine(1.0 / 32.0),
+                &fine(1.0 / 16.0),
+            )
         }
         _ => return Err(format!("is unknown; there are: {}, all", NAMES.join(", "))),
     };

@@ -2,20 +2,23 @@
 //! is too slow, with a converged picture whose own error is estimated. Dials of rays are compared with exact rays where these exist.
 //! Then it does the same with combinations of several dials.
 
+use super::budget::{self, Budget, FLOOR, Share};
 use super::choose::{self, Bound, Changes};
 use super::dials::Dial;
+use super::running::{Rendering, Running, Runs, in_floats};
 use crate::error_report::convergence::{self, Range};
 use crate::error_report::metrics;
-use crate::error_report::{self, Combination, Errors, FORMAT, Measure, Point, Reference, Report, Sizes, Time, Times};
+use crate::error_report::{
+    self, Combination, Errors, FORMAT, Kind as DialKind, Measure, OwnError, Point, Reference, Report, Sizes, Times,
+};
 use crate::exact_ray::picture::{self, Effort};
-use crate::gpu::{Context, GpuError, Renderer, RendererOptions};
+use crate::gpu::{Context, GpuError};
 use crate::machine;
-use crate::passes::chain::distance_end;
 use crate::passes::shade::normal;
-use crate::passes::{Frequency, PASSES, Slot, Texels, is_hit};
-use crate::reference;
-use crate::scene::load::{Layers, LoadError};
-use crate::scene::{Scene, SceneError};
+use crate::passes::{Texels, is_hit};
+use crate::scene::default_look::Recorded;
+use crate::scene::load::Layers;
+use crate::scene::{Layout, Scene};
 use crate::source::Frame;
 use std::sync::Arc;
 
@@ -56,7 +59,9 @@ pub enum ReferenceChoice {
 /// What to measure, and on which device.
 pub struct ErrorMeasurement<'a> {
     pub context: &'a Arc<Context>,
-    /// Settings before any dial is changed.
+    /// What every scene of the report is made from.
+    pub recorded: &'a Recorded,
+    /// Settings before any dial is changed, and before they are completed.
     pub layers: &'a Layers,
     pub scene: &'a Scene,
     pub frames: &'a [Frame],
@@ -75,18 +80,12 @@ enum Kind {
     Converged,
 }
 
-/// A rendered scene: the picture before the tone mapping of stage 4, and the filtered distance map.
-struct Rendering {
-    scene: Scene,
-    picture: Texels,
-    distance: Option<Texels>,
-}
-
 /// The picture of a scene with the finest setting of every numerical dial: what combinations are compared with.
 pub struct Finest {
     rendering: Rendering,
-    /// Its RMSE against the next coarser picture; by exact rays their own estimate; 0 in f64 with fine steps.
-    error: f64,
+    reference: Reference,
+    /// Against the next coarser picture; by exact rays their own estimate; 0 in f64 with fine steps.
+    error: OwnError,
 }
 
 /// A choice that kept its bound when it was measured again.
@@ -95,60 +94,6 @@ pub struct Verified {
     pub choice: Combination,
     /// Those that did not keep it then.
     pub failed: Vec<Combination>,
-}
-
-/// A scene on the device.
-struct Running<'a> {
-    renderer: Renderer,
-    frames: &'a [Frame],
-}
-
-impl Running<'_> {
-    /// Ingests the volume and renders a picture. Returns the times of both, ns; none without time stamps.
-    fn run(&mut self) -> Result<Option<[f64; 2]>, GpuError> {
-        for frame in self.frames {
-            self.renderer.frame(frame.slice as u32, &frame.bytes, 0)?;
-        }
-        self.renderer.show(0)?;
-        self.renderer.picture()?;
-        let taken = self.renderer.take_times()?;
-        let is_of_picture = |name: &str| {
-            let pass = PASSES.iter().find(|pass| pass.name == name);
-            name == "readback" || pass.is_some_and(|pass| pass.frequency == Frequency::Picture)
-        };
-        let (picture, volume): (Vec<_>, Vec<_>) = taken.iter().partition(|t| is_of_picture(t.name));
-        let sum = |times: &[&crate::passes::PassTime]| times.iter().map(|t| t.total).sum::<f64>();
-        Ok((!taken.is_empty()).then(|| [sum(&volume), sum(&picture)]))
-    }
-
-    fn read(&mut self) -> Result<Rendering, GpuError> {
-        let scene = self.renderer.scene().clone();
-        let missing = || GpuError::Broken("the plan has no picture".into());
-        let picture = self.renderer.read(Slot::Picture)?.ok_or_else(missing)?;
-        let distance = match scene.has_distance() {
-            true => self.renderer.read(distance_end(&scene))?,
-            false => None,
-        };
-        Ok(Rendering { scene, picture, distance })
-    }
-}
-
-/// Runs of a scene in turn with the default: [volume, picture], ns.
-#[derive(Default)]
-struct Runs {
-    own: Vec<[f64; 2]>,
-    default: Vec<[f64; 2]>,
-}
-
-impl Runs {
-    /// Times of each run relative to the default's beside it.
-    fn ratios(&self) -> Option<Times> {
-        let of = |part: fn(&[f64; 2]) -> f64| {
-            let ratios = self.own.iter().zip(&self.default).map(|(own, default)| part(own) / part(default));
-            Time::of(&ratios.filter(|r| r.is_finite()).collect::<Vec<_>>())
-        };
-        Some(Times { volume: of(|r| r[0])?, picture: of(|r| r[1])?, total: of(|r| r[0] + r[1])? })
-    }
 }
 
 impl ErrorMeasurement<'_> {
@@ -164,15 +109,21 @@ impl ErrorMeasurement<'_> {
         bound: Option<Bound>,
         mut progress: impl FnMut(&str, &str),
     ) -> Result<Report, MeasureError> {
-        let mut measured = Vec::new();
+        let (mut measured, mut singles) = (Vec::new(), Vec::new());
         for dial in dials {
-            measured.push(self.measure_dial(dial, &mut progress)?);
+            measured.push(self.measure_dial(dial, finest, &mut singles, &mut progress)?);
         }
         let mut choices = Vec::new();
         for changes in choose::proposals(&measured, bound, MAX_COMBINATIONS) {
             progress("combination", &(choices.len() + 1).to_string());
-            choices.push(self.combination(finest, &measured, &changes)?);
+            // The points of a dial alone were measured with it.
+            if changes.len() != 1 {
+                choices.push(self.combination(finest, &measured, &changes)?);
+            }
         }
+        choices.extend(singles);
+        progress("error budget", "");
+        let budget = self.budget(finest)?;
         let machine = machine::device(self.context);
         Ok(Report {
             format: FORMAT.into(),
@@ -184,6 +135,7 @@ impl ErrorMeasurement<'_> {
             repeats: self.repeats,
             dials: measured,
             choices,
+            budget,
         })
     }
 
@@ -193,28 +145,55 @@ impl ErrorMeasurement<'_> {
     /// # Errors
     /// As [`ErrorMeasurement::report`].
     pub fn finest(&self) -> Result<Finest, MeasureError> {
-        let of = |assignments: fn(&Dial) -> &[String]| {
-            let dials = super::dials::NAMES.iter().filter_map(|name| super::dials::dial(name, self.scene).ok());
-            let numerical: Vec<Dial> = dials.filter(Dial::is_numerical).collect();
-            // The number of rays is another picture: the mean over a pixel in place of its middle.
-            let sets = numerical.iter().flat_map(assignments).filter(|set| !set.starts_with("ray.rays="));
-            sets.cloned().collect::<Vec<String>>()
-        };
-        let scene_of = |set: &[String]| self.scene_with("combination", set);
-        let best = scene_of(&of(|dial| &dial.best))?;
+        let sources = budget::sources(self.scene);
+        let all = |of: fn(&budget::Source) -> &[String]| sources.iter().flat_map(of).cloned().collect::<Vec<String>>();
+        let (finest, nearly) = (all(|s| &s.finest), all(|s| &s.nearly));
+        let best = self.scene_with("combination", &finest)?;
         match self.kind("combination", false, true, &best)?.0 {
             Kind::Exact => {
                 let (rendering, effort) = self.by_exact_rays(&best);
-                return Ok(Finest { rendering, error: effort.estimate });
+                let reference = Reference::Exact { estimate: effort.estimate, pieces: effort.pieces };
+                let error = OwnError { rmse: effort.estimate, levels: 255.0 * effort.estimate };
+                return Ok(Finest { rendering, reference, error });
             }
             Kind::F64 => {
-                return Ok(Finest { rendering: self.in_f64(&best, &mut |_, _, _| false), error: 0.0 });
+                let rendering = Rendering::in_f64(&best, self.frames, &mut |_, _, _| false);
+                return Ok(Finest { rendering, reference: Reference::F64, error: OwnError::default() });
             }
             Kind::Look | Kind::Converged => {}
         }
-        let (rendering, nearly) = (self.rendered(&best)?, self.rendered(&scene_of(&of(|dial| &dial.nearly))?)?);
-        let error = compare("combination", &[], &nearly, &rendering)?.rmse;
-        Ok(Finest { rendering, error })
+        let rendering = self.rendered(&best)?;
+        let nearly = self.rendered(&self.scene_with("combination", &nearly)?)?;
+        let error = OwnError::of(&compare("combination", &[], &nearly, &rendering)?);
+        let reference = Reference::Converged { set: finest, rmse: error.rmse };
+        Ok(Finest { rendering, reference, error })
+    }
+
+    /// What each source adds to the error of the scene, and all of them.
+    fn budget(&self, finest: &Finest) -> Result<Budget, MeasureError> {
+        let against = |scene: &Scene| compare("error budget", &[], &self.rendered(scene)?, &finest.rendering);
+        let sources = budget::sources(self.scene);
+        let without = |left: Option<usize>| {
+            let others = sources.iter().enumerate().filter(|(n, _)| Some(*n) != left);
+            self.scene_with("error budget", &others.flat_map(|(_, source)| source.finest.clone()).collect::<Vec<_>>())
+        };
+        let mut shares = Vec::new();
+        for (n, source) in sources.iter().enumerate() {
+            // A source that is as fine as it gets adds nothing.
+            if self.scene_with("error budget", &source.finest)?.settings == self.scene.settings {
+                continue;
+            }
+            let errors = against(&without(Some(n))?)?;
+            shares.push(Share { source: source.name.into(), label: source.label.clone(), errors });
+        }
+        let label = "everything as fine as it gets".into();
+        shares.push(Share { source: FLOOR.into(), label, errors: against(&without(None)?)? });
+        Ok(Budget {
+            reference: finest.reference.clone(),
+            reference_error: finest.error,
+            shares,
+            total: against(self.scene)?,
+        })
     }
 
     /// Renders and times a combination anew.
@@ -242,7 +221,11 @@ impl ErrorMeasurement<'_> {
         let mut refused = Vec::new();
         let mut failed = Vec::new();
         loop {
-            let found = choose::choose(report, measure, bound, &refused).map_err(MeasureError::NoChoice)?;
+            let mut found = choose::choose(report, measure, bound, &refused).map_err(MeasureError::NoChoice)?;
+            if let Bound::Error(error) = bound {
+                let contenders = choose::contenders(report, measure, error, &refused);
+                found = self.fastest(report, &contenders, runs)?.unwrap_or(found);
+            }
             let again = self.measure_again(finest, &report.choices[found], runs)?;
             let kept = match bound {
                 Bound::Error(error) => again.error_limit(measure).is_some_and(|limit| limit <= error),
@@ -254,6 +237,28 @@ impl ErrorMeasurement<'_> {
             refused.push(found);
             failed.push(again);
         }
+    }
+
+    /// The fastest of several choices, by the median of so many runs in turn; none of one.
+    fn fastest(&self, report: &Report, contenders: &[usize], runs: u32) -> Result<Option<usize>, MeasureError> {
+        if contenders.len() < 2 {
+            return Ok(None);
+        }
+        let mut all = Vec::new();
+        for index in contenders {
+            let scene = self.scene_with("combination", &report.choices[*index].set)?;
+            all.push((*index, self.running(&scene)?, Vec::new()));
+        }
+        for n in 0..runs as usize {
+            let count = all.len();
+            // Each goes first as often as the others.
+            for place in 0..count {
+                let (_, running, times) = &mut all[(n + place) % count];
+                times.extend(running.run()?);
+            }
+        }
+        let medians = all.iter().filter_map(|(index, _, times)| Some((*index, Times::of(times)?.total.median)));
+        Ok(medians.min_by(|a, b| a.1.total_cmp(&b.1)).map(|(index, _)| index))
     }
 
     fn combination(
@@ -279,14 +284,16 @@ impl ErrorMeasurement<'_> {
     fn measure_dial(
         &self,
         dial: &Dial,
+        finest: &Finest,
+        singles: &mut Vec<Combination>,
         progress: &mut impl FnMut(&str, &str),
     ) -> Result<error_report::Dial, MeasureError> {
         progress(dial.name, "its reference");
         let best = self.scene_at(dial, &dial.best)?;
-        let (kind, note) = self.kind(dial.name, dial.is_look, dial.samples_rays(), &best)?;
+        let (kind, note) = self.kind(dial.name, dial.kind == DialKind::Look, dial.samples_rays(), &best)?;
         let (expected, reference) = match kind {
             Kind::Look => (self.rendered(&best)?, Reference::AsItIs),
-            Kind::F64 => (self.in_f64(&best, &mut |_, _, _| false), Reference::F64),
+            Kind::F64 => (Rendering::in_f64(&best, self.frames, &mut |_, _, _| false), Reference::F64),
             Kind::Exact => {
                 let (expected, effort) = self.by_exact_rays(&best);
                 (expected, Reference::Exact { estimate: effort.estimate, pieces: effort.pieces })
@@ -307,6 +314,16 @@ impl ErrorMeasurement<'_> {
             progress(dial.name, &setting.label);
             let (rendering, runs) = self.in_turn(&self.scene_at(dial, &setting.set)?, &mut default, self.repeats)?;
             default_runs.extend(&runs.default);
+            // What a choice may take is compared with the picture that all choices are compared with, too.
+            if n > 0 && matches!(dial.kind, DialKind::Numerical | DialKind::Several) {
+                singles.push(Combination {
+                    changed: vec![(dial.name.into(), setting.label.clone())],
+                    set: setting.set.clone(),
+                    errors: compare(dial.name, &setting.set, &rendering, &finest.rendering)?,
+                    reference_error: finest.error,
+                    times: Times::of(&runs.own),
+                });
+            }
             points.push(Point {
                 label: setting.label.clone(),
                 set: setting.set.clone(),
@@ -345,7 +362,8 @@ impl ErrorMeasurement<'_> {
         let order = if steps { fitted() } else { None };
         Ok(error_report::Dial {
             name: dial.name.into(),
-            is_numerical: dial.is_numerical(),
+            kind: dial.kind,
+            is_ordered: dial.is_ordered,
             unit: dial.unit.into(),
             reference,
             points,
@@ -359,8 +377,9 @@ impl ErrorMeasurement<'_> {
     fn by_exact_rays(&self, scene: &Scene) -> (Rendering, Effort) {
         let mut effort = Effort::default();
         let scene = &in_floats(scene);
-        let rendering =
-            self.in_f64(scene, &mut |pass, reads, writes| picture::replace(scene, pass, reads, writes, &mut effort));
+        let rendering = Rendering::in_f64(scene, self.frames, &mut |pass, reads, writes| {
+            picture::replace(scene, pass, reads, writes, &mut effort)
+        });
         (rendering, effort)
     }
 
@@ -403,60 +422,25 @@ impl ErrorMeasurement<'_> {
 
     fn scene_with(&self, dial: &'static str, set: &[String]) -> Result<Scene, MeasureError> {
         let fault = |fault: String| MeasureError::Setting { dial, set: set.join(" "), fault };
-        let layered = || -> Result<_, LoadError> {
-            let mut layers = self.layers.clone();
-            set.iter().try_for_each(|assignment| layers.set(assignment))?;
-            layers.finish()
-        };
-        let settings = layered().map_err(|e| fault(e.to_string()))?;
-        let made: Result<Scene, SceneError> = Scene::new(self.scene.geometry.clone(), self.scene.input, settings);
-        made.map_err(|e| fault(e.to_string()))
+        let mut layers = self.layers.clone();
+        set.iter().try_for_each(|assignment| layers.set(assignment)).map_err(|e| fault(e.to_string()))?;
+        self.recorded.scene(&layers).map_err(|e| fault(e.to_string()))
     }
 
-    /// The scene on the device, after a first run that compiles its shaders.
     fn running(&self, scene: &Scene) -> Result<Running<'_>, GpuError> {
-        let renderer = Renderer::new(self.context, in_floats(scene), &RendererOptions::default())?;
-        let mut running = Running { renderer, frames: self.frames };
-        running.run()?;
-        Ok(running)
+        Running::new(self.context, self.frames, scene)
     }
 
     fn rendered(&self, scene: &Scene) -> Result<Rendering, GpuError> {
         self.running(scene)?.read()
     }
 
-    /// Renders a scene, and times it in turn with the default, which goes first in every other run: what slows the machine down slows
-    /// both.
+    /// Renders a scene, and times it in turn with the default.
     fn in_turn(&self, scene: &Scene, default: &mut Running, runs: u32) -> Result<(Rendering, Runs), GpuError> {
         let mut own = self.running(scene)?;
-        let mut all = Runs::default();
-        for n in 0..runs {
-            let first = if n % 2 == 0 { default.run()? } else { None };
-            let mine = own.run()?;
-            let last = if n % 2 == 1 { default.run()? } else { None };
-            if let (Some(mine), Some(default)) = (mine, first.or(last)) {
-                all.own.push(mine);
-                all.default.push(default);
-            }
-        }
+        let all = Runs::in_turn(&mut own, default, runs)?;
         Ok((own.read()?, all))
     }
-
-    fn in_f64(&self, scene: &Scene, replace: &mut reference::Replacement) -> Rendering {
-        let scene = &in_floats(scene);
-        let frames = reference::decoded(scene, self.frames);
-        let mut slots = reference::render_with(scene, &frames, replace);
-        let distance = if scene.has_distance() { slots.remove(&distance_end(scene)) } else { None };
-        let picture = slots.remove(&Slot::Picture).unwrap_or_else(|| Texels::untouched([0; 3], 4));
-        Rendering { scene: scene.clone(), picture, distance }
-    }
-}
-
-/// The scene with a picture of floats: steps of 8 bits are as large as many errors.
-fn in_floats(scene: &Scene) -> Scene {
-    let mut scene = scene.clone();
-    scene.settings.post.floats = true;
-    scene
 }
 
 /// Number of samples that the f64 reference of a scene takes, filters of slices included.
@@ -505,15 +489,51 @@ fn compare(
     reference: &Rendering,
 ) -> Result<Errors, MeasureError> {
     let fault = |fault: String| MeasureError::Setting { dial, set: set.join(" "), fault };
-    let picture = enlarged(&rendering.picture, reference.picture.size);
-    let mut errors = Errors::from(metrics::pictures(&picture, &reference.picture).map_err(fault)?);
+    let size = reference.picture.size;
+    let mut picture = enlarged(&rendering.picture, size);
     let maps = rendering.distance.as_ref().zip(reference.distance.as_ref());
+    let cliff = reference.scene.cliff();
+    // Where tiles share the picture, a pixel has no ray of its own.
+    let is_single = reference.scene.settings.layout == Layout::Single;
+    let changed = match maps.filter(|_| is_single && reference.scene.detects_surface()) {
+        Some((measured, expected)) => metrics::changed_rays(measured, expected, cliff, size),
+        None => vec![false; size[0] * size[1]],
+    };
+    let (channels, all) = (picture.channels.max(1), picture.values.len() / picture.channels.max(1));
+    for (n, _) in changed.iter().enumerate().filter(|(_, is_changed)| **is_changed) {
+        let texel = n * channels..(n + 1) * channels;
+        if let (Some(own), Some(expected)) =
+            (picture.values.get_mut(texel.clone()), reference.picture.values.get(texel))
+        {
+            own.copy_from_slice(expected);
+        }
+    }
+    let own = metrics::pictures(&picture, &reference.picture).map_err(fault)?;
+    let counted = changed.iter().filter(|is_changed| !**is_changed).count().max(1);
+    // The mean is over what was compared.
+    let rmse = own.rmse * (all as f64 / counted as f64).sqrt();
+    let psnr = (rmse > 0.0).then(|| -20.0 * rmse.log10());
+    let levels = metrics::levels(&rendering.toned(&picture), &reference.toned(&reference.picture), &changed);
+    let levels = levels.map_err(fault)?;
+    let mut errors = Errors { rmse, max: own.max, psnr, ssim: own.ssim, levels, mm: None, degrees: None };
     if let Some((measured, expected)) = maps.filter(|(a, b)| a.size == b.size) {
-        errors.mm = Some(metrics::distances(measured, expected).map_err(fault)?);
-        let (measured, expected) = (normals(&rendering.scene, measured), normals(&reference.scene, expected));
+        errors.mm = Some(metrics::surfaces(measured, expected, cliff).map_err(fault)?);
+        let same = same_surface(measured, expected, cliff);
+        let (measured, expected) = (normals(&rendering.scene, &same), normals(&reference.scene, expected));
         errors.degrees = Some(metrics::normals(&measured, &expected).map_err(fault)?);
     }
     Ok(errors)
+}
+
+/// The distances of a map, those of the reference where they jump to another surface: normals are not compared across.
+fn same_surface(measured: &Texels, expected: &Texels, cliff: f64) -> Texels {
+    let mut same = measured.clone();
+    for (own, other) in same.values.iter_mut().zip(&expected.values) {
+        if is_hit(*own) && is_hit(*other) && (*own - other).abs() > cliff {
+            *own = *other;
+        }
+    }
+    same
 }
 
 fn normals(scene: &Scene, distances: &Texels) -> Texels {

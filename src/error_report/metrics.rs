@@ -38,16 +38,75 @@ pub struct Spread {
     pub count: usize,
 }
 
+/// Differences of two pictures as a screen shows them, in levels of 255, not rounded. A pixel's difference is that of its channel that differs most.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Levels {
+    pub rms: f64,
+    pub median: f64,
+    /// 95th percentile, interpolated linearly.
+    pub p95: f64,
+    pub max: f64,
+    /// Share of the pixels that differ by more than 1 level, and by more than 8.
+    pub over_1: f64,
+    pub over_8: f64,
+}
+
 /// Differences of two maps of a surface.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct SurfaceError {
-    /// Over the pixels that are hit in both, mm or degrees; None if there are none.
+    /// Over the pixels that are hit in both and do not jump, mm or degrees; None if there are none.
     pub error: Option<Spread>,
     /// Share of all pixels that are hit, but missed in the reference.
     pub false_hits: f64,
     /// Share of all pixels that are missed, but hit in the reference.
     pub missed_hits: f64,
+    /// Share of all pixels that are hit in both, but on another surface.
+    pub jumps: f64,
+}
+
+/// Compares toned pictures, values in 0..1, of which `left_out` pixels do not count.
+///
+/// # Errors
+/// As [`pictures`].
+pub fn levels(measured: &Texels, reference: &Texels, left_out: &[bool]) -> Result<Levels, String> {
+    check("picture", measured, reference)?;
+    let channels = measured.channels;
+    let pairs = measured.values.chunks_exact(channels).zip(reference.values.chunks_exact(channels)).enumerate();
+    let counted = pairs.filter(|(n, _)| !left_out.get(*n).is_some_and(|is_out| *is_out));
+    let of_pixel = |(a, b): (&[f64], &[f64])| a.iter().zip(b).take(3).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+    let differences: Vec<f64> = counted.map(|(_, pair)| 255.0 * of_pixel(pair)).collect();
+    let share =
+        |limit: f64| differences.iter().filter(|d| **d > limit).count() as f64 / differences.len().max(1) as f64;
+    let (over_1, over_8) = (share(1.0), share(8.0));
+    let Some(spread) = spread(differences) else { return Ok(Levels::default()) };
+    Ok(Levels { rms: spread.rms, median: spread.median, p95: spread.p95, max: spread.max, over_1, over_8 })
+}
+
+/// The pixels of a picture of `size` whose rays find something else: lost, gained, or on a surface that is farther away by more than `cliff` mm. With them
+/// their neighbours, whose normals and edges they change. The maps may have other sizes than the picture; the ray in a pixel's middle tells.
+pub fn changed_rays(measured: &Texels, reference: &Texels, cliff: f64, size: [usize; 3]) -> Vec<bool> {
+    let at = |map: &Texels, x: usize, y: usize| {
+        let along = |n: usize, axis: usize| {
+            let place = (2 * n + 1) * map.size[axis] / (2 * size[axis]).max(1);
+            place.min(map.size[axis].saturating_sub(1))
+        };
+        map.one(along(x, 0), along(y, 1), 0)
+    };
+    let [width, height, _] = size;
+    let differs = |n: usize| {
+        let [a, b] = [measured, reference].map(|map| at(map, n % width, n / width));
+        is_hit(a) != is_hit(b) || (is_hit(a) && (a - b).abs() > cliff)
+    };
+    let changed: Vec<bool> = (0..width * height).map(differs).collect();
+    let near = |n: usize| {
+        let (x, y) = (n % width, n / width);
+        let rows = y.saturating_sub(1)..=(y + 1).min(height - 1);
+        rows.flat_map(|y| (x.saturating_sub(1)..=(x + 1).min(width - 1)).map(move |x| (x, y)))
+            .any(|(x, y)| changed[y * width + x])
+    };
+    (0..width * height).map(near).collect()
 }
 
 /// Compares pictures of 3 or 4 channels in 0..1.
@@ -76,9 +135,18 @@ pub fn pictures(measured: &Texels, reference: &Texels) -> Result<PictureError, S
 /// # Errors
 /// As [`pictures`].
 pub fn distances(measured: &Texels, reference: &Texels) -> Result<SurfaceError, String> {
+    surfaces(measured, reference, f64::INFINITY)
+}
+
+/// The same, where distances that differ by more than `cliff` mm are jumps to another surface and no errors.
+///
+/// # Errors
+/// As [`pictures`].
+pub fn surfaces(measured: &Texels, reference: &Texels, cliff: f64) -> Result<SurfaceError, String> {
     check("distance map", measured, reference)?;
     let first = |t: &Texels| t.values.iter().step_by(t.channels).map(|v| is_hit(*v).then_some(*v)).collect::<Vec<_>>();
-    Ok(surface(&first(measured), &first(reference), |a, b| (a - b).abs()))
+    let difference = |a: &f64, b: &f64| Some((a - b).abs()).filter(|off| *off <= cliff);
+    Ok(surface(&first(measured), &first(reference), difference))
 }
 
 /// Compares maps of normals (first three channels x, y, z) by the angle between them, degrees. Normals need not have unit length; a
@@ -96,7 +164,7 @@ pub fn normals(measured: &Texels, reference: &Texels) -> Result<SurfaceError, St
         vectors.map(|v| v.try_normalize()).collect::<Vec<_>>()
     };
     // atan2 rather than acos, which is inaccurate for small angles.
-    Ok(surface(&read(measured), &read(reference), |a, b| a.cross(*b).length().atan2(a.dot(*b)).to_degrees()))
+    Ok(surface(&read(measured), &read(reference), |a, b| Some(a.cross(*b).length().atan2(a.dot(*b)).to_degrees())))
 }
 
 fn check(what: &str, measured: &Texels, reference: &Texels) -> Result<(), String> {
@@ -117,19 +185,32 @@ fn check(what: &str, measured: &Texels, reference: &Texels) -> Result<(), String
     Ok(())
 }
 
-fn surface<T>(measured: &[Option<T>], reference: &[Option<T>], difference: impl Fn(&T, &T) -> f64) -> SurfaceError {
+/// `difference`: none for two places that are on different surfaces.
+fn surface<T>(
+    measured: &[Option<T>],
+    reference: &[Option<T>],
+    difference: impl Fn(&T, &T) -> Option<f64>,
+) -> SurfaceError {
     let mut errors = Vec::new();
-    let (mut false_hits, mut missed_hits) = (0, 0);
+    let (mut false_hits, mut missed_hits, mut jumps) = (0, 0, 0);
     for pair in measured.iter().zip(reference) {
         match pair {
-            (Some(a), Some(b)) => errors.push(difference(a, b)),
+            (Some(a), Some(b)) => match difference(a, b) {
+                Some(difference) => errors.push(difference),
+                None => jumps += 1,
+            },
             (Some(_), None) => false_hits += 1,
             (None, Some(_)) => missed_hits += 1,
             (None, None) => {}
         }
     }
     let share = |n: usize| n as f64 / measured.len() as f64;
-    SurfaceError { error: spread(errors), false_hits: share(false_hits), missed_hits: share(missed_hits) }
+    SurfaceError {
+        error: spread(errors),
+        false_hits: share(false_hits),
+        missed_hits: share(missed_hits),
+        jumps: share(jumps),
+    }
 }
 
 fn spread(mut errors: Vec<f64>) -> Option<Spread> {

@@ -2,6 +2,7 @@
 //! errors and its times on the device. [`measure`] fills a [`Report`], which is stored as JSON, and renders combinations of several
 //! dials; [`export`] and [`plot`] write it as text and as a diagram, [`choose`] picks settings among the combinations.
 
+pub mod budget;
 pub mod choose;
 pub(crate) mod command;
 pub mod convergence;
@@ -11,14 +12,16 @@ pub mod map;
 pub mod measure;
 pub mod metrics;
 pub mod plot;
+mod running;
 
 use crate::scene::Scene;
+use budget::Budget;
 use convergence::Fit;
-use metrics::{PictureError, SurfaceError};
+use metrics::{Levels, SurfaceError};
 use serde::{Deserialize, Serialize};
 
 /// Format version of a stored report; other versions are refused.
-pub const FORMAT: &str = "echolume error report 2";
+pub const FORMAT: &str = "echolume error report 3";
 
 /// A measurement of one scene on one device.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -36,8 +39,10 @@ pub struct Report {
     /// Number of runs of which each time is the median.
     pub repeats: u32,
     pub dials: Vec<Dial>,
-    /// Settings of several dials at once, each rendered and measured. The first is the scene as it is.
+    /// Settings of one dial and of several, each rendered and measured against the scene's finest picture. The first is the scene as it is.
     pub choices: Vec<Combination>,
+    /// What each approximation of the scene adds to its error.
+    pub budget: Budget,
 }
 
 /// Settings of several dials at once, and what was measured with them.
@@ -50,10 +55,41 @@ pub struct Combination {
     pub set: Vec<String>,
     /// Against the scene's own picture with the finest numerical settings.
     pub errors: Errors,
-    /// RMSE of that picture itself; 0 if it is a reference in f64.
-    pub reference_error: f64,
+    /// Error of that picture itself; 0 if it is a reference in f64.
+    pub reference_error: OwnError,
     /// None without time stamps.
     pub times: Option<Times>,
+}
+
+/// The error of a reference itself.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct OwnError {
+    /// RMSE of its picture, 0..1.
+    pub rmse: f64,
+    /// 95th percentile of its pixels after tone, levels of 255.
+    pub levels: f64,
+}
+
+impl OwnError {
+    /// The upper limit that two pictures of a converging sequence give: the difference of the last two.
+    pub fn of(errors: &Errors) -> OwnError {
+        OwnError { rmse: errors.rmse, levels: errors.levels.p95 }
+    }
+}
+
+/// What the settings of a dial have to do with one another.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Kind {
+    /// One setting that computes the same picture more or less accurately: a choice may turn it, and combine it with others.
+    Numerical,
+    /// Several such settings at once: a choice may take one, and combines it with nothing.
+    Several,
+    /// The number of pixels, or of rays in a pixel: another picture, with an error of its own.
+    Pixels,
+    /// Another look: differences from the scene as it is, which are no errors.
+    Look,
 }
 
 /// Sizes of what was rendered.
@@ -71,8 +107,9 @@ pub struct Sizes {
 #[serde(deny_unknown_fields)]
 pub struct Dial {
     pub name: String,
-    /// True if all of its settings compute the same picture more or less accurately, so that a choice may turn it.
-    pub is_numerical: bool,
+    pub kind: Kind,
+    /// True if its points lie on an axis, so that a line may join them; false for names.
+    pub is_ordered: bool,
     /// Unit of the values of the points; empty for counts and names.
     pub unit: String,
     pub reference: Reference,
@@ -131,25 +168,23 @@ pub struct Point {
     pub is_default: bool,
 }
 
-/// Errors of a picture on a scale of 0..1, and of the surface if there is one.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+/// Errors of a picture, and of the surface if there is one. Pixels whose rays find another surface than those of the reference, or none, and pixels next to
+/// them, are left out of the errors of the picture: their shares are in `mm`.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Errors {
+    /// Of red, green and blue before tone, 0..1.
     pub rmse: f64,
     pub max: f64,
     /// Peak signal-to-noise ratio, dB; None (infinite) for equal pictures.
     pub psnr: Option<f64>,
     pub ssim: Option<f64>,
+    /// As the screen shows it.
+    pub levels: Levels,
     /// Error of the distance map, mm.
     pub mm: Option<SurfaceError>,
     /// Error of the normals, degrees.
     pub degrees: Option<SurfaceError>,
-}
-
-impl From<PictureError> for Errors {
-    fn from(e: PictureError) -> Errors {
-        Errors { rmse: e.rmse, max: e.max, psnr: e.psnr, ssim: e.ssim, mm: None, degrees: None }
-    }
 }
 
 /// A time over several runs, ns, or the ratio of two.
@@ -209,8 +244,10 @@ impl Times {
 /// The error measure of a plot or choice.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Measure {
-    /// RMSE of the picture, 0..1.
+    /// RMSE of the picture before tone, 0..1.
     Rmse,
+    /// 95th percentile of the pixels after tone, levels of 255.
+    Levels,
     /// RMS error of the distance map, mm.
     Mm,
     /// RMS error of the normals, degrees.
@@ -223,6 +260,7 @@ impl Measure {
         let rms = |surface: &Option<SurfaceError>| surface.and_then(|s| s.error).map(|e| e.rms);
         let error = match self {
             Measure::Rmse => Some(errors.rmse),
+            Measure::Levels => Some(errors.levels.p95),
             Measure::Mm => rms(&errors.mm),
             Measure::Degrees => rms(&errors.degrees),
         };
@@ -232,6 +270,7 @@ impl Measure {
     pub fn name(self) -> &'static str {
         match self {
             Measure::Rmse => "RMSE of the picture (0..1)",
+            Measure::Levels => "95th percentile of the pixels (levels of 255)",
             Measure::Mm => "RMS error of distance (mm)",
             Measure::Degrees => "RMS error of normals (degrees)",
         }
@@ -241,6 +280,7 @@ impl Measure {
     pub fn format(self, error: f64) -> String {
         match self {
             Measure::Rmse => format!("RMSE {error:.3e}"),
+            Measure::Levels => format!("{error:.3} levels"),
             Measure::Mm => format!("{error:.3e} mm"),
             Measure::Degrees => format!("{error:.3e} degrees"),
         }
@@ -250,7 +290,7 @@ impl Measure {
 impl Dial {
     /// True if its settings differ in look, so that its differences are no errors.
     pub fn is_look(&self) -> bool {
-        self.reference == Reference::AsItIs
+        self.kind == Kind::Look
     }
 }
 
@@ -316,8 +356,15 @@ impl Report {
             }
         }
         for choice in &self.choices {
-            if let Some(v) = wrong_result(&choice.errors, &[choice.times], choice.reference_error) {
+            if let Some(v) = wrong_result(&choice.errors, &[choice.times], choice.reference_error.rmse) {
                 return Err(format!("error report: choice '{}': {v} is no result", choice.set.join(" ")));
+            }
+        }
+        let sums = self.budget.shares.iter().map(|share| (share.source.as_str(), &share.errors));
+        let own = self.budget.reference_error.rmse;
+        for (source, errors) in sums.chain([("total", &self.budget.total)]) {
+            if let Some(v) = wrong_result(errors, &[], own) {
+                return Err(format!("error report: budget, '{source}': {v} is no result"));
             }
         }
         Ok(())
@@ -344,11 +391,13 @@ impl Report {
 fn wrong_result(e: &Errors, times: &[Option<Times>], other: f64) -> Option<f64> {
     let surfaces = [e.mm, e.degrees].into_iter().flatten().flat_map(|s| {
         let spread = s.error.map_or([0.0; 4], |e| [e.rms, e.median, e.p95, e.max]);
-        spread.into_iter().chain([s.false_hits, s.missed_hits])
+        spread.into_iter().chain([s.false_hits, s.missed_hits, s.jumps])
     });
+    let l = e.levels;
+    let levels = [l.rms, l.median, l.p95, l.max, l.over_1, l.over_8];
     let times = times.iter().flatten().flat_map(|t| [t.volume, t.picture, t.total]);
     let times = times.flat_map(|t| [t.low, t.median, t.high, t.p95]);
-    let mut unsigned = [e.rmse, e.max].into_iter().chain(surfaces).chain(times).chain([other]);
+    let mut unsigned = [e.rmse, e.max].into_iter().chain(levels).chain(surfaces).chain(times).chain([other]);
     let wrong = unsigned.find(|v| !v.is_finite() || *v < 0.0);
     wrong.or_else(|| [e.psnr, e.ssim].into_iter().flatten().find(|v| !v.is_finite()))
 }

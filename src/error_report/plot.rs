@@ -1,7 +1,8 @@
-//! The work-precision diagram as SVG or PNG: small multiples, one panel per dial and one for the combinations. A panel shows error over
-//! the time that its dial changes, of the picture or of the volume, both logarithmic; every point is named.
+//! The work-precision diagram as SVG or PNG: small multiples, one panel per dial and one for the choices. A panel shows error over
+//! the time that its dial changes, of the picture or of the volume, both logarithmic; every point is named. A line joins values of an axis, and never names.
+//! Dials of another look, whose differences are no errors, are a figure of their own.
 
-use super::{Dial, Measure, Reference, Report, Sizes, Time, Times, choose};
+use super::{Dial, Kind, Measure, Reference, Report, Sizes, Time, Times, choose};
 use crate::canvas::{self, Canvas, Drawing, Drawn, Frame, GRID, INK};
 use crate::picture::Picture;
 use plotters::prelude::*;
@@ -26,22 +27,43 @@ const MIN_SIZE: [u32; 2] = [640, 400];
 /// Maximum width and height, pixels.
 const MAX_SIZE: u32 = 4096;
 
+/// What a figure shows.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Figure {
+    /// Errors: the dials of one picture, and the choices among their settings.
+    Errors,
+    /// Differences of looks from the scene as it is.
+    Looks,
+}
+
+impl Figure {
+    /// The dials that it shows, by their number in the report.
+    fn dials(self, report: &Report) -> impl Iterator<Item = (usize, &Dial)> {
+        report.dials.iter().enumerate().filter(move |(_, dial)| (dial.kind == Kind::Look) == (self == Figure::Looks))
+    }
+
+    /// True if the report has dials that it shows.
+    pub fn is_in(self, report: &Report) -> bool {
+        self.dials(report).next().is_some()
+    }
+}
+
 /// The diagram as SVG, `size` in pixels.
 ///
 /// # Errors
 /// One line: no point has a time and such an error, or the size is not within 640x400..4096x4096.
-pub fn svg(report: &Report, measure: Measure, size: [u32; 2]) -> Result<String, String> {
+pub fn svg(report: &Report, figure: Figure, measure: Measure, size: [u32; 2]) -> Result<String, String> {
     check(size)?;
-    canvas::svg(size, &Diagram { report, measure })
+    canvas::svg(size, &Diagram { report, figure, measure })
 }
 
 /// The diagram as a picture, `size` in pixels.
 ///
 /// # Errors
 /// As [`svg`].
-pub fn picture(report: &Report, measure: Measure, size: [u32; 2]) -> Result<Picture, String> {
+pub fn picture(report: &Report, figure: Figure, measure: Measure, size: [u32; 2]) -> Result<Picture, String> {
     check(size)?;
-    canvas::picture(size, &Diagram { report, measure })
+    canvas::picture(size, &Diagram { report, figure, measure })
 }
 
 fn check([width, height]: [u32; 2]) -> Result<(), String> {
@@ -53,9 +75,10 @@ fn check([width, height]: [u32; 2]) -> Result<(), String> {
 }
 
 /// The size at which every panel has room for its names, pixels.
-pub fn size(report: &Report) -> [u32; 2] {
-    let rows = (report.dials.len() + 1).div_ceil(COLUMNS).clamp(1, 12) as u32;
-    let key = key_height(&combinations(report, Measure::Rmse).key) as u32;
+pub fn size(report: &Report, figure: Figure) -> [u32; 2] {
+    let panels = panels(report, figure, Measure::Rmse);
+    let rows = panels.len().div_ceil(COLUMNS).clamp(1, 12) as u32;
+    let key = panels.iter().map(|panel| key_height(&panel.key)).sum::<f64>() as u32;
     [PANEL[0] * COLUMNS as u32, (HEAD as u32 + PANEL[1] * rows + key).clamp(MIN_SIZE[1], MAX_SIZE)]
 }
 
@@ -69,7 +92,7 @@ fn key_height(key: &[String]) -> f64 {
 /// A point of a panel.
 struct PlottedPoint {
     name: String,
-    /// Minimum, median, maximum, ms.
+    /// Low end of the interval, median, high end, ms.
     time: [f64; 3],
     error: f64,
     is_default: bool,
@@ -84,13 +107,14 @@ struct Panel {
     colour: usize,
     /// In the order of the line that joins them.
     points: Vec<PlottedPoint>,
+    is_joined: bool,
     /// Names of the points that are numbered, a line each.
     key: Vec<String>,
 }
 
-fn panels(report: &Report, measure: Measure) -> Vec<Panel> {
-    let mut all = vec![combinations(report, measure)];
-    all.extend(report.dials.iter().enumerate().map(|(d, dial)| of_dial(d, dial, measure)));
+fn panels(report: &Report, figure: Figure, measure: Measure) -> Vec<Panel> {
+    let mut all: Vec<Panel> = (figure == Figure::Errors).then(|| combinations(report, measure)).into_iter().collect();
+    all.extend(figure.dials(report).map(|(d, dial)| of_dial(d, dial, measure)));
     all.retain(|panel| !panel.points.is_empty());
     all
 }
@@ -109,19 +133,23 @@ fn combinations(report: &Report, measure: Measure) -> Panel {
     });
     let mut points: Vec<_> = points.filter(|p| p.time[0] > 0.0).collect();
     points.sort_by(|a, b| a.time[1].total_cmp(&b.time[1]));
-    // Names of many changes, or many names, fit into no panel: they are numbered from the fastest on.
+    // Names of many changes, or many names, fit into no panel: those of the front and of the scene as it is are numbered from the fastest on.
     const LONGEST: usize = 40;
     const MOST: usize = 14;
     let mut key = Vec::new();
     if points.len() > MOST || points.iter().any(|p| p.name.chars().count() > LONGEST) {
-        for (n, point) in points.iter_mut().enumerate() {
-            key.push(format!("{}: {}", n + 1, point.name));
-            point.name = (n + 1).to_string();
+        for point in &mut points {
+            let name = std::mem::take(&mut point.name);
+            if point.on_front || point.is_default {
+                point.name = (key.len() + 1).to_string();
+                key.push(format!("{}: {name}", point.name));
+            }
         }
     }
     Panel {
         key,
-        title: "combinations".into(),
+        is_joined: true,
+        title: "choices: settings of one dial and of several".into(),
         notes: vec!["rings: Pareto front".into()],
         time_axis: "volume and picture (ms)",
         colour: 6,
@@ -164,6 +192,7 @@ fn of_dial(index: usize, dial: &Dial, measure: Measure) -> Panel {
         notes: notes(dial).into_iter().chain(other).collect(),
         time_axis: if of_picture { "picture (ms)" } else { "volume (ms)" },
         colour: index,
+        is_joined: dial.is_ordered,
         points,
         key: Vec::new(),
     }
@@ -172,18 +201,19 @@ fn of_dial(index: usize, dial: &Dial, measure: Measure) -> Panel {
 /// The report as a diagram.
 struct Diagram<'a> {
     report: &'a Report,
+    figure: Figure,
     measure: Measure,
 }
 
 impl Drawing for Diagram<'_> {
     fn draw<B: DrawingBackend>(&self, canvas: &Canvas<B>) -> Drawn {
-        let Diagram { report, measure } = *self;
-        let all = panels(report, measure);
+        let Diagram { report, figure, measure } = *self;
+        let all = panels(report, figure, measure);
         if all.is_empty() {
             return Err(format!("plot: no setting has a time and an {}", measure.name()));
         }
         let [width, height] = canvas.size();
-        head(canvas, report, measure, width)?;
+        head(canvas, report, figure, measure, width)?;
         let columns = ((width / f64::from(PANEL[0])).floor() as usize).clamp(1, all.len());
         let rows = all.len().div_ceil(columns);
         let key: Vec<String> = all.iter().flat_map(|panel| panel.key.clone()).collect();
@@ -227,9 +257,16 @@ impl Panel {
         // Combinations have no order of their own: their line is the front.
         let of_front = self.points.iter().any(|p| p.on_front);
         let line: Vec<[f64; 2]> = self.points.iter().filter(|p| !of_front || p.on_front).map(place).collect();
-        let line = if of_front { staircase(&line) } else { line };
-        canvas.line(&line, colour(self.colour).mix(0.5).stroke_width(1))?;
-        labels.keep_off_line(&line);
+        let line = match (of_front, self.is_joined) {
+            (true, _) => staircase(&line),
+            (false, true) => line,
+            // Names have no order that a line could show.
+            (false, false) => Vec::new(),
+        };
+        if line.len() > 1 {
+            canvas.line(&line, colour(self.colour).mix(0.5).stroke_width(1))?;
+            labels.keep_off_line(&line);
+        }
         for p in &self.points {
             let [low, _, high] = p.time.map(|t| axes.place([t, error(p)]));
             canvas.line(&[low, high], colour(self.colour).mix(0.6).stroke_width(2))?;
@@ -265,12 +302,19 @@ impl Panel {
     }
 }
 
-fn head<B: DrawingBackend>(canvas: &Canvas<B>, report: &Report, measure: Measure, width: f64) -> Drawn {
+fn head<B: DrawingBackend>(canvas: &Canvas<B>, report: &Report, figure: Figure, measure: Measure, width: f64) -> Drawn {
     let Sizes { volume: [w, h, d], picture: [pw, ph] } = report.sizes;
     let scene = format!("{}: volume {w}x{h}x{d}, picture {pw}x{ph}", report.scene.lines().next().unwrap_or_default());
-    let repeats = format!("median and range of {} runs; boxed: the scene as it is", report.repeats);
+    // Order statistics tell an interval from six runs on.
+    let bars = if report.repeats < 6 { "range" } else { "95 % interval" };
+    let repeats = format!("median and {bars} of {} runs; boxed: the scene as it is", report.repeats);
     let device = format!("{}, {}, {}; {repeats}", report.device, report.driver, report.date);
-    let title = format!("Error against run time: {} over time on the device", measure.name());
+    let title = match figure {
+        Figure::Errors => format!("Error against run time: {} over time on the device", measure.name()),
+        Figure::Looks => {
+            format!("Looks against run time: difference from the scene as it is, {}, no error", measure.name())
+        }
+    };
     canvas.text(&title, [24.0, 12.0], 22, INK, [0, 0])?;
     canvas.text(&canvas.cut(&scene, 14, width - 48.0)?, [24.0, 40.0], 14, INK, [0, 0])?;
     canvas.text(&canvas.cut(&device, 14, width - 48.0)?, [24.0, 58.0], 14, INK, [0, 0])

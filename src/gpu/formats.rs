@@ -142,7 +142,19 @@ pub fn filters(context: &Context, format: Format) -> bool {
 pub fn check(context: &Context, plan: &Plan, scene: &Scene) -> Result<(), GpuError> {
     let limits = &context.limits;
     for &slot in &plan.slots {
-        let what = || format!("image '{}' ({:?} {:?})", slot.name(), slot.shape(scene), slot.format(scene));
+        let what = || {
+            let image = format!("image '{}' ({:?} {:?})", slot.name(), slot.shape(scene), slot.format(scene));
+            // What is as large as the recording is named by the recording's own sizes, which a user can change.
+            let ([w, h], [columns, rows, slices]) = (scene.frame_size(), scene.volume_size());
+            match slot {
+                Slot::Frames if scene.probe().is_some() => {
+                    format!("the recording's frames of {w} samples and {h} lines: {image}")
+                }
+                Slot::Frames => format!("the recording's frames of {w} columns and {h} rows: {image}"),
+                Slot::Volume => format!("the volume of {columns} columns, {rows} rows and {slices} slices: {image}"),
+                _ => image,
+            }
+        };
         let within = |needed: u32, allowed: u32| match needed <= allowed {
             true => Ok(()),
             false => Err(GpuError::Limit { what: what(), needed: needed.into(), allowed: allowed.into() }),

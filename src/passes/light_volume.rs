@@ -7,7 +7,7 @@ use crate::passes::lookup_tables::transfer_of;
 use crate::passes::pass::*;
 use crate::passes::shade::wrap;
 use crate::passes::slots::Shape;
-use crate::scene::{Ground, LightLattice, LightVolume, Propagation, Scene};
+use crate::scene::{Ground, LightLattice, LightVolume, Mode, Propagation, Scene};
 use glam::DVec3;
 
 /// Slope of the echo at which the orientation of a surface is certain, 1/mm: half that of skin in fluid after a Gaussian of 1.5 mm.
@@ -667,6 +667,14 @@ pub(super) fn developed(scene: &Scene, is_alone: bool, rgba: [f64; 4], at: [f64;
         Some(volume) => on_film(scene, volume.exposure, ground_of(scene, is_alone), rgba, at),
         None => rgba,
     }
+}
+
+/// What a ray through a place of the picture, rays from its corner, shows where it meets no matter: none without a ground.
+pub fn bare_ground(scene: &Scene, at: [f64; 2]) -> Option<[f64; 3]> {
+    let is_alone = scene.settings.mode == Mode::Volume && !scene.lights_volume() && scene.still().is_none();
+    ground_of(scene, is_alone)?;
+    let [r, g, b, _] = developed(scene, true, [0.0; 4], at);
+    Some([r, g, b])
 }
 
 /// Linear light of a ray through a place of the picture, rays from its corner, premultiplied: through the response curve and over the ground.

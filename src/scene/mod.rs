@@ -58,6 +58,9 @@ pub const MAX_DEVIATION: f64 = 32.0;
 /// Maximum window of a filter, pixels.
 pub const MAX_WINDOW: u32 = 63;
 
+/// Maximum number of samples on a ray.
+const MAX_SAMPLES: f64 = 65536.0;
+
 /// Maximum number of clip planes.
 pub const MAX_CLIPS: usize = 4;
 
@@ -262,22 +265,39 @@ impl Scene {
             Geometry::Sweep(_) => pixel,
         };
         let largest = settings.ray.samples_per_voxel.map_or(f64::INFINITY, |n| side / f64::from(n));
-        let step = settings.ray.step.unwrap_or(pixel).min(largest);
-        let ring =
-            Ring::new(settings.surface.edge.unwrap_or(Edge::Length(4.0 * pixel)), step, settings.surface.threshold);
         let longest = (high - low).length();
-        if longest / step > 65536.0 {
+        // A step that nobody chose is as long as it has to be: no default makes a scene that is refused.
+        let least = longest / MAX_SAMPLES;
+        let step = settings.ray.step.unwrap_or(pixel.max(least)).min(largest);
+        let edge = settings.surface.edge.unwrap_or(Edge::Length(4.0 * pixel.max(least)));
+        let ring = Ring::new(edge, step, settings.surface.threshold);
+        // The slack is that of rounding.
+        let too_many = |step: f64| longest / step > MAX_SAMPLES * (1.0 + 1e-9);
+        if too_many(step) {
+            let (key, value) = match settings.ray.samples_per_voxel.filter(|_| step == largest) {
+                Some(n) => ("ray.samples_per_voxel", format!("{n} are a step of {step} mm, which")),
+                None => ("ray.step", format!("{step} mm")),
+            };
             return refuse(
-                "ray.step",
-                format!("{step} mm makes {:.0} samples on a ray, at most 65536", longest / step),
+                key,
+                format!("{value} makes {:.0} samples on a ray, at most {MAX_SAMPLES}", (longest / step).ceil()),
             );
         }
-        if longest / ring.step > 65536.0 && matches!(settings.mode, Mode::Surface | Mode::Mixed) {
+        if too_many(ring.step) && matches!(settings.mode, Mode::Surface | Mode::Mixed) {
             return refuse(
                 "surface.edge",
-                format!("4 steps of {} mm make {:.0} samples on a ray, at most 65536", ring.step, longest / ring.step),
+                format!(
+                    "4 steps of {} mm make {:.0} samples on a ray, at most {MAX_SAMPLES}",
+                    ring.step,
+                    (longest / ring.step).ceil()
+                ),
             );
         }
+        let is_longer = settings.ray.step.is_none() && step > pixel;
+        let longer: Vec<String> = is_longer
+            .then(|| format!("ray.step: {step} mm: {MAX_SAMPLES} are the most samples of a ray"))
+            .into_iter()
+            .collect();
         let sampling = settings.ray.sampling;
         let pitches = Pitches::new(&geometry, &grid, &rays, settings.ray.apart(), (low + high) / 2.0);
         let mut resolver = Resolver { pitches, resolved: Vec::new() };
@@ -309,7 +329,7 @@ impl Scene {
             section_smooth,
             distance,
             resolved_sizes: resolver.resolved,
-            found: Vec::new(),
+            found: longer,
             visible_bounds: VisibleBounds::default(),
             kept_bounds: VisibleBounds::default(),
             shared: None,

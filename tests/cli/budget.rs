@@ -5,6 +5,11 @@ use std::fs;
 
 /// An error report of the bone with two combinations: 20 ms as it is, 8 ms with longer steps.
 pub fn error_report(volume: &str) -> String {
+    let errors = |rmse: f64| {
+        format!(
+            "{{\"rmse\": {rmse}, \"max\": 0.1, \"levels\": {{\"rms\": 0.2, \"median\": 0.1, \"p95\": 0.5, \"max\": 2, \"over_1\": 0.01, \"over_8\": 0}}}}"
+        )
+    };
     let choice = |set: &str, rmse: f64, ms: f64| {
         let changed = if set.is_empty() { "" } else { "[\"step\", \"1.25 mm\"]" };
         let time = |ms: f64| {
@@ -12,19 +17,22 @@ pub fn error_report(volume: &str) -> String {
             format!("{{\"median\": {ns}, \"low\": {ns}, \"high\": {ns}, \"p95\": {ns}}}")
         };
         format!(
-            "{{\"changed\": [{changed}], \"set\": [{set}], \"errors\": {{\"rmse\": {rmse}, \"max\": 0.1}}, \"reference_error\": 0, \
+            "{{\"changed\": [{changed}], \"set\": [{set}], \"errors\": {}, \"reference_error\": {{\"rmse\": 0, \"levels\": 0}}, \
              \"times\": {{\"volume\": {}, \"picture\": {}, \"total\": {}}}}}",
+            errors(rmse),
             time(0.25 * ms),
             time(0.75 * ms),
             time(ms)
         )
     };
     format!(
-        "{{\"format\": \"echolume error report 2\", \"device\": \"a card\", \"driver\": \"1\", \"date\": \"2026-11-21\", \
+        "{{\"format\": \"echolume error report 3\", \"device\": \"a card\", \"driver\": \"1\", \"date\": \"2026-11-21\", \
          \"scene\": \"bone\", \"sizes\": {{\"volume\": {volume}, \"picture\": [64, 48]}}, \"repeats\": 3, \"dials\": [], \
-         \"choices\": [{}, {}]}}",
+         \"choices\": [{}, {}], \"budget\": {{\"reference\": {{\"kind\": \"f64\"}}, \"reference_error\": {{\"rmse\": 0, \"levels\": 0}}, \
+         \"shares\": [], \"total\": {}}}}}",
         choice("", 0.001, 20.0),
-        choice("\"ray.step=1.25\"", 0.004, 8.0)
+        choice("\"ray.step=1.25\"", 0.004, 8.0),
+        errors(0.001)
     )
 }
 

@@ -36,7 +36,9 @@ fn each_cause_of_a_picture_of_one_colour_is_named() {
             &["--mode", "mip"],
             &["every sample that it shows is 5", "constant volume", "below", "projection.window=[0, 1]"],
         ),
-        (BONE, &["--mode", "vr", "--set", away], &["clip planes"]),
+        // Without a preset it is lit, before a ground.
+        (BONE, &["--mode", "vr", "--set", away], &["the ground alone", "light.volume.ground", "clip planes"]),
+        (BONE, &["--mode", "vr", "--set", away, "--set", "light.volume=none"], &["is wholly black", "clip planes"]),
         (BONE, &["--mode", "mpr", "--set", away], &["clip planes"]),
         (
             BONE,
@@ -67,7 +69,7 @@ fn each_cause_of_a_picture_of_one_colour_is_named() {
     for (input, more, named) in cases {
         let err = said(&folder, input, more);
         assert_eq!(err.lines().count(), 1, "{more:?}: {err}");
-        assert!(err.contains("p.png: is wholly") && named.iter().all(|n| err.contains(n)), "{more:?}: {err}");
+        assert!(err.contains("p.png: is ") && named.iter().all(|n| err.contains(n)), "{more:?}: {err}");
     }
     // The same scenes without the cause, and a picture of one pixel: nothing to say.
     for (input, more) in

@@ -49,7 +49,13 @@ fn rows(folder: &Folder) -> Vec<Row> {
         row("", Dir, false, &["render", BONE, "-o", "/dev/null", "--dump", "@"], &SMALL),
         row("png", File, false, &["render", BONE, "-o", "/dev/null", "--error-map", "@"], &SMALL),
         row("", Dir, false, &["render", BONE, "--turntable", "2", "-o", "@"], &SMALL),
-        row("", Dir, false, &["report", "bounds", BONE, "-o", "@"], &["--size", "8x8", "--mode", "vr"]),
+        row(
+            "",
+            Dir,
+            false,
+            &["report", "bounds", BONE, "-o", "@"],
+            &["--size", "8x8", "--mode", "vr", "--preset", "bone"],
+        ),
         row("png", File, false, &["filter", &picture, "--filter", "median", "-o", "@"], &[]),
         row(
             "csv",

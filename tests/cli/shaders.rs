@@ -54,14 +54,15 @@ fn a_profile_is_of_the_shaders_of_the_folder() {
         }
     }
     let path = folder.path("");
-    let repeats = ["--size", "64x48", "--repeat", "1", "--warm-up", "1", "--no-ceilings"];
+    // A surface.
+    let repeats = ["--preset", "bone", "--size", "64x48", "--repeat", "1", "--warm-up", "1", "--no-ceilings"];
     let (code, out, err) = run(&[&["profile", BONE, "--glsl", &*path], &repeats[..]].concat());
     assert!(code == Some(0) && out.contains("raycast_surface"), "{out}{err}");
-    let (code, out, err) = run(&["profile", BONE, "--pipelines", "--glsl", &path]);
+    let (code, out, err) = run(&["profile", BONE, "--preset", "bone", "--pipelines", "--glsl", &path]);
     assert!(code == Some(0) && out.contains("raycast/surface"), "{out}{err}");
     // A shader that only the picture needs.
     fs::write(folder.join("raycast/surface.comp"), "#version 460\nvoid main() { nothing; }\n").expect("write");
-    for how in [&repeats[..], &["--pipelines"]] {
+    for how in [&repeats[..], &["--preset", "bone", "--pipelines"]] {
         let ran = run(&[&["profile", BONE, "--glsl", &*path], how].concat());
         assert!(ran.0 == Some(2) && ran.2.contains("raycast/surface") && ran.2.contains("nothing"), "{}", ran.2);
     }

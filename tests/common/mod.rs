@@ -12,4 +12,5 @@ pub mod own_process;
 pub mod probes;
 pub mod program;
 pub mod scenes;
+pub mod setting_keys;
 pub mod wait;

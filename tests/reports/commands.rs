@@ -62,11 +62,25 @@ fn a_report_is_written_plotted_and_advises() {
     let (dir, json) = (folder.path("out"), folder.path("out/error.json"));
     let dials = ["--dial", "step", "--dial", "format", "--repeat", "2", "--mode", "vr", "--set=ray.step=0.5"];
     let out = done(&[&["report", "error"], &SMALL[..], &dials[..], &["-o", &dir, "--under-error", "0.05"]].concat());
-    for word in ["f64 reference", "r16f", "floor", "* the scene as it is", "holds RMSE 5.000e-2"] {
+    for word in
+        ["f64 reference", "r16f", "floor", "* the scene as it is", "holds RMSE 5.000e-2", "error budget", "p95 lv"]
+    {
         assert!(out.contains(word), "{word} is missing from\n{out}");
     }
+    assert!(!out.contains("no stamps"), "{out}");
     for file in ["error.json", "error.csv", "error.svg", "error.png"] {
         assert!(fs::metadata(folder.join("out").join(file)).is_ok_and(|m| m.len() > 500), "{file}");
+    }
+    // The scene of the report is the one that is rendered, with a preset and without.
+    let picture = folder.path("picture.png");
+    for preset in [&["--preset", "bone"][..], &[]] {
+        let scene = [&[BONE, "--size", "48x32", "--mode", "vr"][..], preset].concat();
+        let dir = folder.path("same");
+        done(&[&["report", "error"], &scene[..], &["--dial", "termination", "--repeat", "1", "-o", &dir]].concat());
+        let report = format!("{dir}/error.json");
+        let said =
+            done(&[&["render"], &scene[..], &["--budget", "100s", "--report", &report, "-o", &picture]].concat());
+        assert!(said.contains("with this scene"), "{preset:?}: {said}");
     }
     // The same again without measuring.
     let again = done(&["report", "error", "--from", &json, "--under-time", "10s"]);

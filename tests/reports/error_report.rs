@@ -5,6 +5,7 @@ use echolume::error_report::dials::dial;
 use echolume::error_report::measure::{ErrorMeasurement, MeasureError, ReferenceChoice};
 use echolume::error_report::{Measure, Point, Reference, Report};
 use echolume::scene::Scene;
+use echolume::scene::default_look::Recorded;
 use echolume::scene::load::Layers;
 
 const BASE: [&str; 6] = [
@@ -32,8 +33,10 @@ fn measured(more: &[&str], names: &[&str], repeats: u32, reference: ReferenceCho
     let scene = resolved(&layers);
     let dials: Vec<_> = names.iter().map(|n| dial(n, &scene).expect("dial")).collect();
     let context = device();
+    let recorded = Recorded::as_set(scene.geometry.clone(), scene.input);
     let measurement = ErrorMeasurement {
         context: &context,
+        recorded: &recorded,
         layers: &layers,
         scene: &scene,
         frames: &frames,
@@ -47,6 +50,57 @@ fn measured(more: &[&str], names: &[&str], repeats: u32, reference: ReferenceCho
 
 fn report(more: &[&str], names: &[&str], reference: ReferenceChoice) -> Report {
     measured(more, names, 3, reference).expect("report")
+}
+
+/// Prevents an instrument that prints nothing useful: times that were never taken, or all of them booked as those of the volume, with every error right.
+#[test]
+fn every_point_has_times_of_its_volume_and_of_its_picture() {
+    let _alone = alone();
+    let report = report(&[], &["step", "format", "termination", "pipeline"], ReferenceChoice::F64);
+    let points = || report.dials.iter().flat_map(|dial| dial.points.iter().map(move |point| (&dial.name, point)));
+    for (dial, point) in points() {
+        let times = point.times.unwrap_or_else(|| panic!("{dial} {}: no time", point.label));
+        let all = [times.volume, times.picture, times.total];
+        assert!(
+            all.iter().all(|t| t.median > 0.0 && t.low <= t.median && t.median <= t.high),
+            "{dial} {}: {times:?}",
+            point.label
+        );
+        let sum = times.volume.median + times.picture.median;
+        assert!((0.5..2.0).contains(&(sum / times.total.median)), "{dial} {}: {times:?}", point.label);
+        assert!(point.ratios.is_some(), "{dial} {}: no ratio", point.label);
+    }
+    // A picture of longer steps has fewer samples; a volume of another format as many: each time is of its own part.
+    let of = |name: &str| report.dials.iter().find(|dial| dial.name == name).expect("a dial");
+    let samples = |point: &Point| point.times.expect("timed").picture.median;
+    let steps = of("step");
+    let by_value = |least: bool| {
+        let order = |a: &&Point, b: &&Point| a.value.total_cmp(&b.value);
+        let found = if least { steps.points.iter().min_by(order) } else { steps.points.iter().max_by(order) };
+        samples(found.expect("points"))
+    };
+    assert!(
+        by_value(true) > by_value(false),
+        "32 times as many samples take {} and {} ns",
+        by_value(true),
+        by_value(false)
+    );
+    // Every point of a dial that a choice may take is among the choices, and all were timed.
+    let numerical: usize = report.dials.iter().map(|dial| dial.points.len() - 1).sum();
+    assert!(report.choices.len() > numerical, "{} choices of {numerical} settings", report.choices.len());
+    assert!(report.choices.iter().all(|choice| choice.times.is_some()), "a choice has no time");
+    assert!(report.choices[0].set.is_empty());
+    assert!(report.pareto_front(Measure::Rmse).len() > 1);
+    // The budget: a row for each approximation that the scene makes, none of them above all together by much.
+    let rows: Vec<_> = report.budget.shares.iter().map(|share| (share.source.as_str(), share.errors.rmse)).collect();
+    println!("{rows:?}, together {:.2e}", report.budget.total.rmse);
+    for source in ["step", "format", "termination", "transfer", "device"] {
+        assert!(rows.iter().any(|row| row.0 == source), "{source} is not in {rows:?}");
+    }
+    let (sum, total) = (report.budget.sum(), report.budget.total.rmse);
+    assert!(total < 2.0 * sum && total > 0.0, "together {total}, root of the sum of the squares {sum}");
+    let floor = rows[rows.len() - 1].1;
+    assert!(rows.iter().all(|row| row.1 > 0.2 * floor), "{rows:?}");
 }
 
 #[test]

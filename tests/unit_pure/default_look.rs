@@ -1,10 +1,12 @@
 //! What nobody chose: the levels of a recording's echoes, and the settings that follow from them, its size and the mode.
 
+use crate::common::setting_keys::{self, Key};
 use echolume::probe::{Advance, Array, Axis, Geometry, Grid, Motion, Probe};
-use echolume::scene::default_look::Defaults;
+use echolume::scene::default_look::{Defaults, Recorded};
 use echolume::scene::load::{Layers, PRESETS, rebase};
 use echolume::scene::{Camera, ColourMap, EchoHistogram, EchoLevels, Input, Layout, Mode, Settings, Slices, transfer};
 use echolume::source::StoredType;
+use std::collections::BTreeMap;
 use std::path::Path;
 
 fn grid(size: [usize; 3]) -> Geometry {
@@ -199,6 +201,9 @@ fn sections_show_the_whole_sector_hardly_filtered() {
             assert!(settings.slices.sigma.is_none());
         }
     }
+    // Another key of the same table is no choice of the region or of a filter.
+    let other = completed(&fan(), &["face"], &["mode=plane", "region.fade=1", "slices.pixels=256"]);
+    assert_eq!((other.region.depth, other.region.fade, other.slices.median), (None, 1.0, false));
     let given = completed(&fan(), &["face"], &["mode=plane", "region.depth=[20,60]", "slices.blur=true"]);
     assert_eq!((given.region.depth, given.region.lateral.is_some()), (Some([20.0, 60.0]), true));
     assert!(given.slices.smooth.is_some_and(|s| s.lateral == 1.1), "as in the preset: {:?}", given.slices.smooth);
@@ -315,4 +320,149 @@ fn values_that_were_changed_since_outlast_a_rebase() {
     current.light.shadow.as_mut().expect("shadow").strength = 0.7;
     let rebased = rebase(&current, &before, &after).expect("settings");
     assert_eq!((rebased.light.shadow, rebased.camera), (current.light.shadow, after.camera));
+}
+
+/// Every value of settings, by its path.
+fn flat(settings: &Settings) -> BTreeMap<String, toml::Value> {
+    fn collect(prefix: &str, table: &toml::Table, all: &mut BTreeMap<String, toml::Value>) {
+        for (key, value) in table {
+            match value {
+                toml::Value::Table(inner) => {
+                    all.insert(format!("{prefix}{key}"), "a table".into());
+                    collect(&format!("{prefix}{key}."), inner, all);
+                }
+                other => drop(all.insert(format!("{prefix}{key}"), other.clone())),
+            }
+        }
+    }
+    let mut all = BTreeMap::new();
+    collect("", &toml::Table::try_from(settings).expect("TOML"), &mut all);
+    all
+}
+
+/// What a key means the same as: where it is set, defaults of these keys may be another or none.
+fn same_as(path: &str) -> &'static [&'static str] {
+    let starts = |with: &str| path == with || path.starts_with(&format!("{with}."));
+    let filters = ["smooth", "sigma", "enhanced_sigma", "perona_malik", "estimator", "median", "blur"];
+    match path {
+        _ if filters.iter().any(|filter| starts(&format!("slices.{filter}"))) => &["slices"],
+        // Bright windows and the filters of the distance map have a default each.
+        "volume.window" | "volume.threshold" | "volume.transfer" => &["volume", "light"],
+        "surface.window" | "surface.threshold" => &["surface"],
+        "volume.shading" => &["light"],
+        // Refuses light in the volume, so that the default has none.
+        "volume.compositing" | "light.position" => &["light"],
+        "region.lateral" | "region.depth" | "region.elevation" | "region.start_curve" => {
+            &["region", "cube.inset", "camera.target"]
+        }
+        "volume.start_depth" | "surface.start_depth" | "projection.start_depth" => &["region", "camera.target"],
+        // What is sharpened across slices is not smoothed there.
+        "ray.elevation" => &["slices.smooth", "planes.smooth"],
+        // Fewer entries than the ramp has room for.
+        "volume.entries" => &["volume.transfer"],
+        "camera.target" | "camera.zoom" | "camera.azimuth" | "camera.elevation" => &["camera", "cube.inset"],
+        _ if starts("cube.inset") => &["cube.inset"],
+        _ if starts("distance") => &["distance"],
+        _ if starts("planes.smooth") => &["planes.smooth"],
+        _ => &[],
+    }
+}
+
+/// The settings of keys that choose what is shown, and so what the defaults are.
+fn chooses_the_picture(key: &Key) -> bool {
+    ["mode", "layout"].contains(&&*key.path)
+}
+
+/// Prevents a key of accuracy, such as a format, from switching the look off that was found for the recording: a report would then compare two looks. And a
+/// default that makes a scene that is refused, where the settings alone make one.
+#[test]
+fn a_key_changes_no_default_but_of_what_means_the_same() {
+    let levels = EchoLevels { start: Some(20.0), ..LEVELS };
+    let recorded = Recorded {
+        levels: Some(levels),
+        is_completed: true,
+        ..Recorded::as_set(fan(), Input { stored: StoredType::U8, range: [0.0, 255.0] })
+    };
+    let as_set = Recorded { is_completed: false, ..recorded.clone() };
+    let keys = setting_keys::all();
+    let (mut set, mut faults) = (0, Vec::new());
+    let looks: [(&[&str], &[&str]); 10] = [
+        (&[], &[]),
+        (&[], &["mode=sr"]),
+        (&[], &["mode=mixed"]),
+        (&[], &["mode=mip"]),
+        (&[], &["mode=minip"]),
+        (&[], &["mode=plane"]),
+        (&[], &["mode=cube"]),
+        (&[], &["layout=4up", "mode=vr"]),
+        (&["face"], &["mode=cube"]),
+        (&["face-classic"], &["mode=plane"]),
+    ];
+    for (presets, look) in looks {
+        let base = recorded.scene(&layers(presets, look)).expect("a scene").settings;
+        let before = flat(&base);
+        for key in keys.iter().filter(|key| !chooses_the_picture(key)) {
+            for value in key.values(before.get(&key.path)) {
+                let mut with = layers(presets, look);
+                if with.set(&format!("{}={value}", key.path)).is_err() || as_set.scene(&with).is_err() {
+                    continue;
+                }
+                set += 1;
+                let scene = match recorded.scene(&with) {
+                    Ok(scene) => scene,
+                    Err(fault) => {
+                        faults.push(format!("{look:?} {}={value}: the defaults are refused: {fault}", key.path));
+                        continue;
+                    }
+                };
+                let after = flat(&scene.settings);
+                let allowed = |path: &str| {
+                    let within = |of: &str| path == of || path.starts_with(&format!("{of}."));
+                    // A table around the key may be new with it, and then all that is in it.
+                    let around = |table: &str| key.path.starts_with(&format!("{table}."));
+                    let parents = key.path.match_indices('.').map(|(at, _)| &key.path[..at]);
+                    let is_new = parents.into_iter().any(|table| !before.contains_key(table) && within(table));
+                    within(&key.path) || around(path) || is_new || same_as(&key.path).iter().any(|of| within(of))
+                };
+                let paths = before.keys().chain(after.keys());
+                let changed: Vec<_> = paths.filter(|p| before.get(*p) != after.get(*p) && !allowed(p)).collect();
+                if !changed.is_empty() {
+                    faults.push(format!("{presets:?} {look:?} {}={value} changes {changed:?}", key.path));
+                }
+            }
+        }
+    }
+    println!("{} keys, {set} scenes", keys.len());
+    assert!(faults.is_empty(), "{} faults, such as {:#?}", faults.len(), &faults[..faults.len().min(12)]);
+    assert!(set > 10 * keys.len(), "{set} of {} keys in ten looks", keys.len());
+}
+
+/// Prevents a default of 300 pixels, which no filter takes, and a default step that makes more samples than a ray may have.
+#[test]
+fn defaults_of_extreme_voxels_are_cut_and_not_refused() {
+    for spacing in [[1.0, 0.001, 1.0], [0.001, 1.0, 1.0], [1e-6; 3], [1.0, 1.0, 1e-4], [1e3; 3], [40.0, 0.01, 0.01]] {
+        let geometry = Geometry::Cartesian(Grid { origin: [0.0; 3], spacing, size: [96, 80, 40] });
+        for mode in ["vr", "sr", "mixed", "mip", "minip", "xray", "plane", "cube"] {
+            let recorded =
+                Recorded { levels: Some(LEVELS), is_completed: true, ..Recorded::as_set(geometry.clone(), BYTES) };
+            let scene = recorded.scene(&layers(&[], &[&format!("mode={mode}")]));
+            let scene = scene.unwrap_or_else(|fault| panic!("{spacing:?}, {mode}: {fault}"));
+            let [lateral, depth, _] = scene.smoothing();
+            assert!(lateral <= 32.0 && depth <= 32.0, "{spacing:?}, {mode}: {lateral} and {depth} pixels");
+            let is_cut = spacing == [1.0, 0.001, 1.0] && mode == "vr";
+            assert!(
+                !is_cut || scene.found.iter().any(|line| line.contains("slices.smooth.depth")),
+                "{:?}",
+                scene.found
+            );
+        }
+    }
+    // The step alone, of a long and thin volume.
+    let thin = Geometry::Cartesian(Grid { origin: [0.0; 3], spacing: [0.001, 1.0, 1.0], size: [8, 200, 8] });
+    let recorded = Recorded::as_set(thin, BYTES);
+    let scene = recorded.scene(&layers(&[], &["mode=vr"])).expect("a scene");
+    assert!((scene.high - scene.low).length() / scene.step <= 65536.0 * (1.0 + 1e-9));
+    assert!(scene.found.iter().any(|line| line.contains("ray.step") && line.contains("65536")), "{:?}", scene.found);
+    let said = recorded.scene(&layers(&[], &["mode=vr", "ray.step=0.003"])).expect_err("too many").to_string();
+    assert!(said.contains("ray.step") && !said.contains("65536 samples on a ray, at most 65536"), "{said}");
 }

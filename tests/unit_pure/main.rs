@@ -30,6 +30,7 @@ mod sizes_in_mm;
 mod soak;
 mod start_curve;
 mod still;
+mod stored_reports;
 mod supply;
 mod unveil;
 mod user_presets;
