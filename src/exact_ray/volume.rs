@@ -72,7 +72,7 @@ impl<'a> Medium<'a> {
         levels.extend(points.windows(2).filter_map(|pair| {
             let [low, high] = [&pair[0], &pair[1]];
             let share = (opaque - low.opacity) / (high.opacity - low.opacity);
-            (share > 0.0 && share < 1.0).then(|| low.at + share * (high.at - low.at))
+            (share > 0.0 && share < 1.0).then_some(low.at + share * (high.at - low.at))
         }));
         levels.sort_by(f64::total_cmp);
         levels.dedup();

@@ -57,7 +57,7 @@ fn dial(name: &str, unit: &str, default: usize, mut points: Vec<Point>) -> Dial 
     Dial {
         name: name.into(),
         kind: Kind::Numerical,
-        is_ordered: unit != "",
+        is_ordered: !unit.is_empty(),
         unit: unit.into(),
         reference: Reference::F64,
         points,
