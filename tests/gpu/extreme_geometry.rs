@@ -187,10 +187,12 @@ fn probes_without_a_valid_geometry_are_refused_by_name() {
         assert!(refused.contains(field) && refused.contains(fault), "{name}: {refused}");
         assert_eq!(refused.lines().count(), 1, "{name}");
     }
-    // A millionth: more steps than a ray may have; the message names the setting that helps.
-    let grid = Grid { size: [64, 64, 64], spacing: [1e-4, 1.0, 1.0], origin: [0.0; 3] };
-    let refused = Scene::new(Geometry::Cartesian(grid), BYTES, settings("")).expect_err("steps").to_string();
+    // A millionth: a step that is set and makes more steps than a ray may have is refused by its name; one that nobody set is lengthened.
+    let grid = Geometry::Cartesian(Grid { size: [64, 64, 64], spacing: [1e-4, 1.0, 1.0], origin: [0.0; 3] });
+    let refused = Scene::new(grid.clone(), BYTES, settings("[ray]\nstep = 5e-5")).expect_err("steps").to_string();
     assert!(refused.contains("ray.step") && refused.contains("65536"), "{refused}");
+    let lengthened = Scene::new(grid, BYTES, settings("")).expect("a default is no reason to refuse");
+    assert!(lengthened.found.iter().any(|line| line.contains("ray.step")), "{:?}", lengthened.found);
 }
 
 /// Row: a part of the sector before the wobble axis, which is cut, and a phased array whose lines meet at its face.
