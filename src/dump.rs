@@ -176,9 +176,14 @@ fn meaning(slot: Slot) -> (&'static [&'static str], &'static str) {
         Slot::LightMatter => {
             (&["density", "echo"], "share of the densest matter; share of the range of the recording's samples")
         }
-        Slot::LightPyramid1 | Slot::LightPyramid2 | Slot::LightPyramid3 | Slot::LightPyramid4 => {
-            (GREY, "share of the densest matter, 0..1")
-        }
+        Slot::LightPyramid1
+        | Slot::LightPyramid2
+        | Slot::LightPyramid3
+        | Slot::LightPyramid4
+        | Slot::LightPyramid5
+        | Slot::LightPyramid6
+        | Slot::LightPyramid7
+        | Slot::LightPyramid8 => (GREY, "share of the densest matter, 0..1"),
         Slot::LightArriving | Slot::LightScattered | Slot::LightScatteredB | Slot::BackLight => {
             (&["red", "green", "blue", "density"], "light: share of what came; share of the densest matter")
         }

@@ -136,10 +136,14 @@ impl Plan {
         }
         if self.slots.contains(&Slot::Volume) {
             let _ = writeln!(text, "slices: {}", self.slice_path(scene));
+            let _ = writeln!(text, "{}", scene.format_choice());
             let _ = writeln!(text, "samples of the volume: {}", scene.sampling.words());
             if let Some(choice) = scene.brick_choice() {
                 let _ = writeln!(text, "{choice}");
             }
+        }
+        if let Some(choice) = scene.light_choice() {
+            let _ = writeln!(text, "{choice}");
         }
         for found in &scene.found {
             let _ = writeln!(text, "chosen: {found}");

@@ -21,7 +21,9 @@ void main() {
     float dense = 0.0, echo = 0.0;
     for (int n = 0; n < TAPS * TAPS * TAPS; ++n) {
         ivec3 tap = ivec3(n % TAPS, (n / TAPS) % TAPS, n / (TAPS * TAPS));
-        vec3 p = light_low + (vec3(at) + (vec3(tap) + 0.5) / float(TAPS)) * cell;
+        // Cells beyond the box hold what is at its faces, as all that reads the lattice repeats the outermost cell: a face of the region is no surface, and no light
+        // comes in through it, however many cells fit.
+        vec3 p = clamp(light_low + (vec3(at) + (vec3(tap) + 0.5) / float(TAPS)) * cell, box_low, box_high);
         vec3 texel;
         // What is beyond the first and the last slice casts shadows as they do: a cut has no bright face.
         vec4 place;

@@ -19,7 +19,7 @@ void main() {
         light = vec3(0.0);
         for (int y = 0; y < 3; ++y) {
             for (int x = 0; x < 3; ++x) {
-                ivec2 tap = clamp(from + ivec2(x, y) - 1, ivec2(0), size - 1);
+                ivec2 tap = clamp(from + STRIDE * (ivec2(x, y) - 1), ivec2(0), size - 1);
                 light += across[x] * down[y] * texelFetch(front, tap, 0).rgb;
             }
         }

@@ -15,6 +15,8 @@ layout(scalar) uniform Params {
     int layer;
     int from_high; // 1: each layer is followed by the one before it
     int count;     // of layers, 1..LAYERS
+    int last_layer;    // of the lattice
+    float outer_share; // of the lattice's outermost layers that is within the box, and absorbs
 #include "propagation_params.glsl"
 };
 #include "propagation.glsl"
@@ -58,6 +60,8 @@ void main() {
             ivec2 at = clamp(low - whole + mine(i), ivec2(0), size - 1);
             next_densities[i] = texelFetch(matter, cell_of(from_high == 1 ? layer - next : layer + next, at), 0).x;
         }
+        int here = from_high == 1 ? layer + 1 - step : layer - 1 + step;
+        float share = here == 0 || here == last_layer ? outer_share : 1.0;
         barrier();
         [[unroll]] for (int i = 0; i < EACH; ++i) {
             ivec2 cell = mine(i), at = low + cell;
@@ -78,13 +82,13 @@ void main() {
                     }
                 }
             }
-            vec3 absorbed = half_way(density);
+            vec3 absorbed = half_way(share * density);
             light *= absorbed;
             vec3 onward = light * absorbed;
             keep(now + cell.y * REGION + cell.x, onward);
             // Each cell belongs to one tile, wherever its light comes from.
             if (any(lessThan(at, tile)) || any(greaterThanEqual(at, tile + TILE))) continue;
-            imageStore(arriving, cell_of(from_high == 1 ? layer + 1 - step : layer - 1 + step, at), vec4(light, density));
+            imageStore(arriving, cell_of(here, at), vec4(light, density));
             if (step == count) imageStore(next_front, at, vec4(onward, 1.0));
         }
     }

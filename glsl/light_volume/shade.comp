@@ -34,7 +34,7 @@ void main() {
         }
         gradient /= 32.0 * cell;
         float steep = length(gradient);
-        vec3 normal = steep > 1e-9 ? -gradient / steep : vec3(0.0);
+        vec3 normal = steep > 1e-9 * slope ? -gradient / steep : vec3(0.0);
         float certain = min(steep / slope, 1.0);
         vec3 wrapped = max((vec3(dot(normal, towards)) + wrap) / (1.0 + wrap), vec3(0.0));
         vec3 key = texelFetch(arriving, at, 0).rgb * light_colour;

@@ -174,7 +174,10 @@ impl InputArgs {
     pub fn resolve_sampling(&self, scene: Scene) -> Scene {
         let devices = list().unwrap_or_default();
         match device_selection::choose(&devices, self.scene.device.as_ref().unwrap_or(&DeviceChoice::Best)) {
-            Ok(n) => scene.sampled(TexelAccess::for_device(&devices[n]).sampling()),
+            Ok(n) => {
+                let scene = Scene { truncates_halves: devices[n].truncates_halves(), ..scene };
+                scene.sampled(TexelAccess::for_device(&devices[n]).sampling())
+            }
             Err(_) => scene,
         }
     }

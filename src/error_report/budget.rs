@@ -52,12 +52,12 @@ pub struct Source {
     pub nearly: Vec<String>,
 }
 
-/// The sources of error of a scene: its numerical dials, but for the rule of compositing, which chooses how fast the picture converges, and for bricks, which
-/// change no picture.
+/// The sources of error of a scene: its numerical dials, but for the rule of compositing, which chooses how fast the picture converges, for bricks, which
+/// change no picture, and for the samples in a cell of a light volume, which converge with the cells.
 pub fn sources(scene: &Scene) -> Vec<Source> {
     let numerical = dials::NAMES.iter().filter_map(|name| dials::dial(name, scene).ok());
-    let numerical =
-        numerical.filter(|dial| dial.kind == Kind::Numerical && !["compositing", "brick"].contains(&dial.name));
+    let numerical = numerical
+        .filter(|dial| dial.kind == Kind::Numerical && !["compositing", "brick", "light-taps"].contains(&dial.name));
     let source = |dial: Dial| {
         let own = |all: &[String]| all.iter().filter(|set| is_own(&dial, set)).cloned().collect::<Vec<_>>();
         let label = dial.settings.first().map_or(String::new(), |setting| setting.label.clone());

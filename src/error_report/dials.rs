@@ -4,6 +4,7 @@
 
 use super::Kind;
 use super::map::step_fault;
+use crate::passes::light_volume;
 use crate::scene::{Compositing, Edge, Mode, PeronaMalik, Sampling, Scene, Scheme, Volume, VolumeFormat, transfer};
 
 /// One setting of a dial.
@@ -42,6 +43,27 @@ impl Dial {
     }
 }
 
+/// Cells of the finest light volume that is measured, nearly: 1.8 GB of a device's memory.
+const MOST_LIGHT_CELLS: f64 = 4e7;
+
+/// Samples of the picture with the finest step: some ten seconds of two cores. A sample in a light volume counts as six.
+const MOST_SAMPLES: f64 = 6e8;
+
+/// How many times as fine as the scene's step the finest is that is measured, and the next one; powers of two from 8.
+fn fineness(scene: &Scene) -> [f64; 2] {
+    let rays = scene.ray_size().iter().map(|n| f64::from(*n)).product::<f64>();
+    let each = if scene.lit_by_volume().is_some() { 6.0 } else { 1.0 };
+    let samples = rays * (scene.high - scene.low).length() / scene.step * each;
+    let most = if samples * 32.0 <= MOST_SAMPLES {
+        32.0
+    } else if samples * 16.0 <= MOST_SAMPLES {
+        16.0
+    } else {
+        8.0
+    };
+    [most, most / 2.0]
+}
+
 /// Names of all dials.
 pub const NAMES: &[&str] = &[
     "step",
@@ -72,6 +94,7 @@ pub const NAMES: &[&str] = &[
 pub fn dial(name: &str, scene: &Scene) -> Result<Dial, String> {
     let s = &scene.settings;
     let step = scene.step;
+    let [finest_step, next_step] = fineness(scene).map(f64::recip);
     let marches = !scene.is_flat() && s.mode != Mode::Cube;
     let composites = scene.composites();
     let need = |there: bool, why: &str| if there { Ok(()) } else { Err(why.to_string()) };
@@ -102,15 +125,16 @@ pub fn dial(name: &str, scene: &Scene) -> Result<Dial, String> {
         "step" => {
             need(marches, "casts no ray")?;
             is_one_picture()?;
-            // From an eighth to four times the step; the reference is four times finer than the finest.
+            // Down to an eighth of the step; the reference is four times as fine as the finest, or finer.
             let settings = [4.0, 2.83, 2.0, 1.41, 0.707, 0.5, 0.354, 0.25, 0.177, 0.125];
+            let settings = settings.into_iter().filter(|f| *f >= 4.0 * finest_step);
             // Steps with the same samples of the surface detector give the same picture.
             let ring_half = |f: f64| match (s.mode, s.surface.edge) {
                 (Mode::Surface, None | Some(Edge::Length(_))) if !composites => scene.ring.half_at(f * step),
                 _ => 0,
             };
             let mut halves = vec![ring_half(1.0)];
-            let settings = settings.into_iter().filter(|f| {
+            let settings = settings.filter(|f| {
                 let half = ring_half(*f);
                 let is_new = half == 0 || !halves.contains(&half);
                 halves.push(half);
@@ -120,7 +144,7 @@ pub fn dial(name: &str, scene: &Scene) -> Result<Dial, String> {
                 .map(|f| at(format!("{:.3} mm", f * step), &[format!("ray.step={}", f * step)], f * step))
                 .collect();
             let fine = |f: f64| [format!("ray.step={}", step * f)];
-            made("step", "mm", is(format!("{step:.3} mm"), step), others, &fine(1.0 / 32.0), &fine(1.0 / 16.0))
+            made("step", "mm", is(format!("{step:.3} mm"), step), others, &fine(finest_step), &fine(next_step))
         }
         "compositing" => {
             need(composites, "composites nothing")?;
@@ -143,15 +167,16 @@ pub fn dial(name: &str, scene: &Scene) -> Result<Dial, String> {
             let others = others.map(|(n, k)| at(k.to_string(), &[format!("volume.compositing={k}")], n as f64));
             let best = |f: f64| [format!("volume.compositing={finest}"), format!("ray.step={}", step * f)];
             let value = kinds.iter().position(|k| *k == now).unwrap_or(0) as f64;
-            made("compositing", "", is(now.clone(), value), others.collect(), &best(1.0 / 32.0), &best(1.0 / 16.0))
+            made("compositing", "", is(now.clone(), value), others.collect(), &best(finest_step), &best(next_step))
         }
         "format" => {
             let bits = |f: VolumeFormat| match f {
                 VolumeFormat::R8 => 8.0,
-                VolumeFormat::R16 | VolumeFormat::R16f => 16.0,
+                VolumeFormat::Auto | VolumeFormat::R16 | VolumeFormat::R16f => 16.0,
                 VolumeFormat::R32f => 32.0,
             };
-            let now = s.slices.format;
+            // `auto` is resolved to one of them.
+            let now = scene.volume_format();
             let all = [VolumeFormat::R8, VolumeFormat::R16, VolumeFormat::R16f, VolumeFormat::R32f];
             let others = all.into_iter().filter(|f| *f != now);
             let others = others.map(|f| at(serde_word(&f), &[format!("slices.format={}", serde_word(&f))], bits(f)));
@@ -281,8 +306,8 @@ pub fn dial(name: &str, scene: &Scene) -> Result<Dial, String> {
                 "share",
                 is(format!("{now:.2}"), now),
                 others.collect(),
-                &best(1.0 / 32.0),
-                &best(1.0 / 16.0),
+                &best(finest_step),
+                &best(next_step),
             )
         }
         "resolution" => {
@@ -365,11 +390,27 @@ pub fn dial(name: &str, scene: &Scene) -> Result<Dial, String> {
         }
         "light-cell" => {
             need(scene.lit_by_volume().is_some(), "has no light volume")?;
-            let now = scene.light_lattice().cell;
-            let set = |cell: f64| [format!("light.volume.cell={cell}")];
-            let others = [3.0, 2.0, 1.6, 1.2, 0.8, 0.6].into_iter().filter(|cell| (*cell - now).abs() > 1e-6);
-            let others = others.map(|cell| at(format!("{cell} mm"), &set(cell), cell)).collect();
-            made("light-cell", "mm", is(format!("{now:.2} mm"), now), others, &set(0.4), &set(0.5))
+            let lattice = scene.light_lattice();
+            let (now, [total, along]) = (
+                lattice.cell,
+                [
+                    lattice.count.iter().map(|n| f64::from(*n)).product(),
+                    f64::from(lattice.count.into_iter().max().unwrap_or(1)),
+                ],
+            );
+            // The finest lattice that a device is asked for, at most four times as fine as the scene's. Every point is coarser than it and the next one.
+            let finest = now * (f64::max(total / MOST_LIGHT_CELLS, 1.0 / 64.0)).cbrt().max(along / 1000.0);
+            let finest = finest.max(light_volume::least_cell(scene));
+            need(
+                finest * 2.0 <= now * (1.0 + 1e-9),
+                "has a light volume of which none with cells half as large is measured: set light.volume.cell to more",
+            )?;
+            let set =
+                |cell: f64| [format!("light.volume.cell={cell}"), format!("light.volume.cells={MOST_LIGHT_CELLS}")];
+            let others =
+                [4.0, 2.83, 2.0, 1.41, 0.707, 0.5].map(|f| f * now).into_iter().filter(|cell| *cell > 1.99 * finest);
+            let others = others.map(|cell| at(format!("{cell:.3} mm"), &set(cell), cell)).collect();
+            made("light-cell", "mm", is(format!("{now:.3} mm"), now), others, &set(finest), &set(finest * 2.0))
         }
         "light-taps" => {
             let Some(light) = scene.lit_by_volume() else { return Err("has no light volume".into()) };
@@ -387,6 +428,7 @@ pub fn dial(name: &str, scene: &Scene) -> Result<Dial, String> {
         }
         "pipeline" => {
             need(marches, "casts no ray")?;
+            is_one_picture()?;
             let format = s.slices.format;
             let lit = scene.lit_by_volume().map(|_| scene.light_lattice().cell);
             // Steps, cells of light and bits together: coarse ones are stored in 8 bits, fine ones in 32.
@@ -398,19 +440,16 @@ pub fn dial(name: &str, scene: &Scene) -> Result<Dial, String> {
                 };
                 let mut set =
                     vec![format!("ray.step={}", step * factor), format!("slices.format={}", serde_word(&format))];
-                set.extend(lit.map(|cell| format!("light.volume.cell={}", (cell * factor).clamp(0.2, 10.0))));
+                if let Some(cell) = lit {
+                    set.push(format!("light.volume.cell={}", cell * factor));
+                    set.push(format!("light.volume.cells={MOST_LIGHT_CELLS}"));
+                }
                 set
             };
-            let others = [8.0, 4.0, 2.0, 0.5, 0.25, 0.125].map(|f| at(format!("x {f}"), &set(f), f));
+            let others = [8.0, 4.0, 2.0, 0.5, 0.25, 0.125].into_iter().filter(|f| *f >= 4.0 * finest_step);
+            let others = others.map(|f| at(format!("x {f}"), &set(f), f)).collect();
             let fine = |f: f64| set(f);
-            made(
-                "pipeline",
-                "times step and cell",
-                is("x 1".into(), 1.0),
-                others.into(),
-                &fine(1.0 / 32.0),
-                &fine(1.0 / 16.0),
-            )
+            made("pipeline", "times step and cell", is("x 1".into(), 1.0), others, &fine(finest_step), &fine(next_step))
         }
         _ => return Err(format!("is unknown; there are: {}, all", NAMES.join(", "))),
     };

@@ -41,6 +41,9 @@ pub fn csv(report: &Report) -> String {
                 Reference::Exact { estimate, .. } => ["exact rays".into(), estimate.to_string()],
                 Reference::AsItIs => ["the scene as it is: another look, no error".into(), String::new()],
                 Reference::Converged { set, rmse } => [format!("converged: {}", set.join("; ")), rmse.to_string()],
+                Reference::Extrapolated { set, cells, rmse, .. } => {
+                    [format!("extrapolated over cells of {}: {}", in_mm(cells), set.join("; ")), rmse.to_string()]
+                }
             });
             row.extend([&report.device, &report.driver, &report.date].map(String::clone));
             row.push(report.repeats.to_string());
@@ -58,6 +61,10 @@ fn quoted(field: &str) -> String {
     }
 }
 
+fn in_mm([coarse, middle, fine]: &[f64; 3]) -> String {
+    format!("{coarse:.3}, {middle:.3} and {fine:.3} mm")
+}
+
 /// The reference of a dial or budget, in words.
 fn held(reference: &Reference) -> String {
     match reference {
@@ -69,6 +76,11 @@ fn held(reference: &Reference) -> String {
         Reference::Converged { set, rmse } => {
             format!("against the device's own at {}, itself off by about {rmse:.1e}", set.join(" "))
         }
+        Reference::Extrapolated { set, cells, order, rmse } => format!(
+            "against the device's own at {}, extrapolated over light cells of {} with order {order:.1}, itself off by about {rmse:.1e}",
+            set.join(" "),
+            in_mm(cells)
+        ),
     }
 }
 

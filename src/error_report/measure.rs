@@ -8,6 +8,7 @@ use super::dials::Dial;
 use super::running::{Rendering, Running, Runs, in_floats};
 use crate::error_report::convergence::{self, Range};
 use crate::error_report::metrics;
+use crate::error_report::richardson;
 use crate::error_report::{
     self, Combination, Errors, FORMAT, Kind as DialKind, Measure, OwnError, Point, Reference, Report, Sizes, Times,
 };
@@ -162,11 +163,59 @@ impl ErrorMeasurement<'_> {
             }
             Kind::Look | Kind::Converged => {}
         }
-        let rendering = self.rendered(&best)?;
-        let nearly = self.rendered(&self.scene_with("combination", &nearly)?)?;
-        let error = OwnError::of(&compare("combination", &[], &nearly, &rendering)?);
-        let reference = Reference::Converged { set: finest, rmse: error.rmse };
+        let (rendering, reference, error) = self.converged("combination", &finest, &nearly)?;
         Ok(Finest { rendering, reference, error })
+    }
+
+    /// The picture that settings converge to, and its own error: the finest one by its difference from the next, or, of a scene that a light volume lights,
+    /// what three lattices of it converge to.
+    fn converged(
+        &self,
+        dial: &'static str,
+        finest: &[String],
+        nearly: &[String],
+    ) -> Result<(Rendering, Reference, OwnError), MeasureError> {
+        let (best, next) = (self.scene_with(dial, finest)?, self.scene_with(dial, nearly)?);
+        let mut rendering = self.rendered(&best)?;
+        let is_lit = best.lit_by_volume().is_some() && next.lit_by_volume().is_some();
+        let cells = [&next, &best].map(|scene| scene.light_lattice().cell);
+        if !is_lit || cells[0] <= cells[1] {
+            let error = OwnError::of(&compare(dial, &[], &self.rendered(&next)?, &rendering)?);
+            return Ok((rendering, Reference::Converged { set: finest.to_vec(), rmse: error.rmse }, error));
+        }
+        // What is finest but for its light, with cells whose edges have one ratio, and the converse. A ratio of two leaves all cones of ambient light as wide as
+        // cells of the pyramid, or as far between two.
+        let with = |set: &[String], cell: f64| {
+            let set: Vec<String> = set.iter().cloned().chain([format!("light.volume.cell={cell}")]).collect();
+            self.scene_with(dial, &set)
+        };
+        let coarser = [with(finest, cells[0] * cells[0] / cells[1])?, with(finest, cells[0])?];
+        let [coarse, middle] = [self.rendered(&coarser[0])?, self.rendered(&coarser[1])?];
+        let edges = [coarser[0].light_lattice().cell, coarser[1].light_lattice().cell, cells[1]];
+        let others = with(nearly, cells[1])?;
+        let others = match others.settings == best.settings {
+            true => OwnError::default(),
+            false => OwnError::of(&compare(dial, &[], &self.rendered(&others)?, &rendering)?),
+        };
+        let both = |light: OwnError| OwnError {
+            rmse: light.rmse.hypot(others.rmse),
+            levels: light.levels.hypot(others.levels),
+        };
+        match richardson::extrapolated([&coarse.picture, &middle.picture, &rendering.picture], edges) {
+            Ok(found) if found.order.is_finite() => {
+                let before = Rendering { picture: found.coarser, ..middle };
+                rendering.picture = found.picture;
+                let error = both(OwnError::of(&compare(dial, &[], &before, &rendering)?));
+                let set = finest.to_vec();
+                let reference = Reference::Extrapolated { set, cells: edges, order: found.order, rmse: error.rmse };
+                Ok((rendering, reference, error))
+            }
+            // The same light in both, or differences that are no power of the cell: the last of them bounds what is left.
+            _ => {
+                let error = both(OwnError::of(&compare(dial, &[], &middle, &rendering)?));
+                Ok((rendering, Reference::Converged { set: finest.to_vec(), rmse: error.rmse }, error))
+            }
+        }
     }
 
     /// What each source adds to the error of the scene, and all of them.
@@ -299,10 +348,8 @@ impl ErrorMeasurement<'_> {
                 (expected, Reference::Exact { estimate: effort.estimate, pieces: effort.pieces })
             }
             Kind::Converged => {
-                let rendering = self.rendered(&best)?;
-                let nearly = self.rendered(&self.scene_at(dial, &dial.nearly)?)?;
-                let own = compare(dial.name, &[], &nearly, &rendering)?.rmse;
-                (rendering, Reference::Converged { set: dial.best.clone(), rmse: own })
+                let (rendering, reference, _) = self.converged(dial.name, &dial.best, &dial.nearly)?;
+                (rendering, reference)
             }
         };
         if let Some(fault) = nothing_in(&expected) {
@@ -352,7 +399,9 @@ impl ErrorMeasurement<'_> {
                     let distances = p.errors.mm.as_ref().and_then(|mm| mm.error.as_ref());
                     distances.map_or(p.errors.rmse, |mm| mm.rms) >= BETTER * estimate
                 }
-                Reference::Converged { rmse, .. } => p.errors.rmse >= BETTER * rmse,
+                Reference::Converged { rmse, .. } | Reference::Extrapolated { rmse, .. } => {
+                    p.errors.rmse >= BETTER * rmse
+                }
                 Reference::F64 | Reference::AsItIs => p.value >= BETTER * best.step * (1.0 - 1e-9),
             };
             let pairs: Vec<[f64; 2]> = points.iter().filter(good).map(|p| [p.value, p.errors.rmse]).collect();
@@ -394,7 +443,9 @@ impl ErrorMeasurement<'_> {
         if is_look {
             return Ok((Kind::Look, None));
         }
-        let in_f64 = if cost(best) <= MAX_F64_SAMPLES { Kind::F64 } else { Kind::Converged };
+        // The lattice of a light volume has an error of its own, which f64 keeps and an extrapolated picture states.
+        let is_f64 = best.lit_by_volume().is_none() && cost(best) <= MAX_F64_SAMPLES;
+        let in_f64 = if is_f64 { Kind::F64 } else { Kind::Converged };
         let fault = picture::fault(best);
         let too_long = (picture::cost(best) + cost_of_slices(best) > MAX_EXACT_SEGMENTS)
             .then(|| "exact rays would take longer than a minute".to_string());

@@ -12,6 +12,7 @@ pub mod map;
 pub mod measure;
 pub mod metrics;
 pub mod plot;
+pub mod richardson;
 mod running;
 
 use crate::scene::Scene;
@@ -145,6 +146,18 @@ pub enum Reference {
         /// The assignments that give it.
         set: Vec<String>,
         /// Its RMSE against the next coarser picture: an upper bound of its own error if it converges.
+        rmse: f64,
+    },
+    /// What such pictures with ever smaller cells of the light volume converge to, by Richardson's extrapolation ([`richardson`]).
+    Extrapolated {
+        /// The assignments that give the picture with the smallest cells.
+        set: Vec<String>,
+        /// Edges of the cells, mm, descending.
+        cells: [f64; 3],
+        /// The order in the cell that was observed.
+        order: f64,
+        /// Its RMSE: against what the two coarser pictures alone converge to, and against the next coarser setting of all else, as a root of the sum of
+        /// squares. An upper bound of its own error if the pictures converge.
         rmse: f64,
     },
 }
@@ -339,7 +352,7 @@ impl Report {
         for dial in &self.dials {
             let reference_rmse = match &dial.reference {
                 Reference::F64 | Reference::AsItIs => 0.0,
-                Reference::Converged { rmse, .. } => *rmse,
+                Reference::Converged { rmse, .. } | Reference::Extrapolated { rmse, .. } => *rmse,
                 Reference::Exact { estimate, .. } => *estimate,
             };
             if !(reference_rmse.is_finite() && reference_rmse >= 0.0) {

@@ -333,7 +333,9 @@ fn notes(dial: &Dial) -> Vec<String> {
         Reference::F64 => None,
         Reference::Exact { estimate, .. } => Some(format!("against exact rays, estimate {estimate:.0e}")),
         Reference::AsItIs => Some("another look: difference, no error".to_string()),
-        Reference::Converged { rmse, .. } => Some(format!("against a picture good to {rmse:.0e}")),
+        Reference::Converged { rmse, .. } | Reference::Extrapolated { rmse, .. } => {
+            Some(format!("against a picture good to {rmse:.0e}"))
+        }
     };
     order.into_iter().chain(against).collect()
 }

@@ -89,6 +89,12 @@ impl Candidate {
         self.kind == vk::PhysicalDeviceType::CPU
     }
 
+    /// True if half-precision floats are truncated where shaders store them. Vulkan allows that; llvmpipe does it in every version
+    /// (`lp_build_float_to_half` of Mesa), and a test measures it. GPUs round.
+    pub fn truncates_halves(&self) -> bool {
+        self.is_software() && self.name.contains("llvmpipe")
+    }
+
     /// True if it shares the machine's memory.
     pub fn has_unified_memory(&self) -> bool {
         self.is_software() || self.kind == vk::PhysicalDeviceType::INTEGRATED_GPU

@@ -95,9 +95,11 @@ fn features(context: &Context, slot: Slot, scene: &Scene) -> vk::FormatFeatureFl
 const FRAMES_IN_CACHE: u32 = 4;
 
 /// The scene with the fields that the device resolves: the fastest sampling, which reads eight texels if texels are loaded or the
-/// device cannot filter the volume's format; no packed neighbours if the device cannot hold them; a picture in the format of the window; and the shared
+/// device cannot filter the volume's format; no packed neighbours if the device cannot hold them; a volume in the format that the
+/// device stores best; a picture in the format of the window; and the shared
 /// memory of a GPU. On a CPU few frames go through stage 1 at once: their slots stay in its caches.
-pub fn adapt_scene(context: &Context, texel_access: TexelAccess, scene: Scene) -> Scene {
+pub fn adapt_scene(context: &Context, texel_access: TexelAccess, mut scene: Scene) -> Scene {
+    scene.truncates_halves = context.candidate.truncates_halves();
     let filters = filters(context, Slot::Volume.format(&scene));
     let mut scene = scene.sampled(if filters { texel_access.sampling() } else { Sampling::Exact });
     match context.candidate.is_software() {

@@ -10,17 +10,19 @@ use crate::passes::slots::Shape;
 use crate::scene::{Ground, LightLattice, LightVolume, Mode, Propagation, Scene};
 use glam::DVec3;
 
-/// Slope of the echo at which the orientation of a surface is certain, 1/mm: half that of skin in fluid after a Gaussian of 1.5 mm.
-const CERTAIN_SLOPE: f64 = 0.04;
 /// Density that fluid counts as where light is scattered: FLUID of diffuse.comp.
 const FLUID: f64 = 0.0015;
-/// Smallest and largest variance of the kernel of propagate.comp, cells^2, for which no weight is negative.
+/// Most cells between two of that kernel.
+const MAX_STRIDE: u32 = 16;
+/// Largest standard deviation of scattered light, cells.
+const MAX_SCATTER: f64 = 48.0;
+/// Smallest and largest variance of the kernel of propagate.comp, cells^2, for which no weight is negative; the largest by the square of its stride.
 const VARIANCES: [f64; 2] = [0.25, 0.75];
 /// Layers of a dispatch of propagate_layers.comp, and the shared memory that it takes, bytes: a float for each of three colours, in
 /// 32 x 32 cells of two layers.
 const LAYERS: u32 = 8;
 const LAYERS_MEMORY: u32 = 2 * 3 * 4 * 32 * 32;
-/// mm along a cone of ambient light, and the length that each place stands for: REACH and LENGTH of ambient.comp.
+/// Places along a cone of ambient light, and the length that each stands for, for a reach of 20: REACH and LENGTH of ambient.comp.
 const REACH: [f64; 4] = [2.5, 5.0, 10.0, 20.0];
 const LENGTH: [f64; 4] = [2.5, 3.5, 7.0, 12.0];
 
@@ -54,7 +56,7 @@ fn cells(scene: &Scene) -> [u32; 3] {
     scene.light_lattice().count
 }
 
-/// The density and the echo of each cell. Matter does not fade towards the faces of the region here: what it cuts lies in the shade of what is beyond.
+/// The density and the echo of each cell; beyond the box, those at its faces. Matter does not fade towards the faces of the region here: what it cuts lies in the shade of what is beyond.
 pub const MATTER: Pass = Pass {
     name: "light_matter",
     stage: Stage::Raycast,
@@ -102,10 +104,8 @@ pub const MATTER: Pass = Pass {
             for n in 0..taps.pow(3) {
                 let tap =
                     [n % taps, n / taps % taps, n / taps.pow(2)].map(|tap| (f64::from(tap) + 0.5) / f64::from(taps));
-                let place = lattice.place(std::array::from_fn(|a| at[a] as f64 + tap[a]));
-                let is_kept = place.cmpge(view.low).all()
-                    && place.cmple(scene.high).all()
-                    && scene.clips().all(|(normal, limit)| normal.dot(place) <= limit);
+                let place = lattice.place(std::array::from_fn(|a| at[a] as f64 + tap[a])).clamp(view.low, scene.high);
+                let is_kept = scene.clips().all(|(normal, limit)| normal.dot(place) <= limit);
                 let Some(texel) = ray::texel_beyond_sweep(scene, place).filter(|_| is_kept) else { continue };
                 let value = ray::interpolated(scene, volume, texel);
                 let [low, high] = view.window;
@@ -127,7 +127,7 @@ pub const REDUCE: Pass = Pass {
     reads: |_, t| vec![whole("source", level(t.iteration))],
     writes: |_, t| vec![whole("target", level(t.iteration + 1))],
     extent: |s, t| cells(s).map(|n| n.div_ceil(2 << t.iteration)),
-    repeat: |_| 4,
+    repeat: |s| s.ambient_cones().levels(),
     params: |_, _| Params::default(),
     constants: no_constants,
     tolerance: Tolerance {
@@ -162,8 +162,23 @@ fn level(n: u32) -> Slot {
         1 => Slot::LightPyramid1,
         2 => Slot::LightPyramid2,
         3 => Slot::LightPyramid3,
-        _ => Slot::LightPyramid4,
+        4 => Slot::LightPyramid4,
+        5 => Slot::LightPyramid5,
+        6 => Slot::LightPyramid6,
+        7 => Slot::LightPyramid7,
+        _ => Slot::LightPyramid8,
     }
+}
+
+/// The least edge of a cell at which the light is the one that is asked for, mm: in smaller ones kernels and cones would be wider than they can be.
+pub fn least_cell(scene: &Scene) -> f64 {
+    let light = light_of(scene);
+    let scattered = light.scatter_deviations().into_iter().fold(0.0, f64::max) / MAX_SCATTER;
+    let beam = |beam: &Beam| {
+        let most = VARIANCES[1] * f64::from(MAX_STRIDE.pow(2));
+        light.widening.powi(2) * beam.propagation(scene).path / most
+    };
+    beam(&KEY).max(scattered).max(scene.least_cell_of_cones())
 }
 
 /// One of the lights that are propagated.
@@ -205,9 +220,9 @@ impl Beam {
         self.cells(scene)[self.propagation(scene).axis]
     }
 
-    /// Several layers a dispatch where workgroups have memory of their own: on a GPU.
+    /// Several layers a dispatch where workgroups have memory of their own: on a GPU. A stride would need a wider border of each.
     fn layers_at_once(&self, scene: &Scene) -> u32 {
-        if LAYERS_MEMORY <= scene.shared_memory { LAYERS } else { 1 }
+        if LAYERS_MEMORY <= scene.shared_memory && self.stride(scene) == 1 { LAYERS } else { 1 }
     }
 
     fn shader(&self, scene: &Scene) -> &'static str {
@@ -241,10 +256,33 @@ impl Beam {
         [width, height, 1]
     }
 
+    /// Of the kernel, cells^2.
     fn variance(&self, scene: &Scene) -> f64 {
-        let path = self.propagation(scene).path * self.cell(scene);
         let [low, high] = VARIANCES;
-        (light_of(scene).widening.powi(2) * path / self.cell(scene).powi(2)).clamp(low, high)
+        self.widening(scene).clamp(low, high * f64::from(self.stride(scene).pow(2)))
+    }
+
+    /// Variance that a layer adds, cells^2.
+    fn widening(&self, scene: &Scene) -> f64 {
+        light_of(scene).widening.powi(2) * self.propagation(scene).path / self.cell(scene)
+    }
+
+    /// Cells between two of the kernel: the fewest that its variance needs. Small cells need more than one.
+    fn stride(&self, scene: &Scene) -> u32 {
+        // The slack is that of rounding.
+        ((self.widening(scene) / VARIANCES[1]).sqrt() - 1e-9).ceil().clamp(1.0, f64::from(MAX_STRIDE)) as u32
+    }
+
+    /// The share of the outermost layers that is within the box: what is beyond it absorbs nothing on the way in.
+    fn outer_share(&self, scene: &Scene) -> f64 {
+        let axis = self.propagation(scene).axis;
+        scene.light_lattice().outer_share(axis, self.layers(scene), self.cell(scene))
+    }
+
+    /// The share of a layer that absorbs.
+    fn share(&self, scene: &Scene, layer: u32) -> f64 {
+        let is_outer = layer == 0 || layer + 1 == self.layers(scene);
+        if is_outer { self.outer_share(scene) } else { 1.0 }
     }
 
     /// Absorption of red, green and blue over the path through one layer of density 1.
@@ -255,35 +293,49 @@ impl Beam {
     }
 
     fn constants(&self, scene: &Scene, args: &DispatchArgs) -> Vec<(&'static str, i32)> {
-        vec![("AXIS", self.propagation(scene).axis as i32), ("FIRST", i32::from(args.iteration == 0))]
+        vec![
+            ("AXIS", self.propagation(scene).axis as i32),
+            ("FIRST", i32::from(args.iteration == 0)),
+            ("STRIDE", self.stride(scene) as i32),
+        ]
     }
 
     fn params(&self, scene: &Scene, args: &DispatchArgs) -> Params {
         let (found, layers) = (self.propagation(scene), self.lit_layers(scene, args));
-        let mut params = Params::default().i32("layer", layers.first().copied().unwrap_or(0));
-        if self.layers_at_once(scene) > 1 {
-            params = params.i32("from_high", found.from_high.into()).i32("count", layers.len() as u32);
-        }
+        let first = layers.first().copied().unwrap_or(0);
+        let mut params = Params::default().i32("layer", first);
+        let share = match self.layers_at_once(scene) > 1 {
+            true => {
+                params = params
+                    .i32("from_high", found.from_high.into())
+                    .i32("count", layers.len() as u32)
+                    .i32("last_layer", self.layers(scene) - 1)
+                    .f32("outer_share", self.outer_share(scene));
+                1.0
+            }
+            false => self.share(scene, first),
+        };
         params
             .vec2("shift", found.shift)
             .f32("variance", self.variance(scene))
-            .vec3("absorption", self.absorption(scene))
+            .vec3("absorption", self.absorption(scene).map(|a| a * share))
     }
 
     fn reference(&self, scene: &Scene, args: &DispatchArgs, reads: &Arrays, writes: &mut Arrays) {
         let found = self.propagation(scene);
         let [width, height, _] = self.extent(scene).map(|n| n as usize);
-        let (absorption, variance) = (self.absorption(scene), self.variance(scene));
+        let (absorption, variance, stride) = (self.absorption(scene), self.variance(scene), self.stride(scene));
         // The share of each of three cells, with the mean and the variance asked for.
         let shares = |shift: f64| {
-            let spread = variance + shift * shift;
-            [(spread - shift) / 2.0, 1.0 - spread, (spread + shift) / 2.0]
+            let (spread, off) = ((variance + shift * shift) / f64::from(stride.pow(2)), shift / f64::from(stride));
+            [(spread - off) / 2.0, 1.0 - spread, (spread + off) / 2.0]
         };
         let whole = found.shift.map(|shift| (shift + 0.5).floor());
         let [across, down] = [0, 1].map(|a| shares(found.shift[a] - whole[a]));
         let mut front = (args.iteration > 0).then(|| reads.get("front").clone());
         for layer in self.lit_layers(scene, args) {
             let mut next = Texels::untouched([width, height, 1], 4);
+            let share = self.share(scene, layer);
             for (u, v) in (0..height).flat_map(|v| (0..width).map(move |u| (u, v))) {
                 let layer = layer as usize;
                 let cell = match found.axis {
@@ -296,14 +348,15 @@ impl Beam {
                     light = [0.0; 3];
                     for (i, j) in (0..3).flat_map(|j| (0..3).map(move |i| (i, j))) {
                         let tap = |at: usize, whole: f64, n: usize, size: usize| {
-                            (at as i64 + whole as i64 + n as i64 - 1).clamp(0, size as i64 - 1) as usize
+                            (at as i64 + whole as i64 + i64::from(stride) * (n as i64 - 1)).clamp(0, size as i64 - 1)
+                                as usize
                         };
                         let from = front.get([tap(u, whole[0], i, width), tap(v, whole[1], j, height), 0]);
                         light.iter_mut().zip(from).for_each(|(light, from)| *light += across[i] * down[j] * from);
                     }
                 }
                 let dense = reads.get("matter").get(cell)[0];
-                let half: [f64; 3] = absorption.map(|a| (-0.5 * a * dense).exp());
+                let half: [f64; 3] = absorption.map(|a| (-0.5 * a * share * dense).exp());
                 let there: [f64; 3] = std::array::from_fn(|c| light[c] * half[c]);
                 let on: [f64; 3] = std::array::from_fn(|c| there[c] * half[c]);
                 writes.get_mut("arriving").set(cell, &[there[0], there[1], there[2], dense]);
@@ -423,7 +476,9 @@ fn scattered(axes: u32) -> Slot {
 
 /// Standard deviations over which red, green and blue light are scattered, cells; more than 0.
 fn scatter(scene: &Scene) -> [f64; 3] {
-    light_of(scene).scatter_deviations().map(|deviation| (deviation / scene.light_lattice().cell).clamp(0.05, 12.0))
+    light_of(scene)
+        .scatter_deviations()
+        .map(|deviation| (deviation / scene.light_lattice().cell).clamp(0.05, MAX_SCATTER))
 }
 
 /// Light from everywhere above, and from behind.
@@ -431,10 +486,9 @@ pub const AMBIENT: Pass = Pass {
     name: "light_ambient",
     shader: |_, _| "light_volume/ambient",
     reads: |s, _| {
-        let mut reads: Vec<Bind> = (1..=4)
-            .zip(["pyramid_1", "pyramid_2", "pyramid_3", "pyramid_4"])
-            .map(|(n, name)| whole(name, level(n)))
-            .collect();
+        let cones = s.ambient_cones();
+        let mut reads: Vec<Bind> = (0..).zip(PYRAMID).map(|(n, name)| whole(name, level(1 + cones.level(n)))).collect();
+        reads.push(whole("around", Slot::LightPyramid2));
         reads.extend(need_back(s).is_ok().then_some(whole("back_light", Slot::BackLight)));
         reads
     },
@@ -443,14 +497,23 @@ pub const AMBIENT: Pass = Pass {
     repeat: once,
     params: |s, _| {
         let light = light_of(s);
+        let unit = reach_unit(light);
         Params::default()
-            .f32("absorption", light.ambient_extinction())
-            .f32("density", 0.5 / s.light_lattice().cell)
+            .f32("absorption", light.ambient_extinction() * unit)
+            .f32("density", 0.5 / s.light_lattice().cell * unit)
             .vec3("powers", light.ambient_powers())
             .f32("ambient", s.settings.light.ambient)
             .vec3("back_colour", light.back_colour.map(|c| c * light.back))
+            .f32("wider", s.ambient_cones().wider)
     },
-    constants: |s, _| vec![("BACK", need_back(s).is_ok() as i32)],
+    constants: |s, _| {
+        let cones = s.ambient_cones();
+        vec![
+            ("BACK", need_back(s).is_ok() as i32),
+            ("NARROWEST", cones.narrowest),
+            ("BETWEEN", (cones.wider > 0.0) as i32),
+        ]
+    },
     tolerance: Tolerance {
         absolute: 2e-5,
         relative: 1e-3,
@@ -459,25 +522,35 @@ pub const AMBIENT: Pass = Pass {
     },
     reference: |scene, _, reads, writes| {
         let light = light_of(scene);
-        let density = 0.5 / scene.light_lattice().cell;
+        let unit = reach_unit(light);
+        let density = 0.5 / scene.light_lattice().cell * unit;
         let target = writes.get_mut("ambient_light");
-        let pyramid = ["pyramid_1", "pyramid_2", "pyramid_3", "pyramid_4"].map(|name| reads.get(name));
+        let (pyramid, around, levels) =
+            (PYRAMID.map(|name| reads.get(name)), reads.get("around"), scene.ambient_cones());
         let ambient = scene.settings.light.ambient;
         for_cells(target.size.map(|n| n as u32), |at| {
-            let coarse: [usize; 3] = std::array::from_fn(|a| (at[a] / 2).min(pyramid[1].size[a] - 1));
+            let coarse: [usize; 3] = std::array::from_fn(|a| (at[a] / 2).min(around.size[a] - 1));
             let mut open = 1.0;
-            if pyramid[1].get(coarse)[0] > 0.0 {
+            if around.get(coarse)[0] > 0.0 {
                 let share = |cone: DVec3| {
                     let matter: f64 = (0..4)
-                        .map(|level| {
-                            let place: [f64; 3] = std::array::from_fn(|a| {
-                                let cells = at[a] as f64 + 0.5 + cone[a] * REACH[level] * density;
-                                cells / f64::from(1 << level) - 0.5
-                            });
-                            pyramid[level].trilinear(clamped(place, pyramid[level])) * LENGTH[level]
+                        .map(|n| {
+                            // The nth place in the cells of the mth level.
+                            let sample = |n: usize, m: usize| {
+                                let place: [f64; 3] = std::array::from_fn(|a| {
+                                    let cells = at[a] as f64 + 0.5 + cone[a] * REACH[n] * density;
+                                    cells / f64::from(1u32 << levels.level(m as i32)) - 0.5
+                                });
+                                pyramid[m].trilinear(clamped(place, pyramid[m]))
+                            };
+                            let mut found = sample(n, n);
+                            if levels.wider > 0.0 && levels.narrowest + n as i32 >= 0 {
+                                found += levels.wider * (sample(n, n + 1) - found);
+                            }
+                            found * LENGTH[n]
                         })
                         .sum();
-                    (-light.ambient_extinction() * matter).exp()
+                    (-light.ambient_extinction() * unit * matter).exp()
                 };
                 open = cones().into_iter().map(share).sum::<f64>() / 7.0;
             }
@@ -494,6 +567,14 @@ pub const AMBIENT: Pass = Pass {
     },
     ..MATTER
 };
+
+/// What the shader calls the levels that the cones run through.
+const PYRAMID: [&str; 5] = ["pyramid_1", "pyramid_2", "pyramid_3", "pyramid_4", "pyramid_5"];
+
+/// The length that [`REACH`] and [`LENGTH`] count in, mm.
+fn reach_unit(light: LightVolume) -> f64 {
+    light.reach / REACH[3]
+}
 
 /// Directions towards the probe: one along depth, six around it.
 fn cones() -> [DVec3; 7] {
@@ -531,7 +612,7 @@ pub const SHADE: Pass = Pass {
             .vec3("wrap", wrap(volume.wrap))
             .f32("relief", volume.relief)
             .f32("cell", s.light_lattice().cell)
-            .f32("slope", CERTAIN_SLOPE)
+            .f32("slope", volume.slope)
     },
     constants: no_constants,
     tolerance: Tolerance {
@@ -552,8 +633,8 @@ pub const SHADE: Pass = Pass {
             if pyramid.one(x, y, z) > 0.0 {
                 let gradient = slope_at(matter, at) / cell;
                 let steep = gradient.length();
-                let normal = if steep > 1e-9 { -gradient / steep } else { DVec3::ZERO };
-                let certain = (steep / CERTAIN_SLOPE).min(1.0);
+                let normal = if steep > 1e-9 * volume.slope { -gradient / steep } else { DVec3::ZERO };
+                let certain = (steep / volume.slope).min(1.0);
                 let wrapped = ((DVec3::splat(normal.dot(towards)) + wrap) / (1.0 + wrap)).max(DVec3::ZERO);
                 let arriving = reads.get("arriving").get(at);
                 let place: [f64; 3] = std::array::from_fn(|a| (at[a] as f64 + 0.5) / 2.0 - 0.5);

@@ -287,10 +287,10 @@ pub const PACKED_NEIGHBOURS: Pass = Pass {
 
 /// STORED of packed_neighbours.comp.
 fn packed_format(scene: &Scene) -> i32 {
-    match scene.settings.slices.format {
+    match scene.volume_format() {
         VolumeFormat::R8 => 0,
         VolumeFormat::R16 => 1,
-        VolumeFormat::R16f | VolumeFormat::R32f => 2,
+        VolumeFormat::Auto | VolumeFormat::R16f | VolumeFormat::R32f => 2,
     }
 }
 

@@ -278,6 +278,10 @@ slots! {
     LightPyramid2 = D::image("light_pyramid_2", |s| light_level(s, 2), |_| Format::R16f);
     LightPyramid3 = D::image("light_pyramid_3", |s| light_level(s, 3), |_| Format::R16f);
     LightPyramid4 = D::image("light_pyramid_4", |s| light_level(s, 4), |_| Format::R16f);
+    LightPyramid5 = D::image("light_pyramid_5", |s| light_level(s, 5), |_| Format::R16f);
+    LightPyramid6 = D::image("light_pyramid_6", |s| light_level(s, 6), |_| Format::R16f);
+    LightPyramid7 = D::image("light_pyramid_7", |s| light_level(s, 7), |_| Format::R16f);
+    LightPyramid8 = D::image("light_pyramid_8", |s| light_level(s, 8), |_| Format::R16f);
     /// Light that has passed one layer of cells, and the next.
     LightFrontA = D::image("light_front_a", |s| light_layer(s, false), |_| Format::Rgba32f);
     LightFrontB = D::image("light_front_b", |s| light_layer(s, false), |_| Format::Rgba32f);
@@ -409,17 +413,17 @@ fn volume(scene: &Scene) -> Shape {
 }
 
 fn volume_format(scene: &Scene) -> Format {
-    match scene.settings.slices.format {
+    match scene.volume_format() {
         VolumeFormat::R8 => Format::R8,
         VolumeFormat::R16 => Format::R16,
-        VolumeFormat::R16f => Format::R16f,
+        VolumeFormat::Auto | VolumeFormat::R16f => Format::R16f,
         VolumeFormat::R32f => Format::R32f,
     }
 }
 
 /// The bits of four texels of the volume.
 fn four_texels(scene: &Scene) -> Format {
-    if scene.settings.slices.format == VolumeFormat::R8 { Format::R32u } else { Format::Rg32u }
+    if scene.volume_format() == VolumeFormat::R8 { Format::R32u } else { Format::Rg32u }
 }
 
 fn per_brick(scene: &Scene) -> Shape {

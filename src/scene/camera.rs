@@ -4,6 +4,10 @@
 use super::{Layout, Settings};
 use glam::DVec3;
 
+/// How far the eye of a parallel view stands off the box beyond a 20th of the box's extent along the view: this share of half its diagonal. About 1 mm
+/// for a fetal head; the least that keeps a ray's entry above 0 by more than f32 loses.
+const OFF: f64 = 1.0 / 128.0;
+
 /// The ray of the point (px, py) in pixels: origin + px origin_dx + py origin_dy, and the direction likewise, then normalised. Distances
 /// along a ray are in mm.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -76,8 +80,8 @@ pub fn rays(settings: &Settings, low: DVec3, high: DVec3, depth_offset: f64, sti
     let fit = (along(up) / height).max(along(right) / width);
     // mm per pixel at the target.
     let pixel = 2.0 * fit / camera.zoom;
-    // The millimetre keeps the camera off a thin box. A box of micrometres gets less: in f32 the distance must not hide it.
-    let away = along(forward) * 1.05 + half.length().min(1.0);
+    // A share of the box, so that its picture is the same whatever its size in mm is. The second term keeps the camera off a thin box.
+    let away = along(forward) * 1.05 + half.length() * OFF;
 
     // Offset of the picture's upper left corner from its middle, pixels.
     let corner = |right: DVec3, up: DVec3| right * (-width / 2.0) + up * (height / 2.0);

@@ -1,6 +1,6 @@
 //! Checks of settings. Each error names the setting and its limits.
 
-use super::planes::{MAX_SLAB, MAX_TILES, MIN_APART};
+use super::planes::{MAX_SLAB, MAX_TILES, SAME_POINT};
 use super::{
     Bilateral, CINE_SPEEDS, Cine, Clip, Compositing, Conditioning, Curve, Distance, Edge, Elevation, EnhancedSigma,
     Layout, Light, MAX_CLIPS, MAX_CURVE_POINTS, MAX_DEVIATION, MAX_PICTURE, MAX_WINDOW, Mode, Noise, PeronaMalik,
@@ -8,6 +8,10 @@ use super::{
 };
 use crate::probe::Geometry;
 use glam::DVec3;
+
+/// The least and the largest length of a setting, mm: a thousandth of the smallest voxel that a volume may have, and a thousand of the largest. A scene may so
+/// be drawn at any size.
+pub(super) const LENGTHS: [f64; 2] = [1e-9, 1e9];
 
 /// Checks that need no geometry.
 pub(super) fn check(settings: &Settings) -> Result<(), SceneError> {
@@ -49,7 +53,7 @@ pub(super) fn check(settings: &Settings) -> Result<(), SceneError> {
     if settings.layout == Layout::Pair && settings.mode != Mode::Surface {
         return refuse("layout", "pair shows a volume and the surface found in the same march: set mode=surface");
     }
-    within("floating", settings.floating, 0.0, 1e9)?;
+    within("floating", settings.floating, 0.0, LENGTHS[1].powi(3))?;
     within("unveil.offset", settings.unveil.offset, -100.0, 100.0)?;
     within("unveil.smoothing", settings.unveil.smoothing, 0.0, 20.0)?;
     let s = &settings.slices;
@@ -121,7 +125,7 @@ pub(super) fn check(settings: &Settings) -> Result<(), SceneError> {
         within("camera.target", *value, -1e10, 1e10)?;
     }
     if let Some(step) = settings.ray.step {
-        within("ray.step", step, 1e-9, 1e9)?;
+        length("ray.step", step)?;
     }
     within("ray.early_end", settings.ray.early_end, 0.0, 1.0)?;
     if let Some(fault) = transfer::fault(&settings.volume.transfer) {
@@ -142,15 +146,15 @@ pub(super) fn check(settings: &Settings) -> Result<(), SceneError> {
     within("surface.threshold", f.threshold, 1e-6, 1.0)?;
     within("surface.rough_threshold", f.rough_threshold.unwrap_or(f.threshold), 1e-6, 1.0)?;
     if let Some(Edge::Length(edge)) = f.edge {
-        within("surface.edge", edge, 1e-9, 1e9)?;
+        length("surface.edge", edge)?;
     }
     within("surface.noise", f.noise, 0.0, 10.0)?;
     within("surface.rough", f64::from(f.rough), 1.0, 8.0)?;
     within("surface.number", f64::from(f.number), 1.0, 8.0)?;
-    within("surface.colour_depth", f.colour_depth, 0.01, 1000.0)?;
+    length("surface.colour_depth", f.colour_depth)?;
     check_light(&settings.light)?;
-    within("region.fade", settings.region.fade, 0.0, 100.0)?;
-    within("volume.extinction", settings.volume.extinction.unwrap_or(1.0), 1e-3, 1e3)?;
+    within("region.fade", settings.region.fade, 0.0, LENGTHS[1])?;
+    within("volume.extinction", settings.volume.extinction.unwrap_or(1.0), 1.0 / LENGTHS[1], 1.0 / LENGTHS[0])?;
     if settings.volume.compositing == Compositing::Exponential {
         let table = "needs volume.compositing=riemann, corrected or pre-integrated: exponential takes the light of a step from a table";
         if settings.light.volume.is_some() {
@@ -198,7 +202,7 @@ pub(super) fn check_conditioning(c: &Conditioning, geometry: &Geometry) -> Resul
         within("conditioning.low_pass", deviation, 0.0, MAX_DEVIATION)?;
     }
     if let Some(mm) = c.low_pass_mm {
-        within("conditioning.low_pass_mm", mm, 0.0, 1000.0)?;
+        within("conditioning.low_pass_mm", mm, 0.0, LENGTHS[1])?;
     }
     if let Some(samples) = c.samples {
         within("conditioning.samples", f64::from(samples), 2.0, 65536.0)?;
@@ -254,29 +258,33 @@ fn check_light(l: &Light) -> Result<(), SceneError> {
     if l.volume.is_some() && l.position.is_some() {
         return refuse("light.volume", "takes a distant light: leave light.position out");
     }
+    let [least, most] = LENGTHS;
     for (field, value, low, high) in [
         ("light.ambient", l.ambient, 0.0, 10.0),
         ("light.diffuse", l.diffuse, 0.0, 10.0),
         ("light.specular", l.specular, 0.0, 10.0),
         ("light.shininess", l.shininess, 0.0, 1e6),
         ("light.texture", l.texture, 0.0, 1.0),
-        ("light.cliff", l.cliff, 0.0, 1e6),
+        ("light.cliff", l.cliff, 0.0, most),
         ("light.shadow.strength", shadow.strength, 0.0, 1.0),
         ("light.shadow.softness", shadow.softness, 0.0, 10.0),
-        ("light.shadow.reach", shadow.reach, 1e-3, 1e4),
-        ("light.shadow.thickness", shadow.thickness, 0.0, 1e6),
-        ("light.shadow.bias", shadow.bias, 0.0, 1e3),
-        ("light.occlusion.radius", occlusion.radius, 1e-3, 1e3),
+        ("light.shadow.reach", shadow.reach, least, most),
+        ("light.shadow.thickness", shadow.thickness, 0.0, most),
+        ("light.shadow.bias", shadow.bias, 0.0, most),
+        ("light.occlusion.radius", occlusion.radius, least, most),
         ("light.occlusion.strength", occlusion.strength, 0.0, 4.0),
         ("light.skin.wrap", skin.wrap, 0.0, 1.0),
         ("light.skin.translucency", skin.translucency, 0.0, 1.0),
-        ("light.skin.depth", skin.depth, 0.0, 100.0),
-        ("light.volume.cell", volume.cell, 0.2, 10.0),
+        ("light.skin.depth", skin.depth, 0.0, most),
+        ("light.volume.cell", volume.cell.unwrap_or(1.0), least, most),
+        ("light.volume.cells", f64::from(volume.cells), 1e3, 1e9),
         ("light.volume.taps", f64::from(volume.taps), 1.0, 4.0),
-        ("light.volume.depth", volume.depth, 0.05, 100.0),
+        ("light.volume.depth", volume.depth, least, most),
         ("light.volume.warmth", volume.warmth, 0.0, 2.0),
-        ("light.volume.widening", volume.widening, 0.0, 2.0),
-        ("light.volume.scatter", volume.scatter, 0.0, 3.0),
+        ("light.volume.widening", volume.widening, 0.0, most.sqrt()),
+        ("light.volume.scatter", volume.scatter, 0.0, most),
+        ("light.volume.reach", volume.reach, least, most),
+        ("light.volume.slope", volume.slope, 1.0 / most, 1.0 / least),
         ("light.volume.relief", volume.relief, 0.0, 1.0),
         ("light.volume.wrap", volume.wrap, 0.0, 1.0),
         ("light.volume.back", volume.back, 0.0, 10.0),
@@ -312,12 +320,18 @@ pub(super) fn within(field: &'static str, value: f64, low: f64, high: f64) -> Re
     }
 }
 
+/// A length, mm.
+fn length(field: &'static str, mm: f64) -> Result<(), SceneError> {
+    let [least, most] = LENGTHS;
+    match (least..=most).contains(&mm) {
+        true => Ok(()),
+        false => refuse(field, format!("is {mm} mm, must lie in {least:e}..={most:e} mm")),
+    }
+}
+
 /// A size of a filter in mm.
 fn in_mm(field: &'static str, mm: Option<f64>) -> Result<(), SceneError> {
-    mm.map_or(Ok(()), |mm| match (1e-3..=1e3).contains(&mm) {
-        true => Ok(()),
-        false => refuse(field, format!("is {mm} mm, must lie in 0.001..=1000 mm")),
-    })
+    mm.map_or(Ok(()), |mm| length(field, mm))
 }
 
 /// `key`: the name of the window in that table, as the user wrote it.
@@ -351,7 +365,7 @@ fn check_distance(d: &Distance) -> Result<(), SceneError> {
             Some(mm) => in_mm("distance.bilateral.mm", Some(mm))?,
             None => within("distance.bilateral.pixels", b.pixels, Bilateral::MIN_PIXELS, Bilateral::MAX_PIXELS)?,
         }
-        within("distance.bilateral.distance", b.distance, 1e-3, 1e3)?;
+        length("distance.bilateral.distance", b.distance)?;
         within("distance.bilateral.repeat", f64::from(b.repeat), 1.0, 16.0)?;
     }
     check_sigma("distance.sigma", d.sigma)?;
@@ -431,15 +445,15 @@ fn check_smooth(smooth: Option<Smooth>, fields: [&'static str; 5]) -> Result<(),
     let Some(smooth) = smooth else { return Ok(()) };
     let [lateral, depth, elevation, elevation_mm, kernel] = fields;
     let deviations = [
-        (lateral, smooth.lateral),
-        (depth, smooth.depth),
-        (elevation, smooth.elevation),
-        (elevation_mm, smooth.elevation_mm.unwrap_or(0.0)),
+        (lateral, smooth.lateral, LENGTHS[1]),
+        (depth, smooth.depth, LENGTHS[1]),
+        (elevation, smooth.elevation, 1000.0),
+        (elevation_mm, smooth.elevation_mm.unwrap_or(0.0), LENGTHS[1]),
     ];
-    deviations.iter().try_for_each(|(field, deviation)| within(field, *deviation, 0.0, 1000.0))?;
+    deviations.iter().try_for_each(|(field, deviation, most)| within(field, *deviation, 0.0, *most))?;
     match smooth.kernel {
         Some(taps) if taps != 3 && taps != 5 => refuse(kernel, format!("is {taps}, must be 3 or 5")),
-        Some(_) if deviations.iter().any(|(_, deviation)| *deviation != 0.0) => {
+        Some(_) if deviations.iter().any(|(_, deviation, _)| *deviation != 0.0) => {
             refuse(kernel, "stands instead of lateral, depth and elevation: set it, or them")
         }
         _ => Ok(()),
@@ -465,12 +479,12 @@ pub(super) fn check_planes(settings: &Settings) -> Result<(), SceneError> {
             "planes.smooth.kernel",
         ],
     )?;
-    within("planes.thickness", p.thickness, 0.0, 1e6)?;
+    within("planes.thickness", p.thickness, 0.0, LENGTHS[1])?;
     within("planes.zoom", p.zoom, 1e-3, 1e3)?;
     within("planes.columns", f64::from(p.columns), 1.0, f64::from(MAX_TILES))?;
     within("planes.rows", f64::from(p.rows), 1.0, f64::from(MAX_TILES))?;
     if let Some(spacing) = p.spacing {
-        within("planes.spacing", spacing, 1e-4, 1e4)?;
+        length("planes.spacing", spacing)?;
     }
     check_curve(p.curve.as_ref())?;
     let (inset, tilt) = (&settings.cube.inset, &settings.cube.tilt);
@@ -482,7 +496,7 @@ pub(super) fn check_planes(settings: &Settings) -> Result<(), SceneError> {
         ("cube.inset.bottom, cube.tilt.bottom", inset.bottom, tilt.bottom),
         ("cube.inset.top, cube.tilt.top", inset.top, tilt.top),
     ] {
-        within(field, inset, 0.0, 1e6)?;
+        within(field, inset, 0.0, LENGTHS[1])?;
         // A face that is tilted to 90 degrees would no longer bound its side.
         tilt.iter().try_for_each(|angle| within(field, *angle, -80.0, 80.0))?;
     }
@@ -496,9 +510,10 @@ fn check_curve(curve: Option<&Curve>) -> Result<(), SceneError> {
         let fault = format!("has {count} points, a line has 2 to {MAX_CURVE_POINTS}");
         return refuse(field, fault);
     }
-    points.iter().flatten().try_for_each(|value| within(field, *value, -1e6, 1e6))?;
+    points.iter().flatten().try_for_each(|value| within(field, *value, -LENGTHS[1], LENGTHS[1]))?;
     let apart = |pair: &[[f64; 2]]| (pair[1][0] - pair[0][0]).hypot(pair[1][1] - pair[0][1]);
-    match points.windows(2).position(|pair| apart(pair) < MIN_APART) {
+    let extent = points.iter().map(|point| apart(&[points[0], *point])).fold(0.0, f64::max);
+    match points.windows(2).position(|pair| apart(pair) <= SAME_POINT * extent) {
         Some(n) => refuse(field, format!("points {} and {} coincide: leave one of them out", n + 1, n + 2)),
         None => Ok(()),
     }

@@ -3,7 +3,7 @@
 //! A cut is decided texel by texel, at the texel's centre. Its edge in the volume is therefore as fine as the lattice of the volume: between a texel
 //! that is removed and one that stays, samples are interpolated, and the edge lies up to half a texel beside the contour.
 
-use super::check::within;
+use super::check::{LENGTHS, within};
 use super::picker::Picker;
 use super::{
     Brush, Cut, CutView, KeptSide, MAX_BRUSH_POINTS, MAX_CUT_POINTS, MAX_CUTS, Mode, Scene, SceneError, Sign, refuse,
@@ -15,7 +15,7 @@ use glam::{DVec2, DVec3};
 /// The farthest that a point of a cut's plane may be, mm: as of a clip plane.
 const FARTHEST: f64 = 1e10;
 /// The largest lengths of a contour and of its view, mm.
-const LARGEST: f64 = 1e7;
+const LARGEST: f64 = LENGTHS[1];
 
 /// A cut in space.
 #[derive(Clone, Debug, PartialEq)]
@@ -178,11 +178,13 @@ impl Scene {
         });
         let nearest = entries.reduce(f64::min)?;
         let eye = behind(rays.origin);
-        // An eye within the region is not on the contour's plane.
-        let nearest = if rays.is_perspective { nearest.max(eye + 1.0) } else { nearest };
+        // An eye within the region is not on the contour's plane: a share of the region away from it, about a millimetre of a head.
+        let diagonal = (self.high - self.low).length();
+        let nearest = if rays.is_perspective { nearest.max(eye + diagonal / 128.0) } else { nearest };
         let at = rays.target + rays.forward * nearest;
-        // A tenth of a micrometre: files stay short.
-        let short = |mm: f64| (mm * 1e4).round() / 1e4;
+        // The power of ten next to a millionth of the region, a tenth of a micrometre of a head: files stay short.
+        let digit = 10f64.powf((diagonal * 1e-6).log10().floor());
+        let short = |mm: f64| (mm / digit).round() * digit;
         let contour = along.iter().map(|(origin, direction)| {
             let away = (nearest - behind(*origin)) / direction.dot(rays.forward);
             let from = *origin + *direction * away - at;
@@ -326,7 +328,7 @@ pub(super) fn check(cuts: &[Cut]) -> Result<(), SceneError> {
         if direction.normalize().cross(up.normalize()).length() < 1e-6 {
             return refuse("cuts.view.up", "must not be parallel to cuts.view.direction");
         }
-        within("cuts.view.eye", cut.view.eye.unwrap_or(1.0), 1e-3, LARGEST)?;
+        within("cuts.view.eye", cut.view.eye.unwrap_or(1.0), LENGTHS[0], LARGEST)?;
         within("cuts.depth", cut.depth.unwrap_or(0.0), 0.0, LARGEST)?;
     }
     Ok(())
@@ -344,7 +346,7 @@ fn check_brush(n: usize, cut: &Cut, brush: &Brush) -> Result<(), SceneError> {
             format!("entry {}: has {count} points, must have 1 to {MAX_BRUSH_POINTS}, and one in each stroke", n + 1),
         );
     }
-    within("cuts.brush.radius", brush.radius, 0.1, 100.0)?;
+    within("cuts.brush.radius", brush.radius, LENGTHS[0], LARGEST)?;
     let points = brush.strokes.iter().flatten().flatten();
     points.into_iter().try_for_each(|value| within("cuts.brush.strokes", *value, -LARGEST, LARGEST))
 }

@@ -3,8 +3,8 @@
 use super::{Scene, SceneError, Sign, refuse, transfer};
 use crate::probe::{Geometry, Motion};
 
-/// Sizes of parts are integers of this many a mm^3: their sums are exact.
-const PER_MM3: f64 = 1e9;
+/// Sizes of parts are integers, so that their sums are exact: of so many a texel, of a fan one at its end. 16 billion of them fit.
+const PER_TEXEL: f64 = (1u64 << 30) as f64;
 
 impl Scene {
     /// True if parts that float are dropped: a size is set, and something is drawn from a volume of several slices.
@@ -35,9 +35,25 @@ impl Scene {
         }
     }
 
-    /// The size below which a part is dropped.
+    /// The unit of the sizes of parts, mm^3: a share of a texel, whatever its size in mm is.
+    pub fn part_unit(&self) -> f64 {
+        let [across, down] = self.grid.pitch;
+        let along = match &self.geometry {
+            Geometry::Cartesian(grid) => grid.spacing[2],
+            Geometry::Sweep(probe) => {
+                let radius = match probe.motion {
+                    Motion::Fan { .. } => probe.last_range() - probe.axis_depth(),
+                    Motion::Translated | Motion::Still { .. } => 1.0,
+                };
+                (probe.slices.pitch() * radius).abs()
+            }
+        };
+        across * down * along / PER_TEXEL
+    }
+
+    /// The size below which a part is dropped, in units.
     pub fn least_part(&self) -> u64 {
-        (self.settings.floating * PER_MM3).ceil() as u64
+        (self.settings.floating / self.part_unit()).ceil() as u64
     }
 
     /// Slices from one texel to another that one sample may touch both.
@@ -45,11 +61,11 @@ impl Scene {
         if self.takes_bspline() { 3 } else { 1 }
     }
 
-    /// The size of a texel by row, then slice: entry `slice * rows + row`. Along a fan's sweep a texel is as long as its arc.
+    /// The size of a texel in units by row, then slice: entry `slice * rows + row`. Along a fan's sweep a texel is as long as its arc.
     pub fn texel_sizes(&self) -> Vec<u64> {
-        let [across, down] = self.grid.pitch;
+        let ([across, down], unit) = (self.grid.pitch, self.part_unit());
         // Above the axis of a fan, radii are negative.
-        let size = |along: f64| (across * down * along * PER_MM3).abs().round() as u64;
+        let size = |along: f64| (across * down * along / unit).abs().round() as u64;
         let rows = self.grid.size[1];
         let each = |slice: u32, row: u32| match &self.geometry {
             Geometry::Cartesian(grid) => size(grid.spacing[2]),

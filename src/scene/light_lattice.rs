@@ -4,8 +4,16 @@ use super::region::is_still;
 use super::{Compositing, Follows, LightVolume, Scene};
 use glam::DVec3;
 
-/// Maximum number of cells of the lattice, nearly.
-const MAX_CELLS: f64 = 4e6;
+/// Edge of a cell where no setting says another, in standard deviations of the volume's smoothing: docs/performance.md, "The cells of the light volume".
+const CELL: f64 = 0.5;
+/// The least such edge, slice pixels: smaller cells show nothing more.
+const LEAST_PIXELS: f64 = 1.0;
+/// Most cells along an edge of the lattice.
+const MAX_ALONG: f64 = 1024.0;
+/// Width of the nearest place of a cone of ambient light, as a share of the reach; each of the others is twice as wide, and twice as far away.
+const CONE_WIDTH: f64 = 0.08;
+/// Levels of the pyramid, from 0, whose cells the nearest place may have.
+const NARROWEST: [f64; 2] = [-4.0, 3.0];
 
 /// Cubic cells over the rendered box.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -16,12 +24,54 @@ pub struct LightLattice {
     pub cell: f64,
     /// Number of cells along each axis, even.
     pub count: [u32; 3],
+    /// Size of the box, mm. Cells reach beyond it by less than one, by as much on both sides.
+    pub extent: DVec3,
 }
 
 impl LightLattice {
+    /// The share of the outermost layers of `count` cells with an edge of `cell` along an axis that is within the box.
+    pub fn outer_share(&self, axis: usize, count: u32, cell: f64) -> f64 {
+        let beyond = f64::from(count) * cell - self.extent[axis];
+        let sides = if count == 1 { 1.0 } else { 2.0 };
+        (1.0 - beyond / (sides * cell)).clamp(0.0, 1.0)
+    }
+
     /// A place in space, from a place in cells: cell n reaches from n to n + 1.
     pub fn place(&self, cells: [f64; 3]) -> DVec3 {
         self.low + DVec3::from(cells) * self.cell
+    }
+}
+
+/// The levels of the pyramid of matter, from 0, that the cones of ambient light run through. Their cells are as wide as the cones, so that a lattice of other
+/// cells has the same cones. Where there are none as narrow, or as wide, the cones are as the lattice has them.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct AmbientCones {
+    /// Of the nearest place; below 0 its cells are narrower than any there are.
+    pub narrowest: i32,
+    /// The share of the next level, 0..1: the mixture of both levels has the variance of the cone's width.
+    pub wider: f64,
+}
+
+impl AmbientCones {
+    /// `reach`: length of a cone; `cell`: edge of the lattice's cells, in the same unit. Those of level 0 are twice as long.
+    fn new(reach: f64, cell: f64) -> AmbientCones {
+        let [least, most] = NARROWEST;
+        let level = (CONE_WIDTH * reach / (2.0 * cell)).log2().clamp(least, most);
+        // What rounding leaves between two levels is one of them.
+        let whole = (level + 1e-9).floor();
+        // Variances of widths add up, so that of the mixture is the cone's: (1 - m) w^2 + m (2 w)^2 = (2^f w)^2.
+        let wider = if level - whole < 1e-9 { 0.0 } else { (4f64.powf(level - whole) - 1.0) / 3.0 };
+        AmbientCones { narrowest: whole as i32, wider }
+    }
+
+    /// The level of the nth place, from 0.
+    pub fn level(&self, n: i32) -> u32 {
+        (self.narrowest + n).max(0) as u32
+    }
+
+    /// Number of levels that are needed: the farthest place may lie between two, and the second one tells where matter is near.
+    pub fn levels(&self) -> u32 {
+        1 + self.level(4).max(1)
     }
 }
 
@@ -111,13 +161,62 @@ impl Scene {
     pub fn light_lattice(&self) -> LightLattice {
         let low = self.volume_view().low;
         let extent = self.high - low;
-        let asked = self.settings.light.volume.unwrap_or_default().cell;
-        // A tenth more, since counts are rounded up.
-        let fitting = (1.1 * extent.x * extent.y * extent.z / MAX_CELLS).cbrt();
-        let cell = asked.max(fitting).max(extent.max_element() / 1024.0);
-        let count: [u32; 3] = std::array::from_fn(|a| 2 * ((extent[a] / cell / 2.0).ceil().max(1.0) as u32));
+        let cell = self.wanted_cell().max(self.fitting_cell()).max(extent.max_element() / MAX_ALONG);
+        // The slack is that of rounding: 120 mm are 20 cells of 6 mm, in any unit.
+        let count: [u32; 3] = std::array::from_fn(|a| 2 * ((extent[a] / cell / 2.0 - 1e-9).ceil().max(1.0) as u32));
         let size = DVec3::from(count.map(f64::from)) * cell;
-        LightLattice { low: low - (size - extent) / 2.0, cell, count }
+        LightLattice { low: low - (size - extent) / 2.0, cell, count, extent }
+    }
+
+    /// Edge of a cell that is asked for, mm: the setting, or what resolves the volume as it is smoothed.
+    fn wanted_cell(&self) -> f64 {
+        let light = self.settings.light.volume.unwrap_or_default();
+        light.cell.unwrap_or_else(|| (CELL * self.least_smoothing()).max(LEAST_PIXELS * self.reference_length()))
+    }
+
+    /// Edge of a cell of the lattice that has as many as it may have, mm. A tenth more, since counts are rounded up.
+    fn fitting_cell(&self) -> f64 {
+        let extent = self.high - self.volume_view().low;
+        let most = self.settings.light.volume.unwrap_or_default().cells;
+        (1.1 * extent.x * extent.y * extent.z / f64::from(most)).cbrt()
+    }
+
+    /// The smaller of the standard deviations that the volume is smoothed with within slices, mm.
+    fn least_smoothing(&self) -> f64 {
+        let [lateral, depth, _] = self.smoothing();
+        (lateral * self.grid.pitch[0]).min(depth * self.grid.pitch[1])
+    }
+
+    /// The lattice of the light volume and why it is as it is, for `--explain`; none if nothing is lit by one.
+    pub fn light_choice(&self) -> Option<String> {
+        let light = self.lit_by_volume()?;
+        let (LightLattice { cell, count: [x, y, z], .. }, wanted) = (self.light_lattice(), self.wanted_cell());
+        let asked = match light.cell {
+            Some(_) => "as set".to_string(),
+            None if wanted > LEAST_PIXELS * self.reference_length() => {
+                format!("{CELL} of the smoothing's standard deviation, {:.3} mm", self.least_smoothing())
+            }
+            None => format!("a slice pixel, {:.3} mm", self.reference_length()),
+        };
+        let why = match (cell > wanted, cell > self.fitting_cell()) {
+            (false, _) => asked,
+            (true, false) => {
+                format!("at most {} (light.volume.cells) force larger ones than {wanted:.3} mm, {asked}", light.cells)
+            }
+            (true, true) => format!("at most {MAX_ALONG} along an edge force larger ones than {wanted:.3} mm, {asked}"),
+        };
+        Some(format!("light volume: {x} x {y} x {z} cells of {cell:.3} mm, {}: {why}", x * y * z))
+    }
+
+    /// The least edge of a cell of which a cell of the pyramid is as wide as the nearest place of a cone, mm.
+    pub fn least_cell_of_cones(&self) -> f64 {
+        CONE_WIDTH * self.settings.light.volume.unwrap_or_default().reach / 2.0 / NARROWEST[1].exp2()
+    }
+
+    /// The levels of the pyramid that ambient light comes through.
+    pub fn ambient_cones(&self) -> AmbientCones {
+        let light = self.settings.light.volume.unwrap_or_default();
+        AmbientCones::new(light.reach, self.light_lattice().cell)
     }
 
     /// Steps of a ray that share the light in their middle: two, where together they are no longer than a cell of the lattice, and each has one sample.

@@ -38,7 +38,7 @@ pub use bricks::{Bricks, Reach, Side, TILE};
 pub use camera::Rays;
 pub use echo_levels::{EchoHistogram, EchoLevels};
 pub use lattice::Lattice;
-pub use light_lattice::{LightLattice, Propagation};
+pub use light_lattice::{AmbientCones, LightLattice, Propagation};
 pub use marks::VolumeAxis;
 pub use region::{depth_offset, insonified_box};
 pub use settings::*;
@@ -178,6 +178,8 @@ pub struct Scene {
     /// Bytes of shared memory of a workgroup of a GPU, which solves a row or a column under AOS in it, propagates light through several layers, and reads the
     /// texels of filters once; 0 on a CPU, where single invocations do all that faster. The device resolves this.
     pub shared_memory: u32,
+    /// Half-precision floats are truncated where they are stored, not rounded. The device resolves this.
+    pub truncates_halves: bool,
     /// Maximum number of frames that go through stage 1 at once, 1... The device resolves this.
     pub frames_at_once: u32,
     /// How the volume is sampled: the setting, or for `Auto` the last choice of [`Scene::sampled`].
@@ -321,6 +323,7 @@ impl Scene {
             bricks_pay: true,
             window_texels: WindowTexels::default(),
             shared_memory: 0,
+            truncates_halves: false,
             frames_at_once: u32::MAX,
             sampling,
             apron: 0.0,

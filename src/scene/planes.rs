@@ -8,12 +8,16 @@ use glam::{DMat3, DVec2, DVec3};
 pub const MAX_TILES: u32 = 64;
 /// Maximum number of samples through a slab.
 pub const MAX_SLAB: f64 = 4096.0;
-/// Points of the line of a curved plane that are closer than this coincide, mm.
-pub const MIN_APART: f64 = 1e-3;
-/// A place is on a curved plane if it is no farther from it, mm.
-const ON_SECTION: f64 = 0.5;
-/// Distance between the places of a way along a curved plane, mm. Chords of a circle of 3 mm are shorter than it by 0.03 %.
-const WAY_STEP: f64 = 0.25;
+/// Points of the line of a curved plane that are closer than this share of its extent coincide.
+pub(super) const SAME_POINT: f64 = 1e-6;
+/// Where the line of a curved plane is drawn, a point that is closer to the last one than this share of the planes' box is none. It is more than
+/// [`SAME_POINT`] of any line that fits into ten boxes.
+const NEXT_POINT: f64 = 1e-5;
+/// A place is on a curved plane if it is no farther from it than this share of its line's length: half a millimetre of 64 mm.
+const ON_SECTION: f64 = 1.0 / 128.0;
+/// Distance between the places of a way along a curved plane, as a share of its line's length: 0.25 mm of 64. Chords of a circle of a tenth of the length
+/// are shorter than its arcs by 6e-5.
+const WAY_STEP: f64 = 1.0 / 256.0;
 /// Size of a tile in the buffer, in vectors of four floats.
 pub const TILE_VECTORS: u32 = 9;
 
@@ -188,6 +192,12 @@ impl Scene {
             * DMat3::from_rotation_z(-settings.roll.to_radians())
     }
 
+    /// How far apart two points of the line of a curved plane are at least where it is drawn, mm.
+    pub fn least_apart(&self) -> f64 {
+        let (low, high) = self.planes_box();
+        NEXT_POINT * (high - low).length()
+    }
+
     /// The curved plane's settings, if this mode shows it.
     pub fn curve(&self) -> Option<&Curve> {
         let planes = &self.settings.planes;
@@ -339,13 +349,14 @@ impl Scene {
         let section = tile.section.as_ref()?;
         let ends = [from, to].map(|place| section.coordinates(tile.plane.down, place));
         // Where the line passes twice, nothing says which passage is meant.
-        if ends.iter().any(|(_, off)| *off > ON_SECTION)
+        let length = section.line.length();
+        if ends.iter().any(|(_, off)| *off > ON_SECTION * length)
             || [from, to].iter().any(|place| section.is_passed_twice(*place))
         {
             return None;
         }
         let [(from, _), (to, _)] = ends;
-        let count = ((from.distance(to) / WAY_STEP).ceil() as usize).clamp(1, MAX_POINTS - 1);
+        let count = ((from.distance(to) / (WAY_STEP * length)).ceil() as usize).clamp(1, MAX_POINTS - 1);
         let between = |n: usize| from + (to - from) * (n as f64 / count as f64);
         Some((0..=count).map(between).map(|at| section.at(at.x).0 + tile.plane.down * at.y).collect())
     }
@@ -419,7 +430,7 @@ impl Section {
 
     /// True if two passages of the line are within reach of a place: at a crossing, and at the ends of a line that is closed.
     fn is_passed_twice(&self, place: DVec3) -> bool {
-        self.line.passes_twice(self.in_plane(place), ON_SECTION)
+        self.line.passes_twice(self.in_plane(place), ON_SECTION * self.line.length())
     }
 
     fn in_plane(&self, place: DVec3) -> DVec2 {
@@ -694,8 +705,8 @@ mod tests {
             ("[[1,2]]".into(), "has 1 points, a line has 2 to 64"),
             (many, "has 65 points, a line has 2 to 64"),
             ("[[1,2],[3,4],[3,4],[5,6]]".into(), "points 2 and 3 coincide: leave one of them out"),
-            ("[[1,2],[nan,4]]".into(), "is NaN, must lie in -1000000..=1000000"),
-            ("[[1,2],[inf,4]]".into(), "is inf, must lie in -1000000..=1000000"),
+            ("[[1,2],[nan,4]]".into(), "is NaN, must lie in -1000000000..=1000000000"),
+            ("[[1,2],[inf,4]]".into(), "is inf, must lie in -1000000000..=1000000000"),
         ] {
             let fault = fault(points);
             assert!(fault.contains("planes.curve.points") && fault.contains(says) && !fault.contains('\n'), "{fault}");

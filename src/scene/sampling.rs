@@ -1,8 +1,8 @@
-//! How rays sample the volume, and whether they skip bricks: what is fastest for a scene.
+//! How the volume is stored, how rays sample it, and whether they skip bricks: what is best for a scene on a device.
 
 use super::Scene;
 use super::camera;
-use super::settings::{Mode, Sampling, VolumeFormat};
+use super::settings::{Mode, Sampling, Scheme, VolumeFormat};
 
 /// Maximum number of texels for which packed neighbours are chosen automatically: four times as many values.
 const MAX_PACKED_TEXELS: u64 = 1 << 27;
@@ -28,6 +28,34 @@ const EXTREME_SAVING: f64 = 1.4;
 const NO_SAVING: f64 = 0.0;
 
 impl Scene {
+    /// How the volume is stored: the setting, or what `auto` stands for on the device. R16F has 11 bits, and a store that truncates loses one more of
+    /// them, always downwards; R16 has 16 bits of 0..1, which is what frames become and filters keep.
+    pub fn volume_format(&self) -> VolumeFormat {
+        match self.settings.slices.format {
+            VolumeFormat::Auto if self.truncates_halves && !self.may_overshoot() => VolumeFormat::R16,
+            VolumeFormat::Auto => VolumeFormat::R16f,
+            format => format,
+        }
+    }
+
+    /// True if a filter of slices may leave values beyond 0..1: Richardson's extrapolation in time subtracts one result from another.
+    fn may_overshoot(&self) -> bool {
+        self.slice_filters.perona_malik.is_some_and(|p| p.scheme == Scheme::AosRichardson)
+    }
+
+    /// How the volume is stored and why, for `--explain`.
+    pub fn format_choice(&self) -> String {
+        let why = match (self.settings.slices.format, self.truncates_halves, self.may_overshoot()) {
+            (VolumeFormat::Auto, true, true) => {
+                "the device truncates what it stores so, but scheme aos-richardson may leave values beyond 0..1"
+            }
+            (VolumeFormat::Auto, true, false) => "the device truncates what it stores as r16f",
+            (VolumeFormat::Auto, false, _) => "no device that truncates what it stores so",
+            _ => "as set",
+        };
+        format!("format of the volume: {}, {why}", self.volume_format().name())
+    }
+
     /// The scene with `auto` replaced by `fastest`, the fastest sampling of the device; and without bricks if they cost more than they
     /// save. What they cost is known of a CPU only, whose fastest sampling is packed neighbours.
     pub fn sampled(mut self, fastest: Sampling) -> Scene {
@@ -110,7 +138,7 @@ impl Scene {
 
     /// True if rays sample packed neighbours: texels that hold four neighbours of a slice. Not for 32-bit floats, which would take 16 bytes.
     pub fn packs(&self) -> bool {
-        let stored = self.settings.slices.format != VolumeFormat::R32f;
+        let stored = self.volume_format() != VolumeFormat::R32f;
         self.sampling == Sampling::PackedNeighbours
             && stored
             && (self.composites() || self.detects_surface() || self.projects())

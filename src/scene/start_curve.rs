@@ -4,15 +4,15 @@
 //! `PchipInterpolator` is the same). It has no corners at its points and never leaves the depths of the two points that it is between: where
 //! neighbours have the same depth it is level, and it turns at points only. Beyond its ends it stays at their depths.
 
-use super::check::within;
+use super::check::{LENGTHS, within};
 use super::{MAX_START_POINTS, MIN_START_POINTS, Scene, SceneError, Settings, cuts, refuse, region};
 use glam::DVec3;
 
 /// The largest coordinates of a point, mm.
-const LARGEST: f64 = 1e7;
+const LARGEST: f64 = LENGTHS[1];
 
-/// Least lateral distance of neighbouring points, mm.
-const LEAST_GAP: f64 = 0.01;
+/// Least lateral distance of neighbouring points, as a share of the distance from the first to the last: a micrometre of a curve over 100 mm.
+const LEAST_GAP: f64 = 1e-5;
 
 /// A render start in space.
 #[derive(Clone, Debug, PartialEq)]
@@ -132,13 +132,14 @@ pub(super) fn check(settings: &Settings) -> Result<(), SceneError> {
         return refuse(FIELD, format!("has {count} points, must have {MIN_START_POINTS} to {MAX_START_POINTS}"));
     }
     points.iter().flatten().try_for_each(|value| within(FIELD, *value, -LARGEST, LARGEST))?;
+    let width = points.iter().map(|point| (point[0] - points[0][0]).abs()).fold(0.0, f64::max);
     for (n, two) in points.windows(2).enumerate() {
         let ([before, _], [lateral, _]) = (two[0], two[1]);
-        if lateral - before < LEAST_GAP {
+        if lateral <= before || lateral - before < LEAST_GAP * width {
             return refuse(
                 FIELD,
                 format!(
-                    "point {}: lateral {lateral} mm must be at least {LEAST_GAP} mm more than that of the point before, {before} mm",
+                    "point {}: lateral {lateral} mm must be more than that of the point before, {before} mm, by at least {LEAST_GAP:e} of the line's width",
                     n + 2
                 ),
             );
@@ -173,7 +174,10 @@ mod tests {
             (points(6), "has 6 points, must have 3 to 5"),
             (vec![[0.0, 20.0], [f64::NAN, 20.0], [9.0, 20.0]], "is NaN, must lie in"),
             (vec![[0.0, 20.0], [4.0, f64::INFINITY], [9.0, 20.0]], "is inf, must lie in"),
-            (vec![[0.0, 20.0], [4.0, 20.0], [4.0, 21.0]], "point 3: lateral 4 mm must be at least 0.01 mm more"),
+            (
+                vec![[0.0, 20.0], [4.0, 20.0], [4.0, 21.0]],
+                "point 3: lateral 4 mm must be more than that of the point before, 4 mm",
+            ),
             (vec![[0.0, 20.0], [-4.0, 20.0], [9.0, 20.0]], "point 2: lateral -4 mm"),
         ] {
             let fault = fault(&wrong).expect("refused");
@@ -218,7 +222,7 @@ mod tests {
             let mut lateral = -20.0;
             let points: Vec<[f64; 2]> = (0..3 + case % 3)
                 .map(|_| {
-                    lateral += LEAST_GAP + 15.0 * random() * random();
+                    lateral += 0.01 + 15.0 * random() * random();
                     [lateral, 60.0 * random()]
                 })
                 .collect();

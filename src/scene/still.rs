@@ -5,8 +5,8 @@ use super::{Mode, Scene, SceneError, Settings, Shading, Still, refuse};
 use glam::DVec3;
 use std::f64::consts::PI;
 
-/// Largest extinction, 1/mm: a mean free path of 10 micrometres, far below any texel.
-const MAX_EXTINCTION: f64 = 100.0;
+/// Largest extinction in the length that opacities refer to, a slice pixel: a mean free path far below any texel.
+const MAX_EXTINCTION: f64 = 40.0;
 
 /// A distant light.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -80,7 +80,7 @@ impl Scene {
         let still = self.still().copied().unwrap_or_default();
         let of = |[r, g, b, absorption]: &[f64; 4]| {
             let albedo = [r, g, b].map(|c| still.albedo * albedo_of(*c, still.anisotropy));
-            let extinction = (still.extinction * absorption / self.reference_length()).min(MAX_EXTINCTION);
+            let extinction = (still.extinction * absorption).min(MAX_EXTINCTION) / self.reference_length();
             [albedo[0], albedo[1], albedo[2], extinction]
         };
         transfer.iter().map(of).collect()

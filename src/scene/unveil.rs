@@ -3,6 +3,9 @@
 use super::{Scene, SceneError, cuts};
 use crate::probe::{Geometry, Motion};
 
+// What is looked for is a pocket of fluid in a body and what is averaged out are the grains of ultrasound, both of a size in mm whatever the
+// volume's size is. So these two, and the offset and the smoothing that the settings give, are lengths in mm.
+
 /// Edge of a cell, mm: a pocket of fluid has several, and speckle that is left averages out.
 const CELL: f64 = 1.0;
 /// Standard deviation of the Gaussian that cells are seen through, with that of the volume itself, mm.
@@ -43,7 +46,7 @@ impl Scene {
         FluidLattice {
             cell,
             size: [columns.div_ceil(cell[0]), rows.div_ceil(cell[1]), slices],
-            pitch: [side, cell[1] as f64 * self.grid.pitch[1], across.max(1e-3)],
+            pitch: [side, cell[1] as f64 * self.grid.pitch[1], across.max(f64::MIN_POSITIVE)],
             smoothing,
         }
     }

@@ -2,6 +2,7 @@
 //! others 2017, who filter only what a picture shows). They do not depend on the camera, which may move at any time.
 
 use super::planes::{Plane, Tile};
+use super::region::insonified_box;
 use super::{Mode, Scene, SliceGrid};
 use crate::probe::{Array, Geometry, Motion, Probe};
 use glam::{DMat3, DVec3};
@@ -251,11 +252,13 @@ pub(super) fn reach(scene: &Scene, step: f64, steps: u32) -> f64 {
     let (mut widest, mut growth) = (1.0, 0.0);
     if let Some(probe) = scene.probe().filter(|_| scene.spreads()) {
         // The same rule as in the ray casters: proportional to the range, starting here.
-        let (spread, from) = (scene.settings.ray.spread, probe.first_range().max(probe.last_range() / 8.0).max(1e-6));
+        let (spread, from) = (scene.settings.ray.spread, probe.first_range().max(probe.last_range() / 8.0));
         widest = 1.0 + spread * 7.0;
         growth = step * spread / from;
     }
-    (step * widest * steps * ((steps + 1.0) * growth).exp()).min(1e7)
+    let (low, high) = insonified_box(&scene.geometry);
+    // Beyond twice the volume there is nothing, and an exponential may be infinite.
+    (step * widest * steps * ((steps + 1.0) * growth).exp()).min(2.0 * (high - low).length())
 }
 
 /// An interval that grows to contain the values added to it.
@@ -287,7 +290,7 @@ fn touched(scene: &Scene, look: &Look) -> Option<VisibleBounds> {
         // Only the insonified region is sampled. A single frame is sampled anywhere along its thickness.
         let (first, last) = probe.bounds();
         let thick = matches!(probe.motion, Motion::Still { .. });
-        let nudge = 1e-9 * (1.0 + first.abs().max(last.abs()).max_element());
+        let nudge = 1e-9 * first.abs().max(last.abs()).max_element();
         let axes = if thick { 0..2 } else { 0..3 };
         for axis in axes {
             (low[axis], high[axis]) = (low[axis].max(first[axis] - nudge), high[axis].min(last[axis] + nudge));
@@ -333,7 +336,7 @@ fn unswept(probe: &Probe, corners: &[DVec3], x: Span, y: Span, z: Span) -> (Span
     // What is drawn, and with it the solid, lies beyond the wobble axis. A plane of constant angle divides the solid there, so that the
     // extremes of the angle and the maximum distance from the axis lie at corners. The minimum distance may not.
     let beyond = Span((y.0 - axis).max(0.0), y.1 - axis);
-    let angle = Span::of(corners.iter().map(|c| c.z.atan2((c.y - axis).max(1e-12))));
+    let angle = Span::of(corners.iter().map(|c| c.z.atan2((c.y - axis).max(f64::MIN_POSITIVE))));
     let farthest = corners.iter().map(|c| (c.y - axis).hypot(c.z)).fold(0.0, f64::max);
     (x, Span(beyond.least().hypot(z.least()) + axis, farthest + axis), angle)
 }

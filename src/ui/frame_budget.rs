@@ -12,7 +12,7 @@ use crate::ui::texts;
 use std::time::{Duration, Instant};
 
 /// The view is at rest so long after its last movement.
-const REST_DELAY: Duration = Duration::from_millis(250);
+pub(super) const REST_DELAY: Duration = Duration::from_millis(250);
 /// Weight of a new time in the running mean of a rung.
 const NEW_WEIGHT: f64 = 0.4;
 /// A better rung is chosen if its estimated time is below this fraction of the budget, so that it is not left again at once.
@@ -115,6 +115,11 @@ impl Pace {
         self.live.came = None;
     }
 
+    /// True if volumes keep coming from a source that does not wait for pictures.
+    pub(super) fn is_live(&self, now: Instant) -> bool {
+        self.live.is_on(now)
+    }
+
     /// Discards the measurements: the scene changed.
     pub(super) fn forget(&mut self) {
         self.live.pictures.forget();
@@ -161,6 +166,18 @@ pub(super) fn shaded(mut settings: Settings, rung: usize) -> Settings {
     }
     if rung > 1 {
         settings.light.shadow = None;
+    }
+    settings
+}
+
+/// Most cells of a light volume that is made again for every picture of a view that moves.
+const MOVING_CELLS: u32 = 1_000_000;
+
+/// The settings of a moving view whose light is made again for every picture: its cells are coarser, which pictures with fewer rays hardly show. A view that
+/// only turns keeps the light that it has.
+pub(super) fn coarsely_lit(mut settings: Settings) -> Settings {
+    if let Some(light) = &mut settings.light.volume {
+        light.cells = light.cells.min(MOVING_CELLS);
     }
     settings
 }

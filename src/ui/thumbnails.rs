@@ -202,7 +202,10 @@ fn drawn(
 /// Settings of a small picture that looks like the large one: filters in pixels are smaller, and what a coarse volume has no use for is left out.
 fn thumbnail(settings: &Settings) -> Settings {
     let of = settings.clone();
-    let volume = of.light.volume.map(|volume| LightVolume { cell: volume.cell.max(CELL), ..volume });
+    let volume = of
+        .light
+        .volume
+        .map(|volume| LightVolume { cell: Some(volume.cell.map_or(CELL, |cell| cell.max(CELL))), ..volume });
     let has_distance = of.distance.median > 0 || of.distance.median_mm.is_some() || of.distance.bilateral.is_some();
     let bilateral = Bilateral { pixels: 1.5, mm: None, distance: 3.0, repeat: 1 };
     Settings {

@@ -6,6 +6,7 @@
 pub mod files;
 pub mod gpu;
 pub mod layer;
+pub mod lengths;
 #[cfg(target_os = "linux")]
 pub mod motor;
 pub mod own_process;

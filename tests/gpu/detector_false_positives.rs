@@ -68,13 +68,19 @@ fn noise_spreads_a_wall_within_the_measured_bounds() {
 }
 
 /// Shares of the columns with a speck of one or two voxels: where a speck was found, and where the wall
-/// behind it was. The specks are at least `gap` steps before the wall.
+/// behind it was. The specks are at least `gap` steps before the wall. The mean over six volumes that end at other depths: how many steps
+/// before the box the search begins, and so the phase of rough steps, follows from how far the eye is off it, and the shares from the phase.
 fn specks(device: &Device, surface: &str, gap: [f64; 2]) -> (f64, f64) {
+    let all = [64, 84, 104, 124, 144, 164].map(|depth| specks_to(device, surface, gap, depth));
+    all.iter().fold((0.0, 0.0), |(speck, wall), of| (speck + of.0 / 6.0, wall + of.1 / 6.0))
+}
+
+fn specks_to(device: &Device, surface: &str, gap: [f64; 2], depth: usize) -> (f64, f64) {
     // Two samples a voxel, as where specks are resolved.
     let (voxel, wall) = (2.0 * STEP, 60.0);
-    let scene = columns([64, 100, 64], voxel, surface);
+    let scene = columns([64, depth, 64], voxel, surface);
     let mut noise = Noise(11);
-    let mut bright = vec![false; 64 * 100 * 64];
+    let mut bright = vec![false; 64 * depth * 64];
     for _ in 0..600 {
         let middle: [f64; 3] = std::array::from_fn(|axis| match axis {
             1 => wall - noise.range(gap[0], gap[1]) * STEP / voxel,
@@ -86,18 +92,18 @@ fn specks(device: &Device, surface: &str, gap: [f64; 2]) -> (f64, f64) {
             let at = [corner[0] + n % 4, corner[1] + n / 4 % 4, corner[2] + n / 16];
             let away = (0..3).map(|a| (at[a] as f64 - middle[a]).powi(2)).sum::<f64>().sqrt();
             if away <= radius && at[0] < 64 && at[2] < 64 {
-                bright[(at[2] * 100 + at[1]) * 64 + at[0]] = true;
+                bright[(at[2] * depth + at[1]) * 64 + at[0]] = true;
             }
         }
     }
     let frames =
-        frames(&scene, |[x, y, z]| if bright[(z * 100 + y) * 64 + x] { 1.0 } else { ramp(y as f64, wall, 2.0) });
+        frames(&scene, |[x, y, z]| if bright[(z * depth + y) * 64 + x] { 1.0 } else { ramp(y as f64, wall, 2.0) });
     let (mut crossed, mut on_speck, mut on_wall) = (0, 0, 0);
-    for ([x, z], depth) in depths(device, &scene, &frames) {
-        if (0..58).any(|y| bright[(z * 100 + y) * 64 + x]) {
+    for ([x, z], found) in depths(device, &scene, &frames) {
+        if (0..58).any(|y| bright[(z * depth + y) * 64 + x]) {
             crossed += 1;
-            on_wall += i32::from(depth.is_some_and(|d| (d - wall * voxel).abs() < 0.5 * STEP));
-            on_speck += i32::from(depth.is_some_and(|d| d < wall * voxel - 2.0 * STEP));
+            on_wall += i32::from(found.is_some_and(|d| (d - wall * voxel).abs() < 0.5 * STEP));
+            on_speck += i32::from(found.is_some_and(|d| d < wall * voxel - 2.0 * STEP));
         }
     }
     assert!(crossed > 500, "{crossed} columns have a speck");
@@ -113,15 +119,15 @@ fn only_long_steps_pass_over_specks_in_the_fluid() {
     let shares = [1, 2, 3, 4].map(|rough| specks(&device, &format!("threshold = 0.4\nrough = {rough}"), [34.0, 90.0]));
     println!("shares of specks and of walls found, by the rough step: {shares:.4?}");
     let [one, two, three, four] = shares;
-    // Measured: 1.0, 0.270, 0.0136, 0.0099; the others are walls.
+    // Measured: 1.0, 0.269, 0.0153, 0.0095; the others are walls.
     assert!(one.0 > 0.97, "without a rough detector specks are surfaces: {one:?}");
     assert!(two.0 < 0.35, "{two:?}");
     assert!(three.0 < 0.03 && four.0 < 0.03, "{three:?}, {four:?}");
     assert!([two, three, four].iter().all(|(speck, wall)| speck + wall > 0.995), "walls were lost: {shares:?}");
     let near = [3, 4].map(|rough| specks(&device, &format!("threshold = 0.4\nrough = {rough}"), [8.0, 16.0]));
     println!("8 to 16 steps before the wall: {near:.4?}");
-    // Measured: 0.128, 0.399. From a whole rough ring before, 0.571 and 0.994.
-    assert!(near[0].0 < 0.16 && near[1].0 < 0.48, "{near:?}");
+    // Measured: 0.169, 0.558. From a whole rough ring before, 0.571 and 0.994 at one phase.
+    assert!(near[0].0 < 0.21 && near[1].0 < 0.65, "{near:?}");
     assert!(near.iter().all(|(speck, wall)| speck + wall > 0.995), "walls were lost: {near:?}");
 }
 

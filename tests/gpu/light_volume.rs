@@ -253,3 +253,52 @@ fn two_steps_that_share_their_light_have_that_of_their_middle() {
     let one_by_one = Scene { shared_memory: 1, ..together.clone() };
     assert!(picture(&together) == picture(&one_by_one));
 }
+
+/// Prevents a surface, or light, where the region ends: in what is the same everywhere nothing has an orientation, however many cells fit into the box.
+#[test]
+fn a_face_of_the_region_is_no_surface_in_any_lattice() {
+    let device = Device::new();
+    for cell in [0.9, 1.0, 1.3, 2.0, 2.9] {
+        let scene = look(LIGHT, &GREY.replace("cell = 1", &format!("cell = {cell}")));
+        let matter = lit(&device, &scene, |_| 0.6, Slot::LightMatter);
+        let [least, most] =
+            matter.values.chunks_exact(2).fold([f64::MAX, f64::MIN], |[a, b], v| [a.min(v[0]), b.max(v[0])]);
+        assert!((0.59..0.61).contains(&least) && most - least < 1e-3, "{cell} mm: densities of {least} to {most}");
+        let normals = lit(&device, &scene, |_| 0.6, Slot::LightNormals);
+        let longest = normals.values.chunks_exact(4).map(|v| v[0].hypot(v[1]).hypot(v[2])).fold(0.0, f64::max);
+        assert!(longest < 1e-2, "{cell} mm: an orientation of {longest}");
+    }
+}
+
+/// Prevents cones of ambient light that narrow with the cells: their light was that of another width in every lattice, and its limit that of four points of each
+/// cone. Cells half as large differ by what a cell shows less of the ball.
+#[test]
+fn ambient_light_converges_with_the_cells() {
+    let device = Device::new();
+    let middle = DVec3::new(23.5, 19.5, 21.5);
+    let of = |cell: f64| {
+        let grey = GREY.replace("cell = 1", &format!("cell = {cell}, reach = 14"));
+        let scene = look("follows = 'region', direction = [0, 1, 0], ambient = 1", &grey);
+        let light = lit(&device, &scene, ball(middle, 9.0), Slot::LightAmbient);
+        // The ambient light's own lattice has cells of twice the edge.
+        let (low, edge) = (scene.light_lattice().low, 2.0 * scene.light_lattice().cell);
+        let at = |place: DVec3| {
+            let cells = (place - low) / edge - 0.5;
+            light.interpolated(std::array::from_fn(|a| cells[a].clamp(0.0, (light.size[a] - 1) as f64)))[3]
+        };
+        // Of matter alone: where none is near, every lattice by its own cells, nothing is lit and no light is looked for.
+        let places = (0..13).flat_map(|i| (0..13).flat_map(move |j| (0..13).map(move |k| [i, j, k])));
+        let places = places.map(|n| 1.5 * (DVec3::from(n.map(f64::from)) - 6.0)).filter(|from| from.length() < 9.0);
+        places.map(|from| at(middle + from)).collect::<Vec<_>>()
+    };
+    let rms =
+        |a: &[f64], b: &[f64]| (a.iter().zip(b).map(|(a, b)| (a - b) * (a - b)).sum::<f64>() / a.len() as f64).sqrt();
+    // The widths of cones lie between those of two levels for the third alone.
+    let [coarse, usual, between, fine] = [1.12, 0.56, 0.4, 0.28].map(of);
+    let off = [&coarse, &usual, &between].map(|light| rms(light, &fine));
+    println!("ambient light, cells of 1.12, 0.56 and 0.4 mm, from that of 0.28 mm: {off:.4?}");
+    let [least, most] = usual.iter().fold([f64::MAX, 0.0f64], |[a, b], v| [a.min(*v), b.max(*v)]);
+    assert!(least < 0.4 && most > 0.7, "light and shadow: {least} to {most}");
+    // Were they of first order, the second would be 1/3 of the first. What is between two levels is an average of two widths.
+    assert!(off[0] < 0.03 && off[1] < 0.2 * off[0] && off[2] < 0.5 * off[0], "{off:?}");
+}

@@ -50,6 +50,7 @@ mod recordings;
 mod reproduce;
 mod reruns;
 mod sampling;
+mod scaled;
 mod sections;
 mod sector;
 mod self_test;

@@ -313,7 +313,12 @@ fn planes_upload_and_filter_the_slices_that_they_cross() {
         (Geometry::Sweep(wobbler()), "mode = 'plane'\nslices.median = true", 2..=3, "scan_convert"),
         (still, "mode = 'plane'", 1..=1, "scan_convert"),
     ] {
-        let scene = scene(geometry, BYTES, &format!("{toml}\npicture.size = [24, 20]\nslices.pixels = 48"));
+        // A format that no frame is copied to without a pass.
+        let scene = scene(
+            geometry,
+            BYTES,
+            &format!("{toml}\npicture.size = [24, 20]\nslices.pixels = 48\nslices.format = 'r16f'"),
+        );
         let frames = speckle(&scene);
         let mut renderer = Renderer::new(&device, scene.clone(), &RendererOptions::default()).expect("renderer");
         let passes = renderer

@@ -338,3 +338,37 @@ fn a_volume_that_stays_is_packed_without_new_frames_and_a_texture_of_floats_neve
     let floats = of("ray.sampling = 'quads'\nslices = { format = 'r32f', still = true }");
     assert!(!packs(&Renderer::new(&device, floats, &RendererOptions::default()).expect("renderer")));
 }
+
+/// Measures what `slices.format = auto` relies on: whether a float between two half floats is stored as the nearer one, or as the one nearer to 0.
+#[test]
+fn a_device_that_truncates_halves_is_known_and_stores_volumes_as_r16() {
+    let device = Device::new();
+    let scene = volume(StoredType::U8, 255.0, "mode = 'mip'\nslices.format = 'r16f'");
+    let level = |x: usize, y: usize| (x + 24 * y) % 256;
+    let frame = Texels::from_fn([24, 33, 1], 1, |[x, y, _], _| level(x, y) as f64 / 255.0);
+    let mut renderer = rendered(&device, scene, &vec![frame; 11]);
+    assert!(renderer.plan().steps.iter().any(|step| step.pass.name == "load_slice"), "a shader stores the texels");
+    let stored = renderer.read(Slot::Volume).expect("read").expect("the volume");
+    let (mut up, mut down) = (0, 0);
+    for (x, y) in (0..10).flat_map(|y| (0..24).map(move |x| (x, y))) {
+        let value = f64::from((level(x, y) as f64 / 255.0) as f32);
+        let one = Texels::from_fn([1; 3], 1, |_, _| value);
+        let nearest = Texels::decode([1; 3], Format::R16f, &one.encode(Format::R16f)).values[0];
+        let found = stored.one(x, y, 0);
+        assert!((value - found).abs() < 1e-3, "{value} is stored as {found}");
+        // Those that round up, away from 0.
+        if nearest > value && found == nearest {
+            up += 1;
+        } else if nearest > value {
+            down += 1;
+        }
+    }
+    println!("{}: of {} values that round up, {down} are truncated", device.describe(), up + down);
+    assert!(up + down > 50 && (up == 0 || down == 0), "{up} up, {down} down");
+    if device.candidate.is_software() {
+        assert_eq!(device.candidate.truncates_halves(), down > 0);
+    }
+    let auto = rendered(&device, volume(StoredType::U8, 255.0, "mode = 'mip'"), &[]);
+    let expected = if device.candidate.truncates_halves() { Format::R16 } else { Format::R16f };
+    assert_eq!(Slot::Volume.format(auto.scene()), expected);
+}

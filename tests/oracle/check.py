@@ -168,9 +168,11 @@ def light(scene, folder):
     cells = np.argwhere(density > 0.02)
     cells = cells[np.random.default_rng(1).permutation(len(cells))[:6000]]
     step, optical = 0.5, np.zeros(len(cells))
+    # Beyond the sides of the lattice its outermost cells repeat; light begins where it enters the layers, at the face of the box.
+    across = int(np.abs(towards).argmax())
     for n in range(int(2 * np.linalg.norm(size))):
         at = cells + towards * step * (n + 0.5)
-        inside = np.all((at >= -0.5) & (at <= size - 0.5), axis=1)
+        inside = (at[:, across] >= -0.5) & (at[:, across] <= size[across] - 0.5)
         if not inside.any():
             break
         at = np.clip(at, 0, size - 1)

@@ -215,3 +215,31 @@ fn a_reference_without_hits_is_refused_by_name() {
     let said = refused(&["mode=sr", "surface.rough=2"], "step", ReferenceChoice::Exact);
     assert!(said.contains("no exact reference") && said.contains("surface.rough=1"), "{said}");
 }
+
+/// Prevents a reference of a lit scene that is as coarse as what it judges: its cells are smaller than those of every point, it is extrapolated to cells of no
+/// size, and it states its own error.
+#[test]
+fn a_lit_scene_is_compared_with_what_ever_smaller_cells_converge_to() {
+    let _alone = alone();
+    let report = report(&["light.volume={cell=3.0}"], &["light-cell"], ReferenceChoice::Auto);
+    for (name, reference) in [("light-cell", &report.dials[0].reference), ("budget", &report.budget.reference)] {
+        let Reference::Extrapolated { cells, order, rmse, .. } = reference else {
+            panic!("{name}: {reference:?}");
+        };
+        println!("{name}: cells of {cells:.3?} mm, order {order:.2}, off by {rmse:.1e}");
+        assert!(cells[0] > cells[1] && cells[1] > cells[2] && (0.5..4.0).contains(order), "{name}: {cells:?}, {order}");
+        assert!(report.dials[0].points.iter().all(|point| point.value > 1.9 * cells[2]), "{name}: {cells:?}");
+    }
+    let mut points: Vec<&Point> = report.dials[0].points.iter().collect();
+    points.sort_by(|a, b| a.value.total_cmp(&b.value));
+    let errors: Vec<_> = points.iter().map(|point| (point.value, point.errors.rmse)).collect();
+    println!("{errors:.4?}");
+    assert!(errors.len() > 4 && errors.windows(2).all(|two| two[1].1 > 0.9 * two[0].1), "{errors:?}");
+    assert!(errors[errors.len() - 1].1 > 3.0 * errors[0].1, "{errors:?}");
+    let Reference::Extrapolated { rmse, .. } = report.dials[0].reference else { return };
+    // Its limit is what the two coarser lattices alone would be off by, of which the finer is a point.
+    assert!(rmse < 1.5 * errors[0].1, "the reference is off by {rmse}, the best point by {}", errors[0].1);
+    let of =
+        |source: &str| report.budget.shares.iter().find(|share| share.source == source).expect("a share").errors.rmse;
+    assert!(of("light-cell") > 0.0 && report.budget.total.rmse < 2.0 * report.budget.sum(), "{:?}", report.budget);
+}

@@ -35,7 +35,7 @@ fn removed(scene: &Scene) -> f64 {
     let (cuts, sizes) = (scene.cuts().collect::<Vec<_>>(), scene.texel_sizes());
     let rows = scene.volume_size()[1];
     let is_removed = |at: &[u32; 3]| cuts.iter().any(|cut| cut.removes(scene.texel_place(*at)));
-    texels(scene).filter(is_removed).map(|[_, y, z]| sizes[(z * rows + y) as usize] as f64 * 1e-9).sum()
+    texels(scene).filter(is_removed).map(|[_, y, z]| sizes[(z * rows + y) as usize] as f64 * scene.part_unit()).sum()
 }
 
 /// A block of 40 x 40 x 40 mm about (0, 20, 0) of 0.4 mm voxels.

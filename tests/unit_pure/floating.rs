@@ -95,7 +95,7 @@ fn texels_of_a_fan_have_the_volume_of_the_ring_that_they_fill() {
     let (near, far) = (edge(-0.5), edge(f64::from(rows) - 0.5));
     let angle = probe.slices.pitch() * f64::from(slices);
     let ring = (far * far - near * near) / 2.0 * angle * f64::from(columns) * scene.grid.pitch[0];
-    assert!((all as f64 * f64::from(columns) * 1e-9 / ring - 1.0).abs() < 1e-4, "{all} {ring}");
+    assert!((all as f64 * f64::from(columns) * scene.part_unit() / ring - 1.0).abs() < 1e-4, "{all} {ring}");
     let of_row = |row: usize| scene.texel_sizes()[row] as f64;
     assert!(of_row(rows as usize - 1) / of_row(0) > 1.5);
 }

@@ -135,7 +135,7 @@ fn sizes_are_explained_and_checked() {
         "slices.smooth = { elevation_mm = -1 }",
         "slices.smooth = { kernel = 3, elevation_mm = 1 }",
         "slices.smooth = { elevation_mm = 1 }\nray.elevation = 'bspline-sharp'",
-        "conditioning.low_pass_mm = 1e9",
+        "conditioning.low_pass_mm = 1e10",
         "post.sigma = { window_mm = 2 }",
         "post.enhanced_sigma = { largest_mm = 2 }",
         "post.perona_malik = { width_mm = 2 }",

@@ -60,6 +60,9 @@ def reference(r):
         return "the f64 reference"
     if r["kind"] == "as-it-is":
         return "the scene as it is"
+    if r["kind"] == "extrapolated":
+        cells = " to ".join(f"{r['cells'][n]:.2f}" for n in (0, 2))
+        return f"pictures with light cells of {cells} mm, extrapolated with order {r['order']:.1f}; itself off by {r['rmse']:.1e}"
     return f"a converged picture, itself off by {r['rmse']:.1e}"
 
 

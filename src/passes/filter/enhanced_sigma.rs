@@ -1,7 +1,7 @@
 //! The enhanced sigma filter (thesis 5.4, 5.5) on slices, distance maps and pictures: the centre is estimated first, and while
 //! fewer pixels than the starting window holds lie within two sigma of it, the window grows by one on every side.
 
-use super::estimator::{self, LEAST, LEAST_DISTANCE};
+use super::estimator::{self, LEAST, least_distance};
 use super::sigma::{few, range};
 use crate::passes::pass::*;
 use crate::scene::{EnhancedSigma, Noise, Scene};
@@ -43,12 +43,12 @@ pub const DISTANCE: Pass = Pass {
     writes: writes_target,
     extent: ray_extent,
     repeat: once,
-    params: |s, t| params(s.distance.enhanced_sigma, LEAST_DISTANCE, t),
+    params: |s, t| params(s.distance.enhanced_sigma, least_distance(s), t),
     constants: |s, _| constants(s, s.distance.enhanced_sigma, false),
     // A pixel in mm differs by 4e-6 between f32 and f64, a hundred times as much as one in 0..1.
     tolerance: Tolerance { absolute: 2e-5, relative: 1e-6, outliers: 5e-3, why: WHY },
     reference: |s, t, reads, writes| {
-        let enhanced = Enhanced::new(s, s.distance.enhanced_sigma, LEAST_DISTANCE, is_hit);
+        let enhanced = Enhanced::new(s, s.distance.enhanced_sigma, least_distance(s), is_hit);
         enhanced.filter(t, reads, writes, |found| found.mean);
     },
 };

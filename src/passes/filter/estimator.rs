@@ -2,7 +2,7 @@
 //! enhanced sigma filter. Beyond the border the nearest pixel repeats; of distances, misses are ignored.
 
 use crate::passes::pass::*;
-use crate::scene::Estimator;
+use crate::scene::{Estimator, Scene};
 
 pub const SLICE: Pass = Pass {
     name: "estimator_slice",
@@ -40,8 +40,10 @@ pub const SLICE: Pass = Pass {
 
 /// Smallest difference that counts as a gradient: half a level of 255, as Wang, Vagnucci and Li do on integer levels.
 pub(super) const LEAST: f64 = 0.5 / 255.0;
-/// The same on distances, mm: below the detector's resolution.
-pub(super) const LEAST_DISTANCE: f64 = 0.01;
+/// The same on distances, mm: a 32nd of the detector's step, below its resolution.
+pub(super) fn least_distance(scene: &Scene) -> f64 {
+    scene.ring.step / 32.0
+}
 
 /// The value of the shader's constant ESTIMATOR.
 pub(super) fn constant(estimator: Estimator) -> i32 {

@@ -120,7 +120,7 @@ pub(super) fn params(scene: &Scene, view: View, step: f64) -> Params {
         .vec3("brick_density", bricks.edge.recip())
         .vec3("last_brick", bricks.count.map(|n| f64::from(n) - 1.0))
         .f32("spread", scene.settings.ray.spread)
-        .f32("spread_range", scene.probe().map_or(1.0, spread_range).max(1e-6))
+        .f32("spread_range", scene.probe().map_or(1.0, spread_range))
         .vec4("clip_0", clip_0)
         .vec4("clip_1", clip_1)
         .vec4("clip_2", clip_2)

@@ -222,13 +222,13 @@ pub struct Region {
     pub depth: Option<[f64; 2]>,
     /// Elevation bounds, mm.
     pub elevation: Option<[f64; 2]>,
-    /// Curved render start: 3 to 5 points [lateral, depth] of a line, mm, lateral ascending by at least 0.01. What is nearer to the probe than the
+    /// Curved render start: 3 to 5 points [lateral, depth] of a line, mm, lateral ascending, by a hundred-thousandth of the line's width at least. What is nearer to the probe than the
     /// line is not rendered, at any elevation. The line is a monotone cubic: smooth, and between two points never beyond their depths; left of the
     /// first point and right of the last it stays at their depths. Planes and the block of mode cube show everything; a 4-up picture has the line in
     /// green on its planes. With `unveil`, start depths and the region, rendering starts at the deepest of them. Takes a second volume. Absent:
     /// rendering starts at the region's near face.
     pub start_curve: Option<Vec<[f64; 2]>>,
-    /// Length over which what is composited fades towards the faces of the region, except the shallowest, 0..=100 mm. It is also the radius of the
+    /// Length over which what is composited fades towards the faces of the region, except the shallowest, 0..=1e9 mm. It is also the radius of the
     /// region's edges and corners.
     pub fade: f64,
 }

@@ -16,7 +16,7 @@ pub struct Conditioning {
     /// Standard deviation of the Gaussian low pass along each line, samples, 0..=32; 0 for none. Absent: half the decimation factor if
     /// lines are decimated, else none.
     pub low_pass: Option<f64>,
-    /// The same in mm along the line, 0..=1000, in place of `low_pass`; at most 32 samples.
+    /// The same in mm along the line, 0..=1e9, in place of `low_pass`; at most 32 samples.
     pub low_pass_mm: Option<f64>,
     /// Most samples per line, 2..=65536. Longer lines are low-passed and decimated by the smallest integer factor that meets this.
     pub samples: Option<u32>,
@@ -119,7 +119,7 @@ impl Default for Slices {
             perona_malik: None,
             smooth: None,
             blur: false,
-            format: VolumeFormat::R16f,
+            format: VolumeFormat::Auto,
             everything: false,
             still: false,
         }
@@ -130,15 +130,31 @@ impl Default for Slices {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum VolumeFormat {
+    /// `r16f`. On a device that truncates what it stores as such (llvmpipe) `r16`, which is more accurate there in the same time, unless a filter
+    /// may leave values beyond 0..1 (`slices.perona_malik` with scheme aos-richardson).
+    #[default]
+    Auto,
     /// 8 bits, normalised.
     R8,
     /// 16 bits, normalised.
     R16,
     /// Half-precision float.
-    #[default]
     R16f,
     /// Single-precision float.
     R32f,
+}
+
+impl VolumeFormat {
+    /// The name in settings.
+    pub fn name(self) -> &'static str {
+        match self {
+            VolumeFormat::Auto => "auto",
+            VolumeFormat::R8 => "r8",
+            VolumeFormat::R16 => "r16",
+            VolumeFormat::R16f => "r16f",
+            VolumeFormat::R32f => "r32f",
+        }
+    }
 }
 
 /// Lee's sigma filter: the mean of the pixels of a window whose values lie within 2 sigma of the centre.
@@ -147,7 +163,7 @@ pub enum VolumeFormat {
 pub struct Sigma {
     /// Window size, pixels; odd.
     pub window: u32,
-    /// The same in mm, 0.001..=1000, in place of `window`: the nearest odd number of pixels, at most 63; less than two are no filter. Not
+    /// The same in mm, 1e-9..=1e9, in place of `window`: the nearest odd number of pixels, at most 63; less than two are no filter. Not
     /// in `post`.
     pub window_mm: Option<f64>,
     /// Standard deviation of the noise. A neighbour counts within 2 sigma. In 0..1 on slices and pictures, in mm on distances; relative to
@@ -183,7 +199,7 @@ pub struct EnhancedSigma {
     pub window: u32,
     /// Largest window size, pixels; odd. Thesis Tables 7-9: 17, 19, 19, 21, 21, 23 for starts of 3, 5, 7, 9, 11, 13.
     pub largest: u32,
-    /// The starting window in mm, 0.001..=1000, in place of `window`: the nearest odd number of pixels, 3..=63. Not in `post`.
+    /// The starting window in mm, 1e-9..=1e9, in place of `window`: the nearest odd number of pixels, 3..=63. Not in `post`.
     pub window_mm: Option<f64>,
     /// The largest window in mm, in place of `largest`: as large as the first at least; less than two pixels are no filter. Not in `post`.
     pub largest_mm: Option<f64>,
@@ -259,7 +275,7 @@ pub struct PeronaMalik {
     pub step: f64,
     /// Number of steps, 1..=1000.
     pub repeat: u32,
-    /// Width of the diffusion in mm, 0.001..=1000: the standard deviation of the Gaussian that it is where no edge stops it. It takes the
+    /// Width of the diffusion in mm, 1e-9..=1e9: the standard deviation of the Gaussian that it is where no edge stops it. It takes the
     /// place of `repeat` in the explicit scheme, whose step is then at most `step`, and of `step` in the others. Not in `post`.
     pub width_mm: Option<f64>,
 }
@@ -335,7 +351,7 @@ pub struct Smooth {
     pub depth: f64,
     /// Standard deviation along elevation, slices.
     pub elevation: f64,
-    /// The same in mm at the middle of the region, 0..=1000, in place of `elevation`: it follows the slice pitch. At most 32 slices.
+    /// The same in mm at the middle of the region, 0..=1e9, in place of `elevation`: it follows the slice pitch. At most 32 slices.
     pub elevation_mm: Option<f64>,
     /// Taps along each axis, 3 or 5, in place of the deviations above: a Gaussian in pixels, pixels and slices with the deviation
     /// sqrt(n - 1) / 2 of the binomial of n taps, cut off there.

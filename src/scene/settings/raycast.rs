@@ -172,7 +172,7 @@ pub struct Volume {
     pub start_depth: Option<f64>,
     /// Transfer function.
     pub transfer: Transfer,
-    /// Extinction where the transfer function's opacity is 1, in proportion to the opacity, 0.001..=1000 1/mm. Absent: opacities are those of one voxel
+    /// Extinction where the transfer function's opacity is 1, in proportion to the opacity, 1e-9..=1e9 1/mm. Absent: opacities are those of one voxel
     /// (one slice pixel).
     pub extinction: Option<f64>,
     /// Entries of its table, 16..=4096 (1024 with pre-integrated compositing); absorption is linear between two. Absent: 256, or
@@ -315,7 +315,7 @@ pub struct Surface {
     pub number: u32,
     /// What is lit: a constant colour, or the volume through the transfer function.
     pub colour: SurfaceColour,
-    /// Depth of the volume behind the surface that gives it its colour with `colour = "behind"`, 0.01..=1000 mm.
+    /// Depth of the volume behind the surface that gives it its colour with `colour = "behind"`, 1e-9..=1e9 mm.
     pub colour_depth: f64,
 }
 

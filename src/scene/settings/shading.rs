@@ -10,7 +10,7 @@ use serde::{Deserialize, Serialize};
 pub struct Distance {
     /// Window size of the median filter, pixels; odd, 0 for none.
     pub median: u32,
-    /// The same in mm at the middle of the region, 0.001..=1000, in place of `median`: the nearest odd number of pixels, at most 63; less
+    /// The same in mm at the middle of the region, 1e-9..=1e9, in place of `median`: the nearest odd number of pixels, at most 63; less
     /// than two are no filter.
     pub median_mm: Option<f64>,
     /// Bilateral filter.
@@ -57,7 +57,7 @@ pub struct Bilateral {
     /// Standard deviation in the picture, pixels, 0.1..=10.
     #[serde(default)]
     pub pixels: f64,
-    /// The same in mm at the middle of the region, 0.001..=1000, in place of `pixels`: at most 10 pixels; less than a tenth is no filter.
+    /// The same in mm at the middle of the region, 1e-9..=1e9, in place of `pixels`: at most 10 pixels; less than a tenth is no filter.
     #[serde(default)]
     pub mm: Option<f64>,
     /// Standard deviation of the distance, mm.
@@ -155,19 +155,27 @@ impl Default for Light {
 #[derive(Clone, Copy, Debug, PartialEq, Deserialize, Serialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct LightVolume {
-    /// Edge of a cell, 0.2..=10 mm. A region of more than 4 million cells gets larger ones.
-    pub cell: f64,
+    /// Edge of a cell, 1e-9..=1e9 mm. Absent: half the standard deviation of the Gaussian that the volume is smoothed with (`slices.smooth`), and a slice
+    /// pixel at least. Where there would be more cells than `cells` they are larger; `--explain` says what they are and why.
+    pub cell: Option<f64>,
+    /// Most cells, nearly, 1000..=1000000000; also at most 1024 along an edge. A cell takes 44 bytes of the device's memory.
+    pub cells: u32,
     /// Samples along each edge of a cell, 1..=4.
     pub taps: u32,
-    /// Depth of light: the path through the most opaque tissue after which 1/e of green light is left, 0.05..=100 mm.
+    /// Depth of light: the path through the most opaque tissue after which 1/e of green light is left, 1e-9..=1e9 mm.
     pub depth: f64,
     /// Warmth: how much deeper red light goes than green, and green than blue, 0..=2; 0 is grey.
     pub warmth: f64,
-    /// Standard deviation over which light has spread after 1 mm, mm, 0..=2; it grows with the square root of the path. The lattice spreads light
+    /// Standard deviation over which light has spread after 1 mm, mm, 0..=3e4; it grows with the square root of the path. The lattice spreads light
     /// over at least half a cell a layer.
     pub widening: f64,
-    /// Standard deviation over which tissue scatters green light, 0..=3 mm; red further, blue less.
+    /// Standard deviation over which tissue scatters green light, 0..=1e9 mm; red further, blue less.
     pub scatter: f64,
+    /// Reach of ambient light, 1e-9..=1e9 mm: matter farther away than this keeps none of it off.
+    pub reach: f64,
+    /// Slope of the echo from which on the orientation of a surface is certain, 1e-9..=1e9 1/mm: half that of skin in fluid after a Gaussian of 1.5 mm. Where the
+    /// echo is flatter, light depends less on the orientation.
+    pub slope: f64,
     /// How much light depends on the orientation of the tissue's surface, 0..=1.
     pub relief: f64,
     /// Wrap-around of the light, 0..=1.
@@ -204,12 +212,15 @@ impl Default for Ground {
 impl Default for LightVolume {
     fn default() -> Self {
         LightVolume {
-            cell: 0.8,
+            cell: None,
+            cells: 4_000_000,
             taps: 1,
             depth: 1.4,
             warmth: 1.0,
             widening: 0.35,
             scatter: 0.9,
+            reach: 20.0,
+            slope: 0.04,
             relief: 0.85,
             wrap: 0.35,
             back: 0.12,

@@ -9,6 +9,7 @@ mod measuring;
 mod opening;
 mod options;
 mod presets;
+mod quality;
 mod saving;
 mod turning;
 
@@ -20,7 +21,7 @@ pub use self::options::{ConsoleOptions, OpenFile, Opened, StartupFault};
 use self::presets::Presets;
 use super::cine_player::{CinePlayer, Loop};
 use super::clipboard::Clipboard;
-use super::command::{Command, HeldKeys, Tool};
+use super::command::{Command, HeldKeys};
 use super::controls::{Change, Controls};
 use super::export::Exporter;
 use super::frame_budget::{self, Pace, Quality, Rung};
@@ -40,7 +41,7 @@ use crate::live::{self, Feed, StartStep, Stream, StreamError};
 use crate::passes::unveil::StartLine;
 use crate::plan::Work;
 use crate::progress_lines::Progress;
-use crate::scene::{Layout, Scene, Settings, variants};
+use crate::scene::{Scene, Settings};
 use crate::source::live::SourceKind;
 use crate::ui::texts;
 use crate::workspace::Origin;
@@ -117,6 +118,8 @@ pub struct Console {
     has_new_picture: bool,
     /// Number of volumes that had come from a live source.
     live_volumes: u64,
+    /// When a light moved last.
+    light_moved: Option<Instant>,
     /// Number of presentations of the panels while a picture was being drawn.
     shown_between: u64,
     shows_help: bool,
@@ -318,6 +321,7 @@ impl Console {
             needs_redraw: true,
             has_new_picture: false,
             live_volumes: 0,
+            light_moved: None,
             shown_between: 0,
             shows_help: false,
             shows_times: display.is_some_and(|display| display.times),
@@ -530,6 +534,9 @@ impl Console {
                 self.last_change = now;
                 self.unsent_input.get_or_insert(now);
                 if command.is_continuous() {
+                    if before.as_ref().is_some_and(|before| before.light != self.controls.settings().light) {
+                        self.light_moved = Some(now);
+                    }
                     let work = before.map_or(Work::Rays, |before| self.work_since(before));
                     self.pace.moved(work, now);
                 } else {
@@ -729,52 +736,6 @@ impl Console {
         if self.warmed.take().is_some() {
             self.stream.stop_warming();
         }
-    }
-
-    /// While the user rests, compiles what may be asked for next: every mode, layout and preset, and the lower rungs of the quality
-    /// ladder. Frames that arrive meanwhile are drawn as before.
-    fn warm(&mut self, now: Instant) {
-        let is_due = self.fixed.warms && now >= self.last_input + REST_BEFORE_WARMING;
-        let is_done = self.stream.has_warmed() && self.warmed.as_ref() == Some(self.controls.settings());
-        // The first picture in full has the processor for itself.
-        let has_drawn = self.has_started && self.stream.renderer().is_some_and(|renderer| renderer.has_drawn());
-        if !is_due || is_done || !has_drawn {
-            return;
-        }
-        let (_, settings) = self.effective_settings(now);
-        let lowered = self.rungs.iter().skip(1).filter(|_| self.pace.budget().is_some());
-        let lowered = lowered.map(|rung| (rung.apply(&settings), Some(settings.clone())));
-        let switches = variants::switches(&settings, |to| self.controls.switched(to)).into_iter();
-        let next = lowered.chain(switches.map(|variant| (variant.settings, None))).collect();
-        self.stream.warm(next);
-        self.warmed = Some(self.controls.settings().clone());
-    }
-
-    /// When pipelines are compiled in advance, if that is not yet done.
-    fn warms_at(&self, now: Instant) -> Option<Instant> {
-        let at = self.last_input + REST_BEFORE_WARMING;
-        (self.fixed.warms && self.warmed.is_none() && at > now).then_some(at)
-    }
-
-    /// The settings of a view at rest.
-    fn full_settings(&self) -> Settings {
-        let mut full = self.controls.settings().clone().without_drawings();
-        // A region that grows and a plane that moves show slices that were left out. With all of them processed, dragging needs no frame
-        // again.
-        let cuts_planes = full.mode.is_flat() || full.layout == Layout::Four;
-        full.slices.everything |= cuts_planes || matches!(self.controls.tool(), Tool::Region | Tool::Clip);
-        full
-    }
-
-    /// The quality that keeps the frame budget now, and the settings of it.
-    fn effective_settings(&self, now: Instant) -> (Quality, Settings) {
-        let quality = self.pace.quality(now);
-        let full = self.full_settings();
-        let lowered = match self.rungs.get(quality.rays) {
-            Some(rung) => rung.apply(&full),
-            None => full,
-        };
-        (quality, frame_budget::shaded(lowered, quality.shading))
     }
 }
 

@@ -1,7 +1,6 @@
 //! The curved plane: the points of its line, one at a time, and what is measured on it.
 
 use super::{Change, Controls, drawable};
-use crate::scene::planes::MIN_APART;
 use crate::scene::{Curve, Layout, MAX_CURVE_POINTS, MeasureKind, Measurement, Mode, PlaneName, Scene, Settings};
 use crate::ui::command::{Command, Tool};
 use crate::ui::texts;
@@ -43,7 +42,9 @@ impl Controls {
     /// Applies a command about curved planes; none if it is about something else.
     pub(super) fn curve(&mut self, command: &Command, scene: Option<&Scene>) -> Option<Change> {
         Some(match *command {
-            Command::CurvePoint(plane, point) if point.iter().all(|n| n.is_finite()) => self.add_to_line(plane, point),
+            Command::CurvePoint(plane, point) if point.iter().all(|n| n.is_finite()) => {
+                self.add_to_line(plane, point, scene.map_or(0.0, Scene::least_apart))
+            }
             Command::CurvePoint(..) => Change::Nothing,
             Command::EndCurve => self.end_line(command, scene?),
             Command::CancelCurve => match self.line.take() {
@@ -55,7 +56,7 @@ impl Controls {
         })
     }
 
-    fn add_to_line(&mut self, plane: PlaneName, point: [f64; 2]) -> Change {
+    fn add_to_line(&mut self, plane: PlaneName, point: [f64; 2], least_apart: f64) -> Change {
         let point = kept(point);
         let line = self.line.get_or_insert_with(|| Curve { plane, points: Vec::new() });
         if line.plane != plane {
@@ -64,7 +65,7 @@ impl Controls {
         if line.points.len() >= MAX_CURVE_POINTS {
             return Change::Refused(texts::CURVE_FULL);
         }
-        if line.points.last().is_some_and(|[x, y]| (x - point[0]).hypot(y - point[1]) < MIN_APART) {
+        if line.points.last().is_some_and(|[x, y]| (x - point[0]).hypot(y - point[1]) <= least_apart) {
             return Change::Nothing;
         }
         line.points.push(point);

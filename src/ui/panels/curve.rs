@@ -4,7 +4,7 @@ use super::colours::{self, OUTLINE, TEXT};
 use super::{PanelState, picture_rect};
 use crate::measure::overlay;
 use crate::scene::Curve;
-use crate::scene::planes::{CURVE_COLOUR, CurveLine, MIN_APART};
+use crate::scene::planes::{CURVE_COLOUR, CurveLine};
 use crate::ui::command::Tool;
 use egui::{Painter, Rect, Stroke, Ui, vec2};
 
@@ -58,7 +58,7 @@ pub(super) fn paint(ui: &Ui, state: &PanelState, scale: f32) {
     let under = under.filter(|(number, _)| scene.plane_of_tile(*number) == Some(work.plane));
     let under = under.map(|(_, place)| scene.point_on_plane(work.plane, place));
     let last = work.points.last();
-    let under = under.filter(|[x, y]| last.is_some_and(|last| (last[0] - x).hypot(last[1] - y) >= MIN_APART));
+    let under = under.filter(|[x, y]| last.is_some_and(|last| (last[0] - x).hypot(last[1] - y) >= scene.least_apart()));
     let points = work.points.iter().copied().chain(under).collect();
     let shown = Curve { plane: work.plane, points };
     if let Some(mut line) = scene.line_on_tile(&sheet, &shown) {

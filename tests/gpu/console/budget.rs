@@ -104,6 +104,29 @@ fn tone_casts_no_ray_light_keeps_the_distance_map_and_no_rung_runs_stage_1() {
     assert!(desk.picture() == headless(&device, &desk.drawn(), &body(0)), "at rest");
 }
 
+/// Prevents a light volume that is made again because a view turns, and one in full for each picture while its light moves.
+#[test]
+fn the_cells_of_a_light_volume_are_coarser_while_the_light_moves_and_stay_while_the_view_turns() {
+    let device = Device::alone();
+    let settings =
+        settings("mode = 'vr'\nslices = { pixels = 40, format = 'r8' }\nlight = { follows = 'region', volume = {} }");
+    let mut desk = Desk::new(&device, ConsoleOptions { settings, budget: Some(Duration::from_nanos(1)), ..options() });
+    desk.begin();
+    desk.live(0);
+    desk.press(Key::Space);
+    desk.rest();
+    let cells = |settings: &Settings| settings.light.volume.expect("a light volume").cells;
+    let full = cells(&desk.drawn());
+    let turned = desk.drag_slowly([40.0, 36.0], [60.0, 20.0]);
+    assert!(turned.iter().any(|s| s.ray.half) && turned.iter().all(|s| cells(s) == full), "a view that turns");
+    desk.rest();
+    desk.press(Key::Char('l'));
+    let lit = desk.drag_slowly([40.0, 36.0], [50.0, 40.0]);
+    assert!(lit.iter().any(|s| s.ray.half && cells(s) < full), "a light that moves");
+    desk.rest();
+    assert!(desk.picture() == headless(&device, &desk.drawn(), &body(0)), "at rest");
+}
+
 /// A probe, which does not wait.
 struct Hasty(Fed);
 

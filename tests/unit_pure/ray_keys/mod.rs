@@ -253,13 +253,14 @@ fn ray(scene: &Scene, [x, y, _]: [usize; 3], apart: f64) -> [DVec3; 2] {
 }
 
 /// What a ray of volume rendering shows by samples, and whether it begins at a cut face.
-fn sampled(scene: &Scene, reads: &Arrays, at: [usize; 3], apart: f64) -> (samples::Light, bool) {
+fn sampled(scene: &Scene, pass: &str, reads: &Arrays, at: [usize; 3], apart: f64) -> (samples::Light, bool) {
     let volume = &scene.settings.volume;
     let samples = Samples::new(scene, reads.get("volume"), volume.window, volume.start_depth);
     let surface = &scene.settings.surface;
     let ends = match scene.settings.mode {
         Mode::Mixed => [0.0, reads.get("distance_map").one(at[0], at[1], 0)],
-        Mode::Surface if surface.colour == SurfaceColour::Behind => {
+        // The march that finds the surface composites whole rays, for the other half of a pair.
+        Mode::Surface if surface.colour == SurfaceColour::Behind && pass != "raycast_surface_and_volume" => {
             let found = reads.get("distance_map").one(at[0], at[1], 0);
             [found, found + surface.colour_depth]
         }
@@ -295,7 +296,7 @@ fn lights(
     let bounds = (pass == "raycast_volume" && !adapts && bounds::fault(scene).is_none())
         .then(|| bounds::picture(scene, reads.get("volume"), bounds::Effort { width: 0.05, parts: 120 }));
     for at in chosen(picture.size, rays, draw, |at| picture.get(at)[3] > 0.02).into_iter().filter(|at| is_cast(*at)) {
-        let (light, is_cut) = sampled(scene, reads, at, if adapts { f64::from(of_a_pixel) } else { 1.0 });
+        let (light, is_cut) = sampled(scene, pass, reads, at, if adapts { f64::from(of_a_pixel) } else { 1.0 });
         // Of a volume that stage 3 lights, faces come later.
         if is_cut && scene.lights_volume() {
             continue;
@@ -455,7 +456,8 @@ fn of_key(number: usize, key: &Key) -> Checked {
 /// The same of many settings together.
 #[test]
 fn settings_that_rays_read_are_honoured_together() {
-    let all: Vec<Key> = keys().filter(|key| key.of != Of::Nothing).collect();
+    // Not of light volumes, which exact rays refuse in every draw.
+    let all: Vec<Key> = keys().filter(|key| key.of != Of::Nothing && !key.name.starts_with("light.volume")).collect();
     let modes = [
         "mode=volume",
         "mode=volume",
