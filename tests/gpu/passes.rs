@@ -174,7 +174,7 @@ fn a_perturbed_input_swapped_parameters_and_half_a_pixel_are_each_noticed() {
 fn texels_outside_the_sector_are_not_written() {
     let device = Device::new();
     let mut single = PassRunner::new(&device).expect("single");
-    let scene = scene(Geometry::Sweep(wobbler()), BYTES, "mode = 'vr'\nslices = { pixels = 64 }");
+    let scene = scene(Geometry::Sweep(wobbler()), BYTES, "mode = 'vr'\nslices = { pixels = 64, format = 'r16f' }");
     let pass = echolume::passes::by_name("scan_convert").expect("pass");
     let result = run_with_reference(&mut single, &scene, pass, 0, "one", 1).expect("dispatch");
     let (expected, got) = (result.expected, result.got);
