@@ -67,4 +67,8 @@
     ("shade/light", include_bytes!("shade/light.spv")),
     ("shade/occlusion", include_bytes!("shade/occlusion.spv")),
     ("shade/shadow", include_bytes!("shade/shadow.spv")),
+    ("tolerance/cast.first", include_bytes!("tolerance/cast.first.spv")),
+    ("tolerance/cast.refine", include_bytes!("tolerance/cast.refine.spv")),
+    ("tolerance/list", include_bytes!("tolerance/list.spv")),
+    ("tolerance/mark", include_bytes!("tolerance/mark.spv")),
 ]

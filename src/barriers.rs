@@ -92,7 +92,7 @@ pub fn accesses(scene: &Scene, pass: &Pass, args: &DispatchArgs) -> Vec<Access> 
         // An image may begin with a later slice than the first.
         let part = |slice: u32| slice.saturating_sub(bind.slot.first_texel(scene)[2]).min(all);
         let parts = match bind.part {
-            Part::Whole => 0..all,
+            Part::Whole | Part::Groups => 0..all,
             Part::Slices => match bind.slot.shape(scene) {
                 Shape::Three(_) => part(args.slice)..part(args.slice + args.slices),
                 Shape::Layers(_) => 0..args.slices,

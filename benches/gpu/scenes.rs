@@ -135,6 +135,11 @@ pub const SCENES: &[Stated] = &[
         &["mode=vr", "ray.rays=2", "ray.adaptive=true"],
         &["raycast_volume", "mark_edges", "raycast_refined", "assemble_toned"],
     ),
+    sweep(
+        "steps by their error",
+        &["mode=vr", "ray.tolerance=1"],
+        &["tolerance_first", "tolerance_mark", "tolerance_list", "tolerance_refine"],
+    ),
     sweep("largest", &["mode=mip"], &["raycast_projection", "tone"]),
     sweep("mean", &["mode=mean"], &["raycast_projection"]),
     sweep("three planes", &["mode=orthogonal"], &["raycast_planes_toned"]),

@@ -65,6 +65,9 @@ pub fn fault(scene: &Scene) -> Option<&'static str> {
         Mode::Volume if scene.lit_by_volume().is_some() => {
             Some("light.volume takes light from a lattice of cells: set light.volume=none")
         }
+        Mode::Volume if scene.tolerance().is_some() => {
+            Some("ray.tolerance chooses the steps of each pixel: set ray.tolerance=0")
+        }
         Mode::Volume if scene.settings.ray.sliding != 0 => {
             Some("ray.sliding filters samples, at distances of one step: set ray.sliding=0")
         }

@@ -9,12 +9,14 @@ use crate::args::{InputArgs, Output, PictureFile, ShaderArgs, check_outputs};
 use crate::dump;
 use crate::error_report::choose::Bound;
 use crate::error_report::command::{parse_nanoseconds, read_report};
+use crate::error_report::stated::Stated;
 use crate::error_report::{Measure, choose, map};
 use crate::files;
 use crate::gpu::{Context, Renderer, RendererOptions, TimeStamps};
 use crate::marked;
 use crate::mesh::files::MeshFile;
-use crate::passes::{PassTime, Slot, Texels};
+use crate::passes::raycast::tolerance::LEVELS;
+use crate::passes::{Frequency, PassTime, Slot, Texels, by_name};
 use crate::picture::{Picture, PictureFormat};
 use crate::plan::Plan;
 use crate::probe::Probe;
@@ -33,6 +35,7 @@ use std::time::Instant;
                         echolume render sweep.mha --preset fetal\n  \
                         echolume render sweep.vol --mode vr --camera azimuth=30,zoom=1.5 -o view.png\n  \
                         echolume render sweep.mha --preset face --still samples=64\n  \
+                        echolume render sweep.mha --preset face --tolerance 1level\n  \
                         echolume render bone.mha --preset bone --roi depth=20:50 --explain\n  \
                         echolume render sweep.mha --turntable 120 -o turn/\n  \
                         echolume render loop.mha --volumes all -o loop-%03d.png\n  \
@@ -76,6 +79,10 @@ pub struct Render {
     /// 20s, which chooses N and prints it; further settings of the table still, such as seed=1 or extinction=4
     #[arg(long, value_name = "KEY=VALUE,...|TIME")]
     still: Option<String>,
+    /// Choose the steps of every pixel by the error that they leave, such as 1level of the 255 of the finished picture, and print how many pixels keep it
+    /// by proof and by their own estimate; --error-map then shows the error that each states. For mode vr; the same as ray.tolerance
+    #[arg(long, value_name = "LEVELS")]
+    tolerance: Option<String>,
     /// Print the time of every pass
     #[arg(long)]
     timings: bool,
@@ -97,6 +104,7 @@ impl Render {
                 ("--error-map", self.error_map.is_some()),
                 ("--budget", self.budget.is_some()),
                 ("--still", self.still.is_some()),
+                ("--tolerance", self.tolerance.is_some()),
             ];
             if let Some((flag, _)) = alone.iter().find(|(_, is_given)| *is_given) {
                 return Err(input(format!("{flag}: is for one picture; leave --turntable and --volumes out")));
@@ -169,6 +177,9 @@ impl Render {
             remark(&format!("unveil: {outcome}"));
         }
         let measured = renderer.take_times().map_err(failed)?;
+        if let Some(stated) = self.stated(&mut renderer, &measured)? {
+            say!("{stated}");
+        }
         if let Some(noise) = still::noise(&mut renderer).map_err(failed)? {
             say!("{noise}");
         }
@@ -225,8 +236,15 @@ impl Render {
 
     /// Opens the recording and builds its scene, with the settings that keep the budget if there is one.
     fn open(&self) -> Result<(Box<dyn Source>, Scene), Failure> {
-        let still = self.still_args()?.map_or_else(Vec::new, |still| still.set);
-        let (Some(budget), Some(file)) = (&self.budget, &self.report) else { return self.input.open_with(&still) };
+        let mut own = self.still_args()?.map_or_else(Vec::new, |still| still.set);
+        if let Some(levels) = &self.tolerance {
+            let number = levels.trim_end_matches('s').trim_end_matches("level").trim();
+            number
+                .parse::<f64>()
+                .map_err(|_| input(format!("--tolerance {levels}: must be a number of levels, such as 1level")))?;
+            own.push((format!("--tolerance {levels}"), format!("ray.tolerance={number}")));
+        }
+        let (Some(budget), Some(file)) = (&self.budget, &self.report) else { return self.opened(&own) };
         let time = parse_nanoseconds("--budget", budget)?;
         let report = read_report(file)?;
         let (_, scene) = self.input.open()?;
@@ -247,8 +265,38 @@ impl Render {
         let choice = &report.choices[chosen];
         let of = if report.is_of(&scene) { "this scene" } else { "another scene, whose error it is" };
         say!("budget {budget}: {}, measured on {} with {of}", choice.describe(measure), report.device);
-        let chosen = choice.set.iter().map(|set| (format!("--budget, {set}"), set.clone())).chain(still);
-        self.input.open_with(&chosen.collect::<Vec<_>>())
+        let chosen = choice.set.iter().map(|set| (format!("--budget, {set}"), set.clone())).chain(own);
+        self.opened(&chosen.collect::<Vec<_>>())
+    }
+
+    /// Opens the recording, with settings of flags and where each comes from.
+    fn opened(&self, set: &[(String, String)]) -> Result<(Box<dyn Source>, Scene), Failure> {
+        let (source, scene) = self.input.open_with(set)?;
+        match (&self.tolerance, scene.tolerance()) {
+            (Some(_), None) if scene.settings.ray.tolerance > 0.0 => {
+                Err(input("--tolerance: is for volume rendering without first-hit shading; use --mode vr"))
+            }
+            _ => Ok((source, scene)),
+        }
+    }
+
+    /// What a picture with `ray.tolerance` says of its error, and its time.
+    fn stated(&self, renderer: &mut Renderer, times: &[PassTime]) -> Result<Option<String>, Failure> {
+        let Some(tolerance) = renderer.scene().tolerance() else { return Ok(None) };
+        let [errors, marks] = Stated::SLOTS.map(|slot| renderer.read(slot));
+        let (Some(errors), Some(marks)) = (errors.map_err(failed)?, marks.map_err(failed)?) else { return Ok(None) };
+        if let Some(file) = &self.error_map {
+            let colours = Texels::from_fn(errors.size, 3, |[x, y, _], _| errors.one(x, y, 0));
+            let none = Texels::from_fn(errors.size, 3, |_, _| 0.0);
+            let found = map::error_map(&colours, &none, tolerance / LEVELS).map_err(failed)?;
+            found.picture.save(file).map_err(failed)?;
+        }
+        let picture = times.iter().filter(|time| by_name(time.name).is_some_and(|p| p.frequency == Frequency::Picture));
+        let taken = match times.is_empty() {
+            true => String::new(),
+            false => format!("; the picture took {:.3} ms", picture.map(|time| time.total).sum::<f64>() * 1e-6),
+        };
+        Ok(Some(format!("{}{taken}", Stated::new(&errors, &marks, tolerance))))
     }
 
     fn still_args(&self) -> Result<Option<StillArgs>, Failure> {
@@ -311,7 +359,8 @@ impl Render {
 
     /// With --error-map the scene at half its step.
     fn finer(&self, scene: &Scene) -> Result<Option<Scene>, Failure> {
-        if self.error_map.is_none() {
+        // A picture with a tolerance states its error itself.
+        if self.error_map.is_none() || scene.tolerance().is_some() {
             return Ok(None);
         }
         if !(0.0..=1.0).contains(&self.error_tolerance) {
@@ -321,7 +370,7 @@ impl Render {
     }
 
     fn options(&self) -> Result<RendererOptions, Failure> {
-        let times_passes = self.timings || self.budget.is_some();
+        let times_passes = self.timings || self.budget.is_some() || self.tolerance.is_some();
         let time_stamps = if times_passes { TimeStamps::EachPass } else { TimeStamps::None };
         Ok(RendererOptions { time_stamps, shaders: self.shaders.open()?, ..RendererOptions::default() })
     }

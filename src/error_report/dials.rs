@@ -38,8 +38,19 @@ pub struct Dial {
 impl Dial {
     /// True if its settings are ways of taking samples along rays: then exact rays are its reference.
     pub fn samples_rays(&self) -> bool {
-        ["step", "compositing", "sampling", "termination", "adaptive", "lut", "brick", "transfer", "pipeline"]
-            .contains(&self.name)
+        [
+            "step",
+            "tolerance",
+            "compositing",
+            "sampling",
+            "termination",
+            "adaptive",
+            "lut",
+            "brick",
+            "transfer",
+            "pipeline",
+        ]
+        .contains(&self.name)
     }
 }
 
@@ -67,6 +78,7 @@ fn fineness(scene: &Scene) -> [f64; 2] {
 /// Names of all dials.
 pub const NAMES: &[&str] = &[
     "step",
+    "tolerance",
     "compositing",
     "format",
     "sampling",
@@ -145,6 +157,16 @@ pub fn dial(name: &str, scene: &Scene) -> Result<Dial, String> {
                 .collect();
             let fine = |f: f64| [format!("ray.step={}", step * f)];
             made("step", "mm", is(format!("{step:.3} mm"), step), others, &fine(finest_step), &fine(next_step))
+        }
+        "tolerance" => {
+            let alone = s.mode == Mode::Volume && !scene.lights_volume() && scene.still().is_none();
+            need(alone, "does not show the colour along each ray alone")?;
+            is_one_picture()?;
+            need(!s.ray.adaptive || s.ray.rays == 1, "chooses the rays of each pixel")?;
+            let fine = |f: f64| ["ray.tolerance=0".to_string(), format!("ray.step={}", step * f)];
+            let others = [8.0, 4.0, 2.0, 1.0, 0.5, 0.25].into_iter();
+            let others = others.map(|n| at(format!("{n} levels"), &[format!("ray.tolerance={n}")], n)).collect();
+            made("tolerance", "levels", is("one step".into(), 0.0), others, &fine(finest_step), &fine(next_step))
         }
         "compositing" => {
             need(composites, "composites nothing")?;

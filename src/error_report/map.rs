@@ -35,6 +35,9 @@ pub fn step_fault(scene: &Scene) -> Option<&'static str> {
     if scene.is_flat() || settings.mode == Mode::Cube || scene.still().is_some() {
         return Some("this mode takes no steps along rays: set mode to volume, surface, mixed, mip, minip or mean");
     }
+    if scene.tolerance().is_some() {
+        return Some("ray.tolerance chooses the steps of each pixel, and states their error: set ray.tolerance=0");
+    }
     if settings.ray.sliding != 0 {
         return Some(
             "ray.sliding filters samples at distances of one step, so that another step is another filter: set ray.sliding=0",

@@ -14,6 +14,7 @@ pub mod metrics;
 pub mod plot;
 pub mod richardson;
 mod running;
+pub mod stated;
 
 use crate::scene::Scene;
 use budget::Budget;

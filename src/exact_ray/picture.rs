@@ -42,6 +42,9 @@ fn fault_of(scene: &Scene) -> Option<&'static str> {
     if scene.lit_by_volume().is_some() {
         return Some("light.volume takes light from a lattice of cells: set light.volume=none");
     }
+    if scene.tolerance().is_some() {
+        return Some("ray.tolerance chooses the steps of each pixel: set ray.tolerance=0");
+    }
     if s.ray.sliding != 0 {
         return Some("ray.sliding filters samples, at distances of one step: set ray.sliding=0");
     }

@@ -34,6 +34,8 @@ pub enum Purpose {
     Staging,
     /// Results to download, read by the CPU.
     Readback,
+    /// Numbers of workgroups, which dispatches read.
+    Groups,
 }
 
 const TEXELS: [vk::Format; 3] = [vk::Format::R32_SFLOAT, vk::Format::R32G32_SFLOAT, vk::Format::R32G32B32A32_SFLOAT];
@@ -67,6 +69,7 @@ impl Buffer {
             Purpose::Params => vk::BufferUsageFlags::UNIFORM_BUFFER,
             Purpose::Staging => vk::BufferUsageFlags::TRANSFER_SRC,
             Purpose::Readback => vk::BufferUsageFlags::TRANSFER_DST,
+            Purpose::Groups => vk::BufferUsageFlags::TRANSFER_DST | vk::BufferUsageFlags::INDIRECT_BUFFER,
         };
         let allowed = context.candidate.max_buffer;
         if size > allowed {
@@ -97,6 +100,7 @@ impl Buffer {
                 }
                 MemoryLocation::Unknown
             }
+            Purpose::Groups => MemoryLocation::GpuOnly,
             _ => MemoryLocation::CpuToGpu,
         };
         let wanted = Reserve { name, requirements, location, linear: true };

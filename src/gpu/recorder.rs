@@ -75,6 +75,8 @@ pub struct Recorder {
     expected: f64,
     params: Buffer,
     params_used: u64,
+    /// Workgroups of the dispatches that passes count.
+    groups: Option<Buffer>,
     /// For a device without push descriptors.
     sets: DescriptorSets,
     pub stamps: Option<Stamps>,
@@ -125,6 +127,7 @@ impl Recorder {
             expected: 0.0,
             params,
             params_used: 0,
+            groups: None,
             sets: DescriptorSets::new(context),
             stamps,
             unread: Vec::new(),
@@ -328,6 +331,7 @@ impl Recorder {
         let local = pipeline.module.local_size;
         let groups: [u32; 3] = std::array::from_fn(|i| extent[i].div_ceil(local[i]));
         let invocations = |of: [u32; 3]| of.iter().map(|n| u64::from(*n)).product::<u64>();
+        let counted = pass.reads(scene, args).into_iter().find(|bind| bind.part == Part::Groups);
         let mut bands = vec![Band { base: [0; 3], groups }];
         let mut expected = 0.0;
         if let Some((timelines, limit)) = &mut by {
@@ -335,7 +339,13 @@ impl Recorder {
             if limit.is_full(self.open.iter().map(|work| work.expected).sum(), expected) {
                 self.cut(barriers, timelines)?;
             }
-            bands = limit.bands(groups, invocations(extent), expected);
+            // Only the device knows how many workgroups a counted dispatch has.
+            if counted.is_none() {
+                bands = limit.bands(groups, invocations(extent), expected);
+            }
+        }
+        if let Some(bind) = counted {
+            self.copy_groups(barriers, dispatch, bind.slot)?;
         }
         let block = interface_check::pack(&pipeline.module, &self.context.faults.numbers(pass, scene, args));
         let offset = self.place_params(&block)?;
@@ -372,6 +382,7 @@ impl Recorder {
         // SAFETY: the pipeline is alive until the device is done.
         unsafe { device.cmd_bind_pipeline(commands, vk::PipelineBindPoint::COMPUTE, pipeline.handle) };
         let ([x, y, z], [wide, high, deep]) = (band.base, band.groups);
+        let is_counted = pass.reads(dispatch.scene, dispatch.args).iter().any(|bind| bind.part == Part::Groups);
         let repeat = || {
             for n in 0..self.context.faults.times(pass.name) {
                 // Repetitions of a slowed pass must not overlap.
@@ -381,9 +392,10 @@ impl Recorder {
                 // SAFETY: everything the pipeline's layout names was bound, and it allows a base; extents are within limits checked with
                 // the formats.
                 unsafe {
-                    match band.base {
+                    match (band.base, &self.groups) {
+                        (_, Some(groups)) if is_counted => device.cmd_dispatch_indirect(commands, groups.handle, 0),
                         // Synchronization validation of older layers (1.3.239) ignores dispatches with a base.
-                        [0, 0, 0] => device.cmd_dispatch(commands, wide, high, deep),
+                        ([0, 0, 0], _) => device.cmd_dispatch(commands, wide, high, deep),
                         _ => device.cmd_dispatch_base(commands, x, y, z, wide, high, deep),
                     }
                 }
@@ -401,6 +413,29 @@ impl Recorder {
             }
         }
         self.context.counts.dispatches.fetch_add(1, Ordering::Relaxed);
+    }
+
+    /// Copies the numbers of workgroups that passes have left in a slot to where the next counted dispatch reads them.
+    fn copy_groups(&mut self, barriers: &mut BarrierRecorder, dispatch: &Dispatch, slot: Slot) -> Result<(), GpuError> {
+        let Some(image) = dispatch.slots.image(slot, 0) else { return Ok(()) };
+        self.barrier(barriers, &[Access::of_slot(slot, 0, 0..1, false, PipelineStage::Copy)]);
+        if self.groups.is_none() {
+            let bytes = image.shape.texels() * image.format.texel_bytes() as u64;
+            self.groups = Some(Buffer::new(&self.context, "groups", bytes, Purpose::Groups)?);
+        }
+        let Some(groups) = &self.groups else { return Ok(()) };
+        let (device, commands) = (&self.context.device, self.commands);
+        let indirect = (vk::PipelineStageFlags2::DRAW_INDIRECT, vk::AccessFlags2::INDIRECT_COMMAND_READ);
+        let copied = (vk::PipelineStageFlags2::ALL_TRANSFER, vk::AccessFlags2::TRANSFER_WRITE);
+        // The buffer belongs to this recorder alone: an earlier dispatch may still read it.
+        order(device, commands, (indirect.0, vk::AccessFlags2::NONE), copied);
+        let region = region(image, 0..1, 0..image.extent.height, BufferLayout::default());
+        // SAFETY: the buffer is as large as the image and both live until the device is done.
+        unsafe {
+            device.cmd_copy_image_to_buffer(commands, image.handle, vk::ImageLayout::GENERAL, groups.handle, &[region]);
+        }
+        order(device, commands, copied, indirect);
+        Ok(())
     }
 
     /// Copies parameters into the uniform buffer; returns their byte offset.
@@ -440,6 +475,23 @@ fn flush(device: &ash::Device, commands: vk::CommandBuffer, memory: vk::AccessFl
         .src_stage_mask(vk::PipelineStageFlags2::ALL_COMMANDS)
         .src_access_mask(memory & vk::AccessFlags2::MEMORY_WRITE)
         .dst_stage_mask(vk::PipelineStageFlags2::ALL_COMMANDS)
+        .dst_access_mask(memory)];
+    let dependency = vk::DependencyInfo::default().memory_barriers(&barrier);
+    // SAFETY: the command buffer is being recorded, outside any render pass.
+    unsafe { device.cmd_pipeline_barrier2(commands, &dependency) };
+}
+
+/// Records a barrier between accesses of one stage and those of another.
+fn order(
+    device: &ash::Device,
+    commands: vk::CommandBuffer,
+    (before, written): (vk::PipelineStageFlags2, vk::AccessFlags2),
+    (after, memory): (vk::PipelineStageFlags2, vk::AccessFlags2),
+) {
+    let barrier = [vk::MemoryBarrier2::default()
+        .src_stage_mask(before)
+        .src_access_mask(written)
+        .dst_stage_mask(after)
         .dst_access_mask(memory)];
     let dependency = vk::DependencyInfo::default().memory_barriers(&barrier);
     // SAFETY: the command buffer is being recorded, outside any render pass.

@@ -800,6 +800,19 @@ impl<'a> Lit<'a> {
         })
     }
 
+    /// Light that white matter at a place scatters along a unit direction, without a highlight.
+    pub fn scattered(&self, place: DVec3, along: DVec3) -> [f64; 3] {
+        let cells = (place - self.lattice.low) / self.lattice.cell - 0.5;
+        let at = clamped(cells.to_array(), self.shade);
+        let (shade, oriented) = (self.shade.interpolated(at), self.normals.interpolated(at));
+        let direction = DVec3::new(oriented[0], oriented[1], oriented[2]);
+        let grazing = match direction.length() {
+            certain if certain < 1e-4 => 0.0,
+            certain => 1.0 - (-direction.dot(along) / certain).max(0.0),
+        };
+        std::array::from_fn(|c| shade[c] + shade[3] * SHEEN * grazing.powi(3))
+    }
+
     /// The light of matter of this colour at a place in space that is seen along a unit direction.
     pub fn light(&self, scene: &Scene, albedo: [f64; 3], place: DVec3, along: DVec3) -> [f64; 3] {
         let cells = (place - self.lattice.low) / self.lattice.cell - 0.5;

@@ -147,6 +147,30 @@ pub fn transfer_table(scene: &Scene) -> Vec<f32> {
     floats(transfer_of(scene).into_iter().flatten())
 }
 
+/// Integral over the values up to each entry, of absorption times colour and of absorption. Between two entries both are linear in the value.
+pub fn transfer_integral(scene: &Scene) -> Vec<f32> {
+    let entries = transfer_of(scene);
+    let width = 1.0 / (entries.len() - 1) as f64;
+    let mut sum = [0.0; 4];
+    let mut sums = vec![sum];
+    for pair in entries.windows(2) {
+        let part = transfer_integral_within(pair[0], pair[1], 1.0);
+        sum = std::array::from_fn(|c| sum[c] + width * part[c]);
+        sums.push(sum);
+    }
+    floats(sums.into_iter().flatten())
+}
+
+/// The same from an entry on over a share of the way to the next, with a width of 1 between them.
+pub(super) fn transfer_integral_within(low: [f64; 4], high: [f64; 4], share: f64) -> [f64; 4] {
+    let rise: [f64; 4] = std::array::from_fn(|c| high[c] - low[c]);
+    let (t, kappa) = (share, low[3]);
+    std::array::from_fn(|c| match c {
+        3 => t * (kappa + 0.5 * t * rise[3]),
+        _ => t * (kappa * low[c] + 0.5 * t * (kappa * rise[c] + rise[3] * low[c]) + t * t / 3.0 * rise[3] * rise[c]),
+    })
+}
+
 /// How many entries before each are not transparent, and in all.
 pub fn opaque_before(scene: &Scene) -> Vec<f32> {
     let absorption: Vec<f32> = transfer_table(scene).chunks_exact(4).map(|entry| entry[3]).collect();

@@ -41,6 +41,7 @@ pub mod raycast {
     pub mod surface;
     pub mod surface_and_volume;
     pub mod survey;
+    pub mod tolerance;
     pub mod volume;
 }
 pub mod empty_space;
@@ -95,6 +96,10 @@ pub const PASSES: &[Pass] = &[
     raycast::volume::PASS,
     raycast::refine::MARK_EDGES,
     raycast::volume::REFINED,
+    raycast::tolerance::FIRST,
+    raycast::tolerance::MARK,
+    raycast::tolerance::LIST,
+    raycast::tolerance::REFINE,
     raycast::still::MAJORANTS,
     raycast::still::BEGIN,
     raycast::still::PATHS,

@@ -125,6 +125,8 @@ pub enum Part {
     Layers,
     /// The dispatch's slices of a 3D texture, and that many more on either side.
     Around(u32),
+    /// All of it: the first three texels are the workgroups along x, y and z that the dispatch has. The device reads them when it gets there.
+    Groups,
 }
 
 /// A slot under the name that the shader gives it.

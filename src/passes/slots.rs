@@ -1,6 +1,7 @@
 //! Slots: the GPU resources that passes read and write. Each is declared once, in the table below; its shape and format
 //! follow from the scene. A slot that no pass of a plan names does not exist.
 
+use super::raycast::tolerance;
 use super::{cut, lookup_tables, net};
 use crate::scene::planes::{TILE_VECTORS, cell};
 use crate::scene::{Propagation, Scene, SurfaceColour, VolumeFormat, WindowTexels};
@@ -240,6 +241,13 @@ slots! {
         lookup_tables::transfer_table,
         ByContent,
     );
+    /// Its integral over the values up to each entry: of absorption times colour, and of absorption.
+    TransferIntegral = D::table(
+        "transfer_integral",
+        |s| Shape::Buffer(16 * s.transfer_entries() as u32),
+        lookup_tables::transfer_integral,
+        ByContent,
+    );
     /// The transfer function between every two sample values. It differs when the transfer function does, which is shorter.
     PreIntegrated = D::table(
         "pre_integrated",
@@ -336,6 +344,14 @@ slots! {
     /// With adaptive supersampling: one ray through the middle of each pixel of the rendering, and 1 in pixels that have all rays.
     PixelRays = D::image("pixel_rays", per_pixel_of_rendering, |_| Format::Rgba16f);
     EdgeMarks = D::image("edge_marks", per_pixel_of_rendering, |_| Format::R8);
+    /// With a tolerance: the error of each pixel by the scene's step, and by the steps that it has in the end, 0..1 of the screen; 0 is certain.
+    FirstErrors = D::image("first_errors", per_ray, |_| Format::R32f);
+    PixelErrors = D::image("pixel_errors", per_ray, |_| Format::R32f);
+    /// Which pixels of each tile of 8 x 8 have too large an error, a bit each; how many of them are in the tiles before.
+    ErrorMarks = D::image("error_marks", |s| Shape::Two(tolerance::tiles(s)), |_| Format::Rg32u);
+    MarkedBefore = D::image("marked_before", |s| Shape::Two(tolerance::tiles(s)), |_| Format::R32u);
+    /// Workgroups along x, y and z that take all of them, and their number.
+    RefineGroups = D::image("refine_groups", |_| Shape::Two([4, 1]), |_| Format::R32u);
     /// The planes of a 4-up picture; black where the rendering goes.
     Planes = D::image("planes", per_pixel, |_| Format::Rgba16f);
     /// The picture of stages 2 and 3 before the filters of stage 4.

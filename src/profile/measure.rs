@@ -301,7 +301,7 @@ fn touched(bind: &Bind, scene: &Scene) -> u64 {
     let all = bind.slot.bytes(scene);
     match bind.part {
         Part::Slices | Part::Layers => all / u64::from(bind.slot.shape(scene).parts()),
-        Part::Whole | Part::Around(_) => all,
+        Part::Whole | Part::Around(_) | Part::Groups => all,
     }
 }
 

@@ -13,6 +13,26 @@ use glam::DVec3;
 /// be drawn at any size.
 pub(super) const LENGTHS: [f64; 2] = [1e-9, 1e9];
 
+/// A tolerance needs rays whose samples another step takes as well, and whose colour is all that makes a pixel.
+fn check_tolerance(settings: &Settings) -> Result<(), SceneError> {
+    let (ray, levels) = (&settings.ray, settings.ray.tolerance);
+    if levels == 0.0 {
+        return Ok(());
+    }
+    within("ray.tolerance", levels, 0.01, 64.0)?;
+    if settings.mode != Mode::Volume || settings.still.is_some() {
+        return Ok(());
+    }
+    let fault = if ray.sliding != 0 {
+        "takes other steps, and ray.sliding filters samples at distances of one step: set one of them"
+    } else if ray.adaptive && ray.rays > 1 {
+        "chooses the steps of each pixel, ray.adaptive the rays: set one of them"
+    } else {
+        return Ok(());
+    };
+    refuse("ray.tolerance", fault)
+}
+
 /// Checks that need no geometry.
 pub(super) fn check(settings: &Settings) -> Result<(), SceneError> {
     let [width, height] = settings.picture.size;
@@ -43,6 +63,7 @@ pub(super) fn check(settings: &Settings) -> Result<(), SceneError> {
             );
         }
     }
+    check_tolerance(settings)?;
     let [width, height] = super::camera::ray_size(settings);
     if width > MAX_PICTURE || height > MAX_PICTURE {
         return refuse("ray.rays", format!("makes {width}x{height} rays, each edge must lie in 1..={MAX_PICTURE}"));

@@ -470,6 +470,12 @@ impl Scene {
         ray.adaptive && ray.rays > 1 && is_alone && self.still().is_none() && !self.has_caps()
     }
 
+    /// The error that each pixel may have, levels of 8 bits, if its steps follow from that: where the colour along each ray is all that makes the picture.
+    pub fn tolerance(&self) -> Option<f64> {
+        let is_alone = self.settings.mode == Mode::Volume && !self.lights_volume() && self.still().is_none();
+        Some(self.settings.ray.tolerance).filter(|levels| *levels > 0.0 && is_alone)
+    }
+
     /// True if pixels at edges of a surface, or of a cut face, show what is near and what is far, by the share that each covers. Where several rays make a
     /// pixel they tell.
     pub fn antialiases(&self) -> bool {

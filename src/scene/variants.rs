@@ -34,7 +34,7 @@ const MODES: [(Mode, &str); 10] = [
 const SAMPLINGS: [&str; 3] = ["hardware", "exact", "quads"];
 
 /// Filters, lights and other choices that are structure: each line is a table of a scene file.
-const CHOICES: [&str; 50] = [
+const CHOICES: [&str; 51] = [
     "slices.median = true",
     "slices.sigma = {}",
     "slices.enhanced_sigma = { window = 5, largest = 19, sigma = 0.1 }",
@@ -72,6 +72,7 @@ const CHOICES: [&str; 50] = [
     "ray.eighth = true",
     "ray.rays = 2",
     "mode = 'vr'\nray.rays = 2\nray.adaptive = true",
+    "mode = 'vr'\nray.tolerance = 1",
     "ray.elevation = 'bspline'",
     "ray.slice_index = 'table'",
     "ray.elevation = 'bspline-sharp'",

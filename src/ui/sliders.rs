@@ -365,6 +365,11 @@ pub const SLIDERS: &[Slider] = &[
         |s| f64::from(s.ray.rays),
         |s, v| s.ray.rays = if s.ray.apart() > 1 { 1 } else { v.round() as u32 },
     ),
+    slider(texts::LARGEST_ERROR, "", Quality, [0.0, 8.0], 0.5).of(
+        can_tolerate,
+        |s| s.ray.tolerance,
+        |s, v| s.ray.tolerance = above(v, 0.25).unwrap_or(0.0),
+    ),
 ];
 
 /// True if rendering may start at the fluid.
@@ -382,6 +387,12 @@ fn always(_: &Settings) -> bool {
 
 fn renders_rays(s: &Settings) -> bool {
     !s.mode.is_flat()
+}
+
+/// True if each pixel may have steps of its own.
+fn can_tolerate(s: &Settings) -> bool {
+    let is_alone = s.mode == Mode::Volume && s.volume.shading != Shading::FirstHit && s.still.is_none();
+    is_alone && s.ray.sliding == 0 && !s.ray.adaptive
 }
 
 fn shows_planes(s: &Settings) -> bool {

@@ -321,6 +321,26 @@ fn plane_scenes() -> Vec<SceneSpec> {
         let toml = if toml.contains("slices") { toml } else { format!("{toml}\nslices.pixels = 33") };
         scenes.push(SceneSpec::new(name, geometry, BYTES, toml));
     }
+    let lit = "light = { volume = { cell = 3, ground = {} } }\nregion.fade = 6";
+    for (name, geometry, toml) in [
+        ("fan, steps by their error", &Geometry::Sweep(wobbler()), "ray.tolerance = 0.5\nray.step = 2"),
+        ("fan, moving, steps by their error, lit", &Geometry::Sweep(moving()), &format!("ray.tolerance = 2\n{lit}")),
+        (
+            "translated, steps by their error, pre-integrated",
+            &Geometry::Sweep(linear()),
+            "ray = { tolerance = 1, spread = 0, early_end = 0.05 }\nvolume = { compositing = 'pre-integrated', shading = 'depth-coded' }",
+        ),
+        (
+            "Cartesian, steps by their error, 4-up, toned",
+            &voxels,
+            "layout = 'four'\nray.tolerance = 0.2\nray.rays = 2\npost = { gamma = 1.6, contrast = 1.2, colour_map = 'ice' }\n\
+             volume.compositing = 'riemann'",
+        ),
+    ] {
+        let toml = format!("mode = 'vr'\n{toml}\npicture.size = [27, 31]\nray.sampling = 'exact'\nslices.pixels = 33");
+        let toml = if toml.contains("ray = {") { toml.replace("ray.sampling = 'exact'\n", "") } else { toml };
+        scenes.push(SceneSpec::new(name, geometry, BYTES, toml));
+    }
     for (mode, size) in [("orthogonal", "[41, 33]"), ("cube", "[40, 30]")] {
         let toml = format!(
             "mode = '{mode}'\nslices.pixels = 33\nray = {{ sampling = 'exact', elevation = 'bspline' }}\npicture.size = {size}\n\

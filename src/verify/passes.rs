@@ -7,6 +7,7 @@ use super::{Check, DeviceUnderTest, Findings};
 use crate::gpu::GpuError;
 use crate::gpu::pass_runner::PassRunner;
 use crate::passes::preprocess::PACKED_NEIGHBOURS;
+use crate::passes::raycast::tolerance::{self, LEVELS};
 use crate::passes::slots::{Format, Initializer, Shape, frames_per_batch};
 use crate::passes::{Arrays, Bind, DispatchArgs, Frequency, MISS, PASSES, Part, Pass, Slot, Texels};
 use crate::plan::Plan;
@@ -255,6 +256,14 @@ fn input(scene: &Scene, bind: &Bind, slices: u32, kind: &str, noise: &mut Noise)
         // The passes write alpha as 0 or 1.
         texels.values.chunks_exact_mut(4).for_each(|p| p[3] = p[3].round());
     }
+    if bind.slot == Slot::FirstErrors {
+        // Some pixels are marked, and their steps are halved more or less often.
+        let allowed = scene.tolerance().unwrap_or(1.0) / LEVELS;
+        texels.values.iter_mut().for_each(|v| *v = allowed * (6.0 * *v - 3.0).exp2());
+    }
+    if bind.slot == Slot::ErrorMarks && kind == "noise" {
+        texels.values.iter_mut().for_each(|v| *v = (*v * f64::from(u32::MAX)).floor());
+    }
     if bind.slot == Slot::EdgeMarks {
         texels.values.iter_mut().for_each(|v| *v = v.round());
     }
@@ -342,6 +351,20 @@ pub fn inputs_of(scene: &Scene, pass: &Pass, args: &DispatchArgs, kind: &str, se
         // Empty space must be consistent with the volume.
         let distances = empty_space_of(scene, bricks.slot, inputs.get("volume"));
         inputs.insert(bricks.name, distances);
+    }
+    if reads.iter().any(|b| b.slot == Slot::RefineGroups) {
+        // The list of the pixels whose errors are too large.
+        for pass in [tolerance::MARK, tolerance::LIST] {
+            let mut outputs = Arrays::default();
+            for bind in pass.writes(scene, args) {
+                let channels = bind.slot.format(scene).channels();
+                outputs.insert(bind.name, Texels::untouched(bind.slot.array_size(scene), channels));
+            }
+            pass.reference(scene, args, &inputs, &mut outputs);
+            for bind in pass.writes(scene, args).iter().filter(|bind| bind.name != "errors") {
+                inputs.insert(bind.name, outputs.get(bind.name).clone());
+            }
+        }
     }
     if reads.iter().any(|b| b.slot == Slot::PackedNeighbours) {
         let mut packed = Arrays::default();

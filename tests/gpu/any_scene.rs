@@ -68,6 +68,7 @@ const SETTINGS: &[(&str, &[&str])] = &[
     ("ray.elevation", &["linear", "bspline", "bspline-sharp"]),
     ("ray.rays", &["2", "3"]),
     ("ray.adaptive", &["true"]),
+    ("ray.tolerance", &["0.01", "1", "64"]),
     ("ray.half", &["true"]),
     ("ray.quarter", &["true"]),
     ("ray.eighth", &["true"]),

@@ -63,6 +63,7 @@ mod stored_volume;
 mod surface_net;
 mod tiles;
 mod timing;
+mod tolerance;
 mod truth;
 mod unveil;
 #[cfg(feature = "view")]

@@ -365,6 +365,7 @@ fn scenes() -> Vec<Scene> {
         }
         for sections in [
             "mode = 'vr'\nray = { rays = 2, adaptive = true }",
+            "mode = 'vr'\nray = { tolerance = 1 }",
             "mode = 'plane'",
             "mode = 'orthogonal'",
             "mode = 'plane'\npost = { floats = true }",

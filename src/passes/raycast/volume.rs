@@ -17,6 +17,7 @@ pub const PASS: Pass = Pass {
     shader: |_, _| "raycast/volume",
     needed: |s| match (s.composites(), s.marches_once()) {
         _ if s.still().is_some() => Err("a still is drawn in its place"),
+        _ if s.tolerance().is_some() => Err("each pixel has steps of its own"),
         (false, _) => Err("nothing is composited in this mode"),
         (true, Ok(_)) if kind(s) == Kind::Colour => Err("composited in the march that finds the surface"),
         (true, _) => Ok("samples are composited"),
@@ -220,12 +221,12 @@ fn is_exponential(scene: &Scene) -> bool {
 }
 
 /// The tables of the transfer function that the pass reads.
-struct Tables<'a> {
+pub(super) struct Tables<'a> {
     /// Over the value, or between the values at both ends of a step.
-    of_steps: &'a Texels,
+    pub of_steps: &'a Texels,
     /// Over the value: what a step of another length is integrated from. Empty unless the rule is exponential.
-    curve: Vec<[f64; 4]>,
-    lit: Option<Lit<'a>>,
+    pub curve: Vec<[f64; 4]>,
+    pub lit: Option<Lit<'a>>,
 }
 
 fn curve(scene: &Scene, table: &Texels) -> Vec<[f64; 4]> {
@@ -250,7 +251,7 @@ pub(crate) fn depth_axis(scene: &Scene) -> (DVec3, f64) {
 }
 
 /// The volume along a ray, through the transfer function and the tints by depth.
-struct RayMedium<'a> {
+pub(super) struct RayMedium<'a> {
     scene: &'a Scene,
     ray: &'a ray::Ray<'a>,
     tables: &'a Tables<'a>,
@@ -259,30 +260,36 @@ struct RayMedium<'a> {
     depth_axis: (DVec3, f64),
 }
 
-impl RayMedium<'_> {
+impl<'a> RayMedium<'a> {
+    pub fn new(scene: &'a Scene, ray: &'a ray::Ray<'a>, tables: &'a Tables<'a>) -> RayMedium<'a> {
+        RayMedium { scene, ray, tables, entries: scene.transfer_entries(), depth_axis: depth_axis(scene) }
+    }
+
     /// Under the light and the tints of step n, with the colour of the place at an offset.
-    fn tinted(&self, rgba: [f64; 4], n: f64, offset: f64) -> [f64; 4] {
-        let settings = &self.scene.settings.volume;
+    fn tinted(&self, [r, g, b, kappa]: [f64; 4], n: f64, offset: f64) -> [f64; 4] {
         let place = self.ray.place(offset);
-        let rgba = match &self.tables.lit {
-            Some(lit) => {
-                // Steps that share it are lit in their middle.
-                let steps = f64::from(self.scene.lit_steps());
-                let middle = ((n / steps).floor() + 0.5) * steps;
-                let lit_at = if steps > 1.0 { self.ray.place(self.ray.offset(middle)) } else { place };
-                let [r, g, b] = lit.light(self.scene, [rgba[0], rgba[1], rgba[2]], lit_at, self.ray.direction());
-                [r, g, b, rgba[3]]
-            }
-            None => rgba,
+        // Steps that share their light are lit in their middle.
+        let steps = f64::from(self.scene.lit_steps());
+        let middle = ((n / steps).floor() + 0.5) * steps;
+        let lit_at = if steps > 1.0 { self.ray.place(self.ray.offset(middle)) } else { place };
+        let [r, g, b] = self.tinted_at([r, g, b], place, lit_at);
+        [r, g, b, kappa * self.scene.faded(place)]
+    }
+
+    /// A colour of a place under the light of another, and the tint by depth.
+    pub fn tinted_at(&self, rgb: [f64; 3], place: DVec3, lit_at: DVec3) -> [f64; 3] {
+        let settings = &self.scene.settings.volume;
+        let rgb = match &self.tables.lit {
+            Some(lit) => lit.light(self.scene, rgb, lit_at, self.ray.direction()),
+            None => rgb,
         };
-        let rgba = [rgba[0], rgba[1], rgba[2], rgba[3] * self.scene.faded(place)];
         if settings.shading != Shading::DepthCoded {
-            return rgba;
+            return rgb;
         }
         let (axis, near) = self.depth_axis;
         let depth = (place.dot(axis) - near).clamp(0.0, 1.0);
         let tint = |c: usize| settings.near_tint[c] + (settings.far_tint[c] - settings.near_tint[c]) * depth;
-        std::array::from_fn(|c| if c < 3 { rgba[c] * tint(c) } else { rgba[c] })
+        std::array::from_fn(|c| rgb[c] * tint(c))
     }
 }
 
@@ -335,12 +342,12 @@ fn composite(scene: &Scene, ray: &ray::Ray, tables: &Tables) -> ([f64; 4], f64) 
         early_end: scene.settings.ray.early_end,
         hit: scene.settings.volume.hit,
     };
-    let medium = RayMedium { scene, ray, tables, entries: scene.transfer_entries(), depth_axis: depth_axis(scene) };
+    let medium = RayMedium::new(scene, ray, tables);
     let (colour, hit) = march.through(&medium, |n| ray.offset(n));
     (colour, hit.map_or(MISS, |offset| ray.enter + offset))
 }
 
-fn entry(table: &Texels, n: usize) -> [f64; 4] {
+pub(super) fn entry(table: &Texels, n: usize) -> [f64; 4] {
     std::array::from_fn(|c| table.values[4 * n + c])
 }
 
@@ -349,13 +356,13 @@ fn between(low: [f64; 4], high: [f64; 4], share: f64) -> [f64; 4] {
 }
 
 /// Index of the entry before a value in 0..1, and the fraction to the next entry.
-fn placed(value: f64, entries: usize) -> (usize, f64) {
+pub(super) fn placed(value: f64, entries: usize) -> (usize, f64) {
     let at = value * (entries - 1) as f64;
     let n = (at.floor() as usize).min(entries - 2);
     (n, at - n as f64)
 }
 
-fn looked_up(table: &Texels, entries: usize, value: f64) -> [f64; 4] {
+pub(super) fn looked_up(table: &Texels, entries: usize, value: f64) -> [f64; 4] {
     let (n, share) = placed(value, entries);
     between(entry(table, n), entry(table, n + 1), share)
 }

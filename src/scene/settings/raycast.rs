@@ -58,6 +58,11 @@ pub struct Ray {
     /// others. The picture is that of all rays within a level. In mode volume without first-hit shading and without cut faces; other pictures have all
     /// rays.
     pub adaptive: bool,
+    /// Largest error of a pixel that its steps may leave, in levels of 8 bits of the finished picture, 0.01..=64; 0 takes the same steps in all pixels. Rays begin with
+    /// `step`, at most a slice pixel, and take shorter steps, down to a 32nd, where steps of twice the length differ by more. Light is
+    /// integrated between samples whatever `volume.compositing` says. The error is an estimate; pixels whose rays meet only empty bricks have none. In
+    /// mode volume without first-hit shading.
+    pub tolerance: f64,
     /// Brick size of empty-space skipping, texels: 4..=64; 0 takes every sample. Rays skip bricks that cannot change the picture, so
     /// that it stays the same bit for bit. Absent: 8; a CPU skips only where one picture of a volume saves more time than the ranges of
     /// the bricks take, or with `slices.still`.
@@ -97,6 +102,7 @@ impl Default for Ray {
             entries: 1025,
             rays: 1,
             adaptive: false,
+            tolerance: 0.0,
             brick: None,
             half: false,
             quarter: false,

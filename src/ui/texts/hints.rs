@@ -5,7 +5,7 @@ use crate::ui::command::{Tool, Viewpoint};
 use crate::ui::texts;
 
 /// By name of a slider: what it does.
-const SLIDERS: [(&str, &str); 55] = [
+const SLIDERS: [(&str, &str); 56] = [
     (texts::GAIN, "Makes the picture brighter or darker as a whole."),
     (texts::CONTRAST, "Spreads bright and dark apart."),
     (texts::GAMMA, "Brightens (above 1) or darkens the middle tones; black and white stay."),
@@ -72,6 +72,7 @@ const SLIDERS: [(&str, &str); 55] = [
     (texts::PICTURE_SPECKLE, "Averages speckle in the finished picture."),
     (texts::STEP, "Distance of samples along a ray: short is exact, long is fast. 0: one slice pixel."),
     (texts::FIELD_OF_VIEW, "0 draws without perspective; more draws near things larger."),
+    (texts::LARGEST_ERROR, "Of a pixel by its steps, levels of 255. 0 takes the same steps everywhere."),
     (texts::RAYS_A_PIXEL, "More rays give smoother edges and take longer."),
 ];
 

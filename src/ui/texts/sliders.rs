@@ -49,3 +49,4 @@ pub const START_SMOOTHING: &str = "Start smoothing";
 pub const STEP: &str = "Step";
 pub const FIELD_OF_VIEW: &str = "Field of view";
 pub const RAYS_A_PIXEL: &str = "Rays a pixel";
+pub const LARGEST_ERROR: &str = "Largest error";

@@ -472,6 +472,7 @@ const ROWS: &[Row] = &[
     ("cine.last", Nothing, "", &["cine.last=3"]),
     ("cine.speed", Nothing, "", &["cine.speed=2.0"]),
     ("cine.back_and_forth", Nothing, "", &["cine.back_and_forth=true"]),
+    ("ray.tolerance", Rays, "", &["ray.tolerance=2.0"]),
 ];
 
 /// The keys of all settings, from the declaration of their types: those of tables within tables and lists after a dot.

@@ -35,11 +35,15 @@ const CASTS_RAYS: [&str; 6] = [
     "raycast_cap",
 ];
 /// Planes and the block cast none; bricks and marks of edges tell which rays and samples can be left out; light volumes and stills are refused.
-const CASTS_NONE: [&str; 20] = [
+const CASTS_NONE: [&str; 24] = [
     "raycast_planes",
     "raycast_planes_toned",
     "raycast_cube",
     "mark_edges",
+    "tolerance_first",
+    "tolerance_mark",
+    "tolerance_list",
+    "tolerance_refine",
     "classify_bricks_surface",
     "classify_bricks_volume",
     "brick_distance_surface",

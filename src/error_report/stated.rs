@@ -1,0 +1,88 @@
+//! What a picture with `ray.tolerance` says of its own error.
+
+use crate::passes::raycast::tolerance::LEVELS;
+use crate::passes::{Slot, Texels};
+use std::fmt::{self, Display};
+
+/// Share of the pixels with an estimate under the tolerance whose error is above it, in the worst of the scenes of tests/gpu/tolerance.rs: an estimate from
+/// samples cannot know what none of them meets. So many are not counted.
+const MISSED: f64 = 0.004;
+
+/// The errors that the pixels of a picture state.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Stated {
+    /// What each may be, levels of 8 bits.
+    pub tolerance: f64,
+    /// Share of the pixels whose rays meet only empty bricks: these have no error.
+    pub certain: f64,
+    /// Share of the pixels whose error is under the tolerance by their own estimate, less those that estimates miss.
+    pub estimated: f64,
+    /// Share of the pixels whose rays were cast again with shorter steps.
+    pub refined: f64,
+    /// The largest error that a pixel states, levels of 8 bits.
+    pub largest: f64,
+}
+
+impl Stated {
+    /// The slots of a drawn picture that it is made from.
+    pub const SLOTS: [Slot; 2] = [Slot::PixelErrors, Slot::ErrorMarks];
+
+    /// `errors` and `marks`: texels of [`Stated::SLOTS`]. `tolerance`: levels of 8 bits.
+    pub fn new(errors: &Texels, marks: &Texels, tolerance: f64) -> Stated {
+        let count = errors.values.len().max(1) as f64;
+        let share = |is_counted: &dyn Fn(f64) -> bool| {
+            errors.values.iter().filter(|error| is_counted(**error)).count() as f64 / count
+        };
+        // As the shader compares them.
+        let allowed = f64::from((tolerance / LEVELS) as f32);
+        let refined: u32 = marks.values.iter().map(|word| (*word as u32).count_ones()).sum();
+        Stated {
+            tolerance,
+            certain: share(&|error| error == 0.0),
+            estimated: share(&|error| error > 0.0 && error <= allowed) * (1.0 - MISSED),
+            refined: f64::from(refined) / count,
+            largest: errors.values.iter().copied().fold(0.0, f64::max) * LEVELS,
+        }
+    }
+
+    /// Share of the pixels that state an error under the tolerance.
+    pub fn kept(&self) -> f64 {
+        self.certain + self.estimated
+    }
+}
+
+impl Display for Stated {
+    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        let Stated { tolerance, certain, estimated, refined, largest } = self;
+        let levels = if *tolerance == 1.0 { "level" } else { "levels" };
+        write!(
+            f,
+            "at most {tolerance} {levels} of 255: {:.1} % of the pixels by proof, {:.1} % by estimate; {:.1} % may have more, {largest:.1} is \
+             the largest stated; {:.1} % have shorter steps",
+            100.0 * certain,
+            100.0 * estimated,
+            100.0 * (1.0 - self.kept()).max(0.0),
+            100.0 * refined
+        )
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn shares_are_of_all_pixels() {
+        let errors = Texels { size: [5, 1, 1], channels: 1, values: vec![0.0, 1e-6, 1.0 / 255.0, 2.5 / 255.0, 0.0] };
+        let marks = Texels { size: [1, 1, 1], channels: 2, values: vec![f64::from(0b11000_u32), 0.0] };
+        // Texels hold what was stored in 32 bits.
+        let errors = Texels { values: errors.values.iter().map(|v| f64::from(*v as f32)).collect(), ..errors };
+        let stated = Stated::new(&errors, &marks, 1.0);
+        assert_eq!([stated.certain, stated.estimated, stated.refined], [0.4, 0.4 * (1.0 - MISSED), 0.4]);
+        assert_eq!(
+            stated.to_string(),
+            "at most 1 level of 255: 40.0 % of the pixels by proof, 39.8 % by estimate; 20.2 % may have more, 2.5 is the largest stated; \
+             40.0 % have shorter steps"
+        );
+    }
+}

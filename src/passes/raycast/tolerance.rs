@@ -1,0 +1,404 @@
+//! Volume rendering with an error that every pixel states: each ray takes the steps that keep it under a tolerance.
+//!
+//! Light is integrated between every two samples of a ray, as if the value went evenly from one to the other: by the integral of the transfer function over the
+//! values ([`Slot::TransferIntegral`]), so that no thin shell of it is missed. From the same samples it is integrated between every second, beginning with
+//! the first and with the next. The larger difference after toning is the error that is stated: in smooth matter three times the error of the shorter steps, and where samples hit detail by chance the two coarse sums tell by how much chance decides. The shade that a step casts on itself is not in its integral, and is added to
+//! the error as far as colours differ at its ends. [`FIRST`] does this for all rays, [`MARK`] and [`LIST`] list the pixels whose
+//! error is too large and those beside them, and [`REFINE`] casts the rays of these again, with steps halved as often as they need; as many workgroups of
+//! it run as the list fills, which the device itself reads. Rays that meet only empty bricks have no error at all, by the bricks' ranges.
+
+use super::cap;
+use super::ray::{self, Ray};
+use super::volume::{self, RayMedium, Tables};
+use crate::passes::empty_space;
+use crate::passes::light_volume::{self, Lit};
+use crate::passes::lookup_tables::transfer_integral_within;
+use crate::passes::pass::*;
+use crate::passes::postprocess::{tone_constants, tone_params, toned};
+use crate::scene::{Scene, transfer};
+use glam::DVec3;
+
+/// Levels of the screen.
+pub const LEVELS: f64 = 255.0;
+
+/// How often a step is halved, at most.
+const FINEST: u32 = 5;
+
+/// Edge of the tiles whose pixels are marked together: a workgroup's.
+const TILE: u32 = GROUP;
+
+/// Values that differ by less are one: their mean is that of both, and the difference of the integrals is rounding.
+const SAME_VALUE: f64 = 1e-3;
+
+/// The error that is stated where matter was met and none was found. 0 is certain.
+const LEAST: f64 = 1e-6;
+
+fn need(scene: &Scene) -> Need {
+    match scene.tolerance() {
+        Some(_) => Ok("each pixel has the steps that keep its error"),
+        None => Err("no error is asked for"),
+    }
+}
+
+/// The error that is allowed, 0..1 of the screen.
+fn allowed(scene: &Scene) -> f64 {
+    scene.tolerance().unwrap_or(1.0) / LEVELS
+}
+
+/// The step of all rays, mm: no longer than a slice pixel, so that no sample of a ray is missed by all of its neighbours'.
+fn first_step(scene: &Scene) -> f64 {
+    scene.step.min(volume::reference_length(scene))
+}
+
+/// Light that is left where a ray ends early: what it can add is to be little beside the error.
+fn early_end(scene: &Scene) -> f64 {
+    scene.settings.ray.early_end.min(allowed(scene) / LEVELS)
+}
+
+/// Tiles of a picture.
+pub fn tiles(scene: &Scene) -> [u32; 2] {
+    scene.ray_size().map(|n| n.div_ceil(TILE))
+}
+
+fn sized(scene: &Scene, params: Params) -> Params {
+    let [columns, rows] = scene.ray_size();
+    params.i32("columns", columns).i32("rows", rows)
+}
+
+/// Light of matter, at most: what is not yet seen of a ray that was left early.
+fn brightest(scene: &Scene) -> f64 {
+    let light = &scene.settings.light;
+    match scene.lit_by_volume() {
+        Some(_) => light.diffuse + light.ambient + light.specular,
+        None => 1.0,
+    }
+}
+
+/// All rays, with the scene's step.
+pub const FIRST: Pass = Pass {
+    name: "tolerance_first",
+    shader: |_, _| "tolerance/cast.first",
+    needed: need,
+    reads: |s, _| {
+        let mut reads = ray::marching_reads(s, empty_space::volume_skipping(s));
+        reads.extend([whole("transfer", Slot::Transfer), whole("transfer_integral", Slot::TransferIntegral)]);
+        reads.extend(light_volume::reads(s));
+        reads.extend(cap::reads(s));
+        reads
+    },
+    writes: |s, _| vec![whole("picture", rendered(s)), whole("errors", Slot::FirstErrors)],
+    extent: ray_extent,
+    params: |s, _| {
+        let params = ray::params(s, s.volume_view(), first_step(s));
+        let mut params = tone_params(s, volume::compositing_params(s, params, first_step(s)));
+        params.0.retain(|(name, _)| *name != "opaque_enough");
+        params = params.f32("opaque_enough", 1.0 - early_end(s));
+        sized(s, params.f32("allowed", allowed(s)).f32("brightest", brightest(s)).i32("finest", FINEST))
+    },
+    constants: |s, _| {
+        let mut constants = ray::marching_constants(s, empty_space::volume_skipping(s));
+        constants.extend(volume::compositing_constants(s, true));
+        constants.push(cap::constant(s));
+        constants.extend(tone_constants(s));
+        // Each step has its own light, opacities follow from integrals, nothing is filtered along the ray, and where the sector ends is asked of both its sides.
+        let others = ["LIT_STEPS", "SLIDING", "CROSSING", "COMPOSITING", "MIRRORED"];
+        constants.retain(|(name, _)| !others.contains(name));
+        constants.push(("COMPOSITING", 1));
+        constants
+    },
+    tolerance: Tolerance {
+        absolute: 4e-3,
+        relative: 0.0,
+        outliers: 2e-2,
+        why: "as raycast_volume; a ray whose error is close to what is allowed may take other steps, which change it by as much; behind bricks that are \
+              skipped long steps begin anew, which changes the estimate of an error, and light in the middle of a long step is the mean of two",
+    },
+    reference: |scene, _, reads, writes| {
+        let medium = Cast::new(scene, reads);
+        let [width, height, _] = writes.get("picture").size;
+        for (x, y) in (0..height).flat_map(|y| (0..width).map(move |x| (x, y))) {
+            let (rgba, error) = medium.cast([x, y], 0);
+            writes.get_mut("picture").set([x, y, 0], &rgba);
+            writes.get_mut("errors").set([x, y, 0], &[error]);
+        }
+    },
+    ..volume::PASS
+};
+
+/// Which pixels have too large an error. What is thinner than a step may be seen by none of a ray's samples, but by some of those beside it.
+pub const MARK: Pass = Pass {
+    name: "tolerance_mark",
+    shader: |_, _| "tolerance/mark",
+    reads: |_, _| vec![whole("first_errors", Slot::FirstErrors)],
+    writes: |_, _| vec![whole("errors", Slot::PixelErrors), whole("error_marks", Slot::ErrorMarks)],
+    params: |s, _| sized(s, Params::default().f32("allowed", allowed(s))),
+    constants: no_constants,
+    tolerance: Tolerance { absolute: 0.0, relative: 0.0, outliers: 0.0, why: "a comparison of a stored number" },
+    reference: |scene, _, reads, writes| {
+        // As the shader has it.
+        let allowed = f64::from(allowed(scene) as f32);
+        let found = reads.get("first_errors");
+        writes.get_mut("errors").values.clone_from(&found.values);
+        let marks = writes.get_mut("error_marks");
+        marks.values.fill(0.0);
+        let [width, height, _] = found.size;
+        for (x, y) in (0..height).flat_map(|y| (0..width).map(move |x| (x, y))) {
+            let beside = (-1..=1).flat_map(|dy| (-1..=1).map(move |dx| (x as i64 + dx, y as i64 + dy)));
+            let most = beside.map(|(x, y)| found.clamped(x, y, 0)).fold(0.0, f64::max);
+            if found.one(x, y, 0) > 0.0 && most > allowed {
+                let tile = TILE as usize;
+                let (word, bit) = place_in_tile([x % tile, y % tile]);
+                let at = 2 * (x / tile + (y / tile) * marks.size[0]) + word;
+                marks.values[at] += f64::from(1_u32 << bit);
+            }
+        }
+    },
+    ..FIRST
+};
+
+/// Word and bit of a pixel of a tile.
+fn place_in_tile([x, y]: [usize; 2]) -> (usize, usize) {
+    let n = x + y * TILE as usize;
+    (n / 32, n % 32)
+}
+
+/// Marked pixels of a tile.
+fn marked(marks: &Texels, tile: usize) -> u32 {
+    marks.values[2 * tile..2 * tile + 2].iter().map(|word| (*word as u32).count_ones()).sum()
+}
+
+/// The marked pixels in order of tiles: one workgroup counts them.
+pub const LIST: Pass = Pass {
+    name: "tolerance_list",
+    shader: |_, _| "tolerance/list",
+    reads: |_, _| vec![whole("error_marks", Slot::ErrorMarks)],
+    writes: |_, _| vec![whole("marked_before", Slot::MarkedBefore), whole("refine_groups", Slot::RefineGroups)],
+    extent: |_, _| [GROUP, GROUP, 1],
+    params: |s, _| {
+        let [columns, rows] = tiles(s);
+        Params::default().i32("tile_columns", columns).i32("tile_rows", rows)
+    },
+    tolerance: Tolerance { absolute: 0.0, relative: 0.0, outliers: 0.0, why: "sums of integers" },
+    reference: |_, _, reads, writes| {
+        let marks = reads.get("error_marks");
+        let mut before = 0;
+        for tile in 0..marks.values.len() / 2 {
+            writes.get_mut("marked_before").values[tile] = f64::from(before);
+            before += marked(marks, tile);
+        }
+        let groups = before.div_ceil(GROUP * GROUP);
+        let wide = groups.clamp(1, 32768);
+        let groups = [wide, groups.div_ceil(wide), 1, before];
+        writes.get_mut("refine_groups").values.copy_from_slice(&groups.map(f64::from));
+    },
+    ..MARK
+};
+
+/// The rays of the listed pixels, with shorter steps.
+pub const REFINE: Pass = Pass {
+    name: "tolerance_refine",
+    shader: |_, _| "tolerance/cast.refine",
+    reads: |s, dispatch| {
+        let mut reads = (FIRST.reads)(s, dispatch);
+        reads.extend([
+            whole("first_errors", Slot::FirstErrors),
+            whole("error_marks", Slot::ErrorMarks),
+            whole("marked_before", Slot::MarkedBefore),
+            Bind { part: Part::Groups, ..whole("refine_groups", Slot::RefineGroups) },
+        ]);
+        reads
+    },
+    writes: |s, _| vec![whole("picture", rendered(s)), whole("errors", Slot::PixelErrors)],
+    reference: |scene, _, reads, writes| {
+        let medium = Cast::new(scene, reads);
+        let (first, marks) = (reads.get("first_errors"), reads.get("error_marks"));
+        let [width, height, _] = first.size;
+        for (x, y) in (0..height).flat_map(|y| (0..width).map(move |x| (x, y))) {
+            let tile = TILE as usize;
+            let (word, bit) = place_in_tile([x % tile, y % tile]);
+            let marks = marks.values[2 * (x / tile + (y / tile) * marks.size[0]) + word];
+            if (marks as u32) >> bit & 1 == 0 {
+                continue;
+            }
+            let (mut error, mut halvings) = (first.one(x, y, 0), 0);
+            let rgba = loop {
+                let wanted = (0.5 * (error / allowed(scene)).log2()).ceil().max(1.0);
+                halvings = (f64::from(halvings) + wanted).min(f64::from(FINEST)) as u32;
+                let (rgba, found) = medium.cast([x, y], halvings);
+                error = found;
+                if error <= allowed(scene) || halvings >= FINEST {
+                    break rgba;
+                }
+            };
+            writes.get_mut("picture").set([x, y, 0], &rgba);
+            writes.get_mut("errors").set([x, y, 0], &[error]);
+        }
+    },
+    ..FIRST
+};
+
+/// What the passes cast, in f64.
+struct Cast<'a> {
+    scene: &'a Scene,
+    reads: &'a Arrays,
+    tables: Tables<'a>,
+}
+
+/// What the matter between two samples adds to a ray.
+struct Between {
+    rgb: [f64; 3],
+    opacity: f64,
+    place: DVec3,
+    /// What the shade that it casts on itself may change of its colour.
+    unsure: [f64; 3],
+}
+
+/// How much of the colours' difference at both ends the shade of a step on itself may take from its mean: of even matter y / 12 of a thin step, a half of an
+/// opaque one; more where absorption rises.
+fn self_shade(depth: f64) -> f64 {
+    depth / (depth + 12.0)
+}
+
+/// Colour, premultiplied, and opacity of a ray so far.
+#[derive(Clone, Copy, Default)]
+struct Sum([f64; 4]);
+
+impl Sum {
+    /// Adds a step of this colour and opacity.
+    fn add(&mut self, colour: [f64; 3], opacity: f64) {
+        let through = 1.0 - self.0[3];
+        for (sum, colour) in self.0.iter_mut().zip([colour[0], colour[1], colour[2], 1.0]) {
+            *sum += through * opacity * colour;
+        }
+    }
+}
+
+impl<'a> Cast<'a> {
+    fn new(scene: &'a Scene, reads: &'a Arrays) -> Cast<'a> {
+        let tables = Tables { of_steps: reads.get("transfer"), curve: Vec::new(), lit: Lit::new(scene, reads) };
+        Cast { scene, reads, tables }
+    }
+
+    /// The colour of a pixel with steps halved so many times, and its error, 0..1 of the screen.
+    fn cast(&self, [x, y]: [usize; 2], halvings: u32) -> ([f64; 4], f64) {
+        let scene = self.scene;
+        let step = first_step(scene) / f64::from(1 << halvings);
+        let at = ray::middle_of(x, y);
+        let ray = Ray::through(scene, self.reads.get("volume"), scene.volume_view(), step, at);
+        let cut = cap::cut_at(scene, self.reads, x, y);
+        let shows = |sum: [f64; 4]| {
+            let rgba = light_volume::developed(scene, true, sum, at);
+            match &cut {
+                Some(cut) => cut.over(rgba),
+                None => rgba,
+            }
+        };
+        let on_screen = |rgba: [f64; 4]| match rgba[3] > 0.0 {
+            true => toned(scene, [rgba[0], rgba[1], rgba[2]]),
+            false => [0.0; 3],
+        };
+        let is_cut = cut.as_ref().is_some_and(|cut| cut.ends_ray());
+        let (sums, doubt) = if is_cut { Default::default() } else { self.march(&ray) };
+        let [fine, even, odd] = sums.map(|sum| shows(sum.0));
+        if ray.path() <= 0.0 || is_cut {
+            return (fine, 0.0);
+        }
+        let [colour, even, odd] = [fine, even, odd].map(on_screen);
+        let mut off: [f64; 3] = std::array::from_fn(|c| (even[c] - colour[c]).abs().max((odd[c] - colour[c]).abs()));
+        let [r, g, b, opacity] = sums[0].0;
+        let doubtful = on_screen(shows([r + doubt[0], g + doubt[1], b + doubt[2], opacity]));
+        (0..3).for_each(|c| off[c] += (doubtful[c] - colour[c]).abs());
+        if self.ends(&sums) {
+            let left = (1.0 - opacity) * brightest(scene);
+            let most = on_screen(shows([r + left, g + left, b + left, 1.0]));
+            (0..3).for_each(|c| off[c] += (most[c] - colour[c]).abs());
+        }
+        (fine, off.into_iter().fold(LEAST, f64::max))
+    }
+
+    /// True if nothing more of the ray is looked at.
+    fn ends(&self, sums: &[Sum; 3]) -> bool {
+        let early = early_end(self.scene);
+        early > 0.0 && sums.iter().all(|sum| sum.0[3] >= 1.0 - early)
+    }
+
+    /// A ray by its steps, and by the two ways of longer ones; what the shade of steps on themselves may change.
+    fn march(&self, ray: &Ray) -> ([Sum; 3], [f64; 3]) {
+        let [mut fine, mut here, mut behind] = [Sum::default(); 3];
+        let mut doubt = [0.0; 3];
+        // Where the step before was lit.
+        let mut lit_before = None;
+        let (medium, path) = (RayMedium::new(self.scene, ray, &self.tables), ray.path());
+        let (mut i, mut before, mut last) = (0.0, 0.0, 0.0);
+        while last < path && !self.ends(&[fine, here, behind]) {
+            let next = ray.offset(i + 1.0).min(path);
+            let middle = ray.place((last + next) / 2.0);
+            let [short, long] = [last, before].map(|from| self.between(&medium, ray, [from, next]));
+            let is_lit = [&short, &long].into_iter().flatten().any(|found| found.opacity > 0.0);
+            if let Some(found) = short {
+                let light = match &self.tables.lit {
+                    Some(lit) => lit.scattered(middle, ray.direction()),
+                    None => [1.0; 3],
+                };
+                let seen = (1.0 - fine.0[3]) * found.opacity;
+                (0..3).for_each(|c| doubt[c] += seen * found.unsure[c] * light[c]);
+                fine.add(medium.tinted_at(found.rgb, found.place, middle), found.opacity);
+            }
+            if let Some(found) = long {
+                // The light in the middle of a long step is the mean of those in its halves.
+                let [one, other] =
+                    [lit_before.unwrap_or(middle), middle].map(|at| medium.tinted_at(found.rgb, found.place, at));
+                behind.add(std::array::from_fn(|c| (one[c] + other[c]) / 2.0), found.opacity);
+            }
+            lit_before = is_lit.then_some(middle);
+            (here, behind) = (behind, here);
+            (i, before, last) = (i + 1.0, last, next);
+        }
+        if !self.ends(&[fine, here, behind]) {
+            self.catch_up(&medium, ray, [before, last], &mut behind);
+        }
+        ([fine, here, behind], doubt)
+    }
+
+    /// Adds a long step, under the light of its middle.
+    fn catch_up(&self, medium: &RayMedium, ray: &Ray, step: [f64; 2], sum: &mut Sum) {
+        if let Some(found) = self.between(medium, ray, step) {
+            sum.add(medium.tinted_at(found.rgb, found.place, found.place), found.opacity);
+        }
+    }
+
+    /// What is between two samples, offsets behind the ray's entry; nothing where both are outside.
+    fn between(&self, medium: &RayMedium, ray: &Ray, step: [f64; 2]) -> Option<Between> {
+        let [a, b] = super::composite::Medium::part_inside(medium, step)?;
+        let ends = step.map(|offset| ray.sample(offset, 0.0));
+        let (front, back) = (ends[0].or(ends[1])?, ends[1].or(ends[0])?);
+        let looked_up = |value| volume::looked_up(self.tables.of_steps, self.scene.transfer_entries(), value);
+        let [r, g, bl, kappa] = match (back - front).abs() < SAME_VALUE {
+            true => {
+                let [low, high] = [front, back].map(looked_up);
+                std::array::from_fn(|c| (low[c] + high[c]) / 2.0)
+            }
+            false => {
+                let [low, high] = [front, back].map(|value| self.integral(value));
+                let [r, g, bl, kappa]: [f64; 4] = std::array::from_fn(|c| (high[c] - low[c]) / (back - front));
+                let over = kappa.max(1e-20);
+                [r / over, g / over, bl / over, kappa]
+            }
+        };
+        let place = ray.place((step[0] + step[1]) / 2.0);
+        let depth = kappa * self.scene.faded(place) * (b - a) / volume::reference_length(self.scene);
+        let [low, high] = [front, back].map(looked_up);
+        let unsure = std::array::from_fn(|c| self_shade(depth) * (high[c] - low[c]).abs());
+        Some(Between { rgb: [r, g, bl], opacity: transfer::opacity(depth), place, unsure })
+    }
+
+    /// Integral of the transfer function over the values up to one.
+    fn integral(&self, value: f64) -> [f64; 4] {
+        let entries = self.scene.transfer_entries();
+        let (n, share) = volume::placed(value, entries);
+        let [low, high] = [n, n + 1].map(|n| volume::entry(self.tables.of_steps, n));
+        let (sum, part) =
+            (volume::entry(self.reads.get("transfer_integral"), n), transfer_integral_within(low, high, share));
+        std::array::from_fn(|c| sum[c] + part[c] / (entries - 1) as f64)
+    }
+}
