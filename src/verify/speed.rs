@@ -11,12 +11,14 @@ use crate::verify::report::{Figure, Level};
 
 /// Scenes that together need every pass, with pictures as large as a tile of a small display. A pass is timed in the first scene that
 /// needs it.
-const SCENES: [&str; 21] = [
+const SCENES: [&str; 22] = [
     "mode = 'sr'",
     "mode = 'vr'",
     "mode = 'vr'\nlight = { volume = {} }",
     "mode = 'vr'\nstill = { samples = 2, events = 16 }",
     "mode = 'vr'\nray = { rays = 2, adaptive = true }",
+    // Alone, the pass over the list has an empty one.
+    "mode = 'vr'\nray = { tolerance = 1 }",
     "mode = 'mip'",
     "mode = 'orthogonal'",
     "mode = 'orthogonal'\npost = { floats = true }",
