@@ -238,10 +238,10 @@ impl Render {
     fn open(&self) -> Result<(Box<dyn Source>, Scene), Failure> {
         let mut own = self.still_args()?.map_or_else(Vec::new, |still| still.set);
         if let Some(levels) = &self.tolerance {
-            let number = levels.trim_end_matches('s').trim_end_matches("level").trim();
-            number
-                .parse::<f64>()
-                .map_err(|_| input(format!("--tolerance {levels}: must be a number of levels, such as 1level")))?;
+            let number = ["levels", "level"].iter().find_map(|unit| levels.strip_suffix(unit)).unwrap_or(levels).trim();
+            if !number.parse::<f64>().is_ok_and(|number| number > 0.0) {
+                return Err(input(format!("--tolerance {levels}: must be a number of levels above 0, such as 1level")));
+            }
             own.push((format!("--tolerance {levels}"), format!("ray.tolerance={number}")));
         }
         let (Some(budget), Some(file)) = (&self.budget, &self.report) else { return self.opened(&own) };
