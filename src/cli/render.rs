@@ -72,9 +72,9 @@ pub struct Render {
     /// --error-tolerance
     #[arg(long, value_name = "FILE")]
     error_map: Option<PathBuf>,
-    /// Largest difference of a pixel that --error-map does not hatch, 0..=1
-    #[arg(long, value_name = "ERROR", default_value_t = 0.01, requires = "error_map")]
-    error_tolerance: f64,
+    /// Largest difference of a pixel that --error-map does not hatch, 0..=1; 0.01 unless set. Not with --tolerance, whose levels are hatched
+    #[arg(long, value_name = "ERROR", requires = "error_map", conflicts_with = "tolerance")]
+    error_tolerance: Option<f64>,
     /// Draw a still: volume rendering (mode vr) by paths of light that collide many times in the tissue. samples=N paths of a pixel, or a time such as
     /// 20s, which chooses N and prints it; further settings of the table still, such as seed=1 or extinction=4
     #[arg(long, value_name = "KEY=VALUE,...|TIME")]
@@ -343,9 +343,10 @@ impl Render {
     }
 
     fn write_error_map(&self, file: &Path, picture: &Texels, finer: &Texels) -> Result<(), Failure> {
-        let found = map::error_map(picture, finer, self.error_tolerance).map_err(failed)?;
+        let tolerance = self.error_tolerance.unwrap_or(MAP_TOLERANCE);
+        let found = map::error_map(picture, finer, tolerance).map_err(failed)?;
         found.picture.save(file).map_err(failed)?;
-        let ([least, most], tolerance) = (map::SCALE, self.error_tolerance);
+        let [least, most] = map::SCALE;
         say!(
             "error map: {}: difference from half the step, dark {least:e} to light {most}, logarithmic; RMS {:.1e}, largest {:.1e}; \
              hatched above {tolerance}: {:.1} % of the pixels",
@@ -359,12 +360,18 @@ impl Render {
 
     /// With --error-map the scene at half its step.
     fn finer(&self, scene: &Scene) -> Result<Option<Scene>, Failure> {
+        match self.error_tolerance {
+            Some(tolerance) if !(0.0..=1.0).contains(&tolerance) => {
+                return Err(input(format!("--error-tolerance {tolerance}: must lie in 0..=1")));
+            }
+            Some(_) if scene.tolerance().is_some() => {
+                return Err(input("--error-tolerance: the map of a picture with ray.tolerance hatches that tolerance"));
+            }
+            _ => {}
+        }
         // A picture with a tolerance states its error itself.
         if self.error_map.is_none() || scene.tolerance().is_some() {
             return Ok(None);
-        }
-        if !(0.0..=1.0).contains(&self.error_tolerance) {
-            return Err(input(format!("--error-tolerance {}: must lie in 0..=1", self.error_tolerance)));
         }
         map::finer(scene).map(Some).map_err(|why| input(format!("--error-map: {why}")))
     }
@@ -395,6 +402,9 @@ impl Render {
         Ok(())
     }
 }
+
+/// Difference of a pixel above which `--error-map` hatches, unless `--error-tolerance` is set.
+const MAP_TOLERANCE: f64 = 0.01;
 
 /// A picture, the renderer that drew it, and the frames that it shows, if they are needed again.
 struct Drawn {

@@ -48,6 +48,8 @@ fn what_has_no_bounds_and_no_error_map_is_refused_in_one_line() {
     let map = folder.path("map.png");
     folder.refuses(&[BONE, "--mode", "mpr", "--error-map", &map], &["--error-map", "no steps"]);
     folder.refuses(&[BONE, "--mode", "vr", "--error-map", &map, "--error-tolerance", "2"], &["--error-tolerance 2"]);
+    let stated = [BONE, "--mode", "vr", "--set", "ray.tolerance=1", "--error-map", &map, "--error-tolerance", "0.1"];
+    folder.refuses(&stated, &["--error-tolerance", "ray.tolerance"]);
 }
 
 #[test]

@@ -100,7 +100,7 @@ def page(folder, target):
         rows.append(f"**together: the scene as it is** | {errors(budget['total'])}")
         text += table(f"approximation | {COLUMNS}", rows)
         for d in r["dials"]:
-            if d["kind"] in ("numerical", "several") and d["name"] in ("step", "format", "light-cell", "pipeline", "compositing", "termination"):
+            if d["kind"] in ("numerical", "several") and d["name"] in ("step", "format", "light-cell", "pipeline", "compositing", "termination", "tolerance"):
                 text += dial(d)
     pathlib.Path(target).write_text(text)
 
