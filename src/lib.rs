@@ -1,26 +1,16 @@
 //! Echolume turns the polar frames of a mechanically wobbling ultrasound probe into rendered volumes, on bare Vulkan.
 //!
-//! # Modules
-//!
-//! In the order in which a frame travels:
+//! This crate is the program and a facade of the members of its workspace, in the order in which a frame travels:
 //!
 //! - [`source`] reads recordings and live sources into frames. [`probe`] defines where their samples lie in space and drives the probe's
 //!   motor.
-//! - [`scene`] is everything that determines a picture: geometry, mode, filters, camera, light.
-//! - [`passes`] declares every compute pass in one place: its slots (GPU resources), parameters, constants, tolerance and f64 reference.
-//!   Its modules are the four stages preprocess, raycast, shade and postprocess, and the filters that several stages share.
-//! - [`plan`] derives the passes and slots that a scene needs, and what must run again after a change. [`barriers`] derives the barriers
-//!   between passes, [`queues`] the waits between queues. [`spirv`] reflects and rewrites shaders. These modules need no GPU.
-//! - [`gpu`] is the only module that uses Vulkan and the only one with unsafe code.
-//! - [`live`] renders frames while they arrive. [`mod@ui`] shows the pictures and handles input. [`kiosk`] holds the configuration, the logs
-//!   and the support bundle of a kiosk display.
+//! - [`scene`] is everything that determines a picture: geometry, mode, filters, camera, light. [`passes`] declares every compute pass,
+//!   [`plan`] derives the passes and slots that a scene needs, [`barriers`] and [`queues`] their order.
+//! - [`gpu`] is the only member that uses Vulkan and the only one with unsafe code.
+//! - [`live`] renders frames while they arrive.
 //! - [`reference`](mod@reference) renders on the CPU in f64, [`exact_ray`] integrates its rays without samples, [`bounds`] encloses them.
-//!   [`profile`] measures GPU times, [`error_report`] error against run time,
-//!   [`filter_report`] what filters do to speckle and edges, [`thesis_tables`] the tables of the thesis. [`verify`] tests a device and its driver.
-//! - [`batch`] renders, converts, measures or verifies many recordings, one shard of them a process. [`mesh`] makes triangles of a volume's surface.
-//! - [`metrics`] is what Prometheus is told.
-//! - [`measure`] has the geometry and the results of calipers, contours and volumes; [`workspace`] keeps them with settings and recording.
-//! - [`files`] reads with limits and writes atomically. [`picture`] holds pictures, `marked` draws marks on saved ones. [`cli`] is the command line.
+//!   [`profile`] measures GPU times, [`error_report`] error against run time. [`verify`] tests a device and its driver.
+//! - [`batch`] renders, converts, measures or verifies many recordings, one shard of them a process. [`cli`] is the command line.
 //!
 //! # Render a file
 //!
@@ -168,93 +158,22 @@
 //! # }
 //! ```
 
-// No module but `gpu` may allow it again.
-#![deny(unsafe_code)]
+#![forbid(unsafe_code)]
 
-#[forbid(unsafe_code)]
 mod args;
-#[forbid(unsafe_code)]
-pub mod barriers;
-#[forbid(unsafe_code)]
 pub mod batch;
-#[forbid(unsafe_code)]
-pub mod bounds;
-#[forbid(unsafe_code)]
-mod canvas;
-#[forbid(unsafe_code)]
 pub mod cli;
-#[forbid(unsafe_code)]
-pub mod dump;
-#[forbid(unsafe_code)]
-pub mod error_report;
-#[forbid(unsafe_code)]
-pub mod exact_ray;
-#[forbid(unsafe_code)]
-pub mod files;
-#[forbid(unsafe_code)]
-pub mod filter_report;
-#[allow(unsafe_code)]
-pub mod gpu;
-#[forbid(unsafe_code)]
-mod html_page;
-#[forbid(unsafe_code)]
-pub mod kiosk;
-#[forbid(unsafe_code)]
-pub mod live;
-#[forbid(unsafe_code)]
-pub mod machine;
-#[forbid(unsafe_code)]
-pub mod marked;
-#[forbid(unsafe_code)]
-pub mod measure;
-#[forbid(unsafe_code)]
-pub mod mesh;
-#[forbid(unsafe_code)]
-pub mod metrics;
-#[forbid(unsafe_code)]
-pub mod passes;
-#[forbid(unsafe_code)]
-pub mod picture;
-#[forbid(unsafe_code)]
-pub mod plan;
-#[forbid(unsafe_code)]
-pub mod probe;
-#[forbid(unsafe_code)]
-pub mod profile;
-#[forbid(unsafe_code)]
-mod progress_lines;
-#[forbid(unsafe_code)]
-pub mod queues;
-#[forbid(unsafe_code)]
-pub mod reference;
-#[forbid(unsafe_code)]
-pub mod scene;
-#[cfg(feature = "hot-reload")]
-#[forbid(unsafe_code)]
-mod shader_compile;
-#[forbid(unsafe_code)]
-pub mod shader_source;
-#[forbid(unsafe_code)]
-pub mod shader_tools;
-#[forbid(unsafe_code)]
-pub mod source;
-#[forbid(unsafe_code)]
-pub mod spirv;
-#[forbid(unsafe_code)]
-mod terminal;
-#[forbid(unsafe_code)]
-pub mod text;
-#[forbid(unsafe_code)]
-pub mod thesis_tables;
+
+pub use echolume_base::{files, metrics, picture, text};
+pub use echolume_core::{barriers, dump, exact_ray, mesh, passes, plan, queues, reference, scene, spirv};
+pub use echolume_gpu::{self as gpu, machine, shader_source, shader_tools};
+pub use echolume_lab::{bounds, error_report, filter_report, profile, thesis_tables};
+pub use echolume_session::{kiosk, live, marked, measure, user_presets, workspace};
 #[cfg(feature = "view")]
-#[forbid(unsafe_code)]
-pub mod ui;
-#[forbid(unsafe_code)]
-pub mod user_presets;
-#[forbid(unsafe_code)]
-pub mod verify;
-#[forbid(unsafe_code)]
-pub mod workspace;
+pub use echolume_ui as ui;
+pub use {echolume_probe as probe, echolume_source as source, echolume_verify as verify};
+
+use echolume_base::{html_page, terminal};
 
 pub use gpu::{Context, ContextOptions, DeviceChoice, Renderer, RendererOptions};
 pub use live::{Stream, StreamOptions};

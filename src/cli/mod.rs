@@ -5,12 +5,17 @@
 
 mod about;
 mod batch;
+mod bounds;
 mod drawing;
+mod error_report;
 mod filter;
+mod filter_report;
 mod machine;
 mod mesh;
 mod one_colour;
+mod pipelines;
 mod probe;
+mod profile;
 mod recordings;
 mod render;
 mod series;
@@ -19,6 +24,8 @@ mod sheet;
 mod stic;
 mod still;
 mod stream;
+mod thesis_tables;
+mod verify;
 #[cfg(feature = "view")]
 mod view;
 #[cfg(feature = "view")]
@@ -29,7 +36,6 @@ mod view_open;
 use crate::kiosk::log_rotation::{self, RotatingLog};
 use crate::source::standard_input;
 use crate::terminal::{self, Failure, failed, input};
-use crate::{bounds, error_report, filter_report, profile, thesis_tables, verify};
 use clap::{CommandFactory, Parser, Subcommand};
 use std::io::Write;
 use std::path::PathBuf;
@@ -76,9 +82,9 @@ enum Command {
     /// Run the 2D filters on an ordinary picture, and measure their effect
     Filter(Box<filter::Filter>),
     /// Measure the GPU time of every pass, and compare two such runs
-    Profile(Box<profile::command::Profile>),
+    Profile(Box<profile::Profile>),
     /// Test whether this device and its driver render correctly
-    Verify(verify::command::Verify),
+    Verify(verify::Verify),
     /// Report error against run time for each dial, proven bounds of a picture, filters compared, or the tables of the thesis
     Report(Report),
     /// Write a synthetic sweep: a fetal head, or a body with an exact answer
@@ -114,13 +120,13 @@ struct Report {
 #[derive(Subcommand)]
 enum ReportKind {
     /// Measure error against run time: renders and times every setting of each dial and compares it with the reference
-    Error(Box<error_report::command::ErrorReport>),
+    Error(Box<error_report::ErrorReport>),
     /// Enclose every ray of volume rendering by proven bounds, on the CPU
-    Bounds(Box<bounds::command::BoundsReport>),
+    Bounds(Box<bounds::BoundsReport>),
     /// Compare the 2D filters of slices: noise, contrast, edges, error and time
-    Filters(filter_report::command::FilterReport),
+    Filters(filter_report::FilterReport),
     /// Measure the thesis' tables of times in our reading of its conditions, and print them with its figures
-    Tables(thesis_tables::command::ThesisTables),
+    Tables(thesis_tables::ThesisTables),
 }
 
 impl Report {

@@ -1,6 +1,7 @@
 //! `echolume render`.
 
 use super::drawing::{DrawFault, draw_despite_losses, send_volume};
+use super::error_report::{parse_nanoseconds, read_report};
 use super::one_colour;
 use super::series::{Job, SeriesArgs};
 use super::sheet;
@@ -8,7 +9,6 @@ use super::still::{self, StillArgs};
 use crate::args::{InputArgs, Output, PictureFile, ShaderArgs, check_outputs};
 use crate::dump;
 use crate::error_report::choose::Bound;
-use crate::error_report::command::{parse_nanoseconds, read_report};
 use crate::error_report::stated::Stated;
 use crate::error_report::{Measure, choose, map};
 use crate::files;

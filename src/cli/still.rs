@@ -1,6 +1,6 @@
 //! `echolume render --still`: how many paths a still has, and how far its mean is from its expectation.
 
-use crate::error_report::command::parse_nanoseconds;
+use super::error_report::parse_nanoseconds;
 use crate::gpu::{GpuError, Renderer};
 use crate::passes::raycast::still::{final_sums, luminance};
 use crate::scene::Still;

@@ -1,7 +1,7 @@
 //! The configuration of a view: device, window and console, from flags or from a configuration file.
 
+use super::error_report::read_report;
 use crate::args::{SceneArgs, SourceArgs, pipeline_folder};
-use crate::error_report::command::read_report;
 use crate::gpu::window::{MonitorChoice, PresentMode};
 use crate::gpu::{Context, ContextOptions, GpuError, Wake};
 use crate::kiosk::config::{Config, Present};

@@ -13,7 +13,7 @@ use std::path::{Path, PathBuf};
 /// Largest probe file, bytes.
 const MAX_BYTES: u64 = 1 << 20;
 /// Thickness of the slab that a single frame is drawn as, mm.
-pub(crate) const SLAB: f64 = 1.0;
+pub const SLAB: f64 = 1.0;
 
 /// A probe file that was read. `tests/data/*/probe.toml` are commented examples.
 #[derive(Clone, Debug, PartialEq)]
@@ -277,7 +277,7 @@ impl ProbeFile {
 }
 
 /// A fault of the geometry as one of the file that it comes from.
-pub(crate) fn geometry_error(file: &Path, error: &GeometryError) -> InputError {
+pub fn geometry_error(file: &Path, error: &GeometryError) -> InputError {
     InputError::new(file, error.field, &error.fault)
 }
 

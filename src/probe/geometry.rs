@@ -145,7 +145,7 @@ impl Probe {
     }
 
     /// Distance that the motor travels while the frame at a fractional slice is acquired.
-    pub(crate) fn advance_at(&self, slice: f64) -> f64 {
+    pub fn advance_at(&self, slice: f64) -> f64 {
         match &self.advance {
             Advance::None => 0.0,
             Advance::Same(a) => *a,

@@ -69,7 +69,7 @@ impl Geometry {
 
 impl Geometry {
     /// True if the two differ at most in the motor's travel during a frame, which moves only the later lines of each slice.
-    pub(crate) fn equals_except_advance(&self, other: &Geometry) -> bool {
+    pub fn equals_except_advance(&self, other: &Geometry) -> bool {
         match (self, other) {
             (Geometry::Sweep(a), Geometry::Sweep(b)) => {
                 let fields = |p: &Probe| (p.array, p.start_depth, p.sample_pitch, p.samples, p.motion, p.sound_speed);
@@ -80,7 +80,7 @@ impl Geometry {
     }
 
     /// True if the two differ at most in the direction of the motor's travel during each frame.
-    pub(crate) fn equals_except_direction(&self, other: &Geometry) -> bool {
+    pub fn equals_except_direction(&self, other: &Geometry) -> bool {
         let travels = |geometry: &Geometry| match geometry {
             Geometry::Sweep(p) => (0..p.slices.len()).map(|k| p.advance_at(k as f64).abs()).collect(),
             Geometry::Cartesian(_) => Vec::new(),
@@ -90,7 +90,7 @@ impl Geometry {
 
     /// A volume with slices of both directions: a slice is as in `backward` if it is marked, else as in `self`. None if the last lines
     /// of neighbouring slices would cross, or if the two geometries differ in more than the motor's travel.
-    pub(crate) fn with_mixed_directions(&self, backward: &Geometry, marked: &[bool]) -> Option<Geometry> {
+    pub fn with_mixed_directions(&self, backward: &Geometry, marked: &[bool]) -> Option<Geometry> {
         let (Geometry::Sweep(forward), Geometry::Sweep(back)) = (self, backward) else { return None };
         let travel = |k: usize| {
             if marked.get(k) == Some(&true) { back.advance_at(k as f64) } else { forward.advance_at(k as f64) }
@@ -129,7 +129,7 @@ mod tests {
 
     #[test]
     fn the_first_index_of_a_frame_runs_along_a_line_and_of_a_picture_along_x() {
-        use crate::probe::{Advance, Array, Axis, Motion};
+        use crate::{Advance, Array, Axis, Motion};
         let cartesian = Geometry::Cartesian(Grid { size: [7, 5, 3], spacing: [1.0; 3], origin: [0.0; 3] });
         assert_eq!((cartesian.frame_size(), cartesian.slices()), ([7, 5], 3));
         let sweep = Geometry::Sweep(Probe {
@@ -150,7 +150,7 @@ mod tests {
 #[cfg(test)]
 mod direction_tests {
     use super::*;
-    use crate::probe::{Array, Axis, Motion};
+    use crate::{Array, Axis, Motion};
 
     fn probe(advance: Advance) -> Geometry {
         Geometry::Sweep(Probe {

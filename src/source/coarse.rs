@@ -1,7 +1,7 @@
 //! A volume with fewer samples, for small pictures of it: means of neighbouring samples, lines and frames, in the same sector.
 
-use super::frame::Frame;
-use super::samples::StoredType;
+use crate::Frame;
+use crate::probe::StoredType;
 use crate::probe::{Advance, Axis, Geometry, Grid, Probe};
 use rayon::prelude::*;
 use std::sync::Arc;

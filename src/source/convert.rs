@@ -1,12 +1,12 @@
 //! Conversion of a sweep to a Cartesian volume file: each voxel is interpolated in the polar frames, trilinearly in sample, line and slice.
 //! In f64 on the CPU, one slice of the result at a time, so that only the sweep itself has to fit into memory.
 
-use super::frame::Frame;
-use super::samples::{SampleType, StoredType};
 use super::segmentation::{self, Segment};
 use super::volume_file::VolumeFile;
+use crate::Frame;
 use crate::files::InputError;
 use crate::probe::{Geometry, Grid, Probe, World};
+use crate::{SampleType, StoredType};
 use glam::DVec3;
 use rayon::prelude::*;
 use std::io::Write;

@@ -1,8 +1,7 @@
-//! Frames, the header of a sequence of frames, and the trait of sources that are read on demand.
+//! The header of a sequence of frames, and the trait of sources that are read on demand.
 
-use super::samples::{SampleType, StoredType};
 use crate::files::InputError;
-use crate::probe::{Advance, Geometry, World, is_rigid};
+pub use crate::probe::{Advance, Frame, Geometry, SampleType, StoredType, World, is_rigid};
 use glam::{DAffine3, DMat4, DVec3};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeSet;
@@ -12,33 +11,6 @@ use std::path::{Path, PathBuf};
 const MAX_SLICES: usize = 1 << 16;
 /// Largest frame, bytes.
 const MAX_FRAME_BYTES: u64 = 1 << 30;
-
-/// One polar 2D acquisition, or one slice of a Cartesian volume.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Frame {
-    /// Number of the volume that the frame belongs to, from 0.
-    pub volume: u32,
-    /// Index in its volume in order of acquisition, from 0.
-    pub number: u32,
-    /// Index in its volume in geometric order, from 0: K - 1 - `number` if it was swept backwards (K frames a volume).
-    pub slice: usize,
-    /// The volume was swept backwards.
-    pub backward: bool,
-    /// Time stamp, s, on the clock of the device that acquired it.
-    pub time: Option<f64>,
-    /// From the space of the geometry, mm, to the world (LPS) or the space of a tracker: rigid. Of a volume the
-    /// pose of its first frame that has one counts.
-    pub pose: Option<DAffine3>,
-    /// Samples of the stored type ([`Header::stored`]), little-endian, line by line (samples fastest).
-    pub bytes: Vec<u8>,
-}
-
-impl Frame {
-    /// Slice `slice` of a volume that was swept forwards, without time and pose.
-    pub fn of_slice(volume: u32, slice: usize, bytes: Vec<u8>) -> Frame {
-        Frame { volume, number: slice as u32, slice, backward: false, time: None, pose: None, bytes }
-    }
-}
 
 /// What all frames of a file or of a live source have in common.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -95,7 +67,7 @@ impl Header {
     }
 
     /// Sizes of a line and of a frame, bytes; 0 where [`Header::frame_bytes`] is None.
-    pub(crate) fn line_and_frame(&self) -> (usize, usize) {
+    pub fn line_and_frame(&self) -> (usize, usize) {
         let frame = self.frame_bytes().unwrap_or(0) as usize;
         (frame / self.forward.frame_size()[1].max(1), frame)
     }

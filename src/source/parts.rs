@@ -1,13 +1,13 @@
 //! Frames that arrive in parts of lines, put together.
 
-use super::frame::Frame;
+use crate::Frame;
 use std::borrow::Cow;
 
 /// The frame whose parts are arriving.
 ///
 /// Memory: one frame.
 #[derive(Debug, Default)]
-pub(crate) struct FrameParts(Option<Frame>);
+pub struct FrameParts(Option<Frame>);
 
 impl FrameParts {
     /// Adds a part, `at` bytes into a frame of `total` bytes. Returns the frame when it is complete. A part at 0 begins a frame; one that

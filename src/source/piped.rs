@@ -19,10 +19,12 @@
 //! The frames follow in order of acquisition, line by line (samples fastest), with nothing between them but their time stamps. The
 //! stream may end after any frame. `tools/pipe_frames.py` writes such a stream.
 
-use super::frame::{Frame, Header, POSE_BYTES, read_pose};
+use super::frame::{Header, POSE_BYTES, read_pose};
 use super::freehand::CompoundingOptions;
 use super::live::{Event, Live};
-use super::samples::{self, Replaced, SampleType};
+use super::samples::{self, Replaced};
+use crate::Frame;
+use crate::SampleType;
 use crate::files::InputError;
 use crate::probe::{Geometry, Grid, Probe, ProbeFile, Volumes};
 use serde::Deserialize;

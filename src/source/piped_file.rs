@@ -1,12 +1,14 @@
 //! A stream of raw frames ([`super::piped`]) that was kept in a file: every frame has the same size, so that any can be read.
 
 use super::describe;
-use super::frame::{Frame, Header, POSE_BYTES, Source, read_pose};
+use super::frame::{Header, POSE_BYTES, Source, read_pose};
 use super::piped::{StreamHeader, first_line};
-use super::samples::{self, SampleType, StoredType};
+use super::samples;
+use crate::Frame;
 use crate::files::InputError;
 use crate::files::progress::CountedFile;
 use crate::probe::{Geometry, ProbeFile, World};
+use crate::{SampleType, StoredType};
 use glam::DAffine3;
 use std::fs::File;
 use std::io::{BufReader, Read, Seek, SeekFrom};

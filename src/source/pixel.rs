@@ -1,6 +1,7 @@
 //! Pixels of files: number types, channels and scales, and the conversion to stored samples.
 
-use super::samples::{Replaced, SampleType, StoredType, store};
+use super::samples::{Replaced, store};
+use crate::{SampleType, StoredType};
 
 /// A number type of a file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -1,10 +1,11 @@
 //! Pictures that each carry a pose, as a freehand volume: while they arrive ([`Posed`]), and from a file ([`Opened`]).
 
-use super::frame::{Frame, Header, Source, file_bytes};
+use super::frame::{Header, Source, file_bytes};
 use super::freehand::{
     CompoundingOptions, FreehandArguments, FreehandFile, PlacedPicture, PlacedPictures, Pose, Refusal, Schedule, Sweep,
 };
 use super::live::Event;
+use crate::Frame;
 use crate::files::{InputError, progress};
 use crate::probe::{Geometry, Grid};
 use glam::{DAffine3, DMat3, DVec3};

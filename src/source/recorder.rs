@@ -20,11 +20,12 @@
 pub use super::frame::Header;
 
 use super::describe::{self, number};
-use super::frame::{Frame, POSE_BYTES, Source, read_pose, stored_pose};
-use super::samples::{SampleType, StoredType};
+use super::frame::{POSE_BYTES, Source, read_pose, stored_pose};
+use crate::Frame;
 use crate::files::progress::CountedFile;
 use crate::files::{InputError, progress};
 use crate::probe::{Geometry, World};
+use crate::{SampleType, StoredType};
 use crc::{CRC_32_ISO_HDLC, Crc, Table};
 use glam::{DAffine3, DQuat};
 use std::fs::{File, OpenOptions};
@@ -146,7 +147,7 @@ impl Writer {
     }
 
     /// Removes the incomplete file.
-    pub(crate) fn discard(self) {
+    pub fn discard(self) {
         // If it cannot be removed, nothing else can be done.
         let _ = std::fs::remove_file(&self.path);
     }
@@ -217,7 +218,7 @@ pub struct Reader {
 
 impl Reader {
     /// True if a file begins as a `.frames` file.
-    pub(crate) fn is_one(start: &[u8]) -> bool {
+    pub fn is_one(start: &[u8]) -> bool {
         start.starts_with(MAGIC)
     }
 

@@ -2,16 +2,17 @@
 
 use super::drawn::Drawn;
 use super::formats::read_layout;
-use super::frame::{Frame, Source};
 use super::layout::{Layout, LineOrder, StoredGeometry};
 use super::packed::PixelStream;
-use super::samples::{Replaced, SampleType, StoredType};
+use super::samples::Replaced;
 use super::transforms::Poses;
 use super::value_range::ValueRange;
 use super::{OpenOptions, describe};
 use crate::files::{InputError, progress};
 use crate::probe::file::geometry_error;
 use crate::probe::{Geometry, Probe, ProbeFile, Volumes, World};
+use crate::{Frame, Source};
+use crate::{SampleType, StoredType};
 use std::io;
 use std::path::{Path, PathBuf};
 

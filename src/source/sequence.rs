@@ -2,8 +2,8 @@
 
 use super::frame::DEMO_DATA;
 use super::frame::Source;
-use super::samples::SampleType;
 use crate::files::{InputError, Unfinished};
+use crate::probe::SampleType;
 use crate::probe::{Geometry, ProbeFile, Volumes};
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
@@ -25,7 +25,7 @@ pub struct Sequence {
 }
 
 /// The path of the probe file of a sequence.
-pub(crate) fn probe_file_path(path: &Path) -> PathBuf {
+pub fn probe_file_path(path: &Path) -> PathBuf {
     let mut name = path.file_stem().unwrap_or_default().to_os_string();
     name.push(".probe.toml");
     path.with_file_name(name)

@@ -1,9 +1,9 @@
 //! Standard input as a recording: `-` in place of a file. It is kept in a temporary file, once, so that readers can go back in it.
 
 use super::frame::{Frame, Header, Source};
-use super::samples::{SampleType, StoredType};
 use crate::files::{InputError, Spool};
 use crate::probe::{Geometry, World};
+use crate::{SampleType, StoredType};
 use glam::DAffine3;
 use std::io::IsTerminal;
 use std::path::{Path, PathBuf};
@@ -27,7 +27,7 @@ pub(super) fn is_meant(path: &Path) -> bool {
 }
 
 /// Removes what was kept. Sources that are still open then fail.
-pub(crate) fn forget() {
+pub fn forget() {
     kept().take();
 }
 

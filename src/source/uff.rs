@@ -7,11 +7,11 @@
 //! Complex data and amplitudes become decibels of their envelope, 0 at the largest of the file. Data of both signs are RF and are refused.
 
 use super::describe;
-use super::frame::{Frame, Source};
-use super::samples::{SampleType, StoredType};
 use crate::files::{InputError, progress, quoted};
 use crate::probe::file::SLAB;
 use crate::probe::{Advance, Array, Axis, Geometry, Motion, Probe};
+use crate::{Frame, Source};
+use crate::{SampleType, StoredType};
 use hdf5_reader::group::Group;
 use hdf5_reader::{DEFAULT_CHUNK_CACHE_SLOTS, Dataset, Hdf5File, OpenOptions, SliceInfo, SliceInfoElem};
 use std::path::{Path, PathBuf};
@@ -575,7 +575,7 @@ mod tests {
     use super::*;
 
     fn file(name: &str) -> PathBuf {
-        Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/data/uff").join(name)
+        Path::new(env!("CARGO_MANIFEST_DIR")).join("../../tests/data/uff").join(name)
     }
 
     fn frames(source: &mut Beamformed) -> Vec<Frame> {

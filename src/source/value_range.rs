@@ -6,7 +6,8 @@
 //! over all their decades, have no such gap. Outliers are recognised up to a share of [`MOST`].
 
 use super::describe::number;
-use super::samples::{StoredType, not_empty, widen};
+use super::samples::{not_empty, widen};
+use crate::StoredType;
 
 /// Least empty distance to an outlier, spans of the rest: 60 dB.
 const GAP: f64 = 1000.0;

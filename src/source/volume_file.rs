@@ -1,8 +1,8 @@
 //! Volume files that are written: MetaImage, NRRD, NIfTI-1 and DICOM, each with its voxel-to-world matrix. A file is whole or does not exist.
 
 use super::dicom::{DicomWriter, Form, MOST_BYTES};
-use super::samples::SampleType;
 use crate::files::{InputError, Unfinished};
+use crate::probe::SampleType;
 use crate::probe::World;
 use flate2::Compression;
 use flate2::write::GzEncoder;

@@ -9,7 +9,7 @@ use crate::scene::{
     Body, BodyMark, ColourMap, KeptSide, Layout, MeasureKind, Mode, PlaneName, ProbeMarker, Sides, TransferName,
     VolumeAxis,
 };
-use crate::ui::texts::keys;
+use crate::texts::keys;
 use Key::{Char, Function};
 
 /// One command.

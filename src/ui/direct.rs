@@ -186,7 +186,7 @@ impl CursorTimer {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::ui::input::Phase;
+    use crate::input::Phase;
 
     #[test]
     fn the_cursor_is_visible_for_a_while_and_hidden_by_a_finger() {

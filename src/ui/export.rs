@@ -7,7 +7,7 @@ use crate::live::cine::CineVolume;
 use crate::picture::Picture;
 use crate::progress_lines::Progress;
 use crate::source::recorder::Header;
-use crate::ui::texts;
+use crate::texts;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::mpsc::{Receiver, Sender, channel};
@@ -196,7 +196,7 @@ mod tests {
     use crate::probe::{Geometry, Grid};
     use crate::scene::Settings;
     use crate::source::StoredType;
-    use crate::ui::volume_export::FORMATS;
+    use crate::volume_export::FORMATS;
     use std::time::Duration;
 
     fn wait(exporter: &mut Exporter) -> Result<PathBuf, String> {

@@ -8,7 +8,7 @@ use crate::error_report::{Combination, Measure, Report, choose};
 use crate::plan::Work;
 use crate::scene::load::Layers;
 use crate::scene::{Mode, Ray, Scene, Settings, camera};
-use crate::ui::texts;
+use crate::texts;
 use std::time::{Duration, Instant};
 
 /// The view is at rest so long after its last movement.

@@ -32,14 +32,12 @@ impl ScreenReader {
 #[cfg(feature = "screen-reader")]
 mod served {
     use super::{ActiveEventLoop, Console, Wake, Window, WindowEvent};
-    use crate::ui::panels::accesskit::{
-        ActionHandler, ActionRequest, ActivationHandler, DeactivationHandler, TreeUpdate,
-    };
+    use crate::panels::accesskit::{ActionHandler, ActionRequest, ActivationHandler, DeactivationHandler, TreeUpdate};
     use accesskit_winit::Adapter;
     use std::sync::mpsc::{Receiver, Sender, channel};
 
     /// The connection of one window with the screen readers.
-    pub(in crate::ui) struct ScreenReader {
+    pub(crate) struct ScreenReader {
         adapter: Adapter,
         heard: Receiver<Heard>,
         is_listening: bool,
@@ -51,10 +49,10 @@ mod served {
     }
 
     impl ScreenReader {
-        pub(in crate::ui) const IS_SERVED: bool = true;
+        pub(crate) const IS_SERVED: bool = true;
 
         /// `window` must not have been visible yet. `wake` is called, by any thread, when there is something to [`ScreenReader::listen`] to.
-        pub(in crate::ui) fn new(events: &ActiveEventLoop, window: &Window, wake: Wake) -> ScreenReader {
+        pub fn new(events: &ActiveEventLoop, window: &Window, wake: Wake) -> ScreenReader {
             let (sender, heard) = channel();
             let ear = Ear { sender, wake };
             let adapter = Adapter::with_direct_handlers(events, window, ear.clone(), ear.clone(), ear);
@@ -62,12 +60,12 @@ mod served {
         }
 
         /// Takes note of an event of the window: its place, its focus.
-        pub(in crate::ui) fn event(&mut self, window: &Window, event: &WindowEvent) {
+        pub fn event(&mut self, window: &Window, event: &WindowEvent) {
             self.adapter.process_event(window, event);
         }
 
         /// Hands on what screen readers ask for.
-        pub(in crate::ui) fn listen(&mut self, console: &mut Console) {
+        pub fn listen(&mut self, console: &mut Console) {
             for heard in self.heard.try_iter() {
                 match heard {
                     Heard::Listens(is_listening) => self.is_listening = is_listening,
@@ -81,7 +79,7 @@ mod served {
         }
 
         /// Tells what the panels are now, if they were laid out.
-        pub(in crate::ui) fn tell(&mut self, console: &mut Console) {
+        pub fn tell(&mut self, console: &mut Console) {
             if let Some(tree) = console.take_tree() {
                 self.adapter.update_if_active(|| tree);
             }

@@ -4,7 +4,7 @@ use crate::scene::{
     Bilateral, EnhancedSigma, Layout, MAX_DEVIATION, Mode, Occlusion, Scene, Settings, Shading, Shadow, Sigma, Skin,
     Smooth, Transfer,
 };
-use crate::ui::texts;
+use crate::texts;
 
 /// A group of sliders in the panel.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

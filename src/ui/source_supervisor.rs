@@ -3,7 +3,7 @@
 use crate::gpu::Wake;
 use crate::live::Feed;
 use crate::source::live::{Live, SourceKind};
-use crate::ui::texts;
+use crate::texts;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::mpsc::{Receiver, TryRecvError, channel};
@@ -14,55 +14,6 @@ pub type OpenSource = Arc<dyn Fn() -> Result<Box<dyn Live>, String> + Send + Syn
 
 /// A message about a source: its title, its text, and whether it is a fault.
 pub(super) type SourceNotice = (&'static str, String, bool);
-
-impl SourceKind {
-    /// What its pictures show, if that is no patient.
-    pub(super) fn origin(self) -> Option<&'static str> {
-        (self == SourceKind::Demo).then_some(texts::DEMO_DATA)
-    }
-
-    /// What there is to say about a source in this state. `disconnected`: why it is not connected. `is_silent`: no frame came for a while in
-    /// which the program could have taken one. `has_shown`: a volume was shown.
-    pub(super) fn notice(
-        self,
-        state: &SourceState,
-        disconnected: Option<&str>,
-        is_silent: bool,
-        has_shown: bool,
-    ) -> Option<SourceNotice> {
-        use SourceKind::{Demo, Pipe, Probe, Recording};
-        let waiting = match self {
-            Demo => texts::COMPUTING_DEMO_DATA,
-            Recording => texts::READING_RECORDING,
-            Pipe => texts::WAITING_FOR_STANDARD_INPUT,
-            Probe => texts::CONNECTING_TO_PROBE,
-        };
-        let again = match self {
-            Demo => texts::NO_DEMO_DATA,
-            Recording => texts::RECORDING_NOT_OPENED,
-            Pipe => texts::STANDARD_INPUT_NOT_READ,
-            Probe => texts::NO_PROBE,
-        };
-        match (state, disconnected) {
-            (SourceState::Opening, _) => Some((waiting, String::new(), false)),
-            (SourceState::Retrying(why), _) => Some((again, why.clone(), true)),
-            (SourceState::Cancelled, _) => {
-                Some((texts::READING_CANCELLED, texts::READING_CANCELLED_ABOUT.into(), false))
-            }
-            (SourceState::Ended(why), _) => Some((texts::SOURCE_ENDED, why.clone()?, true)),
-            (SourceState::Open, Some(why)) => Some((texts::NOT_CONNECTED, why.into(), true)),
-            // Files and the phantom are read by this program: if they take long, it is busy.
-            (SourceState::Open, None) if is_silent && matches!(self, Pipe | Probe) => match self {
-                Pipe => {
-                    Some((texts::NO_FRAMES_ON_STANDARD_INPUT, texts::NO_FRAMES_ON_STANDARD_INPUT_ABOUT.into(), true))
-                }
-                _ => Some((texts::NO_FRAMES_FROM_THE_PROBE, texts::NO_FRAMES_FROM_THE_PROBE_ABOUT.into(), true)),
-            },
-            (SourceState::Open, None) if !has_shown => Some((waiting, String::new(), false)),
-            (SourceState::Open, None) => None,
-        }
-    }
-}
 
 /// The state of the source.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -75,6 +26,50 @@ pub(super) enum SourceState {
     Ended(Option<String>),
     /// The user ended it before it was open.
     Cancelled,
+}
+
+impl SourceState {
+    /// What there is to say about a source of this kind. `disconnected`: why it is not connected. `is_silent`: no frame came for a while in
+    /// which the program could have taken one. `has_shown`: a volume was shown.
+    pub(super) fn notice(
+        &self,
+        kind: SourceKind,
+        disconnected: Option<&str>,
+        is_silent: bool,
+        has_shown: bool,
+    ) -> Option<SourceNotice> {
+        use SourceKind::{Demo, Pipe, Probe, Recording};
+        let waiting = match kind {
+            Demo => texts::COMPUTING_DEMO_DATA,
+            Recording => texts::READING_RECORDING,
+            Pipe => texts::WAITING_FOR_STANDARD_INPUT,
+            Probe => texts::CONNECTING_TO_PROBE,
+        };
+        let again = match kind {
+            Demo => texts::NO_DEMO_DATA,
+            Recording => texts::RECORDING_NOT_OPENED,
+            Pipe => texts::STANDARD_INPUT_NOT_READ,
+            Probe => texts::NO_PROBE,
+        };
+        match (self, disconnected) {
+            (SourceState::Opening, _) => Some((waiting, String::new(), false)),
+            (SourceState::Retrying(why), _) => Some((again, why.clone(), true)),
+            (SourceState::Cancelled, _) => {
+                Some((texts::READING_CANCELLED, texts::READING_CANCELLED_ABOUT.into(), false))
+            }
+            (SourceState::Ended(why), _) => Some((texts::SOURCE_ENDED, why.clone()?, true)),
+            (SourceState::Open, Some(why)) => Some((texts::NOT_CONNECTED, why.into(), true)),
+            // Files and the phantom are read by this program: if they take long, it is busy.
+            (SourceState::Open, None) if is_silent && matches!(kind, Pipe | Probe) => match kind {
+                Pipe => {
+                    Some((texts::NO_FRAMES_ON_STANDARD_INPUT, texts::NO_FRAMES_ON_STANDARD_INPUT_ABOUT.into(), true))
+                }
+                _ => Some((texts::NO_FRAMES_FROM_THE_PROBE, texts::NO_FRAMES_FROM_THE_PROBE_ABOUT.into(), true)),
+            },
+            (SourceState::Open, None) if !has_shown => Some((waiting, String::new(), false)),
+            (SourceState::Open, None) => None,
+        }
+    }
 }
 
 /// Keeps a source open.
@@ -265,7 +260,7 @@ mod tests {
     #[test]
     fn a_notice_names_what_is_missing() {
         let title = |kind: SourceKind, state: &SourceState, gone: Option<&str>, is_silent, has_shown| {
-            kind.notice(state, gone, is_silent, has_shown).map(|(title, ..)| title)
+            state.notice(kind, gone, is_silent, has_shown).map(|(title, ..)| title)
         };
         let missing = SourceState::Retrying("a.mha: no such file".into());
         for kind in [SourceKind::Demo, SourceKind::Recording, SourceKind::Pipe] {
@@ -279,7 +274,7 @@ mod tests {
         assert_eq!(title(SourceKind::Probe, &open, None, silent, true), Some("No frames from the probe"));
         assert_eq!(title(SourceKind::Recording, &open, None, silent, true), None, "the program itself reads it");
         let why = "cannot connect: the connection was refused: no server listens at localhost:1";
-        let refused = SourceKind::Probe.notice(&open, Some(why), silent, true);
+        let refused = open.notice(SourceKind::Probe, Some(why), silent, true);
         assert!(refused.is_some_and(|(title, text, is_fault)| is_fault && !title.contains("frames") && text == why));
         assert_eq!(title(SourceKind::Probe, &open, None, false, true), None);
     }
@@ -306,7 +301,7 @@ mod tests {
         assert!(supervisor.poll(Instant::now()).is_none() && supervisor.cancel());
         drop(open);
         assert!(!poll(&mut supervisor, Duration::from_secs(100)) && supervisor.state() == &SourceState::Cancelled);
-        let notice = SourceKind::Recording.notice(supervisor.state(), None, false, false);
+        let notice = supervisor.state().notice(SourceKind::Recording, None, false, false);
         assert_eq!(notice, Some(("Reading was cancelled", "Ctrl+O opens a recording.".into(), false)));
     }
 

@@ -7,7 +7,7 @@ use crate::live::cine::CineVolume;
 use crate::progress_lines::{self, Progress};
 use crate::source::recorder::{Header, Writer};
 use crate::text::printable;
-use crate::ui::texts;
+use crate::texts;
 use crate::workspace::{self, Origin};
 use std::io::{BufRead, BufReader, Read};
 use std::path::{Path, PathBuf};

@@ -5,8 +5,8 @@ use super::Findings;
 use crate::passes::slots::Format;
 use crate::passes::{Arrays, Bind, DispatchArgs, Pass, Slot, Texels, is_hit};
 use crate::picture::Picture;
+use crate::report::{Fault, Figure, PictureComparison, Unit, Worst};
 use crate::scene::Scene;
-use crate::verify::report::{Fault, Figure, PictureComparison, Unit, Worst};
 
 /// Errors of the outputs of one dispatch.
 #[derive(Clone, Debug, Default)]

@@ -11,8 +11,8 @@ use crate::passes::{Slot, Texels};
 use crate::picture::Picture;
 use crate::probe::{Geometry, Grid};
 use crate::queues::MAX_QUEUES;
+use crate::report::{Fault, Figure, Level, Unit, Worst};
 use crate::scene::{MAX_PICTURE, Scene};
-use crate::verify::report::{Fault, Figure, Level, Unit, Worst};
 use std::sync::Arc;
 use std::sync::atomic::Ordering;
 

@@ -9,8 +9,8 @@ use crate::passes::Texels;
 use crate::picture::Picture;
 use crate::plan::Plan;
 use crate::probe::Geometry;
+use crate::report::{Fault, Figure, Level, PictureComparison, Unit};
 use crate::scene::{Sampling, Scene};
-use crate::verify::report::{Fault, Figure, Level, PictureComparison, Unit};
 use std::sync::Arc;
 
 /// Volume formats with the allowed difference of a picture, levels: mean and maximum. A maximum projection differs by half a step of the

@@ -9,8 +9,8 @@ use crate::passes::{Slot, Texels};
 use crate::picture::Picture;
 use crate::probe::{Advance, Geometry, Probe};
 use crate::queues::MAX_QUEUES;
+use crate::report::{Fault, Level, PictureComparison};
 use crate::scene::Scene;
-use crate::verify::report::{Fault, Level, PictureComparison};
 use std::sync::Arc;
 
 /// A scenario on a number of queues; returns how many pictures were compared and how many differ.

@@ -2,7 +2,7 @@
 
 use super::built_in::{BYTES, FLOATS, body_frames, frames, scene, wobbler};
 use super::compare::{ExtraTolerance, compare_outputs, picture_comparison, texel_comparison};
-use super::passes::POISON;
+use super::each_pass::POISON;
 use super::{Check, DeviceUnderTest, Findings, render};
 use crate::gpu::{GpuError, Renderer, RendererOptions};
 use crate::passes::raycast::still::final_sums;
@@ -11,8 +11,8 @@ use crate::passes::slots::Format;
 use crate::passes::{Arrays, DispatchArgs, MISS, Slot, Texels, is_hit};
 use crate::picture::Picture;
 use crate::probe::{Axis, Geometry, Grid, Probe};
+use crate::report::{Fault, Figure, Level, PictureComparison, Unit, Worst};
 use crate::scene::Scene;
-use crate::verify::report::{Fault, Figure, Level, PictureComparison, Unit, Worst};
 use glam::DVec3;
 
 /// The checks are the same at every level. The slowest come last.

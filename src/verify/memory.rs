@@ -8,8 +8,8 @@ use crate::gpu::{Context, GpuError, RendererOptions};
 use crate::passes::slots::{Initializer, Shape};
 use crate::passes::{Slot, Texels};
 use crate::picture::Picture;
+use crate::report::{Fault, Figure, Level, PictureComparison, Unit, Worst};
 use crate::scene::Scene;
-use crate::verify::report::{Fault, Figure, Level, PictureComparison, Unit, Worst};
 use std::sync::Arc;
 
 pub fn checks(_: Level) -> Vec<Check> {

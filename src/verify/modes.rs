@@ -9,9 +9,9 @@ use crate::gpu::GpuError;
 use crate::passes::Texels;
 use crate::passes::slots::Format;
 use crate::probe::{Advance, Geometry, Probe};
+use crate::report::{Fault, Figure, Level, PictureComparison, Unit};
 use crate::scene::{Input, Scene};
 use crate::source::phantom::{Phantom, PhantomOptions};
-use crate::verify::report::{Fault, Figure, Level, PictureComparison, Unit};
 use glam::DVec3;
 use std::sync::Arc;
 

@@ -5,13 +5,13 @@
 
 use super::built_in::{BYTES, Noise, cartesian, scene};
 use super::compare::{count_figure, texel_comparison};
-use super::passes::POISON;
+use super::each_pass::POISON;
 use super::{Check, DeviceUnderTest, Findings};
 use crate::gpu::{GpuError, formats};
 use crate::passes::measure::{POSITIONS, sample_position};
 use crate::passes::slots::Format;
 use crate::passes::{Arrays, DispatchArgs, Slot, Texels};
-use crate::verify::report::{Fault, Figure, Level, PictureComparison, Unit, Worst};
+use crate::report::{Fault, Figure, Level, PictureComparison, Unit, Worst};
 
 /// Volume formats by the words of the settings.
 const FORMATS: [&str; 4] = ["r8", "r16", "r16f", "r32f"];

@@ -6,8 +6,8 @@ use super::{Check, DeviceUnderTest, Findings};
 use crate::gpu::{Context, ContextOptions, GpuError, pass_runner, pipeline_measure};
 use crate::passes::{PASSES, Pass};
 use crate::probe::{Axis, Geometry, Probe};
+use crate::report::{Figure, Level};
 use crate::scene::{Sampling, Scene};
-use crate::verify::report::{Figure, Level};
 
 /// Scenes that together need every pass, with pictures as large as a tile of a small display. A pass is timed in the first scene that
 /// needs it.

@@ -5,7 +5,7 @@
 
 use super::built_in::{Noise, geometries};
 use super::compare::{ExtraTolerance, compare_outputs, count_figure};
-use super::passes::{DispatchComparison, POISON, PassSummary};
+use super::each_pass::{DispatchComparison, POISON, PassSummary};
 use super::report::{Figure, Level, Unit};
 use super::{Check, DeviceUnderTest, Findings};
 use crate::gpu::GpuError;
@@ -235,7 +235,7 @@ fn ball(dut: &mut DeviceUnderTest) -> Result<Findings, GpuError> {
     let expected = surface_net([VOXELS; 3], surface, fill, |at| at * h).map_err(GpuError::Broken)?;
 
     let mut findings = Findings::default();
-    // Nothing of the mesh lies deeper below the ball: src/mesh/nets.rs has the derivation.
+    // Nothing of the mesh lies deeper below the ball: src/core/mesh/nets.rs has the derivation.
     let share = 2.0 * h * h / (RADIUS * RADIUS);
     let (volume, area) = (4.0 / 3.0 * PI * RADIUS.powi(3), 4.0 * PI * RADIUS * RADIUS);
     let open = open_edges(&made);

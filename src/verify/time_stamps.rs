@@ -10,8 +10,8 @@ use crate::passes::{PassTime, Span};
 use crate::picture::Picture;
 use crate::probe::Geometry;
 use crate::profile::export::pass_time_table;
+use crate::report::{Fault, Figure, Level, Unit};
 use crate::scene::Scene;
-use crate::verify::report::{Fault, Figure, Level, Unit};
 use std::sync::Arc;
 
 /// Maximum number of runs until one is undisturbed.

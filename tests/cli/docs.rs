@@ -190,10 +190,10 @@ fn renamed(name: &str, rule: Option<&str>) -> String {
     }
 }
 
-/// Every public type of src/scene/settings with serde attributes, by name.
+/// Every public type of src/core/scene/settings with serde attributes, by name.
 fn described_types() -> BTreeMap<String, Described> {
     let mut types = BTreeMap::new();
-    for file in files("src/scene/settings", "rs") {
+    for file in files("src/core/scene/settings", "rs") {
         let parsed = syn::parse_file(&read(&file)).unwrap_or_else(|e| panic!("{file}: {e}"));
         for item in parsed.items {
             let (name, attributes, body) = match item {
@@ -436,11 +436,11 @@ fn generated_settings_page_is_what_the_types_say() {
     assert_eq!(keys.iter().map(|key| &key.name).collect::<BTreeSet<_>>(), known, "keys that serde names otherwise");
 
     let mut presets = String::new();
-    for file in files("src/scene/presets", "toml") {
+    for file in files("src/core/scene/presets", "toml") {
         let name = Path::new(&file).file_stem().expect("a name").to_string_lossy().into_owned();
         write!(presets, "\n### {name}\n\n```toml\n{}\n```\n", read(&file).trim_end()).expect("text");
     }
-    let head = "# Settings\n\n<!-- Generated: `tools/docs` writes this page from src/scene/settings. Do not edit it. -->\n\n\
+    let head = "# Settings\n\n<!-- Generated: `tools/docs` writes this page from src/core/scene/settings. Do not edit it. -->\n\n\
                 Everything that a scene file (`--scene settings.toml`) or `--set` can change. A key of a table is written with dots: the \
                 key `window`\nof `surface` is `--set surface.window=[0.1,0.9]`, and in a scene file\n\n\
                 ```toml\n[surface]\nwindow = [0.1, 0.9]\n```\n\n\
@@ -583,14 +583,23 @@ fn readme_is_short_and_says_what_must_be_said() {
     let lines = readme.lines().count();
     assert!(lines <= 200, "README.md has {lines} lines; 200 are enough, the rest belongs to docs/");
     let manifest: toml::Table = toml::from_str(&read("Cargo.toml")).expect("Cargo.toml");
-    let version = manifest["package"]["rust-version"].as_str().expect("a version");
+    let version = manifest["workspace"]["package"]["rust-version"].as_str().expect("a version");
     assert!(readme.contains(&format!("Rust {version}")), "README.md does not say Rust {version}");
     for said in ["not a medical device", "No licence has been chosen yet", "tools/demo", "tools/test"] {
         assert!(readme.contains(said), "README.md does not say: {said}");
     }
 }
 
-/// Every Rust source below `src/place`, a folder or a file without its ending.
+/// Every Rust source of a module: of the program, a member, or a module of a member.
+fn module_sources(name: &str) -> String {
+    let top = repository("src");
+    let members = std::fs::read_dir(&top).expect("src").map(|entry| entry.expect("entry").path());
+    let places = std::iter::once(top.clone()).chain(members.filter(|path| path.join("Cargo.toml").is_file()));
+    let mut found = places.map(|place| place.join(name)).filter(|p| p.is_dir() || p.with_extension("rs").is_file());
+    sources(&found.next().unwrap_or_else(|| panic!("no member has a module {name}")))
+}
+
+/// Every Rust source below a place, a folder or a file without its ending.
 fn sources(place: &Path) -> String {
     if place.with_extension("rs").is_file() {
         return std::fs::read_to_string(place.with_extension("rs")).expect("source");
@@ -622,7 +631,7 @@ fn walks_through_the_code_name_functions_that_exist() {
                 module = (*first).to_string();
             }
             let function = parts.last().expect("a name");
-            let text = sources(&repository("src").join(&module));
+            let text = module_sources(&module);
             let is_there = ["(", "<"].iter().any(|end| text.contains(&format!("fn {function}{end}")));
             assert!(is_there, "docs/architecture.md: src/{module} has no function {function} ({name})");
             let of = parts.iter().rev().nth(1).filter(|of| of.starts_with(char::is_uppercase));

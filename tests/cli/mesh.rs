@@ -85,7 +85,7 @@ fn a_ball_keeps_its_volume_and_place_whatever_the_hand_of_its_axes() {
         assert!(said.contains("closed, 0.8"), "{said}");
         let (volume, centre) = measured(&output);
         let net = fs::metadata(&output).expect("a mesh").len();
-        // Bound as in src/mesh/nets.rs: nothing lies deeper than 2 h^2 / R, for the widest voxel.
+        // Bound as in src/core/mesh/nets.rs: nothing lies deeper than 2 h^2 / R, for the widest voxel.
         let lost = 1.0 - volume / exact;
         assert!((0.0..6.0 / (RADIUS * RADIUS)).contains(&lost), "mirrored {mirrored}: {lost}");
         assert!(centre.iter().all(|v| v.abs() < 1e-2), "mirrored {mirrored}: {centre:?}");

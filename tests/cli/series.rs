@@ -198,7 +198,7 @@ fn a_film_has_the_pictures_of_its_series() {
         let own = own.rgba.chunks_exact(4).flat_map(|p| &p[..3]);
         let squares: f64 = own.zip(frame).map(|(a, b)| f64::from(a.abs_diff(*b)).powi(2)).sum();
         let psnr = 10.0 * (255.0f64.powi(2) * size as f64 / squares).log10();
-        // 41 to 46 dB, as docs/formats.md and src/picture/film.rs say: rounded.
+        // 41 to 46 dB, as docs/formats.md and src/base/picture/film.rs say: rounded.
         assert!((40.5..46.5).contains(&psnr), "picture {n}: {psnr:.1} dB");
         eprintln!("picture {n}: {psnr:.1} dB");
     }

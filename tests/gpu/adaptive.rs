@@ -80,7 +80,7 @@ fn unmarked_pixels_have_no_ray() {
     let scene = scene(cartesian([20, 20, 20]), BYTES, toml);
     let pass = by_name("raycast_refined").expect("pass");
     let args = DispatchArgs::default();
-    let mut inputs = echolume::verify::passes::inputs_of(&scene, pass, &args, "noise", 7);
+    let mut inputs = echolume::verify::each_pass::inputs_of(&scene, pass, &args, "noise", 7);
     let marks = echolume::passes::Texels::from_fn([24, 16, 1], 1, |[x, y, _], _| f64::from(u8::from(x == 5 && y == 3)));
     inputs.insert("marks", marks);
     let mut runner = echolume::gpu::pass_runner::PassRunner::new(&device).expect("runner");

@@ -8,7 +8,7 @@ use echolume::passes::slots::Shape;
 use echolume::passes::{Arrays, DispatchArgs, PASSES, Slot, Texels, measure};
 use echolume::probe::Geometry;
 use echolume::scene::{Sampling, Scene};
-use echolume::verify::passes::{POISON, dispatch_args_of, inputs_of, run_with_reference};
+use echolume::verify::each_pass::{POISON, dispatch_args_of, inputs_of, run_with_reference};
 use echolume::verify::report::Level;
 use echolume::verify::{self, DeviceUnderTest, ExtraTolerance};
 use std::collections::HashSet;
@@ -21,7 +21,7 @@ fn every_pass_matches_its_reference() {
     let options =
         ContextOptions { device: chosen(), validation: true, specialize: Some(true), ..ContextOptions::default() };
     let mut bench = DeviceUnderTest::new(&options, Level::Full).expect("bench");
-    let checks = verify::passes::checks(Level::Full);
+    let checks = verify::each_pass::checks(Level::Full);
     assert_eq!(checks.len(), PASSES.len());
     let run = verify::run(&mut bench, &checks, || None, |_| ());
     for outcome in &run.outcomes {

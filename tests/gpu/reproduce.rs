@@ -7,7 +7,7 @@ use echolume::gpu::pass_runner::PassRunner;
 use echolume::passes::slots::Format;
 use echolume::passes::{self, Arrays, Texels};
 use echolume::verify::DeviceUnderTest;
-use echolume::verify::passes::{POISON, dispatch_args_of};
+use echolume::verify::each_pass::{POISON, dispatch_args_of};
 use echolume::verify::report::Level;
 use echolume::verify::reproduce::{ReproduceError, reproduce};
 use serde_json::Value;

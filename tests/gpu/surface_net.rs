@@ -166,7 +166,7 @@ fn a_ball_has_its_volume_and_area_and_is_that_of_the_cpu() {
         let (lattice, frames) = volume([n; 3], h, |at| R - (at * h).distance(centre));
         let mesh = on_device(&device, &lattice, &frames, None);
         assert_eq!((watertight(&mesh), mesh.open_edges), (2, 0));
-        // As in src/mesh/nets.rs: nothing lies deeper than this below the ball, nor above it. Rounding of floats, twice, is far less.
+        // As in src/core/mesh/nets.rs: nothing lies deeper than this below the ball, nor above it. Rounding of floats, twice, is far less.
         let depth = 2.0 * h * h / R;
         let origin = DVec3::from(lattice.grid.origin);
         let below = mesh.vertices.iter().map(|v| R - (*v - origin).distance(centre));

@@ -5,7 +5,7 @@ use crate::ladder::{Stage, draw};
 use echolume::gpu::pass_runner::PassRunner;
 use echolume::passes::{Arrays, DispatchArgs, MISS, Slot, Texels, by_name};
 use echolume::scene::Scene;
-use echolume::verify::passes::run_with_reference;
+use echolume::verify::each_pass::run_with_reference;
 
 const SIDE: usize = 96;
 

@@ -133,21 +133,32 @@ fn the_crates_beside_the_program_have_locked_what_the_library_needs() {
         package: Vec<Entry>,
     }
     let manifest: toml::Table = toml("Cargo.toml");
-    let mut tables = vec![&manifest["dependencies"]];
-    tables.extend(manifest["target"].as_table().expect("targets").values().map(|target| &target["dependencies"]));
-    let all: BTreeMap<&String, &toml::Value> =
-        tables.into_iter().flat_map(|table| table.as_table().expect("dependencies")).collect();
+    let mut manifests = vec![manifest.clone()];
+    manifests
+        .extend(words(&manifest["workspace"]["members"]).iter().map(|member| toml(&format!("{member}/Cargo.toml"))));
     let is_optional = |about: &toml::Value| about.get("optional").and_then(toml::Value::as_bool).unwrap_or(false);
-    for name in ["tools/python/Cargo.lock", "tools/fuzz/Cargo.lock"] {
-        let lock: Entries = toml(name);
-        let entry = lock.package.iter().find(|entry| entry.name == "echolume").expect("the library");
-        // A crate of which there are two versions has its version behind its name.
-        let locked: Vec<&str> = entry.dependencies.iter().filter_map(|crate_| crate_.split(' ').next()).collect();
-        for (needed, _) in all.iter().filter(|(_, about)| !is_optional(about)) {
-            assert!(locked.contains(&needed.as_str()), "{name} lacks {needed}: run `cargo metadata` beside it");
+    for lock in ["tools/python/Cargo.lock", "tools/fuzz/Cargo.lock"] {
+        let entries: Entries = toml(lock);
+        for manifest in &manifests {
+            let package = manifest["package"]["name"].as_str().expect("a name");
+            let Some(entry) = entries.package.iter().find(|entry| entry.name == package) else { continue };
+            let mut tables = vec![&manifest["dependencies"]];
+            let targets = manifest.get("target").and_then(toml::Value::as_table);
+            tables.extend(targets.into_iter().flat_map(|all| all.values().map(|target| &target["dependencies"])));
+            let all: BTreeMap<&String, &toml::Value> =
+                tables.into_iter().flat_map(|table| table.as_table().expect("dependencies")).collect();
+            // A crate of which there are two versions has its version behind its name.
+            let locked: Vec<&str> = entry.dependencies.iter().filter_map(|crate_| crate_.split(' ').next()).collect();
+            for (needed, _) in all.iter().filter(|(_, about)| !is_optional(about)) {
+                assert!(
+                    locked.contains(&needed.as_str()),
+                    "{lock}, {package}: no {needed}: run `cargo metadata` beside it"
+                );
+            }
+            for there in locked {
+                assert!(all.keys().any(|known| *known == there), "{lock}, {package}: {there} is needed no more");
+            }
         }
-        for there in locked {
-            assert!(all.keys().any(|known| *known == there), "{name} has {there}, which the library needs no more");
-        }
+        assert!(entries.package.iter().any(|entry| entry.name == "echolume"), "{lock} has no library");
     }
 }

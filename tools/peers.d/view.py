@@ -1,4 +1,4 @@
-"""The camera and the light of every picture, as Echolume has them (src/scene/camera.rs), for peers that want a position."""
+"""The camera and the light of every picture, as Echolume has them (src/core/scene/camera.rs), for peers that want a position."""
 
 import math
 
@@ -61,7 +61,7 @@ def transfer(n):
 
 
 def plane(n):
-    """The oblique plane of the n-th picture: right and down, unit length, through the middle (src/scene/planes.rs, plane A)."""
+    """The oblique plane of the n-th picture: right and down, unit length, through the middle (src/core/scene/planes.rs, plane A)."""
     azimuth, tilt = math.radians(20 + TURN * n), math.radians(25)
     turn = lambda a: np.array([[math.cos(a), 0, math.sin(a)], [0, 1, 0], [-math.sin(a), 0, math.cos(a)]])
     lean = np.array([[1, 0, 0], [0, math.cos(tilt), -math.sin(tilt)], [0, math.sin(tilt), math.cos(tilt)]])

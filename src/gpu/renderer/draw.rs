@@ -2,11 +2,11 @@
 //! run again.
 
 use super::*;
-#[cfg(feature = "view")]
-use crate::gpu::window::screen::{Drawn, Panels, PresentOutcome, Screen};
 use crate::passes::floating;
 use crate::passes::unveil::{self, Unveiled};
 use crate::plan::Work;
+#[cfg(feature = "view")]
+use crate::window::screen::{Drawn, Panels, PresentOutcome, Screen};
 
 impl Renderer {
     /// The next picture shows volume image `image`. All of its visible frames must have been sent.

@@ -2,7 +2,7 @@
 //! image, consecutive ones in a batch: one submission, and one dispatch of each pass. If frames need no conversion, the batch is copied.
 
 use super::*;
-use crate::source::StoredType;
+use crate::probe::StoredType;
 use std::mem::MaybeUninit;
 use std::ops::Range;
 

@@ -2,8 +2,8 @@
 //! panels beside it stay as they are: to draw them takes a software device as long as a coarse picture.
 
 use super::flat_image::FlatImage;
-use crate::gpu::context::Context;
-use crate::gpu::error::GpuError;
+use crate::context::Context;
+use crate::error::GpuError;
 use ash::vk;
 use egui::ClippedPrimitive;
 use std::sync::Arc;

@@ -1,9 +1,9 @@
 //! A two-dimensional colour image with its view, in the device's memory: what the panels and the composed window are drawn from and into.
 
-use crate::gpu::context::Context;
-use crate::gpu::error::{ErrorContext, GpuError};
-use crate::gpu::memory::{self, Reserve};
-use crate::gpu::resources::WHOLE;
+use crate::context::Context;
+use crate::error::{ErrorContext, GpuError};
+use crate::memory::{self, Reserve};
+use crate::resources::WHOLE;
 use ash::vk;
 use gpu_allocator::MemoryLocation;
 use gpu_allocator::vulkan::Allocation;

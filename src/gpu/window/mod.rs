@@ -28,8 +28,8 @@ pub use target::{MonitorChoice, Target, WindowHandles};
 /// The target of presentation in a build without the feature `view`. No value of it exists, so nothing here is ever called.
 #[cfg(not(feature = "view"))]
 pub(super) mod target {
-    use crate::gpu::device_selection::Candidate;
-    use crate::gpu::error::GpuError;
+    use crate::device_selection::Candidate;
+    use crate::error::GpuError;
     use ash::{Entry, Instance};
     use std::ffi::CStr;
 

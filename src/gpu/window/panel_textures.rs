@@ -2,10 +2,10 @@
 //! the panels, so that nothing waits for the queue: a picture may take long, and egui adds a glyph at any time.
 
 use super::flat_image::FlatImage;
-use crate::gpu::buffers::{Buffer, Purpose};
-use crate::gpu::context::Context;
-use crate::gpu::error::{ErrorContext, GpuError};
-use crate::gpu::resources::WHOLE;
+use crate::buffers::{Buffer, Purpose};
+use crate::context::Context;
+use crate::error::{ErrorContext, GpuError};
+use crate::resources::WHOLE;
 use ash::vk;
 use egui::epaint::{ImageData, ImageDelta, Primitive};
 use egui_ash_renderer::Renderer;

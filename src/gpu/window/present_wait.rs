@@ -1,7 +1,7 @@
 //! The time from presenting a picture to its first pixel on the monitor (VK_KHR_present_wait), measured on a thread of its own, because
 //! the call blocks.
 
-use crate::gpu::context::Context;
+use crate::context::Context;
 use ash::vk;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};

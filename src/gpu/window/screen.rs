@@ -6,13 +6,13 @@ use super::panel_textures::{PanelTextures, failed};
 use super::swapchain::{PresentMode, Swapchain};
 use super::target::{MonitorChoice, Target, choose_monitor};
 use crate::barriers::{Access, PipelineStage};
-use crate::gpu::context::Context;
-use crate::gpu::error::{ErrorContext, GpuError};
-use crate::gpu::formats;
-use crate::gpu::recorder::BarrierRecorder;
-use crate::gpu::resources::{Image, WHOLE};
-use crate::gpu::timeline::Timelines;
+use crate::context::Context;
+use crate::error::{ErrorContext, GpuError};
+use crate::formats;
 use crate::passes::Slot;
+use crate::recorder::BarrierRecorder;
+use crate::resources::{Image, WHOLE};
+use crate::timeline::Timelines;
 use ash::vk;
 use egui_ash_renderer::allocator::DefaultAllocator;
 use egui_ash_renderer::{DynamicRendering, Options, RenderMode, Renderer};
@@ -33,7 +33,7 @@ pub enum PresentOutcome {
 }
 
 /// The picture of a renderer, and what orders its use among the renderer's work.
-pub(in crate::gpu) struct Drawn<'a> {
+pub struct Drawn<'a> {
     pub image: &'a Image,
     pub barriers: &'a mut BarrierRecorder,
     pub timelines: &'a mut Timelines,
@@ -156,11 +156,7 @@ impl Screen {
     ///
     /// # Errors
     /// As of [`Screen::show`].
-    pub(in crate::gpu) fn show_picture(
-        &mut self,
-        drawn: Drawn,
-        panels: Option<Panels>,
-    ) -> Result<PresentOutcome, GpuError> {
+    pub(crate) fn show_picture(&mut self, drawn: Drawn, panels: Option<Panels>) -> Result<PresentOutcome, GpuError> {
         self.show_with(Content::Picture(drawn), panels)
     }
 

@@ -2,9 +2,9 @@
 
 use super::present_wait::PresentWaiter;
 use super::target::Target;
-use crate::gpu::context::{Context, Presentation};
-use crate::gpu::error::{ErrorContext, GpuError};
-use crate::gpu::faults::InjectionPoint;
+use crate::context::{Context, Presentation};
+use crate::error::{ErrorContext, GpuError};
+use crate::faults::InjectionPoint;
 use crate::scene::WindowTexels;
 use ash::vk;
 use std::sync::Arc;

@@ -1,7 +1,7 @@
 //! The target of presentation: a window, or a monitor without a compositor (VK_KHR_display).
 
-use crate::gpu::device_selection::Candidate;
-use crate::gpu::error::{ErrorContext, GpuError};
+use crate::device_selection::Candidate;
+use crate::error::{ErrorContext, GpuError};
 use ash::{Entry, Instance, vk};
 use raw_window_handle::{HasDisplayHandle, HasWindowHandle};
 use std::ffi::CStr;

@@ -80,7 +80,7 @@ impl BackgroundSweep {
     }
 
     /// True if the sweep has ended. [`BackgroundSweep::stop`] returns the reason.
-    pub(crate) fn has_ended(&self) -> bool {
+    pub fn has_ended(&self) -> bool {
         self.thread.as_ref().is_none_or(JoinHandle::is_finished)
     }
 
@@ -142,12 +142,12 @@ impl PositionLog {
     }
 
     /// A time stamp in s since 1970 on the clock of the positions. Off by as much as the system's clock was adjusted since the start.
-    pub(crate) fn time_of_stamp(&self, stamp: f64) -> f64 {
+    pub fn time_of_stamp(&self, stamp: f64) -> f64 {
         stamp - self.start_since_1970
     }
 
     /// The instant of a time on the clock of the positions. The start for a time that is not finite or before it.
-    pub(crate) fn instant(&self, time: f64) -> Instant {
+    pub fn instant(&self, time: f64) -> Instant {
         let since = Duration::try_from_secs_f64(time.max(0.0)).unwrap_or_default();
         self.start.checked_add(since).unwrap_or(self.start)
     }

@@ -575,12 +575,12 @@ impl Module {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::probe::ProbeFile;
+    use crate::ProbeFile;
 
     /// The counter and the shaft at rest are one state, whether the port is served every 10 us or every 20 ms.
     #[test]
     fn the_motor_is_at_rest_where_its_counter_shows_the_target() {
-        let probe = ProbeFile::read(Path::new("tests/data/motor/probe.toml")).expect("the example is right");
+        let probe = ProbeFile::read(Path::new("../../tests/data/motor/probe.toml")).expect("the example is right");
         let table = probe.motor().expect("and has a motor");
         for step in [1e-5, 3e-4, 5e-3, 2e-2].map(Duration::from_secs_f64) {
             let mut module = Module::new(table);

@@ -4,7 +4,7 @@
 
 use super::rhythm::Rhythm;
 use crate::probe::{Advance, Axis, Probe};
-use crate::source::{Frame, Header, StoredType};
+use crate::{Frame, Header, StoredType};
 use rayon::prelude::*;
 
 /// Most volumes of a cycle, and slices of a volume.

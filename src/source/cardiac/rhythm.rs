@@ -15,7 +15,7 @@
 //!
 //! What it cannot see: a phase that drifts through all blocks alike while the sweep passes a wall is taken for a change of the rate.
 
-use crate::source::{Frame, StoredType};
+use crate::{Frame, StoredType};
 use rayon::prelude::*;
 use std::f64::consts::TAU;
 

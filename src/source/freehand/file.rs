@@ -1,18 +1,19 @@
 //! Pictures of a file with places in space, as one freehand volume.
 
 use super::{Compounder, CompoundingOptions, Lattice, Pose, TrackedFrame};
+use crate::Frame;
+use crate::describe;
 use crate::files::{InputError, progress};
+use crate::frame::{Source, file_bytes};
 use crate::probe::{Geometry, World};
-use crate::source::describe;
-use crate::source::frame::{Frame, Source, file_bytes};
-use crate::source::samples::{SampleType, StoredType};
+use crate::{SampleType, StoredType};
 use std::path::{Path, PathBuf};
 
 /// A picture's place, if it is known, and its samples.
-pub(in crate::source) type PlacedPicture = (Option<Pose>, Vec<u8>);
+pub(crate) type PlacedPicture = (Option<Pose>, Vec<u8>);
 
 /// Pictures and their places. They can be read again from the first on.
-pub(in crate::source) trait PlacedPictures: Send {
+pub(crate) trait PlacedPictures: Send {
     /// The pictures themselves.
     fn pictures(&self) -> &dyn Source;
     /// # Errors
@@ -32,7 +33,7 @@ pub(in crate::source) trait PlacedPictures: Send {
 /// A freehand volume. Its pictures are compounded when the first slice is read.
 ///
 /// Memory: that of a [`Compounder`], from the first slice on.
-pub(in crate::source) struct FreehandFile<P> {
+pub(crate) struct FreehandFile<P> {
     path: PathBuf,
     placed: P,
     lattice: Lattice,

@@ -30,7 +30,7 @@ impl FreehandArguments {
     ///
     /// # Errors
     /// Anything was said.
-    pub(in crate::source) fn refused(&self, path: &Path) -> Result<(), InputError> {
+    pub fn refused(&self, path: &Path) -> Result<(), InputError> {
         let fault = "is for pictures with poses that differ, which become a freehand volume";
         self.flag().map_or(Ok(()), |flag| Err(InputError::new(path, flag, fault)))
     }

@@ -15,7 +15,7 @@ pub(super) use file::{FreehandFile, PlacedPicture, PlacedPictures};
 pub use given::FreehandArguments;
 pub use sweep::{Refusal, Schedule, Sweep};
 
-use super::samples::StoredType;
+use crate::probe::StoredType;
 use crate::probe::{Grid, World};
 use glam::{DAffine3, DMat3, DVec3};
 use rayon::prelude::*;

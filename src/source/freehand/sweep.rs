@@ -2,7 +2,7 @@
 //! they come.
 
 use super::{Compounder, CompoundingOptions, Lattice, Pose, TrackedFrame};
-use crate::source::samples::StoredType;
+use crate::probe::StoredType;
 use std::time::{Duration, Instant};
 
 /// Longest wait for the first pictures, and most bytes of them.

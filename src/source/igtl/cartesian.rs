@@ -2,10 +2,10 @@
 
 use super::message::{Coordinates, Image, Scalar};
 use super::pixels::{range_of, samples, stored};
+use crate::frame::Header;
+use crate::probe::StoredType;
 use crate::probe::{AxisOrder, Geometry, Grid, World, is_rigid};
-use crate::source::frame::Header;
-use crate::source::samples::StoredType;
-use crate::source::value_range::ValueRange;
+use crate::value_range::ValueRange;
 use glam::{DAffine3, DVec3};
 
 /// Relative difference of spacings that count as equal: the spacing of a rotated volume is computed again in f32.

@@ -421,7 +421,7 @@ mod tests {
 #[cfg(test)]
 mod queue_tests {
     use super::*;
-    use crate::source::igtl::Text;
+    use crate::igtl::Text;
 
     fn text(length: usize) -> Received {
         let text = Text { device: String::new(), time: length as f64, text: "x".repeat(length) };

@@ -1,8 +1,9 @@
 //! The samples of images: their stored types, colours as luminance, and the values that are shown as 0 and 1.
 
 use super::message::{Image, Scalar};
-use crate::source::samples::{Replaced, SampleType, StoredType, store};
-use crate::source::value_range::ValueRange;
+use crate::samples::{Replaced, store};
+use crate::value_range::ValueRange;
+use crate::{SampleType, StoredType};
 
 /// Weights of red, green and blue in luminance (ITU-R BT.601).
 const LUMINANCE: [f64; 3] = [0.299, 0.587, 0.114];
@@ -98,7 +99,7 @@ pub(super) fn range_of(stored: StoredType, values: ValueRange) -> [f64; 2] {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::source::igtl::message::{Coordinates, Region};
+    use crate::igtl::message::{Coordinates, Region};
 
     fn image(scalar: Scalar, components: u8, bytes: Vec<u8>) -> Image {
         Image {

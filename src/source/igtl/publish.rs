@@ -5,11 +5,11 @@
 
 use super::message::{Coordinates, Image, Message, Region, Scalar};
 use super::server::{Server, ServerOptions, ServerStatistics, now};
+use crate::convert::{Volume, lattice};
+use crate::live::Event;
+use crate::parts::FrameParts;
 use crate::probe::{Geometry, Grid, World};
-use crate::source::convert::{Volume, lattice};
-use crate::source::frame::{Frame, Header};
-use crate::source::live::Event;
-use crate::source::parts::FrameParts;
+use crate::{Frame, Header};
 use glam::{DAffine3, DVec3};
 use std::borrow::Cow;
 use std::io;
@@ -321,7 +321,7 @@ impl Listener {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::source::StoredType;
+    use crate::StoredType;
 
     /// Prevents that pictures, which come faster than they are sent, hold up volumes for ever.
     #[test]

@@ -1,9 +1,9 @@
 //! Frames of known angle become the slices of a pass. Pure.
 
+use crate::Frame;
+use crate::live::Event;
 use crate::probe::Axis;
 use crate::probe::motor::{ArrayState, Direction};
-use crate::source::frame::Frame;
-use crate::source::live::Event;
 use std::collections::VecDeque;
 
 /// Most consecutive missing slices that are filled.

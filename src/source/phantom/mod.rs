@@ -27,11 +27,11 @@ pub use speckle::DYNAMIC_RANGE;
 pub use truth::distance_path;
 pub use vessels::{Vessel, VesselTree};
 
+use crate::Frame;
 use crate::files::InputError;
+use crate::probe::SampleType;
 use crate::probe::{Advance, Array, Axis, Motion, Probe, Volumes};
-use crate::source::frame::Frame;
-use crate::source::samples::SampleType;
-use crate::source::sequence::{self, MAX_FRAMES};
+use crate::sequence::{self, MAX_FRAMES};
 use body::{Scatterers, refusal};
 use rayon::prelude::*;
 use speckle::{Beam, Echo, grey};

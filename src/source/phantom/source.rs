@@ -2,9 +2,9 @@
 
 use super::Phantom;
 use crate::files::InputError;
+use crate::frame::{Frame, Source};
 use crate::probe::Geometry;
-use crate::source::frame::{Frame, Source};
-use crate::source::samples::StoredType;
+use crate::probe::StoredType;
 use std::collections::VecDeque;
 use std::sync::Arc;
 use std::sync::mpsc::{Receiver, channel};
@@ -141,10 +141,10 @@ impl Source for PhantomSource {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::source::phantom::PhantomOptions;
-    use crate::source::recorder::Writer;
-    use crate::source::sequence::Sequence;
-    use crate::source::{self, Header};
+    use crate::Header;
+    use crate::phantom::PhantomOptions;
+    use crate::recorder::Writer;
+    use crate::sequence::Sequence;
 
     fn all(source: &mut dyn Source) -> Vec<Frame> {
         std::iter::from_fn(|| source.next_frame().expect("frames")).collect()
@@ -190,7 +190,7 @@ mod tests {
         phantom.write(&sweep).expect("written");
         let text = String::from_utf8_lossy(&std::fs::read(&sweep).expect("the file")).into_owned();
         assert!(text.contains("\nComment = Demo data (phantom)\n"));
-        let opened = |path: &std::path::Path| source::open(path, None).expect("a recording");
+        let opened = |path: &std::path::Path| crate::open(path, None).expect("a recording");
         assert!(opened(&sweep).is_synthetic());
         // Frames as they arrive, of the phantom and of what is the same but for its origin.
         let mut source = PhantomSource::new(phantom);

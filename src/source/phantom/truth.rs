@@ -5,12 +5,12 @@ use super::body::{Scatterers, Truth, refusal};
 use super::head::Head;
 use super::labels::Label;
 use super::vessels::VesselTree;
+use crate::convert::{lattice, write_grid, write_labels};
 use crate::files::InputError;
+use crate::probe::SampleType;
 use crate::probe::{Geometry, Grid};
-use crate::source::convert::{lattice, write_grid, write_labels};
-use crate::source::samples::SampleType;
-use crate::source::segmentation::{self, Segment};
-use crate::source::volume_file::VolumeFile;
+use crate::segmentation::{self, Segment};
+use crate::volume_file::VolumeFile;
 use glam::DVec3;
 use std::path::{Path, PathBuf};
 

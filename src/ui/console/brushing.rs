@@ -2,11 +2,11 @@
 
 use super::Console;
 use super::measuring::SurfaceMap;
+use crate::controls::Change;
 use crate::passes::chain;
 use crate::scene::Scene;
 use crate::scene::picker::Picker;
-use crate::ui::controls::Change;
-use crate::ui::texts;
+use crate::texts;
 use std::time::Instant;
 
 /// Least distance of two points of a stroke, as a share of the radius: what they leave between them is a hundredth of it.

@@ -1,9 +1,9 @@
 //! The hints of the first start: when they are shown, and that they do not come again.
 
 use super::Console;
+use crate::command::Command;
 use crate::files;
-use crate::ui::command::Command;
-use crate::ui::panels::first_steps;
+use crate::panels::first_steps;
 use std::path::{Path, PathBuf};
 
 /// The hints of the first start.

@@ -1,17 +1,17 @@
 //! One update of the console: polls the source, draws what is due, and presents it. Nothing is presented unless something changed.
 
 use super::{Console, ConsoleError, FAULT_CHECK_INTERVAL, LoopRequest};
+use crate::frame_budget;
 use crate::gpu;
 use crate::gpu::window::PresentOutcome;
 use crate::live::metrics::{LiveMetrics, SourceStatus};
 use crate::live::volume_pool::VolumeCounts;
 use crate::live::{Feed, FinishedPicture, StartStep, Step, StreamError};
+use crate::panels::{self, Banner, PanelState};
 use crate::passes::unveil;
-use crate::ui::frame_budget;
-use crate::ui::panels::{self, Banner, PanelState};
-use crate::ui::source_supervisor::SourceState;
-use crate::ui::texts;
-use crate::ui::times::RecentTimes;
+use crate::source_supervisor::SourceState;
+use crate::texts;
+use crate::times::RecentTimes;
 use std::time::{Duration, Instant};
 
 /// Time for the stream in one update, so that inputs are handled between.
@@ -533,7 +533,7 @@ impl Console {
         if *state == SourceState::Opening && self.opening.told().is_some() {
             return None;
         }
-        let (title, text, is_fault) = self.fixed.source.notice(state, gone.as_deref(), is_silent, has_shown)?;
+        let (title, text, is_fault) = state.notice(self.fixed.source, gone.as_deref(), is_silent, has_shown)?;
         let is_start = !is_fault && text.is_empty() && matches!(state, SourceState::Open);
         match self.start_step.filter(|_| is_start) {
             Some(StartStep::Compiling { count: 0, .. }) => Some(banner(texts::PREPARING_THE_DEVICE, "", false)),

@@ -1,11 +1,11 @@
 //! Input of the user: whom keys, pointers and fingers are for.
 
 use super::Console;
-use crate::ui::command::Command;
-use crate::ui::input::{Input, Key, Modifiers};
-use crate::ui::keyboard_pointer::Pointed;
-use crate::ui::picking::Viewport;
-use crate::ui::texts::keys;
+use crate::command::Command;
+use crate::input::{Input, Key, Modifiers};
+use crate::keyboard_pointer::Pointed;
+use crate::picking::Viewport;
+use crate::texts::keys;
 use std::time::Instant;
 
 /// Longest text that the help is searched for, characters.

@@ -1,7 +1,9 @@
 //! Measuring in the console: points of the rendered surface, counted voxels, typed texts, and results that leave the program.
 
 use super::Console;
+use crate::command::{Command, Tool};
 use crate::gpu::Wake;
+use crate::input::{Input, Key};
 use crate::measure::{outcome, voxels};
 use crate::mesh::sheet::STEEPEST;
 use crate::passes::chain;
@@ -9,9 +11,7 @@ use crate::scene::picker::Picker;
 use crate::scene::{MeasureKind, Measurement, Mode, Scene, insonified_box};
 use crate::source::Frame;
 use crate::source::convert::Volume;
-use crate::ui::command::{Command, Tool};
-use crate::ui::input::{Input, Key};
-use crate::ui::texts;
+use crate::texts;
 use crate::workspace;
 use glam::DVec3;
 use std::sync::Arc;
@@ -101,7 +101,7 @@ impl Console {
         match self.picked(kind, pixel) {
             Ok(Some(measured)) => {
                 let change = self.controls.add_measure(measured);
-                if let crate::ui::controls::Change::Refused(why) = change {
+                if let crate::controls::Change::Refused(why) = change {
                     self.notify(why, true);
                 }
                 self.last_change = Instant::now();
@@ -207,7 +207,7 @@ impl Console {
         };
         (self.counting.counted, self.needs_redraw) = (None, true);
         match counted.map(|measured| self.controls.add_measure(measured)) {
-            Some(crate::ui::controls::Change::Refused(why)) => self.notify(why, true),
+            Some(crate::controls::Change::Refused(why)) => self.notify(why, true),
             Some(_) => self.last_change = Instant::now(),
             None => self.notify(texts::REGION_IS_EMPTY, true),
         }

@@ -43,7 +43,7 @@ use crate::plan::Work;
 use crate::progress_lines::Progress;
 use crate::scene::{Scene, Settings};
 use crate::source::live::SourceKind;
-use crate::ui::texts;
+use crate::texts;
 use crate::workspace::Origin;
 use glam::DVec3;
 use std::sync::Arc;

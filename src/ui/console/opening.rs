@@ -4,12 +4,12 @@
 use super::{Console, OpenFile, Opened};
 use crate::files::progress::{Progress, Share};
 use crate::gpu::Wake;
+use crate::open_list::{self, Kind};
+use crate::panels::Reading;
+use crate::recordings::{Display, Kept, MAX_OPEN, Named, OpenRecordings, Recordings};
 use crate::source::live::SourceKind;
-use crate::ui::open_list::{self, Kind};
-use crate::ui::panels::Reading;
-use crate::ui::recordings::{Display, Kept, MAX_OPEN, Named, OpenRecordings, Recordings};
-use crate::ui::source_supervisor::SourceState;
-use crate::ui::texts;
+use crate::source_supervisor::SourceState;
+use crate::texts;
 use std::path::{Path, PathBuf};
 use std::sync::MutexGuard;
 use std::sync::mpsc::{Receiver, TryRecvError, channel};

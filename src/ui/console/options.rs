@@ -1,16 +1,16 @@
 //! The options of a console.
 
 use crate::files::progress::Progress;
+use crate::frame_budget::{Rung, built_in_ladder};
 use crate::gpu::shader_reload::ShaderFolder;
 use crate::gpu::{TimeStamps, Wake};
 use crate::kiosk::chord::Chord;
 use crate::live::Update;
 use crate::live::cine::CineLimits;
+use crate::recordings::OpenRecordings;
 use crate::scene::Settings;
 use crate::scene::load::Layers;
 use crate::source::live::SourceKind;
-use crate::ui::frame_budget::{Rung, built_in_ladder};
-use crate::ui::recordings::OpenRecordings;
 use crate::workspace::Origin;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;

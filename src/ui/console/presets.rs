@@ -1,16 +1,16 @@
 //! The list of presets: built-in ones as they look with the present volume, and those of the user, which are saved, renamed and deleted here.
 
 use super::Console;
+use crate::command::Command;
+use crate::controls::{Change, EXAMS};
 use crate::gpu::Wake;
+use crate::input::Key;
+use crate::panels::{PresetTile, PresetsShown};
 use crate::picture::Picture;
 use crate::scene::{Scene, Settings};
 use crate::source::live::SourceKind;
-use crate::ui::command::Command;
-use crate::ui::controls::{Change, EXAMS};
-use crate::ui::input::Key;
-use crate::ui::panels::{PresetTile, PresetsShown};
-use crate::ui::texts;
-use crate::ui::thumbnails::{Job, Thumbnails};
+use crate::texts;
+use crate::thumbnails::{Job, Thumbnails};
 use crate::user_presets::{self, MAX_NAME, MAX_PRESETS, UserPreset, checked_name};
 use std::path::PathBuf;
 use std::sync::Arc;

@@ -1,9 +1,9 @@
 //! The quality of the next picture: what is left out of it while the view moves, and the pipelines of that, compiled in advance.
 
 use super::{Console, REST_BEFORE_WARMING};
+use crate::command::Tool;
+use crate::frame_budget::{self, Quality};
 use crate::scene::{Follows, Layout, Settings, variants};
-use crate::ui::command::Tool;
-use crate::ui::frame_budget::{self, Quality};
 use std::time::Instant;
 
 impl Console {

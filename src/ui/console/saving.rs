@@ -3,17 +3,18 @@
 use super::Console;
 use crate::live::cine::CineVolume;
 use crate::marked;
+use crate::panels::Note;
 use crate::progress_lines::Progress;
-use crate::ui::panels::Note;
-use crate::ui::texts;
-use crate::ui::volume_export::{FORMATS, Job};
+use crate::source::live::SourceKind;
+use crate::texts;
+use crate::volume_export::{FORMATS, Job};
 use std::time::SystemTime;
 
 impl Console {
     /// What the pictures are of, if that is no patient: the phantom, also where a recording of it is played.
     pub(super) fn origin(&self) -> Option<&'static str> {
         let is_synthetic = self.stream.header().is_some_and(|header| header.synthetic);
-        self.fixed.source.origin().or(is_synthetic.then_some(texts::DEMO_DATA))
+        (self.fixed.source == SourceKind::Demo || is_synthetic).then_some(texts::DEMO_DATA)
     }
 
     /// Saves the picture that is shown, with its measurements, and its bar if that is switched on.

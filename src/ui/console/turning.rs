@@ -1,10 +1,10 @@
 //! The turntable of the view: the rendering turns by itself, as long as nobody turns it by hand.
 
 use super::Console;
+use crate::command::Command;
+use crate::controls::Change;
 use crate::plan::Work;
-use crate::ui::command::Command;
-use crate::ui::controls::Change;
-use crate::ui::texts;
+use crate::texts;
 use std::time::{Duration, Instant};
 
 /// Speed, degrees a second: a turn takes twelve seconds.

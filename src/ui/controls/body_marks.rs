@@ -1,10 +1,10 @@
 //! Body marks: one is added, moved, turned, changed and removed. The last one that was touched is the one that controls are about.
 
 use super::{Change, Controls};
+use crate::command::Command;
 use crate::scene::{BODY_MARK_SIZES, BodyMark, MAX_BODY_MARKS, Settings};
-use crate::ui::command::Command;
-use crate::ui::texts;
-use crate::ui::view;
+use crate::texts;
+use crate::view;
 
 /// Where marks are put that are added: the corners of the picture, the one on the lower left first. Shares of the picture.
 const PLACES: [[f64; 2]; MAX_BODY_MARKS] = [[0.12, 0.8], [0.88, 0.8], [0.12, 0.2], [0.88, 0.2]];

@@ -1,9 +1,9 @@
 //! How the cine loop is played: its marks, its speed and its direction. The picture stays as it is.
 
 use super::{Change, Controls};
+use crate::cine_player::{marked, stepped};
+use crate::command::Command;
 use crate::scene::Cine;
-use crate::ui::cine_player::{marked, stepped};
-use crate::ui::command::Command;
 
 impl Controls {
     /// Applies a command about the cine loop that needs none of its volumes; none if it is about something else.
@@ -19,7 +19,7 @@ impl Controls {
     }
 
     /// The cine loop begins or ends with the volume of this number.
-    pub(in crate::ui) fn mark_cine(&mut self, volume: u32, end: bool) -> Change {
+    pub(crate) fn mark_cine(&mut self, volume: u32, end: bool) -> Change {
         self.play_as(marked(self.settings.cine, volume, end), &Command::MarkCine(end))
     }
 

@@ -1,9 +1,9 @@
 //! The curved plane: the points of its line, one at a time, and what is measured on it.
 
 use super::{Change, Controls, drawable};
+use crate::command::{Command, Tool};
 use crate::scene::{Curve, Layout, MAX_CURVE_POINTS, MeasureKind, Measurement, Mode, PlaneName, Scene, Settings};
-use crate::ui::command::{Command, Tool};
-use crate::ui::texts;
+use crate::texts;
 
 /// Farthest coordinate of a point, mm.
 const FARTHEST: f64 = 1e5;

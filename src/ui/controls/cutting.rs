@@ -1,9 +1,9 @@
 //! Cuts: a contour that is drawn on a rendering takes away what lies along the view within it, or outside of it; a brush what is near its strokes.
 
 use super::{Change, Controls, drawable};
+use crate::command::{Command, Tool};
 use crate::scene::{Brush, Cut, KeptSide, MAX_BRUSH_POINTS, MAX_CUTS, Scene, Settings};
-use crate::ui::command::{Command, Tool};
-use crate::ui::texts;
+use crate::texts;
 
 /// Most points of a contour in work. A drag longer than that goes on without more.
 const MAX_OUTLINE: usize = 20_000;
@@ -48,7 +48,7 @@ impl Controls {
     }
 
     /// The places that a stroke of the brush went over, pixels of the picture; it is over.
-    pub(in crate::ui) fn take_stroke(&mut self) -> Vec<[f64; 2]> {
+    pub(crate) fn take_stroke(&mut self) -> Vec<[f64; 2]> {
         std::mem::take(&mut self.outline)
     }
 
@@ -106,7 +106,7 @@ impl Controls {
     }
 
     /// Removes what is near strokes over the surface: lateral, depth, elevation, mm. Strokes with one radius are one cut.
-    pub(in crate::ui) fn brush(&mut self, strokes: Vec<Vec<[f64; 3]>>, scene: &Scene) -> Change {
+    pub(crate) fn brush(&mut self, strokes: Vec<Vec<[f64; 3]>>, scene: &Scene) -> Change {
         let radius = self.brush_radius;
         let mut new = self.settings.clone();
         for mut rest in strokes {

@@ -1,7 +1,7 @@
 //! Undo and redo: the settings before each change. A drag or a held key is one step.
 
+use crate::command::Command;
 use crate::scene::Settings;
-use crate::ui::command::Command;
 
 /// Most steps that can be undone.
 const MAX_STEPS: usize = 100;

@@ -1,10 +1,10 @@
 //! Measurements and annotations: points make them, one at a time, and commands bend, label and delete them.
 
 use super::{Change, Controls};
+use crate::command::{Command, Tool};
 use crate::measure::outcome;
 use crate::scene::{MAX_ALL_POINTS, MAX_CONTOURS, MAX_MEASURES, MAX_POINTS, MAX_TEXT, MeasureKind, Measurement};
-use crate::ui::command::{Command, Tool};
-use crate::ui::texts;
+use crate::texts;
 
 /// Farthest place of a point, mm.
 const FARTHEST: f64 = 1e6;
@@ -26,12 +26,12 @@ impl Controls {
     }
 
     /// The threshold between the darker and the brighter echoes of the source, as a share of the sample range; none before its first volume.
-    pub(in crate::ui) fn found_threshold(&self) -> Option<f64> {
+    pub(crate) fn found_threshold(&self) -> Option<f64> {
         self.defaults.as_ref()?.levels.as_ref().map(|levels| levels.threshold)
     }
 
     /// Adds a measurement that is complete.
-    pub(in crate::ui) fn add_measure(&mut self, measured: Measurement) -> Change {
+    pub(crate) fn add_measure(&mut self, measured: Measurement) -> Change {
         if self.is_full(measured.count()) {
             return Change::Refused(texts::TOO_MANY_MEASUREMENTS);
         }
@@ -96,7 +96,7 @@ impl Controls {
     }
 
     /// Leaves the measurement in work.
-    pub(in crate::ui) fn leave_work(&mut self) {
+    pub(crate) fn leave_work(&mut self) {
         self.work = None;
     }
 

@@ -2,15 +2,15 @@
 
 use super::cutting::in_the_way;
 use super::{Change, Controls, drawable};
+use crate::command::Command;
 use crate::scene::load::Layers;
 use crate::scene::{Layout, Region, Scene, Settings};
-use crate::ui::command::Command;
-use crate::ui::texts;
+use crate::texts;
 
 /// A built-in preset in the list of the view.
-pub(in crate::ui) struct Exam {
-    pub(in crate::ui) title: &'static str,
-    pub(in crate::ui) hint: &'static str,
+pub(crate) struct Exam {
+    pub title: &'static str,
+    pub hint: &'static str,
     preset: &'static str,
     /// Region and camera are made for the head of the phantom.
     is_framed: bool,
@@ -21,7 +21,7 @@ const fn exam(title: &'static str, preset: &'static str, is_framed: bool, hint: 
 }
 
 /// The built-in presets of the list.
-pub(in crate::ui) const EXAMS: [Exam; 6] = [
+pub(crate) const EXAMS: [Exam; 6] = [
     exam(texts::FACE, "face", true, texts::FACE_HINT),
     exam(texts::SKELETON, "skeleton", true, texts::SKELETON_HINT),
     exam(texts::GLASS, "glass", true, texts::GLASS_HINT),
@@ -38,7 +38,7 @@ impl Controls {
     ///
     /// # Errors
     /// Why it cannot be drawn.
-    pub(in crate::ui) fn with_exam(&self, n: usize, scene: &Scene, is_phantom: bool) -> Result<Settings, &'static str> {
+    pub(crate) fn with_exam(&self, n: usize, scene: &Scene, is_phantom: bool) -> Result<Settings, &'static str> {
         self.drawn_by(self.examined(n, scene, is_phantom).ok_or(texts::PRESET_DOES_NOT_FIT)?, scene)
     }
 
@@ -65,7 +65,7 @@ impl Controls {
     ///
     /// # Errors
     /// Why it cannot be drawn.
-    pub(in crate::ui) fn with_look(&self, look: &Settings, scene: &Scene) -> Result<Settings, &'static str> {
+    pub(crate) fn with_look(&self, look: &Settings, scene: &Scene) -> Result<Settings, &'static str> {
         self.drawn_by(look.look_over(&self.in_mode_of_look(look)), scene)
     }
 
@@ -81,7 +81,7 @@ impl Controls {
     }
 
     /// Takes the settings of a preset, as one step for undo.
-    pub(in crate::ui) fn take(&mut self, settings: Settings, command: &Command) -> Change {
+    pub(crate) fn take(&mut self, settings: Settings, command: &Command) -> Change {
         if settings == self.settings {
             return Change::Nothing;
         }

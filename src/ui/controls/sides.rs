@@ -2,7 +2,7 @@
 //! which stays as it is.
 
 use super::{Change, Controls};
-use crate::ui::command::Command;
+use crate::command::Command;
 
 impl Controls {
     /// Applies a command about sides, marker and bar.

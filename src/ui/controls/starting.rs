@@ -1,11 +1,11 @@
 //! The start line of the region: bent at three to five handles, or straight, which is the region's near face.
 
 use super::Controls;
+use crate::command::Command;
 use crate::scene::start_curve::StartCurve;
 use crate::scene::{MAX_START_POINTS, MIN_START_POINTS, Scene, Settings};
-use crate::ui::command::Command;
-use crate::ui::texts;
-use crate::ui::view;
+use crate::texts;
+use crate::view;
 use glam::DVec3;
 
 /// Handles that are dragged towards each other stay so far apart, mm.

@@ -16,7 +16,7 @@ pub(super) use reader::DeviceMessage;
 
 use super::input::Input;
 use crate::gpu::Wake;
-use crate::ui::texts;
+use crate::texts;
 use reader::OpenDevices;
 use rustix::event::{EventfdFlags, PollFd, PollFlags, Timespec, eventfd, poll};
 use std::io;

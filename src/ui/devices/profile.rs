@@ -1,7 +1,7 @@
 //! Classifies a device by its abilities, and gives key codes their meaning: by position on a US keyboard, independent of the layout in use.
 //! A number pad always gives numbers.
 
-use crate::ui::input::{Button, Key};
+use crate::input::{Button, Key};
 use evdev::{AbsoluteAxisCode as Abs, KeyCode, RelativeAxisCode as Rel};
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -177,7 +177,7 @@ pub(super) fn pen_meaning(code: u16) -> Option<Meaning> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::ui::command::KEY_BINDINGS;
+    use crate::command::KEY_BINDINGS;
 
     fn can(keys: &[KeyCode], relative: &[Rel], absolute: &[Abs], is_direct: bool) -> Abilities {
         Abilities {

@@ -2,8 +2,8 @@
 
 use super::profile::{Abilities, Profile, Span};
 use super::translator::{Event, State, Translator};
-use crate::ui::input::Input;
-use crate::ui::texts;
+use crate::input::Input;
+use crate::texts;
 use evdev::raw_stream::RawDevice;
 use evdev::{AbsoluteAxisCode as Abs, PropType};
 use std::collections::{BTreeMap, BTreeSet};

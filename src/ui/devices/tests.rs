@@ -2,7 +2,7 @@
 
 use super::profile::{Pointing, Profile, Span};
 use super::translator::{Event, State, Translator};
-use crate::ui::input::{Button, Input, Key, Modifiers, Phase};
+use crate::input::{Button, Input, Key, Modifiers, Phase};
 use evdev::{AbsoluteAxisCode as Abs, EventType, KeyCode, RelativeAxisCode as Rel, SynchronizationCode as Sync};
 use proptest::prelude::*;
 use std::collections::BTreeSet;

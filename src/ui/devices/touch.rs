@@ -2,7 +2,7 @@
 //! them (multi-touch protocol B); a screen for one finger has one slot. A pad moves the pointer with one finger and scrolls with two.
 
 use super::profile::Span;
-use crate::ui::input::{Input, Phase};
+use crate::input::{Input, Phase};
 use evdev::KeyCode;
 
 /// Largest number of fingers.

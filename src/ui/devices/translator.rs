@@ -2,7 +2,7 @@
 
 use super::profile::{self, Meaning, Pointing, Profile};
 use super::touch::{Area, Fingers, Pad, PadMotion};
-use crate::ui::input::{Input, Modifiers};
+use crate::input::{Input, Modifiers};
 use evdev::{AbsoluteAxisCode as Abs, EventType, KeyCode, RelativeAxisCode as Rel, SynchronizationCode};
 use std::collections::{BTreeMap, BTreeSet};
 

@@ -3,13 +3,13 @@
 
 use super::colours::{self, ACCENT, AXES, BACKING, MEASURE, ON_PLANE, OUTLINE, SIDES, START, TEXT, WARNING, WEAK_TEXT};
 use super::{PanelState, SMALL_TEXT, body_marks, picture_rect, recordings};
+use crate::command::Tool;
 use crate::measure::overlay;
 use crate::passes::postprocess;
+use crate::region_box;
 use crate::scene::marks::{BAR_LENGTHS, TileMarks};
 use crate::scene::{Layout, Mode, Scene, transfer};
-use crate::ui::command::Tool;
-use crate::ui::region_box;
-use crate::ui::texts;
+use crate::texts;
 use egui::{Align2, Color32, FontId, Painter, Pos2, Rect, Stroke, Ui, Vec2, pos2, vec2};
 use glam::DVec3;
 

@@ -4,10 +4,10 @@ use super::colours::{BODY, MEASURE, OUTLINE, SELECTED, TEXT, WEAK_TEXT};
 use super::names::{self, Tell};
 use super::widgets::{scale_slider, switch};
 use super::{PanelState, SMALL_TEXT, TOUCH_SIZE, heading, picture_rect};
+use crate::command::{Command, Tool};
 use crate::measure::body_marks::{self, Drawn};
 use crate::scene::{BODY_MARK_SIZES, Body, BodyMark, MAX_BODY_MARKS};
-use crate::ui::command::{Command, Tool};
-use crate::ui::texts;
+use crate::texts;
 use egui::{Button, Label, Painter, Pos2, Rect, RichText, Sense, Stroke, StrokeKind, Ui, WidgetInfo, WidgetType, vec2};
 
 /// Columns of the buttons of parts of the body.

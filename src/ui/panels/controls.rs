@@ -8,13 +8,13 @@ use super::names::{self, Tell};
 use super::widgets::{front, name_and_value, slider, switch};
 use super::{PanelState, TEXT_SIZE, TOUCH_SIZE, heading};
 use super::{body_marks, measures, rail, recordings, sides, tools};
+use crate::cine_player::{CineState, SPEEDS};
+use crate::command::{Command, RailTab, Tool};
 use crate::scene::{ColourMap, Layout, Mode, PlaneName, Settings, Transfer, TransferName};
-use crate::ui::cine_player::{CineState, SPEEDS};
-use crate::ui::command::{Command, RailTab, Tool};
-use crate::ui::sliders::{Group, SLIDERS, Slider as Control};
-use crate::ui::texts;
-use crate::ui::texts::hints;
-use crate::ui::view;
+use crate::sliders::{Group, SLIDERS, Slider as Control};
+use crate::texts;
+use crate::texts::hints;
+use crate::view;
 use egui::accesskit::Role;
 use egui::{
     Align, Button, CollapsingHeader, FontId, Label, Panel, RichText, ScrollArea, Sense, Slider, Stroke, Ui, WidgetInfo,

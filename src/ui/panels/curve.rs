@@ -2,10 +2,10 @@
 
 use super::colours::{self, OUTLINE, TEXT};
 use super::{PanelState, picture_rect};
+use crate::command::Tool;
 use crate::measure::overlay;
 use crate::scene::Curve;
 use crate::scene::planes::{CURVE_COLOUR, CurveLine};
-use crate::ui::command::Tool;
 use egui::{Painter, Rect, Stroke, Ui, vec2};
 
 /// Radius of a point, points.

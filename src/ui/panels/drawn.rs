@@ -4,11 +4,11 @@ use egui::Shape;
 use egui::epaint::ClippedShape;
 
 /// Left, top, right, bottom.
-pub(in crate::ui) type Area = [f32; 4];
-pub(in crate::ui) type Colour = [u8; 4];
+pub type Area = [f32; 4];
+pub type Colour = [u8; 4];
 
 #[derive(Clone, Debug, PartialEq)]
-pub(in crate::ui) enum Kind {
+pub enum Kind {
     Rect {
         area: Area,
         fill: Colour,
@@ -39,10 +39,10 @@ pub(in crate::ui) enum Kind {
 }
 
 #[derive(Clone, Debug, PartialEq)]
-pub(in crate::ui) struct Drawn {
+pub struct Drawn {
     /// Nothing is drawn outside.
-    pub(in crate::ui) clip: Area,
-    pub(in crate::ui) kind: Kind,
+    pub clip: Area,
+    pub kind: Kind,
 }
 
 pub(super) fn drawn(shapes: &[ClippedShape]) -> Vec<Drawn> {

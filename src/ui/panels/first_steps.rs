@@ -3,8 +3,8 @@
 use super::colours::{ACCENT, MESSAGE, TEXT};
 use super::names::{self, Tell};
 use super::{PanelState, SMALL_TEXT, TEXT_SIZE, TOUCH_SIZE, picture_rect};
-use crate::ui::command::Command;
-use crate::ui::texts;
+use crate::command::Command;
+use crate::texts;
 use egui::accesskit::Role;
 use egui::{Align2, Area, Button, Frame, Id, Label, Margin, Order, RichText, Stroke, Ui, vec2};
 
@@ -16,7 +16,7 @@ const WIDTH: f32 = 320.0;
 const BELOW: f32 = 40.0;
 
 /// True if a picture of this size, pixels, has room for the hints.
-pub(in crate::ui) fn has_room(picture: [u32; 2], scale: f32) -> bool {
+pub(crate) fn has_room(picture: [u32; 2], scale: f32) -> bool {
     let [width, height] = picture.map(|edge| edge as f32 / scale);
     width >= MIN_PICTURE[0] && height >= MIN_PICTURE[1]
 }

@@ -5,10 +5,10 @@ use super::names::{self, Tell};
 use super::overlays::LOW_WINDOW;
 use super::walking::Walk;
 use super::{SMALL_TEXT, TOUCH_SIZE};
+use crate::command::Command;
 use crate::progress_lines::Progress;
-use crate::ui::command::Command;
-use crate::ui::texts;
-use crate::ui::volume_export::FORMATS;
+use crate::texts;
+use crate::volume_export::FORMATS;
 use egui::accesskit::Role;
 use egui::{Align2, Area, Button, Frame, Id, Label, Margin, Order, RichText, ScrollArea, Stroke, Ui, vec2};
 

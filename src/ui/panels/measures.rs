@@ -4,13 +4,13 @@ use super::colours::{ACCENT, BACKING, MEASURE, OUTLINE, TEXT, WARNING};
 use super::names::{self, Tell};
 use super::overlays::first;
 use super::{PanelState, SMALL_TEXT, TEXT_SIZE, TOUCH_SIZE, heading, picture_rect};
+use crate::command::{Command, Tool};
 use crate::measure::outcome::{self, Quantity};
 use crate::measure::overlay::{self, Drawn};
+use crate::picking::Picker;
 use crate::scene::{MeasureKind, Scene};
-use crate::ui::command::{Command, Tool};
-use crate::ui::picking::Picker;
-use crate::ui::texts;
-use crate::ui::texts::hints;
+use crate::texts;
+use crate::texts::hints;
 use egui::accesskit::Role;
 use egui::{Button, FontId, Label, Painter, Pos2, Rect, RichText, Stroke, StrokeKind, Ui, pos2, vec2};
 

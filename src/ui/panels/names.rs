@@ -3,10 +3,10 @@
 
 use super::colours::{FOCUS, FOCUS_EDGE};
 use super::{PanelState, picture_rect};
+use crate::command::Viewpoint;
 use crate::scene::{Layout, PlaneName, Scene};
-use crate::ui::command::Viewpoint;
-use crate::ui::texts;
-use crate::ui::view;
+use crate::texts;
+use crate::view;
 use egui::accesskit::{Action, Live, Node, Rect as Bounds, Role};
 use egui::{Context, Id, Key, Response, Stroke, StrokeKind, Ui};
 

@@ -6,10 +6,10 @@ use super::colours::{
 };
 use super::names::{self, Tell};
 use super::{LARGE_TEXT, Note, PanelState, SMALL_TEXT, TEXT_SIZE, TOUCH_SIZE, picture_rect};
-use crate::ui::command::{self, Command};
-use crate::ui::sliders::SLIDERS;
-use crate::ui::texts;
-use crate::ui::texts::{hints, keys};
+use crate::command::{self, Command};
+use crate::sliders::SLIDERS;
+use crate::texts;
+use crate::texts::{hints, keys};
 use egui::accesskit::Role;
 use egui::text::LayoutJob;
 use egui::{

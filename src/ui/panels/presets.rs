@@ -5,9 +5,9 @@ use super::names::{self, Tell};
 use super::overlays::{LOW_WINDOW, first};
 use super::walking::Walk;
 use super::{SMALL_TEXT, TEXT_SIZE, TOUCH_SIZE};
+use crate::command::Command;
 use crate::picture::Picture;
-use crate::ui::command::Command;
-use crate::ui::texts;
+use crate::texts;
 use egui::accesskit::Role;
 use egui::{
     Align2, Area, Button, ColorImage, Context, FontId, Frame, Id, Label, Margin, Order, Pos2, Rect, Response, RichText,
@@ -17,24 +17,24 @@ use egui::{
 use std::sync::Arc;
 
 /// The list while it is shown.
-pub(in crate::ui) struct PresetsShown<'a> {
-    pub(in crate::ui) tiles: Vec<PresetTile<'a>>,
+pub(crate) struct PresetsShown<'a> {
+    pub tiles: Vec<PresetTile<'a>>,
     /// The user has presets.
-    pub(in crate::ui) can_save: bool,
+    pub(crate) can_save: bool,
     /// Why those of the user cannot be read.
-    pub(in crate::ui) fault: Option<&'a str>,
+    pub fault: Option<&'a str>,
     /// The name that is being typed, and whether a preset is renamed.
-    pub(in crate::ui) naming: Option<(&'a str, bool)>,
-    pub(in crate::ui) can_restore: bool,
+    pub naming: Option<(&'a str, bool)>,
+    pub(crate) can_restore: bool,
 }
 
 /// A preset of the list.
-pub(in crate::ui) struct PresetTile<'a> {
-    pub(in crate::ui) name: &'a str,
-    pub(in crate::ui) hint: &'a str,
-    pub(in crate::ui) picture: Option<Arc<Picture>>,
+pub(crate) struct PresetTile<'a> {
+    pub name: &'a str,
+    pub hint: &'a str,
+    pub picture: Option<Arc<Picture>>,
     /// Its number among those of the user.
-    pub(in crate::ui) own: Option<usize>,
+    pub own: Option<usize>,
 }
 
 /// Width of a tile where there is room, points; and width over height of its picture.

@@ -4,8 +4,8 @@
 use super::colours::{EDGE, PANEL};
 use super::names::{self, Tell};
 use super::{MODES_WIDTH, PanelState, TOUCH_SIZE};
-use crate::ui::command::{Command, RailTab};
-use crate::ui::texts;
+use crate::command::{Command, RailTab};
+use crate::texts;
 use egui::accesskit::Role;
 use egui::{Area, Button, Frame, Id, Margin, Order, Panel, Stroke, Ui, pos2, vec2};
 
@@ -18,15 +18,15 @@ const LOW_DRAWER: f32 = 150.0;
 
 /// What of the rail the user chose.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub(in crate::ui) struct Rail {
-    pub(in crate::ui) tab: RailTab,
+pub(crate) struct Rail {
+    pub tab: RailTab,
     /// The drawer is open, in a window that has one.
-    pub(in crate::ui) is_open: bool,
+    pub is_open: bool,
 }
 
 impl Rail {
     /// Executes a command for the rail; false if it is another one's.
-    pub(in crate::ui) fn apply(&mut self, command: &Command, has_drawer: bool) -> bool {
+    pub fn apply(&mut self, command: &Command, has_drawer: bool) -> bool {
         match *command {
             Command::RailTab(tab) => self.tab = tab,
             Command::ToggleDrawer => self.is_open = !self.is_open,

@@ -4,8 +4,8 @@ use super::colours::{ACCENT, BAR, EDGE, TEXT, WHOLE_BAR};
 use super::names::{self, Tell};
 use super::overlays::{BETWEEN_MESSAGES, MESSAGE_EDGES, message_frame};
 use super::{PanelState, SMALL_TEXT, TEXT_SIZE, TOUCH_SIZE, heading, picture_rect};
-use crate::ui::command::Command;
-use crate::ui::texts;
+use crate::command::Command;
+use crate::texts;
 use egui::accesskit::Role;
 use egui::{
     Align2, Area, Button, FontId, Id, Label, Order, Pos2, Rect, RichText, Sense, Stroke, StrokeKind, Ui, WidgetInfo,
@@ -14,11 +14,11 @@ use egui::{
 
 /// What is being read.
 #[derive(Clone, Debug, PartialEq)]
-pub(in crate::ui) struct Reading {
-    pub(in crate::ui) name: String,
+pub struct Reading {
+    pub name: String,
     /// How far it is, if that is known, and the same in words.
-    pub(in crate::ui) share: Option<f32>,
-    pub(in crate::ui) text: String,
+    pub share: Option<f32>,
+    pub text: String,
 }
 
 /// Width of the button that closes a recording, points.

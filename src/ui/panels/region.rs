@@ -3,8 +3,8 @@
 
 use super::colours::{OUTLINE, START, TEXT};
 use super::{PanelState, picture_rect};
-use crate::ui::command::Tool;
-use crate::ui::region_box;
+use crate::command::Tool;
+use crate::region_box;
 use egui::{Painter, Pos2, Rect, Stroke, Ui, pos2, vec2};
 
 /// Width of a handle, points.

@@ -2,9 +2,9 @@
 
 use super::names::{self, Tell};
 use super::{PanelState, SMALL_TEXT, TOUCH_SIZE, heading};
+use crate::command::Command;
 use crate::scene::{Marks, ProbeMarker, Sides, VolumeAxis};
-use crate::ui::command::Command;
-use crate::ui::texts;
+use crate::texts;
 use egui::accesskit::Role;
 use egui::{Button, CollapsingHeader, RichText, Ui, vec2};
 

@@ -4,12 +4,12 @@ use super::colours::ACCENT;
 use super::names::{self, Tell};
 use super::widgets::{front, plain_slider, slider, switch};
 use super::{PanelState, SMALL_TEXT, TOUCH_SIZE, heading};
+use crate::command::{Command, Tool};
+use crate::controls::BRUSH_RADII;
 use crate::scene::{KeptSide, MAX_START_POINTS, MIN_START_POINTS, Settings};
-use crate::ui::command::{Command, Tool};
-use crate::ui::controls::BRUSH_RADII;
-use crate::ui::sliders::{SLIDERS, Slider as Control};
-use crate::ui::texts;
-use crate::ui::view;
+use crate::sliders::{SLIDERS, Slider as Control};
+use crate::texts;
+use crate::view;
 use egui::{Button, Label, RichText, Ui, vec2};
 
 /// The numbers of the controls of clip faces that are there.

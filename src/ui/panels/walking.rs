@@ -1,7 +1,7 @@
 //! Walking through the entries of a list: arrows, Home, End, Page up and Page down give the keyboard from one to another, and Enter chooses the one that has
 //! it.
 
-use crate::ui::input::Key as InputKey;
+use crate::input::Key as InputKey;
 use egui::{FocusDirection, Id, Key, Response, Ui};
 
 /// Entries that Page up and Page down pass.

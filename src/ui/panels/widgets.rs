@@ -3,11 +3,11 @@
 use super::colours::{ACCENT, BUTTON, ON_SELECTED, SELECTED, TEXT, WEAK_TEXT};
 use super::names::{self, Tell};
 use super::{PanelState, TEXT_SIZE, TOUCH_SIZE};
+use crate::command::Command;
 use crate::scene::Settings;
-use crate::ui::command::Command;
-use crate::ui::sliders::SLIDERS;
-use crate::ui::texts;
-use crate::ui::texts::hints;
+use crate::sliders::SLIDERS;
+use crate::texts;
+use crate::texts::hints;
 use egui::accesskit::Role;
 use egui::{
     Align, FontId, PointerButton, Rect, RichText, Sense, Slider, Stroke, StrokeKind, Ui, WidgetInfo, WidgetType, pos2,

@@ -2,14 +2,14 @@
 
 use super::shown::Shown;
 use super::*;
+use crate::command::binding;
+use crate::input::Key;
 use crate::measure::body_marks::{centre_of, drawn, probe_of};
+use crate::panels::accesskit::{Action, Role};
+use crate::panels::colours::{BODY, MEASURE};
+use crate::panels::drawn::Kind;
 use crate::scene::{Body, BodyMark, MAX_BODY_MARKS};
-use crate::ui::command::binding;
-use crate::ui::input::Key;
-use crate::ui::panels::accesskit::{Action, Role};
-use crate::ui::panels::colours::{BODY, MEASURE};
-use crate::ui::panels::drawn::Kind;
-use crate::ui::texts;
+use crate::texts;
 
 const MARK: &str = "body_marks=[{body='neck',at=[0.75,0.25],size=0.3,probe=[0.2,-0.1],angle=30}]";
 const MODES: [&str; 6] = [

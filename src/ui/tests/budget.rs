@@ -1,12 +1,12 @@
 //! The quality ladder and the frames that are there: no rung sends them through stage 1 again.
 
 use super::*;
+use crate::frame_budget::{Rung, built_in_ladder, lowered};
 use crate::live::{Update, Views};
 use crate::passes::Stage;
 use crate::plan::{Plan, Rerun, Work};
 use crate::scene::Sampling;
 use crate::source::recorder::Header;
-use crate::ui::frame_budget::{Rung, built_in_ladder, lowered};
 
 /// What a change of scene sends through stage 1 again, if anything, on a CPU.
 fn stage_1(before: &Scene, after: &Scene) -> Option<String> {

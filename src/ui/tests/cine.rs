@@ -2,8 +2,8 @@
 
 use super::shown::Shown;
 use super::*;
+use crate::panels::accesskit::{Action, Role};
 use crate::scene::Cine;
-use crate::ui::panels::accesskit::{Action, Role};
 use crate::workspace::{Origin, text};
 
 /// Prevents a loop that undo forgets, and one that makes the picture be drawn again.

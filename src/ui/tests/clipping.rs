@@ -2,8 +2,8 @@
 
 use super::shown::Shown;
 use super::*;
-use crate::ui::panels::accesskit::Role;
-use crate::ui::texts::{CLIP_ECHOES, CLIP_THRESHOLD};
+use crate::panels::accesskit::Role;
+use crate::texts::{CLIP_ECHOES, CLIP_THRESHOLD};
 
 fn slider(name: &str) -> usize {
     SLIDERS.iter().position(|slider| slider.name == name).expect("a slider")

@@ -4,14 +4,14 @@
 use super::shown::Shown;
 use super::*;
 use crate::measure::overlay;
-use crate::scene::planes::{CURVE_COLOUR, colour};
-use crate::ui::panels::accesskit::Role;
-use crate::ui::panels::colours::{
+use crate::panels::accesskit::Role;
+use crate::panels::colours::{
     ABSENT, ACCENT, AXES, BACKGROUND, BUTTON, EDGE, FAULT, FOCUS, FOCUS_EDGE, GOOD, MEASURE, OUTLINE, PANEL, SELECTED,
     START, WARNING, of_scene,
 };
-use crate::ui::panels::drawn::{Area, Colour, Drawn, Kind};
-use crate::ui::panels::{Banner, Note};
+use crate::panels::drawn::{Area, Colour, Drawn, Kind};
+use crate::panels::{Banner, Note};
+use crate::scene::planes::{CURVE_COLOUR, colour};
 
 const OF_TEXT: f64 = 4.5;
 const OF_LARGE_TEXT: f64 = 3.0;
@@ -53,7 +53,7 @@ fn middle([left, top, right, bottom]: Area) -> [f32; 2] {
 
 /// What is behind a place before the n-th thing is drawn, the picture being of one colour.
 fn behind(shown: &Shown, n: usize, at: [f32; 2], picture: [f64; 3]) -> [f64; 3] {
-    let ([x, y], [w, h]) = crate::ui::panels::picture_area(shown.size, 1.0, shown.shows_panels);
+    let ([x, y], [w, h]) = crate::panels::picture_area(shown.size, 1.0, shown.shows_panels);
     let is_on_picture = holds([x as f32, y as f32, (x + w) as f32, (y + h) as f32], at);
     let from = if is_on_picture { picture } else { opaque(BACKGROUND.to_array()) };
     shown.drawn[..n].iter().filter(|drawn| holds(drawn.clip, at)).fold(from, |below, drawn| match &drawn.kind {
@@ -148,7 +148,7 @@ fn check(shown: &Shown, what: &str) {
     check_boundaries(shown, what);
 }
 
-fn bounds(node: &crate::ui::panels::accesskit::Node) -> Option<Area> {
+fn bounds(node: &crate::panels::accesskit::Node) -> Option<Area> {
     node.bounds().map(|b| [b.x0, b.y0, b.x1, b.y1].map(|n| n as f32))
 }
 
@@ -263,7 +263,7 @@ fn everything_that_is_drawn_has_the_contrast_that_wcag_demands() {
     shown.recordings = ["a.mha", "b.mha"].map(String::from).to_vec();
     for share in [None, Some(0.6), Some(1.0)] {
         let text = share.map_or(String::new(), |share| format!("{:.0} %", share * 100.0));
-        shown.reading = Some(crate::ui::panels::Reading { name: "c.mha".into(), share, text });
+        shown.reading = Some(crate::panels::Reading { name: "c.mha".into(), share, text });
         shown.settle();
         check(&shown, "reading");
     }

@@ -2,10 +2,10 @@
 
 use super::shown::Shown;
 use super::*;
+use crate::panels::accesskit::{Node, Role};
+use crate::panels::drawn::Kind;
+use crate::panels::picture_area;
 use crate::scene::MeasureKind;
-use crate::ui::panels::accesskit::{Node, Role};
-use crate::ui::panels::drawn::Kind;
-use crate::ui::panels::picture_area;
 
 const FRONT: [&str; 6] = ["Threshold", "Gain", "Smooth", "Brightness", "Light", "Depth"];
 

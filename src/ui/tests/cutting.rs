@@ -1,9 +1,9 @@
 //! Cuts by gestures: what is drawn round on a rendering is within the cut, in parallel and in perspective; undo, and the side that stays.
 
 use super::*;
+use crate::input::Phase;
 use crate::scene::cuts::CutShape;
 use crate::scene::{Cut, KeptSide, MAX_CUT_POINTS};
-use crate::ui::input::Phase;
 
 /// Drags round a circle of the picture.
 fn circle(window: &mut TestWindow, centre: [f64; 2], radius: f64, steps: u32) {
@@ -165,7 +165,7 @@ fn a_mode_that_cannot_have_cuts_says_why() {
     circle(&mut window, [x, y], 40.0, 100);
     let made = cuts(&window);
     assert_eq!(made.len(), 1);
-    assert_eq!(apply(&mut window, Command::Mode(Mode::Mixed)), Change::Refused(crate::ui::texts::CUTS_IN_THE_WAY));
+    assert_eq!(apply(&mut window, Command::Mode(Mode::Mixed)), Change::Refused(crate::texts::CUTS_IN_THE_WAY));
     assert_eq!((window.controls.settings().mode, cuts(&window)), (Mode::Surface, made));
     apply(&mut window, Command::ClearCuts);
     assert_eq!(apply(&mut window, Command::Mode(Mode::Mixed)), Change::Settings);

@@ -2,10 +2,10 @@
 
 use super::shown::{SIZE, Shown};
 use super::*;
-use crate::ui::panels::accesskit::{Action, Role};
-use crate::ui::panels::drawn::{Area, Kind};
-use crate::ui::panels::{self, first_steps};
-use crate::ui::texts;
+use crate::panels::accesskit::{Action, Role};
+use crate::panels::drawn::{Area, Kind};
+use crate::panels::{self, first_steps};
+use crate::texts;
 
 /// The texts that are drawn, each once, and where.
 fn texts_of(shown: &Shown) -> Vec<(String, Area)> {

@@ -1,11 +1,11 @@
 //! Known answers for gestures of a mouse and of fingers.
 
 use super::*;
-use crate::ui::command::Viewpoint;
-use crate::ui::gestures::DEGREES_PER_HEIGHT;
-use crate::ui::input::Phase;
-use crate::ui::picking::Picker;
-use crate::ui::view::{self, face_axis, nearest_face};
+use crate::command::Viewpoint;
+use crate::gestures::DEGREES_PER_HEIGHT;
+use crate::input::Phase;
+use crate::picking::Picker;
+use crate::view::{self, face_axis, nearest_face};
 
 fn near(a: f64, b: f64, off: f64) {
     assert!((a - b).abs() <= off, "{a} is not {b}");

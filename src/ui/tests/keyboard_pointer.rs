@@ -1,11 +1,11 @@
 //! Gestures by keys alone: each does what the mouse does at the same places.
 
 use super::*;
+use crate::command::HeldKeys;
+use crate::input::Key;
+use crate::keyboard_pointer::KeyboardPointer;
+use crate::picking::Picker;
 use crate::scene::MeasureKind;
-use crate::ui::command::HeldKeys;
-use crate::ui::input::Key;
-use crate::ui::keyboard_pointer::KeyboardPointer;
-use crate::ui::picking::Picker;
 
 /// A window whose mouse is the keyboard.
 struct Keyboard {

@@ -2,11 +2,11 @@
 
 use super::shown::Shown;
 use super::*;
-use crate::ui::command::RailTab;
-use crate::ui::panels::accesskit::{Action, Node, Role};
-use crate::ui::panels::colours::{BACKING, MESSAGE, OUTLINE, PANEL};
-use crate::ui::panels::drawn::{Area, Kind};
-use crate::ui::panels::{self, Banner, Note, Reading};
+use crate::command::RailTab;
+use crate::panels::accesskit::{Action, Node, Role};
+use crate::panels::colours::{BACKING, MESSAGE, OUTLINE, PANEL};
+use crate::panels::drawn::{Area, Kind};
+use crate::panels::{self, Banner, Note, Reading};
 
 const SIZES: [[u32; 2]; 8] =
     [[640, 480], [800, 600], [1024, 768], [1280, 720], [1280, 1024], [1920, 1080], [2560, 1440], [3840, 2160]];

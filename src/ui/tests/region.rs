@@ -1,12 +1,12 @@
 //! The box of the region on planes and in the rendering: known answers for its sides, its edges and what drags on it do.
 
 use super::*;
-use crate::ui::picking::Picker;
-use crate::ui::region_box::{Part, is_on_planes, part_at, rendered_handles, section, wireframe};
+use crate::picking::Picker;
+use crate::region_box::{Part, is_on_planes, part_at, rendered_handles, section, wireframe};
 
 const FOUR: &str = "mode='surface'\nlayout='four'\nplanes.smooth={lateral=1,depth=1}\nregion.lateral=[-12,15]\nregion.depth=[30,60]\nregion.elevation=[-10,14]";
 
-fn sides(scene: &Scene, tile: usize) -> Vec<crate::ui::region_box::Side> {
+fn sides(scene: &Scene, tile: usize) -> Vec<crate::region_box::Side> {
     let sheet = scene.sheet();
     section(scene, &sheet, &sheet.tiles[tile])
 }

@@ -2,11 +2,11 @@
 
 use super::shown::Shown;
 use super::*;
+use crate::panels;
+use crate::panels::colours::START;
+use crate::panels::drawn::Kind;
 use crate::passes::unveil::StartLine;
-use crate::ui::panels;
-use crate::ui::panels::colours::START;
-use crate::ui::panels::drawn::Kind;
-use crate::ui::texts::{AUTO_RENDER_START as AUTO_START, START_OFFSET};
+use crate::texts::{AUTO_RENDER_START as AUTO_START, START_OFFSET};
 
 fn slider(name: &str) -> usize {
     SLIDERS.iter().position(|slider| slider.name == name).expect("a slider")

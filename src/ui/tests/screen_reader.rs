@@ -3,11 +3,11 @@
 
 use super::shown::{SIZE, Shown};
 use super::*;
+use crate::command::{RailTab, Viewpoint};
+use crate::input::Key;
+use crate::panels::accesskit::{Action, ActionData, Node, NodeId, Role, Toggled};
+use crate::panels::{self, Banner, Note, Reading};
 use crate::scene::MeasureKind;
-use crate::ui::command::{RailTab, Viewpoint};
-use crate::ui::input::Key;
-use crate::ui::panels::accesskit::{Action, ActionData, Node, NodeId, Role, Toggled};
-use crate::ui::panels::{self, Banner, Note, Reading};
 use std::collections::{BTreeMap, BTreeSet};
 
 impl Shown {
@@ -510,7 +510,7 @@ fn arrows_walk_through_lists_and_enter_chooses() {
     shown.files = None;
     shown.open = [false, false, true, false];
     shown.settle();
-    let names: Vec<&str> = crate::ui::volume_export::FORMATS.iter().map(|format| format.name).collect();
+    let names: Vec<&str> = crate::volume_export::FORMATS.iter().map(|format| format.name).collect();
     assert_eq!(shown.walked(&[End], false), names[names.len() - 1]);
     // Enter follows at once.
     for key in [Home, Down] {

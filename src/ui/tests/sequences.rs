@@ -1,9 +1,9 @@
 //! Property tests: after any sequence of commands and inputs the settings can be drawn, and numbers are finite.
 
 use super::*;
+use crate::command::{HeldKeys, KEY_BINDINGS, Viewpoint};
+use crate::input::Phase;
 use crate::scene::{Body, BodyMark, ColourMap, TransferName};
-use crate::ui::command::{HeldKeys, KEY_BINDINGS, Viewpoint};
-use crate::ui::input::Phase;
 use proptest::prelude::*;
 
 /// Numbers of users, and of broken drivers.

@@ -1,20 +1,20 @@
 //! The panels around the phantom, as the console lays them out, without a console.
 
 use super::*;
+use crate::cine_player::{CinePlayer, CineState, Loop};
+use crate::controls::EXAMS;
+use crate::keyboard_pointer::PointerMark;
 use crate::live::cine::CineVolume;
+use crate::panels::accesskit::{Action, ActionData, ActionRequest, Node, NodeId, TreeId, TreeUpdate};
+use crate::panels::drawn::Drawn;
+use crate::panels::{self, Banner, Note, PanelOutput, PanelState, Panels, PresetTile, PresetsShown, Rail, Reading};
 use crate::passes::unveil::StartLine;
 use crate::picture::Picture;
 use crate::progress_lines::Progress;
+use crate::recordings::Named;
 use crate::scene::Cine;
 use crate::source::phantom::{Phantom, PhantomOptions};
-use crate::ui::cine_player::{CinePlayer, CineState, Loop};
-use crate::ui::controls::EXAMS;
-use crate::ui::keyboard_pointer::PointerMark;
-use crate::ui::panels::accesskit::{Action, ActionData, ActionRequest, Node, NodeId, TreeId, TreeUpdate};
-use crate::ui::panels::drawn::Drawn;
-use crate::ui::panels::{self, Banner, Note, PanelOutput, PanelState, Panels, PresetTile, PresetsShown, Rail, Reading};
-use crate::ui::recordings::Named;
-use crate::ui::times::Times;
+use crate::times::Times;
 use std::collections::BTreeMap;
 use std::sync::Arc;
 

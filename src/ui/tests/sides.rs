@@ -2,11 +2,11 @@
 
 use super::shown::Shown;
 use super::*;
+use crate::panels::accesskit::{Action, Role};
+use crate::panels::colours::{ACCENT, SIDES};
+use crate::panels::drawn::Kind;
 use crate::scene::marks::Edge;
 use crate::scene::{ProbeMarker, Sides, VolumeAxis};
-use crate::ui::panels::accesskit::{Action, Role};
-use crate::ui::panels::colours::{ACCENT, SIDES};
-use crate::ui::panels::drawn::Kind;
 use crate::workspace::{Origin, text};
 
 const LATERAL: &str = "Scan lines, first to last";
@@ -103,7 +103,7 @@ fn the_group_is_reached_by_the_keyboard_and_in_a_window_without_a_column() {
     let mut shown = opened("mode='plane'");
     let button = shown.find(LATERAL, Role::Button, "left to right");
     shown.ask(button, Action::Focus, None);
-    assert_eq!(shown.key(crate::ui::input::Key::Space, false), [Command::Sides(VolumeAxis::Lateral, Sides::LeftRight)]);
+    assert_eq!(shown.key(crate::input::Key::Space, false), [Command::Sides(VolumeAxis::Lateral, Sides::LeftRight)]);
     let mut narrow = Shown::sized("mode='plane'", [640, 480], 1.0);
     narrow.rail_does(&Command::SwitchRail);
     press(&mut narrow, "Controls", "Sides");

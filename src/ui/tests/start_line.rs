@@ -2,12 +2,12 @@
 
 use super::shown::Shown;
 use super::*;
-use crate::ui::command::binding;
-use crate::ui::input::Key;
-use crate::ui::panels::colours::START;
-use crate::ui::panels::drawn::Kind;
-use crate::ui::region_box::{StartLine, start_line};
-use crate::ui::texts::{
+use crate::command::binding;
+use crate::input::Key;
+use crate::panels::colours::START;
+use crate::panels::drawn::Kind;
+use crate::region_box::{StartLine, start_line};
+use crate::texts::{
     AUTO_RENDER_START as AUTO_START, CURVE_IN_THE_WAY, CUTS_IN_THE_WAY, SEVERAL_IN_THE_WAY, UNVEILING_IN_THE_WAY,
 };
 

@@ -1,8 +1,8 @@
 //! What each control does, in one or two sentences: the tooltips of the view.
 
+use crate::command::{Tool, Viewpoint};
 use crate::scene::{Layout, MeasureKind, Mode};
-use crate::ui::command::{Tool, Viewpoint};
-use crate::ui::texts;
+use crate::texts;
 
 /// By name of a slider: what it does.
 const SLIDERS: [(&str, &str); 56] = [
@@ -165,7 +165,7 @@ mod tests {
 
     #[test]
     fn every_slider_has_a_hint_and_every_hint_a_slider() {
-        let known: Vec<&str> = crate::ui::sliders::SLIDERS.iter().map(|slider| slider.name).collect();
+        let known: Vec<&str> = crate::sliders::SLIDERS.iter().map(|slider| slider.name).collect();
         for name in &known {
             assert!(of_slider(name).ends_with('.'), "{name} has no hint");
         }

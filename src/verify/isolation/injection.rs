@@ -2,7 +2,7 @@
 //! reads the reports sees it.
 
 use crate::files::signals;
-use crate::verify::{Check, Findings};
+use crate::{Check, Findings};
 use std::str::FromStr;
 use std::time::Duration;
 

@@ -8,9 +8,9 @@ pub use injection::InjectedCrash;
 pub use worker::{Ready, refuse, serve};
 
 use crate::files::signals;
+use crate::report::{CheckName, Outcome, Verdict};
 use crate::terminal::Failure;
 use crate::text::single_line;
-use crate::verify::report::{CheckName, Outcome, Verdict};
 use std::collections::VecDeque;
 use std::io::{BufRead, BufReader, Read, Write};
 use std::process::{Child, ChildStdin, Command, ExitStatus, Stdio};

@@ -6,9 +6,9 @@
 
 use crate::machine::Device;
 use crate::picture::Picture;
+use crate::report::{CheckName, Outcome, PictureComparison};
 use crate::terminal::Failure;
-use crate::verify::report::{CheckName, Outcome, PictureComparison};
-use crate::verify::{Check, DeviceUnderTest};
+use crate::{Check, DeviceUnderTest};
 use base64::Engine as _;
 use base64::prelude::BASE64_STANDARD;
 use serde::{Deserialize, Serialize};

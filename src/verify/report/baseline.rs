@@ -105,7 +105,7 @@ impl BaselineComparison {
     }
 
     /// Number of checks with a change that fails the run.
-    pub(crate) fn worse_checks(&self) -> usize {
+    pub fn worse_checks(&self) -> usize {
         let worse = self.changes.iter().filter(|c| c.class == Class::Worse);
         worse.map(|c| (&c.group, &c.name)).collect::<HashSet<_>>().len()
     }

@@ -312,7 +312,7 @@ fn check_row(outcome: &Outcome) -> Markup {
 /// Maximum number of sets of three pictures in a page.
 const MAX_SETS: usize = 300;
 /// Maximum encoded size of all pictures in a page, bytes.
-pub(crate) const MAX_BYTES: usize = 24 << 20;
+pub const MAX_BYTES: usize = 24 << 20;
 
 /// Width below which pictures are enlarged, every pixel as a square, pixels.
 const SMALL: u32 = 320;

@@ -5,7 +5,7 @@ mod amber;
 
 use super::DeviceUnderTest;
 use super::compare::{ExtraTolerance, tolerance_of};
-use super::passes::{KINDS, POISON, dispatch_args_of, inputs_of, run_with_reference, seed_of};
+use super::each_pass::{KINDS, POISON, dispatch_args_of, inputs_of, run_with_reference, seed_of};
 use crate::files;
 use crate::gpu::GpuError;
 use crate::machine;

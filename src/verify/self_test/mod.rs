@@ -12,9 +12,9 @@ use crate::passes::fault_injection::InjectedFault;
 use crate::passes::{PASSES, Texels, is_hit};
 use crate::probe::Geometry;
 use crate::queues::oracle::SubmissionLog;
+use crate::report::{Fault, Level, Outcome, Verdict};
 use crate::scene::Scene;
-use crate::verify::report::{Fault, Level, Outcome, Verdict};
-use crate::verify::{Check, DeviceUnderTest, Findings, credible_messages, known_answers, passes, render, sampling};
+use crate::{Check, DeviceUnderTest, Findings, credible_messages, each_pass, known_answers, render, sampling};
 use std::collections::BTreeMap;
 use std::sync::Arc;
 use std::time::Instant;
@@ -160,10 +160,10 @@ impl DetectionSearch {
         for (n, pass) in PASSES.iter().enumerate() {
             let concerned = (0..scenes.len()).filter(|s| fault.change.concerns(pass, &scenes[*s].1));
             for s in concerned.take(SCENES) {
-                let Some(message) = alarm(passes::in_scene(dut, n, s), &mut refused) else { continue };
+                let Some(message) = alarm(each_pass::in_scene(dut, n, s), &mut refused) else { continue };
                 let (by, sound) = (format!("passes, {}", pass.name), &mut self.sound);
                 let alarms = self.alarms.entry(format!("{by}, '{}'", scenes[s].0));
-                if alarms.or_insert_with(|| sound_alarm(passes::in_scene(sound, n, s))).is_none() {
+                if alarms.or_insert_with(|| sound_alarm(each_pass::in_scene(sound, n, s))).is_none() {
                     return Ok((by, message));
                 }
             }

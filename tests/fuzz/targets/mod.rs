@@ -150,7 +150,7 @@ pub const TARGETS: &[Target] = &[
         text: true,
         memory: 64 * MIB,
         rounds: 15_000,
-        also: &["src/scene/presets"],
+        also: &["src/core/scene/presets"],
     },
     Target { name: "set", run: scenes::assignments, text: true, memory: 64 * MIB, rounds: 2_000, also: &[] },
     Target { name: "transfer", run: scenes::transfer_file, text: true, memory: 64 * MIB, rounds: 50_000, also: &[] },

@@ -1,5 +1,5 @@
 //! Every key of the settings as a ray sees it: read by rays, read only for their accuracy, or read by none. The list of keys is that of the
-//! declaration (src/scene/settings), so that a new one must be put here.
+//! declaration (src/core/scene/settings), so that a new one must be put here.
 
 use crate::common::files::repository;
 use std::collections::BTreeMap;
@@ -478,7 +478,7 @@ const ROWS: &[Row] = &[
 /// The keys of all settings, from the declaration of their types: those of tables within tables and lists after a dot.
 pub fn declared() -> Vec<String> {
     let mut types = BTreeMap::new();
-    let folder = repository("src/scene/settings");
+    let folder = repository("src/core/scene/settings");
     for entry in std::fs::read_dir(&folder).expect("the settings") {
         let path = entry.expect("a file").path();
         let text = std::fs::read_to_string(&path).expect("source");

@@ -39,7 +39,7 @@ fn checked(page: &str) -> Html {
     assert!(all(&document, "#injected, b, script").is_empty());
     for word in ["http:", "https:", "@import", "url("] {
         assert!(
-            !include_str!(concat!(env!("CARGO_MANIFEST_DIR"), "/src/html_page/style.css")).contains(word),
+            !include_str!(concat!(env!("CARGO_MANIFEST_DIR"), "/src/base/html_page/style.css")).contains(word),
             "{word}"
         );
     }

@@ -3,9 +3,9 @@
 //!
 //!     cargo run --release --manifest-path tools/shaders/Cargo.toml
 
-#[path = "../../../src/shader_source.rs"]
+#[path = "../../../src/gpu/shader_source.rs"]
 mod shader_source;
-#[path = "../../../src/shader_compile.rs"]
+#[path = "../../../src/gpu/shader_compile.rs"]
 mod shader_compile;
 
 use sha2::{Digest, Sha256};

@@ -1,0 +1,14 @@
+//! What every other member stands on: files that are read with limits and written atomically ([`files`]), pictures and films
+//! ([`picture`]), drawings and plots ([`canvas`]), lines of text ([`text`]), what is said on a terminal ([`terminal`]), pages of HTML
+//! ([`html_page`]) and tables for Prometheus ([`metrics`]).
+
+#![forbid(unsafe_code)]
+
+pub mod canvas;
+pub mod files;
+pub mod html_page;
+pub mod metrics;
+pub mod picture;
+pub mod progress_lines;
+pub mod terminal;
+pub mod text;

@@ -1,0 +1,163 @@
+//! What a command says to the terminal: lines on standard output, and the one line that ends a command that failed.
+
+use crate::progress_lines;
+use indicatif::ProgressBar;
+use std::io::{ErrorKind, IsTerminal, Write};
+use std::sync::Mutex;
+use std::sync::atomic::{AtomicBool, Ordering};
+
+/// Longest message of a failure, characters.
+const MAX_MESSAGE: usize = 600;
+
+/// The first error of writing to standard output.
+static WRITE_ERROR: Mutex<Option<std::io::Error>> = Mutex::new(None);
+/// True once the reader of standard output has closed it.
+static IS_CLOSED: AtomicBool = AtomicBool::new(false);
+
+/// True once standard output carries data: lines then go to standard error.
+static IS_DATA: AtomicBool = AtomicBool::new(false);
+
+/// Prints one line on standard output. Takes the arguments of `format!`.
+#[macro_export]
+macro_rules! say {
+    ($($word:tt)*) => { $crate::terminal::print(format_args!($($word)*)) };
+}
+pub use say;
+
+/// Why a command ends early, in one line.
+#[derive(Debug)]
+pub enum Failure {
+    /// The input or the command line is wrong: exit code 2.
+    Input(String),
+    /// The request was valid but could not be carried out: exit code 1.
+    Failed(String),
+    /// There is no Vulkan device, not the one that was asked for, or `batch` lost it: exit code 3.
+    NoDevice(String),
+    /// A signal ended the work before all of it was done, and none of what was done has failed: exit code 4.
+    Interrupted(String),
+    /// Some units of a `batch` failed, and the others are done: exit code 4.
+    SomeFailed(String),
+}
+
+impl Failure {
+    /// The message without its kind.
+    pub fn message(self) -> String {
+        let (Failure::Input(message)
+        | Failure::Failed(message)
+        | Failure::NoDevice(message)
+        | Failure::Interrupted(message)
+        | Failure::SomeFailed(message)) = self;
+        message
+    }
+
+    /// The exit code of the process.
+    pub fn exit_code(&self) -> u8 {
+        match self {
+            Failure::Failed(_) => 1,
+            Failure::Input(_) => 2,
+            Failure::NoDevice(_) => 3,
+            Failure::Interrupted(_) | Failure::SomeFailed(_) => 4,
+        }
+    }
+}
+
+/// A failure of the input or the command line.
+pub fn input(error: impl std::fmt::Display) -> Failure {
+    Failure::Input(error.to_string())
+}
+
+/// A failure of a valid request.
+pub fn failed(error: impl std::fmt::Display) -> Failure {
+    Failure::Failed(error.to_string())
+}
+
+/// Prints a line on standard output. A write error is reported when the command ends: a reader may close the pipe at any time, but a full
+/// disk is a failure. Once standard output carries data ([`keep_standard_output`]), the line goes to standard error.
+pub fn print(line: std::fmt::Arguments) {
+    let line = without_control_characters(&line.to_string());
+    if IS_DATA.load(Ordering::Relaxed) {
+        let _ = writeln!(std::io::stderr(), "{line}");
+        return;
+    }
+    write(format!("{line}\n").as_bytes());
+}
+
+/// Keeps standard output for data: lines go to standard error from here on.
+///
+/// # Errors
+/// In words: standard output is a terminal.
+pub fn keep_standard_output() -> Result<(), &'static str> {
+    if std::io::stdout().is_terminal() {
+        return Err("standard output is a terminal; send it to a file or a pipe");
+    }
+    IS_DATA.store(true, Ordering::Relaxed);
+    Ok(())
+}
+
+/// Writes bytes to standard output as they are. An error is reported when the command ends, as by [`print`].
+pub fn write(bytes: &[u8]) {
+    match std::io::stdout().write_all(bytes).and_then(|()| std::io::stdout().flush()) {
+        Ok(()) => {}
+        Err(error) if error.kind() == ErrorKind::BrokenPipe => IS_CLOSED.store(true, Ordering::Relaxed),
+        Err(error) => drop(WRITE_ERROR.lock().unwrap_or_else(|e| e.into_inner()).get_or_insert(error)),
+    }
+}
+
+/// Prints a remark on standard error as one line: the command goes on, and succeeds.
+pub fn remark(message: &str) {
+    let _ = writeln!(std::io::stderr(), "echolume: {}", single_line(message));
+}
+
+/// Prints the failure on standard error as one line.
+pub fn print_failure(failure: &Failure) {
+    let (Failure::Input(message)
+    | Failure::Failed(message)
+    | Failure::NoDevice(message)
+    | Failure::Interrupted(message)
+    | Failure::SomeFailed(message)) = failure;
+    let _ = writeln!(std::io::stderr(), "echolume: {}", single_line(message));
+}
+
+/// True if standard error may carry colours and move its cursor: a terminal that can, of a user who did not refuse colours (NO_COLOR).
+pub fn has_colours() -> bool {
+    std::io::stderr().is_terminal() && !is_dumb() && std::env::var_os("NO_COLOR").is_none_or(|value| value.is_empty())
+}
+
+fn is_dumb() -> bool {
+    std::env::var_os("TERM").is_some_and(|name| name == "dumb")
+}
+
+/// A bar of the progress to `count` on standard error. It draws nothing unless that is a terminal that can move its cursor, or lines are asked
+/// for.
+pub fn progress_bar(count: u64) -> ProgressBar {
+    if progress_lines::is_asked() {
+        return progress_lines::bar(count);
+    }
+    if is_dumb() { ProgressBar::hidden() } else { ProgressBar::new(count) }
+}
+
+/// True if the reader of standard output has closed it.
+pub fn is_closed() -> bool {
+    IS_CLOSED.load(Ordering::Relaxed)
+}
+
+/// The first error of writing to standard output since the last call.
+pub fn take_write_error() -> Option<std::io::Error> {
+    WRITE_ERROR.lock().unwrap_or_else(|e| e.into_inner()).take()
+}
+
+/// Escapes control characters other than line ends. Text from files must not control the terminal.
+fn without_control_characters(text: &str) -> String {
+    let mut lines = String::with_capacity(text.len());
+    for c in text.chars() {
+        if c.is_control() && c != '\n' { lines.extend(c.escape_default()) } else { lines.push(c) }
+    }
+    lines
+}
+
+/// `message` as one line of at most [`MAX_MESSAGE`] characters.
+fn single_line(message: &str) -> String {
+    let start: String = message.chars().take(MAX_MESSAGE).collect();
+    let line = without_control_characters(&start).replace('\n', "\\n");
+    if message.chars().nth(MAX_MESSAGE).is_some() { line + " ..." } else { line }
+}

@@ -1,0 +1,76 @@
+//! Text from outside (files, the network, drivers) made safe for a terminal, for one-line messages and for tables.
+
+use std::fmt::Write as _;
+
+/// Maximum length of [`single_line`], characters.
+const MAX_LINE: usize = 400;
+
+/// Length of [`escaped`] after which the text is cut, bytes.
+const MAX_ESCAPED: usize = 600;
+
+/// The message on one line: line breaks become spaces, other control characters escapes. A key that it names may hold anything.
+pub fn printable(message: &str) -> String {
+    let mut line = String::new();
+    for c in message.lines().collect::<Vec<_>>().join(" ").chars() {
+        if c.is_control() { line.extend(c.escape_default()) } else { line.push(c) }
+    }
+    line
+}
+
+/// Like [`printable`], cut at 400 characters.
+pub fn single_line(text: &str) -> String {
+    printable(text).chars().take(MAX_LINE).collect()
+}
+
+/// One line of bounded length: control characters and other invisible ones, line breaks included, become escapes.
+pub fn escaped(text: &str) -> String {
+    let mut line = String::new();
+    for c in text.chars() {
+        if line.len() >= MAX_ESCAPED {
+            line.push_str(" ...");
+            break;
+        }
+        match c {
+            '\'' | '"' | '\\' => line.push(c),
+            _ => line.extend(c.escape_debug()),
+        }
+    }
+    line
+}
+
+/// A CSV field in quotes.
+pub fn csv_quoted(text: &str) -> String {
+    format!("\"{}\"", text.replace('"', "\"\""))
+}
+
+/// Text without Markdown table markup and terminal control characters.
+pub fn markdown_text(text: &str) -> String {
+    text.chars()
+        .flat_map(|c| if c.is_control() { c.escape_default().collect() } else { vec![c] })
+        .collect::<String>()
+        .replace('|', "\\|")
+}
+
+/// A Markdown table with aligned pipes: the first column left-aligned, the others right-aligned.
+pub fn markdown_table(rows: &[Vec<String>]) -> String {
+    let columns = rows.first().map_or(0, Vec::len);
+    let width = |c: usize| rows.iter().map(|r| r[c].chars().count()).max().unwrap_or(0).max(3);
+    let widths: Vec<usize> = (0..columns).map(width).collect();
+    let mut text = String::new();
+    for (n, row) in rows.iter().enumerate() {
+        for (c, (cell, width)) in row.iter().zip(&widths).enumerate() {
+            let _ = if c == 0 { write!(text, "| {cell:<width$} ") } else { write!(text, "| {cell:>width$} ") };
+        }
+        text.push_str("|\n");
+        if n == 0 {
+            for (c, width) in widths.iter().enumerate() {
+                let _ = match c {
+                    0 => write!(text, "|{}", "-".repeat(width + 2)),
+                    _ => write!(text, "|{}:", "-".repeat(width + 1)),
+                };
+            }
+            text.push_str("|\n");
+        }
+    }
+    text
+}

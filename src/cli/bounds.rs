@@ -1,0 +1,133 @@
+//! `echolume report bounds`.
+
+use crate::args::InputArgs;
+use crate::bounds::{Effort, PictureBounds, fault, picture};
+use crate::dump::npy;
+use crate::passes::Texels;
+use crate::picture::{Picture, replace};
+use crate::reference;
+use crate::terminal::{Failure, failed, input, say};
+use serde_json::json;
+use std::path::{Path, PathBuf};
+
+#[derive(clap::Args)]
+#[command(
+    after_help = "For every ray of volume rendering, low and high contain the exact integral of the sampled field: computed on the CPU in interval \
+                  arithmetic, with the volume that stage 1 makes in f64, before the tone mapping of stage 4.\n\n\
+                  Examples:\n  \
+                  echolume report bounds --mode vr --size 64x64 -o bounds\n  \
+                  echolume report bounds bone.mha --preset bone --mode vr --size 128x128 --width 0.02 -o bounds"
+)]
+pub struct BoundsReport {
+    #[command(flatten)]
+    input: InputArgs,
+    /// Write low.png, high.png, width.png, low.npy, high.npy and bounds.json into this folder
+    #[arg(short, long, value_name = "DIR")]
+    output: PathBuf,
+    /// Width of the widest channel of a ray (0..1) below which its parts are halved no more
+    #[arg(long, value_name = "WIDTH", default_value_t = 0.01)]
+    width: f64,
+    /// Largest number of parts of a ray, 16..=1000000
+    #[arg(long, value_name = "N", default_value_t = 8000, value_parser = clap::value_parser!(u32).range(16..=1_000_000))]
+    parts: u32,
+}
+
+/// Median and 95th percentile of widths, and the share of them within a limit.
+fn summary(widths: &[f64], limit: f64) -> [f64; 3] {
+    let mut sorted = widths.to_vec();
+    sorted.sort_by(f64::total_cmp);
+    let at = |share: f64| {
+        sorted.get((share * sorted.len().saturating_sub(1) as f64).round() as usize).copied().unwrap_or(0.0)
+    };
+    let within = widths.iter().filter(|w| **w <= limit).count() as f64 / widths.len().max(1) as f64;
+    [at(0.5), at(0.95), within]
+}
+
+impl BoundsReport {
+    pub fn run(&self) -> Result<(), Failure> {
+        if !(1e-6..=1.0).contains(&self.width) {
+            return Err(input(format!("--width {}: must lie in 1e-6..=1", self.width)));
+        }
+        let (mut source, scene) = self.input.open()?;
+        if let Some(why) = fault(&scene) {
+            return Err(input(format!("report bounds: {why}")));
+        }
+        std::fs::create_dir_all(&self.output)
+            .map_err(|e| failed(format!("{}: cannot be written: {e}", self.output.display())))?;
+        let mut frames = Vec::new();
+        self.input.for_each_frame(&mut *source, |frame| {
+            frames.push(frame);
+            Ok(())
+        })?;
+        let effort = Effort { width: self.width, parts: self.parts as usize };
+        let begun = std::time::Instant::now();
+        let mut found = None;
+        let frames = reference::decoded(&scene, &frames);
+        reference::render_with(&scene, &frames, &mut |pass, reads, _| {
+            if pass == "raycast_volume" {
+                found = Some(picture(&scene, reads.get("volume"), effort));
+            }
+            found.is_some()
+        });
+        let Some(bounds) = found else { return Err(failed("report bounds: no ray is cast in this scene")) };
+        self.write(&bounds)?;
+        let hit = bounds.widths_of_hits();
+        let [median, p95, within] = summary(&hit, self.width);
+        say!(
+            "bounds of {} rays that meet something: median width {median:.4}, 95th percentile {p95:.4}, {:.1} % of the rays within {}; \
+             {} parts, {:.1} s",
+            hit.len(),
+            100.0 * within,
+            self.width,
+            bounds.parts,
+            begun.elapsed().as_secs_f64()
+        );
+        say!("written: low, high and width as .png, low.npy, high.npy, bounds.json in {}", self.output.display());
+        Ok(())
+    }
+
+    fn write(&self, bounds: &PictureBounds) -> Result<(), Failure> {
+        let [width, height, _] = bounds.low.size;
+        let widths = bounds.widths();
+        let widest = widths.iter().fold(0.0, |most: f64, w| most.max(*w)).max(1e-300);
+        colours(&bounds.low).save(&self.output.join("low.png")).map_err(failed)?;
+        colours(&bounds.high).save(&self.output.join("high.png")).map_err(failed)?;
+        let grey = Texels {
+            size: bounds.low.size,
+            channels: 4,
+            values: widths.iter().flat_map(|w| [w / widest, w / widest, w / widest, 1.0]).collect(),
+        };
+        colours(&grey).save(&self.output.join("width.png")).map_err(failed)?;
+        for (name, map) in [("low.npy", &bounds.low), ("high.npy", &bounds.high)] {
+            write(&self.output, name, &npy(&[height, width, 4], &map.values, true))?;
+        }
+        let hit = bounds.widths_of_hits();
+        let [median, p95, within] = summary(&hit, self.width);
+        let about = json!({
+            "format": "echolume bounds 1",
+            "input": self.input.name(),
+            "axes": ["row", "column", "channel"],
+            "channels": ["red", "green", "blue", "opacity"],
+            "unit": "share, 0..1, before stage 4",
+            "target_width": self.width,
+            "rays_that_meet_something": hit.len(),
+            "median_width": median,
+            "p95_width": p95,
+            "largest_width": widest,
+            "share_within_target": within,
+            "parts": bounds.parts,
+            "white_of_width_png": widest,
+        });
+        write(&self.output, "bounds.json", format!("{about:#}\n").as_bytes())
+    }
+}
+
+fn write(folder: &Path, name: &str, bytes: &[u8]) -> Result<(), Failure> {
+    replace(&folder.join(name), bytes).map_err(failed)
+}
+
+fn colours(map: &Texels) -> Picture {
+    let byte = |v: f64| (v.clamp(0.0, 1.0) * 255.0).round() as u8;
+    let rgba = map.values.chunks_exact(4).flat_map(|p| [byte(p[0]), byte(p[1]), byte(p[2]), 255]).collect();
+    Picture { width: map.size[0] as u32, height: map.size[1] as u32, rgba }
+}

@@ -1,0 +1,164 @@
+//! `echolume report filters`.
+
+use crate::args::{Output, check_outputs, open_device, open_recording, write_report};
+use crate::filter_report::candidates::candidates;
+use crate::filter_report::measure::{MeasureError, MeasureOptions, count, phantom, recording};
+use crate::filter_report::{Area, Areas, Report, export, sheet};
+use crate::gpu::DeviceChoice;
+use crate::machine;
+use crate::source::OpenOptions;
+use crate::terminal::{Failure, failed, input, progress_bar, say};
+use std::path::{Path, PathBuf};
+
+#[derive(clap::Args)]
+#[command(
+    after_help = "Measures every 2D filter of slices, over its windows and strengths, on the middle frame of the phantom, whose mean over all \
+                  speckle is known, and of the given recordings: SNR, CNR, Pratt's figure of merit of edges, RMSE, SSIM, time.\n\nExamples:\n  \
+                  echolume report filters --markdown filters.md --pictures filters\n  \
+                  echolume report filters sweep.mha --crop lateral=-30:30,depth=40:90 --region lateral=-5:5,depth=60:66 \
+                  --background lateral=-5:5,depth=42:46"
+)]
+pub struct FilterReport {
+    /// Recordings to measure as well: MetaImage (.mha, .mhd), Kretz (.vol) or frames (.frames)
+    recordings: Vec<PathBuf>,
+    /// Part of the frame that is measured, mm, inside of the sector; once for each recording, in their order
+    #[arg(long, value_name = "lateral=A:B,depth=C:D", allow_hyphen_values = true)]
+    crop: Vec<String>,
+    /// Tissue of one kind within it, for SNR and CNR; once for each recording
+    #[arg(long, value_name = "lateral=A:B,depth=C:D", allow_hyphen_values = true)]
+    region: Vec<String>,
+    /// The background of the contrast, within it; once for each recording
+    #[arg(long, value_name = "lateral=A:B,depth=C:D", allow_hyphen_values = true)]
+    background: Vec<String>,
+    /// Measure only the filters with this in their names, such as median
+    #[arg(long, value_name = "NAME", default_value = "", hide_default_value = true)]
+    filter: String,
+    /// Pixels along the longer edge of a slice (sweeps only)
+    #[arg(long, value_name = "N", default_value_t = 512, value_parser = clap::value_parser!(u32).range(64..=4096))]
+    pixels: u32,
+    /// Number of times measured for each setting
+    #[arg(long, value_name = "N", default_value_t = 5, value_parser = clap::value_parser!(u32).range(1..=1000))]
+    repeat: u32,
+    /// Write the tables to this file instead of standard output
+    #[arg(long, value_name = "FILE")]
+    markdown: Option<PathBuf>,
+    /// Write all figures to this file, too
+    #[arg(long, value_name = "FILE")]
+    csv: Option<PathBuf>,
+    /// Write the filtered frames side by side into this folder: phantom.png, and NAME.png of each recording
+    #[arg(long, value_name = "DIR")]
+    pictures: Option<PathBuf>,
+    /// Vulkan device, by number or part of its name (see `echolume devices`)
+    #[arg(long, value_name = "N|NAME")]
+    device: Option<DeviceChoice>,
+}
+
+impl FilterReport {
+    pub fn run(&self) -> Result<(), Failure> {
+        let areas = self.areas()?;
+        if count(&self.filter) < 2 {
+            let mut names: Vec<&str> = candidates([1.0; 2], "").iter().map(|c| c.filter).collect();
+            names.dedup();
+            return Err(input(format!("--filter {}: is in no name; there are: {}", self.filter, names.join("; "))));
+        }
+        let names: Vec<String> =
+            std::iter::once("phantom".to_string()).chain(self.recordings.iter().map(|f| stem(f))).collect();
+        let sheets: Vec<PathBuf> = match &self.pictures {
+            None => Vec::new(),
+            Some(folder) => names.iter().map(|name| folder.join(format!("{name}.png"))).collect(),
+        };
+        if let Some(folder) = &self.pictures {
+            std::fs::create_dir_all(folder)
+                .map_err(|e| failed(format!("--pictures {}: cannot be written: {e}", folder.display())))?;
+        }
+        let mut targets: Vec<Output> = vec![("--markdown", self.markdown.as_deref()), ("--csv", self.csv.as_deref())];
+        targets.extend(sheets.iter().map(|file| ("--pictures", Some(file.as_path()))));
+        check_outputs(&targets, self.recordings.iter().map(PathBuf::as_path))?;
+        let mut sources = Vec::new();
+        for file in &self.recordings {
+            sources.push(open_recording(file, OpenOptions::default())?);
+        }
+        let context = open_device(self.device.clone(), false)?;
+        let options = MeasureOptions { only: &self.filter, pixels: self.pixels, repeats: self.repeat as usize };
+        let bar = progress_bar((names.len() * count(&self.filter)) as u64).with_message("settings");
+        let mut subjects = vec![phantom(&context, options, &mut || bar.inc(1)).map_err(|e| fault("phantom", e))?];
+        for ((source, file), areas) in sources.iter_mut().zip(&self.recordings).zip(areas) {
+            let name = stem(file);
+            let measured = recording(&context, &mut **source, &name, areas, options, &mut || bar.inc(1));
+            subjects.push(measured.map_err(|e| fault(&file.display().to_string(), e))?);
+        }
+        bar.finish_and_clear();
+        let report = Report {
+            device: machine::device(&context),
+            program: machine::program(),
+            date: machine::date(),
+            repeats: options.repeats,
+            subjects,
+        };
+        let written = export::markdown(&report);
+        match &self.markdown {
+            None => say!("{}", written.trim_end()),
+            Some(file) => write_report(file, &written)?,
+        }
+        if let Some(file) = &self.csv {
+            write_report(file, &export::csv(&report))?;
+        }
+        for (file, subject) in sheets.iter().zip(&report.subjects) {
+            sheet::sheet(&report, subject).and_then(|sheet| sheet.save(file)).map_err(failed)?;
+            say!("written: {}", file.display());
+        }
+        Ok(())
+    }
+
+    /// The areas of each recording.
+    fn areas(&self) -> Result<Vec<Areas>, Failure> {
+        let count = self.recordings.len();
+        for (flag, given) in [("--crop", &self.crop), ("--region", &self.region), ("--background", &self.background)] {
+            if given.len() != count {
+                let given = given.len();
+                return Err(input(format!(
+                    "{flag}: is given {given} times for {count} recordings; give it once for each"
+                )));
+            }
+        }
+        let parse = |flag: &str, text: &str| {
+            area(text).ok_or_else(|| {
+                input(format!(
+                    "{flag} {text}: must read lateral=LOW:HIGH,depth=LOW:HIGH in mm, as lateral=-20:20,depth=30:70"
+                ))
+            })
+        };
+        let each = self.crop.iter().zip(&self.region).zip(&self.background);
+        each.map(|((crop, region), background)| {
+            Ok(Areas {
+                crop: parse("--crop", crop)?,
+                region: parse("--region", region)?,
+                background: parse("--background", background)?,
+            })
+        })
+        .collect()
+    }
+}
+
+fn area(text: &str) -> Option<Area> {
+    let mut sides = [None; 2];
+    for part in text.split(',') {
+        let (key, range) = part.split_once('=')?;
+        let (low, high) = range.split_once(':')?;
+        let range = [low.trim().parse::<f64>().ok()?, high.trim().parse::<f64>().ok()?];
+        let axis = ["lateral", "depth"].iter().position(|name| *name == key.trim())?;
+        (range[0] < range[1] && sides[axis].is_none()).then(|| sides[axis] = Some(range))?;
+    }
+    Some(Area { lateral: sides[0]?, depth: sides[1]? })
+}
+
+fn stem(file: &Path) -> String {
+    file.file_stem().unwrap_or(file.as_os_str()).to_string_lossy().into_owned()
+}
+
+fn fault(what: &str, error: MeasureError) -> Failure {
+    match error {
+        MeasureError::Input(fault) => input(format!("{what}: {fault}")),
+        MeasureError::Gpu(fault) => failed(fault),
+    }
+}

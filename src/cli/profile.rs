@@ -1,0 +1,181 @@
+//! `echolume profile`.
+
+use super::pipelines::Request;
+use crate::args::{InputArgs, Output, ShaderArgs, check_outputs, open_device, write_report};
+use crate::files::{read_text, replace};
+use crate::gpu::DeviceChoice;
+use crate::profile as model;
+use crate::profile::measure;
+use crate::profile::{compare, export};
+use crate::terminal::{Failure, failed, input, say};
+use std::path::{Path, PathBuf};
+
+/// Longest profile that is read, bytes.
+const MAX_BYTES: u64 = 256 << 20;
+
+#[derive(clap::Args)]
+#[command(after_help = "A repeat is a whole volume: every frame through stage 1, then the picture.\n\nExamples:\n  \
+                        echolume profile sweep.mha --preset fetal --json before.json\n  \
+                        echolume profile --mode vr --trace trace.json    (open it in Perfetto or chrome://tracing)\n  \
+                        echolume profile volume.mha --mode mip --still --turn 2    (the picture alone, each from another angle)\n  \
+                        echolume profile --compare before.json after.json    (exit code 1 if a pass became slower)\n  \
+                        echolume profile --pipelines --all --json gpu.json    (what the driver makes of every shader)\n  \
+                        echolume profile --pipelines --all --compare gpu.json    (exit code 1 on a spill or a loss of occupancy)\n  \
+                        echolume profile --pipelines --glsl glsl    (what an edited shader costs in registers, without a build)")]
+pub struct Profile {
+    #[command(flatten)]
+    input: InputArgs,
+    /// Number of volumes to measure
+    #[arg(long, value_name = "N", default_value_t = 30, value_parser = clap::value_parser!(u32).range(1..=10000))]
+    repeat: u32,
+    /// Number of warm-up volumes: the driver compiles shaders and the clocks rise
+    #[arg(long, value_name = "N", default_value_t = 3, value_parser = clap::value_parser!(u32).range(1..=1000))]
+    warm_up: u32,
+    /// Upload the frames once and measure only the picture
+    #[arg(long)]
+    still: bool,
+    /// Rotate the view by this angle before each volume: the azimuth of the camera, or of the planes
+    #[arg(long, value_name = "DEG", default_value_t = 0.0, allow_hyphen_values = true)]
+    turn: f64,
+    /// Do not measure the device's ceilings (copies, samples, fetches)
+    #[arg(long)]
+    no_ceilings: bool,
+    /// Write all measurements (JSON), for --compare
+    #[arg(long, value_name = "FILE")]
+    json: Option<PathBuf>,
+    /// Write one line per pass (CSV)
+    #[arg(long, value_name = "FILE")]
+    csv: Option<PathBuf>,
+    /// Write one line per pass and repeat (CSV)
+    #[arg(long, value_name = "FILE")]
+    csv_samples: Option<PathBuf>,
+    /// Write a trace for Perfetto or Chrome
+    #[arg(long, value_name = "FILE")]
+    trace: Option<PathBuf>,
+    /// Compare two profiles pass by pass, without measuring; exit code 1 on a regression. With --pipelines, OLD alone is compared with
+    /// what is measured
+    #[arg(long, num_args = 1..=2, value_names = ["OLD", "NEW"])]
+    compare: Vec<PathBuf>,
+    /// Measure on this device too, alternating with the other, and compare them
+    #[arg(long, value_name = "N|NAME", conflicts_with = "compare")]
+    against: Option<DeviceChoice>,
+    #[command(flatten)]
+    shaders: ShaderArgs,
+    /// Compile the pipelines of the scene, and print what the driver makes of them: registers, occupancy, spills, instructions, time to
+    /// compile without a cache and with one. Runs nothing on the device
+    #[arg(long, conflicts_with_all = ["repeat", "warm_up", "still", "turn", "no_ceilings", "csv", "csv_samples", "trace", "against"])]
+    pipelines: bool,
+    /// With --pipelines: of every mode, preset and filter instead of the scene alone
+    #[arg(long, requires = "pipelines")]
+    all: bool,
+    /// Ratio that a pass must exceed to be a regression
+    #[arg(long, value_name = "RATIO", default_value_t = 1.05)]
+    threshold: f64,
+    /// Compare also profiles of different scenes or sizes
+    #[arg(long)]
+    force: bool,
+}
+
+impl Profile {
+    pub fn run(&self) -> Result<(), Failure> {
+        if self.pipelines {
+            let (json, compare) = (self.json.as_deref(), self.compare.as_slice());
+            let shaders = &self.shaders;
+            return Request { input: &self.input, all: self.all, json, compare, force: self.force, shaders }.run();
+        }
+        match self.compare.as_slice() {
+            [old, new] => self.compare(old, new),
+            [_] => Err(input("--compare: needs two profiles, OLD and NEW; with --pipelines one")),
+            _ => self.measure(),
+        }
+    }
+
+    fn measure(&self) -> Result<(), Failure> {
+        let (mut source, mut scene) = self.input.open()?;
+        scene.settings.slices.still |= self.still;
+        let targets: [Output; 4] = [
+            ("--json", self.json.as_deref()),
+            ("--csv", self.csv.as_deref()),
+            ("--csv-samples", self.csv_samples.as_deref()),
+            ("--trace", self.trace.as_deref()),
+        ];
+        self.input.check_outputs(&targets, &*source)?;
+        if !self.turn.is_finite() {
+            return Err(input(format!("--turn {}: must be a finite angle in degrees", self.turn)));
+        }
+        let shaders = self.shaders.open()?;
+        let context = self.input.open_device(false)?;
+        // All repeats use the same volume.
+        let mut frames = Vec::new();
+        self.input.for_each_frame(&mut *source, |frame| {
+            frames.push(frame);
+            Ok(())
+        })?;
+        let options = measure::ProfileOptions {
+            repeats: self.repeat as usize,
+            warm_up: self.warm_up as usize,
+            still: self.still,
+            angle_step: self.turn,
+            input: self.input.name(),
+            ceilings: !self.no_ceilings,
+        };
+        let against = match &self.against {
+            Some(choice) => Some(open_device(Some(choice.clone()), false)?),
+            None => None,
+        };
+        let failure = |fault| self.shaders.failure(fault);
+        let run = |context| measure::ProfileRun::with_shaders(context, &scene, &options, &shaders).map_err(failure);
+        let (mut first, mut second) = (run(&context)?, against.as_ref().map(run).transpose()?);
+        while first.needs_more() {
+            first.repeat(&frames).map_err(failure)?;
+            second.as_mut().map_or(Ok(()), |s| s.repeat(&frames)).map_err(failure)?;
+        }
+        let (profile, spans) = first.finish();
+        say!("{}", export::profile_table(&profile).trim_end());
+        self.write(&self.json, || profile.to_json().map_err(failed))?;
+        self.write(&self.csv, || Ok(export::csv(&profile)))?;
+        self.write(&self.csv_samples, || Ok(export::csv_samples(&profile)))?;
+        self.write(&self.trace, || export::chrome_trace(&profile, &spans).map_err(failed))?;
+        match second {
+            Some(second) => self.judge(&profile, &second.finish().0),
+            None => Ok(()),
+        }
+    }
+
+    fn write(&self, file: &Option<PathBuf>, text: impl FnOnce() -> Result<String, Failure>) -> Result<(), Failure> {
+        let Some(file) = file else { return Ok(()) };
+        write_report(file, &text()?)
+    }
+
+    fn compare(&self, old: &Path, new: &Path) -> Result<(), Failure> {
+        check_outputs(&[("--json", self.json.as_deref())], [old, new])?;
+        let (old, new) = (read(old)?, read(new)?);
+        self.judge(&old, &new)
+    }
+
+    /// Prints the differences. Fails on a regression.
+    fn judge(&self, old: &model::Profile, new: &model::Profile) -> Result<(), Failure> {
+        let options = compare::CompareOptions {
+            threshold: self.threshold,
+            force: self.force,
+            ..compare::CompareOptions::default()
+        };
+        let compared = compare::compare(old, new, &options).map_err(input)?;
+        say!("{}", export::comparison_table(&compared).trim_end());
+        if let (Some(file), true) = (&self.json, !self.compare.is_empty()) {
+            let text = serde_json::to_string_pretty(&compared).map_err(failed)?;
+            replace(file, text.as_bytes()).map_err(failed)?;
+        }
+        let slower: Vec<&str> = compared.regressions().map(|l| l.name.as_str()).collect();
+        match slower.is_empty() {
+            true => Ok(()),
+            false => Err(failed(format!("slower by more than the threshold: {}", slower.join(", ")))),
+        }
+    }
+}
+
+fn read(file: &Path) -> Result<model::Profile, Failure> {
+    let fault = |e: &dyn std::fmt::Display| input(format!("{}: {e}", file.display()));
+    let text = read_text(file, MAX_BYTES, "profile").map_err(|e| fault(&e))?;
+    model::Profile::from_json(&text).map_err(|e| fault(&e))
+}

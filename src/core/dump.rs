@@ -1,0 +1,344 @@
+//! The contents of slots for inspection: as pictures, and as arrays with their units and axes for other programs.
+
+use crate::passes::slots::{Format, Initializer, Shape};
+use crate::passes::{MISS, Slot, Texels, is_hit};
+use crate::picture::Picture;
+use crate::probe::Geometry;
+use crate::scene::Scene;
+use glam::DVec3;
+use serde_json::{Value, json};
+
+/// Width and height of a drawn table, pixels.
+const GRAPH: [usize; 2] = [512, 256];
+
+/// Draws a slot: colours unchanged, a volume as a sheet of its slices, a distance map with near bright and far dark, a table as
+/// curves. A single channel is stretched from its minimum to its maximum unless it is within 0..1.
+pub fn draw(slot: Slot, texels: Option<&Texels>, scene: &Scene) -> Picture {
+    match (texels, slot.initializer()) {
+        (Some(texels), _) if texels.channels == 4 && texels.size[2] == 1 => colours(texels),
+        (Some(texels), _) if texels.channels == 4 => sheet(texels, |n| colour(&texels.values[4 * n..])),
+        (Some(texels), _) if matches!(slot, Slot::Distance | Slot::DistanceA | Slot::DistanceB) => {
+            sheet(texels, grey(distances(texels)))
+        }
+        (Some(texels), _) => sheet(texels, grey(stretched(texels))),
+        (None, Initializer::ByScene(make)) => curves(&make(scene), meaning(slot).0.len()),
+        (None, _) => Picture { width: 1, height: 1, rgba: vec![0, 0, 0, 255] },
+    }
+}
+
+fn byte(value: f64) -> u8 {
+    (value.clamp(0.0, 1.0) * 255.0).round() as u8
+}
+
+fn colour(texel: &[f64]) -> [u8; 3] {
+    [byte(texel[0]), byte(texel[1]), byte(texel[2])]
+}
+
+/// Grey values, 0..1, as colours by index.
+fn grey(values: Vec<f64>) -> impl Fn(usize) -> [u8; 3] {
+    move |n| [byte(values[n]); 3]
+}
+
+fn colours(texels: &Texels) -> Picture {
+    let opaque = |p: &[f64]| {
+        let [r, g, b] = colour(p);
+        [r, g, b, 255]
+    };
+    let rgba = texels.values.chunks_exact(4).flat_map(opaque).collect();
+    Picture { width: texels.size[0] as u32, height: texels.size[1] as u32, rgba }
+}
+
+fn stretched(texels: &Texels) -> Vec<f64> {
+    let first: Vec<f64> = texels.values.chunks_exact(texels.channels).map(|t| t[0]).collect();
+    let (low, high) = first.iter().fold((f64::MAX, f64::MIN), |(l, h), v| (l.min(*v), h.max(*v)));
+    let (low, high) = if low >= 0.0 && high <= 1.0 { (0.0, 1.0) } else { (low, high) };
+    first.iter().map(|v| (v - low) / (high - low).max(1e-30)).collect()
+}
+
+fn distances(texels: &Texels) -> Vec<f64> {
+    let hits = texels.values.iter().copied().filter(|v| is_hit(*v));
+    let (low, high) = hits.fold((f64::MAX, f64::MIN), |(l, h), v| (l.min(v), h.max(v)));
+    let near = |v: f64| 1.0 - 0.85 * (v - low) / (high - low).max(1e-30);
+    texels.values.iter().map(|v| if is_hit(*v) { near(*v) } else { 0.0 }).collect()
+}
+
+/// A sheet of all slices, as square as possible, at most 2048 pixels wide. `colour` is that of the texel of this index.
+fn sheet(texels: &Texels, colour: impl Fn(usize) -> [u8; 3]) -> Picture {
+    let [width, height, slices] = texels.size;
+    let across = (((slices * height) as f64 / width as f64).sqrt().ceil() as usize).clamp(1, slices);
+    let shrink = (across * width).div_ceil(2048).max(1);
+    let (w, h) = (width.div_ceil(shrink), height.div_ceil(shrink));
+    let down = slices.div_ceil(across);
+    let mut picture = Picture { width: (across * w) as u32, height: (down * h) as u32, rgba: Vec::new() };
+    picture.rgba = [0, 0, 0, 255].repeat(across * w * down * h);
+    for z in 0..slices {
+        for y in 0..h {
+            for x in 0..w {
+                let shown = colour((z * height + y * shrink) * width + x * shrink);
+                let at = 4 * ((z / across * h + y) * across * w + z % across * w + x);
+                picture.rgba[at..at + 3].copy_from_slice(&shown);
+            }
+        }
+    }
+    picture
+}
+
+/// One curve per channel over the entries, each stretched to the full height.
+fn curves(values: &[f32], channels: usize) -> Picture {
+    const COLOURS: [[u8; 3]; 4] = [[230, 80, 70], [90, 200, 90], [90, 140, 255], [240, 240, 240]];
+    let [width, height] = GRAPH;
+    let mut rgba = [16, 16, 16, 255].repeat(width * height);
+    let entries = values.len() / channels;
+    for (channel, colour) in COLOURS.iter().enumerate().take(channels) {
+        let curve: Vec<f32> = values.iter().skip(channel).step_by(channels).copied().collect();
+        let (low, high) = curve.iter().fold((f32::MAX, f32::MIN), |(l, h), v| (l.min(*v), h.max(*v)));
+        for x in 0..width {
+            let Some(value) = curve.get(x * entries.saturating_sub(1) / (width - 1)) else { continue };
+            let share = (value - low) / (high - low).max(1e-30);
+            let y = ((1.0 - share) * (height - 1) as f32).round() as usize;
+            let at = 4 * (y.min(height - 1) * width + x);
+            rgba[at..at + 3].copy_from_slice(colour);
+        }
+    }
+    Picture { width: width as u32, height: height as u32, rgba }
+}
+
+/// Of distance maps.
+const DISTANCES: &str = "mm along the ray of the pixel, from the ray's origin";
+const GREY: &[&str] = &["value"];
+const COLOUR: &[&str] = &["red", "green", "blue", "alpha"];
+/// Of samples of the recording.
+const SHARE_OF_RANGE: &str = "share of the range of the recording's samples, 0..1, before the grey window";
+
+/// Names of the channels of a slot, and the unit of its values.
+fn meaning(slot: Slot) -> (&'static [&'static str], &'static str) {
+    match slot {
+        Slot::Distance | Slot::DistanceA | Slot::DistanceB => (GREY, DISTANCES),
+        Slot::Frames
+        | Slot::Conditioned
+        | Slot::SliceA
+        | Slot::SliceB
+        | Slot::SliceForward
+        | Slot::SliceRows
+        | Slot::SliceStep
+        | Slot::SliceHalfStep
+        | Slot::SliceStageA
+        | Slot::SliceStageB
+        | Slot::SliceStageC
+        | Slot::SharpVolume
+        | Slot::SharpSectionVolume
+        | Slot::WholeVolume
+        | Slot::CutVolume
+        | Slot::SectionVolume
+        | Slot::Volume => (GREY, SHARE_OF_RANGE),
+        Slot::Floating => (GREY, "1 in parts of the volume that float"),
+        Slot::StartSurface | Slot::StartCurve => (GREY, "row of the volume, by column and slice"),
+        Slot::LineShares => (GREY, "share of the frame's lines that fired before"),
+        Slot::TileRanges | Slot::BrickRanges => (&["smallest", "largest"], SHARE_OF_RANGE),
+        Slot::Tgc => (GREY, "gain of a sample: a factor, or an addend where samples are log-compressed"),
+        Slot::ScanLut => (&["sample", "line"], "index from 0; -1 outside the sector"),
+        Slot::Growth => (GREY, "rings of pixels"),
+        Slot::PackedNeighbours => {
+            (&["bits", "more_bits"], "bits of a texel and of its neighbours one column on, one row on, and both")
+        }
+        Slot::BrickKinds
+        | Slot::BrickDistancesX
+        | Slot::BrickDistancesXy
+        | Slot::SurfaceBrickDistances
+        | Slot::VolumeBrickDistances => {
+            (GREY, "(64 kind + distance in bricks) / 255; kinds: 0 active, 1 empty, 2 homogeneous")
+        }
+        Slot::BrickTable => (
+            &["tile_columns", "tile_rows", "slices", "side"],
+            "indices: 4096 first + last; side: 0 outside the sector, 1 across its border, 2 inside",
+        ),
+        Slot::OpaqueBefore => (GREY, "entries of the transfer function"),
+        Slot::SweepLut => (GREY, "mean distances of slices"),
+        Slot::SliceTable => (&["position", "advance"], "mean distances of slices"),
+        Slot::LineLut => (GREY, "share of the lines of a frame"),
+        Slot::Transfer | Slot::PreIntegrated | Slot::TransferIntegral => {
+            (&["red", "green", "blue", "absorption"], "colour 0..1; absorption of one slice pixel")
+        }
+        Slot::SelfAttenuated => {
+            (&["red", "green", "blue", "opacity"], "premultiplied colour and opacity of a step, 0..1")
+        }
+        Slot::Tiles | Slot::CurveColumns | Slot::Block | Slot::Cuts | Slot::SlicePlaces => {
+            (&["x", "y", "z", "w"], "vectors as the shader takes them")
+        }
+        Slot::Surface => {
+            (&["echo", "found", "echo_behind", "unused"], "echo 0..1 after the grey window; found: 0 or 1")
+        }
+        Slot::Cap => (
+            &["echo", "opacity"],
+            "echo 0..1 after the grey window of planes, where a ray ends at a cut face; opacity, 0..1",
+        ),
+        Slot::SliceShares | Slot::PictureShares | Slot::Shadow | Slot::Occlusion => (GREY, "share, 0..1"),
+        Slot::LightMatter => {
+            (&["density", "echo"], "share of the densest matter; share of the range of the recording's samples")
+        }
+        Slot::LightPyramid1
+        | Slot::LightPyramid2
+        | Slot::LightPyramid3
+        | Slot::LightPyramid4
+        | Slot::LightPyramid5
+        | Slot::LightPyramid6
+        | Slot::LightPyramid7
+        | Slot::LightPyramid8 => (GREY, "share of the densest matter, 0..1"),
+        Slot::LightArriving | Slot::LightScattered | Slot::LightScatteredB | Slot::BackLight => {
+            (&["red", "green", "blue", "density"], "light: share of what came; share of the densest matter")
+        }
+        Slot::LightNormals => (&["x", "y", "z", "highlight"], "direction, as long as it is certain; light"),
+        Slot::LightFrontA
+        | Slot::LightFrontB
+        | Slot::BackFrontA
+        | Slot::BackFrontB
+        | Slot::LightAmbient
+        | Slot::LightShade => (COLOUR, "light; 1 is that of an unshadowed light of strength 1"),
+        Slot::StillMedium => (&["red", "green", "blue", "extinction"], "albedo of scattering, 0..1; extinction, 1/mm"),
+        Slot::StillMajorants => (GREY, "largest extinction of a brick, 1/mm"),
+        Slot::StillSumsA | Slot::StillSumsB => {
+            (&["red", "green", "blue", "collided"], "light of all paths of a pixel; how many of them collided")
+        }
+        Slot::StillSquaresA | Slot::StillSquaresB => (GREY, "squares of the luminance of all paths of a pixel"),
+        Slot::NetSamples | Slot::NetValues | Slot::NetSmoothed | Slot::NetFilled => {
+            (GREY, "as stored; the smallest float where nothing is known")
+        }
+        Slot::NetLines => (GREY, "rad or mm"),
+        Slot::NetSlices => (&["position", "advance"], "rad or mm"),
+        Slot::NetDepths => (GREY, "row; -1 where nothing is inside"),
+        Slot::NetCounts | Slot::NetFirsts => (GREY, "cells"),
+        Slot::NetCrossed | Slot::NetAsked => (&["column", "row"], "bits of cells, and of their corners or edges"),
+        Slot::NetOffsets => (&["x", "y", "z", "unused"], "voxels from the first corner of a cell"),
+        Slot::EdgeMarks => (GREY, "1 in pixels that have several rays"),
+        Slot::FirstErrors | Slot::PixelErrors => (GREY, "error on the screen, 0..1; 0 is certain"),
+        Slot::ErrorMarks => (&["rows 0 to 3", "rows 4 to 7"], "bits of pixels of a tile"),
+        Slot::MarkedBefore => (GREY, "pixels"),
+        Slot::RefineGroups => (GREY, "workgroups along x, y, z; pixels"),
+        Slot::VolumeLayer
+        | Slot::VolumeBesideSurface
+        | Slot::PixelRays
+        | Slot::Rendered
+        | Slot::Planes
+        | Slot::Picture
+        | Slot::SmoothPicture
+        | Slot::SmoothPictureB
+        | Slot::PictureForward
+        | Slot::PictureRows
+        | Slot::Screen => (COLOUR, "share, 0..1"),
+    }
+}
+
+/// A slot as an array that numpy reads (NPY 1.0, little endian, C order), and a description of its axes, channels and units. `texels` as in
+/// [`draw`]. Values are f32 as the shaders read them, f64 where they are bits.
+pub fn array(slot: Slot, texels: Option<&Texels>, scene: &Scene) -> (Vec<u8>, Value) {
+    let (channels, unit) = meaning(slot);
+    let (shape, values) = match (texels, slot.initializer()) {
+        (Some(t), _) => ([t.size[2], t.size[1], t.size[0], t.channels], t.values.clone()),
+        (None, Initializer::ByScene(make)) => {
+            let values: Vec<f64> = make(scene).into_iter().map(f64::from).collect();
+            ([1, 1, values.len() / channels.len(), channels.len()], values)
+        }
+        (None, _) => ([1, 1, 0, 1], Vec::new()),
+    };
+    let axes = match slot.shape(scene) {
+        Shape::Layers(_) => ["layer", "line or row", "sample or column"],
+        Shape::Three(_) => ["slice", "row", "column"],
+        Shape::Two(_) => ["", "row", "column"],
+        Shape::Buffer(_) => ["", "", "entry"],
+    };
+    // Axes that a shape lacks, and a single channel, are left out.
+    let mut kept: Vec<(&str, usize)> = axes.into_iter().zip(shape).filter(|(axis, _)| !axis.is_empty()).collect();
+    if shape[3] > 1 {
+        kept.push(("channel", shape[3]));
+    }
+    let is_bits = matches!(slot.format(scene), Format::R32u | Format::Rg32u);
+    let bytes = npy(&kept.iter().map(|(_, n)| *n).collect::<Vec<_>>(), &values, is_bits);
+    let mut about = json!({
+        "slot": slot.name(),
+        "axes": kept.iter().map(|(axis, _)| *axis).collect::<Vec<_>>(),
+        "channels": channels.iter().take(shape[3]).collect::<Vec<_>>(),
+        "unit": unit,
+    });
+    if unit == DISTANCES {
+        about["no_surface"] = json!(MISS);
+    }
+    if slot == Slot::PackedNeighbours {
+        // Of the volume it holds the stored part. The volume itself is written whole.
+        let [column, row, slice] = slot.first_texel(scene);
+        about["first"] = json!({"slice": slice, "row": row, "column": column});
+    }
+    (bytes, about)
+}
+
+/// NPY, format 1.0: a magic number, a Python literal padded to 64 bytes, and the values.
+pub fn npy(shape: &[usize], values: &[f64], as_f64: bool) -> Vec<u8> {
+    let sizes: String = shape.iter().map(|n| format!("{n}, ")).collect();
+    let kind = if as_f64 { "<f8" } else { "<f4" };
+    let header = format!("{{'descr': '{kind}', 'fortran_order': False, 'shape': ({}), }}", sizes.trim_end());
+    // Magic number, version and length take 10 bytes; the header ends with a line break.
+    let padded = (10 + header.len() + 1).next_multiple_of(64) - 10;
+    let mut bytes = b"\x93NUMPY\x01\x00".to_vec();
+    bytes.extend((padded as u16).to_le_bytes());
+    bytes.extend(format!("{header:<width$}\n", width = padded - 1).as_bytes());
+    for value in values {
+        match as_f64 {
+            true => bytes.extend(value.to_le_bytes()),
+            false => bytes.extend((*value as f32).to_le_bytes()),
+        }
+    }
+    bytes
+}
+
+/// What the arrays of a scene refer to, in mm in the space of the volume: x lateral, y depth, z elevation.
+pub fn scene_description(scene: &Scene) -> Value {
+    let at = |v: DVec3| json!([v.x, v.y, v.z]);
+    let rays = &scene.rays;
+    json!({
+        "format": "echolume dump 1",
+        "space": "mm; x lateral, y depth, z elevation; y is 0 at the apex of a curved array and at the face of a linear one",
+        "geometry": match &scene.geometry {
+            Geometry::Sweep(probe) => json!({"sweep": probe}),
+            Geometry::Cartesian(grid) => json!({"cartesian": grid}),
+        },
+        "slice_pixels": {"origin_mm": scene.grid.origin, "pitch_mm": scene.grid.pitch, "columns_rows": scene.grid.size},
+        "box": {"low_mm": at(scene.low), "high_mm": at(scene.high)},
+        "rays": {
+            "note": "of the pixel in column x and row y, from 0: origin + (x + 0.5) origin_dx + (y + 0.5) origin_dy, the direction likewise and then normalised",
+            "size": scene.ray_size(),
+            "origin": at(rays.origin), "origin_dx": at(rays.origin_dx), "origin_dy": at(rays.origin_dy),
+            "direction": at(rays.direction), "direction_dx": at(rays.direction_dx), "direction_dy": at(rays.direction_dy),
+        },
+        "step_mm": scene.step,
+        "detector": {"step_mm": scene.ring.step, "samples_of_an_edge": scene.ring.half},
+        "settings": scene.settings,
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Numpy's format, byte by byte: NEP 1.
+    #[test]
+    fn an_array_has_numpys_header_and_little_endian_values() {
+        for (shape, values, as_f64) in [(vec![2, 3], [1.0, -2.5, 0.0, 4.0, 5.0, 1e9], false), (vec![6], [0.5; 6], true)]
+        {
+            let bytes = npy(&shape, &values, as_f64);
+            assert_eq!(&bytes[..8], b"\x93NUMPY\x01\0");
+            let length = usize::from(u16::from_le_bytes([bytes[8], bytes[9]]));
+            assert_eq!((10 + length) % 64, 0);
+            let header = std::str::from_utf8(&bytes[10..10 + length]).expect("ASCII");
+            assert!(header.ends_with('\n') && header.contains("'fortran_order': False"), "{header}");
+            let expected = if shape.len() == 2 { "'shape': (2, 3,), " } else { "'shape': (6,), " };
+            assert!(header.contains(expected), "{header}");
+            let size = if as_f64 { 8 } else { 4 };
+            assert!(header.contains(&format!("'descr': '<f{size}'")) && bytes.len() == 10 + length + 6 * size);
+            let second = &bytes[10 + length + size..][..size];
+            let second = match as_f64 {
+                true => f64::from_le_bytes(second.try_into().expect("8 bytes")),
+                false => f64::from(f32::from_le_bytes(second.try_into().expect("4 bytes"))),
+            };
+            assert_eq!(second, values[1]);
+        }
+    }
+}

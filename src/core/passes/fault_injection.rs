@@ -1,0 +1,129 @@
+//! Fault injection: deliberate faults that test whether the checks detect them. A fault changes what the device gets; the input of the
+//! f64 reference stays the same. Pure: the renderer applies the changes where it passes data to the device.
+
+use super::pass::{DispatchArgs, Params, Pass, Slot};
+use super::slots::Initializer;
+use crate::scene::Scene;
+use crate::spirv::SpirvError;
+
+/// A fault with its name.
+pub struct InjectedFault {
+    pub name: &'static str,
+    /// The real fault that it represents, in a driver or in this program.
+    pub what: &'static str,
+    pub change: Change,
+}
+
+/// What is changed. A pass name means all passes whose names begin with it.
+#[derive(Clone, Copy)]
+pub enum Change {
+    /// Numbers of a dispatch.
+    Numbers { pass: &'static str, by: fn(&Scene, &mut Params) },
+    /// A specialization constant.
+    Constant { pass: &'static str, name: &'static str, by: fn(i32) -> i32 },
+    /// Words of a shader.
+    Shader { pass: &'static str, by: fn(&[u32]) -> Result<Vec<u32>, SpirvError> },
+    /// Arguments of a dispatch.
+    DispatchArgs { pass: &'static str, by: fn(&Scene, &mut DispatchArgs) },
+    /// A dispatch that never runs: its outputs keep their old content.
+    LeftOut { pass: &'static str, which: fn(&Scene, &DispatchArgs) -> bool },
+    /// Invocations of a dispatch.
+    Extent { pass: &'static str, by: fn(&mut [u32; 3]) },
+    /// A table that the CPU makes from the scene.
+    Table { slot: Slot, by: fn(&Scene, &mut [f32]) },
+    /// The bytes of an uploaded frame; given are bytes per texel, texels per line, and lines.
+    Frame(fn([usize; 3], &mut [u8])),
+    /// The sampler takes the nearest texel.
+    Nearest,
+}
+
+impl Change {
+    /// Changes the numbers of a dispatch; true if they differ afterwards. The methods below do the same for other arguments.
+    pub fn numbers(&self, pass: &Pass, scene: &Scene, params: &mut Params) -> bool {
+        match self {
+            Change::Numbers { pass: name, by } if pass.name.starts_with(name) => changed(params, |p| by(scene, p)),
+            _ => false,
+        }
+    }
+
+    pub fn constants(&self, pass: &str, constants: &mut [(&'static str, i32)]) -> bool {
+        let Change::Constant { pass: of, name, by } = self else { return false };
+        let found = constants.iter_mut().find(|(n, _)| n == name && pass.starts_with(of));
+        found.is_some_and(|(_, value)| changed(value, |v| *v = by(*v)))
+    }
+
+    /// # Errors
+    /// A module that breaks the format, or has not what is to be changed.
+    pub fn words(&self, pass: &str, words: &mut Vec<u32>) -> Result<bool, SpirvError> {
+        match self {
+            Change::Shader { pass: name, by } if pass.starts_with(name) => {
+                let other = by(words)?;
+                Ok(std::mem::replace(words, other) != *words)
+            }
+            _ => Ok(false),
+        }
+    }
+
+    pub fn args(&self, pass: &str, scene: &Scene, args: &mut DispatchArgs) -> bool {
+        match self {
+            Change::DispatchArgs { pass: name, by } if pass.starts_with(name) => changed(args, |t| by(scene, t)),
+            _ => false,
+        }
+    }
+
+    pub fn leaves_out(&self, pass: &str, scene: &Scene, args: &DispatchArgs) -> bool {
+        matches!(self, Change::LeftOut { pass: name, which } if pass.starts_with(name) && which(scene, args))
+    }
+
+    pub fn extent(&self, pass: &str, extent: &mut [u32; 3]) -> bool {
+        match self {
+            Change::Extent { pass: name, by } if pass.starts_with(name) => changed(extent, by),
+            _ => false,
+        }
+    }
+
+    pub fn table(&self, slot: Slot, scene: &Scene, values: &mut [f32]) -> bool {
+        let Change::Table { slot: of, by } = self else { return false };
+        let before = values.to_vec();
+        if slot == *of {
+            by(scene, values);
+        }
+        before != values
+    }
+
+    pub fn frame(&self, scene: &Scene, bytes: &mut [u8]) -> bool {
+        let Change::Frame(by) = self else { return false };
+        let ([width, height], before) = (scene.frame_size().map(|n| n as usize), bytes.to_vec());
+        by([bytes.len() / (width * height), width, height], bytes);
+        before != bytes
+    }
+
+    /// True if the fault can change the output of a pass for a scene.
+    pub fn concerns(&self, pass: &Pass, scene: &Scene) -> bool {
+        let args = |iteration| DispatchArgs { layer: 2, slice: scene.slices() / 2, slices: 1, iteration, image: 0 };
+        let turns: Vec<DispatchArgs> = (0..(pass.repeat)(scene)).map(args).collect();
+        let reads = |slot: Slot| turns.iter().any(|t| pass.reads(scene, t).iter().any(|b| b.slot == slot));
+        pass.is_needed(scene)
+            && match self {
+                Change::Numbers { .. } => turns.iter().any(|t| self.numbers(pass, scene, &mut pass.numbers(scene, t))),
+                Change::Constant { .. } => {
+                    turns.iter().any(|t| self.constants(pass.name, &mut pass.constants(scene, t)))
+                }
+                Change::Shader { pass: name, .. } | Change::Extent { pass: name, .. } => pass.name.starts_with(name),
+                Change::DispatchArgs { .. } => turns.iter().any(|t| self.args(pass.name, scene, &mut t.clone())),
+                Change::LeftOut { .. } => turns.iter().any(|t| self.leaves_out(pass.name, scene, t)),
+                Change::Table { slot, .. } => {
+                    let made = |make: fn(&Scene) -> Vec<f32>| self.table(*slot, scene, &mut make(scene));
+                    reads(*slot) && matches!(slot.initializer(), Initializer::ByScene(make) if made(make))
+                }
+                Change::Frame(_) => reads(Slot::Frames),
+                Change::Nearest => pass.reads(scene, &turns[0]).iter().any(|b| b.filtered),
+            }
+    }
+}
+
+fn changed<T: Clone + PartialEq>(value: &mut T, by: impl FnOnce(&mut T)) -> bool {
+    let before = value.clone();
+    by(value);
+    before != *value
+}

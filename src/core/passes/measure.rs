@@ -1,0 +1,126 @@
+//! The device's limits for every pass: how fast it samples, fetches and copies without computing. These passes are in no plan;
+//! `profile` runs each alone and compares the other passes with them.
+
+use super::pass::*;
+use crate::probe::StoredType;
+use crate::probe::{Geometry, Grid};
+use crate::scene::{Input, Scene, SceneError, Settings};
+
+/// Samples of each invocation.
+pub const SAMPLES: u32 = 256;
+
+/// Measured in this order.
+pub const MEASURES: &[Pass] = &[FILTERED, EIGHT_FETCHES, ONE_FETCH, COPY];
+
+/// The device's own trilinear filter.
+pub const FILTERED: Pass = Pass {
+    name: "measure_filtered",
+    stage: Stage::Raycast,
+    frequency: Frequency::Picture,
+    link: Link::None,
+    shader: |_, _| "measure/sampling",
+    needed: |_| Err("measures the device, not a scene"),
+    reads: |_, _| vec![Bind { filtered: true, ..whole("volume", Slot::Volume) }],
+    writes: |_, _| vec![whole("picture", Slot::Picture)],
+    extent: picture_extent,
+    repeat: once,
+    params: |_, _| Params::default(),
+    constants: |_, _| vec![("SAMPLING", 0), ("SAMPLES", SAMPLES as i32)],
+    tolerance: Tolerance {
+        absolute: 2e-3,
+        relative: 0.0,
+        outliers: 0.0,
+        why: "a device's filter may have weights of 8 bits; R16F stores 1 to 4.9e-4",
+    },
+    reference: |_, _, reads, writes| {
+        mean(reads, writes, |volume, at| volume.trilinear(at));
+    },
+};
+
+/// Trilinear interpolation of our own: eight texels, fetched or loaded as the device reads them fastest.
+pub const EIGHT_FETCHES: Pass = Pass {
+    name: "measure_eight_fetches",
+    reads: |_, _| vec![whole("volume", Slot::Volume)],
+    constants: |_, _| vec![("SAMPLING", 1), ("SAMPLES", SAMPLES as i32)],
+    ..FILTERED
+};
+
+pub const ONE_FETCH: Pass = Pass {
+    name: "measure_one_fetch",
+    reads: |_, _| vec![whole("volume", Slot::Volume)],
+    constants: |_, _| vec![("SAMPLING", 2), ("SAMPLES", SAMPLES as i32)],
+    reference: |_, _, reads, writes| {
+        mean(reads, writes, |volume, at| {
+            let low = at.map(|v| v.max(0.0) as i64);
+            volume.clamped(low[0], low[1], low[2])
+        });
+    },
+    ..FILTERED
+};
+
+/// 8 bytes a pixel read and written.
+pub const COPY: Pass = Pass {
+    name: "measure_copy",
+    shader: |_, _| "measure/copy",
+    reads: |_, _| vec![whole("source", Slot::Picture)],
+    writes: |_, _| vec![whole("target", Slot::SmoothPicture)],
+    constants: no_constants,
+    tolerance: Tolerance { absolute: 0.0, relative: 0.0, outliers: 0.0, why: "nothing is computed" },
+    reference: |_, _, reads, writes| {
+        let source = reads.get("source");
+        writes.get_mut("target").values.copy_from_slice(&source.values);
+    },
+    ..FILTERED
+};
+
+/// One sample for each texel of the output, at [`sample_position`]: to judge a device's filter. No profile times it.
+pub const POSITIONS: Pass = Pass {
+    name: "measure_positions",
+    shader: |_, _| "measure/positions",
+    writes: |_, _| vec![whole("values", Slot::Distance)],
+    extent: ray_extent,
+    constants: no_constants,
+    reference: |_, _, reads, writes| {
+        let volume = reads.get("volume");
+        let values = writes.get_mut("values");
+        let [width, height, _] = values.size;
+        for (x, y) in (0..height).flat_map(|y| (0..width).map(move |x| (x, y))) {
+            let share = sample_position([x, y], [width, height]);
+            let at = std::array::from_fn(|axis| share[axis] * volume.size[axis] as f64 - 0.5);
+            values.set([x, y, 0], &[volume.trilinear(at)]);
+        }
+    },
+    ..FILTERED
+};
+
+/// Where [`POSITIONS`] samples for a texel of its output of this size: shares of the volume's size, from an eighth before its border to an
+/// eighth behind it. The same as in glsl/measure/positions.comp.
+pub fn sample_position(texel: [usize; 2], size: [usize; 2]) -> [f64; 3] {
+    let turn = (13 * texel[0] + 29 * texel[1]) % 61;
+    let across = |axis: usize| (texel[axis] as f64 + 0.5) / size[axis] as f64;
+    [across(0), across(1), (turn as f64 + 0.5) / 61.0].map(|share| 1.25 * share - 0.125)
+}
+
+fn mean(reads: &Arrays, writes: &mut Arrays, sample: impl Fn(&Texels, [f64; 3]) -> f64) {
+    let volume = reads.get("volume");
+    let picture = writes.get_mut("picture");
+    let size = volume.size.map(|n| n as f64);
+    for y in 0..picture.size[1] {
+        for x in 0..picture.size[0] {
+            let share = [(x as f64 + 0.5) / picture.size[0] as f64, (y as f64 + 0.5) / picture.size[1] as f64];
+            let at = |i: u32| [share[0], share[1], (f64::from(i) + 0.5) / f64::from(SAMPLES)];
+            let texel = |i: u32| std::array::from_fn(|axis| at(i)[axis] * size[axis] - 0.5);
+            let sum: f64 = (0..SAMPLES).map(|i| sample(volume, texel(i))).sum();
+            let mean = sum / f64::from(SAMPLES);
+            picture.set([x, y, 0], &[mean, mean, mean, 1.0]);
+        }
+    }
+}
+
+/// A volume of `edge`^3 in the format that volumes have, and a picture of `pixels`^2.
+pub fn scene(edge: usize, pixels: u32) -> Result<Scene, SceneError> {
+    let mut settings = Settings::default();
+    settings.picture.size = [pixels, pixels];
+    let grid = Grid { size: [edge; 3], spacing: [1.0; 3], origin: [0.0; 3] };
+    Scene::new(Geometry::Cartesian(grid), Input { stored: StoredType::U8, range: [0.0, 255.0] }, settings)
+}

@@ -1,0 +1,439 @@
+//! Shared by the ray casters: the parameters of rays and sweep map, and in f64 the march of a ray through the volume.
+
+use crate::passes::empty_space::Skipping;
+use crate::passes::lookup_tables::{is_non_uniform, line_parameter, sweep_border, sweep_span};
+use crate::passes::pass::*;
+use crate::passes::preprocess::packed_sampling;
+use crate::probe::{Advance, Array, Geometry, Motion, Probe};
+use crate::scene::{MAX_CLIPS, Scene, View};
+use glam::DVec3;
+
+/// Whether the sweep look-up table, the table of slices (non-uniform sweep), and the line look-up table (intra-frame motion) are
+/// needed.
+fn tables(scene: &Scene) -> (bool, bool, bool) {
+    match &scene.geometry {
+        Geometry::Sweep(probe) => {
+            let swept = !matches!(probe.motion, Motion::Still { .. });
+            let moving = match &probe.advance {
+                Advance::None => false,
+                Advance::Same(a) => *a != 0.0,
+                Advance::Each(table) => table.iter().any(|a| *a != 0.0),
+            };
+            (swept, swept && is_non_uniform(&scene.geometry), swept && moving)
+        }
+        Geometry::Cartesian(_) => (false, false, false),
+    }
+}
+
+pub(in crate::passes) fn reads(scene: &Scene) -> Vec<Bind> {
+    let (swept, non_uniform, moving) = tables(scene);
+    let mut reads = vec![Bind { filtered: scene.filters_in_hardware(), ..whole("volume", Slot::of_rays(scene)) }];
+    reads.extend((swept && scene.slice_terms() == 0).then_some(whole("sweep_lut", Slot::SweepLut)));
+    reads.extend(moving.then_some(whole("line_lut", Slot::LineLut)));
+    reads.extend(non_uniform.then_some(whole("slice_table", Slot::SliceTable)));
+    reads
+}
+
+/// What passes that take samples along rays read: with the slots for empty-space skipping.
+pub(super) fn marching_reads(scene: &Scene, skipping: Skipping) -> Vec<Bind> {
+    let mut reads = reads(scene);
+    reads.extend(scene.packs().then_some(whole("packed_neighbours", Slot::PackedNeighbours)));
+    reads.extend(skipping.slot().map(|slot| whole("bricks", slot)));
+    reads
+}
+
+pub(in crate::passes) fn constants(scene: &Scene) -> Vec<(&'static str, i32)> {
+    let (sweep, array) = match &scene.geometry {
+        Geometry::Cartesian(_) => (0, 0),
+        Geometry::Sweep(probe) => (
+            match probe.motion {
+                Motion::Fan { .. } => 1,
+                Motion::Translated => 2,
+                Motion::Still { .. } => 3,
+            },
+            match probe.array {
+                Array::Linear => 0,
+                Array::Curved { .. } if probe.is_radial() => 2,
+                Array::Curved { .. } => 1,
+            },
+        ),
+    };
+    let (_, non_uniform, moving) = tables(scene);
+    vec![
+        ("SWEEP", sweep),
+        ("ARRAY", array),
+        ("SAMPLING", !scene.filters_in_hardware() as i32),
+        ("ELEVATION", scene.takes_bspline() as i32),
+        ("INTRA_FRAME_MOTION", moving as i32),
+        ("NON_UNIFORM", non_uniform as i32),
+        ("SWEEP_TERMS", scene.slice_terms() as i32),
+        ("MIRRORED", scene.probe().map_or(0, mirrored)),
+        ("CLIPS", scene.settings.clip.len() as i32),
+        ("SPREAD", scene.spreads() as i32),
+    ]
+}
+
+/// Constants of the passes that take samples along rays.
+pub(super) fn marching_constants(scene: &Scene, skipping: Skipping) -> Vec<(&'static str, i32)> {
+    let mut constants = constants(scene);
+    if scene.packs() {
+        constants.retain(|(name, _)| *name != "SAMPLING");
+        constants.push(("SAMPLING", packed_sampling(scene)));
+    }
+    constants.push(skipping.constant());
+    constants.push(("SLIDING", scene.settings.ray.sliding as i32));
+    constants
+}
+
+/// The same for a pass that casts no ray: a camera that moves changes nothing.
+pub(in crate::passes) fn unmoved_params(scene: &Scene, view: View) -> Params {
+    params(&unmoved(scene, [DVec3::ZERO, DVec3::ZERO, DVec3::ZERO, DVec3::Y]), view, 1.0)
+}
+
+/// The scene with rays of one direction from an origin and its steps of a pixel right and down, and without its rays' step.
+pub(super) fn unmoved(scene: &Scene, [origin, origin_dx, origin_dy, direction]: [DVec3; 4]) -> Scene {
+    let zero = DVec3::ZERO;
+    let rays = crate::scene::Rays {
+        origin,
+        origin_dx,
+        origin_dy,
+        direction,
+        direction_dx: zero,
+        direction_dy: zero,
+        ..scene.rays
+    };
+    Scene { rays, step: 1.0, ..scene.clone() }
+}
+
+pub(super) fn params(scene: &Scene, view: View, step: f64) -> Params {
+    let [window_low, window_high] = view.window;
+    let (grid, local) = (&scene.grid, scene.local_origin());
+    let mut clips = [[0.0; 4]; MAX_CLIPS];
+    for (clip, (normal, limit)) in clips.iter_mut().zip(scene.clips()) {
+        *clip = [normal.x, normal.y, normal.z, scene.limit_to_local(normal, limit)];
+    }
+    let [clip_0, clip_1, clip_2, clip_3] = clips;
+    let (bricks, stored) = (scene.bricks(), scene.stored_bounds());
+    let last_stored = stored.high.map(|end| end - 1);
+    let params = sweep_params(ray_params(scene), scene)
+        .vec3("brick_low", scene.to_local(bricks.low))
+        .vec3("brick_density", bricks.edge.recip())
+        .vec3("last_brick", bricks.count.map(|n| f64::from(n) - 1.0))
+        .f32("spread", scene.settings.ray.spread)
+        .f32("spread_range", scene.probe().map_or(1.0, spread_range))
+        .vec4("clip_0", clip_0)
+        .vec4("clip_1", clip_1)
+        .vec4("clip_2", clip_2)
+        .vec4("clip_3", clip_3)
+        .vec3("box_low", scene.to_local(view.low))
+        .vec3("box_high", scene.to_local(view.high))
+        .f32("step_length", step)
+        .first_stored(scene)
+        .i32("last_stored_column", last_stored[0])
+        .i32("last_stored_row", last_stored[1])
+        .i32("last_stored_slice", last_stored[2])
+        .vec3("texture_shift", stored.low.map(|first| 0.5 - f64::from(first)))
+        .vec3("texture_scale", std::array::from_fn(|axis| 1.0 / f64::from(stored.high[axis] - stored.low[axis])))
+        .f32("last_slice", f64::from(scene.slices() - 1))
+        .f32("window_low", window_low)
+        .f32("window_scale", 1.0 / (window_high - window_low))
+        .vec2("grid_origin", [grid.origin[0] - local.x, grid.origin[1] - local.y])
+        .vec2("grid_density", grid.pitch.map(|p| 1.0 / p));
+    match &scene.geometry {
+        Geometry::Cartesian(volume) => sector(params, [0.0; 4])
+            .f32("slice_origin", volume.origin[2] - local.z)
+            .f32("slice_density", 1.0 / volume.spacing[2])
+            .f32("axis_depth", 0.0)
+            .f32("line_density", 0.0)
+            .f32("advance", 0.0),
+        Geometry::Sweep(probe) => {
+            let low = line_parameter(probe, probe.lines.first());
+            let high = line_parameter(probe, probe.lines.last());
+            let entries = f64::from(scene.settings.ray.entries - 1);
+            let advance = match &probe.advance {
+                Advance::Same(a) => a / probe.slices.pitch(),
+                _ => 0.0,
+            };
+            let swept = tables(scene).0;
+            sector(params, [probe.first_range(), probe.last_range(), low, high])
+                .f32("slice_origin", 0.0)
+                .f32("slice_density", 0.0)
+                .f32("axis_depth", probe.axis_depth())
+                .f32("line_density", entries / (high - low))
+                .f32("advance", if swept { advance } else { 0.0 })
+        }
+    }
+}
+
+/// From the position in a sweep to the slice index, and the borders of the lines.
+fn sweep_params(params: Params, scene: &Scene) -> Params {
+    let probe = scene.probe();
+    let [border_low, border_high] = probe.map_or([0.0; 2], sweep_border);
+    let (first_position, last_position) = probe.filter(|_| tables(scene).0).map_or((0.0, 0.0), sweep_span);
+    let polynomial = scene.slice_polynomial();
+    let [low, high] = polynomial.as_ref().map_or([first_position, last_position], |polynomial| polynomial.limits);
+    let density = match polynomial.is_none() && last_position > first_position {
+        true => f64::from(scene.settings.ray.entries - 1) / (last_position - first_position),
+        false => 0.0,
+    };
+    let term = |i: usize| polynomial.as_ref().and_then(|p| p.terms.get(i)).copied().unwrap_or(0.0);
+    let four = |first: usize| std::array::from_fn(|i| term(first + i));
+    let [first_line, last_line] = border_lines(probe);
+    params
+        .vec2("first_line", first_line)
+        .vec2("last_line", last_line)
+        .f32("sweep_first", first_position)
+        .f32("sweep_last", last_position)
+        .f32("sweep_border_low", border_low)
+        .f32("sweep_border_high", border_high)
+        .f32("sweep_low", low)
+        .f32("sweep_high", high)
+        .f32("sweep_density", density)
+        .f32("sweep_offset", polynomial.as_ref().map_or(0.0, |p| p.offset))
+        .vec4("sweep_terms_0", four(0))
+        .vec4("sweep_terms_1", four(4))
+        .vec2("sweep_terms_2", [term(8), term(9)])
+}
+
+/// In-plane normals of the first and the last line of a curved array: towards larger angles from the first, towards smaller ones from the last.
+fn border_lines(probe: Option<&Probe>) -> [[f64; 2]; 2] {
+    let side = |angle: f64, towards: f64| [towards * angle.cos(), -towards * angle.sin()];
+    let curved = probe.filter(|p| matches!(p.array, Array::Curved { .. }));
+    let [first, last] = curved.map_or([0.0; 2], |p| [p.lines.first(), p.lines.last()]);
+    [side(first, 1.0), side(last, -1.0)]
+}
+
+/// The lines and the sweep are each their own mirror image, to the last bit of the parameters: bits 0 and 1.
+fn mirrored(probe: &Probe) -> i32 {
+    let [[first_x, first_y], [last_x, last_y]] = border_lines(Some(probe)).map(|line| line.map(|c| c as f32));
+    let [low, high] = sweep_border(probe).map(|position| position as f32);
+    i32::from(first_x == -last_x && first_y == last_y && last_x < 0.0) + 2 * i32::from(low == -high)
+}
+
+fn sector(params: Params, [range_low, range_high, line_low, line_high]: [f64; 4]) -> Params {
+    params
+        .f32("range_low", range_low)
+        .f32("range_high", range_high)
+        .f32("range_low_squared", f64::from(range_low as f32 * range_low as f32))
+        .f32("range_high_squared", f64::from(range_high as f32 * range_high as f32))
+        .f32("line_low", line_low)
+        .f32("line_high", line_high)
+}
+
+/// Where the ray of a pixel goes through the picture, rays from its corner.
+pub(super) fn middle_of(x: usize, y: usize) -> [f64; 2] {
+    [x as f64 + 0.5, y as f64 + 0.5]
+}
+
+/// A pixel's ray in f64, and the volume that it goes through.
+pub(super) struct Ray<'a> {
+    scene: &'a Scene,
+    volume: &'a Texels,
+    /// mm, at the place where steps are shortest if they grow.
+    step: f64,
+    window: [f64; 2],
+    origin: DVec3,
+    direction: DVec3,
+    /// Across the ray, unit length.
+    across: [DVec3; 2],
+    /// Interval inside the box and on the near side of every clip plane, mm; leave < enter is a miss.
+    pub enter: f64,
+    pub leave: f64,
+    /// Ratio of the step at the entry to the scene's step, and the increase of this ratio per mm.
+    wider: f64,
+    widening: f64,
+}
+
+impl<'a> Ray<'a> {
+    pub fn cast(scene: &'a Scene, volume: &'a Texels, view: View, step: f64, x: usize, y: usize) -> Ray<'a> {
+        Ray::through(scene, volume, view, step, middle_of(x, y))
+    }
+
+    /// The ray through a place of the picture, rays from its corner.
+    pub fn through(scene: &'a Scene, volume: &'a Texels, view: View, step: f64, [x, y]: [f64; 2]) -> Ray<'a> {
+        let (origin, direction) = scene.rays.at(x, y);
+        let (enter, leave) = span(scene, view, origin, direction);
+        let sideways = scene.rays.origin_dx + scene.rays.direction_dx;
+        let across = sideways.reject_from_normalized(direction).normalize();
+        let (wider, widening) = match scene.spreads() && leave > enter {
+            true => {
+                let (low, high) = (wider(scene, origin + direction * enter), wider(scene, origin + direction * leave));
+                (low, (high - low) / (leave - enter))
+            }
+            false => (1.0, 0.0),
+        };
+        let across = [across, across.cross(direction)];
+        Ray { scene, volume, step, window: view.window, origin, direction, across, enter, leave, wider, widening }
+    }
+
+    pub fn path(&self) -> f64 {
+        self.leave - self.enter
+    }
+
+    /// Where it enters the region; a miss if it does not.
+    pub fn enter_or_miss(&self) -> f64 {
+        if self.path() > 0.0 { self.enter } else { MISS }
+    }
+
+    /// mm behind the entry after n steps: dt/dn = step (wider + widening t).
+    pub fn offset(&self, n: f64) -> f64 {
+        let rate = self.step * self.widening;
+        match rate == 0.0 {
+            true => self.step * self.wider * n,
+            false => self.wider / self.widening * (rate * n).exp_m1(),
+        }
+    }
+
+    /// Length of the step that begins after n steps, mm.
+    pub fn length(&self, n: f64) -> f64 {
+        self.offset(n + 1.0) - self.offset(n)
+    }
+
+    /// Steps to an offset.
+    pub fn steps_to(&self, offset: f64) -> f64 {
+        match self.widening == 0.0 {
+            true => offset / (self.step * self.wider),
+            false => (self.widening / self.wider * offset).max(-0.999_999).ln_1p() / (self.step * self.widening),
+        }
+    }
+
+    /// A place that many mm behind the entry.
+    pub fn place(&self, offset: f64) -> DVec3 {
+        self.origin + self.direction * (self.enter + offset)
+    }
+
+    /// Unit direction, away from the eye.
+    pub fn direction(&self) -> DVec3 {
+        self.direction
+    }
+
+    /// Whether a place that many mm behind the entry is in the insonified region.
+    pub fn is_inside(&self, offset: f64) -> bool {
+        texel(self.scene, self.place(offset)).is_some()
+    }
+
+    /// The windowed sample at an offset, which is that of step `n`; none outside the insonified region. With the sliding
+    /// filter it is the weighted mean of the samples of a cube around it that are inside.
+    pub fn sample(&self, offset: f64, n: f64) -> Option<f64> {
+        let at = texel(self.scene, self.place(offset))?;
+        let edge = i64::from(self.scene.settings.ray.sliding);
+        let value = match edge {
+            0 => interpolated(self.scene, self.volume, at),
+            _ => self.filtered(n, edge / 2),
+        };
+        let [low, high] = self.window;
+        Some(((value - low) / (high - low)).clamp(0.0, 1.0))
+    }
+
+    fn filtered(&self, n: f64, reach: i64) -> f64 {
+        // Deviation sqrt(edge - 1) / 2.
+        let weight = |away: i64| (-(away * away) as f64 / (2.0 * reach as f64 / 2.0)).exp();
+        let (mut sum, mut weights) = (0.0, 0.0);
+        for along in -reach..=reach {
+            let n = n + along as f64;
+            let (middle, apart) = (self.place(self.offset(n)), self.length(n - 0.5));
+            for (x, y) in (-reach..=reach).flat_map(|y| (-reach..=reach).map(move |x| (x, y))) {
+                let place = middle + (self.across[0] * x as f64 + self.across[1] * y as f64) * apart;
+                if let Some(at) = texel(self.scene, place) {
+                    let w = weight(x) * weight(y) * weight(along);
+                    sum += w * interpolated(self.scene, self.volume, at);
+                    weights += w;
+                }
+            }
+        }
+        if weights > 0.0 { sum / weights } else { 0.0 }
+    }
+
+    /// The unfiltered sample at a distance along the ray.
+    pub fn echo(&self, distance: f64) -> Option<f64> {
+        let [low, high] = self.window;
+        let at = texel(self.scene, self.origin + self.direction * distance)?;
+        Some(((interpolated(self.scene, self.volume, at) - low) / (high - low)).clamp(0.0, 1.0))
+    }
+}
+
+/// The volume at texture indices, as the scene interpolates it.
+pub(in crate::passes) fn interpolated(scene: &Scene, volume: &Texels, at: [f64; 3]) -> f64 {
+    if scene.takes_bspline() { volume.bspline_across_slices(at) } else { volume.trilinear(at) }
+}
+
+/// Ratio of the step to the scene's step at a place: proportional to the range from the array's apex.
+fn wider(scene: &Scene, place: DVec3) -> f64 {
+    let Some(probe) = scene.probe() else { return 1.0 };
+    let (x, y, _) = probe.inverse_sweep_map(place);
+    1.0 + scene.settings.ray.spread * ((x.hypot(y) / spread_range(probe)).clamp(1.0, 8.0) - 1.0)
+}
+
+/// The range up to which steps have the scene's length: that of the first sample, unless that is (nearly) the apex.
+fn spread_range(probe: &Probe) -> f64 {
+    probe.first_range().max(probe.last_range() / 8.0)
+}
+
+/// Where a ray enters and leaves the rendered region, mm; leave < enter is a miss.
+pub fn span(scene: &Scene, view: View, origin: DVec3, direction: DVec3) -> (f64, f64) {
+    let (mut enter, mut leave) = (0.0f64, f64::MAX);
+    for axis in 0..3 {
+        let (low, high) = (view.low[axis] - origin[axis], view.high[axis] - origin[axis]);
+        if direction[axis] == 0.0 {
+            if low > 0.0 || high < 0.0 {
+                return (0.0, -1.0);
+            }
+            continue;
+        }
+        let (a, b) = (low / direction[axis], high / direction[axis]);
+        enter = enter.max(a.min(b));
+        leave = leave.min(a.max(b));
+    }
+    for (normal, limit) in scene.clips() {
+        let (towards, room) = (normal.dot(direction), limit - normal.dot(origin));
+        match towards.abs() < 1e-12 {
+            true if room < 0.0 => return (0.0, -1.0),
+            true => {}
+            false if towards > 0.0 => leave = leave.min(room / towards),
+            false => enter = enter.max(room / towards),
+        }
+    }
+    (enter, leave)
+}
+
+/// Texture indices of a place in space, beyond the sweep those of its nearest end; none outside the scan lines.
+pub(in crate::passes) fn texel_beyond_sweep(scene: &Scene, place: DVec3) -> Option<[f64; 3]> {
+    let Geometry::Sweep(probe) = &scene.geometry else { return texel(scene, place) };
+    let (x, y, position) = probe.inverse_sweep_map(place);
+    let at = probe.to_indices(place);
+    // The shader's table ends with the sweep.
+    let (low, high) = sweep_span(probe);
+    let (low, high) = match probe.motion {
+        Motion::Fan { .. } => (2.0 * low.atan(), 2.0 * high.atan()),
+        Motion::Translated | Motion::Still { .. } => (low, high),
+    };
+    let slice = probe.slice_index(position.clamp(low, high), at.line);
+    let grid = &scene.grid;
+    let pixel = [(x - grid.origin[0]) / grid.pitch[0], (y - grid.origin[1]) / grid.pitch[1]];
+    let in_plane = crate::probe::Indices { slice: 0.0, ..at };
+    inside(probe, in_plane).then_some([pixel[0], pixel[1], slice])
+}
+
+/// Texture indices of a place in space; none outside the insonified region. By the exact inverse of the probe's maps, not by the
+/// tables that the shader reads.
+pub fn texel(scene: &Scene, place: DVec3) -> Option<[f64; 3]> {
+    let grid = &scene.grid;
+    let column = |x: f64, y: f64| [(x - grid.origin[0]) / grid.pitch[0], (y - grid.origin[1]) / grid.pitch[1]];
+    match &scene.geometry {
+        Geometry::Cartesian(volume) => {
+            let [i, j] = column(place.x, place.y);
+            Some([i, j, (place.z - volume.origin[2]) / volume.spacing[2]])
+        }
+        Geometry::Sweep(probe) => {
+            let (x, y, _) = probe.inverse_sweep_map(place);
+            let at = probe.to_indices(place);
+            let [i, j] = column(x, y);
+            inside(probe, at).then_some([i, j, at.slice])
+        }
+    }
+}
+
+fn inside(probe: &Probe, at: crate::probe::Indices) -> bool {
+    let within = |index: f64, count: usize| index >= 0.0 && index <= (count - 1) as f64;
+    within(at.sample, probe.samples) && within(at.line, probe.lines.len()) && within(at.slice, probe.slices.len())
+}

@@ -1,0 +1,700 @@
+//! Slots: the GPU resources that passes read and write. Each is declared once, in the table below; its shape and format
+//! follow from the scene. A slot that no pass of a plan names does not exist.
+
+use super::raycast::tolerance;
+use super::{cut, lookup_tables, net};
+use crate::probe::StoredType;
+use crate::scene::planes::{TILE_VECTORS, cell};
+use crate::scene::{Propagation, Scene, SurfaceColour, VolumeFormat, WindowTexels};
+
+/// Batches of frames that may be in flight at once: entries of the staging ring. The frame array has layers for each.
+pub const BATCHES_IN_FLIGHT: u32 = 4;
+
+/// Most frames that go through stage 1 at once. Submitting a batch of so many costs little more than a single frame.
+const MAX_FRAMES: u64 = 16;
+
+/// Maximum bytes of the samples of a batch, and of each slot between its filters, unless a single frame is larger: what stays in the caches of a
+/// CPU, and what takes a GPU several times longer than the host needs to submit it.
+pub fn batch_bytes(scene: &Scene) -> u64 {
+    if scene.is_for_cpu() { 4 << 20 } else { 16 << 20 }
+}
+
+/// Consecutive frames that go through stage 1 at once, each pass in one dispatch.
+pub fn frames_per_batch(scene: &Scene) -> u32 {
+    let bytes =
+        |[width, height]: [u32; 2], format: Format| u64::from(width) * u64::from(height) * format.texel_bytes() as u64;
+    let largest = bytes(scene.frame_size(), frame_format(scene)).max(bytes(scene.grid.size, Format::R32f));
+    let largest = if scene.conditions() { largest.max(bytes(scene.line_lattice(), Format::R32f)) } else { largest };
+    let most = MAX_FRAMES.min(scene.slices().into()).min(scene.frames_at_once.max(1).into());
+    (batch_bytes(scene) / largest).clamp(1, most) as u32
+}
+
+/// What a slot is.
+struct Descriptor {
+    /// Debug name; also the GLSL variable's unless a pass gives an alias.
+    name: &'static str,
+    shape: fn(&Scene) -> Shape,
+    format: fn(&Scene) -> Format,
+    initializer: Initializer,
+    /// How to tell that two scenes make different content, where it is made from the scene.
+    differs: Differs,
+    /// True if each of the volume images has its own copy.
+    is_multibuffered: bool,
+    /// True if texels that no pass writes are read as 0: those of slices outside the sector.
+    starts_clear: bool,
+    /// True if different queues use it where the device has several; it is created CONCURRENT then. Stage 1 works on these
+    /// slots; new ones are cleared and filled where pictures are made.
+    crosses_queues: bool,
+}
+
+/// Who writes a slot first.
+#[derive(Clone, Copy)]
+pub enum Initializer {
+    ByPasses,
+    ByFrames,
+    /// Made from the scene by the CPU, in f64, stored as f32.
+    ByScene(fn(&Scene) -> Vec<f32>),
+    /// Found by the CPU in a volume, when that is complete.
+    ByVolume,
+}
+
+/// How to tell that two scenes make different content of a slot.
+#[derive(Clone, Copy)]
+enum Differs {
+    /// Both are made and compared.
+    ByContent,
+    /// From what the content follows from: the content itself is too long to compare.
+    By(fn(&Scene, &Scene) -> bool),
+}
+
+impl Descriptor {
+    /// An image that passes write.
+    const fn image(name: &'static str, shape: fn(&Scene) -> Shape, format: fn(&Scene) -> Format) -> Descriptor {
+        Descriptor {
+            name,
+            shape,
+            format,
+            initializer: Initializer::ByPasses,
+            differs: Differs::ByContent,
+            is_multibuffered: false,
+            starts_clear: false,
+            crosses_queues: false,
+        }
+    }
+
+    /// A buffer of 32-bit floats made from the scene.
+    const fn table(
+        name: &'static str,
+        shape: fn(&Scene) -> Shape,
+        make: fn(&Scene) -> Vec<f32>,
+        differs: Differs,
+    ) -> Descriptor {
+        Descriptor::image(name, shape, |_| Format::Floats).by_scene(make, differs)
+    }
+
+    const fn by_frames(self) -> Descriptor {
+        Descriptor { initializer: Initializer::ByFrames, ..self }
+    }
+
+    const fn by_scene(self, make: fn(&Scene) -> Vec<f32>, differs: Differs) -> Descriptor {
+        Descriptor { initializer: Initializer::ByScene(make), differs, ..self }
+    }
+
+    /// `differs`: whether two scenes find other content in the same volume.
+    const fn by_volume(self, differs: fn(&Scene, &Scene) -> bool) -> Descriptor {
+        Descriptor { initializer: Initializer::ByVolume, differs: Differs::By(differs), ..self }
+    }
+
+    const fn multibuffered(self) -> Descriptor {
+        Descriptor { is_multibuffered: true, ..self }
+    }
+
+    const fn clear(self) -> Descriptor {
+        Descriptor { starts_clear: true, ..self }
+    }
+
+    const fn across_queues(self) -> Descriptor {
+        Descriptor { crosses_queues: true, ..self }
+    }
+}
+
+/// Declares the enum of slots and the descriptor of each.
+macro_rules! slots {
+    ($($(#[$doc:meta])* $slot:ident = $descriptor:expr;)*) => {
+        #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+        pub enum Slot { $($(#[$doc])* $slot,)* }
+
+        const DESCRIPTORS: &[Descriptor] = &[$($descriptor,)*];
+
+        impl Slot {
+            pub const ALL: &'static [Slot] = &[$(Slot::$slot,)*];
+        }
+    };
+}
+
+use Descriptor as D;
+use Differs::{By, ByContent};
+
+slots! {
+    /// Arriving frames, one a layer: those of every batch in flight.
+    Frames = D::image("frames", frame_layers, frame_format).by_frames().across_queues();
+    /// Gain of every sample of a line.
+    Tgc = D::table("tgc", |s| Shape::Buffer(4 * s.frame_size()[0]), lookup_tables::tgc, ByContent);
+    /// The frame after line conditioning: decimated samples x lines.
+    Conditioned = D::image("conditioned", |s| batch(s.line_lattice(), s), |_| Format::R32f).across_queues();
+    /// (sample, line) of every slice pixel on the lattice that is scan-converted; -1 outside the sector.
+    ScanLut = D::image("scan_lut", one_slice, |_| Format::Rg32f)
+        .by_scene(lookup_tables::scan_lut, By(lattice_differs))
+        .across_queues();
+    /// Slices between filters of stage 1. In these slots each slice of a batch is a layer.
+    SliceA = D::image("slice_a", slices, |_| Format::R32f).clear().across_queues();
+    SliceB = D::image("slice_b", slices, |_| Format::R32f).clear().across_queues();
+    /// How many rings the window of the enhanced sigma filter grew, at each pixel of the last batch's slices.
+    Growth = D::image("growth", slices, |_| Format::R32f).across_queues();
+    /// Of a slice's rows or columns under elimination: u = forward + shares u of the next pixel.
+    SliceShares = D::image("slice_shares", slices, |_| Format::R32f).across_queues();
+    SliceForward = D::image("slice_forward", slices, |_| Format::R32f).across_queues();
+    /// A slice diffused along its rows.
+    SliceRows = D::image("slice_rows", slices, |_| Format::R32f).across_queues();
+    /// A slice after a complete step, and after the first half of one, of AOS with Richardson's extrapolation.
+    SliceStep = D::image("slice_step", slices, |_| Format::R32f).across_queues();
+    SliceHalfStep = D::image("slice_half_step", slices, |_| Format::R32f).across_queues();
+    /// A slice after a stage of RKL1. Each stage reads the last two.
+    SliceStageA = D::image("slice_stage_a", slices, |_| Format::R32f).across_queues();
+    SliceStageB = D::image("slice_stage_b", slices, |_| Format::R32f).across_queues();
+    SliceStageC = D::image("slice_stage_c", slices, |_| Format::R32f).across_queues();
+    /// The volume before smoothing across slices.
+    SharpVolume = D::image("sharp_volume", volume, volume_format).multibuffered().clear().across_queues();
+    /// The volume before parts that float are dropped.
+    WholeVolume = D::image("whole_volume", volume, volume_format).multibuffered().clear().across_queues();
+    /// 1 in parts of a volume that float.
+    Floating = D::image("floating", volume, |_| Format::R8)
+        .by_volume(|a, b| a.floating_basis() != b.floating_basis());
+    /// The 3D texture that rays are cast through: the part that is visible.
+    Volume = D::image("volume", volume, volume_format).multibuffered().clear().across_queues();
+    /// The volume without what is removed, by cuts or in front of the render start: rays are cast through it in place of the other.
+    CutVolume = D::image("cut_volume", volume, volume_format).multibuffered().clear();
+    /// The row of each column and slice of the volume at which rendering starts.
+    StartSurface = D::image("start_surface", |s| Shape::Two([s.grid.size[0], s.slices()]), |_| Format::R32f)
+        .by_volume(|a, b| a.unveil_basis() != b.unveil_basis())
+        .multibuffered();
+    /// The first row of each column and slice of the volume that is not in front of the curved render start.
+    StartCurve = D::image("start_curve", |s| Shape::Two([s.grid.size[0], s.slices()]), |_| Format::R32f)
+        .by_scene(cut::start_curve, By(|a, b| a.start_curve_differs(b)));
+    /// The cuts: the axes of their views, and the edges of their contours.
+    Cuts = D::table("cuts", |s| Shape::Buffer(16 * cut::table_length(s) as u32), cut::table, ByContent);
+    /// Where each slice is.
+    SlicePlaces = D::table("slice_places", |s| Shape::Buffer(16 * s.slices()), cut::slice_places, ByContent);
+    /// Share of the lines of a frame that fired before the one at each texel of a slice.
+    LineShares = D::image("line_shares", one_slice, |_| Format::R32f).by_scene(cut::line_shares, By(lattice_differs));
+    /// The volume that the planes beside a rendering are cut from, before smoothing across slices, and after.
+    SharpSectionVolume = D::image("sharp_section_volume", volume, volume_format).multibuffered().clear().across_queues();
+    SectionVolume = D::image("section_volume", volume, volume_format).multibuffered().clear().across_queues();
+    /// Each texel of the volume with its neighbours one column and one row on, as their bits.
+    PackedNeighbours = D::image("packed_neighbours", volume, four_texels).multibuffered();
+    /// Smallest and largest value of every tile of every slice.
+    TileRanges = D::image("tile_ranges", |s| Shape::Three(s.tile_counts()), |_| Format::Rg16).multibuffered().clear();
+    /// Which tiles the samples in each brick may touch, and on which side of the sector's border the brick is.
+    BrickTable = D::table(
+        "brick_table",
+        |s| Shape::Buffer(16 * s.bricks().total() as u32),
+        lookup_tables::brick_table,
+        By(|a, b| !a.geometry.equals_except_direction(&b.geometry) || a.brick_basis() != b.brick_basis()),
+    );
+    /// Smallest and largest value that samples within each brick may have.
+    BrickRanges = D::image("brick_ranges", per_brick, |_| Format::Rg16).multibuffered();
+    /// The kind of each brick to a mode: active, empty or homogeneous.
+    BrickKinds = D::image("brick_kinds", per_brick, |_| Format::R8);
+    /// The same with the distance to the nearest brick of another kind along x, and within x and y.
+    BrickDistancesX = D::image("brick_distances_x", per_brick, |_| Format::R8);
+    BrickDistancesXy = D::image("brick_distances_xy", per_brick, |_| Format::R8);
+    /// The same in space: for the surface detector, and for the mode that composites or takes the mean.
+    SurfaceBrickDistances = D::image("surface_brick_distances", per_brick, |_| Format::R8);
+    VolumeBrickDistances = D::image("volume_brick_distances", per_brick, |_| Format::R8);
+    /// Entries of the transfer function that are not transparent, before each.
+    OpaqueBefore = D::table(
+        "opaque_before",
+        |s| Shape::Buffer(4 * (s.transfer_entries() as u32 + 1)),
+        lookup_tables::opaque_before,
+        ByContent,
+    );
+    /// Slice position over the sweep parameter. The direction of the motor only stretches the span of the sweep.
+    SweepLut = D::table(
+        "sweep_lut",
+        entries,
+        lookup_tables::sweep_lut,
+        By(|a, b| !a.geometry.equals_except_direction(&b.geometry) || lattice(a) != lattice(b)),
+    );
+    /// Share of the lines that fired before each line.
+    LineLut = D::table("line_lut", entries, lookup_tables::line_lut, By(lattice_differs));
+    /// Position and advance of every slice.
+    SliceTable = D::table(
+        "slice_table",
+        |s| Shape::Buffer(8 * s.slices()),
+        lookup_tables::slice_table,
+        By(|a, b| a.geometry != b.geometry),
+    );
+    /// The transfer function: colour and absorption over the sample value.
+    Transfer = D::table(
+        "transfer",
+        |s| Shape::Buffer(16 * s.transfer_entries() as u32),
+        lookup_tables::transfer_table,
+        ByContent,
+    );
+    /// Its integral over the values up to each entry: of absorption times colour, and of absorption.
+    TransferIntegral = D::table(
+        "transfer_integral",
+        |s| Shape::Buffer(16 * s.transfer_entries() as u32),
+        lookup_tables::transfer_integral,
+        ByContent,
+    );
+    /// The transfer function between every two sample values. It differs when the transfer function does, which is shorter.
+    PreIntegrated = D::table(
+        "pre_integrated",
+        |s| Shape::Buffer(16 * (s.transfer_entries().pow(2)) as u32),
+        lookup_tables::pre_integrated_table,
+        By(|a, b| Slot::Transfer.differs(a, b)),
+    );
+    /// Light and opacity of a complete step between every two sample values, then the transfer function for the incomplete last step of a
+    /// ray. They differ with the step's length too.
+    SelfAttenuated = D::table(
+        "self_attenuated",
+        |s| Shape::Buffer(16 * (s.transfer_entries() * (s.transfer_entries() + 1)) as u32),
+        lookup_tables::self_attenuated_table,
+        By(|a, b| Slot::Transfer.differs(a, b) || a.optical_step() != b.optical_step()),
+    );
+    /// The tiles of a picture of planes: what each shows, and its lines.
+    Tiles = D::table(
+        "tiles",
+        |s| Shape::Buffer(16 * TILE_VECTORS * s.tile_count()),
+        lookup_tables::tile_table,
+        ByContent,
+    );
+    /// The columns of a curved plane: where each is, and through which vector its slab reaches.
+    CurveColumns = D::table("curve_columns", curve_columns, lookup_tables::curve_table, ByContent);
+    /// The half-spaces that bound the block of mode cube.
+    Block = D::table(
+        "block",
+        |s| Shape::Buffer(16 * s.block().len() as u32),
+        lookup_tables::block_table,
+        ByContent,
+    );
+    /// The light volume: density of the matter in each cell, and its echo.
+    LightMatter = D::image("light_matter", |s| Shape::Three(s.light_lattice().count), |_| Format::Rg16f);
+    /// The density in a Gaussian pyramid: cells of twice the edge at each level.
+    LightPyramid1 = D::image("light_pyramid_1", |s| light_level(s, 1), |_| Format::R16f);
+    LightPyramid2 = D::image("light_pyramid_2", |s| light_level(s, 2), |_| Format::R16f);
+    LightPyramid3 = D::image("light_pyramid_3", |s| light_level(s, 3), |_| Format::R16f);
+    LightPyramid4 = D::image("light_pyramid_4", |s| light_level(s, 4), |_| Format::R16f);
+    LightPyramid5 = D::image("light_pyramid_5", |s| light_level(s, 5), |_| Format::R16f);
+    LightPyramid6 = D::image("light_pyramid_6", |s| light_level(s, 6), |_| Format::R16f);
+    LightPyramid7 = D::image("light_pyramid_7", |s| light_level(s, 7), |_| Format::R16f);
+    LightPyramid8 = D::image("light_pyramid_8", |s| light_level(s, 8), |_| Format::R16f);
+    /// Light that has passed one layer of cells, and the next.
+    LightFrontA = D::image("light_front_a", |s| light_layer(s, false), |_| Format::Rgba32f);
+    LightFrontB = D::image("light_front_b", |s| light_layer(s, false), |_| Format::Rgba32f);
+    /// Light that arrives in each cell, and the density of its matter. The other slots are those of the passes that scatter it, which alternate: what
+    /// arrives stays, as many dispatches have made it.
+    LightArriving = D::image("light_arriving", |s| Shape::Three(s.light_lattice().count), |_| Format::Rgba16f);
+    LightScattered = D::image("light_scattered", |s| Shape::Three(s.light_lattice().count), |_| Format::Rgba16f);
+    LightScatteredB = D::image("light_scattered_b", |s| Shape::Three(s.light_lattice().count), |_| Format::Rgba16f);
+    /// The same of the back light, in cells of twice the edge.
+    BackFrontA = D::image("back_front_a", |s| light_layer(s, true), |_| Format::Rgba32f);
+    BackFrontB = D::image("back_front_b", |s| light_layer(s, true), |_| Format::Rgba32f);
+    BackLight = D::image("back_light", |s| light_level(s, 1), |_| Format::Rgba16f);
+    /// Light from all sides and from behind in cells of twice the edge: its colour, and the ambient share.
+    LightAmbient = D::image("light_ambient", |s| light_level(s, 1), |_| Format::Rgba16f);
+    /// Light that each cell scatters, and its ambient share.
+    LightShade = D::image("light_shade", |s| Shape::Three(s.light_lattice().count), |_| Format::Rgba16f);
+    /// Orientation of each cell, as long as it is certain, and the light for a highlight.
+    LightNormals = D::image("light_normals", |s| Shape::Three(s.light_lattice().count), |_| Format::Rgba16f);
+    /// The medium of a still: albedo and extinction over the sample value.
+    StillMedium = D::table(
+        "still_medium",
+        |s| Shape::Buffer(16 * s.transfer_entries() as u32),
+        lookup_tables::still_medium,
+        ByContent,
+    );
+    /// The largest extinction in each brick.
+    StillMajorants = D::image("still_majorants", per_brick, |_| Format::R32f);
+    /// Sums of light and collisions of the paths of each pixel, and of the squares of their luminance; the dispatches alternate.
+    StillSumsA = D::image("still_sums_a", per_ray, |_| Format::Rgba32f);
+    StillSumsB = D::image("still_sums_b", per_ray, |_| Format::Rgba32f);
+    StillSquaresA = D::image("still_squares_a", per_ray, |_| Format::R32f);
+    StillSquaresB = D::image("still_squares_b", per_ray, |_| Format::R32f);
+    /// The cut faces of clip planes: echo where a ray ends at one, and its opacity.
+    Cap = D::image("cap", per_ray, |_| Format::Rg16f);
+    /// Distance along each pixel's ray, mm; the largest float where nothing was hit.
+    Distance = D::image("distance_map", per_ray, |_| Format::R32f);
+    DistanceA = D::image("distance_a", per_ray, |_| Format::R32f);
+    DistanceB = D::image("distance_b", per_ray, |_| Format::R32f);
+    /// Echo at the surface, 1 where a surface was found, and the mean echo behind it where the skin look needs it.
+    Surface = D::image("surface", per_ray, |s| if s.samples_behind() > 0 { Format::Rgba16f } else { Format::Rg16f });
+    /// Light that arrives at each pixel's surface, 0..1.
+    Shadow = D::image("shadow", per_ray, |_| Format::R16f);
+    /// Ambient light that arrives, 0..1.
+    Occlusion = D::image("occlusion", per_ray, |_| Format::R16f);
+    /// The composited volume, where stage 3 lights it or shows it in front of a surface.
+    VolumeLayer = D::image("volume_layer", per_ray, |_| Format::Rgba16f);
+    /// The volume that is shown beside a surface, where the volume layer is the surface's colour.
+    VolumeBesideSurface = D::image("volume_beside_surface", per_ray, |_| Format::Rgba16f);
+    /// What stages 2 and 3 render, where it becomes the picture only by averaging or next to planes. With adaptive supersampling the rays of marked
+    /// pixels: what was there stays in the others.
+    Rendered = D::image("rendered", per_ray, |_| Format::Rgba16f);
+    /// With adaptive supersampling: one ray through the middle of each pixel of the rendering, and 1 in pixels that have all rays.
+    PixelRays = D::image("pixel_rays", per_pixel_of_rendering, |_| Format::Rgba16f);
+    EdgeMarks = D::image("edge_marks", per_pixel_of_rendering, |_| Format::R8);
+    /// With a tolerance: the error of each pixel by the scene's step, and by the steps that it has in the end, 0..1 of the screen; 0 is certain.
+    FirstErrors = D::image("first_errors", per_ray, |_| Format::R32f);
+    PixelErrors = D::image("pixel_errors", per_ray, |_| Format::R32f);
+    /// Which pixels of each tile of 8 x 8 have too large an error, a bit each; how many of them are in the tiles before.
+    ErrorMarks = D::image("error_marks", |s| Shape::Two(tolerance::tiles(s)), |_| Format::Rg32u);
+    MarkedBefore = D::image("marked_before", |s| Shape::Two(tolerance::tiles(s)), |_| Format::R32u);
+    /// Workgroups along x, y and z that take all of them, and their number.
+    RefineGroups = D::image("refine_groups", |_| Shape::Two([4, 1]), |_| Format::R32u);
+    /// The planes of a 4-up picture; black where the rendering goes.
+    Planes = D::image("planes", per_pixel, |_| Format::Rgba16f);
+    /// The picture of stages 2 and 3 before the filters of stage 4.
+    Picture = D::image("picture", per_pixel, |_| Format::Rgba16f);
+    SmoothPicture = D::image("smooth_picture", per_pixel, |_| Format::Rgba16f);
+    SmoothPictureB = D::image("smooth_picture_b", per_pixel, |_| Format::Rgba16f);
+    /// As of slices: elimination of the picture's rows or columns.
+    PictureShares = D::image("picture_shares", per_pixel, |_| Format::R32f);
+    PictureForward = D::image("picture_forward", per_pixel, |_| Format::Rgba32f);
+    PictureRows = D::image("picture_rows", per_pixel, |_| Format::Rgba32f);
+    /// The stored samples of a volume that a mesh is made of: samples, lines, frames.
+    NetSamples = D::image("net_samples", |s| Shape::Three(net::samples(s)), frame_format).by_frames();
+    /// Positions of its lines, and of its slices with the motor's advance.
+    NetLines = D::table("net_lines", |s| Shape::Buffer(4 * net::table_lengths(s)[0]), net::lines, ByContent);
+    NetSlices = D::table("net_slices", |s| Shape::Buffer(8 * net::table_lengths(s)[1]), net::slices_of, ByContent);
+    /// Values of a slab of a lattice; while it is smoothed, in turn with the next.
+    NetValues = D::image("net_values", |s| Shape::Three(net::values(s)), |_| Format::R32f);
+    NetSmoothed = D::image("net_smoothed", |s| Shape::Three(net::values(s)), |_| Format::R32f);
+    /// The same filled behind the surface, with the rows of a base.
+    NetFilled = D::image("net_filled", |s| Shape::Three(net::filled(s)), |_| Format::R32f);
+    /// First row of each column of the slab that is inside.
+    NetDepths = D::image("net_depths", |s| Shape::Two(net::depths(s)), |_| Format::R32f);
+    /// Crossed cells of each row of each layer, and where they begin in the list.
+    NetCounts = D::image("net_counts", |s| Shape::Two(net::rows(s)), |_| Format::R32u);
+    NetFirsts = D::image("net_firsts", |s| Shape::Two(net::rows(s)), |_| Format::R32u);
+    /// The list of crossed cells.
+    NetCrossed = D::image("net_crossed", |s| Shape::Two(net::list(s)), |_| Format::Rg32u);
+    /// The list of vertices by their cells and edges, and their places.
+    NetAsked = D::image("net_asked", |s| Shape::Two(net::list(s)), |_| Format::Rg32u);
+    NetOffsets = D::image("net_offsets", |s| Shape::Two(net::list(s)), |_| Format::Rgba32f);
+    /// The result: in 8 bits, or as the window shows it.
+    Screen = D::image("screen", per_pixel, |s| match s.window_texels {
+        WindowTexels::Rgba8 => Format::Rgba8,
+        WindowTexels::Bgra8 => Format::Bgra8,
+        WindowTexels::Deep => Format::Rgba16f,
+    });
+}
+
+fn frame_layers(scene: &Scene) -> Shape {
+    let [width, height] = scene.frame_size();
+    Shape::Layers([width, height, BATCHES_IN_FLIGHT * frames_per_batch(scene)])
+}
+
+/// Of a frame array with so many layers, the layer behind those of the ring entry that holds `layer`.
+pub fn ring_entry_end(layers: u32, layer: u32) -> u32 {
+    let entry = (layers / BATCHES_IN_FLIGHT).max(1);
+    layer - layer % entry + entry
+}
+
+/// A layer for each frame of a batch.
+fn batch([width, height]: [u32; 2], scene: &Scene) -> Shape {
+    Shape::Layers([width, height, frames_per_batch(scene)])
+}
+
+fn slices(scene: &Scene) -> Shape {
+    batch(scene.grid.size, scene)
+}
+
+fn frame_format(scene: &Scene) -> Format {
+    match scene.input.stored {
+        StoredType::U8 => Format::R8,
+        StoredType::U16 => Format::R16,
+        StoredType::F32 => Format::R32f,
+    }
+}
+
+fn one_slice(scene: &Scene) -> Shape {
+    Shape::Two(scene.grid.size)
+}
+
+/// The part of the volume that is stored.
+fn volume(scene: &Scene) -> Shape {
+    let stored = scene.stored_bounds();
+    Shape::Three(std::array::from_fn(|a| stored.high[a] - stored.low[a]))
+}
+
+fn volume_format(scene: &Scene) -> Format {
+    match scene.volume_format() {
+        VolumeFormat::R8 => Format::R8,
+        VolumeFormat::R16 => Format::R16,
+        VolumeFormat::Auto | VolumeFormat::R16f => Format::R16f,
+        VolumeFormat::R32f => Format::R32f,
+    }
+}
+
+/// The bits of four texels of the volume.
+fn four_texels(scene: &Scene) -> Format {
+    if scene.volume_format() == VolumeFormat::R8 { Format::R32u } else { Format::Rg32u }
+}
+
+fn per_brick(scene: &Scene) -> Shape {
+    Shape::Three(scene.bricks().count)
+}
+
+/// Cells of a level of the light volume's pyramid.
+fn light_level(scene: &Scene, level: u32) -> Shape {
+    Shape::Three(scene.light_lattice().count.map(|n| n.div_ceil(1 << level)))
+}
+
+/// One layer of cells across the axis that the light comes along; of the back light, in cells of twice the edge.
+fn light_layer(scene: &Scene, is_back: bool) -> Shape {
+    let light = &scene.settings.light;
+    let volume = light.volume.unwrap_or_default();
+    let direction = if is_back { volume.back_direction } else { light.direction };
+    let axis = Propagation::new(scene.light_direction(direction)).axis;
+    let Shape::Three(count) = light_level(scene, u32::from(is_back)) else { return Shape::Two([1; 2]) };
+    Shape::Two(if axis == 0 { [count[1], count[2]] } else { [count[0], if axis == 1 { count[2] } else { count[1] }] })
+}
+
+fn entries(scene: &Scene) -> Shape {
+    Shape::Buffer(4 * scene.settings.ray.entries)
+}
+
+fn per_ray(scene: &Scene) -> Shape {
+    Shape::Two(scene.ray_size())
+}
+
+fn per_pixel_of_rendering(scene: &Scene) -> Shape {
+    Shape::Two(scene.rendering_size())
+}
+
+/// Two vectors for each column of the last tile.
+fn curve_columns(scene: &Scene) -> Shape {
+    let ([columns, _], [width, _]) = (scene.tile_grid(), scene.picture_size());
+    Shape::Buffer(32 * (width - cell(width, columns - 1, columns)))
+}
+
+fn per_pixel(scene: &Scene) -> Shape {
+    Shape::Two(scene.picture_size())
+}
+
+/// What look-up tables follow from besides the geometry.
+fn lattice(scene: &Scene) -> impl PartialEq + use<> {
+    (scene.grid, scene.apron, scene.decimation(), scene.settings.ray.entries)
+}
+
+fn lattice_differs(old: &Scene, new: &Scene) -> bool {
+    !old.geometry.equals_except_advance(&new.geometry) || lattice(old) != lattice(new)
+}
+
+impl Slot {
+    fn descriptor(self) -> &'static Descriptor {
+        &DESCRIPTORS[self as usize]
+    }
+
+    /// Debug name; also the GLSL variable's unless a pass gives an alias.
+    pub fn name(self) -> &'static str {
+        self.descriptor().name
+    }
+
+    pub fn shape(self, scene: &Scene) -> Shape {
+        (self.descriptor().shape)(scene)
+    }
+
+    pub fn format(self, scene: &Scene) -> Format {
+        (self.descriptor().format)(scene)
+    }
+
+    pub fn initializer(self) -> Initializer {
+        self.descriptor().initializer
+    }
+
+    /// True if each of the volume images has its own copy.
+    pub fn is_multibuffered(self) -> bool {
+        self.descriptor().is_multibuffered
+    }
+
+    /// True if texels that no pass writes are read as 0.
+    pub fn starts_clear(self) -> bool {
+        self.descriptor().starts_clear
+    }
+
+    /// True if different queues use it where the device has several.
+    pub fn crosses_queues(self) -> bool {
+        self.descriptor().crosses_queues
+    }
+
+    /// True if the CPU makes the slot's content from the scene, or finds it in a volume, and makes it differently of these two.
+    pub fn differs(self, old: &Scene, new: &Scene) -> bool {
+        match (self.initializer(), self.descriptor().differs) {
+            (Initializer::ByScene(make), ByContent) => make(old) != make(new),
+            (Initializer::ByScene(_) | Initializer::ByVolume, By(differs)) => differs(old, new),
+            _ => false,
+        }
+    }
+
+    /// True for an array of layers.
+    pub fn is_layered(self, scene: &Scene) -> bool {
+        matches!(self.shape(scene), Shape::Layers(_))
+    }
+
+    /// True if the slot has a texel for each of the volume, of which the visible part is stored.
+    pub fn is_volume(self) -> bool {
+        let of_rays =
+            matches!(self, Slot::Volume | Slot::SharpVolume | Slot::WholeVolume | Slot::Floating | Slot::CutVolume);
+        of_rays || matches!(self, Slot::SectionVolume | Slot::SharpSectionVolume)
+    }
+
+    /// The volume that rays are cast through: without what is removed.
+    pub fn of_rays(scene: &Scene) -> Slot {
+        if scene.removes() { Slot::CutVolume } else { Slot::Volume }
+    }
+
+    /// The volume that planes are cut from: their own beside a rendering if they have one, otherwise that of the rays, with what is dropped
+    /// for these alone.
+    pub fn of_planes(scene: &Scene) -> Slot {
+        match (scene.has_sections(), scene.drops_floating()) {
+            (true, _) => Slot::SectionVolume,
+            (false, true) => Slot::WholeVolume,
+            (false, false) => Slot::Volume,
+        }
+    }
+
+    /// The texel of the whole volume that the image begins with; 0 of a slot that is no part of it.
+    pub fn first_texel(self, scene: &Scene) -> [u32; 3] {
+        match self {
+            Slot::PackedNeighbours => scene.stored_bounds().low,
+            _ if self.is_volume() => scene.stored_bounds().low,
+            _ => [0; 3],
+        }
+    }
+
+    /// Size of the slot's array in references and in what is read back. Of the volume it is all of it, so that its indices are texel
+    /// coordinates.
+    pub fn array_size(self, scene: &Scene) -> [usize; 3] {
+        match self {
+            _ if self.is_volume() => scene.volume_size().map(|n| n as usize),
+            _ => self.shape(scene).size(),
+        }
+    }
+
+    /// Bytes of one copy.
+    pub fn bytes(self, scene: &Scene) -> u64 {
+        self.shape(scene).texels() * self.format(scene).texel_bytes() as u64
+    }
+}
+
+/// The slot that stages 2 and 3 render into: the picture itself, unless it is assembled from what they render.
+pub fn rendered(scene: &Scene) -> Slot {
+    if scene.assembles() { Slot::Rendered } else { Slot::Picture }
+}
+
+/// The slot of whole rays that are composited for a picture or a colour of a surface: the volume layer, unless that holds what lies
+/// behind the surface.
+pub(super) fn composited_beside_surface(scene: &Scene) -> Slot {
+    let is_behind = scene.settings.surface.colour == SurfaceColour::Behind;
+    if scene.is_pair() && is_behind { Slot::VolumeBesideSurface } else { Slot::VolumeLayer }
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Shape {
+    Two([u32; 2]),
+    Layers([u32; 3]),
+    Three([u32; 3]),
+    /// Bytes.
+    Buffer(u32),
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Format {
+    R8,
+    R16,
+    R16f,
+    R32f,
+    Rg16,
+    Rg16f,
+    Rg32f,
+    Rgba16f,
+    Rgba32f,
+    Rgba8,
+    /// As most windows store their pixels.
+    Bgra8,
+    /// Bits.
+    R32u,
+    Rg32u,
+    /// 32-bit floats of a buffer.
+    Floats,
+}
+
+impl Format {
+    pub fn channels(self) -> usize {
+        match self {
+            Format::R8 | Format::R16 | Format::R16f | Format::R32f | Format::R32u | Format::Floats => 1,
+            Format::Rg16 | Format::Rg16f | Format::Rg32f | Format::Rg32u => 2,
+            Format::Rgba16f | Format::Rgba32f | Format::Rgba8 | Format::Bgra8 => 4,
+        }
+    }
+
+    pub fn channel_bytes(self) -> usize {
+        match self {
+            Format::R8 | Format::Rgba8 | Format::Bgra8 => 1,
+            Format::R16 | Format::Rg16 | Format::R16f | Format::Rg16f | Format::Rgba16f => 2,
+            Format::R32f | Format::Rg32f | Format::Rgba32f | Format::Floats | Format::R32u | Format::Rg32u => 4,
+        }
+    }
+
+    pub fn texel_bytes(self) -> usize {
+        self.channels() * self.channel_bytes()
+    }
+}
+
+impl Shape {
+    pub fn texels(self) -> u64 {
+        match self {
+            Shape::Two([w, h]) => u64::from(w) * u64::from(h),
+            Shape::Layers(n) | Shape::Three(n) => n.iter().map(|n| u64::from(*n)).product(),
+            Shape::Buffer(bytes) => u64::from(bytes) / 4,
+        }
+    }
+
+    /// Texels along x, y and z; the first varies fastest. A buffer counts as a row of floats.
+    pub fn size(self) -> [usize; 3] {
+        match self {
+            Shape::Two([w, h]) => [w as usize, h as usize, 1],
+            Shape::Layers(n) | Shape::Three(n) => n.map(|n| n as usize),
+            Shape::Buffer(bytes) => [bytes as usize / Format::Floats.texel_bytes(), 1, 1],
+        }
+    }
+
+    /// Slices of a 3D image, layers of an array, 1 otherwise: the parts that barriers distinguish.
+    pub fn parts(self) -> u32 {
+        match self {
+            Shape::Layers(n) | Shape::Three(n) => n[2],
+            _ => 1,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A batch that is read must have its layers in its view, and those of the batches that are written beside it must not be there.
+    #[test]
+    fn a_view_of_a_batch_ends_with_its_entry_of_the_ring() {
+        for batch in 1..=MAX_FRAMES as u32 {
+            let layers = BATCHES_IN_FLIGHT * batch;
+            for entry in 0..BATCHES_IN_FLIGHT {
+                let first = entry * batch;
+                for layer in first..first + batch {
+                    assert_eq!(ring_entry_end(layers, layer), first + batch, "layer {layer} of {layers}");
+                }
+            }
+        }
+    }
+}

@@ -1,0 +1,256 @@
+//! Arrays of the f64 references.
+
+use super::slots::{Format, Slot};
+use crate::scene::Scene;
+use half::f16;
+use std::borrow::Cow;
+
+/// Texels with `channels` values each; x fastest.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Texels {
+    pub size: [usize; 3],
+    pub channels: usize,
+    pub values: Vec<f64>,
+}
+
+impl Texels {
+    /// All values NaN: texels that a reference leaves NaN are not written by the pass either.
+    pub fn untouched(size: [usize; 3], channels: usize) -> Texels {
+        Texels { size, channels, values: vec![f64::NAN; size.iter().product::<usize>() * channels] }
+    }
+
+    pub fn from_fn(size: [usize; 3], channels: usize, f: impl Fn([usize; 3], usize) -> f64) -> Texels {
+        let mut texels = Texels::untouched(size, channels);
+        for z in 0..size[2] {
+            for y in 0..size[1] {
+                for x in 0..size[0] {
+                    for c in 0..channels {
+                        let at = texels.index([x, y, z]) + c;
+                        texels.values[at] = f([x, y, z], c);
+                    }
+                }
+            }
+        }
+        texels
+    }
+
+    fn index(&self, [x, y, z]: [usize; 3]) -> usize {
+        ((z * self.size[1] + y) * self.size[0] + x) * self.channels
+    }
+
+    pub fn get(&self, at: [usize; 3]) -> &[f64] {
+        let i = self.index(at);
+        &self.values[i..i + self.channels]
+    }
+
+    /// First channel.
+    pub fn one(&self, x: usize, y: usize, z: usize) -> f64 {
+        self.values[self.index([x, y, z])]
+    }
+
+    /// First channel of the nearest texel.
+    pub fn clamped(&self, x: i64, y: i64, z: i64) -> f64 {
+        let at = |i: i64, n: usize| i.clamp(0, n as i64 - 1) as usize;
+        self.one(at(x, self.size[0]), at(y, self.size[1]), at(z, self.size[2]))
+    }
+
+    pub fn set(&mut self, at: [usize; 3], value: &[f64]) {
+        let i = self.index(at);
+        self.values[i..i + self.channels].copy_from_slice(value);
+    }
+
+    fn part(&self, first: [usize; 3], size: [usize; 3]) -> Texels {
+        let mut part = Texels::untouched(size, self.channels);
+        for (y, z) in (0..size[2]).flat_map(|z| (0..size[1]).map(move |y| (y, z))) {
+            let (from, to) = (self.index([first[0], first[1] + y, first[2] + z]), part.index([0, y, z]));
+            let length = size[0] * self.channels;
+            part.values[to..to + length].copy_from_slice(&self.values[from..from + length]);
+        }
+        part
+    }
+
+    /// One layer; that of an array that has a single one, whatever its number.
+    pub(super) fn layer(&self, n: usize) -> Texels {
+        self.part([0, 0, n.min(self.size[2] - 1)], [self.size[0], self.size[1], 1])
+    }
+
+    pub(super) fn set_layer(&mut self, n: usize, layer: &Texels) {
+        self.insert([0, 0, n.min(self.size[2] - 1)], layer);
+    }
+
+    fn insert(&mut self, first: [usize; 3], part: &Texels) {
+        let size = part.size;
+        for (y, z) in (0..size[2]).flat_map(|z| (0..size[1]).map(move |y| (y, z))) {
+            let (from, to) = (part.index([0, y, z]), self.index([first[0], first[1] + y, first[2] + z]));
+            let length = size[0] * self.channels;
+            self.values[to..to + length].copy_from_slice(&part.values[from..from + length]);
+        }
+    }
+
+    /// The part of a slot's array ([`Slot::array_size`]) that the device stores.
+    pub fn stored_part(&self, slot: Slot, scene: &Scene) -> Texels {
+        match slot {
+            _ if slot.is_volume() => self.part(slot.first_texel(scene).map(|n| n as usize), slot.shape(scene).size()),
+            _ => self.clone(),
+        }
+    }
+
+    /// The slot's array of which the device stores this part; `outside` is all of the rest.
+    pub fn with_outside(self, slot: Slot, scene: &Scene, outside: f64) -> Texels {
+        if self.size == slot.array_size(scene) {
+            return self;
+        }
+        let mut array = Texels::from_fn(slot.array_size(scene), self.channels, |_, _| outside);
+        array.insert(slot.first_texel(scene).map(|n| n as usize), &self);
+        array
+    }
+
+    /// First channel between texels, beyond the border that of the nearest.
+    pub fn trilinear(&self, at: [f64; 3]) -> f64 {
+        let low = at.map(f64::floor);
+        let mut sum = 0.0;
+        for corner in 0..8 {
+            let mut weight = 1.0;
+            let mut tap = [0i64; 3];
+            for axis in 0..3 {
+                let share = at[axis] - low[axis];
+                let upper = corner >> axis & 1;
+                weight *= if upper == 1 { share } else { 1.0 - share };
+                tap[axis] = low[axis] as i64 + upper;
+            }
+            sum += weight * self.clamped(tap[0], tap[1], tap[2]);
+        }
+        sum
+    }
+
+    /// Up to four channels between texels, all of which exist.
+    pub fn interpolated(&self, at: [f64; 3]) -> [f64; 4] {
+        let mut sum = [0.0; 4];
+        for corner in 0..8 {
+            let mut weight = 1.0;
+            let tap = std::array::from_fn(|axis| {
+                let low = at[axis].floor().min((self.size[axis] - 1) as f64);
+                let share = at[axis] - low;
+                let upper = corner >> axis & 1;
+                weight *= if upper == 1 { share } else { 1.0 - share };
+                (low as usize + upper).min(self.size[axis] - 1)
+            });
+            sum.iter_mut().zip(self.get(tap)).for_each(|(sum, value)| *sum += weight * value);
+        }
+        sum
+    }
+
+    /// First channel between texels: bilinear within a slice, the uniform cubic B-spline without a prefilter across slices, beyond the
+    /// border that of the nearest. As the sum of two linear fetches (Sigg and Hadwiger 2005).
+    pub fn bspline_across_slices(&self, [x, y, z]: [f64; 3]) -> f64 {
+        let k = z.floor();
+        let t = z - k;
+        let weights = [
+            (1.0 - t).powi(3) / 6.0,
+            (4.0 - 6.0 * t.powi(2) + 3.0 * t.powi(3)) / 6.0,
+            (1.0 + 3.0 * t + 3.0 * t.powi(2) - 3.0 * t.powi(3)) / 6.0,
+            t.powi(3) / 6.0,
+        ];
+        let pair = |first: usize| {
+            let both = weights[first] + weights[first + 1];
+            let between = k - 1.0 + first as f64 + weights[first + 1] / both;
+            both * self.trilinear([x, y, between])
+        };
+        pair(0) + pair(2)
+    }
+
+    /// The bytes that a slot of this format stores, each value rounded as a driver rounds: to nearest, ties to even.
+    pub fn encode(&self, format: Format) -> Vec<u8> {
+        let mut bytes = Vec::with_capacity(self.values.len() * format.channel_bytes());
+        for &v in &in_order(format, &self.values)[..] {
+            match format {
+                Format::R8 | Format::Rgba8 | Format::Bgra8 => {
+                    bytes.push((v.clamp(0.0, 1.0) * 255.0).round_ties_even() as u8)
+                }
+                Format::R16 | Format::Rg16 => {
+                    bytes.extend(((v.clamp(0.0, 1.0) * 65535.0).round_ties_even() as u16).to_le_bytes());
+                }
+                Format::R16f | Format::Rg16f | Format::Rgba16f => bytes.extend(f16::from_f64(v).to_le_bytes()),
+                Format::R32f | Format::Rg32f | Format::Rgba32f | Format::Floats => {
+                    bytes.extend((v as f32).to_le_bytes())
+                }
+                Format::R32u | Format::Rg32u => bytes.extend((v as u32).to_le_bytes()),
+            }
+        }
+        bytes
+    }
+
+    pub fn decode(size: [usize; 3], format: Format, bytes: &[u8]) -> Texels {
+        let two = |b: &[u8]| [b[0], b[1]];
+        let values = bytes.chunks_exact(format.channel_bytes()).map(|b| match format {
+            Format::R8 | Format::Rgba8 | Format::Bgra8 => f64::from(b[0]) / 255.0,
+            Format::R16 | Format::Rg16 => f64::from(u16::from_le_bytes(two(b))) / 65535.0,
+            Format::R16f | Format::Rg16f | Format::Rgba16f => f64::from(f16::from_le_bytes(two(b))),
+            Format::R32f | Format::Rg32f | Format::Rgba32f | Format::Floats => {
+                f64::from(f32::from_le_bytes([b[0], b[1], b[2], b[3]]))
+            }
+            Format::R32u | Format::Rg32u => f64::from(u32::from_le_bytes([b[0], b[1], b[2], b[3]])),
+        });
+        let values: Vec<f64> = values.collect();
+        Texels { size, channels: format.channels(), values: in_order(format, &values).into_owned() }
+    }
+
+    /// A value as the format stores it.
+    pub fn stored(format: Format, value: f64) -> f64 {
+        let one = Texels { size: [1; 3], channels: format.channels(), values: vec![value; format.channels()] };
+        Texels::decode([1; 3], format, &one.encode(format)).values[0]
+    }
+
+    /// The distance between neighbouring values that the format stores near `value`.
+    pub fn spacing(format: Format, value: f64) -> f64 {
+        match format {
+            Format::R8 | Format::Rgba8 | Format::Bgra8 => 1.0 / 255.0,
+            // Integers are exact; the fraction of other numbers is lost.
+            Format::R32u | Format::Rg32u => 0.9,
+            Format::R16 | Format::Rg16 => 1.0 / 65535.0,
+            Format::R16f | Format::Rg16f | Format::Rgba16f => value.abs().max(6.2e-5) / 1024.0,
+            Format::R32f | Format::Rg32f | Format::Rgba32f | Format::Floats => value.abs().max(1.2e-38) / 8_388_608.0,
+        }
+    }
+}
+
+/// Red, green and blue from or into the order in which the format stores them.
+fn in_order(format: Format, values: &[f64]) -> Cow<'_, [f64]> {
+    match format {
+        Format::Bgra8 => values.chunks_exact(4).flat_map(|c| [c[2], c[1], c[0], c[3]]).collect(),
+        _ => Cow::Borrowed(values),
+    }
+}
+
+/// The arrays of one pass by the names that its shader gives them.
+#[derive(Clone, Debug, Default)]
+pub struct Arrays(Vec<(&'static str, Texels)>);
+
+impl Arrays {
+    pub fn insert(&mut self, name: &'static str, texels: Texels) {
+        self.0.retain(|(n, _)| *n != name);
+        self.0.push((name, texels));
+    }
+
+    /// # Panics
+    /// When the pass did not declare the name: the declaration and its reference disagree.
+    pub fn get(&self, name: &str) -> &Texels {
+        match self.0.iter().find(|(n, _)| *n == name) {
+            Some((_, texels)) => texels,
+            None => panic!("reference reads '{name}', which its pass does not declare"),
+        }
+    }
+
+    /// # Panics
+    /// As [`Arrays::get`].
+    pub fn get_mut(&mut self, name: &str) -> &mut Texels {
+        match self.0.iter_mut().find(|(n, _)| *n == name) {
+            Some((_, texels)) => texels,
+            None => panic!("reference writes '{name}', which its pass does not declare"),
+        }
+    }
+
+    pub fn iter(&self) -> impl Iterator<Item = (&'static str, &Texels)> {
+        self.0.iter().map(|(n, t)| (*n, t))
+    }
+}

@@ -1,0 +1,89 @@
+//! The CPU reference renderer: all four stages in f64, every step of a plan by the reference of its pass, slots as plain arrays.
+//! Goldens are made with it, and errors are measured against it.
+
+use crate::passes::slots::{Initializer, Shape};
+use crate::passes::{Arrays, DispatchArgs, Frequency, Slot, Texels, chain, floating, unveil};
+use crate::plan::{Plan, Step};
+use crate::probe::Frame;
+use crate::scene::Scene;
+use std::collections::BTreeMap;
+
+/// Renders a volume. `frames`: one array per slice in geometric order, with the values that the texture of a frame yields. Returns the
+/// contents of all slots of the plan.
+pub fn render(scene: &Scene, frames: &[Texels]) -> BTreeMap<Slot, Texels> {
+    render_with(scene, frames, &mut |_, _, _| false)
+}
+
+/// The frames of a volume in geometric order, as the values that the texture of a frame yields.
+pub fn decoded(scene: &Scene, frames: &[Frame]) -> Vec<Texels> {
+    let format = Slot::Frames.format(scene);
+    let [width, height] = scene.frame_size().map(|n| n as usize);
+    let mut frames: Vec<&Frame> = frames.iter().collect();
+    frames.sort_by_key(|f| f.slice);
+    frames.iter().map(|f| Texels::decode([width, height, 1], format, &f.bytes)).collect()
+}
+
+/// Takes the place of a pass's reference: given the pass's name, its inputs and its outputs, fills the outputs and returns true, or
+/// returns false for a pass that it leaves to its own reference.
+pub type Replacement<'a> = dyn FnMut(&str, &Arrays, &mut Arrays) -> bool + 'a;
+
+/// As [`render`], with some passes by another reference than their own.
+pub fn render_with(scene: &Scene, frames: &[Texels], replace: &mut Replacement) -> BTreeMap<Slot, Texels> {
+    let plan = Plan::new(scene);
+    let mut slots: BTreeMap<Slot, Texels> = plan.slots.iter().map(|s| (*s, empty(*s, scene))).collect();
+    for (slice, frame) in frames.iter().enumerate() {
+        if let Some(volume) = chain::copied(scene).and_then(|slot| slots.get_mut(&slot)) {
+            for (x, y) in (0..frame.size[1]).flat_map(|y| (0..frame.size[0]).map(move |x| (x, y))) {
+                volume.set([x, y, slice], frame.get([x, y, 0]));
+            }
+        }
+        slots.insert(Slot::Frames, frame.clone());
+        for (_, step) in plan.steps_of(Frequency::Frame) {
+            run(scene, step, &DispatchArgs { slice: slice as u32, ..step.args() }, &mut slots, replace);
+        }
+    }
+    for (_, step) in plan.steps_of(Frequency::Volume).chain(plan.steps_of(Frequency::Picture)) {
+        run(scene, step, &DispatchArgs { slices: step.pass.slices(scene), ..step.args() }, &mut slots, replace);
+    }
+    slots
+}
+
+/// Initial contents of a slot on the device: zeros, or values computed from the scene.
+fn empty(slot: Slot, scene: &Scene) -> Texels {
+    let format = slot.format(scene);
+    let mut size = slot.array_size(scene);
+    if let Shape::Layers(_) = slot.shape(scene) {
+        size[2] = 1;
+    }
+    let mut texels = Texels::from_fn(size, format.channels(), |_, _| 0.0);
+    if let Initializer::ByScene(make) = slot.initializer() {
+        texels.values = make(scene).into_iter().map(f64::from).collect();
+    }
+    texels
+}
+
+fn run(scene: &Scene, step: &Step, args: &DispatchArgs, slots: &mut BTreeMap<Slot, Texels>, replace: &mut Replacement) {
+    let (reads, writes) = (step.pass.reads(scene, args), step.pass.writes(scene, args));
+    let (mut inputs, mut outputs) = (Arrays::default(), Arrays::default());
+    // A plan lists every slot of its steps, and no step reads a slot that it writes.
+    let missing = || Texels::untouched([0; 3], 1);
+    for bind in &reads {
+        if let Initializer::ByVolume = bind.slot.initializer() {
+            let found = match bind.slot {
+                Slot::Floating => slots.get(&Slot::WholeVolume).map(|volume| floating::reference(scene, volume)),
+                _ => slots.get(&Slot::Volume).map(|volume| unveil::reference(scene, volume).0),
+            };
+            slots.extend(found.map(|found| (bind.slot, found)));
+        }
+        inputs.insert(bind.name, slots.get(&bind.slot).cloned().unwrap_or_else(missing));
+    }
+    for bind in &writes {
+        outputs.insert(bind.name, slots.remove(&bind.slot).unwrap_or_else(missing));
+    }
+    if !replace(step.pass.name, &inputs, &mut outputs) {
+        step.pass.reference(scene, args, &inputs, &mut outputs);
+    }
+    for bind in writes {
+        slots.insert(bind.slot, outputs.get(bind.name).clone());
+    }
+}

@@ -1,0 +1,483 @@
+//! Layers of settings: defaults, presets, a scene file and the command line. Each layer overrides the one before.
+
+use super::look::is_look;
+use super::{Settings, TransferPoint};
+use crate::files;
+use crate::text::printable;
+use serde::Deserialize;
+use std::collections::BTreeSet;
+use std::path::Path;
+use toml::{Table, Value};
+
+/// Maximum size of a settings file, bytes.
+const MAX_BYTES: u64 = 1 << 20;
+
+/// The presets as TOML.
+pub const PRESETS: &[(&str, &str)] = &[
+    ("bmode", include_str!("presets/bmode.toml")),
+    ("bone", include_str!("presets/bone.toml")),
+    ("face", include_str!("presets/face.toml")),
+    ("face-classic", include_str!("presets/face-classic.toml")),
+    ("fetal", include_str!("presets/fetal.toml")),
+    ("glass", include_str!("presets/glass.toml")),
+    ("skeleton", include_str!("presets/skeleton.toml")),
+    ("thesis", include_str!("presets/thesis.toml")),
+    ("vessel", include_str!("presets/vessel.toml")),
+];
+
+/// Keys of one table that give the same size in two units.
+const RIVALS: &[(&str, &str)] = &[
+    ("median", "median_mm"),
+    ("window", "window_mm"),
+    ("largest", "largest_mm"),
+    ("pixels", "mm"),
+    ("elevation", "elevation_mm"),
+    ("low_pass", "low_pass_mm"),
+];
+
+#[derive(Debug, thiserror::Error)]
+pub enum LoadError {
+    #[error("preset {name:?} is unknown; there are: {}", PRESETS.iter().map(|p| p.0).collect::<Vec<_>>().join(", "))]
+    UnknownPreset { name: String },
+    #[error("{path}: {fault}")]
+    File { path: String, fault: String },
+    #[error("{layer}: {fault}")]
+    Layer { layer: String, fault: String },
+}
+
+/// Layers of settings as TOML tables, merged key by key.
+#[derive(Clone, Debug, Default)]
+pub struct Layers {
+    merged: Table,
+    /// The presets among them.
+    presets: Vec<String>,
+    /// The paths of the values that other layers than presets give.
+    given: BTreeSet<String>,
+}
+
+impl Layers {
+    /// One layer that holds all of `settings`. Empty if they cannot be written as TOML.
+    pub fn of(settings: &Settings) -> Option<Layers> {
+        Table::try_from(settings).ok().map(|merged| Layers { merged, ..Layers::default() })
+    }
+
+    /// These layers with those of `over` on top. What `over` gives without a preset counts as given.
+    pub(super) fn with(mut self, over: &Layers) -> Layers {
+        merge(&mut self.merged, over.merged.clone(), &mut Vec::new());
+        // A `none` of these layers left nothing to merge.
+        for path in over.given.iter().filter(|path| !holds(&over.merged, path)) {
+            remove(&mut self.merged, path);
+        }
+        Layers { presets: over.presets.clone(), given: over.given.clone(), ..self }
+    }
+
+    /// The presets among the layers, in their order.
+    pub fn presets(&self) -> &[String] {
+        &self.presets
+    }
+
+    /// True if a layer other than a preset gives this value, a value of this table, or the whole table that it is in.
+    pub fn gives(&self, path: &str) -> bool {
+        self.given.iter().any(|given| {
+            let (longer, shorter) =
+                if given.len() > path.len() { (given.as_str(), path) } else { (path, given.as_str()) };
+            longer.strip_prefix(shorter).is_some_and(|rest| rest.is_empty() || rest.starts_with('.'))
+        })
+    }
+
+    /// True if any layer, presets included, gives this value or table.
+    pub fn has(&self, path: &str) -> bool {
+        self.gives(path) || holds(&self.merged, path)
+    }
+
+    pub fn preset(&mut self, name: &str) -> Result<(), LoadError> {
+        let (_, text) =
+            PRESETS.iter().find(|p| p.0 == name).ok_or_else(|| LoadError::UnknownPreset { name: name.to_string() })?;
+        let given = self.given.clone();
+        self.add(&format!("preset {name}"), text, None)?;
+        self.given = given;
+        self.presets.push(name.to_string());
+        Ok(())
+    }
+
+    /// Adds a preset of a user: the whole look of `settings` in place of the look of the layers so far. Its values count as given.
+    ///
+    /// # Errors
+    /// The settings cannot be written as TOML.
+    pub fn look(&mut self, name: &str, settings: &Settings) -> Result<(), LoadError> {
+        let fault =
+            |e: &dyn std::fmt::Display| LoadError::Layer { layer: format!("preset {name}"), fault: e.to_string() };
+        let before = self.settings().map_err(|e| fault(&e))?;
+        self.merged = Table::try_from(settings.look_over(&before)).map_err(|e| fault(&e))?;
+        let mut given = BTreeSet::new();
+        add_paths(&Table::try_from(settings).map_err(|e| fault(&e))?, "", &mut given);
+        self.given.extend(given.into_iter().filter(|path| is_look(path)));
+        Ok(())
+    }
+
+    /// The presets of the built-in phantom: the face as a lit surface, and with `is_plain`, where nobody chose a look, light in the volume.
+    ///
+    /// # Errors
+    /// None: the presets are embedded, and a test reads them.
+    pub fn phantom(&mut self, is_plain: bool) -> Result<(), LoadError> {
+        self.preset("face-classic")?;
+        if is_plain { self.preset("face") } else { Ok(()) }
+    }
+
+    pub fn file(&mut self, path: &Path) -> Result<(), LoadError> {
+        let text = read(path, "scene")?;
+        self.add(&path.display().to_string(), &text, path.parent())
+    }
+
+    /// Adds a table with the keys of a scene file. `layer` names it in messages; relative file names refer to `folder`.
+    pub fn table(&mut self, layer: &str, table: Table, folder: &Path) -> Result<(), LoadError> {
+        self.merge_checked(layer, table, Some(folder))
+    }
+
+    /// Adds one `key.path=value` of `--set`. The value is TOML, or a plain word.
+    pub fn set(&mut self, assignment: &str) -> Result<(), LoadError> {
+        self.set_by(&format!("--set {assignment}"), assignment)
+    }
+
+    /// Like [`Layers::set`], for a flag that stands for a setting. Messages name the flag as it was typed.
+    pub fn set_by(&mut self, flag: &str, assignment: &str) -> Result<(), LoadError> {
+        let fault = |fault: &str| LoadError::Layer { layer: flag.into(), fault: fault.into() };
+        let (path, text) = assignment.split_once('=').ok_or_else(|| fault("must read key.path=value"))?;
+        if text.contains('\n') {
+            return Err(fault("unknown field after a line break"));
+        }
+        let value: Value = toml::from_str::<Table>(&format!("v = {text}"))
+            .ok()
+            .and_then(|mut t| t.remove("v"))
+            .unwrap_or_else(|| Value::String(text.trim().to_string()));
+        let mut layer = Table::new();
+        let mut at = &mut layer;
+        let mut keys = path.trim().split('.').peekable();
+        while let Some(key) = keys.next() {
+            if keys.peek().is_none() {
+                at.insert(key.to_string(), value);
+                break;
+            }
+            let inner = at.entry(key).or_insert_with(|| Value::Table(Table::new()));
+            at = inner.as_table_mut().ok_or_else(|| fault("names a key twice"))?;
+        }
+        self.merge_checked(flag, layer, None)
+    }
+
+    fn add(&mut self, layer: &str, text: &str, folder: Option<&Path>) -> Result<(), LoadError> {
+        let fault = |e: &toml::de::Error| LoadError::Layer { layer: layer.into(), fault: one_line(e, text) };
+        let table = toml::from_str::<Table>(text).map_err(|e| fault(&e))?;
+        // Check this layer alone first: only then can a message name its line.
+        if transfer_file(&table).is_none() {
+            let mut without_none = Table::new();
+            merge(&mut without_none, table.clone(), &mut Vec::new());
+            if Settings::deserialize(without_none).is_err() {
+                let refused =
+                    |e: &toml::de::Error| e.span().and_then(|span| text.get(span)).map(|t| t.trim_matches(['"', '\'']));
+                // A `none` that removes a setting is refused by the text alone. Then another one is at fault, and the check below names it.
+                toml::from_str::<Settings>(text).or_else(|e| match refused(&e) {
+                    Some("none") => Ok(Settings::default()),
+                    _ => Err(fault(&e)),
+                })?;
+            }
+        }
+        self.merge_checked(layer, table, folder)
+    }
+
+    /// Checks the merged settings after every layer, so that the message names the layer at fault.
+    fn merge_checked(&mut self, layer: &str, mut table: Table, folder: Option<&Path>) -> Result<(), LoadError> {
+        if let Some(name) = transfer_file(&table) {
+            let path = folder.unwrap_or(Path::new("")).join(name);
+            let points = points(&path)?;
+            if let Some(Value::Table(volume)) = table.get_mut("volume") {
+                volume.insert("transfer".into(), points);
+            }
+        }
+        add_paths(&table, "", &mut self.given);
+        merge(&mut self.merged, table, &mut Vec::new());
+        self.settings().map(drop).map_err(|e| LoadError::Layer { layer: layer.into(), fault: one_line(&e, "") })
+    }
+
+    fn settings(&self) -> Result<Settings, toml::de::Error> {
+        Settings::deserialize(self.merged.clone())
+    }
+
+    pub fn finish(self) -> Result<Settings, LoadError> {
+        self.settings().map_err(|e| LoadError::Layer { layer: "scene".into(), fault: one_line(&e, "") })
+    }
+}
+
+/// `current` with what changed from `before` to `after`, value by value. A value that is not as it was before stays; so does a table with such a
+/// value that is no longer in `after`. None if that makes no settings.
+pub fn rebase(current: &Settings, before: &Settings, after: &Settings) -> Option<Settings> {
+    let table = |settings: &Settings| Table::try_from(settings).ok();
+    let mut rebased = table(current)?;
+    rebase_table(&mut rebased, &table(before)?, &table(after)?);
+    Settings::deserialize(rebased).ok()
+}
+
+fn rebase_table(current: &mut Table, before: &Table, after: &Table) {
+    let keys: BTreeSet<String> = before.keys().chain(after.keys()).cloned().collect();
+    for key in keys {
+        let was = before.get(&key);
+        if current.get(&key) == was {
+            match after.get(&key) {
+                Some(value) => drop(current.insert(key, value.clone())),
+                None => drop(current.remove(&key)),
+            }
+        } else if let (Some(Value::Table(current)), Some(Value::Table(was)), Some(Value::Table(after))) =
+            (current.get_mut(&key), was, after.get(&key))
+        {
+            rebase_table(current, was, after);
+        }
+    }
+}
+
+/// The settings of a preset alone.
+pub(super) fn preset_settings(name: &str) -> Option<Settings> {
+    let mut layers = Layers::default();
+    layers.preset(name).ok()?;
+    layers.finish().ok()
+}
+
+/// Adds the paths of all values of a table.
+fn add_paths(table: &Table, before: &str, paths: &mut BTreeSet<String>) {
+    for (key, value) in table {
+        let path = if before.is_empty() { key.clone() } else { format!("{before}.{key}") };
+        match value {
+            Value::Table(inner) if !inner.is_empty() => add_paths(inner, &path, paths),
+            _ => drop(paths.insert(path)),
+        }
+    }
+}
+
+/// True if a table has a value at `path`.
+fn holds(table: &Table, path: &str) -> bool {
+    match path.split_once('.') {
+        None => table.contains_key(path),
+        Some((key, rest)) => table.get(key).and_then(Value::as_table).is_some_and(|inner| holds(inner, rest)),
+    }
+}
+
+fn remove(table: &mut Table, path: &str) {
+    match path.split_once('.') {
+        None => drop(table.remove(path)),
+        Some((key, rest)) => {
+            if let Some(Value::Table(inner)) = table.get_mut(key) {
+                remove(inner, rest);
+            }
+        }
+    }
+}
+
+/// Reads a small text file. `what` names its kind in messages.
+pub fn read(path: &Path, what: &str) -> Result<String, LoadError> {
+    files::read_text(path, MAX_BYTES, what).map_err(|fault| LoadError::File { path: path.display().to_string(), fault })
+}
+
+/// The transfer function file that a layer names.
+pub fn transfer_file(table: &Table) -> Option<String> {
+    let name = table.get("volume")?.get("transfer")?.as_str()?;
+    name.ends_with(".toml").then(|| name.to_string())
+}
+
+/// Reads a transfer function file: a list `points` of { at, colour, opacity }.
+fn points(path: &Path) -> Result<Value, LoadError> {
+    #[derive(Deserialize)]
+    #[serde(deny_unknown_fields)]
+    struct Listed {
+        points: Vec<TransferPoint>,
+    }
+    let text = read(path, "transfer function")?;
+    let fault = |e: &dyn std::fmt::Display| LoadError::File { path: path.display().to_string(), fault: e.to_string() };
+    let listed = toml::from_str::<Listed>(&text).map_err(|e| fault(&one_line(&e, &text)))?;
+    Value::try_from(listed.points).map_err(|e| fault(&e))
+}
+
+/// Merges `over` into `under`, which is at `path` in the scene. The word `none` removes a setting that may be absent.
+fn merge(under: &mut Table, over: Table, path: &mut Vec<String>) {
+    // A size in one unit takes the place of an earlier layer's in the other.
+    for (pixels, mm) in RIVALS {
+        let gives = |key: &str| over.get(key).is_some_and(|value| value.as_str() != Some("none"));
+        match (gives(pixels), gives(mm)) {
+            (true, false) => drop(under.remove(*mm)),
+            (false, true) => drop(under.remove(*pixels)),
+            _ => {}
+        }
+    }
+    for (key, value) in over {
+        path.push(key.clone());
+        match (under.get_mut(&key), value) {
+            (_, Value::String(word)) if word == "none" && may_be_absent(path) => drop(under.remove(&key)),
+            (Some(Value::Table(under)), Value::Table(over)) => merge(under, over, path),
+            // So that a `none` within the table is seen.
+            (None, Value::Table(over)) => {
+                let mut inner = Table::new();
+                merge(&mut inner, over, path);
+                under.insert(key, Value::Table(inner));
+            }
+            (_, value) => drop(under.insert(key, value)),
+        }
+        path.pop();
+    }
+}
+
+/// True if a scene may have no value at this path: a table, as `light.shadow`, or an optional value, as `ray.step`.
+fn may_be_absent(path: &[String]) -> bool {
+    let nested =
+        path.iter().rev().fold(Table::new(), |inner, key| Table::from_iter([(key.clone(), Value::Table(inner))]));
+    match Settings::deserialize(nested) {
+        Ok(_) => true,
+        // A table with fields that must be given is one too.
+        Err(e) if e.message().starts_with("missing field") => true,
+        Err(e) if e.message().starts_with("unknown field") => false,
+        // A value. Settings without a value are not written.
+        Err(_) => {
+            let written = Table::try_from(Settings::default()).unwrap_or_default();
+            let written = Value::Table(written);
+            let mut at = Some(&written);
+            for key in path {
+                at = at.and_then(|value| value.get(key));
+            }
+            at.is_none()
+        }
+    }
+}
+
+fn one_line(error: &toml::de::Error, text: &str) -> String {
+    let span = error.span().filter(|_| !text.is_empty());
+    let place = span.map_or(String::new(), |span| format!("line {}: ", line_of(text, span.start)));
+    place + &printable(error.message())
+}
+
+/// The line number of a byte in a text, from 1.
+pub fn line_of(text: &str, byte: usize) -> usize {
+    text.bytes().take(byte).filter(|b| *b == b'\n').count() + 1
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_preset_parses_and_later_layers_win() {
+        for (name, _) in PRESETS {
+            let mut layers = Layers::default();
+            layers.preset(name).unwrap();
+            layers.set("surface.threshold=0.3").unwrap();
+            layers.set("mode=volume").unwrap();
+            let settings = layers.finish().unwrap();
+            assert_eq!(settings.surface.threshold, 0.3, "{name}");
+            assert_eq!(settings.mode, super::super::Mode::Volume);
+        }
+    }
+
+    #[test]
+    fn none_switches_off_what_a_preset_asked_for() {
+        let mut layers = Layers::default();
+        layers.preset("fetal").unwrap();
+        layers.set("light.shadow=none").unwrap();
+        let settings = layers.finish().unwrap();
+        assert!(settings.light.shadow.is_none() && settings.light.occlusion.is_some());
+    }
+
+    #[test]
+    fn a_size_in_one_unit_takes_the_place_of_an_earlier_one_in_the_other() {
+        let sizes = |sets: &[&str]| {
+            let mut layers = Layers::default();
+            layers.preset("fetal").unwrap();
+            sets.iter().for_each(|set| layers.set(set).unwrap());
+            let settings = layers.finish().unwrap();
+            let smooth = settings.slices.smooth.unwrap();
+            (settings.distance.median, settings.distance.median_mm, smooth.elevation, smooth.elevation_mm)
+        };
+        assert_eq!(sizes(&[]), (19, None, 1.4, None));
+        assert_eq!(sizes(&["distance.median_mm=4"]), (0, Some(4.0), 1.4, None));
+        assert_eq!(sizes(&["distance.median_mm=4", "distance.median=7"]), (7, None, 1.4, None));
+        assert_eq!(sizes(&["distance.median_mm=none"]), (19, None, 1.4, None));
+        assert_eq!(sizes(&["slices.smooth.elevation_mm=2.5"]), (19, None, 0.0, Some(2.5)));
+        assert_eq!(sizes(&["slices.smooth={elevation=1,elevation_mm=2.5}"]), (19, None, 1.0, Some(2.5)));
+    }
+
+    #[test]
+    fn none_works_in_a_file_and_for_any_setting_that_may_be_absent() {
+        let mut layers = Layers::default();
+        layers.preset("face-classic").unwrap();
+        let text = "[ray]\nstep = 'none'\n[camera]\ntarget = 'none'\n[distance]\nbilateral = 'none'\n[slices]\nestimator = 'none'";
+        layers.add("scene.toml", text, None).unwrap();
+        let settings = layers.clone().finish().unwrap();
+        assert_eq!((settings.ray.step, settings.camera.target, settings.distance.bilateral), (None, None, None));
+        assert_eq!(settings.post.colour_map, super::super::ColourMap::None);
+        for wrong in ["ray.stp=none", "ray.entries=none", "mode=none", "light.shadow.depth=none"] {
+            assert!(layers.set(wrong).is_err(), "{wrong}");
+        }
+        for (text, line) in [("[ray]\nentries = 'none'", ""), ("[ray]\nstep = 'none'\nentries = 'x'", "line 3")] {
+            let said = layers.add("scene.toml", text, None).unwrap_err().to_string();
+            assert!(said.contains(line) && said.lines().count() == 1, "{said}");
+        }
+    }
+
+    #[test]
+    fn a_transfer_function_may_lie_in_a_file_of_its_own() {
+        let folder = std::env::temp_dir().join(format!("echolume-transfer-{}", std::process::id()));
+        std::fs::create_dir_all(&folder).unwrap();
+        let write = |name: &str, text: &str| std::fs::write(folder.join(name), text).unwrap();
+        write(
+            "fire.toml",
+            "points = [{ at = 0, colour = [0, 0, 0], opacity = 0 }, { at = 1, colour = [1, 0.5, 0], opacity = 0.5 }]",
+        );
+        write("scene.toml", "[volume]\ntransfer = 'fire.toml'");
+        write("broken.toml", "points = [{ at = 0, color = [0, 0, 0] }]");
+        let mut layers = Layers::default();
+        layers.file(&folder.join("scene.toml")).unwrap();
+        let crate::scene::Transfer::Points(points) = layers.finish().unwrap().volume.transfer else { panic!("points") };
+        assert_eq!((points.len(), points[1].colour), (2, [1.0, 0.5, 0.0]));
+        let broken = format!("volume.transfer={}", folder.join("broken.toml").display());
+        let error = Layers::default().set(&broken).unwrap_err().to_string();
+        assert!(error.contains("broken.toml") && error.contains("color") && error.lines().count() == 1, "{error}");
+        let missing = Layers::default().set("volume.transfer=missing.toml").unwrap_err().to_string();
+        assert!(missing.contains("missing.toml: cannot be read"), "{missing}");
+        std::fs::remove_dir_all(&folder).unwrap();
+    }
+
+    #[test]
+    fn a_misspelt_key_is_an_error_that_names_it() {
+        let error = Layers::default().set("surface.treshold=0.3").unwrap_err().to_string();
+        assert!(error.contains("treshold"), "{error}");
+        assert_eq!(error.lines().count(), 1);
+        assert!(Layers::default().set("nonsense").is_err());
+        assert!(Layers::default().set("mode=sideways").is_err());
+        assert!(Layers::default().preset("nothing").unwrap_err().to_string().contains("bone"));
+    }
+
+    /// Prevents a pasted assignment that works only over a preset which happens to set the same table.
+    #[test]
+    fn none_switches_off_what_an_earlier_layer_set_and_what_none_did() {
+        for path in [
+            "slices.smooth",
+            "slices.sigma",
+            "slices.enhanced_sigma",
+            "slices.perona_malik",
+            "distance.bilateral",
+            "post.sigma",
+            "light.shadow",
+            "light.occlusion",
+            "light.skin",
+        ] {
+            let mut layers = Layers::default();
+            layers.set(&format!("{path}=none")).expect(path);
+            let fields = if path == "distance.bilateral" { "{pixels=2,distance=3}" } else { "{}" };
+            layers.set(&format!("{path}={fields}")).expect(path);
+            assert_ne!(layers.settings().expect("settings"), Settings::default(), "{path} has an effect");
+            layers.set(&format!("{path}=none")).expect(path);
+            layers.set(&format!("{path}=none")).expect(path);
+            assert_eq!(layers.finish().expect("settings"), Settings::default(), "{path}");
+        }
+        // A word of its own, numbers, and keys that do not exist.
+        let mut layers = Layers::default();
+        layers.set("volume.shading=none").expect("a word");
+        for wrong in ["slices.smoooth=none", "camera.zoom=none", "light.shadow.softness=none", "none=none"] {
+            assert!(layers.set(wrong).is_err(), "{wrong}");
+        }
+    }
+}

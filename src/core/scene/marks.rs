@@ -1,0 +1,343 @@
+//! Marks of a picture: by tile its place, its scale, the letters of the patient's sides at its edges, and the side of the probe's marker.
+//! The viewer and written pictures draw the same.
+
+use super::planes::{CURVE_COLOUR, cell, colour};
+use super::region::depth_offset;
+use super::{Layout, Marks, Mode, PlaneName, ProbeMarker, Scene, Sides};
+use glam::DVec3;
+
+/// Directions whose components differ by less are as far from one edge as from the other.
+const SAME: f64 = 1e-6;
+/// Lengths that a scale bar may have, mm.
+pub const BAR_LENGTHS: [f64; 9] = [0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0, 200.0];
+
+/// An axis of the volume.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum VolumeAxis {
+    Lateral,
+    Depth,
+    Elevation,
+}
+
+impl Marks {
+    /// The patient's sides along an axis of the volume.
+    pub fn sides(&self, axis: VolumeAxis) -> Sides {
+        match axis {
+            VolumeAxis::Lateral => self.lateral,
+            VolumeAxis::Depth => self.depth,
+            VolumeAxis::Elevation => self.elevation,
+        }
+    }
+
+    /// These marks with other sides along an axis. A pair of sides lies along one axis: another axis that had it has none then.
+    pub fn with_sides(mut self, axis: VolumeAxis, sides: Sides) -> Marks {
+        for other in [&mut self.lateral, &mut self.depth, &mut self.elevation] {
+            if *other == sides || *other == sides.exchanged() {
+                *other = Sides::None;
+            }
+        }
+        *match axis {
+            VolumeAxis::Lateral => &mut self.lateral,
+            VolumeAxis::Depth => &mut self.depth,
+            VolumeAxis::Elevation => &mut self.elevation,
+        } = sides;
+        self
+    }
+
+    /// These marks with L in place of R, and R in place of L.
+    pub fn left_and_right_exchanged(mut self) -> Marks {
+        for sides in [&mut self.lateral, &mut self.depth, &mut self.elevation] {
+            if matches!(sides, Sides::LeftRight | Sides::RightLeft) {
+                *sides = sides.exchanged();
+            }
+        }
+        self
+    }
+}
+
+/// An edge of a tile.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Edge {
+    Left,
+    Right,
+    Top,
+    Bottom,
+}
+
+impl Edge {
+    fn opposite(self) -> Edge {
+        match self {
+            Edge::Left => Edge::Right,
+            Edge::Right => Edge::Left,
+            Edge::Top => Edge::Bottom,
+            Edge::Bottom => Edge::Top,
+        }
+    }
+
+    /// From the middle of a tile to the middle of this edge, in halves of its width and height.
+    pub fn offset(self) -> [f64; 2] {
+        match self {
+            Edge::Left => [-1.0, 0.0],
+            Edge::Right => [1.0, 0.0],
+            Edge::Top => [0.0, -1.0],
+            Edge::Bottom => [0.0, 1.0],
+        }
+    }
+}
+
+/// The marks of a tile.
+#[derive(Clone, Debug, PartialEq)]
+pub struct TileMarks {
+    /// Its upper left corner and its size, pixels of the picture.
+    pub corner: [f64; 2],
+    pub size: [f64; 2],
+    /// Size of a pixel, mm; of a rendering at the camera's target.
+    pub pixel: f64,
+    /// True for a rendering, false for a plane.
+    pub is_rendering: bool,
+    /// Depth of its upper edge below the probe's face, mm, where depth runs straight down.
+    pub depth_from: Option<f64>,
+    pub letters: Vec<(Edge, &'static str)>,
+    /// The edge of the probe's marker.
+    pub probe: Option<Edge>,
+    /// The letter of the plane and its colour, where several planes are shown.
+    pub plane: Option<(&'static str, [f64; 3])>,
+    /// Of a curved plane: the length of its line, mm.
+    pub along: Option<f64>,
+}
+
+impl Scene {
+    /// The marks of every tile, in the order of the tiles; a rendering comes last.
+    pub fn marks(&self) -> Vec<TileMarks> {
+        self.marks_with(&self.settings.marks)
+    }
+
+    /// The same with other settings of the marks: those of a picture that is shown may be newer than its own.
+    pub fn marks_with(&self, marks: &Marks) -> Vec<TileMarks> {
+        let mut all = Vec::new();
+        if self.cuts_planes() {
+            let sheet = self.sheet();
+            all.extend(sheet.tiles.iter().enumerate().map(|(n, tile)| {
+                // Along a line that bends away, left and right are no sides of the patient.
+                let heading = tile.section.as_ref().map_or(tile.plane.right, |section| section.heading());
+                let (letters, probe) = sides(marks, heading, tile.plane.down);
+                let middle = tile.plane.at.y - depth_offset(&self.geometry);
+                let is_upright = tile.plane.down.y > 0.99;
+                TileMarks {
+                    corner: tile.corner.map(f64::from),
+                    size: tile.size.map(f64::from),
+                    pixel: tile.pixel,
+                    is_rendering: false,
+                    depth_from: is_upright.then(|| middle - tile.pixel * f64::from(tile.size[1]) / 2.0),
+                    letters,
+                    probe,
+                    plane: match &tile.section {
+                        Some(_) => Some(("S", CURVE_COLOUR)),
+                        None if self.has_curve() || self.shows_three() => {
+                            self.plane_of_tile(n).map(|name| (name.letter(), colour(name)))
+                        }
+                        None => None,
+                    },
+                    along: tile.section.as_ref().map(|section| section.line.length()),
+                }
+            }));
+        }
+        if !self.is_flat() {
+            all.push(self.marks_of_rendering(marks));
+        }
+        all
+    }
+
+    fn marks_of_rendering(&self, marks: &Marks) -> TileMarks {
+        let size = self.picture_size();
+        let corner = match self.settings.layout {
+            Layout::Single => [0, 0],
+            Layout::Four => size.map(|n| cell(n, 1, 2)),
+            Layout::Pair => [cell(size[0], 1, 2), 0],
+        };
+        let (rays, size) = (&self.rays, [size[0] - corner[0], size[1] - corner[1]]);
+        let apart = match rays.is_perspective {
+            true => rays.direction_dx.length() * (rays.target - rays.origin).dot(rays.forward),
+            false => rays.origin_dx.length(),
+        };
+        let (letters, probe) = sides(marks, rays.right, -rays.up);
+        TileMarks {
+            corner: corner.map(f64::from),
+            size: size.map(f64::from),
+            pixel: apart * f64::from(self.ray_size()[0]) / f64::from(size[0].max(1)),
+            is_rendering: true,
+            depth_from: None,
+            letters,
+            probe,
+            plane: None,
+            along: None,
+        }
+    }
+}
+
+/// The edges to which a direction of the volume points, on a tile with these directions in space: one, or two that are as near. None if it points
+/// more towards or away from the viewer than to any edge: then it has no side on the picture.
+fn edges_of(axis: DVec3, right: DVec3, down: DVec3) -> Vec<Edge> {
+    let [across, along] = [axis.dot(right), axis.dot(down)];
+    let away = (1.0 - across * across - along * along).max(0.0).sqrt();
+    let nearest = across.abs().max(along.abs());
+    if nearest + SAME < away {
+        return Vec::new();
+    }
+    let edges = [
+        (across.abs(), if across > 0.0 { Edge::Right } else { Edge::Left }),
+        (along.abs(), if along > 0.0 { Edge::Bottom } else { Edge::Top }),
+    ];
+    edges.into_iter().filter(|(share, _)| share + SAME >= nearest).map(|(_, edge)| edge).collect()
+}
+
+/// Letters and the marker's edge of a tile with these directions in space.
+fn sides(marks: &Marks, right: DVec3, down: DVec3) -> (Vec<(Edge, &'static str)>, Option<Edge>) {
+    let mut letters: Vec<(Edge, &'static str)> = Vec::new();
+    for (axis, sides) in [(DVec3::X, marks.lateral), (DVec3::Z, marks.elevation), (DVec3::Y, marks.depth)] {
+        let Some([low, high]) = sides.letters() else { continue };
+        let is_free = |edge: &Edge| letters.iter().all(|(taken, _)| taken != edge && *taken != edge.opposite());
+        if let Some(edge) = edges_of(axis, right, down).into_iter().find(is_free) {
+            letters.extend([(edge.opposite(), low), (edge, high)]);
+        }
+    }
+    let last = edges_of(DVec3::X, right, down).first().copied();
+    let probe = match marks.probe {
+        ProbeMarker::First => last.map(Edge::opposite),
+        ProbeMarker::Last => last,
+        ProbeMarker::Hidden => None,
+    };
+    (letters, probe)
+}
+
+impl PlaneName {
+    /// Its letter.
+    pub fn letter(self) -> &'static str {
+        match self {
+            PlaneName::A => "A",
+            PlaneName::B => "B",
+            PlaneName::C => "C",
+        }
+    }
+}
+
+impl TileMarks {
+    /// The corner of the plane's letter, from the middle in halves of width and height: next to an upper edge, away from the probe's marker.
+    pub fn plane_corner(&self) -> [f64; 2] {
+        match self.probe {
+            Some(Edge::Right) => [-1.0, -1.0],
+            _ => [1.0, -1.0],
+        }
+    }
+
+    /// What a curved plane says of itself: across it shows the length along its line.
+    pub fn along_label(&self) -> Option<String> {
+        self.along.map(|mm| format!("along the line: {mm:.1} mm"))
+    }
+
+    /// The longest scale bar of at most a share of the tile's width: its length, mm and pixels.
+    pub fn bar(&self, share: f64) -> Option<(f64, f64)> {
+        let most = self.size[0] * share * self.pixel;
+        let mm = BAR_LENGTHS.into_iter().rev().find(|mm| *mm <= most && self.pixel > 0.0 && self.pixel.is_finite())?;
+        Some((mm, mm / self.pixel))
+    }
+}
+
+impl Mode {
+    /// The name of the mode for the user.
+    pub fn title(self) -> &'static str {
+        match self {
+            Mode::Volume => "Volume",
+            Mode::Surface => "Surface",
+            Mode::Mixed => "Mixed",
+            Mode::Mip => "MIP",
+            Mode::MinIp => "MinIP",
+            Mode::Mean => "X-ray",
+            Mode::Plane => "Plane",
+            Mode::Orthogonal => "3 planes",
+            Mode::Tomography => "Slices",
+            Mode::Cube => "Cube",
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scene::test_block::block;
+
+    fn scene(lines: &[&str]) -> Scene {
+        block(&[&["picture.size=[200,100]"], lines].concat(), [40, 30, 20])
+    }
+
+    const SIDES: [&str; 2] = ["marks.lateral='right-left'", "marks.elevation='feet-head'"];
+
+    #[test]
+    fn letters_stand_where_the_axes_point() {
+        let plane = scene(&[SIDES[0], SIDES[1], "mode='plane'"]).marks();
+        assert_eq!(plane[0].letters, [(Edge::Left, "R"), (Edge::Right, "L")], "plane A: lateral to the right");
+        assert_eq!((plane[0].probe, plane[0].depth_from.is_some()), (Some(Edge::Left), true));
+        let coronal = scene(&[SIDES[0], SIDES[1], "mode='plane'", "planes.plane='c'"]).marks();
+        let expected = [(Edge::Left, "R"), (Edge::Right, "L"), (Edge::Bottom, "F"), (Edge::Top, "H")];
+        assert_eq!(coronal[0].letters, expected, "plane C: elevation up");
+        assert_eq!(coronal[0].depth_from, None);
+        let turned = scene(&[SIDES[0], "mode='plane'", "planes.azimuth=180", "marks.probe='last'"]).marks();
+        assert_eq!(turned[0].letters, [(Edge::Right, "R"), (Edge::Left, "L")], "seen from behind");
+        assert_eq!(turned[0].probe, Some(Edge::Left));
+    }
+
+    /// Prevents tiles that lose the marker and the letters at some angle within the picture, and letters at an edge to which nothing points.
+    #[test]
+    fn a_direction_has_the_edge_it_points_to_most_unless_it_points_at_the_viewer() {
+        let [x, y] = [DVec3::X, DVec3::Y];
+        let at = |degrees: f64, axis: DVec3| {
+            let (sin, cos) = degrees.to_radians().sin_cos();
+            edges_of(axis, x * cos + y * sin, y * cos - x * sin)
+        };
+        for degrees in 0..360 {
+            let edge = at(f64::from(degrees), x);
+            let expected: &[Edge] = match degrees {
+                45 => &[Edge::Right, Edge::Top],
+                135 => &[Edge::Left, Edge::Top],
+                225 => &[Edge::Left, Edge::Bottom],
+                315 => &[Edge::Right, Edge::Bottom],
+                46..135 => &[Edge::Top],
+                136..225 => &[Edge::Left],
+                226..315 => &[Edge::Bottom],
+                _ => &[Edge::Right],
+            };
+            assert_eq!(edge, expected, "{degrees} degrees in the picture");
+            assert!(at(f64::from(degrees), DVec3::Z).is_empty(), "it points at the viewer");
+        }
+        // Turned in the picture and tilted out of it: the share along the edge decides.
+        let marks = Marks { lateral: Sides::RightLeft, depth: Sides::FrontBack, ..Marks::default() };
+        for roll in [0.0, 30.0, 44.0, 45.0, 46.0, 90.0] {
+            let (sin, cos) = f64::to_radians(roll).sin_cos();
+            let (letters, probe) = super::sides(&marks, x * cos + y * sin, y * cos - x * sin);
+            assert_eq!((letters.len(), probe.is_some()), (4, true), "{roll}: {letters:?}");
+        }
+        let probe = |lines: &[&str]| scene(lines).marks()[0].probe;
+        assert_eq!(probe(&["camera.azimuth=0"]), Some(Edge::Left));
+        assert_eq!(probe(&["camera.azimuth=40", "camera.roll=30"]), Some(Edge::Left));
+        assert_eq!(probe(&["camera.azimuth=50"]), None, "it points more at the viewer than to an edge");
+        assert_eq!(probe(&["camera.azimuth=90", "camera.roll=45"]), None);
+    }
+
+    #[test]
+    fn every_tile_has_marks_and_none_has_letters_that_nobody_set() {
+        let four = scene(&["layout='four'"]).marks();
+        assert_eq!(four.len(), 4);
+        assert!(four.iter().all(|tile| tile.letters.is_empty()) && four[3].is_rendering);
+        let slices = scene(&[SIDES[0], "mode='tomography'"]).marks();
+        assert!(slices.len() == 12 && slices.iter().all(|tile| tile.letters.len() == 2 && tile.probe.is_some()));
+        let single = scene(&["camera.azimuth=45"]).marks();
+        assert_eq!((single.len(), single[0].size), (1, [200.0, 100.0]));
+    }
+
+    #[test]
+    fn a_scale_bar_has_its_length_in_pixels() {
+        let marks = scene(&["mode='plane'"]).marks();
+        let (mm, pixels) = marks[0].bar(0.3).expect("a bar");
+        assert!((mm - pixels * marks[0].pixel).abs() < 1e-9 && pixels <= 0.3 * marks[0].size[0]);
+    }
+}

@@ -1,0 +1,805 @@
+//! The scene: everything that determines a picture. It combines the geometry of the probe, the type of the samples and the user's
+//! [`Settings`], checked and resolved to the values that the passes need. Pure data, no Vulkan.
+
+mod bricks;
+pub mod camera;
+mod caps;
+mod check;
+mod check_body_marks;
+mod check_measures;
+pub mod cube;
+pub mod curve;
+pub mod cuts;
+pub mod default_look;
+mod echo_levels;
+mod floating;
+mod lattice;
+mod light_lattice;
+pub mod load;
+pub mod look;
+pub mod marks;
+pub mod picker;
+pub mod planes;
+mod region;
+mod sampling;
+pub mod self_attenuation;
+pub mod settings;
+mod sizes;
+mod slice_index;
+pub mod start_curve;
+mod still;
+#[cfg(test)]
+mod test_block;
+pub mod transfer;
+mod turntable;
+pub mod unveil;
+pub mod variants;
+pub mod visible_bounds;
+
+pub use bricks::{Bricks, Reach, Side, TILE};
+pub use camera::Rays;
+pub use echo_levels::{EchoHistogram, EchoLevels};
+pub use lattice::Lattice;
+pub use light_lattice::{AmbientCones, LightLattice, Propagation};
+pub use marks::VolumeAxis;
+pub use region::{depth_offset, insonified_box};
+pub use settings::*;
+pub use still::{DistantLight, StillLights};
+pub use visible_bounds::{Rectangle, Shared, VisibleBounds};
+
+use crate::probe::StoredType;
+use crate::probe::{Array, Geometry, Probe};
+use glam::DVec3;
+use region::{framed_low, is_still, slice_grid, visible_box};
+use sizes::{Pitches, ResolvedSize, Resolver};
+
+/// Maximum width and height of a picture, pixels.
+pub const MAX_PICTURE: u32 = 16384;
+/// Maximum standard deviation of a Gaussian, pixels: 193 taps.
+pub const MAX_DEVIATION: f64 = 32.0;
+/// Maximum window of a filter, pixels.
+pub const MAX_WINDOW: u32 = 63;
+
+/// Maximum number of samples on a ray.
+const MAX_SAMPLES: f64 = 65536.0;
+
+/// Maximum number of clip planes.
+pub const MAX_CLIPS: usize = 4;
+
+/// Type and value range of the samples of a source.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Input {
+    pub stored: StoredType,
+    /// The stored values that map to 0 and 1.
+    pub range: [f64; 2],
+}
+
+impl Input {
+    /// The same samples with the range that the settings ask for, if they do. `shift`: what signed samples are stored with
+    /// ([`SampleType::shift`](crate::probe::SampleType::shift)), which the setting does not have.
+    pub fn in_range_of(self, settings: &Settings, shift: f64) -> Input {
+        let asked = settings.samples.range.map(|range| range.map(|value| value + shift));
+        Input { range: asked.unwrap_or(self.range), ..self }
+    }
+}
+
+/// The pixel grid of a slice. The centre of pixel (0, 0) lies at `origin`, in-plane (x, y) in mm.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SliceGrid {
+    pub size: [u32; 2],
+    pub origin: [f64; 2],
+    pub pitch: [f64; 2],
+}
+
+impl SliceGrid {
+    pub fn place(&self, column: f64, row: f64) -> (f64, f64) {
+        (self.origin[0] + column * self.pitch[0], self.origin[1] + row * self.pitch[1])
+    }
+}
+
+/// The region, grey window and start depth of a pass of stage 2. They belong to the mode: rays that start at the probe meet the wall first.
+#[derive(Clone, Copy, Debug)]
+pub struct View {
+    pub window: [f64; 2],
+    /// Lower corner of the region, cut at the start depth, mm in space.
+    pub low: DVec3,
+    /// Upper corner of the region.
+    pub high: DVec3,
+}
+
+/// The samples that the surface detector compares at a place: a ring of two halves, each as long as an edge.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Ring {
+    /// Distance between two samples of the ring, mm.
+    pub step: f64,
+    /// Samples of a half, 4..=256.
+    pub half: u32,
+    /// The largest difference is among this many samples from the crossing of the threshold on.
+    pub follow: u32,
+}
+
+impl Ring {
+    pub fn new(edge: Edge, step: f64, threshold: f64) -> Ring {
+        let (step, half) = match edge {
+            Edge::Named(EdgeName::Samples) => (step, 4),
+            Edge::Length(length) => {
+                let half = Ring::half_of(length, step);
+                (length / f64::from(half), half)
+            }
+        };
+        // An edge with the shape of an error function and a height A peaks at most 0.242 A/threshold halves behind its crossing.
+        let follow = f64::from(half) * (0.25 / threshold).clamp(1.0, 16.0);
+        // One more, as the crossing lies up to a step in front of the sample that exceeds the threshold.
+        Ring { step, half, follow: follow.ceil() as u32 + 1 }
+    }
+
+    fn half_of(length: f64, step: f64) -> u32 {
+        // The slack is that of rounding: 1.6 mm are four steps of 0.4 mm.
+        (length / step - 1e-9).ceil().clamp(4.0, 256.0) as u32
+    }
+
+    /// Samples of a half for rays with another step, mm, and the same edge.
+    pub fn half_at(self, step: f64) -> u32 {
+        Ring::half_of(self.step * f64::from(self.half), step)
+    }
+
+    /// Number of samples (n of thesis 4-3).
+    pub fn samples(self) -> u32 {
+        2 * self.half
+    }
+}
+
+/// How a window stores pixels. A picture that is stored so is copied to it as it is.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum WindowTexels {
+    #[default]
+    Rgba8,
+    Bgra8,
+    /// More than 8 bits a channel.
+    Deep,
+}
+
+#[derive(Clone, Debug)]
+pub struct Scene {
+    pub geometry: Geometry,
+    pub input: Input,
+    pub settings: Settings,
+    pub grid: SliceGrid,
+    /// Corners of the rendered box, mm in space: the bounds of the insonified region within the region of interest.
+    pub low: DVec3,
+    pub high: DVec3,
+    pub rays: Rays,
+    /// Step along a ray, mm.
+    pub step: f64,
+    /// Samples of the surface detector, whose step divides the length of an edge.
+    pub ring: Ring,
+    /// Whether rays skip bricks if no setting says so: true, or the last choice of [`Scene::sampled`].
+    pub bricks_pay: bool,
+    /// How the picture is stored: as the window takes it without a conversion. The device resolves this.
+    pub window_texels: WindowTexels,
+    /// Bytes of shared memory of a workgroup of a GPU, which solves a row or a column under AOS in it, propagates light through several layers, and reads the
+    /// texels of filters once; 0 on a CPU, where single invocations do all that faster. The device resolves this.
+    pub shared_memory: u32,
+    /// Half-precision floats are truncated where they are stored, not rounded. The device resolves this.
+    pub truncates_halves: bool,
+    /// Maximum number of frames that go through stage 1 at once, 1... The device resolves this.
+    pub frames_at_once: u32,
+    /// How the volume is sampled: the setting, or for `Auto` the last choice of [`Scene::sampled`].
+    pub sampling: Sampling,
+    /// Margin in pixels around the sector in which pixels take the nearest sample inside: the reach of the filters. 0 is the strict rule
+    /// of the PLUS toolkit, which keeps a pixel only if all four neighbours exist.
+    pub apron: f64,
+    /// Conditioning of lines, sizes in samples.
+    pub conditioning: Conditioning,
+    /// Filters of slices, sizes in slice pixels; the Gaussian's as set along lateral and depth, and in slices across them.
+    pub slice_filters: Slices,
+    /// The Gaussian of the planes' own volume, in the same units.
+    pub section_smooth: Option<Smooth>,
+    /// Filters of the distance map, sizes in rays.
+    pub distance: Distance,
+    /// What became of sizes in mm, for `--explain`.
+    pub resolved_sizes: Vec<ResolvedSize>,
+    /// How settings that nobody chose were found, for `--explain`; one line each.
+    pub found: Vec<String>,
+    /// The texels of the volume that stage 2 may read. Stage 1 computes only these.
+    pub visible_bounds: visible_bounds::VisibleBounds,
+    /// What a renderer stores beyond what this scene shows, from an earlier scene: [`Scene::keeping`].
+    pub kept_bounds: visible_bounds::VisibleBounds,
+    /// What stage 1 prepares for other pictures of the same volume: [`Scene::sharing`].
+    pub shared: Option<Shared>,
+    /// Where a surface is found for a mesh. No picture has one.
+    pub lattice: Option<Lattice>,
+}
+
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[error("scene: {field}: {fault}")]
+pub struct SceneError {
+    pub field: &'static str,
+    pub fault: String,
+}
+
+pub fn refuse<T>(field: &'static str, fault: impl Into<String>) -> Result<T, SceneError> {
+    Err(SceneError { field, fault: fault.into() })
+}
+
+impl Settings {
+    /// Checks settings without a geometry.
+    ///
+    /// # Errors
+    /// Names the first setting that is invalid for every geometry, and its limits.
+    pub fn check(&self) -> Result<(), SceneError> {
+        check::check(self)?;
+        check_measures::check_measures(&self.measure)?;
+        check_body_marks::check_body_marks(&self.body_marks)?;
+        check::check_cine(&self.cine)?;
+        still::check(self)?;
+        cuts::check(&self.cuts)?;
+        start_curve::check(self)?;
+        check::check_planes(self)
+    }
+}
+
+impl Scene {
+    /// Checks the settings against the geometry and resolves them.
+    ///
+    /// # Errors
+    /// Names the first setting that cannot be rendered, and its limits.
+    pub fn new(geometry: Geometry, input: Input, settings: Settings) -> Result<Scene, SceneError> {
+        match &geometry {
+            Geometry::Sweep(probe) => {
+                probe.check().map_err(|e| SceneError { field: e.field, fault: e.fault })?;
+            }
+            Geometry::Cartesian(grid) => {
+                grid.check().map_err(|e| SceneError { field: e.field, fault: e.fault })?;
+            }
+        }
+        settings.check()?;
+        check::check_conditioning(&settings.conditioning, &geometry)?;
+        let [low, high] = input.range;
+        if !(low.is_finite() && high.is_finite() && low < high) {
+            return refuse("samples.range", format!("[{low}, {high}] must be finite and rise"));
+        }
+        let grid = slice_grid(&geometry, settings.slices.pixels);
+        let (low, high) = visible_box(&geometry, &settings)?;
+        let framed = framed_low(&geometry, &settings, low, high)?;
+        let rays = camera::rays(&settings, framed, high, depth_offset(&geometry), is_still(&geometry));
+        let pixel = grid.pitch[0].min(grid.pitch[1]);
+        let side = match &geometry {
+            Geometry::Cartesian(volume) => pixel.min(volume.spacing[2]),
+            Geometry::Sweep(_) => pixel,
+        };
+        let largest = settings.ray.samples_per_voxel.map_or(f64::INFINITY, |n| side / f64::from(n));
+        let longest = (high - low).length();
+        // A step that nobody chose is as long as it has to be: no default makes a scene that is refused.
+        let least = longest / MAX_SAMPLES;
+        let step = settings.ray.step.unwrap_or(pixel.max(least)).min(largest);
+        let edge = settings.surface.edge.unwrap_or(Edge::Length(4.0 * pixel.max(least)));
+        let ring = Ring::new(edge, step, settings.surface.threshold);
+        // The slack is that of rounding.
+        let too_many = |step: f64| longest / step > MAX_SAMPLES * (1.0 + 1e-9);
+        if too_many(step) {
+            let (key, value) = match settings.ray.samples_per_voxel.filter(|_| step == largest) {
+                Some(n) => ("ray.samples_per_voxel", format!("{n} are a step of {step} mm, which")),
+                None => ("ray.step", format!("{step} mm")),
+            };
+            return refuse(
+                key,
+                format!("{value} makes {:.0} samples on a ray, at most {MAX_SAMPLES}", (longest / step).ceil()),
+            );
+        }
+        if too_many(ring.step) && matches!(settings.mode, Mode::Surface | Mode::Mixed) {
+            return refuse(
+                "surface.edge",
+                format!(
+                    "4 steps of {} mm make {:.0} samples on a ray, at most {MAX_SAMPLES}",
+                    ring.step,
+                    (longest / ring.step).ceil()
+                ),
+            );
+        }
+        let is_longer = settings.ray.step.is_none() && step > pixel;
+        let longer: Vec<String> = is_longer
+            .then(|| format!("ray.step: {step} mm: {MAX_SAMPLES} are the most samples of a ray"))
+            .into_iter()
+            .collect();
+        let sampling = settings.ray.sampling;
+        let pitches = Pitches::new(&geometry, &grid, &rays, settings.ray.apart(), (low + high) / 2.0);
+        let mut resolver = Resolver { pitches, resolved: Vec::new() };
+        let conditioning = resolver.conditioning(&settings.conditioning);
+        let slice_filters = resolver.slices(&settings.slices);
+        let is_four = settings.layout == Layout::Four;
+        let section_smooth = settings.planes.smooth.filter(|_| is_four);
+        let section_smooth = section_smooth.map(|smooth| resolver.smooth("planes.smooth.elevation_mm", smooth));
+        let halvings = settings.ray.apart().ilog2();
+        let distance = (0..halvings).fold(resolver.distance(&settings.distance), |distance, _| distance.halved());
+        let mut scene = Scene {
+            geometry,
+            input,
+            settings,
+            grid,
+            low,
+            high,
+            rays,
+            step,
+            ring,
+            bricks_pay: true,
+            window_texels: WindowTexels::default(),
+            shared_memory: 0,
+            truncates_halves: false,
+            frames_at_once: u32::MAX,
+            sampling,
+            apron: 0.0,
+            conditioning,
+            slice_filters,
+            section_smooth,
+            distance,
+            resolved_sizes: resolver.resolved,
+            found: longer,
+            visible_bounds: VisibleBounds::default(),
+            kept_bounds: VisibleBounds::default(),
+            shared: None,
+            lattice: None,
+        };
+        let fields = [
+            ["slices.smooth.lateral", "slices.smooth.depth", "slices.smooth.elevation"],
+            ["planes.smooth.lateral", "planes.smooth.depth", "planes.smooth.elevation"],
+        ];
+        let deviations = [scene.smoothing(), scene.section_smoothing()];
+        for (axis, field, deviation) in
+            (0..2).flat_map(|n| (0..3).map(move |axis| (axis, fields[n][axis], deviations[n][axis])))
+        {
+            if deviation > MAX_DEVIATION {
+                let unit = if axis < 2 { "slice pixels" } else { "slices" };
+                return refuse(field, format!("is {deviation:.1} {unit}, at most {MAX_DEVIATION} can be filtered"));
+            }
+        }
+        if scene.settings.volume.compositing == Compositing::Exponential && scene.composites() && scene.spreads() {
+            return refuse(
+                "ray.spread",
+                "makes steps of different lengths, and volume.compositing=exponential takes one: set ray.spread=0, or another compositing",
+            );
+        }
+        let is_behind = scene.settings.surface.colour == SurfaceColour::Behind;
+        if scene.is_pair() && is_behind && scene.marches_once().is_err() {
+            return refuse(
+                "surface.colour",
+                "'behind' in layout pair needs the volume of the surface's own march: set volume.compositing=corrected, ray.spread=0 and \
+                 the same start depth of volume and surface, or another colour",
+            );
+        }
+        scene.apron = 2.0 + scene.filter_reach();
+        floating::check_floating(&scene)?;
+        cuts::check_drawn(&scene)?;
+        unveil::check_unveiled(&scene)?;
+        start_curve::check_drawn(&scene)?;
+        check::check_planes_resolved(&scene)?;
+        scene.visible_bounds = visible_bounds::of(&scene);
+        Ok(scene)
+    }
+
+    /// The origin of the coordinates that shaders compute with, mm in space ("relative to center", Ohlarik 2008): the centre of the
+    /// rendered box of a Cartesian volume, which may lie anywhere. A sweep's own origin, which its inverse map needs, is on its probe.
+    pub fn local_origin(&self) -> DVec3 {
+        match self.geometry {
+            Geometry::Cartesian(_) => (self.low + self.high) / 2.0,
+            Geometry::Sweep(_) => DVec3::ZERO,
+        }
+    }
+
+    /// A place in space, mm, as shaders get it. The subtraction is in f64: f32 would lose a voxel of 0.1 mm at 1e6 mm.
+    pub fn to_local(&self, place: DVec3) -> DVec3 {
+        place - self.local_origin()
+    }
+
+    /// The limit w of a half-space dot(n, p) <= w in space, mm, for places as shaders get them.
+    pub fn limit_to_local(&self, normal: DVec3, limit: f64) -> f64 {
+        limit - normal.dot(self.local_origin())
+    }
+
+    pub fn probe(&self) -> Option<&Probe> {
+        match &self.geometry {
+            Geometry::Sweep(probe) => Some(probe),
+            Geometry::Cartesian(_) => None,
+        }
+    }
+
+    /// The place in space of a point of the settings, whose depth counts from the probe's face, mm.
+    pub fn place_of(&self, [lateral, depth, elevation]: [f64; 3]) -> DVec3 {
+        DVec3::new(lateral, depth + depth_offset(&self.geometry), elevation)
+    }
+
+    /// A place in space, mm, as a point of the settings: the opposite of [`Scene::place_of`].
+    pub fn point_of(&self, place: DVec3) -> [f64; 3] {
+        (place - DVec3::Y * depth_offset(&self.geometry)).to_array()
+    }
+
+    pub fn slices(&self) -> u32 {
+        self.geometry.slices() as u32
+    }
+
+    /// Width and height of a frame of the source: samples x lines, or columns x rows.
+    pub fn frame_size(&self) -> [u32; 2] {
+        self.geometry.frame_size().map(|n| n as u32)
+    }
+
+    /// True for a device that executes both sides of every branch and has no shared memory: a CPU, or none that is known yet.
+    pub fn is_for_cpu(&self) -> bool {
+        self.shared_memory == 0
+    }
+
+    /// True if lines are conditioned before scan conversion.
+    pub fn conditions(&self) -> bool {
+        let c = &self.conditioning;
+        let on = !c.tgc.is_empty() || c.dynamic_range.is_some() || c.deviation(1) > 0.0 || self.decimation() > 1;
+        on && self.probe().is_some()
+    }
+
+    /// Decimation factor of the lines of a frame.
+    pub fn decimation(&self) -> u32 {
+        self.probe().map_or(1, |probe| self.settings.conditioning.factor(probe.samples))
+    }
+
+    /// Samples per line and number of lines at scan conversion.
+    pub fn line_lattice(&self) -> [u32; 2] {
+        let [samples, lines] = self.frame_size();
+        [(samples - 1) / self.decimation() + 1, lines]
+    }
+
+    /// Width, height and number of slices of the volume.
+    pub fn volume_size(&self) -> [u32; 3] {
+        [self.grid.size[0], self.grid.size[1], self.slices()]
+    }
+
+    /// Width and height of the picture.
+    pub fn picture_size(&self) -> [u32; 2] {
+        self.settings.picture.size
+    }
+
+    /// Number of rays along each axis, the size of the pictures of stages 2 and 3: one tile of a 4-up picture, and several rays per pixel.
+    pub fn ray_size(&self) -> [u32; 2] {
+        camera::ray_size(&self.settings)
+    }
+
+    /// Pixels of the rendering along each axis, where each has one ray or more.
+    pub fn rendering_size(&self) -> [u32; 2] {
+        self.ray_size().map(|n| n / self.settings.ray.rays)
+    }
+
+    /// True if only pixels at edges have several rays: where the colour along each ray is all that makes the picture.
+    pub fn adapts_rays(&self) -> bool {
+        let ray = &self.settings.ray;
+        let is_alone = self.settings.mode == Mode::Volume && !self.lights_volume();
+        ray.adaptive && ray.rays > 1 && is_alone && self.still().is_none() && !self.has_caps()
+    }
+
+    /// The error that each pixel may have, levels of 8 bits, if its steps follow from that: where the colour along each ray is all that makes the picture.
+    pub fn tolerance(&self) -> Option<f64> {
+        let is_alone = self.settings.mode == Mode::Volume && !self.lights_volume() && self.still().is_none();
+        Some(self.settings.ray.tolerance).filter(|levels| *levels > 0.0 && is_alone)
+    }
+
+    /// True if pixels at edges of a surface, or of a cut face, show what is near and what is far, by the share that each covers. Where several rays make a
+    /// pixel they tell.
+    pub fn antialiases(&self) -> bool {
+        let ray = &self.settings.ray;
+        self.settings.post.antialias && (self.has_distance() || self.has_caps()) && ray.rays == 1 && ray.apart() == 1
+    }
+
+    /// True if stage 2 and 3 render beside the picture: several rays make a pixel, one ray makes several, edges are antialiased, or planes or the volume
+    /// are shown next to the rendering.
+    pub fn assembles(&self) -> bool {
+        let ray = &self.settings.ray;
+        let is_beside = ray.rays > 1 || ray.apart() > 1 || self.settings.layout != Layout::Single || self.antialiases();
+        is_beside && !self.is_flat()
+    }
+
+    /// True if a picture is converted to 8 bits when it is assembled, since no other pass of stage 4 reads it.
+    pub fn tones_assembled(&self) -> bool {
+        self.assembles() && self.only_tones()
+    }
+
+    /// True if nothing is done to a picture but toning.
+    fn only_tones(&self) -> bool {
+        let post = &self.settings.post;
+        let filtered = post.sigma.is_some() || post.enhanced_sigma.is_some() || post.perona_malik.is_some();
+        !filtered && !post.floats
+    }
+
+    /// Entries of the table of the transfer function; its points were checked.
+    pub fn transfer_entries(&self) -> usize {
+        transfer::entries(&self.settings.volume).unwrap_or(transfer::ENTRIES)
+    }
+
+    /// True if the scene runs a surface detector.
+    pub fn detects_surface(&self) -> bool {
+        matches!(self.settings.mode, Mode::Surface | Mode::Mixed)
+    }
+
+    /// True if stage 3 lights a distance map.
+    pub fn has_distance(&self) -> bool {
+        self.detects_surface() || self.lights_volume()
+    }
+
+    /// True if volume rendering lights the first hit of each ray.
+    pub fn lights_volume(&self) -> bool {
+        self.settings.mode == Mode::Volume && self.settings.volume.shading == Shading::FirstHit
+    }
+
+    /// True if steps along a ray grow with the range.
+    pub fn spreads(&self) -> bool {
+        let curved = self.probe().is_some_and(|p| matches!(p.array, Array::Curved { .. }));
+        curved && self.settings.ray.spread > 0.0
+    }
+
+    /// The view of the surface detector.
+    pub fn surface_view(&self) -> View {
+        self.view(self.settings.surface.window, self.settings.surface.start_depth)
+    }
+
+    /// The view of volume rendering.
+    pub fn volume_view(&self) -> View {
+        self.view(self.settings.volume.window, self.settings.volume.start_depth)
+    }
+
+    /// The view of projections.
+    pub fn projection_view(&self) -> View {
+        self.view(self.settings.projection.window, self.settings.projection.start_depth)
+    }
+
+    /// Depth at which rendering starts, where nothing else is in front of it, mm: that of the surface and of the volume layer in mode mixed, whichever is deeper.
+    pub fn start_depth(&self) -> f64 {
+        let (surface, volume, projection) = (self.surface_view(), self.volume_view(), self.projection_view());
+        match self.settings.mode {
+            Mode::Surface => surface.low.y,
+            Mode::Volume => volume.low.y,
+            Mode::Mixed => surface.low.y.max(volume.low.y),
+            Mode::Mip | Mode::MinIp | Mode::Mean => projection.low.y,
+            _ => self.low.y,
+        }
+    }
+
+    /// The whole region with a grey window.
+    pub fn whole_view(&self, window: [f64; 2]) -> View {
+        self.view(window, None)
+    }
+
+    fn view(&self, window: [f64; 2], start: Option<f64>) -> View {
+        let start = start.map_or(self.low.y, |s| s + depth_offset(&self.geometry));
+        View { window, low: self.low.with_y(self.low.y.max(start)), high: self.high }
+    }
+
+    /// Clip planes (n, w) in space. Points p with dot(n, p) > w are removed.
+    pub fn clips(&self) -> impl Iterator<Item = (DVec3, f64)> {
+        let offset = depth_offset(&self.geometry);
+        self.settings.clip.iter().map(move |c| {
+            let normal = DVec3::from(c.normal).normalize();
+            (normal, normal.dot(DVec3::from(c.at) + DVec3::Y * offset))
+        })
+    }
+
+    /// The length for which the transfer function's opacities are given: one slice pixel, mm.
+    pub fn reference_length(&self) -> f64 {
+        self.grid.pitch[0].min(self.grid.pitch[1])
+    }
+
+    /// A step of volume rendering, where steps have one length, in lengths for which opacities are given.
+    pub fn optical_step(&self) -> f64 {
+        self.step / self.reference_length()
+    }
+
+    /// True if samples are composited through the transfer function.
+    pub fn composites(&self) -> bool {
+        matches!(self.settings.mode, Mode::Volume | Mode::Mixed) || self.colours_surface() || self.is_pair()
+    }
+
+    /// True if the volume gives the surface its colour.
+    pub fn colours_surface(&self) -> bool {
+        self.settings.mode == Mode::Surface && self.settings.surface.colour != SurfaceColour::Constant
+    }
+
+    /// True if the volume and the surface are shown side by side.
+    pub fn is_pair(&self) -> bool {
+        self.settings.layout == Layout::Pair
+    }
+
+    /// Whether one march finds the surface and composites the whole ray, and why, or why not (thesis 4.4.2).
+    pub fn marches_once(&self) -> Result<&'static str, &'static str> {
+        let settings = &self.settings;
+        let is_whole = settings.surface.colour == SurfaceColour::Rendered || self.is_pair();
+        if settings.mode != Mode::Surface {
+            return Err("no surface is found and no whole ray composited in this mode");
+        }
+        if !is_whole {
+            return Err("no whole ray is composited");
+        }
+        if settings.ray.sliding == 0 && !self.is_pair() {
+            // Measured: docs/performance.md, "One march for surface and volume".
+            return Err("two passes: where samples are cheap (no ray.sliding) they are no slower than one march");
+        }
+        if matches!(settings.volume.compositing, Compositing::PreIntegrated | Compositing::Exponential) {
+            return Err(
+                "two passes: this compositing takes samples at the ends of steps, the detector in their middles",
+            );
+        }
+        if self.spreads() {
+            return Err("two passes: steps that grow have no sample of the detector in their middles");
+        }
+        if self.surface_view().low != self.volume_view().low {
+            return Err("two passes: rays of the volume and of the surface start at different depths");
+        }
+        Ok("one march finds the surface and composites the whole ray")
+    }
+
+    /// True if the mode is a projection: one value per ray.
+    pub fn projects(&self) -> bool {
+        matches!(self.settings.mode, Mode::Mip | Mode::MinIp | Mode::Mean)
+    }
+
+    /// True if the picture has planes: a mode of planes, or 4-up.
+    pub fn cuts_planes(&self) -> bool {
+        self.is_flat() || self.settings.layout == Layout::Four
+    }
+
+    /// True if the mode cuts planes and casts no rays.
+    pub fn is_flat(&self) -> bool {
+        self.settings.mode.is_flat()
+    }
+
+    /// Standard deviations of the 3D Gaussian in slice pixels, slice pixels and slices. Across slices it is less than the setting where
+    /// the interpolation between slices smooths more than linear interpolation.
+    pub fn smoothing(&self) -> [f64; 3] {
+        let [lateral, depth, elevation] = self.deviations(self.slice_filters.smooth.unwrap_or_default());
+        if self.blurs() {
+            return [binomial_deviation(3), binomial_deviation(3), elevation];
+        }
+        [lateral, depth, elevation]
+    }
+
+    /// The same of the volume that planes beside a rendering are cut from.
+    pub fn section_smoothing(&self) -> [f64; 3] {
+        self.deviations(self.section_smooth.unwrap_or_default())
+    }
+
+    fn deviations(&self, smooth: Smooth) -> [f64; 3] {
+        if let Some(taps) = smooth.kernel {
+            return [binomial_deviation(taps); 3];
+        }
+        let elevation = self.left_to_smooth(smooth.elevation);
+        [smooth.lateral / self.grid.pitch[0], smooth.depth / self.grid.pitch[1], elevation]
+    }
+
+    /// The deviation of the Gaussian across slices, slices, that together with the interpolation between them has the variance of this
+    /// deviation and linear interpolation. The weights of two texels at a share t have the variance t (1 - t), 1/6 on average; those of
+    /// the cubic B-spline 1/3 everywhere.
+    fn left_to_smooth(&self, deviation: f64) -> f64 {
+        match self.settings.ray.elevation {
+            Elevation::Linear => deviation,
+            Elevation::Bspline | Elevation::BsplineSharp => {
+                (deviation * deviation - (1.0 / 3.0 - 1.0 / 6.0)).max(0.0).sqrt()
+            }
+        }
+    }
+
+    /// True if samples between slices are those of the cubic B-spline, which touch four slices.
+    pub fn takes_bspline(&self) -> bool {
+        self.settings.ray.elevation != Elevation::Linear
+    }
+
+    /// True if slices are sharpened across elevation.
+    pub fn sharpens(&self) -> bool {
+        self.settings.ray.elevation == Elevation::BsplineSharp
+    }
+
+    /// True if a pass filters across slices.
+    pub fn filters_across_slices(&self) -> bool {
+        self.smoothing_radius()[2] > 0
+    }
+
+    /// Taps of the 3D Gaussian on one side, along each axis.
+    pub fn smoothing_radius(&self) -> [u32; 3] {
+        if let Some(taps) = self.slice_filters.smooth.and_then(|s| s.kernel) {
+            return [taps / 2; 3];
+        }
+        let [lateral, depth, elevation] = self.smoothing().map(gaussian_radius);
+        let elevation = if self.sharpens() { 1 } else { elevation };
+        if self.blurs() { [1, 1, elevation] } else { [lateral, depth, elevation] }
+    }
+
+    /// Taps on one side of the Gaussian of the volume that planes beside a rendering are cut from.
+    pub fn section_smoothing_radius(&self) -> [u32; 3] {
+        if let Some(taps) = self.section_smooth.and_then(|s| s.kernel) {
+            return [taps / 2; 3];
+        }
+        let [lateral, depth, elevation] = self.section_smoothing().map(gaussian_radius);
+        [lateral, depth, if self.sharpens() { 1 } else { elevation }]
+    }
+
+    /// Frames on either side that change a slice of the volume that rays are cast through: all of them where parts that float are dropped, or the
+    /// render start follows the fluid.
+    pub fn reach_to_frames(&self) -> u32 {
+        if self.drops_floating() || self.unveils() { self.slices() } else { self.smoothing_radius()[2] }
+    }
+
+    /// Neighbours on either side that a filtered slice is made of, in the volume with the most.
+    pub fn reach_across_slices(&self) -> u32 {
+        let sections = if self.has_sections() { self.section_smoothing_radius()[2] } else { 0 };
+        self.smoothing_radius()[2].max(sections)
+    }
+
+    /// True if slices get the slight blur against wood grain: it is set, and no smoothing blurs them in their plane.
+    fn blurs(&self) -> bool {
+        let smooth = self.slice_filters.smooth.unwrap_or_default();
+        self.settings.slices.blur && smooth.kernel.is_none() && smooth.lateral == 0.0 && smooth.depth == 0.0
+    }
+
+    /// Estimator of the centre of an enhanced sigma filter: Perona-Malik for planes, the median otherwise (thesis 5.5).
+    pub fn centre(&self, enhanced: EnhancedSigma) -> Estimator {
+        let usual = if self.is_flat() { Estimator::PeronaMalik } else { Estimator::Median };
+        enhanced.centre.unwrap_or(usual)
+    }
+
+    /// Number of samples behind the surface whose mean echo skin shading needs; 0 for none.
+    pub fn samples_behind(&self) -> u32 {
+        match self.settings.light.skin {
+            Some(skin) if skin.translucency > 0.0 => ((skin.depth / self.ring.step).ceil() as u32).clamp(1, 256),
+            _ => 0,
+        }
+    }
+
+    /// Distance between these samples, mm: together they span the skin's depth.
+    pub fn step_behind(&self) -> f64 {
+        self.settings.light.skin.map_or(0.0, |skin| skin.depth) / f64::from(self.samples_behind().max(1))
+    }
+
+    /// True if the light on a surface depends on the echo there or behind it: through texture, or the translucency of skin.
+    pub fn lights_by_echo(&self) -> bool {
+        let is_translucent = self.skin().is_some_and(|s| s.translucency > 0.0);
+        self.detects_surface() && (self.settings.light.texture > 0.0 || is_translucent)
+    }
+
+    /// Skin shading, if it has an effect: wrap or translucency is above 0.
+    pub fn skin(&self) -> Option<Skin> {
+        self.settings.light.skin.filter(|s| s.wrap > 0.0 || s.translucency > 0.0)
+    }
+
+    /// Largest difference of neighbouring distances within one surface, mm.
+    pub fn cliff(&self) -> f64 {
+        self.settings.light.cliff * f64::from(self.settings.ray.apart())
+    }
+
+    /// Position of a near light in space, mm.
+    pub fn light_place(&self) -> Option<DVec3> {
+        self.settings.light.position.map(|p| self.rays.target + self.rays.from_camera(p))
+    }
+
+    /// Reach of the slice filters, pixels.
+    fn filter_reach(&self) -> f64 {
+        let [lateral, depth, _] = self.smoothing_radius().map(f64::from);
+        let median = if self.settings.slices.median { 1.0 } else { 0.0 };
+        let slices = &self.slice_filters;
+        let sigma = slices.sigma.map_or(0.0, |s| f64::from(s.window / 2));
+        let enhanced = slices.enhanced_sigma.map_or(0.0, |e| f64::from(e.largest / 2));
+        let estimator = match slices.estimator {
+            Some(Estimator::NagaoMatsuyama) => 2.0,
+            Some(_) => 1.0,
+            None => 0.0,
+        };
+        let diffusion = slices.perona_malik.map_or(0.0, |p| p.reach());
+        // The reach of a chain of square windows extends to their corners.
+        let gaussian = lateral.hypot(depth);
+        let [lateral, depth, _] = self.section_smoothing_radius().map(f64::from);
+        let sections = if self.has_sections() { lateral.hypot(depth) } else { 0.0 };
+        let slices = std::f64::consts::SQRT_2 * (median + estimator + sigma + enhanced) + diffusion + gaussian;
+        slices.max(sections)
+    }
+}
+
+/// Standard deviation of the binomial kernel of `taps` taps.
+fn binomial_deviation(taps: u32) -> f64 {
+    f64::from(taps - 1).sqrt() / 2.0
+}
+
+/// Taps on one side of a Gaussian, cut off at three standard deviations, which hold 99.7 % of it.
+pub fn gaussian_radius(deviation: f64) -> u32 {
+    if deviation > 0.0 { ((3.0 * deviation).ceil() as u32).max(1) } else { 0 }
+}

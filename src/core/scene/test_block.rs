@@ -1,0 +1,14 @@
+//! For unit tests, also of other members: a scene of a block of voxels.
+
+use crate::probe::{Geometry, Grid, StoredType};
+use crate::scene::load::Layers;
+use crate::scene::{Input, Scene};
+
+/// The scene of settings `key=value` and a Cartesian volume of bytes, of `size` voxels of 1 mm from (-20, 0, -10) on.
+pub fn block(lines: &[&str], size: [usize; 3]) -> Scene {
+    let mut layers = Layers::default();
+    lines.iter().for_each(|line| layers.set(line).expect(line));
+    let grid = Grid { size, spacing: [1.0; 3], origin: [-20.0, 0.0, -10.0] };
+    let input = Input { stored: StoredType::U8, range: [0.0, 255.0] };
+    Scene::new(Geometry::Cartesian(grid), input, layers.finish().expect("settings")).expect("scene")
+}

@@ -1,0 +1,141 @@
+//! Proven bounds of a picture in volume mode: for every ray and channel an interval that contains the exact integral of the sampled field
+//! (docs/numerics.md, "The exact reference of a ray"). Every number is computed in interval arithmetic with outward rounding, so that
+//! the bounds hold whatever the quadrature, the step or the rounding of a renderer does.
+
+pub mod field;
+pub mod interval;
+pub mod ray;
+
+use crate::exact_ray::fade::Fade as Kinks;
+use crate::exact_ray::volume::{Medium as Hints, cut};
+use crate::exact_ray::{Line, segments};
+use crate::passes::Texels;
+use crate::passes::raycast::ray::span;
+use crate::passes::raycast::volume::{depth_axis, reference_length};
+use crate::scene::transfer::{self, Absorption};
+use crate::scene::{Mode, Scene, Shading};
+use glam::DVec3;
+use interval::Interval;
+use rayon::prelude::*;
+
+/// When a ray's bounds are narrow enough.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Effort {
+    /// Width of the widest channel, 0..1.
+    pub width: f64,
+    /// Largest number of parts of a ray.
+    pub parts: usize,
+}
+
+/// Bounds of every ray of a picture.
+#[derive(Clone, Debug)]
+pub struct PictureBounds {
+    /// Red, green, blue and opacity, before stage 4.
+    pub low: Texels,
+    pub high: Texels,
+    /// Parts of all rays.
+    pub parts: u64,
+}
+
+impl PictureBounds {
+    /// Width of the widest channel of every ray.
+    pub fn widths(&self) -> Vec<f64> {
+        let pairs = self.low.values.chunks_exact(4).zip(self.high.values.chunks_exact(4));
+        pairs.map(|(low, high)| (0..4).map(|c| high[c] - low[c]).fold(0.0, f64::max)).collect()
+    }
+}
+
+impl PictureBounds {
+    /// The same of the rays whose opacity may be above 0: the others have no width.
+    pub fn widths_of_hits(&self) -> Vec<f64> {
+        let hits = self.high.values.chunks_exact(4).map(|high| high[3] > 0.0);
+        self.widths().into_iter().zip(hits).filter(|(_, hit)| *hit).map(|(width, _)| width).collect()
+    }
+}
+
+/// Why a scene has no bounds, and what to set instead, as the end of a sentence; none if it has. Every setting that a ray of volume rendering
+/// reads is honoured by [`picture`] or named here (tests/unit_pure/ray_keys.rs).
+pub fn fault(scene: &Scene) -> Option<&'static str> {
+    match scene.settings.mode {
+        Mode::Volume if scene.still().is_some() => Some("a still is a mean of random paths: set still=none"),
+        Mode::Volume if scene.lights_volume() => {
+            Some("volume.shading=first-hit is lit by stage 3: set volume.shading=none or depth-coded")
+        }
+        Mode::Volume if scene.lit_by_volume().is_some() => {
+            Some("light.volume takes light from a lattice of cells: set light.volume=none")
+        }
+        Mode::Volume if scene.tolerance().is_some() => {
+            Some("ray.tolerance chooses the steps of each pixel: set ray.tolerance=0")
+        }
+        Mode::Volume if scene.settings.ray.sliding != 0 => {
+            Some("ray.sliding filters samples, at distances of one step: set ray.sliding=0")
+        }
+        Mode::Volume if scene.has_caps() && scene.cap_level().is_some() => {
+            Some("cap.enabled shows echoes where clip planes cut: set cap.enabled=false")
+        }
+        Mode::Volume => None,
+        _ => Some("only the integral of volume rendering (--mode vr) is bounded"),
+    }
+}
+
+/// Bounds of all rays of a scene through a volume: the texels that stage 1 makes.
+pub fn picture(scene: &Scene, volume: &Texels, effort: Effort) -> PictureBounds {
+    let [width, height] = scene.ray_size().map(|n| n as usize);
+    let (least, most) = volume.values.iter().fold((f64::MAX, f64::MIN), |(l, h), v| (l.min(*v), h.max(*v)));
+    let one = |n: usize| {
+        let (origin, direction) = scene.rays.at((n % width) as f64 + 0.5, (n / width) as f64 + 0.5);
+        let (enter, leave) = span(scene, scene.volume_view(), origin, direction);
+        let line = Line { scene, base: origin + direction * enter, direction };
+        bounds_of(&line, volume, [least, most], leave - enter, effort)
+    };
+    let found: Vec<ray::Bounds> = (0..width * height).into_par_iter().with_min_len(4).map(one).collect();
+    let map = |of: fn(Interval) -> f64| Texels {
+        size: [width, height, 1],
+        channels: 4,
+        values: found.iter().flat_map(|b| b.rgba.map(of)).collect(),
+    };
+    PictureBounds { low: map(|v| v.low), high: map(|v| v.high), parts: found.iter().map(|b| b.parts as u64).sum() }
+}
+
+/// Bounds of one ray from 0 to `path` mm along a line. `range`: smallest and largest texel of the volume.
+fn bounds_of(line: &Line, volume: &Texels, range: [f64; 2], path: f64, effort: Effort) -> ray::Bounds {
+    let scene = line.scene;
+    let view = scene.volume_view();
+    let settings = &scene.settings.volume;
+    if path <= 0.0 {
+        return ray::Bounds { rgba: [Interval::ZERO; 4], parts: 0 };
+    }
+    let points = transfer::resolved(&settings.transfer);
+    let absorption = Absorption::of(settings, reference_length(scene));
+    let mut medium = ray::Medium::new(points, settings.threshold, absorption).faded(ray::Fade::of(line));
+    if settings.shading == Shading::DepthCoded {
+        let (axis, near) = depth_axis(scene);
+        let dot = |a: DVec3, b: DVec3| {
+            (0..3).map(|n| Interval::of(a[n]) * Interval::of(b[n])).fold(Interval::ZERO, |sum, v| sum + v)
+        };
+        let (start, rate) = (dot(line.base, axis) - Interval::of(near), dot(line.direction, axis));
+        let apart = |c: usize| Interval::of(settings.far_tint[c]) - Interval::of(settings.near_tint[c]);
+        medium = medium.tinted(
+            std::array::from_fn(|c| Interval::of(settings.near_tint[c]) + apart(c) * start),
+            std::array::from_fn(|c| apart(c) * rate),
+        );
+    }
+    let field = field::Field::new(line, volume, view.window, range);
+    ray::bounds(&field, &medium, &hints(line, volume, path), effort.width, effort.parts)
+}
+
+/// Where parts should end: cells, the border of the region, the points of the transfer function, and kinks of the fade, to rounding.
+fn hints(line: &Line, volume: &Texels, path: f64) -> Vec<f64> {
+    let scene = line.scene;
+    let medium = Hints::of(scene, line, 1.0);
+    let mut places = line.breakpoints([0.0, path]);
+    places.extend(Kinks::of(line).map(|fade| fade.kinks([0.0, path])).into_iter().flatten());
+    let mut cuts = Vec::new();
+    for segment in segments(line, volume, scene.volume_view().window, [0.0, path]) {
+        cut(&segment, medium.levels(), &mut cuts);
+        places.extend(cuts.iter().filter(|x| x.abs() < 1.0).map(|x| segment.place(*x)));
+    }
+    places.sort_by(f64::total_cmp);
+    places.dedup();
+    places
+}

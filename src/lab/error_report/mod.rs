@@ -1,0 +1,432 @@
+//! Error against run time (work-precision). Every approximation is a dial; the points of a dial are its settings, each with its
+//! errors and its times on the device. [`measure`] fills a [`Report`], which is stored as JSON, and renders combinations of several
+//! dials; [`export`] and [`plot`] write it as text and as a diagram, [`choose`] picks settings among the combinations.
+
+pub mod budget;
+pub mod choose;
+pub mod convergence;
+pub mod dials;
+pub mod export;
+pub mod map;
+pub mod measure;
+pub mod metrics;
+pub mod plot;
+pub mod richardson;
+mod running;
+pub mod stated;
+
+use crate::scene::Scene;
+use budget::Budget;
+use convergence::Fit;
+use metrics::{Levels, SurfaceError};
+use serde::{Deserialize, Serialize};
+
+/// Format version of a stored report; other versions are refused.
+pub const FORMAT: &str = "echolume error report 3";
+
+/// A measurement of one scene on one device.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Report {
+    /// [`FORMAT`].
+    pub format: String,
+    pub device: String,
+    pub driver: String,
+    /// Time of the measurement, ISO 8601.
+    pub date: String,
+    /// Description of the input on the first line, then all settings, resolved, as TOML.
+    pub scene: String,
+    pub sizes: Sizes,
+    /// Number of runs of which each time is the median.
+    pub repeats: u32,
+    pub dials: Vec<Dial>,
+    /// Settings of one dial and of several, each rendered and measured against the scene's finest picture. The first is the scene as it is.
+    pub choices: Vec<Combination>,
+    /// What each approximation of the scene adds to its error.
+    pub budget: Budget,
+}
+
+/// Settings of several dials at once, and what was measured with them.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Combination {
+    /// Changes from the scene as it is: name of the dial and label of the point.
+    pub changed: Vec<(String, String)>,
+    /// Their assignments, "key=value" as `--set` takes them.
+    pub set: Vec<String>,
+    /// Against the scene's own picture with the finest numerical settings.
+    pub errors: Errors,
+    /// Error of that picture itself; 0 if it is a reference in f64.
+    pub reference_error: OwnError,
+    /// None without time stamps.
+    pub times: Option<Times>,
+}
+
+/// The error of a reference itself.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct OwnError {
+    /// RMSE of its picture, 0..1.
+    pub rmse: f64,
+    /// 95th percentile of its pixels after tone, levels of 255.
+    pub levels: f64,
+}
+
+impl OwnError {
+    /// The upper limit that two pictures of a converging sequence give: the difference of the last two.
+    pub fn of(errors: &Errors) -> OwnError {
+        OwnError { rmse: errors.rmse, levels: errors.levels.p95 }
+    }
+}
+
+/// What the settings of a dial have to do with one another.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Kind {
+    /// One setting that computes the same picture more or less accurately: a choice may turn it, and combine it with others.
+    Numerical,
+    /// Several such settings at once: a choice may take one, and combines it with nothing.
+    Several,
+    /// The number of pixels, or of rays in a pixel: another picture, with an error of its own.
+    Pixels,
+    /// Another look: differences from the scene as it is, which are no errors.
+    Look,
+}
+
+/// Sizes of what was rendered.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Sizes {
+    /// Texels of the volume.
+    pub volume: [u32; 3],
+    /// Pixels of the picture by default (a dial may change it).
+    pub picture: [u32; 2],
+}
+
+/// Measurements of one approximation, varied while all other settings keep their defaults.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Dial {
+    pub name: String,
+    pub kind: Kind,
+    /// True if its points lie on an axis, so that a line may join them; false for names.
+    pub is_ordered: bool,
+    /// Unit of the values of the points; empty for counts and names.
+    pub unit: String,
+    pub reference: Reference,
+    pub points: Vec<Point>,
+    /// Order of the error over the value, if it has one.
+    pub order: Option<Fit>,
+    /// RMSE of the device against f64 if only its arithmetic and formats differ.
+    #[serde(default)]
+    pub floor: Option<f64>,
+    /// Why the reference is not the exact one, if the dial is one of rays.
+    #[serde(default)]
+    pub note: Option<String>,
+}
+
+/// The reference of the errors of a dial.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(tag = "kind", rename_all = "kebab-case", deny_unknown_fields)]
+pub enum Reference {
+    /// The four stages in f64 on the CPU.
+    F64,
+    /// The same with exact rays in place of stage 2: no step, no table of the transfer function.
+    Exact {
+        /// Their own estimate of their error, RMS over the rays; no bound. Of the picture, or of the distance map in mm if the scene
+        /// shows surfaces.
+        estimate: f64,
+        /// Parts of rays that were integrated.
+        pieces: u64,
+    },
+    /// The device's picture of the scene as it is: the settings differ in look, and what is measured is no error.
+    AsItIs,
+    /// A picture by the device itself, converged as far as possible.
+    Converged {
+        /// The assignments that give it.
+        set: Vec<String>,
+        /// Its RMSE against the next coarser picture: an upper bound of its own error if it converges.
+        rmse: f64,
+    },
+    /// What such pictures with ever smaller cells of the light volume converge to, by Richardson's extrapolation ([`richardson`]).
+    Extrapolated {
+        /// The assignments that give the picture with the smallest cells.
+        set: Vec<String>,
+        /// Edges of the cells, mm, descending.
+        cells: [f64; 3],
+        /// The order in the cell that was observed.
+        order: f64,
+        /// Its RMSE: against what the two coarser pictures alone converge to, and against the next coarser setting of all else, as a root of the sum of
+        /// squares. An upper bound of its own error if the pictures converge.
+        rmse: f64,
+    },
+}
+
+/// One setting of a dial.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Point {
+    /// Short label for plots: "0.25", "pre-integrated".
+    pub label: String,
+    /// Its assignments, each "key=value" as `--set` takes them.
+    pub set: Vec<String>,
+    /// Value on the dial's axis, in the dial's unit; for names their index.
+    pub value: f64,
+    pub errors: Errors,
+    /// None without time stamps.
+    pub times: Option<Times>,
+    /// Times relative to the default, by runs of both in turn; None without time stamps.
+    pub ratios: Option<Times>,
+    /// True for the setting of the scene itself, without assignments.
+    pub is_default: bool,
+}
+
+/// Errors of a picture, and of the surface if there is one. Pixels whose rays find another surface than those of the reference, or none, and pixels next to
+/// them, are left out of the errors of the picture: their shares are in `mm`.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Errors {
+    /// Of red, green and blue before tone, 0..1.
+    pub rmse: f64,
+    pub max: f64,
+    /// Peak signal-to-noise ratio, dB; None (infinite) for equal pictures.
+    pub psnr: Option<f64>,
+    pub ssim: Option<f64>,
+    /// As the screen shows it.
+    pub levels: Levels,
+    /// Error of the distance map, mm.
+    pub mm: Option<SurfaceError>,
+    /// Error of the normals, degrees.
+    pub degrees: Option<SurfaceError>,
+}
+
+/// A time over several runs, ns, or the ratio of two.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Time {
+    pub median: f64,
+    /// Confidence interval of the median: 95 % by order statistics; from the shortest to the longest of fewer than 6 runs.
+    pub low: f64,
+    pub high: f64,
+    /// 95th percentile by the nearest rank; the longest of fewer than 20 runs.
+    pub p95: f64,
+}
+
+impl Time {
+    /// The statistics of the runs; None without runs.
+    pub fn of(runs: &[f64]) -> Option<Time> {
+        let mut sorted = runs.to_vec();
+        sorted.sort_by(f64::total_cmp);
+        sorted.first()?;
+        let n = sorted.len();
+        // The most runs that may be left out at either end: as many heads of n coins have a probability of at most 0.025.
+        let (mut out, mut below, mut heads) = (0, 0.0, 0.5f64.powi(n.min(1000) as i32));
+        while below + heads <= 0.025 && out < (n - 1) / 2 {
+            below += heads;
+            heads *= (n - out) as f64 / (out + 1) as f64;
+            out += 1;
+        }
+        let p95 = sorted[(n * 95).div_ceil(100).max(1) - 1];
+        let median = (sorted[(n - 1) / 2] + sorted[n / 2]) / 2.0;
+        // `out` runs at either end lie outside; the interval begins at the one after them, as the first is outside with `out` - 1.
+        let edge = out.saturating_sub(1);
+        Some(Time { median, low: sorted[edge], high: sorted[n - 1 - edge], p95 })
+    }
+}
+
+/// Times on the device, ns.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Times {
+    /// Work of each frame and volume: upload and stage 1.
+    pub volume: Time,
+    /// Work of each picture: stages 2 to 4, and what rays skip by.
+    pub picture: Time,
+    /// Both.
+    pub total: Time,
+}
+
+impl Times {
+    /// The statistics of runs of [volume, picture], ns; None without runs.
+    pub fn of(runs: &[[f64; 2]]) -> Option<Times> {
+        let of = |part: fn(&[f64; 2]) -> f64| Time::of(&runs.iter().map(part).collect::<Vec<_>>());
+        Some(Times { volume: of(|r| r[0])?, picture: of(|r| r[1])?, total: of(|r| r[0] + r[1])? })
+    }
+}
+
+/// The error measure of a plot or choice.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Measure {
+    /// RMSE of the picture before tone, 0..1.
+    Rmse,
+    /// 95th percentile of the pixels after tone, levels of 255.
+    Levels,
+    /// RMS error of the distance map, mm.
+    Mm,
+    /// RMS error of the normals, degrees.
+    Degrees,
+}
+
+impl Measure {
+    /// The error by this measure; None if it was not measured or is not finite.
+    pub fn of(self, errors: &Errors) -> Option<f64> {
+        let rms = |surface: &Option<SurfaceError>| surface.and_then(|s| s.error).map(|e| e.rms);
+        let error = match self {
+            Measure::Rmse => Some(errors.rmse),
+            Measure::Levels => Some(errors.levels.p95),
+            Measure::Mm => rms(&errors.mm),
+            Measure::Degrees => rms(&errors.degrees),
+        };
+        error.filter(|e| e.is_finite())
+    }
+
+    pub fn name(self) -> &'static str {
+        match self {
+            Measure::Rmse => "RMSE of the picture (0..1)",
+            Measure::Levels => "95th percentile of the pixels (levels of 255)",
+            Measure::Mm => "RMS error of distance (mm)",
+            Measure::Degrees => "RMS error of normals (degrees)",
+        }
+    }
+
+    /// An error with its name and unit, for messages.
+    pub fn format(self, error: f64) -> String {
+        match self {
+            Measure::Rmse => format!("RMSE {error:.3e}"),
+            Measure::Levels => format!("{error:.3} levels"),
+            Measure::Mm => format!("{error:.3e} mm"),
+            Measure::Degrees => format!("{error:.3e} degrees"),
+        }
+    }
+}
+
+impl Dial {
+    /// True if its settings differ in look, so that its differences are no errors.
+    pub fn is_look(&self) -> bool {
+        self.kind == Kind::Look
+    }
+}
+
+impl Report {
+    /// True if the report was measured with the settings of a scene, and volumes and pictures of its size.
+    pub fn is_of(&self, scene: &Scene) -> bool {
+        let settings = self.scene.split_once('\n').map_or("", |(_, settings)| settings);
+        let sizes = Sizes { volume: scene.volume_size(), picture: scene.picture_size() };
+        self.sizes == sizes && toml::to_string(&scene.settings).is_ok_and(|own| own == settings)
+    }
+
+    /// The report as JSON.
+    ///
+    /// # Errors
+    /// One line: a number is not finite, or an error or time is negative; it names the dial and the point.
+    pub fn to_json(&self) -> Result<String, String> {
+        self.check()?;
+        serde_json::to_string_pretty(self).map_err(|e| format!("error report: {e}"))
+    }
+
+    /// Reads a report.
+    ///
+    /// # Errors
+    /// One line: no JSON, another format or version, or numbers that no measurement gives.
+    pub fn from_json(text: &str) -> Result<Report, String> {
+        Report::read(text).map_err(|e| crate::text::single_line(&e))
+    }
+
+    fn read(text: &str) -> Result<Report, String> {
+        #[derive(Deserialize)]
+        struct Version {
+            format: String,
+        }
+        let unread = |e: serde_json::Error| format!("error report: cannot be read: {e}");
+        // The version first: a newer report would otherwise fail by its fields, with a less clear message.
+        let version: Version = serde_json::from_str(text).map_err(unread)?;
+        if version.format != FORMAT {
+            return Err(format!("error report: format is '{}', this program reads '{FORMAT}'", version.format));
+        }
+        let report: Report = serde_json::from_str(text).map_err(unread)?;
+        report.check()?;
+        Ok(report)
+    }
+
+    fn check(&self) -> Result<(), String> {
+        for dial in &self.dials {
+            let reference_rmse = match &dial.reference {
+                Reference::F64 | Reference::AsItIs => 0.0,
+                Reference::Converged { rmse, .. } | Reference::Extrapolated { rmse, .. } => *rmse,
+                Reference::Exact { estimate, .. } => *estimate,
+            };
+            if !(reference_rmse.is_finite() && reference_rmse >= 0.0) {
+                return Err(format!("error report: dial '{}': its reference's error is {reference_rmse}", dial.name));
+            }
+            for point in &dial.points {
+                let wrong = wrong_result(&point.errors, &[point.times, point.ratios], 0.0);
+                if let Some(v) = wrong.or(Some(point.value).filter(|v| !v.is_finite())) {
+                    return Err(format!(
+                        "error report: dial '{}', point '{}': {v} is no result",
+                        dial.name, point.label
+                    ));
+                }
+            }
+        }
+        for choice in &self.choices {
+            if let Some(v) = wrong_result(&choice.errors, &[choice.times], choice.reference_error.rmse) {
+                return Err(format!("error report: choice '{}': {v} is no result", choice.set.join(" ")));
+            }
+        }
+        let sums = self.budget.shares.iter().map(|share| (share.source.as_str(), &share.errors));
+        let own = self.budget.reference_error.rmse;
+        for (source, errors) in sums.chain([("total", &self.budget.total)]) {
+            if let Some(v) = wrong_result(errors, &[], own) {
+                return Err(format!("error report: budget, '{source}': {v} is no result"));
+            }
+        }
+        Ok(())
+    }
+
+    /// The Pareto front over all dials: indices of dial and point, from the fastest to the most accurate. Points without a time or
+    /// without this error are not on it, nor are those of another look.
+    pub fn pareto_front(&self, measure: Measure) -> Vec<(usize, usize)> {
+        let mut indices = Vec::new();
+        let mut pairs = Vec::new();
+        for (d, dial) in self.dials.iter().enumerate().filter(|(_, dial)| !dial.is_look()) {
+            for (p, point) in dial.points.iter().enumerate() {
+                if let (Some(times), Some(error)) = (point.times, measure.of(&point.errors)) {
+                    indices.push((d, p));
+                    pairs.push([times.total.median, error]);
+                }
+            }
+        }
+        pareto_front(&pairs).into_iter().map(|i| indices[i]).collect()
+    }
+}
+
+/// A number that no measurement gives: one that is not finite, or an error or time below 0.
+fn wrong_result(e: &Errors, times: &[Option<Times>], other: f64) -> Option<f64> {
+    let surfaces = [e.mm, e.degrees].into_iter().flatten().flat_map(|s| {
+        let spread = s.error.map_or([0.0; 4], |e| [e.rms, e.median, e.p95, e.max]);
+        spread.into_iter().chain([s.false_hits, s.missed_hits, s.jumps])
+    });
+    let l = e.levels;
+    let levels = [l.rms, l.median, l.p95, l.max, l.over_1, l.over_8];
+    let times = times.iter().flatten().flat_map(|t| [t.volume, t.picture, t.total]);
+    let times = times.flat_map(|t| [t.low, t.median, t.high, t.p95]);
+    let mut unsigned = [e.rmse, e.max].into_iter().chain(levels).chain(surfaces).chain(times).chain([other]);
+    let wrong = unsigned.find(|v| !v.is_finite() || *v < 0.0);
+    wrong.or_else(|| [e.psnr, e.ssim].into_iter().flatten().find(|v| !v.is_finite()))
+}
+
+/// The Pareto front: indices of the pairs that no other pair dominates (at most as large in both values and smaller in one), in order
+/// of the first value. Equal pairs all stay, in the order given. Pairs that are not finite are never on the front.
+pub fn pareto_front(pairs: &[[f64; 2]]) -> Vec<usize> {
+    let mut order: Vec<usize> = (0..pairs.len()).filter(|i| pairs[*i].iter().all(|v| v.is_finite())).collect();
+    // A stable sort: equal pairs keep their order.
+    order.sort_by(|a, b| pairs[*a][0].total_cmp(&pairs[*b][0]).then(pairs[*a][1].total_cmp(&pairs[*b][1])));
+    let mut kept: Vec<usize> = Vec::new();
+    for i in order {
+        let beaten = kept.last().is_some_and(|last| pairs[*last][1] <= pairs[i][1] && pairs[*last] != pairs[i]);
+        if !beaten {
+            kept.push(i);
+        }
+    }
+    kept
+}

@@ -1,0 +1,88 @@
+//! Compares the 2D filters of slices: how well each reduces speckle and keeps edges, over its windows and strengths, and what it
+//! costs (as thesis Figs. 46-53, with figures). [`candidates`] lists the settings, [`quality`] has the measures, [`measure`]
+//! runs them on a device, [`export`] and [`sheet`] write tables and pictures.
+
+pub mod candidates;
+pub mod export;
+pub mod measure;
+pub mod quality;
+pub mod sheet;
+
+use crate::machine::Device;
+use crate::thesis_tables::Spread;
+use quality::Quality;
+
+/// A part of a slice, mm: lateral, and depth as `region.depth` counts it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Area {
+    pub lateral: [f64; 2],
+    pub depth: [f64; 2],
+}
+
+/// Where a frame is measured.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Areas {
+    /// All measures but SNR and CNR; also what the sheet shows. Must lie inside of the sector.
+    pub crop: Area,
+    /// Tissue of one kind: SNR, and CNR against `background`.
+    pub region: Area,
+    pub background: Area,
+}
+
+/// One filter with its settings, measured.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Row {
+    pub candidate: candidates::Candidate,
+    pub quality: Quality,
+    /// Time of the filter's passes for one slice, ms; None for no filter and without time stamps.
+    pub time: Option<Spread>,
+    /// The filtered crop, row by row, 0..1.
+    pub pixels: Vec<f64>,
+}
+
+/// All filters on one frame.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Subject {
+    /// Name of the recording, or `phantom`.
+    pub name: String,
+    pub areas: Areas,
+    /// Frame of the volume, counted from 0.
+    pub frame: usize,
+    /// Pixels of the crop.
+    pub size: [usize; 2],
+    /// The crop as the mean over all speckle, row by row; None if it is not known.
+    pub clean: Option<Vec<f64>>,
+    pub rows: Vec<Row>,
+}
+
+/// The comparison on every frame.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Report {
+    pub device: Device,
+    /// Name, version and build of the program.
+    pub program: String,
+    /// Time of the measurement, RFC 3339.
+    pub date: String,
+    /// Times measured for each row.
+    pub repeats: usize,
+    /// The first is the phantom, which has a clean frame.
+    pub subjects: Vec<Subject>,
+}
+
+impl Report {
+    /// For every filter the index of its row that is most similar to the clean frame (SSIM), in the order of the rows.
+    pub fn chosen(&self) -> Vec<usize> {
+        let Some(subject) = self.subjects.iter().find(|s| s.clean.is_some()) else { return Vec::new() };
+        let ssim = |n: &usize| subject.rows[*n].quality.ssim.unwrap_or(f64::NEG_INFINITY);
+        let mut chosen: Vec<usize> = Vec::new();
+        for n in 0..subject.rows.len() {
+            let filter = subject.rows[n].candidate.filter;
+            match chosen.iter_mut().find(|c| subject.rows[**c].candidate.filter == filter) {
+                Some(best) if ssim(&n) > ssim(best) => *best = n,
+                Some(_) => {}
+                None => chosen.push(n),
+            }
+        }
+        chosen
+    }
+}

@@ -1,0 +1,421 @@
+//! Compares two profiles of the same work: which passes became faster or slower, and which differ by no more than the noise
+//! of the machine.
+//!
+//! Times of neighbouring repeats are correlated (clocks, heat, other programs), so a rank test on the raw samples reports
+//! differences between identical runs far too often. A difference must therefore pass two tests:
+//!
+//! 1. Each series is cut into a few blocks. The Mann-Whitney test compares the logarithms of the block medians. Its p values
+//!    are corrected by Holm over all lines, so that a false alarm anywhere in the report is rare.
+//! 2. The Hodges-Lehmann shift must exceed the noise floor, which is the range of the block medians within one run. A line
+//!    whose blocks happen to be close together is not steadier than the device: the floor is at least the range of the typical
+//!    pass (median over the passes, weighted by their time) and one clock tick per dispatch.
+//!
+//! No test on two runs can detect conditions that held during one whole run and not the other. A common shift of all passes
+//! is reported for that reason.
+
+use super::statistics::{Sample, SampleError, Shift, block_medians, hodges_lehmann, holm, mann_whitney, min_p};
+use super::{LEVEL, PassProfile, Profile, ProfileError};
+use serde::Serialize;
+use std::collections::{BTreeMap, BTreeSet};
+use toml::{Table, Value};
+
+/// Thresholds of a comparison.
+#[derive(Clone, Copy, Debug)]
+pub struct CompareOptions {
+    /// Ratio of medians above which a slower pass is a regression; at least 1.
+    pub threshold: f64,
+    /// Probability of any false alarm in the whole report, 0..1.
+    pub alpha: f64,
+    /// Compare even if the profiles ran different work.
+    pub force: bool,
+}
+
+impl Default for CompareOptions {
+    fn default() -> CompareOptions {
+        CompareOptions { threshold: 1.05, alpha: 0.05, force: false }
+    }
+}
+
+/// Why two profiles cannot be compared.
+#[derive(Debug, thiserror::Error)]
+pub enum CompareError {
+    #[error("{which} profile: {fault}")]
+    Profile { which: &'static str, fault: ProfileError },
+    #[error("the profiles ran different work ({}); profile the same, or pass --force", .0.join("; "))]
+    DifferentWork(Vec<String>),
+    #[error("times: {fault}")]
+    Times { fault: SampleError },
+    #[error("{field}: {value} {fault}")]
+    Option { field: &'static str, value: f64, fault: &'static str },
+}
+
+/// Result of comparing one line.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Verdict {
+    Faster,
+    Slower,
+    WithinNoise,
+    New,
+    Gone,
+    NotComparable,
+}
+
+/// What the times of a line are of.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Kind {
+    Pass,
+    /// A span of the host. Reported, but never a regression: such spans are short and part of the wall time.
+    Host,
+    /// From submission until the device is idle.
+    Wall,
+}
+
+/// New over old; below 1 is faster.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct Ratio {
+    pub estimate: f64,
+    /// Confidence interval of this line alone, not corrected for the other lines.
+    pub low: f64,
+    pub high: f64,
+    pub coverage: f64,
+    /// Uncorrected.
+    pub p: f64,
+    /// Corrected by Holm over all lines.
+    pub p_holm: f64,
+    /// Noise floor as a ratio (at least 1): a smaller difference is noise.
+    pub floor: f64,
+}
+
+/// Comparison of one pass, host span or wall time.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Line {
+    pub name: String,
+    pub stage: String,
+    pub kind: Kind,
+    pub verdict: Verdict,
+    /// Median of the old run, ns.
+    pub old_ns: Option<f64>,
+    /// Median of the new run, ns.
+    pub new_ns: Option<f64>,
+    /// None if there was nothing to compare.
+    pub ratio: Option<Ratio>,
+    /// Why it is not comparable, or other remarks.
+    pub note: Option<String>,
+    /// True if slower by more than the threshold.
+    pub is_regression: bool,
+}
+
+/// Comparison of two profiles.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Comparison {
+    pub format: &'static str,
+    /// Description of the statistical test.
+    pub test: String,
+    pub threshold: f64,
+    pub notes: Vec<String>,
+    pub lines: Vec<Line>,
+}
+
+impl Comparison {
+    /// Lines that are slower by more than the threshold.
+    pub fn regressions(&self) -> impl Iterator<Item = &Line> {
+        self.lines.iter().filter(|l| l.is_regression)
+    }
+}
+
+/// Compares two profiles. Lines are in this order: passes of the new profile, passes only in the old one, host spans, wall time.
+///
+/// # Errors
+/// An option out of range, an inconsistent profile, or profiles of different work unless forced.
+pub fn compare(old: &Profile, new: &Profile, options: &CompareOptions) -> Result<Comparison, CompareError> {
+    let refuse = |field, value, fault| Err(CompareError::Option { field, value, fault });
+    if !(options.threshold.is_finite() && options.threshold >= 1.0) {
+        return refuse("--threshold", options.threshold, "is not a ratio of at least 1 (1.05 is five percent slower)");
+    }
+    if !(options.alpha > 0.0 && options.alpha < 1.0) {
+        return refuse("alpha", options.alpha, "is not a probability between 0 and 1");
+    }
+    for (which, profile) in [("old", old), ("new", new)] {
+        profile.check().map_err(|fault| CompareError::Profile { which, fault })?;
+    }
+    let differences = Differences::between(old, new);
+    if !differences.work.is_empty() && !options.force {
+        return Err(CompareError::DifferentWork(differences.work));
+    }
+    let pairs = pairs(old, new);
+    let both = pairs.iter().filter(|p| p.old.is_some() && p.new.is_some()).count();
+    let blocks = blocks_needed(both, options.alpha);
+    let tick = old.device.timestamp_period_ns.max(new.device.timestamp_period_ns);
+    let lines = judge(pairs, blocks, tick, options).map_err(|fault| CompareError::Times { fault })?;
+    let mut notes = differences.work;
+    notes.extend(differences.conditions);
+    notes.extend(common_shift(&lines));
+    let test = format!(
+        "Mann-Whitney on the medians of {blocks} blocks a run, Holm over {both} lines at {:.0} %, and a shift beyond what the \
+         blocks of a run range over",
+        options.alpha * 100.0
+    );
+    Ok(Comparison { format: "echolume-comparison-1", test, threshold: options.threshold, notes, lines })
+}
+
+/// Times of one line in one run.
+#[derive(Clone, Copy)]
+pub struct Series<'a> {
+    pub stage: &'a str,
+    pub runs: u32,
+    pub times: &'a [f64],
+}
+
+/// Times of one line in both runs; None where a run lacks it.
+pub struct Pair<'a> {
+    pub kind: Kind,
+    pub name: &'a str,
+    pub old: Option<Series<'a>>,
+    pub new: Option<Series<'a>>,
+}
+
+fn pairs<'a>(old: &'a Profile, new: &'a Profile) -> Vec<Pair<'a>> {
+    let series = |list: &'a [PassProfile], name: &str| {
+        let found = list.iter().find(|p| p.name == name)?;
+        Some(Series { stage: &found.stage, runs: found.runs_per_picture, times: &found.samples_ns })
+    };
+    let mut pairs = Vec::new();
+    for (kind, old, new) in [(Kind::Pass, &old.passes, &new.passes), (Kind::Host, &old.host, &new.host)] {
+        let gone = old.iter().filter(|p| series(new, &p.name).is_none());
+        for name in new.iter().chain(gone).map(|p| p.name.as_str()) {
+            pairs.push(Pair { kind, name, old: series(old, name), new: series(new, name) });
+        }
+    }
+    let wall = |profile: &'a Profile| Some(Series { stage: "", runs: 1, times: &profile.wall_ns });
+    pairs.push(Pair { kind: Kind::Wall, name: "wall", old: wall(old), new: wall(new) });
+    pairs
+}
+
+/// Differences between the conditions of two profiles, one text each, old before new.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Differences {
+    /// Different work: the times are not comparable.
+    pub work: Vec<String>,
+    /// The same work under other conditions: comparable, but worth reporting.
+    pub conditions: Vec<String>,
+}
+
+impl Differences {
+    pub fn between(old: &Profile, new: &Profile) -> Differences {
+        let mut found = Differences::default();
+        found.work.extend(settings(&old.scene, &new.scene));
+        let sizes = [&old.sizes, &new.sizes];
+        let work = [
+            ("input", [old, new].map(|p| p.input.clone())),
+            ("frame", sizes.map(|s| format!("{} x {} samples", s.frame[0], s.frame[1]))),
+            ("slices", sizes.map(|s| s.slices.to_string())),
+            ("volume", sizes.map(|s| format!("{} x {} x {} texels", s.volume[0], s.volume[1], s.volume[2]))),
+            ("turn", [old, new].map(|p| format!("{} deg", p.turn))),
+            ("picture", sizes.map(|s| format!("{} x {} pixels", s.picture[0], s.picture[1]))),
+        ];
+        let devices = [&old.device, &new.device];
+        let conditions = [
+            ("device", devices.map(|d| d.name.clone())),
+            ("driver", devices.map(|d| d.driver.clone())),
+            ("Vulkan", devices.map(|d| d.api.clone())),
+            ("clocks", devices.map(|d| d.clocks.clone().unwrap_or_else(|| "not known".into()))),
+            ("ns a tick", devices.map(|d| d.timestamp_period_ns.to_string())),
+            ("time stamp bits", devices.map(|d| d.valid_bits.to_string())),
+            ("program", [old, new].map(|p| p.program.clone())),
+            ("repeats", [old, new].map(|p| p.repeats.to_string())),
+            ("warm-up", [old, new].map(|p| p.warm_up.to_string())),
+        ];
+        for (list, pairs) in [(&mut found.work, &work[..]), (&mut found.conditions, &conditions[..])] {
+            for (what, [old, new]) in pairs.iter().filter(|(_, [old, new])| old != new) {
+                list.push(format!("{what}: {old} -> {new}"));
+            }
+        }
+        found
+    }
+}
+
+/// Differences of settings, each under its full key.
+fn settings(old: &str, new: &str) -> Vec<String> {
+    if old == new {
+        return Vec::new();
+    }
+    let (Ok(old), Ok(new)) = (old.parse::<Table>(), new.parse::<Table>()) else {
+        return vec!["scene: the settings differ, and at least one side is not TOML".into()];
+    };
+    let [mut a, mut b] = [BTreeMap::new(), BTreeMap::new()];
+    flatten("", &Value::Table(old), &mut a);
+    flatten("", &Value::Table(new), &mut b);
+    let missing = "not set";
+    let keys: BTreeSet<&String> = a.keys().chain(b.keys()).collect();
+    let value = |side: &BTreeMap<String, String>, key: &String| side.get(key).map_or(missing.into(), String::clone);
+    let pairs = keys.into_iter().map(|key| (key, value(&a, key), value(&b, key)));
+    pairs.filter(|(_, old, new)| old != new).map(|(key, old, new)| format!("scene {key}: {old} -> {new}")).collect()
+}
+
+fn flatten(key: &str, value: &Value, into: &mut BTreeMap<String, String>) {
+    match value {
+        Value::Table(table) if !table.is_empty() || key.is_empty() => {
+            for (name, inner) in table {
+                let key = if key.is_empty() { name.clone() } else { format!("{key}.{name}") };
+                flatten(&key, inner, into);
+            }
+        }
+        other => {
+            into.insert(key.into(), other.to_string());
+        }
+    }
+}
+
+/// Minimum number of blocks that a series is cut into. Fewer blocks are longer, so neighbours are less correlated.
+const MIN_BLOCKS: usize = 6;
+
+/// Minimum number of passes in which a common shift is looked for.
+const MIN_COMMON: usize = 3;
+
+/// The minimum number of blocks per run with which the test can report any difference among `lines` lines.
+pub fn blocks_needed(lines: usize, alpha: f64) -> usize {
+    (MIN_BLOCKS..100).find(|b| min_p(*b) * lines as f64 <= alpha).unwrap_or(100)
+}
+
+/// Test result of two series, before correction for the other lines.
+struct BlockTest {
+    p: f64,
+    /// Of the logarithms of times.
+    shift: Shift,
+    /// Largest range of block medians within one run, logarithm of a ratio.
+    range: f64,
+    /// One clock tick per dispatch, logarithm of a ratio.
+    tick: f64,
+    /// Median time of the new run, ns.
+    weight: f64,
+}
+
+/// Tests the block medians of two series; Err(reason) if there is nothing to compare. `tick` in ns.
+fn test(old: &Series, new: &Series, blocks: usize, tick: f64) -> Result<Result<BlockTest, String>, SampleError> {
+    let mut logs = Vec::new();
+    for (which, series) in [("old", old), ("new", new)] {
+        let Some(medians) = block_medians(series.times, blocks)? else {
+            let count = series.times.len();
+            let fault = match count {
+                0 => format!("the {which} run has no times"),
+                _ => format!("the {which} run has {count} repeats; with fewer than {blocks} nothing can be told apart"),
+            };
+            return Ok(Err(fault));
+        };
+        if medians.iter().any(|ns| *ns <= 0.0) {
+            return Ok(Err(format!("the {which} run has times of 0 ns: below what its clock resolves")));
+        }
+        logs.push(medians.into_iter().map(f64::ln).collect::<Vec<f64>>());
+    }
+    let mut range: f64 = 0.0;
+    for medians in &logs {
+        let sample = Sample::new(medians)?;
+        range = range.max(sample.max() - sample.min());
+    }
+    let (old_ns, new_ns) = (Sample::new(old.times)?.median(), Sample::new(new.times)?.median());
+    let runs = f64::from(old.runs.max(new.runs));
+    Ok(Ok(BlockTest {
+        p: mann_whitney(&logs[0], &logs[1])?.p,
+        shift: hodges_lehmann(&logs[0], &logs[1], LEVEL)?,
+        range,
+        tick: (tick * runs / old_ns.min(new_ns)).ln_1p(),
+        weight: new_ns,
+    }))
+}
+
+/// Median range over the passes, weighted by their time.
+fn typical_range(passes: &[&BlockTest]) -> f64 {
+    let mut ordered: Vec<(f64, f64)> = passes.iter().map(|t| (t.range, t.weight)).collect();
+    ordered.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let half = ordered.iter().map(|(_, weight)| weight).sum::<f64>() / 2.0;
+    let mut below = 0.0;
+    let middle = ordered.iter().find(|(_, weight)| {
+        below += weight;
+        below >= half
+    });
+    middle.map_or(0.0, |(range, _)| *range)
+}
+
+/// Compares all pairs. `tick`: resolution of the device's clock, ns.
+pub fn judge(pairs: Vec<Pair>, blocks: usize, tick: f64, options: &CompareOptions) -> Result<Vec<Line>, SampleError> {
+    let mut tested = Vec::new();
+    for pair in &pairs {
+        // The host's clock has a resolution of 1 ns.
+        let tick = if pair.kind == Kind::Pass { tick } else { 1.0 };
+        tested.push(match (&pair.old, &pair.new) {
+            (Some(old), Some(new)) => test(old, new, blocks, tick)?,
+            _ => Err(String::new()),
+        });
+    }
+    let passes = pairs.iter().zip(&tested).filter(|(pair, _)| pair.kind == Kind::Pass);
+    let typical = typical_range(&passes.filter_map(|(_, t)| t.as_ref().ok()).collect::<Vec<_>>());
+    let p: Vec<f64> = tested.iter().flatten().map(|t| t.p).collect();
+    let mut corrected = holm(&p).into_iter();
+    let lines = pairs.into_iter().zip(tested).map(|(pair, tested)| {
+        let (ratio, fault) = match tested {
+            Ok(tested) => (corrected.next().map(|p_holm| ratio(&tested, typical, p_holm)), None),
+            Err(fault) => (None, Some(fault)),
+        };
+        line(pair, ratio, fault, options)
+    });
+    Ok(lines.collect())
+}
+
+fn ratio(tested: &BlockTest, typical: f64, p_holm: f64) -> Ratio {
+    let shift = &tested.shift;
+    Ratio {
+        estimate: shift.estimate.exp(),
+        low: shift.low.exp(),
+        high: shift.high.exp(),
+        coverage: shift.coverage,
+        p: tested.p,
+        p_holm,
+        floor: tested.range.max(typical).max(tested.tick).exp(),
+    }
+}
+
+fn line(pair: Pair, ratio: Option<Ratio>, fault: Option<String>, options: &CompareOptions) -> Line {
+    let verdict = match (&pair.old, &pair.new, &ratio) {
+        (None, _, _) => Verdict::New,
+        (_, None, _) => Verdict::Gone,
+        (_, _, None) => Verdict::NotComparable,
+        (_, _, Some(r)) if r.p_holm > options.alpha => Verdict::WithinNoise,
+        (_, _, Some(r)) if r.estimate > r.floor => Verdict::Slower,
+        (_, _, Some(r)) if r.estimate < 1.0 / r.floor => Verdict::Faster,
+        _ => Verdict::WithinNoise,
+    };
+    let runs = match (&pair.old, &pair.new) {
+        (Some(old), Some(new)) if old.runs != new.runs => Some(format!("runs a picture: {} -> {}", old.runs, new.runs)),
+        _ => None,
+    };
+    let median = |series: &Option<Series>| series.and_then(|s| Sample::new(s.times).ok()).map(|s| s.median());
+    let slower_by = ratio.map_or(0.0, |r| r.estimate);
+    Line {
+        name: pair.name.into(),
+        stage: pair.new.or(pair.old).map_or(String::new(), |s| s.stage.into()),
+        kind: pair.kind,
+        verdict,
+        old_ns: median(&pair.old),
+        new_ns: median(&pair.new),
+        ratio,
+        note: fault.filter(|f| !f.is_empty()).or(runs),
+        is_regression: verdict == Verdict::Slower && slower_by > options.threshold && pair.kind != Kind::Host,
+    }
+}
+
+/// A note if all passes changed by a similar factor: then a clock changed rather than a pass.
+pub fn common_shift(lines: &[Line]) -> Option<String> {
+    let passes: Vec<Ratio> = lines.iter().filter(|l| l.kind == Kind::Pass).filter_map(|l| l.ratio).collect();
+    let logs: Vec<f64> = passes.iter().map(|r| r.estimate.ln()).collect();
+    let sample = Sample::new(&logs).ok().filter(|s| s.count() >= MIN_COMMON)?;
+    let floors: Vec<f64> = passes.iter().map(|r| r.floor.ln()).collect();
+    let floor = Sample::new(&floors).ok()?.median();
+    let (shift, spread) = (sample.median(), sample.max() - sample.min());
+    // The shift is more than twice the spread of the passes.
+    (shift.abs() > floor && spread < shift.abs() / 2.0).then(|| {
+        let each = sample.quantile(0.5).exp();
+        format!("all passes changed alike, by a factor of {each:.2}: look whether clocks or other load differ between the runs")
+    })
+}

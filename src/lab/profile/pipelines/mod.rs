@@ -1,0 +1,228 @@
+//! What the driver makes of the pipelines: registers, occupancy, spills, instructions, and the time to compile them. [`measure`] asks a
+//! device, [`compare`] finds what became worse, [`table`] is for people, and [`PipelineProfile`] is the file, small enough to be kept for
+//! a driver that the machine at hand does not have.
+
+mod columns;
+pub mod compare;
+pub mod table;
+
+pub use columns::Columns;
+pub use table::table;
+
+use crate::gpu::pipeline_measure::{self, MeasuredPipeline};
+use crate::gpu::{Context, GpuError, Shaders};
+use crate::machine;
+use crate::scene::Scene;
+use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
+use std::sync::Arc;
+
+/// Version of the JSON format.
+pub const FORMAT: &str = "echolume-pipelines-1";
+
+/// Why a file cannot be read or written.
+#[derive(Debug, thiserror::Error)]
+pub enum PipelinesError {
+    #[error("format is '{found}', this program reads '{FORMAT}'; profile the pipelines again with it")]
+    Format { found: String },
+    #[error("not statistics of pipelines: {0}")]
+    Json(String),
+    #[error("{field}: {fault}")]
+    Contents { field: String, fault: String },
+}
+
+/// Statistics of pipelines on one device.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct PipelineProfile {
+    /// [`FORMAT`].
+    pub format: String,
+    /// Name, version and build of the program.
+    pub program: String,
+    /// Time of the run, RFC 3339.
+    pub date: String,
+    pub device: String,
+    pub driver: String,
+    /// What was compiled: the input, and `every mode, preset and filter` or the settings' own.
+    pub input: String,
+    /// False if the device does not tell statistics: then there are only times.
+    pub has_statistics: bool,
+    /// The driver's names of its statistics; the values of an executable are in this order.
+    pub statistics: Vec<String>,
+    /// In the order of their first use.
+    pub pipelines: Vec<Pipeline>,
+}
+
+/// A pipeline. Shader, constants and formats tell it from others.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Pipeline {
+    /// The first pass that uses it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub pass: Option<String>,
+    pub shader: String,
+    /// Specialization constants by name.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub constants: BTreeMap<String, i32>,
+    /// Formats of the inputs.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub formats: Vec<String>,
+    /// Time to compile without any cache, ms.
+    pub cold_ms: f64,
+    /// The same from a pipeline cache, ms.
+    pub warm_ms: f64,
+    /// The driver says that it took it from the cache; `None` if it does not say.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub from_cache: Option<bool>,
+    /// The programs that the driver made of it; it chooses one for a dispatch.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub executables: Vec<Executable>,
+}
+
+/// A program for the device.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Executable {
+    pub name: String,
+    /// Invocations of a subgroup.
+    pub subgroup: u32,
+    /// By the names of [`PipelineProfile::statistics`]; `None` where this executable lacks one.
+    pub values: Vec<Option<f64>>,
+}
+
+impl Pipeline {
+    /// Shader, constants and formats in one line.
+    pub fn title(&self) -> String {
+        let constants: Vec<String> = self.constants.iter().map(|(name, value)| format!("{name}={value}")).collect();
+        let parts = [vec![self.shader.clone()], constants, vec![self.formats.join("+")]].concat();
+        parts.into_iter().filter(|part| !part.is_empty()).collect::<Vec<_>>().join(" ")
+    }
+}
+
+/// Compiles every pipeline that these scenes need with these shaders, twice: without any cache, and from a pipeline cache. Submits nothing.
+///
+/// # Errors
+/// A scene that the device cannot hold, a shader that does not compile.
+pub fn measure(
+    context: &Arc<Context>,
+    scenes: &[Scene],
+    shaders: &Arc<Shaders>,
+    input: String,
+) -> Result<PipelineProfile, GpuError> {
+    let measured = pipeline_measure::measure(context, scenes, shaders)?;
+    let mut statistics: Vec<String> = Vec::new();
+    for (name, _) in measured.iter().flat_map(|p| &p.executables).flat_map(|e| &e.statistics) {
+        if is_measure(name) && !statistics.contains(name) {
+            statistics.push(name.clone());
+        }
+    }
+    let device = machine::device(context);
+    Ok(PipelineProfile {
+        format: FORMAT.into(),
+        program: machine::program(),
+        date: machine::date(),
+        device: device.name,
+        driver: device.driver,
+        input,
+        has_statistics: context.candidate.compile_statistics,
+        pipelines: measured.into_iter().map(|p| pipeline(p, &statistics)).collect(),
+        statistics,
+    })
+}
+
+/// False for numbers that name a build instead of measuring it.
+fn is_measure(name: &str) -> bool {
+    !name.to_lowercase().contains("hash")
+}
+
+fn pipeline(measured: MeasuredPipeline, statistics: &[String]) -> Pipeline {
+    // A hundredth of a millisecond is what a reader and a file need.
+    let ms = |time: std::time::Duration| (time.as_secs_f64() * 1e5).round() / 100.0;
+    let executable = |e: pipeline_measure::Executable| Executable {
+        values: statistics.iter().map(|name| e.statistics.iter().find(|s| s.0 == *name).map(|s| s.1)).collect(),
+        name: e.name,
+        subgroup: e.subgroup,
+    };
+    Pipeline {
+        pass: Some(measured.pass.into()),
+        shader: measured.shader.into(),
+        constants: measured.constants.into_iter().map(|(name, value)| (name.to_string(), value)).collect(),
+        formats: measured.formats.iter().map(|format| format!("{format:?}")).collect(),
+        cold_ms: ms(measured.cold),
+        warm_ms: ms(measured.warm),
+        from_cache: measured.warm_hit,
+        executables: measured.executables.into_iter().map(executable).collect(),
+    }
+}
+
+impl PipelineProfile {
+    /// The columns of a pipeline that the drivers have in common.
+    pub fn columns(&self, pipeline: &Pipeline) -> Columns {
+        Columns::of(&self.statistics, pipeline)
+    }
+
+    /// Checks that the lists are consistent and all numbers are finite.
+    ///
+    /// # Errors
+    /// The first field that is not.
+    fn check(&self) -> Result<(), PipelinesError> {
+        let fault = |field: &str, fault: String| Err(PipelinesError::Contents { field: field.into(), fault });
+        let mut known = std::collections::BTreeSet::new();
+        for pipeline in &self.pipelines {
+            let title = crate::text::escaped(&pipeline.title());
+            if !known.insert((&pipeline.shader, &pipeline.constants, &pipeline.formats)) {
+                return fault(&title, "is listed twice".into());
+            }
+            let times = [pipeline.cold_ms, pipeline.warm_ms];
+            if let Some(ms) = times.iter().find(|ms| !(ms.is_finite() && **ms >= 0.0)) {
+                return fault(&title, format!("a time is {ms} ms; a time is finite and not below 0"));
+            }
+            for executable in &pipeline.executables {
+                let (count, expected) = (executable.values.len(), self.statistics.len());
+                if count != expected {
+                    return fault(&title, format!("has {count} values for {expected} statistics"));
+                }
+                if executable.values.iter().flatten().any(|value| !value.is_finite()) {
+                    return fault(&title, "has a value that is not finite".into());
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// The statistics as JSON, a line for each pipeline.
+    ///
+    /// # Errors
+    /// A number that is not finite.
+    pub fn to_json(&self) -> Result<String, PipelinesError> {
+        self.check()?;
+        let json = |fault: serde_json::Error| PipelinesError::Json(fault.to_string());
+        let without = PipelineProfile { pipelines: Vec::new(), ..self.clone() };
+        let head = serde_json::to_string(&without).map_err(json)?;
+        let lines: Result<Vec<String>, _> = self.pipelines.iter().map(serde_json::to_string).collect();
+        let lines = lines.map_err(json)?.join(",\n");
+        // The list of pipelines is the last field and empty.
+        let head = head.strip_suffix("]}").unwrap_or(&head);
+        Ok(format!("{head}\n{lines}\n]}}\n"))
+    }
+
+    /// Reads what [`PipelineProfile::to_json`] wrote. Any text gives consistent statistics or an error.
+    ///
+    /// # Errors
+    /// One line: another format, no JSON of statistics, or contents that are not consistent.
+    pub fn from_json(text: &str) -> Result<PipelineProfile, PipelinesError> {
+        /// Read first, to distinguish another version from a file that is none.
+        #[derive(Deserialize)]
+        struct Version {
+            format: String,
+        }
+        let json = |fault: serde_json::Error| PipelinesError::Json(crate::text::single_line(&fault.to_string()));
+        let version: Version = serde_json::from_str(text).map_err(json)?;
+        if version.format != FORMAT {
+            return Err(PipelinesError::Format { found: crate::text::single_line(&version.format) });
+        }
+        let profile: PipelineProfile = serde_json::from_str(text).map_err(json)?;
+        profile.check()?;
+        Ok(profile)
+    }
+}

@@ -1,0 +1,326 @@
+//! The thesis' tables as Markdown and as CSV.
+
+use super::growth::{Grown, Growth, THESIS};
+use super::{Conditions, DEPTH, FAN_ANGLE, Report, Row, SAMPLES, SECTOR_ANGLE, SOUND_SPEED, Spread, Table};
+use crate::profile::export::acquisition_floor;
+use crate::scene::Estimator;
+use crate::text::{csv_quoted, markdown_table, markdown_text};
+use std::fmt::Write as _;
+
+/// Tables 3-6 as CSV, one line per row; a missing time is an empty field.
+pub fn tables_csv(report: &Report) -> String {
+    let mut text = String::from(
+        "table,varied,value,usual,picture_ms,picture_least_ms,picture_most_ms,ratio,thesis_ms,thesis_ratio,stage_1_ms,\
+         stage_1_least_ms,stage_1_most_ms,surface_mm,surface_share,repeats,frames,lines,samples,volume,filter_3d,filter_2d,device,driver,date\n",
+    );
+    for table in &report.tables {
+        for (n, row) in table.rows.iter().enumerate() {
+            text.push_str(&csv_row(report, table, row, n == table.usual));
+        }
+    }
+    text
+}
+
+fn csv_row(report: &Report, table: &Table, row: &Row, usual: bool) -> String {
+    let c = row.conditions;
+    let number = |value: Option<f64>| value.map_or(String::new(), |v| format!("{v:.6}"));
+    let three = |ns: &[f64]| {
+        let spread = Spread::new(ns);
+        [spread.map(|s| s.median), spread.map(|s| s.min), spread.map(|s| s.max)].map(number)
+    };
+    let mut fields = vec![table.number.to_string(), table.varied.into(), csv_quoted(&row.label), usual.to_string()];
+    fields.extend(three(&row.times.picture));
+    fields.extend([number(table.ratio(row)), row.thesis.ms.to_string(), number(table.thesis_ratio(row))]);
+    fields.extend(three(&row.times.preprocess));
+    fields.extend([row.reached.map(|r| r.depth), row.reached.map(|r| r.share)].map(number));
+    fields.extend([report.repeats, c.frames, c.lines, SAMPLES].map(|n| n.to_string()));
+    fields.extend([c.volume.to_string(), c.filter_3d.name(), c.filter_2d.to_string()]);
+    fields.extend([&report.device.name, &report.device.driver, &report.date].map(|t| csv_quoted(t)));
+    fields.join(",") + "\n"
+}
+
+/// Tables 7-9 as CSV, one line per picture, sigma, starting window and step of growth; shares in 0..1.
+pub fn growth_csv(grown: &[Grown]) -> String {
+    let mut text = String::from("picture,centre,sigma,window,largest,grew,share\n");
+    for picture in grown {
+        for row in &picture.rows {
+            for n in 0..row.counts.len() {
+                let share = row.share(n).unwrap_or(0.0);
+                let [window, largest] = row.windows;
+                let name = csv_quoted(&picture.picture);
+                let (centre, sigma) = (row.centre.name(), row.sigma);
+                let _ = writeln!(text, "{name},{centre},{sigma},{window},{largest},{},{share:.6}", 2 * n);
+            }
+        }
+    }
+    text
+}
+
+/// The thesis' example of the acquisition floor: frames, lines.
+const THESIS_FLOOR: [usize; 2] = [35, 64];
+
+/// Travel time of sound for a volume, s: 2 d / c per line (thesis 4.3).
+fn acquisition(frames: usize, lines: usize) -> f64 {
+    (frames * lines) as f64 * 2.0 * DEPTH * 1e-3 / SOUND_SPEED
+}
+
+fn ms(value: f64) -> String {
+    format!("{value:.3}")
+}
+
+/// The report as Markdown: conditions, Tables 3-6 with the figures of the thesis, notes, and Tables 7-9 of every picture.
+pub fn markdown(report: &Report) -> String {
+    let mut text = String::from("# Tables of the thesis on this device\n\n");
+    conditions(&mut text, report);
+    for table in &report.tables {
+        let _ = write!(text, "\n## Table {}: {}\n\n{}", table.number, table.varied, markdown_table(&rows(table)));
+    }
+    text.push('\n');
+    for note in notes(report) {
+        let _ = writeln!(text, "- {note}");
+    }
+    report.grown.iter().for_each(|grown| growth(&mut text, grown));
+    text
+}
+
+fn conditions(text: &mut String, report: &Report) {
+    let device = &report.device;
+    let software = if device.is_software { " (software: computes on the CPU)" } else { "" };
+    let clocks = device.clocks.as_deref().map_or(String::new(), |c| format!("; {c}"));
+    let usual = Conditions::usual(report.quick);
+    let n = usual.volume;
+    let _ = writeln!(
+        text,
+        "- device: {}{software}, {}, Vulkan {}{}; {}; {}",
+        markdown_text(&device.name),
+        markdown_text(&device.driver),
+        markdown_text(&device.api),
+        markdown_text(&clocks),
+        markdown_text(&report.program),
+        markdown_text(&report.date)
+    );
+    if report.quick {
+        let _ = writeln!(
+            text,
+            "- quick: every volume has a quarter of the thesis' edge, so the times do not compare with its figures"
+        );
+    }
+    let _ = writeln!(
+        text,
+        "- conditions, each unless varied: surface mode, {} frames of {} lines x {SAMPLES} samples, sector {SECTOR_ANGLE} deg, \
+         fan {FAN_ANGLE} deg, depth {DEPTH} mm; volume {n}^3: slices of {n} x {n}, {n} samples on a ray from the face to the \
+         last sample, picture {n} x {n}; 3D filter {}; 2D filter {m}x{m}",
+        usual.frames,
+        usual.lines,
+        usual.filter_3d.name(),
+        m = usual.filter_2d,
+    );
+    let _ = writeln!(
+        text,
+        "- input: a synthetic sweep, a ball of 90 mm before a wall in fluid; surface: the mean depth below the face at which \
+         rays met one, and the share of the rays that did"
+    );
+    let _ = match report.has_times() {
+        true => writeln!(
+            text,
+            "- times: on the device, ms, median (least..most) of {} after {} to warm up, the rows of a table in turns; \
+             * is the row that ratios are to",
+            report.repeats, report.warm_up
+        ),
+        false => writeln!(text, "- times: not known, this device has no time stamps; * is the row that ratios are to"),
+    };
+}
+
+fn rows(table: &Table) -> Vec<Vec<String>> {
+    let head = [
+        table.varied,
+        "stages 2-4, ms",
+        "least..most",
+        "ratio",
+        "thesis, ms",
+        "ratio",
+        "stage 1, ms",
+        "least..most",
+        "surface",
+    ];
+    let mut rows = vec![head.map(String::from).to_vec()];
+    for (n, row) in table.rows.iter().enumerate() {
+        let mark = if n == table.usual { " *" } else { "" };
+        let ratio = |ratio: Option<f64>| ratio.map_or("-".into(), |r| format!("{r:.2}"));
+        let mut cells = vec![format!("{}{mark}", row.label)];
+        cells.extend(spread(&row.times.picture));
+        cells.push(ratio(table.ratio(row)));
+        let thesis = format!("{:.1}", row.thesis.ms);
+        cells.push(if row.thesis.from_others { format!("({thesis})") } else { thesis });
+        cells.push(ratio(table.thesis_ratio(row)));
+        cells.extend(spread(&row.times.preprocess));
+        let met = row.reached.map(|r| format!("{:.1} mm, {:.1} %", r.depth, 100.0 * r.share));
+        cells.push(met.unwrap_or("-".into()));
+        rows.push(cells);
+    }
+    rows
+}
+
+fn spread(ns: &[f64]) -> [String; 2] {
+    match Spread::new(ns) {
+        Some(s) => [ms(s.median), format!("{}..{}", ms(s.min), ms(s.max))],
+        None => ["-".into(), "-".into()],
+    }
+}
+
+fn notes(report: &Report) -> Vec<String> {
+    let usual = Conditions::usual(report.quick);
+    let [frames, lines] = THESIS_FLOOR;
+    let mut notes = vec![
+        "thesis: a GTX 650 (4.3; 3.8 says GT 630), time per rendered volume: stages 2-4 here. Stage 1 of all frames stands \
+         beside it, since frames go through it while they arrive"
+            .into(),
+        "3D filter along the ray: the thesis' own, made anew for every picture. Slice by slice: separable, in stage 1, so that \
+         a picture does not pay for it"
+            .into(),
+        "2D filter: the sigma filter on the distance map, in stage 3. The thesis' own figures say that it runs on pictures: from \
+         3x3 to 11x11 they rise by 2.5 ms, so 512 x 512 pixels x 112 more fetches make 12 G/s, of the 34 G/s of a GTX 650 (32 \
+         texture units at 1058 MHz); on 37 slices it would be 430 G/s"
+            .into(),
+        "(54.6): Table 6 of the thesis has no such row; its figure of the same conditions in Tables 3-5, which lies below its \
+         5x5 and 7x7"
+            .into(),
+        format!("lines: the thesis has 64 to 256; here {}. Slices are resampled, so stages 2-4 do not see lines", usual.lines),
+        format!("as of the usual row: {}", acquisition_floor(acquisition(usual.frames, usual.lines), SOUND_SPEED)),
+        format!(
+            "the thesis' example, {frames} frames of {lines} lines to {DEPTH} mm: {:.1} ms (thesis: around 466 ms)",
+            acquisition(frames, lines) * 1e3
+        ),
+    ];
+    if report.device.is_software && report.has_times() {
+        notes.push("a software device stamps times by the CPU's clock, and shares the CPU with everything else".into());
+    }
+    notes
+}
+
+fn growth(text: &mut String, grown: &Grown) {
+    let _ = writeln!(
+        text,
+        "\n## Tables 7-9: growth of the enhanced sigma filter's windows, {}",
+        markdown_text(&grown.picture)
+    );
+    let mut tables: Vec<(Estimator, f64)> = grown.rows.iter().map(|r| (r.centre, r.sigma)).collect();
+    tables.dedup();
+    for (centre, sigma) in tables {
+        let of: Vec<&Growth> = grown.rows.iter().filter(|r| (r.centre, r.sigma) == (centre, sigma)).collect();
+        let columns = of.iter().map(|r| r.counts.len()).max().unwrap_or(0);
+        let mut rows = vec![vec!["window".to_string(), "largest".to_string()]];
+        rows[0].extend((0..columns).map(|n| format!("+{}, %", 2 * n)));
+        for row in of {
+            let mut cells = vec![row.windows[0].to_string(), row.windows[1].to_string()];
+            cells.extend((0..columns).map(|n| row.share(n).map_or(String::new(), |s| format!("{:.2}", 100.0 * s))));
+            rows.push(cells);
+        }
+        let _ = write!(text, "\ncentre {}, sigma {sigma}\n\n{}", centre.name(), markdown_table(&rows));
+    }
+    let _ = writeln!(text, "\nThe thesis, on pictures of its own:\n");
+    let mut rows = vec![["table", "window", "+0, %", "+2, %", "+4, %"].map(str::to_string).to_vec()];
+    for (table, window, shares) in THESIS {
+        let mut cells = vec![table.to_string(), window.to_string()];
+        cells.extend(shares.map(|s| format!("{s:.2}")));
+        rows.push(cells);
+    }
+    text.push_str(&markdown_table(&rows));
+    text.push_str(
+        "\nThe shares are of the picture, not of the filter: a window grows where fewer pixels than it has lie within 2 sigma of the \
+         centre, so they follow from how much of the picture is edge or speckle, and from the ratio of its noise to sigma.\n",
+    );
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::thesis_tables::tests::{measured, report};
+
+    #[test]
+    fn markdown_has_every_row_under_aligned_pipes() {
+        let text = markdown(&measured());
+        for number in 3..=6 {
+            let head = format!("\n## Table {number}: ");
+            assert_eq!(text.matches(&head).count(), 1, "{text}");
+        }
+        let lines: Vec<&str> = text.lines().filter(|l| l.starts_with('|')).collect();
+        assert_eq!(lines.len(), 4 + 4 + 5 + 5 + 2 * 4, "{text}");
+        let pipes = |l: &str| l.chars().enumerate().filter(|c| c.1 == '|').map(|c| c.0).collect::<Vec<_>>();
+        for table in text.split("\n## ").skip(1) {
+            let rows: Vec<_> = table.lines().filter(|l| l.starts_with('|')).map(pipes).collect();
+            assert!(rows.iter().all(|r| r.len() == 10 && *r == rows[0]), "{table}");
+        }
+        // The second of Table 5: of its own usual row, and of the thesis' that is not its own in Table 6.
+        let cells = |start: &str| -> Vec<Vec<String>> {
+            let of = lines.iter().filter(|l| l.starts_with(start));
+            of.map(|l| l.trim_matches('|').split('|').map(|c| c.trim().to_string()).collect()).collect()
+        };
+        assert_eq!(
+            cells("| 5x5x5 along")[0][1..],
+            ["6.000", "3.000..9.000", "1.50", "187.0", "3.42", "60.000", "60.000..60.000", "71.2 mm, 98.7 %"]
+        );
+        assert_eq!(cells("| 9x9 *")[0][3..6], ["1.00", "(54.6)", "1.00"]);
+        assert!(text.contains("465.5 ms (thesis: around 466 ms)"), "{text}");
+        assert!(text.contains("Some, \"device\" \\| one (software") && text.contains("2026-01-02"), "{text}");
+    }
+
+    #[test]
+    fn without_time_stamps_no_time_is_printed_and_the_text_says_so() {
+        let text = markdown(&report());
+        assert!(text.contains("this device has no time stamps"), "{text}");
+        for row in text.lines().filter(|l| l.starts_with("| 27") || l.starts_with("| 512^3")) {
+            assert_eq!(row.matches(" - ").count(), 6, "{row}");
+        }
+    }
+
+    #[test]
+    fn growth_has_a_table_a_sigma() {
+        let rows = [0.03, 0.1].map(|sigma| Growth::new(Estimator::Median, sigma, [3, 7], &[0.0, 1.0, 2.0, 2.0]));
+        let grown = vec![Grown { picture: "a|b.png".into(), rows: rows.to_vec() }];
+        let text = markdown(&Report { grown, ..report() });
+        assert!(
+            text.contains("windows, a\\|b.png\n\ncentre median, sigma 0.03\n")
+                && text.contains("\ncentre median, sigma 0.1\n"),
+            "{text}"
+        );
+        assert_eq!(
+            text.lines().filter(|l| l.starts_with("| 3      |       7 | 25.00 | 25.00 | 50.00 |")).count(),
+            2,
+            "{text}"
+        );
+    }
+
+    #[test]
+    fn csv_has_a_line_a_row_and_as_many_fields_in_each() {
+        let text = tables_csv(&measured());
+        assert_eq!(text.lines().count(), 1 + 4 + 4 + 5 + 5);
+        // Commas within quotes are not separators.
+        let fields = |line: &str| {
+            let outside = line.split('"').step_by(2).map(|part| part.matches(',').count());
+            outside.sum::<usize>() + 1
+        };
+        let counts: Vec<_> = text.lines().map(fields).collect();
+        assert!(counts.iter().all(|n| *n == 25), "{counts:?}");
+        assert!(
+            text.contains("3,frames,\"37\",true,8.000000,4.000000,12.000000,1.000000,54.6,1.000000,80.000000"),
+            "{text}"
+        );
+        assert!(text.contains("\"Some, \"\"device\"\" | one\""), "{text}");
+    }
+
+    #[test]
+    fn what_was_not_measured_is_an_empty_field() {
+        let csv = tables_csv(&report());
+        assert!(csv.lines().nth(1).is_some_and(|l| l.starts_with("3,frames,\"27\",false,,,,,53.7,")), "{csv}");
+    }
+
+    #[test]
+    fn growth_has_a_line_a_step() {
+        let rows = [0.03, 0.1].map(|sigma| Growth::new(Estimator::Median, sigma, [3, 7], &[0.0, 1.0, 2.0, 2.0]));
+        let grown = vec![Grown { picture: "a|b.png".into(), rows: rows.to_vec() }];
+        let csv = growth_csv(&grown);
+        assert_eq!(csv.lines().count(), 1 + 2 * 3);
+        assert!(csv.contains("\"a|b.png\",median,0.03,3,7,4,0.500000\n"), "{csv}");
+    }
+}

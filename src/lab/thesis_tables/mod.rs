@@ -1,0 +1,293 @@
+//! The tables of the thesis, next to the times of this device: Tables 3-6 (4.3), time per rendered volume in surface mode, and
+//! Tables 7-9 (5.5), the growth of filter windows. This file has the rows, their conditions and the figures of the thesis;
+//! [`measure`] and [`growth`] fill them, [`export`] writes Markdown and CSV.
+
+pub mod export;
+pub mod growth;
+pub mod measure;
+
+use crate::machine::Device;
+use crate::profile::statistics::Sample;
+use growth::Grown;
+
+/// Conditions of the thesis (4.3) unless varied. Angle over the scan lines of a frame, deg.
+pub(crate) const SECTOR_ANGLE: f64 = 77.0;
+/// Angle over the frames of a volume, deg.
+pub(crate) const FAN_ANGLE: f64 = 61.0;
+/// Depth, mm.
+pub const DEPTH: f64 = 160.0;
+/// Samples per scan line.
+pub const SAMPLES: usize = 512;
+/// Speed of sound, m/s.
+pub const SOUND_SPEED: f64 = 1540.0;
+/// Time that the thesis measured under these conditions, ms.
+const USUAL_MS: f64 = 54.6;
+
+/// The 3D filter on the samples of the volume, and where it runs.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Filter3d {
+    None,
+    /// As in the thesis: along every ray, with a sliding front slice (`ray.sliding`). Samples along each edge.
+    Sliding(u32),
+    /// Separable, applied slice by slice in stage 1 (`slices.smooth.kernel`). Taps along each axis.
+    Stored(u32),
+}
+
+impl Filter3d {
+    /// Name in the tables.
+    pub fn name(self) -> String {
+        match self {
+            Filter3d::None => "none".into(),
+            Filter3d::Sliding(n) => format!("{n}x{n}x{n} along the ray"),
+            Filter3d::Stored(n) => format!("{n}x{n}x{n} slice by slice"),
+        }
+    }
+}
+
+/// Conditions of one row.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Conditions {
+    /// Frames per volume.
+    pub frames: usize,
+    /// Scan lines per frame, of [`SAMPLES`] samples.
+    pub lines: usize,
+    /// n of n^3: slices of n x n pixels, n samples per ray from the face to the end of the volume, picture of n x n pixels.
+    pub volume: u32,
+    pub filter_3d: Filter3d,
+    /// Edge of the sigma filter's window on the distance map, pixels.
+    pub filter_2d: u32,
+}
+
+impl Conditions {
+    /// The conditions of the thesis; if `quick`, with a quarter of the edge of the volume and half of the lines.
+    pub fn usual(quick: bool) -> Conditions {
+        let (lines, volume) = if quick { (64, 128) } else { (128, 512) };
+        Conditions { frames: 37, lines, volume, filter_3d: Filter3d::Sliding(3), filter_2d: 9 }
+    }
+}
+
+/// Times on the device, ns, one entry per repeat.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Times {
+    /// Stages 2-4, which the thesis timed.
+    pub picture: Vec<f64>,
+    /// Stage 1 of all frames of a volume.
+    pub preprocess: Vec<f64>,
+}
+
+/// Median, minimum and maximum of repeats, ms.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Spread {
+    pub median: f64,
+    pub min: f64,
+    pub max: f64,
+}
+
+impl Spread {
+    /// From times in ns; None without times.
+    pub fn new(ns: &[f64]) -> Option<Spread> {
+        let sample = Sample::new(ns).ok()?;
+        let [median, min, max] = [sample.median(), sample.min(), sample.max()].map(|ns| ns * 1e-6);
+        Some(Spread { median, min, max })
+    }
+}
+
+/// The figure of the thesis for a row.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Thesis {
+    /// Time per rendered volume, ms.
+    pub ms: f64,
+    /// True if its table has no such row: the figure is from other tables of the thesis, under the same conditions.
+    pub from_others: bool,
+}
+
+/// A row of a table.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Row {
+    /// Value of the varied condition.
+    pub label: String,
+    pub conditions: Conditions,
+    pub thesis: Thesis,
+    /// Empty until measured, and without time stamps.
+    pub times: Times,
+    /// None until measured.
+    pub reached: Option<Reached>,
+}
+
+/// One of Tables 3-6.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Table {
+    /// Number in the thesis.
+    pub number: u32,
+    /// Name of the varied condition.
+    pub varied: &'static str,
+    pub rows: Vec<Row>,
+    /// Index of the row with the usual conditions, to which ratios are given.
+    pub usual: usize,
+}
+
+impl Table {
+    /// Ratio of the median of stages 2-4 to that of the usual row; None if not measured.
+    pub fn ratio(&self, row: &Row) -> Option<f64> {
+        let usual = Spread::new(&self.rows.get(self.usual)?.times.picture)?;
+        let own = Spread::new(&row.times.picture)?;
+        (usual.median > 0.0).then(|| own.median / usual.median)
+    }
+
+    /// The same ratio of the figures of the thesis.
+    pub(crate) fn thesis_ratio(&self, row: &Row) -> Option<f64> {
+        self.rows.get(self.usual).map(|usual| row.thesis.ms / usual.thesis.ms)
+    }
+}
+
+/// Tables 3-6 without times. `quick`: see [`Conditions::usual`].
+pub fn tables(quick: bool) -> Vec<Table> {
+    let usual = Conditions::usual(quick);
+    let table = |number, varied, rows: Vec<(String, Conditions, f64)>| {
+        let row = |(label, conditions, ms): (String, Conditions, f64)| {
+            // Table 6 has no row for the conditions of the other tables.
+            let from_others = number == 6 && conditions == usual;
+            Row { label, conditions, thesis: Thesis { ms, from_others }, times: Times::default(), reached: None }
+        };
+        let at = rows.iter().position(|(_, conditions, _)| *conditions == usual).unwrap_or(0);
+        Table { number, varied, rows: rows.into_iter().map(row).collect(), usual: at }
+    };
+    let frames = [(27, 53.7), (31, 54.0), (35, 54.6), (37, USUAL_MS)];
+    let volumes = [(128, 13.2), (256, 15.8), (384, 35.0), (512, USUAL_MS)];
+    let filters = [
+        (Filter3d::None, 21.5),
+        (Filter3d::Sliding(3), USUAL_MS),
+        (Filter3d::Sliding(5), 187.0),
+        (Filter3d::Stored(3), USUAL_MS),
+        (Filter3d::Stored(5), 187.0),
+    ];
+    let windows = [(3, 54.3), (5, 54.9), (7, 55.5), (9, USUAL_MS), (11, 56.8)];
+    let volume = |(n, ms): (u32, f64)| {
+        let edge = n / (512 / usual.volume);
+        let label = if quick { format!("{edge}^3 (for {n}^3)") } else { format!("{n}^3") };
+        (label, Conditions { volume: edge, ..usual }, ms)
+    };
+    vec![
+        table(3, "frames", frames.map(|(n, ms)| (n.to_string(), Conditions { frames: n, ..usual }, ms)).to_vec()),
+        table(4, "volume", volumes.map(volume).to_vec()),
+        table(5, "3D filter", filters.map(|(f, ms)| (f.name(), Conditions { filter_3d: f, ..usual }, ms)).to_vec()),
+        table(
+            6,
+            "2D filter",
+            windows.map(|(n, ms)| (format!("{n}x{n}"), Conditions { filter_2d: n, ..usual }, ms)).to_vec(),
+        ),
+    ]
+}
+
+/// Where the rays of a row hit a surface, which shows whether rows did the same work.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Reached {
+    /// Share of the rays that hit a surface, 0..1.
+    pub share: f64,
+    /// Mean depth of those surfaces below the face, mm; 0 without hits.
+    pub depth: f64,
+}
+
+/// All tables with the conditions of the measurement.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Report {
+    pub device: Device,
+    /// Name, version and build of the program.
+    pub program: String,
+    /// Time of the measurement, RFC 3339.
+    pub date: String,
+    pub quick: bool,
+    pub repeats: usize,
+    /// Volumes rendered before those, not measured.
+    pub warm_up: usize,
+    pub tables: Vec<Table>,
+    pub grown: Vec<Grown>,
+}
+
+impl Report {
+    /// True if any row has times.
+    pub fn has_times(&self) -> bool {
+        self.tables.iter().flat_map(|t| &t.rows).any(|r| !r.times.picture.is_empty())
+    }
+}
+
+#[cfg(test)]
+pub mod tests {
+    use super::*;
+
+    /// A report without times.
+    pub fn report() -> Report {
+        Report {
+            device: Device {
+                name: "Some, \"device\" | one".into(),
+                driver: "driver 1".into(),
+                api: "1.3.0".into(),
+                is_software: true,
+                timestamp_period_ns: 1.0,
+                valid_bits: 64,
+                calibrated: true,
+                clocks: None,
+            },
+            program: "echolume 0".into(),
+            date: "2026-01-02T03:04:05Z".into(),
+            quick: false,
+            repeats: 3,
+            warm_up: 1,
+            tables: tables(false),
+            grown: Vec::new(),
+        }
+    }
+
+    /// Row n takes 2 (n + 1) ms and in stage 1 ten times as long.
+    pub fn measured() -> Report {
+        let mut report = report();
+        for table in &mut report.tables {
+            for (n, row) in table.rows.iter_mut().enumerate() {
+                let ns = 2e6 * (n + 1) as f64;
+                row.times.picture = vec![ns * 1.5, ns * 0.5, ns];
+                row.times.preprocess = vec![ns * 10.0; 3];
+                row.reached = Some(Reached { share: 0.987, depth: 71.25 });
+            }
+        }
+        report
+    }
+
+    #[test]
+    fn rows_vary_one_condition_and_all_tables_share_the_usual_row() {
+        for quick in [false, true] {
+            let usual = Conditions::usual(quick);
+            let counts: Vec<_> = tables(quick).iter().map(|t| (t.number, t.rows.len())).collect();
+            assert_eq!(counts, [(3, 4), (4, 4), (5, 5), (6, 5)]);
+            for table in tables(quick) {
+                let at_usual: Vec<_> = table.rows.iter().filter(|r| r.conditions == usual).collect();
+                assert_eq!(at_usual.len(), 1, "table {}", table.number);
+                assert_eq!(table.rows[table.usual].conditions, usual);
+                assert_eq!(at_usual[0].thesis.ms, 54.6);
+                for row in &table.rows {
+                    let (c, u) = (row.conditions, usual);
+                    let differs = [
+                        c.frames != u.frames,
+                        c.volume != u.volume,
+                        c.filter_3d != u.filter_3d,
+                        c.filter_2d != u.filter_2d,
+                    ];
+                    let expected = [3, 4, 5, 6].map(|n| n == table.number && c != u);
+                    assert_eq!((differs, c.lines), (expected, u.lines), "table {}: {}", table.number, row.label);
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn ratios_are_to_the_usual_row() {
+        let mut table = tables(false).remove(2);
+        assert_eq!(table.ratio(&table.rows[0]), None);
+        for (row, ms) in table.rows.iter_mut().zip([2.0, 4.0, 10.0, 3.0, 3.0]) {
+            row.times.picture = vec![ms * 1e6; 3];
+        }
+        let ratios: Vec<_> = table.rows.iter().map(|r| table.ratio(r)).collect();
+        assert_eq!(ratios, [0.5, 1.0, 2.5, 0.75, 0.75].map(Some));
+        let thesis = table.thesis_ratio(&table.rows[2]).expect("a ratio");
+        assert!((thesis - 187.0 / 54.6).abs() < 1e-12);
+    }
+}

@@ -1,0 +1,30 @@
+//! A frame of samples.
+
+use glam::DAffine3;
+
+/// One polar 2D acquisition, or one slice of a Cartesian volume.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Frame {
+    /// Number of the volume that the frame belongs to, from 0.
+    pub volume: u32,
+    /// Index in its volume in order of acquisition, from 0.
+    pub number: u32,
+    /// Index in its volume in geometric order, from 0: K - 1 - `number` if it was swept backwards (K frames a volume).
+    pub slice: usize,
+    /// The volume was swept backwards.
+    pub backward: bool,
+    /// Time stamp, s, on the clock of the device that acquired it.
+    pub time: Option<f64>,
+    /// From the space of the geometry, mm, to the world (LPS) or the space of a tracker: rigid. Of a volume the
+    /// pose of its first frame that has one counts.
+    pub pose: Option<DAffine3>,
+    /// Samples of the stored type (`Header::stored` of the source), little-endian, line by line (samples fastest).
+    pub bytes: Vec<u8>,
+}
+
+impl Frame {
+    /// Slice `slice` of a volume that was swept forwards, without time and pose.
+    pub fn of_slice(volume: u32, slice: usize, bytes: Vec<u8>) -> Frame {
+        Frame { volume, number: slice as u32, slice, backward: false, time: None, pose: None, bytes }
+    }
+}

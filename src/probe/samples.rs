@@ -1,0 +1,106 @@
+//! The number types of samples.
+
+use serde::{Deserialize, Serialize};
+use std::fmt;
+
+/// Type of a sample in a file.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum SampleType {
+    U8,
+    U16,
+    I16,
+    F32,
+}
+
+/// Type of a sample in a [`Frame`](super::Frame).
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub enum StoredType {
+    U8,
+    U16,
+    F32,
+}
+
+/// Added to an i16 to store it as u16.
+const I16_SHIFT: f64 = 32768.0;
+
+impl SampleType {
+    /// Size of a sample, bytes.
+    pub fn bytes(self) -> usize {
+        self.stored().bytes()
+    }
+
+    /// The type that it is stored as.
+    pub fn stored(self) -> StoredType {
+        match self {
+            SampleType::U8 => StoredType::U8,
+            SampleType::U16 | SampleType::I16 => StoredType::U16,
+            SampleType::F32 => StoredType::F32,
+        }
+    }
+
+    /// The name of the type in a MetaImage header.
+    pub fn metaimage(self) -> &'static str {
+        match self {
+            SampleType::U8 => "MET_UCHAR",
+            SampleType::U16 => "MET_USHORT",
+            SampleType::I16 => "MET_SHORT",
+            SampleType::F32 => "MET_FLOAT",
+        }
+    }
+
+    /// Stored value minus the file's value.
+    pub fn shift(self) -> f64 {
+        if self == SampleType::I16 { I16_SHIFT } else { 0.0 }
+    }
+}
+
+impl From<StoredType> for SampleType {
+    fn from(stored: StoredType) -> SampleType {
+        match stored {
+            StoredType::U8 => SampleType::U8,
+            StoredType::U16 => SampleType::U16,
+            StoredType::F32 => SampleType::F32,
+        }
+    }
+}
+
+impl StoredType {
+    /// Size of a sample, bytes.
+    pub fn bytes(self) -> usize {
+        match self {
+            StoredType::U8 => 1,
+            StoredType::U16 => 2,
+            StoredType::F32 => 4,
+        }
+    }
+
+    /// The sample that these bytes are, little-endian; 0 of another number of bytes.
+    pub fn value(self, bytes: &[u8]) -> f64 {
+        match (self, bytes) {
+            (StoredType::U8, [a]) => f64::from(*a),
+            (StoredType::U16, [a, b]) => f64::from(u16::from_le_bytes([*a, *b])),
+            (StoredType::F32, [a, b, c, d]) => f64::from(f32::from_le_bytes([*a, *b, *c, *d])),
+            _ => 0.0,
+        }
+    }
+
+    /// Appends a sample; integers are rounded.
+    pub fn append(self, value: f64, bytes: &mut Vec<u8>) {
+        match self {
+            StoredType::U8 => bytes.push(value.round() as u8),
+            StoredType::U16 => bytes.extend((value.round() as u16).to_le_bytes()),
+            StoredType::F32 => bytes.extend((value as f32).to_le_bytes()),
+        }
+    }
+}
+
+impl fmt::Display for SampleType {
+    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        f.write_str(match self {
+            SampleType::U8 => "u8",
+            SampleType::U16 => "u16",
+            SampleType::I16 => "i16 (stored as u16, 32768 added)",
+            SampleType::F32 => "f32",
+        })
+    }
+}

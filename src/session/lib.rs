@@ -1,0 +1,20 @@
+//! What lasts longer than one picture: streams of frames that are rendered while they arrive ([`live`]), measurements ([`measure`]) and marks
+//! on saved pictures ([`marked`]), presets and workspaces of a user ([`user_presets`], [`workspace`]), and the configuration, the logs and the
+//! support bundle of a kiosk display ([`kiosk`]).
+
+#![forbid(unsafe_code)]
+
+pub mod kiosk;
+pub mod live;
+pub mod marked;
+pub mod measure;
+#[cfg(test)]
+#[path = "../core/scene/test_block.rs"]
+mod test_block;
+pub mod user_presets;
+pub mod workspace;
+
+use echolume_base::{canvas, files, metrics, picture, text};
+use echolume_core::{passes, plan, scene};
+use echolume_gpu::{self as gpu, machine};
+use {echolume_probe as probe, echolume_source as source};

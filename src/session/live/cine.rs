@@ -1,0 +1,175 @@
+//! The cine loop: the last volumes, for looking back. Their frames are kept as acquired, so that every setting, also of stage 1, can
+//! still be changed. Bounded in volumes and bytes. Pure.
+
+use crate::source::Frame;
+use crate::source::parts::FrameParts;
+use std::borrow::Cow;
+use std::collections::VecDeque;
+use std::sync::Arc;
+
+/// A complete volume.
+#[derive(Clone, Debug, Default)]
+pub struct CineVolume {
+    pub volume: u32,
+    /// In order of the slices.
+    pub frames: Vec<Arc<Frame>>,
+    bytes: usize,
+}
+
+/// Size of a cine loop.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct CineLimits {
+    /// Most volumes; 0 switches the cine loop off.
+    pub volumes: usize,
+    /// Most bytes of samples. The newest volume is kept even if it alone is larger.
+    pub bytes: usize,
+}
+
+struct Filling {
+    volume: u32,
+    frames: Vec<Option<Arc<Frame>>>,
+    missing: usize,
+}
+
+/// The cine loop.
+pub struct Cine {
+    limits: CineLimits,
+    slices: usize,
+    volumes: VecDeque<CineVolume>,
+    filling: Option<Filling>,
+    /// A frame whose lines are arriving.
+    partial: FrameParts,
+    bytes: usize,
+}
+
+impl Cine {
+    /// An empty loop of volumes of `slices` frames.
+    pub fn new(limits: CineLimits, slices: usize) -> Cine {
+        Cine { limits, slices, volumes: VecDeque::new(), filling: None, partial: FrameParts::default(), bytes: 0 }
+    }
+
+    /// True if the volumes have so many frames.
+    pub fn is_of(&self, slices: usize) -> bool {
+        self.slices == slices
+    }
+
+    /// The volumes, the oldest first.
+    pub fn volumes(&self) -> &VecDeque<CineVolume> {
+        &self.volumes
+    }
+
+    /// Bytes of all samples.
+    pub fn bytes(&self) -> usize {
+        self.bytes
+    }
+
+    /// Removes all volumes.
+    pub fn clear(&mut self) {
+        *self = Cine::new(self.limits, self.slices);
+    }
+
+    /// Removes the volume that is being filled: its remaining frames will not come.
+    pub(crate) fn discard_partial(&mut self) {
+        (self.filling, self.partial) = (None, FrameParts::default());
+    }
+
+    /// Adds lines of a frame of `total` bytes, `at` bytes into it. Lines that do not continue those before are discarded.
+    pub fn lines(&mut self, frame: Frame, at: usize, total: usize) {
+        if self.limits.volumes == 0 {
+            return;
+        }
+        if let Some(frame) = self.partial.add(Cow::Owned(frame), at, total) {
+            self.frame(frame);
+        }
+    }
+
+    /// Adds a complete frame.
+    pub fn frame(&mut self, frame: Frame) {
+        if self.limits.volumes == 0 || frame.slice >= self.slices {
+            return;
+        }
+        if self.filling.as_ref().is_none_or(|f| f.volume != frame.volume) {
+            let frames = vec![None; self.slices];
+            self.filling = Some(Filling { volume: frame.volume, frames, missing: self.slices });
+        }
+        let Some(filling) = &mut self.filling else { return };
+        let slice = frame.slice;
+        filling.missing -= usize::from(filling.frames[slice].replace(Arc::new(frame)).is_none());
+        if filling.missing == 0
+            && let Some(Filling { volume, frames, .. }) = self.filling.take()
+        {
+            let frames: Vec<_> = frames.into_iter().flatten().collect();
+            let bytes = frames.iter().map(|f| f.bytes.len()).sum();
+            self.bytes += bytes;
+            self.volumes.push_back(CineVolume { volume, frames, bytes });
+        }
+        while self.volumes.len() > self.limits.volumes || (self.bytes > self.limits.bytes && self.volumes.len() > 1) {
+            let removed = self.volumes.pop_front();
+            self.bytes -= removed.map_or(0, |volume| volume.bytes);
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn frame(volume: u32, slice: usize, bytes: Vec<u8>) -> Frame {
+        Frame::of_slice(volume, slice, bytes)
+    }
+
+    fn numbers(cine: &Cine) -> Vec<u32> {
+        cine.volumes().iter().map(|kept| kept.volume).collect()
+    }
+
+    #[test]
+    fn complete_volumes_are_kept_and_the_oldest_removed() {
+        let mut cine = Cine::new(CineLimits { volumes: 3, bytes: 1000 }, 4);
+        for volume in 0..6 {
+            // A frame of volume 2 is missing.
+            (0..4).filter(|slice| (volume, *slice) != (2, 1)).for_each(|s| cine.frame(frame(volume, s, vec![0; 10])));
+        }
+        assert_eq!(numbers(&cine), [3, 4, 5]);
+        assert_eq!(cine.bytes(), 120);
+        assert!(cine.volumes().iter().all(|k| k.frames.iter().enumerate().all(|(s, f)| f.slice == s)));
+    }
+
+    #[test]
+    fn the_bytes_are_bounded_but_the_newest_volume_stays() {
+        let mut cine = Cine::new(CineLimits { volumes: 9, bytes: 100 }, 2);
+        for (volume, bytes) in [(0, 30), (1, 30), (2, 10), (3, 200)] {
+            (0..2).for_each(|s| cine.frame(frame(volume, s, vec![0; bytes])));
+            assert!(cine.bytes() <= 100 || cine.volumes().len() == 1);
+        }
+        assert_eq!(numbers(&cine), [3]);
+    }
+
+    #[test]
+    fn a_repeated_frame_counts_once_and_one_beyond_the_volume_is_ignored() {
+        let mut cine = Cine::new(CineLimits { volumes: 2, bytes: 100 }, 2);
+        [0, 0, 7].into_iter().for_each(|s| cine.frame(frame(1, s, vec![1])));
+        assert!(cine.volumes().is_empty());
+        cine.frame(frame(1, 1, vec![2]));
+        assert_eq!(numbers(&cine), [1]);
+    }
+
+    #[test]
+    fn lines_make_a_frame_unless_there_is_a_gap() {
+        let mut cine = Cine::new(CineLimits { volumes: 2, bytes: 100 }, 1);
+        cine.lines(frame(0, 0, vec![1, 2]), 0, 4);
+        cine.lines(frame(0, 0, vec![3, 4]), 2, 4);
+        assert_eq!(cine.volumes()[0].frames[0].bytes, [1, 2, 3, 4]);
+        cine.lines(frame(1, 0, vec![1]), 0, 4);
+        cine.lines(frame(1, 0, vec![3, 4]), 2, 4);
+        cine.lines(frame(1, 0, vec![3, 4]), 2, 4);
+        assert_eq!(numbers(&cine), [0]);
+    }
+
+    #[test]
+    fn a_loop_of_size_zero_keeps_nothing() {
+        let mut cine = Cine::new(CineLimits::default(), 1);
+        cine.frame(frame(0, 0, vec![1]));
+        cine.lines(frame(1, 0, vec![1]), 0, 1);
+        assert!(cine.volumes().is_empty() && cine.bytes() == 0);
+    }
+}

@@ -1,0 +1,454 @@
+//! A live source on its own thread, and a bounded queue of what it reported. If the queue is full, a source that can wait is kept
+//! waiting; a source that cannot wait loses frames, which are counted. The thread also records the frames.
+
+use crate::gpu::Wake;
+use crate::source::Frame;
+use crate::source::live::{Event, Live};
+use crate::source::parts::FrameParts;
+use crate::source::posed::Posed;
+use crate::source::recorder::{Header, Writer};
+use std::borrow::Cow;
+use std::collections::VecDeque;
+use std::io;
+use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+use std::sync::{Arc, Condvar, Mutex, MutexGuard};
+use std::thread::JoinHandle;
+use std::time::{Duration, Instant};
+
+/// Largest total size of the queued frames, bytes. A single larger frame is still queued.
+const MAX_BYTES: usize = 256 << 20;
+/// Most events in the queue.
+const MAX_EVENTS: usize = 4096;
+/// Longest wait of the thread before it checks whether it is to stop.
+const PATIENCE: Duration = Duration::from_millis(50);
+
+/// An event, and when it arrived.
+#[derive(Clone, Debug)]
+pub struct Arrived {
+    pub event: Event,
+    pub at: Instant,
+}
+
+/// Sees every event of a feed.
+pub type Observer = Box<dyn FnMut(&Event) + Send>;
+
+/// What a feed counted.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct FeedCounts {
+    /// Frames, or parts of frames that arrive line by line, that were lost because the queue was full.
+    pub lost: u64,
+    /// Frames that could not be recorded, and other failures of the recording.
+    pub unrecorded: u64,
+    /// How often the source was disconnected.
+    pub disconnected: u64,
+}
+
+impl FeedCounts {
+    /// Both together.
+    pub(super) fn plus(self, other: FeedCounts) -> FeedCounts {
+        FeedCounts {
+            lost: self.lost + other.lost,
+            unrecorded: self.unrecorded + other.unrecorded,
+            disconnected: self.disconnected + other.disconnected,
+        }
+    }
+}
+
+/// A source that is listened to, or none.
+pub struct Feed {
+    shared: Arc<Shared>,
+    can_wait: bool,
+    thread: Option<JoinHandle<()>>,
+}
+
+#[derive(Default)]
+struct Shared {
+    queue: Mutex<Queue>,
+    /// Signalled when an event is added or removed.
+    changed: Condvar,
+    stop: AtomicBool,
+    lost: AtomicU64,
+    unrecorded: AtomicU64,
+    disconnections: AtomicU64,
+    wake: Option<Wake>,
+}
+
+#[derive(Default)]
+struct Queue {
+    events: VecDeque<Arrived>,
+    bytes: usize,
+    /// The volume of the last frame that arrived.
+    newest: Option<u32>,
+    /// A frame of this volume was lost. Its remaining frames are of no use.
+    lost_volume: Option<u32>,
+    /// Why the source is not connected at the moment.
+    disconnected: Option<String>,
+}
+
+fn bytes_of(event: &Event) -> usize {
+    match event {
+        Event::Frame(frame) | Event::Lines { frame, .. } => frame.bytes.len(),
+        _ => 0,
+    }
+}
+
+impl Shared {
+    fn lock(&self) -> MutexGuard<'_, Queue> {
+        self.queue.lock().unwrap_or_else(|e| e.into_inner())
+    }
+
+    fn set_disconnected(&self, why: Option<String>) {
+        let mut queue = self.lock();
+        if queue.disconnected != why {
+            if queue.disconnected.is_none() {
+                self.disconnections.fetch_add(1, Ordering::Relaxed);
+            }
+            queue.disconnected = why;
+            drop(queue);
+            self.wake.iter().for_each(|wake| wake());
+        }
+    }
+
+    /// Adds an event. For a frame, waits until it fits, or loses it together with the rest of its volume. Other events are never lost.
+    fn put(&self, arrived: Arrived, can_wait: bool) {
+        let bytes = bytes_of(&arrived.event);
+        let mut queue = self.lock();
+        let is_full = |q: &Queue| !q.events.is_empty() && (q.bytes + bytes > MAX_BYTES || q.events.len() >= MAX_EVENTS);
+        if let Event::Frame(frame) | Event::Lines { frame, .. } = &arrived.event {
+            while can_wait && is_full(&queue) && !self.stop.load(Ordering::Relaxed) {
+                queue = self.changed.wait_timeout(queue, PATIENCE).map_or_else(|e| e.into_inner().0, |w| w.0);
+            }
+            queue.newest = Some(frame.volume);
+            if is_full(&queue) {
+                queue.lost_volume = Some(frame.volume);
+            }
+            if queue.lost_volume == Some(frame.volume) {
+                self.lost.fetch_add(1, Ordering::Relaxed);
+                return;
+            }
+        }
+        queue.bytes += bytes;
+        queue.events.push_back(arrived);
+        drop(queue);
+        self.changed.notify_all();
+        if let Some(wake) = &self.wake {
+            wake();
+        }
+    }
+}
+
+impl Feed {
+    /// Listens to a source until it ends or the feed is dropped. If `record` is given, every frame is also written to this `.frames`
+    /// file. Each further geometry gets a file of its own: NAME-2.frames.
+    ///
+    /// # Errors
+    /// The thread cannot be started.
+    pub fn new(source: Box<dyn Live>, record: Option<&Path>) -> io::Result<Feed> {
+        Feed::waking(source, record, None)
+    }
+
+    /// A feed without a source: no event ever arrives.
+    pub fn none() -> Feed {
+        Feed { shared: Arc::default(), can_wait: true, thread: None }
+    }
+
+    /// As [`Feed::new`]. `wake` is called after each event.
+    ///
+    /// # Errors
+    /// The thread cannot be started.
+    pub fn waking(source: Box<dyn Live>, record: Option<&Path>, wake: Option<Wake>) -> io::Result<Feed> {
+        Feed::observed(source, record, wake, None)
+    }
+
+    /// As [`Feed::waking`]. `observer` sees every event before it is queued, on the thread of the source.
+    ///
+    /// # Errors
+    /// The thread cannot be started.
+    pub fn observed(
+        source: Box<dyn Live>,
+        record: Option<&Path>,
+        wake: Option<Wake>,
+        observer: Option<Observer>,
+    ) -> io::Result<Feed> {
+        let (shared, can_wait) = (Arc::new(Shared { wake, ..Shared::default() }), source.can_wait());
+        let theirs = shared.clone();
+        let tap = record.map(RecordingTap::new);
+        let thread =
+            std::thread::Builder::new().name("source".into()).spawn(move || listen(source, tap, observer, &theirs))?;
+        Ok(Feed { shared, can_wait, thread: Some(thread) })
+    }
+
+    /// The oldest queued event. Waits for one for at most `patience`.
+    pub fn next(&self, patience: Duration) -> Option<Arrived> {
+        let mut queue = self.shared.lock();
+        if queue.events.is_empty() && !patience.is_zero() {
+            let woken = self.shared.changed.wait_timeout_while(queue, patience, |q| q.events.is_empty());
+            queue = woken.map_or_else(|e| e.into_inner().0, |w| w.0);
+        }
+        let arrived = queue.events.pop_front()?;
+        queue.bytes -= bytes_of(&arrived.event);
+        drop(queue);
+        self.shared.changed.notify_all();
+        Some(arrived)
+    }
+
+    /// True if the source loses nothing while it is kept waiting.
+    pub fn can_wait(&self) -> bool {
+        self.can_wait
+    }
+
+    /// Number of queued events.
+    pub fn waiting(&self) -> usize {
+        self.shared.lock().events.len()
+    }
+
+    /// Why the source is not connected at the moment, on one line; None while it is.
+    pub fn disconnected(&self) -> Option<String> {
+        self.shared.lock().disconnected.clone()
+    }
+
+    /// True if a complete volume has arrived after this one and the source cannot wait: then this one need not be drawn.
+    pub fn is_behind(&self, volume: u32) -> bool {
+        !self.can_wait && self.shared.lock().newest.is_some_and(|newest| newest > volume.saturating_add(1))
+    }
+
+    /// What was counted so far.
+    pub fn counts(&self) -> FeedCounts {
+        let Shared { lost, unrecorded, disconnections, .. } = &*self.shared;
+        let [lost, unrecorded, disconnected] =
+            [lost, unrecorded, disconnections].map(|count| count.load(Ordering::Relaxed));
+        FeedCounts { lost, unrecorded, disconnected }
+    }
+}
+
+impl Drop for Feed {
+    fn drop(&mut self) {
+        self.shared.stop.store(true, Ordering::Relaxed);
+        self.shared.changed.notify_all();
+        if let Some(thread) = self.thread.take() {
+            // A panic of the source was reported as its end.
+            let _ = thread.join();
+        }
+    }
+}
+
+fn listen(mut source: Box<dyn Live>, mut tap: Option<RecordingTap>, mut observer: Option<Observer>, shared: &Shared) {
+    let (can_wait, records) = (source.can_wait(), tap.is_some());
+    // After the recording: that has the pictures themselves.
+    let mut posed = source.compounding().map(Posed::new);
+    let _guard = EndOnPanic(shared);
+    while !shared.stop.load(Ordering::Relaxed) {
+        let event = source.next(PATIENCE);
+        let at = Instant::now();
+        shared.set_disconnected(source.disconnected());
+        let is_frame = matches!(event, Event::Frame(_) | Event::Lines { .. });
+        if records && is_frame && tap.is_none() {
+            shared.unrecorded.fetch_add(1, Ordering::Relaxed);
+        }
+        if let Some(Err(fault)) = tap.as_mut().map(|tap| tap.write(&event, at)) {
+            // Without a file the recording ends. A frame that cannot be written does not prevent the next; failures in a row are
+            // reported once.
+            shared.unrecorded.fetch_add(1, Ordering::Relaxed);
+            let ends = matches!(event, Event::Begin(_));
+            let is_reported = tap.as_mut().is_some_and(|tap| std::mem::replace(&mut tap.is_failing, true));
+            tap = tap.filter(|_| !ends);
+            if !is_reported {
+                let what = if ends { "the recording ends" } else { "the recording lacks a frame" };
+                shared.put(Arrived { event: Event::Fault(format!("{what}: {fault}")), at }, can_wait);
+            }
+        } else if let Some(tap) = tap.as_mut().filter(|_| is_frame) {
+            tap.is_failing = false;
+        }
+        let ends = matches!(event, Event::End(_));
+        if ends && let Some(Err(fault)) = tap.take().map(RecordingTap::finish) {
+            shared.put(Arrived { event: Event::Fault(format!("the recording has no index: {fault}")), at }, can_wait);
+        }
+        let events = match &mut posed {
+            Some(posed) => posed.take(event),
+            None => vec![event],
+        };
+        for event in events.into_iter().filter(|event| !matches!(event, Event::Idle)) {
+            observer.iter_mut().for_each(|observer| observer(&event));
+            shared.put(Arrived { event, at }, can_wait);
+        }
+        if ends {
+            return;
+        }
+    }
+    if let Some(Err(fault)) = tap.map(RecordingTap::finish) {
+        tracing::warn!("the recording has no index: {fault}");
+    }
+}
+
+/// Reports the end of the source if its thread panics.
+struct EndOnPanic<'a>(&'a Shared);
+
+impl Drop for EndOnPanic<'_> {
+    fn drop(&mut self) {
+        if std::thread::panicking() {
+            let event = Event::End(Some("the source panicked".into()));
+            self.0.put(Arrived { event, at: Instant::now() }, false);
+        }
+    }
+}
+
+/// Writes what arrives to `.frames` files, one for each geometry.
+struct RecordingTap {
+    path: PathBuf,
+    /// Number of file names tried so far.
+    files: u32,
+    writer: Option<Writer>,
+    header: Option<Header>,
+    /// A frame whose lines are arriving.
+    partial: FrameParts,
+    /// The last frame could not be written.
+    is_failing: bool,
+}
+
+impl RecordingTap {
+    fn new(path: &Path) -> RecordingTap {
+        RecordingTap {
+            path: path.into(),
+            files: 0,
+            writer: None,
+            header: None,
+            partial: FrameParts::default(),
+            is_failing: false,
+        }
+    }
+
+    /// Writes a frame, or collects lines until their frame is complete.
+    ///
+    /// # Errors
+    /// A file that cannot be created, or a frame that cannot be written. The next frame may succeed.
+    fn write(&mut self, event: &Event, at: Instant) -> Result<(), String> {
+        // Readers of a recording use differences only, so any steady clock will do.
+        static BEGAN: std::sync::OnceLock<Instant> = std::sync::OnceLock::new();
+        let seconds = at.saturating_duration_since(*BEGAN.get_or_init(|| at)).as_secs_f64();
+        match event {
+            Event::Begin(header) if self.header.as_ref() != Some(header) => {
+                self.finish_file()?;
+                self.partial = FrameParts::default();
+                let path = self.free_name();
+                self.writer = Some(Writer::create(&path, (**header).clone()).map_err(|e| e.to_string())?);
+                self.header = Some((**header).clone());
+                Ok(())
+            }
+            Event::Frame(frame) => self.frame(frame, seconds),
+            Event::Lines { frame, first } => {
+                let Some((line, total)) = self.header.as_ref().map(Header::line_and_frame) else { return Ok(()) };
+                match self.partial.add(Cow::Borrowed(frame), first * line, total) {
+                    Some(frame) => self.frame(&frame, seconds),
+                    None => Ok(()),
+                }
+            }
+            _ => Ok(()),
+        }
+    }
+
+    /// The given name for the first file, then the name with the next number that is free: no recording is overwritten.
+    fn free_name(&mut self) -> PathBuf {
+        loop {
+            self.files += 1;
+            let stem = self.path.file_stem().unwrap_or_default().to_string_lossy();
+            let path = match self.files {
+                1 => return self.path.clone(),
+                n => self.path.with_file_name(format!("{stem}-{n}.frames")),
+            };
+            if !path.exists() {
+                return path;
+            }
+        }
+    }
+
+    fn frame(&mut self, frame: &Frame, at: f64) -> Result<(), String> {
+        self.writer.as_mut().map_or(Ok(()), |w| w.frame(frame, at)).map_err(|e| e.to_string())
+    }
+
+    fn finish_file(&mut self) -> Result<(), String> {
+        self.writer.take().map_or(Ok(()), Writer::finish).map_err(|e| e.to_string())
+    }
+
+    /// Ends the current file with its index.
+    fn finish(mut self) -> Result<(), String> {
+        self.finish_file()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Volumes of three frames, as fast as they are asked for.
+    struct FastSource {
+        next: u32,
+        frames: u32,
+        bytes: usize,
+        waits: bool,
+    }
+
+    impl Live for FastSource {
+        fn next(&mut self, _: Duration) -> Event {
+            if self.next == self.frames {
+                return Event::End(None);
+            }
+            let number = self.next;
+            self.next += 1;
+            Event::Frame(Frame {
+                volume: number / 3,
+                number: number % 3,
+                slice: (number % 3) as usize,
+                backward: false,
+                time: None,
+                pose: None,
+                bytes: vec![0; self.bytes],
+            })
+        }
+
+        fn can_wait(&self) -> bool {
+            self.waits
+        }
+    }
+
+    fn all(feed: &Feed, pause: Duration) -> Vec<u32> {
+        let mut numbers = Vec::new();
+        loop {
+            match feed.next(Duration::from_secs(20)).map(|a| a.event) {
+                Some(Event::Frame(frame)) => numbers.push(3 * frame.volume + frame.number),
+                Some(Event::End(_)) | None => return numbers,
+                _ => {}
+            }
+            std::thread::sleep(pause);
+        }
+    }
+
+    #[test]
+    fn a_source_that_can_wait_loses_nothing() {
+        let source = FastSource { next: 0, frames: 30, bytes: MAX_BYTES / 4, waits: true };
+        let feed = Feed::new(Box::new(source), None).expect("thread");
+        assert_eq!(all(&feed, Duration::from_millis(1)), (0..30).collect::<Vec<_>>());
+        assert_eq!(feed.counts(), FeedCounts::default());
+    }
+
+    #[test]
+    fn a_source_that_cannot_wait_loses_the_rest_of_a_volume_and_memory_stays_bounded() {
+        let source = FastSource { next: 0, frames: 30, bytes: MAX_BYTES / 4, waits: false };
+        let feed = Feed::new(Box::new(source), None).expect("thread");
+        std::thread::sleep(Duration::from_millis(300));
+        assert!(feed.shared.lock().bytes <= MAX_BYTES);
+        let came = all(&feed, Duration::ZERO);
+        assert_eq!(came.len() as u64 + feed.counts().lost, 30);
+        for pair in came.windows(2).filter(|w| w[0] + 1 != w[1]) {
+            assert_eq!(pair[1] % 3, 0, "what follows a gap begins a volume: {came:?}");
+        }
+    }
+
+    #[test]
+    fn a_feed_that_is_dropped_ends_its_source() {
+        let source = FastSource { next: 0, frames: u32::MAX, bytes: 1 << 20, waits: true };
+        let begun = Instant::now();
+        drop(Feed::new(Box::new(source), None).expect("thread"));
+        assert!(begun.elapsed() < Duration::from_secs(10));
+    }
+}

@@ -1,0 +1,350 @@
+//! Everything that depends on the geometry of the frames: the scenes, the renderer with its volume images, and the state of the picture.
+
+use super::cine::{Cine, CineVolume};
+use super::phase::{Display, InFlight, Pending, Phase, Replay};
+use super::statistics::Statistics;
+use super::volume_pool::{Update, VolumePool};
+use crate::gpu::{GpuError, Renderer, SceneMaker};
+use crate::picture::Picture;
+use crate::plan::{Rerun, Work};
+use crate::probe::Geometry;
+use crate::scene::{Input, Scene, SceneError, Settings};
+use crate::source::recorder::Header;
+use std::borrow::Cow;
+use std::collections::HashSet;
+use std::time::{Duration, Instant};
+
+/// Frames of a replay that one step sends: a few milliseconds of work.
+const REPLAY_FRAMES: usize = 8;
+
+/// A picture that is done.
+#[derive(Debug)]
+pub struct FinishedPicture {
+    /// The volume that it shows. Rolling: the newest one that has a slice in it.
+    pub volume: u32,
+    /// None if pictures stay on the device ([`StreamOptions::readback`](super::StreamOptions::readback)).
+    pub picture: Option<Picture>,
+    /// From the arrival of the last frame that is new in it to now.
+    pub latency: Duration,
+    /// From the beginning of its drawing to now.
+    pub took: Duration,
+    /// How much of it was drawn again.
+    pub work: Work,
+    /// It was drawn with few rays, to be there soon ([`StreamOptions::coarse_first`](super::StreamOptions::coarse_first)).
+    pub is_coarse: bool,
+}
+
+/// The scenes of a stream: one for each direction of the sweep, and mixtures of both for rolling volumes. All see the same visible
+/// bounds, so that a frame can be filtered before it is known in which scene it will be drawn.
+pub struct Views {
+    forward: Scene,
+    backward: Scene,
+    /// The geometry depends on the direction.
+    is_directional: bool,
+    /// Slices of both directions may be shown together. Then every scene has a mixed geometry, so that passes and slots stay the same.
+    is_mixed: bool,
+}
+
+impl Views {
+    /// # Errors
+    /// Settings that this geometry cannot be drawn with.
+    pub fn new(header: &Header, settings: &Settings, update: Update) -> Result<Views, SceneError> {
+        let input = Input { stored: header.stored, range: header.range };
+        let scene = |geometry: &Geometry| Scene::new(geometry.clone(), input, settings.clone());
+        let (mut forward, mut backward) = (scene(&header.forward)?, scene(&header.backward)?);
+        forward.visible_bounds = forward.visible_bounds.with(backward.visible_bounds);
+        backward.visible_bounds = forward.visible_bounds;
+        let is_directional = header.forward != header.backward;
+        Ok(Views { forward, backward, is_directional, is_mixed: is_directional && update == Update::Rolling })
+    }
+
+    /// The same with a stage 1 that also serves pictures of `full`, and of what `lowered` makes of that scene. What of it cannot be drawn is
+    /// left out.
+    ///
+    /// # Errors
+    /// Settings that this geometry cannot be drawn with.
+    pub fn sharing(
+        self,
+        header: &Header,
+        full: &Settings,
+        lowered: &dyn Fn(&Scene) -> Vec<Settings>,
+    ) -> Result<Views, SceneError> {
+        let input = Input { stored: header.stored, range: header.range };
+        let scene = |geometry: &Geometry, of: &Settings| Scene::new(geometry.clone(), input, of.clone());
+        let mut geometries = vec![&header.forward];
+        geometries.extend(self.is_directional.then_some(&header.backward));
+        let full = scene(&header.forward, full)?;
+        let others = lowered(&full);
+        let others: Vec<Scene> =
+            geometries.into_iter().flat_map(|g| others.iter().filter_map(|s| scene(g, s).ok())).collect();
+        let others: Vec<&Scene> = others.iter().chain([&self.forward, &self.backward]).collect();
+        let (forward, backward) = (self.forward.clone(), self.backward.clone());
+        Ok(Views { forward: forward.sharing(&full, &others), backward: backward.sharing(&full, &others), ..self })
+    }
+
+    /// The scene that the first frames are filtered for. The filters are the same in all of them.
+    pub fn first(&self) -> &Scene {
+        &self.forward
+    }
+
+    /// The scene of a volume. `backward`: for each slice, true if it was swept backwards. Where neighbouring slices of different
+    /// directions would cross, all slices get the direction of the majority.
+    pub fn of(&self, backward: &[bool]) -> Cow<'_, Scene> {
+        let count = backward.iter().filter(|b| **b).count();
+        let majority = 2 * count > backward.len();
+        let mix = |marked: &[bool]| self.forward.geometry.with_mixed_directions(&self.backward.geometry, marked);
+        let mixed = self.is_mixed.then(|| mix(backward).or_else(|| mix(&vec![majority; backward.len()]))).flatten();
+        match mixed {
+            Some(geometry) => Cow::Owned(Scene { geometry, ..self.forward.clone() }),
+            None if self.is_directional && majority => Cow::Borrowed(&self.backward),
+            None => Cow::Borrowed(&self.forward),
+        }
+    }
+}
+
+/// What a step between pictures led to.
+pub(super) enum Begun {
+    /// A picture is being drawn.
+    Picture,
+    /// Changed settings were refused, and why. The previous ones remain.
+    Refused(String),
+    /// This volume has to go through stage 1 again before it can be drawn.
+    Restore(u32),
+    Nothing,
+}
+
+/// Everything that depends on the geometry of the frames.
+pub(super) struct Session {
+    pub views: Views,
+    pub renderer: Renderer,
+    pub pool: VolumePool,
+    pub phase: Phase,
+    pub pending: Pending<Views>,
+    pub display: Display,
+    /// When the last picture was begun.
+    pub begun: Instant,
+    /// By volume image: the volume of its last frame, and when those frames arrived that no picture shows yet.
+    arrived: Vec<(u32, Vec<Instant>)>,
+    /// By slice of the volume on display: swept backwards.
+    backward: Vec<bool>,
+    /// Pipelines of changed settings are compiled in the background; the settings wait for them.
+    compiles_async: bool,
+    /// Why changed settings were not applied; not reported yet.
+    refused: Option<String>,
+    /// A volume that was on display and has to be sent again before it can be drawn.
+    to_restore: Option<u32>,
+    /// Pipelines were asked for in advance.
+    pub has_warmed: bool,
+}
+
+impl Session {
+    /// `to_restore`: a volume of the cine loop to show first.
+    pub fn new(
+        views: Views,
+        renderer: Renderer,
+        pool: VolumePool,
+        compiles_async: bool,
+        to_restore: Option<u32>,
+    ) -> Session {
+        Session {
+            arrived: vec![(0, Vec::new()); pool.images() as usize],
+            backward: vec![false; views.first().slices() as usize],
+            views,
+            renderer,
+            pool,
+            phase: Phase::Idle,
+            pending: Pending::None,
+            display: Display::Empty,
+            begun: Instant::now(),
+            compiles_async,
+            refused: None,
+            to_restore,
+            has_warmed: false,
+        }
+    }
+
+    /// A frame of `volume` is in volume image `image`.
+    pub(crate) fn frame_arrived(&mut self, image: u32, volume: u32, at: Instant) {
+        let (previous, arrived) = &mut self.arrived[image as usize];
+        // Arrivals of a volume that was never shown are discarded. A rolling volume takes the frames of all.
+        if *previous != volume && !self.pool.is_rolling() {
+            arrived.clear();
+        }
+        *previous = volume;
+        arrived.push(at);
+    }
+
+    /// Applies the pending settings when all their pipelines are there. If stage 1 has to run again, whole volumes that were filtered
+    /// before are discarded, so that slices of both settings are never mixed. A rolling volume fills again by itself.
+    fn apply_pending(&mut self) -> Result<(), GpuError> {
+        let Some(next) = self.pending.take() else { return Ok(()) };
+        let scene = next.of(&self.backward);
+        if !self.renderer.differs_from(&scene) {
+            drop(scene);
+            self.views = next;
+            self.display.invalidate();
+            return Ok(());
+        }
+        if self.compiles_async {
+            let prepared = self.renderer.prepare(&scene);
+            if !matches!(prepared, Ok(true)) {
+                drop(scene);
+                match prepared {
+                    Ok(_) => self.pending = Pending::Compiling(next),
+                    Err(error) if error.is_device_lost() => {
+                        self.pending = Pending::Ready(next);
+                        return Err(error);
+                    }
+                    // The previous settings remain.
+                    Err(error) => self.refused = Some(error.to_string()),
+                }
+                return Ok(());
+            }
+        }
+        let rerun = match self.renderer.change(scene.into_owned()) {
+            Ok(rerun) => {
+                self.views = next;
+                rerun
+            }
+            Err(error) if error.is_device_lost() => {
+                self.pending = Pending::Ready(next);
+                return Err(error);
+            }
+            // Memory may have run out half-way. It was enough for the previous settings.
+            Err(error) => {
+                self.refused = Some(error.to_string());
+                self.renderer.change(self.views.of(&self.backward).into_owned())?
+            }
+        };
+        self.run_again(&rerun);
+        Ok(())
+    }
+
+    /// Compiles the pipelines of changed shaders again, and draws with them.
+    pub fn reload_shaders(&mut self, shaders: &HashSet<String>) -> Result<(), GpuError> {
+        let rerun = self.renderer.reload_shaders(shaders)?;
+        self.run_again(&rerun);
+        Ok(())
+    }
+
+    /// By slice of the volume on display: swept backwards.
+    pub fn swept_backward(&self) -> &[bool] {
+        &self.backward
+    }
+
+    /// Compiles the pipelines of scenes that may come next, where pipelines are compiled in the background.
+    pub fn warm(&mut self, scenes: Vec<SceneMaker>) {
+        self.has_warmed = true;
+        if self.compiles_async
+            && let Err(fault) = self.renderer.warm(scenes)
+        {
+            tracing::debug!("compiled in advance: {fault}");
+        }
+    }
+
+    fn run_again(&mut self, rerun: &Rerun) {
+        self.display.invalidate();
+        if !matches!(rerun, Rerun::Steps { .. }) {
+            // A replay is interrupted: its first frames went through the previous stage 1.
+            let interrupted = self.phase.take_replay().map(|replay| replay.volume.volume);
+            self.to_restore = interrupted.or(self.current_volume());
+            if !self.pool.is_rolling() {
+                self.pool.forget();
+                self.arrived.iter_mut().for_each(|(_, arrived)| arrived.clear());
+                self.display = Display::Empty;
+            }
+        }
+    }
+
+    /// The volume on display, or the next one to be.
+    pub(crate) fn current_volume(&self) -> Option<u32> {
+        self.pool.waiting().or(self.display.volume()).or(self.to_restore)
+    }
+
+    /// The volume that is being sent again, if any.
+    pub(crate) fn replayed_volume(&self) -> Option<u32> {
+        self.phase.replay().map(|replay| replay.volume.volume)
+    }
+
+    /// True if a step has work to do without any event of the source. A replay is not counted.
+    pub fn is_busy(&self) -> bool {
+        matches!(self.phase, Phase::Drawing { .. } | Phase::Draining { .. })
+            || self.pending.is_ready()
+            || self.refused.is_some()
+            || self.to_restore.is_some()
+            || self.pool.has_new()
+            || matches!(self.display, Display::Stale(_))
+    }
+
+    /// Applies pending settings, and begins a picture if there is anything new to show.
+    pub fn begin(&mut self) -> Result<Begun, GpuError> {
+        self.apply_pending()?;
+        let mut arrived = Vec::new();
+        if let Some(ready) = self.pool.take() {
+            self.renderer.show(ready.image)?;
+            (self.backward, self.display) = (ready.backward, Display::Stale(ready.volume));
+            arrived = std::mem::take(&mut self.arrived[ready.image as usize].1);
+        }
+        let Display::Stale(volume) = self.display else {
+            let refused = self.refused.take().map(Begun::Refused);
+            return Ok(refused.or_else(|| self.to_restore.take().map(Begun::Restore)).unwrap_or(Begun::Nothing));
+        };
+        let scene = self.views.of(&self.backward);
+        if self.renderer.differs_from(&scene) {
+            self.renderer.change(scene.into_owned())?;
+        }
+        self.renderer.begin_picture()?;
+        self.phase.begin(InFlight { volume, arrived });
+        (self.display, self.begun) = (Display::Current(volume), Instant::now());
+        Ok(Begun::Picture)
+    }
+
+    /// Waits for the picture in flight. `queued`: events to take before the next picture begins.
+    pub fn finish(&mut self, queued: usize, statistics: &mut Statistics) -> Result<FinishedPicture, GpuError> {
+        let picture = self.renderer.end_drawing()?;
+        let InFlight { volume, arrived } = self.phase.finish(queued);
+        // Their pipelines may have been compiled meanwhile, and nothing would ask again.
+        self.pending.ask_again();
+        let now = Instant::now();
+        arrived.iter().for_each(|at| statistics.record_latency(now.saturating_duration_since(*at)));
+        statistics.pictures += 1;
+        let latency = arrived.iter().max().map_or(Duration::ZERO, |at| now.saturating_duration_since(*at));
+        let (took, work) = (now.saturating_duration_since(self.begun), self.renderer.drawn_work());
+        Ok(FinishedPicture { volume, picture, latency, took, work, is_coarse: false })
+    }
+
+    /// Starts to send a volume again, instead of one that is being sent. Without a free volume image nothing happens.
+    pub(crate) fn start_replay(&mut self, volume: CineVolume) {
+        let image = match self.phase.replay() {
+            Some(replay) => Some(replay.image),
+            None => self.pool.spare(),
+        };
+        if let Some(image) = image {
+            self.phase.start_replay(Replay { volume, sent: 0, image });
+        }
+    }
+
+    /// Shows a volume again that changed settings or another device discarded, if the cine loop has it; otherwise the newest of the loop.
+    pub fn restore(&mut self, volume: u32, cine: &Cine) {
+        let volumes = cine.volumes();
+        if let Some(volume) = volumes.iter().find(|kept| kept.volume == volume).or(volumes.back()) {
+            self.start_replay(volume.clone());
+        }
+    }
+
+    /// Sends the next frames of the replay.
+    pub(crate) fn continue_replay(&mut self) -> Result<(), GpuError> {
+        let Some(replay) = self.phase.replay_mut() else { return Ok(()) };
+        let (frames, image) = (&replay.volume.frames, replay.image);
+        for frame in frames.iter().skip(replay.sent).take(REPLAY_FRAMES) {
+            self.renderer.frame(frame.slice as u32, &frame.bytes, image)?;
+            replay.sent += 1;
+        }
+        if replay.sent >= frames.len() {
+            let backward = frames.iter().map(|frame| frame.backward).collect();
+            self.pool.put(image, replay.volume.volume, backward);
+            self.phase.take_replay();
+        }
+        Ok(())
+    }
+}

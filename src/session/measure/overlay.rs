@@ -1,0 +1,314 @@
+//! What is drawn of measurements over a picture: lines, calipers and labels in pixels of the picture, tile by tile. The viewer and written
+//! pictures draw the same.
+
+use super::outcome;
+use super::shapes::Ellipse;
+use crate::scene::picker::Picker;
+use crate::scene::planes::{Sheet, Tile};
+use crate::scene::{MeasureKind, Measurement, Scene};
+use glam::DVec3;
+
+/// Points of the outline of an ellipse.
+const OUTLINE: usize = 72;
+/// A point lies in the plane of a tile if it is no farther from it, mm; in a slab, half of its thickness.
+const IN_PLANE: f64 = 0.5;
+
+/// What is drawn of one measurement on one tile. Positions are in pixels of the picture from its upper left corner.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Drawn {
+    /// Its index in the list.
+    pub index: usize,
+    /// The tile that it is drawn on: upper left corner and size.
+    pub tile: [[f64; 2]; 2],
+    /// Open lines.
+    pub lines: Vec<Vec<[f64; 2]>>,
+    /// The points that were set: where crosses are drawn, and what can be grabbed. By their index.
+    pub points: Vec<(usize, [f64; 2])>,
+    /// Where an arrow's head is, and where its shaft comes from.
+    pub head: Option<[[f64; 2]; 2]>,
+    pub label: String,
+    /// The lower left corner of the label.
+    pub at: [f64; 2],
+}
+
+/// Everything that measurements draw over the picture of a scene. `all`: the list, as in [`crate::scene::Settings::measure`].
+pub fn drawn(scene: &Scene, all: &[Measurement]) -> Vec<Drawn> {
+    if all.is_empty() {
+        return Vec::new();
+    }
+    let mut found = Vec::new();
+    if scene.cuts_planes() {
+        let sheet = scene.sheet();
+        let reach = IN_PLANE.max(scene.settings.planes.thickness / 2.0);
+        for tile in &sheet.tiles {
+            let view = OnTile { sheet: &sheet, tile, reach };
+            let area = [tile.corner, tile.size].map(|[x, y]| [f64::from(x), f64::from(y)]);
+            let drawn = all.iter().enumerate().filter(|(_, measured)| !measured.on_surface);
+            // What is straight in space, and its length, is another thing on a curved plane.
+            let is_curved = tile.section.is_some();
+            let fits = |kind| matches!(kind, MeasureKind::Surface | MeasureKind::Text | MeasureKind::Arrow);
+            let drawn = drawn.filter(|(_, measured)| !is_curved || fits(measured.kind));
+            found.extend(drawn.filter_map(|(index, measured)| of(scene, index, measured, area, |p| view.project(p))));
+        }
+    }
+    if !scene.is_flat() {
+        let picker = Picker::of(scene);
+        let drawn = all.iter().enumerate().filter(|(_, measured)| measured.on_surface);
+        let area = [picker.corner(), picker.size()];
+        found.extend(drawn.filter_map(|(index, measured)| of(scene, index, measured, area, |p| picker.project(p))));
+    }
+    found
+}
+
+/// What is drawn of a measurement in work, `hover` being the place of the pointer, which may be on a curved plane: what it would be with
+/// that point.
+pub fn preview(
+    scene: &Scene,
+    number: usize,
+    work: &Measurement,
+    hover: Option<[f64; 3]>,
+    on_section: bool,
+) -> Vec<Drawn> {
+    let mut shown = work.clone();
+    // On a curved plane the caliper is the way that is straight there.
+    let ends = work.points.first().copied().zip(hover).map(|(from, to)| [from, to].map(|point| scene.place_of(point)));
+    if let (MeasureKind::Distance, 1, Some([from, to])) = (work.kind, work.points.len(), ends.filter(|_| on_section))
+        && let Some(way) = scene.way_on_section(from, to)
+    {
+        let points = way.into_iter().map(|place| scene.point_of(place)).collect();
+        let way = Measurement { kind: MeasureKind::Surface, points, ..Measurement::default() };
+        let mut found = drawn(scene, &[way]);
+        found.iter_mut().for_each(|drawn| drawn.label = drawn.label.replacen("1:", &format!("{number}:"), 1));
+        return found;
+    }
+    let is_open = work.kind.complete_at().is_none_or(|count| work.points.len() < count);
+    shown.points.extend(hover.filter(|_| is_open && !work.points.is_empty()));
+    let closed = Measurement { points: Vec::new(), ..shown.clone() };
+    shown.contours.clear();
+    shown.kind = match (work.kind, shown.points.len()) {
+        (_, 0 | 1) => MeasureKind::Text,
+        (MeasureKind::Ellipse | MeasureKind::Angle, 2) => MeasureKind::Distance,
+        (MeasureKind::Volume, _) => MeasureKind::Trace,
+        (kind, _) => kind,
+    };
+    let mut found = drawn(scene, &[shown, closed]);
+    for drawn in &mut found {
+        // What is not complete has no result yet.
+        let is_caliper = work.kind == MeasureKind::Distance && drawn.points.len() == 2;
+        drawn.label = if is_caliper { drawn.label.replacen("1:", &format!("{number}:"), 1) } else { String::new() };
+    }
+    found
+}
+
+/// The distance of the slices of a tomography, for its reference tile.
+pub fn spacing_label(sheet: &Sheet) -> String {
+    match &sheet.tiles[..] {
+        [_, first, second, ..] => format!("every {:.1} mm", second.plane.at.distance(first.plane.at)),
+        _ => String::new(),
+    }
+}
+
+/// The two strokes of an arrow's head, pixels. `head`: the tip, and where the shaft comes from.
+pub fn arrow_head([tip, tail]: [[f64; 2]; 2], length: f64) -> Vec<[[f64; 2]; 2]> {
+    let (x, y) = (tail[0] - tip[0], tail[1] - tip[1]);
+    let shaft = x.hypot(y);
+    if shaft < 1e-6 {
+        return Vec::new();
+    }
+    let (x, y) = (x / shaft * length, y / shaft * length);
+    let turned = |share: f64| [tip[0] + x - share * y, tip[1] + y + share * x];
+    vec![[tip, turned(0.45)], [tip, turned(-0.45)]]
+}
+
+/// The upper left corner of a label of this size: next to its measurement, within its tile. Pixels.
+pub fn label_corner(drawn: &Drawn, size: [f64; 2]) -> [f64; 2] {
+    let [corner, tile] = drawn.tile;
+    let wanted = [drawn.at[0], drawn.at[1] - size[1]];
+    std::array::from_fn(|a| wanted[a].min(corner[a] + tile[a] - size[a]).max(corner[a]))
+}
+
+struct OnTile<'a> {
+    sheet: &'a Sheet,
+    tile: &'a Tile,
+    reach: f64,
+}
+
+impl OnTile<'_> {
+    fn project(&self, point: DVec3) -> Option<[f64; 2]> {
+        let (at, off) = self.sheet.project(self.tile, point);
+        (off.abs() <= self.reach).then_some(at)
+    }
+}
+
+/// A measurement with a projection; none if a point that it needs is not shown there.
+fn of(
+    scene: &Scene,
+    index: usize,
+    measured: &Measurement,
+    tile: [[f64; 2]; 2],
+    project: impl Fn(DVec3) -> Option<[f64; 2]>,
+) -> Option<Drawn> {
+    let path = |points: &[[f64; 3]]| -> Option<Vec<[f64; 2]>> {
+        points.iter().map(|point| project(scene.place_of(*point))).collect()
+    };
+    let closed = |mut line: Vec<[f64; 2]>| {
+        line.extend(line.first().copied());
+        line
+    };
+    let mut head = None;
+    let mut points = Vec::new();
+    let lines = match measured.kind {
+        // A box is not in a plane.
+        MeasureKind::Threshold => return None,
+        MeasureKind::Volume => {
+            let shown: Vec<_> = measured.contours.iter().filter_map(|contour| path(contour)).map(closed).collect();
+            if shown.is_empty() {
+                return None;
+            }
+            shown
+        }
+        MeasureKind::Trace => vec![closed(path(&measured.points)?)],
+        MeasureKind::Ellipse => {
+            let places: Vec<DVec3> = measured.points.iter().map(|point| scene.place_of(*point)).collect();
+            let outline = <[DVec3; 3]>::try_from(&places[..]).ok().and_then(Ellipse::of);
+            let outline: Option<Vec<_>> =
+                outline.map(|ellipse| ellipse.outline(OUTLINE).map(&project).collect::<Option<Vec<_>>>())?;
+            points = path(&measured.points)?;
+            vec![closed(outline?)]
+        }
+        MeasureKind::Distance | MeasureKind::Angle | MeasureKind::Surface => {
+            let line = path(&measured.points)?;
+            points = match (measured.kind, &line[..]) {
+                (MeasureKind::Surface, [first, .., last]) => vec![*first, *last],
+                _ => line.clone(),
+            };
+            vec![line]
+        }
+        MeasureKind::Arrow => {
+            let line = path(&measured.points)?;
+            if let [tip, tail] = line[..] {
+                head = Some([tip, tail]);
+            }
+            points = line.clone();
+            vec![line]
+        }
+        MeasureKind::Text => {
+            points = path(&measured.points)?;
+            Vec::new()
+        }
+    };
+    let points: Vec<_> = points.into_iter().enumerate().collect();
+    let shown = lines.iter().flatten().chain(points.iter().map(|(_, at)| at));
+    let at = match measured.kind {
+        MeasureKind::Text => points.first().map(|(_, at)| *at)?,
+        // At the tail, away from what the tip shows.
+        MeasureKind::Arrow => points.last().map(|(_, at)| *at)?,
+        _ => shown.copied().reduce(|a, b| if b[0] > a[0] { b } else { a })?,
+    };
+    Some(Drawn {
+        index,
+        tile,
+        lines,
+        points,
+        head,
+        label: outcome::label(index + 1, measured),
+        at: [at[0] + 7.0, at[1] - 4.0],
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::test_block::block;
+
+    fn scene(lines: &[&str]) -> Scene {
+        block(&[&["picture.size=[200,100]"], lines].concat(), [41, 31, 21])
+    }
+
+    fn caliper(from: [f64; 3], to: [f64; 3]) -> Measurement {
+        Measurement { points: vec![from, to], ..Measurement::default() }
+    }
+
+    #[test]
+    fn a_caliper_is_drawn_on_the_planes_that_it_lies_in_at_its_points() {
+        let across = caliper([-5.0, 15.0, 0.0], [5.0, 15.0, 0.0]);
+        for (toml, tiles) in [("mode='plane'", 1), ("mode='orthogonal'", 2), ("planes.plane='b'", 0)] {
+            let scene = scene(&["mode='plane'", toml]);
+            let found = drawn(&scene, std::slice::from_ref(&across));
+            assert_eq!(found.len(), tiles, "{toml}");
+            for Drawn { points, label, .. } in &found {
+                let apart = points[1].1[0] - points[0].1[0];
+                assert!((apart * scene.sheet().pixel - 10.0).abs() < 1e-9, "{apart} pixels");
+                assert_eq!(label, "1: 10.0 mm");
+            }
+        }
+        let stepped = scene(&["mode='plane'", "planes.position=[0,15,3]"]);
+        assert!(drawn(&stepped, std::slice::from_ref(&across)).is_empty(), "the plane was stepped away");
+        let slab = scene(&["mode='plane'", "planes.position=[0,15,3]", "planes.thickness=8"]);
+        assert_eq!(drawn(&slab, &[across]).len(), 1, "the slab holds it");
+    }
+
+    #[test]
+    fn the_lines_of_a_reference_are_where_its_slices_are() {
+        for plane in ["a", "b", "c"] {
+            let plane = format!("planes.plane='{plane}'");
+            let scene =
+                scene(&["mode='tomography'", "planes.reference=true", "planes.spacing=3", "planes.azimuth=20", &plane]);
+            let sheet = scene.sheet();
+            let (reference, lines) = (&sheet.tiles[0], sheet.slice_lines());
+            assert_eq!((sheet.tiles.len(), lines.len()), (12, 11));
+            assert!(reference.plane.normal.dot(sheet.tiles[1].plane.normal).abs() < 1e-12, "across the slices");
+            for (slice, ends) in sheet.tiles[1..].iter().zip(&lines) {
+                for end in ends {
+                    // Each end is a point of both planes.
+                    let off = sheet.project(slice, sheet.point(reference, *end)).1;
+                    assert!(off.abs() < 1e-9, "{plane}: {off} mm");
+                }
+            }
+            assert_eq!(spacing_label(&sheet), "every 3.0 mm");
+        }
+        assert!(!scene(&["mode='tomography'"]).has_reference(), "only if asked for");
+    }
+
+    /// An arrow points with its head to its first point, its text is at the tail; a text is at its point.
+    #[test]
+    fn an_arrow_points_to_what_was_clicked_and_texts_stand_where_they_were_put() {
+        let scene = scene(&["mode='plane'"]);
+        let points = vec![[2.0, 12.0, 0.0], [8.0, 20.0, 0.0]];
+        let arrow = Measurement { kind: MeasureKind::Arrow, points, text: "lip".into(), ..Measurement::default() };
+        let text = Measurement {
+            kind: MeasureKind::Text,
+            points: vec![[-5.0, 9.0, 0.0]],
+            text: "nose".into(),
+            ..Measurement::default()
+        };
+        let found = drawn(&scene, &[arrow.clone(), text]);
+        let pixel = |point: [f64; 3]| scene.sheet().project(&scene.sheet().tiles[0], scene.place_of(point)).0;
+        let [tip, tail] = [arrow.points[0], arrow.points[1]].map(pixel);
+        let (drawn, head) = (&found[0], found[0].head.expect("a head"));
+        assert_eq!((head, &drawn.lines[..], drawn.label.as_str()), ([tip, tail], &[vec![tip, tail]][..], "lip"));
+        assert!((drawn.at[0] - tail[0]).hypot(drawn.at[1] - tail[1]) < 10.0, "at the tail");
+        for [from, to] in arrow_head(head, 12.0) {
+            assert_eq!(from, tip);
+            // The strokes go back along the shaft, to both sides of it.
+            let (along, across) = ([tail[0] - tip[0], tail[1] - tip[1]], [to[0] - tip[0], to[1] - tip[1]]);
+            let cosine =
+                (along[0] * across[0] + along[1] * across[1]) / (along[0].hypot(along[1]) * across[0].hypot(across[1]));
+            assert!((cosine - 1.0 / (1.0 + 0.45_f64.powi(2)).sqrt()).abs() < 1e-9, "{cosine}");
+        }
+        assert_eq!((arrow_head(head, 12.0).len(), arrow_head([tip, tip], 12.0).len()), (2, 0));
+        let at = pixel([-5.0, 9.0, 0.0]);
+        assert_eq!((found[1].points[0].1, found[1].label.as_str(), found[1].head), (at, "nose", None));
+        assert!((found[1].at[0] - at[0]).hypot(found[1].at[1] - at[1]) < 10.0);
+    }
+
+    #[test]
+    fn what_is_on_the_surface_is_drawn_on_the_rendering_alone() {
+        let on = Measurement { on_surface: true, ..caliper([0.0, 10.0, 0.0], [4.0, 10.0, 0.0]) };
+        let four = scene(&["layout='four'"]);
+        let found = drawn(&four, &[on, caliper([0.0, 15.0, 0.0], [4.0, 15.0, 0.0])]);
+        let on_rendering: Vec<usize> = found.iter().filter(|d| d.tile[0] == [100.0, 50.0]).map(|d| d.index).collect();
+        assert_eq!(on_rendering, [0]);
+        assert!(found.iter().filter(|d| d.tile[0] != [100.0, 50.0]).all(|d| d.index == 1) && found.len() > 1);
+    }
+}

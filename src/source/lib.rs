@@ -1,0 +1,215 @@
+//! Sources of frames: files, the phantom, a pipe, and OpenIGTLink, whose tracked frames are compounded. Frames of a free-running probe are
+//! placed by the motor's position.
+//!
+//! Every reader is total: any bytes give frames or an [`InputError`], never a panic. No reader takes more memory than the bytes of its
+//! file account for, or than a live source documents.
+
+#![forbid(unsafe_code)]
+
+pub mod cardiac;
+pub mod coarse;
+pub mod convert;
+mod describe;
+mod dicom;
+mod drawn;
+mod formats;
+mod frame;
+pub mod freehand;
+pub mod igtl;
+mod kretz;
+mod layout;
+pub mod live;
+mod metaimage;
+pub mod motor_tracking;
+mod nifti;
+mod nrrd;
+mod packed;
+pub mod parts;
+pub mod phantom;
+mod pictures;
+pub mod piped;
+mod piped_file;
+mod pixel;
+mod plus_config;
+pub mod posed;
+pub mod recorder;
+pub mod recording;
+mod samples;
+pub mod segmentation;
+pub mod sequence;
+mod stack;
+pub mod standard_input;
+mod tracked;
+mod transforms;
+mod uff;
+mod value_range;
+pub mod volume_file;
+
+use echolume_base::files;
+use echolume_probe as probe;
+
+pub use crate::files::InputError;
+pub use crate::probe::{DepthAxis, Frame, Geometry, Grid, SampleType, StoredType};
+pub use frame::{DEMO_DATA, Header, Source};
+pub use recording::Recording;
+pub use transforms::Calibration;
+
+use std::fs::{self, File};
+use std::io::Read;
+use std::path::Path;
+
+/// What a user can say about a file that is opened.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct OpenOptions<'a> {
+    /// The probe file to use.
+    pub probe: Option<&'a Path>,
+    /// The stored axis of a Cartesian volume that is drawn as depth; None: that of the file's orientation, or y.
+    pub depth_axis: Option<DepthAxis>,
+    /// Distance between the voxels of a stack of pictures: columns, rows, pictures, mm.
+    pub voxel_spacing: Option<[f64; 3]>,
+    /// A configuration of the PLUS toolkit (XML): tracked pictures become a freehand volume.
+    pub plus_config: Option<&'a Path>,
+    /// Constant transforms of tracked pictures, which come before those of the configuration.
+    pub calibration: &'a [Calibration],
+    /// The coordinate frame of the tracking that the volume is placed in. None: that of the configuration, or Reference, Tracker or World.
+    pub reference: Option<&'a str>,
+    /// Of pictures with poses, which become a freehand volume.
+    pub freehand: freehand::FreehandArguments,
+}
+
+/// As [`open_with`], with the stored order of axes. `probe`: the probe file to use.
+///
+/// # Errors
+/// As [`open_with`].
+pub fn open(path: &Path, probe: Option<&Path>) -> Result<Box<dyn Source>, InputError> {
+    open_with(path, OpenOptions { probe, ..OpenOptions::default() })
+}
+
+/// True if a file is DICOM, whatever its name. Reads its first 132 bytes.
+pub fn is_dicom(path: &Path) -> bool {
+    dicom::is_dicom(path)
+}
+
+/// Opens a `.frames` file, a stream of frames in a file, or any other recording; the content decides which. `-` is standard input.
+///
+/// # Errors
+/// As [`recorder::Reader::open`] and [`Recording::open_with`].
+pub fn open_with(path: &Path, options: OpenOptions) -> Result<Box<dyn Source>, InputError> {
+    if standard_input::is_meant(path) {
+        let source = open_file(&standard_input::file()?, options).map_err(standard_input::renamed)?;
+        return Ok(Box::new(standard_input::FromInput(source)));
+    }
+    open_file(path, options)
+}
+
+fn open_file(path: &Path, options: OpenOptions) -> Result<Box<dyn Source>, InputError> {
+    Ok(match Kind::of(path) {
+        Kind::Frames => posed::Opened::new(path, Box::new(frames(path, options)?), options.freehand)?.source(),
+        Kind::Stream => posed::Opened::new(path, Box::new(stream(path, options)?), options.freehand)?.source(),
+        Kind::Uff => Box::new(uff(path, options)?),
+        Kind::Recording if tracked::is_asked_for(&options) => Box::new(tracked_volume(path, options)?),
+        Kind::Recording => Box::new(recording(path, options)?),
+    })
+}
+
+/// A description of such a file for users: pairs of title and value. Never a patient's name or number.
+///
+/// # Errors
+/// As [`open_with`]; a `.frames` file is read completely, and may fail while that is done.
+pub fn description(path: &Path, options: OpenOptions) -> Result<Vec<(String, String)>, InputError> {
+    if standard_input::is_meant(path) {
+        return file_description(&standard_input::file()?, options).map_err(standard_input::renamed);
+    }
+    file_description(path, options)
+}
+
+fn file_description(path: &Path, options: OpenOptions) -> Result<Vec<(String, String)>, InputError> {
+    match Kind::of(path) {
+        Kind::Frames => {
+            let opened = posed::Opened::new(path, Box::new(frames(path, options)?), options.freehand)?;
+            Ok(opened.description(frames(path, options)?.description()?))
+        }
+        Kind::Stream => {
+            let opened = posed::Opened::new(path, Box::new(stream(path, options)?), options.freehand)?;
+            Ok(opened.description(stream(path, options)?.description()))
+        }
+        Kind::Uff => Ok(uff(path, options)?.description()),
+        Kind::Recording if tracked::is_asked_for(&options) => Ok(tracked_volume(path, options)?.description()),
+        Kind::Recording => Ok(recording(path, options)?.description()),
+    }
+}
+
+fn recording(path: &Path, options: OpenOptions) -> Result<Recording, InputError> {
+    options.freehand.refused(path)?;
+    Recording::open_with(path, options)
+}
+
+fn tracked_volume(path: &Path, options: OpenOptions) -> Result<tracked::TrackedVolume, InputError> {
+    // The folder's probe file is for scan lines; what was given with it is refused by the volume.
+    let pictures = Recording::open_with(path, OpenOptions { probe: None, depth_axis: None, ..options })?;
+    tracked::TrackedVolume::new(path, pictures, &options)
+}
+
+fn frames(path: &Path, options: OpenOptions) -> Result<recorder::Reader, InputError> {
+    only_probe(path, options)?;
+    recorder::Reader::open(path)
+}
+
+fn stream(path: &Path, options: OpenOptions) -> Result<piped_file::PipedFile, InputError> {
+    only_probe(path, options)?;
+    piped_file::PipedFile::open(path, options.probe)
+}
+
+fn uff(path: &Path, options: OpenOptions) -> Result<uff::Beamformed, InputError> {
+    let fault = |flag: &str| Err(InputError::new(path, flag, "is not for UFF, which states its own geometry"));
+    match options {
+        OpenOptions { probe: Some(_), .. } => fault("--probe"),
+        OpenOptions { depth_axis: Some(_), .. } => fault("--depth-axis"),
+        OpenOptions { voxel_spacing: Some(_), .. } => fault("--voxel-spacing"),
+        _ if tracked::is_asked_for(&options) => fault("--plus-config"),
+        _ => {
+            options.freehand.refused(path)?;
+            uff::Beamformed::open(path)
+        }
+    }
+}
+
+/// Refuses what does not apply to frames as they arrived.
+fn only_probe(path: &Path, options: OpenOptions) -> Result<(), InputError> {
+    let fault = "is not for frames as they arrived";
+    match (options.depth_axis, options.voxel_spacing) {
+        (Some(_), _) => Err(InputError::new(path, "--depth-axis", fault)),
+        (_, Some(_)) => Err(InputError::new(path, "--voxel-spacing", fault)),
+        _ if tracked::is_asked_for(&options) => {
+            Err(InputError::new(path, "--plus-config", "is for tracked pictures, not for frames as they arrived"))
+        }
+        (None, None) => Ok(()),
+    }
+}
+
+/// What a file holds, by its first bytes.
+enum Kind {
+    Frames,
+    Stream,
+    Uff,
+    Recording,
+}
+
+impl Kind {
+    fn of(path: &Path) -> Kind {
+        let mut start = Vec::new();
+        // A file that cannot be read is reported by the reader. Opening a pipe may block for ever.
+        if fs::metadata(path).is_ok_and(|m| m.is_file()) {
+            let _ = File::open(path).and_then(|file| file.take(64).read_to_end(&mut start));
+        }
+        if recorder::Reader::is_one(&start) {
+            Kind::Frames
+        } else if piped_file::PipedFile::is_one(&start) {
+            Kind::Stream
+        } else if uff::is_one(&start) {
+            Kind::Uff
+        } else {
+            Kind::Recording
+        }
+    }
+}

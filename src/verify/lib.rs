@@ -1,0 +1,459 @@
+//! Checks that a device and its driver render correctly: every pass, every mode and every kind of failure, on inputs that are built
+//! into the program, so that no source tree is needed. The result is a [`Run`]; [`report`] writes it as text, JSON, JUnit XML and HTML
+//! and compares it with an earlier run.
+//!
+//! A [`Check`] runs on a [`DeviceUnderTest`] and returns [`Findings`]. Modules are named like the groups that `echolume verify --list`
+//! prints. [`self_test`] proves the checks by fault injection: it injects faults on the device's side and records which check
+//! detects each.
+
+#![forbid(unsafe_code)]
+
+pub mod built_in;
+mod compare;
+pub mod determinism;
+pub mod each_pass;
+pub mod failures;
+pub mod formats;
+pub mod gtest;
+pub mod hazards;
+pub mod isolation;
+mod known_answers;
+pub mod memory;
+pub mod modes;
+pub mod progress;
+pub mod render;
+pub mod report;
+pub mod reproduce;
+pub mod sampling;
+pub mod self_test;
+mod speed;
+pub mod stress;
+pub mod surface_nets;
+pub mod time_stamps;
+
+pub use compare::{Comparison, ExtraTolerance, compare_outputs, compare_picture, expect_same_picture};
+
+use echolume_base::{files, html_page, metrics, picture, terminal, text};
+use echolume_core::{mesh, passes, plan, queues, reference, scene, spirv};
+use echolume_gpu::{self as gpu, machine};
+use echolume_lab::profile;
+use {echolume_probe as probe, echolume_source as source};
+
+use crate::gpu::pass_runner::PassRunner;
+use crate::gpu::{Context, ContextOptions, GpuError};
+use crate::passes::fault_injection::Change;
+use crate::scene::Scene;
+use render::Drawn;
+use report::{CheckName, FORMAT, Fault, Figure, Level, Outcome, PictureComparison, Run, Verdict};
+use std::path::PathBuf;
+use std::rc::Rc;
+use std::sync::Arc;
+use std::time::Instant;
+
+/// All checks of a level, in running order.
+pub fn checks(level: Level) -> Vec<Check> {
+    let groups = [
+        each_pass::checks,
+        surface_nets::checks,
+        sampling::checks,
+        known_answers::checks,
+        modes::checks,
+        determinism::checks,
+        memory::checks,
+        failures::checks,
+        formats::checks,
+        hazards::checks,
+        time_stamps::checks,
+        speed::checks,
+        stress::checks,
+    ];
+    groups.into_iter().flat_map(|group| group(level)).collect()
+}
+
+/// Runs checks one after the other in this process and calls `tell` after each. Once `stop` returns a reason, the remaining checks are
+/// interrupted.
+pub fn run(
+    dut: &mut DeviceUnderTest,
+    checks: &[Check],
+    stop: impl Fn() -> Option<&'static str>,
+    tell: impl FnMut(&Outcome),
+) -> Run {
+    let begun = Instant::now();
+    let names: Vec<CheckName> = checks.iter().map(Check::title).collect();
+    let mut group = None;
+    let outcomes = run_each(&names, stop, |n| checks[n].run_after(&mut group, dut), tell);
+    dut.run_of(outcomes, begun)
+}
+
+/// Runs checks one after the other by `one`, which is given their places, and calls `tell` after each. Once `stop` returns a reason,
+/// the remaining checks are interrupted, so that there is one outcome for each name.
+pub fn run_each(
+    names: &[CheckName],
+    stop: impl Fn() -> Option<&'static str>,
+    mut one: impl FnMut(usize) -> Outcome,
+    mut tell: impl FnMut(&Outcome),
+) -> Vec<Outcome> {
+    let mut outcomes = Vec::new();
+    for (n, name) in names.iter().enumerate() {
+        if let Some(why) = stop() {
+            outcomes.push(Outcome::unrun(name, Verdict::Interrupted, format!("not run: {why}")));
+            continue;
+        }
+        // Logged first, because a driver that crashes may end the process.
+        tracing::info!("check: {} / {}", name.group, name.name);
+        let outcome = one(n);
+        tell(&outcome);
+        outcomes.push(outcome);
+    }
+    outcomes
+}
+
+/// A run of these outcomes that ends now. `device`: what they are of; `validation`: whether the validation layer watched.
+pub fn run_on(device: machine::Device, validation: bool, level: Level, outcomes: Vec<Outcome>, begun: Instant) -> Run {
+    Run {
+        format: FORMAT.into(),
+        program: machine::program(),
+        date: machine::date(),
+        device,
+        level,
+        validation,
+        seconds: begun.elapsed().as_secs_f64(),
+        outcomes,
+    }
+}
+
+/// What a check measured and detected.
+#[derive(Default)]
+pub struct Findings {
+    pub figures: Vec<Figure>,
+    pub faults: Vec<Fault>,
+    pub notes: Vec<String>,
+    pub pictures: Vec<PictureComparison>,
+    /// Set if the check was skipped: what this device or system lacks.
+    pub left_out: Option<String>,
+    /// Set if a signal ended the check before it had seen everything: which.
+    pub interrupted: Option<&'static str>,
+}
+
+impl Findings {
+    /// A skipped check.
+    pub fn left_out(why: impl Into<String>) -> Findings {
+        Findings { left_out: Some(why.into()), ..Findings::default() }
+    }
+
+    /// Adds a fault with this text unless the condition holds.
+    pub fn expect(&mut self, holds: bool, what: impl FnOnce() -> String) {
+        if !holds {
+            self.faults.push(Fault::new(what()));
+        }
+    }
+
+    /// Records a figure, and adds a fault if it exceeds its limit. NaN exceeds any limit.
+    pub fn error(&mut self, figure: Figure, what: impl FnOnce() -> String) {
+        let within = figure.allowed.is_none_or(|allowed| figure.value <= allowed);
+        self.expect(within, what);
+        self.figures.push(figure);
+    }
+}
+
+type Work = Box<dyn Fn(&mut DeviceUnderTest) -> Result<Findings, GpuError>>;
+
+/// A single check.
+pub struct Check {
+    pub group: &'static str,
+    /// Unique in its group.
+    pub name: String,
+    work: Work,
+}
+
+impl Check {
+    pub fn new(
+        group: &'static str,
+        name: impl Into<String>,
+        work: impl Fn(&mut DeviceUnderTest) -> Result<Findings, GpuError> + 'static,
+    ) -> Check {
+        Check { group, name: name.into(), work: Box::new(work) }
+    }
+
+    /// Runs the check. An error of the device is a fault; after a lost device the next check gets a new context.
+    pub fn run(&self, dut: &mut DeviceUnderTest) -> Outcome {
+        let begun = Instant::now();
+        let mut findings = self.findings(dut).unwrap_or_else(|error| {
+            let mut findings = Findings::default();
+            findings.faults.push(Fault::new(error.to_string()));
+            if error.is_device_lost() {
+                dut.renew().unwrap_or_else(|e| findings.faults.push(Fault::new(format!("and no other device: {e}"))));
+            }
+            findings
+        });
+        let complaints = dut.complaints();
+        findings.faults.extend(complaints.iter().map(|message| Fault::new(format!("validation: {message}"))));
+        let verdict = match (findings.faults.is_empty(), &findings.left_out, findings.interrupted) {
+            (false, _, _) => Verdict::Failed,
+            (true, _, Some(_)) => Verdict::Interrupted,
+            (true, Some(_), None) => Verdict::LeftOut,
+            (true, None, None) => Verdict::Passed,
+        };
+        findings.notes.extend(findings.left_out.take());
+        findings.notes.extend(findings.interrupted.map(|signal| format!("not to its end: {signal}")));
+        self.outcome(verdict, findings, begun)
+    }
+
+    /// Runs the check and returns errors of the device unchanged.
+    ///
+    /// # Errors
+    /// The device fails.
+    fn findings(&self, dut: &mut DeviceUnderTest) -> Result<Findings, GpuError> {
+        (self.work)(dut)
+    }
+
+    /// Runs the check after one of `group`, which becomes this check's group. None: nothing was run before.
+    pub fn run_after(&self, group: &mut Option<&'static str>, dut: &mut DeviceUnderTest) -> Outcome {
+        // State that the validation layer keeps of one group must not affect the next: see `IsolatedContext`.
+        let is_other = group.replace(self.group).is_some_and(|before| before != self.group);
+        if dut.options.validation && is_other {
+            let renewed = dut.renew();
+            renewed.unwrap_or_else(|error| tracing::warn!("the old device goes on: {error}"));
+        }
+        self.run(dut)
+    }
+
+    /// Group and name.
+    pub fn title(&self) -> CheckName {
+        CheckName { group: self.group.into(), name: self.name.clone() }
+    }
+
+    fn outcome(&self, verdict: Verdict, findings: Findings, begun: Instant) -> Outcome {
+        Outcome {
+            group: self.group.into(),
+            name: self.name.clone(),
+            verdict,
+            seconds: begun.elapsed().as_secs_f64(),
+            figures: findings.figures,
+            faults: findings.faults,
+            notes: findings.notes,
+            pictures: findings.pictures,
+        }
+    }
+}
+
+/// The device under test, with the built-in scenes.
+pub struct DeviceUnderTest {
+    pub context: Arc<Context>,
+    pub level: Level,
+    options: ContextOptions,
+    /// Its pipelines are those of all renderers of the context, which compile each only once.
+    pass_runner: PassRunner,
+    scenes: Rc<Vec<(String, Scene)>>,
+    /// Called on every new context.
+    prepare: Option<fn(&Context)>,
+    /// The program that checks start as a child process; None if this process is not the `echolume` program.
+    pub program: Option<PathBuf>,
+    modes: Option<Rc<Vec<Drawn>>>,
+    /// Fault injected into every new context.
+    injected_fault: Option<Change>,
+    /// Number of validation messages already reported.
+    messages_read: usize,
+    /// The validation layer is active but does not notice a missing barrier.
+    validation_is_blind: bool,
+}
+
+impl DeviceUnderTest {
+    /// # Errors
+    /// There is no device, or no validation layer although it is requested.
+    pub fn new(options: &ContextOptions, level: Level) -> Result<DeviceUnderTest, GpuError> {
+        DeviceUnderTest::prepared(options, level, None)
+    }
+
+    /// Like `new`, but calls `prepare` on every context before anything is created from it.
+    ///
+    /// # Errors
+    /// As [`DeviceUnderTest::new`].
+    pub fn prepared(
+        options: &ContextOptions,
+        level: Level,
+        prepare: Option<fn(&Context)>,
+    ) -> Result<DeviceUnderTest, GpuError> {
+        let context = Context::new(options)?;
+        prepare.iter().for_each(|prepare| prepare(&context));
+        let pass_runner = PassRunner::new(&context)?;
+        let made = |spec: &built_in::SceneSpec| Ok((spec.name.clone(), spec.build()?));
+        let scenes: Result<Vec<_>, String> = built_in::scenes().iter().map(made).collect();
+        let scenes = Rc::new(scenes.map_err(GpuError::Broken)?);
+        Ok(DeviceUnderTest {
+            context,
+            level,
+            options: options.clone(),
+            pass_runner,
+            scenes,
+            prepare,
+            injected_fault: None,
+            program: std::env::current_exe().ok(),
+            modes: None,
+            messages_read: 0,
+            validation_is_blind: false,
+        })
+    }
+
+    /// A device under test with the same device and scenes, and an injected fault.
+    ///
+    /// # Errors
+    /// As [`DeviceUnderTest::new`].
+    pub fn with_fault(&self, change: Change) -> Result<DeviceUnderTest, GpuError> {
+        let mut dut = DeviceUnderTest {
+            context: self.context.clone(),
+            options: self.options.clone(),
+            scenes: self.scenes.clone(),
+            pass_runner: PassRunner::new(&self.context)?,
+            injected_fault: Some(change),
+            program: None,
+            modes: None,
+            ..*self
+        };
+        dut.renew()?;
+        Ok(dut)
+    }
+
+    /// The built-in scenes by name. Together they need every pass.
+    pub fn scenes(&self) -> Rc<Vec<(String, Scene)>> {
+        self.scenes.clone()
+    }
+
+    /// Every mode with filters of every stage, rendered in the simplest way: the expected pictures of other checks. Rendered once.
+    ///
+    /// # Errors
+    /// The device fails.
+    pub fn modes(&mut self) -> Result<Rc<Vec<Drawn>>, GpuError> {
+        if let Some(modes) = &self.modes {
+            return Ok(modes.clone());
+        }
+        let modes = Rc::new(render::modes(&self.context)?);
+        self.modes = Some(modes.clone());
+        Ok(modes)
+    }
+
+    /// The runner of single passes.
+    pub fn pass_runner(&mut self) -> &mut PassRunner {
+        &mut self.pass_runner
+    }
+
+    /// Another context on the same device, because the old one was lost or will be.
+    ///
+    /// # Errors
+    /// As [`DeviceUnderTest::new`].
+    pub fn another(&self) -> Result<Arc<Context>, GpuError> {
+        let context = Context::new(&self.options)?;
+        self.injected_fault.iter().for_each(|change| context.faults.inject_change(*change));
+        self.prepare.iter().for_each(|prepare| prepare(&context));
+        Ok(context)
+    }
+
+    /// RendererOptions of new contexts.
+    pub fn options(&self) -> &ContextOptions {
+        &self.options
+    }
+
+    /// True if the validation layer is active, and not known to see nothing.
+    pub fn watched(&self) -> bool {
+        self.options.validation && !self.validation_is_blind
+    }
+
+    /// Finds out, once and for all, whether validation notices a missing barrier. If not, its silence proves nothing, and no report says
+    /// that it watched. Without validation it notices none.
+    ///
+    /// # Errors
+    /// As [`DeviceUnderTest::another`].
+    pub fn prove_validation(&mut self) -> Result<bool, GpuError> {
+        let notices = hazards::validation_notices_a_dropped_barrier(self)?;
+        self.validation_is_blind = !notices;
+        Ok(notices)
+    }
+
+    /// A run of these outcomes that ends now.
+    pub fn run_of(&self, outcomes: Vec<Outcome>, begun: Instant) -> Run {
+        run_on(machine::device(&self.context), self.watched(), self.level, outcomes, begun)
+    }
+
+    fn renew(&mut self) -> Result<(), GpuError> {
+        self.context = self.another()?;
+        (self.pass_runner, self.messages_read) = (PassRunner::new(&self.context)?, 0);
+        Ok(())
+    }
+
+    /// Validation messages since the last call.
+    fn complaints(&mut self) -> Vec<String> {
+        let messages = self.context.messages();
+        let new = messages[self.messages_read.min(messages.len())..].to_vec();
+        self.messages_read = messages.len();
+        credible_messages(&self.context, new, true)
+    }
+}
+
+/// A context for one check alone: its device may be lost, may lack features, or one queue may act as several. Validation messages are
+/// reported at the end.
+///
+/// Validation layers of version 1.3.239 do not know that a queue or the host waits for a timeline semaphore. If one queue acts as
+/// several, they report everything between submissions as a hazard; likewise if memory that was read back is reused.
+struct IsolatedContext {
+    pub context: Arc<Context>,
+    /// Report hazards between submissions.
+    hears_submissions: bool,
+}
+
+impl IsolatedContext {
+    /// # Errors
+    /// As [`DeviceUnderTest::another`].
+    pub fn new(dut: &DeviceUnderTest) -> Result<IsolatedContext, GpuError> {
+        IsolatedContext::of_queues(dut, 1)
+    }
+
+    /// A context that is used as if it had this many queues.
+    ///
+    /// # Errors
+    /// As [`DeviceUnderTest::another`].
+    pub(crate) fn of_queues(dut: &DeviceUnderTest, queues: usize) -> Result<IsolatedContext, GpuError> {
+        let context = dut.another()?;
+        Ok(IsolatedContext { hears_submissions: context.queue_count() >= queues, context })
+    }
+
+    /// A context whose renderers change often, or are created again after slots were read back.
+    ///
+    /// # Errors
+    /// As [`DeviceUnderTest::another`].
+    pub(crate) fn of_changes(dut: &DeviceUnderTest) -> Result<IsolatedContext, GpuError> {
+        Ok(IsolatedContext { hears_submissions: false, context: dut.another()? })
+    }
+
+    /// A context that lacks features: `change` edits its known capabilities before anything is created from it.
+    ///
+    /// # Errors
+    /// As [`DeviceUnderTest::another`].
+    pub(crate) fn lacking(
+        dut: &DeviceUnderTest,
+        change: impl FnOnce(&mut Context),
+    ) -> Result<IsolatedContext, GpuError> {
+        let mut isolated = IsolatedContext::new(dut)?;
+        let own = Arc::get_mut(&mut isolated.context);
+        own.map(change).ok_or(GpuError::Broken("the isolated context is shared".into()))?;
+        Ok(isolated)
+    }
+
+    /// Adds the validation messages as faults.
+    pub(crate) fn report_validation(&self, findings: &mut Findings) {
+        let messages = self.credible_messages();
+        findings.faults.extend(messages.iter().map(|message| Fault::new(format!("validation: {message}"))));
+    }
+
+    /// All validation messages so far, without known false positives.
+    fn credible_messages(&self) -> Vec<String> {
+        credible_messages(&self.context, self.context.messages(), self.hears_submissions)
+    }
+}
+
+/// Validation messages without known false positives: hazards between submissions only if they are reliable.
+fn credible_messages(context: &Context, mut messages: Vec<String>, hears_submissions: bool) -> Vec<String> {
+    if !hears_submissions || !context.validates_timelines() {
+        messages.retain(|m| !(m.contains("SYNC-HAZARD") && m.contains("vkQueueSubmit2")));
+    }
+    messages
+}
