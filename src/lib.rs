@@ -161,6 +161,7 @@
 #![forbid(unsafe_code)]
 
 mod args;
+#[cfg(feature = "verify")]
 pub mod batch;
 pub mod cli;
 
@@ -171,9 +172,13 @@ pub use echolume_lab::{bounds, error_report, filter_report, profile, thesis_tabl
 pub use echolume_session::{kiosk, live, marked, measure, user_presets, workspace};
 #[cfg(feature = "view")]
 pub use echolume_ui as ui;
-pub use {echolume_probe as probe, echolume_source as source, echolume_verify as verify};
+#[cfg(feature = "verify")]
+pub use echolume_verify as verify;
+pub use {echolume_probe as probe, echolume_source as source};
 
-use echolume_base::{html_page, terminal};
+#[cfg(feature = "verify")]
+use echolume_base::html_page;
+use echolume_base::terminal;
 
 pub use gpu::{Context, ContextOptions, DeviceChoice, Renderer, RendererOptions};
 pub use live::{Stream, StreamOptions};

@@ -332,6 +332,7 @@ impl SceneArgs {
     }
 
     /// True if a device or a limit of its time was given.
+    #[cfg(feature = "verify")]
     pub fn has_device(&self) -> bool {
         self.device.is_some() || self.device_timeout.is_some()
     }
@@ -459,6 +460,7 @@ pub fn open_device(choice: Option<DeviceChoice>, validation: bool) -> Result<Arc
 }
 
 /// Opens a device whose waits end when `stop` says so. Prints nothing.
+#[cfg(feature = "verify")]
 pub fn open_device_until(
     choice: Option<DeviceChoice>,
     deadline: Deadline,

@@ -11,8 +11,10 @@ mod user_files;
 
 pub use input::{
     InputArgs, Opened, Output, SceneArgs, check_outputs, check_volume, device_failure, frames_of, open_device,
-    open_device_for_statistics, open_device_until, recorded, write_report,
+    open_device_for_statistics, write_report,
 };
+#[cfg(feature = "verify")]
+pub use input::{open_device_until, recorded};
 pub use motor::{SerialArgs, motor_failure, motor_table};
 pub use picture_file::PictureFile;
 pub use picture_series::{PictureSeries, SeriesTarget};

@@ -3,7 +3,36 @@
 //! Exit codes of every command: 0 done, 1 failed, 2 bad input or usage, 3 no Vulkan device, 4 stopped by a signal before all was done. `batch` also
 //! 3, a lost device, and 4, some units failed.
 
+/// A command in a build without its feature: it says how to have it.
+#[cfg(not(all(feature = "verify", feature = "view")))]
+macro_rules! left_out {
+    ($module:ident, $command:ident, $name:literal) => {
+        mod $module {
+            use crate::terminal::{Failure, input};
+            use std::ffi::OsString;
+
+            #[derive(clap::Args)]
+            pub struct $command {
+                #[arg(trailing_var_arg = true, allow_hyphen_values = true)]
+                _arguments: Vec<OsString>,
+            }
+
+            impl $command {
+                pub fn run(self) -> Result<(), Failure> {
+                    let built = "was built without the feature";
+                    Err(input(format!(
+                        "{}: this program {built} `{}`; build it with `cargo build --release`",
+                        stringify!($module),
+                        $name
+                    )))
+                }
+            }
+        }
+    };
+}
+
 mod about;
+#[cfg(feature = "verify")]
 mod batch;
 mod bounds;
 mod drawing;
@@ -25,6 +54,7 @@ mod stic;
 mod still;
 mod stream;
 mod thesis_tables;
+#[cfg(feature = "verify")]
 mod verify;
 #[cfg(feature = "view")]
 mod view;
@@ -32,6 +62,13 @@ mod view;
 mod view_config;
 #[cfg(feature = "view")]
 mod view_open;
+
+#[cfg(not(feature = "verify"))]
+left_out!(batch, Batch, "verify");
+#[cfg(not(feature = "verify"))]
+left_out!(verify, Verify, "verify");
+#[cfg(not(feature = "view"))]
+left_out!(view, View, "view");
 
 use crate::kiosk::log_rotation::{self, RotatingLog};
 use crate::source::standard_input;
@@ -84,6 +121,7 @@ enum Command {
     /// Measure the GPU time of every pass, and compare two such runs
     Profile(Box<profile::Profile>),
     /// Test whether this device and its driver render correctly
+    #[cfg_attr(not(feature = "verify"), command(hide = true, disable_help_flag = true))]
     Verify(verify::Verify),
     /// Report error against run time for each dial, proven bounds of a picture, filters compared, or the tables of the thesis
     Report(Report),
@@ -98,6 +136,7 @@ enum Command {
     /// Describe a recording, without patient fields
     Info(recordings::Info),
     /// Render, convert, measure or verify many recordings: one shard of a manifest, to be run on many machines
+    #[cfg_attr(not(feature = "verify"), command(hide = true, disable_help_flag = true))]
     Batch(Box<batch::Batch>),
     /// Drive the motor of a probe: home, sweep, stop; or simulate one
     Probe(probe::Probe),
@@ -186,6 +225,7 @@ impl Command {
     /// The log that the command's configuration asks for: its path, the size limit of one file in bytes, and the number of files.
     fn log(&self) -> Option<(PathBuf, u64, u32)> {
         match self {
+            #[cfg(feature = "view")]
             Command::View(view) => view.log(),
             _ => None,
         }
@@ -240,29 +280,4 @@ fn start_log(
         }
     }
     Ok(())
-}
-
-/// `echolume view` in a build without the feature `view`: says how to have it.
-#[cfg(not(feature = "view"))]
-mod view {
-    use crate::terminal::{Failure, input};
-    use std::ffi::OsString;
-    use std::path::PathBuf;
-
-    #[derive(clap::Args)]
-    pub struct View {
-        #[arg(trailing_var_arg = true, allow_hyphen_values = true)]
-        _arguments: Vec<OsString>,
-    }
-
-    impl View {
-        pub fn run(self) -> Result<(), Failure> {
-            Err(input("view: this program was built without the feature `view`; build it with `cargo build --release`"))
-        }
-
-        /// The configuration is not read.
-        pub fn log(&self) -> Option<(PathBuf, u64, u32)> {
-            None
-        }
-    }
 }

@@ -34,7 +34,7 @@ pub fn date() -> String {
 /// Name, version and build of the program.
 pub fn program() -> String {
     let build = if cfg!(debug_assertions) { "debug" } else { "release" };
-    format!("{} {} ({build})", env!("CARGO_PKG_NAME"), env!("CARGO_PKG_VERSION"))
+    format!("echolume {} ({build})", env!("CARGO_PKG_VERSION"))
 }
 
 /// Resident memory of this process, bytes. None if the system does not report it.

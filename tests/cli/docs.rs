@@ -590,13 +590,15 @@ fn readme_is_short_and_says_what_must_be_said() {
     }
 }
 
-/// Every Rust source of a module: of the program, a member, or a module of a member.
+/// Every Rust source of the modules of this name: of the program, a member, or a module of a member.
 fn module_sources(name: &str) -> String {
     let top = repository("src");
     let members = std::fs::read_dir(&top).expect("src").map(|entry| entry.expect("entry").path());
     let places = std::iter::once(top.clone()).chain(members.filter(|path| path.join("Cargo.toml").is_file()));
-    let mut found = places.map(|place| place.join(name)).filter(|p| p.is_dir() || p.with_extension("rs").is_file());
-    sources(&found.next().unwrap_or_else(|| panic!("no member has a module {name}")))
+    let found = places.map(|place| place.join(name)).filter(|p| p.is_dir() || p.with_extension("rs").is_file());
+    let text: String = found.map(|place| sources(&place)).collect();
+    assert!(!text.is_empty(), "no member has a module {name}");
+    text
 }
 
 /// Every Rust source below a place, a folder or a file without its ending.

@@ -213,7 +213,7 @@ fn system_information() -> String {
         let _ = writeln!(report, "{name}: {}", value.unwrap_or_else(|| "unknown".into()));
     };
     let build = if cfg!(debug_assertions) { "debug" } else { "release" };
-    item("program", Some(format!("{} {} ({build})", env!("CARGO_PKG_NAME"), env!("CARGO_PKG_VERSION"))));
+    item("program", Some(format!("echolume {} ({build})", env!("CARGO_PKG_VERSION"))));
     item("time", Some(humantime::format_rfc3339_seconds(std::time::SystemTime::now()).to_string()));
     item("built for", Some(format!("{} on {}", std::env::consts::OS, std::env::consts::ARCH)));
     let kernel = ["ostype", "osrelease", "version"].map(|name| text(&format!("/proc/sys/kernel/{name}")));
