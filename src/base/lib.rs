@@ -1,5 +1,5 @@
 //! What every other member stands on: files that are read with limits and written atomically ([`files`]), pictures and films
-//! ([`picture`]), drawings and plots ([`canvas`]), lines of text ([`text`]), what is said on a terminal ([`terminal`]), pages of HTML
+//! ([`picture`]), drawings and plots ([`canvas`]), lines of text ([`text`]), values of TOML that types are read from ([`tree`]), what is said on a terminal ([`terminal`]), pages of HTML
 //! ([`html_page`]) and tables for Prometheus ([`metrics`]).
 
 #![forbid(unsafe_code)]
@@ -12,3 +12,4 @@ pub mod picture;
 pub mod progress_lines;
 pub mod terminal;
 pub mod text;
+pub mod tree;

@@ -219,7 +219,7 @@ impl Work {
 
     /// Everything but the recording that determines the output.
     fn hash(&self, settings: &Settings) -> Result<Vec<u8>, Failure> {
-        let settings = serde_json::to_string(settings).map_err(|e| input(format!("settings: {e}")))?;
+        let settings = settings.to_json().map_err(|e| input(format!("settings: {e}")))?;
         // Presets decide what follows from the echoes.
         let presets = self.layers.presets().join(",");
         let numbers = format!("{} {:?} {:?}", self.volume, self.spacing, self.outside);

@@ -257,7 +257,8 @@ mod tests {
             post = { sigma = {}, enhanced_sigma = {}, perona_malik = { scheme = 'aos' } }";
         let grid = Grid { size: [8, 8, 6], spacing: [1.0; 3], origin: [0.0; 3] };
         let input = crate::scene::Input { stored: crate::probe::StoredType::U8, range: [0.0, 255.0] };
-        let scene = Scene::new(Geometry::Cartesian(grid), input, toml::from_str(settings).unwrap()).unwrap();
+        let scene =
+            Scene::new(Geometry::Cartesian(grid), input, crate::scene::Settings::from_toml(settings).unwrap()).unwrap();
         let mut operations: Vec<Operation> = Vec::new();
         let run = |frequency: Frequency, args: DispatchArgs, operations: &mut Vec<Operation>| {
             for pass in PASSES.iter().filter(|p| p.frequency == frequency && p.is_needed(&scene)) {

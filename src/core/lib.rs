@@ -21,5 +21,5 @@ pub mod reference;
 pub mod scene;
 pub mod spirv;
 
-use echolume_base::{files, picture, text};
+use echolume_base::{files, picture, text, tree};
 use echolume_probe as probe;

@@ -6,6 +6,7 @@ use super::axis::Axis;
 use super::geometry::{Advance, Array, GeometryError, Motion, Probe, Volumes};
 use super::motor::MotorTable;
 use crate::files::{self, InputError};
+use crate::tree;
 use serde::Deserialize;
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
@@ -34,7 +35,7 @@ impl ProbeFile {
     }
 
     fn parse(path: &Path, text: &str) -> Result<ProbeFile, InputError> {
-        let tables = toml::from_str::<Tables>(text).map_err(|e| {
+        let tables = tree::from_text::<Tables>(text).map_err(|e| {
             let before = e.span().and_then(|s| text.get(..s.start)).unwrap_or("");
             let line = before.matches('\n').count() + 1;
             InputError::new(path, format!("line {line}"), e.message().trim().replace('\n', ", "))

@@ -12,7 +12,7 @@ pub mod motor;
 mod samples;
 pub mod world;
 
-use echolume_base::files;
+use echolume_base::{files, tree};
 
 pub use axis::Axis;
 pub use file::ProbeFile;

@@ -14,7 +14,7 @@ mod test_block;
 pub mod user_presets;
 pub mod workspace;
 
-use echolume_base::{canvas, files, metrics, picture, text};
+use echolume_base::{canvas, files, metrics, picture, text, tree};
 use echolume_core::{passes, plan, scene};
 use echolume_gpu::{self as gpu, machine};
 use {echolume_probe as probe, echolume_source as source};

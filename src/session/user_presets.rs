@@ -6,7 +6,7 @@ use crate::scene::load::{PRESETS, line_of};
 use crate::text::printable;
 use serde::{Deserialize, Serialize};
 use std::path::Path;
-use toml::{Table, Value};
+use toml::Table;
 
 /// Maximum size of the file, bytes.
 const MAX_BYTES: u64 = 4 << 20;
@@ -41,7 +41,7 @@ impl UserPreset {
     /// One line: a name that cannot be given, or settings that cannot be written as TOML.
     pub fn new(name: &str, settings: &Settings) -> Result<UserPreset, String> {
         let name = checked_name(name)?;
-        let settings = Table::try_from(settings.look());
+        let settings = settings.look().to_table();
         settings.map(|settings| UserPreset { name, settings }).map_err(|e| format!("a preset cannot be written: {e}"))
     }
 
@@ -51,7 +51,7 @@ impl UserPreset {
     /// One line that names the preset: a setting is not known, or not allowed.
     pub fn look(&self) -> Result<Settings, String> {
         let fault = |e: &str| format!("preset {:?}: {}", self.name, printable(e));
-        let settings = Settings::deserialize(Value::Table(self.settings.clone())).map_err(|e| fault(e.message()))?;
+        let settings = Settings::from_table(self.settings.clone()).map_err(|e| fault(e.message()))?;
         settings.check().map_err(|e| fault(&e.to_string()))?;
         Ok(settings.look())
     }
@@ -88,7 +88,7 @@ pub fn read(file: &Path) -> Result<Vec<UserPreset>, String> {
         return Ok(Vec::new());
     }
     let text = files::read_text(file, MAX_BYTES, "list of presets").map_err(|e| fault(&e))?;
-    let kept: Kept = toml::from_str(&text).map_err(|e| {
+    let kept: Kept = crate::tree::from_text(&text).map_err(|e| {
         let line = e.span().map_or(String::new(), |span| format!("line {}: ", line_of(&text, span.start)));
         fault(&format!("{line}{}", e.message()))
     })?;

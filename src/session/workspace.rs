@@ -5,6 +5,7 @@ use crate::files;
 use crate::scene::Settings;
 use crate::scene::load::Layers;
 use crate::text::printable;
+use crate::tree::Node;
 use serde::{Deserialize, Serialize};
 use std::io::Read;
 use std::path::{Path, PathBuf};
@@ -87,7 +88,8 @@ impl Workspace {
         let Some(origin) = table.remove(TABLE) else {
             return Err(fault("has no table [workspace]: a file of settings alone is given with --scene"));
         };
-        let mut origin = Origin::deserialize(origin).map_err(|e| fault(&format!("[workspace]: {}", e.message())))?;
+        let mut origin =
+            Origin::deserialize(Node::from(origin)).map_err(|e| fault(&format!("[workspace]: {}", e.message())))?;
         if origin.version != VERSION {
             let version = origin.version;
             return Err(fault(&format!("[workspace] is of version {version}, this program reads version {VERSION}")));
@@ -127,7 +129,7 @@ impl Workspace {
 pub fn text(settings: &Settings, origin: &Origin) -> Result<String, String> {
     let fault = |e: &dyn std::fmt::Display| format!("a workspace cannot be written: {e}");
     let head = Table::from_iter([(TABLE.to_string(), Value::try_from(origin).map_err(|e| fault(&e))?)]);
-    let (head, settings) = (toml::to_string(&head), toml::to_string(settings));
+    let (head, settings) = (toml::to_string(&head), settings.to_toml());
     let (head, settings) = (head.map_err(|e| fault(&e))?, settings.map_err(|e| fault(&e))?);
     // The settings begin with values that belong to no table, which the table follows.
     let (values, tables) = match settings.find("\n[") {

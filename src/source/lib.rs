@@ -45,7 +45,7 @@ mod uff;
 mod value_range;
 pub mod volume_file;
 
-use echolume_base::files;
+use echolume_base::{files, tree};
 use echolume_probe as probe;
 
 pub use crate::files::InputError;

@@ -8,6 +8,7 @@ use super::transforms::Poses;
 use super::{OpenOptions, describe};
 use crate::files::{self, InputError, escaped, progress, quoted};
 use crate::probe::{AxisOrder, Grid, World};
+use crate::tree;
 use serde::Deserialize;
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
@@ -138,7 +139,7 @@ fn stated_spacing(file: &Path) -> Result<Option<[f64; 3]>, InputError> {
         // What is wrong with it is said by its own reader.
         return Ok(None);
     }
-    let read = toml::from_str::<StackFile>(&text);
+    let read = tree::from_text::<StackFile>(&text);
     let read = read.map_err(|e| InputError::new(file, "voxels", e.message().trim().replace('\n', ", ")))?;
     Ok(Some(read.voxels.spacing_mm))
 }

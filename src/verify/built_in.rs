@@ -70,7 +70,7 @@ const BRICK: u32 = 8;
 /// # Errors
 /// One line: the settings are invalid.
 pub fn scene(geometry: Geometry, input: Input, toml: &str) -> Result<Scene, String> {
-    let mut settings: Settings = toml::from_str(toml).map_err(|e| format!("settings: {}", e.message()))?;
+    let mut settings = Settings::from_toml(toml).map_err(|e| format!("settings: {}", e.message()))?;
     // Pictures as small as these would not be worth their bricks on a CPU, and skipping would go unchecked.
     settings.ray.brick.get_or_insert(BRICK);
     // Passes are compared on values beyond 0..1 too, and texels that none writes are marked by one: every device stores the same.

@@ -161,7 +161,7 @@ fn what_is_removed_has_a_value_of_which_nothing_is_drawn() {
     assert_eq!(of(&format!("mode = 'vr'\n{all}")), None);
     let grid = Grid { size: [8; 3], spacing: [1.0; 3], origin: [0.0; 3] };
     let toml = format!("{}\n{all}", cut("[[0, 0], [3, 0], [0, 3]]", VIEW, ""));
-    let settings: Settings = toml::from_str(&toml).expect("settings");
+    let settings: Settings = Settings::from_toml(&toml).expect("settings");
     let error = Scene::new(Geometry::Cartesian(grid), BYTES, settings).expect_err("refused").to_string();
     assert!(error.starts_with("scene: cuts: ") && error.ends_with("remove the cuts"), "{error}");
 }

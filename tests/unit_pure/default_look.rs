@@ -308,7 +308,7 @@ fn a_change_of_mode_brings_what_follows_from_it_and_keeps_what_was_set() {
 
 #[test]
 fn values_that_were_changed_since_outlast_a_rebase() {
-    let settings = |text: &str| -> Settings { toml::from_str(text).expect("settings") };
+    let settings = |text: &str| -> Settings { Settings::from_toml(text).expect("settings") };
     let before = settings("[camera]\nzoom = 2\n[light.shadow]\nstrength = 0.5\n[region]\ndepth = [1, 2]");
     let after = settings("[camera]\nzoom = 3\nazimuth = 10\n[region]\nlateral = [3, 4]");
     assert_eq!(rebase(&before, &before, &after), Some(after.clone()));

@@ -123,7 +123,7 @@ fn what_is_drawn_begins_where_the_transfer_function_or_the_detector_does() {
     assert_eq!(Slot::Floating.format(&plain("mode = 'sr'")), Format::R8);
     let refused = |toml: &str| {
         let grid = Grid { size: [8; 3], spacing: [1.0; 3], origin: [0.0; 3] };
-        let settings = toml::from_str(toml).expect("settings");
+        let settings = echolume::scene::Settings::from_toml(toml).expect("settings");
         Scene::new(Geometry::Cartesian(grid), BYTES, settings).expect_err("refused").to_string()
     };
     for dark in [

@@ -61,7 +61,7 @@ fn only_renderings_that_start_at_a_curve_have_a_volume_for_it() {
     let Rerun::Steps { steps, slots } = plan.rerun(&old, &new) else { panic!("frames again") };
     assert_eq!((slots, plan.steps[steps[0]].pass.name), (vec![Slot::StartCurve], "cut"));
     let refused = |toml: &str| {
-        let settings: Settings = toml::from_str(toml).expect("settings");
+        let settings: Settings = Settings::from_toml(toml).expect("settings");
         Scene::new(Geometry::Sweep(wobbler()), BYTES, settings).expect_err("refused").to_string()
     };
     let all = "mode = 'vr'\nvolume.transfer = [{ at = 0, colour = [1, 1, 1], opacity = 1 }, { at = 1, colour = [1, 1, 1], opacity = 1 }]";
@@ -77,7 +77,7 @@ fn it_is_set_by_a_flag_and_none_removes_it() {
     layers.set("region.start_curve=[[-20,30],[0,36.5],[20,30]]").expect("a curve");
     let settings = layers.clone().finish().expect("settings");
     assert_eq!(settings.region.start_curve, Some(vec![[-20.0, 30.0], [0.0, 36.5], [20.0, 30.0]]));
-    let again: Settings = toml::from_str(&toml::to_string(&settings).expect("text")).expect("settings");
+    let again: Settings = Settings::from_toml(&settings.to_toml().expect("text")).expect("settings");
     assert_eq!(again, settings);
     layers.set("region.start_curve=none").expect("none");
     assert_eq!(layers.clone().finish().expect("settings").region.start_curve, None);

@@ -181,7 +181,7 @@ fn only_renderings_that_start_at_fluid_have_a_volume_for_it() {
     let small = fan("mode = 'vr'\nregion.depth = [30, 40]\nunveil.enabled = true");
     assert_eq!(small.visible_share(), 1.0);
     let refused = |toml: &str| {
-        let settings: Settings = toml::from_str(toml).expect("settings");
+        let settings: Settings = Settings::from_toml(toml).expect("settings");
         Scene::new(Geometry::Sweep(wobbler()), BYTES, settings).expect_err("refused").to_string()
     };
     let all = "mode = 'vr'\nunveil.enabled = true\nvolume.transfer = [{ at = 0, colour = [1, 1, 1], opacity = 1 }, { at = 1, colour = [1, 1, 1], opacity = 1 }]";

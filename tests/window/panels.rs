@@ -522,7 +522,9 @@ fn the_start_line_is_bent_on_plane_a_and_the_rendering_follows() {
     let recording = echolume::source::open(SWEEP.as_ref(), None).expect("it opens");
     let input = Input { stored: recording.stored_type(), range: recording.range() };
     let toml = format!("mode='vr'\nlayout='four'\nregion.depth=[20,80]\npicture.size={size:?}\n{smooth}");
-    let scene = Scene::new(recording.geometry(0), input, toml::from_str(&toml).expect("settings")).expect("a scene");
+    let scene =
+        Scene::new(recording.geometry(0), input, echolume::scene::Settings::from_toml(&toml).expect("settings"))
+            .expect("a scene");
     let sheet = scene.sheet();
     let middle_handle = (scene.low + scene.high).with_y(2.0 * scene.low.y) / 2.0;
     let at = sheet.project(&sheet.tiles[0], middle_handle).0;

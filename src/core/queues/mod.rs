@@ -232,7 +232,8 @@ mod tests {
         let settings = "slices = { median = true, smooth = { elevation = 1.0 } }\nlight = { shadow = {} }";
         let grid = Grid { size: [8, 8, 6], spacing: [1.0; 3], origin: [0.0; 3] };
         let input = crate::scene::Input { stored: crate::probe::StoredType::U8, range: [0.0, 255.0] };
-        let scene = Scene::new(Geometry::Cartesian(grid), input, toml::from_str(settings).unwrap()).unwrap();
+        let scene =
+            Scene::new(Geometry::Cartesian(grid), input, crate::scene::Settings::from_toml(settings).unwrap()).unwrap();
         let of = |frequency: Frequency, args: DispatchArgs| -> Vec<Access> {
             let passes = PASSES.iter().filter(|p| p.frequency == frequency && p.is_needed(&scene));
             passes.flat_map(|pass| crate::barriers::accesses(&scene, pass, &args)).collect()

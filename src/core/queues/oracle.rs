@@ -190,7 +190,7 @@ mod tests {
     fn scene() -> Scene {
         let grid = Grid { size: [8, 8, 6], spacing: [1.0; 3], origin: [0.0; 3] };
         let input = crate::scene::Input { stored: StoredType::U8, range: [0.0, 255.0] };
-        Scene::new(Geometry::Cartesian(grid), input, toml::from_str("mode = 'sr'").unwrap()).unwrap()
+        Scene::new(Geometry::Cartesian(grid), input, crate::scene::Settings::from_toml("mode = 'sr'").unwrap()).unwrap()
     }
 
     fn touch(slot: Slot, part: u32, write: bool) -> Event {

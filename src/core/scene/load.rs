@@ -4,6 +4,7 @@ use super::look::is_look;
 use super::{Settings, TransferPoint};
 use crate::files;
 use crate::text::printable;
+use crate::tree::{self, NodeError};
 use serde::Deserialize;
 use std::collections::BTreeSet;
 use std::path::Path;
@@ -58,7 +59,7 @@ pub struct Layers {
 impl Layers {
     /// One layer that holds all of `settings`. Empty if they cannot be written as TOML.
     pub fn of(settings: &Settings) -> Option<Layers> {
-        Table::try_from(settings).ok().map(|merged| Layers { merged, ..Layers::default() })
+        settings.to_table().ok().map(|merged| Layers { merged, ..Layers::default() })
     }
 
     /// These layers with those of `over` on top. What `over` gives without a preset counts as given.
@@ -108,9 +109,9 @@ impl Layers {
         let fault =
             |e: &dyn std::fmt::Display| LoadError::Layer { layer: format!("preset {name}"), fault: e.to_string() };
         let before = self.settings().map_err(|e| fault(&e))?;
-        self.merged = Table::try_from(settings.look_over(&before)).map_err(|e| fault(&e))?;
+        self.merged = settings.look_over(&before).to_table().map_err(|e| fault(&e))?;
         let mut given = BTreeSet::new();
-        add_paths(&Table::try_from(settings).map_err(|e| fault(&e))?, "", &mut given);
+        add_paths(&settings.to_table().map_err(|e| fault(&e))?, "", &mut given);
         self.given.extend(given.into_iter().filter(|path| is_look(path)));
         Ok(())
     }
@@ -165,17 +166,17 @@ impl Layers {
     }
 
     fn add(&mut self, layer: &str, text: &str, folder: Option<&Path>) -> Result<(), LoadError> {
-        let fault = |e: &toml::de::Error| LoadError::Layer { layer: layer.into(), fault: one_line(e, text) };
-        let table = toml::from_str::<Table>(text).map_err(|e| fault(&e))?;
+        let fault = |e: &NodeError| LoadError::Layer { layer: layer.into(), fault: one_line(e, text) };
+        let table = toml::from_str::<Table>(text).map_err(|e| fault(&e.into()))?;
         // Check this layer alone first: only then can a message name its line.
         if transfer_file(&table).is_none() {
             let mut without_none = Table::new();
             merge(&mut without_none, table.clone(), &mut Vec::new());
-            if Settings::deserialize(without_none).is_err() {
+            if Settings::from_table(without_none).is_err() {
                 let refused =
-                    |e: &toml::de::Error| e.span().and_then(|span| text.get(span)).map(|t| t.trim_matches(['"', '\'']));
+                    |e: &NodeError| e.span().and_then(|span| text.get(span)).map(|t| t.trim_matches(['"', '\'']));
                 // A `none` that removes a setting is refused by the text alone. Then another one is at fault, and the check below names it.
-                toml::from_str::<Settings>(text).or_else(|e| match refused(&e) {
+                Settings::from_toml(text).or_else(|e| match refused(&e) {
                     Some("none") => Ok(Settings::default()),
                     _ => Err(fault(&e)),
                 })?;
@@ -198,8 +199,8 @@ impl Layers {
         self.settings().map(drop).map_err(|e| LoadError::Layer { layer: layer.into(), fault: one_line(&e, "") })
     }
 
-    fn settings(&self) -> Result<Settings, toml::de::Error> {
-        Settings::deserialize(self.merged.clone())
+    fn settings(&self) -> Result<Settings, NodeError> {
+        Settings::from_table(self.merged.clone())
     }
 
     pub fn finish(self) -> Result<Settings, LoadError> {
@@ -210,10 +211,10 @@ impl Layers {
 /// `current` with what changed from `before` to `after`, value by value. A value that is not as it was before stays; so does a table with such a
 /// value that is no longer in `after`. None if that makes no settings.
 pub fn rebase(current: &Settings, before: &Settings, after: &Settings) -> Option<Settings> {
-    let table = |settings: &Settings| Table::try_from(settings).ok();
+    let table = |settings: &Settings| settings.to_table().ok();
     let mut rebased = table(current)?;
     rebase_table(&mut rebased, &table(before)?, &table(after)?);
-    Settings::deserialize(rebased).ok()
+    Settings::from_table(rebased).ok()
 }
 
 fn rebase_table(current: &mut Table, before: &Table, after: &Table) {
@@ -290,7 +291,7 @@ fn points(path: &Path) -> Result<Value, LoadError> {
     }
     let text = read(path, "transfer function")?;
     let fault = |e: &dyn std::fmt::Display| LoadError::File { path: path.display().to_string(), fault: e.to_string() };
-    let listed = toml::from_str::<Listed>(&text).map_err(|e| fault(&one_line(&e, &text)))?;
+    let listed = tree::from_text::<Listed>(&text).map_err(|e| fault(&one_line(&e, &text)))?;
     Value::try_from(listed.points).map_err(|e| fault(&e))
 }
 
@@ -326,14 +327,14 @@ fn merge(under: &mut Table, over: Table, path: &mut Vec<String>) {
 fn may_be_absent(path: &[String]) -> bool {
     let nested =
         path.iter().rev().fold(Table::new(), |inner, key| Table::from_iter([(key.clone(), Value::Table(inner))]));
-    match Settings::deserialize(nested) {
+    match Settings::from_table(nested) {
         Ok(_) => true,
         // A table with fields that must be given is one too.
         Err(e) if e.message().starts_with("missing field") => true,
         Err(e) if e.message().starts_with("unknown field") => false,
         // A value. Settings without a value are not written.
         Err(_) => {
-            let written = Table::try_from(Settings::default()).unwrap_or_default();
+            let written = Settings::default().to_table().unwrap_or_default();
             let written = Value::Table(written);
             let mut at = Some(&written);
             for key in path {
@@ -344,7 +345,7 @@ fn may_be_absent(path: &[String]) -> bool {
     }
 }
 
-fn one_line(error: &toml::de::Error, text: &str) -> String {
+fn one_line(error: &NodeError, text: &str) -> String {
     let span = error.span().filter(|_| !text.is_empty());
     let place = span.map_or(String::new(), |span| format!("line {}: ", line_of(text, span.start)));
     place + &printable(error.message())

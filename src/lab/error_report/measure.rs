@@ -131,7 +131,7 @@ impl ErrorMeasurement<'_> {
             device: machine.name,
             driver: machine.driver,
             date: machine::date(),
-            scene: format!("{}\n{}", self.input, toml::to_string(&self.scene.settings).unwrap_or_default()),
+            scene: format!("{}\n{}", self.input, self.scene.settings.to_toml().unwrap_or_default()),
             sizes: Sizes { volume: self.scene.volume_size(), picture: self.scene.picture_size() },
             repeats: self.repeats,
             dials: measured,

@@ -312,7 +312,7 @@ impl Report {
     pub fn is_of(&self, scene: &Scene) -> bool {
         let settings = self.scene.split_once('\n').map_or("", |(_, settings)| settings);
         let sizes = Sizes { volume: scene.volume_size(), picture: scene.picture_size() };
-        self.sizes == sizes && toml::to_string(&scene.settings).is_ok_and(|own| own == settings)
+        self.sizes == sizes && scene.settings.to_toml().is_ok_and(|own| own == settings)
     }
 
     /// The report as JSON.

@@ -216,7 +216,7 @@ impl Repeat {
 
 fn settings(scene: &Scene) -> String {
     // Settings come from TOML, so writing them cannot fail; if it did, only the description would be lost.
-    toml::to_string(&scene.settings).unwrap_or_default()
+    scene.settings.to_toml().unwrap_or_default()
 }
 
 fn traced(repeat: usize, span: Span) -> export::Span {

@@ -11,6 +11,7 @@ mod preprocess;
 mod raycast;
 mod shading;
 mod still;
+mod text;
 mod unveil;
 
 pub use body_marks::*;

@@ -9,6 +9,7 @@ use crate::live::Update;
 use crate::scene::Settings;
 use crate::scene::load::{self, Layers, LoadError, line_of, transfer_file};
 use crate::text::printable;
+use crate::tree::{self, Node, NodeError};
 use serde::de::Error;
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 use std::fmt;
@@ -256,7 +257,7 @@ impl Config {
     /// One line that names the file, the line, the key and the allowed values.
     pub fn parse(text: &str, path: &Path) -> Result<Config, ConfigError> {
         let locations = KeyLocations::of(text, path)?;
-        let mut config: Config = toml::from_str(text).map_err(|e| locations.parse_error(&e))?;
+        let mut config: Config = tree::from_text(text).map_err(|e| locations.parse_error(&e))?;
         config.locations = locations;
         config.check(text)?;
         config.resolve_paths()?;
@@ -345,14 +346,12 @@ impl Config {
 
     /// Checks the scene like a scene file, with line numbers.
     fn check_scene(&self, text: &str) -> Result<(), ConfigError> {
-        #[derive(Deserialize)]
-        struct Rest {
-            #[serde(default, rename = "scene")]
-            _scene: Settings,
-        }
         // First without the layers, because merged settings have no line numbers. A transfer function in a file is not resolved yet.
         if transfer_file(&self.scene).is_none() {
-            toml::from_str::<Rest>(text).map_err(|e| self.locations.parse_error(&e))?;
+            let scene = Node::parse(text).map(|mut all| all.take("scene"));
+            scene
+                .and_then(|scene| scene.map_or(Ok(Settings::default()), Settings::from_node))
+                .map_err(|e| self.locations.parse_error(&e))?;
         }
         for preset in &self.preset {
             let known = crate::scene::load::Layers::default().preset(preset);
@@ -618,7 +617,7 @@ impl KeyLocations {
     }
 
     /// Converts an error of the parser to one that names the key and the allowed values.
-    fn parse_error(&self, error: &toml::de::Error) -> ConfigError {
+    fn parse_error(&self, error: &NodeError) -> ConfigError {
         let at = error.span().unwrap_or_default();
         let holds = |range: &Range<usize>| range.start <= at.start && at.end <= range.end;
         let place = self.keys.iter().rfind(|place| holds(&place.name));

@@ -1,0 +1,356 @@
+//! The values of a TOML text or table as a tree that types are read from, with the place of each value in the text.
+//!
+//! serde's code for a type is compiled once for each kind of input. `toml` alone has four: a table in memory, and three of a text. A [`Node`] is the one
+//! kind here: of the settings of a scene, which are read from both, this left a quarter of the code.
+
+use serde::de::{self, DeserializeOwned, DeserializeSeed, Deserializer, Unexpected, Visitor};
+use std::fmt::{self, Display};
+use std::ops::Range;
+use toml::Value;
+use toml::de::{DeTable, DeValue};
+
+/// A value, and the bytes of the text that it stands in.
+#[derive(Clone, Debug)]
+pub struct Node {
+    span: Option<Range<usize>>,
+    content: Content,
+}
+
+#[derive(Clone, Debug)]
+enum Content {
+    Boolean(bool),
+    Integer(i64),
+    Float(f64),
+    Text(String),
+    /// No type that is read has one.
+    Date,
+    List(Vec<Node>),
+    /// In the order of their names.
+    Table(Vec<(Node, Node)>),
+    /// A number that its type cannot hold, in words.
+    Overflow(&'static str),
+}
+
+/// Why a value is not of the type that is read, in one line.
+#[derive(Clone, Debug, PartialEq)]
+pub struct NodeError {
+    message: String,
+    span: Option<Range<usize>>,
+}
+
+impl NodeError {
+    /// What is wrong, without a place.
+    pub fn message(&self) -> &str {
+        &self.message
+    }
+
+    /// The bytes of the text that are wrong; none of a table in memory.
+    pub fn span(&self) -> Option<Range<usize>> {
+        self.span.clone()
+    }
+
+    /// This error at `span`, unless it has a place already.
+    fn at(mut self, span: &Option<Range<usize>>) -> NodeError {
+        if self.span.is_none() {
+            self.span.clone_from(span);
+        }
+        self
+    }
+}
+
+impl Display for NodeError {
+    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        f.write_str(&self.message)
+    }
+}
+
+impl std::error::Error for NodeError {}
+
+impl de::Error for NodeError {
+    fn custom<T: Display>(message: T) -> NodeError {
+        NodeError { message: message.to_string(), span: None }
+    }
+}
+
+impl From<toml::de::Error> for NodeError {
+    fn from(error: toml::de::Error) -> NodeError {
+        NodeError { message: error.message().to_string(), span: error.span() }
+    }
+}
+
+/// Reads a type from a TOML text.
+///
+/// # Errors
+/// The text is no TOML, or a value is not what the type asks for; with its place.
+pub fn from_text<T: DeserializeOwned>(text: &str) -> Result<T, NodeError> {
+    T::deserialize(Node::parse(text)?)
+}
+
+/// Reads a type from a table in memory.
+///
+/// # Errors
+/// A value is not what the type asks for.
+pub fn from_table<T: DeserializeOwned>(table: toml::Table) -> Result<T, NodeError> {
+    T::deserialize(Node::from(Value::Table(table)))
+}
+
+impl Node {
+    /// The values of a TOML text.
+    ///
+    /// # Errors
+    /// The text is no TOML.
+    pub fn parse(text: &str) -> Result<Node, NodeError> {
+        let table = DeTable::parse(text)?;
+        Ok(Node { span: Some(table.span()), content: content_of_table(table.into_inner()) })
+    }
+
+    /// The value of a key of a table, which is taken out of it.
+    pub fn take(&mut self, key: &str) -> Option<Node> {
+        let Content::Table(table) = &mut self.content else { return None };
+        let at = table.iter().position(|(name, _)| matches!(&name.content, Content::Text(name) if name == key))?;
+        Some(table.remove(at).1)
+    }
+
+    fn unexpected(&self) -> Unexpected<'_> {
+        match &self.content {
+            Content::Boolean(value) => Unexpected::Bool(*value),
+            Content::Integer(value) => Unexpected::Signed(*value),
+            Content::Float(value) => Unexpected::Float(*value),
+            Content::Text(value) => Unexpected::Str(value),
+            Content::Date => Unexpected::Other("date"),
+            Content::List(_) => Unexpected::Seq,
+            Content::Table(_) => Unexpected::Map,
+            Content::Overflow(what) => Unexpected::Other(what),
+        }
+    }
+}
+
+fn content_of_table(table: DeTable) -> Content {
+    let entry = |(key, value): (toml::Spanned<toml::de::DeString>, toml::Spanned<DeValue>)| {
+        let name = Node { span: Some(key.span()), content: Content::Text(key.into_inner().into_owned()) };
+        (name, of_spanned(value))
+    };
+    Content::Table(table.into_iter().map(entry).collect())
+}
+
+fn of_spanned(value: toml::Spanned<DeValue>) -> Node {
+    let span = Some(value.span());
+    let content = match value.into_inner() {
+        DeValue::String(text) => Content::Text(text.into_owned()),
+        DeValue::Integer(number) => match i64::from_str_radix(number.as_str(), number.radix()) {
+            Ok(number) => Content::Integer(number),
+            Err(_) => Content::Overflow("integer that is too large"),
+        },
+        DeValue::Float(number) => match number.as_str().parse() {
+            Ok(number) => Content::Float(number),
+            Err(_) => Content::Overflow("number that is too large"),
+        },
+        DeValue::Boolean(value) => Content::Boolean(value),
+        DeValue::Datetime(_) => Content::Date,
+        DeValue::Array(list) => Content::List(list.into_iter().map(of_spanned).collect()),
+        DeValue::Table(table) => content_of_table(table),
+    };
+    Node { span, content }
+}
+
+impl From<Value> for Node {
+    fn from(value: Value) -> Node {
+        let content = match value {
+            Value::String(text) => Content::Text(text),
+            Value::Integer(number) => Content::Integer(number),
+            Value::Float(number) => Content::Float(number),
+            Value::Boolean(value) => Content::Boolean(value),
+            Value::Datetime(_) => Content::Date,
+            Value::Array(list) => Content::List(list.into_iter().map(Node::from).collect()),
+            Value::Table(table) => {
+                let entry = |(key, value)| (Node { span: None, content: Content::Text(key) }, Node::from(value));
+                Content::Table(table.into_iter().map(entry).collect())
+            }
+        };
+        Node { span: None, content }
+    }
+}
+
+impl<'de> Deserializer<'de> for Node {
+    type Error = NodeError;
+
+    fn deserialize_any<V: Visitor<'de>>(self, visitor: V) -> Result<V::Value, NodeError> {
+        let span = self.span;
+        match self.content {
+            Content::Boolean(value) => visitor.visit_bool(value),
+            Content::Integer(value) => visitor.visit_i64(value),
+            Content::Float(value) => visitor.visit_f64(value),
+            Content::Text(value) => visitor.visit_string(value),
+            Content::Date => Err(de::Error::invalid_type(Unexpected::Other("date"), &visitor)),
+            Content::Overflow(what) => Err(de::Error::invalid_value(Unexpected::Other(what), &visitor)),
+            Content::List(list) => visitor.visit_seq(Elements(list.into_iter())),
+            Content::Table(table) => visitor.visit_map(Entries { rest: table.into_iter(), value: None }),
+        }
+        .map_err(|error| error.at(&span))
+    }
+
+    fn deserialize_option<V: Visitor<'de>>(self, visitor: V) -> Result<V::Value, NodeError> {
+        visitor.visit_some(self)
+    }
+
+    fn deserialize_newtype_struct<V: Visitor<'de>>(self, _: &'static str, visitor: V) -> Result<V::Value, NodeError> {
+        visitor.visit_newtype_struct(self)
+    }
+
+    fn deserialize_enum<V: Visitor<'de>>(
+        self,
+        _: &'static str,
+        _: &'static [&'static str],
+        visitor: V,
+    ) -> Result<V::Value, NodeError> {
+        let span = self.span.clone();
+        let (name, value) = self.variant()?;
+        visitor.visit_enum(Variant { name, value }).map_err(|error: NodeError| error.at(&span))
+    }
+
+    serde::forward_to_deserialize_any! {
+        bool u8 u16 u32 u64 i8 i16 i32 i64 f32 f64 char str string seq bytes byte_buf map struct unit ignored_any unit_struct
+        tuple_struct tuple identifier
+    }
+}
+
+impl Node {
+    /// That a table has no other keys than these.
+    fn check_keys(&self, fields: &[&str]) -> Result<(), NodeError> {
+        let Content::Table(table) = &self.content else { return Ok(()) };
+        for (name, _) in table {
+            if let Content::Text(key) = &name.content
+                && !fields.contains(&key.as_str())
+            {
+                let message = format!("unexpected keys in table: {key}, available keys: {}", fields.join(", "));
+                return Err(NodeError { message, span: name.span.clone() });
+            }
+        }
+        Ok(())
+    }
+
+    /// The name of a variant, and what it holds.
+    fn variant(self) -> Result<(Node, Option<Node>), NodeError> {
+        let fault = |message: &str| NodeError { message: message.into(), span: self.span.clone() };
+        match self.content {
+            Content::Text(_) => Ok((self, None)),
+            Content::Table(ref table) if table.is_empty() => Err(fault("wanted exactly 1 element, found 0 elements")),
+            Content::Table(table) => {
+                let mut entries = table.into_iter();
+                match (entries.next(), entries.next()) {
+                    (Some((name, value)), None) => Ok((name, Some(value))),
+                    _ => Err(NodeError {
+                        message: "wanted exactly 1 element, more than 1 element".into(),
+                        span: self.span,
+                    }),
+                }
+            }
+            _ => Err(fault("wanted string or table")),
+        }
+    }
+}
+
+struct Elements(std::vec::IntoIter<Node>);
+
+impl<'de> de::SeqAccess<'de> for Elements {
+    type Error = NodeError;
+
+    fn next_element_seed<T: DeserializeSeed<'de>>(&mut self, seed: T) -> Result<Option<T::Value>, NodeError> {
+        self.0.next().map(|element| seed.deserialize(element)).transpose()
+    }
+
+    fn size_hint(&self) -> Option<usize> {
+        Some(self.0.len())
+    }
+}
+
+struct Entries {
+    rest: std::vec::IntoIter<(Node, Node)>,
+    value: Option<Node>,
+}
+
+impl<'de> de::MapAccess<'de> for Entries {
+    type Error = NodeError;
+
+    fn next_key_seed<K: DeserializeSeed<'de>>(&mut self, seed: K) -> Result<Option<K::Value>, NodeError> {
+        let Some((key, value)) = self.rest.next() else { return Ok(None) };
+        self.value = Some(value);
+        seed.deserialize(key).map(Some)
+    }
+
+    fn next_value_seed<V: DeserializeSeed<'de>>(&mut self, seed: V) -> Result<V::Value, NodeError> {
+        let value = self.value.take().ok_or_else(|| <NodeError as de::Error>::custom("a value without a key"))?;
+        let span = value.span.clone();
+        seed.deserialize(value).map_err(|error| error.at(&span))
+    }
+
+    fn size_hint(&self) -> Option<usize> {
+        Some(self.rest.len())
+    }
+}
+
+struct Variant {
+    name: Node,
+    value: Option<Node>,
+}
+
+impl<'de> de::EnumAccess<'de> for Variant {
+    type Error = NodeError;
+    type Variant = Held;
+
+    fn variant_seed<V: DeserializeSeed<'de>>(self, seed: V) -> Result<(V::Value, Held), NodeError> {
+        Ok((seed.deserialize(self.name)?, Held(self.value)))
+    }
+}
+
+/// What a variant holds; none if only its name is given.
+struct Held(Option<Node>);
+
+impl Held {
+    fn needed(self, what: Unexpected<'_>) -> Result<Node, NodeError> {
+        self.0.ok_or_else(|| de::Error::invalid_type(Unexpected::UnitVariant, &Expected(what)))
+    }
+}
+
+/// In a message: what is expected.
+struct Expected<'a>(Unexpected<'a>);
+
+impl de::Expected for Expected<'_> {
+    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        self.0.fmt(f)
+    }
+}
+
+impl<'de> de::VariantAccess<'de> for Held {
+    type Error = NodeError;
+
+    fn unit_variant(self) -> Result<(), NodeError> {
+        let Some(node) = self.0 else { return Ok(()) };
+        let fault = |message: String| Err(NodeError { message, span: node.span.clone() });
+        match &node.content {
+            Content::List(list) if list.is_empty() => Ok(()),
+            Content::Table(table) if table.is_empty() => Ok(()),
+            Content::List(_) => fault("expected empty array".into()),
+            Content::Table(_) => fault("expected empty table".into()),
+            _ => fault(format!("expected table, found {}", node.unexpected())),
+        }
+    }
+
+    fn newtype_variant_seed<T: DeserializeSeed<'de>>(self, seed: T) -> Result<T::Value, NodeError> {
+        seed.deserialize(self.needed(Unexpected::NewtypeVariant)?)
+    }
+
+    fn tuple_variant<V: Visitor<'de>>(self, _: usize, visitor: V) -> Result<V::Value, NodeError> {
+        self.needed(Unexpected::TupleVariant)?.deserialize_any(visitor)
+    }
+
+    fn struct_variant<V: Visitor<'de>>(
+        self,
+        fields: &'static [&'static str],
+        visitor: V,
+    ) -> Result<V::Value, NodeError> {
+        let node = self.needed(Unexpected::StructVariant)?;
+        node.check_keys(fields)?;
+        node.deserialize_any(visitor)
+    }
+}
