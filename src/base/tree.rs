@@ -139,11 +139,13 @@ fn of_spanned(value: toml::Spanned<DeValue>) -> Node {
         DeValue::String(text) => Content::Text(text.into_owned()),
         DeValue::Integer(number) => match i64::from_str_radix(number.as_str(), number.radix()) {
             Ok(number) => Content::Integer(number),
-            Err(_) => Content::Overflow("integer that is too large"),
+            Err(_) => Content::Overflow("integer number overflowed"),
         },
-        DeValue::Float(number) => match number.as_str().parse() {
-            Ok(number) => Content::Float(number),
-            Err(_) => Content::Overflow("number that is too large"),
+        DeValue::Float(number) => match number.as_str().parse::<f64>() {
+            Ok(value) if value.is_finite() || !number.as_str().contains(|c: char| c.is_ascii_digit()) => {
+                Content::Float(value)
+            }
+            _ => Content::Overflow("floating-point number overflowed"),
         },
         DeValue::Boolean(value) => Content::Boolean(value),
         DeValue::Datetime(_) => Content::Date,
@@ -182,7 +184,7 @@ impl<'de> Deserializer<'de> for Node {
             Content::Float(value) => visitor.visit_f64(value),
             Content::Text(value) => visitor.visit_string(value),
             Content::Date => Err(de::Error::invalid_type(Unexpected::Other("date"), &visitor)),
-            Content::Overflow(what) => Err(de::Error::invalid_value(Unexpected::Other(what), &visitor)),
+            Content::Overflow(message) => Err(de::Error::custom(message)),
             Content::List(list) => visitor.visit_seq(Elements(list.into_iter())),
             Content::Table(table) => visitor.visit_map(Entries { rest: table.into_iter(), value: None }),
         }
@@ -352,5 +354,122 @@ impl<'de> de::VariantAccess<'de> for Held {
         let node = self.needed(Unexpected::StructVariant)?;
         node.check_keys(fields)?;
         node.deserialize_any(visitor)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use serde::{Deserialize, Serialize};
+    use std::collections::BTreeMap;
+
+    #[derive(Debug, Default, PartialEq, Deserialize, Serialize)]
+    #[serde(deny_unknown_fields, default)]
+    struct All {
+        number: f64,
+        count: u8,
+        word: String,
+        is_on: bool,
+        maybe: Option<f32>,
+        pair: [f64; 2],
+        inner: Option<Inner>,
+        list: Vec<Inner>,
+        named: BTreeMap<String, u32>,
+        choice: Choice,
+        path: std::path::PathBuf,
+    }
+
+    #[derive(Debug, Default, PartialEq, Deserialize, Serialize)]
+    #[serde(deny_unknown_fields)]
+    struct Inner {
+        at: f64,
+        #[serde(default)]
+        of: Choice,
+    }
+
+    #[derive(Debug, Default, PartialEq, Deserialize, Serialize)]
+    #[serde(rename_all = "kebab-case")]
+    enum Choice {
+        #[default]
+        NoneOfAll,
+        Of(Box<Inner>),
+        Both {
+            low: f64,
+        },
+        Two(f64, f64),
+    }
+
+    const TEXTS: &[&str] = &[
+        "",
+        "number = 3",
+        "number = 1e400",
+        "number = -inf",
+        "count = 255\nword = 'a'\nis_on = true\nmaybe = 0.1\npair = [1, 2.5]\npath = '/x'",
+        "choice = 'none-of-all'",
+        "choice = { of = { at = 1.0 } }",
+        "[choice.both]\nlow = 2",
+        "choice = { two = [1, 2] }",
+        "[[list]]\nat = 1\n[[list]]\nat = 2\nof = { both = { low = 1 } }",
+        "[named]\na = 1\n'b c' = 2",
+        // Each of these is wrong.
+        "number = 'x'",
+        "\ncount = 256",
+        "count = -1",
+        "word = 1",
+        "is_on = 'yes'",
+        "pair = [1]",
+        "pair = [1, 2, 3]",
+        "pair = [1,\n 'x']",
+        "unknown = 1",
+        "[inner]\nof = 'none-of-all'",
+        "[inner]\nat = 1\nmore = 2",
+        "[[list]]\nat = 1\n[[list]]\nat = 'x'",
+        "list = 3",
+        "choice = 'other'",
+        "choice = 3",
+        "choice = {}",
+        "choice = { of = 1 }",
+        "choice = { of = { at = 1 }, both = { low = 1 } }",
+        "choice = { both = { low = 1, high = 2 } }",
+        "[named]\na = -1",
+        "number = ",
+        "number = 1\nnumber = 2",
+        "[inner]\nat = 1\n[inner]\nat = 2",
+    ];
+
+    /// Prevents a reading that differs from that of the crate `toml`: in a value, in a message or in its place.
+    #[test]
+    fn a_text_is_read_as_toml_reads_it() {
+        for text in TEXTS {
+            let (ours, theirs) = (from_text::<All>(text), toml::from_str::<All>(text));
+            match (ours, theirs) {
+                (Ok(ours), Ok(theirs)) => assert_eq!(ours, theirs, "{text}"),
+                (Err(ours), Err(theirs)) => {
+                    assert_eq!((ours.message(), ours.span()), (theirs.message(), theirs.span()), "{text}");
+                }
+                (ours, theirs) => panic!("{text}: {ours:?}, of toml {theirs:?}"),
+            }
+        }
+    }
+
+    /// Prevents a table in memory that is read otherwise than its text.
+    #[test]
+    fn a_table_is_read_as_its_text() {
+        for text in TEXTS {
+            let Ok(table) = toml::from_str::<toml::Table>(text) else { continue };
+            let (ours, theirs) = (from_table::<All>(table), from_text::<All>(text));
+            assert_eq!(ours.as_ref().ok(), theirs.as_ref().ok(), "{text}");
+            assert_eq!(ours.err().map(|e| e.to_string()), theirs.err().map(|e| e.to_string()), "{text}");
+        }
+    }
+
+    #[test]
+    fn what_is_too_large_or_a_date_is_refused_in_words() {
+        for (text, said) in [
+            ("count = 99999999999999999999", "integer number overflowed"),
+            ("number = 1979-05-27", "invalid type: date, expected f64"),
+        ] {
+            assert_eq!(from_text::<All>(text).expect_err("it is refused").message(), said);
+        }
     }
 }

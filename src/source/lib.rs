@@ -41,6 +41,7 @@ mod stack;
 pub mod standard_input;
 mod tracked;
 mod transforms;
+#[cfg(feature = "uff")]
 mod uff;
 mod value_range;
 pub mod volume_file;
@@ -106,7 +107,7 @@ fn open_file(path: &Path, options: OpenOptions) -> Result<Box<dyn Source>, Input
     Ok(match Kind::of(path) {
         Kind::Frames => posed::Opened::new(path, Box::new(frames(path, options)?), options.freehand)?.source(),
         Kind::Stream => posed::Opened::new(path, Box::new(stream(path, options)?), options.freehand)?.source(),
-        Kind::Uff => Box::new(uff(path, options)?),
+        Kind::Uff => uff(path, options)?.0,
         Kind::Recording if tracked::is_asked_for(&options) => Box::new(tracked_volume(path, options)?),
         Kind::Recording => Box::new(recording(path, options)?),
     })
@@ -133,7 +134,7 @@ fn file_description(path: &Path, options: OpenOptions) -> Result<Vec<(String, St
             let opened = posed::Opened::new(path, Box::new(stream(path, options)?), options.freehand)?;
             Ok(opened.description(stream(path, options)?.description()))
         }
-        Kind::Uff => Ok(uff(path, options)?.description()),
+        Kind::Uff => Ok(uff(path, options)?.1),
         Kind::Recording if tracked::is_asked_for(&options) => Ok(tracked_volume(path, options)?.description()),
         Kind::Recording => Ok(recording(path, options)?.description()),
     }
@@ -160,7 +161,11 @@ fn stream(path: &Path, options: OpenOptions) -> Result<piped_file::PipedFile, In
     piped_file::PipedFile::open(path, options.probe)
 }
 
-fn uff(path: &Path, options: OpenOptions) -> Result<uff::Beamformed, InputError> {
+/// What describes a source: pairs of title and value.
+type Description = Vec<(String, String)>;
+
+/// The source of a UFF file, and its description.
+fn uff(path: &Path, options: OpenOptions) -> Result<(Box<dyn Source>, Description), InputError> {
     let fault = |flag: &str| Err(InputError::new(path, flag, "is not for UFF, which states its own geometry"));
     match options {
         OpenOptions { probe: Some(_), .. } => fault("--probe"),
@@ -169,7 +174,13 @@ fn uff(path: &Path, options: OpenOptions) -> Result<uff::Beamformed, InputError>
         _ if tracked::is_asked_for(&options) => fault("--plus-config"),
         _ => {
             options.freehand.refused(path)?;
-            uff::Beamformed::open(path)
+            #[cfg(feature = "uff")]
+            return uff::Beamformed::open(path).map(|file| {
+                let description = file.description();
+                (Box::new(file) as Box<dyn Source>, description)
+            });
+            #[cfg(not(feature = "uff"))]
+            Err(InputError::new(path, "file", left_out("UFF (HDF5)", "uff")))
         }
     }
 }
@@ -185,6 +196,14 @@ fn only_probe(path: &Path, options: OpenOptions) -> Result<(), InputError> {
         }
         (None, None) => Ok(()),
     }
+}
+
+/// Says of a format how to have it in a build without it.
+#[cfg(not(all(feature = "jpeg2000", feature = "uff")))]
+fn left_out(format: &str, feature: &str) -> String {
+    format!(
+        "is {format}, and this program was built without the feature `{feature}`; build it with `cargo build --release`"
+    )
 }
 
 /// What a file holds, by its first bytes.
@@ -206,7 +225,7 @@ impl Kind {
             Kind::Frames
         } else if piped_file::PipedFile::is_one(&start) {
             Kind::Stream
-        } else if uff::is_one(&start) {
+        } else if start.starts_with(b"\x89HDF\r\n\x1a\n") {
             Kind::Uff
         } else {
             Kind::Recording

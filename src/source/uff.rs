@@ -34,11 +34,6 @@ const SHOWN: [f64; 2] = [-60.0, 0.0];
 /// What is stored for an amplitude of 0 and everything below, dB.
 const FLOOR: f64 = -200.0;
 
-/// True if a file begins like this.
-pub(super) fn is_one(start: &[u8]) -> bool {
-    start.starts_with(b"\x89HDF\r\n\x1a\n")
-}
-
 /// Beamformed data as volumes.
 ///
 /// Memory: a frame, twice; a chunk, three times while it is unpacked (at most 1 GiB each); and a cache of chunks (64 MiB, or what a pass over

@@ -1,6 +1,7 @@
 //! Frames that are compressed as JPEG baseline, JPEG lossless (process 14) or JPEG 2000, as numbers in little-endian order, pixel by pixel.
 
 use crate::files::escaped;
+#[cfg(feature = "jpeg2000")]
 use hayro_jpeg2000::{DecodeSettings, DecoderContext, Image};
 use image::{DynamicImage, ImageDecoder, ImageFormat, ImageReader};
 use jpeg_decoder::{ColorTransform, Decoder};
@@ -252,20 +253,33 @@ fn check_coding_style(style: &[u8], pixels: u64) -> Result<(), String> {
     }
 }
 
+const JPEG_2000: &str = "JPEG 2000";
+
 /// JPEG 2000, lossless or not: the bare code stream that DICOM asks for, up to 16 bits without a sign, grey or three channels.
 ///
 /// # Errors
 /// In words, what is wrong with the frame.
 pub(super) fn jpeg_2000(bytes: &[u8], expected: Expected) -> Result<Vec<u8>, String> {
-    const KIND: &str = "JPEG 2000";
     check_end(bytes)?;
-    check_code_stream(bytes, expected).map_err(|why| unreadable(KIND, why))?;
+    check_code_stream(bytes, expected).map_err(|why| unreadable(JPEG_2000, why))?;
+    decoded_2000(bytes, expected)
+}
+
+#[cfg(not(feature = "jpeg2000"))]
+fn decoded_2000(_: &[u8], _: Expected) -> Result<Vec<u8>, String> {
+    Err(crate::left_out(JPEG_2000, "jpeg2000"))
+}
+
+/// # Errors
+/// In words, what is wrong with the frame.
+#[cfg(feature = "jpeg2000")]
+fn decoded_2000(bytes: &[u8], expected: Expected) -> Result<Vec<u8>, String> {
     // Of what is damaged nothing is made up.
     let settings = DecodeSettings { strict: true, ..DecodeSettings::default() };
-    let image = Image::new(bytes, &settings).map_err(|e| unreadable(KIND, e))?;
+    let image = Image::new(bytes, &settings).map_err(|e| unreadable(JPEG_2000, e))?;
     expected.check_size(image.width() as usize, image.height() as usize)?;
     let mut context = DecoderContext::default();
-    let decoded = image.decode(&mut context).map_err(|e| unreadable(KIND, e))?;
+    let decoded = image.decode(&mut context).map_err(|e| unreadable(JPEG_2000, e))?;
     let channels = decoded.components();
     let most = match expected.width {
         1 => 8,
@@ -275,7 +289,7 @@ pub(super) fn jpeg_2000(bytes: &[u8], expected: Expected) -> Result<Vec<u8>, Str
     let is_right = |c: &hayro_jpeg2000::ComponentData| c.bit_depth() <= most && c.samples().len() == pixels;
     if channels.len() != expected.channels || !channels.iter().all(is_right) {
         let bits = channels.first().map_or(0, |c| c.bit_depth());
-        return Err(unreadable(KIND, format!("{} numbers a pixel of {bits} bits", channels.len())));
+        return Err(unreadable(JPEG_2000, format!("{} numbers a pixel of {bits} bits", channels.len())));
     }
     let mut numbers = Vec::with_capacity(expected.bytes());
     for pixel in 0..pixels {
@@ -336,6 +350,7 @@ mod tests {
         assert!(bits(7).is_err_and(|why| why.contains("7 bits")) && bits(17).is_err());
     }
 
+    #[cfg(feature = "jpeg2000")]
     #[test]
     fn code_streams_that_ask_for_more_than_they_hold_are_refused() {
         let good = frame(include_bytes!("../../../tests/data/dicom/image-j2k.dcm"), [0xff, 0x4f, 0xff]);
