@@ -9,7 +9,7 @@ use echolume::scene::load::Layers;
 use echolume::scene::{EchoHistogram, Input, Scene, Settings};
 use echolume::source::live::{Playback, PlaybackSource};
 use echolume::source::phantom::{Phantom, PhantomOptions, PhantomSource};
-use echolume::source::samples::SampleType;
+use echolume::source::SampleType;
 use echolume::source::{self, Frame, OpenOptions, Source};
 use echolume::{Context, ContextOptions, DeviceChoice, RendererOptions, StreamOptions};
 use pyo3::create_exception;
