@@ -1,7 +1,7 @@
 //! The values of a TOML text or table as a tree that types are read from, with the place of each value in the text.
 //!
-//! serde's code for a type is compiled once for each kind of input. `toml` alone has four: a table in memory, and three of a text. A [`Node`] is the one
-//! kind here: of the settings of a scene, which are read from both, this left a quarter of the code.
+//! The compiler makes serde's code for a type once for each kind of input. `toml` has four: a table in memory, and three of a text. A [`Node`] is the one
+//! kind here. docs/experiments.md states what that saves.
 
 use serde::de::{self, DeserializeOwned, DeserializeSeed, Deserializer, Unexpected, Visitor};
 use std::fmt::{self, Display};
@@ -111,16 +111,17 @@ impl Node {
         Some(table.remove(at).1)
     }
 
-    fn unexpected(&self) -> Unexpected<'_> {
-        match &self.content {
-            Content::Boolean(value) => Unexpected::Bool(*value),
-            Content::Integer(value) => Unexpected::Signed(*value),
-            Content::Float(value) => Unexpected::Float(*value),
-            Content::Text(value) => Unexpected::Str(value),
-            Content::Date => Unexpected::Other("date"),
-            Content::List(_) => Unexpected::Seq,
-            Content::Table(_) => Unexpected::Map,
-            Content::Overflow(what) => Unexpected::Other(what),
+    /// The kind of the value, as `toml` names it.
+    fn kind(&self) -> &'static str {
+        match self.content {
+            Content::Boolean(_) => "boolean",
+            Content::Integer(_) => "integer",
+            Content::Float(_) => "float",
+            Content::Text(_) => "string",
+            Content::Date => "datetime",
+            Content::List(_) => "array",
+            Content::Table(_) => "table",
+            Content::Overflow(_) => "number",
         }
     }
 }
@@ -309,17 +310,8 @@ impl<'de> de::EnumAccess<'de> for Variant {
 struct Held(Option<Node>);
 
 impl Held {
-    fn needed(self, what: Unexpected<'_>) -> Result<Node, NodeError> {
-        self.0.ok_or_else(|| de::Error::invalid_type(Unexpected::UnitVariant, &Expected(what)))
-    }
-}
-
-/// In a message: what is expected.
-struct Expected<'a>(Unexpected<'a>);
-
-impl de::Expected for Expected<'_> {
-    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
-        self.0.fmt(f)
+    fn needed(self, what: &'static str) -> Result<Node, NodeError> {
+        self.0.ok_or_else(|| de::Error::invalid_type(Unexpected::UnitVariant, &what))
     }
 }
 
@@ -334,16 +326,22 @@ impl<'de> de::VariantAccess<'de> for Held {
             Content::Table(table) if table.is_empty() => Ok(()),
             Content::List(_) => fault("expected empty array".into()),
             Content::Table(_) => fault("expected empty table".into()),
-            _ => fault(format!("expected table, found {}", node.unexpected())),
+            _ => fault(format!("expected table, found {}", node.kind())),
         }
     }
 
     fn newtype_variant_seed<T: DeserializeSeed<'de>>(self, seed: T) -> Result<T::Value, NodeError> {
-        seed.deserialize(self.needed(Unexpected::NewtypeVariant)?)
+        seed.deserialize(self.needed("newtype variant")?)
     }
 
-    fn tuple_variant<V: Visitor<'de>>(self, _: usize, visitor: V) -> Result<V::Value, NodeError> {
-        self.needed(Unexpected::TupleVariant)?.deserialize_any(visitor)
+    fn tuple_variant<V: Visitor<'de>>(self, length: usize, visitor: V) -> Result<V::Value, NodeError> {
+        let node = self.needed("tuple variant")?;
+        let message = match &node.content {
+            Content::List(list) if list.len() == length => return node.deserialize_any(visitor),
+            Content::List(_) => format!("expected tuple with length {length}"),
+            _ => format!("expected table, found {}", node.kind()),
+        };
+        Err(NodeError { message, span: node.span })
     }
 
     fn struct_variant<V: Visitor<'de>>(
@@ -351,7 +349,7 @@ impl<'de> de::VariantAccess<'de> for Held {
         fields: &'static [&'static str],
         visitor: V,
     ) -> Result<V::Value, NodeError> {
-        let node = self.needed(Unexpected::StructVariant)?;
+        let node = self.needed("struct variant")?;
         node.check_keys(fields)?;
         node.deserialize_any(visitor)
     }
@@ -428,6 +426,14 @@ mod tests {
         "choice = 'other'",
         "choice = 3",
         "choice = {}",
+        "choice = 'of'",
+        "choice = 'both'",
+        "choice = 'two'",
+        "choice = { none-of-all = 3 }",
+        "choice = { none-of-all = [1] }",
+        "choice = { none-of-all = { a = 1 } }",
+        "choice = { two = [1] }",
+        "choice = { two = 3 }",
         "choice = { of = 1 }",
         "choice = { of = { at = 1 }, both = { low = 1 } }",
         "choice = { both = { low = 1, high = 2 } }",

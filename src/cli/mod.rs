@@ -19,10 +19,9 @@ macro_rules! left_out {
 
             impl $command {
                 pub fn run(self) -> Result<(), Failure> {
-                    let built = "was built without the feature";
+                    let name = stringify!($module);
                     Err(input(format!(
-                        "{}: this program {built} `{}`; build it with `cargo build --release`",
-                        stringify!($module),
+                        "{name}: this program was built without the feature `{}`; build it with `cargo build --release`",
                         $name
                     )))
                 }
