@@ -1,25 +1,18 @@
 //! Echolume turns the polar frames of a mechanically wobbling ultrasound probe into rendered volumes, on bare Vulkan.
 //!
-//! This crate is the program and a facade of the members of its workspace, in the order in which a frame travels:
+//! A frame travels from a [`Recording`] or a [`Live`] source, whose [`Geometry`] says where its samples lie in space, through the [`Plan`] of a
+//! [`Scene`] on the device of a [`Context`]. A [`Renderer`] draws a volume, a [`Stream`] frames while they arrive. [`Layers`] read the settings of a
+//! scene from presets, files and `key=value`. Those names are at the root of this crate, with what they take, return and refuse.
 //!
-//! - [`source`] reads recordings and live sources into frames. [`probe`] defines where their samples lie in space and drives the probe's
-//!   motor.
-//! - [`scene`] is everything that determines a picture: geometry, mode, filters, camera, light. [`passes`] declares every compute pass,
-//!   [`plan`] derives the passes and slots that a scene needs, [`barriers`] and [`queues`] their order.
-//! - [`gpu`] is the only member that uses Vulkan and the only one with unsafe code.
-//! - [`live`] renders frames while they arrive.
-//! - [`reference`](mod@reference) renders on the CPU in f64, [`exact_ray`] integrates its rays without samples, [`bounds`] encloses them.
-//!   [`profile`] measures GPU times, [`error_report`] error against run time. [`verify`] tests a device and its driver.
-//! - [`batch`] renders, converts, measures or verifies many recordings, one shard of them a process. [`cli`] is the command line.
+//! [`low_level`] holds the modules that the program itself is made of, without a promise of stability.
 //!
 //! # Render a file
 //!
 //! ```
-//! use echolume::scene::{Input, load::Layers};
-//! use echolume::{Context, ContextOptions, Renderer, RendererOptions, Scene};
+//! use echolume::{Context, ContextOptions, Input, Layers, Renderer, RendererOptions, Scene};
 //!
 //! # fn main() -> Result<(), Box<dyn std::error::Error>> {
-//! let mut recording = echolume::source::open("tests/data/bone-l14/bone.mha".as_ref(), None)?;
+//! let mut recording = echolume::open("tests/data/bone-l14/bone.mha".as_ref(), None)?;
 //! let mut layers = Layers::default();
 //! layers.preset("bone")?;
 //! layers.set("picture.size=[96,64]")?;
@@ -42,15 +35,10 @@
 //!
 //! # Stream from an own source
 //!
-//! A source implements [`source::live::Live`]: it states the geometry once, then hands over frames on its own clock.
+//! A source implements [`Live`]: it states the geometry once, then hands over frames on its own clock.
 //!
 //! ```
-//! use echolume::live::{Feed, Step};
-//! use echolume::probe::{Geometry, Grid};
-//! use echolume::scene::load::Layers;
-//! use echolume::source::live::{Event, Live};
-//! use echolume::source::{Frame, StoredType, recorder::Header};
-//! use echolume::{Context, ContextOptions, Stream, StreamOptions};
+//! use echolume::{Context, ContextOptions, Event, Feed, Frame, Geometry, Grid, Header, Layers, Live, Step, StoredType, Stream, StreamOptions};
 //! use std::time::Duration;
 //!
 //! /// Eight slices of 16 x 16 pixels that become brighter.
@@ -105,12 +93,9 @@
 //! # Run one pass alone
 //!
 //! ```
-//! use echolume::gpu::pass_runner::PassRunner;
-//! use echolume::passes::{Arrays, DispatchArgs, Texels, by_name};
-//! use echolume::probe::{Geometry, Grid};
-//! use echolume::scene::{Input, load::Layers};
-//! use echolume::source::StoredType;
-//! use echolume::{Context, ContextOptions, Scene};
+//! use echolume::low_level::gpu::pass_runner::PassRunner;
+//! use echolume::low_level::passes::{Arrays, DispatchArgs, Texels, by_name};
+//! use echolume::{Context, ContextOptions, Geometry, Grid, Input, Layers, Scene, StoredType};
 //!
 //! # fn main() -> Result<(), Box<dyn std::error::Error>> {
 //! let mut layers = Layers::default();
@@ -139,11 +124,7 @@
 //! Needs no device.
 //!
 //! ```
-//! use echolume::plan::Plan;
-//! use echolume::probe::{Geometry, Grid};
-//! use echolume::scene::{Input, load::Layers};
-//! use echolume::Scene;
-//! use echolume::source::StoredType;
+//! use echolume::{Geometry, Grid, Input, Layers, Plan, Scene, StoredType};
 //!
 //! # fn main() -> Result<(), Box<dyn std::error::Error>> {
 //! let mut layers = Layers::default();
@@ -162,25 +143,55 @@
 
 mod args;
 #[cfg(feature = "verify")]
+#[doc(hidden)]
 pub mod batch;
-pub mod cli;
+mod cli;
 
-pub use echolume_base::{files, metrics, picture, text};
-pub use echolume_core::{barriers, dump, exact_ray, mesh, passes, plan, queues, reference, scene, spirv};
-pub use echolume_gpu::{self as gpu, machine, shader_source, shader_tools};
-pub use echolume_lab::{bounds, error_report, filter_report, profile, thesis_tables};
-pub use echolume_session::{kiosk, live, marked, measure, user_presets, workspace};
-#[cfg(feature = "view")]
-pub use echolume_ui as ui;
-#[cfg(feature = "verify")]
-pub use echolume_verify as verify;
-pub use {echolume_probe as probe, echolume_source as source};
+pub use cli::run;
+
+pub use low_level::files::InputError;
+pub use low_level::gpu::{Context, ContextOptions, DeviceChoice, GpuError, Renderer, RendererOptions};
+pub use low_level::live::{Feed, FinishedPicture, Step, Stream, StreamError, StreamOptions};
+pub use low_level::picture::Picture;
+pub use low_level::plan::Plan;
+pub use low_level::probe::{Frame, Geometry, GeometryError, Grid, Probe, SampleType, StoredType};
+pub use low_level::scene::load::{Layers, LoadError};
+pub use low_level::scene::{Input, Scene, Settings};
+pub use low_level::source::live::{Event, Live};
+pub use low_level::source::{Header, Recording, open};
+
+/// The modules of the program, for its own tests, benches and tools. Any of it may change with any version.
+///
+/// In the order in which a frame travels:
+///
+/// - [`source`] reads recordings and live sources into frames. [`probe`] defines where their samples lie in space and drives the probe's
+///   motor.
+/// - [`scene`] is everything that determines a picture: geometry, mode, filters, camera, light. [`passes`] declares every compute pass,
+///   [`plan`] derives the passes and slots that a scene needs, [`barriers`] and [`queues`] their order.
+/// - [`gpu`] is the only member that uses Vulkan and the only one with unsafe code.
+/// - [`live`] renders frames while they arrive.
+/// - [`reference`](mod@reference) renders on the CPU in f64, [`exact_ray`] integrates its rays without samples, [`bounds`] encloses them.
+///   [`profile`] measures GPU times, [`error_report`] error against run time. [`verify`] tests a device and its driver.
+/// - [`batch`] renders, converts, measures or verifies many recordings, one shard of them a process.
+pub mod low_level {
+    #[cfg(feature = "verify")]
+    pub use crate::batch;
+    pub use echolume_base::{files, metrics, picture, text};
+    pub use echolume_core::{
+        barriers, dump, error_map, exact_ray, mesh, passes, plan, queues, reference, scene, spirv, stated_error,
+    };
+    pub use echolume_gpu::{self as gpu, machine, shader_source, shader_tools};
+    #[cfg(feature = "lab")]
+    pub use echolume_lab::{bounds, error_report, filter_report, profile, thesis_tables};
+    pub use echolume_session::{kiosk, live, marked, measure, user_presets, workspace};
+    #[cfg(feature = "view")]
+    pub use echolume_ui as ui;
+    #[cfg(feature = "verify")]
+    pub use echolume_verify as verify;
+    pub use {echolume_probe as probe, echolume_source as source};
+}
 
 #[cfg(feature = "verify")]
 use echolume_base::html_page;
 use echolume_base::terminal;
-
-pub use gpu::{Context, ContextOptions, DeviceChoice, Renderer, RendererOptions};
-pub use live::{Stream, StreamOptions};
-pub use scene::Scene;
-pub use source::Recording;
+use low_level::*;

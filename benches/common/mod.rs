@@ -1,11 +1,11 @@
 //! What both benches share: the phantom's sweep, scenes of it, and the command line.
 
 use criterion::Criterion;
-use echolume::probe::Geometry;
-use echolume::scene::load::Layers;
-use echolume::scene::{Input, Scene};
-use echolume::source::StoredType;
-use echolume::source::phantom::{Phantom, PhantomOptions};
+use echolume::low_level::probe::Geometry;
+use echolume::low_level::scene::load::Layers;
+use echolume::low_level::scene::{Input, Scene};
+use echolume::low_level::source::StoredType;
+use echolume::low_level::source::phantom::{Phantom, PhantomOptions};
 use std::time::Duration;
 
 /// Bytes of the phantom.

@@ -1,7 +1,7 @@
 //! The phantom: what a live view without a probe waits for.
 
 use criterion::{Criterion, SamplingMode, Throughput};
-use echolume::source::phantom::{Body, Phantom, PhantomOptions, Speckle};
+use echolume::low_level::source::phantom::{Body, Phantom, PhantomOptions, Speckle};
 
 pub fn bench(criterion: &mut Criterion) -> Result<(), String> {
     let mut group = criterion.benchmark_group("phantom");

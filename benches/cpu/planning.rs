@@ -2,11 +2,11 @@
 
 use crate::common;
 use criterion::{Criterion, Throughput};
-use echolume::barriers::{Barrier, BarrierTracker, accesses};
-use echolume::passes::{DispatchArgs, Frequency};
-use echolume::plan::{Plan, Rerun};
-use echolume::probe::Geometry;
-use echolume::scene::Scene;
+use echolume::low_level::barriers::{Barrier, BarrierTracker, accesses};
+use echolume::low_level::passes::{DispatchArgs, Frequency};
+use echolume::low_level::plan::{Plan, Rerun};
+use echolume::low_level::probe::Geometry;
+use echolume::low_level::scene::Scene;
 use std::hint::black_box;
 
 /// Barriers of a volume's frames, its passes, and one picture.

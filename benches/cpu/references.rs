@@ -3,10 +3,10 @@
 
 use crate::common::{self, BYTES};
 use criterion::{Criterion, Throughput};
-use echolume::passes::{Arrays, DispatchArgs, Frequency, Slot, Texels, by_name};
-use echolume::probe::Geometry;
-use echolume::reference;
-use echolume::scene::Scene;
+use echolume::low_level::passes::{Arrays, DispatchArgs, Frequency, Slot, Texels, by_name};
+use echolume::low_level::probe::Geometry;
+use echolume::low_level::reference;
+use echolume::low_level::scene::Scene;
 use std::collections::BTreeMap;
 
 /// Small: a reference takes microseconds a texel.
@@ -55,7 +55,7 @@ fn one(
     let mut prepared = None;
     group.bench_function(name, |b| {
         let (reads, writes) = prepared.get_or_insert_with(|| {
-            let taken = |binds: Vec<echolume::passes::Bind>| {
+            let taken = |binds: Vec<echolume::low_level::passes::Bind>| {
                 let mut arrays = Arrays::default();
                 binds.iter().for_each(|b| arrays.insert(b.name, slots[&b.slot].clone()));
                 arrays

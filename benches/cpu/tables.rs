@@ -2,8 +2,8 @@
 
 use crate::common;
 use criterion::{Criterion, Throughput};
-use echolume::passes::lookup_tables;
-use echolume::probe::{Axis, Geometry, Probe};
+use echolume::low_level::passes::lookup_tables;
+use echolume::low_level::probe::{Axis, Geometry, Probe};
 use std::hint::black_box;
 
 pub fn bench(criterion: &mut Criterion) -> Result<(), String> {

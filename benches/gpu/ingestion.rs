@@ -3,11 +3,11 @@
 
 use crate::common::{BYTES, Run};
 use criterion::{Criterion, SamplingMode, Throughput};
-use echolume::gpu::{Context, GpuError, Renderer, RendererOptions};
-use echolume::probe::{Geometry, Grid};
-use echolume::scene::Scene;
-use echolume::scene::load::Layers;
-use echolume::source::phantom::Phantom;
+use echolume::low_level::gpu::{Context, GpuError, Renderer, RendererOptions};
+use echolume::low_level::probe::{Geometry, Grid};
+use echolume::low_level::scene::Scene;
+use echolume::low_level::scene::load::Layers;
+use echolume::low_level::source::phantom::Phantom;
 use std::hint::black_box;
 use std::sync::Arc;
 

@@ -19,12 +19,12 @@ mod surface_net;
 
 use common::Run;
 use criterion::{Criterion, SamplingMode, Throughput};
-use echolume::gpu::pass_runner::PassTimer;
-use echolume::gpu::{Context, ContextOptions, DeviceChoice, GpuError, Renderer, RendererOptions};
-use echolume::passes::slots::Initializer;
-use echolume::passes::{DispatchArgs, Pass, Slot, Texels, measure};
-use echolume::scene::Scene;
-use echolume::source::Frame;
+use echolume::low_level::gpu::pass_runner::PassTimer;
+use echolume::low_level::gpu::{Context, ContextOptions, DeviceChoice, GpuError, Renderer, RendererOptions};
+use echolume::low_level::passes::slots::Initializer;
+use echolume::low_level::passes::{DispatchArgs, Pass, Slot, Texels, measure};
+use echolume::low_level::scene::Scene;
+use echolume::low_level::source::Frame;
 use scenes::{FULL, SCENES, SMALL, check_that_none_is_forgotten};
 use std::cell::LazyCell;
 use std::process::ExitCode;

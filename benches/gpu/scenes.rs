@@ -1,10 +1,10 @@
 //! The scenes that passes are timed on: for each, what it sets beyond the phantom's preset and which passes it is for.
 
 use crate::common::scene;
-use echolume::passes::{PASSES, Pass};
-use echolume::probe::{Geometry, Grid};
-use echolume::scene::Scene;
-use echolume::source::phantom::Phantom;
+use echolume::low_level::passes::{PASSES, Pass};
+use echolume::low_level::probe::{Geometry, Grid};
+use echolume::low_level::scene::Scene;
+use echolume::low_level::source::phantom::Phantom;
 
 /// One sweep and its scenes: how large everything is.
 pub struct Sizes {

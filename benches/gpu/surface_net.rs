@@ -3,15 +3,15 @@
 
 use crate::or_end;
 use criterion::{Criterion, SamplingMode, Throughput};
-use echolume::gpu::Context;
-use echolume::gpu::surface_net::SurfaceNet;
-use echolume::passes::net::NETS;
-use echolume::probe::Geometry;
-use echolume::scene::default_look::smoothing;
-use echolume::source::StoredType;
-use echolume::source::convert::lattice;
-use echolume::source::phantom::Phantom;
-use echolume::verify::surface_nets::whole;
+use echolume::low_level::gpu::Context;
+use echolume::low_level::gpu::surface_net::SurfaceNet;
+use echolume::low_level::passes::net::NETS;
+use echolume::low_level::probe::Geometry;
+use echolume::low_level::scene::default_look::smoothing;
+use echolume::low_level::source::StoredType;
+use echolume::low_level::source::convert::lattice;
+use echolume::low_level::source::phantom::Phantom;
+use echolume::low_level::verify::surface_nets::whole;
 use std::sync::Arc;
 use std::time::Duration;
 

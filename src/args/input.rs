@@ -3,10 +3,10 @@
 use super::picture_file::STANDARD;
 use super::recording::{GeometryArgs, open_recording};
 use super::user_files::{pipeline_folder, presets_file};
+use crate::files::check_target;
 use crate::files::signals;
-use crate::files::{check_target, replace};
 use crate::gpu::context::list;
-use crate::gpu::{Context, ContextOptions, Deadline, DeviceChoice, GpuError, TexelAccess, device_selection};
+use crate::gpu::{Candidate, Context, ContextOptions, Deadline, DeviceChoice, GpuError, TexelAccess, device_selection};
 use crate::marked::Demo;
 use crate::scene::default_look::Recorded;
 use crate::scene::load::{Layers, LoadError};
@@ -24,6 +24,7 @@ use std::sync::Arc;
 type Assigned = (String, String);
 
 /// A recording that was opened, and the scene of a volume of it.
+#[cfg_attr(not(feature = "lab"), expect(dead_code, reason = "only reports read all of it"))]
 pub struct Opened {
     pub source: Box<dyn Source>,
     pub recorded: Recorded,
@@ -155,6 +156,7 @@ impl InputArgs {
     }
 
     /// Calls `each` with every frame of the volume, in the order of the recording, and shows a progress bar.
+    #[cfg(feature = "lab")]
     pub fn for_each_frame(
         &self,
         source: &mut dyn Source,
@@ -172,14 +174,23 @@ impl InputArgs {
 
     /// `scene` with the way of sampling that the chosen device will use. Without a device the scene stays unchanged.
     pub fn resolve_sampling(&self, scene: Scene) -> Scene {
-        let devices = list().unwrap_or_default();
-        match device_selection::choose(&devices, self.scene.device.as_ref().unwrap_or(&DeviceChoice::Best)) {
-            Ok(n) => {
-                let scene = Scene { truncates_halves: devices[n].truncates_halves(), ..scene };
-                scene.sampled(TexelAccess::for_device(&devices[n]).sampling())
-            }
-            Err(_) => scene,
+        match self.candidate() {
+            Some(device) => self.resolve_format(scene).sampled(TexelAccess::for_device(&device).sampling()),
+            None => scene,
         }
+    }
+
+    /// The scene with the format of its volume that the device of these flags would have. Opens no device.
+    pub fn resolve_format(&self, scene: Scene) -> Scene {
+        let truncates_halves = self.candidate().is_some_and(|device| device.truncates_halves());
+        Scene { truncates_halves, ..scene }
+    }
+
+    fn candidate(&self) -> Option<Candidate> {
+        let mut devices = list().unwrap_or_default();
+        let chosen =
+            device_selection::choose(&devices, self.scene.device.as_ref().unwrap_or(&DeviceChoice::Best)).ok()?;
+        Some(devices.swap_remove(chosen))
     }
 
     /// Opens the chosen device and prints its name.
@@ -202,6 +213,7 @@ impl InputArgs {
     }
 
     /// The device that was asked for.
+    #[cfg(feature = "lab")]
     pub fn device(&self) -> Option<DeviceChoice> {
         self.scene.device.clone()
     }
@@ -476,6 +488,7 @@ pub fn open_device_until(
 }
 
 /// Like [`open_device`], for statistics of the compilation of pipelines: none of them comes from an earlier run.
+#[cfg(feature = "lab")]
 pub fn open_device_for_statistics(choice: Option<DeviceChoice>) -> Result<Arc<Context>, Failure> {
     let device = choice.unwrap_or_default();
     open(&ContextOptions { device, compile_statistics: true, ..ContextOptions::default() })
@@ -522,8 +535,9 @@ pub fn check_outputs<'a>(outputs: &[Output], read: impl IntoIterator<Item = &'a 
 }
 
 /// Writes a report and says where: completely, or not at all.
+#[cfg(feature = "lab")]
 pub fn write_report(file: &Path, text: &str) -> Result<(), Failure> {
-    replace(file, text.as_bytes()).map_err(failed)?;
+    crate::files::replace(file, text.as_bytes()).map_err(failed)?;
     say!("written: {}", file.display());
     Ok(())
 }

@@ -7,12 +7,12 @@ mod picture_series;
 mod recording;
 mod shaders;
 mod source;
+mod time;
 mod user_files;
 
-pub use input::{
-    InputArgs, Opened, Output, SceneArgs, check_outputs, check_volume, device_failure, frames_of, open_device,
-    open_device_for_statistics, write_report,
-};
+pub use input::{InputArgs, Output, SceneArgs, check_outputs, check_volume, device_failure, frames_of, open_device};
+#[cfg(feature = "lab")]
+pub use input::{Opened, open_device_for_statistics, write_report};
 #[cfg(feature = "verify")]
 pub use input::{open_device_until, recorded};
 pub use motor::{SerialArgs, motor_failure, motor_table};
@@ -21,5 +21,6 @@ pub use picture_series::{PictureSeries, SeriesTarget};
 pub use recording::{GeometryArgs, open_recording};
 pub use shaders::{ShaderArgs, gpu_failure};
 pub use source::{SourceArgs, StreamArgs};
+pub use time::parse_nanoseconds;
 #[cfg(feature = "view")]
 pub use user_files::{first_steps, pipeline_folder, presets_file, recent_list};

@@ -31,6 +31,7 @@ impl ShaderArgs {
     }
 
     /// The failure that ends the command.
+    #[cfg(feature = "lab")]
     pub fn failure(&self, fault: GpuError) -> Failure {
         gpu_failure(fault, self.are_given())
     }

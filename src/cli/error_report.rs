@@ -1,6 +1,6 @@
 //! `echolume report error`.
 
-use crate::args::{InputArgs, Opened};
+use crate::args::{InputArgs, Opened, parse_nanoseconds};
 use crate::error_report::choose::Bound;
 use crate::error_report::plot::Figure;
 use crate::error_report::{self, Measure, choose, dials, export, measure, plot};
@@ -97,6 +97,7 @@ impl ErrorReport {
             other => return Err(input(format!("--against {other}: must be exact, f64, converged or auto"))),
         };
         let Opened { mut source, recorded, layers, scene } = self.input.open_recorded(&[], None)?;
+        let scene = self.input.resolve_format(scene);
         if let Some(folder) = &self.output {
             std::fs::create_dir_all(folder)
                 .map_err(|e| failed(format!("{}: cannot be written: {e}", folder.display())))?;
@@ -216,15 +217,4 @@ pub(crate) fn read_report(file: &Path) -> Result<error_report::Report, Failure> 
     let fault = |e: &dyn std::fmt::Display| input(format!("{}: {e}", file.display()));
     let text = read_text(file, MAX_REPORT, "report").map_err(|e| fault(&e))?;
     error_report::Report::from_json(&text).map_err(|e| fault(&e))
-}
-
-/// Parses a time such as 16ms, 0.25s or 250us, in ns.
-pub(crate) fn parse_nanoseconds(flag: &str, text: &str) -> Result<f64, Failure> {
-    let units = [("ms", 1e6), ("us", 1e3), ("ns", 1.0), ("s", 1e9)];
-    let parsed =
-        units.iter().find_map(|(unit, ns)| text.strip_suffix(unit)?.trim().parse::<f64>().ok().map(|v| v * ns));
-    match parsed {
-        Some(ns) if ns > 0.0 && ns.is_finite() => Ok(ns),
-        _ => Err(input(format!("{flag} {text}: must be a time such as 16ms or 0.25s"))),
-    }
 }

@@ -2,9 +2,9 @@
 
 use crate::args::{PictureFile, check_outputs, open_device};
 use crate::gpu::{Context, DeviceChoice, Renderer, RendererOptions, TimeStamps};
+use crate::passes::times::pass_time_table;
 use crate::passes::{Slot, Texels};
 use crate::picture::{self, Grey, Region};
-use crate::profile::export::pass_time_table;
 use crate::scene::Settings;
 use crate::scene::load::Layers;
 use crate::terminal::{Failure, failed, input, remark, say};

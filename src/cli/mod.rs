@@ -3,12 +3,20 @@
 //! Exit codes of every command: 0 done, 1 failed, 2 bad input or usage, 3 no Vulkan device, 4 stopped by a signal before all was done. `batch` also
 //! 3, a lost device, and 4, some units failed.
 
+/// What a build without a feature says of what it leaves out.
+#[cfg(not(all(feature = "lab", feature = "verify", feature = "view")))]
+fn left_out_fault(what: &str, feature: &str) -> Failure {
+    input(format!(
+        "{what}: this program was built without the feature `{feature}`; build it with `cargo build --release`"
+    ))
+}
+
 /// A command in a build without its feature: it says how to have it.
-#[cfg(not(all(feature = "verify", feature = "view")))]
+#[cfg(not(all(feature = "lab", feature = "verify", feature = "view")))]
 macro_rules! left_out {
     ($module:ident, $command:ident, $name:literal) => {
         mod $module {
-            use crate::terminal::{Failure, input};
+            use crate::terminal::Failure;
             use std::ffi::OsString;
 
             #[derive(clap::Args)]
@@ -19,11 +27,7 @@ macro_rules! left_out {
 
             impl $command {
                 pub fn run(self) -> Result<(), Failure> {
-                    let name = stringify!($module);
-                    Err(input(format!(
-                        "{name}: this program was built without the feature `{}`; build it with `cargo build --release`",
-                        $name
-                    )))
+                    Err(super::left_out_fault(stringify!($module), $name))
                 }
             }
         }
@@ -33,25 +37,36 @@ macro_rules! left_out {
 mod about;
 #[cfg(feature = "verify")]
 mod batch;
+#[cfg(feature = "lab")]
 mod bounds;
+#[cfg(feature = "lab")]
+mod budget;
 mod drawing;
+#[cfg(feature = "lab")]
 mod error_report;
+#[cfg(feature = "lab")]
 mod filter;
+#[cfg(feature = "lab")]
 mod filter_report;
 mod machine;
 mod mesh;
 mod one_colour;
+#[cfg(feature = "lab")]
 mod pipelines;
 mod probe;
+#[cfg(feature = "lab")]
 mod profile;
 mod recordings;
 mod render;
+#[cfg(feature = "lab")]
+mod report;
 mod series;
 mod serve;
 mod sheet;
 mod stic;
 mod still;
 mod stream;
+#[cfg(feature = "lab")]
 mod thesis_tables;
 #[cfg(feature = "verify")]
 mod verify;
@@ -62,6 +77,31 @@ mod view_config;
 #[cfg(feature = "view")]
 mod view_open;
 
+/// `--budget` in a build without error reports.
+#[cfg(not(feature = "lab"))]
+mod budget {
+    use super::left_out_fault;
+    use crate::passes::PassTime;
+    use crate::scene::Scene;
+    use crate::terminal::Failure;
+    use std::path::Path;
+
+    type Opened = Result<Scene, Failure>;
+
+    pub fn chosen(_: &str, _: &Path, _: impl FnOnce() -> Opened) -> Result<Vec<String>, Failure> {
+        Err(left_out_fault("--budget", "lab"))
+    }
+
+    pub fn judge(_: &str, _: &[PassTime]) -> Result<(), Failure> {
+        Err(left_out_fault("--budget", "lab"))
+    }
+}
+#[cfg(not(feature = "lab"))]
+left_out!(filter, Filter, "lab");
+#[cfg(not(feature = "lab"))]
+left_out!(profile, Profile, "lab");
+#[cfg(not(feature = "lab"))]
+left_out!(report, Report, "lab");
 #[cfg(not(feature = "verify"))]
 left_out!(batch, Batch, "verify");
 #[cfg(not(feature = "verify"))]
@@ -116,14 +156,17 @@ enum Command {
     #[cfg_attr(not(feature = "view"), command(hide = true, disable_help_flag = true))]
     View(Box<view::View>),
     /// Run the 2D filters on an ordinary picture, and measure their effect
+    #[cfg_attr(not(feature = "lab"), command(hide = true, disable_help_flag = true))]
     Filter(Box<filter::Filter>),
     /// Measure the GPU time of every pass, and compare two such runs
+    #[cfg_attr(not(feature = "lab"), command(hide = true, disable_help_flag = true))]
     Profile(Box<profile::Profile>),
     /// Test whether this device and its driver render correctly
     #[cfg_attr(not(feature = "verify"), command(hide = true, disable_help_flag = true))]
     Verify(verify::Verify),
     /// Report error against run time for each dial, proven bounds of a picture, filters compared, or the tables of the thesis
-    Report(Report),
+    #[cfg_attr(not(feature = "lab"), command(hide = true, disable_help_flag = true))]
+    Report(report::Report),
     /// Write a synthetic sweep: a fetal head, or a body with an exact answer
     Phantom(recordings::MakePhantom),
     /// Resample a volume to a Cartesian grid (.mha, .nrrd), or convert frames
@@ -147,35 +190,6 @@ enum Command {
     Completions(about::Completions),
     /// Write the manual pages
     Man(about::ManPages),
-}
-
-#[derive(clap::Args)]
-struct Report {
-    #[command(subcommand)]
-    kind: ReportKind,
-}
-
-#[derive(Subcommand)]
-enum ReportKind {
-    /// Measure error against run time: renders and times every setting of each dial and compares it with the reference
-    Error(Box<error_report::ErrorReport>),
-    /// Enclose every ray of volume rendering by proven bounds, on the CPU
-    Bounds(Box<bounds::BoundsReport>),
-    /// Compare the 2D filters of slices: noise, contrast, edges, error and time
-    Filters(filter_report::FilterReport),
-    /// Measure the thesis' tables of times in our reading of its conditions, and print them with its figures
-    Tables(thesis_tables::ThesisTables),
-}
-
-impl Report {
-    fn run(&self) -> Result<(), Failure> {
-        match &self.kind {
-            ReportKind::Error(error) => error.run(),
-            ReportKind::Bounds(bounds) => bounds.run(),
-            ReportKind::Filters(filters) => filters.run(),
-            ReportKind::Tables(tables) => tables.run(),
-        }
-    }
 }
 
 /// Parses the command line and runs it.

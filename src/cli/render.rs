@@ -1,28 +1,27 @@
 //! `echolume render`.
 
+use super::budget;
 use super::drawing::{DrawFault, draw_despite_losses, send_volume};
-use super::error_report::{parse_nanoseconds, read_report};
 use super::one_colour;
 use super::series::{Job, SeriesArgs};
 use super::sheet;
 use super::still::{self, StillArgs};
 use crate::args::{InputArgs, Output, PictureFile, ShaderArgs, check_outputs};
 use crate::dump;
-use crate::error_report::choose::Bound;
-use crate::error_report::stated::Stated;
-use crate::error_report::{Measure, choose, map};
+use crate::error_map;
 use crate::files;
 use crate::gpu::{Context, Renderer, RendererOptions, TimeStamps};
 use crate::marked;
 use crate::mesh::files::MeshFile;
 use crate::passes::raycast::tolerance::LEVELS;
+use crate::passes::times::pass_time_table;
 use crate::passes::{Frequency, PassTime, Slot, Texels, by_name};
 use crate::picture::{Picture, PictureFormat};
 use crate::plan::Plan;
 use crate::probe::Probe;
-use crate::profile::export::pass_time_table;
 use crate::scene::{Scene, Still};
 use crate::source::{Frame, Source};
+use crate::stated_error::Stated;
 use crate::terminal::{Failure, failed, input, progress_bar, remark, say};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -183,7 +182,9 @@ impl Render {
         if let Some(noise) = still::noise(&mut renderer).map_err(failed)? {
             say!("{noise}");
         }
-        self.judge_budget(&measured)?;
+        if let Some(budget) = &self.budget {
+            budget::judge(budget, &measured)?;
+        }
         if let Some(colour) = one_colour::of(renderer.scene(), &picture) {
             let shift = source.sample_type().shift();
             let volume = renderer.read(Slot::Volume).map_err(failed)?;
@@ -245,27 +246,8 @@ impl Render {
             own.push((format!("--tolerance {levels}"), format!("ray.tolerance={number}")));
         }
         let (Some(budget), Some(file)) = (&self.budget, &self.report) else { return self.opened(&own) };
-        let time = parse_nanoseconds("--budget", budget)?;
-        let report = read_report(file)?;
-        let (_, scene) = self.input.open()?;
-        let (there, here) = (report.sizes.volume, scene.volume_size());
-        if there != here {
-            let shown = |[x, y, z]: [u32; 3]| format!("{x}x{y}x{z}");
-            let fault = format!(
-                "--report {}: is for a volume of {}, this one has {}",
-                file.display(),
-                shown(there),
-                shown(here)
-            );
-            return Err(input(fault));
-        }
-        let measure = Measure::Rmse;
-        let chosen = choose::choose(&report, measure, Bound::Time(time), &[])
-            .map_err(|e| failed(format!("--budget {budget}: {e}")))?;
-        let choice = &report.choices[chosen];
-        let of = if report.is_of(&scene) { "this scene" } else { "another scene, whose error it is" };
-        say!("budget {budget}: {}, measured on {} with {of}", choice.describe(measure), report.device);
-        let chosen = choice.set.iter().map(|set| (format!("--budget, {set}"), set.clone())).chain(own);
+        let chosen = budget::chosen(budget, file, || Ok(self.input.open()?.1))?;
+        let chosen = chosen.into_iter().map(|set| (format!("--budget, {set}"), set)).chain(own);
         self.opened(&chosen.collect::<Vec<_>>())
     }
 
@@ -288,7 +270,7 @@ impl Render {
         if let Some(file) = &self.error_map {
             let colours = Texels::from_fn(errors.size, 3, |[x, y, _], _| errors.one(x, y, 0));
             let none = Texels::from_fn(errors.size, 3, |_, _| 0.0);
-            let found = map::error_map(&colours, &none, tolerance / LEVELS).map_err(failed)?;
+            let found = error_map::error_map(&colours, &none, tolerance / LEVELS).map_err(failed)?;
             found.picture.save(file).map_err(failed)?;
         }
         let picture = times.iter().filter(|time| by_name(time.name).is_some_and(|p| p.frequency == Frequency::Picture));
@@ -330,23 +312,11 @@ impl Render {
         Ok(with(samples))
     }
 
-    /// Says whether the picture kept the budget.
-    fn judge_budget(&self, times: &[PassTime]) -> Result<(), Failure> {
-        let Some(budget) = &self.budget else { return Ok(()) };
-        let (time, taken) = (parse_nanoseconds("--budget", budget)?, times.iter().map(|t| t.total).sum::<f64>());
-        let kept = if taken <= time { "within" } else { "over" };
-        match times.is_empty() {
-            true => say!("budget {budget}: this device has no time stamps"),
-            false => say!("budget {budget}: volume and picture took {:.3} ms, {kept} the budget", taken * 1e-6),
-        }
-        Ok(())
-    }
-
     fn write_error_map(&self, file: &Path, picture: &Texels, finer: &Texels) -> Result<(), Failure> {
         let tolerance = self.error_tolerance.unwrap_or(MAP_TOLERANCE);
-        let found = map::error_map(picture, finer, tolerance).map_err(failed)?;
+        let found = error_map::error_map(picture, finer, tolerance).map_err(failed)?;
         found.picture.save(file).map_err(failed)?;
-        let [least, most] = map::SCALE;
+        let [least, most] = error_map::SCALE;
         say!(
             "error map: {}: difference from half the step, dark {least:e} to light {most}, logarithmic; RMS {:.1e}, largest {:.1e}; \
              hatched above {tolerance}: {:.1} % of the pixels",
@@ -373,7 +343,7 @@ impl Render {
         if self.error_map.is_none() || scene.tolerance().is_some() {
             return Ok(None);
         }
-        map::finer(scene).map(Some).map_err(|why| input(format!("--error-map: {why}")))
+        error_map::finer(scene).map(Some).map_err(|why| input(format!("--error-map: {why}")))
     }
 
     fn options(&self) -> Result<RendererOptions, Failure> {

@@ -1,6 +1,6 @@
 //! `echolume render --still`: how many paths a still has, and how far its mean is from its expectation.
 
-use super::error_report::parse_nanoseconds;
+use crate::args::parse_nanoseconds;
 use crate::gpu::{GpuError, Renderer};
 use crate::passes::raycast::still::{final_sums, luminance};
 use crate::scene::Still;

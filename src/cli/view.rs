@@ -1,10 +1,10 @@
 //! `echolume view`.
 
-use super::error_report::parse_nanoseconds;
 use super::view_config::{ConsoleConfig, First, WindowConfig, rungs};
 use super::view_open::{OpenedInWindow, Shown, check_later};
 use crate::args::{
-    SceneArgs, SourceArgs, StreamArgs, check_outputs, device_failure, first_steps, presets_file, recent_list,
+    SceneArgs, SourceArgs, StreamArgs, check_outputs, device_failure, first_steps, parse_nanoseconds, presets_file,
+    recent_list,
 };
 use crate::gpu::shader_reload::ShaderFolder;
 use crate::gpu::window::{MonitorChoice, PresentMode};

@@ -1,7 +1,7 @@
 //! Pictures of the phantom say so: of the phantom itself, of recordings of it, of workspaces, and of what the viewer exports.
 
 use crate::common::program::*;
-use echolume::picture::Picture;
+use echolume::low_level::picture::Picture;
 use std::fs;
 use std::path::Path;
 

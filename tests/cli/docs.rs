@@ -3,7 +3,7 @@
 
 use crate::common::files::repository;
 use crate::common::program::PROGRAM;
-use echolume::scene::Settings;
+use echolume::low_level::scene::Settings;
 use serde_json::{Map, Value, json};
 use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Write;

@@ -11,6 +11,7 @@ mod devices;
 mod direct;
 mod docs;
 mod drivers;
+mod features;
 mod filter;
 mod frames;
 mod inputs;

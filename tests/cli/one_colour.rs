@@ -116,7 +116,8 @@ fn outliers_of_a_float_volume_do_not_hide_the_rest_and_are_told_once() {
         assert!(err.contains(named), "{named}: {err}");
     }
     let tones = |name: &str| {
-        let picture = echolume::picture::Picture::load(std::path::Path::new(&folder.path(name))).expect("a picture");
+        let picture =
+            echolume::low_level::picture::Picture::load(std::path::Path::new(&folder.path(name))).expect("a picture");
         let lit: Vec<f64> = picture.rgba.chunks(4).map(|p| f64::from(p[0])).filter(|v| *v > 0.0).collect();
         lit.iter().sum::<f64>() / lit.len().max(1) as f64
     };

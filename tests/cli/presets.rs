@@ -2,8 +2,8 @@
 
 use crate::common::files::{Folder, SWEEP};
 use crate::common::program::*;
-use echolume::scene::load::Layers;
-use echolume::user_presets::{UserPreset, write};
+use echolume::low_level::scene::load::Layers;
+use echolume::low_level::user_presets::{UserPreset, write};
 use std::path::Path;
 use std::process::Command;
 

@@ -1,7 +1,7 @@
 //! `render --turntable` and `--volumes`: several pictures of one recording, as files and as a film.
 
 use crate::common::program::*;
-use echolume::picture::Picture;
+use echolume::low_level::picture::Picture;
 use std::fs;
 use std::path::Path;
 

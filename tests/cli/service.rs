@@ -12,7 +12,7 @@ fn the_service_starts_what_the_program_takes() {
     let words: Vec<&str> = start.split(' ').collect();
     assert_eq!(
         words,
-        ["/usr/local/bin/echolume", "view", "--kiosk", "--config", echolume::kiosk::config::DEFAULT_PATH]
+        ["/usr/local/bin/echolume", "view", "--kiosk", "--config", echolume::low_level::kiosk::config::DEFAULT_PATH]
     );
     let (code, out, err) = run(&["view", "--kiosk", "--config", EXAMPLE, "--help"]);
     assert!(code == Some(0) && out.contains("--config"), "{out}{err}");

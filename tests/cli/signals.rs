@@ -3,7 +3,7 @@
 
 use crate::common::program::*;
 use crate::common::wait::eventually;
-use echolume::verify::report::{self, Verdict};
+use echolume::low_level::verify::report::{self, Verdict};
 use rustix::process::{Pid, Signal, kill_process};
 use std::fs;
 use std::io::{BufRead, BufReader, Read};
@@ -97,7 +97,7 @@ fn a_signal_ends_a_series_after_a_whole_picture() {
     let names = there.names();
     assert!((2..3600).contains(&names.len()), "{}", names.len());
     for name in names {
-        let read = echolume::picture::Picture::load(&there.join(&name));
+        let read = echolume::low_level::picture::Picture::load(&there.join(&name));
         assert!(read.is_ok_and(|picture| picture.width == 64), "{name}");
     }
 }

@@ -1,7 +1,7 @@
 //! Standard input and output as recording and picture, and what the program says about itself to shells, `man` and scripts.
 
 use crate::common::program::*;
-use echolume::scene::load::PRESETS;
+use echolume::low_level::scene::load::PRESETS;
 use std::fs;
 use std::process::{Command, Stdio};
 

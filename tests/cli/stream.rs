@@ -202,7 +202,7 @@ fn a_recording_that_cannot_be_made_is_a_failure() {
 /// A client of the program's server gets its pictures and its volumes, and the server ends with the stream.
 #[test]
 fn clients_of_the_server_get_pictures_and_volumes() {
-    use echolume::source::igtl::{Client, ClientOptions, Message, PICTURE, VOLUME};
+    use echolume::low_level::source::igtl::{Client, ClientOptions, Message, PICTURE, VOLUME};
     use std::io::{BufRead, BufReader};
     use std::time::Duration;
 

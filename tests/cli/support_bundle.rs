@@ -160,7 +160,7 @@ fn without_a_device_a_configuration_and_a_log_it_says_so_inside() {
     let (entries, _) = unpacked(&folder.path(name));
     assert!(entries["devices.txt"].contains("no Vulkan device"), "{}", entries["devices.txt"]);
     assert!(entries["system.txt"].contains("VK_DRIVER_FILES=/") || entries["system.txt"].contains("VK_DRIVER_FILES=<"));
-    if !Path::new(echolume::kiosk::config::DEFAULT_PATH).exists() {
+    if !Path::new(echolume::low_level::kiosk::config::DEFAULT_PATH).exists() {
         let about = &entries["README.txt"];
         assert!(about.contains("echolume.toml: cannot be read") && about.contains("logs: none found"), "{about}");
     }

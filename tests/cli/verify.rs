@@ -2,8 +2,8 @@
 
 use crate::common::files::repository;
 use crate::common::program::*;
-use echolume::verify::report::{self, Level, Run, Unit, Verdict};
-use echolume::verify::self_test;
+use echolume::low_level::verify::report::{self, Level, Run, Unit, Verdict};
+use echolume::low_level::verify::self_test;
 use std::collections::BTreeSet;
 use std::fs;
 use std::process::Command;
@@ -29,7 +29,8 @@ const GROUPS_OF_GPU: [&str; 7] = ["determinism", "failures", "formats", "hazards
 
 #[test]
 fn no_group_of_checks_is_left_out() {
-    let groups: BTreeSet<&str> = echolume::verify::checks(Level::Quick).iter().map(|check| check.group).collect();
+    let groups: BTreeSet<&str> =
+        echolume::low_level::verify::checks(Level::Quick).iter().map(|check| check.group).collect();
     assert_eq!(groups, GROUPS.into_iter().chain(GROUPS_OF_GPU).collect());
 }
 

@@ -1,7 +1,7 @@
 //! `echolume verify --isolate`: checks in processes of their own, of which one may crash, hang or exit.
 
 use crate::common::program::*;
-use echolume::verify::report::{self, Run, Unit, Verdict};
+use echolume::low_level::verify::report::{self, Run, Unit, Verdict};
 use std::fs;
 
 /// Checks that take no time; one with pictures.

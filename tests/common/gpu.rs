@@ -1,12 +1,12 @@
 //! A device with validation on, scenes, and noise that is the same everywhere.
 
-use echolume::gpu::pass_runner::PassRunner;
-use echolume::gpu::{Context, ContextOptions, Deadline, DeviceChoice, Renderer, RendererOptions};
-use echolume::passes::slots::Format;
-use echolume::passes::{Slot, Texels, is_hit};
-use echolume::picture::Picture;
-use echolume::scene::{Scene, WindowTexels, insonified_box};
-use echolume::verify::built_in;
+use echolume::low_level::gpu::pass_runner::PassRunner;
+use echolume::low_level::gpu::{Context, ContextOptions, Deadline, DeviceChoice, Renderer, RendererOptions};
+use echolume::low_level::passes::slots::Format;
+use echolume::low_level::passes::{Slot, Texels, is_hit};
+use echolume::low_level::picture::Picture;
+use echolume::low_level::scene::{Scene, WindowTexels, insonified_box};
+use echolume::low_level::verify::built_in;
 use glam::DVec3;
 use std::ops::Deref;
 use std::sync::{Arc, Mutex};
@@ -15,7 +15,7 @@ use std::time::Duration;
 pub use super::files::*;
 pub use super::probes::wobbler;
 pub use super::scenes::{BYTES, FLOATS, scene};
-pub use echolume::verify::built_in::{
+pub use echolume::low_level::verify::built_in::{
     ALL_FILTERS, Noise, TURNED, body_frames, cartesian, frames, geometries, linear, radial, still, uneven,
 };
 

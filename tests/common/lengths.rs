@@ -1,6 +1,6 @@
 //! The settings that are lengths, each with what becomes of it when a volume is scaled.
 
-use echolume::scene::{Edge, EnhancedSigma, PeronaMalik, Settings, Sigma, Smooth};
+use echolume::low_level::scene::{Edge, EnhancedSigma, PeronaMalik, Settings, Sigma, Smooth};
 
 /// A setting in mm, in a power of mm, or in mm by a root of mm.
 pub struct Length {
@@ -108,7 +108,7 @@ fn all<'a>(values: impl IntoIterator<Item = &'a mut f64>, factor: f64) {
     values.into_iter().for_each(|value| *value *= factor);
 }
 
-fn brushes(settings: &mut Settings) -> impl Iterator<Item = &mut echolume::scene::Brush> {
+fn brushes(settings: &mut Settings) -> impl Iterator<Item = &mut echolume::low_level::scene::Brush> {
     settings.cuts.iter_mut().flat_map(|cut| &mut cut.brush)
 }
 

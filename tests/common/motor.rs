@@ -1,10 +1,10 @@
 //! The simulated motor: a TMCL module on a pseudo-terminal.
 
 use super::files::MOTOR_PROBE;
-use echolume::probe::ProbeFile;
-use echolume::probe::motor::simulate::{Simulator, SimulatorOptions};
-use echolume::probe::motor::tmcl::{Request, command};
-use echolume::probe::motor::{MotorTable, PortSettings};
+use echolume::low_level::probe::ProbeFile;
+use echolume::low_level::probe::motor::simulate::{Simulator, SimulatorOptions};
+use echolume::low_level::probe::motor::tmcl::{Request, command};
+use echolume::low_level::probe::motor::{MotorTable, PortSettings};
 use std::path::Path;
 use std::time::Duration;
 

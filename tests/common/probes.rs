@@ -1,6 +1,6 @@
 //! Small probes. This file needs nothing but the probe module: tools/mutants copies it.
 
-use echolume::probe::{Advance, Array, Axis, Geometry, Grid, Motion, Probe};
+use echolume::low_level::probe::{Advance, Array, Axis, Geometry, Grid, Motion, Probe};
 
 /// A small abdominal wobbler: 24 lines over 66 deg, 9 frames over 27 deg, 64 samples of 0.8 mm. Tests that need other sizes change
 /// those fields.

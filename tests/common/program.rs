@@ -72,7 +72,7 @@ pub fn finish(command: &mut Command) -> Ran {
             child.kill().expect("kill the program");
             panic!("does not end within {HANGS:?}: {command:?}");
         }
-        std::thread::sleep(Duration::from_millis(5));
+        super::wait::poll();
     };
     (status.code(), out.join().expect("text"), err.join().expect("text"))
 }

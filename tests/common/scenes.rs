@@ -1,9 +1,9 @@
 //! Scenes from settings as TOML. This file needs nothing but the probe and scene modules: tools/mutants copies it.
 
-use echolume::probe::Geometry;
-use echolume::scene::load::Layers;
-use echolume::scene::{Input, Scene, Settings};
-use echolume::source::StoredType;
+use echolume::low_level::probe::Geometry;
+use echolume::low_level::scene::load::Layers;
+use echolume::low_level::scene::{Input, Scene, Settings};
+use echolume::low_level::source::StoredType;
 use std::path::Path;
 
 pub const BYTES: Input = Input { stored: StoredType::U8, range: [0.0, 255.0] };

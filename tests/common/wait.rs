@@ -1,4 +1,6 @@
-//! Waiting for other processes and threads. The limits are for a busy machine: no test asserts how long anything takes.
+//! Waiting for other processes and threads. A test waits for a condition; the limits are for a busy machine, and no test asserts how long anything takes.
+//! A pause of a stated length is an input ([`pace`]) or the time in which something must not happen ([`watch`]): on a slower machine both become longer,
+//! and the test does not fail. A rule allows no other sleep in tests.
 
 use std::time::{Duration, Instant};
 
@@ -13,7 +15,7 @@ pub fn until<T>(what: &str, mut look: impl FnMut() -> Option<T>) -> T {
             return found;
         }
         assert!(begun.elapsed() < PATIENCE, "{what} did not come within {PATIENCE:?}");
-        std::thread::sleep(Duration::from_millis(10));
+        poll();
     }
 }
 
@@ -24,7 +26,22 @@ pub fn eventually(mut is_so: impl FnMut() -> bool) -> bool {
         if is_so() {
             return true;
         }
-        std::thread::sleep(Duration::from_millis(2));
+        poll();
     }
     false
+}
+
+/// Between two looks at a condition.
+pub fn poll() {
+    std::thread::sleep(Duration::from_millis(2));
+}
+
+/// What a user, a probe or a peer lets pass between two actions.
+pub fn pace(pause: Duration) {
+    std::thread::sleep(pause);
+}
+
+/// The time in which something could happen that must not.
+pub fn watch(time: Duration) {
+    std::thread::sleep(time);
 }

@@ -6,6 +6,9 @@
 mod memory;
 mod mutate;
 mod targets;
+#[path = "../common/wait.rs"]
+#[allow(dead_code)] // What the other test binaries wait by.
+mod wait;
 
 use mutate::{Random, mutated};
 use std::collections::HashSet;
@@ -60,7 +63,7 @@ fn watch(running: &Running) {
     let running = running.clone();
     std::thread::spawn(move || {
         loop {
-            std::thread::sleep(Duration::from_millis(500));
+            wait::watch(Duration::from_millis(500));
             let now = running.lock().unwrap_or_else(|e| e.into_inner());
             if let Some((since, name, bytes)) = &*now
                 && since.elapsed() > LONGEST

@@ -2,9 +2,9 @@
 
 use crate::common::gpu::*;
 use crate::ladder::Stage;
-use echolume::passes::{DispatchArgs, Slot, by_name};
-use echolume::plan::Plan;
-use echolume::scene::{Scene, Settings};
+use echolume::low_level::passes::{DispatchArgs, Slot, by_name};
+use echolume::low_level::plan::Plan;
+use echolume::low_level::scene::{Scene, Settings};
 
 /// The scene with so many rays along each edge of a pixel.
 fn with(scene: &Scene, rays: u32, adaptive: bool) -> Scene {
@@ -38,7 +38,7 @@ fn the_picture_is_that_of_all_rays_within_a_level() {
         let adaptive = with(&single, rays, true);
         assert!(adaptive.adapts_rays());
         let ((picture, marked), (one, none)) = (drawn(&adaptive), drawn(&single));
-        let off = |picture: &echolume::picture::Picture| {
+        let off = |picture: &echolume::low_level::picture::Picture| {
             let levels = picture.rgba.iter().zip(&wanted.rgba).map(|(a, b)| a.abs_diff(*b));
             (levels.clone().filter(|n| *n > 1).count() as f64 / wanted.rgba.len() as f64, levels.max())
         };
@@ -80,10 +80,12 @@ fn unmarked_pixels_have_no_ray() {
     let scene = scene(cartesian([20, 20, 20]), BYTES, toml);
     let pass = by_name("raycast_refined").expect("pass");
     let args = DispatchArgs::default();
-    let mut inputs = echolume::verify::each_pass::inputs_of(&scene, pass, &args, "noise", 7);
-    let marks = echolume::passes::Texels::from_fn([24, 16, 1], 1, |[x, y, _], _| f64::from(u8::from(x == 5 && y == 3)));
+    let mut inputs = echolume::low_level::verify::each_pass::inputs_of(&scene, pass, &args, "noise", 7);
+    let marks = echolume::low_level::passes::Texels::from_fn([24, 16, 1], 1, |[x, y, _], _| {
+        f64::from(u8::from(x == 5 && y == 3))
+    });
     inputs.insert("marks", marks);
-    let mut runner = echolume::gpu::pass_runner::PassRunner::new(&device).expect("runner");
+    let mut runner = echolume::low_level::gpu::pass_runner::PassRunner::new(&device).expect("runner");
     let got = runner.run(&scene, pass, &args, &inputs, 0.625).expect("run");
     let texels = got.get("picture");
     for (x, y) in (0..32).flat_map(|y| (0..48).map(move |x| (x, y))) {

@@ -2,10 +2,10 @@
 
 use crate::common::gpu::*;
 use crate::shading::{map, plate, run};
-use echolume::gpu::pass_runner::PassRunner;
-use echolume::passes::{Arrays, DispatchArgs, MISS, Texels, by_name};
-use echolume::plan::Plan;
-use echolume::scene::Scene;
+use echolume::low_level::gpu::pass_runner::PassRunner;
+use echolume::low_level::passes::{Arrays, DispatchArgs, MISS, Texels, by_name};
+use echolume::low_level::plan::Plan;
+use echolume::low_level::scene::Scene;
 
 /// The scene of outlines and cut faces alone: one colour wherever something is hit.
 fn ball(rays: u32, antialias: bool, look: &str, grey: f64) -> Scene {

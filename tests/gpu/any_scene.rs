@@ -1,10 +1,10 @@
 //! Random scenes: each is refused in one line or drawn, and validation is silent.
 
 use crate::common::gpu::*;
-use echolume::gpu::{Renderer, RendererOptions};
-use echolume::probe::{Advance, Geometry};
-use echolume::scene::Scene;
-use echolume::scene::load::{Layers, PRESETS};
+use echolume::low_level::gpu::{Renderer, RendererOptions};
+use echolume::low_level::probe::{Advance, Geometry};
+use echolume::low_level::scene::Scene;
+use echolume::low_level::scene::load::{Layers, PRESETS};
 use std::time::Instant;
 
 /// Number of scenes within the tests.

@@ -1,11 +1,11 @@
 //! Dispatches in bands: the same texels as in one piece, in any band, on any number of queues; and no band where none is needed.
 
 use crate::common::gpu::*;
-use echolume::gpu::{Bands, Renderer, RendererOptions};
-use echolume::passes::{DispatchArgs, Frequency, PASSES, Slot, Texels, by_name};
-use echolume::probe::{Axis, Geometry, Probe};
-use echolume::queues::oracle::Event;
-use echolume::scene::Scene;
+use echolume::low_level::gpu::{Bands, Renderer, RendererOptions};
+use echolume::low_level::passes::{DispatchArgs, Frequency, PASSES, Slot, Texels, by_name};
+use echolume::low_level::probe::{Axis, Geometry, Probe};
+use echolume::low_level::queues::oracle::Event;
+use echolume::low_level::scene::Scene;
 use std::collections::BTreeMap;
 use std::sync::atomic::Ordering;
 

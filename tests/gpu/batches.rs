@@ -2,17 +2,18 @@
 //! alone does not wait.
 
 use crate::common::gpu::*;
+use crate::common::wait;
 use crate::live::{Told, events, header, settings, volume};
-use echolume::barriers::Resource;
-use echolume::gpu::{Renderer, RendererOptions};
-use echolume::live::{self, Feed, Step, Stream};
-use echolume::passes::slots::frames_per_batch;
-use echolume::passes::{Frequency, Slot, Texels};
-use echolume::probe::{Axis, Geometry, Probe};
-use echolume::queues::oracle::Event as Logged;
-use echolume::scene::Scene;
-use echolume::source::Frame;
-use echolume::source::live::{Event, Live};
+use echolume::low_level::barriers::Resource;
+use echolume::low_level::gpu::{Renderer, RendererOptions};
+use echolume::low_level::live::{self, Feed, Step, Stream};
+use echolume::low_level::passes::slots::frames_per_batch;
+use echolume::low_level::passes::{Frequency, Slot, Texels};
+use echolume::low_level::probe::{Axis, Geometry, Probe};
+use echolume::low_level::queues::oracle::Event as Logged;
+use echolume::low_level::scene::Scene;
+use echolume::low_level::source::Frame;
+use echolume::low_level::source::live::{Event, Live};
 use std::time::{Duration, Instant};
 
 const SLICES: usize = 37;
@@ -176,7 +177,7 @@ impl Live for Pausing {
     fn next(&mut self, patience: Duration) -> Event {
         match self.0.0.is_empty() {
             true => {
-                std::thread::sleep(patience.min(Duration::from_millis(5)));
+                wait::pace(patience.min(Duration::from_millis(5)));
                 Event::Idle
             }
             false => self.0.next(patience),
@@ -199,7 +200,7 @@ fn a_frame_that_arrives_alone_is_submitted_at_once_and_those_that_wait_together(
         let begun = Instant::now();
         while feed.waiting() < count {
             assert!(begun.elapsed() < Duration::from_secs(60), "the events do not arrive");
-            std::thread::sleep(Duration::from_millis(1));
+            wait::poll();
         }
         let mut stream = Stream::new(&device, feed, settings(), live::StreamOptions::default());
         let before = stream.dispatches();

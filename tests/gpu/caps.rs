@@ -2,12 +2,12 @@
 //! switched off, nothing changes.
 
 use crate::common::gpu::*;
-use echolume::passes::{Slot, Texels, is_hit};
-use echolume::picture::Picture;
-use echolume::plan::Plan;
-use echolume::probe::{Geometry, Grid};
-use echolume::scene::Scene;
-use echolume::scene::planes::Plane;
+use echolume::low_level::passes::{Slot, Texels, is_hit};
+use echolume::low_level::picture::Picture;
+use echolume::low_level::plan::Plan;
+use echolume::low_level::probe::{Geometry, Grid};
+use echolume::low_level::scene::Scene;
+use echolume::low_level::scene::planes::Plane;
 use glam::DVec3;
 
 const SOLID: &str = "volume.transfer = [{ at = 0, colour = [0.9, 0.5, 0.3], opacity = 1 }]";
@@ -61,7 +61,7 @@ fn a_cut_face_is_the_picture_of_its_plane() {
         "mode = 'sr'\nsurface.threshold = 0.05\nlight = { shadow = {}, occlusion = {}, skin = {}, texture = 0.5 }";
     let lit = format!("mode = 'vr'\n{SOLID}\nlight.volume = {{ cell = 4 }}\nray.step = 0.7");
     for (name, geometry) in [("fan", Geometry::Sweep(wobbler())), ("Cartesian", voxels())] {
-        let (low, high) = echolume::scene::insonified_box(&geometry);
+        let (low, high) = echolume::low_level::scene::insonified_box(&geometry);
         for plane in ["plane = 'a'", "plane = 'b'", "plane = 'c'", TURNED] {
             let flat = of(&geometry, &format!("mode = 'plane'\nplanes = {{ {plane}, {window} }}\n{tone}"));
             let cut = flat.plane(flat.settings.planes.plane);

@@ -3,11 +3,11 @@
 
 use crate::common::gpu::*;
 use crate::common::scenes::settings;
-use echolume::gpu::{Renderer, RendererOptions};
-use echolume::passes::{Slot, Texels};
-use echolume::plan::{Plan, Rerun};
-use echolume::probe::{Array, Axis, Geometry, Motion, Probe};
-use echolume::scene::Scene;
+use echolume::low_level::gpu::{Renderer, RendererOptions};
+use echolume::low_level::passes::{Slot, Texels};
+use echolume::low_level::plan::{Plan, Rerun};
+use echolume::low_level::probe::{Array, Axis, Geometry, Motion, Probe};
+use echolume::low_level::scene::Scene;
 
 /// One frame of a still linear array: slices equal the lines, so that depths can be read directly.
 fn probe(samples: usize, lines: usize) -> Probe {
@@ -279,14 +279,14 @@ fn another_curve_or_factor_sends_the_frames_again_and_gives_the_picture_of_a_fre
 /// Lines of a real probe: 3640 samples become 455 with the preset of the thesis, and the picture looks the same.
 #[test]
 fn real_lines_of_3640_samples_keep_their_picture() {
-    use echolume::source::Recording;
+    use echolume::low_level::source::Recording;
     let device = Device::new();
     let volume = |conditioning: &str| {
         let mut recording = Recording::open(&data("ultrasonix-curvilinear/brightness.mha"), None).expect("recording");
         let toml = format!(
             "mode = 'vr'\npicture = {{ size = [2, 2] }}\nslices = {{ pixels = 512 }}\nconditioning = {{ {conditioning} }}"
         );
-        let input = echolume::scene::Input { stored: recording.stored_type(), range: recording.range() };
+        let input = echolume::low_level::scene::Input { stored: recording.stored_type(), range: recording.range() };
         let scene = scene(recording.geometry(0), input, &toml);
         let mut renderer = Renderer::new(&device, scene.clone(), &RendererOptions::default()).expect("renderer");
         let frame = recording.next_frame().expect("frame").expect("there");

@@ -2,7 +2,7 @@
 
 use crate::common::gpu::*;
 use crate::planes::picture;
-use echolume::probe::{Geometry, Grid};
+use echolume::low_level::probe::{Geometry, Grid};
 use glam::DVec3;
 
 /// The entry of a ray into the block by the slab method, and the field's value there.

@@ -2,10 +2,10 @@
 
 use crate::common::gpu::*;
 use crate::planes::picture;
-use echolume::passes::{Slot, Texels};
-use echolume::plan::Plan;
-use echolume::probe::{Geometry, Grid};
-use echolume::scene::Scene;
+use echolume::low_level::passes::{Slot, Texels};
+use echolume::low_level::plan::Plan;
+use echolume::low_level::probe::{Geometry, Grid};
+use echolume::low_level::scene::Scene;
 use glam::{DVec2, DVec3};
 
 /// A cube of noise, 30 mm wide, its middle at (0, 15, 0).

@@ -1,12 +1,12 @@
 //! Cuts: renderings are those of a volume from which the same was removed before it came, to the last bit, and planes show all of it.
 
 use crate::common::gpu::*;
-use echolume::gpu::Renderer;
-use echolume::passes::{Slot, Texels};
-use echolume::picture::Picture;
-use echolume::plan::Rerun;
-use echolume::probe::{Geometry, Grid};
-use echolume::scene::Scene;
+use echolume::low_level::gpu::Renderer;
+use echolume::low_level::passes::{Slot, Texels};
+use echolume::low_level::picture::Picture;
+use echolume::low_level::plan::Rerun;
+use echolume::low_level::probe::{Geometry, Grid};
+use echolume::low_level::scene::Scene;
 use glam::DVec3;
 
 const PRISM: &str = "{ contour = [[-3.1, -2.7], [3.3, -2.9], [2.1, 3.7], [-1.9, 2.2]], view = { at = [0, 10, 0], direction = [0.1, 1, 0.2], up = [0, 0, 1] } }";

@@ -2,12 +2,12 @@
 //! are asked for.
 
 use crate::common::gpu::*;
-use echolume::gpu::{Renderer, RendererOptions};
-use echolume::passes::slots::Format;
-use echolume::passes::{Slot, Texels};
-use echolume::picture::Picture;
-use echolume::probe::Geometry;
-use echolume::scene::{Scene, WindowTexels};
+use echolume::low_level::gpu::{Renderer, RendererOptions};
+use echolume::low_level::passes::slots::Format;
+use echolume::low_level::passes::{Slot, Texels};
+use echolume::low_level::picture::Picture;
+use echolume::low_level::probe::Geometry;
+use echolume::low_level::scene::{Scene, WindowTexels};
 use std::collections::BTreeSet;
 
 /// A picture, what the window takes of it, and the format of that.

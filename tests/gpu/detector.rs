@@ -1,9 +1,9 @@
 //! The position of surfaces found by the detector on analytic walls and spheres.
 
 use crate::common::gpu::*;
-use echolume::passes::{Slot, Texels, is_hit};
-use echolume::probe::{Geometry, Grid};
-use echolume::scene::Scene;
+use echolume::low_level::passes::{Slot, Texels, is_hit};
+use echolume::low_level::probe::{Geometry, Grid};
+use echolume::low_level::scene::Scene;
 use glam::DVec3;
 
 pub const STEP: f64 = 0.4;

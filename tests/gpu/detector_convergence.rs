@@ -4,11 +4,11 @@
 use crate::common::gpu::*;
 use crate::common::scenes::settings;
 use crate::detector::columns;
-use echolume::gpu::{Renderer, RendererOptions};
-use echolume::passes::{Slot, Texels, is_hit};
-use echolume::probe::{Geometry, Grid};
-use echolume::scene::{Input, Scene};
-use echolume::source::Recording;
+use echolume::low_level::gpu::{Renderer, RendererOptions};
+use echolume::low_level::passes::{Slot, Texels, is_hit};
+use echolume::low_level::probe::{Geometry, Grid};
+use echolume::low_level::scene::{Input, Scene};
+use echolume::low_level::source::Recording;
 
 /// Length of the preset's edge, mm.
 const EDGE: f64 = 1.6;
@@ -168,6 +168,6 @@ fn the_ring_of_the_thesis_shrinks_with_the_step_and_the_other_does_not() {
     assert_eq!(settings("100").half, 256);
 }
 
-fn settings_of_edge(toml: &str) -> Option<echolume::scene::Edge> {
+fn settings_of_edge(toml: &str) -> Option<echolume::low_level::scene::Edge> {
     settings(&format!("surface.edge = {toml}")).surface.edge
 }

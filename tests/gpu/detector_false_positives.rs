@@ -2,10 +2,10 @@
 
 use crate::common::gpu::*;
 use crate::detector::{STEP, columns, depths, ramp};
-use echolume::gpu::pass_runner::PassRunner;
-use echolume::passes::slots::Initializer;
-use echolume::passes::{Arrays, DispatchArgs, Slot, Texels, is_hit};
-use echolume::probe::{Geometry, Grid};
+use echolume::low_level::gpu::pass_runner::PassRunner;
+use echolume::low_level::passes::slots::Initializer;
+use echolume::low_level::passes::{Arrays, DispatchArgs, Slot, Texels, is_hit};
+use echolume::low_level::probe::{Geometry, Grid};
 
 /// A wall in noise: the spread of the positions, and shares of all rays.
 #[derive(Debug)]
@@ -296,7 +296,7 @@ fn the_lasting_detector_ignores_specks_but_not_a_thin_shell() {
 fn every_detector_matches_its_reference_in_noise() {
     let device = Device::new();
     let mut single = PassRunner::new(&device).expect("single");
-    let pass = echolume::passes::by_name("raycast_surface").expect("pass");
+    let pass = echolume::low_level::passes::by_name("raycast_surface").expect("pass");
     let geometries = [
         ("box", Geometry::Cartesian(Grid { size: [40, 96, 24], spacing: [1.0, STEP, 1.0], origin: [0.0; 3] })),
         ("sweep", Geometry::Sweep(wobbler())),

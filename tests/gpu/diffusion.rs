@@ -2,9 +2,9 @@
 
 use crate::common::gpu::*;
 use crate::filters::{by_reference, largest_difference, noise, on_device, plane, texels};
-use echolume::gpu::pass_runner::PassRunner;
-use echolume::passes::{Slot, Texels, by_name};
-use echolume::scene::Scene;
+use echolume::low_level::gpu::pass_runner::PassRunner;
+use echolume::low_level::passes::{Slot, Texels, by_name};
+use echolume::low_level::scene::Scene;
 
 fn csv(name: &str) -> Texels {
     let text = std::fs::read_to_string(data(&format!("perona-malik/{name}.csv"))).expect("numbers");

@@ -2,8 +2,8 @@
 
 use crate::common::gpu::*;
 use crate::detector_convergence::normal_distribution;
-use echolume::passes::{Slot, is_hit};
-use echolume::probe::{Geometry, Grid};
+use echolume::low_level::passes::{Slot, is_hit};
+use echolume::low_level::probe::{Geometry, Grid};
 use glam::DVec3;
 
 /// Distance of two slices, mm.

@@ -1,12 +1,12 @@
 //! Empty-space skipping: rays that skip bricks make the same picture, bit for bit, as rays that take every sample; and bricks are skipped.
 
 use crate::common::gpu::*;
-use echolume::gpu::{Renderer, RendererOptions};
-use echolume::passes::{Slot, Texels};
-use echolume::probe::{Advance, Geometry, Probe};
-use echolume::scene::load::Layers;
-use echolume::scene::{Input, Scene};
-use echolume::source::Recording;
+use echolume::low_level::gpu::{Renderer, RendererOptions};
+use echolume::low_level::passes::{Slot, Texels};
+use echolume::low_level::probe::{Advance, Geometry, Probe};
+use echolume::low_level::scene::load::Layers;
+use echolume::low_level::scene::{Input, Scene};
+use echolume::low_level::source::Recording;
 use glam::DVec3;
 
 /// A shell with a knob on it in dark fluid, with speckle on both and a wall before them.
@@ -46,8 +46,11 @@ fn geometries() -> Vec<(&'static str, Geometry)> {
         ("still", Geometry::Sweep(still())),
         ("radial, moving", Geometry::Sweep(moved(radial(), 0.6))),
         ("Cartesian", {
-            let grid =
-                echolume::probe::Grid { size: [60, 110, 40], spacing: [0.5, 0.5, 0.7], origin: [-14.0, 18.0, -14.0] };
+            let grid = echolume::low_level::probe::Grid {
+                size: [60, 110, 40],
+                spacing: [0.5, 0.5, 0.7],
+                origin: [-14.0, 18.0, -14.0],
+            };
             Geometry::Cartesian(grid)
         }),
     ]

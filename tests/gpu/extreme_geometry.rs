@@ -3,12 +3,12 @@
 
 use crate::common::gpu::*;
 use crate::common::scenes::settings;
-use echolume::gpu::{Renderer, RendererOptions};
-use echolume::passes::{Slot, Texels, is_hit};
-use echolume::plan::Plan;
-use echolume::probe::{Advance, Array, Axis, Geometry, Grid, Motion, Probe};
-use echolume::reference;
-use echolume::scene::Scene;
+use echolume::low_level::gpu::{Renderer, RendererOptions};
+use echolume::low_level::passes::{Slot, Texels, is_hit};
+use echolume::low_level::plan::Plan;
+use echolume::low_level::probe::{Advance, Array, Axis, Geometry, Grid, Motion, Probe};
+use echolume::low_level::reference;
+use echolume::low_level::scene::Scene;
 use std::f64::consts::PI;
 
 /// A speck of tissue in fluid, smooth over a few samples of any lattice: a function of the indices of the frame.

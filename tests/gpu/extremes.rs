@@ -5,11 +5,11 @@
 use crate::common::gpu::*;
 use crate::common::program;
 use crate::shading::{map, plate, run};
-use echolume::gpu::{Renderer, RendererOptions};
-use echolume::passes::{MISS, Slot, Texels, is_hit};
-use echolume::probe::{Geometry, Grid};
-use echolume::scene::{Input, transfer};
-use echolume::source::Recording;
+use echolume::low_level::gpu::{Renderer, RendererOptions};
+use echolume::low_level::passes::{MISS, Slot, Texels, is_hit};
+use echolume::low_level::probe::{Geometry, Grid};
+use echolume::low_level::scene::{Input, transfer};
+use echolume::low_level::source::Recording;
 use half::f16;
 
 /// One ray through `voxels` of constant opacity in steps of `step` voxels: its accumulated opacity against 1 - exp(-y).

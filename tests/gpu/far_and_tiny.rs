@@ -2,9 +2,9 @@
 //! volume at the origin, with voxels of 1 mm.
 
 use crate::common::gpu::*;
-use echolume::passes::{Slot, Texels};
-use echolume::probe::{Geometry, Grid};
-use echolume::scene::Scene;
+use echolume::low_level::passes::{Slot, Texels};
+use echolume::low_level::probe::{Geometry, Grid};
+use echolume::low_level::scene::Scene;
 
 const SIZE: [usize; 3] = [26, 22, 24];
 

@@ -2,10 +2,10 @@
 
 use crate::common::gpu::*;
 use crate::common::scenes::settings;
-use echolume::gpu::pass_runner::PassRunner;
-use echolume::passes::{Arrays, DispatchArgs, Frequency, MISS, Pass, Slot, Texels, by_name, is_hit};
-use echolume::plan::Plan;
-use echolume::scene::Scene;
+use echolume::low_level::gpu::pass_runner::PassRunner;
+use echolume::low_level::passes::{Arrays, DispatchArgs, Frequency, MISS, Pass, Slot, Texels, by_name, is_hit};
+use echolume::low_level::plan::Plan;
+use echolume::low_level::scene::Scene;
 use std::collections::BTreeMap;
 
 pub const CENTRES: [&str; 4] = ["median", "perona-malik", "gradient-inverse", "nagao-matsuyama"];
@@ -280,7 +280,7 @@ fn a_plan_of_every_filter_is_what_its_references_make_in_a_row() {
         assert!(error < 5e-6, "{after}: slices are {error} off");
         // From the picture of stage 2, through the filters of stage 4.
         let mut slots = BTreeMap::from([(Slot::Picture, read(Slot::Picture))]);
-        let end = echolume::passes::chain::picture_end(&scene);
+        let end = echolume::low_level::passes::chain::picture_end(&scene);
         for pass in ["sigma_picture", "perona_malik_picture", "aos_picture"].map(|n| by_name(n).expect("pass")) {
             for iteration in 0..if pass.is_needed(&scene) { (pass.repeat)(&scene) } else { 0 } {
                 let args = DispatchArgs { iteration, ..DispatchArgs::default() };

@@ -1,12 +1,12 @@
 //! Parts that float are not drawn, and nothing else changes.
 
 use crate::common::gpu::*;
-use echolume::gpu::Renderer;
-use echolume::passes::{Slot, Texels};
-use echolume::picture::Picture;
-use echolume::plan::Rerun;
-use echolume::probe::Geometry;
-use echolume::scene::{Scene, insonified_box};
+use echolume::low_level::gpu::Renderer;
+use echolume::low_level::passes::{Slot, Texels};
+use echolume::low_level::picture::Picture;
+use echolume::low_level::plan::Rerun;
+use echolume::low_level::probe::Geometry;
+use echolume::low_level::scene::{Scene, insonified_box};
 use glam::DVec3;
 
 const TRANSFER: &str = "volume.transfer = [{ at = 0.4, colour = [0.5, 0.4, 0.3], opacity = 0 }, { at = 0.7, colour = [1, 0.9, 0.8], opacity = 0.5 }]";

@@ -1,11 +1,11 @@
 //! A few stored pictures, made by the f64 reference, so that no driver is the truth. `tools/goldens` regenerates them.
 
 use crate::common::gpu::*;
-use echolume::passes::{Slot, Texels};
-use echolume::picture::Picture;
-use echolume::probe::{Advance, Geometry, Probe};
-use echolume::reference;
-use echolume::scene::Scene;
+use echolume::low_level::passes::{Slot, Texels};
+use echolume::low_level::picture::Picture;
+use echolume::low_level::probe::{Advance, Geometry, Probe};
+use echolume::low_level::reference;
+use echolume::low_level::scene::Scene;
 use glam::DVec3;
 use std::path::PathBuf;
 

@@ -2,14 +2,14 @@
 
 use crate::common::gpu::*;
 use crate::filters::{by_reference, on_device, plane, texels};
-use echolume::gpu::pass_runner::PassRunner;
-use echolume::gpu::{Renderer, RendererOptions};
-use echolume::passes::filter::enhanced_sigma::growth_shares;
-use echolume::passes::{Slot, Texels};
-use echolume::plan::Plan;
-use echolume::probe::Geometry;
-use echolume::scene::Input;
-use echolume::source::Recording;
+use echolume::low_level::gpu::pass_runner::PassRunner;
+use echolume::low_level::gpu::{Renderer, RendererOptions};
+use echolume::low_level::passes::filter::enhanced_sigma::growth_shares;
+use echolume::low_level::passes::{Slot, Texels};
+use echolume::low_level::plan::Plan;
+use echolume::low_level::probe::Geometry;
+use echolume::low_level::scene::Input;
+use echolume::low_level::source::Recording;
 
 #[test]
 fn estimators_by_hand() {
@@ -45,10 +45,10 @@ fn estimators_by_hand() {
 
 #[test]
 fn planes_take_perona_malik_for_a_centre_and_renderings_the_median() {
-    use echolume::scene::Estimator;
+    use echolume::low_level::scene::Estimator;
     for (mode, usual) in [("sr", Estimator::Median), ("vr", Estimator::Median), ("mpr", Estimator::PeronaMalik)] {
         let scene = scene(cartesian([8, 8, 8]), BYTES, &format!("mode = '{mode}'"));
-        let mut enhanced = echolume::scene::EnhancedSigma::default();
+        let mut enhanced = echolume::low_level::scene::EnhancedSigma::default();
         assert_eq!(scene.centre(enhanced), usual, "{mode}");
         enhanced.centre = Some(Estimator::GradientInverse);
         assert_eq!(scene.centre(enhanced), Estimator::GradientInverse, "{mode}");
@@ -56,7 +56,7 @@ fn planes_take_perona_malik_for_a_centre_and_renderings_the_median() {
 }
 
 /// How far a window grows, by a brute-force count, and whether a pixel is so near the end of the range that f32 may differ.
-fn grown(source: &Texels, centre: f64, at: [usize; 2], e: echolume::scene::EnhancedSigma) -> (u32, bool) {
+fn grown(source: &Texels, centre: f64, at: [usize; 2], e: echolume::low_level::scene::EnhancedSigma) -> (u32, bool) {
     let range = 2.0 * e.sigma;
     let count = |radius: i64, close: &dyn Fn(f64) -> bool| {
         let mut n = 0;

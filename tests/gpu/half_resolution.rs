@@ -2,11 +2,11 @@
 
 use crate::common::gpu::*;
 use crate::common::scenes::settings;
-use echolume::gpu::Renderer;
-use echolume::passes::{PASSES, Stage};
-use echolume::plan::Rerun;
-use echolume::probe::Geometry;
-use echolume::scene::{Distance, Scene};
+use echolume::low_level::gpu::Renderer;
+use echolume::low_level::passes::{PASSES, Stage};
+use echolume::low_level::plan::Rerun;
+use echolume::low_level::probe::Geometry;
+use echolume::low_level::scene::{Distance, Scene};
 
 const LOOK: &str = "picture.size = [97, 72]
     slices = { pixels = 120, smooth = { lateral = 0.8, depth = 0.8, elevation = 0.8 } }

@@ -1,10 +1,10 @@
 //! Normals by formula. Pictures with analytic answers are checked by `verify`.
 
 use crate::common::gpu::*;
-use echolume::passes::shade::normal;
-use echolume::passes::{MISS, Texels};
-use echolume::probe::{Geometry, Grid};
-use echolume::scene::Scene;
+use echolume::low_level::passes::shade::normal;
+use echolume::low_level::passes::{MISS, Texels};
+use echolume::low_level::probe::{Geometry, Grid};
+use echolume::low_level::scene::Scene;
 use glam::DVec3;
 
 fn block(spacing: f64, size: [usize; 3]) -> Geometry {

@@ -1,15 +1,15 @@
 //! The quality ladder of a moving view: no rung shows a hole or a part that the full picture has not.
 
 use crate::common::gpu::*;
-use echolume::gpu::{Renderer, RendererOptions, TimeStamps};
-use echolume::passes::{chain, is_hit, slots};
-use echolume::plan::Rerun;
-use echolume::probe::{Geometry, Probe};
-use echolume::scene::load::Layers;
-use echolume::scene::{Mode, Scene, Settings};
-use echolume::source::Frame;
-use echolume::source::phantom::{Phantom, PhantomOptions};
-use echolume::ui::frame_budget::built_in_ladder;
+use echolume::low_level::gpu::{Renderer, RendererOptions, TimeStamps};
+use echolume::low_level::passes::{chain, is_hit, slots};
+use echolume::low_level::plan::Rerun;
+use echolume::low_level::probe::{Geometry, Probe};
+use echolume::low_level::scene::load::Layers;
+use echolume::low_level::scene::{Mode, Scene, Settings};
+use echolume::low_level::source::Frame;
+use echolume::low_level::source::phantom::{Phantom, PhantomOptions};
+use echolume::low_level::ui::frame_budget::built_in_ladder;
 use std::sync::LazyLock;
 
 /// Largest part by which the hit mask of a rung may differ from that of the full picture, mm^2 in the picture plane.

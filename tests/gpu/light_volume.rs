@@ -3,10 +3,10 @@
 use crate::common::gpu::*;
 use crate::common::probes::voxels;
 use crate::common::scenes::{BYTES, scene};
-use echolume::gpu::Renderer;
-use echolume::passes::{Slot, Texels};
-use echolume::plan::Plan;
-use echolume::scene::Scene;
+use echolume::low_level::gpu::Renderer;
+use echolume::low_level::passes::{Slot, Texels};
+use echolume::low_level::plan::Plan;
+use echolume::low_level::scene::Scene;
 use glam::DVec3;
 
 /// Voxels of 1 mm whose centres count from 0.

@@ -2,14 +2,15 @@
 
 use crate::common::gpu::*;
 use crate::common::scenes;
-use echolume::gpu::{Renderer, RendererOptions, TimeStamps};
-use echolume::live::{self, Feed, Statistics, Step, Stream, Update};
-use echolume::passes::{Slot, Texels};
-use echolume::probe::{Advance, Geometry, Probe};
-use echolume::scene::Settings;
-use echolume::source::live::{Event, Live};
-use echolume::source::recorder::Header;
-use echolume::source::{Frame, StoredType};
+use crate::common::wait;
+use echolume::low_level::gpu::{Renderer, RendererOptions, TimeStamps};
+use echolume::low_level::live::{self, Feed, Statistics, Step, Stream, Update};
+use echolume::low_level::passes::{Slot, Texels};
+use echolume::low_level::probe::{Advance, Geometry, Probe};
+use echolume::low_level::scene::Settings;
+use echolume::low_level::source::live::{Event, Live};
+use echolume::low_level::source::recorder::Header;
+use echolume::low_level::source::{Frame, StoredType};
 use std::collections::VecDeque;
 use std::sync::atomic::Ordering;
 use std::time::{Duration, Instant};
@@ -44,7 +45,7 @@ pub struct Told(pub VecDeque<Event>, pub Duration, pub bool);
 
 impl Live for Told {
     fn next(&mut self, _: Duration) -> Event {
-        std::thread::sleep(self.1);
+        wait::pace(self.1);
         self.0.pop_front().unwrap_or(Event::End(None))
     }
 

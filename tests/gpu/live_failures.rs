@@ -2,13 +2,13 @@
 
 use crate::common::gpu::*;
 use crate::live::*;
-use echolume::gpu::{Renderer, RendererOptions};
-use echolume::live::{self, Step};
-use echolume::probe::Geometry;
-use echolume::scene::Scene;
-use echolume::source::Frame;
-use echolume::source::live::Event;
-use echolume::source::recorder::Header;
+use echolume::low_level::gpu::{Renderer, RendererOptions};
+use echolume::low_level::live::{self, Step};
+use echolume::low_level::probe::Geometry;
+use echolume::low_level::scene::Scene;
+use echolume::low_level::source::Frame;
+use echolume::low_level::source::live::Event;
+use echolume::low_level::source::recorder::Header;
 use std::time::Duration;
 
 /// Prevents a stream that stops or shows wrong pictures because of a faulty source.
@@ -91,7 +91,7 @@ fn new_settings_are_drawn_from_the_present_volume() {
 /// when it is lost depends on how many frames go together.
 #[test]
 fn a_lost_device_costs_a_volume_and_not_the_stream() {
-    use echolume::gpu::faults::InjectionPoint;
+    use echolume::low_level::gpu::faults::InjectionPoint;
     let mut incomplete = 0;
     let mut last = None;
     // Whether frames were on their way with that submission depends on how fast they came.

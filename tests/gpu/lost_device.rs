@@ -1,11 +1,11 @@
 //! What is said of a device that is lost or has no memory left, and how work goes on with smaller bands.
 
 use crate::common::gpu::*;
-use echolume::gpu::faults::{InjectedFailure, InjectionPoint};
-use echolume::gpu::lost_device::{Checkpoint, FaultAddress, LossReport};
-use echolume::gpu::{Bands, GpuError, Renderer, RendererOptions};
-use echolume::probe::Geometry;
-use echolume::scene::Scene;
+use echolume::low_level::gpu::faults::{InjectedFailure, InjectionPoint};
+use echolume::low_level::gpu::lost_device::{Checkpoint, FaultAddress, LossReport};
+use echolume::low_level::gpu::{Bands, GpuError, Renderer, RendererOptions};
+use echolume::low_level::probe::Geometry;
+use echolume::low_level::scene::Scene;
 
 fn small() -> Scene {
     scene(Geometry::Sweep(wobbler()), BYTES, "mode = 'mip'\npicture = { size = [24, 24] }\nslices = { pixels = 40 }")

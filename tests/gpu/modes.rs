@@ -2,11 +2,11 @@
 //! incremental update of the volume by slices.
 
 use crate::common::gpu::*;
-use echolume::passes::filter::gaussian;
-use echolume::passes::{Slot, in_runs_of};
-use echolume::plan::{Plan, affected};
-use echolume::probe::Geometry;
-use echolume::scene::Scene;
+use echolume::low_level::passes::filter::gaussian;
+use echolume::low_level::passes::{Slot, in_runs_of};
+use echolume::low_level::plan::{Plan, affected};
+use echolume::low_level::probe::Geometry;
+use echolume::low_level::scene::Scene;
 
 fn of(toml: &str) -> Scene {
     let slices = if toml.contains("slices") { "" } else { "slices = { pixels = 40 }" };
@@ -148,7 +148,10 @@ fn in_every_mode_a_change_reruns_only_the_affected_passes() {
             ("camera", |s| s.settings.camera.azimuth = 20.0, seen_from_elsewhere),
             (
                 "transfer function",
-                |s| s.settings.volume.transfer = echolume::scene::Transfer::Named(echolume::scene::TransferName::Warm),
+                |s| {
+                    s.settings.volume.transfer =
+                        echolume::low_level::scene::Transfer::Named(echolume::low_level::scene::TransferName::Warm)
+                },
                 if base.composites() { from(&["classify_bricks_volume"]) } else { vec![] },
             ),
             ("light", |s| s.settings.light.ambient = 0.4, from(&["light"])),

@@ -1,10 +1,10 @@
 //! The motor moves while a frame is acquired: a fixed object must not move between forward and backward sweeps.
 
 use crate::common::gpu::*;
-use echolume::gpu::{Renderer, RendererOptions};
-use echolume::passes::{Slot, Texels, is_hit};
-use echolume::probe::{Advance, Axis, Geometry, Indices, Probe};
-use echolume::scene::Scene;
+use echolume::low_level::gpu::{Renderer, RendererOptions};
+use echolume::low_level::passes::{Slot, Texels, is_hit};
+use echolume::low_level::probe::{Advance, Axis, Geometry, Indices, Probe};
+use echolume::low_level::scene::Scene;
 use glam::DVec3;
 
 /// Both directions at a share of the pitch, the same with a non-uniform table, and both mixed as in rolling updates.
@@ -219,7 +219,7 @@ fn a_ball_swept_both_ways_does_not_move() {
 /// The ball of the phantom, swept in both directions with a moving motor: the two distance maps, in one view.
 #[test]
 fn the_phantom_does_not_move_between_forward_and_backward_sweeps() {
-    use echolume::source::phantom::{Body, Phantom, PhantomOptions as Made, Speckle, Truth};
+    use echolume::low_level::source::phantom::{Body, Phantom, PhantomOptions as Made, Speckle, Truth};
     let device = Device::new();
     let made = Made {
         body: Body::Sphere,

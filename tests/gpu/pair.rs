@@ -2,11 +2,11 @@
 //! the pair of both pictures is the two pictures.
 
 use crate::common::gpu::*;
-use echolume::gpu::Renderer;
-use echolume::passes::{Slot, Stage, by_name};
-use echolume::picture::Picture;
-use echolume::probe::{Advance, Geometry};
-use echolume::scene::Scene;
+use echolume::low_level::gpu::Renderer;
+use echolume::low_level::passes::{Slot, Stage, by_name};
+use echolume::low_level::picture::Picture;
+use echolume::low_level::probe::{Advance, Geometry};
+use echolume::low_level::scene::Scene;
 use glam::DVec3;
 
 /// A wavy wall with specks in front of it, noisy behind, and a second wall farther away.
@@ -26,7 +26,7 @@ fn geometries() -> Vec<(&'static str, Geometry)> {
         ("translated", Geometry::Sweep(linear())),
         (
             "Cartesian",
-            Geometry::Cartesian(echolume::probe::Grid {
+            Geometry::Cartesian(echolume::low_level::probe::Grid {
                 size: [40, 70, 30],
                 spacing: [0.6, 0.8, 0.9],
                 origin: [-12.0, 12.0, -13.0],

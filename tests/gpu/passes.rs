@@ -2,15 +2,15 @@
 //! variant of the geometry. Each pass gets its own inputs, so that errors do not add up. A perturbed reference must fail.
 
 use crate::common::gpu::*;
-use echolume::gpu::pass_runner::PassRunner;
-use echolume::gpu::{ContextOptions, Renderer, RendererOptions, TexelAccess};
-use echolume::passes::slots::Shape;
-use echolume::passes::{Arrays, DispatchArgs, PASSES, Slot, Texels, measure};
-use echolume::probe::Geometry;
-use echolume::scene::{Sampling, Scene};
-use echolume::verify::each_pass::{POISON, dispatch_args_of, inputs_of, run_with_reference};
-use echolume::verify::report::Level;
-use echolume::verify::{self, DeviceUnderTest, ExtraTolerance};
+use echolume::low_level::gpu::pass_runner::PassRunner;
+use echolume::low_level::gpu::{ContextOptions, Renderer, RendererOptions, TexelAccess};
+use echolume::low_level::passes::slots::Shape;
+use echolume::low_level::passes::{Arrays, DispatchArgs, PASSES, Slot, Texels, measure};
+use echolume::low_level::probe::Geometry;
+use echolume::low_level::scene::{Sampling, Scene};
+use echolume::low_level::verify::each_pass::{POISON, dispatch_args_of, inputs_of, run_with_reference};
+use echolume::low_level::verify::report::Level;
+use echolume::low_level::verify::{self, DeviceUnderTest, ExtraTolerance};
 use std::collections::HashSet;
 
 /// The pass checks of `echolume verify --full`: every input in every scene.
@@ -133,7 +133,7 @@ fn a_perturbed_input_swapped_parameters_and_half_a_pixel_are_each_noticed() {
         ("a narrower sigma", "sigma_slice", &base, &narrow),
     ];
     for (fault, name, told, wrong) in cases {
-        let pass = echolume::passes::by_name(name).expect("pass");
+        let pass = echolume::low_level::passes::by_name(name).expect("pass");
         let right = run_with_reference(&mut single, told, pass, 0, "noise", 5).expect("dispatch");
         assert!(right.comparison.worst.is_none(), "{name}, unperturbed: {:?}", right.comparison);
         let args = dispatch_args_of(told, pass, 0);
@@ -155,7 +155,7 @@ fn a_perturbed_input_swapped_parameters_and_half_a_pixel_are_each_noticed() {
         assert!(compared.worst.is_some(), "{fault} went unnoticed in {name}");
     }
     // One voxel.
-    let pass = echolume::passes::by_name("median_slice").expect("pass");
+    let pass = echolume::low_level::passes::by_name("median_slice").expect("pass");
     let right = run_with_reference(&mut single, &base, pass, 0, "zero", 5).expect("dispatch");
     let mut inputs = right.inputs;
     let mut source = inputs.get("source").clone();
@@ -175,7 +175,7 @@ fn texels_outside_the_sector_are_not_written() {
     let device = Device::new();
     let mut single = PassRunner::new(&device).expect("single");
     let scene = scene(Geometry::Sweep(wobbler()), BYTES, "mode = 'vr'\nslices = { pixels = 64, format = 'r16f' }");
-    let pass = echolume::passes::by_name("scan_convert").expect("pass");
+    let pass = echolume::low_level::passes::by_name("scan_convert").expect("pass");
     let result = run_with_reference(&mut single, &scene, pass, 0, "one", 1).expect("dispatch");
     let (expected, got) = (result.expected, result.got);
     let Shape::Three([width, height, _]) = Slot::Volume.shape(&scene) else { panic!("volume") };

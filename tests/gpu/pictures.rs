@@ -1,11 +1,11 @@
 //! Pictures of the recordings with their presets: not black, without holes, and objects in their true positions.
 
 use crate::common::gpu::*;
-use echolume::gpu::{Renderer, RendererOptions};
-use echolume::passes::{Slot, Texels, is_hit};
-use echolume::scene::load::Layers;
-use echolume::scene::{Input, Scene};
-use echolume::source::Recording;
+use echolume::low_level::gpu::{Renderer, RendererOptions};
+use echolume::low_level::passes::{Slot, Texels, is_hit};
+use echolume::low_level::scene::load::Layers;
+use echolume::low_level::scene::{Input, Scene};
+use echolume::low_level::source::Recording;
 use glam::DVec3;
 
 fn preset(device: &Device, file: &str, preset: &str, mode: &str) -> (Scene, Renderer) {

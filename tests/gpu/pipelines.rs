@@ -1,9 +1,10 @@
 //! How the pipelines of a scene are made: at the same time, and each once.
 
 use crate::common::gpu::*;
-use echolume::gpu::{ContextOptions, GpuError, Renderer, RendererOptions, Shaders};
-use echolume::plan::Plan;
-use echolume::spirv;
+use crate::common::wait;
+use echolume::low_level::gpu::{ContextOptions, GpuError, Renderer, RendererOptions, Shaders};
+use echolume::low_level::plan::Plan;
+use echolume::low_level::spirv;
 use std::collections::BTreeSet;
 use std::sync::atomic::Ordering;
 use std::sync::{Arc, Condvar, Mutex};
@@ -26,7 +27,7 @@ fn options(shaders: Arc<Shaders>) -> RendererOptions {
 #[test]
 fn the_pipelines_of_a_scene_are_compiled_at_the_same_time_and_once() {
     let device = Device::alone();
-    let scene = scene(echolume::probe::Geometry::Sweep(wobbler()), BYTES, SETTINGS);
+    let scene = scene(echolume::low_level::probe::Geometry::Sweep(wobbler()), BYTES, SETTINGS);
     let several = rayon::current_num_threads() > 1;
     let asked = Arc::new((Mutex::new(0u32), Condvar::new()));
     let met = Arc::new(Mutex::new(false));
@@ -61,7 +62,7 @@ fn the_pipelines_of_a_scene_are_compiled_at_the_same_time_and_once() {
 #[test]
 fn renderers_of_a_device_share_the_pipelines_of_the_embedded_shaders() {
     let device = Device::alone();
-    let of = |settings: &str| scene(echolume::probe::Geometry::Sweep(wobbler()), BYTES, settings);
+    let of = |settings: &str| scene(echolume::low_level::probe::Geometry::Sweep(wobbler()), BYTES, settings);
     let made = || device.counts.pipelines.load(Ordering::Relaxed);
     let frames = body_frames(&of(SETTINGS), |p| 0.5 + 0.4 * (0.3 * p.y).sin());
     let mut first = rendered(&device, of(SETTINGS), &frames);
@@ -82,7 +83,7 @@ fn renderers_of_a_device_share_the_pipelines_of_the_embedded_shaders() {
 #[test]
 fn of_several_shaders_that_fail_the_first_of_the_plan_is_named() {
     let device = Device::alone();
-    let scene = scene(echolume::probe::Geometry::Sweep(wobbler()), BYTES, SETTINGS);
+    let scene = scene(echolume::low_level::probe::Geometry::Sweep(wobbler()), BYTES, SETTINGS);
     let plan = Plan::new(&scene);
     let first = plan.steps[0].pass.shader(&scene, &plan.steps[0].args());
     for _ in 0..4 {
@@ -99,9 +100,9 @@ const MODES: [&str; 4] = [
     "mode = 'orthogonal'",
 ];
 
-fn in_mode(mode: &str) -> echolume::scene::Scene {
+fn in_mode(mode: &str) -> echolume::low_level::scene::Scene {
     let settings = format!("{mode}\nslices.pixels = 24\npicture.size = [32, 32]");
-    scene(echolume::probe::Geometry::Sweep(wobbler()), BYTES, &settings)
+    scene(echolume::low_level::probe::Geometry::Sweep(wobbler()), BYTES, &settings)
 }
 
 /// Prevents memory that grows with every change of a kiosk's settings, and pipelines destroyed while they are used or asked for.
@@ -126,7 +127,7 @@ fn forgotten_pipelines_are_compiled_again_and_draw_the_same() {
             let begun = std::time::Instant::now();
             while round > 0 && !renderer.prepare(&in_mode(mode)).expect("pipelines") {
                 assert!(begun.elapsed() < BOUND, "{mode} is never compiled");
-                std::thread::sleep(Duration::from_millis(1));
+                wait::poll();
             }
             renderer.change(in_mode(mode)).expect("a change");
             send(&mut renderer, &frames, 0);

@@ -2,11 +2,11 @@
 
 use crate::common::gpu::*;
 use crate::common::scenes::settings;
-use echolume::gpu::{Renderer, RendererOptions};
-use echolume::passes::{Slot, Texels};
-use echolume::probe::{Geometry, Grid, Probe};
-use echolume::scene::{Input, Scene};
-use echolume::source::Recording;
+use echolume::low_level::gpu::{Renderer, RendererOptions};
+use echolume::low_level::passes::{Slot, Texels};
+use echolume::low_level::probe::{Geometry, Grid, Probe};
+use echolume::low_level::scene::{Input, Scene};
+use echolume::low_level::source::Recording;
 use glam::{DVec2, DVec3};
 
 /// Right, down and normal of plane A from the settings, one rotation after the other.
@@ -51,7 +51,7 @@ fn a_linear_field_is_itself_on_every_plane() {
     for (name, geometry) in geometries() {
         let is_still = name == "single frame";
         let slope = DVec3::new(0.005, 0.006, if is_still { 0.0 } else { -0.005 });
-        let (low, high) = echolume::scene::insonified_box(&geometry);
+        let (low, high) = echolume::low_level::scene::insonified_box(&geometry);
         let field = |p: DVec3| 0.5 + slope.dot(p - (low + high) / 2.0);
         for (plane, axes) in [
             ("", turned(0.0, 0.0, 0.0)),

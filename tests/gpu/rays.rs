@@ -2,9 +2,9 @@
 //! several rays a pixel.
 
 use crate::common::gpu::*;
-use echolume::passes::{Slot, Texels, is_hit};
-use echolume::probe::{Axis, Geometry, Grid};
-use echolume::scene::Scene;
+use echolume::low_level::passes::{Slot, Texels, is_hit};
+use echolume::low_level::probe::{Axis, Geometry, Grid};
+use echolume::low_level::scene::Scene;
 use glam::DVec3;
 
 /// A block of n^3 voxels of 0.5 mm, including half a voxel beyond the outer centres.

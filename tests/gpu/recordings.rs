@@ -2,12 +2,12 @@
 
 use crate::common::gpu::*;
 use crate::common::scenes::settings;
-use echolume::gpu::{Renderer, RendererOptions};
-use echolume::passes::lookup_tables::scan_index;
-use echolume::passes::{Slot, Texels};
-use echolume::probe::{Geometry, Probe};
-use echolume::scene::{Input, Scene, SliceGrid};
-use echolume::source::Recording;
+use echolume::low_level::gpu::{Renderer, RendererOptions};
+use echolume::low_level::passes::lookup_tables::scan_index;
+use echolume::low_level::passes::{Slot, Texels};
+use echolume::low_level::probe::{Geometry, Probe};
+use echolume::low_level::scene::{Input, Scene, SliceGrid};
+use echolume::low_level::source::Recording;
 use glam::DVec3;
 
 /// The conversion that the PLUS toolkit stored beside the frames: 820 x 616 pixels of 0.15 mm, apex at (410, 87).

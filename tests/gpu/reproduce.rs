@@ -2,14 +2,14 @@
 //! and its script for Amber keeps to Amber's grammar.
 
 use crate::common::gpu::*;
-use echolume::gpu::ContextOptions;
-use echolume::gpu::pass_runner::PassRunner;
-use echolume::passes::slots::Format;
-use echolume::passes::{self, Arrays, Texels};
-use echolume::verify::DeviceUnderTest;
-use echolume::verify::each_pass::{POISON, dispatch_args_of};
-use echolume::verify::report::Level;
-use echolume::verify::reproduce::{ReproduceError, reproduce};
+use echolume::low_level::gpu::ContextOptions;
+use echolume::low_level::gpu::pass_runner::PassRunner;
+use echolume::low_level::passes::slots::Format;
+use echolume::low_level::passes::{self, Arrays, Texels};
+use echolume::low_level::verify::DeviceUnderTest;
+use echolume::low_level::verify::each_pass::{POISON, dispatch_args_of};
+use echolume::low_level::verify::report::Level;
+use echolume::low_level::verify::reproduce::{ReproduceError, reproduce};
 use serde_json::Value;
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -110,13 +110,14 @@ fn the_files_are_the_dispatch_and_give_the_expected_values_again() {
 /// Of a dispatch that fails, the one that fails is written.
 #[test]
 fn a_failure_is_written_and_not_the_smallest_dispatch() {
-    let planted = echolume::verify::self_test::faults().find(|fault| fault.name == "median of the wrong rank");
+    let planted =
+        echolume::low_level::verify::self_test::faults().find(|fault| fault.name == "median of the wrong rank");
     let mut bench = bench().with_fault(planted.expect("the fault").change).expect("bench");
     let folder = Folder::new("reproduce-failure");
     let made = reproduce(&mut bench, "median_slice", &folder.join("it")).expect("written");
     assert!(made.fails, "{}", made.title);
     let shader = bytes(&folder.join("it"), "shader.spv");
-    let sound = echolume::spirv::embedded("filter/median.slice").expect("embedded");
+    let sound = echolume::low_level::spirv::embedded("filter/median.slice").expect("embedded");
     assert!(!shader.is_empty() && shader != sound, "the shader is the one that the driver got");
 }
 

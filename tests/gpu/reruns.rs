@@ -1,11 +1,11 @@
 //! Reruns after a change, counted from recorded dispatches; and omitted barriers, detected by validation.
 
 use crate::common::gpu::*;
-use echolume::gpu::Renderer;
-use echolume::passes::{PASSES, Stage};
-use echolume::plan::{Plan, Rerun};
-use echolume::probe::Geometry;
-use echolume::scene::{Scene, Settings};
+use echolume::low_level::gpu::Renderer;
+use echolume::low_level::passes::{PASSES, Stage};
+use echolume::low_level::plan::{Plan, Rerun};
+use echolume::low_level::probe::Geometry;
+use echolume::low_level::scene::{Scene, Settings};
 
 const SETTINGS: &str = "mode = 'sr'
     picture = { size = [24, 24] }

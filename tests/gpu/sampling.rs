@@ -1,9 +1,9 @@
 //! The group "sampling" of verify passes on this device, and notices a sampler that does not filter.
 
 use crate::common::gpu::*;
-use echolume::gpu::ContextOptions;
-use echolume::verify::report::{Level, Verdict};
-use echolume::verify::{DeviceUnderTest, sampling, self_test};
+use echolume::low_level::gpu::ContextOptions;
+use echolume::low_level::verify::report::{Level, Verdict};
+use echolume::low_level::verify::{DeviceUnderTest, sampling, self_test};
 
 #[test]
 fn the_filter_is_within_its_bounds_and_one_that_does_not_filter_is_not() {

@@ -2,10 +2,10 @@
 
 use crate::common::gpu::*;
 use crate::common::lengths::scaled;
-use echolume::passes::{Slot, Texels};
-use echolume::probe::{Geometry, Grid};
-use echolume::scene::load::{Layers, PRESETS};
-use echolume::scene::{Scene, Settings};
+use echolume::low_level::passes::{Slot, Texels};
+use echolume::low_level::probe::{Geometry, Grid};
+use echolume::low_level::scene::load::{Layers, PRESETS};
+use echolume::low_level::scene::{Scene, Settings};
 use std::path::Path;
 
 /// Voxels that all presets, which are framed for the built-in phantom, find something in.

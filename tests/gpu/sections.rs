@@ -2,11 +2,11 @@
 
 use crate::common::gpu::*;
 use crate::visible_bounds::speckle;
-use echolume::passes::Slot;
-use echolume::picture::Picture;
-use echolume::plan::{Plan, Rerun};
-use echolume::probe::Geometry;
-use echolume::scene::Scene;
+use echolume::low_level::passes::Slot;
+use echolume::low_level::picture::Picture;
+use echolume::low_level::plan::{Plan, Rerun};
+use echolume::low_level::probe::Geometry;
+use echolume::low_level::scene::Scene;
 
 /// The rendering's own filters, region and clip plane.
 const RENDERING: &str = "mode = 'vr'

@@ -1,8 +1,8 @@
 //! Filters of slices on the sector of a sweep: its border, and the artefacts of the pixel lattice on a tilted wall.
 
 use crate::common::gpu::*;
-use echolume::passes::{Slot, is_hit};
-use echolume::probe::Geometry;
+use echolume::low_level::passes::{Slot, is_hit};
+use echolume::low_level::probe::Geometry;
 
 /// Outside the border there are no data, and no filter may use it: pixels repeat the nearest sample as far as the filters reach.
 #[test]
@@ -47,8 +47,8 @@ fn no_filter_blends_the_sector_border_with_the_outside() {
 /// An oblique wall in SR: the root mean square of its distances less the plane through them, mm.
 fn ripple(device: &Device, slices: &str) -> f64 {
     let mut probe = wobbler();
-    probe.lines = echolume::probe::Axis::centred(1.1 / 127.0, 128);
-    probe.slices = echolume::probe::Axis::centred(0.8 / 60.0, 61);
+    probe.lines = echolume::low_level::probe::Axis::centred(1.1 / 127.0, 128);
+    probe.slices = echolume::low_level::probe::Axis::centred(0.8 / 60.0, 61);
     probe.sample_pitch = 0.4;
     probe.samples = 160;
     let toml = format!(

@@ -1,10 +1,10 @@
 //! The self-test of `echolume verify` can fail. The tests of `cli` check that its injected faults are caught.
 
 use crate::common::gpu::chosen;
-use echolume::gpu::ContextOptions;
-use echolume::passes::fault_injection::{Change, InjectedFault};
-use echolume::verify::report::Verdict;
-use echolume::verify::self_test::{self, Detection};
+use echolume::low_level::gpu::ContextOptions;
+use echolume::low_level::passes::fault_injection::{Change, InjectedFault};
+use echolume::low_level::verify::report::Verdict;
+use echolume::low_level::verify::self_test::{self, Detection};
 
 fn options() -> ContextOptions {
     ContextOptions { device: chosen(), specialize: Some(true), ..ContextOptions::default() }

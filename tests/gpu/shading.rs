@@ -3,10 +3,10 @@
 
 use crate::common::gpu::*;
 use crate::common::probes::wobbler;
-use echolume::gpu::pass_runner::PassRunner;
-use echolume::passes::{Arrays, DispatchArgs, MISS, Slot, Texels, by_name, is_hit};
-use echolume::probe::{Geometry, Grid};
-use echolume::scene::Scene;
+use echolume::low_level::gpu::pass_runner::PassRunner;
+use echolume::low_level::passes::{Arrays, DispatchArgs, MISS, Slot, Texels, by_name, is_hit};
+use echolume::low_level::probe::{Geometry, Grid};
+use echolume::low_level::scene::Scene;
 
 /// A block of 60 mm viewed along its depth axis, 0.25 mm a pixel, parallel.
 pub fn plate(toml: &str) -> Scene {

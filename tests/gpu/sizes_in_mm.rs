@@ -1,10 +1,10 @@
 //! Filters whose sizes are in mm do the same to the body at any size of the picture and of the slices.
 
 use crate::common::gpu::*;
-use echolume::error_report::metrics;
-use echolume::passes::Texels;
-use echolume::picture::Picture;
-use echolume::probe::Geometry;
+use echolume::low_level::error_report::metrics;
+use echolume::low_level::passes::Texels;
+use echolume::low_level::picture::Picture;
+use echolume::low_level::probe::Geometry;
 use glam::DVec3;
 
 /// The mean of squares of pixels.

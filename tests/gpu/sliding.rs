@@ -2,8 +2,8 @@
 //! sector one after the other, and each computes its missing sums while the others wait.
 
 use crate::common::gpu::*;
-use echolume::passes::{Arrays, DispatchArgs, Slot, Texels, by_name, is_hit};
-use echolume::probe::Geometry;
+use echolume::low_level::passes::{Arrays, DispatchArgs, Slot, Texels, by_name, is_hit};
+use echolume::low_level::probe::Geometry;
 use glam::DVec3;
 
 /// Speckle everywhere, and an echo-rich shell.

@@ -1,10 +1,10 @@
 //! The curved render start: what it removes, texel by texel, and that renderings are those of a volume which was cut the same way before it came.
 
 use crate::common::gpu::*;
-use echolume::passes::Slot;
-use echolume::plan::Rerun;
-use echolume::probe::{Geometry, Grid};
-use echolume::scene::{Scene, insonified_box};
+use echolume::low_level::passes::Slot;
+use echolume::low_level::plan::Rerun;
+use echolume::low_level::probe::{Geometry, Grid};
+use echolume::low_level::scene::{Scene, insonified_box};
 use glam::DVec3;
 
 fn of(geometry: &Geometry, toml: &str) -> Scene {

@@ -2,12 +2,12 @@
 //! dispatches.
 
 use crate::common::gpu::*;
-use echolume::gpu::{Bands, Renderer, RendererOptions};
-use echolume::passes::raycast::still::{Medium, final_sums, luminance};
-use echolume::passes::{Slot, Texels};
-use echolume::plan::Plan;
-use echolume::probe::{Geometry, Grid};
-use echolume::scene::Scene;
+use echolume::low_level::gpu::{Bands, Renderer, RendererOptions};
+use echolume::low_level::passes::raycast::still::{Medium, final_sums, luminance};
+use echolume::low_level::passes::{Slot, Texels};
+use echolume::low_level::plan::Plan;
+use echolume::low_level::probe::{Geometry, Grid};
+use echolume::low_level::scene::Scene;
 use glam::DVec3;
 use rayon::prelude::*;
 use std::f64::consts::PI;
@@ -280,7 +280,7 @@ fn the_mean_of_speckle_lies_within_its_confidence_interval_of_the_expectation() 
 
 /// The medium of a scene as the CPU makes it.
 fn renderer_table(scene: &Scene) -> Texels {
-    let echolume::passes::slots::Initializer::ByScene(make) = Slot::StillMedium.initializer() else {
+    let echolume::low_level::passes::slots::Initializer::ByScene(make) = Slot::StillMedium.initializer() else {
         panic!("a table")
     };
     let values: Vec<f64> = make(scene).into_iter().map(f64::from).collect();

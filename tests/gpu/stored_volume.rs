@@ -3,13 +3,13 @@
 
 use crate::common::gpu::*;
 use crate::visible_bounds::{FILTERS, WINDOWS, geometries, speckle};
-use echolume::passes::{Slot, Texels, chain, is_hit};
-use echolume::picture::Picture;
-use echolume::plan::Rerun;
-use echolume::probe::{Geometry, Grid};
-use echolume::scene::load::Layers;
-use echolume::scene::{Input, Scene, VisibleBounds};
-use echolume::source::{Recording, StoredType};
+use echolume::low_level::passes::{Slot, Texels, chain, is_hit};
+use echolume::low_level::picture::Picture;
+use echolume::low_level::plan::Rerun;
+use echolume::low_level::probe::{Geometry, Grid};
+use echolume::low_level::scene::load::Layers;
+use echolume::low_level::scene::{Input, Scene, VisibleBounds};
+use echolume::low_level::source::{Recording, StoredType};
 use std::path::Path;
 
 /// Bytes of the volume and of packed neighbours where only the visible part is stored, and where everything is.

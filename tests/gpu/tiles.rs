@@ -3,9 +3,9 @@
 use crate::common::gpu::*;
 use crate::common::scenes::settings;
 use crate::planes::picture;
-use echolume::plan::Plan;
-use echolume::probe::Geometry;
-use echolume::scene::{PlaneName, Scene, SceneError};
+use echolume::low_level::plan::Plan;
+use echolume::low_level::probe::Geometry;
+use echolume::low_level::scene::{PlaneName, Scene, SceneError};
 use glam::DVec3;
 
 /// A black volume shows only lines: their centre of light along a row or column is the position of the other plane.
@@ -51,7 +51,7 @@ fn cross_lines_run_through_the_place_where_the_planes_meet() {
             // 0.1 lies half-way between two levels, and may be stored as either.
             let drawn = &screen.rgba[corner..corner + 3];
             let is_near = |(drawn, c): (&u8, f64)| (f64::from(*drawn) - c * 255.0).abs() < 0.51;
-            let frame = echolume::scene::planes::colour(name);
+            let frame = echolume::low_level::scene::planes::colour(name);
             assert!(
                 drawn.iter().zip(frame).all(is_near),
                 "tile {n}: {drawn:?} is framed in its plane's colour {frame:?}"

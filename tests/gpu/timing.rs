@@ -1,11 +1,11 @@
 //! Passes that are timed separately. Time stamps of complete pictures are checked by `echolume verify`.
 
 use crate::common::gpu::*;
-use echolume::gpu::pass_runner::{PassRunner, PassTimer};
-use echolume::gpu::{Renderer, RendererOptions, TimeStamps};
-use echolume::passes::{Arrays, DispatchArgs, Frequency, Slot, Texels, by_name};
-use echolume::probe::Geometry;
-use echolume::queues::oracle::Event;
+use echolume::low_level::gpu::pass_runner::{PassRunner, PassTimer};
+use echolume::low_level::gpu::{Renderer, RendererOptions, TimeStamps};
+use echolume::low_level::passes::{Arrays, DispatchArgs, Frequency, Slot, Texels, by_name};
+use echolume::low_level::probe::Geometry;
+use echolume::low_level::queues::oracle::Event;
 
 /// The timed work is the intended work: every iteration, on the given contents, the same each time.
 #[test]

@@ -2,17 +2,17 @@
 //! and what is certain is exact.
 
 use crate::common::gpu::*;
-use echolume::error_report::stated::Stated;
-use echolume::exact_ray::picture::{self, Effort};
-use echolume::gpu::Renderer;
-use echolume::passes::postprocess::toned;
-use echolume::passes::raycast::tolerance::LEVELS;
-use echolume::passes::{Arrays, Slot, Texels, slots};
-use echolume::probe::Geometry;
-use echolume::scene::load::Layers;
-use echolume::scene::{Input, Scene};
-use echolume::source::StoredType;
-use echolume::verify::built_in;
+use echolume::low_level::exact_ray::picture::{self, Effort};
+use echolume::low_level::gpu::Renderer;
+use echolume::low_level::passes::postprocess::toned;
+use echolume::low_level::passes::raycast::tolerance::LEVELS;
+use echolume::low_level::passes::{Arrays, Slot, Texels, slots};
+use echolume::low_level::probe::Geometry;
+use echolume::low_level::scene::load::Layers;
+use echolume::low_level::scene::{Input, Scene};
+use echolume::low_level::source::StoredType;
+use echolume::low_level::stated_error::Stated;
+use echolume::low_level::verify::built_in;
 
 /// Settings that all scenes begin with: the format and the table leave little error of their own, and rays are as close to each other as in a picture of some
 /// hundred pixels.

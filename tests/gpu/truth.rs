@@ -2,11 +2,11 @@
 
 use crate::common::gpu::*;
 use crate::common::scenes::settings;
-use echolume::gpu::{Renderer, RendererOptions};
-use echolume::passes::chain::distance_end;
-use echolume::passes::{Slot, Texels, is_hit};
-use echolume::scene::{Input, Scene};
-use echolume::source::Recording;
+use echolume::low_level::gpu::{Renderer, RendererOptions};
+use echolume::low_level::passes::chain::distance_end;
+use echolume::low_level::passes::{Slot, Texels, is_hit};
+use echolume::low_level::scene::{Input, Scene};
+use echolume::low_level::source::Recording;
 use glam::{DVec2, DVec3};
 
 /// Viewed from the probe along parallel rays, below the uterine wall (3 .. 15 mm). The same holds with any one of these

@@ -1,13 +1,13 @@
 //! The render start that follows the fluid: against the truth of the phantom, and what renderings lose.
 
 use crate::common::gpu::*;
-use echolume::gpu::{Renderer, RendererOptions};
-use echolume::passes::Slot;
-use echolume::passes::unveil::{self, Outcome};
-use echolume::plan::Rerun;
-use echolume::probe::{Geometry, Grid};
-use echolume::scene::Scene;
-use echolume::source::phantom::{Label, Phantom, PhantomOptions};
+use echolume::low_level::gpu::{Renderer, RendererOptions};
+use echolume::low_level::passes::Slot;
+use echolume::low_level::passes::unveil::{self, Outcome};
+use echolume::low_level::plan::Rerun;
+use echolume::low_level::probe::{Geometry, Grid};
+use echolume::low_level::scene::Scene;
+use echolume::low_level::source::phantom::{Label, Phantom, PhantomOptions};
 
 /// The head behind its wall, as preset face filters it, in a region that begins at the probe.
 const FACE: &str = "mode = 'vr'\nslices = { smooth = { lateral = 1.1, depth = 1.1, elevation = 1.1 }, pixels = 128 }\n\

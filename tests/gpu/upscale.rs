@@ -2,10 +2,10 @@
 
 use crate::common::gpu::*;
 use crate::ladder::{Stage, draw};
-use echolume::gpu::pass_runner::PassRunner;
-use echolume::passes::{Arrays, DispatchArgs, MISS, Slot, Texels, by_name};
-use echolume::scene::Scene;
-use echolume::verify::each_pass::run_with_reference;
+use echolume::low_level::gpu::pass_runner::PassRunner;
+use echolume::low_level::passes::{Arrays, DispatchArgs, MISS, Slot, Texels, by_name};
+use echolume::low_level::scene::Scene;
+use echolume::low_level::verify::each_pass::run_with_reference;
 
 const SIDE: usize = 96;
 

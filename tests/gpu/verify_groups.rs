@@ -2,12 +2,12 @@
 //! faults.
 
 use crate::common::gpu::*;
-use echolume::gpu::{Context, ContextOptions, GpuError, Renderer, RendererOptions};
-use echolume::passes::Span;
-use echolume::picture::Picture;
-use echolume::probe::Geometry;
-use echolume::verify::report::{Level, Outcome, Verdict};
-use echolume::verify::{self, Check, DeviceUnderTest, Findings, built_in};
+use echolume::low_level::gpu::{Context, ContextOptions, GpuError, Renderer, RendererOptions};
+use echolume::low_level::passes::Span;
+use echolume::low_level::picture::Picture;
+use echolume::low_level::probe::Geometry;
+use echolume::low_level::verify::report::{Level, Outcome, Verdict};
+use echolume::low_level::verify::{self, Check, DeviceUnderTest, Findings, built_in};
 use std::os::unix::fs::PermissionsExt;
 use std::path::PathBuf;
 use std::sync::Arc;

@@ -3,12 +3,12 @@
 
 use crate::common::gpu::*;
 use crate::common::scenes::settings;
-use echolume::gpu::{Renderer, RendererOptions};
-use echolume::passes::filter::gaussian;
-use echolume::passes::{DispatchArgs, Slot, Texels, by_name};
-use echolume::plan::Rerun;
-use echolume::probe::{Advance, Geometry, Probe};
-use echolume::scene::{Elevation, Mode, Scene, VisibleBounds};
+use echolume::low_level::gpu::{Renderer, RendererOptions};
+use echolume::low_level::passes::filter::gaussian;
+use echolume::low_level::passes::{DispatchArgs, Slot, Texels, by_name};
+use echolume::low_level::plan::Rerun;
+use echolume::low_level::probe::{Advance, Geometry, Probe};
+use echolume::low_level::scene::{Elevation, Mode, Scene, VisibleBounds};
 use glam::DVec3;
 
 fn moved(probe: Probe) -> Probe {
@@ -345,7 +345,7 @@ fn planes_upload_and_filter_the_slices_that_they_cross() {
 #[test]
 fn the_b_mode_preset_takes_two_dispatches() {
     let device = Device::new();
-    let mut layers = echolume::scene::load::Layers::default();
+    let mut layers = echolume::low_level::scene::load::Layers::default();
     layers.preset("bmode").expect("preset");
     let mut settings = layers.finish().expect("settings");
     settings.picture.size = [24, 20];

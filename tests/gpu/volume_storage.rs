@@ -1,13 +1,13 @@
 //! The storage of the volume for the rays: frames in the volume's format are copied, and packed neighbours equal eight texels.
 
 use crate::common::gpu::*;
-use echolume::gpu::{Renderer, RendererOptions};
-use echolume::passes::slots::Format;
-use echolume::passes::{Slot, Texels, chain, is_hit};
-use echolume::plan::{Plan, Rerun};
-use echolume::probe::Geometry;
-use echolume::scene::{Input, Sampling, Scene};
-use echolume::source::StoredType;
+use echolume::low_level::gpu::{Renderer, RendererOptions};
+use echolume::low_level::passes::slots::Format;
+use echolume::low_level::passes::{Slot, Texels, chain, is_hit};
+use echolume::low_level::plan::{Plan, Rerun};
+use echolume::low_level::probe::Geometry;
+use echolume::low_level::scene::{Input, Sampling, Scene};
+use echolume::low_level::source::StoredType;
 use glam::DVec3;
 
 const LOOK: &str =
@@ -48,7 +48,7 @@ fn frames_in_the_volume_format_are_copied_without_a_pass() {
             // The same through a pass, into a format that rounds them.
             let passed = scene.settings.clone();
             let mut passed = Scene::new(scene.geometry.clone(), scene.input, passed).expect("scene");
-            use echolume::scene::VolumeFormat::{R16, R16f};
+            use echolume::low_level::scene::VolumeFormat::{R16, R16f};
             passed.settings.slices.format = if format == "r32f" { R16 } else { R16f };
             assert_eq!(chain::copied(&passed), None);
             let other = rendered(&device, passed, &frames).picture().expect("picture");
@@ -72,7 +72,7 @@ fn the_first_filter_reads_unscaled_frames_as_they_are() {
             let mut renderer = rendered(&device, scene.clone(), &frames);
             assert!(!renderer.plan().steps.iter().any(|s| s.pass.name == "load_slice"), "{filters}");
             let there = renderer.read(Slot::Volume).expect("read").expect("the volume");
-            let expected = echolume::reference::render(&scene, &frames);
+            let expected = echolume::low_level::reference::render(&scene, &frames);
             let off = there.values.iter().zip(&expected[&Slot::Volume].values).map(|(a, b)| (a - b).abs());
             assert!(off.fold(0.0, f64::max) < 2e-6, "{stored:?}, {filters}");
         }
@@ -324,7 +324,7 @@ fn a_volume_that_stays_is_packed_without_new_frames_and_a_texture_of_floats_neve
     let first = renderer.picture().expect("picture");
     let packs = |r: &Renderer| r.plan().steps.iter().any(|s| s.pass.name == "packed_neighbours");
     assert!(!packs(&renderer), "fewer than six samples a texel do not pay");
-    let software = renderer.texel_access() == echolume::gpu::TexelAccess::Storage;
+    let software = renderer.texel_access() == echolume::low_level::gpu::TexelAccess::Storage;
     assert!(matches!(renderer.change(still.clone()).expect("change"), Rerun::Steps { .. }));
     assert_eq!(packs(&renderer), software, "a GPU filters by itself");
     assert!(difference(&renderer.picture().expect("picture"), &first).1 <= 1.0);

@@ -3,10 +3,10 @@
 use crate::common::files::{Folder, SWEEP};
 use crate::common::probes::wobbler;
 use crate::common::program;
-use echolume::probe::{Advance, Axis, Geometry, Grid, Indices, Probe};
-use echolume::source::convert::{Target, Volume, lattice};
-use echolume::source::volume_file::VolumeFile;
-use echolume::source::{Frame, Recording, SampleType, StoredType};
+use echolume::low_level::probe::{Advance, Axis, Geometry, Grid, Indices, Probe};
+use echolume::low_level::source::convert::{Target, Volume, lattice};
+use echolume::low_level::source::volume_file::VolumeFile;
+use echolume::low_level::source::{Frame, Recording, SampleType, StoredType};
 use glam::DVec3;
 use std::path::Path;
 

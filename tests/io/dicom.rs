@@ -4,8 +4,8 @@
 use crate::common::files::{Folder, data, repository};
 use crate::common::program;
 use crate::formats::{Expected, agrees, expected, voxels};
-use echolume::probe::Geometry;
-use echolume::source::{OpenOptions, Recording};
+use echolume::low_level::probe::Geometry;
+use echolume::low_level::source::{OpenOptions, Recording};
 use glam::DVec3;
 use std::collections::BTreeMap;
 use std::io::Write;

@@ -3,9 +3,9 @@
 
 use crate::common::files::{Folder, data, repository};
 use crate::common::program;
-use echolume::probe::{Geometry, World};
-use echolume::source::convert::{Target, Volume};
-use echolume::source::{OpenOptions, Recording, SampleType, StoredType};
+use echolume::low_level::probe::{Geometry, World};
+use echolume::low_level::source::convert::{Target, Volume};
+use echolume::low_level::source::{OpenOptions, Recording, SampleType, StoredType};
 use glam::{DMat4, DVec3};
 use serde::Deserialize;
 use std::collections::BTreeMap;

@@ -4,12 +4,12 @@
 use crate::common::files::Folder;
 use crate::common::motor::{settings, simulated, stopped_at_last, table};
 use crate::common::own_process;
-use echolume::live::Feed;
-use echolume::probe::motor::{BackgroundSweep, Drive, Sweep};
-use echolume::source::live::Event;
-use echolume::source::motor_tracking::{self, Clock, FreeRunning, MotorTracked};
-use echolume::source::phantom;
-use echolume::source::recorder::Reader;
+use echolume::low_level::live::Feed;
+use echolume::low_level::probe::motor::{BackgroundSweep, Drive, Sweep};
+use echolume::low_level::source::live::Event;
+use echolume::low_level::source::motor_tracking::{self, Clock, FreeRunning, MotorTracked};
+use echolume::low_level::source::phantom;
+use echolume::low_level::source::recorder::Reader;
 use rustix::process::{Signal, getpid, kill_process};
 use std::time::{Duration, Instant};
 

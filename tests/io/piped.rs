@@ -1,11 +1,12 @@
 //! Raw frames through a pipe: each keeps its slice, time and bytes however the data are split; and any bytes terminate. Needs no GPU.
 
 use crate::common::files::{data, repository};
-use echolume::probe::{Advance, Geometry};
-use echolume::source::live::{Event, Live};
-use echolume::source::piped::Piped;
-use echolume::source::recorder::Header;
-use echolume::source::{Frame, StoredType};
+use crate::common::wait;
+use echolume::low_level::probe::{Advance, Geometry};
+use echolume::low_level::source::live::{Event, Live};
+use echolume::low_level::source::piped::Piped;
+use echolume::low_level::source::recorder::Header;
+use echolume::low_level::source::{Frame, StoredType};
 use proptest::prelude::*;
 use serde_json::{Value, json};
 use std::io::{Cursor, Read, Write};
@@ -250,7 +251,7 @@ fn patience_is_kept_and_dropping_does_not_hang() {
     // The other end notices it with one of the next two bytes.
     while writer.write_all(&[1; 8]).is_ok() {
         assert!(started.elapsed() < SOON);
-        std::thread::sleep(Duration::from_millis(1));
+        wait::poll();
     }
 }
 
@@ -272,12 +273,10 @@ fn unread_frames_do_not_accumulate() {
         let came = std::sync::Arc::new(std::sync::atomic::AtomicUsize::new(0));
         let start = Cursor::new(stream(&changed(changes), &[]));
         let piped = Piped::new(Endless(start, came.clone()), None).unwrap();
-        let (frame, started) = (512 * 256, Instant::now());
+        let frame = 512 * 256;
         let so_far = || came.load(std::sync::atomic::Ordering::Relaxed);
-        while so_far() < 4 * frame && started.elapsed() < SOON {
-            std::thread::sleep(Duration::from_millis(5));
-        }
-        std::thread::sleep(Duration::from_millis(100));
+        wait::until("four frames", || (so_far() >= 4 * frame).then_some(()));
+        wait::watch(Duration::from_millis(100));
         assert!((4 * frame..6 * frame).contains(&so_far()), "{}", so_far());
         drop(piped);
     }

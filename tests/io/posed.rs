@@ -1,14 +1,15 @@
 //! Frames with poses: through a pipe, in `.frames` files, and as freehand volumes of both.
 
 use crate::common::files::{Folder, repository};
-use echolume::live::Feed;
-use echolume::probe::{Geometry, Grid, World};
-use echolume::source::freehand::{CompoundingOptions, FreehandArguments};
-use echolume::source::live::{Event, Live, Playback, PlaybackSource};
-use echolume::source::piped::Piped;
-use echolume::source::posed::Posed;
-use echolume::source::recorder::{Header, Reader, Writer};
-use echolume::source::{Frame, InputError, OpenOptions, Source, StoredType, description, open, open_with};
+use crate::common::wait;
+use echolume::low_level::live::Feed;
+use echolume::low_level::probe::{Geometry, Grid, World};
+use echolume::low_level::source::freehand::{CompoundingOptions, FreehandArguments};
+use echolume::low_level::source::live::{Event, Live, Playback, PlaybackSource};
+use echolume::low_level::source::piped::Piped;
+use echolume::low_level::source::posed::Posed;
+use echolume::low_level::source::recorder::{Header, Reader, Writer};
+use echolume::low_level::source::{Frame, InputError, OpenOptions, Source, StoredType, description, open, open_with};
 use glam::{DAffine3, DQuat, DVec3};
 use serde_json::json;
 use std::io::Cursor;
@@ -315,7 +316,7 @@ fn pictures_that_are_left_out_are_counted_on_few_lines() {
     let take =
         |stream: &mut Posed, event: Event| -> Vec<Event> { (0..50).flat_map(|_| stream.take(event.clone())).collect() };
     assert!(take(&mut stream, Event::Frame(frame(0, None, samples(0)))).is_empty());
-    std::thread::sleep(Duration::from_millis(1050));
+    wait::pace(Duration::from_millis(1050));
     let said = take(&mut stream, Event::Idle);
     assert_eq!(faults(&said), ["50 pictures without a valid pose are left out"]);
     // Pictures that cannot be compounded.

@@ -1,11 +1,11 @@
 //! How far a recording is read: each reader counts to its end, and ends when it is told to.
 
 use crate::common::files::{Folder, SWEEP, data};
-use echolume::files::progress::{Progress, Share};
-use echolume::picture::Grey;
-use echolume::probe::DepthAxis;
-use echolume::source::recorder::{Reader, Writer};
-use echolume::source::{self, OpenOptions, Source};
+use echolume::low_level::files::progress::{Progress, Share};
+use echolume::low_level::picture::Grey;
+use echolume::low_level::probe::DepthAxis;
+use echolume::low_level::source::recorder::{Reader, Writer};
+use echolume::low_level::source::{self, OpenOptions, Source};
 use std::path::{Path, PathBuf};
 
 const SPACING: [f64; 3] = [0.2, 0.3, 0.5];

@@ -3,10 +3,10 @@
 use crate::common::files::{Folder, SWEEP};
 use crate::common::probes::wobbler;
 use crate::common::program::run;
-use echolume::probe::{Advance, Axis, Geometry, Grid, Probe};
-use echolume::source::live::{Event, Live, Playback, PlaybackSource};
-use echolume::source::recorder::{Header, Reader, Writer};
-use echolume::source::{Frame, Source, StoredType};
+use echolume::low_level::probe::{Advance, Axis, Geometry, Grid, Probe};
+use echolume::low_level::source::live::{Event, Live, Playback, PlaybackSource};
+use echolume::low_level::source::recorder::{Header, Reader, Writer};
+use echolume::low_level::source::{Frame, Source, StoredType};
 use proptest::prelude::*;
 use std::path::Path;
 use std::time::{Duration, Instant};

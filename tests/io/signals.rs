@@ -3,8 +3,9 @@
 
 use crate::common::files::Folder;
 use crate::common::own_process;
-use echolume::files::Unfinished;
-use echolume::files::signals::{Held, Writing};
+use crate::common::wait;
+use echolume::low_level::files::Unfinished;
+use echolume::low_level::files::signals::{Held, Writing};
 use rustix::process::{Signal, getpid, kill_process};
 use std::io::Write;
 use std::os::unix::process::ExitStatusExt;
@@ -20,13 +21,14 @@ fn send(signal: Signal) {
 
 /// Any thread may receive the signal: it takes a moment.
 fn eventually(signal: impl Fn() -> Option<&'static str>) -> Option<&'static str> {
-    for _ in 0..5000 {
-        if let Some(signal) = signal() {
-            return Some(signal);
-        }
-        std::thread::sleep(Duration::from_millis(1));
-    }
-    None
+    Some(wait::until("the signal", signal))
+}
+
+/// True while a signal that was sent to this process has reached none of its threads (proc(5): `ShdPnd`).
+fn is_pending() -> bool {
+    let status = std::fs::read_to_string("/proc/self/status").expect("Linux tells");
+    let pending = status.lines().find_map(|line| line.strip_prefix("ShdPnd:")).expect("it is listed");
+    pending.trim().bytes().any(|digit| digit != b'0')
 }
 
 fn file() -> PathBuf {
@@ -64,7 +66,8 @@ const CASES: &[Case] = &[
             (0..3).for_each(|_| send(Signal::HUP));
             assert_eq!(eventually(|| first.signal()), Some("SIGHUP"));
             // The other two may not have arrived yet.
-            std::thread::sleep(Duration::from_millis(300));
+            wait::until("all of them", || (!is_pending()).then_some(()));
+            wait::watch(Duration::from_millis(20));
             drop(patient);
             assert_eq!(first.signal(), Some("SIGHUP"));
         },
@@ -101,7 +104,7 @@ const CASES: &[Case] = &[
         "written",
         || {
             let writing = Writing::begin();
-            echolume::files::replace(&file(), b"new").expect("written");
+            echolume::low_level::files::replace(&file(), b"new").expect("written");
             send(Signal::TERM);
             assert_eq!(eventually(|| writing.signal()), Some("SIGTERM"));
             drop(writing);
@@ -114,7 +117,7 @@ const CASES: &[Case] = &[
             let held = Held::first();
             send(Signal::TERM);
             assert_eq!(eventually(|| held.signal()), Some("SIGTERM"));
-            echolume::files::replace(&file(), b"new").expect("whoever holds it says what it means");
+            echolume::low_level::files::replace(&file(), b"new").expect("whoever holds it says what it means");
         },
         None,
     ),
@@ -130,7 +133,7 @@ fn child() {
     let (_, run, ends) = CASES.iter().find(|case| case.0 == name).expect("a known case");
     run();
     if ends.is_some() {
-        std::thread::sleep(Duration::from_secs(10));
+        wait::watch(Duration::from_secs(10));
     }
     std::process::exit(SURVIVED);
 }

@@ -1,9 +1,9 @@
 //! Folders and patterns of numbered pictures as volumes.
 
 use crate::common::files::{BONE, Folder};
-use echolume::picture::{Grey, Picture};
-use echolume::probe::Geometry;
-use echolume::source::{InputError, OpenOptions, Recording, SampleType};
+use echolume::low_level::picture::{Grey, Picture};
+use echolume::low_level::probe::Geometry;
+use echolume::low_level::source::{InputError, OpenOptions, Recording, SampleType};
 use std::path::Path;
 
 const SPACING: [f64; 3] = [0.2, 0.3, 0.5];

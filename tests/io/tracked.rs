@@ -1,8 +1,8 @@
 //! Tracked pictures of the PLUS toolkit in a file become a freehand volume in its place.
 
 use crate::common::files::{BONE, Folder, SWEEP, data};
-use echolume::probe::{Geometry, Grid};
-use echolume::source::{Calibration, OpenOptions, Source, description, open_with};
+use echolume::low_level::probe::{Geometry, Grid};
+use echolume::low_level::source::{Calibration, OpenOptions, Source, description, open_with};
 use glam::{DMat4, DVec3};
 use std::path::Path;
 

@@ -1,8 +1,8 @@
 //! UFF of USTB: beamformed data and their scan, written by h5py as USTB lays them out (tests/data/uff/make.py).
 
 use crate::common::files::data;
-use echolume::probe::{Geometry, Indices};
-use echolume::source::{OpenOptions, StoredType, description, open};
+use echolume::low_level::probe::{Geometry, Indices};
+use echolume::low_level::source::{OpenOptions, StoredType, description, open};
 use glam::DVec3;
 use std::collections::BTreeMap;
 use std::path::PathBuf;

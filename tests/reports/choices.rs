@@ -3,20 +3,20 @@
 
 use crate::common::scenes::FLOATS;
 use crate::scenes::*;
-use echolume::error_report::choose::Bound;
-use echolume::error_report::dials::{NAMES, dial};
-use echolume::error_report::measure::{ErrorMeasurement, MeasureError, ReferenceChoice};
-use echolume::error_report::{Kind, Measure, Time, metrics};
-use echolume::exact_ray::picture::{self, Effort};
-use echolume::gpu::TimeStamps;
-use echolume::passes::chain::distance_end;
-use echolume::passes::{Slot, Texels};
-use echolume::probe::{Array, Axis, Geometry, Grid, Indices, Motion, Probe};
-use echolume::reference;
-use echolume::scene::Scene;
-use echolume::scene::default_look::Recorded;
-use echolume::scene::load::Layers;
-use echolume::source::Frame;
+use echolume::low_level::error_report::choose::Bound;
+use echolume::low_level::error_report::dials::{NAMES, dial};
+use echolume::low_level::error_report::measure::{ErrorMeasurement, MeasureError, ReferenceChoice};
+use echolume::low_level::error_report::{Kind, Measure, Time, metrics};
+use echolume::low_level::exact_ray::picture::{self, Effort};
+use echolume::low_level::gpu::TimeStamps;
+use echolume::low_level::passes::chain::distance_end;
+use echolume::low_level::passes::{Slot, Texels};
+use echolume::low_level::probe::{Array, Axis, Geometry, Grid, Indices, Motion, Probe};
+use echolume::low_level::reference;
+use echolume::low_level::scene::Scene;
+use echolume::low_level::scene::default_look::Recorded;
+use echolume::low_level::scene::load::Layers;
+use echolume::low_level::source::Frame;
 use echolume::{Renderer, RendererOptions};
 
 /// Runs of which the 95th percentile is taken.

@@ -71,6 +71,18 @@ fn a_report_is_written_plotted_and_advises() {
     for file in ["error.json", "error.csv", "error.svg", "error.png"] {
         assert!(fs::metadata(folder.join("out").join(file)).is_ok_and(|m| m.len() > 500), "{file}");
     }
+    // The format that the device stores best has its own name: a report of llvmpipe called its r16 r16f.
+    let explained = done(&[&["render"], &SMALL[..], &["--mode", "vr", "--set=ray.step=0.5", "--explain"]].concat());
+    let volume =
+        explained.lines().find(|line| line.trim_start().starts_with("volume ")).expect("the slot of the volume");
+    let report: serde_json::Value = serde_json::from_slice(&fs::read(&json).expect("a report")).expect("JSON");
+    let dials = report["dials"].as_array().expect("dials");
+    let format = dials.iter().find(|dial| dial["name"] == "format").expect("the dial of formats");
+    let points = format["points"].as_array().expect("points");
+    let own = points.iter().find(|point| point["is_default"] == true).expect("the scene itself");
+    let name = own["label"].as_str().expect("a name");
+    assert!(volume.to_lowercase().ends_with(&format!(" {name}")), "{name}: {volume}");
+    assert_eq!(points.iter().filter(|point| point["label"] == name).count(), 1, "{name} stands twice");
     // The scene of the report is the one that is rendered, with a preset and without.
     let picture = folder.path("picture.png");
     for preset in [&["--preset", "bone"][..], &[]] {

@@ -1,12 +1,12 @@
 //! `echolume report error` on a device: its measurements are right, and its advice holds for other scenes.
 
 use crate::scenes::*;
-use echolume::error_report::dials::dial;
-use echolume::error_report::measure::{ErrorMeasurement, MeasureError, ReferenceChoice};
-use echolume::error_report::{Measure, Point, Reference, Report};
-use echolume::scene::Scene;
-use echolume::scene::default_look::Recorded;
-use echolume::scene::load::Layers;
+use echolume::low_level::error_report::dials::dial;
+use echolume::low_level::error_report::measure::{ErrorMeasurement, MeasureError, ReferenceChoice};
+use echolume::low_level::error_report::{Measure, Point, Reference, Report};
+use echolume::low_level::scene::Scene;
+use echolume::low_level::scene::default_look::Recorded;
+use echolume::low_level::scene::load::Layers;
 
 const BASE: [&str; 6] = [
     "mode=vr",

@@ -52,7 +52,8 @@ fn filters_are_compared_on_the_phantom_and_on_a_recording() {
         assert!(text.contains(word), "{word} is missing from\n{text}");
     }
     for name in ["phantom.png", "sweep.png"] {
-        let sheet = echolume::picture::Picture::load(&std::path::Path::new(&pictures).join(name)).expect(name);
+        let sheet =
+            echolume::low_level::picture::Picture::load(&std::path::Path::new(&pictures).join(name)).expect(name);
         let levels: std::collections::BTreeSet<u8> = sheet.rgba.chunks_exact(4).map(|p| p[0]).collect();
         assert!(sheet.width > 500 && levels.len() > 100, "{name}: {} levels", levels.len());
     }

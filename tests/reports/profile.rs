@@ -1,10 +1,10 @@
 //! Profiles on a device: an injected slow pass is found, and identical runs are not called different.
 
 use crate::scenes::*;
-use echolume::passes::{DispatchArgs, by_name};
-use echolume::profile::compare::{CompareOptions, Verdict, compare};
-use echolume::profile::measure::{ProfileOptions, ProfileRun, run};
-use echolume::profile::{Profile, export};
+use echolume::low_level::passes::{DispatchArgs, by_name};
+use echolume::low_level::profile::compare::{CompareOptions, Verdict, compare};
+use echolume::low_level::profile::measure::{ProfileOptions, ProfileRun, run};
+use echolume::low_level::profile::{Profile, export};
 
 const SETTINGS: &str = "mode = 'sr'
     picture = { size = [96, 96] }

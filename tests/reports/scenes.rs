@@ -3,9 +3,9 @@
 use crate::common::gpu::Device;
 use crate::common::probes::wobbler;
 use crate::common::scenes::{self, FLOATS};
-use echolume::probe::{Axis, Geometry, Indices, Probe};
-use echolume::scene::{Scene, Settings};
-use echolume::source::Frame;
+use echolume::low_level::probe::{Axis, Geometry, Indices, Probe};
+use echolume::low_level::scene::{Scene, Settings};
+use echolume::low_level::source::Frame;
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
 /// Serialises the tests of this binary, because they measure time: every test holds this while it runs.

@@ -2,15 +2,15 @@
 
 use crate::scenes::alone;
 use crate::scenes::device;
-use echolume::gpu::{Renderer, RendererOptions};
-use echolume::passes::{DispatchArgs, Slot, Stage, Texels, is_hit};
-use echolume::picture::Grey;
-use echolume::plan::Plan;
-use echolume::reference;
-use echolume::scene::{MAX_WINDOW, Scene};
-use echolume::thesis_tables::growth::{CENTRES, Growth, SIGMAS, WINDOWS, growth, growth_settings};
-use echolume::thesis_tables::measure::{BALL_RADIUS, TableOptions, run, scene, surface_depth, sweep_frames};
-use echolume::thesis_tables::{Conditions, Filter3d, export, tables};
+use echolume::low_level::gpu::{Renderer, RendererOptions};
+use echolume::low_level::passes::{DispatchArgs, Slot, Stage, Texels, is_hit};
+use echolume::low_level::picture::Grey;
+use echolume::low_level::plan::Plan;
+use echolume::low_level::reference;
+use echolume::low_level::scene::{MAX_WINDOW, Scene};
+use echolume::low_level::thesis_tables::growth::{CENTRES, Growth, SIGMAS, WINDOWS, growth, growth_settings};
+use echolume::low_level::thesis_tables::measure::{BALL_RADIUS, TableOptions, run, scene, surface_depth, sweep_frames};
+use echolume::low_level::thesis_tables::{Conditions, Filter3d, export, tables};
 
 fn pass_names(plan: &Plan, first: bool) -> Vec<&'static str> {
     let steps = plan.steps.iter().filter(|s| (s.pass.stage == Stage::Preprocess) == first);
@@ -139,9 +139,11 @@ fn growth_is_the_reference_s() {
     assert!(WINDOWS.iter().flatten().all(|w| *w <= MAX_WINDOW));
     let frame = Texels { size: [40, 32, 1], channels: 1, values: grey.shares() };
     for row in &grown.rows {
-        let scene =
-            echolume::thesis_tables::growth::scene_of(&grey, growth_settings(row.centre, row.sigma, row.windows))
-                .expect("scene");
+        let scene = echolume::low_level::thesis_tables::growth::scene_of(
+            &grey,
+            growth_settings(row.centre, row.sigma, row.windows),
+        )
+        .expect("scene");
         let slots = reference::render(&scene, std::slice::from_ref(&frame));
         let reference = Growth::new(row.centre, row.sigma, row.windows, &slots[&Slot::Growth].values);
         // A pixel whose count depends on rounding may stop a ring earlier or later.

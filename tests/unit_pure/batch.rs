@@ -1,14 +1,14 @@
 //! The division of a batch: no unit is lost or done twice, no shard costs much more than another; lines that a killed process left; names of outputs.
 
 use crate::common::files::Folder;
-use echolume::batch::agreement::{Agreement, Class, Drawer};
-use echolume::batch::comparisons::pairs;
-use echolume::batch::manifest::{self, Unit};
-use echolume::batch::report::{Merged, html};
-use echolume::batch::results::{self, Asked, Earlier, OutputFile, Record, Results, Seconds, Status};
-use echolume::batch::shard::{Shard, assign};
-use echolume::batch::unit::{Kind, Work};
-use echolume::picture::Picture;
+use echolume::low_level::batch::agreement::{Agreement, Class, Drawer};
+use echolume::low_level::batch::comparisons::pairs;
+use echolume::low_level::batch::manifest::{self, Unit};
+use echolume::low_level::batch::report::{Merged, html};
+use echolume::low_level::batch::results::{self, Asked, Earlier, OutputFile, Record, Results, Seconds, Status};
+use echolume::low_level::batch::shard::{Shard, assign};
+use echolume::low_level::batch::unit::{Kind, Work};
+use echolume::low_level::picture::Picture;
 use proptest::prelude::*;
 use serde_json::{Map, json};
 use std::collections::BTreeMap;
@@ -202,7 +202,7 @@ fn earlier_results_are_those_of_the_units_that_are_asked_for_in_any_shard() {
     let mut results = open(&folder, other).expect("opened");
     assert!(read().is_begun && !read().has_lines);
     let add = |results: &mut Results, input: &str, status| {
-        let program = echolume::machine::program();
+        let program = echolume::low_level::machine::program();
         results.add(&Record { program, ..record(input, status, "x", "1") }).expect("added");
     };
     add(&mut results, "z", Status::Done);

@@ -3,11 +3,11 @@
 
 use crate::common::probes::{voxels, wobbler};
 use crate::common::scenes::{FLOATS, scene};
-use echolume::bounds::{Effort, PictureBounds, fault, picture};
-use echolume::exact_ray;
-use echolume::passes::{Arrays, Texels};
-use echolume::probe::{Advance, Array, Axis, Geometry, Motion, Probe};
-use echolume::scene::Scene;
+use echolume::low_level::bounds::{Effort, PictureBounds, fault, picture};
+use echolume::low_level::exact_ray;
+use echolume::low_level::passes::{Arrays, Texels};
+use echolume::low_level::probe::{Advance, Array, Axis, Geometry, Motion, Probe};
+use echolume::low_level::scene::Scene;
 
 /// Numbers in 0..1, the same in every run (SplitMix64; Steele, Lea, Flood 2014).
 struct Draw(u64);

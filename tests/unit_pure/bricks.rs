@@ -3,8 +3,8 @@
 
 use crate::common::probes::wobbler;
 use crate::common::scenes::{self, BYTES};
-use echolume::probe::{Advance, Array, Axis, Geometry, Grid, Motion, Probe};
-use echolume::scene::{Scene, Side, TILE};
+use echolume::low_level::probe::{Advance, Array, Axis, Geometry, Grid, Motion, Probe};
+use echolume::low_level::scene::{Scene, Side, TILE};
 use glam::DVec3;
 use proptest::prelude::*;
 
@@ -72,7 +72,7 @@ fn texel(scene: &Scene, p: DVec3) -> ([f64; 3], bool) {
 
 fn check(scene: &Scene, shares: &[[f64; 3]]) {
     let bricks = scene.bricks();
-    let (low, high) = echolume::scene::insonified_box(&scene.geometry);
+    let (low, high) = echolume::low_level::scene::insonified_box(&scene.geometry);
     let (mut inside, mut outside) = (0, 0);
     for share in shares {
         let p = low + (high - low) * DVec3::from(*share);

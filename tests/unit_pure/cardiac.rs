@@ -1,10 +1,10 @@
 //! STIC against a beating phantom, whose phase and radius have a formula.
 
-use echolume::probe::Geometry;
-use echolume::source::cardiac::{Cycle, CycleOptions, Motion, Rhythm};
-use echolume::source::convert::Volume;
-use echolume::source::phantom::{Body, HeartTruth, Phantom, PhantomOptions, Speckle, Truth};
-use echolume::source::{Frame, StoredType};
+use echolume::low_level::probe::Geometry;
+use echolume::low_level::source::cardiac::{Cycle, CycleOptions, Motion, Rhythm};
+use echolume::low_level::source::convert::Volume;
+use echolume::low_level::source::phantom::{Body, HeartTruth, Phantom, PhantomOptions, Speckle, Truth};
+use echolume::low_level::source::{Frame, StoredType};
 use glam::DVec3;
 
 /// A slow sweep of 64 lines of 80 samples a frame: 100 frames a second.

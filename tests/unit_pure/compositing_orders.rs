@@ -1,7 +1,7 @@
 //! Convergence orders of the compositing rules in f64, and what degrades them.
 
-use echolume::error_report::convergence::{Field, Fit, Flaw, NONE, Range, errors, fit, steps, stiffness};
-use echolume::passes::raycast::composite::Rule;
+use echolume::low_level::error_report::convergence::{Field, Fit, Flaw, NONE, Range, errors, fit, steps, stiffness};
+use echolume::low_level::passes::raycast::composite::Rule;
 
 const STEPS: [f64; 2] = [1.0 / 32.0, 0.7];
 const RAYS: usize = 256;

@@ -2,11 +2,11 @@
 
 use crate::common::probes::wobbler;
 use crate::common::scenes::{BYTES, scene};
-use echolume::passes::Slot;
-use echolume::plan::Plan;
-use echolume::probe::{Geometry, Grid};
-use echolume::scene::{Scene, Settings};
-use echolume::verify::built_in::geometries;
+use echolume::low_level::passes::Slot;
+use echolume::low_level::plan::Plan;
+use echolume::low_level::probe::{Geometry, Grid};
+use echolume::low_level::scene::{Scene, Settings};
+use echolume::low_level::verify::built_in::geometries;
 use glam::DVec3;
 use std::f64::consts::PI;
 

@@ -1,11 +1,13 @@
 //! What nobody chose: the levels of a recording's echoes, and the settings that follow from them, its size and the mode.
 
 use crate::common::setting_keys::{self, Key};
-use echolume::probe::{Advance, Array, Axis, Geometry, Grid, Motion, Probe};
-use echolume::scene::default_look::{Defaults, Recorded};
-use echolume::scene::load::{Layers, PRESETS, rebase};
-use echolume::scene::{Camera, ColourMap, EchoHistogram, EchoLevels, Input, Layout, Mode, Settings, Slices, transfer};
-use echolume::source::StoredType;
+use echolume::low_level::probe::{Advance, Array, Axis, Geometry, Grid, Motion, Probe};
+use echolume::low_level::scene::default_look::{Defaults, Recorded};
+use echolume::low_level::scene::load::{Layers, PRESETS, rebase};
+use echolume::low_level::scene::{
+    Camera, ColourMap, EchoHistogram, EchoLevels, Input, Layout, Mode, Settings, Slices, transfer,
+};
+use echolume::low_level::source::StoredType;
 use std::collections::BTreeMap;
 use std::path::Path;
 

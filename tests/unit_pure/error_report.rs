@@ -1,18 +1,18 @@
 //! Error against run time without a device: the metrics, the Pareto front, the choice, the file, the plot.
 
 use crate::common::files::data;
-use echolume::error_report::budget::{Budget, FLOOR, Share};
-use echolume::error_report::choose::{self, Bound, choose, contenders, proposals};
-use echolume::error_report::convergence::{Range, fit};
-use echolume::error_report::metrics::{
+use echolume::low_level::error_report::budget::{Budget, FLOOR, Share};
+use echolume::low_level::error_report::choose::{self, Bound, choose, contenders, proposals};
+use echolume::low_level::error_report::convergence::{Range, fit};
+use echolume::low_level::error_report::metrics::{
     Levels, SurfaceError, changed_rays, distances, levels, normals, pictures, surfaces,
 };
-use echolume::error_report::plot::Figure;
-use echolume::error_report::{
+use echolume::low_level::error_report::plot::Figure;
+use echolume::low_level::error_report::{
     Combination, Dial, Errors, FORMAT, Kind, Measure, OwnError, Point, Reference, Report, Sizes, Time, Times, export,
     pareto_front, plot,
 };
-use echolume::passes::{MISS, Texels};
+use echolume::low_level::passes::{MISS, Texels};
 use proptest::prelude::*;
 
 fn texels(width: usize, channels: usize, values: &[f64]) -> Texels {

@@ -2,10 +2,10 @@
 
 use crate::common::probes::wobbler;
 use crate::common::scenes::{BYTES, scene};
-use echolume::passes::slots::Format;
-use echolume::passes::{Slot, Texels, floating};
-use echolume::probe::{Geometry, Grid};
-use echolume::scene::Scene;
+use echolume::low_level::passes::slots::Format;
+use echolume::low_level::passes::{Slot, Texels, floating};
+use echolume::low_level::probe::{Geometry, Grid};
+use echolume::low_level::scene::Scene;
 use proptest::prelude::*;
 
 fn voxels(size: [usize; 3], more: &str) -> Scene {
@@ -123,7 +123,7 @@ fn what_is_drawn_begins_where_the_transfer_function_or_the_detector_does() {
     assert_eq!(Slot::Floating.format(&plain("mode = 'sr'")), Format::R8);
     let refused = |toml: &str| {
         let grid = Grid { size: [8; 3], spacing: [1.0; 3], origin: [0.0; 3] };
-        let settings = echolume::scene::Settings::from_toml(toml).expect("settings");
+        let settings = echolume::low_level::scene::Settings::from_toml(toml).expect("settings");
         Scene::new(Geometry::Cartesian(grid), BYTES, settings).expect_err("refused").to_string()
     };
     for dark in [

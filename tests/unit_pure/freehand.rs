@@ -1,8 +1,8 @@
 //! Freehand compounding: known answers, an f64 reference written from the formula, holes, and invalid poses. Needs no GPU.
 
-use echolume::probe::Grid;
-use echolume::source::StoredType;
-use echolume::source::freehand::*;
+use echolume::low_level::probe::Grid;
+use echolume::low_level::source::StoredType;
+use echolume::low_level::source::freehand::*;
 use glam::{DAffine3, DMat3, DQuat, DVec3};
 use proptest::prelude::*;
 

@@ -2,9 +2,9 @@
 
 use crate::common::probes::wobbler;
 use crate::common::scenes::{BYTES, scene};
-use echolume::plan::Plan;
-use echolume::probe::{Geometry, Grid};
-use echolume::scene::Scene;
+use echolume::low_level::plan::Plan;
+use echolume::low_level::probe::{Geometry, Grid};
+use echolume::low_level::scene::Scene;
 
 const LIT: &str = "mode = 'vr'";
 

@@ -1,10 +1,10 @@
 //! Measuring the phantom: its ball has the volume that its formula says.
 
-use echolume::measure::voxels;
-use echolume::probe::Geometry;
-use echolume::source::StoredType;
-use echolume::source::convert::Volume;
-use echolume::source::phantom::{Body, Phantom, PhantomOptions, Speckle, Truth};
+use echolume::low_level::measure::voxels;
+use echolume::low_level::probe::Geometry;
+use echolume::low_level::source::StoredType;
+use echolume::low_level::source::convert::Volume;
+use echolume::low_level::source::phantom::{Body, Phantom, PhantomOptions, Speckle, Truth};
 use glam::DVec3;
 
 /// Requirement: 1 %, in the polar frames of a wobbler, for the whole ball and for the half of it that a box holds.

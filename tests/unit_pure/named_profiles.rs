@@ -1,7 +1,7 @@
 //! The compositing rules on profiles whose light is known: what a step that is thick optically costs each rule.
 
-use echolume::passes::raycast::composite::{March, Medium, Place, Rule};
-use echolume::scene::{self_attenuation, transfer};
+use echolume::low_level::passes::raycast::composite::{March, Medium, Place, Rule};
+use echolume::low_level::scene::{self_attenuation, transfer};
 use std::cell::OnceCell;
 
 /// Values along a ray, and the transfer table that they go through.

@@ -2,11 +2,11 @@
 //! the same bytes.
 
 use crate::common::files::Folder;
-use echolume::probe::{Advance, Geometry, Indices, Probe};
-use echolume::source::phantom::{
+use echolume::low_level::probe::{Advance, Geometry, Indices, Probe};
+use echolume::low_level::source::phantom::{
     Body, DYNAMIC_RANGE, Label, Phantom, PhantomOptions, PointSpread, Sampling, Speckle, Truth, distance_path,
 };
-use echolume::source::{Frame, Recording};
+use echolume::low_level::source::{Frame, Recording};
 use glam::DVec3;
 use std::fs;
 

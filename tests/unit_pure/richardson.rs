@@ -1,7 +1,7 @@
 //! Richardson's extrapolation of pictures against functions whose limit is known.
 
-use echolume::error_report::richardson::{Extrapolated, extrapolated};
-use echolume::passes::Texels;
+use echolume::low_level::error_report::richardson::{Extrapolated, extrapolated};
+use echolume::low_level::passes::Texels;
 
 fn rms(a: &Texels, b: &Texels) -> f64 {
     let squares: f64 = a.values.iter().zip(&b.values).map(|(a, b)| (a - b) * (a - b)).sum();

@@ -4,15 +4,15 @@
 use crate::common::files::repository;
 use crate::common::probes::{voxels, wobbler};
 use crate::common::scenes::{BYTES, FLOATS, scene};
-use echolume::gpu::WRITERS_OF_RUNS;
-use echolume::passes::net::NETS;
-use echolume::passes::{DispatchArgs, Frequency, PASSES, Part, Pass, interface_check, measure};
-use echolume::probe::{Advance, Axis, Geometry, Grid, Motion, Probe};
-use echolume::scene::{Lattice, Scene};
-use echolume::shader_source;
-use echolume::source::StoredType;
-use echolume::spirv;
-use echolume::verify::built_in::geometries;
+use echolume::low_level::gpu::WRITERS_OF_RUNS;
+use echolume::low_level::passes::net::NETS;
+use echolume::low_level::passes::{DispatchArgs, Frequency, PASSES, Part, Pass, interface_check, measure};
+use echolume::low_level::probe::{Advance, Axis, Geometry, Grid, Motion, Probe};
+use echolume::low_level::scene::{Lattice, Scene};
+use echolume::low_level::shader_source;
+use echolume::low_level::source::StoredType;
+use echolume::low_level::spirv;
+use echolume::low_level::verify::built_in::geometries;
 use sha2::{Digest, Sha256};
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
@@ -252,6 +252,17 @@ fn no_assertion_is_for_debug_builds_alone() {
     }
 }
 
+/// A test that sleeps for a time fails under load, or is slow without: it waits for a condition.
+#[test]
+fn tests_sleep_only_in_their_one_module_of_waits() {
+    let own = ["tests/common/wait.rs", "tests/unit_pure/rules.rs"];
+    for (path, text) in sources("tests").into_iter().filter(|(path, _)| !own.contains(&path.as_str())) {
+        let code = code(&text);
+        let sleeps = ["sleep(", "park_timeout("].iter().any(|call| code.contains(call));
+        assert!(!sleeps, "{path} sleeps: use tests/common/wait.rs");
+    }
+}
+
 /// A wait for a queue waits for the picture in flight too, which may take seconds. egui-ash-renderer's own uploads of textures do that.
 #[test]
 fn nothing_waits_for_a_whole_queue() {
@@ -478,7 +489,7 @@ fn every_pass_agrees_with_every_shader_it_may_use() {
 #[test]
 fn an_interface_mismatch_names_both_sides() {
     let scene = scenes().swap_remove(1);
-    let tone = echolume::passes::by_name("tone").unwrap();
+    let tone = echolume::low_level::passes::by_name("tone").unwrap();
     let words = spirv::words(spirv::embedded("postprocess/tone").unwrap());
     let module =
         spirv::reflect(&interface_check::for_scene(tone, &scene, &DispatchArgs::default(), &words).unwrap()).unwrap();
@@ -487,13 +498,17 @@ fn an_interface_mismatch_names_both_sides() {
         change(&mut pass);
         interface_check::check(&pass, &scene, &DispatchArgs::default(), &module).unwrap_err()
     };
-    let error = changed(|p| p.reads = |_, _| vec![echolume::passes::whole("pictur", echolume::passes::Slot::Picture)]);
+    let error = changed(|p| {
+        p.reads = |_, _| vec![echolume::low_level::passes::whole("pictur", echolume::low_level::passes::Slot::Picture)]
+    });
     assert!(error.contains("pictur") && error.contains("reads"), "{error}");
-    let error = changed(|p| p.params = |_, _| echolume::passes::Params::default().i32("brightness", 1));
+    let error = changed(|p| p.params = |_, _| echolume::low_level::passes::Params::default().i32("brightness", 1));
     assert!(error.contains("brightness") && error.contains("float"), "{error}");
     let error = changed(|p| p.constants = |_, _| vec![("COLOUR", 1)]);
     assert!(error.contains("COLOUR"), "{error}");
-    let error = changed(|p| p.writes = |_, _| vec![echolume::passes::whole("screen", echolume::passes::Slot::Volume)]);
+    let error = changed(|p| {
+        p.writes = |_, _| vec![echolume::low_level::passes::whole("screen", echolume::low_level::passes::Slot::Volume)]
+    });
     assert!(error.contains("Three") && error.contains("Two"), "{error}");
 }
 

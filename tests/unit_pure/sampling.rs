@@ -1,10 +1,10 @@
 //! The bounds of the device's linear filter hold for every sampler that Vulkan allows, and for no wrong one.
 
-use echolume::passes::Texels;
-use echolume::passes::measure::sample_position;
-use echolume::passes::slots::Format;
-use echolume::verify::built_in::Noise;
-use echolume::verify::sampling::{FilterPrecision, Judged, judge};
+use echolume::low_level::passes::Texels;
+use echolume::low_level::passes::measure::sample_position;
+use echolume::low_level::passes::slots::Format;
+use echolume::low_level::verify::built_in::Noise;
+use echolume::low_level::verify::sampling::{FilterPrecision, Judged, judge};
 
 fn volume(size: [usize; 3], format: Format) -> Texels {
     let mut noise = Noise(5);

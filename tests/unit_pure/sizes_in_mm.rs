@@ -2,9 +2,9 @@
 
 use crate::common::probes::wobbler;
 use crate::common::scenes::{BYTES, FLOATS, scene, settings};
-use echolume::plan::Plan;
-use echolume::probe::{Geometry, Grid, Motion, Probe};
-use echolume::scene::Scene;
+use echolume::low_level::plan::Plan;
+use echolume::low_level::probe::{Geometry, Grid, Motion, Probe};
+use echolume::low_level::scene::Scene;
 
 /// Slice pixels of 0.5 mm, slices of 2 mm, rays of 0.25 mm.
 fn cartesian(toml: &str) -> Scene {

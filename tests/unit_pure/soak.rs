@@ -1,7 +1,7 @@
 //! `tools/soak`: the rules by which it passes, and that it understands what the program logs. The soak itself takes hours.
 
 use crate::common::files::repository;
-use echolume::live::Statistics;
+use echolume::low_level::live::Statistics;
 use std::process::Command;
 
 #[test]

@@ -2,12 +2,12 @@
 
 use crate::common::probes::wobbler;
 use crate::common::scenes::{BYTES, scene};
-use echolume::passes::{Slot, unveil};
-use echolume::plan::{Plan, Rerun};
-use echolume::probe::{Geometry, Grid};
-use echolume::scene::load::Layers;
-use echolume::scene::{Scene, Settings};
-use echolume::verify::built_in::geometries;
+use echolume::low_level::passes::{Slot, unveil};
+use echolume::low_level::plan::{Plan, Rerun};
+use echolume::low_level::probe::{Geometry, Grid};
+use echolume::low_level::scene::load::Layers;
+use echolume::low_level::scene::{Scene, Settings};
+use echolume::low_level::verify::built_in::geometries;
 
 /// An arc 20 mm wide, whose middle is 8 mm deeper than its ends: a parabola.
 const ARC: &str = "region.start_curve = [[-10, 30], [0, 38], [10, 30]]";

@@ -2,10 +2,10 @@
 
 use crate::common::probes::wobbler;
 use crate::common::scenes::{BYTES, scene, settings};
-use echolume::passes::Slot;
-use echolume::plan::Plan;
-use echolume::probe::Geometry;
-use echolume::scene::Scene;
+use echolume::low_level::passes::Slot;
+use echolume::low_level::plan::Plan;
+use echolume::low_level::probe::Geometry;
+use echolume::low_level::scene::Scene;
 
 fn built(toml: &str) -> Scene {
     scene(Geometry::Sweep(wobbler()), BYTES, toml)

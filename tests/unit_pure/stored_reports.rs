@@ -1,6 +1,6 @@
 //! The error reports that the documents show: each is complete, and its errors go where theory says.
 
-use echolume::error_report::{Kind, Report};
+use echolume::low_level::error_report::{Kind, Report};
 use std::fs;
 use std::path::Path;
 

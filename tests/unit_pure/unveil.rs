@@ -2,11 +2,11 @@
 
 use crate::common::probes::wobbler;
 use crate::common::scenes::{BYTES, scene};
-use echolume::passes::unveil::{self, Outcome, Unveiled};
-use echolume::passes::{Slot, Texels};
-use echolume::plan::Plan;
-use echolume::probe::{Geometry, Grid};
-use echolume::scene::{Scene, Settings};
+use echolume::low_level::passes::unveil::{self, Outcome, Unveiled};
+use echolume::low_level::passes::{Slot, Texels};
+use echolume::low_level::plan::Plan;
+use echolume::low_level::probe::{Geometry, Grid};
+use echolume::low_level::scene::{Scene, Settings};
 use glam::DVec3;
 use proptest::prelude::*;
 

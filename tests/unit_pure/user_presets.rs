@@ -1,9 +1,9 @@
 //! Presets of a user: what is saved is the look, is read again exactly, and a damaged file is never replaced.
 
 use crate::common::files::Folder;
-use echolume::scene::Settings;
-use echolume::scene::load::Layers;
-use echolume::user_presets::{MAX_NAME, MAX_PRESETS, UserPreset, checked_name, read, write};
+use echolume::low_level::scene::Settings;
+use echolume::low_level::scene::load::Layers;
+use echolume::low_level::user_presets::{MAX_NAME, MAX_PRESETS, UserPreset, checked_name, read, write};
 use std::path::PathBuf;
 
 fn settings(preset: &str, lines: &[&str]) -> Settings {
@@ -81,7 +81,7 @@ fn a_damaged_file_is_one_line_and_stays_as_it_is() {
     let presets = read(&PathBuf::from(folder.write("presets.toml", text))).expect("a list");
     let said = presets[0].look().expect_err("an unknown setting");
     assert!(said.contains("\"a\"") && said.contains("colour") && said.lines().count() == 1, "{said}");
-    assert_eq!(presets[1].look().expect("a look").mode, echolume::scene::Mode::Mip);
+    assert_eq!(presets[1].look().expect("a look").mode, echolume::low_level::scene::Mode::Mip);
     // So does one whose name a later version gave to a preset of its own: it can be given another.
     let file =
         PathBuf::from(folder.write("presets.toml", "version = 1\n[[preset]]\nname = 'Face'\n[preset.settings]\n"));

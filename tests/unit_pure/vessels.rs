@@ -1,9 +1,9 @@
 //! The phantom's tree of vessels: what its labels hold, measured from outside, follows Murray's law and the closed formulas of cones.
 
 use crate::common::files::Folder;
-use echolume::probe::Geometry;
-use echolume::source::Recording;
-use echolume::source::phantom::{
+use echolume::low_level::probe::Geometry;
+use echolume::low_level::source::Recording;
+use echolume::low_level::source::phantom::{
     Body, Label, Phantom, PhantomOptions, Speckle, Truth, Vessel, VesselTree, distance_path,
 };
 use glam::DVec3;

@@ -2,10 +2,10 @@
 
 use crate::common::probes::voxels;
 use crate::common::scenes::{BYTES, scene};
-use echolume::passes::Slot;
-use echolume::passes::slots::Format;
-use echolume::plan::Plan;
-use echolume::scene::Scene;
+use echolume::low_level::passes::Slot;
+use echolume::low_level::passes::slots::Format;
+use echolume::low_level::plan::Plan;
+use echolume::low_level::scene::Scene;
 
 fn stored(toml: &str, truncates_halves: bool) -> Scene {
     Scene { truncates_halves, ..scene(voxels([12, 10, 8]), BYTES, toml) }

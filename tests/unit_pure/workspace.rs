@@ -1,9 +1,9 @@
 //! Workspaces: what is saved is read again exactly, and what is no workspace is refused.
 
 use crate::common::files::Folder;
-use echolume::scene::load::Layers;
-use echolume::scene::{Brush, Cut, CutView, KeptSide, MeasureKind, Measurement, Mode};
-use echolume::workspace::{Origin, Workspace, is_workspace, text};
+use echolume::low_level::scene::load::Layers;
+use echolume::low_level::scene::{Brush, Cut, CutView, KeptSide, MeasureKind, Measurement, Mode};
+use echolume::low_level::workspace::{Origin, Workspace, is_workspace, text};
 use std::path::{Path, PathBuf};
 
 fn kept(name: &str, text: &str) -> (Folder, PathBuf) {

@@ -4,7 +4,7 @@ pub use crate::common::files::*;
 pub use crate::common::program::PROGRAM;
 pub use crate::common::wait::*;
 
-use echolume::picture::Picture;
+use echolume::low_level::picture::Picture;
 use std::collections::BTreeMap;
 use std::io::{BufRead, BufReader, Read};
 use std::path::PathBuf;
@@ -78,7 +78,7 @@ impl Desk {
         let begun = Instant::now();
         let mut framed = false;
         while !framed && begun.elapsed() < Duration::from_secs(1) {
-            std::thread::sleep(Duration::from_millis(20));
+            poll();
             let tree = connection.query_tree(window).expect("ask").reply().expect("the window is there");
             let attributes = connection.get_window_attributes(window).expect("ask").reply().expect("it is there");
             framed = tree.parent != self.root && attributes.map_state == MapState::VIEWABLE;
@@ -238,7 +238,7 @@ impl View<'_> {
     /// Waits until the middle of the picture between the panels, which has no marks, equals that of a headless one.
     pub fn shows_middle(&self, wanted: &Picture, what: &str) {
         let (_, window) = self.place();
-        let (corner, size) = echolume::ui::panels::picture_area(window.map(u32::from), 1.0, true);
+        let (corner, size) = echolume::low_level::ui::panels::picture_area(window.map(u32::from), 1.0, true);
         assert_eq!([wanted.width, wanted.height], size);
         let (from, middle) = (size.map(|n| n / 4), size.map(|n| n / 2));
         self.shows_at(wanted, [corner[0] + from[0], corner[1] + from[1]], from, middle, what);
@@ -253,7 +253,7 @@ impl View<'_> {
             if seen.as_ref() == Some(&wanted) {
                 return;
             }
-            std::thread::sleep(Duration::from_millis(50));
+            poll();
         }
         let folder = std::env::temp_dir();
         let save = |picture: &Picture, name: &str| drop(picture.save(&folder.join(format!("window-{name}.png"))));
@@ -284,7 +284,7 @@ impl View<'_> {
         for step in 1..=10 {
             let between = |a: usize| from[a] + (to[a] - from[a]) * step / 10;
             self.hover(between(0), between(1));
-            std::thread::sleep(Duration::from_millis(15));
+            pace(Duration::from_millis(15));
         }
         self.button(1, false);
     }

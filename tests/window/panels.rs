@@ -1,17 +1,18 @@
 //! Panels: buttons and drags act on the picture, which equals the headless one where nothing is drawn over it.
 
 use crate::desktop::*;
-use echolume::measure::outcome;
-use echolume::picture::Picture;
-use echolume::scene::{Input, Scene};
-use echolume::workspace::Workspace;
+use echolume::low_level::measure::outcome;
+use echolume::low_level::picture::Picture;
+use echolume::low_level::scene::{Input, Scene};
+use echolume::low_level::workspace::Workspace;
 use std::path::PathBuf;
+use std::time::Duration;
 
 /// The window of these tests, and the size of the picture between the panels, from `ui::panels::place`.
 const WINDOW: [u32; 2] = [1000, 700];
 
 fn picture() -> ([u32; 2], [u32; 2]) {
-    echolume::ui::panels::picture_area(WINDOW, 1.0, true)
+    echolume::low_level::ui::panels::picture_area(WINDOW, 1.0, true)
 }
 
 fn open(desk: &Desk) -> View<'_> {
@@ -151,7 +152,7 @@ fn panels_are_presented_while_a_picture_is_drawn() {
     while shown() != wanted && begun.elapsed() < PATIENCE {
         for _ in 0..2 {
             desk.tap('h');
-            std::thread::sleep(std::time::Duration::from_millis(50));
+            pace(Duration::from_millis(50));
         }
     }
     view.shows_middle(&surface, "the surface");
@@ -175,7 +176,7 @@ fn what_is_kept_of_a_window_equals_what_is_drawn_whole() {
         let mut seen = view.look();
         let mut same = 0;
         until("a window that rests", || {
-            std::thread::sleep(std::time::Duration::from_millis(300));
+            watch(Duration::from_millis(300));
             let now = view.look();
             same = if now == seen { same + 1 } else { 0 };
             seen = now;
@@ -259,7 +260,7 @@ fn presets_are_pictures_and_show_what_the_command_renders() {
     desk.tap('s');
     "mine".chars().for_each(|letter| desk.tap(letter));
     desk.tap(RETURN);
-    until("the preset", || echolume::user_presets::read(file.as_ref()).ok().filter(|kept| kept.len() == 1));
+    until("the preset", || echolume::low_level::user_presets::read(file.as_ref()).ok().filter(|kept| kept.len() == 1));
     desk.tap(ESCAPE);
     desk.control('z');
     view.shows_middle(&start, "taken back");
@@ -291,7 +292,7 @@ fn a_cut_is_shown_saved_and_taken_back() {
     view.button(1, true);
     for at in (1..40).map(round) {
         view.hover(at[0], at[1]);
-        std::thread::sleep(std::time::Duration::from_millis(10));
+        pace(Duration::from_millis(10));
     }
     view.button(1, false);
     let file = desk.save_workspace(&folder.path("kept"));
@@ -335,13 +336,14 @@ fn a_curved_plane_is_drawn_shown_saved_and_taken_back() {
     for [x, y] in clicks {
         view.click(corner[0] as i16 + x, corner[1] as i16 + y);
         // Not a double click.
-        std::thread::sleep(std::time::Duration::from_millis(500));
+        pace(Duration::from_millis(500));
     }
     desk.tap(0xff0d_u32);
     let file = desk.save_workspace(&folder.path("kept"));
     let workspace = until("the whole workspace", || Workspace::read(&file).ok());
     let settings = workspace.layers.clone().finish().expect("settings");
-    let recording = echolume::source::open(workspace.recording(&file).expect("a recording"), None).expect("it opens");
+    let recording =
+        echolume::low_level::source::open(workspace.recording(&file).expect("a recording"), None).expect("it opens");
     let input = Input { stored: recording.stored_type(), range: recording.range() };
     let scene = Scene::new(recording.geometry(0), input, settings).expect("a scene");
     let line = scene.curve_line(&scene.sheet()).expect("a line");
@@ -373,7 +375,8 @@ fn measure_on_a_plane(desk: &Desk, view: &View, folder: &Folder) {
     let file = desk.save_workspace(&folder.path("kept"));
     let workspace = until("the whole workspace", || Workspace::read(&file).ok());
     let settings = workspace.layers.clone().finish().expect("settings");
-    let recording = echolume::source::open(workspace.recording(&file).expect("a recording"), None).expect("it opens");
+    let recording =
+        echolume::low_level::source::open(workspace.recording(&file).expect("a recording"), None).expect("it opens");
     let input = Input { stored: recording.stored_type(), range: recording.range() };
     let scene = Scene::new(recording.geometry(0), input, settings.clone()).expect("a scene");
     let found: Vec<f64> = settings.measure.iter().map(|m| outcome::quantities(m).expect("results")[0].value).collect();
@@ -406,7 +409,7 @@ fn the_volume_is_exported_as_the_commands_do() {
     let open = || {
         let view = desk.view(&["--size", "700x500", "--source", &ball, "--save-to", &kept, "--mode", "mip"]);
         until("a picture", || {
-            let (corner, size) = echolume::ui::panels::picture_area([700, 500], 1.0, true);
+            let (corner, size) = echolume::low_level::ui::panels::picture_area([700, 500], 1.0, true);
             let seen = view.look_at(corner, size)?;
             let is_bright = |pixel: &[u8]| pixel[..3].iter().all(|c| *c > 150);
             (seen.rgba.chunks(4).filter(|pixel| is_bright(pixel)).count() > 5000).then_some(())
@@ -462,7 +465,7 @@ fn a_turntable_and_a_loop_are_exported_with_marks_as_asked() {
     let view = desk.view(
         &[&["-v", "--size", "700x500", "--source", &sweep, "--save-to", &kept, "--cine", "9"], &look[..]].concat(),
     );
-    let (_, size) = echolume::ui::panels::picture_area([700, 500], 1.0, true);
+    let (_, size) = echolume::low_level::ui::panels::picture_area([700, 500], 1.0, true);
     let all = || std::fs::read_dir(&kept).into_iter().flatten().flatten().map(|entry| entry.path());
     let exported = |format: char, ending: &str| {
         let mut asked: Option<std::time::Instant> = None;
@@ -519,12 +522,15 @@ fn the_start_line_is_bent_on_plane_a_and_the_rendering_follows() {
     desk.tap('g');
     desk.press(SHIFT, false);
     // Where its handles are.
-    let recording = echolume::source::open(SWEEP.as_ref(), None).expect("it opens");
+    let recording = echolume::low_level::source::open(SWEEP.as_ref(), None).expect("it opens");
     let input = Input { stored: recording.stored_type(), range: recording.range() };
     let toml = format!("mode='vr'\nlayout='four'\nregion.depth=[20,80]\npicture.size={size:?}\n{smooth}");
-    let scene =
-        Scene::new(recording.geometry(0), input, echolume::scene::Settings::from_toml(&toml).expect("settings"))
-            .expect("a scene");
+    let scene = Scene::new(
+        recording.geometry(0),
+        input,
+        echolume::low_level::scene::Settings::from_toml(&toml).expect("settings"),
+    )
+    .expect("a scene");
     let sheet = scene.sheet();
     let middle_handle = (scene.low + scene.high).with_y(2.0 * scene.low.y) / 2.0;
     let at = sheet.project(&sheet.tiles[0], middle_handle).0;

@@ -11,7 +11,7 @@ const PAGE_DOWN: u32 = 0xff56;
 fn recordings_are_shown_in_turn_and_come_back_as_they_were_left() {
     let desk = Desk::new(false);
     let folder = Folder::new("recordings");
-    let (_, size) = echolume::ui::panels::picture_area(WINDOW, 1.0, true);
+    let (_, size) = echolume::low_level::ui::panels::picture_area(WINDOW, 1.0, true);
     // The same sweep, so that a picture tells the settings.
     let second = folder.path("second.mha");
     std::fs::copy(SWEEP, &second).expect("a copy");

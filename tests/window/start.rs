@@ -28,7 +28,7 @@ fn the_screen_says_each_step_and_the_first_picture_has_few_rays() {
         let mut command = std::process::Command::new(PROGRAM);
         command.env("ECHOLUME_PIPELINE_CACHE", "none");
         let view = desk.view_by(&mut command, &arguments);
-        let (corner, size) = echolume::ui::panels::picture_area([1000, 700], 1.0, true);
+        let (corner, size) = echolume::low_level::ui::panels::picture_area([1000, 700], 1.0, true);
         let (from, half) = (size.map(|n| n / 4), size.map(|n| n / 2));
         let at = [corner[0] + from[0], corner[1] + from[1]];
         view.shows_at(&headless(size, &[]), at, from, half, "the picture in full");

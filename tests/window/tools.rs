@@ -1,9 +1,9 @@
 //! The mouse on the picture, the cine loop, the list of files and files that are dropped, held against closed formulas and what `render` draws.
 
 use crate::desktop::*;
-use echolume::measure::outcome;
-use echolume::scene::{Input, MeasureKind, Scene};
-use echolume::workspace::Workspace;
+use echolume::low_level::measure::outcome;
+use echolume::low_level::scene::{Input, MeasureKind, Scene};
+use echolume::low_level::workspace::Workspace;
 use glam::DVec3;
 use std::cell::Cell;
 use std::f64::consts::PI;
@@ -25,7 +25,7 @@ const RIGHT: u32 = 0xff53;
 const WHEEL_DOWN: u8 = 5;
 
 fn picture() -> ([u32; 2], [u32; 2]) {
-    echolume::ui::panels::picture_area(WINDOW, 1.0, true)
+    echolume::low_level::ui::panels::picture_area(WINDOW, 1.0, true)
 }
 
 /// A point of the picture in the window.
@@ -36,7 +36,7 @@ fn place([x, y]: [f64; 2]) -> [i16; 2] {
 
 /// Waits until a click is no part of a double click.
 fn apart() {
-    std::thread::sleep(Duration::from_millis(450));
+    pace(Duration::from_millis(450));
 }
 
 fn clicks(view: &View, points: &[[f64; 2]]) {
@@ -54,7 +54,7 @@ fn draws(view: &View, way: impl IntoIterator<Item = [f64; 2]>) {
     view.button(1, true);
     for at in way {
         view.hover(at[0], at[1]);
-        std::thread::sleep(Duration::from_millis(8));
+        pace(Duration::from_millis(8));
     }
     view.button(1, false);
 }
@@ -87,7 +87,7 @@ fn clipboard(desk: &Desk) -> String {
                 let found = connection.get_property(true, own, kept, AtomEnum::ANY, 0, 1 << 16).expect("ask");
                 return String::from_utf8(found.reply().expect("a property").value).ok();
             }
-            std::thread::sleep(Duration::from_millis(10));
+            poll();
         }
         None
     })
@@ -206,7 +206,7 @@ fn what_is_drawn_by_the_mouse_is_measured_kept_and_copied() {
     let file = desk.save_workspace(&kept);
     let workspace = until("the whole workspace", || Workspace::read(&file).ok());
     let settings = workspace.layers.clone().finish().expect("settings");
-    let recording = echolume::source::open(SWEEP.as_ref(), None).expect("it opens");
+    let recording = echolume::low_level::source::open(SWEEP.as_ref(), None).expect("it opens");
     let input = Input { stored: recording.stored_type(), range: recording.range() };
     let pixel = Scene::new(recording.geometry(0), input, settings.clone()).expect("a scene").sheet().pixel;
     let measured: Vec<(MeasureKind, f64)> =
@@ -264,7 +264,7 @@ fn the_wheel_and_the_right_button_change_the_view_without_a_tool() {
     view.button(3, true);
     for n in 1..=8 {
         view.hover(x + 4 * n, y);
-        std::thread::sleep(Duration::from_millis(10));
+        pace(Duration::from_millis(10));
     }
     view.button(3, false);
     looks("moved by the right button");

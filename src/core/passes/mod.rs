@@ -14,6 +14,7 @@ pub mod net;
 pub mod pass;
 pub mod slots;
 pub mod texels;
+pub mod times;
 pub mod unveil;
 
 pub mod filter {
@@ -51,6 +52,7 @@ pub mod preprocess;
 pub mod shade;
 
 pub use pass::*;
+pub use times::PassTime;
 
 /// All passes in the order in which they run.
 pub const PASSES: &[Pass] = &[
@@ -124,16 +126,6 @@ pub const PASSES: &[Pass] = &[
     filter::aos::PICTURE,
     postprocess::TONE,
 ];
-
-/// Time of one pass over a run.
-#[derive(Clone, Debug, PartialEq)]
-pub struct PassTime {
-    pub name: &'static str,
-    /// Of a batch of frames, one for each frame.
-    pub runs: u32,
-    /// ns, all runs together.
-    pub total: f64,
-}
 
 /// Something that took time, on the clock of the run: ns since it began.
 #[derive(Clone, Debug, PartialEq)]

@@ -3,7 +3,7 @@
 //! the scene as it is, and none of them is the right one.
 
 use super::Kind;
-use super::map::step_fault;
+use crate::error_map::step_fault;
 use crate::passes::light_volume;
 use crate::scene::{Compositing, Edge, Mode, PeronaMalik, Sampling, Scene, Scheme, Volume, VolumeFormat, transfer};
 
@@ -481,4 +481,30 @@ pub fn dial(name: &str, scene: &Scene) -> Result<Dial, String> {
 /// The name of a setting value as in a scene file.
 fn serde_word(value: &impl serde::Serialize) -> String {
     toml::Value::try_from(value).ok().and_then(|v| v.as_str().map(str::to_string)).unwrap_or_default()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::probe::{Geometry, Grid};
+    use crate::scene::Input;
+    use crate::scene::load::Layers;
+    use crate::source::StoredType;
+
+    /// Prevents a dial whose reference, with finer steps, is another filter.
+    #[test]
+    fn dials_of_steps_refuse_a_filter_along_the_ray() {
+        let scene = |set: &str| {
+            let mut layers = Layers::default();
+            set.split_whitespace().for_each(|set| layers.set(set).expect("a setting"));
+            let grid = Grid { size: [20; 3], spacing: [1.0; 3], origin: [0.0; 3] };
+            let input = Input { stored: StoredType::U8, range: [0.0, 255.0] };
+            Scene::new(Geometry::Cartesian(grid), input, layers.finish().expect("settings")).expect("a scene")
+        };
+        for name in ["step", "compositing"] {
+            let said = dial(name, &scene("mode=volume ray.sliding=3")).expect_err(name);
+            assert!(said.contains("ray.sliding=0"), "{said}");
+            assert!(dial(name, &scene("mode=volume")).is_ok(), "{name}");
+        }
+    }
 }

@@ -7,13 +7,11 @@ pub mod choose;
 pub mod convergence;
 pub mod dials;
 pub mod export;
-pub mod map;
 pub mod measure;
 pub mod metrics;
 pub mod plot;
 pub mod richardson;
 mod running;
-pub mod stated;
 
 use crate::scene::Scene;
 use budget::Budget;

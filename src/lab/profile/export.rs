@@ -4,8 +4,7 @@
 use super::compare::{Comparison, Kind, Line, Verdict};
 use super::statistics::{Interval, Sample, drift};
 use super::{Ceiling, LEVEL, PassProfile, Profile};
-use crate::passes::{PassTime, by_name};
-use crate::scene::Scene;
+use crate::passes::times::acquisition_floor;
 use serde_json::{Value, json};
 use std::fmt::Write as _;
 
@@ -343,35 +342,6 @@ fn comparison_row(line: &Line) -> Vec<String> {
     });
     row.extend([verdict.to_string(), line.note.clone().unwrap_or_default()]);
     row
-}
-
-/// Pass times of one run as a table: one line per pass, the sum, and the acquisition floor if a probe swept the volume. Without
-/// time stamps no time is printed.
-pub fn pass_time_table(measured: &[PassTime], scene: &Scene) -> String {
-    let mut text = String::new();
-    if measured.is_empty() {
-        text.push_str("times: this device has no time stamps\n");
-    } else {
-        let _ = writeln!(text, "{:<12} {:<19} {:>5} {:>10} {:>10}", "stage", "pass", "runs", "ms a run", "ms in all");
-        for time in measured {
-            let stage = by_name(time.name).map_or("", |p| p.stage.name());
-            let all = time.total * 1e-6;
-            let each = all / f64::from(time.runs.max(1));
-            let _ = writeln!(text, "{stage:<12} {:<19} {:>5} {each:>10.3} {all:>10.3}", time.name, time.runs);
-        }
-        let sum = measured.iter().map(|t| t.total).sum::<f64>() * 1e-6;
-        let _ = writeln!(text, "{:<12} {:<19} {:>5} {:>10} {sum:>10.3}", "", "sum", "", "");
-    }
-    if let Some(probe) = scene.probe() {
-        let _ = writeln!(text, "{}", acquisition_floor(probe.acquisition_time(), probe.sound_speed));
-    }
-    text
-}
-
-/// A sentence with the acquisition floor: `seconds` is the travel time of sound for a volume, `sound_speed` in m/s.
-pub(crate) fn acquisition_floor(seconds: f64, sound_speed: f64) -> String {
-    let ms = seconds * 1e3;
-    format!("sound itself needs {ms:.1} ms for this volume ({sound_speed} m/s): no display is faster")
 }
 
 /// Where a span ran, and by whose clock it was timed.

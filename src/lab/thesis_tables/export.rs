@@ -2,7 +2,7 @@
 
 use super::growth::{Grown, Growth, THESIS};
 use super::{Conditions, DEPTH, FAN_ANGLE, Report, Row, SAMPLES, SECTOR_ANGLE, SOUND_SPEED, Spread, Table};
-use crate::profile::export::acquisition_floor;
+use crate::passes::times::acquisition_floor;
 use crate::scene::Estimator;
 use crate::text::{csv_quoted, markdown_table, markdown_text};
 use std::fmt::Write as _;

@@ -435,7 +435,12 @@ mod tests {
     fn a_source_that_cannot_wait_loses_the_rest_of_a_volume_and_memory_stays_bounded() {
         let source = FastSource { next: 0, frames: 30, bytes: MAX_BYTES / 4, waits: false };
         let feed = Feed::new(Box::new(source), None).expect("thread");
-        std::thread::sleep(Duration::from_millis(300));
+        let begun = Instant::now();
+        while feed.counts().lost == 0 {
+            assert!(feed.shared.lock().bytes <= MAX_BYTES);
+            assert!(begun.elapsed() < Duration::from_secs(60), "nothing is lost");
+            std::thread::sleep(Duration::from_millis(1));
+        }
         assert!(feed.shared.lock().bytes <= MAX_BYTES);
         let came = all(&feed, Duration::ZERO);
         assert_eq!(came.len() as u64 + feed.counts().lost, 30);

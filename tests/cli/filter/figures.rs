@@ -71,7 +71,7 @@ fn every_filter_name_gives_the_filter_of_the_settings() {
     ] {
         let got = filtered(&file, &folder.path("out.png"), &[filter]);
         let slots = reference(&given, slices);
-        let expected = given.with(&slots[&echolume::passes::Slot::Volume].values);
+        let expected = given.with(&slots[&echolume::low_level::passes::Slot::Volume].values);
         let off = |other: &Grey| got.values.iter().zip(&other.values).filter(|(g, e)| g.abs_diff(**e) > 40).count();
         // Within the tolerance of the passes; a pixel at exactly two sigma may fall on either side.
         assert!(off(&expected) <= 2, "{filter}: {} pixels differ", off(&expected));
@@ -83,14 +83,18 @@ fn every_filter_name_gives_the_filter_of_the_settings() {
 fn reference(
     grey: &Grey,
     slices: &str,
-) -> std::collections::BTreeMap<echolume::passes::Slot, echolume::passes::Texels> {
+) -> std::collections::BTreeMap<echolume::low_level::passes::Slot, echolume::low_level::passes::Texels> {
     let size = [grey.width as usize, grey.height as usize, 1];
-    let stored = if grey.sixteen { echolume::source::StoredType::U16 } else { echolume::source::StoredType::U8 };
-    let input = echolume::scene::Input { stored, range: [0.0, grey.white()] };
+    let stored = if grey.sixteen {
+        echolume::low_level::source::StoredType::U16
+    } else {
+        echolume::low_level::source::StoredType::U8
+    };
+    let input = echolume::low_level::scene::Input { stored, range: [0.0, grey.white()] };
     let toml = format!("mode = 'plane'\npicture = {{ size = [1, 1] }}\nslices = {{ format = 'r32f', {slices} }}");
     let scene = scene(voxels(size), input, &toml);
-    let frame = echolume::passes::Texels { size, channels: 1, values: grey.shares() };
-    echolume::reference::render(&scene, &[frame])
+    let frame = echolume::low_level::passes::Texels { size, channels: 1, values: grey.shares() };
+    echolume::low_level::reference::render(&scene, &[frame])
 }
 
 /// The rows of a growth table: sigma, window, largest, and shares.
@@ -152,7 +156,7 @@ fn the_growth_table_is_that_of_the_filter() {
         let keys =
             format!("window = {window}, largest = {largest}, sigma = {sigma}, centre = '{centre}', growth = true");
         let slices = format!("enhanced_sigma = {{ {keys} }}");
-        let rings = &reference(&given, &slices)[&echolume::passes::Slot::Growth].values;
+        let rings = &reference(&given, &slices)[&echolume::low_level::passes::Slot::Growth].values;
         for (n, share) in row[4..].iter().enumerate() {
             let expected = rings.iter().filter(|r| **r == n as f64).count() as f64 / rings.len() as f64;
             assert!((share - expected).abs() < 4.0 / rings.len() as f64, "{row:?}: +{} is {expected}", 2 * n);

@@ -5,7 +5,7 @@ mod figures;
 mod refusals;
 
 use crate::common::program::{self, *};
-use echolume::picture::Grey;
+use echolume::low_level::picture::Grey;
 use std::fs;
 use std::process::Command;
 

@@ -1,8 +1,8 @@
 //! Recordings.
 
 use super::{told, written};
-use echolume::source::recorder::Reader;
-use echolume::source::{Geometry, InputError, OpenOptions, Recording, Source};
+use echolume::low_level::source::recorder::Reader;
+use echolume::low_level::source::{Geometry, InputError, OpenOptions, Recording, Source};
 use std::path::Path;
 
 /// Bytes read at most: a few bytes of zlib expand to a thousand times as many.
@@ -31,7 +31,7 @@ fn read(mut source: Box<dyn Source>) -> Result<String, InputError> {
 /// A stream of frames in a file.
 pub fn stream(bytes: &[u8]) -> String {
     let path = written("input.pipe", bytes);
-    outcome(echolume::source::open(&path, None).and_then(|source| {
+    outcome(echolume::low_level::source::open(&path, None).and_then(|source| {
         // Poses far apart make a lattice of any size.
         let is_large =
             matches!(source.geometry(0), Geometry::Cartesian(grid) if grid.size.iter().product::<usize>() > 1 << 20);
@@ -60,8 +60,9 @@ pub fn tracked(bytes: &[u8]) -> String {
     let calibration = ["ImageToProbe=0.5 0 0 0 0 0.5 0 0 0 0 0.5 0".parse().expect("a calibration")];
     let as_pictures = OpenOptions { calibration: &calibration, ..OpenOptions::default() };
     // A pose far away makes a lattice of any size.
-    let one =
-        |path: &Path, options| outcome(echolume::source::description(path, options).map(|rows| rows.len().to_string()));
+    let one = |path: &Path, options| {
+        outcome(echolume::low_level::source::description(path, options).map(|rows| rows.len().to_string()))
+    };
     let config = written("plus.xml", bytes);
     let as_config = OpenOptions { plus_config: Some(&config), ..OpenOptions::default() };
     one(&written("input.mha", bytes), as_pictures) + &one(&written("still.mha", TRACKED), as_config)
@@ -93,7 +94,7 @@ const SLICE: &[u8] = include_bytes!("../../data/dicom/series/0.dcm");
 
 /// An HDF5 file of USTB.
 pub fn uff(bytes: &[u8]) -> String {
-    outcome(echolume::source::open(&written("input.uff", bytes), None).and_then(read))
+    outcome(echolume::low_level::source::open(&written("input.uff", bytes), None).and_then(read))
 }
 
 /// A stack of two pictures; names of pictures, a line each; and a file that states their spacing.

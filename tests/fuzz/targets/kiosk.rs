@@ -1,8 +1,8 @@
 //! The configuration of a cart, and the redaction of logs.
 
 use super::told;
-use echolume::kiosk::config::Config;
-use echolume::kiosk::redaction::Redactor;
+use echolume::low_level::kiosk::config::Config;
+use echolume::low_level::kiosk::redaction::Redactor;
 use std::path::Path;
 
 /// An accepted configuration round-trips, and gives arguments and layers.

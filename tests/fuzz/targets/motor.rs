@@ -1,9 +1,9 @@
 //! Probe files, their `[motor]` table, and replies of the motor.
 
 use super::{Bytes, told, written};
-use echolume::probe::motor::tmcl::{LENGTH, Reply, Request, axis, status_words, version_text};
-use echolume::probe::motor::{MotorTable, Sweep};
-use echolume::probe::{Indices, Probe, ProbeFile};
+use echolume::low_level::probe::motor::tmcl::{LENGTH, Reply, Request, axis, status_words, version_text};
+use echolume::low_level::probe::motor::{MotorTable, Sweep};
+use echolume::low_level::probe::{Indices, Probe, ProbeFile};
 use std::time::Duration;
 
 /// The geometry of a valid probe file, for its motor.

@@ -1,12 +1,12 @@
 //! Input from the network and from pipes.
 
 use super::{Bytes, told};
-use echolume::source::igtl::{
+use echolume::low_level::source::igtl::{
     Coordinates, DecodeError, Decoded, HEADER, Image, Message, Pairing, Region, Scalar, Tool, ToolKind, TrackingData,
     Transform, Version, crc64, decode, encode,
 };
-use echolume::source::live::{Event, Live};
-use echolume::source::piped::Piped;
+use echolume::low_level::source::live::{Event, Live};
+use echolume::low_level::source::piped::Piped;
 use std::io::Cursor;
 use std::time::{Duration, Instant};
 

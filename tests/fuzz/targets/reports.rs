@@ -1,13 +1,13 @@
 //! Reports of earlier runs, and ordinary pictures.
 
 use super::{told, written};
-use echolume::error_report::choose::Bound;
-use echolume::error_report::{Measure, Report, choose, export as error_export};
-use echolume::picture::Grey;
-use echolume::profile::{Profile, compare, export};
+use echolume::low_level::error_report::choose::Bound;
+use echolume::low_level::error_report::{Measure, Report, choose, export as error_export};
+use echolume::low_level::picture::Grey;
+use echolume::low_level::profile::{Profile, compare, export};
 #[cfg(feature = "view")]
-use echolume::ui::frame_budget::measured_ladder;
-use echolume::verify::report::{self, baseline, html as page, junit};
+use echolume::low_level::ui::frame_budget::measured_ladder;
+use echolume::low_level::verify::report::{self, baseline, html as page, junit};
 
 pub fn error_report(bytes: &[u8]) -> String {
     let report = match Report::from_json(&String::from_utf8_lossy(bytes)) {

@@ -2,12 +2,12 @@
 
 use super::probes::wobbler;
 use super::{told, written};
-use echolume::passes::DispatchArgs;
-use echolume::plan::Plan;
-use echolume::probe::{Advance, Axis, Geometry, Grid, Motion, Probe};
-use echolume::scene::load::Layers;
-use echolume::scene::{Input, Scene, Settings, transfer};
-use echolume::source::StoredType;
+use echolume::low_level::passes::DispatchArgs;
+use echolume::low_level::plan::Plan;
+use echolume::low_level::probe::{Advance, Axis, Geometry, Grid, Motion, Probe};
+use echolume::low_level::scene::load::Layers;
+use echolume::low_level::scene::{Input, Scene, Settings, transfer};
+use echolume::low_level::source::StoredType;
 
 fn geometries() -> [Geometry; 3] {
     let fan = Probe { advance: Advance::Same(0.02), ..wobbler() };

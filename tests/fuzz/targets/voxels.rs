@@ -1,9 +1,11 @@
 //! Tracked frames with any pose.
 
 use super::{Bytes, told};
-use echolume::probe::Grid;
-use echolume::source::StoredType;
-use echolume::source::freehand::{Compounder, CompoundingOptions, Lattice, Overlap, Pose, Splat, TrackedFrame};
+use echolume::low_level::probe::Grid;
+use echolume::low_level::source::StoredType;
+use echolume::low_level::source::freehand::{
+    Compounder, CompoundingOptions, Lattice, Overlap, Pose, Splat, TrackedFrame,
+};
 use glam::{DAffine3, DVec3};
 
 const MOST_VOXELS: usize = 1 << 12;

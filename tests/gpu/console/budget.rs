@@ -1,8 +1,9 @@
 //! What a frame budget leaves alone: frames that are there are never sent again, and what only changes tone or light casts no ray.
 
 use super::*;
-use echolume::gpu::TimeStamps;
-use echolume::passes::{Stage, by_name};
+use crate::common::wait;
+use echolume::low_level::gpu::TimeStamps;
+use echolume::low_level::passes::{Stage, by_name};
 
 impl Desk {
     /// The passes that ran since the last call: stage, name and number of runs.
@@ -24,7 +25,7 @@ impl Desk {
 
     /// Drags when the view has come to rest, and draws every picture on the way. Returns the settings of those pictures.
     fn drag_slowly(&mut self, from: [f64; 2], to: [f64; 2]) -> Vec<Settings> {
-        std::thread::sleep(LATER);
+        wait::pace(LATER);
         self.console.input(&Input::Moved(from));
         self.console.input(&Input::Button { button: Button::Left, pressed: true });
         let mut drawn = Vec::new();
@@ -38,7 +39,7 @@ impl Desk {
             // Pipelines are compiled in the background.
             while !self.has_drawn_all() {
                 assert!(begun.elapsed() < BOUND, "it is never drawn");
-                std::thread::sleep(Duration::from_millis(1));
+                wait::poll();
                 self.tick(now);
             }
             drawn.push(self.console.stream().scene().expect("begun").settings.clone());
@@ -76,7 +77,7 @@ fn tone_casts_no_ray_light_keeps_the_distance_map_and_no_rung_runs_stage_1() {
     assert!(ran.iter().any(|(_, name, _)| *name == "raycast_surface"), "{ran:?}");
     assert!(ran.iter().all(|(stage, ..)| *stage != Stage::Preprocess), "a rung runs stage 1: {ran:?}");
 
-    std::thread::sleep(LATER);
+    wait::pace(LATER);
     let before = desk.console.stream().dispatches();
     desk.press(Key::Char(']'));
     desk.tick(Instant::now());
@@ -165,7 +166,7 @@ fn live_volumes_that_come_faster_than_pictures_go_down_the_ladder_until_they_are
         let now = start + Duration::from_micros(number.into());
         while desk.console.stream().volumes_shown() <= u64::from(number) || !desk.console.stream().is_idle() {
             assert!(begun.elapsed() < BOUND, "volume {number} is never shown");
-            std::thread::sleep(Duration::from_millis(1));
+            wait::poll();
             desk.tick(now);
         }
         rungs.push(desk.console.quality().rays);

@@ -2,7 +2,7 @@
 
 use super::*;
 use ash::vk;
-use echolume::gpu::faults::InjectionPoint;
+use echolume::low_level::gpu::faults::InjectionPoint;
 
 /// Prevents a console that ends with its probe, or does not find it again by itself.
 #[test]

@@ -1,7 +1,7 @@
 //! From input to picture: the same, byte for byte, as one drawn from the same settings by a separate renderer.
 
 use super::*;
-use echolume::source::recorder::Reader;
+use echolume::low_level::source::recorder::Reader;
 
 const SHIFT: Modifiers = Modifiers { shift: true, control: false, alt: false };
 
@@ -136,7 +136,7 @@ fn exported_files_are_what_was_shown_and_recorded() {
     assert!(folder.wait("png", |file| Picture::load(file).ok()) == seen[1]);
     let mut replay = folder.wait("frames", |file| Reader::open(file).ok().filter(|r| !r.rebuilt() && r.frames() == 27));
     assert!(*replay.header() == header(0.3));
-    use echolume::source::Source;
+    use echolume::low_level::source::Source;
     for expected in (0..3).flat_map(body).collect::<Vec<_>>().chunks(9) {
         let mut expected = expected.to_vec();
         expected.sort_by_key(|frame| frame.slice);
@@ -152,7 +152,7 @@ fn exported_files_are_what_was_shown_and_recorded() {
 /// Prevents a loop that plays or saves volumes beyond its marks.
 #[test]
 fn a_trimmed_loop_is_played_back_and_forth_and_saved() {
-    use echolume::source::Source;
+    use echolume::low_level::source::Source;
     let (device, folder) = (Device::new(), Folder::new("trimmed"));
     let mut desk = Desk::new(&device, ConsoleOptions { folder: folder.0.clone(), ..options() });
     desk.begin();

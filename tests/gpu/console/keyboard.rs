@@ -1,7 +1,8 @@
 //! The keyboard on the panels, and what a screen reader asks of them, through the console.
 
 use super::*;
-use echolume::ui::panels::accesskit::{Action, ActionRequest, NodeId, Role, TreeId, TreeUpdate};
+use crate::common::wait;
+use echolume::low_level::ui::panels::accesskit::{Action, ActionRequest, NodeId, Role, TreeId, TreeUpdate};
 
 const CONTROL: Modifiers = Modifiers { shift: false, control: true, alt: false };
 
@@ -47,7 +48,7 @@ fn control_tab_gives_the_keyboard_to_the_panels_and_back() {
     // A letter is the view's, whoever has the keyboard.
     desk.press(Key::Char('2'));
     desk.rest();
-    assert_eq!(desk.console.controls().settings().mode, echolume::scene::Mode::Volume);
+    assert_eq!(desk.console.controls().settings().mode, echolume::low_level::scene::Mode::Volume);
     desk.press(Key::Escape);
     assert_eq!(focused(&mut desk), None, "Escape leaves the panels, not the program");
     desk.press(Key::Tab);
@@ -108,7 +109,7 @@ fn the_pointer_by_keyboard_does_what_the_mouse_does() {
     keys.press(Key::Space);
     press(&mut keys, Key::Right, 12);
     // A drag that pauses is one step for undo.
-    std::thread::sleep(Duration::from_millis(600));
+    wait::pace(Duration::from_millis(600));
     press(&mut keys, Key::Right, 8);
     keys.press(Key::Space);
     let light = |desk: &Desk| desk.console.controls().settings().light.direction;

@@ -1,7 +1,8 @@
 //! What a kiosk tells Prometheus.
 
 use super::*;
-use echolume::live::metrics::INTERVAL;
+use crate::common::wait;
+use echolume::low_level::live::metrics::INTERVAL;
 
 /// The value of a sample without labels.
 fn value(told: &str, name: &str) -> f64 {
@@ -22,7 +23,7 @@ fn metrics_are_written_at_once_at_intervals_and_at_the_end() {
     let wait = |until: &dyn Fn(&str) -> bool| {
         while !until(&read()) {
             assert!(begun.elapsed() < BOUND, "{}", read());
-            std::thread::sleep(Duration::from_millis(1));
+            wait::poll();
         }
     };
     wait(&|told| told.ends_with("echolume_frozen 0\n"));

@@ -17,21 +17,22 @@ mod warming;
 
 use crate::common::gpu::*;
 use crate::common::scenes::settings;
+use crate::common::wait;
 use crate::live::header;
 use crate::live_control::{BOUND, Fed, ROOM};
-use echolume::gpu::{self, Context, Renderer};
-use echolume::live::Update;
-use echolume::live::Views;
-use echolume::picture::Picture;
-use echolume::scene::{Layout, Settings};
-use echolume::source::Frame;
-use echolume::source::live::SourceKind;
-use echolume::source::live::{Event, Live};
-use echolume::ui::command::{Command, Tool};
-use echolume::ui::console::{Console, ConsoleError, ConsoleOptions, LoopRequest};
-use echolume::ui::frame_budget::{Quality, built_in_ladder};
-use echolume::ui::input::{Button, Input, Key, Modifiers};
-use echolume::ui::source_supervisor::OpenSource;
+use echolume::low_level::gpu::{self, Context, Renderer};
+use echolume::low_level::live::Update;
+use echolume::low_level::live::Views;
+use echolume::low_level::picture::Picture;
+use echolume::low_level::scene::{Layout, Settings};
+use echolume::low_level::source::Frame;
+use echolume::low_level::source::live::SourceKind;
+use echolume::low_level::source::live::{Event, Live};
+use echolume::low_level::ui::command::{Command, Tool};
+use echolume::low_level::ui::console::{Console, ConsoleError, ConsoleOptions, LoopRequest};
+use echolume::low_level::ui::frame_budget::{Quality, built_in_ladder};
+use echolume::low_level::ui::input::{Button, Input, Key, Modifiers};
+use echolume::low_level::ui::source_supervisor::OpenSource;
 use std::sync::mpsc::{Receiver, Sender, channel};
 use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
@@ -52,7 +53,7 @@ pub fn options() -> ConsoleOptions {
         update: Update::Whole,
         images: 3,
         queues: None,
-        time_stamps: echolume::gpu::TimeStamps::default(),
+        time_stamps: echolume::low_level::gpu::TimeStamps::default(),
         statistics_interval: Duration::from_secs(1),
         cine: ROOM,
         budget: None,
@@ -73,7 +74,7 @@ pub fn options() -> ConsoleOptions {
         open_file: None,
         first_steps: None,
         recordings: Arc::default(),
-        progress: echolume::files::progress::Progress::default(),
+        progress: echolume::low_level::files::progress::Progress::default(),
         recent: None,
         presets: None,
         startup_fault: None,
@@ -92,7 +93,7 @@ impl Folder {
             if let Some(it) = files.filter(|f| f.extension().is_some_and(|e| e == ending)).find_map(|f| read(&f)) {
                 return it;
             }
-            std::thread::sleep(Duration::from_millis(2));
+            wait::poll();
         }
     }
 }
@@ -170,7 +171,7 @@ impl Desk {
                 return Ok(next);
             }
             if still > 0 {
-                std::thread::sleep(Duration::from_millis(1));
+                wait::poll();
             }
         }
     }

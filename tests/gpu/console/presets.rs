@@ -1,8 +1,9 @@
 //! The list of presets: small pictures of the present volume beside the view, and the presets of the user.
 
 use super::*;
-use echolume::scene::{Mode, TransferName};
-use echolume::user_presets::read;
+use crate::common::wait;
+use echolume::low_level::scene::{Mode, TransferName};
+use echolume::low_level::user_presets::read;
 use std::path::PathBuf;
 
 const CONTROL: Modifiers = Modifiers { shift: false, control: true, alt: false };
@@ -35,7 +36,7 @@ impl Desk {
                 return made;
             }
             assert!(begun.elapsed() < BOUND, "{} thumbnails", made.len());
-            std::thread::sleep(Duration::from_millis(2));
+            wait::poll();
         }
     }
 }

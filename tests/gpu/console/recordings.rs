@@ -1,12 +1,13 @@
 //! Several recordings in one window: each comes back as it was left, and what is being read is shown, can be ended, and leaves the picture usable.
 
 use super::*;
-use echolume::files::progress::{self, Progress};
-use echolume::scene::{MeasureKind, Mode};
-use echolume::source::live::{Playback, PlaybackSource};
-use echolume::source::phantom::{CachedPhantom, Phantom, PhantomOptions, Speckle};
-use echolume::ui::panels::accesskit::{Node, Role};
-use echolume::ui::recordings::{OpenRecordings, Recordings};
+use crate::common::wait;
+use echolume::low_level::files::progress::{self, Progress};
+use echolume::low_level::scene::{MeasureKind, Mode};
+use echolume::low_level::source::live::{Playback, PlaybackSource};
+use echolume::low_level::source::phantom::{CachedPhantom, Phantom, PhantomOptions, Speckle};
+use echolume::low_level::ui::panels::accesskit::{Node, Role};
+use echolume::low_level::ui::recordings::{OpenRecordings, Recordings};
 use std::path::{Path, PathBuf};
 
 const WINDOW: [u32; 2] = [900, 700];
@@ -101,7 +102,7 @@ impl Window {
                 return found;
             }
             assert!(begun.elapsed() < BOUND, "no {what}");
-            std::thread::sleep(Duration::from_millis(1));
+            wait::poll();
         }
     }
 
@@ -156,7 +157,7 @@ impl Window {
         let close: Vec<String> = close.into_iter().map(|(_, name)| name).collect();
         let is_shown = |name: &String| {
             let node = self.find(Role::Button, name).unwrap_or_else(|| panic!("{name}: {:?}", self.tree));
-            node.toggled() == Some(echolume::ui::panels::accesskit::Toggled::True)
+            node.toggled() == Some(echolume::low_level::ui::panels::accesskit::Toggled::True)
         };
         close.iter().map(|name| if is_shown(name) { format!("> {name}") } else { name.clone() }).collect()
     }

@@ -1,8 +1,9 @@
 //! Shaders from a folder: those of the system's compilers draw what the embedded ones draw, and a running view draws what was edited.
 
 use super::*;
-use echolume::gpu::shader_reload::ShaderFolder;
-use echolume::shader_tools::Compiler;
+use crate::common::wait;
+use echolume::low_level::gpu::shader_reload::ShaderFolder;
+use echolume::low_level::shader_tools::Compiler;
 use std::path::Path;
 
 const TONE: &str = "postprocess/assemble.comp";
@@ -48,7 +49,7 @@ fn until(desk: &mut Desk, what: &str, mut is: impl FnMut(&mut Desk) -> bool) {
     while !is(desk) {
         assert!(begun.elapsed() < BOUND, "{what}: {:?}", desk.console.shader_fault());
         desk.tick(Instant::now() + LATER);
-        std::thread::sleep(Duration::from_millis(2));
+        wait::poll();
     }
 }
 

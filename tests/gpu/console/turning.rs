@@ -1,7 +1,7 @@
 //! The turntable of the view.
 
 use super::*;
-use echolume::scene::Mode;
+use echolume::low_level::scene::Mode;
 
 const KEY: Modifiers = Modifiers { shift: true, control: false, alt: false };
 

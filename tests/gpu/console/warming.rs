@@ -1,7 +1,8 @@
 //! Pipelines that are compiled while the user rests, so that another mode is there at once.
 
 use super::*;
-use echolume::scene::{Mode, load::PRESETS, variants};
+use crate::common::wait;
+use echolume::low_level::scene::{Mode, load::PRESETS, variants};
 use std::sync::atomic::Ordering;
 
 /// Longer than a user must have rested.
@@ -19,7 +20,7 @@ impl Desk {
         assert!(self.console.stream().has_warmed());
         while self.console.stream().is_warming() {
             assert!(begun.elapsed() < BOUND, "it never ends");
-            std::thread::sleep(Duration::from_millis(2));
+            wait::poll();
             self.tick(Instant::now() + RESTED);
         }
         compiled(device) - before
@@ -89,7 +90,7 @@ fn an_input_ends_warming_and_a_rest_takes_it_up_again() {
     desk.console.input(&Input::Moved([40.0, 36.0]));
     assert!(!desk.console.stream().is_warming(), "an input does not end it");
     let begun = compiled(&device);
-    std::thread::sleep(Duration::from_millis(300));
+    wait::watch(Duration::from_millis(300));
     let after = compiled(&device);
     assert!(after <= begun + 1, "{} pipelines after the one in the making", after - begun);
     assert!(desk.warm_up(&device) > 20);

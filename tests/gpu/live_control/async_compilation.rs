@@ -1,13 +1,14 @@
 //! Settings whose pipelines compile in the background, and those that the device cannot draw.
 
 use super::*;
+use crate::common::wait;
 use ash::vk;
-use echolume::gpu::Wake;
-use echolume::gpu::faults::InjectionPoint;
-use echolume::live::StartStep;
-use echolume::plan::Plan;
-use echolume::probe::{Axis, Geometry, Probe};
-use echolume::scene::{Scene, VolumeFormat};
+use echolume::low_level::gpu::Wake;
+use echolume::low_level::gpu::faults::InjectionPoint;
+use echolume::low_level::live::StartStep;
+use echolume::low_level::plan::Plan;
+use echolume::low_level::probe::{Axis, Geometry, Probe};
+use echolume::low_level::scene::{Scene, VolumeFormat};
 use std::sync::Arc;
 use std::sync::atomic::AtomicU64;
 
@@ -100,7 +101,7 @@ fn what_compiles_during_a_picture_is_drawn_after_it() {
     let begun = Instant::now();
     while woken.load(Ordering::Relaxed) < count {
         assert!(begun.elapsed() < BOUND, "{} of {count} pipelines", woken.load(Ordering::Relaxed));
-        std::thread::sleep(Duration::from_millis(1));
+        wait::poll();
     }
     // As an event loop does it: without an event, only what has something to do is asked.
     let mut drawn = 0;
@@ -348,7 +349,7 @@ fn a_thread_that_panics_over_the_first_pipelines_wakes_the_stream() {
     let begun = Instant::now();
     while woken.load(Ordering::Relaxed) < 2 {
         assert!(begun.elapsed() < BOUND, "nobody was woken");
-        std::thread::sleep(Duration::from_millis(1));
+        wait::poll();
     }
     assert!(!bench.stream.is_idle());
     assert!(bench.picture() == (0, of(&plain, toml, 0)));

@@ -1,7 +1,7 @@
 //! Freezing, the cine loop, and settings that change while no frames arrive.
 
 use super::*;
-use echolume::source::recorder::Reader;
+use echolume::low_level::source::recorder::Reader;
 
 /// Prevents a frozen picture that changes, work for frames that are not shown, a recording with a gap, and a volume whose first
 /// frames arrived while frozen from being shown as complete.

@@ -1,7 +1,8 @@
 //! Sources and devices that are replaced during viewing, and idle streams.
 
 use super::*;
-use echolume::probe::Geometry;
+use crate::common::wait;
+use echolume::low_level::probe::Geometry;
 
 /// Frames of another probe.
 fn other() -> (Header, Vec<Frame>) {
@@ -135,7 +136,7 @@ fn what_a_source_counted_is_kept_when_another_follows() {
     struct Unreachable;
     impl Live for Unreachable {
         fn next(&mut self, patience: Duration) -> Event {
-            std::thread::sleep(patience.min(Duration::from_millis(1)));
+            wait::pace(patience.min(Duration::from_millis(1)));
             Event::Idle
         }
 
@@ -154,7 +155,7 @@ fn what_a_source_counted_is_kept_when_another_follows() {
         let begun = Instant::now();
         while stream.feed_counts().disconnected < sources {
             assert!(begun.elapsed() < BOUND, "source {sources}: {:?}", stream.feed_counts());
-            std::thread::sleep(Duration::from_millis(1));
+            wait::poll();
         }
         assert_eq!(stream.take_statistics().expect("statistics").faults.disconnected, 1, "source {sources}");
         stream.replace_source(feed());

@@ -1,6 +1,7 @@
 //! The client against servers of the tests on the loopback interface.
 
 use super::messages::*;
+use crate::common::wait;
 use std::io::{Read, Write};
 use std::net::{TcpListener, TcpStream};
 use std::sync::mpsc;
@@ -62,17 +63,8 @@ fn take(client: &Client) -> Message {
     received.unwrap_or_else(|| panic!("nothing came: {:?}, {:?}", client.statistics(), client.last_error())).message
 }
 
-/// Waits for it, 10 s at most.
 fn until(client: &Client, reached: impl Fn(&ClientStatistics) -> bool) -> ClientStatistics {
-    let started = Instant::now();
-    loop {
-        let statistics = client.statistics();
-        if reached(&statistics) {
-            return statistics;
-        }
-        assert!(started.elapsed() < Duration::from_secs(10), "{statistics:?}, {:?}", client.last_error());
-        thread::sleep(Duration::from_millis(5));
-    }
+    wait::until("such statistics", || Some(client.statistics()).filter(&reached))
 }
 
 /// Drops the client, which may take a second.
@@ -219,10 +211,7 @@ fn tries_come_apart_and_no_further_than_the_longest_wait() {
 fn a_server_that_comes_later_is_found() {
     let address = nowhere();
     let client = Client::connect(&address, quick()).unwrap();
-    let started = Instant::now();
-    while client.last_error().is_none() && started.elapsed() < Duration::from_secs(10) {
-        thread::sleep(Duration::from_millis(5));
-    }
+    wait::until("an error", || client.last_error());
     assert!(!client.statistics().connected && client.next(Duration::from_millis(20)).is_none());
     let listener = TcpListener::bind(&address).unwrap();
     thread::spawn(move || {
@@ -246,11 +235,7 @@ fn dropping_ends_the_thread_in_every_state() {
     // Waiting to retry, and with an invalid address.
     for address in [nowhere().as_str(), "not an address", "", "127.0.0.1:99999"] {
         let client = Client::connect(address, ClientOptions::default()).unwrap();
-        let started = Instant::now();
-        while client.last_error().is_none() && started.elapsed() < Duration::from_secs(10) {
-            thread::sleep(Duration::from_millis(5));
-        }
-        let error = client.last_error().unwrap_or_default();
+        let error = wait::until("an error", || client.last_error());
         assert!(error.starts_with("cannot connect: "), "{address}: {error}");
         gone(client);
     }

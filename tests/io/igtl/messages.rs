@@ -1,7 +1,7 @@
 //! Messages built by the tests.
 
 use crate::common::files::data;
-pub use echolume::source::igtl::*;
+pub use echolume::low_level::source::igtl::*;
 pub use proptest::prelude::*;
 pub use std::time::{Duration, Instant};
 

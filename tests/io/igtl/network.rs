@@ -2,13 +2,13 @@
 
 use super::client::*;
 use super::messages::*;
-use echolume::probe::{Geometry, Grid, World};
-use echolume::source::freehand::{self, Schedule};
-use echolume::source::live::{Event, Live};
-use echolume::source::recorder::Header;
-use echolume::source::{Frame, StoredType};
+use crate::common::wait;
+use echolume::low_level::probe::{Geometry, Grid, World};
+use echolume::low_level::source::freehand::{self, Schedule};
+use echolume::low_level::source::live::{Event, Live};
+use echolume::low_level::source::recorder::Header;
+use echolume::low_level::source::{Frame, StoredType};
 use glam::DVec3;
-use std::thread;
 
 fn options() -> NetworkOptions {
     NetworkOptions { client: quick(), ..NetworkOptions::default() }
@@ -30,12 +30,8 @@ fn until(network: &mut Network, is_last: impl Fn(&Event) -> bool) -> Vec<Event> 
     events
 }
 
-/// Waits for so many messages, for 10 s at most.
 fn received(network: &Network, messages: u64) {
-    let started = Instant::now();
-    while network.statistics().messages < messages && started.elapsed() < Duration::from_secs(10) {
-        thread::sleep(Duration::from_millis(5));
-    }
+    wait::until("the messages", || (network.statistics().messages >= messages).then_some(()));
 }
 
 fn is_fault(named: &str) -> impl Fn(&Event) -> bool + use<'_> {
@@ -192,7 +188,7 @@ fn tracked_frames_become_a_volume_that_goes_on_growing() {
         let script: Script = Box::new(move |mut stream| {
             use std::io::Write;
             stream.write_all(&[0, 1, 2, 4].map(message).concat()).unwrap();
-            thread::sleep(Duration::from_millis(300));
+            wait::pace(Duration::from_millis(300));
             stream.write_all(&[3, 9].map(message).concat()).unwrap();
             stay(&mut stream);
         });

@@ -3,12 +3,12 @@
 use super::messages::*;
 use crate::common::probes::wobbler;
 use crate::common::wait::until;
-use echolume::probe::{Axis, Geometry, Grid, Probe, World};
-use echolume::source::convert::{Volume, lattice};
-use echolume::source::igtl;
-use echolume::source::live::{Event, Live};
-use echolume::source::recorder::Header;
-use echolume::source::{Frame, StoredType};
+use echolume::low_level::probe::{Axis, Geometry, Grid, Probe, World};
+use echolume::low_level::source::convert::{Volume, lattice};
+use echolume::low_level::source::igtl;
+use echolume::low_level::source::live::{Event, Live};
+use echolume::low_level::source::recorder::Header;
+use echolume::low_level::source::{Frame, StoredType};
 use glam::{DAffine3, DMat3, DVec3};
 use std::io::{Read, Write};
 use std::net::TcpStream;

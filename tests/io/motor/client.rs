@@ -1,7 +1,7 @@
 //! The simulated module as any TMCL client meets it: raw bytes on its port, the kinds of requests that a stock client sends.
 
 use crate::common::motor::simulated;
-use echolume::probe::motor::tmcl::{LENGTH, Reply, Request, checksum, version_text};
+use echolume::low_level::probe::motor::tmcl::{LENGTH, Reply, Request, checksum, version_text};
 use std::fs::{File, OpenOptions};
 use std::io::{Read, Write};
 

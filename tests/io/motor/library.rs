@@ -2,10 +2,12 @@
 
 use crate::common::motor::{settings, simulated, stopped_at_last, table};
 use crate::common::wait::eventually;
-use echolume::probe::motor::simulate::{Simulator, SimulatorOptions};
-use echolume::probe::motor::table::{Home, Side, Units};
-use echolume::probe::motor::tmcl::{Request, axis, command};
-use echolume::probe::motor::{ArrayState, Direction, Drive, Fault, MotorTable, Position, Stopped, Sweep, Track};
+use echolume::low_level::probe::motor::simulate::{Simulator, SimulatorOptions};
+use echolume::low_level::probe::motor::table::{Home, Side, Units};
+use echolume::low_level::probe::motor::tmcl::{Request, axis, command};
+use echolume::low_level::probe::motor::{
+    ArrayState, Direction, Drive, Fault, MotorTable, Position, Stopped, Sweep, Track,
+};
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::time::{Duration, Instant};
 

@@ -2,10 +2,10 @@
 
 use crate::common::files::{Folder, MOTOR_PROBE};
 use crate::common::motor::table;
-use echolume::probe::ProbeFile;
-use echolume::probe::motor::simulate::SimulatedFault;
-use echolume::probe::motor::table::Units;
-use echolume::probe::motor::{ArrayState, Direction, MotorTable, Position, Sweep, Track};
+use echolume::low_level::probe::ProbeFile;
+use echolume::low_level::probe::motor::simulate::SimulatedFault;
+use echolume::low_level::probe::motor::table::Units;
+use echolume::low_level::probe::motor::{ArrayState, Direction, MotorTable, Position, Sweep, Track};
 use proptest::prelude::*;
 use std::time::Duration;
 

@@ -1,6 +1,6 @@
 //! TMCL on the wire: the manuals' examples, and bytes of any kind.
 
-use echolume::probe::motor::tmcl::{LENGTH, Reply, Request, axis, checksum, status_words, version_text};
+use echolume::low_level::probe::motor::tmcl::{LENGTH, Reply, Request, axis, checksum, status_words, version_text};
 use proptest::prelude::*;
 
 #[test]

@@ -2,15 +2,16 @@
 
 use crate::common::motor::{settings, simulated, stopped_at_last, table};
 use crate::common::probes::wobbler;
+use crate::common::wait;
 use crate::common::wait::eventually;
-use echolume::probe::motor::simulate::Simulator;
-use echolume::probe::motor::{BackgroundSweep, Drive, Sweep};
-use echolume::probe::{Advance, Array, Axis, Geometry, Motion, Probe};
-use echolume::source::live::{Event, Live};
-use echolume::source::motor_tracking::{Clock, FreeRunning, MotorTracked, MotorTrackingOptions};
-use echolume::source::phantom;
-use echolume::source::recorder::Header;
-use echolume::source::{Frame, StoredType};
+use echolume::low_level::probe::motor::simulate::Simulator;
+use echolume::low_level::probe::motor::{BackgroundSweep, Drive, Sweep};
+use echolume::low_level::probe::{Advance, Array, Axis, Geometry, Motion, Probe};
+use echolume::low_level::source::live::{Event, Live};
+use echolume::low_level::source::motor_tracking::{Clock, FreeRunning, MotorTracked, MotorTrackingOptions};
+use echolume::low_level::source::phantom;
+use echolume::low_level::source::recorder::Header;
+use echolume::low_level::source::{Frame, StoredType};
 use std::sync::Arc;
 use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
 
@@ -76,7 +77,7 @@ impl Live for Free {
         let angle = self.simulator.angle();
         let (began, stamp, angle) = *self.taking.get_or_insert((Instant::now(), SystemTime::now(), angle));
         let left = (began + Duration::from_millis(10)).saturating_duration_since(Instant::now());
-        std::thread::sleep(left.min(patience));
+        wait::pace(left.min(patience));
         if left > patience {
             return Event::Idle;
         }

@@ -1,8 +1,8 @@
 //! Recordings built by the tests.
 
 pub use crate::common::files::{Folder, SWEEP, data as stored};
-pub use echolume::probe::{Advance, Array, Axis, Geometry, Motion, Probe};
-pub use echolume::source::{Frame, InputError, Recording, SampleType, StoredType};
+pub use echolume::low_level::probe::{Advance, Array, Axis, Geometry, Motion, Probe};
+pub use echolume::low_level::source::{Frame, InputError, Recording, SampleType, StoredType};
 pub use flate2::{Compression, write::ZlibEncoder};
 pub use proptest::prelude::*;
 pub use std::fs;

@@ -3,7 +3,7 @@
 
 mod refused;
 
-use echolume::probe::{Advance, Array, Axis, Indices, Motion, Probe};
+use echolume::low_level::probe::{Advance, Array, Axis, Indices, Motion, Probe};
 use glam::DVec3;
 use std::f64::consts::PI;
 

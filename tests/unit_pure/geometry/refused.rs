@@ -1,7 +1,7 @@
 //! Geometries that are refused, and those just within the limits.
 
 use super::{fan, linear, still};
-use echolume::probe::{Advance, Array, Axis, Motion, Probe};
+use echolume::low_level::probe::{Advance, Array, Axis, Motion, Probe};
 use std::f64::consts::{FRAC_PI_2, PI};
 
 /// Refused with this field, in a message that contains all of these words.

@@ -2,7 +2,7 @@
 
 use super::sample_names;
 use crate::common::files::repository;
-use echolume::metrics::{Metric, table};
+use echolume::low_level::metrics::{Metric, table};
 use serde_json::Value;
 use std::collections::BTreeSet;
 use std::process::Command;

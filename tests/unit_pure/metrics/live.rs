@@ -1,12 +1,12 @@
 //! The metrics of a live run.
 
 use super::{Metrics, parsed};
-use echolume::live::Statistics;
-use echolume::live::metrics::{Conditions, SourceStatus, text};
-use echolume::live::statistics::SourceFaults;
-use echolume::live::volume_pool::VolumeCounts;
-use echolume::metrics::table;
-use echolume::passes::PassTime;
+use echolume::low_level::live::Statistics;
+use echolume::low_level::live::metrics::{Conditions, SourceStatus, text};
+use echolume::low_level::live::statistics::SourceFaults;
+use echolume::low_level::live::volume_pool::VolumeCounts;
+use echolume::low_level::metrics::table;
+use echolume::low_level::passes::PassTime;
 use std::collections::BTreeSet;
 use std::time::Duration;
 

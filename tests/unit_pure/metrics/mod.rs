@@ -4,7 +4,7 @@
 mod fleet;
 mod live;
 
-use echolume::metrics::{Kind, Metric, table};
+use echolume::low_level::metrics::{Kind, Metric, table};
 use std::collections::{BTreeMap, BTreeSet};
 
 /// Labels of a sample and its value.

@@ -2,9 +2,9 @@
 
 use super::{FILTERED, scene};
 use crate::common::probes::voxels;
-use echolume::barriers::{Access, PipelineStage, PipelineStages, Resource, accesses};
-use echolume::passes::slots::frames_per_batch;
-use echolume::passes::{DispatchArgs, Slot, by_name};
+use echolume::low_level::barriers::{Access, PipelineStage, PipelineStages, Resource, accesses};
+use echolume::low_level::passes::slots::frames_per_batch;
+use echolume::low_level::passes::{DispatchArgs, Slot, by_name};
 use std::ops::Range;
 
 /// Slot, volume image, and parts.

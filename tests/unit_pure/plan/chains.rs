@@ -3,11 +3,11 @@
 use super::{fan, scene};
 use crate::common::probes::voxels;
 use crate::common::scenes;
-use echolume::passes::chain::{copied, distance_end, picture_end};
-use echolume::passes::{DispatchArgs, Part, Pass, Slot, by_name, rendered};
-use echolume::probe::Advance;
-use echolume::scene::{Input, Scene, VisibleBounds};
-use echolume::source::StoredType;
+use echolume::low_level::passes::chain::{copied, distance_end, picture_end};
+use echolume::low_level::passes::{DispatchArgs, Part, Pass, Slot, by_name, rendered};
+use echolume::low_level::probe::Advance;
+use echolume::low_level::scene::{Input, Scene, VisibleBounds};
+use echolume::low_level::source::StoredType;
 
 fn pass(name: &str) -> &'static Pass {
     by_name(name).expect("pass")

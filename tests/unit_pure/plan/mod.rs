@@ -7,11 +7,11 @@ mod reruns;
 
 use crate::common::probes::{voxels, wobbler};
 use crate::common::scenes;
-use echolume::passes::{Frequency, Slot};
-use echolume::plan::{Plan, Step, affected};
-use echolume::probe::{Advance, Geometry, Probe};
-use echolume::scene::{Input, Scene, VisibleBounds};
-use echolume::source::StoredType;
+use echolume::low_level::passes::{Frequency, Slot};
+use echolume::low_level::plan::{Plan, Step, affected};
+use echolume::low_level::probe::{Advance, Geometry, Probe};
+use echolume::low_level::scene::{Input, Scene, VisibleBounds};
+use echolume::low_level::source::StoredType;
 
 fn fan(advance: Advance) -> Geometry {
     Geometry::Sweep(Probe { advance, ..wobbler() })

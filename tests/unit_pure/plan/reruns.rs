@@ -2,9 +2,9 @@
 
 use super::{FILTERED, fan, scene};
 use crate::common::probes::voxels;
-use echolume::plan::{Contents, Plan, Rerun};
-use echolume::probe::{Advance, Geometry};
-use echolume::scene::{Input, Scene};
+use echolume::low_level::plan::{Contents, Plan, Rerun};
+use echolume::low_level::probe::{Advance, Geometry};
+use echolume::low_level::scene::{Input, Scene};
 
 const SURFACE: &str = "mode = 'sr'
     picture = { size = [24, 24] }
@@ -186,7 +186,7 @@ fn a_filter_with_an_overwritten_input_reruns_the_filters_before_it() {
     };
     // The state after a picture.
     let mut contents = Contents::new();
-    for step in plan.steps.iter().filter(|s| s.pass.frequency != echolume::passes::Frequency::Frame) {
+    for step in plan.steps.iter().filter(|s| s.pass.frequency != echolume::low_level::passes::Frequency::Frame) {
         contents.extend(step.writes(&scene).into_iter().map(|slot| (slot, step.id())));
     }
     let bilateral = |n| ("bilateral_distance", n);

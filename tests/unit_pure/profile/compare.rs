@@ -1,9 +1,9 @@
 //! Comparisons of simulated runs: how often identical ones are called different, and whether differences are found.
 
 use super::simulated::{Noise, Random, pass, profile, run};
-use echolume::profile::Profile;
-use echolume::profile::compare::{CompareError, CompareOptions, Comparison, Kind, Line, Verdict, compare};
-use echolume::profile::export::comparison_table;
+use echolume::low_level::profile::Profile;
+use echolume::low_level::profile::compare::{CompareError, CompareOptions, Comparison, Kind, Line, Verdict, compare};
+use echolume::low_level::profile::export::comparison_table;
 
 const PAIRS: u32 = 400;
 

@@ -1,8 +1,8 @@
 //! Tables, CSV and JSON of a profile.
 
 use super::simulated::{Noise, Random, pass, profile, run};
-use echolume::profile::export::{csv, csv_samples, profile_table};
-use echolume::profile::{Profile, settings_hash};
+use echolume::low_level::profile::export::{csv, csv_samples, profile_table};
+use echolume::low_level::profile::{Profile, settings_hash};
 
 fn measured() -> Profile {
     let mut profile = run(&mut Random(81), 4, 30, Noise { spread: 0.03, ..Noise::default() });

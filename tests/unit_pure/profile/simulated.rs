@@ -1,7 +1,9 @@
 //! Simulated runs with a known truth.
 
-use echolume::machine::Device;
-use echolume::profile::{Acquisition, Ceiling, Ceilings, FORMAT, PassProfile, Profile, Sizes, settings_hash};
+use echolume::low_level::machine::Device;
+use echolume::low_level::profile::{
+    Acquisition, Ceiling, Ceilings, FORMAT, PassProfile, Profile, Sizes, settings_hash,
+};
 
 /// Vigna's splitmix64: the same numbers everywhere.
 pub struct Random(pub u64);

@@ -1,6 +1,6 @@
 //! Expected numbers: scipy 1.17.1 and numpy, in the calls named beside them.
 
-use echolume::profile::statistics::{
+use echolume::low_level::profile::statistics::{
     Sample, SampleError, block_medians, drift, hodges_lehmann, holm, mann_whitney, min_p, normal_tail,
 };
 

@@ -1,8 +1,8 @@
 //! Traces obey the rules of the Trace Event Format.
 
 use super::simulated::{Random, pass, profile};
-use echolume::profile::Profile;
-use echolume::profile::export::{Span, Track, chrome_trace};
+use echolume::low_level::profile::Profile;
+use echolume::low_level::profile::export::{Span, Track, chrome_trace};
 use serde_json::Value;
 use std::collections::BTreeMap;
 

@@ -2,9 +2,9 @@
 //! bounds or passes but the camera, the maps of the probe, and the interpolation of texels. Its error is estimated by how much what it adds up
 //! varies.
 
-use echolume::passes::{MISS, Texels};
-use echolume::probe::Geometry;
-use echolume::scene::{Mode, Scene, Shading, TransferPoint, transfer};
+use echolume::low_level::passes::{MISS, Texels};
+use echolume::low_level::probe::Geometry;
+use echolume::low_level::scene::{Mode, Scene, Shading, TransferPoint, transfer};
 use glam::DVec3;
 
 /// Samples of a ray.

@@ -2,14 +2,16 @@
 //! and constants. tests/unit_pure/rules.rs compares the names with the shaders; these tests check their meaning.
 
 use super::*;
-use echolume::passes::{Slot, Value};
+use echolume::low_level::passes::{Slot, Value};
 
 /// A dispatch as text: shader, slots read and written, invocations.
 fn told(scene: &Scene, name: &str, iteration: u32) -> String {
     let (pass, args) = (pass(name), DispatchArgs { iteration, slice: 1, slices: 2, ..DispatchArgs::default() });
     assert_eq!(pass.name, name);
     assert!(pass.is_needed(scene), "{name}: {:?}", pass.needed(scene));
-    let slots = |binds: Vec<echolume::passes::Bind>| binds.iter().map(|b| b.slot.name()).collect::<Vec<_>>().join(", ");
+    let slots = |binds: Vec<echolume::low_level::passes::Bind>| {
+        binds.iter().map(|b| b.slot.name()).collect::<Vec<_>>().join(", ")
+    };
     let (reads, writes) = (slots(pass.reads(scene, &args)), slots(pass.writes(scene, &args)));
     format!("{}: {reads} -> {writes} {:?}", pass.shader(scene, &args), (pass.extent)(scene, &args))
 }

@@ -1,9 +1,9 @@
 //! Perona and Malik's diffusion: explicit steps by hand, and semi-implicit ones put back into the equation that they solve.
 
 use super::*;
-use echolume::passes::Slot;
-use echolume::reference;
-use echolume::scene::PeronaMalik;
+use echolume::low_level::passes::Slot;
+use echolume::low_level::reference;
+use echolume::low_level::scene::PeronaMalik;
 
 const SCHEMES: [&str; 2] = ["quotient", "exponential"];
 

@@ -111,7 +111,7 @@ fn the_flattest_mask_is_the_one_of_least_mean_square() {
 
 #[test]
 fn a_difference_that_f32_cannot_divide_by_is_none() {
-    use echolume::passes::Value;
+    use echolume::low_level::passes::Value;
     let edge = |edge: &str| {
         let scene = slices([4, 4], &format!("estimator = 'perona-malik', estimator_edge = {edge}"));
         let params = (pass("estimator_slice").params)(&scene, &DispatchArgs { slice: 3, ..DispatchArgs::default() });

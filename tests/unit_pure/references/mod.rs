@@ -9,9 +9,9 @@ mod smoothing;
 
 use crate::common::probes::{voxels, wobbler};
 use crate::common::scenes::{self, FLOATS};
-use echolume::passes::{Arrays, DispatchArgs, MISS, Pass, Texels, by_name};
-use echolume::probe::{Geometry, Grid};
-use echolume::scene::Scene;
+use echolume::low_level::passes::{Arrays, DispatchArgs, MISS, Pass, Texels, by_name};
+use echolume::low_level::probe::{Geometry, Grid};
+use echolume::low_level::scene::Scene;
 
 fn scene(size: [usize; 3], toml: &str) -> Scene {
     scenes::scene(voxels(size), FLOATS, toml)

@@ -3,8 +3,8 @@
 use super::profile;
 use super::profile::Random;
 use super::simulated::{any_run, check, fail, outcome, run, slower};
-use echolume::verify::report::baseline::{BaselineComparison, BaselineOptions, Class, compare};
-use echolume::verify::report::{self, Figure, Level, Run, Unit, Verdict};
+use echolume::low_level::verify::report::baseline::{BaselineComparison, BaselineOptions, Class, compare};
+use echolume::low_level::verify::report::{self, Figure, Level, Run, Unit, Verdict};
 use proptest::prelude::*;
 use std::time::Duration;
 

@@ -1,8 +1,8 @@
 //! GoogleTest's filters and verdict lines.
 
 use super::simulated::{fail, run};
-use echolume::verify::gtest::{self, Filter};
-use echolume::verify::report::{CheckName, Level, Verdict};
+use echolume::low_level::verify::gtest::{self, Filter};
+use echolume::low_level::verify::report::{CheckName, Level, Verdict};
 use proptest::prelude::*;
 use std::collections::BTreeSet;
 
@@ -57,7 +57,8 @@ proptest! {
 #[test]
 fn full_names_are_distinct_and_plain() {
     for level in [Level::Quick, Level::Full] {
-        let checks: Vec<CheckName> = echolume::verify::checks(level).iter().map(|check| check.title()).collect();
+        let checks: Vec<CheckName> =
+            echolume::low_level::verify::checks(level).iter().map(|check| check.title()).collect();
         let names: BTreeSet<String> = checks.iter().map(gtest::full_name).collect();
         assert_eq!(names.len(), checks.len());
         for name in &names {

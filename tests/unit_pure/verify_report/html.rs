@@ -1,9 +1,9 @@
 //! The page, read back as a browser would.
 
 use super::simulated::{any_run, check, fail, outcome, run, shown, slower};
-use echolume::verify::report::baseline::{BaselineOptions, compare};
-use echolume::verify::report::html::html;
-use echolume::verify::report::{Fault, Figure, Run, Unit, Verdict};
+use echolume::low_level::verify::report::baseline::{BaselineOptions, compare};
+use echolume::low_level::verify::report::html::html;
+use echolume::low_level::verify::report::{Fault, Figure, Run, Unit, Verdict};
 use proptest::prelude::*;
 use scraper::{ElementRef, Html, Selector};
 
@@ -208,7 +208,7 @@ proptest! {
         let document = checked(&page(&run, old.as_ref()));
         let names: Vec<String> = all(&document, "table.checks td.name").into_iter().map(|e| e.text().collect()).collect();
         let groups = run.groups();
-        let expected = groups.iter().flat_map(|(_, outcomes)| outcomes.iter().map(|o| echolume::text::escaped(&o.name)));
+        let expected = groups.iter().flat_map(|(_, outcomes)| outcomes.iter().map(|o| echolume::low_level::text::escaped(&o.name)));
         prop_assert_eq!(names, expected.collect::<Vec<_>>());
         prop_assert_eq!(all(&document, "article").len(), run.failures().count());
     }

@@ -1,8 +1,8 @@
 //! Runs as JSON.
 
 use super::simulated::{any_run, check, empty, fail, run};
-use echolume::verify::report::{Figure, Run, Unit};
-use echolume::verify::report::{MAX_OUTCOMES, MAX_SAMPLES, from_json, to_json};
+use echolume::low_level::verify::report::{Figure, Run, Unit};
+use echolume::low_level::verify::report::{MAX_OUTCOMES, MAX_SAMPLES, from_json, to_json};
 use proptest::prelude::*;
 
 /// Non-finite numbers make runs unequal to themselves: they are compared by their text.

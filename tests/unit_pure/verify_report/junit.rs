@@ -1,9 +1,9 @@
 //! JUnit XML, read back by another parser.
 
 use super::simulated::{any_run, check, fail, run};
-use echolume::verify::report::baseline::{BaselineOptions, compare};
-use echolume::verify::report::junit::junit;
-use echolume::verify::report::{Run, Verdict};
+use echolume::low_level::verify::report::baseline::{BaselineOptions, compare};
+use echolume::low_level::verify::report::junit::junit;
+use echolume::low_level::verify::report::{Run, Verdict};
 use proptest::prelude::*;
 use roxmltree::{Document, Node};
 
@@ -93,7 +93,7 @@ fn an_interrupted_check_is_an_error_and_no_failure() {
 fn every_check_is_a_case_with_its_time_its_failure_or_why_it_was_left_out() {
     let mut run = run(1);
     fail(&mut run, "passes", "shade");
-    check(&mut run, "passes", "shade").faults.push(echolume::verify::report::Fault::new("and another"));
+    check(&mut run, "passes", "shade").faults.push(echolume::low_level::verify::report::Fault::new("and another"));
     let text = written(&run, None);
     println!("{text}");
     has_the_shape(&text);

@@ -2,9 +2,9 @@
 
 use super::simulated::{any_run, check, fail, run};
 use crate::metrics::{Metrics, parsed};
-use echolume::verify::report::baseline::{BaselineOptions, compare};
-use echolume::verify::report::prometheus::prometheus;
-use echolume::verify::report::{Run, Verdict};
+use echolume::low_level::verify::report::baseline::{BaselineOptions, compare};
+use echolume::low_level::verify::report::prometheus::prometheus;
+use echolume::low_level::verify::report::{Run, Verdict};
 use proptest::prelude::*;
 use std::collections::BTreeMap;
 

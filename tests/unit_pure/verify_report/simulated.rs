@@ -2,8 +2,10 @@
 
 use super::profile;
 use super::profile::{Noise, Random};
-use echolume::picture::Picture;
-use echolume::verify::report::{FORMAT, Fault, Figure, Level, Outcome, PictureComparison, Run, Unit, Verdict, Worst};
+use echolume::low_level::picture::Picture;
+use echolume::low_level::verify::report::{
+    FORMAT, Fault, Figure, Level, Outcome, PictureComparison, Run, Unit, Verdict, Worst,
+};
 use proptest::prelude::*;
 
 /// Passes that are timed and checked.

@@ -1,8 +1,8 @@
 //! Text for the terminal, and the numbers in it.
 
 use super::simulated::{any_run, check, empty, fail, outcome, run};
-use echolume::text::escaped;
-use echolume::verify::report::{
+use echolume::low_level::text::escaped;
+use echolume::low_level::verify::report::{
     self, Figure, Outcome, Unit, Verdict, amount, change, expected_and_got, number, percent, seconds, value_of_limit,
 };
 use proptest::prelude::*;

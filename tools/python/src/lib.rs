@@ -1,16 +1,16 @@
 //! Echolume as a Python module. Arrays are made by numpy itself, from bytes that are copied once.
 
-use echolume::live::{Feed, Step};
-use echolume::marked;
-use echolume::picture::Picture;
-use echolume::probe::Geometry;
-use echolume::scene::default_look::block_edge;
-use echolume::scene::load::Layers;
-use echolume::scene::{EchoHistogram, Input, Scene, Settings};
-use echolume::source::live::{Playback, PlaybackSource};
-use echolume::source::phantom::{Phantom, PhantomOptions, PhantomSource};
-use echolume::source::SampleType;
-use echolume::source::{self, Frame, OpenOptions, Source};
+use echolume::low_level::live::{Feed, Step};
+use echolume::low_level::marked;
+use echolume::low_level::picture::Picture;
+use echolume::low_level::probe::Geometry;
+use echolume::low_level::scene::default_look::block_edge;
+use echolume::low_level::scene::load::Layers;
+use echolume::low_level::scene::{EchoHistogram, Input, Scene, Settings};
+use echolume::low_level::source::live::{Playback, PlaybackSource};
+use echolume::low_level::source::phantom::{Phantom, PhantomOptions, PhantomSource};
+use echolume::low_level::source::SampleType;
+use echolume::low_level::source::{self, Frame, OpenOptions, Source};
 use echolume::{Context, ContextOptions, DeviceChoice, RendererOptions, StreamOptions};
 use pyo3::create_exception;
 use pyo3::exceptions::{PyIndexError, PyRuntimeError, PyValueError};
@@ -164,7 +164,7 @@ fn read<'py>(
         Geometry::Cartesian(grid) => {
             found.set_item("geometry", "cartesian")?;
             found.set_item("spacing", grid.spacing)?;
-            let world = source.world().unwrap_or_else(|| echolume::probe::World::of(grid));
+            let world = source.world().unwrap_or_else(|| echolume::low_level::probe::World::of(grid));
             let column = |v: glam::DVec3, w: f64| [v.x, v.y, v.z, w];
             let columns = [
                 column(world.axis(0), 0.0),
@@ -217,7 +217,7 @@ impl Drawing {
     }
 
     fn change(&mut self, scene: Scene) -> PyResult<()> {
-        use echolume::plan::Rerun;
+        use echolume::low_level::plan::Rerun;
         match self.renderer.change(scene).map_err(of_device)? {
             Rerun::Steps { .. } => Ok(()),
             Rerun::Frames | Rerun::Everything => self.send(),

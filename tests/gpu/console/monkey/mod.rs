@@ -5,11 +5,11 @@ mod random_source;
 use super::*;
 use crate::common::own_process;
 use ash::vk;
-use echolume::gpu::ContextOptions;
-use echolume::gpu::faults::InjectionPoint;
-use echolume::ui::command::KEY_BINDINGS;
-use echolume::ui::input::Phase;
-use echolume::ui::sliders::SLIDERS;
+use echolume::low_level::gpu::ContextOptions;
+use echolume::low_level::gpu::faults::InjectionPoint;
+use echolume::low_level::ui::command::KEY_BINDINGS;
+use echolume::low_level::ui::input::Phase;
+use echolume::low_level::ui::sliders::SLIDERS;
 use random_source::Wild;
 use std::collections::BTreeSet;
 use std::fs::File;
@@ -158,7 +158,7 @@ impl Monkey {
             2 => Command::Zoom(a),
             3 => Command::Pan([a / 40.0, b / 40.0]),
             4 => Command::MoveLight([a / 40.0, b]),
-            5 => Command::MoveFace(echolume::ui::command::Face { axis: self.below(5), high: a > 0.0 }, b),
+            5 => Command::MoveFace(echolume::low_level::ui::command::Face { axis: self.below(5), high: a > 0.0 }, b),
             6 => Command::MoveClip(a),
             7 => Command::StepPlane(a),
             8 => Command::MoveCrossing([a, b, c]),

@@ -2,8 +2,9 @@
 
 use super::*;
 use crate::common::gpu::{Noise, linear};
-use echolume::probe::Geometry;
-use echolume::source::recorder::Header;
+use crate::common::wait;
+use echolume::low_level::probe::Geometry;
+use echolume::low_level::source::recorder::Header;
 use std::collections::VecDeque;
 
 /// Volumes of a body, sometimes of another probe, with missing or wrong frames; it ends after some.
@@ -73,7 +74,7 @@ impl Live for Wild {
             }
             self.more();
         }
-        std::thread::sleep(Duration::from_millis(1));
+        wait::pace(Duration::from_millis(1));
         self.said.pop_front().unwrap_or(Event::Idle)
     }
 

@@ -86,7 +86,7 @@ pub(super) fn kept_look(user: &mut User) -> String {
     user.letter('s');
     user.types("thin");
     user.key(Key::Enter);
-    let kept = echolume::user_presets::read(&user.folder.0.join("presets.toml")).expect("presets");
+    let kept = echolume::low_level::user_presets::read(&user.folder.0.join("presets.toml")).expect("presets");
     assert_eq!((kept[0].name.as_str(), kept[0].look().expect("a look").mode), ("thin", Mode::Mip));
     let actions = user.count();
     user.press(Modifiers::default(), Key::Escape);

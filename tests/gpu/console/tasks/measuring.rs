@@ -122,7 +122,7 @@ pub(super) fn body_mark(user: &mut User) -> String {
     let place = [x + 0.2 * mark.size * picture[1], y];
     user.click(in_window(place));
     let mark = user.console.controls().body_marks()[0];
-    assert_eq!(mark.body, echolume::scene::Body::FetusBreech);
+    assert_eq!(mark.body, echolume::low_level::scene::Body::FetusBreech);
     let off = probe_of(&mark, picture);
     assert!((off[0] - place[0]).hypot(off[1] - place[1]) < 0.1, "{off:?}, {place:?}");
     user.count()

@@ -8,19 +8,20 @@ mod planes;
 mod trouble;
 
 use super::*;
+use crate::common::wait;
 use cuts_and_looks::*;
-use echolume::gpu::RendererOptions;
-use echolume::measure::body_marks::{centre_of, probe_of};
-use echolume::measure::outcome;
-use echolume::passes::{Slot, is_hit};
-use echolume::scene::load::Layers;
-use echolume::scene::picker::Picker;
-use echolume::scene::{Mode, PlaneName, Scene};
-use echolume::source::live::{Playback, PlaybackSource};
-use echolume::source::phantom::{Body, CachedPhantom, Label, Phantom, PhantomOptions, Speckle, Truth};
-use echolume::ui::panels::accesskit::{Node, Role};
-use echolume::ui::panels::picture_area;
-use echolume::workspace::Origin;
+use echolume::low_level::gpu::RendererOptions;
+use echolume::low_level::measure::body_marks::{centre_of, probe_of};
+use echolume::low_level::measure::outcome;
+use echolume::low_level::passes::{Slot, is_hit};
+use echolume::low_level::scene::load::Layers;
+use echolume::low_level::scene::picker::Picker;
+use echolume::low_level::scene::{Mode, PlaneName, Scene};
+use echolume::low_level::source::live::{Playback, PlaybackSource};
+use echolume::low_level::source::phantom::{Body, CachedPhantom, Label, Phantom, PhantomOptions, Speckle, Truth};
+use echolume::low_level::ui::panels::accesskit::{Node, Role};
+use echolume::low_level::ui::panels::picture_area;
+use echolume::low_level::workspace::Origin;
 use files::*;
 use glam::DVec3;
 use measuring::*;
@@ -214,7 +215,7 @@ impl User {
                 return found;
             }
             assert!(begun.elapsed() < BOUND, "{}: no {what}", self.task);
-            std::thread::sleep(Duration::from_millis(1));
+            wait::poll();
         }
     }
 
@@ -269,7 +270,7 @@ impl User {
     /// Presses and releases the left button along these places of the window.
     fn drag(&mut self, way: &[[f64; 2]]) {
         self.actions += 1;
-        std::thread::sleep(PAUSE);
+        wait::pace(PAUSE);
         self.console.input(&Input::Moved(way[0]));
         self.update();
         self.console.input(&Input::Button { button: Button::Left, pressed: true });
@@ -365,7 +366,8 @@ impl User {
     fn has_caliper(&mut self, length: f64) {
         self.on_planes();
         let ends = [self.place(0.0, 0.0), self.place(length, 0.0)].map(|place| Scene::point_of(&self.scene(), place));
-        self.console.execute(&Command::Tool(Tool::Measure(echolume::scene::MeasureKind::Distance)), Instant::now());
+        self.console
+            .execute(&Command::Tool(Tool::Measure(echolume::low_level::scene::MeasureKind::Distance)), Instant::now());
         ends.iter().for_each(|end| self.console.execute(&Command::Point(*end, false), Instant::now()));
         self.settle();
     }

@@ -126,11 +126,9 @@ fn colour(difference: f64) -> [f64; 3] {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::error_report::dials::dial;
-    use crate::probe::{Geometry, Grid};
+    use crate::probe::{Geometry, Grid, StoredType};
     use crate::scene::Input;
     use crate::scene::load::Layers;
-    use crate::source::StoredType;
 
     /// Lightness of CIELAB over sRGB (IEC 61966-2-1).
     fn lightness([r, g, b]: [f64; 3]) -> f64 {
@@ -180,12 +178,6 @@ mod tests {
             assert!(said.contains(named) && said.contains("set ") && !said.contains('\n'), "{set}: {said}");
         }
         assert!(finer(&scene(&format!("mode=volume surface.edge=samples {clip} cap.enabled=false"))).is_ok());
-        // Dials whose references have finer steps.
-        for name in ["step", "compositing"] {
-            let said = dial(name, &scene("mode=volume ray.sliding=3")).expect_err(name);
-            assert!(said.contains("ray.sliding=0"), "{said}");
-            assert!(dial(name, &scene("mode=volume")).is_ok(), "{name}");
-        }
     }
 
     #[test]

@@ -1,0 +1,45 @@
+//! `--budget` of `echolume render`: settings from an error report.
+
+use super::error_report::read_report;
+use crate::args::parse_nanoseconds;
+use crate::error_report::Measure;
+use crate::error_report::choose::{Bound, choose};
+use crate::passes::PassTime;
+use crate::scene::Scene;
+use crate::terminal::{Failure, failed, input, say};
+use std::path::Path;
+
+/// The settings with the smallest error that keep the budget, by the report in `file`. `scene` opens the scene without them.
+pub(super) fn chosen(
+    budget: &str,
+    file: &Path,
+    scene: impl FnOnce() -> Result<Scene, Failure>,
+) -> Result<Vec<String>, Failure> {
+    let time = parse_nanoseconds("--budget", budget)?;
+    let report = read_report(file)?;
+    let scene = scene()?;
+    let (there, here) = (report.sizes.volume, scene.volume_size());
+    if there != here {
+        let shown = |[x, y, z]: [u32; 3]| format!("{x}x{y}x{z}");
+        let (file, there, here) = (file.display(), shown(there), shown(here));
+        return Err(input(format!("--report {file}: is for a volume of {there}, this one has {here}")));
+    }
+    let measure = Measure::Rmse;
+    let chosen =
+        choose(&report, measure, Bound::Time(time), &[]).map_err(|e| failed(format!("--budget {budget}: {e}")))?;
+    let choice = &report.choices[chosen];
+    let of = if report.is_of(&scene) { "this scene" } else { "another scene, whose error it is" };
+    say!("budget {budget}: {}, measured on {} with {of}", choice.describe(measure), report.device);
+    Ok(choice.set.clone())
+}
+
+/// Says whether the picture kept the budget.
+pub(super) fn judge(budget: &str, times: &[PassTime]) -> Result<(), Failure> {
+    let (time, taken) = (parse_nanoseconds("--budget", budget)?, times.iter().map(|t| t.total).sum::<f64>());
+    let kept = if taken <= time { "within" } else { "over" };
+    match times.is_empty() {
+        true => say!("budget {budget}: this device has no time stamps"),
+        false => say!("budget {budget}: volume and picture took {:.3} ms, {kept} the budget", taken * 1e-6),
+    }
+    Ok(())
+}
