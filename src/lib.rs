@@ -156,7 +156,7 @@ pub use low_level::picture::Picture;
 pub use low_level::plan::Plan;
 pub use low_level::probe::{Frame, Geometry, GeometryError, Grid, Probe, SampleType, StoredType};
 pub use low_level::scene::load::{Layers, LoadError};
-pub use low_level::scene::{Input, Scene, Settings};
+pub use low_level::scene::{Input, Scene, SceneError, Settings};
 pub use low_level::source::live::{Event, Live};
 pub use low_level::source::{Header, Recording, open};
 

@@ -289,7 +289,7 @@ pub fn check_record(file: &Path, played: &Path) -> Result<(), Failure> {
 fn fault(error: StreamError) -> Failure {
     match error {
         StreamError::Scene(e) => input(e),
-        StreamError::Gpu(e) => failed(e),
+        other => failed(other),
     }
 }
 

@@ -42,7 +42,7 @@ impl Default for Bands {
 
 /// The measured time of an invocation of a pipeline, ns. 0 until it is measured.
 #[derive(Debug, Default)]
-pub struct InvocationTime(AtomicU64);
+pub(crate) struct InvocationTime(AtomicU64);
 
 impl InvocationTime {
     fn measured(&self) -> Option<f64> {
@@ -57,7 +57,7 @@ impl InvocationTime {
     }
 
     /// From now on each invocation is expected to take `factor` times as long, if that is longer.
-    pub fn lengthen(&self, factor: f64) {
+    pub(crate) fn lengthen(&self, factor: f64) {
         if let Some(ns) = self.measured().filter(|_| factor.is_finite() && factor > 1.0) {
             self.0.store((factor * ns).to_bits(), Ordering::Relaxed);
         }
@@ -66,14 +66,14 @@ impl InvocationTime {
 
 /// A part of a dispatch, in workgroups.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Band {
+pub(crate) struct Band {
     pub base: [u32; 3],
     pub groups: [u32; 3],
 }
 
 /// What one submission may hold.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum BandLimit {
+pub(crate) enum BandLimit {
     /// Time, ns; and how often the first bands are halved.
     Time { target: f64, halvings: u32 },
     /// Invocations of a band.
@@ -104,7 +104,7 @@ impl BandLimit {
     }
 
     /// Expected time of what is submitted at once, so that the device does not wait for the host between two bands.
-    pub fn in_flight(&self) -> Duration {
+    pub(crate) fn in_flight(&self) -> Duration {
         match *self {
             BandLimit::Time { target, .. } => Duration::from_nanos((2.0 * target) as u64),
             // Their time is not known: one is in flight.

@@ -6,19 +6,19 @@ use ash::vk;
 
 /// A heap of memory, bytes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct HeapBudget {
+pub(crate) struct HeapBudget {
     pub size: u64,
     /// What this process can use in all.
     pub budget: u64,
     /// What it uses now.
     pub used: u64,
-    pub is_device_local: bool,
+    pub(crate) is_device_local: bool,
 }
 
 /// The heaps of a device, and the heap of each memory type.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct MemoryBudget {
-    pub heaps: Vec<HeapBudget>,
+    pub(crate) heaps: Vec<HeapBudget>,
     /// By memory type: its heap, and its properties.
     pub types: Vec<(usize, vk::MemoryPropertyFlags)>,
 }

@@ -41,7 +41,7 @@ pub enum Purpose {
 const TEXELS: [vk::Format; 3] = [vk::Format::R32_SFLOAT, vk::Format::R32G32_SFLOAT, vk::Format::R32G32B32A32_SFLOAT];
 
 /// True if a lookup table of this size can be a texel buffer, for any size of its entries.
-pub fn has_texels(context: &Context, bytes: u64) -> bool {
+pub(crate) fn has_texels(context: &Context, bytes: u64) -> bool {
     bytes >= 16 && bytes / 4 <= u64::from(context.limits.max_texel_buffer_elements)
 }
 

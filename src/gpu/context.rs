@@ -104,7 +104,7 @@ pub struct Context {
     /// In the order of `candidate.queues`: rendering, ingestion, copies.
     queues: Vec<Mutex<vk::Queue>>,
     /// The queue families that share slots used on several queues.
-    pub queue_families: Vec<u32>,
+    pub(crate) queue_families: Vec<u32>,
     /// Taken in `drop`, before the device is destroyed.
     pub(super) allocator: Mutex<Option<Allocator>>,
     formats: Mutex<HashMap<vk::Format, vk::FormatFeatureFlags>>,
@@ -116,11 +116,12 @@ pub struct Context {
 }
 
 /// The extensions that present pictures.
-pub struct Presentation {
+#[cfg_attr(not(feature = "view"), expect(dead_code, reason = "only a window reads it"))]
+pub(crate) struct Presentation {
     pub surfaces: ash::khr::surface::Instance,
-    pub swapchains: ash::khr::swapchain::Device,
+    pub(crate) swapchains: ash::khr::swapchain::Device,
     /// If the target is a monitor.
-    pub displays: Option<ash::khr::display::Instance>,
+    pub(crate) displays: Option<ash::khr::display::Instance>,
     /// Waits until a picture is on the monitor, if the device can.
     pub waits: Option<ash::khr::present_wait::Device>,
 }
@@ -129,7 +130,7 @@ pub struct Presentation {
 pub(super) struct ClockReading {
     pub ticks: u64,
     /// The host's monotonic clock, ns, if the driver reads it in the same call.
-    pub monotonic: Option<u64>,
+    pub(crate) monotonic: Option<u64>,
     /// The host's clock around the call.
     pub at: Instant,
     /// The largest time between the readings, ns.
@@ -357,7 +358,7 @@ impl Context {
     }
 
     /// Features of a format with optimal tiling.
-    pub fn format_features(&self, format: vk::Format) -> vk::FormatFeatureFlags {
+    pub(crate) fn format_features(&self, format: vk::Format) -> vk::FormatFeatureFlags {
         let mut known = self.formats.lock().unwrap_or_else(|e| e.into_inner());
         // SAFETY: the handle belongs to this instance; the call only reads.
         let query = || unsafe { self.instance.get_physical_device_format_properties(self.candidate.handle, format) };
@@ -547,7 +548,7 @@ impl Context {
     ///
     /// # Errors
     /// A combination that the device does not support.
-    pub fn image_limits(
+    pub(crate) fn image_limits(
         &self,
         format: vk::Format,
         kind: vk::ImageType,

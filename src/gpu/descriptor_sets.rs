@@ -36,7 +36,7 @@ impl PoolSpace {
 }
 
 /// Descriptor sets of one command buffer, for a device without push descriptors. They are allocated from pools and freed all at once.
-pub struct DescriptorSets {
+pub(crate) struct DescriptorSets {
     context: Arc<Context>,
     pools: Vec<vk::DescriptorPool>,
     /// What is left in the current pool.

@@ -44,9 +44,9 @@ pub struct Candidate {
     /// Time stamps can be converted to the host's clock.
     pub calibrated_timestamps: bool,
     /// The same call reads the host's monotonic clock.
-    pub reads_monotonic: bool,
+    pub(crate) reads_monotonic: bool,
     /// Supports push descriptors.
-    pub push_descriptors: bool,
+    pub(crate) push_descriptors: bool,
     /// Can count shader invocations.
     pub pipeline_statistics: bool,
     /// Can tell statistics of the compilation of pipelines.
@@ -54,11 +54,11 @@ pub struct Candidate {
     /// Can present pictures, with panels drawn over them.
     pub can_present: bool,
     /// What its pipelines may be loaded by.
-    pub driver_identity: DriverIdentity,
+    pub(crate) driver_identity: DriverIdentity,
     /// Reports when a picture is on the monitor.
-    pub present_wait: bool,
+    pub(crate) present_wait: bool,
     /// Reports why it was lost.
-    pub device_fault: bool,
+    pub(crate) device_fault: bool,
     /// Reports the passes that its queues had reached when it was lost.
     pub checkpoints: bool,
     /// The budget of its memory when it was listed, if it reports one.
@@ -81,7 +81,7 @@ pub struct QueueInfo {
     pub computes: bool,
     pub draws: bool,
     /// True if it can copy single slices of a 3D image; otherwise only complete images.
-    pub copies_slices: bool,
+    pub(crate) copies_slices: bool,
 }
 
 impl Candidate {

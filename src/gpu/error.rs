@@ -4,6 +4,7 @@ use ash::vk;
 
 /// An error of Vulkan, of the device's limits, or in the use of a renderer.
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum GpuError {
     #[error("no Vulkan loader: {0}; install one (Debian: apt-get install libvulkan1 mesa-vulkan-drivers)")]
     NoLoader(String),
@@ -71,7 +72,7 @@ impl GpuError {
 }
 
 /// Adds the operation that failed to a Vulkan result.
-pub trait ErrorContext<T> {
+pub(crate) trait ErrorContext<T> {
     fn context(self, operation: impl FnOnce() -> String) -> Result<T, GpuError>;
 }
 

@@ -76,7 +76,7 @@ impl LossReport {
 }
 
 /// The extensions that report a lost device, where they are enabled.
-pub struct LossReporting {
+pub(crate) struct LossReporting {
     pub faults: Option<ash::ext::device_fault::Device>,
     pub checkpoints: Option<ash::nv::device_diagnostic_checkpoints::Device>,
 }

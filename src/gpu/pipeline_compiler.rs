@@ -93,7 +93,7 @@ impl Shared {
 }
 
 /// A thread that compiles pipelines, and its requests.
-pub struct AsyncPipelineCompiler {
+pub(crate) struct AsyncPipelineCompiler {
     shared: Arc<Shared>,
     pipelines: Arc<Pipelines>,
     /// Those of the plan that was asked for last: none is forgotten before all of them are compiled.

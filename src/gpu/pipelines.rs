@@ -27,7 +27,7 @@ pub struct Pipeline {
     pub module: Module,
     /// Of its filtered textures. [`Pipelines`] owns it.
     pub sampler: vk::Sampler,
-    pub set_layout: vk::DescriptorSetLayout,
+    pub(crate) set_layout: vk::DescriptorSetLayout,
     pub layout: vk::PipelineLayout,
     pub handle: vk::Pipeline,
     /// What its compilation took, and whether it came from a pipeline cache; `None` if the driver does not say.
@@ -80,7 +80,7 @@ pub fn embedded() -> Arc<Shaders> {
     EMBEDDED.clone()
 }
 
-pub fn descriptor_type(kind: Kind) -> vk::DescriptorType {
+pub(crate) fn descriptor_type(kind: Kind) -> vk::DescriptorType {
     match kind {
         Kind::Params => vk::DescriptorType::UNIFORM_BUFFER,
         Kind::Sampled => vk::DescriptorType::SAMPLED_IMAGE,
@@ -193,7 +193,7 @@ impl Pipelines {
     ///
     /// # Errors
     /// As of [`Pipelines::get`]: the first of the plan that fails. Those that were compiled are kept.
-    pub fn of_plan(&self, plan: &Plan, scene: &Scene) -> Result<Vec<Arc<Pipeline>>, GpuError> {
+    pub(crate) fn of_plan(&self, plan: &Plan, scene: &Scene) -> Result<Vec<Arc<Pipeline>>, GpuError> {
         self.of_plan_while(plan, scene, &|_, _| true)
     }
 

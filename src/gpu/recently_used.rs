@@ -5,7 +5,7 @@ use std::hash::Hash;
 use std::sync::Arc;
 
 /// Keeps a limited number of values that only the cache holds, and all that others hold. The value added last is always kept.
-pub struct RecentlyUsed<K, V> {
+pub(crate) struct RecentlyUsed<K, V> {
     /// Each value, and the number of its last use.
     values: HashMap<K, (Arc<V>, u64)>,
     uses: u64,

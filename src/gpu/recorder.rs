@@ -41,7 +41,7 @@ pub struct Dispatch<'a> {
 
 /// Parts of a slot's image: layers of an array or slices of a 3D image. `copy` is the number of the volume image.
 #[derive(Clone, Debug)]
-pub struct SlotParts {
+pub(crate) struct SlotParts {
     pub slot: Slot,
     pub copy: u32,
     pub parts: Range<u32>,
@@ -49,19 +49,19 @@ pub struct SlotParts {
 
 /// Where texels that are copied lie in a buffer. Lengths of 0: they fill it, row after row.
 #[derive(Clone, Copy, Debug, Default)]
-pub struct BufferLayout {
+pub(crate) struct BufferLayout {
     /// Byte offset of the first.
     pub offset: u64,
     /// Texels from one row to the next.
-    pub row_length: u32,
+    pub(crate) row_length: u32,
     /// Rows from one image to the next.
-    pub image_height: u32,
+    pub(crate) image_height: u32,
     /// Bytes from one part to the next, where the last part comes first.
     pub descending: Option<u64>,
 }
 
 /// Command buffers that are recorded and submitted again and again. One is enough, except for work in bands.
-pub struct Recorder {
+pub(crate) struct Recorder {
     context: Arc<Context>,
     pool: vk::CommandPool,
     /// The one that is being recorded.
@@ -304,7 +304,7 @@ impl Recorder {
     ///
     /// # Errors
     /// More parameters than one command buffer can hold; a device that fails.
-    pub fn dispatch_in_bands(
+    pub(crate) fn dispatch_in_bands(
         &mut self,
         barriers: &mut BarrierRecorder,
         timelines: &mut Timelines,
@@ -601,7 +601,7 @@ impl Recorder {
 impl Recorder {
     /// Moves new images from UNDEFINED to GENERAL and clears them to zero. Passes rely on this: they never write pixels outside the
     /// sector.
-    pub fn clear_new(&mut self, barriers: &mut BarrierRecorder, slots: &SlotResources, new: &[(Slot, u32)]) {
+    pub(crate) fn clear_new(&mut self, barriers: &mut BarrierRecorder, slots: &SlotResources, new: &[(Slot, u32)]) {
         let images: Vec<(&Image, Slot, u32)> =
             new.iter().filter_map(|&(slot, n)| slots.image(slot, n).map(|image| (image, slot, n))).collect();
         let transitions: Vec<_> = images
@@ -643,7 +643,7 @@ impl Recorder {
     }
 
     /// Copies texels of a staging buffer into layers or slices of an image.
-    pub fn copy_in(
+    pub(crate) fn copy_in(
         &mut self,
         barriers: &mut BarrierRecorder,
         (from, layout): (&Buffer, BufferLayout),
@@ -674,7 +674,7 @@ impl Recorder {
 
     /// Says by a barrier that everything submitted so far was waited for, where the layer does not see waits for timelines. A layer that
     /// sees them gets no barrier.
-    pub fn show_layer_the_wait(&self) {
+    pub(crate) fn show_layer_the_wait(&self) {
         if self.context.layer_misses_waits() {
             flush(&self.context.device, self.commands, vk::AccessFlags2::MEMORY_READ | vk::AccessFlags2::MEMORY_WRITE);
         }
@@ -699,7 +699,14 @@ impl Recorder {
     }
 
     /// Copies a complete image into the buffers of a readback and makes them visible to the host.
-    pub fn copy_out(&mut self, barriers: &mut BarrierRecorder, image: &Image, slot: Slot, copy: u32, to: &Readback) {
+    pub(crate) fn copy_out(
+        &mut self,
+        barriers: &mut BarrierRecorder,
+        image: &Image,
+        slot: Slot,
+        copy: u32,
+        to: &Readback,
+    ) {
         let parts = image.shape.parts();
         let read = Access::of_slot(slot, copy, 0..parts, false, PipelineStage::Copy);
         let resource = barriers::Resource::Readback;
@@ -755,7 +762,7 @@ impl Drop for Recorder {
 /// The barriers and waits of everything that uses the same slots, and a count of the barriers. It records the barriers that
 /// [`crate::barriers`] derives as Vulkan commands.
 #[derive(Default)]
-pub struct BarrierRecorder {
+pub(crate) struct BarrierRecorder {
     pub queues: QueueTracker,
     pub count: u32,
     /// The names and invocations of the dispatched passes, in order, while they are counted.

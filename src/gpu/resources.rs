@@ -23,7 +23,7 @@ pub struct Image {
     pub view: vk::ImageView,
     /// Of the frame array, a view of the layers from each one to the last of its entry in the ring: a batch of frames begins with the first
     /// layer of its view. Validation takes every layer of a view for read, so a view holds none of the other entries, which may be written.
-    pub from_layer: Vec<vk::ImageView>,
+    pub(crate) from_layer: Vec<vk::ImageView>,
     pub extent: vk::Extent3D,
     pub shape: Shape,
     pub format: Format,
@@ -210,7 +210,7 @@ pub enum Resource {
 }
 
 /// The allocated slots, by slot and number of the volume image.
-pub struct SlotResources {
+pub(crate) struct SlotResources {
     context: Arc<Context>,
     resources: BTreeMap<(Slot, u32), Resource>,
     /// Number of volume images.
@@ -274,7 +274,7 @@ impl SlotResources {
         }
     }
 
-    pub fn buffer_mut(&mut self, slot: Slot) -> Option<&mut Buffer> {
+    pub(crate) fn buffer_mut(&mut self, slot: Slot) -> Option<&mut Buffer> {
         match self.resources.get_mut(&(slot, 0)) {
             Some(Resource::Buffer(buffer)) => Some(buffer),
             _ => None,

@@ -5,7 +5,7 @@ use std::path::Path;
 use std::sync::Arc;
 
 /// Options that go into every compilation; a change of them is a change of every shader.
-pub const OPTIONS: &str = "vulkan1.3 spirv1.5 -O -g auto-bind";
+pub(crate) const OPTIONS: &str = "vulkan1.3 spirv1.5 -O -g auto-bind";
 
 /// One shader to compile.
 pub struct Source {
@@ -112,7 +112,7 @@ impl Source {
 
     /// A compiler's message with the places of the files that were edited: `file:LINE:` of the expanded text becomes, for example,
     /// `include/ray.glsl:12:`. `file` is the name that the compiler was given.
-    pub fn with_origins(&self, message: &str, file: &str) -> String {
+    pub(crate) fn with_origins(&self, message: &str, file: &str) -> String {
         let place = format!("{file}:");
         let mut parts = message.split(place.as_str());
         let mut located = parts.next().unwrap_or_default().to_string();

@@ -10,7 +10,7 @@ use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
 
 /// A submission is done when its queue's timeline has reached its value.
-pub struct Timeline {
+pub(crate) struct Timeline {
     context: Arc<Context>,
     pub(super) semaphore: vk::Semaphore,
     /// The value of the last submission.
@@ -173,7 +173,7 @@ impl Timeline {
         Ok(())
     }
 
-    pub fn wait_all(&self) -> Result<(), GpuError> {
+    pub(crate) fn wait_all(&self) -> Result<(), GpuError> {
         self.wait(self.submitted)
     }
 
@@ -204,7 +204,7 @@ impl Timeline {
 }
 
 /// The timelines of all queues that a renderer uses.
-pub struct Timelines(Vec<Timeline>);
+pub(crate) struct Timelines(Vec<Timeline>);
 
 impl Timelines {
     pub fn new(context: &Arc<Context>, queues: usize) -> Result<Timelines, GpuError> {
@@ -245,7 +245,7 @@ impl Timelines {
         &mut self.0[queue]
     }
 
-    pub fn wait_all(&self) -> Result<(), GpuError> {
+    pub(crate) fn wait_all(&self) -> Result<(), GpuError> {
         self.0.iter().try_for_each(Timeline::wait_all)
     }
 

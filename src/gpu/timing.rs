@@ -24,7 +24,7 @@ pub enum TimeStamps {
 }
 
 /// The time stamps of one recording, which may be several command buffers.
-pub struct Stamps {
+pub(crate) struct Stamps {
     context: Arc<Context>,
     pool: vk::QueryPool,
     capacity: u32,
@@ -243,7 +243,7 @@ impl Drop for Stamps {
 }
 
 /// Times measured since they were last taken.
-pub struct Timings {
+pub(crate) struct Timings {
     times: Vec<PassTime>,
     /// Passes and copies that could not be timed.
     untimed: u64,

@@ -13,7 +13,7 @@ const KNOWS_TIMELINES: u32 = vk::make_api_version(0, 1, 3, 297);
 pub struct Layer {
     version: u32,
     /// It takes its settings from the program that creates the instance: since January 2024.
-    pub has_settings: bool,
+    pub(crate) has_settings: bool,
 }
 
 impl Layer {
@@ -32,7 +32,7 @@ impl Layer {
         Some(Layer { version, has_settings })
     }
 
-    pub fn knows_timelines(self) -> bool {
+    pub(crate) fn knows_timelines(self) -> bool {
         self.version >= KNOWS_TIMELINES
     }
 
@@ -59,10 +59,11 @@ pub fn settings() -> [vk::LayerSettingEXT<'static>; 2] {
 }
 
 /// What is asked of a layer that takes none.
-pub const FEATURES: &[vk::ValidationFeatureEnableEXT] = &[vk::ValidationFeatureEnableEXT::SYNCHRONIZATION_VALIDATION];
+pub(crate) const FEATURES: &[vk::ValidationFeatureEnableEXT] =
+    &[vk::ValidationFeatureEnableEXT::SYNCHRONIZATION_VALIDATION];
 
 /// Collects the layer's messages. To be dropped before its instance is destroyed.
-pub struct Messenger {
+pub(crate) struct Messenger {
     debug: ash::ext::debug_utils::Instance,
     handle: vk::DebugUtilsMessengerEXT,
     messages: Box<Mutex<Vec<String>>>,

@@ -85,7 +85,7 @@ impl GivenUp {
 }
 
 /// Watches the waits of a context.
-pub struct Watchdog {
+pub(crate) struct Watchdog {
     deadline: Option<Duration>,
     /// True once the program is to end.
     stop: Option<fn() -> bool>,
@@ -99,7 +99,7 @@ impl Watchdog {
     }
 
     /// True once the device was given up.
-    pub fn has_given_up(&self) -> bool {
+    pub(crate) fn has_given_up(&self) -> bool {
         self.given_up().is_some()
     }
 
@@ -123,7 +123,7 @@ impl Watchdog {
     ///
     /// # Errors
     /// The device is given up.
-    pub fn check_deadline(&self, since: Instant, operation: impl FnOnce() -> String) -> Result<(), GpuError> {
+    pub(crate) fn check_deadline(&self, since: Instant, operation: impl FnOnce() -> String) -> Result<(), GpuError> {
         let mut looks = self.looks.lock().unwrap_or_else(|e| e.into_inner());
         match self.deadline.filter(|deadline| looks.is_late(since, Instant::now(), *deadline)) {
             Some(deadline) => Err(self.give_up(GivenUp::Late(deadline), operation)),
@@ -158,7 +158,7 @@ impl Watchdog {
     }
 
     /// Fault injection: the device appears not to finish.
-    pub fn inject_lateness(&self, operation: impl FnOnce() -> String) -> GpuError {
+    pub(crate) fn inject_lateness(&self, operation: impl FnOnce() -> String) -> GpuError {
         self.give_up(GivenUp::Late(self.deadline.unwrap_or_default()), operation)
     }
 }

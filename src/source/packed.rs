@@ -95,7 +95,7 @@ impl<'a> InputFile<'a> {
     }
 
     /// True if the whole file is packed.
-    pub fn is_packed(&self) -> bool {
+    pub(crate) fn is_packed(&self) -> bool {
         self.packed
     }
 
@@ -119,7 +119,7 @@ impl<'a> InputFile<'a> {
     }
 
     /// Most bytes that the file can hold unpacked.
-    pub fn most_bytes(&self) -> u64 {
+    pub(crate) fn most_bytes(&self) -> u64 {
         match (self.part, self.packed) {
             (Some((_, length)), _) => length,
             (None, true) => self.bytes.saturating_mul(Encoding::Gzip.most()).saturating_add(1024),
@@ -197,7 +197,7 @@ impl Pixels {
     }
 
     /// True if the samples are compressed.
-    pub fn is_compressed(&self) -> bool {
+    pub(crate) fn is_compressed(&self) -> bool {
         self.encoding != Encoding::Raw
     }
 

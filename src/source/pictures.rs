@@ -12,7 +12,7 @@ use std::sync::Arc;
 pub(super) struct Pictures {
     pub files: Arc<[PathBuf]>,
     /// One of them has colour: all are read with three channels.
-    pub is_colour: bool,
+    pub(crate) is_colour: bool,
     /// Samples of one of them, bytes.
     pub each: usize,
 }
@@ -22,7 +22,7 @@ pub(super) struct About {
     pub size: [u32; 2],
     /// 16 bits a channel, not 8.
     pub deep: bool,
-    pub is_colour: bool,
+    pub(crate) is_colour: bool,
     /// Length of the file, bytes.
     pub length: u64,
 }

@@ -16,7 +16,7 @@ use std::time::{Duration, Instant};
 const REPORT_INTERVAL: Duration = Duration::from_secs(1);
 
 /// True if the frames are single pictures with poses.
-pub fn is_posed(header: &Header) -> bool {
+pub(crate) fn is_posed(header: &Header) -> bool {
     header.posed && matches!(&header.forward, Geometry::Cartesian(grid) if grid.size[2] == 1)
 }
 

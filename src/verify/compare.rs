@@ -165,7 +165,7 @@ const TILE: u32 = 8;
 const MAX_TILE_SHARE: f64 = 0.5;
 
 /// Difference of two pictures, levels of 255.
-pub struct PictureDifference {
+pub(crate) struct PictureDifference {
     /// Mean over the values that are not far off.
     pub mean: f64,
     /// Share of values that are far off.

@@ -94,7 +94,7 @@ pub fn begins_run(checks: &[CheckName]) -> String {
 }
 
 /// The line before the first check of a group of so many.
-pub fn begins_group(group: &str, checks: usize) -> String {
+pub(crate) fn begins_group(group: &str, checks: usize) -> String {
     format!("[----------] {} from {}", tests(checks), identifier(group))
 }
 
@@ -121,7 +121,7 @@ pub fn ends(outcome: &Outcome) -> String {
 }
 
 /// The line after the last check of a group.
-pub fn ends_group(outcomes: &[Outcome]) -> String {
+pub(crate) fn ends_group(outcomes: &[Outcome]) -> String {
     let suite = outcomes.first().map_or(String::new(), |first| identifier(&first.group));
     let ms = milliseconds(outcomes.iter().map(|o| o.seconds).sum());
     format!("[----------] {} from {suite} ({ms} ms total)", tests(outcomes.len()))

@@ -36,7 +36,7 @@ pub fn checks(_: Level) -> Vec<Check> {
 ///
 /// # Errors
 /// As [`DeviceUnderTest::another`].
-pub fn validation_notices_a_dropped_barrier(dut: &DeviceUnderTest) -> Result<bool, GpuError> {
+pub(crate) fn validation_notices_a_dropped_barrier(dut: &DeviceUnderTest) -> Result<bool, GpuError> {
     // The last ones: they lie between passes over the picture.
     const TRIED: usize = 8;
     let isolated = IsolatedContext::of_changes(dut)?;

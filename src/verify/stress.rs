@@ -39,7 +39,7 @@ pub fn check(seconds: f64) -> Check {
 }
 
 /// A hook called with the renderer and the volume image before each picture; tests use it to cause errors.
-pub type BeforePicture = dyn Fn(&mut Renderer, u32) -> Result<(), GpuError>;
+pub(crate) type BeforePicture = dyn Fn(&mut Renderer, u32) -> Result<(), GpuError>;
 
 /// Every mode in several sizes, with all filters and with few. All take the same frames.
 fn scenes() -> Result<Vec<Scene>, String> {

@@ -557,3 +557,29 @@ fn nothing_is_public_that_no_other_file_uses() {
     assert!(unused.is_empty(), "public, and used by no other file: {unused:?}");
     assert_eq!(exported("pub const fn a() {}\n    pub(super) fn b()\nfn c()\npub static D: u8 = 0;"), ["a", "b", "D"]);
 }
+
+/// A member shows others what they use, and no more: a function that nobody else names is `pub(crate)`. Types are shown by the functions that return them.
+#[test]
+fn no_member_shows_a_function_that_nobody_else_names() {
+    let folders = ["src", "tests", "benches", "tools/python/src", "tools/shaders/src", "tools/fuzz"];
+    let all: Vec<_> = folders.iter().filter(|f| repository(f).exists()).flat_map(|f| sources(f)).collect();
+    let member = |path: &str| {
+        let folder = path.strip_prefix("src/").and_then(|rest| rest.split('/').next()).unwrap_or("");
+        repository(&format!("src/{folder}/Cargo.toml")).exists().then(|| folder.to_string())
+    };
+    let mut users: BTreeMap<&str, BTreeSet<Option<String>>> = BTreeMap::new();
+    for (name, text) in &all {
+        identifiers(text).for_each(|word| _ = users.entry(word).or_default().insert(member(name)));
+    }
+    let mut shown = Vec::new();
+    for (name, text) in all.iter().filter(|(name, _)| member(name).is_some()) {
+        let open: String =
+            text.lines().filter(|line| line.trim_start().starts_with("pub ")).map(|l| format!("{l}\n")).collect();
+        for word in exported(&open) {
+            if users[word].iter().all(|user| *user == member(name)) {
+                shown.push(format!("{name}: {word}"));
+            }
+        }
+    }
+    assert!(shown.is_empty(), "public, and named in no other member: {shown:#?}");
+}

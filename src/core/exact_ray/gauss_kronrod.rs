@@ -35,9 +35,9 @@ const GAUSS: [f64; 4] =
 #[derive(Debug)]
 pub struct Rule {
     pub nodes: [f64; COUNT],
-    pub kronrod: [f64; COUNT],
+    pub(crate) kronrod: [f64; COUNT],
     /// 0 at the nodes that only the larger rule has.
-    pub gauss: [f64; COUNT],
+    pub(crate) gauss: [f64; COUNT],
     /// `inner[i][j]`: weight of the value at node j in the integral from -1 to node i of the polynomial of degree 14 through all values.
     pub inner: [[f64; COUNT]; COUNT],
 }

@@ -172,7 +172,7 @@ fn halves(bernstein: [f64; MOST], count: usize) -> ([f64; MOST], [f64; MOST]) {
 
 /// The root of a continuous function between two places at which it has different signs, to rounding; none if it has not.
 /// The secant rule with halved end values (Illinois; Dowell and Jarratt 1971), bisected where that is slow.
-pub fn bracketed(f: impl Fn(f64) -> f64, low: f64, high: f64) -> Option<f64> {
+pub(crate) fn bracketed(f: impl Fn(f64) -> f64, low: f64, high: f64) -> Option<f64> {
     let (mut a, mut b) = (low, high);
     let (mut fa, mut fb) = (f(a), f(b));
     if fa == 0.0 {

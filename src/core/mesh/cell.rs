@@ -9,27 +9,27 @@ use std::sync::OnceLock;
 
 /// The patches of a cell.
 #[derive(Clone, Copy, Debug, Default)]
-pub struct Patches {
+pub(crate) struct Patches {
     /// Number of patches, 0 to 4.
     pub count: u8,
     /// The patch of each edge that is crossed.
-    pub of_edge: [u8; 12],
+    pub(crate) of_edge: [u8; 12],
 }
 
 /// The corners of an edge, the one with the lower coordinate first.
-pub fn corners_of(edge: usize) -> [usize; 2] {
+pub(crate) fn corners_of(edge: usize) -> [usize; 2] {
     let (axis, place) = (edge / 4, edge % 4);
     let low = (place & 1) << ((axis + 1) % 3) | (place >> 1) << ((axis + 2) % 3);
     [low, low | 1 << axis]
 }
 
 /// The edge of a cell along `axis`, at these places along the next axis and the one after it, 0 or 1.
-pub fn edge_at(axis: usize, next: usize, after: usize) -> usize {
+pub(crate) fn edge_at(axis: usize, next: usize, after: usize) -> usize {
     4 * axis + next + 2 * after
 }
 
 /// The edges of a face: `axis` is its normal, `side` 0 or 1. In cyclic order: each shares a corner with the next.
-pub fn edges_of_face(axis: usize, side: usize) -> [usize; 4] {
+pub(crate) fn edges_of_face(axis: usize, side: usize) -> [usize; 4] {
     let (next, after) = ((axis + 1) % 3, (axis + 2) % 3);
     // An edge along `next` has (after, axis) as its places, one along `after` has (axis, next).
     [edge_at(next, 0, side), edge_at(after, side, 1), edge_at(next, 1, side), edge_at(after, side, 0)]
@@ -42,12 +42,12 @@ pub fn is_crossed(inside: u8, edge: usize) -> bool {
 }
 
 /// True if all four edges of a face are crossed.
-pub fn is_ambiguous(inside: u8, axis: usize, side: usize) -> bool {
+pub(crate) fn is_ambiguous(inside: u8, axis: usize, side: usize) -> bool {
     edges_of_face(axis, side).iter().all(|edge| is_crossed(inside, *edge))
 }
 
 /// The edge that an edge is joined with on a face. Both are crossed.
-pub fn partner(inside: u8, axis: usize, side: usize, edge: usize) -> usize {
+pub(crate) fn partner(inside: u8, axis: usize, side: usize, edge: usize) -> usize {
     let crossed = |other: &usize| *other != edge && is_crossed(inside, *other);
     let edges = edges_of_face(axis, side);
     if !is_ambiguous(inside, axis, side) {
@@ -60,7 +60,7 @@ pub fn partner(inside: u8, axis: usize, side: usize, edge: usize) -> usize {
 }
 
 /// The patches for every set of signs.
-pub fn patches() -> &'static [Patches; 256] {
+pub(crate) fn patches() -> &'static [Patches; 256] {
     static TABLE: OnceLock<[Patches; 256]> = OnceLock::new();
     TABLE.get_or_init(|| std::array::from_fn(|inside| of_signs(inside as u8)))
 }

@@ -151,7 +151,7 @@ pub(super) mod tests {
 
     /// Checks that every edge belongs to two triangles that run along it in opposite directions, that the triangles around each vertex are one
     /// fan, and that no triangle has a vertex twice. Returns the Euler characteristic.
-    pub fn closed_manifold(mesh: &Mesh) -> i64 {
+    pub(crate) fn closed_manifold(mesh: &Mesh) -> i64 {
         // The sides of triangles as they are run along, each with the corner opposite. Sorted: a hash of thousands of small meshes costs more.
         let mut sides: Vec<[u32; 3]> = Vec::with_capacity(3 * mesh.triangles.len());
         for [a, b, c] in mesh.triangles.iter().copied() {

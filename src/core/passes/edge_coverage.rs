@@ -18,7 +18,7 @@ const REACH: i64 = 16;
 /// The share of a pixel that is nearer than a limit, from the distances of rays at an offset from it. The pixel keeps half of itself, at least: its ray
 /// tells where its middle lies; and all of itself where no edge can be told. Around an outline what is near is all that is hit; between two surfaces both may
 /// have the distance of the other further away, so that only the run tells, whose limit follows the two surfaces.
-pub fn near_share(distance: &dyn Fn(i64, i64) -> f64, limit: f64, is_outline: bool) -> f64 {
+pub(crate) fn near_share(distance: &dyn Fn(i64, i64) -> f64, limit: f64, is_outline: bool) -> f64 {
     let is_near = |dx: i64, dy: i64| distance(dx, dy) < limit;
     let side = |dx: i64, dy: i64| f64::from(u8::from(is_near(dx, dy)));
     let rise = |at: &dyn Fn(i64, i64) -> f64| -> f64 {

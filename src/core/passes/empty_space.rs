@@ -69,7 +69,7 @@ fn need(scene: &Scene) -> Need {
 }
 
 /// The smallest and the largest value of every tile of a slice. Only tiles of the slices that a new frame changes are updated.
-pub const TILE_RANGES: Pass = Pass {
+pub(crate) const TILE_RANGES: Pass = Pass {
     name: "tile_ranges",
     stage: Stage::Preprocess,
     frequency: Frequency::Volume,
@@ -111,7 +111,7 @@ pub const TILE_RANGES: Pass = Pass {
 
 /// The smallest and the largest value that samples in each brick may have, from the tiles that they may touch. Only bricks that
 /// depend on the slices that a new frame changes are updated.
-pub const BRICK_RANGES: Pass = Pass {
+pub(crate) const BRICK_RANGES: Pass = Pass {
     name: "brick_ranges",
     stage: Stage::Preprocess,
     frequency: Frequency::Volume,
@@ -162,7 +162,7 @@ pub const BRICK_RANGES: Pass = Pass {
 
 /// The kind of each brick to the surface detector. A change of transfer function, threshold or window classifies bricks again and
 /// reads no voxel.
-pub const CLASSIFY_SURFACE: Pass = Pass {
+pub(crate) const CLASSIFY_SURFACE: Pass = Pass {
     name: "classify_bricks_surface",
     stage: Stage::Raycast,
     frequency: Frequency::Picture,
@@ -196,7 +196,7 @@ pub const CLASSIFY_SURFACE: Pass = Pass {
 };
 
 /// The kind of each brick to the mode that composites, or takes the mean.
-pub const CLASSIFY_VOLUME: Pass = Pass {
+pub(crate) const CLASSIFY_VOLUME: Pass = Pass {
     name: "classify_bricks_volume",
     needed: |s| match (s.composites(), s.settings.mode, need(s)) {
         _ if s.still().is_some() => Err("paths take the majorants of bricks"),
@@ -294,7 +294,7 @@ fn classify_reference(
 
 /// The Chebyshev distance to the nearest brick of another kind, in bricks (Deakin and Knackstedt 2020), for the surface detector: one
 /// axis per dispatch, by d(p) = min over the line through p of max(|q - p|, d(q)).
-pub const DISTANCE_SURFACE: Pass = Pass {
+pub(crate) const DISTANCE_SURFACE: Pass = Pass {
     name: "brick_distance_surface",
     stage: Stage::Raycast,
     frequency: Frequency::Picture,
@@ -312,7 +312,7 @@ pub const DISTANCE_SURFACE: Pass = Pass {
 };
 
 /// The same for the mode that composites, or takes the mean.
-pub const DISTANCE_VOLUME: Pass = Pass {
+pub(crate) const DISTANCE_VOLUME: Pass = Pass {
     name: "brick_distance_volume",
     needed: CLASSIFY_VOLUME.needed,
     reads: |_, t| vec![whole("source", link(Slot::VolumeBrickDistances, t).0)],

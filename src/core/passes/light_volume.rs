@@ -57,7 +57,7 @@ fn cells(scene: &Scene) -> [u32; 3] {
 }
 
 /// The density and the echo of each cell; beyond the box, those at its faces. Matter does not fade towards the faces of the region here: what it cuts lies in the shade of what is beyond.
-pub const MATTER: Pass = Pass {
+pub(crate) const MATTER: Pass = Pass {
     name: "light_matter",
     stage: Stage::Raycast,
     frequency: Frequency::Picture,
@@ -121,7 +121,7 @@ pub const MATTER: Pass = Pass {
 };
 
 /// The levels of the pyramid, one after the other.
-pub const REDUCE: Pass = Pass {
+pub(crate) const REDUCE: Pass = Pass {
     name: "light_reduce",
     shader: |_, _| "light_volume/reduce",
     reads: |_, t| vec![whole("source", level(t.iteration))],
@@ -374,7 +374,7 @@ impl Beam {
 }
 
 /// The light that `light.direction` names, layer by layer, or several layers at once.
-pub const PROPAGATE: Pass = Pass {
+pub(crate) const PROPAGATE: Pass = Pass {
     name: "light_propagate",
     shader: |s, _| KEY.shader(s),
     reads: |_, t| KEY.reads(t),
@@ -394,7 +394,7 @@ pub const PROPAGATE: Pass = Pass {
 };
 
 /// The back light, in larger cells.
-pub const PROPAGATE_BACK: Pass = Pass {
+pub(crate) const PROPAGATE_BACK: Pass = Pass {
     name: "light_propagate_back",
     needed: need_back,
     reads: |_, t| BACK.reads(t),

@@ -148,7 +148,7 @@ pub fn transfer_table(scene: &Scene) -> Vec<f32> {
 }
 
 /// Integral over the values up to each entry, of absorption times colour and of absorption. Between two entries both are linear in the value.
-pub fn transfer_integral(scene: &Scene) -> Vec<f32> {
+pub(crate) fn transfer_integral(scene: &Scene) -> Vec<f32> {
     let entries = transfer_of(scene);
     let width = 1.0 / (entries.len() - 1) as f64;
     let mut sum = [0.0; 4];
@@ -188,7 +188,7 @@ pub fn pre_integrated_table(scene: &Scene) -> Vec<f32> {
 }
 
 /// Light and opacity of a step of the scene between every two sample values, then colour and absorption over the value.
-pub fn self_attenuated_table(scene: &Scene) -> Vec<f32> {
+pub(crate) fn self_attenuated_table(scene: &Scene) -> Vec<f32> {
     let (table, length) = (transfer_of(scene), scene.optical_step());
     let rows = (0..table.len()).into_par_iter().flat_map_iter(|front| self_attenuation::row(&table, front, length));
     let mut steps: Vec<f32> = rows.flatten_iter().map(|v| v as f32).collect();

@@ -37,10 +37,10 @@ pub mod raycast {
     pub mod planes;
     pub mod projection;
     pub mod ray;
-    pub mod refine;
+    pub(crate) mod refine;
     pub mod still;
     pub mod surface;
-    pub mod surface_and_volume;
+    pub(crate) mod surface_and_volume;
     pub mod survey;
     pub mod tolerance;
     pub mod volume;

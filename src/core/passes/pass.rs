@@ -313,7 +313,7 @@ pub(super) fn rendering_extent(scene: &Scene, _: &DispatchArgs) -> [u32; 3] {
 pub const RUN: u32 = 4;
 
 /// Invocations that make so many texels in runs along an axis.
-pub fn in_runs(texels: [u32; 3], axis: usize) -> [u32; 3] {
+pub(crate) fn in_runs(texels: [u32; 3], axis: usize) -> [u32; 3] {
     in_runs_of(RUN, texels, axis)
 }
 

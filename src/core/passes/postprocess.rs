@@ -60,7 +60,7 @@ fn tone_and_lines_constants(scene: &Scene) -> Vec<(&'static str, i32)> {
 }
 
 /// Adds the numbers of toning to those of a pass.
-pub fn tone_params(scene: &Scene, params: Params) -> Params {
+pub(crate) fn tone_params(scene: &Scene, params: Params) -> Params {
     let post = &scene.settings.post;
     let [a, b, c, d, e] = transfer::colour_map(post.colour_map);
     params
@@ -75,7 +75,7 @@ pub fn tone_params(scene: &Scene, params: Params) -> Params {
 }
 
 /// The constants of toning.
-pub fn tone_constants(scene: &Scene) -> Vec<(&'static str, i32)> {
+pub(crate) fn tone_constants(scene: &Scene) -> Vec<(&'static str, i32)> {
     let post = &scene.settings.post;
     vec![
         ("COLOUR_MAP", (post.colour_map != ColourMap::None) as i32),
@@ -85,7 +85,13 @@ pub fn tone_constants(scene: &Scene) -> Vec<(&'static str, i32)> {
 }
 
 /// The colour on the screen, black where there is none; with the lines of the sheet, if it has any.
-pub fn reference_pixel(scene: &Scene, sheet: Option<&Sheet>, colour: Option<[f64; 3]>, x: usize, y: usize) -> [f64; 4] {
+pub(crate) fn reference_pixel(
+    scene: &Scene,
+    sheet: Option<&Sheet>,
+    colour: Option<[f64; 3]>,
+    x: usize,
+    y: usize,
+) -> [f64; 4] {
     let mut colour = colour.map_or([0.0; 3], |c| toned(scene, c));
     if let Some((sheet, tile)) = sheet.and_then(|s| s.tile_at(x, y).map(|tile| (s, tile))) {
         colour = with_lines(sheet, tile, colour, x, y);
@@ -178,7 +184,7 @@ fn assemble_extent(scene: &Scene, _: &DispatchArgs) -> [u32; 3] {
 
 /// The picture from the rendering: the mean of several rays per pixel; what is near and what is far at an edge of a surface, by the share of the pixel that
 /// each covers; or interpolation between the rays where one ray makes several pixels, without mixing what is near with what lies far behind it; in a 4-up picture, the rendering next to the planes; in a pair, the composited volume next to the lit surface.
-pub const ASSEMBLE: Pass = Pass {
+pub(crate) const ASSEMBLE: Pass = Pass {
     name: "assemble",
     stage: Stage::Postprocess,
     frequency: Frequency::Picture,
@@ -206,7 +212,7 @@ pub const ASSEMBLE: Pass = Pass {
 };
 
 /// The same, toned and in 8 bits.
-pub const ASSEMBLE_TONED: Pass = Pass {
+pub(crate) const ASSEMBLE_TONED: Pass = Pass {
     name: "assemble_toned",
     shader: |_, _| "postprocess/assemble.toned",
     needed: |s| match (s.assembles(), s.tones_assembled()) {

@@ -8,7 +8,7 @@ use crate::probe::StoredType;
 use crate::scene::{Conditioning, Scene, VolumeFormat, gaussian_radius};
 
 /// Scan conversion of each polar frame into a slice, through the look-up table (thesis 4.3, Fig. 31).
-pub const SCAN_CONVERT: Pass = Pass {
+pub(crate) const SCAN_CONVERT: Pass = Pass {
     name: "scan_convert",
     stage: Stage::Preprocess,
     frequency: Frequency::Frame,
@@ -62,14 +62,14 @@ pub const SCAN_CONVERT: Pass = Pass {
 };
 
 /// The same for the volume that planes beside a rendering are cut from: scan conversion again, since a filter may have overwritten the first.
-pub const SECTION_SCAN_CONVERT: Pass = Pass {
+pub(crate) const SECTION_SCAN_CONVERT: Pass = Pass {
     name: "section_scan_convert",
     link: Link::Filter(Filter::of(Chain::Sections)),
     needed: |s| of_sections(s, (SCAN_CONVERT.needed)(s)),
     ..SCAN_CONVERT
 };
 
-pub const SECTION_LOAD_SLICE: Pass = Pass {
+pub(crate) const SECTION_LOAD_SLICE: Pass = Pass {
     name: "section_load_slice",
     link: Link::Filter(Filter { is_identity: is_unscaled, ..Filter::of(Chain::Sections) }),
     needed: |s| of_sections(s, (LOAD_SLICE.needed)(s)),
@@ -90,7 +90,7 @@ fn scale(scene: &Scene) -> (f64, f64) {
 
 /// Line conditioning of polar frames before scan conversion (thesis 4.3): time gain compensation, Gaussian low pass and
 /// decimation along the lines, log compression. Sample j of the result is centred on sample j M of the frame.
-pub const CONDITION: Pass = Pass {
+pub(crate) const CONDITION: Pass = Pass {
     name: "condition",
     stage: Stage::Preprocess,
     frequency: Frequency::Frame,
@@ -186,7 +186,7 @@ fn compressed(c: &Conditioning, value: f64) -> f64 {
 }
 
 /// Slices of a Cartesian volume, scaled to 0..1.
-pub const LOAD_SLICE: Pass = Pass {
+pub(crate) const LOAD_SLICE: Pass = Pass {
     name: "load_slice",
     stage: Stage::Preprocess,
     frequency: Frequency::Frame,

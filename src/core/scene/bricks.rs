@@ -124,7 +124,7 @@ impl Scene {
     }
 
     /// Number of tiles along both axes of a slice, and number of slices.
-    pub fn tile_counts(&self) -> [u32; 3] {
+    pub(crate) fn tile_counts(&self) -> [u32; 3] {
         let [width, height, slices] = self.volume_size();
         [width.div_ceil(TILE), height.div_ceil(TILE), slices]
     }
@@ -159,7 +159,7 @@ impl Scene {
     }
 
     /// The values, apart from the geometry, that determine the brick tables. Equal keys give equal tables.
-    pub fn brick_basis(&self) -> impl PartialEq + use<> {
+    pub(crate) fn brick_basis(&self) -> impl PartialEq + use<> {
         (self.bricks(), self.grid, self.tap_reach(), self.takes_bspline())
     }
 }

@@ -26,7 +26,7 @@ impl Scene {
     }
 
     /// The region that is cut, with the grey window of planes. In mode mixed that of the surface, which ends at the faces.
-    pub fn cap_view(&self) -> View {
+    pub(crate) fn cap_view(&self) -> View {
         let low = match self.settings.mode {
             Mode::Surface | Mode::Mixed => self.surface_view().low,
             _ => self.volume_view().low,
@@ -44,12 +44,12 @@ impl Scene {
     }
 
     /// Radius of the disc around a place of a cut face that tells tissue from fluid, mm: the length of an edge.
-    pub fn cap_radius(&self) -> f64 {
+    pub(crate) fn cap_radius(&self) -> f64 {
         self.ring.step * f64::from(self.ring.half)
     }
 
     /// True if cut faces fade towards the faces of the region, as what is composited does.
-    pub fn fades_caps(&self) -> bool {
+    pub(crate) fn fades_caps(&self) -> bool {
         self.settings.mode == Mode::Volume && self.region_fade().is_some()
     }
 

@@ -120,7 +120,7 @@ impl Line {
     }
 
     /// True if two passages of the line are within `reach` of a point, mm.
-    pub fn passes_twice(&self, point: DVec2, reach: f64) -> bool {
+    pub(crate) fn passes_twice(&self, point: DVec2, reach: f64) -> bool {
         let near: Vec<f64> =
             self.near(point, reach).into_iter().filter(|(_, off)| *off <= reach).map(|(along, _)| along).collect();
         // Two pieces beside each other are one passage.

@@ -31,7 +31,7 @@ pub struct CutShape {
     /// Corners in the plane, mm.
     pub contour: Vec<DVec2>,
     /// What is removed is within the contour; otherwise it is outside.
-    pub removes_inside: bool,
+    pub(crate) removes_inside: bool,
     /// Nothing is removed farther behind the plane, mm.
     pub depth: Option<f64>,
     /// What is removed is near these strokes; the contour is then empty.
@@ -131,7 +131,7 @@ impl CutShape {
 impl Scene {
     /// True if a rendering has cuts: it casts rays through a volume without what they remove. Planes and the block of mode cube show the echoes as
     /// they are.
-    pub fn has_cuts(&self) -> bool {
+    pub(crate) fn has_cuts(&self) -> bool {
         !self.settings.cuts.is_empty() && self.renders()
     }
 

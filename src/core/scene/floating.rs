@@ -52,12 +52,12 @@ impl Scene {
     }
 
     /// The size below which a part is dropped, in units.
-    pub fn least_part(&self) -> u64 {
+    pub(crate) fn least_part(&self) -> u64 {
         (self.settings.floating / self.part_unit()).ceil() as u64
     }
 
     /// Slices from one texel to another that one sample may touch both.
-    pub fn part_reach(&self) -> usize {
+    pub(crate) fn part_reach(&self) -> usize {
         if self.takes_bspline() { 3 } else { 1 }
     }
 

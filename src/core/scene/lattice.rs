@@ -77,7 +77,7 @@ impl Lattice {
         Lattice { first, count, ..self.clone() }
     }
 
-    pub fn is_smoothed(&self) -> bool {
+    pub(crate) fn is_smoothed(&self) -> bool {
         self.deviation > 0.0
     }
 
@@ -100,7 +100,7 @@ impl Lattice {
     }
 
     /// The first slice that is stored, and the number of them.
-    pub fn stored_slices(&self) -> (usize, usize) {
+    pub(crate) fn stored_slices(&self) -> (usize, usize) {
         let reach = self.reach()[2];
         let first = self.first.saturating_sub(reach);
         (first, (self.first + self.count + reach).min(self.grid.size[2]) - first)
@@ -129,7 +129,7 @@ impl Lattice {
     }
 
     /// The stored slice before the slab's first layer of cells; -1 if it is not known.
-    pub fn first_layer(&self) -> i64 {
+    pub(crate) fn first_layer(&self) -> i64 {
         let before = if self.first == 0 { self.pad() } else { 0 };
         (self.first - self.stored_slices().0) as i64 - before as i64
     }

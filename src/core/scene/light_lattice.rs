@@ -30,7 +30,7 @@ pub struct LightLattice {
 
 impl LightLattice {
     /// The share of the outermost layers of `count` cells with an edge of `cell` along an axis that is within the box.
-    pub fn outer_share(&self, axis: usize, count: u32, cell: f64) -> f64 {
+    pub(crate) fn outer_share(&self, axis: usize, count: u32, cell: f64) -> f64 {
         let beyond = f64::from(count) * cell - self.extent[axis];
         let sides = if count == 1 { 1.0 } else { 2.0 };
         (1.0 - beyond / (sides * cell)).clamp(0.0, 1.0)
@@ -81,7 +81,7 @@ pub struct Propagation {
     /// The axis that the light is nearest to.
     pub axis: usize,
     /// True if the light comes from the high end of the axis.
-    pub from_high: bool,
+    pub(crate) from_high: bool,
     /// Cells along the other two axes, in their order, from a place to where its light comes from, one layer nearer to the light.
     pub shift: [f64; 2],
     /// Path through one layer, cells.
@@ -130,23 +130,23 @@ impl LightVolume {
     }
 
     /// The same of the back light.
-    pub fn back_extinction(&self) -> [f64; 3] {
+    pub(crate) fn back_extinction(&self) -> [f64; 3] {
         let [_, green, _] = BACK_EXTINCTION;
         BACK_EXTINCTION.map(|ratio| green * (ratio / green).powf(self.warmth) / self.depth)
     }
 
     /// The same of ambient light, of any colour.
-    pub fn ambient_extinction(&self) -> f64 {
+    pub(crate) fn ambient_extinction(&self) -> f64 {
         AMBIENT_EXTINCTION / self.depth
     }
 
     /// Powers of the share of ambient light that arrives.
-    pub fn ambient_powers(&self) -> [f64; 3] {
+    pub(crate) fn ambient_powers(&self) -> [f64; 3] {
         AMBIENT_POWERS.map(|power| 1.0 + self.warmth * (power - 1.0))
     }
 
     /// Standard deviations over which tissue scatters red, green and blue light, mm.
-    pub fn scatter_deviations(&self) -> [f64; 3] {
+    pub(crate) fn scatter_deviations(&self) -> [f64; 3] {
         SCATTER.map(|ratio| ratio.powf(self.warmth) * self.scatter)
     }
 }
@@ -188,7 +188,7 @@ impl Scene {
     }
 
     /// The lattice of the light volume and why it is as it is, for `--explain`; none if nothing is lit by one.
-    pub fn light_choice(&self) -> Option<String> {
+    pub(crate) fn light_choice(&self) -> Option<String> {
         let light = self.lit_by_volume()?;
         let (LightLattice { cell, count: [x, y, z], .. }, wanted) = (self.light_lattice(), self.wanted_cell());
         let asked = match light.cell {
@@ -209,7 +209,7 @@ impl Scene {
     }
 
     /// The least edge of a cell of which a cell of the pyramid is as wide as the nearest place of a cone, mm.
-    pub fn least_cell_of_cones(&self) -> f64 {
+    pub(crate) fn least_cell_of_cones(&self) -> f64 {
         CONE_WIDTH * self.settings.light.volume.unwrap_or_default().reach / 2.0 / NARROWEST[1].exp2()
     }
 
@@ -227,7 +227,7 @@ impl Scene {
     }
 
     /// A direction in the axes that `light.follows` names, in space, as a unit vector.
-    pub fn light_direction(&self, direction: DVec3) -> DVec3 {
+    pub(crate) fn light_direction(&self, direction: DVec3) -> DVec3 {
         let v = direction.normalize();
         match self.settings.light.follows {
             Follows::Camera => self.rays.from_camera(v),

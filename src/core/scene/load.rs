@@ -37,6 +37,7 @@ const RIVALS: &[(&str, &str)] = &[
 ];
 
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum LoadError {
     #[error("preset {name:?} is unknown; there are: {}", PRESETS.iter().map(|p| p.0).collect::<Vec<_>>().join(", "))]
     UnknownPreset { name: String },

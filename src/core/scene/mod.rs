@@ -379,7 +379,7 @@ impl Scene {
 
     /// The origin of the coordinates that shaders compute with, mm in space ("relative to center", Ohlarik 2008): the centre of the
     /// rendered box of a Cartesian volume, which may lie anywhere. A sweep's own origin, which its inverse map needs, is on its probe.
-    pub fn local_origin(&self) -> DVec3 {
+    pub(crate) fn local_origin(&self) -> DVec3 {
         match self.geometry {
             Geometry::Cartesian(_) => (self.low + self.high) / 2.0,
             Geometry::Sweep(_) => DVec3::ZERO,
@@ -392,7 +392,7 @@ impl Scene {
     }
 
     /// The limit w of a half-space dot(n, p) <= w in space, mm, for places as shaders get them.
-    pub fn limit_to_local(&self, normal: DVec3, limit: f64) -> f64 {
+    pub(crate) fn limit_to_local(&self, normal: DVec3, limit: f64) -> f64 {
         limit - normal.dot(self.local_origin())
     }
 
@@ -423,7 +423,7 @@ impl Scene {
     }
 
     /// True for a device that executes both sides of every branch and has no shared memory: a CPU, or none that is known yet.
-    pub fn is_for_cpu(&self) -> bool {
+    pub(crate) fn is_for_cpu(&self) -> bool {
         self.shared_memory == 0
     }
 
@@ -461,7 +461,7 @@ impl Scene {
     }
 
     /// Pixels of the rendering along each axis, where each has one ray or more.
-    pub fn rendering_size(&self) -> [u32; 2] {
+    pub(crate) fn rendering_size(&self) -> [u32; 2] {
         self.ray_size().map(|n| n / self.settings.ray.rays)
     }
 
@@ -494,7 +494,7 @@ impl Scene {
     }
 
     /// True if a picture is converted to 8 bits when it is assembled, since no other pass of stage 4 reads it.
-    pub fn tones_assembled(&self) -> bool {
+    pub(crate) fn tones_assembled(&self) -> bool {
         self.assembles() && self.only_tones()
     }
 
@@ -542,7 +542,7 @@ impl Scene {
     }
 
     /// The view of projections.
-    pub fn projection_view(&self) -> View {
+    pub(crate) fn projection_view(&self) -> View {
         self.view(self.settings.projection.window, self.settings.projection.start_depth)
     }
 
@@ -559,7 +559,7 @@ impl Scene {
     }
 
     /// The whole region with a grey window.
-    pub fn whole_view(&self, window: [f64; 2]) -> View {
+    pub(crate) fn whole_view(&self, window: [f64; 2]) -> View {
         self.view(window, None)
     }
 
@@ -583,7 +583,7 @@ impl Scene {
     }
 
     /// A step of volume rendering, where steps have one length, in lengths for which opacities are given.
-    pub fn optical_step(&self) -> f64 {
+    pub(crate) fn optical_step(&self) -> f64 {
         self.step / self.reference_length()
     }
 
@@ -593,7 +593,7 @@ impl Scene {
     }
 
     /// True if the volume gives the surface its colour.
-    pub fn colours_surface(&self) -> bool {
+    pub(crate) fn colours_surface(&self) -> bool {
         self.settings.mode == Mode::Surface && self.settings.surface.colour != SurfaceColour::Constant
     }
 
@@ -603,7 +603,7 @@ impl Scene {
     }
 
     /// Whether one march finds the surface and composites the whole ray, and why, or why not (thesis 4.4.2).
-    pub fn marches_once(&self) -> Result<&'static str, &'static str> {
+    pub(crate) fn marches_once(&self) -> Result<&'static str, &'static str> {
         let settings = &self.settings;
         let is_whole = settings.surface.colour == SurfaceColour::Rendered || self.is_pair();
         if settings.mode != Mode::Surface {
@@ -631,7 +631,7 @@ impl Scene {
     }
 
     /// True if the mode is a projection: one value per ray.
-    pub fn projects(&self) -> bool {
+    pub(crate) fn projects(&self) -> bool {
         matches!(self.settings.mode, Mode::Mip | Mode::MinIp | Mode::Mean)
     }
 
@@ -656,7 +656,7 @@ impl Scene {
     }
 
     /// The same of the volume that planes beside a rendering are cut from.
-    pub fn section_smoothing(&self) -> [f64; 3] {
+    pub(crate) fn section_smoothing(&self) -> [f64; 3] {
         self.deviations(self.section_smooth.unwrap_or_default())
     }
 
@@ -686,7 +686,7 @@ impl Scene {
     }
 
     /// True if slices are sharpened across elevation.
-    pub fn sharpens(&self) -> bool {
+    pub(crate) fn sharpens(&self) -> bool {
         self.settings.ray.elevation == Elevation::BsplineSharp
     }
 
@@ -706,7 +706,7 @@ impl Scene {
     }
 
     /// Taps on one side of the Gaussian of the volume that planes beside a rendering are cut from.
-    pub fn section_smoothing_radius(&self) -> [u32; 3] {
+    pub(crate) fn section_smoothing_radius(&self) -> [u32; 3] {
         if let Some(taps) = self.section_smooth.and_then(|s| s.kernel) {
             return [taps / 2; 3];
         }
@@ -716,7 +716,7 @@ impl Scene {
 
     /// Frames on either side that change a slice of the volume that rays are cast through: all of them where parts that float are dropped, or the
     /// render start follows the fluid.
-    pub fn reach_to_frames(&self) -> u32 {
+    pub(crate) fn reach_to_frames(&self) -> u32 {
         if self.drops_floating() || self.unveils() { self.slices() } else { self.smoothing_radius()[2] }
     }
 
@@ -739,7 +739,7 @@ impl Scene {
     }
 
     /// Number of samples behind the surface whose mean echo skin shading needs; 0 for none.
-    pub fn samples_behind(&self) -> u32 {
+    pub(crate) fn samples_behind(&self) -> u32 {
         match self.settings.light.skin {
             Some(skin) if skin.translucency > 0.0 => ((skin.depth / self.ring.step).ceil() as u32).clamp(1, 256),
             _ => 0,
@@ -747,7 +747,7 @@ impl Scene {
     }
 
     /// Distance between these samples, mm: together they span the skin's depth.
-    pub fn step_behind(&self) -> f64 {
+    pub(crate) fn step_behind(&self) -> f64 {
         self.settings.light.skin.map_or(0.0, |skin| skin.depth) / f64::from(self.samples_behind().max(1))
     }
 
@@ -800,6 +800,6 @@ fn binomial_deviation(taps: u32) -> f64 {
 }
 
 /// Taps on one side of a Gaussian, cut off at three standard deviations, which hold 99.7 % of it.
-pub fn gaussian_radius(deviation: f64) -> u32 {
+pub(crate) fn gaussian_radius(deviation: f64) -> u32 {
     if deviation > 0.0 { ((3.0 * deviation).ceil() as u32).max(1) } else { 0 }
 }

@@ -7,7 +7,7 @@ use glam::{DMat3, DVec2, DVec3};
 /// Maximum number of tiles of a picture.
 pub const MAX_TILES: u32 = 64;
 /// Maximum number of samples through a slab.
-pub const MAX_SLAB: f64 = 4096.0;
+pub(crate) const MAX_SLAB: f64 = 4096.0;
 /// Points of the line of a curved plane that are closer than this share of its extent coincide.
 pub(super) const SAME_POINT: f64 = 1e-6;
 /// Where the line of a curved plane is drawn, a point that is closer to the last one than this share of the planes' box is none. It is more than
@@ -19,7 +19,7 @@ const ON_SECTION: f64 = 1.0 / 128.0;
 /// are shorter than its arcs by 6e-5.
 const WAY_STEP: f64 = 1.0 / 256.0;
 /// Size of a tile in the buffer, in vectors of four floats.
-pub const TILE_VECTORS: u32 = 9;
+pub(crate) const TILE_VECTORS: u32 = 9;
 
 /// A plane through the volume: a point on it and three unit axes.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -44,7 +44,7 @@ pub struct Tile {
     pub section: Option<Section>,
     pub frame: Frame,
     /// The planes whose cross-lines are drawn, and their colours.
-    pub crossed_by: Vec<(Plane, [f64; 3])>,
+    pub(crate) crossed_by: Vec<(Plane, [f64; 3])>,
 }
 
 /// A curved plane: it stands on a line in a reference plane, perpendicular to that.
@@ -112,19 +112,19 @@ impl Scene {
     }
 
     /// The box and the window of planes.
-    pub fn planes_view(&self) -> View {
+    pub(crate) fn planes_view(&self) -> View {
         let (low, high) = self.planes_box();
         View { window: self.settings.planes.window, low, high }
     }
 
     /// The clip planes that cut planes: (n, w) in space.
-    pub fn planes_clips(&self) -> impl Iterator<Item = (DVec3, f64)> {
+    pub(crate) fn planes_clips(&self) -> impl Iterator<Item = (DVec3, f64)> {
         let is_cut = !self.has_sections();
         self.clips().filter(move |_| is_cut)
     }
 
     /// Number of columns and rows of tiles.
-    pub fn tile_grid(&self) -> [u32; 2] {
+    pub(crate) fn tile_grid(&self) -> [u32; 2] {
         match (self.settings.layout, self.settings.mode) {
             (Layout::Single, Mode::Plane) if self.has_curve() => self.grid_of_two(),
             (Layout::Four, _) | (_, Mode::Orthogonal) => [2, 2],
@@ -145,7 +145,7 @@ impl Scene {
     }
 
     /// Number of tiles that show a plane.
-    pub fn tile_count(&self) -> u32 {
+    pub(crate) fn tile_count(&self) -> u32 {
         let [columns, rows] = self.tile_grid();
         if self.shows_three() { 3 + u32::from(self.has_curve()) } else { columns.saturating_mul(rows) }
     }
@@ -167,7 +167,7 @@ impl Scene {
     }
 
     /// Number of samples through the slab, at most one slice pixel apart, both faces included.
-    pub fn slab_samples(&self) -> f64 {
+    pub(crate) fn slab_samples(&self) -> f64 {
         let thickness = self.settings.planes.thickness;
         let pixel = self.grid.pitch[0].min(self.grid.pitch[1]);
         if thickness > 0.0 { (thickness / pixel).ceil() + 1.0 } else { 1.0 }
@@ -542,7 +542,7 @@ impl Sheet {
 
     /// The columns of the curved plane for the shaders: the place at the tile's upper edge and 1, or 0 beyond the ends of the line; and the vector through the
     /// slab.
-    pub fn column_table(&self, thickness: f64) -> Vec<f64> {
+    pub(crate) fn column_table(&self, thickness: f64) -> Vec<f64> {
         let Some(tile) = self.tiles.last() else { return Vec::new() };
         let up = tile.plane.down * (tile.pixel * f64::from(tile.size[1]) / 2.0);
         let entry = |column: Option<Column>| match column {

@@ -44,7 +44,7 @@ impl Scene {
     }
 
     /// How the volume is stored and why, for `--explain`.
-    pub fn format_choice(&self) -> String {
+    pub(crate) fn format_choice(&self) -> String {
         let why = match (self.settings.slices.format, self.truncates_halves, self.may_overshoot()) {
             (VolumeFormat::Auto, true, true) => {
                 "the device truncates what it stores so, but scheme aos-richardson may leave values beyond 0..1"
@@ -107,7 +107,7 @@ impl Scene {
     }
 
     /// Why rays skip bricks, or why not, for `--explain`; none if no ray is cast.
-    pub fn brick_choice(&self) -> Option<String> {
+    pub(crate) fn brick_choice(&self) -> Option<String> {
         if !(self.composites() || self.detects_surface() || self.projects()) {
             return None;
         }

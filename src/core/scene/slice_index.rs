@@ -6,13 +6,13 @@ use crate::probe::{Motion, Probe};
 use std::f64::consts::{FRAC_PI_2, PI};
 
 /// Error bound of the polynomial, slices. An index in f32 is less exact from 16 slices on.
-pub const MAX_ERROR: f64 = 1e-6;
+pub(crate) const MAX_ERROR: f64 = 1e-6;
 /// Terms that the shaders have parameters for.
 const MAX_TERMS: usize = 10;
 
 /// Slice index in mean pitches: `offset + t (terms[0] + terms[1] t^2 + terms[2] t^4 ...)` at a position t within the limits.
 #[derive(Clone, Debug, PartialEq)]
-pub struct SlicePolynomial {
+pub(crate) struct SlicePolynomial {
     /// The lowest and the highest position, a little beyond the sweep: mm, or of a fan the tangent of half the angle about the wobble axis.
     pub limits: [f64; 2],
     pub offset: f64,
@@ -30,7 +30,7 @@ impl Scene {
     }
 
     /// The polynomial, where there is one.
-    pub fn slice_polynomial(&self) -> Option<SlicePolynomial> {
+    pub(crate) fn slice_polynomial(&self) -> Option<SlicePolynomial> {
         let count = self.slice_terms();
         self.probe().filter(|_| count > 0).map(|probe| polynomial(probe, count))
     }

@@ -80,7 +80,7 @@ fn end_slope((h0, d0): (f64, f64), (h1, d1): (f64, f64)) -> f64 {
 
 impl Scene {
     /// True if a rendering starts at a curve. Planes and the block of mode cube show everything.
-    pub fn starts_at_curve(&self) -> bool {
+    pub(crate) fn starts_at_curve(&self) -> bool {
         self.settings.region.start_curve.is_some() && self.renders()
     }
 

@@ -28,7 +28,7 @@ pub struct StillLights {
 
 impl StillLights {
     /// The probability with which a collision takes light from the back light: its share of both.
-    pub fn back_share(&self) -> f64 {
+    pub(crate) fn back_share(&self) -> f64 {
         let [key, back] = [self.key, self.back].map(|light| light.irradiance.into_iter().fold(0.0, f64::max));
         if back > 0.0 { back / (key + back) } else { 0.0 }
     }
@@ -76,7 +76,7 @@ impl Scene {
     }
 
     /// The medium over the sample value: albedo of red, green and blue, and extinction, 1/mm.
-    pub fn still_medium(&self, transfer: &[[f64; 4]]) -> Vec<[f64; 4]> {
+    pub(crate) fn still_medium(&self, transfer: &[[f64; 4]]) -> Vec<[f64; 4]> {
         let still = self.still().copied().unwrap_or_default();
         let of = |[r, g, b, absorption]: &[f64; 4]| {
             let albedo = [r, g, b].map(|c| still.albedo * albedo_of(*c, still.anisotropy));

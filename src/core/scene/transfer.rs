@@ -116,7 +116,7 @@ pub fn table(transfer: &Transfer, threshold: f64, entries: usize) -> Vec<[f64; 4
 }
 
 /// The same for volume rendering: with [`Volume::extinction`] in place of opacities of one reference length, mm.
-pub fn table_of(volume: &Volume, reference_length: f64, entries: usize) -> Vec<[f64; 4]> {
+pub(crate) fn table_of(volume: &Volume, reference_length: f64, entries: usize) -> Vec<[f64; 4]> {
     table_by(&volume.transfer, volume.threshold, entries, Absorption::of(volume, reference_length))
 }
 

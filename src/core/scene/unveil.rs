@@ -13,7 +13,7 @@ const SMOOTH: f64 = 1.2;
 
 /// The lattice that fluid is looked for in. Lengths are integers from here on, so that the same volume gives the same surface on every machine.
 #[derive(Clone, Debug, PartialEq)]
-pub struct FluidLattice {
+pub(crate) struct FluidLattice {
     /// Texels of a cell along columns and rows. Across slices it has one.
     pub cell: [usize; 2],
     /// Cells along columns, rows and slices.
@@ -32,7 +32,7 @@ impl Scene {
     }
 
     /// The cells that fluid is looked for in.
-    pub fn fluid_lattice(&self) -> FluidLattice {
+    pub(crate) fn fluid_lattice(&self) -> FluidLattice {
         let cell = self.grid.pitch.map(|pitch| (CELL / pitch).round().clamp(1.0, 64.0) as usize);
         let [columns, rows, slices] = self.volume_size().map(|n| n as usize);
         let middle = |slice: u32| self.texel_place([columns as u32 / 2, self.middle_row(), slice]);
@@ -73,7 +73,7 @@ impl Scene {
     }
 
     /// By column of cells, then slice: true if the column crosses the middle of the region's depth within the region.
-    pub fn columns_in_view(&self, lattice: &FluidLattice) -> Vec<bool> {
+    pub(crate) fn columns_in_view(&self, lattice: &FluidLattice) -> Vec<bool> {
         let depth = (self.low.y + self.high.y) / 2.0;
         let is_in_view = |column: usize, slice: u32| {
             let texel = (column * lattice.cell[0]) as f64 + (lattice.cell[0] - 1) as f64 / 2.0;

@@ -69,7 +69,7 @@ pub struct Rectangle {
 
 impl Rectangle {
     /// Texels, a multiple of which each edge of a part of a slice lies at: that of the workgroups that make it, and of tiles.
-    pub const ALIGNMENT: u32 = 32;
+    pub(crate) const ALIGNMENT: u32 = 32;
 }
 
 /// The positions of the samples of a pass: inside a box and all half-spaces, or at most `reach` mm outside.
@@ -101,7 +101,7 @@ impl Scene {
     }
 
     /// The visible columns and rows of a slice and so many around them, extended to complete workgroups or the slice's border.
-    pub fn visible_rectangle(&self, around: [u32; 2]) -> Rectangle {
+    pub(crate) fn visible_rectangle(&self, around: [u32; 2]) -> Rectangle {
         let cut = |axis: usize| {
             let (low, high) = (self.visible_bounds.low[axis], self.visible_bounds.high[axis]);
             let first = low.saturating_sub(around[axis]) / Rectangle::ALIGNMENT * Rectangle::ALIGNMENT;

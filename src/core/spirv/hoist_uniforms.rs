@@ -22,7 +22,7 @@ struct Member {
 ///
 /// # Errors
 /// A module that breaks the format.
-pub fn hoist_uniforms(words: &[u32]) -> Result<Vec<u32>, SpirvError> {
+pub(crate) fn hoist_uniforms(words: &[u32]) -> Result<Vec<u32>, SpirvError> {
     let instructions = decode(words)?;
     let loads = UniformLoads::find(&instructions);
     if loads.functions != 1 || loads.members.is_empty() {

@@ -6,123 +6,123 @@ pub const EMBEDDED: &[(&str, &[u8])] = include!("../../../spirv/embedded.rs");
 
 /// Opcodes.
 pub(super) mod op {
-    pub const UNDEF: u32 = 1;
+    pub(crate) const UNDEF: u32 = 1;
     pub const NAME: u32 = 5;
-    pub const MEMBER_NAME: u32 = 6;
+    pub(crate) const MEMBER_NAME: u32 = 6;
     pub const LINE: u32 = 8;
-    pub const EXT_INST: u32 = 12;
-    pub const ENTRY_POINT: u32 = 15;
-    pub const EXECUTION_MODE: u32 = 16;
+    pub(crate) const EXT_INST: u32 = 12;
+    pub(crate) const ENTRY_POINT: u32 = 15;
+    pub(crate) const EXECUTION_MODE: u32 = 16;
     pub const CAPABILITY: u32 = 17;
-    pub const TYPE_VOID: u32 = 19;
-    pub const TYPE_BOOL: u32 = 20;
-    pub const TYPE_INT: u32 = 21;
-    pub const TYPE_FLOAT: u32 = 22;
-    pub const TYPE_VECTOR: u32 = 23;
-    pub const TYPE_IMAGE: u32 = 25;
-    pub const TYPE_SAMPLER: u32 = 26;
-    pub const TYPE_SAMPLED_IMAGE: u32 = 27;
-    pub const TYPE_ARRAY: u32 = 28;
-    pub const TYPE_RUNTIME_ARRAY: u32 = 29;
-    pub const TYPE_STRUCT: u32 = 30;
-    pub const TYPE_POINTER: u32 = 32;
-    pub const CONSTANT_TRUE: u32 = 41;
-    pub const CONSTANT_FALSE: u32 = 42;
+    pub(crate) const TYPE_VOID: u32 = 19;
+    pub(crate) const TYPE_BOOL: u32 = 20;
+    pub(crate) const TYPE_INT: u32 = 21;
+    pub(crate) const TYPE_FLOAT: u32 = 22;
+    pub(crate) const TYPE_VECTOR: u32 = 23;
+    pub(crate) const TYPE_IMAGE: u32 = 25;
+    pub(crate) const TYPE_SAMPLER: u32 = 26;
+    pub(crate) const TYPE_SAMPLED_IMAGE: u32 = 27;
+    pub(crate) const TYPE_ARRAY: u32 = 28;
+    pub(crate) const TYPE_RUNTIME_ARRAY: u32 = 29;
+    pub(crate) const TYPE_STRUCT: u32 = 30;
+    pub(crate) const TYPE_POINTER: u32 = 32;
+    pub(crate) const CONSTANT_TRUE: u32 = 41;
+    pub(crate) const CONSTANT_FALSE: u32 = 42;
     pub const CONSTANT: u32 = 43;
-    pub const CONSTANT_COMPOSITE: u32 = 44;
-    pub const SPEC_CONSTANT: u32 = 50;
-    pub const SPEC_CONSTANT_COMPOSITE: u32 = 51;
-    pub const SPEC_CONSTANT_OP: u32 = 52;
-    pub const FUNCTION: u32 = 54;
-    pub const FUNCTION_END: u32 = 56;
-    pub const FUNCTION_CALL: u32 = 57;
+    pub(crate) const CONSTANT_COMPOSITE: u32 = 44;
+    pub(crate) const SPEC_CONSTANT: u32 = 50;
+    pub(crate) const SPEC_CONSTANT_COMPOSITE: u32 = 51;
+    pub(crate) const SPEC_CONSTANT_OP: u32 = 52;
+    pub(crate) const FUNCTION: u32 = 54;
+    pub(crate) const FUNCTION_END: u32 = 56;
+    pub(crate) const FUNCTION_CALL: u32 = 57;
     pub const VARIABLE: u32 = 59;
     pub const LOAD: u32 = 61;
     pub const STORE: u32 = 62;
-    pub const COPY_MEMORY_SIZED: u32 = 64;
-    pub const ACCESS_CHAIN: u32 = 65;
-    pub const IN_BOUNDS_ACCESS_CHAIN: u32 = 66;
-    pub const PTR_ACCESS_CHAIN: u32 = 67;
-    pub const ARRAY_LENGTH: u32 = 68;
-    pub const DECORATE: u32 = 71;
-    pub const MEMBER_DECORATE: u32 = 72;
-    pub const VECTOR_EXTRACT_DYNAMIC: u32 = 77;
-    pub const VECTOR_SHUFFLE: u32 = 79;
-    pub const COMPOSITE_EXTRACT: u32 = 81;
-    pub const COPY_OBJECT: u32 = 83;
-    pub const TRANSPOSE: u32 = 84;
+    pub(crate) const COPY_MEMORY_SIZED: u32 = 64;
+    pub(crate) const ACCESS_CHAIN: u32 = 65;
+    pub(crate) const IN_BOUNDS_ACCESS_CHAIN: u32 = 66;
+    pub(crate) const PTR_ACCESS_CHAIN: u32 = 67;
+    pub(crate) const ARRAY_LENGTH: u32 = 68;
+    pub(crate) const DECORATE: u32 = 71;
+    pub(crate) const MEMBER_DECORATE: u32 = 72;
+    pub(crate) const VECTOR_EXTRACT_DYNAMIC: u32 = 77;
+    pub(crate) const VECTOR_SHUFFLE: u32 = 79;
+    pub(crate) const COMPOSITE_EXTRACT: u32 = 81;
+    pub(crate) const COPY_OBJECT: u32 = 83;
+    pub(crate) const TRANSPOSE: u32 = 84;
     pub const SAMPLED_IMAGE: u32 = 86;
-    pub const IMAGE_SAMPLE_EXPLICIT_LOD: u32 = 88;
-    pub const IMAGE_FETCH: u32 = 95;
-    pub const IMAGE_READ: u32 = 98;
-    pub const IMAGE_WRITE: u32 = 99;
+    pub(crate) const IMAGE_SAMPLE_EXPLICIT_LOD: u32 = 88;
+    pub(crate) const IMAGE_FETCH: u32 = 95;
+    pub(crate) const IMAGE_READ: u32 = 98;
+    pub(crate) const IMAGE_WRITE: u32 = 99;
     pub const IMAGE: u32 = 100;
-    pub const IMAGE_QUERY_SIZE_LOD: u32 = 103;
-    pub const IMAGE_QUERY_SIZE: u32 = 104;
-    pub const IMAGE_QUERY_SAMPLES: u32 = 107;
-    pub const CONVERT_F_TO_U: u32 = 109;
-    pub const QUANTIZE_TO_F16: u32 = 116;
-    pub const BITCAST: u32 = 124;
-    pub const S_NEGATE: u32 = 126;
-    pub const I_ADD: u32 = 128;
+    pub(crate) const IMAGE_QUERY_SIZE_LOD: u32 = 103;
+    pub(crate) const IMAGE_QUERY_SIZE: u32 = 104;
+    pub(crate) const IMAGE_QUERY_SAMPLES: u32 = 107;
+    pub(crate) const CONVERT_F_TO_U: u32 = 109;
+    pub(crate) const QUANTIZE_TO_F16: u32 = 116;
+    pub(crate) const BITCAST: u32 = 124;
+    pub(crate) const S_NEGATE: u32 = 126;
+    pub(crate) const I_ADD: u32 = 128;
     pub const F_ADD: u32 = 129;
-    pub const I_SUB: u32 = 130;
+    pub(crate) const I_SUB: u32 = 130;
     pub const F_SUB: u32 = 131;
-    pub const I_MUL: u32 = 132;
-    pub const F_MUL: u32 = 133;
-    pub const S_DIV: u32 = 135;
-    pub const F_DIV: u32 = 136;
-    pub const VECTOR_TIMES_SCALAR: u32 = 142;
-    pub const S_MUL_EXTENDED: u32 = 152;
+    pub(crate) const I_MUL: u32 = 132;
+    pub(crate) const F_MUL: u32 = 133;
+    pub(crate) const S_DIV: u32 = 135;
+    pub(crate) const F_DIV: u32 = 136;
+    pub(crate) const VECTOR_TIMES_SCALAR: u32 = 142;
+    pub(crate) const S_MUL_EXTENDED: u32 = 152;
     pub const ANY: u32 = 154;
-    pub const LOGICAL_OR: u32 = 166;
-    pub const LOGICAL_AND: u32 = 167;
-    pub const LOGICAL_NOT: u32 = 168;
-    pub const SELECT: u32 = 169;
-    pub const I_EQUAL: u32 = 170;
-    pub const I_NOT_EQUAL: u32 = 171;
-    pub const S_GREATER_THAN: u32 = 173;
-    pub const S_GREATER_THAN_EQUAL: u32 = 175;
-    pub const S_LESS_THAN: u32 = 177;
-    pub const S_LESS_THAN_EQUAL: u32 = 179;
-    pub const F_UNORD_GREATER_THAN_EQUAL: u32 = 191;
-    pub const SHIFT_RIGHT_LOGICAL: u32 = 194;
-    pub const BIT_COUNT: u32 = 205;
-    pub const PHI: u32 = 245;
-    pub const LOOP_MERGE: u32 = 246;
-    pub const SELECTION_MERGE: u32 = 247;
-    pub const LABEL: u32 = 248;
-    pub const BRANCH: u32 = 249;
-    pub const BRANCH_CONDITIONAL: u32 = 250;
-    pub const SWITCH: u32 = 251;
+    pub(crate) const LOGICAL_OR: u32 = 166;
+    pub(crate) const LOGICAL_AND: u32 = 167;
+    pub(crate) const LOGICAL_NOT: u32 = 168;
+    pub(crate) const SELECT: u32 = 169;
+    pub(crate) const I_EQUAL: u32 = 170;
+    pub(crate) const I_NOT_EQUAL: u32 = 171;
+    pub(crate) const S_GREATER_THAN: u32 = 173;
+    pub(crate) const S_GREATER_THAN_EQUAL: u32 = 175;
+    pub(crate) const S_LESS_THAN: u32 = 177;
+    pub(crate) const S_LESS_THAN_EQUAL: u32 = 179;
+    pub(crate) const F_UNORD_GREATER_THAN_EQUAL: u32 = 191;
+    pub(crate) const SHIFT_RIGHT_LOGICAL: u32 = 194;
+    pub(crate) const BIT_COUNT: u32 = 205;
+    pub(crate) const PHI: u32 = 245;
+    pub(crate) const LOOP_MERGE: u32 = 246;
+    pub(crate) const SELECTION_MERGE: u32 = 247;
+    pub(crate) const LABEL: u32 = 248;
+    pub(crate) const BRANCH: u32 = 249;
+    pub(crate) const BRANCH_CONDITIONAL: u32 = 250;
+    pub(crate) const SWITCH: u32 = 251;
     pub const KILL: u32 = 252;
     pub const RETURN: u32 = 253;
-    pub const RETURN_VALUE: u32 = 254;
-    pub const UNREACHABLE: u32 = 255;
-    pub const NO_LINE: u32 = 317;
-    pub const EXECUTION_MODE_ID: u32 = 331;
+    pub(crate) const RETURN_VALUE: u32 = 254;
+    pub(crate) const UNREACHABLE: u32 = 255;
+    pub(crate) const NO_LINE: u32 = 317;
+    pub(crate) const EXECUTION_MODE_ID: u32 = 331;
 }
 
 /// Decorations.
 pub(super) mod decoration {
-    pub const SPEC_ID: u32 = 1;
-    pub const NON_WRITABLE: u32 = 24;
-    pub const NON_READABLE: u32 = 25;
+    pub(crate) const SPEC_ID: u32 = 1;
+    pub(crate) const NON_WRITABLE: u32 = 24;
+    pub(crate) const NON_READABLE: u32 = 25;
     pub const BINDING: u32 = 33;
-    pub const OFFSET: u32 = 35;
-    pub const ARRAY_STRIDE: u32 = 6;
+    pub(crate) const OFFSET: u32 = 35;
+    pub(crate) const ARRAY_STRIDE: u32 = 6;
 }
 
 /// Capabilities.
 pub(super) mod capability {
-    pub const IMAGE_BUFFER: u32 = 47;
-    pub const STORAGE_IMAGE_EXTENDED_FORMATS: u32 = 49;
+    pub(crate) const IMAGE_BUFFER: u32 = 47;
+    pub(crate) const STORAGE_IMAGE_EXTENDED_FORMATS: u32 = 49;
 }
 
 /// Storage classes.
 pub(super) mod storage_class {
-    pub const UNIFORM_CONSTANT: u32 = 0;
-    pub const UNIFORM: u32 = 2;
+    pub(crate) const UNIFORM_CONSTANT: u32 = 0;
+    pub(crate) const UNIFORM: u32 = 2;
     pub const STORAGE_BUFFER: u32 = 12;
 }
 
@@ -195,7 +195,7 @@ pub(super) fn text(words: &[u32]) -> String {
 
 /// One instruction: its opcode and its operands.
 pub(super) struct Instruction<'a> {
-    pub opcode: u32,
+    pub(crate) opcode: u32,
     pub operands: &'a [u32],
 }
 

@@ -61,7 +61,7 @@ pub struct Member {
     pub offset: u32,
     pub components: u32,
     pub is_float: bool,
-    pub is_signed: bool,
+    pub(crate) is_signed: bool,
 }
 
 /// A specialization constant.

@@ -36,7 +36,10 @@ impl Entry {
 ///
 /// # Errors
 /// A table that is used other than by reading entries and querying its length.
-pub fn storage_to_texel_buffer(words: &[u32], is_selected: impl Fn(&str) -> bool) -> Result<Vec<u32>, SpirvError> {
+pub(crate) fn storage_to_texel_buffer(
+    words: &[u32],
+    is_selected: impl Fn(&str) -> bool,
+) -> Result<Vec<u32>, SpirvError> {
     let instructions = decode(words)?;
     let mut tables = Tables::find(&instructions);
     tables.by_variable.retain(|_, (name, _)| is_selected(name));

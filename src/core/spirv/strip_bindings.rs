@@ -10,7 +10,7 @@ use std::collections::HashSet;
 /// # Errors
 /// A module that breaks the format, a texture that is used other than by fetches, samples of a given level, stores of texels and size queries, or a
 /// buffer that is used other than by loads and queries of its length.
-pub fn strip_bindings(words: &[u32], names: &[&str]) -> Result<Vec<u32>, SpirvError> {
+pub(crate) fn strip_bindings(words: &[u32], names: &[&str]) -> Result<Vec<u32>, SpirvError> {
     let instructions = decode(words)?;
     let stripped = Stripped::find(&instructions, names);
     if stripped.variables.is_empty() {

@@ -42,7 +42,7 @@ const EXTEND: u32 = 0x3000;
 ///
 /// # Errors
 /// A name that is not a texture, or a texture that is used other than by fetches without offset and size queries.
-pub fn texture_to_storage(words: &[u32], textures: &[(&str, ImageFormat)]) -> Result<Vec<u32>, SpirvError> {
+pub(crate) fn texture_to_storage(words: &[u32], textures: &[(&str, ImageFormat)]) -> Result<Vec<u32>, SpirvError> {
     if textures.is_empty() {
         return Ok(words.to_vec());
     }

@@ -17,7 +17,7 @@ const DIMENSION_3D: u32 = 2;
 /// # Errors
 /// A module that breaks the format, a type that such an image shares with one that stays three-dimensional, a filtered sample, or two types that
 /// would become the same.
-pub fn volumes_to_layers(words: &[u32], names: &[&str]) -> Result<Vec<u32>, SpirvError> {
+pub(crate) fn volumes_to_layers(words: &[u32], names: &[&str]) -> Result<Vec<u32>, SpirvError> {
     let instructions = decode(words)?;
     let layered = layered_types(&instructions, names)?;
     if layered.is_empty() {

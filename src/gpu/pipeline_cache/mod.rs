@@ -12,7 +12,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use stored::{CacheFile, checksum};
 
 /// The cache of a device. Null without a folder: pipelines are then compiled without one.
-pub struct PipelineCache {
+pub(crate) struct PipelineCache {
     handle: vk::PipelineCache,
     file: Option<CacheFile>,
     /// What the file held when it was read or written last: bytes, and their checksum.

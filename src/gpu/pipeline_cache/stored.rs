@@ -36,9 +36,9 @@ pub fn checksum(data: &[u8]) -> u64 {
 pub struct DriverIdentity {
     pub vendor: u32,
     pub device: u32,
-    pub driver_version: u32,
+    pub(crate) driver_version: u32,
     /// pipelineCacheUUID of the driver: another one when what it stores changes.
-    pub uuid: [u8; 16],
+    pub(crate) uuid: [u8; 16],
 }
 
 impl DriverIdentity {
@@ -50,7 +50,7 @@ impl DriverIdentity {
 
 /// A file of a driver, in a folder that need not exist.
 #[derive(Clone, Debug)]
-pub struct CacheFile {
+pub(crate) struct CacheFile {
     path: PathBuf,
     identity: DriverIdentity,
     /// Of the embedded shaders. The pipelines of other ones would stay in the file for ever.

@@ -40,11 +40,11 @@ pub(super) mod target {
             match *self {}
         }
 
-        pub fn check_support(&self, _: &Entry, _: &Instance, _: &mut Candidate) {
+        pub(crate) fn check_support(&self, _: &Entry, _: &Instance, _: &mut Candidate) {
             match *self {}
         }
 
-        pub fn is_monitor(&self) -> bool {
+        pub(crate) fn is_monitor(&self) -> bool {
             match *self {}
         }
     }

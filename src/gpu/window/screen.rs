@@ -36,7 +36,7 @@ pub enum PresentOutcome {
 pub struct Drawn<'a> {
     pub image: &'a Image,
     pub barriers: &'a mut BarrierRecorder,
-    pub timelines: &'a mut Timelines,
+    pub(crate) timelines: &'a mut Timelines,
     /// The upper left corner of the picture in the window, pixels.
     pub at: [u32; 2],
     /// The picture is shown again while the next one is drawn.

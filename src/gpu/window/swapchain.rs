@@ -33,7 +33,7 @@ impl std::str::FromStr for PresentMode {
 }
 
 /// A surface and its images, which are recreated when its size changes.
-pub struct Swapchain {
+pub(crate) struct Swapchain {
     context: Arc<Context>,
     /// Keeps the window alive; the surface must be destroyed first.
     target: Target,
@@ -48,7 +48,7 @@ pub struct Swapchain {
 }
 
 /// An image of a swapchain.
-pub struct SwapchainImage {
+pub(crate) struct SwapchainImage {
     pub handle: vk::Image,
     /// Signalled when the image has been drawn and can be presented.
     pub drawn: vk::Semaphore,
@@ -133,7 +133,7 @@ impl Swapchain {
     }
 
     /// Replaces a lost surface by a new one on the same target.
-    pub fn renew_surface(&mut self) -> Result<(), GpuError> {
+    pub(crate) fn renew_surface(&mut self) -> Result<(), GpuError> {
         self.context.wait_idle()?;
         self.destroy();
         self.surface =

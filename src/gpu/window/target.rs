@@ -45,7 +45,7 @@ impl Target {
         }
     }
 
-    pub fn is_monitor(&self) -> bool {
+    pub(crate) fn is_monitor(&self) -> bool {
         matches!(self, Target::Monitor(_))
     }
 
@@ -71,7 +71,7 @@ impl Target {
     }
 
     /// Adds to the missing features of a candidate what it lacks to present here.
-    pub fn check_support(&self, entry: &Entry, instance: &Instance, candidate: &mut Candidate) {
+    pub(crate) fn check_support(&self, entry: &Entry, instance: &Instance, candidate: &mut Candidate) {
         if !candidate.can_present {
             candidate.missing.push("VK_KHR_swapchain or dynamicRendering".into());
         }

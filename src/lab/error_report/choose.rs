@@ -105,7 +105,7 @@ fn candidates(report: &Report, measure: Measure) -> impl Iterator<Item = Candida
 impl Combination {
     /// The error, and that of its reference in addition: an upper limit by the triangle inequality, and of levels nearly one. For distances and normals,
     /// whose reference has no estimate, the error alone.
-    pub fn error_limit(&self, measure: Measure) -> Option<f64> {
+    pub(crate) fn error_limit(&self, measure: Measure) -> Option<f64> {
         let own = match measure {
             Measure::Rmse => self.reference_error.rmse,
             Measure::Levels => self.reference_error.levels,

@@ -37,7 +37,7 @@ pub struct Dial {
 
 impl Dial {
     /// True if its settings are ways of taking samples along rays: then exact rays are its reference.
-    pub fn samples_rays(&self) -> bool {
+    pub(crate) fn samples_rays(&self) -> bool {
         [
             "step",
             "tolerance",

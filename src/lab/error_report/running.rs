@@ -19,7 +19,7 @@ pub(super) struct Rendering {
 
 impl Rendering {
     /// The scene by its f64 references, some of which `replace` takes the place of.
-    pub fn in_f64(scene: &Scene, frames: &[Frame], replace: &mut reference::Replacement) -> Rendering {
+    pub(crate) fn in_f64(scene: &Scene, frames: &[Frame], replace: &mut reference::Replacement) -> Rendering {
         let scene = in_floats(scene);
         let frames = reference::decoded(&scene, frames);
         let mut slots = reference::render_with(&scene, &frames, replace);

@@ -98,7 +98,7 @@ pub struct Thesis {
     /// Time per rendered volume, ms.
     pub ms: f64,
     /// True if its table has no such row: the figure is from other tables of the thesis, under the same conditions.
-    pub from_others: bool,
+    pub(crate) from_others: bool,
 }
 
 /// A row of a table.

@@ -93,7 +93,7 @@ impl Drive {
     }
 
     /// A handle that stops the motor from another thread, within one request and its reply.
-    pub fn interrupter(&self) -> Interrupter {
+    pub(crate) fn interrupter(&self) -> Interrupter {
         self.guard.interrupter().clone()
     }
 

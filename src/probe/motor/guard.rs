@@ -28,7 +28,7 @@ impl Interrupter {
 }
 
 /// All requests to the module go through the guard, so that it knows whether the motor has to be stopped.
-pub struct Guard {
+pub(crate) struct Guard {
     port: Port,
     address: u8,
     motor: u8,
@@ -77,17 +77,12 @@ impl Guard {
         }
     }
 
-    pub fn interrupter(&self) -> &Interrupter {
+    pub(crate) fn interrupter(&self) -> &Interrupter {
         &self.interrupter
     }
 
     pub fn port(&self) -> &Port {
         &self.port
-    }
-
-    /// The motor may be in motion.
-    pub fn moving(&self) -> bool {
-        self.moving
     }
 
     /// The motor has stopped by itself at its target.

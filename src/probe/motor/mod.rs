@@ -5,9 +5,9 @@
 //! stream, and [`simulate`] is a simulated module for tests and demonstrations. A [`MotorError`] is one line with the fault, the port, what
 //! to do and whether the motor was stopped.
 
-pub mod background_sweep;
+pub(crate) mod background_sweep;
 pub mod drive;
-pub mod guard;
+pub(crate) mod guard;
 pub mod port;
 #[cfg(target_os = "linux")]
 pub mod simulate;

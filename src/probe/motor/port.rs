@@ -51,7 +51,7 @@ impl PortSettings {
 
 /// A successful reply.
 #[derive(Clone, Copy, Debug)]
-pub struct Answer {
+pub(crate) struct Answer {
     pub value: i32,
     /// Midway between the request and its reply.
     pub at: Instant,
@@ -60,7 +60,7 @@ pub struct Answer {
 }
 
 /// An open serial port.
-pub struct Port {
+pub(crate) struct Port {
     serial: Box<dyn SerialPort>,
     settings: PortSettings,
     /// The reply to an earlier request may still arrive.

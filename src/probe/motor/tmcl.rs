@@ -9,16 +9,16 @@ pub const LENGTH: usize = 9;
 
 /// Numbers of the commands.
 pub mod command {
-    pub const ROTATE_RIGHT: u8 = 1;
-    pub const ROTATE_LEFT: u8 = 2;
+    pub(crate) const ROTATE_RIGHT: u8 = 1;
+    pub(crate) const ROTATE_LEFT: u8 = 2;
     pub const STOP: u8 = 3;
     pub const MOVE_TO: u8 = 4;
-    pub const SET_AXIS: u8 = 5;
+    pub(crate) const SET_AXIS: u8 = 5;
     pub const GET_AXIS: u8 = 6;
     pub const SET_GLOBAL: u8 = 9;
-    pub const GET_GLOBAL: u8 = 10;
-    pub const REFERENCE_SEARCH: u8 = 13;
-    pub const GET_INPUT: u8 = 15;
+    pub(crate) const GET_GLOBAL: u8 = 10;
+    pub(crate) const REFERENCE_SEARCH: u8 = 13;
+    pub(crate) const GET_INPUT: u8 = 15;
     pub const VERSION: u8 = 136;
 }
 
@@ -26,35 +26,35 @@ pub mod command {
 pub mod axis {
     pub const TARGET: u8 = 0;
     pub const POSITION: u8 = 1;
-    pub const TARGET_SPEED: u8 = 2;
+    pub(crate) const TARGET_SPEED: u8 = 2;
     pub const SPEED: u8 = 3;
     pub const MAX_SPEED: u8 = 4;
-    pub const MAX_ACCELERATION: u8 = 5;
-    pub const RUN_CURRENT: u8 = 6;
-    pub const STANDBY_CURRENT: u8 = 7;
-    pub const REACHED: u8 = 8;
-    pub const HOME_SWITCH: u8 = 9;
-    pub const RIGHT_LIMIT: u8 = 10;
-    pub const LEFT_LIMIT: u8 = 11;
-    pub const RIGHT_LIMIT_OFF: u8 = 12;
-    pub const LEFT_LIMIT_OFF: u8 = 13;
+    pub(crate) const MAX_ACCELERATION: u8 = 5;
+    pub(crate) const RUN_CURRENT: u8 = 6;
+    pub(crate) const STANDBY_CURRENT: u8 = 7;
+    pub(crate) const REACHED: u8 = 8;
+    pub(crate) const HOME_SWITCH: u8 = 9;
+    pub(crate) const RIGHT_LIMIT: u8 = 10;
+    pub(crate) const LEFT_LIMIT: u8 = 11;
+    pub(crate) const RIGHT_LIMIT_OFF: u8 = 12;
+    pub(crate) const LEFT_LIMIT_OFF: u8 = 13;
     /// Microsteps of a full step, as a power of 2.
-    pub const MICROSTEPS: u8 = 140;
-    pub const SEARCH_MODE: u8 = 193;
-    pub const SEARCH_SPEED: u8 = 194;
-    pub const SWITCH_SPEED: u8 = 195;
-    pub const FREEWHEELING: u8 = 204;
+    pub(crate) const MICROSTEPS: u8 = 140;
+    pub(crate) const SEARCH_MODE: u8 = 193;
+    pub(crate) const SEARCH_SPEED: u8 = 194;
+    pub(crate) const SWITCH_SPEED: u8 = 195;
+    pub(crate) const FREEWHEELING: u8 = 204;
 }
 
 /// The global parameter (bank 0) of the module's own watchdog, the "serial heartbeat": milliseconds without a command after
 /// which the module stops its motors; 0 is off.
-pub const WATCHDOG: u8 = 68;
+pub(crate) const WATCHDOG: u8 = 68;
 
 /// Status of a reply: the command was carried out.
 pub const SUCCESS: u8 = 100;
 
 /// Status of a reply: the checksum of the request was wrong.
-pub const WRONG_CHECKSUM: u8 = 1;
+pub(crate) const WRONG_CHECKSUM: u8 = 1;
 
 /// Description of a status code.
 pub fn status_words(status: u8) -> &'static str {

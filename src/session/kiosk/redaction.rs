@@ -72,7 +72,7 @@ impl Redactor {
     }
 
     /// Adds a private folder.
-    pub fn add_folder(&mut self, folder: &Path) {
+    pub(crate) fn add_folder(&mut self, folder: &Path) {
         let folder = folder.to_string_lossy();
         let folder = folder.trim_end_matches(['/', '\\']);
         if !folder.is_empty() {

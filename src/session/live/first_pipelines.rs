@@ -26,7 +26,7 @@ struct Making {
 
 impl FirstPipelines {
     /// Forgets cancelled ones that have ended.
-    pub fn forget_ended(&mut self) {
+    pub(crate) fn forget_ended(&mut self) {
         self.cancelled.retain(|preparation| !preparation.is_finished());
     }
 

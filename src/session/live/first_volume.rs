@@ -43,7 +43,7 @@ impl FirstVolume {
     }
 
     /// What [`FirstVolume::begin`] will return.
-    pub fn at_begin(&self, header: &Header) -> Option<Defaults> {
+    pub(crate) fn at_begin(&self, header: &Header) -> Option<Defaults> {
         (self.header.as_ref() != Some(header)).then(|| self.defaults(header, None))
     }
 

@@ -138,7 +138,7 @@ impl<T> Pending<T> {
     }
 
     /// The next step that may begin a picture asks whether the pipelines are compiled.
-    pub fn ask_again(&mut self) {
+    pub(crate) fn ask_again(&mut self) {
         *self = match std::mem::take(self) {
             Pending::Compiling(next) => Pending::Ready(next),
             other => other,

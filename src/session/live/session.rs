@@ -228,7 +228,7 @@ impl Session {
     }
 
     /// By slice of the volume on display: swept backwards.
-    pub fn swept_backward(&self) -> &[bool] {
+    pub(crate) fn swept_backward(&self) -> &[bool] {
         &self.backward
     }
 

@@ -60,6 +60,7 @@ pub enum Step {
 
 /// Why a step or a change of settings failed.
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum StreamError {
     #[error(transparent)]
     Gpu(#[from] GpuError),

@@ -37,7 +37,7 @@ pub struct Ready {
 }
 
 /// The volume images of a stream.
-pub struct VolumePool {
+pub(crate) struct VolumePool {
     update: Update,
     slices: usize,
     /// By image and slice: true if the frame in it was swept backwards.

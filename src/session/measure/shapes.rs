@@ -9,7 +9,7 @@ pub fn length(path: &[DVec3]) -> f64 {
 }
 
 /// Length of a closed path, mm: its last point is joined with its first.
-pub fn perimeter(contour: &[DVec3]) -> f64 {
+pub(crate) fn perimeter(contour: &[DVec3]) -> f64 {
     match contour {
         [first, .., last] => length(contour) + last.distance(*first),
         _ => 0.0,
@@ -26,7 +26,7 @@ pub fn angle(leg: DVec3, vertex: DVec3, other: DVec3) -> Option<f64> {
 
 /// The area of a contour as a vector along its normal, mm^2 (Newell): for a contour in a plane its length is the area that it encloses, as by the
 /// shoelace formula; for one that is not flat, the area of its projection onto the plane where that is largest.
-pub fn vector_area(contour: &[DVec3]) -> DVec3 {
+pub(crate) fn vector_area(contour: &[DVec3]) -> DVec3 {
     let Some((first, rest)) = contour.split_first() else { return DVec3::ZERO };
     rest.windows(2).map(|ends| (ends[0] - first).cross(ends[1] - first)).sum::<DVec3>() / 2.0
 }

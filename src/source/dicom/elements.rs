@@ -238,7 +238,7 @@ impl Item {
         self.bytes(tag)?.first_chunk().map(|b| u32::from_le_bytes(*b))
     }
 
-    pub fn reals(&self, tag: Tag) -> Vec<f64> {
+    pub(crate) fn reals(&self, tag: Tag) -> Vec<f64> {
         self.bytes(tag).unwrap_or_default().as_chunks::<8>().0.iter().map(|b| f64::from_le_bytes(*b)).collect()
     }
 
@@ -259,10 +259,10 @@ pub(super) enum PixelData {
 #[derive(Debug)]
 pub(super) struct Elements {
     /// UID of the transfer syntax.
-    pub syntax: String,
+    pub(crate) syntax: String,
     /// UID of the class, of the file meta information.
     pub class: String,
-    pub big_endian: bool,
+    pub(crate) big_endian: bool,
     pub root: Item,
     pub pixels: Option<PixelData>,
     /// Offset and length of a Kretz file inside.

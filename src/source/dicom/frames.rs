@@ -65,7 +65,7 @@ impl Frames {
         &self.files
     }
 
-    pub fn coding(&self) -> Coding {
+    pub(crate) fn coding(&self) -> Coding {
         self.coding
     }
 

@@ -24,8 +24,8 @@ pub(super) struct Image {
     /// Columns and rows.
     pub size: [usize; 2],
     pub pixel: PixelFormat,
-    pub coding: Coding,
-    pub arrangement: Arrangement,
+    pub(crate) coding: Coding,
+    pub(crate) arrangement: Arrangement,
     /// Of each frame, in the order of the file.
     pub places: Vec<Place>,
     pub parts: Vec<(u64, u64)>,

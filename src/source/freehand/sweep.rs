@@ -72,7 +72,7 @@ impl Sweep {
     }
 
     /// True once the volume has its place.
-    pub fn is_placed(&self) -> bool {
+    pub(crate) fn is_placed(&self) -> bool {
         self.compounder.is_some()
     }
 

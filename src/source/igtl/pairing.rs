@@ -116,7 +116,7 @@ impl Pairing {
     }
 
     /// Why frames get no pose, for users: which transforms came.
-    pub fn why_unpaired(&self) -> String {
+    pub(crate) fn why_unpaired(&self) -> String {
         if self.seen.count() == 0 {
             return "no transform came; --tool image takes the matrix of each image".into();
         }

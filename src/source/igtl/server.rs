@@ -175,7 +175,7 @@ impl Server {
     }
 
     /// True if someone would get a message.
-    pub fn has_clients(&self) -> bool {
+    pub(crate) fn has_clients(&self) -> bool {
         self.shared.lock().statistics.clients > 0
     }
 

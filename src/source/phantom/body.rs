@@ -100,8 +100,8 @@ pub struct RampTruth {
     pub middle: f64,
     pub range: f64,
     pub per_mm: f64,
-    pub per_line_rad: f64,
-    pub per_motor_rad: f64,
+    pub(crate) per_line_rad: f64,
+    pub(crate) per_motor_rad: f64,
 }
 
 impl RampTruth {

@@ -24,8 +24,8 @@ pub(super) struct Beam {
     pub start_depth: f64,
     /// Range of sample 0 from the in-plane apex, mm; angle of the line and of the motor, rad.
     pub range: f64,
-    pub line_angle: f64,
-    pub motor_angle: f64,
+    pub(crate) line_angle: f64,
+    pub(crate) motor_angle: f64,
     /// When it was fired, s.
     pub time: f64,
 }
@@ -75,7 +75,7 @@ pub(super) struct Echo {
 
 impl Echo {
     /// Far below the dynamic range.
-    pub const SILENT: Echo = Echo { diffuse: -200.0, mirror: -200.0 };
+    pub(crate) const SILENT: Echo = Echo { diffuse: -200.0, mirror: -200.0 };
 
     /// The level without speckle: the sum of both powers, dB.
     pub fn bare(self) -> f32 {

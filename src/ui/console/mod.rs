@@ -415,7 +415,7 @@ impl Console {
     }
 
     /// Shows for a while that the device did not finish and was opened again.
-    pub fn show_stall(&mut self, now: Instant) {
+    pub(crate) fn show_stall(&mut self, now: Instant) {
         (self.stall_shown_until, self.needs_redraw) = (Some(now + STALL_TIME), true);
     }
 
@@ -458,7 +458,8 @@ impl Console {
         (self.tree, self.needs_redraw) = (None, true);
     }
 
-    pub fn is_described(&self) -> bool {
+    #[cfg(feature = "screen-reader")]
+    pub(crate) fn is_described(&self) -> bool {
         self.panels.is_described()
     }
 

@@ -10,7 +10,7 @@ const MAX_OUTLINE: usize = 20_000;
 
 /// Radius of the brush at the start, and its limits, mm.
 pub(super) const BRUSH_RADIUS: f64 = 4.0;
-pub const BRUSH_RADII: [f64; 2] = [0.5, 20.0];
+pub(crate) const BRUSH_RADII: [f64; 2] = [0.5, 20.0];
 
 /// What removes parts of renderings and keeps settings from being drawn: the first that alone is in the way, or all of it together.
 pub(super) fn in_the_way(now: &Scene, settings: &Settings) -> Option<&'static str> {
@@ -38,12 +38,12 @@ impl Controls {
     }
 
     /// The side of the next contour that stays.
-    pub fn kept_side(&self) -> KeptSide {
+    pub(crate) fn kept_side(&self) -> KeptSide {
         self.kept_side
     }
 
     /// Radius of the brush, mm.
-    pub fn brush_radius(&self) -> f64 {
+    pub(crate) fn brush_radius(&self) -> f64 {
         self.brush_radius
     }
 

@@ -117,7 +117,7 @@ impl Controls {
     }
 
     /// Whether there is something to undo, and to redo.
-    pub fn can_undo(&self) -> [bool; 2] {
+    pub(crate) fn can_undo(&self) -> [bool; 2] {
         let [past, future] = self.history.has();
         [past || self.work.is_some() || self.line.is_some(), future]
     }

@@ -16,7 +16,7 @@ const FIRST: [f64; MIN_START_POINTS] = [0.1, 0.5, 0.9];
 
 impl Controls {
     /// The points of the start line of the region: lateral and depth, mm. None while it is straight.
-    pub fn start_line(&self) -> &[[f64; 2]] {
+    pub(crate) fn start_line(&self) -> &[[f64; 2]] {
         self.settings.region.start_curve.as_deref().unwrap_or_default()
     }
 }

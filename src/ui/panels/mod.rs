@@ -122,6 +122,7 @@ impl Panels {
         }
     }
 
+    #[cfg(feature = "screen-reader")]
     pub(super) fn is_described(&self) -> bool {
         self.is_described
     }

@@ -2,40 +2,40 @@
 
 use std::fmt::Display;
 
-pub const VOLUME_NRRD: &str = "Volume, NRRD";
-pub const VOLUME_NRRD_HINT: &str = "The scan-converted volume in its place, for 3D Slicer and ITK.";
-pub const VOLUME_NIFTI: &str = "Volume, NIfTI";
-pub const VOLUME_NIFTI_HINT: &str = "The scan-converted volume in its place, for tools of imaging research.";
-pub const VOLUME_METAIMAGE: &str = "Volume, MetaImage";
-pub const VOLUME_METAIMAGE_HINT: &str = "The scan-converted volume in its place, for ITK and PLUS.";
-pub const VOLUME_DICOM: &str = "Volume, DICOM";
-pub const VOLUME_DICOM_HINT: &str = "An Enhanced US Volume without a patient's name.";
-pub const SURFACE_STL: &str = "Surface, STL";
-pub const SURFACE_STL_HINT: &str = "The surface between darker and brighter echoes as closed triangles, mm.";
-pub const SURFACE_GLTF: &str = "Surface, glTF";
-pub const SURFACE_GLTF_HINT: &str = "The same with a colour, for viewers and slides.";
-pub const RELIEF_STL: &str = "Relief to print, STL";
-pub const RELIEF_STL_HINT: &str = "The surface as the probe sees it, filled down to a flat base.";
-pub const TURNTABLE_PICTURES: &str = "Turntable, pictures";
-pub const TURNTABLE_PICTURES_HINT: &str = "A folder of 72 PNG files: one turn of the rendering as it is shown.";
+pub(crate) const VOLUME_NRRD: &str = "Volume, NRRD";
+pub(crate) const VOLUME_NRRD_HINT: &str = "The scan-converted volume in its place, for 3D Slicer and ITK.";
+pub(crate) const VOLUME_NIFTI: &str = "Volume, NIfTI";
+pub(crate) const VOLUME_NIFTI_HINT: &str = "The scan-converted volume in its place, for tools of imaging research.";
+pub(crate) const VOLUME_METAIMAGE: &str = "Volume, MetaImage";
+pub(crate) const VOLUME_METAIMAGE_HINT: &str = "The scan-converted volume in its place, for ITK and PLUS.";
+pub(crate) const VOLUME_DICOM: &str = "Volume, DICOM";
+pub(crate) const VOLUME_DICOM_HINT: &str = "An Enhanced US Volume without a patient's name.";
+pub(crate) const SURFACE_STL: &str = "Surface, STL";
+pub(crate) const SURFACE_STL_HINT: &str = "The surface between darker and brighter echoes as closed triangles, mm.";
+pub(crate) const SURFACE_GLTF: &str = "Surface, glTF";
+pub(crate) const SURFACE_GLTF_HINT: &str = "The same with a colour, for viewers and slides.";
+pub(crate) const RELIEF_STL: &str = "Relief to print, STL";
+pub(crate) const RELIEF_STL_HINT: &str = "The surface as the probe sees it, filled down to a flat base.";
+pub(crate) const TURNTABLE_PICTURES: &str = "Turntable, pictures";
+pub(crate) const TURNTABLE_PICTURES_HINT: &str = "A folder of 72 PNG files: one turn of the rendering as it is shown.";
 #[cfg(feature = "video")]
-pub const TURNTABLE_FILM: &str = "Turntable, film";
+pub(crate) const TURNTABLE_FILM: &str = "Turntable, film";
 #[cfg(feature = "video")]
-pub const TURNTABLE_FILM_HINT: &str = "One turn of the rendering as it is shown, as AV1 in MP4.";
-pub const LOOP_PICTURES: &str = "Loop, pictures";
-pub const LOOP_PICTURES_HINT: &str =
+pub(crate) const TURNTABLE_FILM_HINT: &str = "One turn of the rendering as it is shown, as AV1 in MP4.";
+pub(crate) const LOOP_PICTURES: &str = "Loop, pictures";
+pub(crate) const LOOP_PICTURES_HINT: &str =
     "A folder of PNG files: the rendering as it is shown, of each volume of the loop from its first mark to its last.";
 #[cfg(feature = "video")]
-pub const LOOP_FILM: &str = "Loop, film";
+pub(crate) const LOOP_FILM: &str = "Loop, film";
 #[cfg(feature = "video")]
-pub const LOOP_FILM_HINT: &str = "The same as AV1 in MP4, back as well if the loop plays so, at the mean rate times its speed (0.1 to 240 pictures a second).";
-pub fn why_export_not_started(e: impl Display) -> String {
+pub(crate) const LOOP_FILM_HINT: &str = "The same as AV1 in MP4, back as well if the loop plays so, at the mean rate times its speed (0.1 to 240 pictures a second).";
+pub(crate) fn why_export_not_started(e: impl Display) -> String {
     format!("the export cannot be started: {e}")
 }
-pub fn why_export_lost(e: impl Display) -> String {
+pub(crate) fn why_export_lost(e: impl Display) -> String {
     format!("the export was lost: {e}")
 }
-pub const WHY_EXPORT_ENDED: &str = "it ended early";
-pub fn why_no_program(e: impl Display) -> String {
+pub(crate) const WHY_EXPORT_ENDED: &str = "it ended early";
+pub(crate) fn why_no_program(e: impl Display) -> String {
     format!("this program's file is not known: {e}")
 }

@@ -1,7 +1,7 @@
 //! The hints of the first start.
 
-pub const FIRST_STEPS: &str = "First steps";
+pub(crate) const FIRST_STEPS: &str = "First steps";
 /// What to do, and what it does.
-pub const HINTS: [(&str, &str); 3] =
+pub(crate) const HINTS: [(&str, &str); 3] =
     [("Drag", "turns the view"), ("Wheel", "zooms; over a plane: steps it"), ("H", "shows every key and gesture")];
-pub const CLOSE_HINTS_HINT: &str = "Closes these hints; they do not come again.";
+pub(crate) const CLOSE_HINTS_HINT: &str = "Closes these hints; they do not come again.";

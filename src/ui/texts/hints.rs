@@ -77,7 +77,7 @@ const SLIDERS: [(&str, &str); 56] = [
 ];
 
 /// What a slider does.
-pub fn of_slider(name: &str) -> &'static str {
+pub(crate) fn of_slider(name: &str) -> &'static str {
     SLIDERS.iter().find(|(known, _)| *known == name).map_or("", |(_, hint)| *hint)
 }
 
@@ -98,7 +98,7 @@ pub fn of_mode(mode: Mode) -> &'static str {
 }
 
 /// What a layout shows.
-pub fn of_layout(layout: Layout) -> &'static str {
+pub(crate) fn of_layout(layout: Layout) -> &'static str {
     match layout {
         Layout::Single => "One picture.",
         Layout::Four => "Three planes and the rendering.",
@@ -107,7 +107,7 @@ pub fn of_layout(layout: Layout) -> &'static str {
 }
 
 /// What a drag does.
-pub fn of_tool(tool: Tool) -> &'static str {
+pub(crate) fn of_tool(tool: Tool) -> &'static str {
     match tool {
         Tool::Rotate => "Drag turns the view.",
         Tool::Light => "Drag moves the lamp.",
@@ -131,7 +131,7 @@ pub fn of_tool(tool: Tool) -> &'static str {
 }
 
 /// Where a viewpoint is.
-pub fn of_viewpoint(viewpoint: Viewpoint) -> &'static str {
+pub(crate) fn of_viewpoint(viewpoint: Viewpoint) -> &'static str {
     match viewpoint {
         Viewpoint::Front => "Seen from the probe, upright. (Ctrl+1)",
         Viewpoint::Left => "Seen from the left of the front view; the patient's sides are the letters. (Ctrl+2)",
@@ -141,7 +141,7 @@ pub fn of_viewpoint(viewpoint: Viewpoint) -> &'static str {
 }
 
 /// How something is measured.
-pub fn of_measure(kind: MeasureKind) -> &'static str {
+pub(crate) fn of_measure(kind: MeasureKind) -> &'static str {
     match kind {
         MeasureKind::Distance => {
             "Distance in mm: click both ends, or drag. On a rendering: from surface to surface. (M)"

@@ -3,107 +3,109 @@
 use std::fmt::Display;
 
 // Tools, results and steps.
-pub const CALIPER: &str = "Caliper";
-pub const ANGLE: &str = "Angle";
-pub const ELLIPSE: &str = "Ellipse";
+pub(crate) const CALIPER: &str = "Caliper";
+pub(crate) const ANGLE: &str = "Angle";
+pub(crate) const ELLIPSE: &str = "Ellipse";
 pub const TRACE: &str = "Trace";
 pub const SURFACE: &str = "Surface";
 pub const VOLUME: &str = "Volume";
-pub const VOLUME_BY_THRESHOLD: &str = "Vol. by threshold";
+pub(crate) const VOLUME_BY_THRESHOLD: &str = "Vol. by threshold";
 pub const TEXT: &str = "Text";
-pub const ARROW: &str = "Arrow";
-pub const MEASUREMENTS: &str = "Measurements";
-pub const END_VOLUME: &str = "End volume";
-pub const CLOSE_CONTOUR: &str = "Close contour";
-pub const END_TRACING_HINT: &str = "Ends what is being traced (Enter).";
-pub const ECHOES: &str = "Echoes";
-pub const TYPE_TEXT_HINT: &str = "Click to type a text for it.";
-pub const DELETE_MEASUREMENT_HINT: &str = "Deletes it (undo brings it back).";
-pub fn delete_measurement(number: impl Display) -> String {
+pub(crate) const ARROW: &str = "Arrow";
+pub(crate) const MEASUREMENTS: &str = "Measurements";
+pub(crate) const END_VOLUME: &str = "End volume";
+pub(crate) const CLOSE_CONTOUR: &str = "Close contour";
+pub(crate) const END_TRACING_HINT: &str = "Ends what is being traced (Enter).";
+pub(crate) const ECHOES: &str = "Echoes";
+pub(crate) const TYPE_TEXT_HINT: &str = "Click to type a text for it.";
+pub(crate) const DELETE_MEASUREMENT_HINT: &str = "Deletes it (undo brings it back).";
+pub(crate) fn delete_measurement(number: impl Display) -> String {
     format!("Delete measurement {number}")
 }
 pub const COPY: &str = "Copy";
-pub const COPY_HINT: &str = "Copies all results as CSV (Ctrl+C).";
-pub const SAVE_RESULTS_HINT: &str = "Saves all results as a CSV file.";
+pub(crate) const COPY_HINT: &str = "Copies all results as CSV (Ctrl+C).";
+pub(crate) const SAVE_RESULTS_HINT: &str = "Saves all results as a CSV file.";
 pub const CLEAR: &str = "Clear";
-pub const CLEAR_HINT: &str = "Deletes all (undo brings them back).";
-pub const STEP_TYPE: &str = "Type, then Enter.";
-pub const STEP_FIRST_END: &str = "Click the first end.";
-pub const STEP_OTHER_END: &str = "Click the other end.";
-pub const STEP_FIRST_LEG: &str = "Click the end of a leg.";
-pub const STEP_VERTEX: &str = "Click the vertex.";
-pub const STEP_OTHER_LEG: &str = "Click the end of the other leg.";
-pub const STEP_LONG_AXIS: &str = "Click one end of the long axis.";
-pub const STEP_LONG_AXIS_END: &str = "Click its other end.";
-pub const STEP_SHORT_AXIS: &str = "Click the end of the short axis.";
-pub const STEP_NEXT_CONTOUR: &str = "Step or turn the plane and trace again, or press Enter.";
-pub const STEP_OUTLINE: &str = "Drag round the outline on a plane.";
-pub const STEP_CLOSE_OUTLINE: &str = "Enter closes the outline.";
-pub const STEP_TEXT: &str = "Click the place of the text.";
-pub const STEP_ARROW_TIP: &str = "Click what the arrow points to.";
+pub(crate) const CLEAR_HINT: &str = "Deletes all (undo brings them back).";
+pub(crate) const STEP_TYPE: &str = "Type, then Enter.";
+pub(crate) const STEP_FIRST_END: &str = "Click the first end.";
+pub(crate) const STEP_OTHER_END: &str = "Click the other end.";
+pub(crate) const STEP_FIRST_LEG: &str = "Click the end of a leg.";
+pub(crate) const STEP_VERTEX: &str = "Click the vertex.";
+pub(crate) const STEP_OTHER_LEG: &str = "Click the end of the other leg.";
+pub(crate) const STEP_LONG_AXIS: &str = "Click one end of the long axis.";
+pub(crate) const STEP_LONG_AXIS_END: &str = "Click its other end.";
+pub(crate) const STEP_SHORT_AXIS: &str = "Click the end of the short axis.";
+pub(crate) const STEP_NEXT_CONTOUR: &str = "Step or turn the plane and trace again, or press Enter.";
+pub(crate) const STEP_OUTLINE: &str = "Drag round the outline on a plane.";
+pub(crate) const STEP_CLOSE_OUTLINE: &str = "Enter closes the outline.";
+pub(crate) const STEP_TEXT: &str = "Click the place of the text.";
+pub(crate) const STEP_ARROW_TIP: &str = "Click what the arrow points to.";
 
 // Limits.
-pub const TOO_MANY_MEASUREMENTS: &str = "There are as many measurements as a scene can have: delete one first.";
-pub const CONTOUR_LIMITS: &str = "A contour needs three points or more; a volume has at most 64.";
+pub(crate) const TOO_MANY_MEASUREMENTS: &str = "There are as many measurements as a scene can have: delete one first.";
+pub(crate) const CONTOUR_LIMITS: &str = "A contour needs three points or more; a volume has at most 64.";
 
 // What stands in the way, and counting voxels.
-pub const OUTLINE_NEEDS_PLANE: &str = "Outlines are traced on a plane: choose Plane, 3 planes or 4-up";
-pub const POINT_NEEDS_SURFACE: &str = "Points on a rendering need its surface: choose the mode Surface or Mixed";
-pub const NO_PICTURE_TO_USE: &str = "There is no picture yet";
-pub const NO_SURFACE_HERE: &str = "There is no surface at this place";
-pub const FIRST_END_BEHIND_CAMERA: &str = "The first end is behind the camera: turn the view back";
-pub const COUNTING_VOXELS: &str = "Counting the voxels of the region";
-pub fn no_voxels_counted(e: impl Display) -> String {
+pub(crate) const OUTLINE_NEEDS_PLANE: &str = "Outlines are traced on a plane: choose Plane, 3 planes or 4-up";
+pub(crate) const POINT_NEEDS_SURFACE: &str = "Points on a rendering need its surface: choose the mode Surface or Mixed";
+pub(crate) const NO_PICTURE_TO_USE: &str = "There is no picture yet";
+pub(crate) const NO_SURFACE_HERE: &str = "There is no surface at this place";
+pub(crate) const FIRST_END_BEHIND_CAMERA: &str = "The first end is behind the camera: turn the view back";
+pub(crate) const COUNTING_VOXELS: &str = "Counting the voxels of the region";
+pub(crate) fn no_voxels_counted(e: impl Display) -> String {
     format!("No voxels are counted: {e}")
 }
-pub const STILL_COUNTING_VOXELS: &str = "Voxels are being counted: wait a moment";
-pub const NO_VOLUME_YET: &str = "There is no volume yet";
-pub const NO_VOLUME_IN_LOOP: &str = "No volume is in the cine loop: --cine keeps some";
-pub const THRESHOLD_IS_0: &str = "The threshold is 0: choose Surface or Volume and raise it";
-pub const REGION_IS_EMPTY: &str = "The voxels cannot be counted: the region is empty";
-pub const NO_MEASUREMENTS_YET: &str = "There are no measurements yet";
-pub const RESULTS_COPIED: &str = "The results are copied as CSV";
-pub fn no_clipboard(fault: impl Display) -> String {
+pub(crate) const STILL_COUNTING_VOXELS: &str = "Voxels are being counted: wait a moment";
+pub(crate) const NO_VOLUME_YET: &str = "There is no volume yet";
+pub(crate) const NO_VOLUME_IN_LOOP: &str = "No volume is in the cine loop: --cine keeps some";
+pub(crate) const THRESHOLD_IS_0: &str = "The threshold is 0: choose Surface or Volume and raise it";
+pub(crate) const REGION_IS_EMPTY: &str = "The voxels cannot be counted: the region is empty";
+pub(crate) const NO_MEASUREMENTS_YET: &str = "There are no measurements yet";
+pub(crate) const RESULTS_COPIED: &str = "The results are copied as CSV";
+pub(crate) fn no_clipboard(fault: impl Display) -> String {
     format!("There is no clipboard ({fault}): the results are saved instead")
 }
-pub const WHY_NO_MEASUREMENTS: &str = "there are no measurements yet";
-pub fn results_not_saved(fault: impl Display) -> String {
+pub(crate) const WHY_NO_MEASUREMENTS: &str = "there are no measurements yet";
+pub(crate) fn results_not_saved(fault: impl Display) -> String {
     format!("The results were not saved: {fault}")
 }
-pub const WHY_NO_ORIGIN: &str = "this view has none";
-pub const VOLUMES_ARE_LIVE: &str = "The volumes are live and in no file: save the loop too (R)";
-pub fn workspace_not_saved(fault: impl Display) -> String {
+pub(crate) const WHY_NO_ORIGIN: &str = "this view has none";
+pub(crate) const VOLUMES_ARE_LIVE: &str = "The volumes are live and in no file: save the loop too (R)";
+pub(crate) fn workspace_not_saved(fault: impl Display) -> String {
     format!("The workspace was not saved: {fault}")
 }
 
 // Body marks.
-pub const BODY_MARK: &str = "Body mark";
+pub(crate) const BODY_MARK: &str = "Body mark";
 pub fn body_mark(number: impl Display) -> String {
     format!("Body mark {number}")
 }
-pub const TOO_MANY_BODY_MARKS: &str = "There are as many body marks as a picture can have: remove one first.";
-pub const BODY_MARK_FIRST_STEP: &str = "Choose a part of the body.";
-pub const BODY_MARK_STEP: &str = "Click or drag the probe on it; the wheel turns it. Drag the body to move the mark.";
+pub(crate) const TOO_MANY_BODY_MARKS: &str = "There are as many body marks as a picture can have: remove one first.";
+pub(crate) const BODY_MARK_FIRST_STEP: &str = "Choose a part of the body.";
+pub(crate) const BODY_MARK_STEP: &str =
+    "Click or drag the probe on it; the wheel turns it. Drag the body to move the mark.";
 pub const MIRRORED: &str = "Mirrored";
-pub const MIRRORED_HINT: &str = "Exchanges left and right: the left breast, the back of the fetus on the other side.";
-pub const TURN_OF_PROBE: &str = "Probe's direction";
-pub const TURN_OF_PROBE_HINT: &str =
+pub(crate) const MIRRORED_HINT: &str =
+    "Exchanges left and right: the left breast, the back of the fetus on the other side.";
+pub(crate) const TURN_OF_PROBE: &str = "Probe's direction";
+pub(crate) const TURN_OF_PROBE_HINT: &str =
     "Where the marker of the probe points: 0° to the head, -90° to the right side of the patient.";
-pub const PROBE_ACROSS: &str = "Probe across";
-pub const PROBE_DOWN: &str = "Probe down";
-pub const PROBE_ON_BODY_HINT: &str = "Where on the body the probe is, from its middle.";
-pub const SIZE_OF_MARK: &str = "Size";
-pub const SIZE_OF_MARK_HINT: &str = "How large the mark is, of the picture's shorter edge.";
-pub const MARK_ACROSS: &str = "Mark across";
-pub const MARK_DOWN: &str = "Mark down";
-pub const PLACE_OF_MARK_HINT: &str = "Where on the picture the mark is.";
-pub const SELECT_BODY_MARK_HINT: &str = "The controls are about this one.";
-pub const ADD_BODY_MARK: &str = "Add body mark";
-pub const ADD_BODY_MARK_HINT: &str = "One more mark, in another corner of the picture. At most four.";
-pub const REMOVE_BODY_MARK: &str = "Remove body mark";
-pub const REMOVE_BODY_MARK_HINT: &str = "Removes this one (undo brings it back).";
+pub(crate) const PROBE_ACROSS: &str = "Probe across";
+pub(crate) const PROBE_DOWN: &str = "Probe down";
+pub(crate) const PROBE_ON_BODY_HINT: &str = "Where on the body the probe is, from its middle.";
+pub(crate) const SIZE_OF_MARK: &str = "Size";
+pub(crate) const SIZE_OF_MARK_HINT: &str = "How large the mark is, of the picture's shorter edge.";
+pub(crate) const MARK_ACROSS: &str = "Mark across";
+pub(crate) const MARK_DOWN: &str = "Mark down";
+pub(crate) const PLACE_OF_MARK_HINT: &str = "Where on the picture the mark is.";
+pub(crate) const SELECT_BODY_MARK_HINT: &str = "The controls are about this one.";
+pub(crate) const ADD_BODY_MARK: &str = "Add body mark";
+pub(crate) const ADD_BODY_MARK_HINT: &str = "One more mark, in another corner of the picture. At most four.";
+pub(crate) const REMOVE_BODY_MARK: &str = "Remove body mark";
+pub(crate) const REMOVE_BODY_MARK_HINT: &str = "Removes this one (undo brings it back).";
 
 // On the curved plane.
-pub const CURVE_NEEDS_BOTH_ENDS: &str = "A distance on the curved plane needs both of its ends there.";
-pub const CURVE_MEASURES: &str =
+pub(crate) const CURVE_NEEDS_BOTH_ENDS: &str = "A distance on the curved plane needs both of its ends there.";
+pub(crate) const CURVE_MEASURES: &str =
     "On the curved plane distances are measured (Caliper), and texts and arrows set; the rest on A, B or C.";

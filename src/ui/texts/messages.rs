@@ -6,184 +6,184 @@ use std::fmt::Display;
 pub fn saved(file: impl Display) -> String {
     format!("Saved {file}")
 }
-pub fn not_saved(fault: impl Display) -> String {
+pub(crate) fn not_saved(fault: impl Display) -> String {
     format!("Not saved: {fault}")
 }
-pub const SHADER_ERROR: &str = "Shader error: the last good shader is shown";
-pub const DEVICE_STALLED_ABOUT: &str =
+pub(crate) const SHADER_ERROR: &str = "Shader error: the last good shader is shown";
+pub(crate) const DEVICE_STALLED_ABOUT: &str =
     "It did not finish in time and was opened again. The volumes that arrived in between are not shown.";
-pub const DEVICE_STALLED: &str = "The graphics device stalled";
-pub const PREPARING_THE_DEVICE: &str = "Preparing the device";
-pub fn shaders_compiled(done: impl Display, count: impl Display) -> String {
+pub(crate) const DEVICE_STALLED: &str = "The graphics device stalled";
+pub(crate) const PREPARING_THE_DEVICE: &str = "Preparing the device";
+pub(crate) fn shaders_compiled(done: impl Display, count: impl Display) -> String {
     format!("{done} of {count} shaders are compiled")
 }
-pub const WAITING_FOR_FRAME: &str = "Waiting for the first frame";
-pub fn frames_of_first_volume(done: impl Display, count: impl Display) -> String {
+pub(crate) const WAITING_FOR_FRAME: &str = "Waiting for the first frame";
+pub(crate) fn frames_of_first_volume(done: impl Display, count: impl Display) -> String {
     format!("{done} of {count} frames of the first volume")
 }
-pub const DRAWING_FIRST_PICTURE: &str = "Drawing the first picture";
+pub(crate) const DRAWING_FIRST_PICTURE: &str = "Drawing the first picture";
 
 // The device.
-pub const DEVICE_OPENED_AGAIN: &str = "The device was lost and opened again";
+pub(crate) const DEVICE_OPENED_AGAIN: &str = "The device was lost and opened again";
 
 // Opening files.
-pub const FOLDER_ABOVE: &str = "..  (the folder above)";
-pub fn files_as_series(count: usize) -> String {
+pub(crate) const FOLDER_ABOVE: &str = "..  (the folder above)";
+pub(crate) fn files_as_series(count: usize) -> String {
     format!("all {count} DICOM files of this folder as one recording")
 }
-pub const OPENS_NO_OTHER_FILES: &str = "This view opens no other files";
-pub const SAVE_THE_LOOP_FIRST: &str = "The loop is not saved: save it first (R)";
+pub(crate) const OPENS_NO_OTHER_FILES: &str = "This view opens no other files";
+pub(crate) const SAVE_THE_LOOP_FIRST: &str = "The loop is not saved: save it first (R)";
 pub fn reading(name: impl Display) -> String {
     format!("Reading {name}")
 }
 pub fn percent(share: impl Display) -> String {
     format!("{share} %")
 }
-pub fn files_of_folder(done: impl Display, count: impl Display) -> String {
+pub(crate) fn files_of_folder(done: impl Display, count: impl Display) -> String {
     format!("{done} of {count} files")
 }
-pub const READING_SHARE: &str = "Read so far";
-pub const CANCEL_READING: &str = "Cancel";
-pub const CANCEL_READING_HINT: &str = "Reads no further; what is shown stays (Esc).";
-pub fn not_read_further(name: impl Display) -> String {
+pub(crate) const READING_SHARE: &str = "Read so far";
+pub(crate) const CANCEL_READING: &str = "Cancel";
+pub(crate) const CANCEL_READING_HINT: &str = "Reads no further; what is shown stays (Esc).";
+pub(crate) fn not_read_further(name: impl Display) -> String {
     format!("{name} is not read further")
 }
-pub const READING_CANCELLED: &str = "Reading was cancelled";
-pub const READING_CANCELLED_ABOUT: &str = "Ctrl+O opens a recording.";
-pub fn too_many_recordings(most: impl Display) -> String {
+pub(crate) const READING_CANCELLED: &str = "Reading was cancelled";
+pub(crate) const READING_CANCELLED_ABOUT: &str = "Ctrl+O opens a recording.";
+pub(crate) fn too_many_recordings(most: impl Display) -> String {
     format!("{most} recordings are open: close one first")
 }
 pub fn is_closed(name: impl Display) -> String {
     format!("{name} is closed")
 }
-pub const ONLY_RECORDING: &str = "No other recording is open";
-pub const STANDARD_INPUT: &str = "Standard input";
-pub fn cannot_be_opened(name: impl Display, e: impl Display) -> String {
+pub(crate) const ONLY_RECORDING: &str = "No other recording is open";
+pub(crate) const STANDARD_INPUT: &str = "Standard input";
+pub(crate) fn cannot_be_opened(name: impl Display, e: impl Display) -> String {
     format!("{name} cannot be opened: {e}")
 }
-pub const WHY_FILE_NOT_READ: &str = "it ended before the file was read";
+pub(crate) const WHY_FILE_NOT_READ: &str = "it ended before the file was read";
 pub fn not_opened(fault: impl Display) -> String {
     format!("Not opened: {fault}")
 }
 
 // Presets of the user.
-pub const OWN_PRESET_HINT: &str = "A preset of your own.";
-pub const PRESET_DOES_NOT_FIT: &str = "This preset does not fit the volume";
-pub fn too_many_presets(max_presets: impl Display) -> String {
+pub(crate) const OWN_PRESET_HINT: &str = "A preset of your own.";
+pub(crate) const PRESET_DOES_NOT_FIT: &str = "This preset does not fit the volume";
+pub(crate) fn too_many_presets(max_presets: impl Display) -> String {
     format!("{max_presets} presets are kept: delete one first")
 }
-pub fn name_is_taken(name: impl Display) -> String {
+pub(crate) fn name_is_taken(name: impl Display) -> String {
     format!("{name} is the name of another preset")
 }
-pub const WHY_PRESET_IS_GONE: &str = "this preset is gone";
-pub fn preset_is_called(name: impl Display) -> String {
+pub(crate) const WHY_PRESET_IS_GONE: &str = "this preset is gone";
+pub(crate) fn preset_is_called(name: impl Display) -> String {
     format!("The preset is called {name}")
 }
-pub fn preset_is_replaced(name: impl Display) -> String {
+pub(crate) fn preset_is_replaced(name: impl Display) -> String {
     format!("{name} has the present look. Undo in the list brings the earlier one back")
 }
-pub fn preset_is_kept(name: impl Display) -> String {
+pub(crate) fn preset_is_kept(name: impl Display) -> String {
     format!("{name} is kept")
 }
-pub const WHY_NO_PRESETS: &str = "this view keeps no presets";
-pub fn preset_is_deleted(name: impl Display) -> String {
+pub(crate) const WHY_NO_PRESETS: &str = "this view keeps no presets";
+pub(crate) fn preset_is_deleted(name: impl Display) -> String {
     format!("{name} is deleted. Undo in the list brings it back")
 }
-pub const PRESETS_CHANGED_ELSEWHERE: &str = "The presets were changed elsewhere: nothing is taken back";
-pub const PRESETS_RESTORED: &str = "The presets are as they were";
+pub(crate) const PRESETS_CHANGED_ELSEWHERE: &str = "The presets were changed elsewhere: nothing is taken back";
+pub(crate) const PRESETS_RESTORED: &str = "The presets are as they were";
 
 // What cannot be saved.
-pub const WHY_NO_PICTURE: &str = "there is no picture yet";
-pub fn picture_not_saved(fault: impl Display) -> String {
+pub(crate) const WHY_NO_PICTURE: &str = "there is no picture yet";
+pub(crate) fn picture_not_saved(fault: impl Display) -> String {
     format!("The picture was not saved: {fault}")
 }
-pub const WHY_NO_VOLUMES: &str = "there are no volumes yet";
-pub fn loop_not_saved(fault: impl Display) -> String {
+pub(crate) const WHY_NO_VOLUMES: &str = "there are no volumes yet";
+pub(crate) fn loop_not_saved(fault: impl Display) -> String {
     format!("The loop was not saved: {fault}")
 }
-pub const WHY_NO_VOLUME: &str = "there is no volume yet";
-pub fn exporting(name: impl Display) -> String {
+pub(crate) const WHY_NO_VOLUME: &str = "there is no volume yet";
+pub(crate) fn exporting(name: impl Display) -> String {
     format!("Exporting: {name}")
 }
-pub fn not_exported(fault: impl Display) -> String {
+pub(crate) fn not_exported(fault: impl Display) -> String {
     format!("Not exported: {fault}")
 }
 
 // The brush.
-pub const BRUSH_NEEDS_SURFACE: &str = "The brush needs a surface: choose the mode Surface or Mixed";
+pub(crate) const BRUSH_NEEDS_SURFACE: &str = "The brush needs a surface: choose the mode Surface or Mixed";
 
 // Cuts.
-pub const CUTS_IN_THE_WAY: &str =
+pub(crate) const CUTS_IN_THE_WAY: &str =
     "That draws both what is dark and what is bright, of which nothing can be cut: remove the cuts first (Shift+F).";
-pub const TOO_MANY_CUTS: &str = "There are as many cuts as a scene can have: remove them, or take one back.";
-pub const CUTS_NEED_RENDERING: &str = "Cuts are made on a rendering: the block shows all of the volume.";
-pub const CONTOUR_TOO_SMALL: &str = "The contour is too small, or beside the volume.";
-pub const CANNOT_CUT_BOTH: &str = "Nothing can be cut where both what is dark and what is bright is drawn.";
+pub(crate) const TOO_MANY_CUTS: &str = "There are as many cuts as a scene can have: remove them, or take one back.";
+pub(crate) const CUTS_NEED_RENDERING: &str = "Cuts are made on a rendering: the block shows all of the volume.";
+pub(crate) const CONTOUR_TOO_SMALL: &str = "The contour is too small, or beside the volume.";
+pub(crate) const CANNOT_CUT_BOTH: &str = "Nothing can be cut where both what is dark and what is bright is drawn.";
 
 // The automatic render start.
-pub const CURVE_IN_THE_WAY: &str = "That draws both what is dark and what is bright, of which nothing can be removed: the start line has to be straight (Shift+G).";
-pub const SEVERAL_IN_THE_WAY: &str = "That draws both what is dark and what is bright, of which nothing can be removed: no cuts (Shift+F), a straight start line (Shift+G) and no automatic render start go with it.";
-pub const NO_SUCH_PRESET: &str = "There is no such preset";
-pub const UNVEILING_IN_THE_WAY: &str = "That draws both what is dark and what is bright, of which nothing can be removed: rendering cannot start at the fluid.";
+pub(crate) const CURVE_IN_THE_WAY: &str = "That draws both what is dark and what is bright, of which nothing can be removed: the start line has to be straight (Shift+G).";
+pub(crate) const SEVERAL_IN_THE_WAY: &str = "That draws both what is dark and what is bright, of which nothing can be removed: no cuts (Shift+F), a straight start line (Shift+G) and no automatic render start go with it.";
+pub(crate) const NO_SUCH_PRESET: &str = "There is no such preset";
+pub(crate) const UNVEILING_IN_THE_WAY: &str = "That draws both what is dark and what is bright, of which nothing can be removed: rendering cannot start at the fluid.";
 
 // The source: title and explanation.
 pub const DEMO_DATA: &str = crate::source::DEMO_DATA;
-pub const COMPUTING_DEMO_DATA: &str = "Computing the demo data";
-pub const READING_RECORDING: &str = "Reading the recording";
-pub const WAITING_FOR_STANDARD_INPUT: &str = "Waiting for frames on standard input";
-pub const CONNECTING_TO_PROBE: &str = "Connecting to the probe";
-pub const NO_DEMO_DATA: &str = "No demo data: trying again";
-pub const RECORDING_NOT_OPENED: &str = "The recording cannot be opened: trying again";
-pub const STANDARD_INPUT_NOT_READ: &str = "Standard input cannot be read: trying again";
-pub const NO_PROBE: &str = "No probe: trying again";
-pub const SOURCE_ENDED: &str = "The source ended";
-pub const NOT_CONNECTED: &str = "Not connected: trying again";
-pub const NO_FRAMES_ON_STANDARD_INPUT: &str = "No frames on standard input";
-pub const NO_FRAMES_ON_STANDARD_INPUT_ABOUT: &str = "It is open but nothing comes.";
-pub const NO_FRAMES_FROM_THE_PROBE: &str = "No frames from the probe";
-pub const NO_FRAMES_FROM_THE_PROBE_ABOUT: &str = "It is connected but sends nothing.";
-pub const WHY_SOURCE_PANICKED: &str = "the thread that opens the source panicked";
-pub fn why_no_thread_for_source(e: impl Display) -> String {
+pub(crate) const COMPUTING_DEMO_DATA: &str = "Computing the demo data";
+pub(crate) const READING_RECORDING: &str = "Reading the recording";
+pub(crate) const WAITING_FOR_STANDARD_INPUT: &str = "Waiting for frames on standard input";
+pub(crate) const CONNECTING_TO_PROBE: &str = "Connecting to the probe";
+pub(crate) const NO_DEMO_DATA: &str = "No demo data: trying again";
+pub(crate) const RECORDING_NOT_OPENED: &str = "The recording cannot be opened: trying again";
+pub(crate) const STANDARD_INPUT_NOT_READ: &str = "Standard input cannot be read: trying again";
+pub(crate) const NO_PROBE: &str = "No probe: trying again";
+pub(crate) const SOURCE_ENDED: &str = "The source ended";
+pub(crate) const NOT_CONNECTED: &str = "Not connected: trying again";
+pub(crate) const NO_FRAMES_ON_STANDARD_INPUT: &str = "No frames on standard input";
+pub(crate) const NO_FRAMES_ON_STANDARD_INPUT_ABOUT: &str = "It is open but nothing comes.";
+pub(crate) const NO_FRAMES_FROM_THE_PROBE: &str = "No frames from the probe";
+pub(crate) const NO_FRAMES_FROM_THE_PROBE_ABOUT: &str = "It is connected but sends nothing.";
+pub(crate) const WHY_SOURCE_PANICKED: &str = "the thread that opens the source panicked";
+pub(crate) fn why_no_thread_for_source(e: impl Display) -> String {
     format!("a thread for the source cannot be started: {e}")
 }
-pub const WHY_SOURCE_ENDED: &str = "the source ended";
-pub fn why_no_thread(e: impl Display) -> String {
+pub(crate) const WHY_SOURCE_ENDED: &str = "the source ended";
+pub(crate) fn why_no_thread(e: impl Display) -> String {
     format!("a thread cannot be started: {e}")
 }
 
 // Saving in the background.
-pub fn still_exporting(name: impl Display) -> String {
+pub(crate) fn still_exporting(name: impl Display) -> String {
     format!("{name} is still being exported")
 }
-pub fn still_saving(max_pending: impl Display) -> String {
+pub(crate) fn still_saving(max_pending: impl Display) -> String {
     format!("{max_pending} files are still being saved: wait a moment")
 }
-pub fn why_no_folder(folder: impl Display, e: impl Display) -> String {
+pub(crate) fn why_no_folder(folder: impl Display, e: impl Display) -> String {
     format!("{folder}: cannot be created: {e}")
 }
 
 // The ladder of quality, for the times.
-pub const FULL_QUALITY: &str = "full quality";
-pub const NO_OCCLUSION: &str = "no occlusion";
-pub const NO_OCCLUSION_NO_SHADOW: &str = "no occlusion, no shadow";
-pub const HALF_RAYS: &str = "half the rays each way";
-pub const QUARTER_RAYS: &str = "a quarter of the rays each way";
-pub const EIGHTH_RAYS: &str = "an eighth of the rays each way";
+pub(crate) const FULL_QUALITY: &str = "full quality";
+pub(crate) const NO_OCCLUSION: &str = "no occlusion";
+pub(crate) const NO_OCCLUSION_NO_SHADOW: &str = "no occlusion, no shadow";
+pub(crate) const HALF_RAYS: &str = "half the rays each way";
+pub(crate) const QUARTER_RAYS: &str = "a quarter of the rays each way";
+pub(crate) const EIGHTH_RAYS: &str = "an eighth of the rays each way";
 
 pub fn render_start(outcome: impl Display) -> String {
     format!("{}: {outcome}.", super::AUTO_RENDER_START)
 }
 
 // Input devices, where there is no desktop.
-pub const WHY_DEVICES_LOST: &str = "the reader panicked";
-pub fn devices_lost(why: impl Display) -> String {
+pub(crate) const WHY_DEVICES_LOST: &str = "the reader panicked";
+pub(crate) fn devices_lost(why: impl Display) -> String {
     format!("input devices: {why}")
 }
-pub fn devices_not_read(count: impl Display) -> String {
+pub(crate) fn devices_not_read(count: impl Display) -> String {
     format!(
         "{count} input devices cannot be read: this user is not in the group input (as root: usermod -aG input USER)"
     )
 }
-pub fn device_not_grabbed(name: impl Display, path: impl Display, fault: impl Display) -> String {
+pub(crate) fn device_not_grabbed(name: impl Display, path: impl Display, fault: impl Display) -> String {
     format!("{name} ({path}) cannot be grabbed: {fault}")
 }

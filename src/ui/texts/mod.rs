@@ -11,10 +11,10 @@ mod panels;
 mod sides;
 mod sliders;
 
-pub use exports::*;
-pub use first_steps::*;
-pub use measures::*;
-pub use messages::*;
-pub use panels::*;
-pub use sides::*;
-pub use sliders::*;
+pub(crate) use exports::*;
+pub(crate) use first_steps::*;
+pub(crate) use measures::*;
+pub(crate) use messages::*;
+pub(crate) use panels::*;
+pub(crate) use sides::*;
+pub(crate) use sliders::*;

@@ -4,15 +4,15 @@ use crate::scene::{ProbeMarker, Sides, VolumeAxis};
 use std::fmt::Display;
 
 pub const SIDES: &str = "Sides";
-pub const SIDES_HINT: &str =
+pub(crate) const SIDES_HINT: &str =
     "The patient's sides as letters on every tile and in saved pictures, and the probe's marker.";
-pub fn sides_in_short(sides: impl Display) -> String {
+pub(crate) fn sides_in_short(sides: impl Display) -> String {
     format!("Sides: {sides}")
 }
-pub const EXCHANGE_LEFT_AND_RIGHT: &str = "Exchange L and R";
-pub const EXCHANGE_LEFT_AND_RIGHT_HINT: &str =
+pub(crate) const EXCHANGE_LEFT_AND_RIGHT: &str = "Exchange L and R";
+pub(crate) const EXCHANGE_LEFT_AND_RIGHT_HINT: &str =
     "Left and right the other way round, as when the probe is turned. Nothing else changes.";
-pub const NO_SIDES_SHORT: &str = "-";
+pub(crate) const NO_SIDES_SHORT: &str = "-";
 
 /// The heading of an axis.
 pub fn axis(axis: VolumeAxis) -> &'static str {
@@ -37,7 +37,7 @@ pub fn sides(sides: Sides) -> &'static str {
 }
 
 /// What sides along an axis say.
-pub fn sides_hint(axis: VolumeAxis, sides: Sides) -> String {
+pub(crate) fn sides_hint(axis: VolumeAxis, sides: Sides) -> String {
     let (first, last) = match sides {
         Sides::None => return "Not known: no letters.".into(),
         Sides::LeftRight => ("left", "right"),
@@ -54,10 +54,10 @@ pub fn sides_hint(axis: VolumeAxis, sides: Sides) -> String {
     }
 }
 
-pub const PROBE_MARKER: &str = "Probe marker (dot)";
+pub(crate) const PROBE_MARKER: &str = "Probe marker (dot)";
 
 /// Where the marker is, in short.
-pub fn probe_marker(marker: ProbeMarker) -> &'static str {
+pub(crate) fn probe_marker(marker: ProbeMarker) -> &'static str {
     match marker {
         ProbeMarker::First => "First",
         ProbeMarker::Last => "Last",
@@ -66,7 +66,7 @@ pub fn probe_marker(marker: ProbeMarker) -> &'static str {
 }
 
 /// What the place of the marker means.
-pub fn probe_marker_hint(marker: ProbeMarker) -> &'static str {
+pub(crate) fn probe_marker_hint(marker: ProbeMarker) -> &'static str {
     match marker {
         ProbeMarker::First => "The marker on the probe's housing is at the first scan line.",
         ProbeMarker::Last => "The marker on the probe's housing is at the last scan line.",

@@ -95,7 +95,7 @@ pub struct BaselineComparison {
     /// Number of checks without changes.
     pub same: usize,
     /// Number of checks that fail in both runs.
-    pub still_failing: usize,
+    pub(crate) still_failing: usize,
 }
 
 impl BaselineComparison {

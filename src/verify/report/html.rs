@@ -319,7 +319,7 @@ const SMALL: u32 = 320;
 
 /// Number and size of the pictures embedded so far.
 #[derive(Default)]
-pub struct EmbeddedPictures {
+pub(crate) struct EmbeddedPictures {
     sets: usize,
     bytes: usize,
     left_out: usize,

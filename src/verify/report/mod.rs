@@ -270,7 +270,7 @@ impl Figure {
 
 impl Outcome {
     /// The outcome of a check that measured nothing. `why`: the fault of a failed check, otherwise a note.
-    pub fn unrun(check: &CheckName, verdict: Verdict, why: String) -> Outcome {
+    pub(crate) fn unrun(check: &CheckName, verdict: Verdict, why: String) -> Outcome {
         let (faults, notes) = match verdict {
             Verdict::Failed => (vec![Fault::new(why)], Vec::new()),
             _ => (Vec::new(), vec![why]),

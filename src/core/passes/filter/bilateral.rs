@@ -3,7 +3,7 @@
 use crate::passes::pass::*;
 use crate::scene::{Bilateral, Scene};
 
-pub const DISTANCE: Pass = Pass {
+pub(crate) const DISTANCE: Pass = Pass {
     name: "bilateral_distance",
     stage: Stage::Shade,
     frequency: Frequency::Picture,

@@ -29,7 +29,7 @@ pub const SLICE: Pass = Pass {
     },
 };
 
-pub const DISTANCE: Pass = Pass {
+pub(crate) const DISTANCE: Pass = Pass {
     name: "enhanced_sigma_distance",
     stage: Stage::Shade,
     frequency: Frequency::Picture,

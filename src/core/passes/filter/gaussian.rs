@@ -52,10 +52,10 @@ const TOLERANCE: Tolerance = Tolerance { absolute: 6e-4, relative: 0.0, outliers
 
 pub const LATERAL: Pass = within_slices::<RENDERED, 0>("gaussian_lateral");
 pub const DEPTH: Pass = within_slices::<RENDERED, 1>("gaussian_depth");
-pub const ELEVATION: Pass = across_slices::<RENDERED>("gaussian_elevation");
-pub const SECTION_LATERAL: Pass = within_slices::<SECTIONS, 0>("section_lateral");
-pub const SECTION_DEPTH: Pass = within_slices::<SECTIONS, 1>("section_depth");
-pub const SECTION_ELEVATION: Pass = across_slices::<SECTIONS>("section_elevation");
+pub(crate) const ELEVATION: Pass = across_slices::<RENDERED>("gaussian_elevation");
+pub(crate) const SECTION_LATERAL: Pass = within_slices::<SECTIONS, 0>("section_lateral");
+pub(crate) const SECTION_DEPTH: Pass = within_slices::<SECTIONS, 1>("section_depth");
+pub(crate) const SECTION_ELEVATION: Pass = across_slices::<SECTIONS>("section_elevation");
 
 /// The pass of an axis of the slices.
 const fn within_slices<const VOLUME: usize, const AXIS: usize>(name: &'static str) -> Pass {

@@ -31,7 +31,7 @@ fn columns(scene: &Scene) -> u32 {
     if scene.is_for_cpu() { RUN } else { 1 }
 }
 
-pub const DISTANCE: Pass = Pass {
+pub(crate) const DISTANCE: Pass = Pass {
     name: "median_distance",
     stage: Stage::Shade,
     frequency: Frequency::Picture,

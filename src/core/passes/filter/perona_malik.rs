@@ -24,7 +24,7 @@ pub const SLICE: Pass = Pass {
     reference: |s, t, reads, writes| reference(s.slice_filters.perona_malik, t, reads, writes, |_| true),
 };
 
-pub const DISTANCE: Pass = Pass {
+pub(crate) const DISTANCE: Pass = Pass {
     name: "perona_malik_distance",
     stage: Stage::Shade,
     frequency: Frequency::Picture,

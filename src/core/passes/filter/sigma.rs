@@ -29,7 +29,7 @@ pub const SLICE: Pass = Pass {
     reference: |s, t, reads, writes| reference(s.slice_filters.sigma, t, reads, writes, |_| true),
 };
 
-pub const DISTANCE: Pass = Pass {
+pub(crate) const DISTANCE: Pass = Pass {
     name: "sigma_distance",
     stage: Stage::Shade,
     frequency: Frequency::Picture,

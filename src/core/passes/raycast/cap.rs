@@ -83,7 +83,7 @@ pub struct Cut {
 
 impl Cut {
     /// True if the ray ends here: nothing shines through.
-    pub fn ends_ray(self) -> bool {
+    pub(crate) fn ends_ray(self) -> bool {
         self.opacity >= 1.0
     }
 

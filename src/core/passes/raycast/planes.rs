@@ -46,7 +46,7 @@ pub const PASS: Pass = Pass {
 };
 
 /// The same, toned and in 8 bits.
-pub const TONED: Pass = Pass {
+pub(crate) const TONED: Pass = Pass {
     name: "raycast_planes_toned",
     shader: |_, _| "raycast/planes.toned",
     needed: |s| match (s.is_flat(), s.tones_planes()) {

@@ -271,7 +271,7 @@ impl<'a> Ray<'a> {
     }
 
     /// Where it enters the region; a miss if it does not.
-    pub fn enter_or_miss(&self) -> f64 {
+    pub(crate) fn enter_or_miss(&self) -> f64 {
         if self.path() > 0.0 { self.enter } else { MISS }
     }
 
@@ -290,7 +290,7 @@ impl<'a> Ray<'a> {
     }
 
     /// Steps to an offset.
-    pub fn steps_to(&self, offset: f64) -> f64 {
+    pub(crate) fn steps_to(&self, offset: f64) -> f64 {
         match self.widening == 0.0 {
             true => offset / (self.step * self.wider),
             false => (self.widening / self.wider * offset).max(-0.999_999).ln_1p() / (self.step * self.widening),

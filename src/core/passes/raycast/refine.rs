@@ -11,7 +11,7 @@ use crate::passes::postprocess::{tone_constants, tone_params, toned};
 const THRESHOLD: f64 = 2.0 / 255.0;
 
 /// Which pixels have all rays.
-pub const MARK_EDGES: Pass = Pass {
+pub(crate) const MARK_EDGES: Pass = Pass {
     name: "mark_edges",
     stage: Stage::Raycast,
     frequency: Frequency::Picture,

@@ -195,7 +195,7 @@ pub const LIST: Pass = Pass {
 };
 
 /// The rays of the listed pixels, with shorter steps.
-pub const REFINE: Pass = Pass {
+pub(crate) const REFINE: Pass = Pass {
     name: "tolerance_refine",
     shader: |_, _| "tolerance/cast.refine",
     reads: |s, dispatch| {

@@ -81,7 +81,7 @@ pub const PASS: Pass = Pass {
 };
 
 /// With adaptive supersampling, the rays of the pixels that are marked.
-pub const REFINED: Pass = Pass {
+pub(crate) const REFINED: Pass = Pass {
     name: "raycast_refined",
     needed: |s| match s.adapts_rays() {
         true => Ok("pixels at edges have several rays"),
@@ -223,7 +223,7 @@ fn is_exponential(scene: &Scene) -> bool {
 /// The tables of the transfer function that the pass reads.
 pub(super) struct Tables<'a> {
     /// Over the value, or between the values at both ends of a step.
-    pub of_steps: &'a Texels,
+    pub(crate) of_steps: &'a Texels,
     /// Over the value: what a step of another length is integrated from. Empty unless the rule is exponential.
     pub curve: Vec<[f64; 4]>,
     pub lit: Option<Lit<'a>>,
@@ -277,7 +277,7 @@ impl<'a> RayMedium<'a> {
     }
 
     /// A colour of a place under the light of another, and the tint by depth.
-    pub fn tinted_at(&self, rgb: [f64; 3], place: DVec3, lit_at: DVec3) -> [f64; 3] {
+    pub(crate) fn tinted_at(&self, rgb: [f64; 3], place: DVec3, lit_at: DVec3) -> [f64; 3] {
         let settings = &self.scene.settings.volume;
         let rgb = match &self.tables.lit {
             Some(lit) => lit.light(self.scene, rgb, lit_at, self.ray.direction()),

@@ -3,7 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 /// Slowest and fastest play of a cine loop, as multiples of the speed of the acquisition.
-pub const CINE_SPEEDS: [f64; 2] = [0.1, 8.0];
+pub(crate) const CINE_SPEEDS: [f64; 2] = [0.1, 8.0];
 
 /// The cine loop. The viewer plays it; `render --volumes loop` draws it.
 #[derive(Clone, Copy, Debug, PartialEq, Deserialize, Serialize)]

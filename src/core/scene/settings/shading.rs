@@ -69,7 +69,7 @@ pub struct Bilateral {
 
 impl Bilateral {
     /// Least and largest standard deviation in the picture, pixels.
-    pub const MIN_PIXELS: f64 = 0.1;
+    pub(crate) const MIN_PIXELS: f64 = 0.1;
     pub const MAX_PIXELS: f64 = 10.0;
 }
 

@@ -38,7 +38,7 @@ impl Still {
     const MAX_DISPATCHES: u32 = 64;
 
     /// Samples of each dispatch but the last.
-    pub fn samples_at_once(&self) -> u32 {
+    pub(crate) fn samples_at_once(&self) -> u32 {
         self.batch.max(self.samples.div_ceil(Still::MAX_DISPATCHES))
     }
 

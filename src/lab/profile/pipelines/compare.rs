@@ -32,10 +32,10 @@ pub struct PipelineComparison {
     /// What became worse first.
     pub changes: Vec<Change>,
     /// Pipelines that only the new one has and that spill.
-    pub new_spills: Vec<String>,
+    pub(crate) new_spills: Vec<String>,
     /// Time to compile the pipelines that both have, without any cache, ms: old, new. Told, and never a failure: another machine is
     /// faster or slower.
-    pub cold_ms: [f64; 2],
+    pub(crate) cold_ms: [f64; 2],
     /// Other devices, drivers and inputs, one line each.
     pub notes: Vec<String>,
 }

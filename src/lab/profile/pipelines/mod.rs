@@ -68,12 +68,12 @@ pub struct Pipeline {
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub formats: Vec<String>,
     /// Time to compile without any cache, ms.
-    pub cold_ms: f64,
+    pub(crate) cold_ms: f64,
     /// The same from a pipeline cache, ms.
-    pub warm_ms: f64,
+    pub(crate) warm_ms: f64,
     /// The driver says that it took it from the cache; `None` if it does not say.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub from_cache: Option<bool>,
+    pub(crate) from_cache: Option<bool>,
     /// The programs that the driver made of it; it chooses one for a dispatch.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub executables: Vec<Executable>,

@@ -21,7 +21,7 @@ use toml::de::{DeTable, DeValue};
 /// Default path of the configuration of the service.
 pub const DEFAULT_PATH: &str = "/etc/echolume/echolume.toml";
 /// Path of the log in the example configuration.
-pub const DEFAULT_LOG: &str = "/var/log/echolume/echolume.log";
+pub(crate) const DEFAULT_LOG: &str = "/var/log/echolume/echolume.log";
 /// The source that needs no file.
 pub const PHANTOM: &str = "phantom";
 
@@ -44,7 +44,7 @@ pub struct Config {
     pub rounds: Option<u32>,
     /// Play a recording repeatedly, for demonstrations. Default: false.
     #[serde(rename = "loop")]
-    pub forever: bool,
+    pub(crate) forever: bool,
     /// OpenIGTLink: the TRANSFORM or the tool of TDATA that places 2D frames; `image`: their own matrix. Default: any TRANSFORM.
     pub tool: Option<String>,
     /// OpenIGTLink: the device whose images are taken, where there are several. Default: all.

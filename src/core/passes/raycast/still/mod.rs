@@ -41,7 +41,7 @@ pub fn final_sums(scene: &Scene) -> [Slot; 2] {
 }
 
 /// The majorant of each brick: the largest extinction of any value that samples in it may have.
-pub const MAJORANTS: Pass = Pass {
+pub(crate) const MAJORANTS: Pass = Pass {
     name: "still_majorants",
     stage: Stage::Raycast,
     frequency: Frequency::Picture,
@@ -110,7 +110,7 @@ fn written(n: u32) -> Vec<Bind> {
 }
 
 /// Paths of every pixel, some a dispatch, added to the sums of those before.
-pub const PATHS: Pass = Pass {
+pub(crate) const PATHS: Pass = Pass {
     name: "still_paths",
     shader: |_, _| "raycast/still",
     needed: need,
@@ -196,7 +196,7 @@ fn largest_extinction(scene: &Scene) -> f64 {
 }
 
 /// The mean of the paths of each pixel, through the response curve and over the ground.
-pub const RESOLVE: Pass = Pass {
+pub(crate) const RESOLVE: Pass = Pass {
     name: "still_resolve",
     shader: |_, _| "raycast/still_resolve",
     needed: need,
