@@ -36,7 +36,7 @@ impl Rays {
     }
 
     /// Converts a direction from the camera's axes (right, up, towards the viewer) to space.
-    pub(crate) fn from_camera(&self, v: DVec3) -> DVec3 {
+    pub(crate) fn out_of_camera(&self, v: DVec3) -> DVec3 {
         self.right * v.x + self.up * v.y - self.forward * v.z
     }
 }

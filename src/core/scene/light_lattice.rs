@@ -230,7 +230,7 @@ impl Scene {
     pub(crate) fn light_direction(&self, direction: DVec3) -> DVec3 {
         let v = direction.normalize();
         match self.settings.light.follows {
-            Follows::Camera => self.rays.from_camera(v),
+            Follows::Camera => self.rays.out_of_camera(v),
             // A camera that is not turned looks along depth, elevation is up; at a single frame it looks along elevation, depth is down.
             Follows::Region if is_still(&self.geometry) => DVec3::new(v.x, -v.y, -v.z),
             Follows::Region => DVec3::new(v.x, -v.z, v.y),

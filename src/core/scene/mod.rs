@@ -769,7 +769,7 @@ impl Scene {
 
     /// Position of a near light in space, mm.
     pub fn light_place(&self) -> Option<DVec3> {
-        self.settings.light.position.map(|p| self.rays.target + self.rays.from_camera(p))
+        self.settings.light.position.map(|p| self.rays.target + self.rays.out_of_camera(p))
     }
 
     /// Reach of the slice filters, pixels.
