@@ -34,11 +34,31 @@ enum Content {
 /// Why a value is not of the type that is read, in one line.
 #[derive(Clone, Debug, PartialEq)]
 pub struct NodeError {
+    fault: Fault,
     message: String,
     span: Option<Range<usize>>,
 }
 
+/// What kind of fault a value has.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Fault {
+    /// A table lacks a key that its type needs.
+    MissingKey,
+    /// A table has a key that its type does not have.
+    UnknownKey,
+    /// Any other, also all of the text itself.
+    Other,
+}
+
 impl NodeError {
+    fn new(message: String, span: Option<Range<usize>>) -> NodeError {
+        NodeError { fault: Fault::Other, message, span }
+    }
+
+    pub fn fault(&self) -> Fault {
+        self.fault
+    }
+
     /// What is wrong, without a place.
     pub fn message(&self) -> &str {
         &self.message
@@ -68,13 +88,41 @@ impl std::error::Error for NodeError {}
 
 impl de::Error for NodeError {
     fn custom<T: Display>(message: T) -> NodeError {
-        NodeError { message: message.to_string(), span: None }
+        NodeError::new(message.to_string(), None)
+    }
+
+    fn missing_field(field: &'static str) -> NodeError {
+        let Words(message) = de::Error::missing_field(field);
+        NodeError { fault: Fault::MissingKey, message, span: None }
+    }
+
+    fn unknown_field(field: &str, expected: &'static [&'static str]) -> NodeError {
+        let Words(message) = de::Error::unknown_field(field, expected);
+        NodeError { fault: Fault::UnknownKey, message, span: None }
+    }
+}
+
+/// What serde says of a fault.
+#[derive(Debug)]
+struct Words(String);
+
+impl Display for Words {
+    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        f.write_str(&self.0)
+    }
+}
+
+impl std::error::Error for Words {}
+
+impl de::Error for Words {
+    fn custom<T: Display>(message: T) -> Words {
+        Words(message.to_string())
     }
 }
 
 impl From<toml::de::Error> for NodeError {
     fn from(error: toml::de::Error) -> NodeError {
-        NodeError { message: error.message().to_string(), span: error.span() }
+        NodeError::new(error.message().to_string(), error.span())
     }
 }
 
@@ -226,7 +274,7 @@ impl Node {
                 && !fields.contains(&key.as_str())
             {
                 let message = format!("unexpected keys in table: {key}, available keys: {}", fields.join(", "));
-                return Err(NodeError { message, span: name.span.clone() });
+                return Err(NodeError::new(message, name.span.clone()));
             }
         }
         Ok(())
@@ -234,7 +282,7 @@ impl Node {
 
     /// The name of a variant, and what it holds.
     fn variant(self) -> Result<(Node, Option<Node>), NodeError> {
-        let fault = |message: &str| NodeError { message: message.into(), span: self.span.clone() };
+        let fault = |message: &str| NodeError::new(message.into(), self.span.clone());
         match self.content {
             Content::Text(_) => Ok((self, None)),
             Content::Table(ref table) if table.is_empty() => Err(fault("wanted exactly 1 element, found 0 elements")),
@@ -242,10 +290,7 @@ impl Node {
                 let mut entries = table.into_iter();
                 match (entries.next(), entries.next()) {
                     (Some((name, value)), None) => Ok((name, Some(value))),
-                    _ => Err(NodeError {
-                        message: "wanted exactly 1 element, more than 1 element".into(),
-                        span: self.span,
-                    }),
+                    _ => Err(NodeError::new("wanted exactly 1 element, more than 1 element".into(), self.span)),
                 }
             }
             _ => Err(fault("wanted string or table")),
@@ -320,7 +365,7 @@ impl<'de> de::VariantAccess<'de> for Held {
 
     fn unit_variant(self) -> Result<(), NodeError> {
         let Some(node) = self.0 else { return Ok(()) };
-        let fault = |message: String| Err(NodeError { message, span: node.span.clone() });
+        let fault = |message: String| Err(NodeError::new(message, node.span.clone()));
         match &node.content {
             Content::List(list) if list.is_empty() => Ok(()),
             Content::Table(table) if table.is_empty() => Ok(()),
@@ -341,7 +386,7 @@ impl<'de> de::VariantAccess<'de> for Held {
             Content::List(_) => format!("expected tuple with length {length}"),
             _ => format!("expected table, found {}", node.kind()),
         };
-        Err(NodeError { message, span: node.span })
+        Err(NodeError::new(message, node.span))
     }
 
     fn struct_variant<V: Visitor<'de>>(
@@ -466,6 +511,24 @@ mod tests {
             let (ours, theirs) = (from_table::<All>(table), from_text::<All>(text));
             assert_eq!(ours.as_ref().ok(), theirs.as_ref().ok(), "{text}");
             assert_eq!(ours.err().map(|e| e.to_string()), theirs.err().map(|e| e.to_string()), "{text}");
+        }
+    }
+
+    #[test]
+    fn a_key_that_lacks_and_one_that_is_too_many_are_told_apart() {
+        #[derive(Debug, Deserialize)]
+        #[serde(deny_unknown_fields)]
+        struct Two {
+            #[serde(rename = "needed")]
+            _needed: u32,
+        }
+        for (text, fault, said) in [
+            ("", Fault::MissingKey, "missing field `needed`"),
+            ("needed = 1\nother = 2", Fault::UnknownKey, "unknown field `other`, expected `needed`"),
+            ("needed = 'x'", Fault::Other, "invalid type: string \"x\", expected u32"),
+        ] {
+            let error = from_text::<Two>(text).expect_err(text);
+            assert_eq!((error.fault(), error.message()), (fault, said));
         }
     }
 

@@ -4,7 +4,7 @@ use super::look::is_look;
 use super::{Settings, TransferPoint};
 use crate::files;
 use crate::text::printable;
-use crate::tree::{self, NodeError};
+use crate::tree::{self, Fault, NodeError};
 use serde::Deserialize;
 use std::collections::BTreeSet;
 use std::path::Path;
@@ -331,8 +331,8 @@ fn may_be_absent(path: &[String]) -> bool {
     match Settings::from_table(nested) {
         Ok(_) => true,
         // A table with fields that must be given is one too.
-        Err(e) if e.message().starts_with("missing field") => true,
-        Err(e) if e.message().starts_with("unknown field") => false,
+        Err(e) if e.fault() == Fault::MissingKey => true,
+        Err(e) if e.fault() == Fault::UnknownKey => false,
         // A value. Settings without a value are not written.
         Err(_) => {
             let written = Settings::default().to_table().unwrap_or_default();
