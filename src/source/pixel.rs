@@ -80,7 +80,7 @@ impl Number {
 }
 
 /// Weights of red, green and blue in luminance (ITU-R BT.601).
-const LUMINANCE: [f64; 3] = [0.299, 0.587, 0.114];
+pub(super) const LUMINANCE: [f64; 3] = [0.299, 0.587, 0.114];
 
 /// How the pixels of a file are written.
 #[derive(Clone, Copy, Debug, PartialEq)]

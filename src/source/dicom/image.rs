@@ -1,7 +1,7 @@
 //! What a DICOM file says of its pixels, and where each frame of them is.
 
 use super::super::packed::Encoding;
-use super::super::pixel::{Number, PixelFormat};
+use super::super::pixel::{LUMINANCE, Number, PixelFormat};
 use super::classes::syntax;
 use super::elements::{self as tags, Elements, PixelData};
 use super::frames::{Arrangement, Coding, Place};
@@ -16,8 +16,6 @@ const MAX_FRAME_BYTES: u64 = 1 << 30;
 /// The same of lossless JPEG, whose decoder takes 7 bytes for each number, and of JPEG 2000, whose decoder takes some 30 bytes for each number.
 const MAX_LOSSLESS_BYTES: u64 = 1 << 28;
 const MAX_JPEG_2000_BYTES: u64 = 1 << 26;
-/// Red, green and blue in luminance (ITU-R BT.601).
-const LUMINANCE: [f64; 3] = [0.299, 0.587, 0.114];
 
 /// The pixels of one file.
 pub(super) struct Image {

@@ -1,12 +1,11 @@
 //! The samples of images: their stored types, colours as luminance, and the values that are shown as 0 and 1.
 
 use super::message::{Image, Scalar};
+use crate::pixel::LUMINANCE;
 use crate::samples::{Replaced, store};
 use crate::value_range::ValueRange;
 use crate::{SampleType, StoredType};
 
-/// Weights of red, green and blue in luminance (ITU-R BT.601).
-const LUMINANCE: [f64; 3] = [0.299, 0.587, 0.114];
 /// Added to an i8 to store it as u8.
 const I8_SHIFT: f64 = 128.0;
 
