@@ -1,7 +1,7 @@
 //! Arguments of commands that render a recording: the recording, the settings of the scene in layers, the device, and checks of outputs.
 
 use super::picture_file::STANDARD;
-use super::recording::{GeometryArgs, open_recording};
+use super::recording::{GeometryArgs, open_recording, recording_help};
 use super::user_files::{pipeline_folder, presets_file};
 use crate::files::check_target;
 use crate::files::signals;
@@ -36,9 +36,10 @@ pub struct Opened {
 /// The arguments of every command that renders a recording.
 #[derive(clap::Args)]
 pub struct InputArgs {
-    /// Recording: MetaImage (.mha, .mhd), NRRD (.nrrd), NIfTI (.nii), DICOM (.dcm), Kretz (.vol), each also as .gz, UFF (.uff) or frames (.frames); a
-    /// folder or a 'pattern*.png' of numbered pictures; - for standard input, also a stream of frames; or a workspace (.toml) that the viewer saved.
-    /// Without one, a synthetic fetal head (preset face)
+    #[arg(help = format!(
+        "Recording: {}, also a stream of frames; or a workspace (.toml) that the viewer saved. Without one, a synthetic fetal head (preset face)",
+        recording_help()
+    ))]
     input: Option<PathBuf>,
     #[command(flatten)]
     scene: SceneArgs,

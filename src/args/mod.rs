@@ -18,7 +18,7 @@ pub use input::{open_device_until, recorded};
 pub use motor::{SerialArgs, motor_failure, motor_table};
 pub use picture_file::PictureFile;
 pub use picture_series::{PictureSeries, SeriesTarget};
-pub use recording::{GeometryArgs, open_recording};
+pub use recording::{GeometryArgs, open_recording, recording_help};
 pub use shaders::{ShaderArgs, gpu_failure};
 pub use source::{SourceArgs, StreamArgs};
 pub use time::parse_nanoseconds;

@@ -1,5 +1,6 @@
 //! Recordings as commands open them: the probe file that was taken is said on one line.
 
+use crate::source::formats::described;
 use crate::source::{self, Calibration, DepthAxis, OpenOptions, Source};
 use crate::terminal::{Failure, input, say};
 use crate::workspace::Origin;
@@ -107,4 +108,9 @@ pub fn say_probe_file(file: Option<&Path>) {
         say!("probe: {}", file.display());
         *said = Some(file.into());
     }
+}
+
+/// Help of an argument that is a recording.
+pub fn recording_help() -> String {
+    format!("{}; a folder or a 'pattern*.png' of numbered pictures; - for standard input", described())
 }

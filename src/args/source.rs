@@ -6,6 +6,7 @@ use crate::gpu::TimeStamps;
 use crate::kiosk::config::Config;
 use crate::live::Update;
 use crate::probe::Geometry;
+use crate::source::formats::described;
 use crate::source::freehand::FreehandArguments;
 use crate::source::igtl::{Network, NetworkOptions, Poses, SCHEME};
 #[cfg(feature = "view")]
@@ -29,9 +30,11 @@ const PHANTOM_RATE: f64 = 1.0;
 /// The source of live frames.
 #[derive(Clone, clap::Args)]
 pub struct SourceArgs {
-    /// phantom; a recording (.mha, .mhd, .nrrd, .nii, .vol, each also as .gz, .uff, .frames) or, for view, a workspace (.toml); - for standard input (a line of JSON, then raw frames, as
-    /// tools/pipe_frames.py writes them); igtl://HOST[:PORT] for OpenIGTLink
-    #[arg(long, value_name = "SOURCE", default_value = "phantom")]
+    #[arg(long, value_name = "SOURCE", default_value = "phantom", help = format!(
+        "phantom; a recording: {}; for view, a workspace (.toml); - for standard input (a line of JSON, then raw frames, as \
+         tools/pipe_frames.py writes them); igtl://HOST[:PORT] for OpenIGTLink",
+        described()
+    ))]
     source: String,
     #[command(flatten)]
     geometry: GeometryArgs,

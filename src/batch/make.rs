@@ -4,13 +4,12 @@ use super::digest_of;
 use super::manifest::Unit;
 use super::unit::{Kind, Work};
 use crate::args::check_volume;
+use crate::source::formats::is_ending;
 use crate::source::{self, Source};
 use crate::terminal::{Failure, input};
 use std::fs;
 use std::path::{Path, PathBuf};
 
-/// Endings of recordings in a folder. A file that is named itself may have any.
-const ENDINGS: [&str; 10] = [".dcm", ".mha", ".mhd", ".nrrd", ".nhdr", ".nii", ".vol", ".uff", ".frames", ".gz"];
 /// Deepest folder below one that is named.
 const MAX_DEPTH: usize = 64;
 
@@ -60,10 +59,10 @@ fn walk(folder: &Path, depth: usize, found: &mut Vec<PathBuf>) -> Result<(), Str
     for entry in fs::read_dir(folder).map_err(fault)? {
         let entry = entry.map_err(fault)?;
         let (path, kind) = (entry.path(), entry.file_type().map_err(fault)?);
-        let name = entry.file_name().to_string_lossy().to_ascii_lowercase();
+        let ending = path.extension().map(|ending| ending.to_string_lossy().to_ascii_lowercase());
         if kind.is_dir() {
             walk(&path, depth + 1, found)?;
-        } else if ENDINGS.iter().any(|ending| name.ends_with(ending)) && path.is_file() {
+        } else if ending.is_some_and(|ending| is_ending(&ending)) && path.is_file() {
             found.push(path);
         }
     }

@@ -7,6 +7,7 @@ use crate::filter_report::{Area, Areas, Report, export, sheet};
 use crate::gpu::DeviceChoice;
 use crate::machine;
 use crate::source::OpenOptions;
+use crate::source::formats::described;
 use crate::terminal::{Failure, failed, input, progress_bar, say};
 use std::path::{Path, PathBuf};
 
@@ -19,7 +20,7 @@ use std::path::{Path, PathBuf};
                   --background lateral=-5:5,depth=42:46"
 )]
 pub struct FilterReport {
-    /// Recordings to measure as well: MetaImage (.mha, .mhd), Kretz (.vol) or frames (.frames)
+    #[arg(help = format!("Recordings to measure as well: {}", described()))]
     recordings: Vec<PathBuf>,
     /// Part of the frame that is measured, mm, inside of the sector; once for each recording, in their order
     #[arg(long, value_name = "lateral=A:B,depth=C:D", allow_hyphen_values = true)]

@@ -1,7 +1,7 @@
 //! `echolume mesh`: the surface of a recording as triangles.
 
 use super::recordings::{OUTPUT, read_with_threshold, share_of, target_grid};
-use crate::args::{GeometryArgs, check_outputs, open_device, open_recording};
+use crate::args::{GeometryArgs, check_outputs, open_device, open_recording, recording_help};
 use crate::gpu::surface_net::{NetError, SurfaceNet};
 use crate::gpu::{Context, DeviceChoice};
 use crate::mesh::Mesh;
@@ -32,8 +32,7 @@ use std::sync::Arc;
                         echolume mesh bone.mha bone.glb --threshold 0.4 --spacing 0.5 --smooth 0.5 --open"
 )]
 pub struct MakeMesh {
-    /// MetaImage (.mha, .mhd), NRRD (.nrrd), NIfTI (.nii), DICOM (.dcm), Kretz (.vol), each also as .gz, UFF (.uff) or .frames file; a folder or a 'pattern*.png'
-    /// of numbered pictures; - for standard input
+    #[arg(help = recording_help())]
     input: PathBuf,
     /// File to write: .stl, .ply or .glb
     output: PathBuf,

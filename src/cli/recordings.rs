@@ -1,6 +1,6 @@
 //! `echolume convert`, `echolume info` and `echolume phantom`: recordings are converted, described and made.
 
-use crate::args::{GeometryArgs, Output, check_outputs, open_recording};
+use crate::args::{GeometryArgs, Output, check_outputs, open_recording, recording_help};
 use crate::files::signals::Writing;
 use crate::probe::{Geometry, Grid, World};
 use crate::scene::default_look::block_edge;
@@ -86,8 +86,7 @@ pub(super) fn target_grid(geometry: &Geometry, spacing: Option<f64>) -> Result<G
                         echolume convert sweep.frames sweep.mha --sequence    (frames of whole volumes, for other programs)\n  \
                         echolume render volume.mha --mode mip -o mip.png    (the result is a recording, too)")]
 pub struct Convert {
-    /// MetaImage (.mha, .mhd), NRRD (.nrrd), NIfTI (.nii), DICOM (.dcm), Kretz (.vol), each also as .gz, UFF (.uff) or .frames file; a folder or a 'pattern*.png' of numbered
-    /// pictures; - for standard input
+    #[arg(help = recording_help())]
     input: PathBuf,
     /// File to write: .mha, .nrrd, .nii, .nii.gz or .dcm (Enhanced US Volume) for a volume, .seg.nrrd for the voxels above --threshold as a
     /// segmentation, .frames for every frame unchanged, .mha with --sequence
@@ -294,8 +293,7 @@ impl Convert {
 
 #[derive(clap::Args)]
 pub struct Info {
-    /// MetaImage (.mha, .mhd), NRRD (.nrrd), NIfTI (.nii), DICOM (.dcm), Kretz (.vol), each also as .gz, UFF (.uff) or .frames file; a folder or a 'pattern*.png' of numbered
-    /// pictures; - for standard input
+    #[arg(help = recording_help())]
     file: PathBuf,
     #[command(flatten)]
     geometry: GeometryArgs,

@@ -1,16 +1,136 @@
-//! Which reader a file is for: its content decides, then its name. What is not read is named in one line.
+//! The formats of recordings, in one table, and which reader a file is for: its content decides, then its name. What is not read is named in one line.
 
 use super::layout::Layout;
 use super::packed::InputFile;
-use super::{OpenOptions, dicom, kretz, metaimage, nifti, nrrd, recorder, stack};
+use super::{OpenOptions, dicom, kretz, metaimage, nifti, nrrd, piped_file, recorder, stack};
 use crate::files::InputError;
+use std::fs::{self, File};
+use std::io::Read;
 use std::path::Path;
+
+pub use super::pictures::ENDINGS as PICTURES;
 
 /// Bytes that are looked at.
 const START: u64 = 1024;
-/// What is read, for messages.
-const READ: &str = "MetaImage (.mha, .mhd), NRRD (.nrrd, .nhdr), NIfTI (.nii), DICOM (.dcm) and Kretz (.vol) are read, each also as .gz, \
-                    USTB's UFF (.uff), .frames, and folders of DICOM files or numbered pictures";
+/// The ending of a file that is packed as a whole.
+const PACKED: &str = "gz";
+
+/// A format of recordings.
+pub struct Format {
+    /// As helps and messages name it.
+    pub name: &'static str,
+    /// Endings that its files usually have, lower case; none if they have no name of their own.
+    pub endings: &'static [&'static str],
+    /// Endings of the files beside them that hold their samples.
+    pub data: &'static [&'static str],
+    /// True if a file begins with these bytes. At least 64 are given, if the file has them.
+    is_one: fn(&[u8]) -> bool,
+    reads: Reads,
+}
+
+/// How a file of a format becomes a source.
+pub(super) enum Reads {
+    /// As voxels or frames of whole volumes. Such a file may be packed by gzip.
+    Layout(fn(&InputFile) -> Result<Layout, InputError>),
+    /// The same, with what the options say of its voxels.
+    Stated(fn(&InputFile, &OpenOptions) -> Result<Layout, InputError>),
+    /// Frames as they arrived.
+    Frames,
+    /// A stream of frames in a file.
+    Stream,
+    Uff,
+}
+
+/// Every format that is read.
+pub static FORMATS: [Format; 8] = [
+    // First: 128 bytes of anything come before its mark.
+    Format { name: "DICOM", endings: &["dcm"], data: &[], is_one: dicom::is_one, reads: Reads::Stated(dicom::read) },
+    Format {
+        name: "MetaImage",
+        endings: &metaimage::ENDINGS,
+        data: &["raw", "zraw"],
+        is_one: |start| start.starts_with(b"ObjectType") || start.starts_with(b"NDims"),
+        reads: Reads::Layout(metaimage::read),
+    },
+    Format {
+        name: "NRRD",
+        endings: &["nrrd", "nhdr"],
+        data: &["raw"],
+        is_one: nrrd::is_one,
+        reads: Reads::Layout(nrrd::read),
+    },
+    Format {
+        name: "NIfTI",
+        endings: &["nii", "hdr"],
+        data: &["img"],
+        is_one: nifti::is_one,
+        reads: Reads::Layout(nifti::read),
+    },
+    Format {
+        name: "Kretz",
+        endings: &["vol"],
+        data: &[],
+        is_one: |start| start.starts_with(b"KRETZFILE"),
+        reads: Reads::Layout(kretz::read),
+    },
+    Format {
+        name: "UFF",
+        endings: &["uff"],
+        data: &[],
+        // HDF5, which it is.
+        is_one: |start| start.starts_with(b"\x89HDF\r\n\x1a\n"),
+        reads: Reads::Uff,
+    },
+    Format { name: "frames", endings: &["frames"], data: &[], is_one: recorder::Reader::is_one, reads: Reads::Frames },
+    Format {
+        name: "stream of frames",
+        endings: &[],
+        data: &[],
+        is_one: piped_file::PipedFile::is_one,
+        reads: Reads::Stream,
+    },
+];
+
+impl Format {
+    /// True if its files may be packed as a whole by gzip.
+    pub fn may_be_packed(&self) -> bool {
+        matches!(self.reads, Reads::Layout(_) | Reads::Stated(_))
+    }
+
+    /// Name and endings: "NRRD (.nrrd, .nhdr)".
+    fn described(&self) -> String {
+        let endings: Vec<_> = self.endings.iter().map(|ending| format!(".{ending}")).collect();
+        format!("{} ({})", self.name, endings.join(", "))
+    }
+}
+
+/// What is read, for helps and messages.
+pub fn described() -> String {
+    let of = |packed: bool| {
+        let named = FORMATS.iter().filter(|format| !format.endings.is_empty() && format.may_be_packed() == packed);
+        named.map(Format::described).collect::<Vec<_>>().join(", ")
+    };
+    format!("{}, each also as .{PACKED}, {}", of(true), of(false))
+}
+
+/// True if a recording may have this ending, in lower case and without its dot; of packed files it is `gz`.
+pub fn is_ending(ending: &str) -> bool {
+    ending == PACKED || FORMATS.iter().any(|format| format.endings.contains(&ending))
+}
+
+/// How a file is read, by its first bytes; none if they do not say, or it is packed.
+pub(super) fn reads(path: &Path) -> Option<&'static Reads> {
+    let mut start = Vec::new();
+    // A file that cannot be read is reported by the reader. Opening a pipe may block for ever.
+    if fs::metadata(path).is_ok_and(|m| m.is_file()) {
+        let _ = File::open(path).and_then(|file| file.take(START).read_to_end(&mut start));
+    }
+    of_start(&start)
+}
+
+fn of_start(start: &[u8]) -> Option<&'static Reads> {
+    FORMATS.iter().find(|format| (format.is_one)(start)).map(|format| &format.reads)
+}
 
 /// Reads the layout of a file with the reader for its content, or else for the extension of its name; or of a stack of pictures.
 ///
@@ -25,31 +145,27 @@ pub(super) fn read_layout(path: &Path, options: &OpenOptions) -> Result<Layout, 
     }
     let file = InputFile::new(path)?;
     let start = file.start(START)?;
-    if dicom::is_one(&start) {
-        return dicom::read(&file, options);
+    let reads = of_start(&start);
+    if let Some(Reads::Stated(read)) = reads {
+        return read(&file, options);
     }
     if options.voxel_spacing.is_some() {
         let fault = "is for pictures; other recordings state their own";
         return Err(InputError::new(path, "--voxel-spacing", fault));
     }
+    let fault = |fault: String| Err(InputError::new(path, "file", fault));
     let name = if file.is_packed() { path.with_extension("") } else { path.to_path_buf() };
     let ending = name.extension().and_then(|e| e.to_str()).unwrap_or("").to_ascii_lowercase();
-    if start.starts_with(b"KRETZFILE") {
-        kretz::read(&file)
-    } else if nrrd::is_one(&start) {
-        nrrd::read(&file)
-    } else if nifti::is_one(&start) {
-        nifti::read(&file)
-    } else if start.starts_with(b"ObjectType") || start.starts_with(b"NDims") {
-        metaimage::read(&file)
-    } else if recorder::Reader::is_one(&start) {
-        Err(InputError::new(path, "file", "holds frames as they arrived, not a recording"))
-    } else if let Some(kind) = other_kind(&start) {
-        Err(InputError::new(path, "file", format!("is {kind}; {READ}")))
-    } else if ["mha", "mhd"].contains(&&*ending) {
-        metaimage::read(&file)
-    } else {
-        Err(InputError::new(path, "file", format!("is of no known format; {READ}")))
+    let read = "and folders of DICOM files or numbered pictures, are read";
+    match reads {
+        Some(Reads::Layout(read)) => read(&file),
+        Some(Reads::Frames) => fault("holds frames as they arrived, not a recording".into()),
+        _ => match other_kind(&start) {
+            Some(kind) => fault(format!("is {kind}; {}, {read}", described())),
+            // Its keys may stand in any order.
+            None if metaimage::ENDINGS.contains(&&*ending) => metaimage::read(&file),
+            None => fault(format!("is of no known format; {}, {read}", described())),
+        },
     }
 }
 
@@ -89,6 +205,22 @@ fn other_kind(start: &[u8]) -> Option<String> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn formats_are_told_apart_and_described() {
+        for (n, format) in FORMATS.iter().enumerate() {
+            assert!(!(format.is_one)(b"") && !(format.is_one)(&[0; 1024]), "{}", format.name);
+            for ending in format.endings {
+                assert!(is_ending(ending) && *ending == ending.to_lowercase(), "{ending}");
+                assert!(FORMATS[..n].iter().all(|other| !other.endings.contains(ending)), "{ending} has two formats");
+            }
+        }
+        assert!(is_ending("gz") && !is_ending("png") && !is_ending(""));
+        assert_eq!(
+            described(),
+            "DICOM (.dcm), MetaImage (.mha, .mhd), NRRD (.nrrd, .nhdr), NIfTI (.nii, .hdr), Kretz (.vol), each also as .gz, UFF (.uff), frames (.frames)"
+        );
+    }
 
     #[test]
     fn files_of_other_kinds_are_named() {

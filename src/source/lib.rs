@@ -12,7 +12,7 @@ pub mod convert;
 mod describe;
 mod dicom;
 mod drawn;
-mod formats;
+pub mod formats;
 mod frame;
 pub mod freehand;
 pub mod igtl;
@@ -55,8 +55,7 @@ pub use frame::{DEMO_DATA, Header, Source};
 pub use recording::Recording;
 pub use transforms::Calibration;
 
-use std::fs::{self, File};
-use std::io::Read;
+use formats::Reads;
 use std::path::Path;
 
 /// What a user can say about a file that is opened.
@@ -104,12 +103,12 @@ pub fn open_with(path: &Path, options: OpenOptions) -> Result<Box<dyn Source>, I
 }
 
 fn open_file(path: &Path, options: OpenOptions) -> Result<Box<dyn Source>, InputError> {
-    Ok(match Kind::of(path) {
-        Kind::Frames => posed::Opened::new(path, Box::new(frames(path, options)?), options.freehand)?.source(),
-        Kind::Stream => posed::Opened::new(path, Box::new(stream(path, options)?), options.freehand)?.source(),
-        Kind::Uff => uff(path, options)?.0,
-        Kind::Recording if tracked::is_asked_for(&options) => Box::new(tracked_volume(path, options)?),
-        Kind::Recording => Box::new(recording(path, options)?),
+    Ok(match formats::reads(path) {
+        Some(Reads::Frames) => posed::Opened::new(path, Box::new(frames(path, options)?), options.freehand)?.source(),
+        Some(Reads::Stream) => posed::Opened::new(path, Box::new(stream(path, options)?), options.freehand)?.source(),
+        Some(Reads::Uff) => uff(path, options)?.0,
+        _ if tracked::is_asked_for(&options) => Box::new(tracked_volume(path, options)?),
+        _ => Box::new(recording(path, options)?),
     })
 }
 
@@ -125,18 +124,18 @@ pub fn description(path: &Path, options: OpenOptions) -> Result<Vec<(String, Str
 }
 
 fn file_description(path: &Path, options: OpenOptions) -> Result<Vec<(String, String)>, InputError> {
-    match Kind::of(path) {
-        Kind::Frames => {
+    match formats::reads(path) {
+        Some(Reads::Frames) => {
             let opened = posed::Opened::new(path, Box::new(frames(path, options)?), options.freehand)?;
             Ok(opened.description(frames(path, options)?.description()?))
         }
-        Kind::Stream => {
+        Some(Reads::Stream) => {
             let opened = posed::Opened::new(path, Box::new(stream(path, options)?), options.freehand)?;
             Ok(opened.description(stream(path, options)?.description()))
         }
-        Kind::Uff => Ok(uff(path, options)?.1),
-        Kind::Recording if tracked::is_asked_for(&options) => Ok(tracked_volume(path, options)?.description()),
-        Kind::Recording => Ok(recording(path, options)?.description()),
+        Some(Reads::Uff) => Ok(uff(path, options)?.1),
+        _ if tracked::is_asked_for(&options) => Ok(tracked_volume(path, options)?.description()),
+        _ => Ok(recording(path, options)?.description()),
     }
 }
 
@@ -204,31 +203,4 @@ fn left_out(format: &str, feature: &str) -> String {
     format!(
         "is {format}, and this program was built without the feature `{feature}`; build it with `cargo build --release`"
     )
-}
-
-/// What a file holds, by its first bytes.
-enum Kind {
-    Frames,
-    Stream,
-    Uff,
-    Recording,
-}
-
-impl Kind {
-    fn of(path: &Path) -> Kind {
-        let mut start = Vec::new();
-        // A file that cannot be read is reported by the reader. Opening a pipe may block for ever.
-        if fs::metadata(path).is_ok_and(|m| m.is_file()) {
-            let _ = File::open(path).and_then(|file| file.take(64).read_to_end(&mut start));
-        }
-        if recorder::Reader::is_one(&start) {
-            Kind::Frames
-        } else if piped_file::PipedFile::is_one(&start) {
-            Kind::Stream
-        } else if start.starts_with(b"\x89HDF\r\n\x1a\n") {
-            Kind::Uff
-        } else {
-            Kind::Recording
-        }
-    }
 }

@@ -14,6 +14,9 @@ use std::collections::{BTreeMap, HashMap};
 use std::io::{BufRead, BufReader, Read};
 use std::path::Path;
 
+/// Endings of its files: header and samples in one, or in two.
+pub(super) const ENDINGS: [&str; 2] = ["mha", "mhd"];
+
 /// The number types that are read, by their names.
 const NUMBERS: [(&str, Number); 10] = [
     ("MET_UCHAR", Number::U8),

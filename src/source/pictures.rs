@@ -7,6 +7,9 @@ use std::io::{self, Read};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
+/// Endings of pictures, which in a folder are a recording.
+pub const ENDINGS: [&str; 7] = ["png", "jpg", "jpeg", "bmp", "pgm", "ppm", "pnm"];
+
 /// The pictures of a stack, in their order.
 #[derive(Clone, Debug)]
 pub(super) struct Pictures {

@@ -2,7 +2,7 @@
 
 use super::layout::{Cartesian, Layout, LineOrder, StoredGeometry, extent};
 use super::packed::Pixels;
-use super::pictures::{About, Pictures};
+use super::pictures::{About, ENDINGS, Pictures};
 use super::pixel::{Number, PixelFormat};
 use super::transforms::Poses;
 use super::{OpenOptions, describe};
@@ -14,8 +14,6 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-/// The endings of the files of a folder that are its pictures.
-const ENDINGS: [&str; 7] = ["png", "jpg", "jpeg", "bmp", "pgm", "ppm", "pnm"];
 /// Most files of a folder that are looked at.
 const MAX_FILES: usize = 1 << 20;
 /// Largest probe file, bytes.

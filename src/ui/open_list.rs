@@ -1,7 +1,7 @@
 //! The list of files to open: the recent ones and what a folder has, and the file that keeps the recent ones.
 
 use crate::files;
-use crate::source;
+use crate::source::{self, formats};
 use crate::workspace;
 use std::path::{Path, PathBuf};
 
@@ -14,8 +14,6 @@ const MAX_LISTED: usize = 200;
 const MAX_LOOKED_AT: usize = 2000;
 /// Longest list of recent files, bytes.
 const MAX_BYTES: u64 = 1 << 16;
-/// Endings of recordings.
-const ENDINGS: [&str; 11] = ["mha", "mhd", "nrrd", "nhdr", "nii", "hdr", "dcm", "vol", "uff", "frames", "gz"];
 
 /// What an entry of the list is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -83,7 +81,7 @@ fn ending(path: &Path) -> Option<String> {
 
 /// True if a file is named like a recording, or begins like a workspace.
 fn can_be_opened(path: &Path) -> bool {
-    ending(path).is_some_and(|end| ENDINGS.contains(&end.as_str())) || workspace::is_workspace(path)
+    ending(path).is_some_and(|end| formats::is_ending(&end)) || workspace::is_workspace(path)
 }
 
 /// False if a file is named as something else. The numbers of a UID in a name end with one that looks like an ending.
@@ -95,6 +93,18 @@ fn may_be_dicom(path: &Path) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn files_of_every_format_are_offered() {
+        for ending in formats::FORMATS.iter().flat_map(|format| format.endings) {
+            for name in
+                [format!("/a/b.{ending}"), format!("/a/B.{}", ending.to_uppercase()), format!("/a/b.{ending}.gz")]
+            {
+                assert!(can_be_opened(Path::new(&name)), "{name}");
+            }
+        }
+        assert!(!can_be_opened(Path::new("/a/b.txt")) && !can_be_opened(Path::new("/a/b")));
+    }
 
     #[test]
     fn recordings_and_workspaces_are_listed_and_the_recent_ones_are_bounded() {

@@ -2,6 +2,7 @@
 #![cfg(target_os = "linux")]
 
 use crate::common::program::*;
+use echolume::low_level::source::formats::FORMATS;
 use std::fs::{self, File};
 use std::io::{Seek, SeekFrom, Write};
 use std::process::Command;
@@ -119,4 +120,31 @@ fn modes_have_other_names_and_no_case() {
     }
     assert_ne!(plan(&["--mode", "mip"]), plan(&["--mode", "vr"]));
     assert!(run(&["render", "--explain", "--mode", "sideways"]).2.contains("sideways"));
+}
+
+/// Requirement: the table of formats is what every command goes by: a folder's files of each are taken, and a command that cannot read one says so in a line.
+#[test]
+fn every_format_is_taken_from_a_folder_and_refused_by_what_reads_pictures() {
+    let folder = Folder::new("formats");
+    let endings: Vec<_> = FORMATS.iter().flat_map(|format| format.endings).collect();
+    fs::create_dir(folder.join("archive")).expect("a folder");
+    for ending in &endings {
+        let file = folder.write(&format!("archive/scan.{ending}"), b"neither a recording nor a picture");
+        for arguments in
+            [&["filter", &file, "--filter", "median:window=3", "-o", &folder.path("out.png")][..], &["info", &file]]
+        {
+            let (code, out, said) = run(arguments);
+            assert_eq!((code, out.as_str(), said.lines().count()), (Some(2), "", 1), "{arguments:?}: {said}");
+            assert!(said.contains(&format!("scan.{ending}")), "{said}");
+        }
+    }
+    folder.write("archive/notes.txt", b"no recording");
+    let found = echolume::low_level::batch::make::files(&[folder.path("archive")]).expect("files");
+    assert_eq!(found.len(), endings.len(), "{found:?}");
+    let help = done(&["info", "--help"]);
+    let page = fs::read_to_string(repository("docs/formats.md")).expect("the page");
+    let table = page.split("\n\n").find(|part| part.starts_with("| format |")).expect("its table");
+    for ending in endings {
+        assert!(help.contains(&format!(".{ending}")) && table.contains(&format!("`.{ending}`")), "{ending}");
+    }
 }

@@ -10,14 +10,12 @@
 //! - user and password in addresses;
 //! - complete lines of more than 16 KiB.
 
+use crate::source::formats::{FORMATS, PICTURES};
 use std::collections::HashMap;
 use std::path::Path;
 
-/// File extensions of recordings and pictures.
-const EXTENSIONS: &[&str] = &[
-    "mha", "mhd", "vol", "uff", "frames", "png", "dcm", "raw", "zraw", "nrrd", "nhdr", "nii", "img", "jpg", "jpeg",
-    "bmp", "tif", "tiff", "pgm", "ppm", "gif", "avi", "mp4", "mov", "mkv",
-];
+/// Endings of pictures and films that are not read here, but stand in logs.
+const OTHER_PICTURES: [&str; 9] = ["tif", "tiff", "gif", "avi", "mp4", "mov", "mkv", "ima", "dicom"];
 /// System folders: paths inside of them are kept.
 const SYSTEM_FOLDERS: &[&str] = &[
     "/bin",
@@ -242,13 +240,19 @@ fn absolute_path(line: &str, from: usize) -> Option<usize> {
     None
 }
 
+/// File extensions of recordings, of their samples, and of pictures.
+fn extensions() -> impl Iterator<Item = &'static str> {
+    let recordings = FORMATS.iter().flat_map(|format| format.endings.iter().chain(format.data));
+    recordings.chain(&PICTURES).chain(&OTHER_PICTURES).copied()
+}
+
 /// Where the next file name of a recording or picture ends, and its extension.
 fn next_extension(line: &str, from: usize) -> Option<(usize, &'static str)> {
     line[from..].match_indices('.').find_map(|(at, _)| {
         let rest = &line[from + at + 1..];
         let letters = rest.find(|c: char| !c.is_alphanumeric()).unwrap_or(rest.len());
-        let extension = EXTENSIONS.iter().find(|extension| extension.eq_ignore_ascii_case(&rest[..letters]))?;
-        Some((from + at + 1 + letters, *extension))
+        let extension = extensions().find(|extension| extension.eq_ignore_ascii_case(&rest[..letters]))?;
+        Some((from + at + 1 + letters, extension))
     })
 }
 
@@ -290,6 +294,25 @@ mod tests {
         let mut redactor = Redactor::new();
         redactor.add_folder(Path::new("/var/lib/echolume/pictures"));
         redactor.redact(text)
+    }
+
+    /// Requirement: a relative name of any file that is read is removed, whatever its format.
+    #[test]
+    fn names_of_every_format_are_removed() {
+        let mut count = 0;
+        for ending in extensions() {
+            for name in
+                [format!("anna.{ending}"), format!("ANNA.{}", ending.to_uppercase()), format!("anna.{ending}.gz")]
+            {
+                let said = redacted(&format!("cannot open {name}: cut short"));
+                assert!(
+                    said.starts_with("cannot open <file-1>.") && !said.to_lowercase().contains("anna"),
+                    "{name}: {said}"
+                );
+                count += 1;
+            }
+        }
+        assert!(count > 3 * (FORMATS.len() + PICTURES.len()));
     }
 
     #[test]

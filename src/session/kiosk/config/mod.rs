@@ -649,7 +649,7 @@ fn collect_keys(above: &str, table: &DeTable, text: &str, keys: &mut Vec<KeyLoca
 
 /// The allowed values of each key, for error messages. The ranges of the source's keys are those of the flags, which `cli` checks.
 const ALLOWED: &[(&str, &str)] = &[
-    ("source", "\"phantom\", a file (.mha, .mhd, .vol, .frames) or \"igtl://HOST[:PORT]\""),
+    ("source", "\"phantom\", the file of a recording or \"igtl://HOST[:PORT]\""),
     ("probe", "a file, as \"probe.toml\""),
     ("rate", "volumes a second, above 0, at most 1e6"),
     ("real_time", "true or false"),
