@@ -14,4 +14,4 @@ pub(crate) mod texture_to_storage;
 pub(crate) mod volumes_to_layers;
 
 pub use module::{EMBEDDED, SOURCES, SpirvError, embedded, set_tool_version, words};
-pub use reflect::{Access, Binding, Constant, Dimension, Kind, Member, Module, PARAMS, reflect};
+pub use reflect::{Access, Binding, Constant, Dimension, Kind, Member, Module, reflect};

@@ -6,7 +6,7 @@ use super::module::{SpirvError, decode, decoration, error, op, storage_class, te
 use std::collections::HashMap;
 
 /// Name of the uniform block that holds the numbers of a pass.
-pub const PARAMS: &str = "Params";
+const PARAMS: &str = "Params";
 
 /// What a binding is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
