@@ -93,7 +93,7 @@ pub static FORMATS: [Format; 8] = [
 
 impl Format {
     /// True if its files may be packed as a whole by gzip.
-    pub fn may_be_packed(&self) -> bool {
+    fn may_be_packed(&self) -> bool {
         matches!(self.reads, Reads::Layout(_) | Reads::Stated(_))
     }
 
