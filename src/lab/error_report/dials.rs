@@ -164,9 +164,15 @@ pub fn dial(name: &str, scene: &Scene) -> Result<Dial, String> {
             is_one_picture()?;
             need(!s.ray.adaptive || s.ray.rays == 1, "chooses the rays of each pixel")?;
             let fine = |f: f64| ["ray.tolerance=0".to_string(), format!("ray.step={}", step * f)];
-            let others = [8.0, 4.0, 2.0, 1.0, 0.5, 0.25].into_iter();
-            let others = others.map(|n| at(format!("{n} levels"), &[format!("ray.tolerance={n}")], n)).collect();
-            made("tolerance", "levels", is("one step".into(), 0.0), others, &fine(finest_step), &fine(next_step))
+            let now = s.ray.tolerance;
+            let label = |n: f64| match n {
+                0.0 => "one step".to_string(),
+                1.0 => "1 level".into(),
+                n => format!("{n} levels"),
+            };
+            let others = [0.0, 8.0, 4.0, 2.0, 1.0, 0.5, 0.25].into_iter().filter(|n| *n != now);
+            let others = others.map(|n| at(label(n), &[format!("ray.tolerance={n}")], n)).collect();
+            made("tolerance", "levels", is(label(now), now), others, &fine(finest_step), &fine(next_step))
         }
         "compositing" => {
             need(composites, "composites nothing")?;

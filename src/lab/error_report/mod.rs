@@ -123,6 +123,13 @@ pub struct Dial {
     pub note: Option<String>,
 }
 
+impl Dial {
+    /// True if a point lies on the dial's axis. A tolerance of 0 is none at all.
+    pub fn is_on_axis(&self, point: &Point) -> bool {
+        self.is_ordered && (self.name != "tolerance" || point.value > 0.0)
+    }
+}
+
 /// The reference of the errors of a dial.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(tag = "kind", rename_all = "kebab-case", deny_unknown_fields)]

@@ -96,6 +96,8 @@ struct PlottedPoint {
     time: [f64; 3],
     error: f64,
     is_default: bool,
+    /// A line joins it with its neighbours: it lies on the dial's axis, or on the front.
+    is_joined: bool,
     on_front: bool,
 }
 
@@ -107,7 +109,6 @@ struct Panel {
     colour: usize,
     /// In the order of the line that joins them.
     points: Vec<PlottedPoint>,
-    is_joined: bool,
     /// Names of the points that are numbered, a line each.
     key: Vec<String>,
 }
@@ -129,7 +130,8 @@ fn combinations(report: &Report, measure: Measure) -> Panel {
             }
         };
         let (error, time) = (measure.of(&choice.errors)?, of_total(&choice.times?));
-        Some(PlottedPoint { name, time, error, is_default: choice.changed.is_empty(), on_front: front.contains(&i) })
+        let (is_default, on_front) = (choice.changed.is_empty(), front.contains(&i));
+        Some(PlottedPoint { name, time, error, is_default, is_joined: on_front, on_front })
     });
     let mut points: Vec<_> = points.filter(|p| p.time[0] > 0.0).collect();
     points.sort_by(|a, b| a.time[1].total_cmp(&b.time[1]));
@@ -148,7 +150,6 @@ fn combinations(report: &Report, measure: Measure) -> Panel {
     }
     Panel {
         key,
-        is_joined: true,
         title: "choices: settings of one dial and of several".into(),
         notes: vec!["rings: Pareto front".into()],
         time_axis: "volume and picture (ms)",
@@ -178,8 +179,8 @@ fn of_dial(index: usize, dial: &Dial, measure: Measure) -> Panel {
     let plotted = points.into_iter().filter_map(|point| {
         let (times, error) = (point.times?, measure.of(&point.errors)?);
         let time = milliseconds(if of_picture { &times.picture } else { &times.volume });
-        let (name, is_default) = (point.label.clone(), point.is_default);
-        Some(PlottedPoint { name, time, error, is_default, on_front: false }).filter(|p| p.time[0] > 0.0)
+        let (name, is_default, is_joined) = (point.label.clone(), point.is_default, dial.is_on_axis(point));
+        Some(PlottedPoint { name, time, error, is_default, is_joined, on_front: false }).filter(|p| p.time[0] > 0.0)
     });
     let points: Vec<_> = plotted.collect();
     let other = dial.points.iter().find(|p| p.is_default).and_then(|p| p.times);
@@ -192,7 +193,6 @@ fn of_dial(index: usize, dial: &Dial, measure: Measure) -> Panel {
         notes: notes(dial).into_iter().chain(other).collect(),
         time_axis: if of_picture { "picture (ms)" } else { "volume (ms)" },
         colour: index,
-        is_joined: dial.is_ordered,
         points,
         key: Vec::new(),
     }
@@ -256,13 +256,8 @@ impl Panel {
         let mut labels = Labels::default();
         // Combinations have no order of their own: their line is the front.
         let of_front = self.points.iter().any(|p| p.on_front);
-        let line: Vec<[f64; 2]> = self.points.iter().filter(|p| !of_front || p.on_front).map(place).collect();
-        let line = match (of_front, self.is_joined) {
-            (true, _) => staircase(&line),
-            (false, true) => line,
-            // Names have no order that a line could show.
-            (false, false) => Vec::new(),
-        };
+        let line: Vec<[f64; 2]> = self.points.iter().filter(|p| p.is_joined).map(place).collect();
+        let line = if of_front { staircase(&line) } else { line };
         if line.len() > 1 {
             canvas.line(&line, colour(self.colour).mix(0.5).stroke_width(1))?;
             labels.keep_off_line(&line);
