@@ -135,7 +135,7 @@ fn errors_name_the_line_the_key_and_the_allowed_values() {
         ("[live]\nretry = '1ms'", &["line 2: live.retry: must be a time from 100ms"]),
         ("[files]\nlog_files = 101", &["line 2: files.log_files: must be 1 to 100"]),
         ("[files]\nlog_size_mb = 2000", &["line 2: files.log_size_mb: must be 1 to 1024"]),
-        ("source = '-'", &["line 1: source: must be \"phantom\", a file"]),
+        ("source = '-'", &["line 1: source: must be \"phantom\", the file of a recording"]),
         ("source = ''", &["line 1: source: must be"]),
         ("source = 'http://x'", &["line 1: source: must be"]),
         ("source = 'igtl://'", &["line 1: source: must be"]),
