@@ -303,7 +303,7 @@ fn files_of_other_kinds_are_named_with_what_is_read() {
     ];
     for (name, bytes, kind) in kinds {
         let error = Recording::open(Path::new(&folder.write(name, bytes)), None).err().expect("refused").to_string();
-        assert!(error.contains(kind) && error.contains("NIfTI (.nii)") && error.lines().count() == 1, "{error}");
+        assert!(error.contains(kind) && error.contains("NIfTI (.nii, .hdr)") && error.lines().count() == 1, "{error}");
     }
     // The content decides, not the name.
     let renamed = folder.write("renamed.mha", std::fs::read(data("formats/both.nii")).expect("stored"));
