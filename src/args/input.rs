@@ -176,17 +176,21 @@ impl InputArgs {
     /// `scene` with the way of sampling that the chosen device will use. Without a device the scene stays unchanged.
     pub fn resolve_sampling(&self, scene: Scene) -> Scene {
         match self.candidate() {
-            Some(device) => self.resolve_format(scene).sampled(TexelAccess::for_device(&device).sampling()),
+            Some(device) => stored_on(&device, scene).sampled(TexelAccess::for_device(&device).sampling()),
             None => scene,
         }
     }
 
     /// The scene with the format of its volume that the device of these flags would have. Opens no device.
+    #[cfg(feature = "lab")]
     pub fn resolve_format(&self, scene: Scene) -> Scene {
-        let truncates_halves = self.candidate().is_some_and(|device| device.truncates_halves());
-        Scene { truncates_halves, ..scene }
+        match self.candidate() {
+            Some(device) => stored_on(&device, scene),
+            None => scene,
+        }
     }
 
+    /// The device of these flags.
     fn candidate(&self) -> Option<Candidate> {
         let mut devices = list().unwrap_or_default();
         let chosen =
@@ -493,6 +497,11 @@ pub fn open_device_until(
 pub fn open_device_for_statistics(choice: Option<DeviceChoice>) -> Result<Arc<Context>, Failure> {
     let device = choice.unwrap_or_default();
     open(&ContextOptions { device, compile_statistics: true, ..ContextOptions::default() })
+}
+
+/// The scene with the format that a device stores its volume best in.
+fn stored_on(device: &Candidate, scene: Scene) -> Scene {
+    Scene { truncates_halves: device.truncates_halves(), ..scene }
 }
 
 fn open(options: &ContextOptions) -> Result<Arc<Context>, Failure> {

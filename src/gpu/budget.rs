@@ -12,7 +12,7 @@ pub(crate) struct HeapBudget {
     pub budget: u64,
     /// What it uses now.
     pub used: u64,
-    pub(crate) is_device_local: bool,
+    pub is_device_local: bool,
 }
 
 /// The heaps of a device, and the heap of each memory type.

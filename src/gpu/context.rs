@@ -119,9 +119,9 @@ pub struct Context {
 #[cfg_attr(not(feature = "view"), expect(dead_code, reason = "only a window reads it"))]
 pub(crate) struct Presentation {
     pub surfaces: ash::khr::surface::Instance,
-    pub(crate) swapchains: ash::khr::swapchain::Device,
+    pub swapchains: ash::khr::swapchain::Device,
     /// If the target is a monitor.
-    pub(crate) displays: Option<ash::khr::display::Instance>,
+    pub displays: Option<ash::khr::display::Instance>,
     /// Waits until a picture is on the monitor, if the device can.
     pub waits: Option<ash::khr::present_wait::Device>,
 }
@@ -130,7 +130,7 @@ pub(crate) struct Presentation {
 pub(super) struct ClockReading {
     pub ticks: u64,
     /// The host's monotonic clock, ns, if the driver reads it in the same call.
-    pub(crate) monotonic: Option<u64>,
+    pub monotonic: Option<u64>,
     /// The host's clock around the call.
     pub at: Instant,
     /// The largest time between the readings, ns.

@@ -53,9 +53,9 @@ pub(crate) struct BufferLayout {
     /// Byte offset of the first.
     pub offset: u64,
     /// Texels from one row to the next.
-    pub(crate) row_length: u32,
+    pub row_length: u32,
     /// Rows from one image to the next.
-    pub(crate) image_height: u32,
+    pub image_height: u32,
     /// Bytes from one part to the next, where the last part comes first.
     pub descending: Option<u64>,
 }

@@ -8,6 +8,7 @@ use std::fs::{self, File};
 use std::io::Read;
 use std::path::Path;
 
+pub use super::dicom::ENDINGS as DICOM;
 pub use super::pictures::ENDINGS as PICTURES;
 
 /// Bytes that are looked at.
@@ -23,7 +24,7 @@ pub struct Format {
     pub endings: &'static [&'static str],
     /// Endings of the files beside them that hold their samples.
     pub data: &'static [&'static str],
-    /// True if a file begins with these bytes. At least 64 are given, if the file has them.
+    /// True if a file begins with these bytes: its first 1024, or all that it has.
     is_one: fn(&[u8]) -> bool,
     reads: Reads,
 }
@@ -44,7 +45,13 @@ pub(super) enum Reads {
 /// Every format that is read.
 pub static FORMATS: [Format; 8] = [
     // First: 128 bytes of anything come before its mark.
-    Format { name: "DICOM", endings: &["dcm"], data: &[], is_one: dicom::is_one, reads: Reads::Stated(dicom::read) },
+    Format {
+        name: "DICOM",
+        endings: &dicom::ENDINGS,
+        data: &[],
+        is_one: dicom::is_one,
+        reads: Reads::Stated(dicom::read),
+    },
     Format {
         name: "MetaImage",
         endings: &metaimage::ENDINGS,
@@ -77,7 +84,7 @@ pub static FORMATS: [Format; 8] = [
         name: "UFF",
         endings: &["uff"],
         data: &[],
-        // HDF5, which it is.
+        // The mark of HDF5: every UFF file is one.
         is_one: |start| start.starts_with(b"\x89HDF\r\n\x1a\n"),
         reads: Reads::Uff,
     },
@@ -218,7 +225,7 @@ mod tests {
         assert!(is_ending("gz") && !is_ending("png") && !is_ending(""));
         assert_eq!(
             described(),
-            "DICOM (.dcm), MetaImage (.mha, .mhd), NRRD (.nrrd, .nhdr), NIfTI (.nii, .hdr), Kretz (.vol), each also as .gz, UFF (.uff), frames (.frames)"
+            "DICOM (.dcm, .dicom, .ima), MetaImage (.mha, .mhd), NRRD (.nrrd, .nhdr), NIfTI (.nii, .hdr), Kretz (.vol), each also as .gz, UFF (.uff), frames (.frames)"
         );
     }
 

@@ -21,14 +21,14 @@ pub(super) struct Layout {
     pub frame_size: [usize; 2],
     pub frames: usize,
     pub pixels: Pixels,
-    pub(crate) line_order: LineOrder,
+    pub line_order: LineOrder,
     pub geometry: StoredGeometry,
     /// The frames of a sweep come from the last slice to the first.
     pub backward: bool,
     /// Number of volumes of a sweep, one after another.
     pub volumes: usize,
     /// The file states where its samples lie. If not, a `probe.toml` of the folder applies.
-    pub(crate) states_geometry: bool,
+    pub states_geometry: bool,
     /// Transforms of tracked frames.
     pub poses: Poses,
     /// Time stamps by frame, s.

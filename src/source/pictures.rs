@@ -15,7 +15,7 @@ pub const ENDINGS: [&str; 7] = ["png", "jpg", "jpeg", "bmp", "pgm", "ppm", "pnm"
 pub(super) struct Pictures {
     pub files: Arc<[PathBuf]>,
     /// One of them has colour: all are read with three channels.
-    pub(crate) is_colour: bool,
+    pub is_colour: bool,
     /// Samples of one of them, bytes.
     pub each: usize,
 }
@@ -25,7 +25,7 @@ pub(super) struct About {
     pub size: [u32; 2],
     /// 16 bits a channel, not 8.
     pub deep: bool,
-    pub(crate) is_colour: bool,
+    pub is_colour: bool,
     /// Length of the file, bytes.
     pub length: u64,
 }

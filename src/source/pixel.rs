@@ -88,7 +88,7 @@ pub(super) struct PixelFormat {
     pub number: Number,
     /// 1 (grey), 3 (red, green, blue) or 4 (and one that is not read).
     pub channels: usize,
-    pub(crate) big_endian: bool,
+    pub big_endian: bool,
     /// Slope and intercept of the values.
     pub scale: Option<[f64; 2]>,
 }

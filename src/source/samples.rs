@@ -6,7 +6,7 @@ use crate::probe::{SampleType, StoredType};
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(super) struct Replaced {
     /// NaN or infinite.
-    pub(crate) not_finite: u64,
+    pub not_finite: u64,
     /// Denormal f32. Many GPUs flush them to 0, so they are always flushed.
     pub denormal: u64,
 }

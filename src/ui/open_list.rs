@@ -87,7 +87,7 @@ fn can_be_opened(path: &Path) -> bool {
 /// False if a file is named as something else. The numbers of a UID in a name end with one that looks like an ending.
 fn may_be_dicom(path: &Path) -> bool {
     let is_number = |end: &str| end.chars().all(|letter| letter.is_ascii_digit());
-    ending(path).is_none_or(|end| is_number(&end) || ["dcm", "dicom", "ima"].contains(&end.as_str()))
+    ending(path).is_none_or(|end| is_number(&end) || formats::DICOM.contains(&end.as_str()))
 }
 
 #[cfg(test)]

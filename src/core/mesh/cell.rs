@@ -13,7 +13,7 @@ pub(crate) struct Patches {
     /// Number of patches, 0 to 4.
     pub count: u8,
     /// The patch of each edge that is crossed.
-    pub(crate) of_edge: [u8; 12],
+    pub of_edge: [u8; 12],
 }
 
 /// The corners of an edge, the one with the lower coordinate first.

@@ -42,7 +42,7 @@ pub(super) struct Pitches {
     /// Samples of a line; 0 for a Cartesian volume, which has none.
     pub sample: f64,
     /// Pixels of a slice: the mean of both axes.
-    pub(crate) slice_pixel: f64,
+    pub slice_pixel: f64,
     /// Slices; 0 if there is one.
     pub slice: f64,
     /// Rays of a picture with full resolution.

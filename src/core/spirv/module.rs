@@ -195,7 +195,7 @@ pub(super) fn text(words: &[u32]) -> String {
 
 /// One instruction: its opcode and its operands.
 pub(super) struct Instruction<'a> {
-    pub(crate) opcode: u32,
+    pub opcode: u32,
     pub operands: &'a [u32],
 }
 

@@ -15,7 +15,7 @@ use std::collections::HashMap;
 use std::path::Path;
 
 /// Endings of pictures and films that are not read here, but stand in logs.
-const OTHER_PICTURES: [&str; 9] = ["tif", "tiff", "gif", "avi", "mp4", "mov", "mkv", "ima", "dicom"];
+const OTHER_PICTURES: [&str; 7] = ["tif", "tiff", "gif", "avi", "mp4", "mov", "mkv"];
 /// System folders: paths inside of them are kept.
 const SYSTEM_FOLDERS: &[&str] = &[
     "/bin",

@@ -259,10 +259,10 @@ pub(super) enum PixelData {
 #[derive(Debug)]
 pub(super) struct Elements {
     /// UID of the transfer syntax.
-    pub(crate) syntax: String,
+    pub syntax: String,
     /// UID of the class, of the file meta information.
     pub class: String,
-    pub(crate) big_endian: bool,
+    pub big_endian: bool,
     pub root: Item,
     pub pixels: Option<PixelData>,
     /// Offset and length of a Kretz file inside.

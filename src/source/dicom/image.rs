@@ -22,8 +22,8 @@ pub(super) struct Image {
     /// Columns and rows.
     pub size: [usize; 2],
     pub pixel: PixelFormat,
-    pub(crate) coding: Coding,
-    pub(crate) arrangement: Arrangement,
+    pub coding: Coding,
+    pub arrangement: Arrangement,
     /// Of each frame, in the order of the file.
     pub places: Vec<Place>,
     pub parts: Vec<(u64, u64)>,

@@ -23,3 +23,6 @@ pub(super) use file::read;
 pub(super) use frames::{Coding, FrameStream, Frames};
 pub(super) use series::{is_dicom, is_series, read_series};
 pub(super) use write::{DicomWriter, Form, MOST_BYTES};
+
+/// Endings of its files, which often have none, or the end of a number.
+pub const ENDINGS: [&str; 3] = ["dcm", "dicom", "ima"];

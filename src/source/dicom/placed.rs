@@ -18,7 +18,7 @@ pub(super) struct Placed {
     /// The part of each picture: first column and row, columns and rows.
     pub part: [usize; 4],
     /// The file states the distance of its pixels.
-    pub(crate) has_spacing: bool,
+    pub has_spacing: bool,
     /// By place in `order`, s.
     pub times: BTreeMap<usize, f64>,
     pub remarks: Vec<(String, String)>,

@@ -24,8 +24,8 @@ pub(super) struct Beam {
     pub start_depth: f64,
     /// Range of sample 0 from the in-plane apex, mm; angle of the line and of the motor, rad.
     pub range: f64,
-    pub(crate) line_angle: f64,
-    pub(crate) motor_angle: f64,
+    pub line_angle: f64,
+    pub motor_angle: f64,
     /// When it was fired, s.
     pub time: f64,
 }

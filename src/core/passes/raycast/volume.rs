@@ -223,7 +223,7 @@ fn is_exponential(scene: &Scene) -> bool {
 /// The tables of the transfer function that the pass reads.
 pub(super) struct Tables<'a> {
     /// Over the value, or between the values at both ends of a step.
-    pub(crate) of_steps: &'a Texels,
+    pub of_steps: &'a Texels,
     /// Over the value: what a step of another length is integrated from. Empty unless the rule is exponential.
     pub curve: Vec<[f64; 4]>,
     pub lit: Option<Lit<'a>>,
