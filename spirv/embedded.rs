@@ -69,6 +69,6 @@
     ("shade/shadow", include_bytes!("shade/shadow.spv")),
     ("tolerance/cast.first", include_bytes!("tolerance/cast.first.spv")),
     ("tolerance/cast.refine", include_bytes!("tolerance/cast.refine.spv")),
+    ("tolerance/enlarge", include_bytes!("tolerance/enlarge.spv")),
     ("tolerance/list", include_bytes!("tolerance/list.spv")),
-    ("tolerance/mark", include_bytes!("tolerance/mark.spv")),
 ]

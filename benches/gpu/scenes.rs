@@ -138,7 +138,7 @@ pub const SCENES: &[Stated] = &[
     sweep(
         "steps by their error",
         &["mode=vr", "ray.tolerance=1"],
-        &["tolerance_first", "tolerance_mark", "tolerance_list", "tolerance_refine"],
+        &["tolerance_first", "tolerance_enlarge", "tolerance_list", "tolerance_refine"],
     ),
     sweep("largest", &["mode=mip"], &["raycast_projection", "tone"]),
     sweep("mean", &["mode=mean"], &["raycast_projection"]),

@@ -1,5 +1,5 @@
 // VR with an error that every pixel states. Light is integrated between every two samples of a ray, and between every second, beginning with the first and with the
-// next. The larger difference on the screen is the error that is stated.
+// next. The larger difference on the screen is the error that is stated. A ray whose error is too large is cast again with shorter steps.
 // variants: first; refine REFINE
 #version 460
 #include "common.glsl"
@@ -14,8 +14,8 @@ layout(scalar) uniform Params {
     int columns;     // of the picture
     int rows;
 };
-// The steps of a ray are its own, and what they absorb follows. With REFINE a ray is one of the list, with steps as short as it needs; without, all rays have
-// the scene's.
+// The steps of a ray are its own, and what they absorb follows. With REFINE the rays are those of the listed pixels; without, they form a lattice, one through
+// every other pixel of every other row.
 float longest_step = step_length;
 float own_step = longest_step;
 float absorption_per_mm = absorption_scale / longest_step;
@@ -26,14 +26,16 @@ float absorption_per_mm = absorption_scale / longest_step;
 #include "cap.glsl"
 #include "tone.glsl"
 #if defined(REFINE)
-uniform texture2D first_errors;
 uniform utexture2D error_marks;   // of each tile of 8 x 8 pixels, a bit for each pixel that is listed
 uniform utexture2D marked_before; // in the tiles before
 uniform utexture2D refine_groups; // x, y, z of the dispatch; the length of the list
-#endif
-readonly buffer TransferIntegral { vec4 entry[]; } transfer_integral; // of absorption times colour, and of absorption, up to each entry
 uniform writeonly image2D picture;
 uniform writeonly image2D errors; // 0..1 of the screen; 0 where nothing along the ray can be seen, which is certain
+#else
+uniform writeonly image2D lattice;
+uniform writeonly image2D lattice_errors; // the colour on the screen; its error
+#endif
+readonly buffer TransferIntegral { vec4 entry[]; } transfer_integral; // of absorption times colour, and of absorption, up to each entry
 
 // The error that is stated where matter was met and none was found.
 const float LEAST = 1e-6;
@@ -225,6 +227,19 @@ vec4 cast_ray(ivec2 pixel, vec2 cut, int halvings, out float error) {
     return rgba;
 }
 
+// The colour of a pixel with steps as short as its error needs. Of second order, each halving leaves a quarter; where it leaves more, the next one follows.
+vec4 settled(ivec2 pixel, int halvings, out float error) {
+    vec2 cut = cap_at(pixel);
+    vec4 rgba;
+    bool again;
+    do {
+        rgba = cast_ray(pixel, cut, halvings, error);
+        again = error > allowed && halvings < finest;
+        if (again) halvings = min(halvings + max(int(ceil(0.5 * log2(error / allowed))), 1), finest);
+    } while (again);
+    return rgba;
+}
+
 #if defined(REFINE)
 // The pixel at a place of the list.
 ivec2 listed(int index) {
@@ -251,25 +266,19 @@ void main() {
     int index = int((gl_WorkGroupID.y * gl_NumWorkGroups.x + gl_WorkGroupID.x) * 64u + gl_LocalInvocationIndex);
     if (index >= int(texelFetch(refine_groups, ivec2(3, 0), 0).x)) return;
     ivec2 pixel = listed(index);
-    vec2 cut = cap_at(pixel);
-    float error = texelFetch(first_errors, pixel, 0).x;
-    vec4 rgba;
-    // Of second order, each halving leaves a quarter. Where it leaves more, the next one follows.
-    int halvings = 0;
-    do {
-        halvings = min(halvings + max(int(ceil(0.5 * log2(error / allowed))), 1), finest);
-        rgba = cast_ray(pixel, cut, halvings, error);
-    } while (error > allowed && halvings < finest);
+    float error;
+    // What is there is thinner than the distance of the lattice's rays: it may be thinner than their steps.
+    vec4 rgba = settled(pixel, 1, error);
     imageStore(picture, pixel, rgba);
     imageStore(errors, pixel, vec4(error, 0.0, 0.0, 0.0));
 }
 #else
 void main() {
-    ivec2 pixel = ray_pixel();
-    if (any(greaterThanEqual(pixel, ivec2(columns, rows)))) return;
+    ivec2 at = ray_pixel();
+    if (any(greaterThanEqual(2 * at, ivec2(columns, rows)))) return;
     float error;
-    vec4 rgba = cast_ray(pixel, cap_at(pixel), 0, error);
-    imageStore(picture, pixel, rgba);
-    imageStore(errors, pixel, vec4(error, 0.0, 0.0, 0.0));
+    vec4 rgba = settled(2 * at, 0, error);
+    imageStore(lattice, at, rgba);
+    imageStore(lattice_errors, at, vec4(shown(rgba), error));
 }
 #endif

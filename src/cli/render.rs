@@ -78,7 +78,7 @@ pub struct Render {
     /// 20s, which chooses N and prints it; further settings of the table still, such as seed=1 or extinction=4
     #[arg(long, value_name = "KEY=VALUE,...|TIME")]
     still: Option<String>,
-    /// Choose the steps of every pixel by the error that they leave, such as 1level of the 255 of the finished picture, and print how many pixels keep it
+    /// Choose the rays and steps of every pixel by the error that they leave, such as 1level of the 255 of the finished picture, and print how many pixels keep it
     /// by proof and by their own estimate; --error-map then shows the error that each states. For mode vr; the same as ray.tolerance
     #[arg(long, value_name = "LEVELS")]
     tolerance: Option<String>,

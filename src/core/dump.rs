@@ -210,13 +210,17 @@ fn meaning(slot: Slot) -> (&'static [&'static str], &'static str) {
         Slot::NetCrossed | Slot::NetAsked => (&["column", "row"], "bits of cells, and of their corners or edges"),
         Slot::NetOffsets => (&["x", "y", "z", "unused"], "voxels from the first corner of a cell"),
         Slot::EdgeMarks => (GREY, "1 in pixels that have several rays"),
-        Slot::FirstErrors | Slot::PixelErrors => (GREY, "error on the screen, 0..1; 0 is certain"),
+        Slot::LatticeErrors => {
+            (&["red", "green", "blue", "error"], "colour and error on the screen, 0..1; no error is certain")
+        }
+        Slot::PixelErrors => (GREY, "error on the screen, 0..1; 0 is certain"),
         Slot::ErrorMarks => (&["rows 0 to 3", "rows 4 to 7"], "bits of pixels of a tile"),
         Slot::MarkedBefore => (GREY, "pixels"),
         Slot::RefineGroups => (GREY, "workgroups along x, y, z; pixels"),
         Slot::VolumeLayer
         | Slot::VolumeBesideSurface
         | Slot::PixelRays
+        | Slot::Lattice
         | Slot::Rendered
         | Slot::Planes
         | Slot::Picture

@@ -256,10 +256,10 @@ fn input(scene: &Scene, bind: &Bind, slices: u32, kind: &str, noise: &mut Noise)
         // The passes write alpha as 0 or 1.
         texels.values.chunks_exact_mut(4).for_each(|p| p[3] = p[3].round());
     }
-    if bind.slot == Slot::FirstErrors {
-        // Some pixels are marked, and their steps are halved more or less often.
+    if bind.slot == Slot::LatticeErrors {
+        // Some pixels are marked, by their rays or by what is between these.
         let allowed = scene.tolerance().unwrap_or(1.0) / LEVELS;
-        texels.values.iter_mut().for_each(|v| *v = allowed * (6.0 * *v - 3.0).exp2());
+        texels.values.iter_mut().for_each(|v| *v *= allowed);
     }
     if bind.slot == Slot::ErrorMarks && kind == "noise" {
         texels.values.iter_mut().for_each(|v| *v = (*v * f64::from(u32::MAX)).floor());
@@ -354,16 +354,20 @@ pub fn inputs_of(scene: &Scene, pass: &Pass, args: &DispatchArgs, kind: &str, se
     }
     if reads.iter().any(|b| b.slot == Slot::RefineGroups) {
         // The list of the pixels whose errors are too large.
-        for pass in [tolerance::MARK, tolerance::LIST] {
+        let mut of_lattice = inputs_of(scene, &tolerance::ENLARGE, args, kind, seed);
+        for pass in [tolerance::ENLARGE, tolerance::LIST] {
             let mut outputs = Arrays::default();
             for bind in pass.writes(scene, args) {
                 let channels = bind.slot.format(scene).channels();
                 outputs.insert(bind.name, Texels::untouched(bind.slot.array_size(scene), channels));
             }
-            pass.reference(scene, args, &inputs, &mut outputs);
-            for bind in pass.writes(scene, args).iter().filter(|bind| bind.name != "errors") {
-                inputs.insert(bind.name, outputs.get(bind.name).clone());
+            pass.reference(scene, args, &of_lattice, &mut outputs);
+            for bind in pass.writes(scene, args) {
+                of_lattice.insert(bind.name, outputs.get(bind.name).clone());
             }
+        }
+        for name in ["error_marks", "marked_before", "refine_groups"] {
+            inputs.insert(name, of_lattice.get(name).clone());
         }
     }
     if reads.iter().any(|b| b.slot == Slot::PackedNeighbours) {

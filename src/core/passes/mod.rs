@@ -99,7 +99,7 @@ pub const PASSES: &[Pass] = &[
     raycast::refine::MARK_EDGES,
     raycast::volume::REFINED,
     raycast::tolerance::FIRST,
-    raycast::tolerance::MARK,
+    raycast::tolerance::ENLARGE,
     raycast::tolerance::LIST,
     raycast::tolerance::REFINE,
     raycast::still::MAJORANTS,

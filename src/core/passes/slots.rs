@@ -344,8 +344,10 @@ slots! {
     /// With adaptive supersampling: one ray through the middle of each pixel of the rendering, and 1 in pixels that have all rays.
     PixelRays = D::image("pixel_rays", per_pixel_of_rendering, |_| Format::Rgba16f);
     EdgeMarks = D::image("edge_marks", per_pixel_of_rendering, |_| Format::R8);
-    /// With a tolerance: the error of each pixel by the scene's step, and by the steps that it has in the end, 0..1 of the screen; 0 is certain.
-    FirstErrors = D::image("first_errors", per_ray, |_| Format::R32f);
+    /// With a tolerance: the rays through every other pixel of every other row; their colours on the screen, and their errors.
+    Lattice = D::image("lattice", |s| Shape::Two(tolerance::lattice_size(s)), |_| Format::Rgba16f);
+    LatticeErrors = D::image("lattice_errors", |s| Shape::Two(tolerance::lattice_size(s)), |_| Format::Rgba32f);
+    /// The error of each pixel, 0..1 of the screen; 0 is certain.
     PixelErrors = D::image("pixel_errors", per_ray, |_| Format::R32f);
     /// Which pixels of each tile of 8 x 8 have too large an error, a bit each; how many of them are in the tiles before.
     ErrorMarks = D::image("error_marks", |s| Shape::Two(tolerance::tiles(s)), |_| Format::Rg32u);

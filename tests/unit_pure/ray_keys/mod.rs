@@ -41,7 +41,7 @@ const CASTS_NONE: [&str; 24] = [
     "raycast_cube",
     "mark_edges",
     "tolerance_first",
-    "tolerance_mark",
+    "tolerance_enlarge",
     "tolerance_list",
     "tolerance_refine",
     "classify_bricks_surface",

@@ -1,10 +1,12 @@
-//! Volume rendering with an error that every pixel states: each ray takes the steps that keep it under a tolerance.
+//! Volume rendering with an error that every pixel states: each region has the rays, and each ray the steps, that keep it under a tolerance.
 //!
 //! Light is integrated between every two samples of a ray, as if the value went evenly from one to the other: by the integral of the transfer function over the
 //! values ([`Slot::TransferIntegral`]), so that no thin shell of it is missed. From the same samples it is integrated between every second, beginning with
 //! the first and with the next. The larger difference after toning is the error that is stated: in smooth matter three times the error of the shorter steps, and where samples hit detail by chance the two coarse sums tell by how much chance decides. The shade that a step casts on itself is not in its integral, and is added to
-//! the error as far as colours differ at its ends. [`FIRST`] does this for all rays, [`MARK`] and [`LIST`] list the pixels whose
-//! error is too large and those beside them, and [`REFINE`] casts the rays of these again, with steps halved as often as they need; as many workgroups of
+//! the error as far as colours differ at its ends. A ray halves its steps as often as its error needs.
+//!
+//! [`FIRST`] casts a ray through every other pixel of every other row, [`ENLARGE`] takes the means of these for the pixels between and states how far they may be
+//! off by how much the picture bends from ray to ray, [`LIST`] lists the pixels whose error is too large, and [`REFINE`] casts their own rays; as many workgroups of
 //! it run as the list fills, which the device itself reads. Rays that meet only empty bricks have no error at all, by the bricks' ranges.
 
 use super::cap;
@@ -55,6 +57,11 @@ fn early_end(scene: &Scene) -> f64 {
     scene.settings.ray.early_end.min(allowed(scene) / LEVELS)
 }
 
+/// Rays of the lattice: one through every other pixel of every other row.
+pub(crate) fn lattice_size(scene: &Scene) -> [u32; 2] {
+    scene.ray_size().map(|n| n.div_ceil(2))
+}
+
 /// Tiles of a picture.
 pub fn tiles(scene: &Scene) -> [u32; 2] {
     scene.ray_size().map(|n| n.div_ceil(TILE))
@@ -74,7 +81,7 @@ fn brightest(scene: &Scene) -> f64 {
     }
 }
 
-/// All rays, with the scene's step.
+/// The rays of the lattice. They begin with the scene's step.
 pub const FIRST: Pass = Pass {
     name: "tolerance_first",
     shader: |_, _| "tolerance/cast.first",
@@ -86,8 +93,11 @@ pub const FIRST: Pass = Pass {
         reads.extend(cap::reads(s));
         reads
     },
-    writes: |s, _| vec![whole("picture", rendered(s)), whole("errors", Slot::FirstErrors)],
-    extent: ray_extent,
+    writes: |_, _| vec![whole("lattice", Slot::Lattice), whole("lattice_errors", Slot::LatticeErrors)],
+    extent: |s, _| {
+        let [width, height] = lattice_size(s);
+        [width, height, 1]
+    },
     params: |s, _| {
         let params = ray::params(s, s.volume_view(), first_step(s));
         let mut params = tone_params(s, volume::compositing_params(s, params, first_step(s)));
@@ -115,37 +125,63 @@ pub const FIRST: Pass = Pass {
     },
     reference: |scene, _, reads, writes| {
         let medium = Cast::new(scene, reads);
-        let [width, height, _] = writes.get("picture").size;
+        let [width, height, _] = writes.get("lattice").size;
         for (x, y) in (0..height).flat_map(|y| (0..width).map(move |x| (x, y))) {
-            let (rgba, error) = medium.cast([x, y], 0);
-            writes.get_mut("picture").set([x, y, 0], &rgba);
-            writes.get_mut("errors").set([x, y, 0], &[error]);
+            let (rgba, error) = medium.settled([2 * x, 2 * y], 0);
+            let [r, g, b] = on_screen(scene, rgba);
+            writes.get_mut("lattice").set([x, y, 0], &rgba);
+            writes.get_mut("lattice_errors").set([x, y, 0], &[r, g, b, error]);
         }
     },
     ..volume::PASS
 };
 
-/// Which pixels have too large an error. What is thinner than a step may be seen by none of a ray's samples, but by some of those beside it.
-pub const MARK: Pass = Pass {
-    name: "tolerance_mark",
-    shader: |_, _| "tolerance/mark",
-    reads: |_, _| vec![whole("first_errors", Slot::FirstErrors)],
-    writes: |_, _| vec![whole("errors", Slot::PixelErrors), whole("error_marks", Slot::ErrorMarks)],
+/// All pixels from the rays of the lattice, and which of them have too large an error.
+pub const ENLARGE: Pass = Pass {
+    name: "tolerance_enlarge",
+    shader: |_, _| "tolerance/enlarge",
+    reads: |_, _| vec![whole("lattice", Slot::Lattice), whole("lattice_errors", Slot::LatticeErrors)],
+    writes: |s, _| {
+        vec![whole("picture", rendered(s)), whole("errors", Slot::PixelErrors), whole("error_marks", Slot::ErrorMarks)]
+    },
+    extent: ray_extent,
     params: |s, _| sized(s, Params::default().f32("allowed", allowed(s))),
     constants: no_constants,
-    tolerance: Tolerance { absolute: 0.0, relative: 0.0, outliers: 0.0, why: "a comparison of a stored number" },
+    tolerance: Tolerance {
+        absolute: 1e-3,
+        relative: 0.0,
+        outliers: 1e-3,
+        why: "means of four colours, stored in halves; sums of errors are off by 1e-7 in f32: one at what is allowed may be on either side",
+    },
     reference: |scene, _, reads, writes| {
         // As the shader has it.
         let allowed = f64::from(allowed(scene) as f32);
-        let found = reads.get("first_errors");
-        writes.get_mut("errors").values.clone_from(&found.values);
-        let marks = writes.get_mut("error_marks");
-        marks.values.fill(0.0);
-        let [width, height, _] = found.size;
+        let (lattice, shown) = (reads.get("lattice"), reads.get("lattice_errors"));
+        let bend = |x: i64, y: i64| {
+            let inside = |n: i64, size: usize| n.clamp(0, size as i64 - 1) as usize;
+            let at = |x, y, c: usize| shown.get([inside(x, shown.size[0]), inside(y, shown.size[1]), 0])[c];
+            let along = |dx: i64, dy: i64| {
+                let of = |c| (at(x - dx, y - dy, c) + at(x + dx, y + dy, c) - 2.0 * at(x, y, c)).abs();
+                (0..3).map(of).fold(0.0, f64::max)
+            };
+            along(1, 0).max(along(0, 1)) / 4.0
+        };
+        writes.get_mut("error_marks").values.fill(0.0);
+        let ([width, height, _], [columns, rows, _]) = (writes.get("picture").size, lattice.size);
         for (x, y) in (0..height).flat_map(|y| (0..width).map(move |x| (x, y))) {
-            let beside = (-1..=1).flat_map(|dy| (-1..=1).map(move |dx| (x as i64 + dx, y as i64 + dy)));
-            let most = beside.map(|(x, y)| found.clamped(x, y, 0)).fold(0.0, f64::max);
-            if found.one(x, y, 0) > 0.0 && most > allowed {
+            let corners: [[usize; 2]; 4] =
+                std::array::from_fn(|k| [((x + k % 2) / 2).min(columns - 1), ((y + k / 2) / 2).min(rows - 1)]);
+            let mean = |of: &Texels, c| corners.iter().map(|[x, y]| of.get([*x, *y, 0])[c]).sum::<f64>() / 4.0;
+            let is_between = x % 2 == 1 || y % 2 == 1;
+            let is_beyond = x.div_ceil(2) >= columns || y.div_ceil(2) >= rows;
+            let most = corners.iter().map(|[x, y]| bend(*x as i64, *y as i64)).fold(0.0, f64::max);
+            let of_rays = mean(shown, 3);
+            let error = if is_between { (of_rays + most).max(LEAST) } else { of_rays };
+            writes.get_mut("picture").set([x, y, 0], &std::array::from_fn::<_, 4, _>(|c| mean(lattice, c)));
+            writes.get_mut("errors").set([x, y, 0], &[error]);
+            let is_beside = !is_between && error > 0.0 && most > allowed;
+            if is_beside || is_between && (is_beyond || error > allowed) {
+                let marks = writes.get_mut("error_marks");
                 let tile = TILE as usize;
                 let (word, bit) = place_in_tile([x % tile, y % tile]);
                 let at = 2 * (x / tile + (y / tile) * marks.size[0]) + word;
@@ -191,17 +227,16 @@ pub const LIST: Pass = Pass {
         let groups = [wide, groups.div_ceil(wide), 1, before];
         writes.get_mut("refine_groups").values.copy_from_slice(&groups.map(f64::from));
     },
-    ..MARK
+    ..ENLARGE
 };
 
-/// The rays of the listed pixels, with shorter steps.
+/// The rays of the listed pixels.
 pub(crate) const REFINE: Pass = Pass {
     name: "tolerance_refine",
     shader: |_, _| "tolerance/cast.refine",
     reads: |s, dispatch| {
         let mut reads = (FIRST.reads)(s, dispatch);
         reads.extend([
-            whole("first_errors", Slot::FirstErrors),
             whole("error_marks", Slot::ErrorMarks),
             whole("marked_before", Slot::MarkedBefore),
             Bind { part: Part::Groups, ..whole("refine_groups", Slot::RefineGroups) },
@@ -209,10 +244,10 @@ pub(crate) const REFINE: Pass = Pass {
         reads
     },
     writes: |s, _| vec![whole("picture", rendered(s)), whole("errors", Slot::PixelErrors)],
+    extent: ray_extent,
     reference: |scene, _, reads, writes| {
-        let medium = Cast::new(scene, reads);
-        let (first, marks) = (reads.get("first_errors"), reads.get("error_marks"));
-        let [width, height, _] = first.size;
+        let (medium, marks) = (Cast::new(scene, reads), reads.get("error_marks"));
+        let [width, height, _] = writes.get("picture").size;
         for (x, y) in (0..height).flat_map(|y| (0..width).map(move |x| (x, y))) {
             let tile = TILE as usize;
             let (word, bit) = place_in_tile([x % tile, y % tile]);
@@ -220,22 +255,18 @@ pub(crate) const REFINE: Pass = Pass {
             if (marks as u32) >> bit & 1 == 0 {
                 continue;
             }
-            let (mut error, mut halvings) = (first.one(x, y, 0), 0);
-            let rgba = loop {
-                let wanted = (0.5 * (error / allowed(scene)).log2()).ceil().max(1.0);
-                halvings = (f64::from(halvings) + wanted).min(f64::from(FINEST)) as u32;
-                let (rgba, found) = medium.cast([x, y], halvings);
-                error = found;
-                if error <= allowed(scene) || halvings >= FINEST {
-                    break rgba;
-                }
-            };
+            let (rgba, error) = medium.settled([x, y], 1);
             writes.get_mut("picture").set([x, y, 0], &rgba);
             writes.get_mut("errors").set([x, y, 0], &[error]);
         }
     },
     ..FIRST
 };
+
+/// A colour as the screen shows it.
+fn on_screen(scene: &Scene, [r, g, b, opacity]: [f64; 4]) -> [f64; 3] {
+    if opacity > 0.0 { toned(scene, [r, g, b]) } else { [0.0; 3] }
+}
 
 /// What the passes cast, in f64.
 struct Cast<'a> {
@@ -279,6 +310,19 @@ impl<'a> Cast<'a> {
         Cast { scene, reads, tables }
     }
 
+    /// The colour of a pixel with steps halved at least so many times, and as short as its error needs; the error that is left, 0..1 of the screen.
+    fn settled(&self, at: [usize; 2], mut halvings: u32) -> ([f64; 4], f64) {
+        let allowed = allowed(self.scene);
+        loop {
+            let (rgba, error) = self.cast(at, halvings);
+            if error <= allowed || halvings >= FINEST {
+                return (rgba, error);
+            }
+            let wanted = (0.5 * (error / allowed).log2()).ceil().max(1.0);
+            halvings = (f64::from(halvings) + wanted).min(f64::from(FINEST)) as u32;
+        }
+    }
+
     /// The colour of a pixel with steps halved so many times, and its error, 0..1 of the screen.
     fn cast(&self, [x, y]: [usize; 2], halvings: u32) -> ([f64; 4], f64) {
         let scene = self.scene;
@@ -293,10 +337,7 @@ impl<'a> Cast<'a> {
                 None => rgba,
             }
         };
-        let on_screen = |rgba: [f64; 4]| match rgba[3] > 0.0 {
-            true => toned(scene, [rgba[0], rgba[1], rgba[2]]),
-            false => [0.0; 3],
-        };
+        let on_screen = |rgba| on_screen(scene, rgba);
         let is_cut = cut.as_ref().is_some_and(|cut| cut.ends_ray());
         let (sums, doubt) = if is_cut { Default::default() } else { self.march(&ray) };
         let [fine, even, odd] = sums.map(|sum| shows(sum.0));

@@ -58,8 +58,9 @@ pub struct Ray {
     /// others. The picture is that of all rays within a level. In mode volume without first-hit shading and without cut faces; other pictures have all
     /// rays.
     pub adaptive: bool,
-    /// Largest error of a pixel that its steps may leave, in levels of 8 bits of the finished picture, 0.01..=64; 0 takes the same steps in all pixels. Rays begin with
-    /// `step`, at most a slice pixel, and take shorter steps, down to a 32nd, where steps of twice the length differ by more. Light is
+    /// Largest error of a pixel that its rays and their steps may leave, in levels of 8 bits of the finished picture, 0.01..=64; 0 takes the same steps in all pixels. A ray
+    /// through every other pixel of every other row begins with `step`, at most a slice pixel, and takes shorter steps, down to a 32nd, where steps of twice the length differ by
+    /// more. The pixels between are means of these rays where the picture bends little from ray to ray, and have rays of their own elsewhere. Light is
     /// integrated between samples whatever `volume.compositing` says. The error is an estimate; pixels whose rays meet only empty bricks have none. In
     /// mode volume without first-hit shading.
     pub tolerance: f64,
