@@ -193,5 +193,6 @@ pub mod low_level {
 
 #[cfg(feature = "verify")]
 use echolume_base::html_page;
+use echolume_base::statistics;
 use echolume_base::terminal;
 use low_level::*;

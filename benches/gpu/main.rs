@@ -15,7 +15,6 @@
 mod common;
 mod ingestion;
 mod scenes;
-mod surface_net;
 
 use common::Run;
 use criterion::{Criterion, SamplingMode, Throughput};
@@ -87,7 +86,6 @@ fn all(run: Run) -> Result<(), String> {
     for pass in measure::MEASURES {
         bench(&mut criterion, &context, &scene, pass, "noise", || Ok(noise(&scene, pass)));
     }
-    surface_net::bench(&mut criterion, &context, &phantom, sizes.pixels)?;
     ingestion::bench(&mut criterion, &rendering, &phantom, run)?;
     criterion.final_summary();
     match context.messages().into_iter().chain(rendering.messages()).next() {

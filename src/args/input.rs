@@ -467,6 +467,7 @@ fn mode_setting(mode: &str) -> String {
 }
 
 /// Opens the chosen device, or the best one, and prints its name on one line.
+#[cfg(feature = "lab")]
 pub fn open_device(choice: Option<DeviceChoice>, validation: bool) -> Result<Arc<Context>, Failure> {
     open(&ContextOptions {
         device: choice.unwrap_or_default(),

@@ -10,9 +10,9 @@ mod source;
 mod time;
 mod user_files;
 
-pub use input::{InputArgs, Output, SceneArgs, check_outputs, check_volume, device_failure, frames_of, open_device};
+pub use input::{InputArgs, Output, SceneArgs, check_outputs, check_volume, device_failure, frames_of};
 #[cfg(feature = "lab")]
-pub use input::{Opened, open_device_for_statistics, write_report};
+pub use input::{Opened, open_device, open_device_for_statistics, write_report};
 #[cfg(feature = "verify")]
 pub use input::{open_device_until, recorded};
 pub use motor::{SerialArgs, motor_failure, motor_table};

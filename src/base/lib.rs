@@ -10,6 +10,7 @@ pub mod html_page;
 pub mod metrics;
 pub mod picture;
 pub mod progress_lines;
+pub mod statistics;
 pub mod terminal;
 pub mod text;
 pub mod tree;

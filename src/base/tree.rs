@@ -25,7 +25,7 @@ enum Content {
     /// No type that is read has one.
     Date,
     List(Vec<Node>),
-    /// In the order of their names.
+    /// In the order of their names, as far as they come from a text.
     Table(Vec<(Node, Node)>),
     /// A number that its type cannot hold, in words.
     Overflow(&'static str),
@@ -157,6 +157,29 @@ impl Node {
         let Content::Table(table) = &mut self.content else { return None };
         let at = table.iter().position(|(name, _)| matches!(&name.content, Content::Text(name) if name == key))?;
         Some(table.remove(at).1)
+    }
+
+    /// The value of a key of a table.
+    pub fn at(&mut self, key: &str) -> Option<&mut Node> {
+        let Content::Table(table) = &mut self.content else { return None };
+        let is_named = |name: &Node| matches!(&name.content, Content::Text(name) if name == key);
+        table.iter_mut().find(|(name, _)| is_named(name)).map(|(_, value)| value)
+    }
+
+    /// Adds a number to a table that does not have the key.
+    pub fn add(&mut self, key: &str, value: i64) {
+        let is_there = self.at(key).is_some();
+        if let (Content::Table(table), false) = (&mut self.content, is_there) {
+            let name = Node { span: None, content: Content::Text(key.into()) };
+            table.push((name, Node { span: None, content: Content::Integer(value) }));
+        }
+    }
+
+    pub fn as_bool(&self) -> Option<bool> {
+        match self.content {
+            Content::Boolean(value) => Some(value),
+            _ => None,
+        }
     }
 
     /// The kind of the value, as `toml` names it.

@@ -6,6 +6,7 @@ use super::comparisons::{Pair, pairs};
 use super::results::{Record, Status};
 use crate::html_page::page;
 use crate::picture::Picture;
+use crate::statistics::quantile_of;
 use crate::text::escaped;
 use base64::Engine as _;
 use base64::prelude::BASE64_STANDARD;
@@ -187,9 +188,7 @@ impl Times {
 
     /// The middle one of the times of work, s.
     fn median(&self) -> f64 {
-        let mut sorted = self.work.clone();
-        sorted.sort_by(f64::total_cmp);
-        sorted.get(sorted.len() / 2).copied().unwrap_or(0.0)
+        quantile_of(self.work.iter().copied(), 0.5).unwrap_or(0.0)
     }
 
     fn mean(&self, total: f64) -> f64 {

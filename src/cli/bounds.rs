@@ -6,6 +6,7 @@ use crate::dump::npy;
 use crate::passes::Texels;
 use crate::picture::{Picture, replace};
 use crate::reference;
+use crate::statistics::quantile_of;
 use crate::terminal::{Failure, failed, input, say};
 use serde_json::json;
 use std::path::{Path, PathBuf};
@@ -34,11 +35,7 @@ pub struct BoundsReport {
 
 /// Median and 95th percentile of widths, and the share of them within a limit.
 fn summary(widths: &[f64], limit: f64) -> [f64; 3] {
-    let mut sorted = widths.to_vec();
-    sorted.sort_by(f64::total_cmp);
-    let at = |share: f64| {
-        sorted.get((share * sorted.len().saturating_sub(1) as f64).round() as usize).copied().unwrap_or(0.0)
-    };
+    let at = |share: f64| quantile_of(widths.iter().copied(), share).unwrap_or(0.0);
     let within = widths.iter().filter(|w| **w <= limit).count() as f64 / widths.len().max(1) as f64;
     [at(0.5), at(0.95), within]
 }

@@ -1,9 +1,7 @@
 //! `echolume mesh`: the surface of a recording as triangles.
 
 use super::recordings::{OUTPUT, read_with_threshold, share_of, target_grid};
-use crate::args::{GeometryArgs, check_outputs, open_device, open_recording, recording_help};
-use crate::gpu::surface_net::{NetError, SurfaceNet};
-use crate::gpu::{Context, DeviceChoice};
+use crate::args::{GeometryArgs, check_outputs, open_recording, recording_help};
 use crate::mesh::Mesh;
 use crate::mesh::base::Base;
 use crate::mesh::files::{Colours, MeshFile};
@@ -12,13 +10,11 @@ use crate::mesh::simplify::simplified;
 use crate::mesh::smooth::Smoother;
 use crate::probe::{Geometry, Grid, World};
 use crate::scene::default_look::smoothing;
-use crate::scene::{Input, Lattice, depth_offset};
-use crate::source::StoredType;
+use crate::scene::{Input, depth_offset};
 use crate::source::convert::Volume;
-use crate::terminal::{self, Failure, failed, input, remark, say};
+use crate::terminal::{self, Failure, failed, input, say};
 use indicatif::ProgressBar;
 use std::path::PathBuf;
-use std::sync::Arc;
 
 #[derive(clap::Args)]
 #[command(
@@ -66,13 +62,6 @@ pub struct MakeMesh {
     /// Volume of the recording to use, counted from 0
     #[arg(long, value_name = "N", default_value_t = 0)]
     volume: usize,
-    /// Vulkan device, by number or part of its name (see `echolume devices`). The CPU computes, in f64, what it cannot hold [default: the
-    /// best one, or the CPU]
-    #[arg(long, value_name = "N|NAME")]
-    device: Option<DeviceChoice>,
-    /// Compute on the CPU, in f64: the reference of what devices compute
-    #[arg(long, conflicts_with = "device")]
-    cpu: bool,
     #[command(flatten)]
     geometry: GeometryArgs,
 }
@@ -125,11 +114,8 @@ impl MakeMesh {
         // Rows of a slice that are left out.
         let rows = start.map_or(0.0, |depth| ((depth + face - grid.origin[1]) / grid.spacing[1]).ceil());
         let left_out = rows.clamp(0.0, grid.size[1] as f64) as usize;
-        let asked = Asked { grid, world, deviation, left_out, threshold, stored: samples.stored };
-        let (mesh, rows) = match self.device()? {
-            Some(context) => self.on_device(&context, &asked, &volume)?,
-            None => self.on_cpu(&asked, &volume)?,
-        };
+        let asked = Asked { grid, world, deviation, left_out, threshold };
+        let (mesh, rows) = self.net(&asked, &volume)?;
         let in_file = threshold - shift;
         if mesh.triangles.is_empty() {
             let fault =
@@ -162,63 +148,9 @@ impl MakeMesh {
         Ok(())
     }
 
-    /// The device to compute on; none: the CPU.
-    fn device(&self) -> Result<Option<Arc<Context>>, Failure> {
-        if self.cpu {
-            return Ok(None);
-        }
-        match open_device(self.device.clone(), false) {
-            Ok(context) => Ok(Some(context)),
-            Err(failure) if self.device.is_some() => Err(failure),
-            Err(Failure::NoDevice(fault) | Failure::Failed(fault)) => {
-                remark(&format!("{fault}; the mesh is computed on the CPU"));
-                Ok(None)
-            }
-            Err(failure) => Err(failure),
-        }
-    }
-
-    /// The mesh, and the rows of its lattice. Where the device cannot do it, on the CPU.
-    fn on_device(&self, context: &Arc<Context>, asked: &Asked, volume: &Volume) -> Result<(Mesh, usize), Failure> {
-        match self.net(context, asked, volume) {
-            Ok(Ok(made)) => Ok(made),
-            Ok(Err(failure)) => Err(failure),
-            Err(NetError::Device(fault)) => {
-                remark(&format!("{fault}; the mesh is computed on the CPU"));
-                self.on_cpu(asked, volume)
-            }
-            Err(error) => Err(failed(error)),
-        }
-    }
-
-    fn net(
-        &self,
-        context: &Arc<Context>,
-        asked: &Asked,
-        volume: &Volume,
-    ) -> Result<Result<(Mesh, usize), Failure>, NetError> {
-        let Asked { grid, world, .. } = asked;
-        let bar = self.bar(grid);
-        let mut net = SurfaceNet::new(context, asked.lattice(volume, !self.open), volume.frames())?;
-        let mut filled = None;
-        if let Some(mm) = self.base {
-            match self.rows(grid, mm, net.deepest(|| bar.inc(1))?) {
-                Ok(rows) => filled = Some(rows),
-                Err(failure) => return Ok(Err(failure)),
-            }
-        }
-        let mesh = net.mesh(filled, |at| world.at(at), || bar.inc(1))?;
-        bar.finish_and_clear();
-        for time in net.take_times() {
-            tracing::info!("{}: {:.3} ms in {} runs", time.name, time.total / 1e6, time.runs);
-        }
-        tracing::info!("read back: {:.3} MB", net.read_back as f64 / 1e6);
-        Ok(Ok((mesh, filled.unwrap_or(grid.size[1]))))
-    }
-
-    /// The same on the CPU.
-    fn on_cpu(&self, asked: &Asked, volume: &Volume) -> Result<(Mesh, usize), Failure> {
-        let Asked { grid, world, deviation, left_out, threshold, .. } = asked;
+    /// The mesh, and the rows of its lattice.
+    fn net(&self, asked: &Asked, volume: &Volume) -> Result<(Mesh, usize), Failure> {
+        let Asked { grid, world, deviation, left_out, threshold } = asked;
         let bar = self.bar(grid);
         let above = left_out * grid.size[0];
         let reader = || {
@@ -314,25 +246,6 @@ struct Asked {
     /// Rows of a slice.
     left_out: usize,
     threshold: f64,
-    stored: StoredType,
-}
-
-impl Asked {
-    fn lattice(&self, volume: &Volume, closed: bool) -> Lattice {
-        Lattice {
-            source: volume.geometry().clone(),
-            stored: self.stored,
-            grid: self.grid,
-            deviation: self.deviation,
-            threshold: self.threshold,
-            closed,
-            left_out: self.left_out,
-            filled_rows: None,
-            most: Lattice::MOST,
-            first: 0,
-            count: self.grid.size[2],
-        }
-    }
 }
 
 /// A bound with four decimals or, if it is small, two digits. It is rounded up: a bound that is printed smaller than it is would be none.

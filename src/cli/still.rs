@@ -4,6 +4,7 @@ use crate::args::parse_nanoseconds;
 use crate::gpu::{GpuError, Renderer};
 use crate::passes::raycast::still::{final_sums, luminance};
 use crate::scene::Still;
+use crate::statistics::quantile;
 use crate::terminal::{Failure, input};
 
 /// What `--still` asks for.
@@ -76,7 +77,7 @@ pub fn noise(renderer: &mut Renderer) -> Result<Option<String>, GpuError> {
     };
     let mut errors: Vec<f64> = light.values.chunks_exact(4).zip(&squares.values).filter_map(error).collect();
     errors.sort_by(f64::total_cmp);
-    let at = |share: f64| errors.get(((errors.len() as f64 - 1.0) * share) as usize).map(|e| 100.0 * e);
+    let at = |share: f64| quantile(&errors, share).map(|e| 100.0 * e);
     let said = format!("still: {} samples a pixel, seed {}", still.samples, still.seed);
     Ok(Some(match (at(0.5), at(0.95)) {
         (Some(half), Some(most)) if still.samples > 1 => {

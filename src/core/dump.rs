@@ -1,7 +1,7 @@
 //! The contents of slots for inspection: as pictures, and as arrays with their units and axes for other programs.
 
-use crate::passes::slots::{Format, Initializer, Shape};
-use crate::passes::{MISS, Slot, Texels, is_hit};
+use crate::passes::slots::{Format, Initializer, Meaning, Shape};
+use crate::passes::{Slot, Texels, is_hit};
 use crate::picture::Picture;
 use crate::probe::Geometry;
 use crate::scene::Scene;
@@ -17,11 +17,9 @@ pub fn draw(slot: Slot, texels: Option<&Texels>, scene: &Scene) -> Picture {
     match (texels, slot.initializer()) {
         (Some(texels), _) if texels.channels == 4 && texels.size[2] == 1 => colours(texels),
         (Some(texels), _) if texels.channels == 4 => sheet(texels, |n| colour(&texels.values[4 * n..])),
-        (Some(texels), _) if matches!(slot, Slot::Distance | Slot::DistanceA | Slot::DistanceB) => {
-            sheet(texels, grey(distances(texels)))
-        }
+        (Some(texels), _) if slot.meaning().miss.is_some() => sheet(texels, grey(distances(texels))),
         (Some(texels), _) => sheet(texels, grey(stretched(texels))),
-        (None, Initializer::ByScene(make)) => curves(&make(scene), meaning(slot).0.len()),
+        (None, Initializer::ByScene(make)) => curves(&make(scene), slot.meaning().channels.len()),
         (None, _) => Picture { width: 1, height: 1, rgba: vec![0, 0, 0, 255] },
     }
 }
@@ -103,139 +101,10 @@ fn curves(values: &[f32], channels: usize) -> Picture {
     Picture { width: width as u32, height: height as u32, rgba }
 }
 
-/// Of distance maps.
-const DISTANCES: &str = "mm along the ray of the pixel, from the ray's origin";
-const GREY: &[&str] = &["value"];
-const COLOUR: &[&str] = &["red", "green", "blue", "alpha"];
-/// Of samples of the recording.
-const SHARE_OF_RANGE: &str = "share of the range of the recording's samples, 0..1, before the grey window";
-
-/// Names of the channels of a slot, and the unit of its values.
-fn meaning(slot: Slot) -> (&'static [&'static str], &'static str) {
-    match slot {
-        Slot::Distance | Slot::DistanceA | Slot::DistanceB => (GREY, DISTANCES),
-        Slot::Frames
-        | Slot::Conditioned
-        | Slot::SliceA
-        | Slot::SliceB
-        | Slot::SliceForward
-        | Slot::SliceRows
-        | Slot::SliceStep
-        | Slot::SliceHalfStep
-        | Slot::SliceStageA
-        | Slot::SliceStageB
-        | Slot::SliceStageC
-        | Slot::SharpVolume
-        | Slot::SharpSectionVolume
-        | Slot::WholeVolume
-        | Slot::CutVolume
-        | Slot::SectionVolume
-        | Slot::Volume => (GREY, SHARE_OF_RANGE),
-        Slot::Floating => (GREY, "1 in parts of the volume that float"),
-        Slot::StartSurface | Slot::StartCurve => (GREY, "row of the volume, by column and slice"),
-        Slot::LineShares => (GREY, "share of the frame's lines that fired before"),
-        Slot::TileRanges | Slot::BrickRanges => (&["smallest", "largest"], SHARE_OF_RANGE),
-        Slot::Tgc => (GREY, "gain of a sample: a factor, or an addend where samples are log-compressed"),
-        Slot::ScanLut => (&["sample", "line"], "index from 0; -1 outside the sector"),
-        Slot::Growth => (GREY, "rings of pixels"),
-        Slot::PackedNeighbours => {
-            (&["bits", "more_bits"], "bits of a texel and of its neighbours one column on, one row on, and both")
-        }
-        Slot::BrickKinds
-        | Slot::BrickDistancesX
-        | Slot::BrickDistancesXy
-        | Slot::SurfaceBrickDistances
-        | Slot::VolumeBrickDistances => {
-            (GREY, "(64 kind + distance in bricks) / 255; kinds: 0 active, 1 empty, 2 homogeneous")
-        }
-        Slot::BrickTable => (
-            &["tile_columns", "tile_rows", "slices", "side"],
-            "indices: 4096 first + last; side: 0 outside the sector, 1 across its border, 2 inside",
-        ),
-        Slot::OpaqueBefore => (GREY, "entries of the transfer function"),
-        Slot::SweepLut => (GREY, "mean distances of slices"),
-        Slot::SliceTable => (&["position", "advance"], "mean distances of slices"),
-        Slot::LineLut => (GREY, "share of the lines of a frame"),
-        Slot::Transfer | Slot::PreIntegrated | Slot::TransferIntegral => {
-            (&["red", "green", "blue", "absorption"], "colour 0..1; absorption of one slice pixel")
-        }
-        Slot::SelfAttenuated => {
-            (&["red", "green", "blue", "opacity"], "premultiplied colour and opacity of a step, 0..1")
-        }
-        Slot::Tiles | Slot::CurveColumns | Slot::Block | Slot::Cuts | Slot::SlicePlaces => {
-            (&["x", "y", "z", "w"], "vectors as the shader takes them")
-        }
-        Slot::Surface => {
-            (&["echo", "found", "echo_behind", "unused"], "echo 0..1 after the grey window; found: 0 or 1")
-        }
-        Slot::Cap => (
-            &["echo", "opacity"],
-            "echo 0..1 after the grey window of planes, where a ray ends at a cut face; opacity, 0..1",
-        ),
-        Slot::SliceShares | Slot::PictureShares | Slot::Shadow | Slot::Occlusion => (GREY, "share, 0..1"),
-        Slot::LightMatter => {
-            (&["density", "echo"], "share of the densest matter; share of the range of the recording's samples")
-        }
-        Slot::LightPyramid1
-        | Slot::LightPyramid2
-        | Slot::LightPyramid3
-        | Slot::LightPyramid4
-        | Slot::LightPyramid5
-        | Slot::LightPyramid6
-        | Slot::LightPyramid7
-        | Slot::LightPyramid8 => (GREY, "share of the densest matter, 0..1"),
-        Slot::LightArriving | Slot::LightScattered | Slot::LightScatteredB | Slot::BackLight => {
-            (&["red", "green", "blue", "density"], "light: share of what came; share of the densest matter")
-        }
-        Slot::LightNormals => (&["x", "y", "z", "highlight"], "direction, as long as it is certain; light"),
-        Slot::LightFrontA
-        | Slot::LightFrontB
-        | Slot::BackFrontA
-        | Slot::BackFrontB
-        | Slot::LightAmbient
-        | Slot::LightShade => (COLOUR, "light; 1 is that of an unshadowed light of strength 1"),
-        Slot::StillMedium => (&["red", "green", "blue", "extinction"], "albedo of scattering, 0..1; extinction, 1/mm"),
-        Slot::StillMajorants => (GREY, "largest extinction of a brick, 1/mm"),
-        Slot::StillSumsA | Slot::StillSumsB => {
-            (&["red", "green", "blue", "collided"], "light of all paths of a pixel; how many of them collided")
-        }
-        Slot::StillSquaresA | Slot::StillSquaresB => (GREY, "squares of the luminance of all paths of a pixel"),
-        Slot::NetSamples | Slot::NetValues | Slot::NetSmoothed | Slot::NetFilled => {
-            (GREY, "as stored; the smallest float where nothing is known")
-        }
-        Slot::NetLines => (GREY, "rad or mm"),
-        Slot::NetSlices => (&["position", "advance"], "rad or mm"),
-        Slot::NetDepths => (GREY, "row; -1 where nothing is inside"),
-        Slot::NetCounts | Slot::NetFirsts => (GREY, "cells"),
-        Slot::NetCrossed | Slot::NetAsked => (&["column", "row"], "bits of cells, and of their corners or edges"),
-        Slot::NetOffsets => (&["x", "y", "z", "unused"], "voxels from the first corner of a cell"),
-        Slot::EdgeMarks => (GREY, "1 in pixels that have several rays"),
-        Slot::LatticeErrors => {
-            (&["red", "green", "blue", "error"], "colour and error on the screen, 0..1; no error is certain")
-        }
-        Slot::PixelErrors => (GREY, "error on the screen, 0..1; 0 is certain"),
-        Slot::ErrorMarks => (&["rows 0 to 3", "rows 4 to 7"], "bits of pixels of a tile"),
-        Slot::MarkedBefore => (GREY, "pixels"),
-        Slot::RefineGroups => (GREY, "workgroups along x, y, z; pixels"),
-        Slot::VolumeLayer
-        | Slot::VolumeBesideSurface
-        | Slot::PixelRays
-        | Slot::Lattice
-        | Slot::Rendered
-        | Slot::Planes
-        | Slot::Picture
-        | Slot::SmoothPicture
-        | Slot::SmoothPictureB
-        | Slot::PictureForward
-        | Slot::PictureRows
-        | Slot::Screen => (COLOUR, "share, 0..1"),
-    }
-}
-
 /// A slot as an array that numpy reads (NPY 1.0, little endian, C order), and a description of its axes, channels and units. `texels` as in
 /// [`draw`]. Values are f32 as the shaders read them, f64 where they are bits.
 pub fn array(slot: Slot, texels: Option<&Texels>, scene: &Scene) -> (Vec<u8>, Value) {
-    let (channels, unit) = meaning(slot);
+    let Meaning { channels, unit, miss } = slot.meaning();
     let (shape, values) = match (texels, slot.initializer()) {
         (Some(t), _) => ([t.size[2], t.size[1], t.size[0], t.channels], t.values.clone()),
         (None, Initializer::ByScene(make)) => {
@@ -263,8 +132,8 @@ pub fn array(slot: Slot, texels: Option<&Texels>, scene: &Scene) -> (Vec<u8>, Va
         "channels": channels.iter().take(shape[3]).collect::<Vec<_>>(),
         "unit": unit,
     });
-    if unit == DISTANCES {
-        about["no_surface"] = json!(MISS);
+    if let Some(miss) = miss {
+        about["no_surface"] = json!(miss);
     }
     if slot == Slot::PackedNeighbours {
         // Of the volume it holds the stored part. The volume itself is written whole.

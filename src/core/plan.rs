@@ -59,7 +59,7 @@ impl Plan {
         let of_planes = |slot: &Slot| matches!(slot, Slot::SharpSectionVolume | Slot::SectionVolume);
         let work_of = |step: &Step| match step.pass.stage {
             Stage::Preprocess if step.writes(scene).iter().all(of_planes) => Work::Tone,
-            Stage::Raycast if step.pass.name.starts_with("raycast_planes") && !scene.is_flat() => Work::Tone,
+            Stage::Raycast if step.writes(scene).iter().all(|slot| *slot == Slot::Planes) => Work::Tone,
             Stage::Preprocess | Stage::Raycast => Work::Rays,
             Stage::Shade => Work::Shading,
             Stage::Postprocess => Work::Tone,

@@ -2,7 +2,7 @@
 //! Goldens are made with it, and errors are measured against it.
 
 use crate::passes::slots::{Initializer, Shape};
-use crate::passes::{Arrays, DispatchArgs, Frequency, Slot, Texels, chain, floating, unveil};
+use crate::passes::{Arrays, DispatchArgs, Frequency, Slot, Texels, chain};
 use crate::plan::{Plan, Step};
 use crate::probe::Frame;
 use crate::scene::Scene;
@@ -68,11 +68,8 @@ fn run(scene: &Scene, step: &Step, args: &DispatchArgs, slots: &mut BTreeMap<Slo
     // A plan lists every slot of its steps, and no step reads a slot that it writes.
     let missing = || Texels::untouched([0; 3], 1);
     for bind in &reads {
-        if let Initializer::ByVolume = bind.slot.initializer() {
-            let found = match bind.slot {
-                Slot::Floating => slots.get(&Slot::WholeVolume).map(|volume| floating::reference(scene, volume)),
-                _ => slots.get(&Slot::Volume).map(|volume| unveil::reference(scene, volume).0),
-            };
+        if let Some(search) = bind.slot.search() {
+            let found = slots.get(&search.within).map(|volume| (search.reference)(scene, volume));
             slots.extend(found.map(|found| (bind.slot, found)));
         }
         inputs.insert(bind.name, slots.get(&bind.slot).cloned().unwrap_or_else(missing));

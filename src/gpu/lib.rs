@@ -10,7 +10,7 @@
 //!   and `watchdog` gives up a device that does not finish. `bands` divides dispatches that a driver's watchdog might end, and `paced`
 //!   holds bands back while a window's panels are drawn.
 //! - `lost_device` reports why a device was lost, `losses` counts how often the same work lost it, `budget` how much memory it has left; `host_memory` returns what drivers freed.
-//! - `renderer` runs the four stages, `surface_net` the passes of a mesh, `pass_runner` a single pass for tests and benchmarks.
+//! - `renderer` runs the four stages, `pass_runner` a single pass for tests and benchmarks.
 //! - `window` presents pictures.
 
 mod bands;
@@ -43,7 +43,6 @@ mod shader_compile;
 pub mod shader_reload;
 pub mod shader_source;
 pub mod shader_tools;
-pub mod surface_net;
 mod timeline;
 mod timing;
 mod validation;
@@ -51,7 +50,7 @@ mod watchdog;
 pub mod window;
 
 use echolume_base::{files, picture, text};
-use echolume_core::{barriers, mesh, passes, plan, queues, scene, spirv};
+use echolume_core::{barriers, passes, plan, queues, scene, spirv};
 use echolume_probe as probe;
 
 pub use bands::Bands;

@@ -195,7 +195,7 @@ pub(super) fn lowered(rungs: &[Rung], scene: &Scene) -> Vec<Settings> {
     let mut all: Vec<Settings> = Vec::new();
     for rung in rungs.iter().skip(1) {
         let settings = rung.apply(&scene.settings);
-        let ray = Ray { half: false, quarter: false, eighth: false, rays: 1, ..settings.ray };
+        let ray = Ray { subsampling: 1, rays: 1, ..settings.ray };
         let (distance, light, post) = Default::default();
         let plain = Settings { ray, distance, light, post, ..settings };
         if !all.contains(&plain) {
@@ -426,7 +426,7 @@ impl Rung {
                 changed = changed.moving();
                 let [width, height] = camera::full_size(&changed);
                 let most = width.min(height) / min_rays(settings);
-                (changed.ray.quarter, changed.ray.eighth) = (*apart >= 4 && most >= 4, *apart >= 8 && most >= 8);
+                changed.ray.subsampling = [8, 4].into_iter().find(|n| apart >= n && most >= *n).unwrap_or(2);
             }
             Change::Measured(set) => {
                 let apply = || -> Option<Settings> {
@@ -508,7 +508,7 @@ mod tests {
         };
         assert_eq!(begun(first_rung(false)).quality(now).rays, 0);
         let half = begun(first_rung(true)).quality(now).rays;
-        assert!(rungs[half].apply(&Settings::default()).ray.half);
+        assert!(rungs[half].apply(&Settings::default()).ray.subsampling == 2);
         // The picture at rest, ms, and the rung of the drag that follows.
         for (full, rung) in [(10, 0), (60, 1), (400, 2), (3000, 3)] {
             let mut pace = begun(first_rung(true));
@@ -572,7 +572,11 @@ mod tests {
             for pair in rungs.windows(2) {
                 assert!(pair[1].time_share < pair[0].time_share);
                 let changed = pair[1].apply(&settings);
-                assert!(changed.ray.half && changed.slices == settings.slices, "{preset}: {}", pair[1].label);
+                assert!(
+                    changed.ray.subsampling > 1 && changed.slices == settings.slices,
+                    "{preset}: {}",
+                    pair[1].label
+                );
             }
         }
     }
@@ -592,14 +596,14 @@ mod tests {
                 ([40, 30], [1, 2, 2, 2]),
             ] {
                 (settings.picture.size, settings.distance.median) = (size, 15);
-                let apart: Vec<u32> = rungs.iter().map(|rung| rung.apply(&settings).ray.apart()).collect();
+                let apart: Vec<u32> = rungs.iter().map(|rung| rung.apply(&settings).ray.subsampling).collect();
                 assert_eq!(apart, all, "{preset} {size:?}");
             }
             (settings.mode, settings.picture.size, settings.distance.median) = (Mode::Surface, [742, 724], 0);
-            assert_eq!(rungs[3].apply(&settings).ray.apart(), 4, "{preset} without a median");
+            assert_eq!(rungs[3].apply(&settings).ray.subsampling, 4, "{preset} without a median");
             for rung in &rungs[1..] {
                 let mut changed = rung.apply(&settings);
-                changed.ray = Ray { half: false, quarter: false, eighth: false, ..changed.ray };
+                changed.ray = Ray { subsampling: 1, ..changed.ray };
                 let one_ray = Settings { ray: Ray { rays: 1, ..settings.ray.clone() }, ..settings.clone() };
                 assert_eq!(changed, one_ray, "{preset}: {}", rung.label());
             }

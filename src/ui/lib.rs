@@ -41,7 +41,7 @@ mod view;
 mod volume_export;
 pub mod window;
 
-use echolume_base::{files, picture, progress_lines, text};
+use echolume_base::{files, picture, progress_lines, statistics, text};
 use echolume_core::{mesh, passes, plan, scene};
 use echolume_lab::error_report;
 use echolume_session::{kiosk, live, marked, measure, user_presets, workspace};

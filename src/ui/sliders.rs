@@ -361,9 +361,9 @@ pub const SLIDERS: &[Slider] = &[
         |s, v| s.camera.field_of_view = above(v, 1.0).unwrap_or(0.0),
     ),
     slider(texts::RAYS_A_PIXEL, "", Quality, [1.0, 4.0], 1.0).of(
-        |s| renders_rays(s) && s.ray.apart() == 1,
+        |s| renders_rays(s) && s.ray.subsampling == 1,
         |s| f64::from(s.ray.rays),
-        |s, v| s.ray.rays = if s.ray.apart() > 1 { 1 } else { v.round() as u32 },
+        |s, v| s.ray.rays = if s.ray.subsampling > 1 { 1 } else { v.round() as u32 },
     ),
     slider(texts::LARGEST_ERROR, "", Quality, [0.0, 8.0], 0.5).of(
         can_tolerate,

@@ -217,8 +217,7 @@ fn thumbnail(settings: &Settings) -> Settings {
         ray: Ray {
             step: Some(of.ray.step.unwrap_or(STEP).max(STEP)),
             samples_per_voxel: None,
-            half: false,
-            quarter: false,
+            subsampling: 1,
             rays: 1,
             sliding: 0,
             ..of.ray

@@ -1,6 +1,7 @@
 //! Times that the view measures of itself, for the display and for the summary at the end.
 
 use crate::live::Statistics;
+use crate::statistics::quantile_of;
 use std::collections::VecDeque;
 use std::time::Duration;
 
@@ -21,10 +22,7 @@ impl RecentTimes {
 
     /// A percentile in ms; `share`: 0..=1. None before the first time.
     pub(super) fn percentile(&self, share: f64) -> Option<f64> {
-        let mut sorted: Vec<f64> = self.0.iter().copied().collect();
-        sorted.sort_by(f64::total_cmp);
-        let last = sorted.len().checked_sub(1)?;
-        sorted.get((share * last as f64).round() as usize).copied()
+        quantile_of(self.0.iter().copied(), share)
     }
 
     pub(super) fn newest(&self) -> Option<f64> {

@@ -226,7 +226,7 @@ pub(super) struct Job {
     /// Volumes a second of a loop.
     pub(super) rate: f64,
     pub(super) settings: crate::scene::Settings,
-    /// The name of the device of surfaces and turntables: that of the view.
+    /// The name of the device of turntables: that of the view.
     pub(super) device: String,
 }
 
@@ -237,10 +237,8 @@ impl Job {
         let mut command = Command::new(program);
         match self.format.work {
             Work::Convert => command.arg("convert").args([recording, made]),
-            Work::Mesh => command.arg("mesh").args([recording, made]).args(["--device", &self.device]),
-            Work::Relief => {
-                command.arg("mesh").args([recording, made]).args(["--base", BASE, "--device", &self.device])
-            }
+            Work::Mesh => command.arg("mesh").args([recording, made]),
+            Work::Relief => command.arg("mesh").args([recording, made]).args(["--base", BASE]),
             Work::Turntable => {
                 let scene = self.workspace(recording)?;
                 let series = ["--turntable", TURNTABLE].map(String::from);

@@ -631,7 +631,7 @@ fn ray_scenes() -> Vec<SceneSpec> {
         ),
         (
             "pair, half the rays, colours behind a second surface",
-            "mode = 'sr'\nlayout = 'pair'\nray = { half = true }\nvolume = { shading = 'depth-coded' }\n\
+            "mode = 'sr'\nlayout = 'pair'\nray = { subsampling = 2 }\nvolume = { shading = 'depth-coded' }\n\
              surface = { number = 2, threshold = 0.05, rough = 2, colour = 'behind' }\nlight = { skin = {}, texture = 0.5 }\nslices = { pixels = 30 }",
         ),
         (
@@ -670,10 +670,10 @@ fn ray_scenes() -> Vec<SceneSpec> {
             "4-up, three rays at edges, toned",
             "mode = 'vr'\nlayout = 'four'\nslices = { pixels = 12 }\nray = { rays = 3, adaptive = true }\npost = { contrast = 1.5, gamma = 1.8, colour_map = 'skin' }",
         ),
-        ("half the rays", "mode = 'vr'\nslices = { pixels = 12 }\nray = { half = true }"),
+        ("half the rays", "mode = 'vr'\nslices = { pixels = 12 }\nray = { subsampling = 2 }"),
         (
             "4-up, half the rays, filters in their pixels",
-            "layout = 'four'\nslices = { pixels = 12 }\ndistance = { median = 9, sigma = { window = 7 } }\nray = { half = true }",
+            "layout = 'four'\nslices = { pixels = 12 }\ndistance = { median = 9, sigma = { window = 7 } }\nray = { subsampling = 2 }",
         ),
         ("4-up, three rays", "mode = 'mip'\nlayout = 'four'\nslices = { pixels = 12 }\nray = { rays = 3 }"),
         (

@@ -188,7 +188,7 @@ impl PassSummary {
         });
     }
 
-    pub(super) fn into_findings(self, pass: &Pass) -> Findings {
+    fn into_findings(self, pass: &Pass) -> Findings {
         let PassSummary { mut findings, runs, failed, largest, used, outliers, bias } = self;
         findings.expect(runs > 0, || format!("no scene needs '{}'", pass.name));
         findings.expect(failed <= MAX_FAULTS, || format!("{} more inputs beyond tolerance", failed - MAX_FAULTS));

@@ -28,13 +28,12 @@ pub mod sampling;
 pub mod self_test;
 mod speed;
 pub mod stress;
-pub mod surface_nets;
 pub mod time_stamps;
 
 pub use compare::{Comparison, ExtraTolerance, compare_outputs, compare_picture, expect_same_picture};
 
 use echolume_base::{files, html_page, metrics, picture, terminal, text};
-use echolume_core::{mesh, passes, plan, queues, reference, scene, spirv};
+use echolume_core::{passes, plan, queues, reference, scene, spirv};
 use echolume_gpu::{self as gpu, machine};
 use echolume_lab::profile;
 use {echolume_probe as probe, echolume_source as source};
@@ -54,7 +53,6 @@ use std::time::Instant;
 pub fn checks(level: Level) -> Vec<Check> {
     let groups = [
         each_pass::checks,
-        surface_nets::checks,
         sampling::checks,
         known_answers::checks,
         modes::checks,

@@ -24,7 +24,7 @@ fn kept(folder: &Folder, name: &str, more: &[&str]) -> (String, Run) {
 
 /// Groups that the command runs, and those that tests/gpu runs in its own process, in passes.rs and verify_groups.rs: all of them would take a
 /// quarter of the gate's time for this command, whose pipelines validation inspects one by one.
-const GROUPS: [&str; 6] = ["known answers", "modes", "sampling", "speed", "surface nets", "time stamps"];
+const GROUPS: [&str; 5] = ["known answers", "modes", "sampling", "speed", "time stamps"];
 const GROUPS_OF_GPU: [&str; 7] = ["determinism", "failures", "formats", "hazards", "memory", "passes", "stress"];
 
 #[test]

@@ -102,7 +102,7 @@ fn other_pictures_have_no_pass_for_it() {
         ("mode = 'sr'\nlayout = '4up'", true),
         ("mode = 'sr'\nlayout = 'pair'", true),
         ("mode = 'sr'\nray.rays = 2", false),
-        ("mode = 'sr'\nray.half = true", false),
+        ("mode = 'sr'\nray.subsampling = 2", false),
         ("mode = 'vr'", false),
         ("mode = 'vr'\nvolume.shading = 'first-hit'", true),
         ("mode = 'vr'\nclip = [{ at = [0, 5, 0], normal = [0, -1, 0] }]", true),

@@ -54,7 +54,7 @@ fn a_window_that_stores_blue_first_gets_the_same_picture() {
         "mode = 'surface'",
         "mode = 'orthogonal'",
         "mode = 'surface'\nlayout = '4up'",
-        "mode = 'volume'\nray = { half = true, eighth = true }",
+        "mode = 'volume'\nray = { subsampling = 8 }",
     ] {
         let toml = format!("{toml}\npicture = {{ size = [90, 64] }}\nslices = {{ pixels = 64 }}");
         let scene = scene(Geometry::Sweep(wobbler()), FLOATS, &toml);

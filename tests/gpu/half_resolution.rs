@@ -56,10 +56,16 @@ fn filters_span_as_much_of_the_picture_with_half_the_rays() {
     let diffused = half.perona_malik.expect("diffusion");
     assert!((diffused.step * f64::from(diffused.repeat) - 0.25).abs() < 1e-12 && diffused.step <= 0.2);
     assert_eq!(Distance::default().halved(), Distance::default());
-    for key in ["half", "quarter", "eighth"] {
-        let refused = settings(&format!("ray = {{ {key} = true, rays = 2 }}"));
+    for ray in [
+        "subsampling = 2, rays = 2",
+        "subsampling = 8, rays = 4",
+        "subsampling = 0",
+        "subsampling = 3",
+        "subsampling = 16",
+    ] {
+        let refused = settings(&format!("ray = {{ {ray} }}"));
         let error = Scene::new(Geometry::Sweep(wobbler()), BYTES, refused).unwrap_err().to_string();
-        assert!(error.contains(&format!("ray.{key}")), "{error}");
+        assert!(error.contains("ray.subsampling"), "{error}");
     }
 }
 
@@ -68,13 +74,12 @@ fn a_ray_of_16_pixels_goes_through_their_middle() {
     for size in ["[64, 48]", "[63, 47]"] {
         let look =
             |more: &str| scene(Geometry::Sweep(wobbler()), BYTES, &format!("mode = 'vr'\npicture.size = {size}{more}"));
-        let (full, quarter) = (look(""), look("\nray.quarter = true"));
+        let (full, quarter) = (look(""), look("\nray.subsampling = 4"));
         assert_eq!((quarter.ray_size(), quarter.visible_bounds), ([16, 12], full.visible_bounds));
         for (x, y) in [(0.5, 0.5), (10.5, 3.5), (15.5, 11.5)] {
             let ((a, along_a), (b, along_b)) = (quarter.rays.at(x, y), full.rays.at(4.0 * x, 4.0 * y));
             assert!((a - b).length() < 1e-9 && (along_a - along_b).length() < 1e-12, "{size}: {a} {b}");
         }
-        assert_eq!(look("\nray.quarter = true\nray.half = true").ray_size(), [16, 12]);
     }
 }
 
@@ -100,7 +105,7 @@ fn back_from_moving_the_picture_is_whole_again_and_no_frame_was_needed() {
             renderer.picture().expect("picture")
         };
         let mut quarter = half.settings.clone();
-        quarter.ray.quarter = true;
+        quarter.ray.subsampling = 4;
         let quarter = Scene::new(full.geometry.clone(), full.input, quarter).expect("scene");
         let (mean, _) = difference(&picture, &change(&mut renderer, &quarter));
         assert!(mean > 0.0 && mean < 8.0, "{mode}: a quarter is off by {mean}");

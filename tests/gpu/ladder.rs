@@ -154,7 +154,7 @@ fn false_area(renderer: &mut Renderer, full: &Scene, whole: &Mask, settings: Set
     let coarse = Scene::new(full.geometry.clone(), full.input, settings).expect("scene");
     let mask = drawn(renderer, &coarse);
     let ray = coarse.rays.origin_dx.length();
-    whole.reduced(coarse.settings.ray.apart() as usize).largest_difference(&mask) as f64 * ray * ray
+    whole.reduced(coarse.settings.ray.subsampling as usize).largest_difference(&mask) as f64 * ray * ray
 }
 
 /// Turned views, and clip planes on their way through the head.
@@ -211,7 +211,7 @@ fn without_filters_and_with_fewer_rays_holes_open() {
     let mut renderer = stage.renderer(full.clone());
     let whole = drawn(&mut renderer, &full);
     let mut plain = full.settings.moving();
-    plain.ray.quarter = true;
+    plain.ray.subsampling = 4;
     plain.distance = Default::default();
     let plain = false_area(&mut renderer, &full, &whole, plain);
     let rung = built_in_ladder().pop().expect("rungs").apply(&full.settings);

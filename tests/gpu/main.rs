@@ -60,7 +60,6 @@ mod sliding;
 mod start_curve;
 mod still;
 mod stored_volume;
-mod surface_net;
 mod tiles;
 mod timing;
 mod tolerance;

@@ -205,7 +205,7 @@ fn a_pair_is_refused_where_no_surface_is_found() {
 fn a_pair_is_assembled_from_several_rays_and_from_half_of_them() {
     let device = Device::new();
     let geometry = Geometry::Sweep(wobbler());
-    for ray in ["ray.rays = 3", "ray.half = true", "ray.quarter = true"] {
+    for ray in ["ray.rays = 3", "ray.subsampling = 2", "ray.subsampling = 4"] {
         let settings = format!("{}\n{ray}", LOOKS[0]);
         let pair = look(&geometry, "mode = 'sr'\nlayout = 'pair'", &settings, [50, 23]);
         let frames = body_frames(&pair, body);

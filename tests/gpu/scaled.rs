@@ -81,7 +81,7 @@ const SCENES: &[(&str, &str)] = &[
     ),
     ("sr, coloured behind", "mode = 'sr'\nsurface = { colour = 'behind', colour_depth = 8 }"),
     ("sr, samples", "mode = 'sr'\nsurface.edge = 'samples'\nray.rays = 2"),
-    ("sr, half of the rays", "mode = 'sr'\nray.half = true\nlight.cliff = 6"),
+    ("sr, half of the rays", "mode = 'sr'\nray.subsampling = 2\nlight.cliff = 6"),
     ("mixed, caps", "mode = 'mixed'\nsurface.edge = 8\nclip = [{ at = [0, 50, 5], normal = [0.2, -1, 0.3] }]"),
     ("pair", "layout = 'pair'\ncamera.elevation = 20"),
     (

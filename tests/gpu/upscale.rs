@@ -11,12 +11,7 @@ const SIDE: usize = 96;
 
 /// A surface with one ray for several pixels, and cliffs of 2 mm times the pixels between two rays.
 fn coarse(apart: usize) -> Scene {
-    let key = match apart {
-        2 => "half",
-        4 => "quarter",
-        _ => "eighth",
-    };
-    let toml = format!("mode = 'sr'\npicture.size = [{SIDE}, {SIDE}]\nray.{key} = true");
+    let toml = format!("mode = 'sr'\npicture.size = [{SIDE}, {SIDE}]\nray.subsampling = {apart}");
     scene(cartesian([20, 20, 20]), BYTES, &toml)
 }
 
@@ -75,14 +70,14 @@ fn each_pixel_of_every_layout_is_that_of_the_reference() {
     let device = Device::new();
     let mut single = PassRunner::new(&device).expect("single");
     let pass = by_name("assemble").expect("pass");
-    for (layout, key, size) in ["single", "four", "pair"].into_iter().flat_map(|layout| {
+    for (layout, apart, size) in ["single", "four", "pair"].into_iter().flat_map(|layout| {
         let sizes = [[96, 96], [97, 75], [62, 90], [71, 83]];
-        ["half", "quarter", "eighth"].into_iter().flat_map(move |key| sizes.map(|size| (layout, key, size)))
+        [2, 4, 8].into_iter().flat_map(move |apart| sizes.map(|size| (layout, apart, size)))
     }) {
-        let toml = format!("mode = 'sr'\nlayout = '{layout}'\npicture.size = {size:?}\nray.{key} = true");
+        let toml = format!("mode = 'sr'\nlayout = '{layout}'\npicture.size = {size:?}\nray.subsampling = {apart}");
         let scene = scene(cartesian([20, 20, 20]), BYTES, &toml);
         let run = run_with_reference(&mut single, &scene, pass, 0, "noise", 7).expect("dispatch");
-        assert!(run.comparison.worst.is_none(), "{layout} {key} {size:?}: {:?}", run.comparison.worst);
+        assert!(run.comparison.worst.is_none(), "{layout} {apart} {size:?}: {:?}", run.comparison.worst);
     }
 }
 
@@ -195,23 +190,24 @@ fn coarse_pictures_come_nearer_to_the_full_one_than_by_linear_interpolation() {
         let renderer = one.get_or_insert_with(|| stage.renderer(full.clone()));
         draw(renderer, &full);
         let whole = renderer.read(Slot::Picture).expect("read").expect("there");
-        for (apart, key) in [(2.0, "half"), (4.0, "quarter")] {
+        for apart in [2, 4] {
             let mut settings = full.settings.moving();
-            settings.ray.quarter = key == "quarter";
+            settings.ray.subsampling = apart;
             let coarse = Scene::new(full.geometry.clone(), full.input, settings).expect("scene");
             renderer.change(coarse.clone()).expect("change");
             renderer.picture().expect("picture");
             let made = renderer.read(Slot::Picture).expect("read").expect("there");
-            let plain = linear(&renderer.read(Slot::Rendered).expect("read").expect("there"), apart, whole.size);
+            let plain =
+                linear(&renderer.read(Slot::Rendered).expect("read").expect("there"), f64::from(apart), whole.size);
             let (before, after) = (likeness(&whole, &plain), likeness(&whole, &made));
             println!(
-                "{preset} {mode} {key}: mean {:.2} -> {:.2} levels, SSIM {:.4} -> {:.4}",
+                "{preset} {mode} {apart}: mean {:.2} -> {:.2} levels, SSIM {:.4} -> {:.4}",
                 before.0, after.0, before.1, after.1,
             );
             match coarse.has_distance() {
-                true => assert!(after.0 < 0.95 * before.0 && after.1 > before.1, "{key}: {before:?} {after:?}"),
+                true => assert!(after.0 < 0.95 * before.0 && after.1 > before.1, "{apart}: {before:?} {after:?}"),
                 // A GPU's filter rounds its weights to 1/256.
-                false => assert!((after.0 - before.0).abs() < 0.02, "{key}: {before:?} {after:?}"),
+                false => assert!((after.0 - before.0).abs() < 0.02, "{apart}: {before:?} {after:?}"),
             }
         }
     }

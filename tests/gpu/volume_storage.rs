@@ -305,7 +305,7 @@ fn a_moving_view_keeps_its_packed_neighbours() {
         let set = format!("mode = 'mip'\npicture.size = [{size}, {size}]\nslices = {{ pixels = 60, format = 'r8' }}");
         let still = scene(Geometry::Sweep(wobbler()), BYTES, &set);
         let moving = Scene::new(still.geometry.clone(), still.input, still.settings.moving()).expect("scene");
-        assert!(moving.settings.ray.half);
+        assert!(moving.settings.ray.subsampling == 2);
         assert_eq!(
             still.sampled(Sampling::PackedNeighbours).sampling,
             moving.sampled(Sampling::PackedNeighbours).sampling,

@@ -5,14 +5,11 @@ use crate::common::files::repository;
 use crate::common::probes::{voxels, wobbler};
 use crate::common::scenes::{BYTES, FLOATS, scene};
 use echolume::low_level::gpu::WRITERS_OF_RUNS;
-use echolume::low_level::passes::net::NETS;
 use echolume::low_level::passes::{DispatchArgs, Frequency, PASSES, Part, Pass, interface_check, measure};
-use echolume::low_level::probe::{Advance, Axis, Geometry, Grid, Motion, Probe};
-use echolume::low_level::scene::{Lattice, Scene};
+use echolume::low_level::probe::{Advance, Axis, Geometry, Motion, Probe};
+use echolume::low_level::scene::Scene;
 use echolume::low_level::shader_source;
-use echolume::low_level::source::StoredType;
 use echolume::low_level::spirv;
-use echolume::low_level::verify::built_in::geometries;
 use sha2::{Digest, Sha256};
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
@@ -399,28 +396,6 @@ fn scenes() -> Vec<Scene> {
     scenes
 }
 
-/// Scenes of the passes of meshes: in every variant of the geometry, closed and filled or neither.
-fn net_scenes() -> Vec<Scene> {
-    let scene = |source: &Geometry, filled: bool| {
-        let grid = Grid { size: [9, 8, 7], spacing: [1.0; 3], origin: [0.0; 3] };
-        let lattice = Lattice {
-            source: source.clone(),
-            stored: StoredType::U8,
-            grid,
-            deviation: 1.0,
-            threshold: 100.0,
-            closed: filled,
-            left_out: 0,
-            filled_rows: filled.then_some(12),
-            most: Lattice::MOST,
-            first: 0,
-            count: 7,
-        };
-        lattice.scene().expect("a scene")
-    };
-    geometries().iter().flat_map(|(_, geometry)| [false, true].map(|filled| scene(geometry, filled))).collect()
-}
-
 /// Prevents a pass over runs of slices whose writes a validation layer since 2024 takes for hazards, and one that is excused for nothing.
 #[test]
 fn the_writers_of_runs_of_slices_are_listed_for_validation() {
@@ -441,10 +416,8 @@ fn every_pass_agrees_with_every_shader_it_may_use() {
     let mut used = Vec::new();
     // All that a check depends on: many scenes declare the same.
     let mut checked = BTreeSet::new();
-    let nets = net_scenes().into_iter().map(|scene| (NETS.iter().collect(), scene));
-    let needed = |scene: &Scene| PASSES.iter().filter(|p| p.is_needed(scene)).collect::<Vec<_>>();
-    for (passes, scene) in scenes().into_iter().map(|scene| (needed(&scene), scene)).chain(nets) {
-        for pass in passes {
+    for scene in scenes() {
+        for pass in PASSES.iter().filter(|p| p.is_needed(&scene)) {
             for iteration in 0..(pass.repeat)(&scene) {
                 let args = DispatchArgs { iteration, ..DispatchArgs::default() };
                 let shader = pass.shader(&scene, &args);

@@ -39,9 +39,14 @@ fn windows_are_the_nearest_odd_number_of_pixels() {
 
 #[test]
 fn sizes_in_mm_cover_the_same_part_of_a_picture_of_any_size() {
-    for more in
-        ["", "camera.field_of_view = 40", "ray.rays = 2", "ray.half = true", "ray.quarter = true", "ray.eighth = true"]
-    {
+    for more in [
+        "",
+        "camera.field_of_view = 40",
+        "ray.rays = 2",
+        "ray.subsampling = 2",
+        "ray.subsampling = 4",
+        "ray.subsampling = 8",
+    ] {
         let covers = |size: u32| {
             let filters =
                 "distance = { median_mm = 6, bilateral = { mm = 1, distance = 1 }, perona_malik = { width_mm = 3 } }";
@@ -63,7 +68,7 @@ fn sizes_in_mm_cover_the_same_part_of_a_picture_of_any_size() {
         for size in [120, 240] {
             let (ray, [median, bilateral, diffusion]) = covers(size);
             // Halving a window more than once may cost a ray more, and none is smaller than 3.
-            let slack = if more.contains("quarter") || more.contains("eighth") { 2.0 } else { 1.01 };
+            let slack = if more.contains("subsampling = 4") || more.contains("subsampling = 8") { 2.0 } else { 1.01 };
             assert!((median - 6.0).abs() <= slack * ray, "{size}, {more}: {median} mm, rays of {ray} mm");
             assert!(
                 (bilateral - 1.0).abs() < 0.01 && (diffusion - 3.0).abs() < 0.01,

@@ -36,7 +36,7 @@ pub(crate) fn edges_of_face(axis: usize, side: usize) -> [usize; 4] {
 }
 
 /// True if the corners of an edge differ. `inside`: a bit for each corner.
-pub fn is_crossed(inside: u8, edge: usize) -> bool {
+pub(crate) fn is_crossed(inside: u8, edge: usize) -> bool {
     let [a, b] = corners_of(edge);
     (inside >> a ^ inside >> b) & 1 == 1
 }

@@ -6,14 +6,18 @@
 //! Visualization 2004. Two patches that meet on both sides of a face would still share one edge four times: there a vertex is put on the
 //! face. So the mesh is a manifold for any values.
 //!
-//! The lattice comes slice by slice. Memory: two slices of values, the crossed cells of two layers, and the mesh. This is the reference of
-//! the passes that do the same on a device ([`crate::passes::net`]): which cells are crossed, and where their vertices lie. What follows
-//! from that is [`super::polygons`] for both.
+//! The lattice comes slice by slice. Memory: a few slices of values, the crossed cells of a few layers, and the mesh. The rows of a layer are
+//! searched at the same time, and slices are filled while polygons are made of those before ([`super::polygons`]).
 
 use super::Mesh;
 use super::cell;
 use super::polygons::{Builder, Cell, Vertex, cells_of};
 use glam::DVec3;
+use rayon::prelude::*;
+use std::sync::{Arc, mpsc};
+
+/// Layers that are found before polygons are made of them.
+const LAYERS_AHEAD: usize = 2;
 
 /// The surface to find.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -30,10 +34,10 @@ pub struct Surface {
 ///
 /// # Errors
 /// An error of `slice`, or in words more triangles than are made.
-pub fn surface_net<E: From<String>>(
+pub fn surface_net<E: From<String> + Send>(
     size: [usize; 3],
     surface: Surface,
-    mut slice: impl FnMut(usize, &mut [f64]) -> Result<(), E>,
+    mut slice: impl FnMut(usize, &mut [f64]) -> Result<(), E> + Send,
     place: impl Fn(DVec3) -> DVec3,
 ) -> Result<Mesh, E> {
     let cells = cells_of(size, surface.closed);
@@ -44,37 +48,51 @@ pub fn surface_net<E: From<String>>(
     let pad = usize::from(surface.closed);
     let (width, height) = (cells[0] + 1, cells[1] + 1);
     let mut own = vec![f64::NAN; size[0] * size[1]];
-    let mut fill = |z: usize, out: &mut Vec<f64>| -> Result<(), E> {
-        out.clear();
-        out.resize(width * height, f64::NAN);
-        if z < pad || z >= pad + size[2] {
-            return Ok(());
+    let mut fill = |z: usize| -> Result<Arc<Vec<f64>>, E> {
+        let mut out = vec![f64::NAN; width * height];
+        if (pad..pad + size[2]).contains(&z) {
+            slice(z - pad, &mut own)?;
+            for (y, row) in own.chunks_exact(size[0]).enumerate() {
+                let at = (y + pad) * width + pad;
+                out[at..at + size[0]].copy_from_slice(row);
+            }
         }
-        slice(z - pad, &mut own)?;
-        for (y, row) in own.chunks_exact(size[0]).enumerate() {
-            let at = (y + pad) * width + pad;
-            out[at..at + size[0]].copy_from_slice(row);
-        }
-        Ok(())
+        Ok(Arc::new(out))
     };
-    let mut builder = Builder::new(surface.closed, place);
-    let mut slices = Slices { surface, width, values: [Vec::new(), Vec::new()] };
-    fill(0, &mut slices.values[1])?;
-    for z in 0..cells[2] {
-        slices.values.swap(0, 1);
-        fill(z + 1, &mut slices.values[1])?;
-        builder.take(vec![slices.crossed()], |vertices| {
-            Ok::<_, E>(vertices.iter().map(|vertex| slices.offset(vertex)).collect())
-        })?;
-    }
-    Ok(builder.finish())
+    let (sender, layers) = mpsc::sync_channel(LAYERS_AHEAD);
+    std::thread::scope(|scope| {
+        scope.spawn(move || {
+            let mut send_layers = || -> Result<(), E> {
+                let mut above = fill(0)?;
+                for z in 0..cells[2] {
+                    let below = std::mem::replace(&mut above, fill(z + 1)?);
+                    let slices = Slices { surface, width, values: [below, above.clone()] };
+                    let crossed = slices.crossed();
+                    // Nobody takes them any more where a mesh has too many triangles.
+                    if sender.send(Ok((slices, crossed))).is_err() {
+                        break;
+                    }
+                }
+                Ok(())
+            };
+            if let Err(error) = send_layers() {
+                drop(sender.send(Err(error)));
+            }
+        });
+        let mut builder = Builder::new(surface.closed, place);
+        for layer in layers {
+            let (slices, crossed): (Slices, _) = layer?;
+            builder.take(crossed, |vertex| slices.offset(vertex))?;
+        }
+        Ok(builder.finish())
+    })
 }
 
 /// The slices below and above a layer of cells.
 struct Slices {
     surface: Surface,
     width: usize,
-    values: [Vec<f64>; 2],
+    values: [Arc<Vec<f64>>; 2],
 }
 
 impl Slices {
@@ -86,18 +104,15 @@ impl Slices {
     fn crossed(&self) -> Vec<Cell> {
         let across = self.width - 1;
         let rows = self.values[0].len() / self.width - 1;
-        let mut found = Vec::new();
-        for (x, y) in (0..rows).flat_map(|y| (0..across).map(move |x| (x, y))) {
+        let cell = |x: usize, y: usize| {
             let values: [f64; 8] = std::array::from_fn(|corner| self.corner(x, y, corner));
             // Not for NaN.
             let is_inside = |n: &usize| values[*n] >= self.surface.threshold;
             let inside = (0..8).filter(is_inside).fold(0u8, |bits, n| bits | 1 << n);
-            if inside != 0 && inside != u8::MAX {
-                let is_known = self.surface.closed || !values.iter().any(|value| value.is_nan());
-                found.push(Cell { x: x as u32, y: y as u32, inside, is_known });
-            }
-        }
-        found
+            let is_known = self.surface.closed || !values.iter().any(|value| value.is_nan());
+            (inside != 0 && inside != u8::MAX).then_some(Cell { x: x as u32, y: y as u32, inside, is_known })
+        };
+        (0..rows).into_par_iter().flat_map_iter(|y| (0..across).filter_map(move |x| cell(x, y))).collect()
     }
 
     /// Where a vertex is, from the first corner of its cell, voxels.
@@ -139,7 +154,7 @@ pub(super) mod tests {
     use proptest::prelude::*;
 
     /// The net of a function of the voxel, with voxels `h` apart.
-    pub fn net(size: [usize; 3], threshold: f64, closed: bool, h: f64, value: impl Fn(DVec3) -> f64) -> Mesh {
+    pub fn net(size: [usize; 3], threshold: f64, closed: bool, h: f64, value: impl Fn(DVec3) -> f64 + Sync) -> Mesh {
         let slice = |z: usize, out: &mut [f64]| {
             for (n, out) in out.iter_mut().enumerate() {
                 *out = value(DVec3::new((n % size[0]) as f64, (n / size[0]) as f64, z as f64));

@@ -1,8 +1,7 @@
-//! From the crossed cells of a lattice to a mesh: which vertices there are, and the polygons between them. Signs decide both, so that this is
-//! the same for cells that the CPU found and for those that a device did. Where a vertex lies is asked for.
+//! From the crossed cells of a lattice to a mesh: which vertices there are, and the polygons between them. Signs decide both. Where a vertex lies is
+//! asked for.
 //!
-//! Only crossed cells are kept, of a few layers. Layers, cells and vertices are in the order of the lattice whoever found them: the same
-//! values make the same file.
+//! Only crossed cells are kept, of two layers. Layers, cells and vertices are in the order of the lattice: the same values make the same file.
 
 use super::Mesh;
 use super::cell::{self, Patches};
@@ -60,7 +59,7 @@ struct Arc {
 }
 
 /// Cells along each axis of a lattice of `size` voxels.
-pub fn cells_of(size: [usize; 3], closed: bool) -> [usize; 3] {
+pub(crate) fn cells_of(size: [usize; 3], closed: bool) -> [usize; 3] {
     let pad = usize::from(closed);
     match size.contains(&0) {
         true => [0; 3],
@@ -86,41 +85,29 @@ impl<P: Fn(DVec3) -> DVec3> Builder<P> {
         }
     }
 
-    /// Takes the crossed cells of the next layers, in order. `offsets`: of vertices from the first corner of their cells, voxels.
+    /// Takes the crossed cells of the next layer, in order. `offset`: of a vertex from the first corner of its cell, voxels.
     ///
     /// # Errors
-    /// An error of `offsets`, or in words more triangles than are made.
-    pub fn take<E: From<String>>(
-        &mut self,
-        layers: Vec<Vec<Cell>>,
-        offsets: impl FnOnce(&[Vertex]) -> Result<Vec<DVec3>, E>,
-    ) -> Result<(), E> {
-        let (first, begin) = (self.taken, self.mesh.vertices.len());
+    /// In words, more triangles than are made.
+    pub fn take(&mut self, cells: Vec<Cell>, offset: impl Fn(&Vertex) -> DVec3) -> Result<(), String> {
+        let (z, begin) = (self.taken, self.mesh.vertices.len());
         // Those of the layer before are still needed.
-        self.on_faces.retain(|arc, _| arc.face[2] + 1 >= first);
-        let mut vertices = Vec::new();
-        let mut all: Vec<Layer> = vec![std::mem::take(&mut self.last)];
-        for (n, cells) in layers.into_iter().enumerate() {
-            let layer = self.patch_vertices(first + n, cells, begin, &mut vertices);
-            self.face_vertices(first + n, &all[n], &layer, begin, &mut vertices);
-            all.push(layer);
-            if begin + vertices.len() > MAX_TRIANGLES {
-                return Err(too_many().into());
-            }
+        self.on_faces.retain(|arc, _| arc.face[2] + 1 >= z);
+        let (before, mut vertices) = (std::mem::take(&mut self.last), Vec::new());
+        let layer = self.patch_vertices(z, cells, begin, &mut vertices);
+        self.face_vertices(z, &before, &layer, begin, &mut vertices);
+        if begin + vertices.len() > MAX_TRIANGLES {
+            return Err(too_many());
         }
-        let offsets = offsets(&vertices)?;
-        for (vertex, offset) in vertices.iter().zip(offsets) {
+        for vertex in &vertices {
             let corner = DVec3::from_array(vertex.cell.map(|n| f64::from(n) - self.pad as f64));
-            self.mesh.vertices.push((self.place)(corner + offset));
+            self.mesh.vertices.push((self.place)(corner + offset(vertex)));
         }
-        for (n, pair) in all.windows(2).enumerate() {
-            self.polygons(first + n, &pair[0], &pair[1]);
-            if self.mesh.triangles.len() > MAX_TRIANGLES {
-                return Err(too_many().into());
-            }
+        self.polygons(z, &before, &layer);
+        if self.mesh.triangles.len() > MAX_TRIANGLES {
+            return Err(too_many());
         }
-        self.taken = first + all.len() - 1;
-        self.last = all.pop().unwrap_or_default();
+        (self.taken, self.last) = (z + 1, layer);
         Ok(())
     }
 

@@ -44,47 +44,73 @@ impl Smoother {
             self.slices.pop_front();
             self.first += 1;
         }
-        let (slices, kernel) = (&self.slices, &self.kernels[2]);
-        let first = self.first;
-        out.par_iter_mut().enumerate().for_each(|(n, out)| {
-            let value = |k: usize| slices.get(k.wrapping_sub(first)).map_or(f64::NAN, |slice| slice[n]);
-            if !value(z).is_nan() {
-                *out = mean((from..=to).map(|k| (value(k), kernel[k.abs_diff(z)])));
-            } else {
-                *out = f64::NAN;
-            }
+        let (slices, kernel, first) = (&self.slices, &self.kernels[2], self.first);
+        let width = self.width.max(1);
+        out.par_chunks_mut(width).enumerate().for_each(|(y, out)| {
+            let row = |k: usize| &slices[k - first][y * width..][..out.len()];
+            let mean = Mean::of(out.len(), (from..=to).map(|k| (row(k), kernel[k.abs_diff(z)])));
+            mean.over(row(z), out);
         });
     }
 
     /// A slice smoothed along its rows and columns.
     fn within(&self, slice: &[f64]) -> Vec<f64> {
         let [along, down, _] = &self.kernels;
-        let width = self.width;
-        let height = slice.len() / width.max(1);
-        let pass =
-            |source: &[f64], kernel: &[f64], stride: usize, position: fn(usize, usize) -> usize, count: usize| {
-                let mut result = vec![f64::NAN; source.len()];
-                result.par_iter_mut().enumerate().for_each(|(n, out)| {
-                    if source[n].is_nan() {
-                        return;
-                    }
-                    let at = position(n, width);
-                    let (low, high) = (at.saturating_sub(kernel.len() - 1), (at + kernel.len()).min(count));
-                    *out = mean((low..high).map(|k| (source[n + k * stride - at * stride], kernel[k.abs_diff(at)])));
-                });
-                result
-            };
-        let rows = pass(slice, along, 1, |n, width| n % width, width);
-        pass(&rows, down, width, |n, width| n / width, height)
+        let width = self.width.max(1);
+        let (height, reach) = (slice.len() / width, down.len() - 1);
+        let mut rows = vec![f64::NAN; slice.len()];
+        rows.par_chunks_mut(width).zip(slice.par_chunks(width)).for_each(|(out, row)| {
+            let mut mean = Mean::new(width);
+            for (k, weight) in (1 - along.len() as isize..).zip(along.iter().rev().chain(&along[1..])) {
+                // What lies k further along, where that is within the row.
+                let (to, from) = ((-k).max(0) as usize, k.max(0) as usize);
+                mean.add(to, &row[from..width - to], *weight);
+            }
+            mean.over(row, out);
+        });
+        let mut smoothed = vec![f64::NAN; slice.len()];
+        smoothed.par_chunks_mut(width).enumerate().for_each(|(y, out)| {
+            let row = |k: usize| &rows[k * width..][..width];
+            let near = y.saturating_sub(reach)..(y + reach + 1).min(height);
+            Mean::of(width, near.map(|k| (row(k), down[k.abs_diff(y)]))).over(row(y), out);
+        });
+        smoothed
     }
 }
 
-/// The weighted mean of the known values.
-fn mean(values: impl Iterator<Item = (f64, f64)>) -> f64 {
-    let known = values.filter(|(value, _)| !value.is_nan());
-    let (sum, weights) =
-        known.fold((0.0, 0.0), |(sum, weights), (value, weight)| (sum + weight * value, weights + weight));
-    sum / weights
+/// Weighted means of the known values of rows, one for each place.
+struct Mean {
+    sums: Vec<f64>,
+    weights: Vec<f64>,
+}
+
+impl Mean {
+    fn new(width: usize) -> Mean {
+        Mean { sums: vec![0.0; width], weights: vec![0.0; width] }
+    }
+
+    fn of<'a>(width: usize, rows: impl Iterator<Item = (&'a [f64], f64)>) -> Mean {
+        let mut mean = Mean::new(width);
+        rows.for_each(|(row, weight)| mean.add(0, row, weight));
+        mean
+    }
+
+    /// Adds values to the means from a place on. Without a branch, so that several are added at once.
+    fn add(&mut self, from: usize, values: &[f64], weight: f64) {
+        let means = self.sums[from..].iter_mut().zip(&mut self.weights[from..]);
+        for ((sum, weights), value) in means.zip(values) {
+            let is_known = !value.is_nan();
+            *sum += if is_known { weight * value } else { 0.0 };
+            *weights += if is_known { weight } else { 0.0 };
+        }
+    }
+
+    /// Writes the means where a row is known.
+    fn over(&self, row: &[f64], out: &mut [f64]) {
+        for (n, out) in out.iter_mut().enumerate() {
+            *out = if row[n].is_nan() { f64::NAN } else { self.sums[n] / self.weights[n] };
+        }
+    }
 }
 
 #[cfg(test)]

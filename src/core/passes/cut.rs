@@ -10,7 +10,7 @@ use super::pass::*;
 use crate::probe::{Geometry, Motion};
 use crate::scene::{Scene, start_curve};
 
-pub const PASS: Pass = Pass {
+pub(crate) const PASS: Pass = Pass {
     name: "cut",
     stage: Stage::Preprocess,
     frequency: Frequency::Volume,

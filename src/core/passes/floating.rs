@@ -4,7 +4,6 @@
 
 use super::components::Lattice;
 use super::pass::*;
-use super::slots::Format;
 use crate::scene::Scene;
 
 /// How far below the level texels are put: more than the rounding of any format of a volume, the step of 8 bits.
@@ -49,6 +48,13 @@ pub const DROP: Pass = Pass {
     },
 };
 
+pub(super) const SEARCH: Search = Search {
+    name: "floating",
+    within: Slot::WholeVolume,
+    find: |scene, bytes| Found { texels: find(scene, bytes), unveiled: None },
+    reference,
+};
+
 fn level(scene: &Scene) -> f64 {
     scene.floating_level().unwrap_or(0.0)
 }
@@ -81,7 +87,7 @@ pub fn reference(scene: &Scene, volume: &Texels) -> Texels {
     let [columns, rows, slices] = volume.size;
     let (level, reach, sizes) = (level(scene), scene.part_reach() as i64, scene.texel_sizes());
     let is_set = |[x, y, z]: [usize; 3]| volume.one(x, y, z) > level;
-    let mut floating = Texels::from_fn(volume.size, Format::R8.channels(), |_, _| 0.0);
+    let mut floating = Texels::from_fn(volume.size, 1, |_, _| 0.0);
     let mut seen = vec![false; columns * rows * slices];
     let index = |[x, y, z]: [usize; 3]| (z * rows + y) * columns + x;
     let all = (0..slices).flat_map(|z| (0..rows).flat_map(move |y| (0..columns).map(move |x| [x, y, z])));

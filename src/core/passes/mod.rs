@@ -10,7 +10,6 @@ pub mod floating;
 pub mod interface_check;
 pub mod lookup_tables;
 pub mod measure;
-pub mod net;
 pub mod pass;
 pub mod slots;
 pub mod texels;

@@ -2,7 +2,7 @@
 //! and no list of passes; what follows from a pass's place in [`PASSES`](super::PASSES) is in [`chain`](super::chain).
 
 pub(super) use super::slots::composited_beside_surface;
-pub use super::slots::{Slot, rendered};
+pub use super::slots::{Found, Search, Slot, rendered};
 pub use super::texels::{Arrays, Texels};
 use crate::scene::Scene;
 use glam::DVec3;
@@ -366,12 +366,6 @@ impl Params {
     }
 
     pub fn i32(mut self, name: &'static str, value: u32) -> Params {
-        self.0.push((name, Value::I32(value as i32)));
-        self
-    }
-
-    /// One that may be negative.
-    pub(super) fn signed(mut self, name: &'static str, value: i64) -> Params {
         self.0.push((name, Value::I32(value as i32)));
         self
     }

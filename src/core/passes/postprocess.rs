@@ -143,7 +143,7 @@ fn distance(plane: &Plane, other: &Plane, place: DVec3) -> f64 {
 
 /// True if edges are looked for: between rays that are pixels apart, or through pixels with one ray.
 fn has_edges(scene: &Scene) -> bool {
-    scene.settings.ray.apart() > 1 || scene.antialiases()
+    scene.settings.ray.subsampling > 1 || scene.antialiases()
 }
 
 /// What tells edges: the distance of the surface on each ray. Compositing and projections blend what lies behind each other: their pictures are smooth between
@@ -172,7 +172,7 @@ fn edge_distances(scene: &Scene, reads: &Arrays, is_rendering: bool) -> Option<T
 /// One invocation per pixel; where pixels are between rays, one for those of a column between the same two rows of rays, of which the first has half as many.
 fn assemble_extent(scene: &Scene, _: &DispatchArgs) -> [u32; 3] {
     let [width, height] = scene.picture_size();
-    match scene.settings.ray.apart() {
+    match scene.settings.ray.subsampling {
         1 => [width, height, 1],
         apart => {
             let upper = if scene.settings.layout == Layout::Four { height / 2 } else { 0 };
@@ -248,7 +248,7 @@ fn why_assembled(scene: &Scene, layout: Layout) -> &'static str {
     match layout {
         Layout::Four => "the rendering stands beside three planes",
         Layout::Pair => "the volume stands beside the surface",
-        Layout::Single if scene.settings.ray.apart() > 1 => "one ray makes several pixels",
+        Layout::Single if scene.settings.ray.subsampling > 1 => "one ray makes several pixels",
         Layout::Single if scene.antialiases() => "edges are antialiased",
         Layout::Single if scene.adapts_rays() => "several rays make a pixel at an edge",
         Layout::Single => "several rays make a pixel",
@@ -282,7 +282,7 @@ fn assemble_constants(scene: &Scene) -> Vec<(&'static str, i32)> {
     let refined = scene.adapts_rays();
     vec![
         ("RAYS", ray.rays as i32),
-        ("APART", ray.apart() as i32),
+        ("APART", ray.subsampling as i32),
         ("LAYOUT", layout),
         ("GUIDED", guided as i32),
         ("REFINED", refined as i32),
@@ -313,8 +313,8 @@ fn assemble(scene: &Scene, reads: &Arrays, picture: &mut Texels) {
                 false => (reads.get("composited"), [0, 0]),
             };
             let distances = if is_rendering { &of_rendering } else { &beside };
-            if scene.settings.ray.apart() > 1 {
-                let apart = f64::from(scene.settings.ray.apart());
+            if scene.settings.ray.subsampling > 1 {
+                let apart = f64::from(scene.settings.ray.subsampling);
                 let guide = distances.as_ref().map(|distances| (distances, scene.cliff()));
                 picture.set([x, y, 0], &between(shown, guide, apart, [x - corner[0], y - corner[1]]));
                 continue;

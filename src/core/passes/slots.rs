@@ -2,7 +2,8 @@
 //! follow from the scene. A slot that no pass of a plan names does not exist.
 
 use super::raycast::tolerance;
-use super::{cut, lookup_tables, net};
+use super::unveil::{self, Unveiled};
+use super::{MISS, Texels, cut, floating, lookup_tables};
 use crate::probe::StoredType;
 use crate::scene::planes::{TILE_VECTORS, cell};
 use crate::scene::{Propagation, Scene, SurfaceColour, VolumeFormat, WindowTexels};
@@ -38,6 +39,7 @@ struct Descriptor {
     initializer: Initializer,
     /// How to tell that two scenes make different content, where it is made from the scene.
     differs: Differs,
+    meaning: Meaning,
     /// True if each of the volume images has its own copy.
     is_multibuffered: bool,
     /// True if texels that no pass writes are read as 0: those of slices outside the sector.
@@ -47,6 +49,20 @@ struct Descriptor {
     crosses_queues: bool,
 }
 
+/// What the values of a slot are, for whoever reads it (`--dump`).
+#[derive(Clone, Copy)]
+pub(crate) struct Meaning {
+    pub channels: &'static [&'static str],
+    pub unit: &'static str,
+    /// The value where nothing was hit.
+    pub miss: Option<f64>,
+}
+
+const GREY: &[&str] = &["value"];
+const COLOUR: &[&str] = &["red", "green", "blue", "alpha"];
+/// Of samples of the recording.
+const SHARE_OF_RANGE: &str = "share of the range of the recording's samples, 0..1, before the grey window";
+
 /// Who writes a slot first.
 #[derive(Clone, Copy)]
 pub enum Initializer {
@@ -55,7 +71,28 @@ pub enum Initializer {
     /// Made from the scene by the CPU, in f64, stored as f32.
     ByScene(fn(&Scene) -> Vec<f32>),
     /// Found by the CPU in a volume, when that is complete.
-    ByVolume,
+    ByVolume(Search),
+}
+
+/// A search of the CPU in a volume.
+#[derive(Clone, Copy)]
+pub struct Search {
+    /// For the times of the host.
+    pub name: &'static str,
+    /// The volume that is searched.
+    pub within: Slot,
+    /// Gets its texels, in their format.
+    pub find: fn(&Scene, &[u8]) -> Found,
+    /// The same in f64, another way.
+    pub reference: fn(&Scene, &Texels) -> Texels,
+}
+
+/// What a search found.
+pub struct Found {
+    /// Texels of the slot, in its format.
+    pub texels: Vec<u8>,
+    /// Where rendering starts, if that was asked for.
+    pub unveiled: Option<Unveiled>,
 }
 
 /// How to tell that two scenes make different content of a slot.
@@ -76,6 +113,7 @@ impl Descriptor {
             format,
             initializer: Initializer::ByPasses,
             differs: Differs::ByContent,
+            meaning: Meaning { channels: &[], unit: "", miss: None },
             is_multibuffered: false,
             starts_clear: false,
             crosses_queues: false,
@@ -92,6 +130,16 @@ impl Descriptor {
         Descriptor::image(name, shape, |_| Format::Floats).by_scene(make, differs)
     }
 
+    /// `channels`: their names, as many as texels have or more.
+    const fn of(self, channels: &'static [&'static str], unit: &'static str) -> Descriptor {
+        Descriptor { meaning: Meaning { channels, unit, miss: None }, ..self }
+    }
+
+    const fn distances(self) -> Descriptor {
+        let unit = "mm along the ray of the pixel, from the ray's origin";
+        Descriptor { meaning: Meaning { channels: GREY, unit, miss: Some(MISS) }, ..self }
+    }
+
     const fn by_frames(self) -> Descriptor {
         Descriptor { initializer: Initializer::ByFrames, ..self }
     }
@@ -101,8 +149,8 @@ impl Descriptor {
     }
 
     /// `differs`: whether two scenes find other content in the same volume.
-    const fn by_volume(self, differs: fn(&Scene, &Scene) -> bool) -> Descriptor {
-        Descriptor { initializer: Initializer::ByVolume, differs: Differs::By(differs), ..self }
+    const fn by_volume(self, search: Search, differs: fn(&Scene, &Scene) -> bool) -> Descriptor {
+        Descriptor { initializer: Initializer::ByVolume(search), differs: Differs::By(differs), ..self }
     }
 
     const fn multibuffered(self) -> Descriptor {
@@ -126,6 +174,10 @@ macro_rules! slots {
 
         const DESCRIPTORS: &[Descriptor] = &[$($descriptor,)*];
 
+        const _: () = {
+            $(assert!(Slot::$slot.descriptor().meaning.channels.len() > 0, stringify!($slot));)*
+        };
+
         impl Slot {
             pub const ALL: &'static [Slot] = &[$(Slot::$slot,)*];
         }
@@ -137,124 +189,124 @@ use Differs::{By, ByContent};
 
 slots! {
     /// Arriving frames, one a layer: those of every batch in flight.
-    Frames = D::image("frames", frame_layers, frame_format).by_frames().across_queues();
+    Frames = D::image("frames", frame_layers, frame_format).by_frames().across_queues().of(GREY, SHARE_OF_RANGE);
     /// Gain of every sample of a line.
-    Tgc = D::table("tgc", |s| Shape::Buffer(4 * s.frame_size()[0]), lookup_tables::tgc, ByContent);
+    Tgc = D::table("tgc", |s| Shape::Buffer(4 * s.frame_size()[0]), lookup_tables::tgc, ByContent).of(GREY, "gain of a sample: a factor, or an addend where samples are log-compressed");
     /// The frame after line conditioning: decimated samples x lines.
-    Conditioned = D::image("conditioned", |s| batch(s.line_lattice(), s), |_| Format::R32f).across_queues();
+    Conditioned = D::image("conditioned", |s| batch(s.line_lattice(), s), |_| Format::R32f).across_queues().of(GREY, SHARE_OF_RANGE);
     /// (sample, line) of every slice pixel on the lattice that is scan-converted; -1 outside the sector.
     ScanLut = D::image("scan_lut", one_slice, |_| Format::Rg32f)
         .by_scene(lookup_tables::scan_lut, By(lattice_differs))
-        .across_queues();
+        .across_queues().of(&["sample", "line"], "index from 0; -1 outside the sector");
     /// Slices between filters of stage 1. In these slots each slice of a batch is a layer.
-    SliceA = D::image("slice_a", slices, |_| Format::R32f).clear().across_queues();
-    SliceB = D::image("slice_b", slices, |_| Format::R32f).clear().across_queues();
+    SliceA = D::image("slice_a", slices, |_| Format::R32f).clear().across_queues().of(GREY, SHARE_OF_RANGE);
+    SliceB = D::image("slice_b", slices, |_| Format::R32f).clear().across_queues().of(GREY, SHARE_OF_RANGE);
     /// How many rings the window of the enhanced sigma filter grew, at each pixel of the last batch's slices.
-    Growth = D::image("growth", slices, |_| Format::R32f).across_queues();
+    Growth = D::image("growth", slices, |_| Format::R32f).across_queues().of(GREY, "rings of pixels");
     /// Of a slice's rows or columns under elimination: u = forward + shares u of the next pixel.
-    SliceShares = D::image("slice_shares", slices, |_| Format::R32f).across_queues();
-    SliceForward = D::image("slice_forward", slices, |_| Format::R32f).across_queues();
+    SliceShares = D::image("slice_shares", slices, |_| Format::R32f).across_queues().of(GREY, "share, 0..1");
+    SliceForward = D::image("slice_forward", slices, |_| Format::R32f).across_queues().of(GREY, SHARE_OF_RANGE);
     /// A slice diffused along its rows.
-    SliceRows = D::image("slice_rows", slices, |_| Format::R32f).across_queues();
+    SliceRows = D::image("slice_rows", slices, |_| Format::R32f).across_queues().of(GREY, SHARE_OF_RANGE);
     /// A slice after a complete step, and after the first half of one, of AOS with Richardson's extrapolation.
-    SliceStep = D::image("slice_step", slices, |_| Format::R32f).across_queues();
-    SliceHalfStep = D::image("slice_half_step", slices, |_| Format::R32f).across_queues();
+    SliceStep = D::image("slice_step", slices, |_| Format::R32f).across_queues().of(GREY, SHARE_OF_RANGE);
+    SliceHalfStep = D::image("slice_half_step", slices, |_| Format::R32f).across_queues().of(GREY, SHARE_OF_RANGE);
     /// A slice after a stage of RKL1. Each stage reads the last two.
-    SliceStageA = D::image("slice_stage_a", slices, |_| Format::R32f).across_queues();
-    SliceStageB = D::image("slice_stage_b", slices, |_| Format::R32f).across_queues();
-    SliceStageC = D::image("slice_stage_c", slices, |_| Format::R32f).across_queues();
+    SliceStageA = D::image("slice_stage_a", slices, |_| Format::R32f).across_queues().of(GREY, SHARE_OF_RANGE);
+    SliceStageB = D::image("slice_stage_b", slices, |_| Format::R32f).across_queues().of(GREY, SHARE_OF_RANGE);
+    SliceStageC = D::image("slice_stage_c", slices, |_| Format::R32f).across_queues().of(GREY, SHARE_OF_RANGE);
     /// The volume before smoothing across slices.
-    SharpVolume = D::image("sharp_volume", volume, volume_format).multibuffered().clear().across_queues();
+    SharpVolume = D::image("sharp_volume", volume, volume_format).multibuffered().clear().across_queues().of(GREY, SHARE_OF_RANGE);
     /// The volume before parts that float are dropped.
-    WholeVolume = D::image("whole_volume", volume, volume_format).multibuffered().clear().across_queues();
+    WholeVolume = D::image("whole_volume", volume, volume_format).multibuffered().clear().across_queues().of(GREY, SHARE_OF_RANGE);
     /// 1 in parts of a volume that float.
     Floating = D::image("floating", volume, |_| Format::R8)
-        .by_volume(|a, b| a.floating_basis() != b.floating_basis());
+        .by_volume(floating::SEARCH, |a, b| a.floating_basis() != b.floating_basis()).of(GREY, "1 in parts of the volume that float");
     /// The 3D texture that rays are cast through: the part that is visible.
-    Volume = D::image("volume", volume, volume_format).multibuffered().clear().across_queues();
+    Volume = D::image("volume", volume, volume_format).multibuffered().clear().across_queues().of(GREY, SHARE_OF_RANGE);
     /// The volume without what is removed, by cuts or in front of the render start: rays are cast through it in place of the other.
-    CutVolume = D::image("cut_volume", volume, volume_format).multibuffered().clear();
+    CutVolume = D::image("cut_volume", volume, volume_format).multibuffered().clear().of(GREY, SHARE_OF_RANGE);
     /// The row of each column and slice of the volume at which rendering starts.
     StartSurface = D::image("start_surface", |s| Shape::Two([s.grid.size[0], s.slices()]), |_| Format::R32f)
-        .by_volume(|a, b| a.unveil_basis() != b.unveil_basis())
-        .multibuffered();
+        .by_volume(unveil::SEARCH, |a, b| a.unveil_basis() != b.unveil_basis())
+        .multibuffered().of(GREY, "row of the volume, by column and slice");
     /// The first row of each column and slice of the volume that is not in front of the curved render start.
     StartCurve = D::image("start_curve", |s| Shape::Two([s.grid.size[0], s.slices()]), |_| Format::R32f)
-        .by_scene(cut::start_curve, By(|a, b| a.start_curve_differs(b)));
+        .by_scene(cut::start_curve, By(|a, b| a.start_curve_differs(b))).of(GREY, "row of the volume, by column and slice");
     /// The cuts: the axes of their views, and the edges of their contours.
-    Cuts = D::table("cuts", |s| Shape::Buffer(16 * cut::table_length(s) as u32), cut::table, ByContent);
+    Cuts = D::table("cuts", |s| Shape::Buffer(16 * cut::table_length(s) as u32), cut::table, ByContent).of(&["x", "y", "z", "w"], "vectors as the shader takes them");
     /// Where each slice is.
-    SlicePlaces = D::table("slice_places", |s| Shape::Buffer(16 * s.slices()), cut::slice_places, ByContent);
+    SlicePlaces = D::table("slice_places", |s| Shape::Buffer(16 * s.slices()), cut::slice_places, ByContent).of(&["x", "y", "z", "w"], "vectors as the shader takes them");
     /// Share of the lines of a frame that fired before the one at each texel of a slice.
-    LineShares = D::image("line_shares", one_slice, |_| Format::R32f).by_scene(cut::line_shares, By(lattice_differs));
+    LineShares = D::image("line_shares", one_slice, |_| Format::R32f).by_scene(cut::line_shares, By(lattice_differs)).of(GREY, "share of the frame's lines that fired before");
     /// The volume that the planes beside a rendering are cut from, before smoothing across slices, and after.
-    SharpSectionVolume = D::image("sharp_section_volume", volume, volume_format).multibuffered().clear().across_queues();
-    SectionVolume = D::image("section_volume", volume, volume_format).multibuffered().clear().across_queues();
+    SharpSectionVolume = D::image("sharp_section_volume", volume, volume_format).multibuffered().clear().across_queues().of(GREY, SHARE_OF_RANGE);
+    SectionVolume = D::image("section_volume", volume, volume_format).multibuffered().clear().across_queues().of(GREY, SHARE_OF_RANGE);
     /// Each texel of the volume with its neighbours one column and one row on, as their bits.
-    PackedNeighbours = D::image("packed_neighbours", volume, four_texels).multibuffered();
+    PackedNeighbours = D::image("packed_neighbours", volume, four_texels).multibuffered().of(&["bits", "more_bits"], "bits of a texel and of its neighbours one column on, one row on, and both");
     /// Smallest and largest value of every tile of every slice.
-    TileRanges = D::image("tile_ranges", |s| Shape::Three(s.tile_counts()), |_| Format::Rg16).multibuffered().clear();
+    TileRanges = D::image("tile_ranges", |s| Shape::Three(s.tile_counts()), |_| Format::Rg16).multibuffered().clear().of(&["smallest", "largest"], SHARE_OF_RANGE);
     /// Which tiles the samples in each brick may touch, and on which side of the sector's border the brick is.
     BrickTable = D::table(
         "brick_table",
         |s| Shape::Buffer(16 * s.bricks().total() as u32),
         lookup_tables::brick_table,
         By(|a, b| !a.geometry.equals_except_direction(&b.geometry) || a.brick_basis() != b.brick_basis()),
-    );
+    ).of(&["tile_columns", "tile_rows", "slices", "side"], "indices: 4096 first + last; side: 0 outside the sector, 1 across its border, 2 inside");
     /// Smallest and largest value that samples within each brick may have.
-    BrickRanges = D::image("brick_ranges", per_brick, |_| Format::Rg16).multibuffered();
+    BrickRanges = D::image("brick_ranges", per_brick, |_| Format::Rg16).multibuffered().of(&["smallest", "largest"], SHARE_OF_RANGE);
     /// The kind of each brick to a mode: active, empty or homogeneous.
-    BrickKinds = D::image("brick_kinds", per_brick, |_| Format::R8);
+    BrickKinds = D::image("brick_kinds", per_brick, |_| Format::R8).of(GREY, "(64 kind + distance in bricks) / 255; kinds: 0 active, 1 empty, 2 homogeneous");
     /// The same with the distance to the nearest brick of another kind along x, and within x and y.
-    BrickDistancesX = D::image("brick_distances_x", per_brick, |_| Format::R8);
-    BrickDistancesXy = D::image("brick_distances_xy", per_brick, |_| Format::R8);
+    BrickDistancesX = D::image("brick_distances_x", per_brick, |_| Format::R8).of(GREY, "(64 kind + distance in bricks) / 255; kinds: 0 active, 1 empty, 2 homogeneous");
+    BrickDistancesXy = D::image("brick_distances_xy", per_brick, |_| Format::R8).of(GREY, "(64 kind + distance in bricks) / 255; kinds: 0 active, 1 empty, 2 homogeneous");
     /// The same in space: for the surface detector, and for the mode that composites or takes the mean.
-    SurfaceBrickDistances = D::image("surface_brick_distances", per_brick, |_| Format::R8);
-    VolumeBrickDistances = D::image("volume_brick_distances", per_brick, |_| Format::R8);
+    SurfaceBrickDistances = D::image("surface_brick_distances", per_brick, |_| Format::R8).of(GREY, "(64 kind + distance in bricks) / 255; kinds: 0 active, 1 empty, 2 homogeneous");
+    VolumeBrickDistances = D::image("volume_brick_distances", per_brick, |_| Format::R8).of(GREY, "(64 kind + distance in bricks) / 255; kinds: 0 active, 1 empty, 2 homogeneous");
     /// Entries of the transfer function that are not transparent, before each.
     OpaqueBefore = D::table(
         "opaque_before",
         |s| Shape::Buffer(4 * (s.transfer_entries() as u32 + 1)),
         lookup_tables::opaque_before,
         ByContent,
-    );
+    ).of(GREY, "entries of the transfer function");
     /// Slice position over the sweep parameter. The direction of the motor only stretches the span of the sweep.
     SweepLut = D::table(
         "sweep_lut",
         entries,
         lookup_tables::sweep_lut,
         By(|a, b| !a.geometry.equals_except_direction(&b.geometry) || lattice(a) != lattice(b)),
-    );
+    ).of(GREY, "mean distances of slices");
     /// Share of the lines that fired before each line.
-    LineLut = D::table("line_lut", entries, lookup_tables::line_lut, By(lattice_differs));
+    LineLut = D::table("line_lut", entries, lookup_tables::line_lut, By(lattice_differs)).of(GREY, "share of the lines of a frame");
     /// Position and advance of every slice.
     SliceTable = D::table(
         "slice_table",
         |s| Shape::Buffer(8 * s.slices()),
         lookup_tables::slice_table,
         By(|a, b| a.geometry != b.geometry),
-    );
+    ).of(&["position", "advance"], "mean distances of slices");
     /// The transfer function: colour and absorption over the sample value.
     Transfer = D::table(
         "transfer",
         |s| Shape::Buffer(16 * s.transfer_entries() as u32),
         lookup_tables::transfer_table,
         ByContent,
-    );
+    ).of(&["red", "green", "blue", "absorption"], "colour 0..1; absorption of one slice pixel");
     /// Its integral over the values up to each entry: of absorption times colour, and of absorption.
     TransferIntegral = D::table(
         "transfer_integral",
         |s| Shape::Buffer(16 * s.transfer_entries() as u32),
         lookup_tables::transfer_integral,
         ByContent,
-    );
+    ).of(&["red", "green", "blue", "absorption"], "colour 0..1; absorption of one slice pixel");
     /// The transfer function between every two sample values. It differs when the transfer function does, which is shorter.
     PreIntegrated = D::table(
         "pre_integrated",
         |s| Shape::Buffer(16 * (s.transfer_entries().pow(2)) as u32),
         lookup_tables::pre_integrated_table,
         By(|a, b| Slot::Transfer.differs(a, b)),
-    );
+    ).of(&["red", "green", "blue", "absorption"], "colour 0..1; absorption of one slice pixel");
     /// Light and opacity of a complete step between every two sample values, then the transfer function for the incomplete last step of a
     /// ray. They differ with the step's length too.
     SelfAttenuated = D::table(
@@ -262,134 +314,114 @@ slots! {
         |s| Shape::Buffer(16 * (s.transfer_entries() * (s.transfer_entries() + 1)) as u32),
         lookup_tables::self_attenuated_table,
         By(|a, b| Slot::Transfer.differs(a, b) || a.optical_step() != b.optical_step()),
-    );
+    ).of(&["red", "green", "blue", "opacity"], "premultiplied colour and opacity of a step, 0..1");
     /// The tiles of a picture of planes: what each shows, and its lines.
     Tiles = D::table(
         "tiles",
         |s| Shape::Buffer(16 * TILE_VECTORS * s.tile_count()),
         lookup_tables::tile_table,
         ByContent,
-    );
+    ).of(&["x", "y", "z", "w"], "vectors as the shader takes them");
     /// The columns of a curved plane: where each is, and through which vector its slab reaches.
-    CurveColumns = D::table("curve_columns", curve_columns, lookup_tables::curve_table, ByContent);
+    CurveColumns = D::table("curve_columns", curve_columns, lookup_tables::curve_table, ByContent).of(&["x", "y", "z", "w"], "vectors as the shader takes them");
     /// The half-spaces that bound the block of mode cube.
     Block = D::table(
         "block",
         |s| Shape::Buffer(16 * s.block().len() as u32),
         lookup_tables::block_table,
         ByContent,
-    );
+    ).of(&["x", "y", "z", "w"], "vectors as the shader takes them");
     /// The light volume: density of the matter in each cell, and its echo.
-    LightMatter = D::image("light_matter", |s| Shape::Three(s.light_lattice().count), |_| Format::Rg16f);
+    LightMatter = D::image("light_matter", |s| Shape::Three(s.light_lattice().count), |_| Format::Rg16f).of(&["density", "echo"], "share of the densest matter; share of the range of the recording's samples");
     /// The density in a Gaussian pyramid: cells of twice the edge at each level.
-    LightPyramid1 = D::image("light_pyramid_1", |s| light_level(s, 1), |_| Format::R16f);
-    LightPyramid2 = D::image("light_pyramid_2", |s| light_level(s, 2), |_| Format::R16f);
-    LightPyramid3 = D::image("light_pyramid_3", |s| light_level(s, 3), |_| Format::R16f);
-    LightPyramid4 = D::image("light_pyramid_4", |s| light_level(s, 4), |_| Format::R16f);
-    LightPyramid5 = D::image("light_pyramid_5", |s| light_level(s, 5), |_| Format::R16f);
-    LightPyramid6 = D::image("light_pyramid_6", |s| light_level(s, 6), |_| Format::R16f);
-    LightPyramid7 = D::image("light_pyramid_7", |s| light_level(s, 7), |_| Format::R16f);
-    LightPyramid8 = D::image("light_pyramid_8", |s| light_level(s, 8), |_| Format::R16f);
+    LightPyramid1 = D::image("light_pyramid_1", |s| light_level(s, 1), |_| Format::R16f).of(GREY, "share of the densest matter, 0..1");
+    LightPyramid2 = D::image("light_pyramid_2", |s| light_level(s, 2), |_| Format::R16f).of(GREY, "share of the densest matter, 0..1");
+    LightPyramid3 = D::image("light_pyramid_3", |s| light_level(s, 3), |_| Format::R16f).of(GREY, "share of the densest matter, 0..1");
+    LightPyramid4 = D::image("light_pyramid_4", |s| light_level(s, 4), |_| Format::R16f).of(GREY, "share of the densest matter, 0..1");
+    LightPyramid5 = D::image("light_pyramid_5", |s| light_level(s, 5), |_| Format::R16f).of(GREY, "share of the densest matter, 0..1");
+    LightPyramid6 = D::image("light_pyramid_6", |s| light_level(s, 6), |_| Format::R16f).of(GREY, "share of the densest matter, 0..1");
+    LightPyramid7 = D::image("light_pyramid_7", |s| light_level(s, 7), |_| Format::R16f).of(GREY, "share of the densest matter, 0..1");
+    LightPyramid8 = D::image("light_pyramid_8", |s| light_level(s, 8), |_| Format::R16f).of(GREY, "share of the densest matter, 0..1");
     /// Light that has passed one layer of cells, and the next.
-    LightFrontA = D::image("light_front_a", |s| light_layer(s, false), |_| Format::Rgba32f);
-    LightFrontB = D::image("light_front_b", |s| light_layer(s, false), |_| Format::Rgba32f);
+    LightFrontA = D::image("light_front_a", |s| light_layer(s, false), |_| Format::Rgba32f).of(COLOUR, "light; 1 is that of an unshadowed light of strength 1");
+    LightFrontB = D::image("light_front_b", |s| light_layer(s, false), |_| Format::Rgba32f).of(COLOUR, "light; 1 is that of an unshadowed light of strength 1");
     /// Light that arrives in each cell, and the density of its matter. The other slots are those of the passes that scatter it, which alternate: what
     /// arrives stays, as many dispatches have made it.
-    LightArriving = D::image("light_arriving", |s| Shape::Three(s.light_lattice().count), |_| Format::Rgba16f);
-    LightScattered = D::image("light_scattered", |s| Shape::Three(s.light_lattice().count), |_| Format::Rgba16f);
-    LightScatteredB = D::image("light_scattered_b", |s| Shape::Three(s.light_lattice().count), |_| Format::Rgba16f);
+    LightArriving = D::image("light_arriving", |s| Shape::Three(s.light_lattice().count), |_| Format::Rgba16f).of(&["red", "green", "blue", "density"], "light: share of what came; share of the densest matter");
+    LightScattered = D::image("light_scattered", |s| Shape::Three(s.light_lattice().count), |_| Format::Rgba16f).of(&["red", "green", "blue", "density"], "light: share of what came; share of the densest matter");
+    LightScatteredB = D::image("light_scattered_b", |s| Shape::Three(s.light_lattice().count), |_| Format::Rgba16f).of(&["red", "green", "blue", "density"], "light: share of what came; share of the densest matter");
     /// The same of the back light, in cells of twice the edge.
-    BackFrontA = D::image("back_front_a", |s| light_layer(s, true), |_| Format::Rgba32f);
-    BackFrontB = D::image("back_front_b", |s| light_layer(s, true), |_| Format::Rgba32f);
-    BackLight = D::image("back_light", |s| light_level(s, 1), |_| Format::Rgba16f);
+    BackFrontA = D::image("back_front_a", |s| light_layer(s, true), |_| Format::Rgba32f).of(COLOUR, "light; 1 is that of an unshadowed light of strength 1");
+    BackFrontB = D::image("back_front_b", |s| light_layer(s, true), |_| Format::Rgba32f).of(COLOUR, "light; 1 is that of an unshadowed light of strength 1");
+    BackLight = D::image("back_light", |s| light_level(s, 1), |_| Format::Rgba16f).of(&["red", "green", "blue", "density"], "light: share of what came; share of the densest matter");
     /// Light from all sides and from behind in cells of twice the edge: its colour, and the ambient share.
-    LightAmbient = D::image("light_ambient", |s| light_level(s, 1), |_| Format::Rgba16f);
+    LightAmbient = D::image("light_ambient", |s| light_level(s, 1), |_| Format::Rgba16f).of(COLOUR, "light; 1 is that of an unshadowed light of strength 1");
     /// Light that each cell scatters, and its ambient share.
-    LightShade = D::image("light_shade", |s| Shape::Three(s.light_lattice().count), |_| Format::Rgba16f);
+    LightShade = D::image("light_shade", |s| Shape::Three(s.light_lattice().count), |_| Format::Rgba16f).of(COLOUR, "light; 1 is that of an unshadowed light of strength 1");
     /// Orientation of each cell, as long as it is certain, and the light for a highlight.
-    LightNormals = D::image("light_normals", |s| Shape::Three(s.light_lattice().count), |_| Format::Rgba16f);
+    LightNormals = D::image("light_normals", |s| Shape::Three(s.light_lattice().count), |_| Format::Rgba16f).of(&["x", "y", "z", "highlight"], "direction, as long as it is certain; light");
     /// The medium of a still: albedo and extinction over the sample value.
     StillMedium = D::table(
         "still_medium",
         |s| Shape::Buffer(16 * s.transfer_entries() as u32),
         lookup_tables::still_medium,
         ByContent,
-    );
+    ).of(&["red", "green", "blue", "extinction"], "albedo of scattering, 0..1; extinction, 1/mm");
     /// The largest extinction in each brick.
-    StillMajorants = D::image("still_majorants", per_brick, |_| Format::R32f);
+    StillMajorants = D::image("still_majorants", per_brick, |_| Format::R32f).of(GREY, "largest extinction of a brick, 1/mm");
     /// Sums of light and collisions of the paths of each pixel, and of the squares of their luminance; the dispatches alternate.
-    StillSumsA = D::image("still_sums_a", per_ray, |_| Format::Rgba32f);
-    StillSumsB = D::image("still_sums_b", per_ray, |_| Format::Rgba32f);
-    StillSquaresA = D::image("still_squares_a", per_ray, |_| Format::R32f);
-    StillSquaresB = D::image("still_squares_b", per_ray, |_| Format::R32f);
+    StillSumsA = D::image("still_sums_a", per_ray, |_| Format::Rgba32f).of(&["red", "green", "blue", "collided"], "light of all paths of a pixel; how many of them collided");
+    StillSumsB = D::image("still_sums_b", per_ray, |_| Format::Rgba32f).of(&["red", "green", "blue", "collided"], "light of all paths of a pixel; how many of them collided");
+    StillSquaresA = D::image("still_squares_a", per_ray, |_| Format::R32f).of(GREY, "squares of the luminance of all paths of a pixel");
+    StillSquaresB = D::image("still_squares_b", per_ray, |_| Format::R32f).of(GREY, "squares of the luminance of all paths of a pixel");
     /// The cut faces of clip planes: echo where a ray ends at one, and its opacity.
-    Cap = D::image("cap", per_ray, |_| Format::Rg16f);
+    Cap = D::image("cap", per_ray, |_| Format::Rg16f).of(&["echo", "opacity"], "echo 0..1 after the grey window of planes, where a ray ends at a cut face; opacity, 0..1");
     /// Distance along each pixel's ray, mm; the largest float where nothing was hit.
-    Distance = D::image("distance_map", per_ray, |_| Format::R32f);
-    DistanceA = D::image("distance_a", per_ray, |_| Format::R32f);
-    DistanceB = D::image("distance_b", per_ray, |_| Format::R32f);
+    Distance = D::image("distance_map", per_ray, |_| Format::R32f).distances();
+    DistanceA = D::image("distance_a", per_ray, |_| Format::R32f).distances();
+    DistanceB = D::image("distance_b", per_ray, |_| Format::R32f).distances();
     /// Echo at the surface, 1 where a surface was found, and the mean echo behind it where the skin look needs it.
-    Surface = D::image("surface", per_ray, |s| if s.samples_behind() > 0 { Format::Rgba16f } else { Format::Rg16f });
+    Surface = D::image("surface", per_ray, |s| if s.samples_behind() > 0 { Format::Rgba16f } else { Format::Rg16f }).of(&["echo", "found", "echo_behind", "unused"], "echo 0..1 after the grey window; found: 0 or 1");
     /// Light that arrives at each pixel's surface, 0..1.
-    Shadow = D::image("shadow", per_ray, |_| Format::R16f);
+    Shadow = D::image("shadow", per_ray, |_| Format::R16f).of(GREY, "share, 0..1");
     /// Ambient light that arrives, 0..1.
-    Occlusion = D::image("occlusion", per_ray, |_| Format::R16f);
+    Occlusion = D::image("occlusion", per_ray, |_| Format::R16f).of(GREY, "share, 0..1");
     /// The composited volume, where stage 3 lights it or shows it in front of a surface.
-    VolumeLayer = D::image("volume_layer", per_ray, |_| Format::Rgba16f);
+    VolumeLayer = D::image("volume_layer", per_ray, |_| Format::Rgba16f).of(COLOUR, "share, 0..1");
     /// The volume that is shown beside a surface, where the volume layer is the surface's colour.
-    VolumeBesideSurface = D::image("volume_beside_surface", per_ray, |_| Format::Rgba16f);
+    VolumeBesideSurface = D::image("volume_beside_surface", per_ray, |_| Format::Rgba16f).of(COLOUR, "share, 0..1");
     /// What stages 2 and 3 render, where it becomes the picture only by averaging or next to planes. With adaptive supersampling the rays of marked
     /// pixels: what was there stays in the others.
-    Rendered = D::image("rendered", per_ray, |_| Format::Rgba16f);
+    Rendered = D::image("rendered", per_ray, |_| Format::Rgba16f).of(COLOUR, "share, 0..1");
     /// With adaptive supersampling: one ray through the middle of each pixel of the rendering, and 1 in pixels that have all rays.
-    PixelRays = D::image("pixel_rays", per_pixel_of_rendering, |_| Format::Rgba16f);
-    EdgeMarks = D::image("edge_marks", per_pixel_of_rendering, |_| Format::R8);
+    PixelRays = D::image("pixel_rays", per_pixel_of_rendering, |_| Format::Rgba16f).of(COLOUR, "share, 0..1");
+    EdgeMarks = D::image("edge_marks", per_pixel_of_rendering, |_| Format::R8).of(GREY, "1 in pixels that have several rays");
     /// With a tolerance: the rays through every other pixel of every other row; their colours on the screen, and their errors.
-    Lattice = D::image("lattice", |s| Shape::Two(tolerance::lattice_size(s)), |_| Format::Rgba16f);
-    LatticeErrors = D::image("lattice_errors", |s| Shape::Two(tolerance::lattice_size(s)), |_| Format::Rgba32f);
+    Lattice = D::image("lattice", |s| Shape::Two(tolerance::lattice_size(s)), |_| Format::Rgba16f).of(COLOUR, "share, 0..1");
+    LatticeErrors = D::image("lattice_errors", |s| Shape::Two(tolerance::lattice_size(s)), |_| Format::Rgba32f).of(&["red", "green", "blue", "error"], "colour and error on the screen, 0..1; no error is certain");
     /// The error of each pixel, 0..1 of the screen; 0 is certain.
-    PixelErrors = D::image("pixel_errors", per_ray, |_| Format::R32f);
+    PixelErrors = D::image("pixel_errors", per_ray, |_| Format::R32f).of(GREY, "error on the screen, 0..1; 0 is certain");
     /// Which pixels of each tile of 8 x 8 have too large an error, a bit each; how many of them are in the tiles before.
-    ErrorMarks = D::image("error_marks", |s| Shape::Two(tolerance::tiles(s)), |_| Format::Rg32u);
-    MarkedBefore = D::image("marked_before", |s| Shape::Two(tolerance::tiles(s)), |_| Format::R32u);
+    ErrorMarks = D::image("error_marks", |s| Shape::Two(tolerance::tiles(s)), |_| Format::Rg32u).of(&["rows 0 to 3", "rows 4 to 7"], "bits of pixels of a tile");
+    MarkedBefore = D::image("marked_before", |s| Shape::Two(tolerance::tiles(s)), |_| Format::R32u).of(GREY, "pixels");
     /// Workgroups along x, y and z that take all of them, and their number.
-    RefineGroups = D::image("refine_groups", |_| Shape::Two([4, 1]), |_| Format::R32u);
+    RefineGroups = D::image("refine_groups", |_| Shape::Two([4, 1]), |_| Format::R32u).of(GREY, "workgroups along x, y, z; pixels");
     /// The planes of a 4-up picture; black where the rendering goes.
-    Planes = D::image("planes", per_pixel, |_| Format::Rgba16f);
+    Planes = D::image("planes", per_pixel, |_| Format::Rgba16f).of(COLOUR, "share, 0..1");
     /// The picture of stages 2 and 3 before the filters of stage 4.
-    Picture = D::image("picture", per_pixel, |_| Format::Rgba16f);
-    SmoothPicture = D::image("smooth_picture", per_pixel, |_| Format::Rgba16f);
-    SmoothPictureB = D::image("smooth_picture_b", per_pixel, |_| Format::Rgba16f);
+    Picture = D::image("picture", per_pixel, |_| Format::Rgba16f).of(COLOUR, "share, 0..1");
+    SmoothPicture = D::image("smooth_picture", per_pixel, |_| Format::Rgba16f).of(COLOUR, "share, 0..1");
+    SmoothPictureB = D::image("smooth_picture_b", per_pixel, |_| Format::Rgba16f).of(COLOUR, "share, 0..1");
     /// As of slices: elimination of the picture's rows or columns.
-    PictureShares = D::image("picture_shares", per_pixel, |_| Format::R32f);
-    PictureForward = D::image("picture_forward", per_pixel, |_| Format::Rgba32f);
-    PictureRows = D::image("picture_rows", per_pixel, |_| Format::Rgba32f);
-    /// The stored samples of a volume that a mesh is made of: samples, lines, frames.
-    NetSamples = D::image("net_samples", |s| Shape::Three(net::samples(s)), frame_format).by_frames();
-    /// Positions of its lines, and of its slices with the motor's advance.
-    NetLines = D::table("net_lines", |s| Shape::Buffer(4 * net::table_lengths(s)[0]), net::lines, ByContent);
-    NetSlices = D::table("net_slices", |s| Shape::Buffer(8 * net::table_lengths(s)[1]), net::slices_of, ByContent);
-    /// Values of a slab of a lattice; while it is smoothed, in turn with the next.
-    NetValues = D::image("net_values", |s| Shape::Three(net::values(s)), |_| Format::R32f);
-    NetSmoothed = D::image("net_smoothed", |s| Shape::Three(net::values(s)), |_| Format::R32f);
-    /// The same filled behind the surface, with the rows of a base.
-    NetFilled = D::image("net_filled", |s| Shape::Three(net::filled(s)), |_| Format::R32f);
-    /// First row of each column of the slab that is inside.
-    NetDepths = D::image("net_depths", |s| Shape::Two(net::depths(s)), |_| Format::R32f);
-    /// Crossed cells of each row of each layer, and where they begin in the list.
-    NetCounts = D::image("net_counts", |s| Shape::Two(net::rows(s)), |_| Format::R32u);
-    NetFirsts = D::image("net_firsts", |s| Shape::Two(net::rows(s)), |_| Format::R32u);
-    /// The list of crossed cells.
-    NetCrossed = D::image("net_crossed", |s| Shape::Two(net::list(s)), |_| Format::Rg32u);
-    /// The list of vertices by their cells and edges, and their places.
-    NetAsked = D::image("net_asked", |s| Shape::Two(net::list(s)), |_| Format::Rg32u);
-    NetOffsets = D::image("net_offsets", |s| Shape::Two(net::list(s)), |_| Format::Rgba32f);
+    PictureShares = D::image("picture_shares", per_pixel, |_| Format::R32f).of(GREY, "share, 0..1");
+    PictureForward = D::image("picture_forward", per_pixel, |_| Format::Rgba32f).of(COLOUR, "share, 0..1");
+    PictureRows = D::image("picture_rows", per_pixel, |_| Format::Rgba32f).of(COLOUR, "share, 0..1");
     /// The result: in 8 bits, or as the window shows it.
     Screen = D::image("screen", per_pixel, |s| match s.window_texels {
         WindowTexels::Rgba8 => Format::Rgba8,
         WindowTexels::Bgra8 => Format::Bgra8,
         WindowTexels::Deep => Format::Rgba16f,
-    });
+    }).of(COLOUR, "share, 0..1");
 }
 
 fn frame_layers(scene: &Scene) -> Shape {
@@ -495,8 +527,20 @@ fn lattice_differs(old: &Scene, new: &Scene) -> bool {
 }
 
 impl Slot {
-    fn descriptor(self) -> &'static Descriptor {
+    const fn descriptor(self) -> &'static Descriptor {
         &DESCRIPTORS[self as usize]
+    }
+
+    /// How the CPU finds the content in a volume, where it does.
+    pub fn search(self) -> Option<Search> {
+        match self.initializer() {
+            Initializer::ByVolume(search) => Some(search),
+            _ => None,
+        }
+    }
+
+    pub(crate) fn meaning(self) -> Meaning {
+        self.descriptor().meaning
     }
 
     /// Debug name; also the GLSL variable's unless a pass gives an alias.
@@ -535,7 +579,7 @@ impl Slot {
     pub fn differs(self, old: &Scene, new: &Scene) -> bool {
         match (self.initializer(), self.descriptor().differs) {
             (Initializer::ByScene(make), ByContent) => make(old) != make(new),
-            (Initializer::ByScene(_) | Initializer::ByVolume, By(differs)) => differs(old, new),
+            (Initializer::ByScene(_) | Initializer::ByVolume(_), By(differs)) => differs(old, new),
             _ => false,
         }
     }

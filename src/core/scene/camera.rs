@@ -44,7 +44,7 @@ impl Rays {
 /// Number of rays along each axis: a quarter of a 4-up picture or half of a pair (rounded up), times the rays per pixel, or half
 /// or a quarter (rounded up) with that resolution.
 pub fn ray_size(settings: &Settings) -> [u32; 2] {
-    full_size(settings).map(|n| n.div_ceil(settings.ray.apart()))
+    full_size(settings).map(|n| n.div_ceil(settings.ray.subsampling))
 }
 
 /// The same where every pixel has a ray.
@@ -86,7 +86,7 @@ pub fn rays(settings: &Settings, low: DVec3, high: DVec3, depth_offset: f64, sti
     // Offset of the picture's upper left corner from its middle, pixels.
     let corner = |right: DVec3, up: DVec3| right * (-width / 2.0) + up * (height / 2.0);
     // The ray of several pixels passes through their middle.
-    let apart = f64::from(settings.ray.apart());
+    let apart = f64::from(settings.ray.subsampling);
     if camera.field_of_view > 0.0 {
         let spread = 2.0 * (camera.field_of_view.to_radians() / 2.0).tan() / height;
         // The picture fits the near side of the box at zoom 1. As the zoom grows the camera comes nearer to that side, and never into the box.

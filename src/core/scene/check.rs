@@ -52,16 +52,15 @@ pub(super) fn check(settings: &Settings) -> Result<(), SceneError> {
     within("cap.level", settings.cap.level.unwrap_or(0.0), 0.0, 1.0)?;
     within("ray.rays", f64::from(settings.ray.rays), 1.0, 4.0)?;
     let ray = &settings.ray;
-    for (key, is_set, pixels) in
-        [("ray.half", ray.half, "four"), ("ray.quarter", ray.quarter, "16"), ("ray.eighth", ray.eighth, "64")]
-    {
-        if is_set && settings.ray.rays > 1 {
-            let rays = settings.ray.rays;
-            return refuse(
-                key,
-                format!("takes one ray for {pixels} pixels, ray.rays={rays} several for each: set one of them"),
-            );
-        }
+    if !matches!(ray.subsampling, 1 | 2 | 4 | 8) {
+        return refuse("ray.subsampling", format!("is {}, must be 1 (every pixel), 2, 4 or 8", ray.subsampling));
+    }
+    if ray.subsampling > 1 && ray.rays > 1 {
+        let (pixels, rays) = (ray.subsampling.pow(2), ray.rays);
+        return refuse(
+            "ray.subsampling",
+            format!("takes one ray for {pixels} pixels, ray.rays={rays} several for each: set one of them"),
+        );
     }
     check_tolerance(settings)?;
     let [width, height] = super::camera::ray_size(settings);

@@ -195,6 +195,7 @@ impl Layers {
                 volume.insert("transfer".into(), points);
             }
         }
+        Settings::rename(&mut table);
         add_paths(&table, "", &mut self.given);
         merge(&mut self.merged, table, &mut Vec::new());
         self.settings().map(drop).map_err(|e| LoadError::Layer { layer: layer.into(), fault: one_line(&e, "") })
@@ -440,6 +441,28 @@ mod tests {
         let missing = Layers::default().set("volume.transfer=missing.toml").unwrap_err().to_string();
         assert!(missing.contains("missing.toml: cannot be read"), "{missing}");
         std::fs::remove_dir_all(&folder).unwrap();
+    }
+
+    #[test]
+    fn flags_of_before_are_read_as_subsampling() {
+        let of = |sets: &[&str]| {
+            let mut layers = Layers::default();
+            sets.iter().try_for_each(|set| layers.set(set)).map(|()| layers.finish().expect("settings").ray.subsampling)
+        };
+        for (sets, pixels) in [
+            (&["ray.half=true"][..], 2),
+            (&["ray.quarter=true", "ray.half=false"], 1),
+            (&["ray={half=true,eighth=true}"], 8),
+            (&["ray={half=true,subsampling=4}"], 4),
+            (&["ray.half=true", "ray.subsampling=1"], 1),
+            (&["ray.subsampling=1", "ray.quarter=true"], 4),
+        ] {
+            assert_eq!(of(sets).expect("read"), pixels, "{sets:?}");
+        }
+        assert!(of(&["ray.half=2"]).unwrap_err().to_string().contains("half"));
+        let mut layers = Layers::default();
+        layers.add("scene", "mode = 'sr'\n[ray]\nquarter = true\n", None).expect("a file of before");
+        assert_eq!(layers.finish().expect("settings").ray.subsampling, 4);
     }
 
     #[test]

@@ -13,7 +13,6 @@ pub mod cuts;
 pub mod default_look;
 mod echo_levels;
 mod floating;
-mod lattice;
 mod light_lattice;
 pub mod load;
 pub mod look;
@@ -39,7 +38,6 @@ pub mod visible_bounds;
 pub use bricks::{Bricks, Reach, Side, TILE};
 pub use camera::Rays;
 pub use echo_levels::{EchoHistogram, EchoLevels};
-pub use lattice::Lattice;
 pub use light_lattice::{AmbientCones, LightLattice, Propagation};
 pub use marks::VolumeAxis;
 pub use region::{depth_offset, insonified_box};
@@ -207,8 +205,6 @@ pub struct Scene {
     pub kept_bounds: visible_bounds::VisibleBounds,
     /// What stage 1 prepares for other pictures of the same volume: [`Scene::sharing`].
     pub shared: Option<Shared>,
-    /// Where a surface is found for a mesh. No picture has one.
-    pub lattice: Option<Lattice>,
 }
 
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -303,14 +299,14 @@ impl Scene {
             .into_iter()
             .collect();
         let sampling = settings.ray.sampling;
-        let pitches = Pitches::new(&geometry, &grid, &rays, settings.ray.apart(), (low + high) / 2.0);
+        let pitches = Pitches::new(&geometry, &grid, &rays, settings.ray.subsampling, (low + high) / 2.0);
         let mut resolver = Resolver { pitches, resolved: Vec::new() };
         let conditioning = resolver.conditioning(&settings.conditioning);
         let slice_filters = resolver.slices(&settings.slices);
         let is_four = settings.layout == Layout::Four;
         let section_smooth = settings.planes.smooth.filter(|_| is_four);
         let section_smooth = section_smooth.map(|smooth| resolver.smooth("planes.smooth.elevation_mm", smooth));
-        let halvings = settings.ray.apart().ilog2();
+        let halvings = settings.ray.subsampling.ilog2();
         let distance = (0..halvings).fold(resolver.distance(&settings.distance), |distance, _| distance.halved());
         let mut scene = Scene {
             geometry,
@@ -338,7 +334,6 @@ impl Scene {
             visible_bounds: VisibleBounds::default(),
             kept_bounds: VisibleBounds::default(),
             shared: None,
-            lattice: None,
         };
         let fields = [
             ["slices.smooth.lateral", "slices.smooth.depth", "slices.smooth.elevation"],
@@ -482,14 +477,18 @@ impl Scene {
     /// pixel they tell.
     pub fn antialiases(&self) -> bool {
         let ray = &self.settings.ray;
-        self.settings.post.antialias && (self.has_distance() || self.has_caps()) && ray.rays == 1 && ray.apart() == 1
+        self.settings.post.antialias
+            && (self.has_distance() || self.has_caps())
+            && ray.rays == 1
+            && ray.subsampling == 1
     }
 
     /// True if stage 2 and 3 render beside the picture: several rays make a pixel, one ray makes several, edges are antialiased, or planes or the volume
     /// are shown next to the rendering.
     pub fn assembles(&self) -> bool {
         let ray = &self.settings.ray;
-        let is_beside = ray.rays > 1 || ray.apart() > 1 || self.settings.layout != Layout::Single || self.antialiases();
+        let is_beside =
+            ray.rays > 1 || ray.subsampling > 1 || self.settings.layout != Layout::Single || self.antialiases();
         is_beside && !self.is_flat()
     }
 
@@ -764,7 +763,7 @@ impl Scene {
 
     /// Largest difference of neighbouring distances within one surface, mm.
     pub fn cliff(&self) -> f64 {
-        self.settings.light.cliff * f64::from(self.settings.ray.apart())
+        self.settings.light.cliff * f64::from(self.settings.ray.subsampling)
     }
 
     /// Position of a near light in space, mm.

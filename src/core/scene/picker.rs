@@ -27,7 +27,7 @@ impl<'a> Picker<'a> {
             rays: &scene.rays,
             corner: corner.map(f64::from),
             size: std::array::from_fn(|a| f64::from(size[a] - corner[a])),
-            rays_per_pixel: f64::from(ray.rays) / f64::from(ray.apart()),
+            rays_per_pixel: f64::from(ray.rays) / f64::from(ray.subsampling),
         }
     }
 

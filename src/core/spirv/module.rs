@@ -168,7 +168,7 @@ pub fn embedded(name: &str) -> Option<&'static [u8]> {
 pub(super) fn malformed(read: impl Fn(&[u32], &str, &str) -> bool) {
     let modules = [
         ("measure/positions", "volume", "nothing", 1),
-        ("net/sample", "net_samples", "net_lines", 1),
+        ("preprocess/condition", "frames", "tgc", 1),
         ("raycast/planes.plain", "volume", "sweep_lut", 24),
     ];
     for (name, texture, other, every) in modules {

@@ -2,8 +2,8 @@
 //! run again.
 
 use super::*;
-use crate::passes::floating;
-use crate::passes::unveil::{self, Unveiled};
+use crate::passes::pass::Search;
+use crate::passes::unveil::Unveiled;
 use crate::plan::Work;
 #[cfg(feature = "view")]
 use crate::window::screen::{Drawn, Panels, PresentOutcome, Screen};
@@ -162,28 +162,22 @@ impl Renderer {
             if step.pass.frequency == Frequency::Volume && !runs.is_empty() {
                 self.filtered_bounds = scene.visible_bounds;
                 let (reads, writes) = (step.reads(scene), step.writes(scene));
-                let is_due = |slot| reads.contains(&slot) && !self.found.contains(&(slot, self.shown));
-                let (of_parts, of_fluid) = (is_due(Slot::Floating), is_due(Slot::StartSurface));
+                let due = reads.iter().filter_map(|slot| Some((*slot, slot.search()?)));
+                let due: Vec<_> = due.filter(|(slot, _)| !self.found.contains(&(*slot, self.shown))).collect();
                 // Nothing is known of what is about to be replaced, should this picture fail.
                 let is_replaced = |slot: Slot, image: u32| {
-                    let is_due = (slot == Slot::Floating && of_parts) || (slot == Slot::StartSurface && of_fluid);
+                    let is_due = due.iter().any(|(due, _)| *due == slot);
                     is_due && (image == self.shown || !slot.is_multibuffered())
                 };
                 let found = std::mem::take(&mut self.found);
                 self.found = found.into_iter().filter(|(slot, image)| !is_replaced(*slot, *image)).collect();
-                if of_parts {
-                    searched.push(Slot::Floating);
-                    self.find(Slot::Floating, "floating", |_, scene, bytes| floating::find(scene, bytes))?;
-                }
-                if of_fluid {
-                    searched.push(Slot::StartSurface);
-                    self.find(Slot::StartSurface, "unveil", |unveiled, scene, bytes| {
-                        let found = unveiled.insert(unveil::find(scene, bytes));
-                        bytemuck::cast_slice(&found.rows).to_vec()
-                    })?;
+                for (slot, search) in due {
+                    searched.push(slot);
+                    self.find(slot, &search)?;
                 }
                 // In a volume that changes it is looked for again.
-                self.found.retain(|(slot, image)| *image != self.shown || !writes.contains(&searched_in(*slot)));
+                let changes = |slot: &Slot| slot.search().is_some_and(|search| writes.contains(&search.within));
+                self.found.retain(|(slot, image)| *image != self.shown || !changes(slot));
             }
             let (slots, pipeline, scene) = (&self.slots, &*self.steps[i], &self.scene);
             for slices in runs {
@@ -224,14 +218,9 @@ impl Renderer {
         found.filter(|_| self.scene.unveils())
     }
 
-    /// Finds something in the volume that is shown, and uploads it to `target`. What was recorded before is done first; the recording goes on afterwards. `search` gets what was found in the last volume of the image, which it may replace.
-    fn find(
-        &mut self,
-        target: Slot,
-        name: &'static str,
-        search: impl FnOnce(&mut Option<Unveiled>, &Scene, &[u8]) -> Vec<u8>,
-    ) -> Result<(), GpuError> {
-        let source = searched_in(target);
+    /// Finds something in the volume that is shown, and uploads it to `target`. What was recorded before is done first; the recording goes on afterwards.
+    fn find(&mut self, target: Slot, search: &Search) -> Result<(), GpuError> {
+        let (name, source) = (search.name, search.within);
         let Some(volume) = self.slots.image(source, self.shown) else { return Ok(()) };
         let readback = Readback::new(&self.context, name, volume.shape, volume.format.texel_bytes())?;
         self.picture.copy_out(&mut self.barriers, volume, source, self.shown, &readback);
@@ -244,20 +233,16 @@ impl Renderer {
         self.unveiled.resize(self.volume_images as usize, None);
         let (scene, bytes) = (&self.scene, readback.bytes()?);
         let Some(unveiled) = self.unveiled.get_mut(self.shown as usize) else { return Ok(()) };
-        let found = self.timings.host(name, || search(unveiled, scene, &bytes));
+        let found = self.timings.host(name, || (search.find)(scene, &bytes));
+        *unveiled = found.unveiled.or(unveiled.take());
         let copy = if target.is_multibuffered() { self.shown } else { 0 };
         let Some(image) = self.slots.image(target, copy) else { return Ok(()) };
         let place = SlotParts { slot: target, copy, parts: 0..image.shape.parts() };
-        let upload = Upload::new(&self.context, name, image.layout(), place.parts.clone(), &found)?;
+        let upload = Upload::new(&self.context, name, image.layout(), place.parts.clone(), &found.texels)?;
         self.picture.upload(&mut self.barriers, &upload, image, place);
         self.uploads.push(upload);
         Ok(())
     }
-}
-
-/// The volume that the CPU finds the content of a slot in.
-fn searched_in(target: Slot) -> Slot {
-    if target == Slot::Floating { Slot::WholeVolume } else { Slot::Volume }
 }
 
 #[cfg(feature = "view")]

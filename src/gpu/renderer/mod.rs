@@ -15,10 +15,10 @@ use super::recorder::{BarrierRecorder, BufferLayout, Dispatch, Recorder, SlotPar
 use super::resources::SlotResources;
 use super::timeline::Timelines;
 use super::timing::{TimeStamps, Timings};
+use crate::passes::chain;
 use crate::passes::slots::{BATCHES_IN_FLIGHT, Format, Initializer, batch_bytes, frames_per_batch};
 use crate::passes::unveil::Unveiled;
 use crate::passes::{DispatchArgs, Frequency, PassTime, Slot, Span, Stage, Texels};
-use crate::passes::{chain, cut};
 use crate::picture::Picture;
 use crate::plan::{Contents, Plan, Rerun, Work, affected};
 use crate::queues::oracle::SubmissionLog;
@@ -456,7 +456,7 @@ impl Renderer {
         for (step, pipeline) in plan.steps.iter().zip(&steps) {
             if step.pass.stage == Stage::Raycast {
                 pipeline.time.lengthen(self.scene.step / scene.step);
-            } else if step.pass.name == cut::PASS.name {
+            } else if step.writes(&scene).contains(&Slot::CutVolume) {
                 pipeline.time.lengthen(scene.cut_corners() as f64 / self.scene.cut_corners().max(1) as f64);
             }
         }

@@ -407,13 +407,15 @@ pub fn dial(name: &str, scene: &Scene) -> Result<Dial, String> {
         "half" => {
             need(!scene.is_flat(), "casts no ray")?;
             need(s.ray.rays == 1, "casts several rays for each pixel")?;
-            need(s.ray.apart() <= 2, "casts one ray for 16 pixels or more")?;
+            need(s.ray.subsampling <= 2, "casts one ray for 16 pixels or more")?;
             // Assigning `ray.rays` too keeps the two dials from being combined.
-            let half = |on: bool| [format!("ray.half={on}"), "ray.rays=1".to_string()];
-            let (word, value) = if s.ray.half { ("half", 0.25) } else { ("whole", 1.0) };
-            let other =
-                if s.ray.half { at("whole".into(), &half(false), 1.0) } else { at("half".into(), &half(true), 0.25) };
-            let best = |n: u32| ["ray.half=false".to_string(), format!("ray.rays={n}")];
+            let apart = |n: u32| [format!("ray.subsampling={n}"), "ray.rays=1".to_string()];
+            let (word, value) = if s.ray.subsampling == 2 { ("half", 0.25) } else { ("whole", 1.0) };
+            let other = match s.ray.subsampling {
+                2 => at("whole".into(), &apart(1), 1.0),
+                _ => at("half".into(), &apart(2), 0.25),
+            };
+            let best = |n: u32| ["ray.subsampling=1".to_string(), format!("ray.rays={n}")];
             made("half", "rays a pixel", is(word.into(), value), vec![other], &best(3), &best(2))
         }
         "light-cell" => {

@@ -1,6 +1,7 @@
 //! Error metrics of pictures (RMSE, PSNR, SSIM), distance maps and normals against a reference.
 
 use crate::passes::{Texels, is_hit};
+use crate::statistics::quantile;
 use serde::{Deserialize, Serialize};
 
 /// Edge of SSIM's window, pixels, and the deviation of its Gaussian (Wang, Bovik, Sheikh, Simoncelli 2004, section III-B).
@@ -28,7 +29,7 @@ pub struct PictureError {
 /// Statistics of the magnitudes of errors.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct Spread {
+pub struct ErrorStatistics {
     pub rms: f64,
     pub median: f64,
     /// 95th percentile, interpolated linearly.
@@ -57,7 +58,7 @@ pub struct Levels {
 #[serde(deny_unknown_fields)]
 pub struct SurfaceError {
     /// Over the pixels that are hit in both and do not jump, mm or degrees; None if there are none.
-    pub error: Option<Spread>,
+    pub error: Option<ErrorStatistics>,
     /// Share of all pixels that are hit, but missed in the reference.
     pub false_hits: f64,
     /// Share of all pixels that are missed, but hit in the reference.
@@ -213,19 +214,12 @@ fn surface<T>(
     }
 }
 
-fn spread(mut errors: Vec<f64>) -> Option<Spread> {
+fn spread(mut errors: Vec<f64>) -> Option<ErrorStatistics> {
     errors.sort_by(f64::total_cmp);
     let max = *errors.last()?;
     let count = errors.len();
     let rms = (errors.iter().map(|e| e * e).sum::<f64>() / count as f64).sqrt();
-    Some(Spread { rms, median: quantile(&errors, 0.5), p95: quantile(&errors, 0.95), max, count })
-}
-
-/// The quantile of sorted values, interpolated linearly.
-fn quantile(sorted: &[f64], share: f64) -> f64 {
-    let at = share * (sorted.len() - 1) as f64;
-    let (low, high) = (sorted[at.floor() as usize], sorted[at.ceil() as usize]);
-    low + (high - low) * at.fract()
+    Some(ErrorStatistics { rms, median: quantile(&errors, 0.5)?, p95: quantile(&errors, 0.95)?, max, count })
 }
 
 /// Mean structural similarity of two planes with values in 0..1 (SSIM; Wang et al. 2004, equation 13), weighted by the Gaussian window, averaged

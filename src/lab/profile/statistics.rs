@@ -1,6 +1,8 @@
 //! Order statistics, rank tests and multiple-test correction. They assume no distribution: run times have long tails and
 //! outliers, so medians and ranks are used throughout, means and standard deviations nowhere.
 
+use crate::statistics;
+
 /// Why values are no sample.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum SampleError {
@@ -62,13 +64,9 @@ impl Sample {
         self.0[self.0.len() - 1]
     }
 
-    /// The quantile at `share` (0..1, clamped), type 7 of Hyndman and Fan (Sample quantiles in statistical packages, The
-    /// American Statistician 50, 1996): linear between the order statistics, which are at 0, 1 / (n - 1) ... 1.
+    /// As [`statistics::quantile`]; a sample has values.
     pub fn quantile(&self, share: f64) -> f64 {
-        let at = share.clamp(0.0, 1.0) * (self.0.len() - 1) as f64;
-        let (below, part) = (at.floor() as usize, at.fract());
-        let above = (below + 1).min(self.0.len() - 1);
-        self.0[below] + part * (self.0[above] - self.0[below])
+        statistics::quantile(&self.0, share).unwrap_or(f64::NAN)
     }
 
     pub fn median(&self) -> f64 {

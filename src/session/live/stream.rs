@@ -40,7 +40,7 @@ pub enum StartStep {
 fn coarse(settings: &Settings) -> Settings {
     let mut coarse = settings.clone();
     if !settings.mode.is_flat() {
-        (coarse.ray.half, coarse.ray.quarter, coarse.ray.eighth, coarse.ray.rays) = (false, true, false, 1);
+        (coarse.ray.subsampling, coarse.ray.rays) = (4, 1);
     }
     coarse
 }

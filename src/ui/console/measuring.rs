@@ -352,7 +352,7 @@ mod tests {
         for (toml, within) in [
             (&["picture.size=[300,240]"][..], 0.002),
             (&["picture.size=[301,240]", "layout='four'", "camera.azimuth=30"], 0.002),
-            (&["picture.size=[300,240]", "ray.quarter=true"], 0.005),
+            (&["picture.size=[300,240]", "ray.subsampling=4"], 0.005),
         ] {
             let mut layers = Layers::default();
             toml.iter().for_each(|line| layers.set(line).expect(line));

@@ -40,7 +40,7 @@ fn what_is_drawn_round_is_cut_along_the_view() {
         "mode='mip'\ncamera.field_of_view=40\ncamera.azimuth=-50",
         "mode='volume'\nlayout='four'",
         "layout='pair'",
-        "mode='volume'\nray.half=true\nregion.depth=[30, 80]\ncamera.field_of_view=30",
+        "mode='volume'\nray.subsampling=2\nregion.depth=[30, 80]\ncamera.field_of_view=30",
     ] {
         let mut window = TestWindow::new(toml);
         window.tool(Tool::Cut);

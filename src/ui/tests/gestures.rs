@@ -303,7 +303,7 @@ fn a_gesture_on_the_volume_of_a_pair_acts_like_the_same_on_the_surface() {
 fn the_points_under_two_fingers_stay_under_them() {
     for toml in [
         "",
-        "camera.azimuth=40\ncamera.elevation=-30\ncamera.roll=20\nray.half=true",
+        "camera.azimuth=40\ncamera.elevation=-30\ncamera.roll=20\nray.subsampling=2",
         "layout='four'",
         "layout='pair'",
         "ray.rays=2",

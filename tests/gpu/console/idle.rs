@@ -66,7 +66,9 @@ fn an_exceeded_frame_budget_lowers_quality_only_during_interaction() {
             desk.tick(now);
         }
         let drawn = desk.drawn();
-        coarse += u32::from(desk.console.stream().scene().is_some_and(|s| s.settings.ray.half && s.settings != drawn));
+        coarse += u32::from(
+            desk.console.stream().scene().is_some_and(|s| s.settings.ray.subsampling > 1 && s.settings != drawn),
+        );
     }
     desk.console.input(&Input::Button { button: Button::Left, pressed: false });
     desk.rest();

@@ -226,7 +226,7 @@ fn the_first_pipelines_compile_beside_the_steps_and_the_first_picture_has_few_ra
     assert_eq!(steps, ["source", "compiling", "frames", "picture", "none"]);
     assert!(woken.load(Ordering::Relaxed) > 2, "each pipeline wakes the loop");
     assert_eq!(waited_for(&device), 0, "pipelines were made while everything waited");
-    let quarter = of(&plain, &format!("{now}\nray.quarter = true"), 0);
+    let quarter = of(&plain, &format!("{now}\nray.subsampling = 4"), 0);
     assert!(first.is_coarse && first.picture.expect("brought back") == quarter);
     // What only the full picture needs is compiled beside the first one and after it.
     let last = loop {

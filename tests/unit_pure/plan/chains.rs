@@ -108,7 +108,7 @@ fn renderings_with_several_rays_or_planes_use_an_intermediate_slot() {
     let of = |toml: &str| rendered(&scene(voxels([8, 8, 5]), toml));
     assert_eq!(of("mode = 'vr'"), Slot::Picture);
     assert_eq!(of("mode = 'vr'\nray = { rays = 2 }"), Slot::Rendered);
-    assert_eq!(of("mode = 'vr'\nray = { half = true }"), Slot::Rendered);
+    assert_eq!(of("mode = 'vr'\nray = { subsampling = 2 }"), Slot::Rendered);
     assert_eq!(of("mode = 'vr'\nlayout = 'four'"), Slot::Rendered);
     assert_eq!(of("mode = 'plane'\nray = { rays = 2 }"), Slot::Picture, "planes cast no rays");
 }

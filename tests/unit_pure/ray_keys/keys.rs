@@ -245,9 +245,7 @@ const ROWS: &[Row] = &[
     ("camera.target", Rays, "", &["camera.target=[4,30,-3]"]),
     ("ray.rays", Rays, "", &["ray.rays=2"]),
     ("ray.adaptive", Rays, "ray.rays=2", &["ray.rays=2 & ray.adaptive=true"]),
-    ("ray.half", Rays, "", &["ray.half=true"]),
-    ("ray.quarter", Rays, "picture.size=[16,12]", &["ray.quarter=true"]),
-    ("ray.eighth", Rays, "picture.size=[24,32]", &["ray.eighth=true"]),
+    ("ray.subsampling", Rays, "picture.size=[24,32]", &["ray.subsampling=2", "ray.subsampling=4", "ray.subsampling=8"]),
     // How samples are taken along them.
     ("ray.step", Accuracy, "", &["ray.step=0.7"]),
     ("ray.samples_per_voxel", Accuracy, "", &["ray.samples_per_voxel=3"]),

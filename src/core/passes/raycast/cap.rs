@@ -13,7 +13,7 @@ use crate::scene::cube::HalfSpace;
 use glam::DVec3;
 use std::f64::consts::FRAC_PI_6;
 
-pub const PASS: Pass = Pass {
+pub(crate) const PASS: Pass = Pass {
     name: "raycast_cap",
     stage: Stage::Raycast,
     frequency: Frequency::Picture,

@@ -12,7 +12,7 @@ const EDGE: ([f64; 3], f64) = ([0.55, 0.75, 0.95], 0.7);
 /// Pixels from an edge at which its line has faded.
 const EDGE_WIDTH: f64 = 1.5;
 
-pub const PASS: Pass = Pass {
+pub(crate) const PASS: Pass = Pass {
     name: "raycast_cube",
     stage: Stage::Raycast,
     frequency: Frequency::Picture,

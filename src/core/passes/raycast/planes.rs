@@ -8,7 +8,7 @@ use crate::scene::planes::{Column, Sheet, Tile};
 use crate::scene::{Scene, Slab};
 use glam::DVec3;
 
-pub const PASS: Pass = Pass {
+pub(crate) const PASS: Pass = Pass {
     name: "raycast_planes",
     stage: Stage::Raycast,
     frequency: Frequency::Picture,

@@ -6,7 +6,7 @@ use crate::passes::empty_space;
 use crate::passes::pass::*;
 use crate::scene::{Mode, Scene};
 
-pub const PASS: Pass = Pass {
+pub(crate) const PASS: Pass = Pass {
     name: "raycast_projection",
     stage: Stage::Raycast,
     frequency: Frequency::Picture,

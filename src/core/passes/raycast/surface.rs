@@ -7,7 +7,7 @@ use crate::passes::empty_space;
 use crate::passes::pass::*;
 use crate::scene::{Detector, Place, Scene};
 
-pub const PASS: Pass = Pass {
+pub(crate) const PASS: Pass = Pass {
     name: "raycast_surface",
     stage: Stage::Raycast,
     frequency: Frequency::Picture,

@@ -7,7 +7,7 @@ use crate::passes::empty_space;
 use crate::passes::light_volume;
 use crate::passes::pass::*;
 
-pub const PASS: Pass = Pass {
+pub(crate) const PASS: Pass = Pass {
     name: "raycast_surface_and_volume",
     shader: |_, _| "raycast/surface_and_volume",
     needed: |s| s.marches_once(),

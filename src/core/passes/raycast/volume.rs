@@ -9,7 +9,7 @@ use crate::passes::pass::*;
 use crate::scene::{Compositing, Mode, Scene, Shading, SurfaceColour, self_attenuation};
 use glam::DVec3;
 
-pub const PASS: Pass = Pass {
+pub(crate) const PASS: Pass = Pass {
     name: "raycast_volume",
     stage: Stage::Raycast,
     frequency: Frequency::Picture,

@@ -106,6 +106,16 @@ impl fmt::Display for Outcome {
     }
 }
 
+pub(super) const SEARCH: Search = Search {
+    name: "unveil",
+    within: Slot::Volume,
+    find: |scene, bytes| {
+        let unveiled = find(scene, bytes);
+        Found { texels: bytemuck::cast_slice(&unveiled.rows).to_vec(), unveiled: Some(unveiled) }
+    },
+    reference: |scene, volume| reference(scene, volume).0,
+};
+
 /// Where rendering starts in a volume. `bytes` are its texels in the format of [`Slot::Volume`], which is stored whole.
 pub fn find(scene: &Scene, bytes: &[u8]) -> Unveiled {
     let lattice = scene.fluid_lattice();

@@ -98,7 +98,8 @@ pub struct Settings {
 impl Settings {
     /// The settings while the view moves: one ray for four pixels. Stage 1 stays the same.
     pub fn moving(&self) -> Settings {
-        Settings { ray: Ray { half: true, rays: 1, ..self.ray.clone() }, ..self.clone() }
+        let subsampling = self.ray.subsampling.max(2);
+        Settings { ray: Ray { subsampling, rays: 1, ..self.ray.clone() }, ..self.clone() }
     }
 
     /// These settings with what no pass reads of others: measurements, annotations, body marks and marks, which are drawn over the picture, and how

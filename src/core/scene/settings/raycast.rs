@@ -68,25 +68,9 @@ pub struct Ray {
     /// that it stays the same bit for bit. Absent: 8; a CPU skips only where one picture of a volume saves more time than the ranges of
     /// the bricks take, or with `slices.still`.
     pub brick: Option<u32>,
-    /// Half resolution: one ray for four pixels, and the picture is enlarged, along the edges of surfaces, for a view that moves. The filters of the distance map
-    /// cover the same part of the picture with half as many rays per axis. `rays` must be 1.
-    pub half: bool,
-    /// Quarter resolution: one ray for 16 pixels, otherwise like `half`, which then changes nothing.
-    pub quarter: bool,
-    /// An eighth of the resolution: one ray for 64 pixels, otherwise like `half`, which then changes nothing, as `quarter` does.
-    pub eighth: bool,
-}
-
-impl Ray {
-    /// Pixels between two rays along each axis, where a pixel has at most one ray.
-    pub fn apart(&self) -> u32 {
-        match (self.half, self.quarter, self.eighth) {
-            (.., true) => 8,
-            (_, true, _) => 4,
-            (true, ..) => 2,
-            _ => 1,
-        }
-    }
+    /// Pixels from ray to ray along each axis, 1, 2, 4 or 8: 2 casts one ray for four pixels. The picture is enlarged, along the edges of surfaces, for a view
+    /// that moves. The filters of the distance map cover the same part of the picture with fewer rays per axis. Above 1 `rays` must be 1.
+    pub subsampling: u32,
 }
 
 impl Default for Ray {
@@ -105,9 +89,7 @@ impl Default for Ray {
             adaptive: false,
             tolerance: 0.0,
             brick: None,
-            half: false,
-            quarter: false,
-            eighth: false,
+            subsampling: 1,
         }
     }
 }

@@ -4,7 +4,20 @@
 use super::Settings;
 use crate::tree::{Node, NodeError};
 use serde::Deserialize;
+use std::sync::Once;
 use toml::{Table, Value};
+
+/// `ray.subsampling` by the flags that it was before, which are taken out of their table. None if it has none of them.
+fn subsampling(mut taken: impl FnMut(&str) -> Option<bool>) -> Option<i64> {
+    let flags = [("eighth", 8), ("quarter", 4), ("half", 2)].map(|(name, pixels)| (taken(name), pixels));
+    if flags.iter().all(|(flag, _)| flag.is_none()) {
+        return None;
+    }
+    static REPORTED: Once = Once::new();
+    REPORTED
+        .call_once(|| tracing::warn!("ray.half, ray.quarter and ray.eighth are read as ray.subsampling = 2, 4 and 8"));
+    Some(flags.iter().find(|(flag, _)| *flag == Some(true)).map_or(1, |(_, pixels)| *pixels))
+}
 
 impl Settings {
     /// The settings of a scene file.
@@ -19,7 +32,16 @@ impl Settings {
     ///
     /// # Errors
     /// A value is not what its setting asks for; with its place in the text.
-    pub fn from_node(node: Node) -> Result<Settings, NodeError> {
+    pub fn from_node(mut node: Node) -> Result<Settings, NodeError> {
+        if let Some(ray) = node.at("ray") {
+            let pixels = subsampling(|name| {
+                let is_set = ray.at(name).and_then(|flag| flag.as_bool())?;
+                ray.take(name).map(|_| is_set)
+            });
+            if let Some(pixels) = pixels {
+                ray.add("subsampling", pixels);
+            }
+        }
         Settings::deserialize(node)
     }
 
@@ -53,6 +75,19 @@ impl Settings {
     /// A value that JSON does not have.
     pub fn to_json(&self) -> Result<String, serde_json::Error> {
         serde_json::to_string(self.erased())
+    }
+
+    /// Gives the settings of a table by former names their names of today, so that a later table overrides them.
+    pub(crate) fn rename(table: &mut Table) {
+        if let Some(Value::Table(ray)) = table.get_mut("ray") {
+            let pixels = subsampling(|name| {
+                let is_set = ray.get(name)?.as_bool()?;
+                ray.remove(name).map(|_| is_set)
+            });
+            if let Some(pixels) = pixels {
+                ray.entry("subsampling").or_insert(Value::Integer(pixels));
+            }
+        }
     }
 
     fn erased(&self) -> &dyn erased_serde::Serialize {

@@ -11,7 +11,7 @@ fn head() -> Phantom {
 /// What each ray of a rendering meets first, by the phantom's labels: what the surface is at the place that mode surface finds.
 fn met(device: &Arc<Context>, phantom: &Phantom, scene: &Scene) -> Vec<Option<Label>> {
     let mut settings = Settings { mode: Mode::Surface, ..scene.settings.clone() };
-    (settings.surface.threshold, settings.ray.quarter) = (0.18, false);
+    (settings.surface.threshold, settings.ray.subsampling) = (0.18, 1);
     let scene = Scene::new(scene.geometry.clone(), scene.input, settings).expect("a scene");
     let mut renderer = Renderer::new(device, scene.clone(), &RendererOptions::default()).expect("a renderer");
     for frame in phantom.volume(0) {
@@ -99,7 +99,7 @@ pub(super) fn cord(user: &mut User) -> String {
     let mut layers = Layers::default();
     layers.preset("face").expect("the preset");
     let mut settings = layers.finish().expect("settings");
-    settings.ray.quarter = true;
+    settings.ray.subsampling = 4;
     let kept = user.at_another(settings, head);
     let scene = user.scene();
     let before = met(&user.device, &phantom, &scene);

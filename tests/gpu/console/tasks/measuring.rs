@@ -43,7 +43,7 @@ pub(super) fn shadow(user: &mut User) -> String {
 pub(super) fn cheek(user: &mut User) -> String {
     // A length on the surface is as exact as the rays are dense.
     let mut settings = ball_options(&user.folder).settings;
-    settings.ray.quarter = false;
+    settings.ray.subsampling = 1;
     let kept = user.at_another(settings, ball);
     user.on_planes();
     user.letter('1');

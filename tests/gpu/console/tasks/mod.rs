@@ -135,7 +135,7 @@ fn ball_options(folder: &Folder) -> ConsoleOptions {
     let Truth::Sphere { centre, .. } = ball().truth() else { panic!("a ball") };
     let around = format!("planes.position = [{}, {}, {}]", centre.x, centre.y - 40.0, centre.z);
     let settings =
-        settings(&format!("mode = 'sr'\nsurface.threshold = 0.4\nmarks.bar = true\nray.quarter = true\n{around}"));
+        settings(&format!("mode = 'sr'\nsurface.threshold = 0.4\nmarks.bar = true\nray.subsampling = 4\n{around}"));
     let folder = folder.0.join("kept");
     ConsoleOptions { settings, source: SourceKind::Recording, panels: true, folder, ..options() }
 }
