@@ -53,6 +53,9 @@ pub struct SourceArgs {
     /// OpenIGTLink: the device whose images are taken, where there are several [default: all]
     #[arg(long, value_name = "NAME")]
     device_name: Option<String>,
+    /// OpenIGTLink: take messages whose checksum is 0, unchecked: some senders compute none
+    #[arg(long)]
+    no_checksum: bool,
     /// The rectangle of each tracked frame that holds ultrasound, pixels
     #[arg(long, value_name = "X,Y,W,H")]
     clip: Option<String>,
@@ -251,6 +254,7 @@ impl SourceArgs {
             (Poses::Messages { device, .. }, tool) => *device = tool.map(str::to_string),
             (Poses::Image, _) => {}
         }
+        options.client.takes_no_checksum = self.no_checksum;
         options.freehand = self.freehand()?.over(options.freehand);
         Ok(options)
     }

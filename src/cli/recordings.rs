@@ -99,9 +99,9 @@ pub struct Convert {
     volume: usize,
     #[command(flatten)]
     geometry: GeometryArgs,
-    /// Value of voxels outside the sector, in the file's own units
-    #[arg(long, value_name = "VALUE", default_value_t = 0.0, allow_negative_numbers = true)]
-    outside: f64,
+    /// Value of voxels outside the sector, in the file's own units [default: that of no echo, the low end of the sample range, such as -60 of decibels]
+    #[arg(long, value_name = "VALUE", allow_negative_numbers = true)]
+    outside: Option<f64>,
     /// Also write a volume of 1 inside the sector and 0 outside; .seg.nrrd: as a segmentation
     #[arg(long, value_name = "FILE")]
     mask: Option<PathBuf>,
@@ -151,7 +151,10 @@ impl Convert {
         if let (Some(world), Geometry::Cartesian(own)) = (recording.world_of(self.volume), &geometry) {
             target.world = world.on(own, &grid);
         }
-        target.outside = self.outside;
+        let (range, shift) = (recording.range(), recording.sample_type().shift());
+        // A capture has bytes, of which 0 is black.
+        let no_echo = if self.secondary_capture { 0.0 } else { range[0] - shift };
+        target.outside = self.outside.unwrap_or(no_echo);
         if self.secondary_capture {
             target = target.captured(recording.range());
             if target.world != World::of(&grid) {
@@ -176,7 +179,11 @@ impl Convert {
         let ([x, y, z], [dx, dy, dz]) = (grid.size, grid.spacing);
         let spacing = if dx == dy && dy == dz { format!("{dx}") } else { format!("{dx} x {dy} x {dz}") };
         let missing = if there < each { format!(", {there} of {each} frames are there") } else { String::new() };
-        say!("volume: {}, {x} x {y} x {z} voxels of {spacing} mm{missing}", self.output.display());
+        let outside = match geometry {
+            Geometry::Sweep(_) if !self.secondary_capture => format!(", {} outside of the sector", target.outside),
+            _ => String::new(),
+        };
+        say!("volume: {}, {x} x {y} x {z} voxels of {spacing} mm{outside}{missing}", self.output.display());
         if !volume.meets(&grid) {
             remark(&format!("{}: is empty: {}", self.output.display(), thinner_than(&grid, &first)));
         } else if let Some(left) = self.spacing.and_then(|mm| what_is_left(mm, &grid, &first)) {
@@ -187,7 +194,7 @@ impl Convert {
 
     /// Writes the voxels above a threshold as a segmentation.
     fn segment(&self) -> Result<(), Failure> {
-        if self.secondary_capture || self.outside != 0.0 {
+        if self.secondary_capture || self.outside.is_some() {
             let shown = self.output.display();
             return Err(input(format!("{shown}: --secondary-capture and --outside are for volumes of samples")));
         }
@@ -247,7 +254,7 @@ impl Convert {
 
     /// Writes every frame of every volume unchanged, as .frames.
     fn record(&self) -> Result<(), Failure> {
-        let is_of_volumes = self.spacing.is_some() || self.volume != 0 || self.outside != 0.0 || self.mask.is_some();
+        let is_of_volumes = self.spacing.is_some() || self.volume != 0 || self.outside.is_some() || self.mask.is_some();
         if is_of_volumes || self.sequence || self.secondary_capture {
             return Err(input(
                 "--spacing, --volume, --outside, --mask, --secondary-capture and --sequence apply to volumes; .frames holds every frame unchanged",

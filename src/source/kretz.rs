@@ -114,12 +114,16 @@ pub(super) fn read(file: &InputFile) -> Result<Layout, InputError> {
 impl<'a> Items<'a> {
     fn walk(file: &InputFile<'a>) -> Result<Items<'a>, InputError> {
         let path = file.path;
-        let unreadable = |e| InputError::unreadable(path, &e);
+        let unreadable = |e: io::Error| match e.kind() {
+            // Of a packed file, whose length is not known before.
+            io::ErrorKind::UnexpectedEof => InputError::new(path, "items", "cut short, before FFFF,FFFF"),
+            _ => InputError::unreadable(path, &e),
+        };
         let there = file.most_bytes();
         let mut input = file.open().map_err(unreadable)?;
         let mut magic = [0; 16];
-        let whole = fill(&mut input, &mut magic).map_err(unreadable)?;
-        if !whole || magic != *MAGIC {
+        let found = fill(&mut input, &mut magic).map_err(unreadable)?;
+        if found < magic.len() || magic != *MAGIC {
             return Err(InputError::new(path, "magic", "is not 'KRETZFILE 1.0   ', the only version that is read"));
         }
         let mut items = Items {
@@ -135,11 +139,12 @@ impl<'a> Items<'a> {
         let mut at = MAGIC.len() as u64;
         for _ in 0..MAX_ITEMS {
             let mut head = [0; 8];
-            if at == there && !file.is_packed() && items.voxels.or(items.sequence).is_some() {
+            let found = fill(&mut input, &mut head).map_err(unreadable)?;
+            if found == 0 && items.voxels.or(items.sequence).is_some() {
                 items.no_end = true;
                 return Ok(items);
             }
-            if !fill(&mut input, &mut head).map_err(unreadable)? {
+            if found < head.len() {
                 return Err(InputError::new(path, "items", format!("cut short after {there} bytes, before FFFF,FFFF")));
             }
             let [g0, g1, e0, e1, l0, l1, l2, l3] = head;
@@ -312,11 +317,16 @@ fn name((group, element): Tag, title: &str) -> String {
     format!("{group:04X},{element:04X} ({title})")
 }
 
-/// Fills the buffer; false at the end of the file.
-fn fill(input: &mut impl Read, buffer: &mut [u8]) -> io::Result<bool> {
-    match input.read_exact(buffer) {
-        Ok(()) => Ok(true),
-        Err(e) if e.kind() == io::ErrorKind::UnexpectedEof => Ok(false),
-        Err(e) => Err(e),
+/// Fills the buffer as far as the file goes; the number of its bytes.
+fn fill(input: &mut impl Read, buffer: &mut [u8]) -> io::Result<usize> {
+    let mut found = 0;
+    while found < buffer.len() {
+        match input.read(&mut buffer[found..]) {
+            Ok(0) => break,
+            Ok(more) => found += more,
+            Err(e) if e.kind() == io::ErrorKind::Interrupted => {}
+            Err(e) => return Err(e),
+        }
     }
+    Ok(found)
 }

@@ -2,12 +2,13 @@
 //!
 //! A packed file is read through its decompressor from the start, each time anew; nothing is unpacked to a disk.
 
+use super::describe;
 use super::dicom::{Coding, FrameStream, Frames};
 use super::pictures::{PictureStream, Pictures};
 use crate::files::progress::CountedFile;
 use crate::files::{InputError, quoted};
 use bzip2::bufread::MultiBzDecoder;
-use flate2::bufread::MultiGzDecoder;
+use flate2::bufread::GzDecoder;
 use flate2::{Decompress, FlushDecompress, Status};
 use std::fs::{self, File};
 use std::io::{self, BufRead, BufReader, Read, Seek, SeekFrom};
@@ -217,7 +218,7 @@ impl Pixels {
         file.seek(SeekFrom::Start(self.offset))?;
         let input = BufReader::new(file.take(self.length));
         let packed: Box<dyn Read + Send> = match self.encoding {
-            Encoding::Gzip => Box::new(MultiGzDecoder::new(input)),
+            Encoding::Gzip => Box::new(Members::new(input, &self.path)),
             Encoding::Bzip2 => Box::new(MultiBzDecoder::new(input)),
             _ => Box::new(Inflate { input, state: Decompress::new(true), ended: false }),
         };
@@ -263,6 +264,58 @@ impl Read for PixelStream {
             PixelStream::Raw(file) => file.read(out),
             PixelStream::Packed(stream) => stream.read(out),
         }
+    }
+}
+
+/// The members of a gzip file, one after the other. Bytes behind them that are no member end it: zeros fill a tape up (gzip manual, "Using gzip on
+/// tapes"), and of others one line says that they are not read.
+struct Members {
+    /// None behind the last one.
+    current: Option<GzDecoder<Member>>,
+    path: PathBuf,
+    /// Members that were read to their end.
+    count: u64,
+}
+
+/// The two bytes that tell a member, and what follows them.
+type Member = io::Chain<io::Cursor<Vec<u8>>, BufReader<io::Take<CountedFile>>>;
+
+impl Read for Members {
+    fn read(&mut self, out: &mut [u8]) -> io::Result<usize> {
+        while let Some(member) = self.current.as_mut().filter(|_| !out.is_empty()) {
+            match member.read(out) {
+                Ok(0) => {}
+                // A header that is none, behind members that were whole.
+                Err(e) if e.kind() == io::ErrorKind::InvalidInput && self.count > 0 => {
+                    self.current = None;
+                    self.tell_of_others();
+                    break;
+                }
+                found => return found,
+            }
+            self.count += 1;
+            let Some(member) = self.current.take() else { break };
+            let (_, mut rest) = member.into_inner().into_inner();
+            let mut start = Vec::new();
+            (&mut rest).take(2).read_to_end(&mut start)?;
+            if start == GZIP {
+                self.current = Some(GzDecoder::new(io::Cursor::new(start).chain(rest)));
+            } else if start.into_iter().map(Ok).chain(rest.bytes()).any(|byte| !matches!(byte, Ok(0))) {
+                self.tell_of_others();
+            }
+        }
+        Ok(0)
+    }
+}
+
+impl Members {
+    fn new(input: BufReader<io::Take<CountedFile>>, path: &Path) -> Members {
+        let current = GzDecoder::new(io::Cursor::new(Vec::new()).chain(input));
+        Members { current: Some(current), path: path.into(), count: 0 }
+    }
+
+    fn tell_of_others(&self) {
+        tracing::warn!(file = %describe::path(&self.path), "bytes behind the gzip stream are not read");
     }
 }
 

@@ -254,6 +254,9 @@ fn a_resampled_volume_stays_where_it_is() {
     assert_eq!(resampled[n], there[(4 + 1) * 5 + 1]);
 }
 
+/// Decibels of no echo in UFF: what is drawn black.
+const DECIBELS: f64 = -60.0;
+
 #[test]
 fn outside_is_told_from_zero_by_a_value_or_a_mask() {
     let folder = Folder::new("outside");
@@ -270,6 +273,22 @@ fn outside_is_told_from_zero_by_a_value_or_a_mask() {
     for (value, named) in [("256", "256"), ("-1", "-1"), ("0.5", "0.5")] {
         let (code, _, said) = program::run(&["convert", from, &folder.path("no.mha"), "--outside", value]);
         assert!(code == Some(2) && said.contains(named) && said.contains("--outside"), "{said}");
+    }
+    // Without a value it is that of no echo: of decibels their floor.
+    for (recording, floor) in
+        [("wobbler-4dc7/sweep.mha", 0.0), ("uff/decibels.uff", DECIBELS), ("uff/sector.uff", DECIBELS)]
+    {
+        let from = data(recording);
+        let from = from.to_str().expect("a plain name");
+        let (volume, mask) = (folder.path("v.mha"), folder.path("m.nrrd"));
+        let (code, out, said) = program::run(&["convert", from, &volume, "--spacing", "1", "--mask", &mask]);
+        assert_eq!(code, Some(0), "{said}");
+        let (volume, mask) = (values(&volume), values(&mask));
+        assert!(
+            mask.contains(&0.0) && volume.iter().zip(&mask).all(|(v, inside)| *inside == 1.0 || *v == floor),
+            "{recording}"
+        );
+        assert!(out.contains(&format!(", {floor} outside of the sector")), "{out}");
     }
     let (code, _, said) = program::run(&["convert", from, &folder.path("few.mha"), "--spacing", "50"]);
     assert!(code == Some(0) && said.contains("--spacing 50 mm leaves"), "{said}");
@@ -335,6 +354,38 @@ fn any_recording_may_be_packed_by_gzip() {
         });
         assert!(read.is_err_and(|e| e.to_string().lines().count() == 1), "{name} is cut short");
     }
+}
+
+/// Prevents that a whole recording is refused for what a tape or another program left behind the gzip stream.
+#[test]
+fn what_follows_a_gzip_stream_does_not_spoil_it() {
+    let folder = Folder::new("gzip-tail");
+    let plain = std::fs::read(data("formats/both.nii")).expect("stored");
+    let member = |bytes: &[u8]| {
+        let mut packed = flate2::write::GzEncoder::new(Vec::new(), flate2::Compression::fast());
+        packed.write_all(bytes).expect("packed");
+        packed.finish().expect("packed")
+    };
+    let whole = member(&plain);
+    let in_two = [member(&plain[..400]), member(&plain[400..])].concat();
+    for (what, bytes) in [
+        ("zeros", [&whole[..], &[0; 700]].concat()),
+        ("text", [&whole[..], b"signature"].concat()),
+        ("half of a mark", [&whole[..], &[0x1f]].concat()),
+        ("a mark and no member", [&whole[..], &[0x1f, 0x8b, 9, 9], &[0; 20]].concat()),
+        ("two members", in_two.clone()),
+        ("two members and zeros", [&in_two[..], &[0; 5]].concat()),
+    ] {
+        let path = folder.write("tail.nii.gz", &bytes);
+        assert!(voxels(open(Path::new(&path))) == voxels(open(&data("formats/both.nii"))), "{what}");
+    }
+    // Where the second member is cut, the recording is.
+    let cut = folder.write("cut.nii.gz", &in_two[..in_two.len() - 9]);
+    let read = Recording::open(Path::new(&cut), None).and_then(|mut r| {
+        while r.next_frame()?.is_some() {}
+        Ok(())
+    });
+    assert!(read.is_err_and(|e| e.to_string().lines().count() == 1));
 }
 
 #[test]

@@ -7,6 +7,7 @@ use crate::probe::StoredType;
 use crate::probe::{AxisOrder, Geometry, Grid, World, is_rigid};
 use crate::value_range::ValueRange;
 use glam::{DAffine3, DVec3};
+use std::ops::Range;
 
 /// Relative difference of spacings that count as equal: the spacing of a rotated volume is computed again in f32.
 const SPACING_TOLERANCE: f64 = 1e-5;
@@ -23,18 +24,33 @@ pub(super) struct CartesianVolume {
     pub(super) pose: Option<DAffine3>,
     range: [f64; 2],
     bytes: Vec<u8>,
+    /// Slices that came since the volume was last whole; none where it comes in one message.
+    came: Vec<bool>,
+    /// A message brought all slices: parts that follow change it, and each shows.
+    was_whole: bool,
+}
+
+/// What an image did to the volume.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(super) struct Taken {
+    /// Samples that read as 0 because they are not finite or denormal.
+    pub(super) replaced: u64,
+    /// All slices are there.
+    pub(super) is_whole: bool,
+    /// Slices that lacked when one came again: that volume is left out.
+    pub(super) missing: usize,
 }
 
 impl CartesianVolume {
-    /// Stores the slices of an image. If it does not belong to the present volume, a new one is begun, whose missing slices are 0. Returns
-    /// the number of samples that read as 0 because they are not finite or denormal.
+    /// Stores the slices of an image. If it does not belong to the present volume, a new one is begun. A volume that comes in parts is whole when all of its
+    /// slices came.
     ///
     /// Lateral is the image's i, depth its j, elevation its k. Lateral and elevation are centred, depth begins at 0. Of the matrix the
     /// handedness is used: rows of a left-handed image are reversed. The values shown as 0 and 1 are 0 and 255 for 8 bits, otherwise the smallest and largest of the first message.
     ///
     /// # Errors
     /// In words, an image that cannot be used. The volume is not changed.
-    pub(super) fn take(volume: &mut Option<CartesianVolume>, image: Image, max_bytes: usize) -> Result<u64, String> {
+    pub(super) fn take(volume: &mut Option<CartesianVolume>, image: Image, max_bytes: usize) -> Result<Taken, String> {
         let [i, j, _] = image.size;
         let ([x, y, first], [columns, rows, slices]) = (image.region.offset, image.region.size);
         if (x, y, columns, rows) != (0, 0, i, j) {
@@ -80,6 +96,8 @@ impl CartesianVolume {
                     pose,
                     range,
                     bytes: vec![0; all],
+                    came: vec![false; grid.size[2]],
+                    was_whole: false,
                 })
             }
         };
@@ -89,7 +107,30 @@ impl CartesianVolume {
             Some(part) => part.copy_from_slice(&brought),
             None => return Err(format!("{slices} slices from {first} on, which are not all there")),
         }
-        Ok(replaced)
+        let (is_whole, missing) = whole.came(usize::from(first)..usize::from(first) + usize::from(slices));
+        Ok(Taken { replaced, is_whole, missing })
+    }
+
+    /// Notes slices that came. True if the volume is whole with them; how many lacked if one of them was there already.
+    fn came(&mut self, slices: Range<usize>) -> (bool, usize) {
+        if slices.len() == self.came.len() {
+            (self.was_whole, self.came) = (true, vec![false; self.came.len()]);
+            return (true, 0);
+        }
+        if self.was_whole {
+            return (true, 0);
+        }
+        let is_again = self.came[slices.clone()].contains(&true);
+        let missing = if is_again { self.came.iter().filter(|came| !**came).count() } else { 0 };
+        if is_again {
+            self.came.fill(false);
+        }
+        self.came[slices].fill(true);
+        let is_whole = !self.came.contains(&false);
+        if is_whole {
+            self.came.fill(false);
+        }
+        (is_whole, missing)
     }
 
     fn is_at(&self, grid: &Grid) -> bool {

@@ -1,6 +1,6 @@
 //! A connection on a thread of its own, which reconnects, and the queue that the thread fills.
 
-use super::codec::{BODY_LIMIT, DecodeError, Decoded, decode};
+use super::codec::{BODY_LIMIT, DecodeError, Decoded, decode_with};
 use super::message::Message;
 use crate::files::escaped;
 use std::collections::VecDeque;
@@ -48,6 +48,8 @@ pub struct ClientOptions {
     pub queue_messages: usize,
     /// Most memory of the queued messages, bytes. A single larger one is still kept.
     pub queue_bytes: usize,
+    /// Messages with a checksum of 0 are taken unchecked.
+    pub takes_no_checksum: bool,
 }
 
 impl Default for ClientOptions {
@@ -61,6 +63,7 @@ impl Default for ClientOptions {
             body_limit: BODY_LIMIT,
             queue_messages: 256,
             queue_bytes: BODY_LIMIT,
+            takes_no_checksum: false,
         }
     }
 }
@@ -277,7 +280,7 @@ impl Shared {
         let mut useful = false;
         let mut last = Instant::now();
         loop {
-            let missing = match decode(&bytes, options.body_limit) {
+            let missing = match decode_with(&bytes, options.body_limit, options.takes_no_checksum) {
                 Ok(Decoded::Need(missing)) => missing,
                 Ok(Decoded::Message { message, .. }) => {
                     self.deliver(message);

@@ -27,9 +27,11 @@ pub(super) enum FaultKind {
     Pose,
     Outside,
     Volume,
+    /// A volume in parts, of which a slice came again before all did.
+    Incomplete,
 }
 
-const KINDS: [(FaultKind, &str); 13] = [
+const KINDS: [(FaultKind, &str); 14] = [
     (FaultKind::Unreachable, "not connected"),
     (FaultKind::Lost, "connection lost"),
     (FaultKind::Again, "connected again"),
@@ -43,6 +45,7 @@ const KINDS: [(FaultKind, &str); 13] = [
     (FaultKind::Pose, "frames refused"),
     (FaultKind::Outside, "frames outside of the volume"),
     (FaultKind::Volume, "no volume for the sweep"),
+    (FaultKind::Incomplete, "incomplete volumes left out"),
 ];
 
 #[derive(Clone, Default)]

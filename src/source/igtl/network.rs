@@ -4,7 +4,7 @@
 //! frame of a freehand sweep. After a change, all slices of the volume are emitted under a new volume number, so that the receiver
 //! always gets complete volumes and need not know their origin.
 
-use super::cartesian::{CartesianVolume, other_coordinates};
+use super::cartesian::{CartesianVolume, Taken, other_coordinates};
 use super::client::{Client, ClientOptions, ClientStatistics};
 use super::codec::BODY_LIMIT;
 use super::faults::{FaultKind, Faults};
@@ -179,9 +179,13 @@ impl Network {
             Message::Image(image) if image.size[2] > 1 => {
                 let time = (image.time > 0.0).then_some(image.time);
                 match CartesianVolume::take(&mut self.whole, image, self.volume_bytes) {
-                    Ok(replaced) => {
+                    Ok(Taken { replaced, is_whole, missing }) => {
                         self.faults.note(FaultKind::Samples, replaced, "they read as 0");
-                        self.start_output(false, time);
+                        let why = format!("{missing} of its slices did not come");
+                        self.faults.note(FaultKind::Incomplete, u64::from(missing > 0), &why);
+                        if is_whole {
+                            self.start_output(false, time);
+                        }
                     }
                     Err(fault) => self.faults.note(FaultKind::Image, 1, &fault),
                 }

@@ -121,6 +121,23 @@ fn damaged_and_unknown_messages_are_passed_over_and_counted() {
 }
 
 #[test]
+fn a_checksum_of_zero_is_taken_where_that_is_asked_for() {
+    let mut unchecked = bytes(&transform("Probe", 1.0, 2.0));
+    unchecked[50..58].fill(0);
+    let mut wrong = unchecked.clone();
+    wrong[57] = 1;
+    let all = [wrong, unchecked, bytes(&transform("Probe", 2.0, 3.0))].concat();
+    for (takes_no_checksum, expected) in [(false, vec![(2.0, 3.0)]), (true, vec![(1.0, 2.0), (2.0, 3.0)])] {
+        let options = ClientOptions { takes_no_checksum, ..quick() };
+        let client = Client::connect(&serve(vec![send_and_stay(all.clone())]), options).unwrap();
+        for (time, x) in &expected {
+            assert_eq!(take(&client), transform("Probe", *time, *x));
+        }
+        assert_eq!(client.statistics().checksum_failures, 3 - expected.len() as u64);
+    }
+}
+
+#[test]
 fn a_peer_killed_within_a_message_is_connected_to_again() {
     let image = stored("Image_Motor_v1.bin");
     for cut in [30, 100] {
@@ -255,6 +272,7 @@ fn options_of_zero_do_no_harm() {
         body_limit: 0,
         queue_messages: 0,
         queue_bytes: 0,
+        takes_no_checksum: false,
     };
     // Several connections, since no silence at all is allowed.
     let server = || serve((0..100).map(|_| send_and_stay(bytes(&transform("Probe", 1.0, 1.0)))).collect());

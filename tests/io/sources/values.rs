@@ -280,5 +280,19 @@ fn falling_kretz_tables_and_a_missing_end_mark_are_read() {
     assert!(total(folder.write("m.vol", mixed)).unwrap_err().contains("rise or fall"));
     let open_ended = &rising[..rising.len() - 8];
     assert_eq!(places(open_ended), places(&rising));
-    assert!(open(folder.write("e.vol", open_ended)).description().iter().any(|(title, _)| title == "end mark"));
+    let packed = |bytes: &[u8]| {
+        let mut packed = flate2::write::GzEncoder::new(Vec::new(), flate2::Compression::fast());
+        packed.write_all(bytes).and_then(|()| packed.finish()).expect("packed")
+    };
+    for bytes in [open_ended.to_vec(), packed(open_ended)] {
+        assert!(open(folder.write("e.vol", bytes)).description().iter().any(|(title, _)| title == "end mark"));
+    }
+    // Within an item it is cut short, packed or not.
+    let cut = &open_ended[..open_ended.len() - 3];
+    for bytes in
+        [cut.to_vec(), packed(cut), [open_ended, &[1, 2, 3]].concat(), packed(&[open_ended, &[1, 2, 3]].concat())]
+    {
+        let error = total(folder.write("c.vol", bytes)).unwrap_err();
+        assert!(error.contains("cut short") && error.lines().count() == 1, "{error}");
+    }
 }

@@ -49,6 +49,8 @@ pub struct Config {
     pub tool: Option<String>,
     /// OpenIGTLink: the device whose images are taken, where there are several. Default: all.
     pub device_name: Option<String>,
+    /// OpenIGTLink: messages whose checksum is 0 are taken, unchecked. Default: false.
+    pub no_checksum: bool,
     /// The part of each tracked frame that is ultrasound, pixels: x, y, width, height. Default: all of it.
     pub clip: Option<[u32; 4]>,
     /// Distance between the voxels that tracked frames are compounded into, 0.01 to 1000 mm. Default: between the frames' pixels.
@@ -187,6 +189,7 @@ impl Default for Config {
             forever: false,
             tool: None,
             device_name: None,
+            no_checksum: false,
             clip: None,
             spacing: None,
             hole: None,
@@ -429,6 +432,7 @@ const SOURCE_KEYS: &[&str] = &[
     "rounds",
     "tool",
     "device_name",
+    "no_checksum",
     "clip",
     "spacing",
     "hole",
@@ -482,7 +486,12 @@ impl Config {
             ("motor.stop_bits", text(stop_bits)),
             ("motor.timeout", text(timeout)),
         ];
-        let switches = [("real_time", self.real_time), ("motor.homed", homed), ("motor.stamps", stamps)];
+        let switches = [
+            ("real_time", self.real_time),
+            ("no_checksum", self.no_checksum),
+            ("motor.homed", homed),
+            ("motor.stamps", stamps),
+        ];
         let values = values.into_iter().filter_map(|(key, value)| Some(format!("{}={}", flag(key), value?)));
         values.chain(switches.into_iter().filter(|(_, on)| *on).map(|(key, _)| flag(key))).collect()
     }
@@ -657,6 +666,7 @@ const ALLOWED: &[(&str, &str)] = &[
     ("loop", "true or false"),
     ("tool", "the name of a TRANSFORM or tool, or \"image\""),
     ("device_name", "the name of an IMAGE device, as \"Image_Reference\""),
+    ("no_checksum", "true or false"),
     ("clip", "[x, y, width, height] in pixels"),
     ("spacing", "0.01 to 1000 mm"),
     ("hole", "0 to 1000 mm"),
