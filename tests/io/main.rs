@@ -9,6 +9,7 @@ mod igtl;
 mod interrupted;
 #[cfg(target_os = "linux")]
 mod motor;
+mod outside;
 mod piped;
 mod posed;
 mod progress;
