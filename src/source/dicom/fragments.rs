@@ -136,7 +136,8 @@ mod tests {
     fn fragments_are_divided_where_code_streams_begin() {
         assert_eq!(firsts(&[3], &[], "smebsme"), (vec![0, 3, 4], vec![]));
         assert_eq!(firsts(&[2], &[], "seese"), (vec![0, 3], vec![]), "a fragment of padding");
-        assert_eq!(firsts(&[2], &[], "smssme").0, [0], "not reached");
+        assert_eq!(firsts(&[1], &[], "smsme").0, [0], "a small picture in the headers");
+        assert_eq!(firsts(&[2], &[], "smsme").0, [0, 2], "no end marks");
     }
 
     #[test]

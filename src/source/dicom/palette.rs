@@ -133,8 +133,9 @@ fn expanded(words: &[u16], bits: u16) -> Result<Vec<u8>, String> {
     };
     let mut segments = Segments { numbers: &numbers, width, entries: Vec::new() };
     let mut at = 0;
-    // Behind the last segment there may be one byte that makes the length even.
-    while at + 1 < numbers.len() {
+    // Behind the last segment there may be one byte that makes the length even, but no word.
+    let padding = 2 - width;
+    while at + padding < numbers.len() {
         at = segments.segment(at, true)?;
     }
     high(segments.entries.into_iter(), bits)
