@@ -332,7 +332,7 @@ fn bytes_in_words_of_a_big_endian_file_are_exchanged() {
 fn palettes_of_all_forms_give_luminances() {
     let file = |bytes: &[u8]| File::new(LITTLE, bytes.len() as u16, 1).pixels(bytes);
     // Entries for 50 .. 52; those around them mean the ends.
-    let words = [0x0a00, 0x1400, 0x1e00];
+    let words = [10 * 257, 20 * 257, 30 * 257];
     let short = file(&[0, 50, 51, 52, 53, 255]).palette([3, 50, 16]);
     assert_eq!(plain(&short.clone().entries(0x0028_1201, &words)).concat(), [10, 10, 20, 30, 30, 30]);
     refused(&short.clone().entries(0x0028_1201, &words[..1]), &["palette (0028,1101)", "1 of 3 entries"]);
@@ -348,7 +348,7 @@ fn palettes_of_all_forms_give_luminances() {
     assert_eq!(plain(&bytes.clone().entries(0x0028_1201, &[0x1405, 0x3c28])).concat(), [5, 20, 40, 60]);
     assert_eq!(plain(&bytes.entries(0x0028_1201, &[5, 20, 40, 60])).concat(), [5, 20, 40, 60]);
     // Segments: two entries, a line to 254, and the two again.
-    let segments = [0, 2, 0, 0x0200, 1, 252, 0xfe00, 2, 1, 0, 0];
+    let segments = [0, 2, 0, 2 * 257, 1, 252, 254 * 257, 2, 1, 0, 0];
     let segmented = file(&[0, 1, 2, 100, 253, 254, 255]).palette([256, 0, 16]).entries(0x0028_1221, &segments);
     assert_eq!(plain(&segmented).concat(), [0, 2, 3, 101, 254, 0, 2]);
     refused(&segmented.entries(0x0028_1221, &segments[..5]), &["palette (0028,1101)", "cut short"]);

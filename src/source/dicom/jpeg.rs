@@ -48,15 +48,18 @@ pub(super) fn has_end(tail: &[u8]) -> bool {
     tail.is_empty() || tail == [END[1]] || tail.ends_with(&END)
 }
 
-/// The frame without padding. The decoders make up what is missing at the end.
+/// The frame without padding. The decoders make up what is missing at the end, and do not see a second picture.
 ///
 /// # Errors
-/// In words, a missing end.
+/// In words, a missing end, or several pictures.
 fn whole(bytes: &[u8]) -> Result<&[u8], String> {
     let frame = without_padding(bytes);
-    match frame.ends_with(&END) {
-        true => Ok(frame),
-        false => Err("is cut short: its end mark is missing".into()),
+    if !frame.ends_with(&END) {
+        return Err("is cut short: its end mark is missing".into());
+    }
+    match frame.windows(4).any(|mark| matches!(mark, [0xff, 0xd9, 0xff, 0xd8 | 0x4f])) {
+        true => Err("holds several pictures, one behind the other".into()),
+        false => Ok(frame),
     }
 }
 
@@ -405,6 +408,7 @@ mod tests {
             assert_eq!(whole(&[&good[..], padding].concat()), Ok(&good[..]), "{padding:?}");
             assert!(has_end(&[&good[..], padding].concat()) && has_end(padding));
         }
+        assert!(whole(&good.repeat(2)).is_err_and(|why| why.contains("several pictures")));
         assert!(whole(&[0xff, 0xd9, 7]).is_err() && whole(&[0xd9, 0xff]).is_err() && whole(&[]).is_err());
         assert!(!has_end(&[0xff, 0xd9, 7]) && !has_end(&[7, 0xd9]) && has_end(&[0xd9, 0]));
     }

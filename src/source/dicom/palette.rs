@@ -75,7 +75,7 @@ impl Palette {
         warnings.dedup();
         let mut greys = vec![0.0; count];
         for (entries, share) in colours.iter().zip(LUMINANCE) {
-            greys.iter_mut().zip(entries).for_each(|(grey, entry)| *grey += share * f64::from(*entry));
+            greys.iter_mut().zip(entries).for_each(|(grey, entry)| *grey += share * entry);
         }
         let greys = greys.iter().map(|grey: &f64| grey.round() as u8).collect();
         Ok((Palette { greys, first, numbers }, warnings))
@@ -92,30 +92,33 @@ impl Palette {
     }
 }
 
-/// The high bits of entries, 8 of each.
+/// Entries as shares of the largest one that so many bits hold, 0 .. 255.
 ///
 /// # Errors
 /// In words, entries of a width that is not read.
-fn high(entries: impl Iterator<Item = u16>, bits: u16) -> Result<Vec<u8>, String> {
+fn shares(entries: impl Iterator<Item = u16>, bits: u16) -> Result<Vec<f64>, String> {
     match bits {
-        8..=16 => Ok(entries.map(|entry| (entry >> (bits - 8)).min(255) as u8).collect()),
+        8..=16 => {
+            let most = f64::from(bits).exp2() - 1.0;
+            Ok(entries.map(|entry| (f64::from(entry) * 255.0 / most).min(255.0)).collect())
+        }
         _ => Err(format!("states entries of {bits} bits; 8 to 16 are read")),
     }
 }
 
 /// The entries of a table: words, or bytes that are packed two in a word, the first one in the low half.
-fn plain_entries(words: &[u16], count: usize, bits: u16, warnings: &mut Vec<String>) -> Result<Vec<u8>, String> {
-    let bytes = || words.iter().flat_map(|word| word.to_le_bytes());
+fn plain_entries(words: &[u16], count: usize, bits: u16, warnings: &mut Vec<String>) -> Result<Vec<f64>, String> {
+    let bytes = || words.iter().flat_map(|word| word.to_le_bytes()).map(u16::from);
     let is_packed = words.len() == count.div_ceil(2) && count > 1;
     match bits {
-        8 if is_packed => Ok(bytes().collect()),
+        8 if is_packed => shares(bytes(), 8),
         8 if words.iter().any(|word| *word > 255) => Err("states entries of 8 bits, but has larger ones".into()),
         9..=16 if is_packed => {
             let text = format!("palette (0028,1101) states entries of {bits} bits, but has one byte for each");
             warnings.push(format!("{text}; read as 8 bits"));
-            Ok(bytes().collect())
+            shares(bytes(), 8)
         }
-        _ => high(words.iter().copied(), bits),
+        _ => shares(words.iter().copied(), bits),
     }
 }
 
@@ -126,7 +129,7 @@ const MOST: usize = 65536;
 ///
 /// # Errors
 /// In words, a segment that is cut short or not known.
-fn expanded(words: &[u16], bits: u16) -> Result<Vec<u8>, String> {
+fn expanded(words: &[u16], bits: u16) -> Result<Vec<f64>, String> {
     let (numbers, width): (Vec<u16>, usize) = match bits {
         8 => (words.iter().flat_map(|word| word.to_le_bytes()).map(u16::from).collect(), 1),
         _ => (words.to_vec(), 2),
@@ -138,7 +141,7 @@ fn expanded(words: &[u16], bits: u16) -> Result<Vec<u8>, String> {
     while at + padding < numbers.len() {
         at = segments.segment(at, true)?;
     }
-    high(segments.entries.into_iter(), bits)
+    shares(segments.entries.into_iter(), bits)
 }
 
 struct Segments<'a> {
@@ -218,11 +221,11 @@ mod tests {
     #[test]
     fn segments_are_expanded() {
         // Two entries, a line of 4, and both again; then the line alone from its last entry on.
-        let words = [0, 2, 0, 0x1000, 1, 4, 0x5000, 2, 2, 0, 0, 2, 1, 8, 0];
-        let once = [0, 0x10, 0x20, 0x30, 0x40, 0x50];
-        assert_eq!(expanded(&words, 16), Ok([&once[..], &once, &[0x50; 4]].concat()));
+        let words = [0, 2, 0, 257, 1, 4, 5 * 257, 2, 2, 0, 0, 2, 1, 8, 0];
+        let once = [0.0, 1.0, 2.0, 3.0, 4.0, 5.0];
+        assert_eq!(expanded(&words, 16), Ok([&once[..], &once, &[5.0; 4]].concat()));
         let bytes = [0, 2, 0, 100, 1, 5, 0, 2, 1, 4, 0, 0, 0];
-        assert_eq!(expanded(&packed(&bytes), 8), Ok(vec![0, 100, 80, 60, 40, 20, 0, 0, 0, 0, 0, 0]));
+        assert_eq!(expanded(&packed(&bytes), 8), Ok([0, 100, 80, 60, 40, 20, 0, 0, 0, 0, 0, 0].map(f64::from).into()));
     }
 
     #[test]
@@ -246,11 +249,11 @@ mod tests {
     #[test]
     fn entries_are_words_or_bytes() {
         let mut said = Vec::new();
-        assert_eq!(plain_entries(&[0x0201, 0x0003], 3, 8, &mut said), Ok(vec![1, 2, 3, 0]));
-        assert_eq!(plain_entries(&[1, 2, 3], 3, 8, &mut said), Ok(vec![1, 2, 3]));
-        assert_eq!(plain_entries(&[0x1ff, 0xffff], 2, 12, &mut said), Ok(vec![0x1f, 255]));
+        assert_eq!(plain_entries(&[0x0201, 0x0003], 3, 8, &mut said), Ok(vec![1.0, 2.0, 3.0, 0.0]));
+        assert_eq!(plain_entries(&[1, 2, 3], 3, 8, &mut said), Ok(vec![1.0, 2.0, 3.0]));
+        assert_eq!(plain_entries(&[819, 0xffff], 2, 12, &mut said), Ok(vec![51.0, 255.0]));
         assert!(said.is_empty());
-        assert_eq!(plain_entries(&[0x0201, 0x0403], 4, 16, &mut said), Ok(vec![1, 2, 3, 4]));
+        assert_eq!(plain_entries(&[0x0201, 0x0403], 4, 16, &mut said), Ok(vec![1.0, 2.0, 3.0, 4.0]));
         assert!(said.len() == 1 && said[0].contains("one byte for each"), "{said:?}");
         assert!(plain_entries(&[256, 1], 2, 8, &mut said).is_err() && plain_entries(&[1], 1, 7, &mut said).is_err());
     }
