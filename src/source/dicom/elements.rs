@@ -624,14 +624,16 @@ impl Walk<'_> {
     fn fragment(&mut self, length: u64) -> Result<Fragment, InputError> {
         self.check(length, FIELD)?;
         let at = self.at;
-        let mut seen = self.value(PIXEL_DATA, length.min(8))?;
+        let mut last = self.value(PIXEL_DATA, length.min(8))?;
         let mut head = [0; 8];
-        head[..seen.len()].copy_from_slice(&seen);
-        let rest = length - seen.len() as u64;
-        let tail = rest.min(TAIL);
-        self.skip(rest - tail, FIELD)?;
-        seen.extend(self.value(PIXEL_DATA, tail)?);
-        Ok(Fragment { at, length, head, ends: has_end(&seen) })
+        head[..last.len()].copy_from_slice(&last);
+        let rest = length - last.len() as u64;
+        if rest > TAIL {
+            self.skip(rest - TAIL, FIELD)?;
+            last.clear();
+        }
+        last.extend(self.value(PIXEL_DATA, rest.min(TAIL))?);
+        Ok(Fragment { at, length, head, ends: has_end(&last) })
     }
 
     /// An element of the group that may hold a Kretz file.

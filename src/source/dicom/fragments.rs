@@ -43,14 +43,22 @@ pub(super) fn divided(
     let of_table = by_table.clone().filter(|firsts| firsts.len() >= least);
     let each: Vec<usize> = (0..all).collect();
     let whole = (strict.is_none() && (stated.is_empty() || stated.contains(&1))).then(|| vec![0]);
-    let known = [strict.clone(), of_table.clone(), starts(fragments, stream, false), Some(each.clone())];
+    let loose = starts(fragments, stream, false);
+    let most = loose.as_ref().map_or(0, Vec::len);
+    let known = [strict.clone(), of_table.clone(), loose, Some(each.clone())];
     let firsts = known.into_iter().flatten().find(is_stated);
     let firsts = firsts.or(of_table).or(strict).or(whole).or((all == 1).then_some(each));
     let Some(firsts) = firsts else {
         let frames = stated.first().copied().unwrap_or(1);
         return Err(format!("has {all} fragments for {frames} frames, and no table that divides them"));
     };
-    let warnings = warnings(stated, table, &firsts)?;
+    let mut warnings = warnings(stated, table, &firsts)?;
+    if most > firsts.len() {
+        warnings.push(format!(
+            "{most} fragments begin like frames, but not all behind an end mark: {} are read",
+            firsts.len()
+        ));
+    }
     let ends = firsts.iter().skip(1).copied().chain([all]);
     Ok(Divided { frames: firsts.iter().zip(ends).map(|(first, end)| (*first, end - first)).collect(), warnings })
 }
@@ -136,7 +144,9 @@ mod tests {
     fn fragments_are_divided_where_code_streams_begin() {
         assert_eq!(firsts(&[3], &[], "smebsme"), (vec![0, 3, 4], vec![]));
         assert_eq!(firsts(&[2], &[], "seese"), (vec![0, 3], vec![]), "a fragment of padding");
-        assert_eq!(firsts(&[1], &[], "smsme").0, [0], "a small picture in the headers");
+        let (found, said) = firsts(&[1], &[], "smsme");
+        assert_eq!(found, [0], "a small picture in the headers");
+        assert!(said.len() == 1 && said[0].contains("2 fragments begin like frames"), "{said:?}");
         assert_eq!(firsts(&[2], &[], "smsme").0, [0, 2], "no end marks");
     }
 

@@ -57,7 +57,14 @@ fn whole(bytes: &[u8]) -> Result<&[u8], String> {
     if !frame.ends_with(&END) {
         return Err("is cut short: its end mark is missing".into());
     }
-    match frame.windows(4).any(|mark| matches!(mark, [0xff, 0xd9, 0xff, 0xd8 | 0x4f])) {
+    // Every mark begins with the byte that may be padding as well.
+    let begins_again = |(end, _): (usize, &[u8])| {
+        let behind = &frame[end + 2..];
+        let padding = behind.iter().take_while(|b| matches!(b, 0 | 0xff)).count();
+        let mark = padding.checked_sub(1).and_then(|from| behind.get(from..from + 2));
+        matches!(mark, Some([0xff, 0xd8 | 0x4f]))
+    };
+    match frame.windows(2).enumerate().filter(|(_, mark)| *mark == END).any(begins_again) {
         true => Err("holds several pictures, one behind the other".into()),
         false => Ok(frame),
     }
@@ -408,7 +415,10 @@ mod tests {
             assert_eq!(whole(&[&good[..], padding].concat()), Ok(&good[..]), "{padding:?}");
             assert!(has_end(&[&good[..], padding].concat()) && has_end(padding));
         }
-        assert!(whole(&good.repeat(2)).is_err_and(|why| why.contains("several pictures")));
+        for between in [&[][..], &[0, 0], &[0xff, 0xff, 0xff]] {
+            let two = [&good[..], between, &good].concat();
+            assert!(whole(&two).is_err_and(|why| why.contains("several pictures")), "{between:?}");
+        }
         assert!(whole(&[0xff, 0xd9, 7]).is_err() && whole(&[0xd9, 0xff]).is_err() && whole(&[]).is_err());
         assert!(!has_end(&[0xff, 0xd9, 7]) && !has_end(&[7, 0xd9]) && has_end(&[0xd9, 0]));
     }
