@@ -260,7 +260,7 @@ impl Item {
     }
 
     /// Whole numbers of 64 bits.
-    pub fn offsets(&self, tag: Tag) -> Vec<u64> {
+    pub(crate) fn offsets(&self, tag: Tag) -> Vec<u64> {
         self.bytes(tag).unwrap_or_default().as_chunks::<8>().0.iter().map(|b| u64::from_le_bytes(*b)).collect()
     }
 }

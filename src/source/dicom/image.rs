@@ -244,60 +244,19 @@ struct Format {
 }
 
 impl Format {
-    /// The pixels as they are read, how they stand in the file, and the bytes that one of them takes there.
+    /// What the elements say of the pixels.
+    ///
+    /// # Errors
+    /// Pixels of a kind that is not read, a palette that is not whole.
     fn of(path: &Path, elements: &Elements, coding: Coding) -> Result<Format, InputError> {
-        let fault = |field: &str, fault: String| Err(InputError::new(path, field, fault));
+        let fault = |field: &str, fault: String| InputError::new(path, field, fault);
         let root = &elements.root;
         let samples = root.word(tags::SAMPLES).unwrap_or(1);
-        let bits = root.word(tags::BITS_ALLOCATED).unwrap_or(0);
-        let stored_bits = root.word(tags::BITS_STORED).unwrap_or(bits);
-        let signed = root.word(tags::IS_SIGNED).unwrap_or(0) == 1;
-        let number = match (bits, signed) {
-            (8, false) => Number::U8,
-            (8, true) => Number::I8,
-            (16, false) => Number::U16,
-            (16, true) => Number::I16,
-            (32, false) => Number::U32,
-            (32, true) => Number::I32,
-            _ => return fault("bits allocated (0028,0100)", format!("is {bits}: 8, 16 and 32 are read")),
-        };
         let photometric = root.text(tags::PHOTOMETRIC);
         let is_palette = photometric == "PALETTE COLOR";
-        let high = root.word(tags::HIGH_BIT).unwrap_or(stored_bits.saturating_sub(1));
-        if stored_bits == 0
-            || stored_bits > bits
-            || high.checked_add(1) != Some(stored_bits)
-            || (signed && stored_bits != bits && !is_palette)
-        {
-            return fault(
-                "bits stored (0028,0101)",
-                format!("{stored_bits} of {bits}, up to bit {high}, are not read"),
-            );
-        }
-        let (most, name) = match coding {
-            Coding::Native | Coding::Rle => (32, ""),
-            Coding::Jpeg => (8, "JPEG, 8"),
-            Coding::JpegLossless => (16, "lossless JPEG, 8 and 16"),
-            Coding::Jpeg2000 => (16, "JPEG 2000, 8 and 16"),
-        };
-        if bits > most {
-            return fault("bits allocated (0028,0100)", format!("is {bits}: of {name} are read"));
-        }
+        let (number, stored_bits) = number(path, root, coding, is_palette)?;
         let mut warnings = BTreeSet::new();
-        let planar = match root.word(tags::PLANAR) {
-            _ if coding != Coding::Native || samples == 1 => false,
-            Some(order @ 0..=1) => order == 1,
-            None => {
-                if photometric != "YBR_FULL_422" {
-                    let text = "planar configuration (0028,0006) is missing; the colours are taken pixel by pixel";
-                    warnings.insert(text.into());
-                }
-                false
-            }
-            Some(other) => return fault("planar configuration (0028,0006)", format!("is {other}, must be 0 or 1")),
-        };
-        let bytes = number.bytes();
-        let most = (f64::from(stored_bits)).exp2() - 1.0;
+        let planar = coding == Coding::Native && samples > 1 && is_planar(path, root, &photometric, &mut warnings)?;
         let (slope, intercept) =
             (root.decimal(tags::SLOPE).unwrap_or(1.0), root.decimal(tags::INTERCEPT).unwrap_or(0.0));
         let mut scale = [slope, intercept];
@@ -307,13 +266,14 @@ impl Format {
         let (channels, arrangement, stored) = match (photometric.as_str(), samples, coding) {
             ("MONOCHROME2", 1, _) => (1, Arrangement::Plain, 1),
             ("MONOCHROME1", 1, _) => {
+                let most = f64::from(stored_bits).exp2() - 1.0;
                 scale = [-slope, slope * most + intercept];
                 (1, Arrangement::Plain, 1)
             }
-            ("PALETTE COLOR", 1, _) if bits <= 16 && is_exact => {
-                let numbers = Indices { width: bytes, bits: stored_bits.into(), signed, big_endian };
-                let (palette, said) =
-                    Palette::of(root, numbers).map_err(|why| InputError::new(path, "palette (0028,1101)", why))?;
+            ("PALETTE COLOR", 1, _) if number.bytes() <= 2 && is_exact => {
+                let signed = matches!(number, Number::I8 | Number::I16);
+                let numbers = Indices { width: number.bytes(), bits: stored_bits.into(), signed, big_endian };
+                let (palette, said) = Palette::of(root, numbers).map_err(|why| fault("palette (0028,1101)", why))?;
                 warnings.extend(said);
                 (1, Arrangement::Palette(palette), 1)
             }
@@ -326,15 +286,12 @@ impl Format {
             ("YBR_FULL", 3, _) if number == Number::U8 => (1, Arrangement::Luma, 3),
             ("YBR_FULL_422", 3, Coding::Native) if number == Number::U8 => (1, Arrangement::LumaPairs, 2),
             _ => {
-                let shown = quoted(&photometric);
-                return fault(
-                    "photometric interpretation (0028,0004)",
-                    format!("{shown} of {samples} numbers is not read"),
-                );
+                let why = format!("{} of {samples} numbers is not read", quoted(&photometric));
+                return Err(fault("photometric interpretation (0028,0004)", why));
             }
         };
         let is_scaled = scale != [1.0, 0.0] && scale.iter().all(|v| v.is_finite()) && scale[0] != 0.0;
-        let stored = stored * bytes;
+        let stored = stored * number.bytes();
         let (number, big_endian) = if is_palette { (Number::U8, false) } else { (number, big_endian) };
         let pixel = PixelFormat { number, channels, big_endian, scale: is_scaled.then_some(scale) };
         Ok(Format { pixel, arrangement, stored, planar, warnings })
@@ -353,5 +310,61 @@ impl Format {
         self.stored = 3;
         let text = "photometric interpretation (0028,0004) is YBR_FULL_422, but three bytes a pixel are stored";
         self.warnings.insert(format!("{text}; read as YBR_FULL"));
+    }
+}
+
+/// The numbers of a file, and how many of their bits count.
+///
+/// # Errors
+/// Numbers of a width that is not read, or bits that are not the lowest ones.
+fn number(path: &Path, root: &Item, coding: Coding, is_palette: bool) -> Result<(Number, u16), InputError> {
+    let fault = |field: &str, fault: String| Err(InputError::new(path, field, fault));
+    let bits = root.word(tags::BITS_ALLOCATED).unwrap_or(0);
+    let stored = root.word(tags::BITS_STORED).unwrap_or(bits);
+    let signed = root.word(tags::IS_SIGNED).unwrap_or(0) == 1;
+    let number = match (bits, signed) {
+        (8, false) => Number::U8,
+        (8, true) => Number::I8,
+        (16, false) => Number::U16,
+        (16, true) => Number::I16,
+        (32, false) => Number::U32,
+        (32, true) => Number::I32,
+        _ => return fault("bits allocated (0028,0100)", format!("is {bits}: 8, 16 and 32 are read")),
+    };
+    let high = root.word(tags::HIGH_BIT).unwrap_or(stored.saturating_sub(1));
+    let is_lowest = stored > 0 && stored <= bits && high.checked_add(1) == Some(stored);
+    // A sign is found among fewer bits only where they are indices.
+    if !is_lowest || (signed && stored != bits && !is_palette) {
+        return fault("bits stored (0028,0101)", format!("{stored} of {bits}, up to bit {high}, are not read"));
+    }
+    let (most, name) = match coding {
+        Coding::Native | Coding::Rle => (32, ""),
+        Coding::Jpeg => (8, "JPEG, 8"),
+        Coding::JpegLossless => (16, "lossless JPEG, 8 and 16"),
+        Coding::Jpeg2000 => (16, "JPEG 2000, 8 and 16"),
+    };
+    match bits > most {
+        true => fault("bits allocated (0028,0100)", format!("is {bits}: of {name} are read")),
+        false => Ok((number, stored)),
+    }
+}
+
+/// True if native colours stand plane by plane.
+///
+/// # Errors
+/// An order that the standard does not know.
+fn is_planar(path: &Path, root: &Item, photometric: &str, warnings: &mut BTreeSet<String>) -> Result<bool, InputError> {
+    match root.word(tags::PLANAR) {
+        Some(order @ 0..=1) => Ok(order == 1),
+        Some(other) => {
+            Err(InputError::new(path, "planar configuration (0028,0006)", format!("is {other}, must be 0 or 1")))
+        }
+        // Pairs of pixels have but one order.
+        None if photometric == "YBR_FULL_422" => Ok(false),
+        None => {
+            let text = "planar configuration (0028,0006) is missing; the colours are taken pixel by pixel";
+            warnings.insert(text.into());
+            Ok(false)
+        }
     }
 }

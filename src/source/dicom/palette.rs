@@ -82,7 +82,7 @@ impl Palette {
     }
 
     /// The luminance of each stored number.
-    pub fn greys(&self, numbers: &[u8]) -> Vec<u8> {
+    pub(crate) fn greys(&self, numbers: &[u8]) -> Vec<u8> {
         let last = self.greys.len() as i32 - 1;
         let grey = |bytes| {
             let at = (self.numbers.number(bytes) - self.first).clamp(0, last.max(0));
