@@ -3,10 +3,10 @@
 use super::super::packed::Encoding;
 use super::super::pixel::{Number, PixelFormat};
 use super::classes::syntax;
-use super::elements::{self as tags, Elements, Fragment, Item, PixelData};
+use super::elements::{self as tags, Elements, Fragment, Item, PixelData, Tag};
 use super::fragments::{Divided, Stream, divided};
 use super::frames::{Arrangement, Coding, Place};
-use super::palette::{Indices, Palette};
+use super::palette::{Indices, Palette, Tables};
 use crate::files::{InputError, quoted};
 use std::collections::BTreeSet;
 use std::path::Path;
@@ -273,7 +273,13 @@ impl Format {
             ("PALETTE COLOR", 1, _) if number.bytes() <= 2 && is_exact => {
                 let signed = matches!(number, Number::I8 | Number::I16);
                 let numbers = Indices { width: number.bytes(), bits: stored_bits.into(), signed, big_endian };
-                let (palette, said) = Palette::of(root, numbers).map_err(|why| fault("palette (0028,1101)", why))?;
+                let read = |tags: [Tag; 3]| tags.map(|tag| root.words(tag));
+                let tables = Tables {
+                    about: read(tags::PALETTE_ABOUT),
+                    plain: read(tags::PALETTE),
+                    segmented: read(tags::SEGMENTED_PALETTE),
+                };
+                let (palette, said) = Palette::of(&tables, numbers).map_err(|why| fault("palette (0028,1101)", why))?;
                 warnings.extend(said);
                 (1, Arrangement::Palette(palette), 1)
             }

@@ -1,7 +1,6 @@
 //! Palettes (PS3.3 C.7.6.3.1.5, C.7.6.3.1.6 and C.7.9.2): the luminance of the colour that a stored number stands for.
 
 use super::super::pixel::LUMINANCE;
-use super::elements::{self as tags, Item};
 use std::sync::Arc;
 
 /// The colours of a picture as luminances, and the stored numbers that stand for them.
@@ -12,6 +11,15 @@ pub(super) struct Palette {
     /// The number of the first entry. Lower ones mean the first, those beyond the last mean the last.
     first: i32,
     pub numbers: Indices,
+}
+
+/// The elements of a palette, each for red, green and blue.
+pub(super) struct Tables {
+    /// Number of entries, the number of the first one, bits of an entry.
+    pub about: [Vec<u16>; 3],
+    /// Either of these: an entry after the other, or segments.
+    pub plain: [Vec<u16>; 3],
+    pub segmented: [Vec<u16>; 3],
 }
 
 /// How numbers are stored.
@@ -46,10 +54,10 @@ impl Palette {
     ///
     /// # Errors
     /// In words, a palette that is missing, cut short or contradicts itself.
-    pub fn of(root: &Item, numbers: Indices) -> Result<(Palette, Vec<String>), String> {
-        let about = tags::PALETTE_ABOUT.map(|tag| root.words(tag));
+    pub fn of(tables: &Tables, numbers: Indices) -> Result<(Palette, Vec<String>), String> {
+        let Tables { about, plain, segmented } = tables;
         let [count, first, bits] = about[0][..] else { return Err("is missing, or has not three numbers".into()) };
-        if about.iter().any(|other| *other != about[0]) {
+        if about[1..].iter().any(|other| *other != about[0]) {
             return Err("differs from that of green or blue".into());
         }
         // 0 stands for 65536.
@@ -57,11 +65,10 @@ impl Palette {
         let first = if numbers.signed { i32::from(first.cast_signed()) } else { i32::from(first) };
         let mut warnings = Vec::new();
         let mut colours = Vec::new();
-        for (plain, segmented) in tags::PALETTE.into_iter().zip(tags::SEGMENTED_PALETTE) {
-            let (plain, segmented) = (root.words(plain), root.words(segmented));
+        for (plain, segmented) in plain.iter().zip(segmented) {
             let entries = match plain.is_empty() && !segmented.is_empty() {
-                true => expanded(&segmented, bits)?,
-                false => plain_entries(&plain, count, bits, &mut warnings)?,
+                true => expanded(segmented, bits)?,
+                false => plain_entries(plain, count, bits, &mut warnings)?,
             };
             if entries.len() < count {
                 return Err(format!("is not whole: {} of {count} entries are there", entries.len()));
