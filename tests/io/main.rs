@@ -4,6 +4,7 @@
 mod common;
 mod convert;
 mod dicom;
+mod dicom_forms;
 mod formats;
 mod igtl;
 mod interrupted;

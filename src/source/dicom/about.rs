@@ -63,7 +63,8 @@ pub(super) fn about(elements: &Elements) -> Vec<(String, String)> {
     let (maker, model) = (root.text(tags::MANUFACTURER), root.text(tags::MODEL));
     add("scanner", if model.starts_with(&maker) { model } else { format!("{maker} {model}").trim().to_string() });
     add("transfer syntax", syntax(&elements.syntax).0.into());
-    if let Some(time) = root.decimal(tags::FRAME_TIME) {
+    let has_vector = root.words(tags::FRAME_POINTER) == [0x0018, 0x1065];
+    if let Some(time) = root.decimal(tags::FRAME_TIME).filter(|_| !has_vector) {
         add("frame time", format!("{} ms", describe::number(time)));
     }
     rows

@@ -4,6 +4,7 @@
 //! pixel data is kept, not the data. A false length is an error before anything is allocated for it.
 
 use super::super::packed::{InputFile, PixelStream};
+use super::jpeg::has_end;
 use crate::files::InputError;
 use std::io::Read;
 
@@ -58,6 +59,7 @@ pub(super) const SAMPLES: Tag = 0x0028_0002;
 pub(super) const PHOTOMETRIC: Tag = 0x0028_0004;
 pub(super) const PLANAR: Tag = 0x0028_0006;
 pub(super) const FRAMES: Tag = 0x0028_0008;
+pub(super) const FRAME_POINTER: Tag = 0x0028_0009;
 pub(super) const ROWS: Tag = 0x0028_0010;
 pub(super) const COLUMNS: Tag = 0x0028_0011;
 pub(super) const PIXEL_SPACING: Tag = 0x0028_0030;
@@ -69,6 +71,7 @@ pub(super) const INTERCEPT: Tag = 0x0028_1052;
 pub(super) const SLOPE: Tag = 0x0028_1053;
 pub(super) const PALETTE_ABOUT: [Tag; 3] = [0x0028_1101, 0x0028_1102, 0x0028_1103];
 pub(super) const PALETTE: [Tag; 3] = [0x0028_1201, 0x0028_1202, 0x0028_1203];
+pub(super) const SEGMENTED_PALETTE: [Tag; 3] = [0x0028_1221, 0x0028_1222, 0x0028_1223];
 pub(super) const PIXEL_MEASURES: Tag = 0x0028_9110;
 /// Philips' Cartesian volumes: the creator, slices, unit and spacing of the third axis, as public readers know them.
 pub(super) const PHILIPS: Tag = 0x3001_0010;
@@ -77,6 +80,7 @@ pub(super) const PHILIPS_UNIT: Tag = 0x3001_1002;
 pub(super) const PHILIPS_DELTA: Tag = 0x3001_1003;
 pub(super) const SHARED_GROUPS: Tag = 0x5200_9229;
 pub(super) const FRAME_GROUPS: Tag = 0x5200_9230;
+pub(super) const EXTENDED_TABLE: Tag = 0x7fe0_0001;
 const PIXEL_DATA: Tag = 0x7fe0_0010;
 const META_LENGTH: Tag = 0x0002_0000;
 const META_CLASS: Tag = 0x0002_0002;
@@ -143,6 +147,7 @@ const WANTED: &[(Tag, Kind)] = &[
     (PHOTOMETRIC, Kind::Text),
     (PLANAR, WORDS),
     (FRAMES, Kind::Text),
+    (FRAME_POINTER, WORDS),
     (ROWS, WORDS),
     (COLUMNS, WORDS),
     (PIXEL_SPACING, Kind::Text),
@@ -158,6 +163,9 @@ const WANTED: &[(Tag, Kind)] = &[
     (PALETTE[0], WORDS),
     (PALETTE[1], WORDS),
     (PALETTE[2], WORDS),
+    (SEGMENTED_PALETTE[0], WORDS),
+    (SEGMENTED_PALETTE[1], WORDS),
+    (SEGMENTED_PALETTE[2], WORDS),
     (PIXEL_MEASURES, Kind::Sequence),
     (PHILIPS, Kind::Text),
     (PHILIPS_SLICES, LONGS),
@@ -165,6 +173,7 @@ const WANTED: &[(Tag, Kind)] = &[
     (PHILIPS_DELTA, REALS),
     (SHARED_GROUPS, Kind::Sequence),
     (FRAME_GROUPS, Kind::Sequence),
+    (EXTENDED_TABLE, REALS),
 ];
 
 /// Longest value that is kept: a palette of 65536 words, or a time for each of as many frames.
@@ -173,6 +182,10 @@ const MAX_VALUE: u64 = 1 << 20;
 const MAX_ELEMENTS: usize = 1 << 22;
 /// Most items within items. Real files have about five.
 const MAX_DEPTH: usize = 16;
+/// The pixels, for messages.
+const FIELD: &str = "pixel data (7FE0,0010)";
+/// Bytes at the end of a fragment in which an end mark is looked for.
+const TAIL: u64 = 32;
 /// A length that is not stated: the end has a mark.
 const UNDEFINED: u32 = u32::MAX;
 
@@ -245,14 +258,32 @@ impl Item {
     pub fn real(&self, tag: Tag) -> Option<f64> {
         self.reals(tag).first().copied().filter(|value| value.is_finite())
     }
+
+    /// Whole numbers of 64 bits.
+    pub(crate) fn offsets(&self, tag: Tag) -> Vec<u64> {
+        self.bytes(tag).unwrap_or_default().as_chunks::<8>().0.iter().map(|b| u64::from_le_bytes(*b)).collect()
+    }
 }
 
 /// Where the pixels are in the file: offset and length, bytes.
 #[derive(Debug)]
 pub(super) enum PixelData {
-    Native(u64, u64),
+    /// The last one says that they stand in words of 16 bits (OW).
+    Native(u64, u64, bool),
     /// The offsets of frames as the first item states them, and the fragments after it.
-    Encapsulated(Vec<u32>, Vec<(u64, u64)>),
+    Encapsulated(Vec<u32>, Vec<Fragment>),
+}
+
+/// A piece of compressed pixels.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Fragment {
+    /// Offset in the file and length, bytes.
+    pub at: u64,
+    pub length: u64,
+    /// Its first bytes, and zeros if there are fewer.
+    pub head: [u8; 8],
+    /// The end mark of a JPEG or JPEG 2000 is in it, with nothing but padding behind it.
+    pub ends: bool,
 }
 
 /// What was found in a file.
@@ -476,7 +507,7 @@ impl Walk<'_> {
         let kind = WANTED.iter().find(|(wanted, _)| *wanted == tag).map(|(_, kind)| *kind);
         let wanted = keep && kind.is_some() && !item.elements.iter().any(|(there, _)| *there == tag);
         if tag == PIXEL_DATA && depth == 0 {
-            return self.pixel_data(length);
+            return self.pixel_data(&vr, length);
         }
         let is_sequence = &vr == b"SQ" || (kind == Some(Kind::Sequence) && !self.explicit) || length == UNDEFINED;
         if is_sequence && (wanted || length == UNDEFINED) {
@@ -502,7 +533,8 @@ impl Walk<'_> {
                     return self.fault(&name(tag), format!("has {length} bytes, at most {MAX_VALUE} are read"));
                 }
                 let mut bytes = self.value(tag, length)?;
-                if let (Kind::Numbers(width), true) = (kind, self.big_endian) {
+                // The bytes of OB stand alone, whatever they are used for.
+                if let (Kind::Numbers(width), true) = (kind, self.big_endian && &vr != b"OB") {
                     bytes.chunks_exact_mut(width).for_each(<[u8]>::reverse);
                 }
                 item.elements.push((tag, Value::Bytes(bytes)));
@@ -555,10 +587,9 @@ impl Walk<'_> {
         Ok(items)
     }
 
-    fn pixel_data(&mut self, length: u32) -> Result<(), InputError> {
-        const FIELD: &str = "pixel data (7FE0,0010)";
+    fn pixel_data(&mut self, vr: &[u8; 2], length: u32) -> Result<(), InputError> {
         if length != UNDEFINED {
-            let found = PixelData::Native(self.at, length.into());
+            let found = PixelData::Native(self.at, length.into(), vr == b"OW");
             self.skip(length.into(), FIELD)?;
             self.pixels = Some(found);
             return Ok(());
@@ -580,15 +611,29 @@ impl Walk<'_> {
                         table = bytes.as_chunks::<4>().0.iter().map(|b| u32::from_le_bytes(*b)).collect();
                         continue;
                     }
-                    let at = self.at;
-                    self.skip(length.into(), FIELD)?;
-                    fragments.push((at, length.into()));
+                    fragments.push(self.fragment(length.into())?);
                 }
                 (other, _) => return self.fault(FIELD, format!("has {} where a fragment begins", name(other))),
             }
         }
         self.pixels = Some(PixelData::Encapsulated(table, fragments));
         Ok(())
+    }
+
+    /// A fragment of so many bytes, of which only the first and the last are looked at.
+    fn fragment(&mut self, length: u64) -> Result<Fragment, InputError> {
+        self.check(length, FIELD)?;
+        let at = self.at;
+        let mut last = self.value(PIXEL_DATA, length.min(8))?;
+        let mut head = [0; 8];
+        head[..last.len()].copy_from_slice(&last);
+        let rest = length - last.len() as u64;
+        if rest > TAIL {
+            self.skip(rest - TAIL, FIELD)?;
+            last.clear();
+        }
+        last.extend(self.value(PIXEL_DATA, rest.min(TAIL))?);
+        Ok(Fragment { at, length, head, ends: has_end(&last) })
     }
 
     /// An element of the group that may hold a Kretz file.

@@ -37,13 +37,13 @@ pub(in super::super) fn read(file: &InputFile, options: &OpenOptions) -> Result<
     if placed.has_spacing {
         refuse_spacing(file, options)?;
     }
-    let is_plain = image.coding == Coding::Native && image.arrangement == Arrangement::Plain;
+    let is_plain = image.coding == Coding::Native && image.arrangement == Arrangement::Plain && !image.swapped;
     let is_whole = placed.part == [0, 0, image.size[0], image.size[1]];
     let is_in_order = placed.order.iter().copied().eq(0..image.places.len());
     let is_direct = is_plain && is_whole && is_in_order;
     if file.is_packed() && !is_direct {
         let what = if image.coding == Coding::Native {
-            "parts of frames or frames in another order"
+            "parts of frames, or pixels in another order"
         } else {
             "compressed frames"
         };

@@ -1,6 +1,7 @@
 //! The frames of DICOM files as one stream of samples: native, RLE (PS3.5 annex G) or one of the JPEGs, in any order, cut to a part of the picture.
 
 use super::jpeg::{self, Expected};
+use super::palette::Palette;
 use crate::files::progress::CountedFile;
 use std::io::{self, Cursor, Read, Seek, SeekFrom};
 use std::path::PathBuf;
@@ -26,10 +27,12 @@ pub(super) enum Arrangement {
     Planes,
     /// Luminance and two differences of colour for each pixel: the luminance is taken.
     Luma,
+    /// The same plane by plane.
+    LumaPlane,
     /// Two luminances and the two differences that they share.
     LumaPairs,
-    /// Indices of a palette, whose luminances these are.
-    Palette(Arc<[u8]>),
+    /// Indices of a palette, whose luminances are taken.
+    Palette(Palette),
 }
 
 /// Where the bytes of a frame are: a file, and some of the fragments.
@@ -39,6 +42,8 @@ pub(super) struct Place {
     /// The first of its parts, and their number.
     pub first: usize,
     pub count: usize,
+    /// Its first byte is the second one of a word, where bytes stand in words.
+    pub odd: bool,
 }
 
 /// The frames of one or more files, in the order in which they are read.
@@ -50,11 +55,13 @@ pub(in super::super) struct Frames {
     pub(super) parts: Arc<[(u64, u64)]>,
     pub(super) coding: Coding,
     pub(super) arrangement: Arrangement,
+    /// Native bytes stand in words of 16 bits with the highest byte first, so that the second byte of a word is the first pixel.
+    pub(super) swapped: bool,
     /// Columns and rows as they are stored.
     pub(super) stored: [usize; 2],
     /// The part that is read: first column and row, columns and rows.
     pub(super) part: [usize; 4],
-    /// Bytes of a number in the file.
+    /// Bytes of a number that is read.
     pub(super) width: usize,
     /// Numbers of a pixel that are read.
     pub(super) channels: usize,
@@ -77,16 +84,24 @@ impl Frames {
     /// Numbers of a pixel as they are stored.
     fn stored_channels(&self) -> usize {
         match self.arrangement {
-            Arrangement::Luma => 3,
+            Arrangement::Luma | Arrangement::LumaPlane => 3,
             Arrangement::LumaPairs => 2,
             Arrangement::Palette(_) => 1,
             _ => self.channels,
         }
     }
 
+    /// Bytes of a number in the file.
+    fn stored_width(&self) -> usize {
+        match &self.arrangement {
+            Arrangement::Palette(palette) => palette.numbers.width,
+            _ => self.width,
+        }
+    }
+
     /// Bytes of a frame in the file, if it is native.
     fn stored_bytes(&self) -> u64 {
-        (self.stored[0] * self.stored[1] * self.width * self.stored_channels()) as u64
+        (self.stored[0] * self.stored[1] * self.stored_width() * self.stored_channels()) as u64
     }
 
     fn frame(&self, number: usize) -> io::Result<Vec<u8>> {
@@ -99,15 +114,23 @@ impl Frames {
         let mut file = CountedFile::open(path)?;
         let mut bytes = Vec::new();
         for (offset, length) in parts {
-            file.seek(SeekFrom::Start(*offset))?;
-            (&mut file).take(*length).read_to_end(&mut bytes)?;
+            // Whole words.
+            let before = u64::from(self.swapped && place.odd);
+            let length = if self.swapped { (length + before).next_multiple_of(2) } else { *length };
+            file.seek(SeekFrom::Start(offset.saturating_sub(before)))?;
+            (&mut file).take(length).read_to_end(&mut bytes)?;
+        }
+        if self.swapped {
+            bytes.as_chunks_mut::<2>().0.iter_mut().for_each(|word| word.swap(0, 1));
+            bytes.drain(..usize::from(place.odd).min(bytes.len()));
+            bytes.truncate(self.stored_bytes() as usize);
         }
         let wrong = |why: &str| io::Error::new(io::ErrorKind::InvalidData, format!("frame {number} {why}"));
         let numbers = match self.coding {
             Coding::Native => bytes,
             Coding::Rle => {
                 let pixels = self.stored[0] * self.stored[1];
-                unpacked(&bytes, pixels, self.width, self.stored_channels()).map_err(|why| wrong(&why))?
+                unpacked(&bytes, pixels, self.stored_width(), self.stored_channels()).map_err(|why| wrong(&why))?
             }
             Coding::Jpeg => jpeg::baseline(&bytes, self.expected()).map_err(|why| wrong(&why))?,
             Coding::JpegLossless => jpeg::lossless(&bytes, self.expected()).map_err(|why| wrong(&why))?,
@@ -120,7 +143,7 @@ impl Frames {
     }
 
     fn expected(&self) -> Expected {
-        Expected { size: self.stored, channels: self.stored_channels(), width: self.width }
+        Expected { size: self.stored, channels: self.stored_channels(), width: self.stored_width() }
     }
 
     fn arranged(&self, numbers: Vec<u8>) -> Vec<u8> {
@@ -128,9 +151,12 @@ impl Frames {
             Arrangement::Plain => numbers,
             Arrangement::Luma => numbers.chunks_exact(3).map(|pixel| pixel[0]).collect(),
             Arrangement::LumaPairs => numbers.chunks_exact(4).flat_map(|pair| [pair[0], pair[1]]).collect(),
-            Arrangement::Palette(greys) => {
-                numbers.iter().map(|n| greys.get(usize::from(*n)).or(greys.last()).copied().unwrap_or(0)).collect()
+            Arrangement::LumaPlane => {
+                let mut numbers = numbers;
+                numbers.truncate(numbers.len() / 3);
+                numbers
             }
+            Arrangement::Palette(palette) => palette.greys(&numbers),
             Arrangement::Planes => {
                 let plane = numbers.len() / self.channels.max(1);
                 let mut pixels = Vec::with_capacity(numbers.len());
@@ -288,6 +314,7 @@ mod tests {
             parts: Arc::new([]),
             coding: Coding::Native,
             arrangement: Arrangement::Planes,
+            swapped: false,
             stored: [3, 2],
             part: [1, 0, 2, 2],
             width: 1,
@@ -297,5 +324,7 @@ mod tests {
         let pixels = frames.cut(&frames.arranged(planes));
         assert_eq!(pixels, [1, 11, 21, 2, 12, 22, 4, 14, 24, 5, 15, 25]);
         assert_eq!((frames.each(), frames.stored_bytes()), (12, 18));
+        let luma = Frames { arrangement: Arrangement::LumaPlane, channels: 1, ..frames };
+        assert_eq!(luma.cut(&luma.arranged((0..18).collect())), [1, 2, 4, 5]);
     }
 }

@@ -1,13 +1,15 @@
 //! What a DICOM file says of its pixels, and where each frame of them is.
 
 use super::super::packed::Encoding;
-use super::super::pixel::{LUMINANCE, Number, PixelFormat};
+use super::super::pixel::{Number, PixelFormat};
 use super::classes::syntax;
-use super::elements::{self as tags, Elements, PixelData};
+use super::elements::{self as tags, Elements, Fragment, Item, PixelData, Tag};
+use super::fragments::{Divided, Stream, divided};
 use super::frames::{Arrangement, Coding, Place};
+use super::palette::{Indices, Palette, Tables};
 use crate::files::{InputError, quoted};
+use std::collections::BTreeSet;
 use std::path::Path;
-use std::sync::Arc;
 
 /// Most frames of a file.
 const MAX_FRAMES: u64 = 1 << 20;
@@ -29,6 +31,10 @@ pub(super) struct Image {
     pub parts: Vec<(u64, u64)>,
     /// Luminance is taken of colours that the format of the pixels does not tell.
     pub from_colour: bool,
+    /// Native bytes stand in words whose highest byte comes first.
+    pub swapped: bool,
+    /// What the file states and is not so, or does not state.
+    pub warnings: BTreeSet<String>,
 }
 
 impl Image {
@@ -53,23 +59,26 @@ impl Image {
             None => Err(InputError::new(path, field, "is missing")),
         };
         let size = [side("columns (0028,0011)", tags::COLUMNS)?, side("rows (0028,0010)", tags::ROWS)?];
-        let frames = match root.text(tags::FRAMES).as_str() {
-            "" => 1,
+        let stated = match root.text(tags::FRAMES).as_str() {
+            "" => None,
             text => match text.parse() {
-                Ok(n @ 1..=MAX_FRAMES) => n,
+                Ok(n @ 1..=MAX_FRAMES) => Some(n),
                 _ => return fault("frames (0028,0008)", format!("{} is not 1 to {MAX_FRAMES}", quoted(text))),
             },
         };
-        let (coding, pixels) = match (elements.syntax.as_str(), &elements.pixels) {
-            (_, None) => return fault("pixel data (7FE0,0010)", "is missing".into()),
-            ("1.2.840.10008.1.2.5", Some(pixels)) => (Coding::Rle, pixels),
-            ("1.2.840.10008.1.2.4.57" | "1.2.840.10008.1.2.4.70", Some(pixels)) => (Coding::JpegLossless, pixels),
-            ("1.2.840.10008.1.2.4.90" | "1.2.840.10008.1.2.4.91", Some(pixels)) => (Coding::Jpeg2000, pixels),
-            (uid, Some(pixels)) if uid.starts_with("1.2.840.10008.1.2.4.") => (Coding::Jpeg, pixels),
-            (_, Some(pixels)) => (Coding::Native, pixels),
-        };
-        let (pixel, arrangement, stored) = format(path, elements, coding)?;
-        let each = size[0] as u64 * size[1] as u64 * stored as u64;
+        let Some(pixels) = &elements.pixels else { return fault("pixel data (7FE0,0010)", "is missing".into()) };
+        let coding = coding(&elements.syntax);
+        let mut format = Format::of(path, elements, coding)?;
+        if let PixelData::Native(_, length, _) = pixels {
+            format.find_full(size, stated.unwrap_or(1), *length);
+        }
+        if format.arrangement == Arrangement::LumaPairs && format.planar {
+            return fault("planar configuration (0028,0006)", "is 1, must be 0 for YBR_FULL_422".into());
+        }
+        if format.arrangement == Arrangement::LumaPairs && !size[0].is_multiple_of(2) {
+            return fault("columns (0028,0011)", "must be even for colours that two pixels share".into());
+        }
+        let each = size[0] as u64 * size[1] as u64 * format.stored as u64;
         let most = match coding {
             Coding::Jpeg2000 => MAX_JPEG_2000_BYTES,
             Coding::JpegLossless => MAX_LOSSLESS_BYTES,
@@ -78,74 +87,246 @@ impl Image {
         if each > most {
             return fault("rows and columns", format!("make frames of {each} bytes, at most {most} are read"));
         }
-        let all = frames.saturating_mul(slices.into());
-        let holds_all = match pixels {
-            PixelData::Native(_, length) => each.saturating_mul(all) <= *length,
-            PixelData::Encapsulated(_, fragments) => fragments.len() as u64 == all,
-        };
-        let frames = if holds_all && all <= MAX_FRAMES { all.max(frames) } else { frames };
-        if arrangement == Arrangement::LumaPairs && !size[0].is_multiple_of(2) {
-            return fault("columns (0028,0011)", "must be even for colours that two pixels share".into());
-        }
+        let Format { pixel, arrangement, mut warnings, .. } = format;
+        let frames = StatedFrames { stated, slices: slices.into(), each };
+        let mut swapped = false;
         let (places, parts) = match (coding, pixels) {
-            (Coding::Native, PixelData::Native(offset, length)) => {
-                let claimed = each.saturating_mul(frames);
-                if claimed > *length {
-                    return fault("data", format!("cut short, {length} of {claimed} bytes are there"));
-                }
-                let parts = (0..frames).map(|n| (offset + n * each, each)).collect();
-                ((0..frames as usize).map(|n| Place { file: 0, first: n, count: 1 }).collect(), parts)
+            (Coding::Native, PixelData::Native(offset, length, in_words)) => {
+                swapped = *in_words && elements.big_endian && root.word(tags::BITS_ALLOCATED) == Some(8);
+                frames
+                    .native(*offset, *length, swapped, &mut warnings)
+                    .map_err(|why| InputError::new(path, "data", why))?
             }
             (
                 Coding::Rle | Coding::Jpeg | Coding::JpegLossless | Coding::Jpeg2000,
                 PixelData::Encapsulated(table, fragments),
             ) => {
-                let there = fragments.iter().fold(0u64, |all, (_, length)| all.saturating_add(*length));
-                let most = there.saturating_mul(Encoding::Dicom(coding).most()).saturating_add(1024);
-                let claimed = each.saturating_mul(frames);
-                if claimed > most {
-                    let why = format!("{there} compressed bytes cannot hold {claimed} bytes of frames");
-                    return fault("pixel data (7FE0,0010)", why);
-                }
-                let groups = grouped(frames as usize, table, fragments);
-                let groups = groups.map_err(|why| InputError::new(path, "pixel data (7FE0,0010)", why))?;
-                (groups.into_iter().map(|(first, count)| Place { file: 0, first, count }).collect(), fragments.clone())
+                let table = offsets(table, root);
+                let found = frames.encapsulated(coding, &table, fragments, &mut warnings);
+                found.map_err(|why| InputError::new(path, "pixel data (7FE0,0010)", why))?
             }
             _ => return fault("pixel data (7FE0,0010)", format!("is not in the form of {name}")),
         };
-        let from_colour = matches!(arrangement, Arrangement::Luma | Arrangement::LumaPairs | Arrangement::Palette(_));
-        Ok(Image { size, pixel, coding, arrangement, places, parts, from_colour })
+        let from_colour = !matches!(arrangement, Arrangement::Plain | Arrangement::Planes);
+        Ok(Image { size, pixel, coding, arrangement, places, parts, from_colour, swapped, warnings })
     }
 }
 
-/// The fragments of each frame: first and number.
-fn grouped(frames: usize, table: &[u32], fragments: &[(u64, u64)]) -> Result<Vec<(usize, usize)>, String> {
-    if fragments.len() == frames {
-        return Ok((0..frames).map(|n| (n, 1)).collect());
-    }
-    if frames == 1 && !fragments.is_empty() {
-        return Ok(vec![(0, fragments.len())]);
-    }
-    let uneven = || format!("has {} fragments for {frames} frames, and no table that divides them", fragments.len());
-    let (Some((begin, _)), true) = (fragments.first(), table.len() == frames && fragments.len() > frames) else {
-        return Err(uneven());
-    };
-    let firsts = table.iter().map(|at| fragments.binary_search_by_key(&(begin + u64::from(*at)), |(at, _)| *at));
-    let mut firsts = firsts.collect::<Result<Vec<usize>, usize>>().map_err(|_| uneven())?;
-    firsts.push(fragments.len());
-    match firsts[0] == 0 && firsts.windows(2).all(|pair| pair[0] < pair[1]) {
-        true => Ok(firsts.windows(2).map(|pair| (pair[0], pair[1] - pair[0])).collect()),
-        false => Err(uneven()),
+fn coding(syntax: &str) -> Coding {
+    match syntax {
+        "1.2.840.10008.1.2.5" => Coding::Rle,
+        "1.2.840.10008.1.2.4.57" | "1.2.840.10008.1.2.4.70" => Coding::JpegLossless,
+        JPEG_2000_LOSSLESS | "1.2.840.10008.1.2.4.91" => Coding::Jpeg2000,
+        uid if uid.starts_with("1.2.840.10008.1.2.4.") => Coding::Jpeg,
+        _ => Coding::Native,
     }
 }
 
-/// The pixels as they are read, how they stand in the file, and the bytes that one of them takes there.
-fn format(path: &Path, elements: &Elements, coding: Coding) -> Result<(PixelFormat, Arrangement, usize), InputError> {
+/// The offsets of frames: the basic table, otherwise the extended one.
+fn offsets(basic: &[u32], root: &Item) -> Vec<u64> {
+    match basic.is_empty() {
+        true => root.offsets(tags::EXTENDED_TABLE),
+        false => basic.iter().map(|offset| u64::from(*offset)).collect(),
+    }
+}
+
+type Places = (Vec<Place>, Vec<(u64, u64)>);
+
+/// What a file says of the number of its frames.
+struct StatedFrames {
+    stated: Option<u64>,
+    /// Pictures that each stated frame may have.
+    slices: u64,
+    /// Bytes of one that is not compressed.
+    each: u64,
+}
+
+impl StatedFrames {
+    /// Where uncompressed frames are, in pixel data of `length` bytes.
+    ///
+    /// # Errors
+    /// In words, pixel data that are cut short.
+    fn native(
+        &self,
+        offset: u64,
+        length: u64,
+        in_words: bool,
+        warnings: &mut BTreeSet<String>,
+    ) -> Result<Places, String> {
+        let StatedFrames { stated, slices, each } = *self;
+        let all = stated.unwrap_or(1).saturating_mul(slices);
+        let (there, rest) = (length / each, length % each);
+        let frames = match stated {
+            _ if slices > 1 && all <= MAX_FRAMES && all <= there => all,
+            // A byte may make the length even.
+            None if (2..=MAX_FRAMES).contains(&there) && (rest == 0 || (rest == 1 && length.is_multiple_of(2))) => {
+                let text = "frames (0028,0008) is missing; there are";
+                warnings.insert(format!("{text} {there} frames in the pixel data, all are read"));
+                there
+            }
+            stated => stated.unwrap_or(1),
+        };
+        let claimed = each.saturating_mul(frames);
+        let claimed = if in_words { claimed.next_multiple_of(2) } else { claimed };
+        if claimed > length {
+            return Err(format!("cut short, {length} of {claimed} bytes are there"));
+        }
+        if length > claimed.next_multiple_of(2) {
+            let text = format!(
+                "pixel data (7FE0,0010) is longer than stated: {frames} frames (0028,0008) have {claimed} bytes"
+            );
+            warnings.insert(format!("{text}, but {length} are there; the rest is not read"));
+        }
+        let parts = (0..frames).map(|n| (offset + n * each, each)).collect();
+        let place = |n: u64| Place { file: 0, first: n as usize, count: 1, odd: !(n * each).is_multiple_of(2) };
+        Ok(((0..frames).map(place).collect(), parts))
+    }
+
+    /// Where compressed frames are.
+    ///
+    /// # Errors
+    /// In words, fragments that nothing divides, or that are too small.
+    fn encapsulated(
+        &self,
+        coding: Coding,
+        table: &[u64],
+        fragments: &[Fragment],
+        warnings: &mut BTreeSet<String>,
+    ) -> Result<Places, String> {
+        let frames = |n: u64| usize::try_from(n).ok();
+        let stated = self.stated.or((self.slices > 1).then_some(1));
+        let numbers: Vec<usize> = match stated {
+            Some(n) if self.slices > 1 => [n.saturating_mul(self.slices), n].into_iter().filter_map(frames).collect(),
+            stated => stated.into_iter().filter_map(frames).collect(),
+        };
+        let there = fragments.iter().fold(0u64, |all, fragment| all.saturating_add(fragment.length));
+        let most = there.saturating_mul(Encoding::Dicom(coding).most()).saturating_add(1024);
+        let check = |frames: u64| match self.each.saturating_mul(frames) {
+            claimed if claimed > most => Err(format!("{there} compressed bytes cannot hold {claimed} bytes of frames")),
+            _ => Ok(()),
+        };
+        check(stated.unwrap_or(1))?;
+        let found = divided(&numbers, table, fragments, stream(coding, fragments))?;
+        let Divided { frames, warnings: said } = found;
+        check(frames.len() as u64)?;
+        if frames.len() as u64 > MAX_FRAMES {
+            return Err(format!("has {} frames, at most {MAX_FRAMES} are read", frames.len()));
+        }
+        warnings.extend(said);
+        if coding == Coding::Rle && frames.len() < fragments.len() {
+            warnings.insert("frames of RLE are in several fragments each, which the standard forbids".into());
+        }
+        let places = frames.into_iter().map(|(first, count)| Place { file: 0, first, count, odd: false }).collect();
+        Ok((places, fragments.iter().map(|fragment| (fragment.at, fragment.length)).collect()))
+    }
+}
+
+/// What a frame begins with. Of RLE these are the number of segments, which is the same in all, and the offset of the first one.
+fn stream(coding: Coding, fragments: &[Fragment]) -> Stream<'_> {
+    match coding {
+        Coding::Jpeg2000 => Stream { start: &[0xff, 0x4f, 0xff, 0x51], has_end: true },
+        Coding::Rle => Stream { start: fragments.first().map_or(&[], |first| &first.head), has_end: false },
+        _ => Stream { start: &[0xff, 0xd8, 0xff], has_end: true },
+    }
+}
+
+const JPEG_2000_LOSSLESS: &str = "1.2.840.10008.1.2.4.90";
+
+/// How pixels are read.
+struct Format {
+    pixel: PixelFormat,
+    arrangement: Arrangement,
+    /// Bytes of a pixel in the file.
+    stored: usize,
+    /// Plane by plane.
+    planar: bool,
+    warnings: BTreeSet<String>,
+}
+
+impl Format {
+    /// What the elements say of the pixels.
+    ///
+    /// # Errors
+    /// Pixels of a kind that is not read, a palette that is not whole.
+    fn of(path: &Path, elements: &Elements, coding: Coding) -> Result<Format, InputError> {
+        let fault = |field: &str, fault: String| InputError::new(path, field, fault);
+        let root = &elements.root;
+        let samples = root.word(tags::SAMPLES).unwrap_or(1);
+        let photometric = root.text(tags::PHOTOMETRIC);
+        let is_palette = photometric == "PALETTE COLOR";
+        let (number, stored_bits) = number(path, root, coding, is_palette)?;
+        let mut warnings = BTreeSet::new();
+        let planar = coding == Coding::Native && samples > 1 && is_planar(path, root, &photometric, &mut warnings)?;
+        let (slope, intercept) =
+            (root.decimal(tags::SLOPE).unwrap_or(1.0), root.decimal(tags::INTERCEPT).unwrap_or(0.0));
+        let mut scale = [slope, intercept];
+        // What is decompressed is in little-endian order.
+        let big_endian = elements.big_endian && coding == Coding::Native;
+        let is_exact = coding != Coding::Jpeg && (coding != Coding::Jpeg2000 || elements.syntax == JPEG_2000_LOSSLESS);
+        let (channels, arrangement, stored) = match (photometric.as_str(), samples, coding) {
+            ("MONOCHROME2", 1, _) => (1, Arrangement::Plain, 1),
+            ("MONOCHROME1", 1, _) => {
+                let most = f64::from(stored_bits).exp2() - 1.0;
+                scale = [-slope, slope * most + intercept];
+                (1, Arrangement::Plain, 1)
+            }
+            ("PALETTE COLOR", 1, _) if number.bytes() <= 2 && is_exact => {
+                let signed = matches!(number, Number::I8 | Number::I16);
+                let numbers = Indices { width: number.bytes(), bits: stored_bits.into(), signed, big_endian };
+                let read = |tags: [Tag; 3]| tags.map(|tag| root.words(tag));
+                let tables = Tables {
+                    about: read(tags::PALETTE_ABOUT),
+                    plain: read(tags::PALETTE),
+                    segmented: read(tags::SEGMENTED_PALETTE),
+                };
+                let (palette, said) = Palette::of(&tables, numbers).map_err(|why| fault("palette (0028,1101)", why))?;
+                warnings.extend(said);
+                (1, Arrangement::Palette(palette), 1)
+            }
+            ("RGB" | "YBR_FULL" | "YBR_FULL_422", 3, Coding::Jpeg) => (3, Arrangement::Plain, 3),
+            // The decoder undoes the transform of the colours.
+            ("YBR_RCT" | "YBR_ICT", 3, Coding::Jpeg2000) => (3, Arrangement::Plain, 3),
+            ("RGB", 3, _) if planar => (3, Arrangement::Planes, 3),
+            ("RGB", 3, _) => (3, Arrangement::Plain, 3),
+            ("YBR_FULL", 3, _) if number == Number::U8 && planar => (1, Arrangement::LumaPlane, 3),
+            ("YBR_FULL", 3, _) if number == Number::U8 => (1, Arrangement::Luma, 3),
+            ("YBR_FULL_422", 3, Coding::Native) if number == Number::U8 => (1, Arrangement::LumaPairs, 2),
+            _ => {
+                let why = format!("{} of {samples} numbers is not read", quoted(&photometric));
+                return Err(fault("photometric interpretation (0028,0004)", why));
+            }
+        };
+        let is_scaled = scale != [1.0, 0.0] && scale.iter().all(|v| v.is_finite()) && scale[0] != 0.0;
+        let stored = stored * number.bytes();
+        let (number, big_endian) = if is_palette { (Number::U8, false) } else { (number, big_endian) };
+        let pixel = PixelFormat { number, channels, big_endian, scale: is_scaled.then_some(scale) };
+        Ok(Format { pixel, arrangement, stored, planar, warnings })
+    }
+
+    /// Some files say that two pixels share their colours, but store three bytes for each: the length of the pixel data tells.
+    fn find_full(&mut self, size: [usize; 2], frames: u64, length: u64) {
+        if self.arrangement != Arrangement::LumaPairs {
+            return;
+        }
+        let full = (size[0] as u64 * size[1] as u64 * 3).saturating_mul(frames);
+        if length != full && length != full.saturating_add(full % 2) {
+            return;
+        }
+        self.arrangement = if self.planar { Arrangement::LumaPlane } else { Arrangement::Luma };
+        self.stored = 3;
+        let text = "photometric interpretation (0028,0004) is YBR_FULL_422, but three bytes a pixel are stored";
+        self.warnings.insert(format!("{text}; read as YBR_FULL"));
+    }
+}
+
+/// The numbers of a file, and how many of their bits count.
+///
+/// # Errors
+/// Numbers of a width that is not read, or bits that are not the lowest ones.
+fn number(path: &Path, root: &Item, coding: Coding, is_palette: bool) -> Result<(Number, u16), InputError> {
     let fault = |field: &str, fault: String| Err(InputError::new(path, field, fault));
-    let root = &elements.root;
-    let samples = root.word(tags::SAMPLES).unwrap_or(1);
     let bits = root.word(tags::BITS_ALLOCATED).unwrap_or(0);
-    let stored_bits = root.word(tags::BITS_STORED).unwrap_or(bits);
+    let stored = root.word(tags::BITS_STORED).unwrap_or(bits);
     let signed = root.word(tags::IS_SIGNED).unwrap_or(0) == 1;
     let number = match (bits, signed) {
         (8, false) => Number::U8,
@@ -156,13 +337,11 @@ fn format(path: &Path, elements: &Elements, coding: Coding) -> Result<(PixelForm
         (32, true) => Number::I32,
         _ => return fault("bits allocated (0028,0100)", format!("is {bits}: 8, 16 and 32 are read")),
     };
-    let high = root.word(tags::HIGH_BIT).unwrap_or(stored_bits.saturating_sub(1));
-    if stored_bits == 0
-        || stored_bits > bits
-        || high.checked_add(1) != Some(stored_bits)
-        || (signed && stored_bits != bits)
-    {
-        return fault("bits stored (0028,0101)", format!("{stored_bits} of {bits}, up to bit {high}, are not read"));
+    let high = root.word(tags::HIGH_BIT).unwrap_or(stored.saturating_sub(1));
+    let is_lowest = stored > 0 && stored <= bits && high.checked_add(1) == Some(stored);
+    // A sign is found among fewer bits only where they are indices.
+    if !is_lowest || (signed && stored != bits && !is_palette) {
+        return fault("bits stored (0028,0101)", format!("{stored} of {bits}, up to bit {high}, are not read"));
     }
     let (most, name) = match coding {
         Coding::Native | Coding::Rle => (32, ""),
@@ -170,89 +349,28 @@ fn format(path: &Path, elements: &Elements, coding: Coding) -> Result<(PixelForm
         Coding::JpegLossless => (16, "lossless JPEG, 8 and 16"),
         Coding::Jpeg2000 => (16, "JPEG 2000, 8 and 16"),
     };
-    if bits > most {
-        return fault("bits allocated (0028,0100)", format!("is {bits}: of {name} are read"));
+    match bits > most {
+        true => fault("bits allocated (0028,0100)", format!("is {bits}: of {name} are read")),
+        false => Ok((number, stored)),
     }
-    let photometric = root.text(tags::PHOTOMETRIC);
-    let planar = root.word(tags::PLANAR).unwrap_or(0) == 1 && coding == Coding::Native;
-    let bytes = number.bytes();
-    let most = (f64::from(stored_bits)).exp2() - 1.0;
-    let (slope, intercept) = (root.decimal(tags::SLOPE).unwrap_or(1.0), root.decimal(tags::INTERCEPT).unwrap_or(0.0));
-    let mut scale = [slope, intercept];
-    let (channels, arrangement, stored) = match (photometric.as_str(), samples, coding) {
-        ("MONOCHROME2", 1, _) => (1, Arrangement::Plain, 1),
-        ("MONOCHROME1", 1, _) => {
-            scale = [-slope, slope * most + intercept];
-            (1, Arrangement::Plain, 1)
-        }
-        ("PALETTE COLOR", 1, Coding::Native | Coding::Rle | Coding::JpegLossless) if number == Number::U8 => {
-            (1, Arrangement::Palette(palette(path, elements)?), 1)
-        }
-        ("RGB" | "YBR_FULL" | "YBR_FULL_422", 3, Coding::Jpeg) => (3, Arrangement::Plain, 3),
-        // The decoder undoes the transform of the colours.
-        ("YBR_RCT" | "YBR_ICT", 3, Coding::Jpeg2000) => (3, Arrangement::Plain, 3),
-        ("RGB", 3, _) if planar => (3, Arrangement::Planes, 3),
-        ("RGB", 3, _) => (3, Arrangement::Plain, 3),
-        ("YBR_FULL", 3, _) if number == Number::U8 && !planar => (1, Arrangement::Luma, 3),
-        ("YBR_FULL_422", 3, Coding::Native) if number == Number::U8 && !planar => (1, Arrangement::LumaPairs, 2),
-        _ => {
-            let shown = quoted(&photometric);
-            return fault(
-                "photometric interpretation (0028,0004)",
-                format!("{shown} of {samples} numbers is not read"),
-            );
-        }
-    };
-    let is_scaled = scale != [1.0, 0.0] && scale.iter().all(|v| v.is_finite()) && scale[0] != 0.0;
-    // What is decompressed is in little-endian order.
-    let big_endian = elements.big_endian && coding == Coding::Native;
-    let pixel = PixelFormat { number, channels, big_endian, scale: is_scaled.then_some(scale) };
-    Ok((pixel, arrangement, stored * bytes))
 }
 
-/// The luminance of every colour of a palette.
-fn palette(path: &Path, elements: &Elements) -> Result<Arc<[u8]>, InputError> {
-    let mut tables = Vec::new();
-    for (about, table) in tags::PALETTE_ABOUT.into_iter().zip(tags::PALETTE) {
-        let words = elements.root.words(table);
-        let (count, first, bits) = match elements.root.words(about)[..] {
-            // 0 stands for 65536.
-            [count, first, bits] => (if count == 0 { 65536 } else { usize::from(count) }, first, bits),
-            _ => (0, 1, 0),
-        };
-        let entries: Vec<u8> = match bits {
-            16 => words.iter().map(|word| (word >> 8) as u8).collect(),
-            8 if words.len() * 2 <= count + 1 => words.iter().flat_map(|word| word.to_le_bytes()).collect(),
-            8 => words.iter().map(|word| *word as u8).collect(),
-            _ => Vec::new(),
-        };
-        if first != 0 || entries.len() < count || count == 0 {
-            return Err(InputError::new(path, "palette (0028,1101)", "is not whole, or does not begin at 0"));
+/// True if native colours stand plane by plane.
+///
+/// # Errors
+/// An order that the standard does not know.
+fn is_planar(path: &Path, root: &Item, photometric: &str, warnings: &mut BTreeSet<String>) -> Result<bool, InputError> {
+    match root.word(tags::PLANAR) {
+        Some(order @ 0..=1) => Ok(order == 1),
+        Some(other) => {
+            Err(InputError::new(path, "planar configuration (0028,0006)", format!("is {other}, must be 0 or 1")))
         }
-        tables.push(entries);
-    }
-    let [red, green, blue] = &tables[..] else { return Ok(Arc::new([])) };
-    let grey = |((r, g), b): ((&u8, &u8), &u8)| {
-        let all = [r, g, b].into_iter().zip(LUMINANCE);
-        all.map(|(value, share)| f64::from(*value) * share).sum::<f64>().round() as u8
-    };
-    Ok(red.iter().zip(green).zip(blue).map(grey).collect())
-}
-
-#[cfg(test)]
-mod tests {
-    use super::grouped;
-
-    #[test]
-    fn fragments_are_divided_by_the_table() {
-        let fragments = [(100, 10), (118, 10), (136, 10)];
-        assert_eq!(grouped(3, &[], &fragments), Ok(vec![(0, 1), (1, 1), (2, 1)]));
-        assert_eq!(grouped(1, &[], &fragments), Ok(vec![(0, 3)]));
-        assert_eq!(grouped(2, &[0, 36], &fragments), Ok(vec![(0, 2), (2, 1)]));
-        for table in [&[][..], &[0, 35], &[36, 0], &[18, 36], &[0, 0]] {
-            assert!(grouped(2, table, &fragments).is_err(), "{table:?}");
+        // Pairs of pixels have but one order.
+        None if photometric == "YBR_FULL_422" => Ok(false),
+        None => {
+            let text = "planar configuration (0028,0006) is missing; the colours are taken pixel by pixel";
+            warnings.insert(text.into());
+            Ok(false)
         }
-        assert!(grouped(4, &[0, 18, 36, 54], &fragments).is_err());
-        assert!(grouped(1, &[], &[]).is_err());
     }
 }

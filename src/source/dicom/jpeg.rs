@@ -33,15 +33,40 @@ impl Expected {
     }
 }
 
-/// The decoders make up what is missing at the end. All three kinds end with the same mark; one byte may follow that makes their length even.
+/// The end mark of all three kinds, which the two kinds of padding follow.
+const END: [u8; 2] = [0xff, 0xd9];
+
+/// A frame without what fills it up behind its end mark: zeros as the standard demands, or FF as some scanners write.
+fn without_padding(bytes: &[u8]) -> &[u8] {
+    let end = bytes.iter().rposition(|b| !matches!(b, 0 | 0xff)).map_or(0, |last| last + 1);
+    bytes.get(..end).unwrap_or_default()
+}
+
+/// True if the last bytes of a fragment may be the end of a frame. Nothing but padding, or the second half of the mark, may stand alone.
+pub(super) fn has_end(tail: &[u8]) -> bool {
+    let tail = without_padding(tail);
+    tail.is_empty() || tail == [END[1]] || tail.ends_with(&END)
+}
+
+/// The frame without padding. The decoders make up what is missing at the end, and do not see a second picture.
 ///
 /// # Errors
-/// In words, a missing end.
-fn check_end(bytes: &[u8]) -> Result<(), String> {
-    let end = bytes.iter().rposition(|b| *b != 0).unwrap_or(0);
-    match bytes.get(end.saturating_sub(1)..=end) {
-        Some([0xff, 0xd9]) => Ok(()),
-        _ => Err("is cut short: its end mark is missing".into()),
+/// In words, a missing end, or several pictures.
+fn whole(bytes: &[u8]) -> Result<&[u8], String> {
+    let frame = without_padding(bytes);
+    if !frame.ends_with(&END) {
+        return Err("is cut short: its end mark is missing".into());
+    }
+    // Every mark begins with the byte that may be padding as well.
+    let begins_again = |(end, _): (usize, &[u8])| {
+        let behind = &frame[end + 2..];
+        let padding = behind.iter().take_while(|b| matches!(b, 0 | 0xff)).count();
+        let mark = padding.checked_sub(1).and_then(|from| behind.get(from..from + 2));
+        matches!(mark, Some([0xff, 0xd8 | 0x4f]))
+    };
+    match frame.windows(2).enumerate().filter(|(_, mark)| *mark == END).any(begins_again) {
+        true => Err("holds several pictures, one behind the other".into()),
+        false => Ok(frame),
     }
 }
 
@@ -54,7 +79,7 @@ fn unreadable(kind: &str, fault: impl ToString) -> String {
 /// # Errors
 /// In words, what is wrong with the frame.
 pub(super) fn baseline(bytes: &[u8], expected: Expected) -> Result<Vec<u8>, String> {
-    check_end(bytes)?;
+    let bytes = whole(bytes)?;
     let reader = ImageReader::with_format(Cursor::new(bytes), ImageFormat::Jpeg);
     let decoder = reader.into_decoder().map_err(|e| unreadable("JPEG", e))?;
     let (columns, rows) = decoder.dimensions();
@@ -126,7 +151,7 @@ fn word(bytes: &[u8], at: usize) -> Option<u16> {
 /// In words, what is wrong with the frame.
 pub(super) fn lossless(bytes: &[u8], expected: Expected) -> Result<Vec<u8>, String> {
     const KIND: &str = "lossless JPEG";
-    check_end(bytes)?;
+    let bytes = whole(bytes)?;
     let header = lossless_header(bytes).ok_or_else(|| unreadable(KIND, "its frame header is missing"))?;
     expected.check_size(header.columns, header.rows)?;
     let width = match header.precision {
@@ -260,7 +285,7 @@ const JPEG_2000: &str = "JPEG 2000";
 /// # Errors
 /// In words, what is wrong with the frame.
 pub(super) fn jpeg_2000(bytes: &[u8], expected: Expected) -> Result<Vec<u8>, String> {
-    check_end(bytes)?;
+    let bytes = whole(bytes)?;
     check_code_stream(bytes, expected).map_err(|why| unreadable(JPEG_2000, why))?;
     decoded_2000(bytes, expected)
 }
@@ -381,6 +406,21 @@ mod tests {
         ] {
             assert!(check_coding_style(wrong, 1 << 26).is_err_and(|e| e.contains(why)), "{wrong:?}");
         }
+    }
+
+    #[test]
+    fn padding_behind_the_end_mark_is_no_part_of_a_frame() {
+        let good = [0xff, 0xd8, 7, 0xff, 0xd9];
+        for padding in [&[][..], &[0], &[0xff], &[0xff, 0xff, 0xff], &[0, 0xff, 0, 0]] {
+            assert_eq!(whole(&[&good[..], padding].concat()), Ok(&good[..]), "{padding:?}");
+            assert!(has_end(&[&good[..], padding].concat()) && has_end(padding));
+        }
+        for between in [&[][..], &[0, 0], &[0xff, 0xff, 0xff]] {
+            let two = [&good[..], between, &good].concat();
+            assert!(whole(&two).is_err_and(|why| why.contains("several pictures")), "{between:?}");
+        }
+        assert!(whole(&[0xff, 0xd9, 7]).is_err() && whole(&[0xd9, 0xff]).is_err() && whole(&[]).is_err());
+        assert!(!has_end(&[0xff, 0xd9, 7]) && !has_end(&[7, 0xd9]) && has_end(&[0xd9, 0]));
     }
 
     #[test]

@@ -1,13 +1,14 @@
 //! Where the frames of DICOM files lie, and the layout that follows from it.
 
+use super::super::describe;
 use super::super::layout::{Layout, LineOrder, StoredGeometry};
 use super::super::packed::Pixels;
 use super::super::transforms::Poses;
 use super::frames::Frames;
 use super::image::Image;
 use crate::files::InputError;
-use std::collections::BTreeMap;
-use std::path::PathBuf;
+use std::collections::{BTreeMap, BTreeSet};
+use std::path::{Path, PathBuf};
 
 /// Where the frames of a file lie, and in which order they are read.
 pub(super) struct Placed {
@@ -22,6 +23,8 @@ pub(super) struct Placed {
     /// By place in `order`, s.
     pub times: BTreeMap<usize, f64>,
     pub remarks: Vec<(String, String)>,
+    /// What the file states and is not so, or does not state; one line each.
+    pub warnings: BTreeSet<String>,
 }
 
 /// The layout of frames. `direct`: the samples, if they stand in a file as they are read.
@@ -32,7 +35,8 @@ pub(super) fn layout(
     placed: Placed,
     direct: Option<Pixels>,
 ) -> Result<Layout, InputError> {
-    let Placed { format, geometry, order, part, has_spacing, times, mut remarks } = placed;
+    let Placed { format, geometry, order, part, has_spacing, times, mut remarks, warnings } = placed;
+    warn(&path, &image.warnings | &warnings, &mut remarks);
     if image.from_colour {
         remarks.push(("colours".into(), "read as their luminance".into()));
     }
@@ -45,6 +49,7 @@ pub(super) fn layout(
         parts: image.parts.into(),
         coding: image.coding,
         arrangement: image.arrangement,
+        swapped: image.swapped,
         stored: image.size,
         part,
         width: image.pixel.number.bytes(),
@@ -74,6 +79,17 @@ pub(super) fn layout(
     }
     layout.check(&path, "frames (0028,0008)")?;
     Ok(layout)
+}
+
+/// Most warnings of the files of a folder.
+const MOST_WARNINGS: usize = 16;
+
+/// Says what is not as a file states, at once and in its description.
+fn warn(path: &Path, warnings: BTreeSet<String>, remarks: &mut Vec<(String, String)>) {
+    for text in warnings.into_iter().take(MOST_WARNINGS) {
+        tracing::warn!(file = %describe::path(path), "{text}");
+        remarks.push(("warning".into(), text));
+    }
 }
 
 /// All frames of a file, in its order.

@@ -5,7 +5,7 @@
 use super::super::OpenOptions;
 use super::super::describe::number;
 use super::super::layout::{Cartesian, StoredGeometry};
-use super::elements::{self as tags, Item};
+use super::elements::{self as tags, Item, Tag};
 use super::image::Image;
 use super::placed::{Placed, in_order};
 use super::volume::directions;
@@ -13,13 +13,15 @@ use crate::files::InputError;
 use crate::probe::file::SLAB;
 use crate::probe::{AxisOrder, World};
 use glam::DVec3;
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 
 /// Codes of a region: pictures in two dimensions, of tissue, in centimetres.
 const TWO_DIMENSIONS: u16 = 1;
 const TISSUE: u16 = 1;
 const CENTIMETRES: u16 = 3;
+/// Largest difference of two scales that are the same, as a share.
+const MAX_APART: f64 = 0.01;
 /// What pictures lack that have no geometry.
 const NO_SPACING: &str =
     "does not say how large its pixels are: give --voxel-spacing X,Y,Z (mm), or --probe for scan lines";
@@ -28,11 +30,13 @@ const NO_SPACING: &str =
 struct Region {
     /// First column and row, columns and rows.
     part: [usize; 4],
-    /// mm.
-    spacing: [f64; 2],
+    /// mm; None if the region states no scale.
+    spacing: Option<[f64; 2]>,
     /// The place of the first pixel, mm.
     origin: [f64; 2],
     is_tissue: bool,
+    /// A delta is below 0: the value falls where the pixel rises.
+    is_backward: bool,
 }
 
 impl Region {
@@ -47,26 +51,31 @@ impl Region {
         if !is_picture || units != [Some(CENTIMETRES); 2] || x1 < x0 || y1 < y0 {
             return None;
         }
-        let [dx, dy] = tags::DELTA.map(|tag| item.real(tag));
-        let (dx, dy) = (dx?.abs() * 10.0, dy?.abs() * 10.0);
-        let reference = |n: usize, step: f64| {
+        let spacing = match tags::DELTA.map(|tag| item.real(tag).map(|cm| cm.abs() * 10.0)) {
+            [Some(dx), Some(dy)] if dx > 0.0 && dy > 0.0 => Some([dx, dy]),
+            _ => None,
+        };
+        let reference = |n: usize| {
+            let Some(spacing) = spacing else { return 0.0 };
             let pixel = item.long(tags::REFERENCE_PIXEL[n]).map_or(0, u32::cast_signed);
             let value = item.real(tags::REFERENCE_VALUE[n]).unwrap_or(0.0) * 10.0;
-            value - f64::from(pixel) * step
+            value - f64::from(pixel) * spacing[n]
         };
         Some(Region {
             part: [x0, y0, x1 - x0 + 1, y1 - y0 + 1],
-            spacing: [dx, dy],
-            origin: [reference(0, dx), reference(1, dy)],
+            spacing,
+            origin: [reference(0), reference(1)],
             is_tissue: item.word(tags::REGION_TYPE) == Some(TISSUE),
+            is_backward: tags::DELTA.into_iter().any(|tag| item.real(tag).is_some_and(|cm| cm < 0.0)),
         })
     }
 
-    /// The largest region of tissue, otherwise the largest, of an image. The number of regions comes with it.
+    /// The largest region of tissue, otherwise the largest, of an image; one with a scale before others. The number of regions comes with it.
     fn choose(root: &Item, size: [usize; 2]) -> (Option<Region>, usize) {
         let items = root.items(tags::REGIONS);
         let regions = items.iter().filter_map(|item| Region::of(item, size));
-        let best = regions.max_by_key(|region| (region.is_tissue, region.part[2] * region.part[3]));
+        let best =
+            regions.max_by_key(|region| (region.is_tissue, region.spacing.is_some(), region.part[2] * region.part[3]));
         (best, items.len())
     }
 }
@@ -80,28 +89,76 @@ pub(super) struct Flat {
     /// The first pixel of the part, mm.
     pub origin: [f64; 2],
     pub remarks: Vec<(String, String)>,
+    /// What the file states and is not so.
+    pub warnings: BTreeSet<String>,
 }
 
-/// The region, otherwise the whole picture with its pixel spacing.
+/// The region, otherwise the whole picture. The scale of the region counts, otherwise the pixel spacing.
 pub(super) fn flat(root: &Item, size: [usize; 2]) -> Flat {
     let (region, count) = Region::choose(root, size);
-    if let Some(Region { part, spacing, origin, .. }) = region {
-        let [x, y, columns, rows] = part;
-        let text = format!(
-            "columns {x} .. {}, rows {y} .. {} of {} x {} pixels; what is around it is not read",
-            x + columns - 1,
-            y + rows - 1,
-            size[0],
-            size[1]
-        );
-        let text = if count > 1 { format!("one of {count}: {text}") } else { text };
-        return Flat { part, spacing: Some(spacing), origin, remarks: vec![("region".into(), text)] };
-    }
-    let spacing = match root.decimals(tags::PIXEL_SPACING)[..] {
-        [rows, columns] => Some([columns, rows]),
-        _ => None,
+    let mut warnings = BTreeSet::new();
+    let stated = pixel_spacing(root, &mut warnings);
+    let Some(Region { part, spacing, origin, is_backward, .. }) = region else {
+        if count > 0 {
+            let text = format!(
+                "none of {count} regions (0018,6011) is a picture in centimetres, so the whole picture is read"
+            );
+            warnings.insert(format!("{text}; {}", instead(stated)));
+        }
+        return Flat {
+            part: [0, 0, size[0], size[1]],
+            spacing: stated,
+            origin: [0.0; 2],
+            remarks: Vec::new(),
+            warnings,
+        };
     };
-    Flat { part: [0, 0, size[0], size[1]], spacing, origin: [0.0; 2], remarks: Vec::new() }
+    let [x, y, columns, rows] = part;
+    let text = format!(
+        "columns {x} .. {}, rows {y} .. {} of {} x {} pixels; what is around it is not read",
+        x + columns - 1,
+        y + rows - 1,
+        size[0],
+        size[1]
+    );
+    let text = if count > 1 { format!("one of {count}: {text}") } else { text };
+    let mut remarks = vec![("region".into(), text)];
+    if is_backward {
+        warnings
+            .insert("physical delta (0018,602C) or (0018,602E) is below 0; its size counts, not its direction".into());
+    }
+    match (spacing, stated) {
+        (None, _) => {
+            let text = "physical delta (0018,602C) or (0018,602E) of the region is 0 or missing";
+            warnings.insert(format!("{text}; {}", instead(stated)));
+        }
+        (Some(a), Some(b)) if (0..2).any(|n| (a[n] - b[n]).abs() > MAX_APART * a[n]) => {
+            let text = format!("{} of the region; pixel spacing (0028,0030) says {}", spacing_text(a), spacing_text(b));
+            remarks.push(("scale".into(), text));
+        }
+        _ => {}
+    }
+    Flat { part, spacing: spacing.or(stated), origin, remarks, warnings }
+}
+
+/// What counts where the regions have no scale.
+fn instead(stated: Option<[f64; 2]>) -> &'static str {
+    match stated {
+        Some(_) => "pixel spacing (0028,0030) counts instead",
+        None => "nor is there a pixel spacing (0028,0030), so the picture has no scale",
+    }
+}
+
+/// Columns and rows of the pixel spacing, mm; None if there is none that can be one.
+fn pixel_spacing(root: &Item, warnings: &mut BTreeSet<String>) -> Option<[f64; 2]> {
+    match root.decimals(tags::PIXEL_SPACING)[..] {
+        [rows, columns] if [rows, columns].iter().all(|mm| mm.is_finite() && *mm > 0.0) => Some([columns, rows]),
+        _ if root.text(tags::PIXEL_SPACING).is_empty() => None,
+        _ => {
+            warnings.insert("pixel spacing (0028,0030) is not two lengths above 0; it is not used".into());
+            None
+        }
+    }
 }
 
 /// The plane of a picture in the patient's space: the first pixel of its part, and the directions of rising column and row.
@@ -117,7 +174,8 @@ pub(super) fn pictures(path: &Path, root: &Item, image: &Image, options: &OpenOp
     let flat = flat(root, image.size);
     let frames = image.places.len();
     let geometry = of_pictures(path, root, &flat, frames, options)?;
-    let (times, remarks) = (times(root, frames), flat.remarks);
+    let (remarks, mut warnings) = (flat.remarks, flat.warnings);
+    let times = times(root, frames, &mut warnings);
     let (part, has_spacing) = (flat.part, flat.spacing.is_some());
     Ok(Placed {
         format: "DICOM ultrasound pictures",
@@ -127,6 +185,7 @@ pub(super) fn pictures(path: &Path, root: &Item, image: &Image, options: &OpenOp
         has_spacing,
         times,
         remarks,
+        warnings,
     })
 }
 
@@ -163,23 +222,49 @@ pub(super) fn of_pictures(
     Ok(StoredGeometry::Cartesian(Cartesian { size, volumes, world, order: AxisOrder::STORED }))
 }
 
-/// The times of frames, s: at one distance, or each after the one before.
-fn times(root: &Item, frames: usize) -> BTreeMap<usize, f64> {
+/// The times of frames, s. The frame increment pointer says whether they have one distance, or each its own. Without it, or if what it
+/// names is of no use, the other one counts.
+fn times(root: &Item, frames: usize, warnings: &mut BTreeSet<String>) -> BTreeMap<usize, f64> {
+    if frames < 2 {
+        return BTreeMap::new();
+    }
+    let pointer = root.words(tags::FRAME_POINTER);
+    let names: Vec<Tag> = pointer.as_chunks::<2>().0.iter().map(|[g, e]| Tag::from(*g) << 16 | Tag::from(*e)).collect();
+    let (vector, single) = (vector_times(root, frames), single_times(root, frames));
+    let is_there = |tag| !root.text(tag).is_empty();
+    let order = match names.contains(&tags::FRAME_TIME) {
+        true => [(tags::FRAME_TIME, single), (tags::FRAME_TIME_VECTOR, vector)],
+        false => [(tags::FRAME_TIME_VECTOR, vector), (tags::FRAME_TIME, single)],
+    };
+    let name = |tag| if tag == tags::FRAME_TIME { "frame time (0018,1063)" } else { "frame time vector (0018,1065)" };
+    let is_named = names.contains(&order[0].0);
+    let is_both = is_there(tags::FRAME_TIME) && is_there(tags::FRAME_TIME_VECTOR);
+    let chosen = order.iter().find(|(_, times)| times.is_some()).map(|(tag, _)| *tag);
+    let counts = chosen.map_or("the frames have no times".into(), |tag| format!("{} counts", name(tag)));
+    if chosen != Some(order[0].0) && (is_named || is_there(order[0].0)) {
+        warnings.insert(format!("{} is missing, or gives no times for {frames} frames; {counts}", name(order[0].0)));
+    } else if !is_named && (is_both || (chosen.is_some() && !names.is_empty())) {
+        warnings.insert(format!("frame increment pointer (0028,0009) is missing, or names no times; {counts}"));
+    }
+    order.into_iter().find_map(|(_, times)| times).unwrap_or_default()
+}
+
+/// By the frame time vector, each the time since the frame before; None if it is not one for each frame.
+fn vector_times(root: &Item, frames: usize) -> Option<BTreeMap<usize, f64>> {
     let each = root.decimals(tags::FRAME_TIME_VECTOR);
-    if frames > 1 && each.len() == frames && each.iter().all(|ms| ms.is_finite()) {
-        // Each is the time since the frame before.
-        let mut now = 0.0;
-        let mut times = BTreeMap::new();
-        for (n, ms) in each.iter().enumerate() {
-            now += ms / 1e3;
-            times.insert(n, now);
-        }
-        return times;
-    }
-    match root.decimal(tags::FRAME_TIME) {
-        Some(ms) if ms > 0.0 && frames > 1 => (0..frames).map(|n| (n, n as f64 * ms / 1e3)).collect(),
-        _ => BTreeMap::new(),
-    }
+    let is_whole = each.len() == frames && each.iter().all(|ms| ms.is_finite() && *ms >= 0.0);
+    let mut now = 0.0;
+    let next = |(n, ms): (usize, &f64)| {
+        now += ms / 1e3;
+        (n, now)
+    };
+    is_whole.then(|| each.iter().enumerate().map(next).collect())
+}
+
+/// By the frame time, which is the same between all frames.
+fn single_times(root: &Item, frames: usize) -> Option<BTreeMap<usize, f64>> {
+    let ms = root.decimal(tags::FRAME_TIME).filter(|ms| *ms > 0.0)?;
+    Some((0..frames).map(|n| (n, n as f64 * ms / 1e3)).collect())
 }
 
 /// A place in a plane, for users.

@@ -90,7 +90,7 @@ pub(in super::super) fn read_series(folder: &Path, options: &OpenOptions) -> Res
     let is_same = |slice: &Slice| {
         let (a, b) = (&slice.image, &first.image);
         let other = flat(&slice.elements.root, a.size);
-        (a.size, a.pixel, a.coding, &a.arrangement) == (b.size, b.pixel, b.coding, &b.arrangement)
+        (a.size, a.pixel, a.coding, &a.arrangement, a.swapped) == (b.size, b.pixel, b.coding, &b.arrangement, b.swapped)
             && (other.part, other.spacing) == (plane.part, plane.spacing)
     };
     if let Some(other) = all.iter().find(|slice| !is_same(slice)) {
@@ -106,9 +106,11 @@ pub(in super::super) fn read_series(folder: &Path, options: &OpenOptions) -> Res
     let Some(mut image) = images.next() else { return fault("holds no image".into()) };
     for (n, next) in images.enumerate() {
         let before = image.parts.len();
-        let moved = |place: &Place| Place { file: n + 1, first: place.first + before, count: place.count };
+        let moved = |place: &Place| Place { file: n + 1, first: place.first + before, ..*place };
         image.places.extend(next.places.iter().map(moved));
         image.parts.extend(next.parts);
+        // What is wrong with many files is said once.
+        image.warnings.extend(next.warnings);
     }
     layout(files, folder.into(), image, placed, None)
 }
@@ -123,7 +125,7 @@ fn placed(folder: &Path, all: &[Slice], plane: Flat, options: &OpenOptions) -> R
     let mut remarks = about(&all[0].elements);
     remarks.extend(plane.remarks.iter().cloned());
     remarks.push(("files".into(), all.len().to_string()));
-    let part = plane.part;
+    let (part, warnings) = (plane.part, plane.warnings.clone());
     let place = |slice: &Slice| in_patient(&slice.elements.root, &plane);
     let places: Option<Vec<(DVec3, [DVec3; 2])>> = all.iter().map(place).collect();
     if let (Some(places), Some([dx, dy])) = (places, plane.spacing) {
@@ -141,7 +143,16 @@ fn placed(folder: &Path, all: &[Slice], plane: Flat, options: &OpenOptions) -> R
         let geometry =
             StoredGeometry::Cartesian(Cartesian { size, volumes: found.volumes, world, order: AxisOrder::STORED });
         let (order, times) = (found.order, BTreeMap::new());
-        return Ok(Placed { format: "DICOM series", geometry, order, part, has_spacing: true, times, remarks });
+        return Ok(Placed {
+            format: "DICOM series",
+            geometry,
+            order,
+            part,
+            has_spacing: true,
+            times,
+            remarks,
+            warnings,
+        });
     }
     let distance = root.decimal(tags::SPACING_BETWEEN_SLICES).filter(|mm| *mm > 0.0);
     let spacing = match (plane.spacing, distance, options.voxel_spacing) {
@@ -157,7 +168,8 @@ fn placed(folder: &Path, all: &[Slice], plane: Flat, options: &OpenOptions) -> R
     let size = [part[2], part[3], all.len()];
     let geometry = StoredGeometry::Cartesian(Cartesian { size, volumes: 1, world, order: AxisOrder::STORED });
     let order = (0..all.len()).collect();
-    Ok(Placed { format: "DICOM series", geometry, order, part, has_spacing, times: BTreeMap::new(), remarks })
+    let times = BTreeMap::new();
+    Ok(Placed { format: "DICOM series", geometry, order, part, has_spacing, times, remarks, warnings })
 }
 
 /// Pictures that have no distance from each other: they are frames in time.
@@ -174,5 +186,6 @@ fn pictures_in_time(
         remarks.push(("order".into(), text));
     }
     let (order, part, has_spacing) = ((0..all.len()).collect(), plane.part, plane.spacing.is_some());
-    Ok(Placed { format: "DICOM series", geometry, order, part, has_spacing, times: BTreeMap::new(), remarks })
+    let (times, warnings) = (BTreeMap::new(), plane.warnings);
+    Ok(Placed { format: "DICOM series", geometry, order, part, has_spacing, times, remarks, warnings })
 }

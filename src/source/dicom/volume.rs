@@ -106,6 +106,7 @@ pub(super) fn enhanced(path: &Path, elements: &Elements, image: &Image) -> Resul
         has_spacing: true,
         times: found.times,
         remarks,
+        warnings: BTreeSet::new(),
     })
 }
 
@@ -198,6 +199,7 @@ pub(super) fn philips(path: &Path, elements: &Elements, image: &Image) -> Result
         has_spacing: true,
         times: if volumes > 1 { (0..frames).filter_map(time).collect() } else { BTreeMap::new() },
         remarks: Vec::new(),
+        warnings: BTreeSet::new(),
     })
 }
 
