@@ -195,7 +195,7 @@ fn is_sequence(header: &Header, remarks: &mut Remarks) -> Result<bool, InputErro
 fn world(header: &Header, remarks: &mut Remarks) -> Result<World, InputError> {
     let count = header.dimensions();
     let unit = unit(header, remarks);
-    let mut spacing = [1.0; 4];
+    let mut spacing = [unit, unit, unit, 1.0];
     let mut named = "TransformMatrix";
     if let Some((field, _)) = header.first_of(&["ElementSpacing", "ElementSize"]) {
         named = field;
@@ -206,13 +206,16 @@ fn world(header: &Header, remarks: &mut Remarks) -> Result<World, InputError> {
             spacing[i] = if i < 3 { value * unit } else { value };
         }
     }
-    if count == 4 && spacing[3] != 1.0 {
-        let text = format!("the spacing of the fourth axis, {}, has no unit: it makes no time stamps", spacing[3]);
-        remarks.push(("time steps".into(), text));
-    }
     let mut origin = [0.0; 4];
     if let Some((field, _)) = header.first_of(&["Offset", "Position", "Origin"]) {
         origin[..count].copy_from_slice(&header.numbers(field, count)?);
+    }
+    if spacing[3] != 1.0 || origin[3] != 0.0 {
+        let text = format!(
+            "{} from {} on along the fourth axis have no unit: they make no time stamps",
+            spacing[3], origin[3]
+        );
+        remarks.push(("time steps".into(), text));
     }
     let mut axes = [DVec3::X, DVec3::Y, DVec3::Z];
     if let Some((field, _)) = header.first_of(&["TransformMatrix", "Rotation", "Orientation"]) {

@@ -41,6 +41,9 @@ struct Axis {
     label: String,
     unit: String,
     spacing: Option<f64>,
+    /// `axis mins`, and whether the first sample lies there: with `node`; otherwise half a spacing further on.
+    least: Option<f64>,
+    is_node: bool,
     /// None if the file has no directions, Some(None) if this axis has none.
     direction: Option<Option<Vector>>,
     has_values: bool,
@@ -61,7 +64,12 @@ impl Axis {
         let kinds = header.words("kinds", count)?.unwrap_or_else(empty);
         let labels = header.words("labels", count)?.unwrap_or_else(empty);
         let units = header.words("units", count)?.unwrap_or_else(empty);
-        let spacings = header.numbers("spacings", count)?;
+        let [spacings, least, most] = [
+            header.numbers("spacings", count)?,
+            header.numbers("axis mins", count)?,
+            header.numbers("axis maxs", count)?,
+        ];
+        let centerings = header.words("centerings", count)?.unwrap_or_else(empty);
         let mut directions = header.vectors("space directions")?;
         if directions.as_ref().is_some_and(|all| all.len() != count) {
             return header.fault("space directions", format!("is not one vector, or none, for each of {count} axes"));
@@ -71,12 +79,17 @@ impl Axis {
             let Ok(value) = word.parse() else {
                 return header.fault("sizes", format!("{} is not a whole number", quoted(word)));
             };
+            let size = extent(header.path, "sizes", "an entry ", value)?;
+            let is_node = centerings[n].eq_ignore_ascii_case("node");
+            let steps = if is_node { size.max(2) - 1 } else { size };
             axes.push(Axis {
-                size: extent(header.path, "sizes", "an entry ", value)?,
+                size,
+                least: least[n],
+                is_node,
                 kind: kinds[n].to_ascii_lowercase(),
                 label: labels[n].to_ascii_lowercase(),
                 unit: units[n].clone(),
-                spacing: spacings[n],
+                spacing: spacings[n].or(least[n].zip(most[n]).map(|(least, most)| (most - least) / steps as f64)),
                 direction: directions.as_mut().and_then(|all| all.get_mut(n)).map(Option::take),
                 has_values: header.value(&format!("axis {n} index values")).is_some(),
             });
@@ -240,34 +253,31 @@ impl Axes {
         axes: &mut [DVec3; 3],
         remarks: &mut Remarks,
     ) -> Result<DVec3, InputError> {
-        let count = self.all.len();
-        let [least, most] = [header.numbers("axis mins", count)?, header.numbers("axis maxs", count)?];
-        let centerings = header.words("centerings", count)?.unwrap_or_default();
-        let is_node = |n: usize| centerings.get(n).is_some_and(|word| word.eq_ignore_ascii_case("node"));
         let stated = header.get("space dimension").and_then(|text| text.parse().ok());
         let scale = self.scale(
             header,
             stated.unwrap_or(if header.get("space").is_some() { 3 } else { self.space.len() }),
             remarks,
         )?;
-        let mut starts = Vec::new();
+        let (mut starts, mut not_stated) = (Vec::new(), Vec::new());
         for (c, n) in self.space.iter().copied().enumerate() {
             let axis = &self.all[n];
-            let steps = if is_node(n) { axis.size.max(2) - 1 } else { axis.size };
-            let of_ends = least[n].zip(most[n]).map(|(least, most)| (most - least) / steps as f64);
-            let spacing = match axis.spacing.or(of_ends) {
+            let spacing = match axis.spacing {
                 Some(spacing) if spacing > 0.0 => spacing,
                 Some(other) => return header.fault("spacings", format!("is {other} for an axis, must be above 0")),
                 None => {
-                    let text = format!("spacing of axis {n} is not stated; taken as 1 {}", scale.name());
-                    remarks.extend((axis.size > 1).then(|| ("spacing".into(), text)));
+                    not_stated.extend((axis.size > 1).then(|| n.to_string()));
                     1.0
                 }
             };
             let factor = scale.of_axis(n)[c];
             axes[c] *= spacing * factor;
             // The place of the first sample: the middle of its cell, unless samples are at the ends of the axis.
-            starts.push(least[n].map(|least| (least + if is_node(n) { 0.0 } else { spacing / 2.0 }) * factor));
+            starts.push(axis.least.map(|least| (least + if axis.is_node { 0.0 } else { spacing / 2.0 }) * factor));
+        }
+        if !not_stated.is_empty() {
+            let text = format!("not stated of axis {}, taken as 1 {}", not_stated.join(", "), scale.name());
+            remarks.push(("spacing".into(), text));
         }
         match header.vectors("space origin")?.as_deref() {
             Some([Some(origin)]) => Ok(place(origin) * sign * scale.of_axis(self.space[0])),
@@ -369,7 +379,8 @@ impl Axes {
         let text = header.value(&format!("axis {n} index values"))?;
         let is_text =
             header.value(&format!("axis {n} index type")).is_some_and(|word| word.eq_ignore_ascii_case("text"));
-        let numbers: Option<Vec<f64>> = text.split_whitespace().map(|word| word.parse().ok()).collect();
+        let words = text.split(|c: char| c.is_whitespace() || c == ',').filter(|word| !word.is_empty());
+        let numbers: Option<Vec<f64>> = words.map(|word| word.parse().ok()).collect();
         let fault = match numbers {
             _ if is_text => "are text".to_string(),
             Some(numbers) if numbers.len() != self.volumes => {
@@ -391,7 +402,7 @@ impl Axes {
                 let origin = header.vectors("space origin")?.and_then(|all| all.into_iter().next().flatten());
                 (Some(step), origin.and_then(|origin| origin.get(3).copied()))
             }
-            None => (axis.spacing, header.numbers("axis mins", self.all.len())?[n]),
+            None => (axis.spacing, axis.least),
         };
         let Some(step) = step.filter(|step| *step != 0.0) else { return Ok(None) };
         Ok(Some((0..self.volumes).map(|volume| start.unwrap_or(0.0) + step * volume as f64).collect()))
@@ -423,7 +434,7 @@ impl Scale {
     /// The unit of a length that is not stated.
     fn name(&self) -> &'static str {
         let is_mm = self.of_space.is_none_or(|factors| factors == DVec3::ONE);
-        if is_mm && self.of_axes.iter().all(|factor| *factor == 1.0) { "mm" } else { "in the unit of the file" }
+        if is_mm && self.of_axes.iter().all(|factor| *factor == 1.0) { "mm" } else { "of the unit of the file" }
     }
 }
 
@@ -431,13 +442,15 @@ impl Scale {
 fn roles(header: &Header, all: &[Axis], remarks: &mut Remarks) -> Result<Vec<Role>, InputError> {
     let mut roles = all.iter().map(|axis| axis.role(header)).collect::<Result<Vec<Role>, InputError>>()?;
     let known_spacings = all.iter().filter(|axis| axis.spacing.is_some()).count();
-    // In a file with spacings of NaN they are for axes that are not in space.
-    let is_spaceless =
-        |axis: &Axis| axis.is_none() || (axis.direction.is_none() && axis.spacing.is_none() && known_spacings >= 2);
-    let in_space = (0..all.len())
-        .filter(|n| roles[*n] == Role::Space || (roles[*n] == Role::Unsaid && !is_spaceless(&all[*n])))
-        .count();
+    // In a file with spacings, NaN is for axes that are not in space: the first or the last.
     let last = all.len() - 1;
+    let is_spaceless = |n: usize| {
+        let axis = &all[n];
+        let has_no_spacing = axis.direction.is_none() && axis.spacing.is_none() && known_spacings >= 2;
+        axis.is_none() || (has_no_spacing && (n == 0 || n == last))
+    };
+    let in_space =
+        (0..all.len()).filter(|n| roles[*n] == Role::Space || (roles[*n] == Role::Unsaid && !is_spaceless(*n))).count();
     for (n, axis) in all.iter().enumerate() {
         let has_time = roles.contains(&Role::Time);
         roles[n] = match roles[n] {
@@ -455,7 +468,7 @@ fn roles(header: &Header, all: &[Axis], remarks: &mut Remarks) -> Result<Vec<Rol
                     let text = format!("axis {n}, of {} numbers, has no kind: taken as {what}", axis.size);
                     warned(header.path, "axes", text)
                 };
-                match is_spaceless(axis) && all.len() > 2 {
+                match is_spaceless(n) && all.len() > 2 {
                     _ if is_time && !has_time && all.len() > 2 && (!axis.is_in_space() || axis.is_time_by_unit()) => {
                         Role::Time
                     }

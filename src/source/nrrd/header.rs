@@ -3,6 +3,7 @@
 use super::super::packed::InputFile;
 use super::super::plus::PlusFrames;
 use crate::files::{InputError, quoted};
+use std::borrow::Cow;
 use std::collections::HashMap;
 use std::io::{BufRead, BufReader, Read};
 use std::path::Path;
@@ -86,7 +87,7 @@ impl<'a> Header<'a> {
             if header.length >= MAX_HEADER_BYTES {
                 break;
             }
-            let text = String::from_utf8_lossy(&line);
+            let text = text_of(&line);
             let text = text.trim();
             // A detached header may end with the file.
             if text.is_empty() {
@@ -216,6 +217,11 @@ impl<'a> Header<'a> {
     }
 }
 
+/// The text of a line. One that is no UTF-8 is Latin-1, where the sign for micro is a byte.
+fn text_of(line: &[u8]) -> Cow<'_, str> {
+    std::str::from_utf8(line).map_or_else(|_| line.iter().map(|byte| char::from(*byte)).collect(), Cow::Borrowed)
+}
+
 /// Words between spaces, or in quotes.
 fn words(mut text: &str) -> Vec<String> {
     let mut words = Vec::new();
@@ -235,7 +241,13 @@ fn words(mut text: &str) -> Vec<String> {
 
 #[cfg(test)]
 mod tests {
-    use super::words;
+    use super::{text_of, words};
+
+    #[test]
+    fn a_line_is_utf_8_or_latin_1() {
+        assert_eq!(text_of("\u{3bc}m".as_bytes()), "\u{3bc}m");
+        assert_eq!(text_of(b"\xb5m"), "\u{b5}m");
+    }
 
     #[test]
     fn words_may_be_in_quotes_and_empty() {
