@@ -9,6 +9,7 @@
 pub mod cardiac;
 pub mod coarse;
 pub mod convert;
+mod data_files;
 mod describe;
 mod dicom;
 mod drawn;
@@ -30,6 +31,7 @@ mod pictures;
 pub mod piped;
 mod piped_file;
 mod pixel;
+mod plus;
 mod plus_config;
 pub mod posed;
 pub mod recorder;
@@ -43,6 +45,7 @@ mod tracked;
 mod transforms;
 #[cfg(feature = "uff")]
 mod uff;
+mod units;
 mod value_range;
 pub mod volume_file;
 

@@ -1,18 +1,26 @@
 //! MetaImage (`.mha`, `.mhd`): plain volumes, the sequences of the PLUS toolkit, and UsTK's pre-scan sweeps.
 
+use super::data_files::{self, Pattern};
 use super::frame::DEMO_DATA;
-use super::layout::{Cartesian, Layout, LineOrder, StoredGeometry, extent};
+use super::layout::{Layout, StoredGeometry, extent, warned};
 use super::packed::{Encoding, InputFile, Pixels};
 use super::pixel::{Number, PixelFormat};
+use super::plus::{PlusFrames, PlusWords};
 use super::sequence::COMMENT;
-use super::transforms::{Poses, TransformName, matrix};
+use super::units::millimetres;
 use crate::files::{InputError, quoted};
 use crate::probe::file::SLAB;
-use crate::probe::{Advance, Array, Axis, AxisOrder, Motion, Probe, World};
+use crate::probe::{Advance, Array, Axis, Motion, Probe, World};
 use glam::DVec3;
-use std::collections::{BTreeMap, HashMap};
+use std::collections::HashMap;
 use std::io::{BufRead, BufReader, Read};
 use std::path::Path;
+
+/// Pairs of title and text.
+type Remarks = Vec<(String, String)>;
+
+/// Most frames of all volumes.
+const MAX_FRAMES: u64 = 1 << 20;
 
 /// Endings of its files: header and samples in one, or in two.
 pub(super) const ENDINGS: [&str; 2] = ["mha", "mhd"];
@@ -47,34 +55,48 @@ pub(super) fn read(file: &InputFile) -> Result<Layout, InputError> {
         let names = NUMBERS.map(|(name, _)| name).join(", ");
         return header.fault("ElementType", format!("{} is not read, only {names} are", quoted(word)));
     };
-    let big_endian = header.flag("BinaryDataByteOrderMSB")?.or(header.flag("ElementByteOrderMSB")?).unwrap_or(false);
-    let pixel = PixelFormat { number: *number, channels, big_endian, scale: None };
-    let [width, height, frames] = dimensions(path, &header)?;
     let mut remarks = Vec::new();
-    let world = world(&header)?;
-    let lines = line_order(&header)?;
-    let pre_scan = prescan_probe(&header, [width, height], frames)?;
+    let mut pixel = PixelFormat { number: *number, channels: 1, big_endian: false, scale: None };
+    pixel.big_endian = is_big_endian(&header, pixel.bytes(), &mut remarks)?;
+    pixel.channels = channels;
+    let Dimensions { size, volumes } = dimensions(path, &header)?;
+    let [width, height, depth] = size;
+    let frames = depth as u64 * volumes as u64;
+    if frames > MAX_FRAMES {
+        return header.fault("DimSize", format!("makes {frames} frames, at most {MAX_FRAMES} are read"));
+    }
+    let frames = frames as usize;
+    let is_sequence = is_sequence(&header, &mut remarks)?;
+    let world = world(&header, &mut remarks)?;
+    let words = PlusWords {
+        path,
+        orientation: ("UltrasoundImageOrientation", header.get("UltrasoundImageOrientation")),
+        kind: ("UltrasoundImageType", header.get("UltrasoundImageType")),
+    };
+    let lines = words.line_order()?;
+    let pre_scan = prescan_probe(&header, [width, height], depth)?;
     let format = match &pre_scan {
         Some(_) => "MetaImage pre-scan sweep",
-        None if header.sequence || header.get("UltrasoundImageType").is_some() => "PLUS sequence",
+        None if header.frames.is_sequence || words.kind.1.is_some() => "PLUS sequence",
         None => "MetaImage",
     };
+    // Frames in time are not neighbours in space: each is a volume of one slice.
+    let is_pictures = is_sequence && header.dimensions() < 4;
+    let slices = if is_pictures { 1 } else { depth };
     let geometry = match pre_scan {
         Some(probe) => StoredGeometry::Sweep(Box::new(probe)),
-        None => own_pictures(path, &header, ([width, height, frames], world), &lines)?,
+        None => words.pictures([width, height, slices], frames / slices, world, &lines, &mut remarks)?,
     };
     let states_geometry = match &geometry {
         StoredGeometry::Sweep(_) => true,
-        StoredGeometry::Cartesian(_) => !header.has_scan_lines() && header.first_of(&PLACEMENT_KEYS).is_some(),
+        StoredGeometry::Cartesian(_) => !words.has_scan_lines() && header.first_of(&PLACEMENT_KEYS).is_some(),
         StoredGeometry::Missing(_) => false,
     };
-    if let Some(orientation) = header.get("UltrasoundImageOrientation") {
+    if let Some(orientation) = words.orientation.1 {
         remarks.push(("orientation".into(), quoted(orientation)));
     }
-    remarks.extend(header.poses.remark());
-    if header.not_ok > 0 {
-        remarks.push(("frames not OK".into(), format!("{} by their ImageStatus; read all the same", header.not_ok)));
-    }
+    let times = header.frames.times(if header.dimensions() < 4 { 1 } else { depth }, frames);
+    let poses = header.frames.poses(path, if header.dimensions() < 4 { 1 } else { depth }, &mut remarks);
     let mut layout = Layout {
         format,
         pixel,
@@ -84,10 +106,10 @@ pub(super) fn read(file: &InputFile) -> Result<Layout, InputError> {
         line_order: lines,
         geometry,
         backward: false,
-        volumes: 1,
+        volumes,
         states_geometry,
-        poses: std::mem::take(&mut header.poses),
-        times: header.times.range(..frames).map(|(k, t)| (*k, *t)).collect(),
+        poses,
+        times,
         synthetic: header.synthetic,
         remarks,
     };
@@ -96,31 +118,84 @@ pub(super) fn read(file: &InputFile) -> Result<Layout, InputError> {
     Ok(layout)
 }
 
-/// Width, height and frames; a single frame when there are two dimensions.
-fn dimensions(path: &Path, header: &Header) -> Result<[usize; 3], InputError> {
+/// The byte order of numbers; MetaIO takes that of the machine where a file does not say it.
+fn is_big_endian(header: &Header, bytes: usize, remarks: &mut Remarks) -> Result<bool, InputError> {
+    let stated = header.flag("BinaryDataByteOrderMSB")?.or(header.flag("ElementByteOrderMSB")?);
+    if stated.is_none() && bytes > 1 {
+        let text = "BinaryDataByteOrderMSB is missing: the byte order is taken as little-endian";
+        remarks.push(warned(header.path, "byte order", text.into()));
+    }
+    Ok(stated.unwrap_or(false))
+}
+
+/// Voxels of a volume, and the number of volumes.
+struct Dimensions {
+    size: [usize; 3],
+    volumes: usize,
+}
+
+/// Two to four dimensions; the fourth is volumes one after another.
+fn dimensions(path: &Path, header: &Header) -> Result<Dimensions, InputError> {
     let count = match header.integer("NDims")? {
-        Some(count @ (2 | 3)) => count as usize,
-        Some(other) => return header.fault("NDims", format!("is {other}, must be 2 or 3")),
+        Some(count @ (2..=4)) => count as usize,
+        Some(other) => return header.fault("NDims", format!("is {other}, must be 2 to 4")),
         None => return header.fault("NDims", "is missing"),
     };
     let words: Vec<&str> = header.need("DimSize")?.split_whitespace().collect();
     if words.len() != count {
         return header.fault("DimSize", format!("has {} entries, but NDims is {count}", words.len()));
     }
-    let mut size = [1; 3];
+    let mut all = [1; 4];
     for (i, word) in words.iter().enumerate() {
         let Ok(value) = word.parse() else {
             return header.fault("DimSize", format!("{}{} is not a whole number", which(i, count), quoted(word)));
         };
-        size[i] = extent(path, "DimSize", &which(i, count), value)?;
+        all[i] = extent(path, "DimSize", &which(i, count), value)?;
     }
-    Ok(size)
+    let [x, y, z, volumes] = all;
+    Ok(Dimensions { size: [x, y, z], volumes })
 }
 
-/// Where the voxels lie. MetaImage has the directions of the axes one after another, in LPS.
-fn world(header: &Header) -> Result<World, InputError> {
-    let count = if header.get("NDims") == Some("2") { 2 } else { 3 };
-    let mut spacing = [1.0; 3];
+/// Whether the last axis is time. `Kinds = domain domain list` alone does not say so of pictures: the PLUS toolkit writes it into its
+/// volumes, too. An axis of time or a list is read in the last place only.
+fn is_sequence(header: &Header, remarks: &mut Remarks) -> Result<bool, InputError> {
+    let count = header.dimensions();
+    let Some(kinds) = header.get("Kinds") else {
+        remarks
+            .extend((count == 4).then(|| ("fourth axis".into(), "of no stated kind, taken as volumes in time".into())));
+        return Ok(header.frames.is_sequence);
+    };
+    let kinds: Vec<String> = kinds.split_whitespace().map(str::to_ascii_lowercase).collect();
+    if kinds.len() != count {
+        return header.fault("Kinds", format!("has {} entries, but NDims is {count}", kinds.len()));
+    }
+    for (i, kind) in kinds.iter().enumerate() {
+        let is_last = i + 1 == count;
+        match kind.as_str() {
+            "domain" | "space" | "none" | "???" => {}
+            "list" | "time" if is_last && count > 2 => {}
+            other => {
+                let fault = format!(
+                    "{}{} is not read there: axes in space, then a list or time, are",
+                    which(i, count),
+                    quoted(other)
+                );
+                return header.fault("Kinds", fault);
+            }
+        }
+    }
+    let last = kinds.last().map_or("", String::as_str);
+    if count == 4 && !matches!(last, "list" | "time") {
+        remarks.push(("fourth axis".into(), "is no list or time by its kind, taken as volumes in time".into()));
+    }
+    Ok(header.frames.is_sequence || (count == 3 && last == "time"))
+}
+
+/// Where the voxels lie. MetaImage has the directions of the axes one after another, in LPS. A fourth axis must be independent of space.
+fn world(header: &Header, remarks: &mut Remarks) -> Result<World, InputError> {
+    let count = header.dimensions();
+    let unit = unit(header, remarks);
+    let mut spacing = [unit, unit, unit, 1.0];
     let mut named = "TransformMatrix";
     if let Some((field, _)) = header.first_of(&["ElementSpacing", "ElementSize"]) {
         named = field;
@@ -128,86 +203,124 @@ fn world(header: &Header) -> Result<World, InputError> {
             if value <= 0.0 {
                 return header.fault(field, format!("{}is {value}, must be above 0", which(i, count)));
             }
-            spacing[i] = value;
+            spacing[i] = if i < 3 { value * unit } else { value };
         }
     }
-    let mut origin = [0.0; 3];
+    let mut origin = [0.0; 4];
     if let Some((field, _)) = header.first_of(&["Offset", "Position", "Origin"]) {
         origin[..count].copy_from_slice(&header.numbers(field, count)?);
+    }
+    if spacing[3] != 1.0 || origin[3] != 0.0 {
+        let text = format!(
+            "{} from {} on along the fourth axis have no unit: they make no time stamps",
+            spacing[3], origin[3]
+        );
+        remarks.push(("time steps".into(), text));
     }
     let mut axes = [DVec3::X, DVec3::Y, DVec3::Z];
     if let Some((field, _)) = header.first_of(&["TransformMatrix", "Rotation", "Orientation"]) {
         named = field;
-        for (axis, direction) in axes.iter_mut().zip(header.numbers(field, count * count)?.chunks_exact(count)) {
-            let mut whole = [0.0; 3];
+        for (i, direction) in header.numbers(field, count * count)?.chunks_exact(count).enumerate() {
+            let mut whole = [0.0; 4];
             whole[..count].copy_from_slice(direction);
-            *axis = DVec3::from(whole).normalize_or_zero();
+            let [x, y, z, t] = whole;
+            let mixes = if i < 3 { t != 0.0 } else { [x, y, z] != [0.0; 3] };
+            if mixes {
+                return header.fault(field, "turns the fourth axis, time, into space");
+            }
+            if let Some(axis) = axes.get_mut(i) {
+                *axis = DVec3::new(x, y, z).normalize_or_zero();
+            }
         }
     }
-    let axes = [0, 1, 2].map(|n| axes[n] * spacing[n]);
-    World::new(axes, DVec3::from(origin)).map_err(|why| InputError::new(header.path, named, why))
+    let [x, y, z, _] = spacing;
+    let [x, y, z] = header.frames.spacing(header.path, [x, y, z], remarks).unwrap_or([x, y, z]);
+    let axes = [axes[0] * x, axes[1] * y, axes[2] * z];
+    let origin = DVec3::new(origin[0], origin[1], origin[2]) * unit;
+    World::new(axes, origin).map_err(|why| InputError::new(header.path, named, why))
 }
 
-/// PLUS names the axes of a frame by their direction on the transducer, the fastest one first. F is away from it, so FM is scan lines in
-/// order and FU is scan lines from last to first. M or U as the first letter means rows of pictures.
-fn line_order(header: &Header) -> Result<LineOrder, InputError> {
-    match header.get("UltrasoundImageOrientation") {
-        None | Some("FM" | "FMA") => Ok(LineOrder::InOrder),
-        Some("FU" | "FUA") => Ok(LineOrder::Reversed),
-        Some(word) if word.starts_with(['M', 'U', 'A', 'D']) => Ok(LineOrder::Pictures(quoted(word))),
-        Some(other) => header.fault(
-            "UltrasoundImageOrientation",
-            format!("{} is not read: scan lines must be FM or FU, pictures begin with M, U, A or D", quoted(other)),
-        ),
-    }
-}
-
-/// A file without pre-scan keys holds pictures, unless it says that its frames are scan lines.
-fn own_pictures(
-    path: &Path,
-    header: &Header,
-    (mut size, world): ([usize; 3], World),
-    lines: &LineOrder,
-) -> Result<StoredGeometry, InputError> {
-    match (header.get("UltrasoundImageType"), lines) {
-        (None | Some("US_IMG_TYPE_XX"), _) | (Some("BRIGHTNESS"), LineOrder::Pictures(_)) => {}
-        (Some(converted), _) if converted.starts_with("POSTSCAN") => {}
-        (Some("BRIGHTNESS"), _) => {
-            let fault = "BRIGHTNESS frames of scan lines need a probe geometry: give --probe FILE.toml, or put a \
-                         probe.toml beside the recording";
-            return Ok(StoredGeometry::Missing(InputError::new(path, "UltrasoundImageType", fault)));
-        }
-        (Some(other), _) => {
-            let fault = format!("{} is not read: only BRIGHTNESS is detected and compressed", quoted(other));
-            return header.fault("UltrasoundImageType", fault);
-        }
-    }
-    // Frames in time are not neighbours in space: each is a volume of one slice. `Kinds = domain domain list` alone does not make them
-    // so: the PLUS toolkit writes it into its volumes, too.
-    let volumes = if header.sequence { std::mem::replace(&mut size[2], 1) } else { 1 };
-    let order = header.get("UltrasoundImageOrientation").and_then(AxisOrder::of_plus);
-    let order = order.filter(|order| volumes == 1 || order.keeps_frames()).filter(|_| !header.has_scan_lines());
-    let order = order.unwrap_or(AxisOrder::STORED);
-    // The matrix is that of the axes as PLUS draws them, the spacing that of the stored ones.
-    let directions = world.directions();
-    let axes = [0, 1, 2].map(|n| directions.col(n) * world.axis(order.stored[n]).length());
-    let world = World::new(axes, world.origin()).map_err(|why| InputError::new(path, "TransformMatrix", why))?;
-    Ok(StoredGeometry::Cartesian(Cartesian { size, volumes, world, order }))
+/// What the unit of lengths is, mm. Without `DistanceUnits` it is mm.
+fn unit(header: &Header, remarks: &mut Remarks) -> f64 {
+    let Some(word) = header.get("DistanceUnits").filter(|word| *word != "?") else { return 1.0 };
+    millimetres(word).unwrap_or_else(|| {
+        let text = format!("DistanceUnits, the unit {}, is not known, taken as mm", quoted(word));
+        remarks.push(warned(header.path, "units", text));
+        1.0
+    })
 }
 
 /// Finds the location and the length of the samples.
 fn find_pixels(file: &InputFile, header: &Header, layout: &mut Layout) -> Result<(), InputError> {
-    let name = header.need("ElementDataFile")?;
-    if name != "LOCAL" {
-        if name.starts_with("LIST") || name.contains('%') {
-            return header.fault("ElementDataFile", "a list of files is not read, only LOCAL or one file name");
-        }
-        layout.pixels = match Pixels::beside(file.path, name) {
-            Ok(pixels) => pixels,
-            Err(fault) => return header.fault("ElementDataFile", fault),
-        };
+    let mut parts = match data_files(file, header, layout) {
+        Ok(parts) => parts,
+        Err(fault) => return header.fault("ElementDataFile", fault),
+    };
+    let claimed = layout.frame_bytes() * layout.frames as u64;
+    let count = parts.len() as u64;
+    if !claimed.is_multiple_of(count) {
+        return header
+            .fault("ElementDataFile", format!("names {count} files, which cannot share {claimed} bytes evenly"));
     }
-    let is_packed = layout.pixels.is_compressed();
+    let mut more = 0;
+    for part in &mut parts {
+        more += place(header, part, claimed / count)?;
+    }
+    if more > 0 {
+        layout.remarks.push(("more data".into(), format!("{more} bytes behind the samples; not read")));
+    }
+    layout.pixels = data_files::joined(file.path, parts, claimed / count)?;
+    Ok(())
+}
+
+/// The files of the samples: this one (`LOCAL`), a list of names behind the header (`LIST`, `LIST 2D`), numbered ones (`FORMAT`, and the
+/// first number, the last and the step, as far as they are stated), or one.
+fn data_files(file: &InputFile, header: &Header, layout: &Layout) -> Result<Vec<Pixels>, String> {
+    let name = header.get("ElementDataFile").unwrap_or("");
+    let sizes: Vec<u64> =
+        header.get("DimSize").unwrap_or("").split_whitespace().filter_map(|word| word.parse().ok()).collect();
+    let mut words = name.split_whitespace();
+    if name.eq_ignore_ascii_case("LOCAL") {
+        return Ok(vec![layout.pixels.clone()]);
+    }
+    if words.next() == Some("LIST") {
+        let axes = match words.next() {
+            None => sizes.len().saturating_sub(1),
+            Some(word) => {
+                word.trim_end_matches(['D', 'd']).parse().map_err(|_| format!("{} is no list", quoted(name)))?
+            }
+        };
+        if !(1..=sizes.len()).contains(&axes) {
+            return Err(format!("states {axes} axes of a file, there are {}", sizes.len()));
+        }
+        let count = sizes.iter().skip(axes).product::<u64>();
+        if header.list.len() as u64 != count {
+            return Err(format!("lists {} files, {count} make up the sizes", header.list.len()));
+        }
+        return data_files::all(file.path, &header.list);
+    }
+    if !name.contains('%') || data_files::is_there(file.path, name) {
+        return Ok(vec![data_files::beside(file.path, name)?]);
+    }
+    let count = sizes.last().copied().unwrap_or(1) as i64;
+    let pattern = Pattern::parse(name, 3)?;
+    let (first, last, step) = match pattern.numbers[..] {
+        [] => (1, count, 1),
+        [first] => (first, first.saturating_add(count - 1), 1),
+        // The step that leads there in as many files as there are slices.
+        [first, last] => (first, last, (last.saturating_sub(first) / (count - 1).max(1)).max(1)),
+        [first, last, step, ..] => (first, last, step),
+    };
+    let names = pattern.names(first, last, step)?;
+    match names.len() as i64 == count {
+        true => data_files::all(file.path, &names),
+        false => Err(format!("names {} files, {count} make up the sizes", names.len())),
+    }
+}
+
+/// Finds `claimed` bytes of samples in one file. Returns how many bytes follow them.
+fn place(header: &Header, pixels: &mut Pixels, claimed: u64) -> Result<u64, InputError> {
+    let is_packed = pixels.is_compressed();
     let is_compressed = header.flag("CompressedData")?.unwrap_or(false);
     if is_compressed && is_packed {
         return header.fault("CompressedData", "is True in a .gz file: data that are compressed twice are not read");
@@ -215,8 +328,6 @@ fn find_pixels(file: &InputFile, header: &Header, layout: &mut Layout) -> Result
     if !is_compressed && header.flag("BinaryData")? == Some(false) {
         return header.fault("BinaryData", "numbers written as text are not read");
     }
-    let claimed = layout.frame_bytes() * layout.frames as u64;
-    let pixels = &mut layout.pixels;
     let end = pixels.offset + pixels.length;
     match header.integer("HeaderSize")? {
         None | Some(0) => {}
@@ -229,12 +340,12 @@ fn find_pixels(file: &InputFile, header: &Header, layout: &mut Layout) -> Result
         Some(other) => return header.fault("HeaderSize", format!("{other} is not possible here")),
     }
     if is_packed {
-        return Ok(());
-    }
-    if is_compressed {
-        pixels.encoding = Encoding::Zlib;
+        return Ok(0);
     }
     pixels.length = end.saturating_sub(pixels.offset);
+    if is_compressed {
+        pixels.encoding = deflated(pixels)?;
+    }
     let known = match (is_compressed, header.integer("CompressedDataSize")?) {
         (false, _) => claimed,
         (true, None | Some(0)) => pixels.length,
@@ -246,12 +357,19 @@ fn find_pixels(file: &InputFile, header: &Header, layout: &mut Layout) -> Result
         (true, Some(bytes @ 1..)) => bytes as u64,
         (true, Some(other)) => return header.fault("CompressedDataSize", format!("is {other}, must be above 0")),
     };
-    if known < pixels.length {
-        let more = format!("{} bytes behind the samples; not read", pixels.length - known);
-        layout.remarks.push(("more data".into(), more));
-        pixels.length = known;
-    }
-    Ok(())
+    let more = pixels.length.saturating_sub(known);
+    pixels.length -= more;
+    Ok(more)
+}
+
+/// Whether compressed samples are a zlib stream or a gzip file, by their first bytes: a zlib stream cannot begin so. MetaIO reads both.
+fn deflated(pixels: &Pixels) -> Result<Encoding, InputError> {
+    let mut start = Vec::new();
+    pixels
+        .open(0)
+        .and_then(|mut data| data.fill(2, &mut start))
+        .map_err(|e| InputError::unreadable(&pixels.path, &e))?;
+    Ok(if start == [0x1f, 0x8b] { Encoding::Gzip } else { Encoding::Zlib })
 }
 
 /// Longest header, bytes and lines: those of tracked sequences have some ten lines for every frame.
@@ -266,6 +384,8 @@ const KEYS: &[&str] = &[
     "ElementType",
     "ElementSpacing",
     "ElementSize",
+    "DistanceUnits",
+    "Kinds",
     "Offset",
     "Position",
     "Origin",
@@ -298,14 +418,10 @@ const PLACEMENT_KEYS: [&str; 8] =
 struct Header<'a> {
     path: &'a Path,
     fields: HashMap<&'static str, String>,
-    /// Time stamps by frame, s: `Seq_FrameNNNN_Timestamp`.
-    times: BTreeMap<usize, f64>,
-    /// Transforms by frame: `Seq_FrameNNNN_ProbeToTrackerTransform`, those whose status is OK.
-    poses: Poses,
-    /// Frames whose `Seq_FrameNNNN_ImageStatus` is not OK.
-    not_ok: usize,
-    /// There are `Seq_` fields: frames in time.
-    sequence: bool,
+    /// What PLUS says of the frames.
+    frames: PlusFrames,
+    /// The lines behind `ElementDataFile = LIST`.
+    list: Vec<String>,
     /// A comment says that the file is of the phantom. Other comments are skipped.
     synthetic: bool,
     /// Length up to and including the line of `ElementDataFile`, bytes.
@@ -320,25 +436,33 @@ impl<'a> Header<'a> {
         let mut header = Header {
             path,
             fields: HashMap::new(),
-            times: BTreeMap::new(),
-            poses: Poses::default(),
-            not_ok: 0,
-            sequence: false,
+            frames: PlusFrames::default(),
+            list: Vec::new(),
             synthetic: false,
             length: 0,
         };
-        // Transforms whose status is not OK: the status may stand before its transform.
-        let mut invalid = Vec::new();
         let mut line = Vec::new();
         for number in 1..=MAX_HEADER_LINES {
             line.clear();
             header.length += input.read_until(b'\n', &mut line).map_err(|e| InputError::unreadable(path, &e))? as u64;
-            if line.is_empty() || header.length >= MAX_HEADER_BYTES {
+            if header.length >= MAX_HEADER_BYTES {
+                break;
+            }
+            let is_list = header.is_list();
+            if line.is_empty() {
+                // A list ends with the file.
+                if is_list {
+                    return Ok(header);
+                }
                 break;
             }
             let text = String::from_utf8_lossy(&line);
             let text = text.trim();
             if text.is_empty() {
+                continue;
+            }
+            if is_list {
+                header.list.push(text.to_string());
                 continue;
             }
             // The text itself is not quoted: it may contain anything.
@@ -353,51 +477,24 @@ impl<'a> Header<'a> {
             } else if key == COMMENT {
                 header.synthetic |= value == DEMO_DATA;
             } else if let Some(of_frame) = key.strip_prefix("Seq_Frame") {
-                header.sequence = true;
-                header.frame_field(of_frame, value, &mut invalid)?;
+                header.frames.field(path, of_frame, value)?;
             }
             // The data begin after this line.
-            if key == "ElementDataFile" {
-                invalid.iter().for_each(|(name, frame)| header.poses.remove(name, *frame));
+            if key == "ElementDataFile" && !header.is_list() {
                 return Ok(header);
             }
         }
         header.fault("ElementDataFile", "is missing, or not within the first 32 MiB and 500000 lines")
     }
 
-    /// `0012_Timestamp`, `0012_ImageStatus`, `0012_ProbeToTrackerTransform` and its `...Status`; other fields of frames are skipped.
-    fn frame_field(
-        &mut self,
-        key: &str,
-        value: &str,
-        invalid: &mut Vec<(TransformName, usize)>,
-    ) -> Result<(), InputError> {
-        let Some((number, field)) = key.split_once('_') else { return Ok(()) };
-        let Ok(number) = number.parse::<usize>() else { return Ok(()) };
-        match field {
-            "Timestamp" => match value.parse::<f64>() {
-                Ok(time) if time.is_finite() => drop(self.times.insert(number, time)),
-                _ => {
-                    let field = format!("Seq_Frame{number:04}_Timestamp");
-                    return self.fault(&field, format!("{} is not a finite number", quoted(value)));
-                }
-            },
-            "ImageStatus" if value != "OK" => self.not_ok += 1,
-            _ => {
-                if let Some(name) = field.strip_suffix("TransformStatus").and_then(|name| name.parse().ok()) {
-                    if value != "OK" {
-                        invalid.push((name, number));
-                    }
-                } else if let Some(name) = field.strip_suffix("Transform").and_then(|name| name.parse().ok()) {
-                    match matrix(value) {
-                        Ok(matrix) => self.poses.add(name, number, matrix),
-                        // As programs write what was not tracked: no inverse, not finite.
-                        Err(_) => invalid.push((name, number)),
-                    }
-                }
-            }
-        }
-        Ok(())
+    /// True once `ElementDataFile = LIST` was read: names of files follow.
+    fn is_list(&self) -> bool {
+        self.get("ElementDataFile").is_some_and(|name| name.split_whitespace().next() == Some("LIST"))
+    }
+
+    /// What `NDims` says, where it is known to be 2 to 4.
+    fn dimensions(&self) -> usize {
+        self.get("NDims").and_then(|word| word.parse().ok()).unwrap_or(3)
     }
 
     fn fault<T>(&self, field: &str, fault: impl AsRef<str>) -> Result<T, InputError> {
@@ -406,11 +503,6 @@ impl<'a> Header<'a> {
 
     fn get(&self, field: &str) -> Option<&str> {
         self.fields.get(field).map(String::as_str)
-    }
-
-    /// True if the header says that the rows of a frame are scan lines.
-    fn has_scan_lines(&self) -> bool {
-        self.get("UltrasoundImageOrientation").is_some_and(|word| word.starts_with('F'))
     }
 
     /// The first existing field of several spellings, with its value.

@@ -199,7 +199,7 @@ fn pixels(file: &InputFile, header: &Bytes) -> Result<Pixels, InputError> {
     };
     let offset = offset as u64;
     let length = length.saturating_sub(offset);
-    Ok(Pixels { path, offset, length, encoding: Encoding::Raw, inside: 0, pictures: None, frames: None })
+    Ok(Pixels { path, offset, length, encoding: Encoding::Raw, ..file.pixels(0) })
 }
 
 /// The world: that of the sform, otherwise of the qform, otherwise the spacing alone.

@@ -5,14 +5,15 @@
 use super::describe;
 use super::dicom::{Coding, FrameStream, Frames};
 use super::pictures::{PictureStream, Pictures};
+use crate::files::InputError;
 use crate::files::progress::CountedFile;
-use crate::files::{InputError, quoted};
 use bzip2::bufread::MultiBzDecoder;
 use flate2::bufread::GzDecoder;
 use flate2::{Decompress, FlushDecompress, Status};
 use std::fs::{self, File};
 use std::io::{self, BufRead, BufReader, Read, Seek, SeekFrom};
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 const GZIP: [u8; 2] = [0x1f, 0x8b];
 
@@ -137,7 +138,7 @@ impl<'a> InputFile<'a> {
             true => (0, self.bytes, Encoding::Gzip, at),
             false => (at, there.saturating_sub(offset), Encoding::Raw, 0),
         };
-        Pixels { path, offset, length, encoding, inside, pictures: None, frames: None }
+        Pixels { path, offset, length, encoding, inside, pictures: None, frames: None, gathered: None }
     }
 }
 
@@ -156,6 +157,16 @@ pub(super) struct Pixels {
     pub pictures: Option<Pictures>,
     /// Of DICOM, instead of a file.
     pub frames: Option<Frames>,
+    /// Of several files or in another order, instead of a file.
+    pub gathered: Option<Arc<dyn Gathered>>,
+}
+
+/// Samples that are not one range of one file.
+pub(super) trait Gathered: std::fmt::Debug + Send + Sync {
+    /// The stream `skip` bytes after its beginning.
+    fn open(&self, skip: u64) -> io::Result<Box<dyn Read + Send>>;
+    /// The files that hold them.
+    fn files(&self) -> Vec<PathBuf>;
 }
 
 /// The samples as a stream.
@@ -165,36 +176,24 @@ pub(super) enum PixelStream {
 }
 
 impl Pixels {
-    /// All bytes of a file that a header names, which must lie in the folder of the header.
-    ///
-    /// # Errors
-    /// What is wrong with the name or with the file.
-    pub fn beside(header: &Path, name: &str) -> Result<Pixels, String> {
-        let is_plain = Path::new(name).file_name().is_some_and(|n| n == name) && !name.contains('\\');
-        if !is_plain {
-            return Err(format!("{} must be the name of a file in the same folder", quoted(name)));
-        }
-        let path = header.with_file_name(name);
-        match fs::metadata(&path) {
-            Ok(metadata) if metadata.is_file() => {
-                let (length, encoding) = (metadata.len(), Encoding::Raw);
-                Ok(Pixels { path, offset: 0, length, encoding, inside: 0, pictures: None, frames: None })
-            }
-            Ok(_) => Err(format!("{} is not a regular file", quoted(name))),
-            Err(error) => Err(format!("{} cannot be read: {error}", quoted(name))),
-        }
-    }
-
     /// The samples of a stack. `path`: as the user named it; `length`: of all its files, bytes.
     pub fn of_pictures(path: &Path, pictures: Pictures, length: u64) -> Pixels {
         let (path, encoding) = (path.into(), Encoding::Pictures);
-        Pixels { path, offset: 0, length, encoding, inside: 0, pictures: Some(pictures), frames: None }
+        Pixels { path, offset: 0, length, encoding, inside: 0, pictures: Some(pictures), frames: None, gathered: None }
     }
 
     /// The frames of DICOM files. `path`: as the user named it; `length`: of all pixels in the files, bytes.
     pub fn of_frames(path: &Path, frames: Frames, length: u64) -> Pixels {
         let (path, encoding) = (path.into(), Encoding::Dicom(frames.coding()));
-        Pixels { path, offset: 0, length, encoding, inside: 0, pictures: None, frames: Some(frames) }
+        Pixels { path, offset: 0, length, encoding, inside: 0, pictures: None, frames: Some(frames), gathered: None }
+    }
+
+    /// The files that hold the samples: those of a stack, of DICOM, of a list, or one.
+    pub(super) fn files(&self) -> Vec<PathBuf> {
+        let pictures = self.pictures.iter().flat_map(|pictures| pictures.files.iter().cloned());
+        let frames = self.frames.iter().flat_map(|frames| frames.files().iter().cloned());
+        let gathered = self.gathered.iter().flat_map(|gathered| gathered.files());
+        [self.path.clone()].into_iter().chain(pictures).chain(frames).chain(gathered).collect()
     }
 
     /// True if the samples are compressed.
@@ -209,6 +208,9 @@ impl Pixels {
         }
         if let Some(frames) = &self.frames {
             return Ok(PixelStream::Packed(Box::new(FrameStream::new(frames, skip)?)));
+        }
+        if let Some(gathered) = &self.gathered {
+            return Ok(PixelStream::Packed(gathered.open(skip)?));
         }
         let mut file = CountedFile::open(&self.path)?;
         if !self.is_compressed() {

@@ -148,10 +148,8 @@ impl Recording {
 
     /// The recording, the file with its samples, and its probe file.
     pub fn files(&self) -> Vec<PathBuf> {
-        let pictures = self.layout.pixels.pictures.iter().flat_map(|pictures| pictures.files.iter().cloned());
-        let frames = self.layout.pixels.frames.iter().flat_map(|frames| frames.files().iter().cloned());
-        let files = [self.path.clone(), self.layout.pixels.path.clone()];
-        files.into_iter().chain(pictures).chain(frames).chain(self.probe_file.clone()).collect()
+        let files = [self.path.clone()].into_iter().chain(self.layout.pixels.files());
+        files.chain(self.probe_file.clone()).collect()
     }
 
     /// Number of complete volumes.

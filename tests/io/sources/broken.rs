@@ -82,7 +82,7 @@ fn header_numbers_that_cannot_be_true_are_refused_by_name() {
         ("1 1 1", "1 -1 1", "ElementSpacing: 2nd entry"),
         ("1 1 1", "0 1 1", "ElementSpacing: 1st entry"),
         ("0 0 0", "0 1e999 0", "Offset"),
-        ("NDims = 3", "NDims = 4", "NDims"),
+        ("NDims = 3", "NDims = 4", "DimSize: has 3 entries, but NDims is 4"),
         ("MET_UCHAR", "MET_ASCII_CHAR", "ElementType"),
         ("LOCAL", "LIST", "ElementDataFile"),
         ("LOCAL", "../secret.raw", "ElementDataFile"),

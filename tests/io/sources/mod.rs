@@ -2,5 +2,7 @@
 
 mod broken;
 mod geometry;
+mod metaimage;
+mod nrrd;
 mod recordings;
 mod values;

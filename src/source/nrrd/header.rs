@@ -1,0 +1,258 @@
+//! The header of a NRRD: its fields, the keys that programs add, and the names of its data files.
+
+use super::super::packed::InputFile;
+use super::super::plus::PlusFrames;
+use crate::files::{InputError, quoted};
+use std::borrow::Cow;
+use std::collections::HashMap;
+use std::io::{BufRead, BufReader, Read};
+use std::path::Path;
+
+/// Longest header, bytes and lines: those of tracked sequences have some ten lines for every frame.
+const MAX_HEADER_BYTES: u64 = 32 << 20;
+const MAX_HEADER_LINES: usize = 500_000;
+/// Most vectors of a field.
+const MAX_VECTORS: usize = 8;
+
+/// The fields that are read. All others are skipped.
+const FIELDS: [&str; 20] = [
+    "type",
+    "dimension",
+    "space",
+    "space dimension",
+    "sizes",
+    "space directions",
+    "spacings",
+    "kinds",
+    "labels",
+    "space units",
+    "units",
+    "space origin",
+    "encoding",
+    "endian",
+    "line skip",
+    "byte skip",
+    "data file",
+    "axis mins",
+    "axis maxs",
+    "centerings",
+];
+/// Other spellings of fields.
+const SPELLINGS: [(&str, &str); 6] = [
+    ("datafile", "data file"),
+    ("lineskip", "line skip"),
+    ("byteskip", "byte skip"),
+    ("axismins", "axis mins"),
+    ("axismaxs", "axis maxs"),
+    ("centers", "centerings"),
+];
+
+/// The keys of PLUS for a whole sequence.
+pub(super) const ORIENTATION: &str = "ultrasound image orientation";
+pub(super) const IMAGE_TYPE: &str = "ultrasound image type";
+
+/// A vector of numbers that are written in brackets.
+pub(super) type Vector = Vec<f64>;
+
+pub(super) struct Header<'a> {
+    pub path: &'a Path,
+    fields: HashMap<&'static str, String>,
+    /// Keys with values that are read: those of PLUS for a whole sequence, and `axis N index ...`.
+    values: HashMap<String, String>,
+    /// What PLUS says of the frames.
+    pub frames: PlusFrames,
+    /// The lines behind `data file: LIST`.
+    pub list: Vec<String>,
+    /// Length up to and including the empty line, bytes.
+    pub length: u64,
+}
+
+impl<'a> Header<'a> {
+    pub(super) fn read(file: &InputFile<'a>) -> Result<Header<'a>, InputError> {
+        let path = file.path;
+        let unreadable = |e| InputError::unreadable(path, &e);
+        let mut input = BufReader::new(file.open().map_err(unreadable)?.take(MAX_HEADER_BYTES));
+        let mut header = Header {
+            path,
+            fields: HashMap::new(),
+            values: HashMap::new(),
+            frames: PlusFrames::default(),
+            list: Vec::new(),
+            length: 0,
+        };
+        let mut line = Vec::new();
+        for number in 1..=MAX_HEADER_LINES {
+            line.clear();
+            header.length += input.read_until(b'\n', &mut line).map_err(unreadable)? as u64;
+            if header.length >= MAX_HEADER_BYTES {
+                break;
+            }
+            let text = text_of(&line);
+            let text = text.trim();
+            // A detached header may end with the file.
+            if text.is_empty() {
+                let is_detached = header.fields.contains_key("data file");
+                return match line.is_empty() && !is_detached {
+                    true => header.fault("header", "is cut short: there is no empty line before the samples"),
+                    false => Ok(header),
+                };
+            }
+            if header.is_list() {
+                header.list.push(text.to_string());
+            } else if number > 1 && !text.starts_with('#') {
+                header.line(number, text)?;
+            }
+        }
+        header.fault("header", "is longer than 32 MiB or 500000 lines")
+    }
+
+    fn line(&mut self, number: usize, text: &str) -> Result<(), InputError> {
+        if let Some((key, value)) = text.split_once(":=") {
+            return self.value_line(key.trim(), value.trim());
+        }
+        // The text itself is not quoted: it may contain anything.
+        let Some((key, value)) = text.split_once(':') else {
+            return Err(InputError::new(self.path, format!("line {number}"), "is not 'field: value'"));
+        };
+        let key = key.trim().to_ascii_lowercase();
+        let key = SPELLINGS.iter().find(|(other, _)| *other == key).map_or(&*key, |(_, name)| name);
+        match FIELDS.iter().find(|field| **field == key) {
+            Some(known) if self.fields.insert(known, value.trim().to_string()).is_some() => {
+                self.fault(known, "is given twice")
+            }
+            _ => Ok(()),
+        }
+    }
+
+    /// A key with a value, which programs add. Others than those of PLUS and of axes are skipped, so that no patient's name gets into a
+    /// message.
+    fn value_line(&mut self, key: &str, value: &str) -> Result<(), InputError> {
+        if let Some(of_frame) = key.strip_prefix("Seq_Frame") {
+            return self.frames.field(self.path, of_frame, value);
+        }
+        let key = key.to_ascii_lowercase();
+        if key == ORIENTATION || key == IMAGE_TYPE || (key.starts_with("axis ") && key.contains(" index ")) {
+            self.values.insert(key, value.to_string());
+        }
+        Ok(())
+    }
+
+    /// True once `data file: LIST` was read, which is the last field.
+    fn is_list(&self) -> bool {
+        self.get("data file").is_some_and(|name| name.split_whitespace().next() == Some("LIST"))
+    }
+
+    pub(super) fn fault<T>(&self, field: &str, fault: impl AsRef<str>) -> Result<T, InputError> {
+        Err(InputError::new(self.path, field, fault))
+    }
+
+    pub(super) fn get(&self, field: &str) -> Option<&str> {
+        self.fields.get(field).map(String::as_str)
+    }
+
+    pub(super) fn need(&self, field: &str) -> Result<&str, InputError> {
+        self.get(field).map_or_else(|| self.fault(field, "is missing"), Ok)
+    }
+
+    /// The value of a key that a program added.
+    pub(super) fn value(&self, key: &str) -> Option<&str> {
+        self.values.get(key).map(String::as_str)
+    }
+
+    /// The words of a field, one for each of `count`; those in quotes may be empty. None if the field is absent.
+    pub(super) fn words(&self, field: &str, count: usize) -> Result<Option<Vec<String>>, InputError> {
+        let Some(text) = self.get(field) else { return Ok(None) };
+        let words = words(text);
+        if words.len() != count {
+            return self.fault(field, format!("has {} entries, must have {count}", words.len()));
+        }
+        Ok(Some(words))
+    }
+
+    /// One number for each axis; None for what is not known (NaN), or if the field is absent.
+    pub(super) fn numbers(&self, field: &str, count: usize) -> Result<Vec<Option<f64>>, InputError> {
+        let Some(words) = self.words(field, count)? else { return Ok(vec![None; count]) };
+        let mut numbers = Vec::new();
+        for word in words {
+            match word.parse::<f64>() {
+                Ok(number) if number.is_nan() => numbers.push(None),
+                Ok(number) if number.is_finite() => numbers.push(Some(number)),
+                _ => return self.fault(field, format!("{} is not a finite number", quoted(&word))),
+            }
+        }
+        Ok(numbers)
+    }
+
+    /// Vectors in brackets, or None for `none`; None if the field is absent.
+    pub(super) fn vectors(&self, field: &str) -> Result<Option<Vec<Option<Vector>>>, InputError> {
+        let Some(mut rest) = self.get(field) else { return Ok(None) };
+        let mut vectors = Vec::new();
+        while !rest.trim_start().is_empty() && vectors.len() < MAX_VECTORS {
+            rest = rest.trim_start();
+            if let Some(after) = rest.strip_prefix("none") {
+                vectors.push(None);
+                rest = after;
+                continue;
+            }
+            let Some((inside, after)) = rest.strip_prefix('(').and_then(|text| text.split_once(')')) else {
+                return self.fault(field, "is not a list of vectors in brackets");
+            };
+            vectors.push(self.vector(field, inside)?);
+            rest = after;
+        }
+        Ok(Some(vectors))
+    }
+
+    /// The numbers of a vector; None if all are NaN, which is how some programs write none.
+    fn vector(&self, field: &str, inside: &str) -> Result<Option<Vector>, InputError> {
+        let numbers: Option<Vector> = inside.split(',').map(|word| word.trim().parse().ok()).collect();
+        match numbers {
+            Some(numbers) if !(2..=4).contains(&numbers.len()) => {
+                self.fault(field, format!("{} is not a vector of 2 to 4 numbers", quoted(inside)))
+            }
+            Some(numbers) if numbers.iter().all(|number| number.is_nan()) => Ok(None),
+            Some(numbers) if numbers.iter().all(|number| number.is_finite()) => Ok(Some(numbers)),
+            _ => self.fault(field, format!("{} is not a vector of finite numbers", quoted(inside))),
+        }
+    }
+}
+
+/// The text of a line. One that is no UTF-8 is Latin-1, where the sign for micro is a byte.
+fn text_of(line: &[u8]) -> Cow<'_, str> {
+    std::str::from_utf8(line).map_or_else(|_| line.iter().map(|byte| char::from(*byte)).collect(), Cow::Borrowed)
+}
+
+/// Words between spaces, or in quotes.
+fn words(mut text: &str) -> Vec<String> {
+    let mut words = Vec::new();
+    loop {
+        text = text.trim_start();
+        let (word, rest) = match text.strip_prefix('"') {
+            Some(inside) => inside.split_once('"').unwrap_or((inside, "")),
+            None => text.split_once(char::is_whitespace).unwrap_or((text, "")),
+        };
+        if text.is_empty() {
+            return words;
+        }
+        words.push(word.trim().to_string());
+        text = rest;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{text_of, words};
+
+    #[test]
+    fn a_line_is_utf_8_or_latin_1() {
+        assert_eq!(text_of("\u{3bc}m".as_bytes()), "\u{3bc}m");
+        assert_eq!(text_of(b"\xb5m"), "\u{b5}m");
+    }
+
+    #[test]
+    fn words_may_be_in_quotes_and_empty() {
+        assert_eq!(words(r#""mm" "" "micro meter"  s"#), ["mm", "", "micro meter", "s"]);
+        assert_eq!(words("\"mm\"\"mm\" \"open"), ["mm", "mm", "open"]);
+        assert!(words("  ").is_empty());
+    }
+}

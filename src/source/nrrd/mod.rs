@@ -1,0 +1,262 @@
+//! NRRD (`.nrrd`, and `.nhdr` with the samples in another file): lines of `field: value` up to an empty line, then samples that are raw or
+//! compressed. Its space becomes LPS in mm.
+
+mod axes;
+mod header;
+
+use super::data_files::{self, Pattern};
+use super::layout::Layout;
+use super::packed::{Encoding, InputFile, Pixels};
+use super::pixel::{Number, PixelFormat};
+use super::plus::PlusWords;
+use crate::files::{InputError, quoted};
+use crate::probe::World;
+use axes::Axes;
+use header::{Header, IMAGE_TYPE, ORIENTATION};
+use std::io::{BufRead, BufReader};
+use std::path::Path;
+
+/// Most frames of all volumes.
+const MAX_FRAMES: u64 = 1 << 20;
+
+/// The number types by their names.
+const NUMBERS: [(&[&str], Number); 10] = [
+    (&["uchar", "unsigned char", "uint8", "uint8_t"], Number::U8),
+    (&["signed char", "int8", "int8_t"], Number::I8),
+    (&["ushort", "unsigned short", "unsigned short int", "uint16", "uint16_t"], Number::U16),
+    (&["short", "short int", "signed short", "signed short int", "int16", "int16_t"], Number::I16),
+    (&["uint", "unsigned int", "uint32", "uint32_t"], Number::U32),
+    (&["int", "signed int", "int32", "int32_t"], Number::I32),
+    (&["ulonglong", "unsigned long long", "unsigned long long int", "uint64", "uint64_t"], Number::U64),
+    (
+        &["longlong", "long long", "long long int", "signed long long", "signed long long int", "int64", "int64_t"],
+        Number::I64,
+    ),
+    (&["float"], Number::F32),
+    (&["double"], Number::F64),
+];
+
+/// True if a file begins like this.
+pub(super) fn is_one(start: &[u8]) -> bool {
+    start.starts_with(b"NRRD000")
+}
+
+pub(super) fn read(file: &InputFile) -> Result<Layout, InputError> {
+    let mut header = Header::read(file)?;
+    let word = header.need("type")?.to_ascii_lowercase();
+    let Some((_, number)) = NUMBERS.iter().find(|(names, _)| names.contains(&&*word)) else {
+        return header.fault("type", format!("{} is not read: only numbers of 8 to 64 bits are", quoted(&word)));
+    };
+    let mut remarks = Vec::new();
+    let axes = Axes::of(&header, &mut remarks)?;
+    let pixel = PixelFormat { number: *number, channels: 1, big_endian: false, scale: None };
+    let pixel = PixelFormat { channels: axes.channels, big_endian: is_big_endian(&header, pixel.bytes())?, ..pixel };
+    let [width, height, depth] = axes.size;
+    let frames = depth as u64 * axes.volumes as u64;
+    if frames > MAX_FRAMES {
+        return header.fault("sizes", format!("make {frames} frames, at most {MAX_FRAMES} are read"));
+    }
+    let frames = frames as usize;
+    let world = axes.world(&header, &mut remarks)?;
+    let world = of_frames(&header, world, &mut remarks)?;
+    let times = match header.frames.times.is_empty() {
+        true => axes.times(&header, &mut remarks)?,
+        false => header.frames.times(depth, frames),
+    };
+    let words = PlusWords {
+        path: file.path,
+        orientation: (ORIENTATION, header.value(ORIENTATION)),
+        kind: (IMAGE_TYPE, header.value(IMAGE_TYPE)),
+    };
+    let line_order = words.line_order()?;
+    let geometry = words.pictures(axes.size, axes.volumes, world, &line_order, &mut remarks)?;
+    let is_placed = ["space directions", "spacings", "axis mins"].iter().any(|field| header.get(field).is_some());
+    let states_geometry = is_placed && !words.has_scan_lines();
+    if let Some(orientation) = words.orientation.1 {
+        remarks.push(("orientation".into(), quoted(orientation)));
+    }
+    let poses = header.frames.poses(file.path, depth, &mut remarks);
+    let mut layout = Layout {
+        format: "NRRD",
+        pixel,
+        frame_size: [width, height],
+        frames,
+        pixels: file.pixels(header.length),
+        line_order,
+        geometry,
+        backward: false,
+        volumes: 1,
+        states_geometry,
+        poses,
+        times,
+        synthetic: false,
+        remarks,
+    };
+    find_pixels(file, &header, &mut layout)?;
+    layout.check(file.path, "sizes")?;
+    if let Some(stored) = axes.reorder {
+        data_files::reorder(&mut layout, file.path, "sizes", stored)?;
+    }
+    Ok(layout)
+}
+
+/// The byte order of numbers of more than a byte must be stated, as Teem and pynrrd demand.
+fn is_big_endian(header: &Header, bytes: usize) -> Result<bool, InputError> {
+    match header.get("endian").map(str::to_ascii_lowercase).as_deref() {
+        None if bytes > 1 => header.fault("endian", format!("is missing: numbers of {bytes} bytes need a byte order")),
+        None | Some("little") => Ok(false),
+        Some("big") => Ok(true),
+        Some(other) => header.fault("endian", format!("{} is neither little nor big", quoted(other))),
+    }
+}
+
+/// The world with the spacing that the frames of PLUS state, if they do.
+fn of_frames(header: &Header, world: World, remarks: &mut Vec<(String, String)>) -> Result<World, InputError> {
+    let stated = [0, 1, 2].map(|n| world.axis(n).length());
+    let Some(spacing) = header.frames.spacing(header.path, stated, remarks) else { return Ok(world) };
+    let axes = [0, 1, 2].map(|n| world.directions().col(n) * spacing[n]);
+    World::new(axes, world.origin()).map_err(|why| InputError::new(header.path, "ElementSpacing", why))
+}
+
+/// Finds the location and the encoding of the samples.
+fn find_pixels(file: &InputFile, header: &Header, layout: &mut Layout) -> Result<(), InputError> {
+    let mut parts = match header.get("data file") {
+        None => vec![layout.pixels.clone()],
+        Some(name) => match data_files(file.path, header, name) {
+            Ok(parts) => parts,
+            Err(fault) => return header.fault("data file", fault),
+        },
+    };
+    let claimed = layout.frame_bytes() * layout.frames as u64;
+    let count = parts.len() as u64;
+    if !claimed.is_multiple_of(count) {
+        return header.fault("data file", format!("names {count} files, which cannot share {claimed} bytes evenly"));
+    }
+    let mut more = 0;
+    for part in &mut parts {
+        more += place(header, part, claimed / count)?;
+    }
+    if more > 0 {
+        layout.remarks.push(("more data".into(), format!("{more} bytes behind the samples; not read")));
+    }
+    layout.pixels = data_files::joined(file.path, parts, claimed / count)?;
+    Ok(())
+}
+
+/// The files that `data file` names: one, those of a list, or `FORMAT FIRST LAST STEP`. The last two may end in the number of axes of a file;
+/// in any case each file has as many samples as the others, and no axis but the slowest may be divided.
+fn data_files(path: &Path, header: &Header, name: &str) -> Result<Vec<Pixels>, String> {
+    let mut words = name.split_whitespace();
+    let (names, axes) = if words.next() == Some("LIST") {
+        let axes = words.next().map(|word| word.parse::<i64>().map_err(|_| format!("{} is no list", quoted(name))));
+        (header.list.clone(), axes.transpose()?)
+    } else if name.contains('%') && !data_files::is_there(path, name) {
+        let pattern = Pattern::parse(name, 4)?;
+        match pattern.numbers[..] {
+            [first, last, step] => (pattern.names(first, last, step)?, None),
+            [first, last, step, axes] => (pattern.names(first, last, step)?, Some(axes)),
+            _ => return Err(format!("{} must have a first and a last number and a step", quoted(name))),
+        }
+    } else {
+        return Ok(vec![data_files::beside(path, name)?]);
+    };
+    let sizes: Vec<u64> =
+        header.get("sizes").unwrap_or("").split_whitespace().filter_map(|word| word.parse().ok()).collect();
+    let axes = axes.unwrap_or(sizes.len() as i64 - 1);
+    let whole = usize::try_from(axes).ok().filter(|axes| (1..=sizes.len()).contains(axes));
+    let Some(whole) = whole else { return Err(format!("states {axes} axes of a file, there are {}", sizes.len())) };
+    let count = names.len() as u64;
+    // Slabs of the slowest axis, or one file for each place along the slower axes.
+    let fits = match sizes.get(whole..) {
+        Some([]) | None => count > 0 && sizes.last().is_some_and(|last| last % count == 0),
+        Some(slower) => slower.iter().product::<u64>() == count,
+    };
+    if !fits {
+        return Err(format!("names {count} files of {whole} axes, which do not make up the sizes"));
+    }
+    data_files::all(path, &names)
+}
+
+/// Finds `bytes` bytes of samples in one file, behind the lines and bytes that are skipped. Returns how many bytes follow them.
+fn place(header: &Header, pixels: &mut Pixels, bytes: u64) -> Result<u64, InputError> {
+    let encoding = match header.need("encoding")?.to_ascii_lowercase().as_str() {
+        "raw" => Encoding::Raw,
+        "gzip" | "gz" => Encoding::Gzip,
+        "bzip2" | "bz2" => Encoding::Bzip2,
+        other => return header.fault("encoding", format!("{} is not read: raw, gzip and bzip2 are", quoted(other))),
+    };
+    // Lines are skipped before anything is decompressed, bytes after that.
+    skip_lines(header, pixels)?;
+    if encoding != Encoding::Raw {
+        if pixels.is_compressed() {
+            return header
+                .fault("encoding", "is compressed in a .gz file: data that are compressed twice are not read");
+        }
+        pixels.encoding = encoding;
+    }
+    let skip = header.get("byte skip").unwrap_or("0");
+    match skip.parse::<i64>() {
+        Ok(-1) if !pixels.is_compressed() => {
+            let end = pixels.offset + pixels.length;
+            pixels.offset = end.saturating_sub(bytes).max(pixels.offset);
+            pixels.length = end - pixels.offset;
+        }
+        Ok(skip @ 0..) if pixels.is_compressed() => pixels.inside = pixels.inside.saturating_add(skip as u64),
+        Ok(skip @ 0..) => {
+            let skip = (skip as u64).min(pixels.length);
+            (pixels.offset, pixels.length) = (pixels.offset + skip, pixels.length - skip);
+        }
+        _ => return header.fault("byte skip", format!("{} is not possible here", quoted(skip))),
+    }
+    if pixels.is_compressed() || pixels.length <= bytes {
+        return Ok(0);
+    }
+    let more = pixels.length - bytes;
+    pixels.length = bytes;
+    Ok(more)
+}
+
+/// Moves behind as many lines as `line skip` says, of any length.
+fn skip_lines(header: &Header, pixels: &mut Pixels) -> Result<(), InputError> {
+    let Some(stated) = header.get("line skip") else { return Ok(()) };
+    let Ok(lines) = stated.parse::<u64>() else {
+        return header.fault("line skip", format!("{} is not a number of lines", quoted(stated)));
+    };
+    if lines == 0 {
+        return Ok(());
+    }
+    let unreadable = |e: std::io::Error| InputError::unreadable(&pixels.path, &e);
+    let mut input = BufReader::new(pixels.open(0).map_err(unreadable)?);
+    let mut skipped = 0;
+    for there in 0..lines {
+        // The line is not kept: without an end it is as long as the file.
+        let (bytes, has_end) = skip_line(&mut input).map_err(unreadable)?;
+        skipped += bytes;
+        if !has_end {
+            return header.fault("line skip", format!("is {lines}, but {there} lines are there"));
+        }
+    }
+    match pixels.is_compressed() {
+        true => pixels.inside = pixels.inside.saturating_add(skipped),
+        false => {
+            let skipped = skipped.min(pixels.length);
+            (pixels.offset, pixels.length) = (pixels.offset + skipped, pixels.length - skipped);
+        }
+    }
+    Ok(())
+}
+
+/// The bytes of a line, and whether it ends before the file.
+fn skip_line(input: &mut impl BufRead) -> std::io::Result<(u64, bool)> {
+    let mut bytes = 0;
+    loop {
+        let there = input.fill_buf()?;
+        let end = there.iter().position(|byte| *byte == b'\n');
+        let taken = end.map_or(there.len(), |at| at + 1);
+        input.consume(taken);
+        bytes += taken as u64;
+        if end.is_some() || taken == 0 {
+            return Ok((bytes, end.is_some()));
+        }
+    }
+}

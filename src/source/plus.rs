@@ -1,0 +1,218 @@
+//! What the PLUS toolkit says of the frames of a sequence, in MetaImage and in NRRD alike: their times, poses, status and spacing, and how
+//! the axes of a picture lie on the transducer.
+
+use super::describe::number;
+use super::layout::{Cartesian, LineOrder, StoredGeometry, warned};
+use super::transforms::{Poses, TransformName, matrix};
+use crate::files::{InputError, quoted};
+use crate::probe::{AxisOrder, World};
+use std::collections::{BTreeMap, BTreeSet};
+use std::path::Path;
+
+/// Pairs of title and text.
+type Remarks = Vec<(String, String)>;
+
+/// What the fields `Seq_FrameNNNN_...` say, by NNNN.
+#[derive(Default)]
+pub(super) struct PlusFrames {
+    /// Time stamps, s.
+    pub times: BTreeMap<usize, f64>,
+    poses: Poses,
+    /// Transforms whose status is not OK: the status may stand before its transform.
+    invalid: Vec<(TransformName, usize)>,
+    /// Frames whose status is not OK.
+    not_ok: BTreeSet<usize>,
+    /// Sizes of pixels, mm.
+    spacings: BTreeMap<usize, [f64; 3]>,
+    /// There is such a field: the frames are in time.
+    pub is_sequence: bool,
+}
+
+impl PlusFrames {
+    /// `0012_Timestamp`, `0012_ImageStatus`, `0012_ElementSpacing`, `0012_ProbeToTrackerTransform` and its `...Status`, what follows
+    /// `Seq_Frame`; other fields of frames are skipped.
+    ///
+    /// # Errors
+    /// A time stamp that is no number, or a spacing that is none.
+    pub(super) fn field(&mut self, path: &Path, key: &str, value: &str) -> Result<(), InputError> {
+        self.is_sequence = true;
+        let Some((number, field)) = key.split_once('_') else { return Ok(()) };
+        let Ok(number) = number.parse::<usize>() else { return Ok(()) };
+        let fault = |fault: String| Err(InputError::new(path, format!("Seq_Frame{number:04}_{field}"), fault));
+        match field {
+            "Timestamp" => match value.parse::<f64>() {
+                Ok(time) if time.is_finite() => drop(self.times.insert(number, time)),
+                _ => return fault(format!("{} is not a finite number", quoted(value))),
+            },
+            "ImageStatus" | "Status" if value != "OK" => drop(self.not_ok.insert(number)),
+            "ElementSpacing" => match spacing(value) {
+                Some(spacing) => drop(self.spacings.insert(number, spacing)),
+                None => return fault(format!("{} is not 2 or 3 numbers above 0", quoted(value))),
+            },
+            _ => self.transform(number, field, value),
+        }
+        Ok(())
+    }
+
+    fn transform(&mut self, number: usize, field: &str, value: &str) {
+        if let Some(name) = field.strip_suffix("TransformStatus").and_then(|name| name.parse().ok()) {
+            if value != "OK" {
+                self.invalid.push((name, number));
+            }
+        } else if let Some(name) = field.strip_suffix("Transform").and_then(|name| name.parse().ok()) {
+            match matrix(value) {
+                Ok(matrix) => self.poses.add(name, number, matrix),
+                // As programs write what was not tracked: no inverse, not finite.
+                Err(_) => self.invalid.push((name, number)),
+            }
+        }
+    }
+
+    /// The poses whose status is OK. `slices`: of each volume; only pictures are placed by poses.
+    pub(super) fn poses(&mut self, path: &Path, slices: usize, remarks: &mut Remarks) -> Poses {
+        let mut poses = std::mem::take(&mut self.poses);
+        self.invalid.iter().for_each(|(name, frame)| poses.remove(name, *frame));
+        if !self.not_ok.is_empty() {
+            let text = format!("{} by their ImageStatus; read all the same", self.not_ok.len());
+            remarks.push(("frames not OK".into(), text));
+        }
+        if slices > 1 && !poses.by_name.is_empty() {
+            let text = format!("{} of whole volumes: not used, only pictures are placed by poses", poses.names());
+            remarks.push(warned(path, "tracking", text));
+            return Poses::default();
+        }
+        remarks.extend(poses.remark());
+        poses
+    }
+
+    /// Time stamps by frame in the file, s. `slices`: of each volume, which have the time of their volume.
+    pub(super) fn times(&self, slices: usize, frames: usize) -> BTreeMap<usize, f64> {
+        spread(&self.times, slices, frames)
+    }
+
+    /// The sizes of pixels that count if frames state them, mm; `stated`: those of the header, which say less (PLUS lets the depth of a
+    /// transducer change while it records).
+    pub(super) fn spacing(&self, path: &Path, stated: [f64; 3], remarks: &mut Remarks) -> Option<[f64; 3]> {
+        let first = *self.spacings.values().next()?;
+        // The third of pictures may be left out.
+        let first = if first[2] > 0.0 { first } else { [first[0], first[1], stated[2]] };
+        let is_near = |a: [f64; 3], b: [f64; 3]| (0..3).all(|n| (a[n] - b[n]).abs() <= 1e-6 * b[n] || a[n] == 0.0);
+        let text = |values: [f64; 3]| values.map(number).join(" x ");
+        if self.spacings.values().any(|other| !is_near(*other, first)) {
+            let text =
+                format!("ElementSpacing differs from frame to frame: that of the first, {}, is taken", text(first));
+            remarks.push(warned(path, "spacing", format!("{text} mm for all")));
+        } else if !is_near(first, stated) {
+            let [of_frames, of_header] = [first, stated].map(text);
+            let text = format!(
+                "ElementSpacing of the frames is {of_frames} mm and counts, not that of the header, {of_header} mm"
+            );
+            remarks.push(warned(path, "spacing", text));
+        }
+        Some(first)
+    }
+}
+
+/// Two or three numbers above 0; without a third it is 0.
+fn spacing(text: &str) -> Option<[f64; 3]> {
+    let numbers = text.split_whitespace().map(|word| word.parse::<f64>().ok()).collect::<Option<Vec<f64>>>()?;
+    let is_size = |value: &f64| value.is_finite() && *value > 0.0;
+    match numbers[..] {
+        _ if !numbers.iter().all(is_size) => None,
+        [x, y] => Some([x, y, 0.0]),
+        [x, y, z] => Some([x, y, z]),
+        _ => None,
+    }
+}
+
+/// Times of volumes as those of their slices.
+pub(super) fn spread(times: &BTreeMap<usize, f64>, slices: usize, frames: usize) -> BTreeMap<usize, f64> {
+    let volumes = frames / slices.max(1);
+    times.range(..volumes).flat_map(|(volume, time)| (0..slices).map(move |n| (volume * slices + n, *time))).collect()
+}
+
+/// What a file says of its pictures, by the names of its fields.
+pub(super) struct PlusWords<'a> {
+    pub path: &'a Path,
+    /// Field and value of the orientation, such as MF.
+    pub orientation: (&'static str, Option<&'a str>),
+    /// Field and value of the kind of frames, such as BRIGHTNESS.
+    pub kind: (&'static str, Option<&'a str>),
+}
+
+impl PlusWords<'_> {
+    /// True if the rows of a frame are scan lines.
+    pub(super) fn has_scan_lines(&self) -> bool {
+        self.orientation.1.is_some_and(|word| word.starts_with('F'))
+    }
+
+    /// PLUS names the axes of a frame by their direction on the transducer, the fastest one first. F is away from it, so FM is scan lines
+    /// in order and FU is scan lines from last to first. M or U as the first letter means rows of pictures.
+    ///
+    /// # Errors
+    /// Other words.
+    pub(super) fn line_order(&self) -> Result<LineOrder, InputError> {
+        let (field, word) = self.orientation;
+        match word {
+            None | Some("FM" | "FMA") => Ok(LineOrder::InOrder),
+            Some("FU" | "FUA") => Ok(LineOrder::Reversed),
+            Some(word) if word.starts_with(['M', 'U', 'A', 'D']) => Ok(LineOrder::Pictures(quoted(word))),
+            Some(other) => {
+                let why = "is not read: scan lines must be FM or FU, pictures begin with M, U, A or D";
+                Err(InputError::new(self.path, field, format!("{} {why}", quoted(other))))
+            }
+        }
+    }
+
+    /// The volumes of a file of pictures, or why its scan lines need a probe. `size` and `volumes`: as stored.
+    ///
+    /// # Errors
+    /// Frames that are not detected.
+    pub(super) fn pictures(
+        &self,
+        size: [usize; 3],
+        volumes: usize,
+        world: World,
+        lines: &LineOrder,
+        remarks: &mut Remarks,
+    ) -> Result<StoredGeometry, InputError> {
+        let (field, kind) = self.kind;
+        match (kind, lines) {
+            (None | Some("US_IMG_TYPE_XX"), _) | (Some("BRIGHTNESS"), LineOrder::Pictures(_)) => {}
+            (Some(converted), _) if converted.starts_with("POSTSCAN") => {}
+            (Some("BRIGHTNESS"), _) => {
+                let fault = "BRIGHTNESS frames of scan lines need a probe geometry: give --probe FILE.toml, or put a \
+                             probe.toml beside the recording";
+                return Ok(StoredGeometry::Missing(InputError::new(self.path, field, fault)));
+            }
+            (Some(other), _) => {
+                let fault = format!("{} is not read: only BRIGHTNESS is detected and compressed", quoted(other));
+                return Err(InputError::new(self.path, field, fault));
+            }
+        }
+        let order = self.order(size, volumes, remarks);
+        // The matrix is that of the axes as PLUS draws them, the spacing that of the stored ones.
+        let directions = world.directions();
+        let axes = [0, 1, 2].map(|n| directions.col(n) * world.axis(order.stored[n]).length());
+        let world =
+            World::new(axes, world.origin()).map_err(|why| InputError::new(self.path, self.orientation.0, why))?;
+        Ok(StoredGeometry::Cartesian(Cartesian { size, volumes, world, order }))
+    }
+
+    /// The order of axes that the orientation states.
+    fn order(&self, size: [usize; 3], volumes: usize, remarks: &mut Remarks) -> AxisOrder {
+        let Some(word) = self.orientation.1.filter(|_| !self.has_scan_lines()) else { return AxisOrder::STORED };
+        let mut not_drawn = |why: &str| {
+            remarks.push(warned(self.path, "not drawn so", format!("orientation {} {why}", quoted(word))));
+            AxisOrder::STORED
+        };
+        match AxisOrder::of_plus(word) {
+            // Pictures in time are not neighbours in space.
+            Some(order) if volumes > 1 && size[2] == 1 && !order.keeps_frames() => {
+                not_drawn("turns pictures out of their plane: they are drawn as stored")
+            }
+            Some(order) => order,
+            None => not_drawn("is not known: the axes are drawn as stored"),
+        }
+    }
+}
