@@ -347,6 +347,9 @@ fn palettes_of_all_forms_give_luminances() {
     let bytes = file(&[0, 1, 2, 3]).palette([4, 0, 8]);
     assert_eq!(plain(&bytes.clone().entries(0x0028_1201, &[0x1405, 0x3c28])).concat(), [5, 20, 40, 60]);
     assert_eq!(plain(&bytes.entries(0x0028_1201, &[5, 20, 40, 60])).concat(), [5, 20, 40, 60]);
+    // An odd number of bytes, and one that makes the length even.
+    let odd = file(&[0, 1, 2, 3]).palette([3, 0, 8]).entries(0x0028_1201, &[0x1405, 0x0028]);
+    assert_eq!(plain(&odd).concat(), [5, 20, 40, 40]);
     // Segments: two entries, a line to 254, and the two again.
     let segments = [0, 2, 0, 2 * 257, 1, 252, 254 * 257, 2, 1, 0, 0];
     let segmented = file(&[0, 1, 2, 100, 253, 254, 255]).palette([256, 0, 16]).entries(0x0028_1221, &segments);

@@ -115,7 +115,8 @@ fn shares(entries: impl Iterator<Item = u16>, bits: u16) -> Result<Vec<f64>, Str
 
 /// The entries of a table: words, or bytes that are packed two in a word, the first one in the low half.
 fn plain_entries(words: &[u16], count: usize, bits: u16, warnings: &mut Vec<String>) -> Result<Vec<f64>, String> {
-    let bytes = || words.iter().flat_map(|word| word.to_le_bytes()).map(u16::from);
+    // Behind an odd number of bytes there is one that makes the length even.
+    let bytes = || words.iter().flat_map(|word| word.to_le_bytes()).map(u16::from).take(count);
     let is_packed = words.len() == count.div_ceil(2) && count > 1;
     match bits {
         8 if is_packed => shares(bytes(), 8),
@@ -212,7 +213,7 @@ impl Segments<'_> {
             return Err("begins with a linear segment".into());
         };
         let step = (f64::from(end) - begin) / count as f64;
-        self.entries.extend((1..=count).map(|n| (begin + step * n as f64).round() as u16));
+        self.entries.extend((1..=count).map(|n| (begin + step * n as f64).round_ties_even() as u16));
         Ok(())
     }
 }
@@ -256,7 +257,7 @@ mod tests {
     #[test]
     fn entries_are_words_or_bytes() {
         let mut said = Vec::new();
-        assert_eq!(plain_entries(&[0x0201, 0x0003], 3, 8, &mut said), Ok(vec![1.0, 2.0, 3.0, 0.0]));
+        assert_eq!(plain_entries(&[0x0201, 0x0003], 3, 8, &mut said), Ok(vec![1.0, 2.0, 3.0]));
         assert_eq!(plain_entries(&[1, 2, 3], 3, 8, &mut said), Ok(vec![1.0, 2.0, 3.0]));
         assert_eq!(plain_entries(&[819, 0xffff], 2, 12, &mut said), Ok(vec![51.0, 255.0]));
         assert!(said.is_empty());
