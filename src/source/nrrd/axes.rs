@@ -451,7 +451,10 @@ fn roles(header: &Header, all: &[Axis], remarks: &mut Remarks) -> Result<Vec<Rol
     let in_space = (0..all.len()).filter(|n| is_candidate(*n)).count();
     for n in 0..all.len() {
         roles[n] = match roles[n] {
-            Role::List if in_space == 2 && is_slices(header, all, n) => Role::Space,
+            Role::List if in_space == 2 && is_slices(header, all, n) => {
+                remarks.push(("axes".into(), format!("axis {n} is a list beside two axes in space: taken as slices")));
+                Role::Space
+            }
             Role::List => Role::Time,
             Role::Unsaid => unsaid(header, all, &roles, n, remarks)?,
             role => role,
