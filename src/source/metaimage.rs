@@ -160,14 +160,16 @@ fn dimensions(path: &Path, header: &Header) -> Result<Dimensions, InputError> {
 /// volumes, too. An axis of time or a list is read in the last place only.
 fn is_sequence(header: &Header, remarks: &mut Remarks) -> Result<bool, InputError> {
     let count = header.dimensions();
-    let Some(kinds) = header.get("Kinds") else {
-        remarks
-            .extend((count == 4).then(|| ("fourth axis".into(), "of no stated kind, taken as volumes in time".into())));
-        return Ok(header.frames.is_sequence);
-    };
-    let kinds: Vec<String> = kinds.split_whitespace().map(str::to_ascii_lowercase).collect();
+    let kinds: Vec<String> =
+        header.get("Kinds").unwrap_or("").split_whitespace().map(str::to_ascii_lowercase).collect();
+    if !kinds.is_empty() && kinds.len() != count {
+        let text = format!("Kinds has {} entries, but NDims is {count}: they are not used", kinds.len());
+        remarks.push(warned(header.path, "kinds", text));
+    }
     if kinds.len() != count {
-        return header.fault("Kinds", format!("has {} entries, but NDims is {count}", kinds.len()));
+        let text = "of no stated kind, taken as volumes in time".to_string();
+        remarks.extend((count == 4).then(|| ("fourth axis".into(), text)));
+        return Ok(header.frames.is_sequence);
     }
     for (i, kind) in kinds.iter().enumerate() {
         let is_last = i + 1 == count;

@@ -357,21 +357,24 @@ impl Axes {
             _ => axis.unit.clone(),
         };
         let Some(factor) = seconds(&unit) else {
-            let title = if axis.has_values { "times" } else { "time steps" };
-            let text = match is_said(&unit) {
-                true => format!("of axis {n} have the unit {}, which is none of time: not used", quoted(&unit)),
-                false => format!("of axis {n} have no unit: not used"),
-            };
-            let remark = (title.into(), text);
-            remarks.push(if axis.has_values || is_said(&unit) {
-                warned(header.path, title, format!("{title} {}", remark.1))
-            } else {
-                remark
-            });
+            remarks.push(self.no_times(header, n, &unit));
             return Ok(BTreeMap::new());
         };
         let times = values.into_iter().enumerate().map(|(volume, value)| (volume, value * factor)).collect();
         Ok(spread(&times, slices, frames))
+    }
+
+    /// Why numbers along an axis are no times. That steps have no unit is usual, and no warning.
+    fn no_times(&self, header: &Header, n: usize, unit: &str) -> (String, String) {
+        let title = if self.all[n].has_values { "times" } else { "time steps" };
+        if !is_said(unit) && !self.all[n].has_values {
+            return (title.into(), format!("of axis {n} have no unit: not used"));
+        }
+        let why = match is_said(unit) {
+            true => format!("the unit {}, which is none of time", quoted(unit)),
+            false => "no unit".into(),
+        };
+        warned(header.path, title, format!("{title} of axis {n} have {why}: not used"))
     }
 
     /// `axis N index values` as 3D Slicer writes them; None if they are no numbers for each volume.
@@ -441,59 +444,63 @@ impl Scale {
 /// What all axes are. What is not stated and is guessed is a warning.
 fn roles(header: &Header, all: &[Axis], remarks: &mut Remarks) -> Result<Vec<Role>, InputError> {
     let mut roles = all.iter().map(|axis| axis.role(header)).collect::<Result<Vec<Role>, InputError>>()?;
-    let known_spacings = all.iter().filter(|axis| axis.spacing.is_some()).count();
-    // In a file with spacings, NaN is for axes that are not in space: the first or the last.
-    let last = all.len() - 1;
-    let is_spaceless = |n: usize| {
-        let axis = &all[n];
-        let has_no_spacing = axis.direction.is_none() && axis.spacing.is_none() && known_spacings >= 2;
-        axis.is_none() || (has_no_spacing && (n == 0 || n == last))
+    let is_candidate = |n: usize| match roles[n] {
+        Role::Unsaid => !is_spaceless(all, n),
+        role => role == Role::Space,
     };
-    let in_space =
-        (0..all.len()).filter(|n| roles[*n] == Role::Space || (roles[*n] == Role::Unsaid && !is_spaceless(*n))).count();
-    for (n, axis) in all.iter().enumerate() {
-        let has_time = roles.contains(&Role::Time);
+    let in_space = (0..all.len()).filter(|n| is_candidate(*n)).count();
+    for n in 0..all.len() {
         roles[n] = match roles[n] {
-            // PLUS writes "domain domain list" into its volumes, too.
-            Role::List => {
-                let is_slices = axis.direction != Some(None)
-                    && !(n == 0 || axis.has_values || header.frames.is_sequence || axis.is_time_by_unit())
-                    && in_space == 2;
-                if is_slices { Role::Space } else { Role::Time }
+            Role::List if in_space == 2 && is_slices(header, all, n) => {
+                remarks.push(("axes".into(), format!("axis {n} is a list beside two axes in space: taken as slices")));
+                Role::Space
             }
-            Role::Unsaid => {
-                let is_time = axis.is_time_by_unit() || axis.has_values || TIME_LABELS.contains(&axis.label.as_str());
-                let colour = !roles.contains(&Role::Colour) && n == 0 && [3, 4].contains(&axis.size);
-                let guess = |what: &str| {
-                    let text = format!("axis {n}, of {} numbers, has no kind: taken as {what}", axis.size);
-                    warned(header.path, "axes", text)
-                };
-                match is_spaceless(n) && all.len() > 2 {
-                    _ if is_time && !has_time && all.len() > 2 && (!axis.is_in_space() || axis.is_time_by_unit()) => {
-                        Role::Time
-                    }
-                    false => Role::Space,
-                    true if axis.size == 1 => Role::Single,
-                    true if colour => {
-                        remarks.push(guess("colours"));
-                        Role::Colour
-                    }
-                    true if n == last && !has_time => {
-                        remarks.push(guess("volumes one after another"));
-                        Role::Time
-                    }
-                    true => {
-                        let fault =
-                            format!("axis {n}, of {} numbers, is neither in space nor time nor a colour", axis.size);
-                        return header.fault("kinds", fault);
-                    }
-                }
-            }
-            other => other,
+            Role::List => Role::Time,
+            Role::Unsaid => unsaid(header, all, &roles, n, remarks)?,
+            role => role,
         };
     }
     fourth_is_time(header, all, &mut roles, remarks);
     Ok(roles)
+}
+
+/// Whether an axis has no direction, or, as the first or the last of a file with spacings, none of them.
+fn is_spaceless(all: &[Axis], n: usize) -> bool {
+    let has_spacings = all.iter().filter(|axis| axis.spacing.is_some()).count() >= 2;
+    let has_none = all[n].direction.is_none() && all[n].spacing.is_none() && has_spacings;
+    all.len() > 2 && (all[n].is_none() || (has_none && (n == 0 || n + 1 == all.len())))
+}
+
+/// Whether a list beside two axes in space is slices: PLUS writes "domain domain list" into its volumes, too.
+fn is_slices(header: &Header, all: &[Axis], n: usize) -> bool {
+    let axis = &all[n];
+    let is_time = axis.is_none() || axis.has_values || axis.is_time_by_unit() || header.frames.is_sequence;
+    n > 0 && !is_time
+}
+
+/// What an axis is whose kind does not say it.
+fn unsaid(header: &Header, all: &[Axis], roles: &[Role], n: usize, remarks: &mut Remarks) -> Result<Role, InputError> {
+    let (axis, has_time) = (&all[n], roles.contains(&Role::Time));
+    let is_named = axis.has_values || TIME_LABELS.contains(&axis.label.as_str());
+    if !has_time && all.len() > 2 && (axis.is_time_by_unit() || (is_named && !axis.is_in_space())) {
+        return Ok(Role::Time);
+    }
+    if !is_spaceless(all, n) {
+        return Ok(Role::Space);
+    }
+    let is_colour = n == 0 && [3, 4].contains(&axis.size) && !roles.contains(&Role::Colour);
+    let (role, what) = match axis.size {
+        1 => return Ok(Role::Single),
+        _ if is_colour => (Role::Colour, "colours"),
+        _ if n + 1 == all.len() && !has_time => (Role::Time, "volumes one after another"),
+        size => {
+            let fault = format!("axis {n}, of {size} numbers, is neither in space nor time nor a colour");
+            return header.fault("kinds", fault);
+        }
+    };
+    let text = format!("axis {n}, of {} numbers, has no kind: taken as {what}", axis.size);
+    remarks.push(warned(header.path, "axes", text));
+    Ok(role)
 }
 
 /// Of four axes in space one is time: the one along the fourth coordinate, else the last.

@@ -157,6 +157,11 @@ fn colours_and_time_are_told_apart() {
     let path = folder.write("c.nrrd", file("dimension: 4\nsizes: 3 2 2 4\n", &samples([0, 1, 2, 3])));
     assert_eq!(volumes(&path), expected([None; 4]));
     assert!(said(&path).contains("axis 3 is the fourth without a kind of its own: taken as volumes one after another"));
+    let path = folder.write("c.nrrd", file("dimension: 3\nsizes: 3 2 2\nkinds: domain domain list\n", &[7; 12]));
+    assert!(
+        open(&path).volumes() == 1
+            && said(&path).contains("axis 2 is a list beside two axes in space: taken as slices")
+    );
     for (fields, named) in [
         ("sizes: 5 3 2 2\nspace directions: none (1,0,0) (0,1,0) (0,0,1)\n", "kinds: axis 0, of 5 numbers"),
         ("sizes: 4 3 2 2\nkinds: quaternion domain domain domain\n", "kinds: 'quaternion' is not read"),
