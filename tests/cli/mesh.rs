@@ -27,7 +27,7 @@ fn volume(folder: &Folder, name: &str, mirrored: bool, value: impl Fn(f64) -> f6
     }
     let [x, y, z] = origin;
     let header = format!(
-        "ObjectType = Image\nNDims = 3\nDimSize = 21 19 18\nElementType = MET_FLOAT\nElementSpacing = 0.8 0.9 1\nOffset = {x} {y} {z}\n\
+        "ObjectType = Image\nNDims = 3\nBinaryDataByteOrderMSB = False\nDimSize = 21 19 18\nElementType = MET_FLOAT\nElementSpacing = 0.8 0.9 1\nOffset = {x} {y} {z}\n\
          TransformMatrix = 1 0 0 0 1 0 0 0 {hand}\nElementDataFile = LOCAL\n"
     );
     folder.write(name, [header.into_bytes(), samples].concat())

@@ -6,7 +6,7 @@ use crate::common::program::*;
 fn volume(size: [usize; 3], slice: f64, kind: &str, value: impl Fn(usize) -> Vec<u8>) -> Vec<u8> {
     let [x, y, z] = size;
     let header = format!(
-        "ObjectType = Image\nNDims = 3\nDimSize = {x} {y} {z}\nElementSpacing = 0.5 0.5 {slice}\nElementType = {kind}\nElementDataFile = LOCAL\n"
+        "ObjectType = Image\nNDims = 3\nBinaryDataByteOrderMSB = False\nDimSize = {x} {y} {z}\nElementSpacing = 0.5 0.5 {slice}\nElementType = {kind}\nElementDataFile = LOCAL\n"
     );
     header.bytes().chain((0..x * y * z).flat_map(value)).collect()
 }
