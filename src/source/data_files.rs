@@ -154,11 +154,40 @@ pub(super) fn all(header: &Path, names: &[String]) -> Result<Vec<Pixels>, String
     }
 }
 
+/// Takes the samples of a recording from files that have as many each. `place` finds those of a file, given their number of bytes, and returns how many bytes
+/// follow them.
+///
+/// # Errors
+/// Samples that the files cannot share evenly, and what `place` and [`joined`] refuse.
+pub(super) fn divide(
+    header: &Path,
+    field: &str,
+    mut parts: Vec<Pixels>,
+    layout: &mut Layout,
+    place: impl Fn(&mut Pixels, u64) -> Result<u64, InputError>,
+) -> Result<(), InputError> {
+    let claimed = layout.frame_bytes() * layout.frames as u64;
+    let count = parts.len().max(1) as u64;
+    if !claimed.is_multiple_of(count) {
+        let fault = format!("names {count} files, which cannot share {claimed} bytes evenly");
+        return Err(InputError::new(header, field, fault));
+    }
+    let mut more = 0;
+    for part in &mut parts {
+        more += place(part, claimed / count)?;
+    }
+    if more > 0 {
+        layout.remarks.push(("more data".into(), format!("{more} bytes behind the samples; not read")));
+    }
+    layout.pixels = joined(header, parts, claimed / count)?;
+    Ok(())
+}
+
 /// Samples of several files, one after another; of one file, these.
 ///
 /// # Errors
 /// A file that cannot hold its share of the samples.
-pub(super) fn joined(header: &Path, mut parts: Vec<Pixels>, part_bytes: u64) -> Result<Pixels, InputError> {
+fn joined(header: &Path, mut parts: Vec<Pixels>, part_bytes: u64) -> Result<Pixels, InputError> {
     if parts.len() == 1
         && let Some(only) = parts.pop()
     {

@@ -254,25 +254,9 @@ fn unit(header: &Header, remarks: &mut Remarks) -> f64 {
 
 /// Finds the location and the length of the samples.
 fn find_pixels(file: &InputFile, header: &Header, layout: &mut Layout) -> Result<(), InputError> {
-    let mut parts = match data_files(file, header, layout) {
-        Ok(parts) => parts,
-        Err(fault) => return header.fault("ElementDataFile", fault),
-    };
-    let claimed = layout.frame_bytes() * layout.frames as u64;
-    let count = parts.len() as u64;
-    if !claimed.is_multiple_of(count) {
-        return header
-            .fault("ElementDataFile", format!("names {count} files, which cannot share {claimed} bytes evenly"));
-    }
-    let mut more = 0;
-    for part in &mut parts {
-        more += place(header, part, claimed / count)?;
-    }
-    if more > 0 {
-        layout.remarks.push(("more data".into(), format!("{more} bytes behind the samples; not read")));
-    }
-    layout.pixels = data_files::joined(file.path, parts, claimed / count)?;
-    Ok(())
+    let field = "ElementDataFile";
+    let parts = data_files(file, header, layout).map_err(|fault| InputError::new(file.path, field, fault))?;
+    data_files::divide(file.path, field, parts, layout, |part, bytes| place(header, part, bytes))
 }
 
 /// The files of the samples: this one (`LOCAL`), a list of names behind the header (`LIST`, `LIST 2D`), numbered ones (`FORMAT`, and the

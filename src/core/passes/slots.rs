@@ -191,9 +191,11 @@ slots! {
     /// Arriving frames, one a layer: those of every batch in flight.
     Frames = D::image("frames", frame_layers, frame_format).by_frames().across_queues().of(GREY, SHARE_OF_RANGE);
     /// Gain of every sample of a line.
-    Tgc = D::table("tgc", |s| Shape::Buffer(4 * s.frame_size()[0]), lookup_tables::tgc, ByContent).of(GREY, "gain of a sample: a factor, or an addend where samples are log-compressed");
+    Tgc = D::table("tgc", |s| Shape::Buffer(4 * s.frame_size()[0]), lookup_tables::tgc, ByContent)
+        .of(GREY, "gain of a sample: a factor, or an addend where samples are log-compressed");
     /// The frame after line conditioning: decimated samples x lines.
-    Conditioned = D::image("conditioned", |s| batch(s.line_lattice(), s), |_| Format::R32f).across_queues().of(GREY, SHARE_OF_RANGE);
+    Conditioned = D::image("conditioned", |s| batch(s.line_lattice(), s), |_| Format::R32f).across_queues()
+        .of(GREY, SHARE_OF_RANGE);
     /// (sample, line) of every slice pixel on the lattice that is scan-converted; -1 outside the sector.
     ScanLut = D::image("scan_lut", one_slice, |_| Format::Rg32f)
         .by_scene(lookup_tables::scan_lut, By(lattice_differs))
@@ -216,12 +218,15 @@ slots! {
     SliceStageB = D::image("slice_stage_b", slices, |_| Format::R32f).across_queues().of(GREY, SHARE_OF_RANGE);
     SliceStageC = D::image("slice_stage_c", slices, |_| Format::R32f).across_queues().of(GREY, SHARE_OF_RANGE);
     /// The volume before smoothing across slices.
-    SharpVolume = D::image("sharp_volume", volume, volume_format).multibuffered().clear().across_queues().of(GREY, SHARE_OF_RANGE);
+    SharpVolume = D::image("sharp_volume", volume, volume_format).multibuffered().clear().across_queues()
+        .of(GREY, SHARE_OF_RANGE);
     /// The volume before parts that float are dropped.
-    WholeVolume = D::image("whole_volume", volume, volume_format).multibuffered().clear().across_queues().of(GREY, SHARE_OF_RANGE);
+    WholeVolume = D::image("whole_volume", volume, volume_format).multibuffered().clear().across_queues()
+        .of(GREY, SHARE_OF_RANGE);
     /// 1 in parts of a volume that float.
     Floating = D::image("floating", volume, |_| Format::R8)
-        .by_volume(floating::SEARCH, |a, b| a.floating_basis() != b.floating_basis()).of(GREY, "1 in parts of the volume that float");
+        .by_volume(floating::SEARCH, |a, b| a.floating_basis() != b.floating_basis())
+        .of(GREY, "1 in parts of the volume that float");
     /// The 3D texture that rays are cast through: the part that is visible.
     Volume = D::image("volume", volume, volume_format).multibuffered().clear().across_queues().of(GREY, SHARE_OF_RANGE);
     /// The volume without what is removed, by cuts or in front of the render start: rays are cast through it in place of the other.
@@ -234,35 +239,49 @@ slots! {
     StartCurve = D::image("start_curve", |s| Shape::Two([s.grid.size[0], s.slices()]), |_| Format::R32f)
         .by_scene(cut::start_curve, By(|a, b| a.start_curve_differs(b))).of(GREY, "row of the volume, by column and slice");
     /// The cuts: the axes of their views, and the edges of their contours.
-    Cuts = D::table("cuts", |s| Shape::Buffer(16 * cut::table_length(s) as u32), cut::table, ByContent).of(&["x", "y", "z", "w"], "vectors as the shader takes them");
+    Cuts = D::table("cuts", |s| Shape::Buffer(16 * cut::table_length(s) as u32), cut::table, ByContent)
+        .of(&["x", "y", "z", "w"], "vectors as the shader takes them");
     /// Where each slice is.
-    SlicePlaces = D::table("slice_places", |s| Shape::Buffer(16 * s.slices()), cut::slice_places, ByContent).of(&["x", "y", "z", "w"], "vectors as the shader takes them");
+    SlicePlaces = D::table("slice_places", |s| Shape::Buffer(16 * s.slices()), cut::slice_places, ByContent)
+        .of(&["x", "y", "z", "w"], "vectors as the shader takes them");
     /// Share of the lines of a frame that fired before the one at each texel of a slice.
-    LineShares = D::image("line_shares", one_slice, |_| Format::R32f).by_scene(cut::line_shares, By(lattice_differs)).of(GREY, "share of the frame's lines that fired before");
+    LineShares = D::image("line_shares", one_slice, |_| Format::R32f).by_scene(cut::line_shares, By(lattice_differs))
+        .of(GREY, "share of the frame's lines that fired before");
     /// The volume that the planes beside a rendering are cut from, before smoothing across slices, and after.
-    SharpSectionVolume = D::image("sharp_section_volume", volume, volume_format).multibuffered().clear().across_queues().of(GREY, SHARE_OF_RANGE);
-    SectionVolume = D::image("section_volume", volume, volume_format).multibuffered().clear().across_queues().of(GREY, SHARE_OF_RANGE);
+    SharpSectionVolume = D::image("sharp_section_volume", volume, volume_format).multibuffered().clear().across_queues()
+        .of(GREY, SHARE_OF_RANGE);
+    SectionVolume = D::image("section_volume", volume, volume_format).multibuffered().clear().across_queues()
+        .of(GREY, SHARE_OF_RANGE);
     /// Each texel of the volume with its neighbours one column and one row on, as their bits.
-    PackedNeighbours = D::image("packed_neighbours", volume, four_texels).multibuffered().of(&["bits", "more_bits"], "bits of a texel and of its neighbours one column on, one row on, and both");
+    PackedNeighbours = D::image("packed_neighbours", volume, four_texels).multibuffered()
+        .of(&["bits", "more_bits"], "bits of a texel and of its neighbours one column on, one row on, and both");
     /// Smallest and largest value of every tile of every slice.
-    TileRanges = D::image("tile_ranges", |s| Shape::Three(s.tile_counts()), |_| Format::Rg16).multibuffered().clear().of(&["smallest", "largest"], SHARE_OF_RANGE);
+    TileRanges = D::image("tile_ranges", |s| Shape::Three(s.tile_counts()), |_| Format::Rg16).multibuffered().clear()
+        .of(&["smallest", "largest"], SHARE_OF_RANGE);
     /// Which tiles the samples in each brick may touch, and on which side of the sector's border the brick is.
     BrickTable = D::table(
         "brick_table",
         |s| Shape::Buffer(16 * s.bricks().total() as u32),
         lookup_tables::brick_table,
         By(|a, b| !a.geometry.equals_except_direction(&b.geometry) || a.brick_basis() != b.brick_basis()),
-    ).of(&["tile_columns", "tile_rows", "slices", "side"], "indices: 4096 first + last; side: 0 outside the sector, 1 across its border, 2 inside");
+    )
+        .of(&["tile_columns", "tile_rows", "slices", "side"], "indices: 4096 first + last; side: 0 outside the sector, 1 across its border, 2 inside");
     /// Smallest and largest value that samples within each brick may have.
-    BrickRanges = D::image("brick_ranges", per_brick, |_| Format::Rg16).multibuffered().of(&["smallest", "largest"], SHARE_OF_RANGE);
+    BrickRanges = D::image("brick_ranges", per_brick, |_| Format::Rg16).multibuffered()
+        .of(&["smallest", "largest"], SHARE_OF_RANGE);
     /// The kind of each brick to a mode: active, empty or homogeneous.
-    BrickKinds = D::image("brick_kinds", per_brick, |_| Format::R8).of(GREY, "(64 kind + distance in bricks) / 255; kinds: 0 active, 1 empty, 2 homogeneous");
+    BrickKinds = D::image("brick_kinds", per_brick, |_| Format::R8)
+        .of(GREY, "(64 kind + distance in bricks) / 255; kinds: 0 active, 1 empty, 2 homogeneous");
     /// The same with the distance to the nearest brick of another kind along x, and within x and y.
-    BrickDistancesX = D::image("brick_distances_x", per_brick, |_| Format::R8).of(GREY, "(64 kind + distance in bricks) / 255; kinds: 0 active, 1 empty, 2 homogeneous");
-    BrickDistancesXy = D::image("brick_distances_xy", per_brick, |_| Format::R8).of(GREY, "(64 kind + distance in bricks) / 255; kinds: 0 active, 1 empty, 2 homogeneous");
+    BrickDistancesX = D::image("brick_distances_x", per_brick, |_| Format::R8)
+        .of(GREY, "(64 kind + distance in bricks) / 255; kinds: 0 active, 1 empty, 2 homogeneous");
+    BrickDistancesXy = D::image("brick_distances_xy", per_brick, |_| Format::R8)
+        .of(GREY, "(64 kind + distance in bricks) / 255; kinds: 0 active, 1 empty, 2 homogeneous");
     /// The same in space: for the surface detector, and for the mode that composites or takes the mean.
-    SurfaceBrickDistances = D::image("surface_brick_distances", per_brick, |_| Format::R8).of(GREY, "(64 kind + distance in bricks) / 255; kinds: 0 active, 1 empty, 2 homogeneous");
-    VolumeBrickDistances = D::image("volume_brick_distances", per_brick, |_| Format::R8).of(GREY, "(64 kind + distance in bricks) / 255; kinds: 0 active, 1 empty, 2 homogeneous");
+    SurfaceBrickDistances = D::image("surface_brick_distances", per_brick, |_| Format::R8)
+        .of(GREY, "(64 kind + distance in bricks) / 255; kinds: 0 active, 1 empty, 2 homogeneous");
+    VolumeBrickDistances = D::image("volume_brick_distances", per_brick, |_| Format::R8)
+        .of(GREY, "(64 kind + distance in bricks) / 255; kinds: 0 active, 1 empty, 2 homogeneous");
     /// Entries of the transfer function that are not transparent, before each.
     OpaqueBefore = D::table(
         "opaque_before",
@@ -278,7 +297,8 @@ slots! {
         By(|a, b| !a.geometry.equals_except_direction(&b.geometry) || lattice(a) != lattice(b)),
     ).of(GREY, "mean distances of slices");
     /// Share of the lines that fired before each line.
-    LineLut = D::table("line_lut", entries, lookup_tables::line_lut, By(lattice_differs)).of(GREY, "share of the lines of a frame");
+    LineLut = D::table("line_lut", entries, lookup_tables::line_lut, By(lattice_differs))
+        .of(GREY, "share of the lines of a frame");
     /// Position and advance of every slice.
     SliceTable = D::table(
         "slice_table",
@@ -323,7 +343,8 @@ slots! {
         ByContent,
     ).of(&["x", "y", "z", "w"], "vectors as the shader takes them");
     /// The columns of a curved plane: where each is, and through which vector its slab reaches.
-    CurveColumns = D::table("curve_columns", curve_columns, lookup_tables::curve_table, ByContent).of(&["x", "y", "z", "w"], "vectors as the shader takes them");
+    CurveColumns = D::table("curve_columns", curve_columns, lookup_tables::curve_table, ByContent)
+        .of(&["x", "y", "z", "w"], "vectors as the shader takes them");
     /// The half-spaces that bound the block of mode cube.
     Block = D::table(
         "block",
@@ -332,34 +353,54 @@ slots! {
         ByContent,
     ).of(&["x", "y", "z", "w"], "vectors as the shader takes them");
     /// The light volume: density of the matter in each cell, and its echo.
-    LightMatter = D::image("light_matter", |s| Shape::Three(s.light_lattice().count), |_| Format::Rg16f).of(&["density", "echo"], "share of the densest matter; share of the range of the recording's samples");
+    LightMatter = D::image("light_matter", |s| Shape::Three(s.light_lattice().count), |_| Format::Rg16f)
+        .of(&["density", "echo"], "share of the densest matter; share of the range of the recording's samples");
     /// The density in a Gaussian pyramid: cells of twice the edge at each level.
-    LightPyramid1 = D::image("light_pyramid_1", |s| light_level(s, 1), |_| Format::R16f).of(GREY, "share of the densest matter, 0..1");
-    LightPyramid2 = D::image("light_pyramid_2", |s| light_level(s, 2), |_| Format::R16f).of(GREY, "share of the densest matter, 0..1");
-    LightPyramid3 = D::image("light_pyramid_3", |s| light_level(s, 3), |_| Format::R16f).of(GREY, "share of the densest matter, 0..1");
-    LightPyramid4 = D::image("light_pyramid_4", |s| light_level(s, 4), |_| Format::R16f).of(GREY, "share of the densest matter, 0..1");
-    LightPyramid5 = D::image("light_pyramid_5", |s| light_level(s, 5), |_| Format::R16f).of(GREY, "share of the densest matter, 0..1");
-    LightPyramid6 = D::image("light_pyramid_6", |s| light_level(s, 6), |_| Format::R16f).of(GREY, "share of the densest matter, 0..1");
-    LightPyramid7 = D::image("light_pyramid_7", |s| light_level(s, 7), |_| Format::R16f).of(GREY, "share of the densest matter, 0..1");
-    LightPyramid8 = D::image("light_pyramid_8", |s| light_level(s, 8), |_| Format::R16f).of(GREY, "share of the densest matter, 0..1");
+    LightPyramid1 = D::image("light_pyramid_1", |s| light_level(s, 1), |_| Format::R16f)
+        .of(GREY, "share of the densest matter, 0..1");
+    LightPyramid2 = D::image("light_pyramid_2", |s| light_level(s, 2), |_| Format::R16f)
+        .of(GREY, "share of the densest matter, 0..1");
+    LightPyramid3 = D::image("light_pyramid_3", |s| light_level(s, 3), |_| Format::R16f)
+        .of(GREY, "share of the densest matter, 0..1");
+    LightPyramid4 = D::image("light_pyramid_4", |s| light_level(s, 4), |_| Format::R16f)
+        .of(GREY, "share of the densest matter, 0..1");
+    LightPyramid5 = D::image("light_pyramid_5", |s| light_level(s, 5), |_| Format::R16f)
+        .of(GREY, "share of the densest matter, 0..1");
+    LightPyramid6 = D::image("light_pyramid_6", |s| light_level(s, 6), |_| Format::R16f)
+        .of(GREY, "share of the densest matter, 0..1");
+    LightPyramid7 = D::image("light_pyramid_7", |s| light_level(s, 7), |_| Format::R16f)
+        .of(GREY, "share of the densest matter, 0..1");
+    LightPyramid8 = D::image("light_pyramid_8", |s| light_level(s, 8), |_| Format::R16f)
+        .of(GREY, "share of the densest matter, 0..1");
     /// Light that has passed one layer of cells, and the next.
-    LightFrontA = D::image("light_front_a", |s| light_layer(s, false), |_| Format::Rgba32f).of(COLOUR, "light; 1 is that of an unshadowed light of strength 1");
-    LightFrontB = D::image("light_front_b", |s| light_layer(s, false), |_| Format::Rgba32f).of(COLOUR, "light; 1 is that of an unshadowed light of strength 1");
+    LightFrontA = D::image("light_front_a", |s| light_layer(s, false), |_| Format::Rgba32f)
+        .of(COLOUR, "light; 1 is that of an unshadowed light of strength 1");
+    LightFrontB = D::image("light_front_b", |s| light_layer(s, false), |_| Format::Rgba32f)
+        .of(COLOUR, "light; 1 is that of an unshadowed light of strength 1");
     /// Light that arrives in each cell, and the density of its matter. The other slots are those of the passes that scatter it, which alternate: what
     /// arrives stays, as many dispatches have made it.
-    LightArriving = D::image("light_arriving", |s| Shape::Three(s.light_lattice().count), |_| Format::Rgba16f).of(&["red", "green", "blue", "density"], "light: share of what came; share of the densest matter");
-    LightScattered = D::image("light_scattered", |s| Shape::Three(s.light_lattice().count), |_| Format::Rgba16f).of(&["red", "green", "blue", "density"], "light: share of what came; share of the densest matter");
-    LightScatteredB = D::image("light_scattered_b", |s| Shape::Three(s.light_lattice().count), |_| Format::Rgba16f).of(&["red", "green", "blue", "density"], "light: share of what came; share of the densest matter");
+    LightArriving = D::image("light_arriving", |s| Shape::Three(s.light_lattice().count), |_| Format::Rgba16f)
+        .of(&["red", "green", "blue", "density"], "light: share of what came; share of the densest matter");
+    LightScattered = D::image("light_scattered", |s| Shape::Three(s.light_lattice().count), |_| Format::Rgba16f)
+        .of(&["red", "green", "blue", "density"], "light: share of what came; share of the densest matter");
+    LightScatteredB = D::image("light_scattered_b", |s| Shape::Three(s.light_lattice().count), |_| Format::Rgba16f)
+        .of(&["red", "green", "blue", "density"], "light: share of what came; share of the densest matter");
     /// The same of the back light, in cells of twice the edge.
-    BackFrontA = D::image("back_front_a", |s| light_layer(s, true), |_| Format::Rgba32f).of(COLOUR, "light; 1 is that of an unshadowed light of strength 1");
-    BackFrontB = D::image("back_front_b", |s| light_layer(s, true), |_| Format::Rgba32f).of(COLOUR, "light; 1 is that of an unshadowed light of strength 1");
-    BackLight = D::image("back_light", |s| light_level(s, 1), |_| Format::Rgba16f).of(&["red", "green", "blue", "density"], "light: share of what came; share of the densest matter");
+    BackFrontA = D::image("back_front_a", |s| light_layer(s, true), |_| Format::Rgba32f)
+        .of(COLOUR, "light; 1 is that of an unshadowed light of strength 1");
+    BackFrontB = D::image("back_front_b", |s| light_layer(s, true), |_| Format::Rgba32f)
+        .of(COLOUR, "light; 1 is that of an unshadowed light of strength 1");
+    BackLight = D::image("back_light", |s| light_level(s, 1), |_| Format::Rgba16f)
+        .of(&["red", "green", "blue", "density"], "light: share of what came; share of the densest matter");
     /// Light from all sides and from behind in cells of twice the edge: its colour, and the ambient share.
-    LightAmbient = D::image("light_ambient", |s| light_level(s, 1), |_| Format::Rgba16f).of(COLOUR, "light; 1 is that of an unshadowed light of strength 1");
+    LightAmbient = D::image("light_ambient", |s| light_level(s, 1), |_| Format::Rgba16f)
+        .of(COLOUR, "light; 1 is that of an unshadowed light of strength 1");
     /// Light that each cell scatters, and its ambient share.
-    LightShade = D::image("light_shade", |s| Shape::Three(s.light_lattice().count), |_| Format::Rgba16f).of(COLOUR, "light; 1 is that of an unshadowed light of strength 1");
+    LightShade = D::image("light_shade", |s| Shape::Three(s.light_lattice().count), |_| Format::Rgba16f)
+        .of(COLOUR, "light; 1 is that of an unshadowed light of strength 1");
     /// Orientation of each cell, as long as it is certain, and the light for a highlight.
-    LightNormals = D::image("light_normals", |s| Shape::Three(s.light_lattice().count), |_| Format::Rgba16f).of(&["x", "y", "z", "highlight"], "direction, as long as it is certain; light");
+    LightNormals = D::image("light_normals", |s| Shape::Three(s.light_lattice().count), |_| Format::Rgba16f)
+        .of(&["x", "y", "z", "highlight"], "direction, as long as it is certain; light");
     /// The medium of a still: albedo and extinction over the sample value.
     StillMedium = D::table(
         "still_medium",
@@ -370,18 +411,24 @@ slots! {
     /// The largest extinction in each brick.
     StillMajorants = D::image("still_majorants", per_brick, |_| Format::R32f).of(GREY, "largest extinction of a brick, 1/mm");
     /// Sums of light and collisions of the paths of each pixel, and of the squares of their luminance; the dispatches alternate.
-    StillSumsA = D::image("still_sums_a", per_ray, |_| Format::Rgba32f).of(&["red", "green", "blue", "collided"], "light of all paths of a pixel; how many of them collided");
-    StillSumsB = D::image("still_sums_b", per_ray, |_| Format::Rgba32f).of(&["red", "green", "blue", "collided"], "light of all paths of a pixel; how many of them collided");
-    StillSquaresA = D::image("still_squares_a", per_ray, |_| Format::R32f).of(GREY, "squares of the luminance of all paths of a pixel");
-    StillSquaresB = D::image("still_squares_b", per_ray, |_| Format::R32f).of(GREY, "squares of the luminance of all paths of a pixel");
+    StillSumsA = D::image("still_sums_a", per_ray, |_| Format::Rgba32f)
+        .of(&["red", "green", "blue", "collided"], "light of all paths of a pixel; how many of them collided");
+    StillSumsB = D::image("still_sums_b", per_ray, |_| Format::Rgba32f)
+        .of(&["red", "green", "blue", "collided"], "light of all paths of a pixel; how many of them collided");
+    StillSquaresA = D::image("still_squares_a", per_ray, |_| Format::R32f)
+        .of(GREY, "squares of the luminance of all paths of a pixel");
+    StillSquaresB = D::image("still_squares_b", per_ray, |_| Format::R32f)
+        .of(GREY, "squares of the luminance of all paths of a pixel");
     /// The cut faces of clip planes: echo where a ray ends at one, and its opacity.
-    Cap = D::image("cap", per_ray, |_| Format::Rg16f).of(&["echo", "opacity"], "echo 0..1 after the grey window of planes, where a ray ends at a cut face; opacity, 0..1");
+    Cap = D::image("cap", per_ray, |_| Format::Rg16f)
+        .of(&["echo", "opacity"], "echo 0..1 after the grey window of planes, where a ray ends at a cut face; opacity, 0..1");
     /// Distance along each pixel's ray, mm; the largest float where nothing was hit.
     Distance = D::image("distance_map", per_ray, |_| Format::R32f).distances();
     DistanceA = D::image("distance_a", per_ray, |_| Format::R32f).distances();
     DistanceB = D::image("distance_b", per_ray, |_| Format::R32f).distances();
     /// Echo at the surface, 1 where a surface was found, and the mean echo behind it where the skin look needs it.
-    Surface = D::image("surface", per_ray, |s| if s.samples_behind() > 0 { Format::Rgba16f } else { Format::Rg16f }).of(&["echo", "found", "echo_behind", "unused"], "echo 0..1 after the grey window; found: 0 or 1");
+    Surface = D::image("surface", per_ray, |s| if s.samples_behind() > 0 { Format::Rgba16f } else { Format::Rg16f })
+        .of(&["echo", "found", "echo_behind", "unused"], "echo 0..1 after the grey window; found: 0 or 1");
     /// Light that arrives at each pixel's surface, 0..1.
     Shadow = D::image("shadow", per_ray, |_| Format::R16f).of(GREY, "share, 0..1");
     /// Ambient light that arrives, 0..1.
@@ -398,14 +445,17 @@ slots! {
     EdgeMarks = D::image("edge_marks", per_pixel_of_rendering, |_| Format::R8).of(GREY, "1 in pixels that have several rays");
     /// With a tolerance: the rays through every other pixel of every other row; their colours on the screen, and their errors.
     Lattice = D::image("lattice", |s| Shape::Two(tolerance::lattice_size(s)), |_| Format::Rgba16f).of(COLOUR, "share, 0..1");
-    LatticeErrors = D::image("lattice_errors", |s| Shape::Two(tolerance::lattice_size(s)), |_| Format::Rgba32f).of(&["red", "green", "blue", "error"], "colour and error on the screen, 0..1; no error is certain");
+    LatticeErrors = D::image("lattice_errors", |s| Shape::Two(tolerance::lattice_size(s)), |_| Format::Rgba32f)
+        .of(&["red", "green", "blue", "error"], "colour and error on the screen, 0..1; no error is certain");
     /// The error of each pixel, 0..1 of the screen; 0 is certain.
     PixelErrors = D::image("pixel_errors", per_ray, |_| Format::R32f).of(GREY, "error on the screen, 0..1; 0 is certain");
     /// Which pixels of each tile of 8 x 8 have too large an error, a bit each; how many of them are in the tiles before.
-    ErrorMarks = D::image("error_marks", |s| Shape::Two(tolerance::tiles(s)), |_| Format::Rg32u).of(&["rows 0 to 3", "rows 4 to 7"], "bits of pixels of a tile");
+    ErrorMarks = D::image("error_marks", |s| Shape::Two(tolerance::tiles(s)), |_| Format::Rg32u)
+        .of(&["rows 0 to 3", "rows 4 to 7"], "bits of pixels of a tile");
     MarkedBefore = D::image("marked_before", |s| Shape::Two(tolerance::tiles(s)), |_| Format::R32u).of(GREY, "pixels");
     /// Workgroups along x, y and z that take all of them, and their number.
-    RefineGroups = D::image("refine_groups", |_| Shape::Two([4, 1]), |_| Format::R32u).of(GREY, "workgroups along x, y, z; pixels");
+    RefineGroups = D::image("refine_groups", |_| Shape::Two([4, 1]), |_| Format::R32u)
+        .of(GREY, "workgroups along x, y, z; pixels");
     /// The planes of a 4-up picture; black where the rendering goes.
     Planes = D::image("planes", per_pixel, |_| Format::Rgba16f).of(COLOUR, "share, 0..1");
     /// The picture of stages 2 and 3 before the filters of stage 4.

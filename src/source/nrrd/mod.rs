@@ -120,27 +120,12 @@ fn of_frames(header: &Header, world: World, remarks: &mut Vec<(String, String)>)
 
 /// Finds the location and the encoding of the samples.
 fn find_pixels(file: &InputFile, header: &Header, layout: &mut Layout) -> Result<(), InputError> {
-    let mut parts = match header.get("data file") {
+    let field = "data file";
+    let parts = match header.get(field) {
         None => vec![layout.pixels.clone()],
-        Some(name) => match data_files(file.path, header, name) {
-            Ok(parts) => parts,
-            Err(fault) => return header.fault("data file", fault),
-        },
+        Some(name) => data_files(file.path, header, name).map_err(|fault| InputError::new(file.path, field, fault))?,
     };
-    let claimed = layout.frame_bytes() * layout.frames as u64;
-    let count = parts.len() as u64;
-    if !claimed.is_multiple_of(count) {
-        return header.fault("data file", format!("names {count} files, which cannot share {claimed} bytes evenly"));
-    }
-    let mut more = 0;
-    for part in &mut parts {
-        more += place(header, part, claimed / count)?;
-    }
-    if more > 0 {
-        layout.remarks.push(("more data".into(), format!("{more} bytes behind the samples; not read")));
-    }
-    layout.pixels = data_files::joined(file.path, parts, claimed / count)?;
-    Ok(())
+    data_files::divide(file.path, field, parts, layout, |part, bytes| place(header, part, bytes))
 }
 
 /// The files that `data file` names: one, those of a list, or `FORMAT FIRST LAST STEP`. The last two may end in the number of axes of a file;
