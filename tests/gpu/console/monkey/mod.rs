@@ -19,8 +19,8 @@ use std::sync::atomic::{AtomicBool, Ordering};
 /// It runs in a process of its own, whose memory no other test uses.
 const TEST: &str = "console::monkey::random_input_sources_and_device_losses_break_nothing";
 /// Growth of resident memory allowed in the second half, bytes: some pictures are large, and their memory is not
-/// returned at once.
-const GROWTH: u64 = 128 << 20;
+/// returned at once. It does not follow the number of steps: six runs of 15,000 to 131,000 grew by -3 to 78 MB, and one of 41,000 by 134 MB.
+const GROWTH: u64 = 192 << 20;
 
 /// Prevents panics, validation messages, leaks, and a console that stops drawing, after any sequence of events. MONKEY_SECONDS continues
 /// for longer, MONKEY_SEED repeats a run.
