@@ -162,7 +162,7 @@ fn drawable(work: &Work, source: &mut dyn Source) -> Result<Contents, Failure> {
 fn check_all(task: &Task, source: &mut dyn Source) -> Result<bool, Failure> {
     // The description of a .frames file counts damaged frames, which are left out otherwise.
     let facts = source::description(&task.input, task.work.geometry.options()).map_err(input)?;
-    let is_damaged = facts.iter().any(|(title, value)| title == "damaged" && value != "0 frames");
+    let is_damaged = facts.rows.iter().any(|(title, value)| title == "damaged" && value != "0 frames");
     source.skip_to_volume(0).map_err(input)?;
     let (expected, mut there) = (source.volumes() * source.frames_per_volume(), 0);
     while there < expected && source.next_frame().map_err(input)?.is_some() {
@@ -197,7 +197,7 @@ fn measured(task: &Task, source: &mut dyn Source) -> Result<Map<String, Value>, 
     let facts = source::description(&task.input, task.work.geometry.options()).map_err(input)?;
     let mut figures = Map::new();
     // Where a probe file lies differs between machines.
-    let facts = facts.into_iter().filter(|(title, _)| title != "geometry from");
+    let facts = facts.rows.into_iter().filter(|(title, _)| title != "geometry from");
     let facts: Map<String, Value> = facts.map(|(title, value)| (title, value.into())).collect();
     figures.insert("recording".into(), facts.into());
     let frames = frames(&task.work, source)?;

@@ -216,7 +216,7 @@ pub fn run() -> ExitCode {
         Command::Convert(convert) => convert.run(),
         Command::Stic(stic) => stic.run(),
         Command::Mesh(mesh) => mesh.run(),
-        Command::Info(info) => info.run(),
+        Command::Info(info) => info.run(arguments.verbose > 0),
         Command::Batch(batch) => batch.run(),
         Command::Probe(probe) => probe.run(),
         Command::Devices(devices) => devices.run(),

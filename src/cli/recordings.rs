@@ -11,7 +11,7 @@ use crate::source::recorder::{Header, Writer};
 use crate::source::segmentation;
 use crate::source::sequence::{self, Sequence};
 use crate::source::volume_file::VolumeFile;
-use crate::source::{self, Frame, Source};
+use crate::source::{self, Description, Frame, Source};
 use crate::terminal::{Failure, failed, input, progress_bar, remark, say};
 use std::path::{Path, PathBuf};
 
@@ -307,8 +307,16 @@ pub struct Info {
 }
 
 impl Info {
-    pub fn run(&self) -> Result<(), Failure> {
-        let facts = source::description(&self.file, self.geometry.options()).map_err(input)?;
+    /// `all`: also each key that the file states and that was not used.
+    pub fn run(&self, all: bool) -> Result<(), Failure> {
+        let Description { rows: mut facts, unused } =
+            source::description(&self.file, self.geometry.options()).map_err(input)?;
+        let unused = unused.lines();
+        match unused.len() {
+            0 => {}
+            _ if all => facts.extend(unused.into_iter().map(|key| ("key not used".to_string(), key))),
+            count => facts.push(("keys not used".into(), format!("{count}, which info -v lists"))),
+        }
         let width = facts.iter().map(|(name, _)| name.chars().count()).max().unwrap_or(0);
         for (name, value) in facts {
             say!("{name:width$}  {value}");

@@ -1,8 +1,9 @@
 //! The formats of recordings, in one table, and which reader a file is for: its content decides, then its name. What is not read is named in one line.
 
+use super::keys::{self, Row};
 use super::layout::Layout;
 use super::packed::InputFile;
-use super::{OpenOptions, dicom, kretz, metaimage, nifti, nrrd, piped_file, recorder, stack};
+use super::{OpenOptions, dicom, kretz, metaimage, nifti, nrrd, piped_file, plus, recorder, stack};
 use crate::files::InputError;
 use std::fs::{self, File};
 use std::io::Read;
@@ -27,6 +28,8 @@ pub struct Format {
     /// True if a file begins with these bytes: its first 1024, or all that it has.
     is_one: fn(&[u8]) -> bool,
     reads: Reads,
+    /// What is done with each key of its files; none if all that they state is read.
+    keys: fn() -> Vec<Row>,
 }
 
 /// How a file of a format becomes a source.
@@ -51,6 +54,7 @@ pub static FORMATS: [Format; 8] = [
         data: &[],
         is_one: dicom::is_one,
         reads: Reads::Stated(dicom::read),
+        keys: dicom::rows,
     },
     Format {
         name: "MetaImage",
@@ -58,6 +62,7 @@ pub static FORMATS: [Format; 8] = [
         data: &["raw", "zraw"],
         is_one: |start| start.starts_with(b"ObjectType") || start.starts_with(b"NDims"),
         reads: Reads::Layout(metaimage::read),
+        keys: || keys::rows(&[&metaimage::KEYS, &plus::FRAME_KEYS]),
     },
     Format {
         name: "NRRD",
@@ -65,6 +70,7 @@ pub static FORMATS: [Format; 8] = [
         data: &["raw"],
         is_one: nrrd::is_one,
         reads: Reads::Layout(nrrd::read),
+        keys: || keys::rows(&[&nrrd::KEYS, &plus::FRAME_KEYS]),
     },
     Format {
         name: "NIfTI",
@@ -72,6 +78,7 @@ pub static FORMATS: [Format; 8] = [
         data: &["img"],
         is_one: nifti::is_one,
         reads: Reads::Layout(nifti::read),
+        keys: || keys::rows(&[&nifti::KEYS]),
     },
     Format {
         name: "Kretz",
@@ -79,6 +86,7 @@ pub static FORMATS: [Format; 8] = [
         data: &[],
         is_one: |start| start.starts_with(b"KRETZFILE"),
         reads: Reads::Layout(kretz::read),
+        keys: || keys::rows(&[&kretz::KEYS]),
     },
     Format {
         name: "UFF",
@@ -87,18 +95,33 @@ pub static FORMATS: [Format; 8] = [
         // The mark of HDF5: every UFF file is one.
         is_one: |start| start.starts_with(b"\x89HDF\r\n\x1a\n"),
         reads: Reads::Uff,
+        keys: uff_keys,
     },
-    Format { name: "frames", endings: &["frames"], data: &[], is_one: recorder::Reader::is_one, reads: Reads::Frames },
+    Format {
+        name: "frames",
+        endings: &["frames"],
+        data: &[],
+        is_one: recorder::Reader::is_one,
+        reads: Reads::Frames,
+        keys: Vec::new,
+    },
     Format {
         name: "stream of frames",
         endings: &[],
         data: &[],
         is_one: piped_file::PipedFile::is_one,
         reads: Reads::Stream,
+        keys: Vec::new,
     },
 ];
 
 impl Format {
+    /// What is done with each key of its files; empty if all that they state is read.
+    #[must_use]
+    pub fn keys(&self) -> Vec<Row> {
+        (self.keys)()
+    }
+
     /// True if its files may be packed as a whole by gzip.
     fn may_be_packed(&self) -> bool {
         matches!(self.reads, Reads::Layout(_) | Reads::Stated(_))
@@ -109,6 +132,13 @@ impl Format {
         let endings: Vec<_> = self.endings.iter().map(|ending| format!(".{ending}")).collect();
         format!("{} ({})", self.name, endings.join(", "))
     }
+}
+
+fn uff_keys() -> Vec<Row> {
+    #[cfg(feature = "uff")]
+    return keys::rows(&[&super::uff::KEYS]);
+    #[cfg(not(feature = "uff"))]
+    Vec::new()
 }
 
 /// What is read, for helps and messages.

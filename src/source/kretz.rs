@@ -1,6 +1,7 @@
 //! GE Kretz volumes (`.vol`): a magic, then items of {u16 group, u16 element, u32 length, bytes}, little-endian, up to
 //! FFFF,FFFF. Groups 0110 and 0120 hold the patient's identity: their bytes are skipped, never read.
 
+use super::keys::{Aspect, Key, Unused, Use};
 use super::layout::{Cartesian, Layout, LineOrder, StoredGeometry, extent};
 use super::packed::{InputFile, Pixels};
 use super::pixel::{Number, PixelFormat};
@@ -41,6 +42,25 @@ const READ_WHOLE: [Tag; 8] =
 /// Elements of group 0002 that exist if the voxels are wavelet-compressed.
 const WAVELET: [Tag; 3] = [(2, 0x1000), (2, 0x1100), (2, 0x1200)];
 
+/// The items, as far as public readers know them.
+pub(super) static KEYS: [Key; 15] = [
+    Key::new("C000,0001 (samples)", Aspect::Geometry, Use::Used),
+    Key::new("C000,0002 (lines)", Aspect::Geometry, Use::Used),
+    Key::new("C000,0003 (frames)", Aspect::Geometry, Use::Used),
+    Key::new("C100,0001 (radial step)", Aspect::Geometry, Use::Used),
+    Key::new("C200,0001 (array radius)", Aspect::Geometry, Use::Used),
+    Key::new("C200,0002 (minus array radius less motor radius)", Aspect::Geometry, Use::Used),
+    Key::new("C300,0001 (sweep angles)", Aspect::Geometry, Use::Used),
+    Key::new("C300,0002 (line angles)", Aspect::Geometry, Use::Used),
+    Key::new("D000,0001 (voxels)", Aspect::Storage, Use::Used),
+    Key::new("D600,0001 (volumes in time)", Aspect::Storage, Use::Used),
+    Key::new("D000,0101 (colour flow)", Aspect::Value, Use::Listed),
+    Key::new("D000,0201 (power Doppler)", Aspect::Value, Use::Listed),
+    Key::new("0002,1000, 0002,1100, 0002,1200 (wavelets)", Aspect::Storage, Use::Refused(&[])),
+    Key::new("0110,*, 0120,* (patient)", Aspect::About, Use::Listed),
+    Key::new("FFFF,FFFF (end)", Aspect::Storage, Use::Optional),
+];
+
 /// The items of a file that are used. Of repeated items the first one counts.
 struct Items<'a> {
     path: &'a Path,
@@ -56,6 +76,7 @@ struct Items<'a> {
     others: Vec<&'static str>,
     /// The file ends behind a whole item, without the mark.
     no_end: bool,
+    unused: Unused,
 }
 
 pub(super) fn read(file: &InputFile) -> Result<Layout, InputError> {
@@ -106,6 +127,7 @@ pub(super) fn read(file: &InputFile) -> Result<Layout, InputError> {
         times: BTreeMap::new(),
         synthetic: false,
         remarks,
+        unused: items.unused,
     };
     layout.check(path, "C000 (size)")?;
     Ok(layout)
@@ -135,6 +157,7 @@ impl<'a> Items<'a> {
             four_d: false,
             others: Vec::new(),
             no_end: false,
+            unused: Unused::default(),
         };
         let mut at = MAGIC.len() as u64;
         for _ in 0..MAX_ITEMS {
@@ -169,6 +192,9 @@ impl<'a> Items<'a> {
                 items.sequence = Some((at, length));
             }
             items.others.extend(OTHER_VOXELS.iter().filter(|(other, _)| *other == tag).map(|(_, name)| name));
+            if ![VOXELS, SEQUENCE].contains(&tag) && !READ_WHOLE.contains(&tag) {
+                items.unused.note_as_it_is(&format!("{:04X},{:04X}", tag.0, tag.1));
+            }
             let mut unread = length;
             if READ_WHOLE.contains(&tag) && !items.small.contains_key(&tag) {
                 if length > MAX_TABLE_BYTES {

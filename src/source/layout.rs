@@ -1,6 +1,7 @@
 //! The layout of a recorded file: what a reader finds out before any sample is read.
 
 use super::describe;
+use super::keys::Unused;
 use super::packed::Pixels;
 use super::pixel::PixelFormat;
 use super::transforms::Poses;
@@ -38,6 +39,8 @@ pub(super) struct Layout {
     pub synthetic: bool,
     /// Remarks for users: title and text. Never a patient field.
     pub remarks: Vec<(String, String)>,
+    /// Keys that the file states and that were not used.
+    pub unused: Unused,
 }
 
 /// How the rows of a frame relate to scan lines.

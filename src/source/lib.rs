@@ -17,6 +17,7 @@ pub mod formats;
 mod frame;
 pub mod freehand;
 pub mod igtl;
+pub mod keys;
 mod kretz;
 mod layout;
 pub mod live;
@@ -59,6 +60,7 @@ pub use recording::Recording;
 pub use transforms::Calibration;
 
 use formats::Reads;
+use keys::Unused;
 use std::path::Path;
 
 /// What a user can say about a file that is opened.
@@ -119,27 +121,46 @@ fn open_file(path: &Path, options: OpenOptions) -> Result<Box<dyn Source>, Input
 ///
 /// # Errors
 /// As [`open_with`]; a `.frames` file is read completely, and may fail while that is done.
-pub fn description(path: &Path, options: OpenOptions) -> Result<Vec<(String, String)>, InputError> {
+pub fn description(path: &Path, options: OpenOptions) -> Result<Description, InputError> {
     if standard_input::is_meant(path) {
         return file_description(&standard_input::file()?, options).map_err(standard_input::renamed);
     }
     file_description(path, options)
 }
 
-fn file_description(path: &Path, options: OpenOptions) -> Result<Vec<(String, String)>, InputError> {
-    match formats::reads(path) {
+/// What a file is, for users.
+#[derive(Clone, Debug)]
+pub struct Description {
+    /// Pairs of title and value. Never a patient's name or number.
+    pub rows: Vec<(String, String)>,
+    /// Keys that the file states and that were not used.
+    pub unused: Unused,
+}
+
+fn file_description(path: &Path, options: OpenOptions) -> Result<Description, InputError> {
+    let (rows, unused) = match formats::reads(path) {
         Some(Reads::Frames) => {
             let opened = posed::Opened::new(path, Box::new(frames(path, options)?), options.freehand)?;
-            Ok(opened.description(frames(path, options)?.description()?))
+            (opened.description(frames(path, options)?.description()?), Unused::default())
         }
         Some(Reads::Stream) => {
             let opened = posed::Opened::new(path, Box::new(stream(path, options)?), options.freehand)?;
-            Ok(opened.description(stream(path, options)?.description()))
+            (opened.description(stream(path, options)?.description()), Unused::default())
         }
-        Some(Reads::Uff) => Ok(uff(path, options)?.1),
-        _ if tracked::is_asked_for(&options) => Ok(tracked_volume(path, options)?.description()),
-        _ => Ok(recording(path, options)?.description()),
-    }
+        Some(Reads::Uff) => {
+            let (_, description) = uff(path, options)?;
+            return Ok(description);
+        }
+        _ if tracked::is_asked_for(&options) => {
+            let volume = tracked_volume(path, options)?;
+            (volume.description(), volume.unused().clone())
+        }
+        _ => {
+            let recording = recording(path, options)?;
+            (recording.description(), recording.unused().clone())
+        }
+    };
+    Ok(Description { rows, unused })
 }
 
 fn recording(path: &Path, options: OpenOptions) -> Result<Recording, InputError> {
@@ -164,8 +185,6 @@ fn stream(path: &Path, options: OpenOptions) -> Result<piped_file::PipedFile, In
 }
 
 /// What describes a source: pairs of title and value.
-type Description = Vec<(String, String)>;
-
 /// The source of a UFF file, and its description.
 fn uff(path: &Path, options: OpenOptions) -> Result<(Box<dyn Source>, Description), InputError> {
     let fault = |flag: &str| Err(InputError::new(path, flag, "is not for UFF, which states its own geometry"));
@@ -178,7 +197,7 @@ fn uff(path: &Path, options: OpenOptions) -> Result<(Box<dyn Source>, Descriptio
             options.freehand.refused(path)?;
             #[cfg(feature = "uff")]
             return uff::Beamformed::open(path).map(|file| {
-                let description = file.description();
+                let description = Description { rows: file.description(), unused: file.unused().clone() };
                 (Box::new(file) as Box<dyn Source>, description)
             });
             #[cfg(not(feature = "uff"))]

@@ -2,6 +2,7 @@
 
 use super::data_files::{self, Pattern};
 use super::frame::DEMO_DATA;
+use super::keys::{Aspect, Key, Stated, Unused, Use};
 use super::layout::{Layout, StoredGeometry, extent, warned};
 use super::packed::{Encoding, InputFile, Pixels};
 use super::pixel::{Number, PixelFormat};
@@ -12,7 +13,6 @@ use crate::files::{InputError, quoted};
 use crate::probe::file::SLAB;
 use crate::probe::{Advance, Array, Axis, Motion, Probe, World};
 use glam::DVec3;
-use std::collections::HashMap;
 use std::io::{BufRead, BufReader, Read};
 use std::path::Path;
 
@@ -89,7 +89,10 @@ pub(super) fn read(file: &InputFile) -> Result<Layout, InputError> {
     };
     let states_geometry = match &geometry {
         StoredGeometry::Sweep(_) => true,
-        StoredGeometry::Cartesian(_) => !words.has_scan_lines() && header.first_of(&PLACEMENT_KEYS).is_some(),
+        StoredGeometry::Cartesian(_) => {
+            !words.has_scan_lines()
+                && [&SPACING[..], &ORIGIN, &MATRIX].concat().iter().any(|key| header.stated.has(key))
+        }
         StoredGeometry::Missing(_) => false,
     };
     if let Some(orientation) = words.orientation.1 {
@@ -112,9 +115,14 @@ pub(super) fn read(file: &InputFile) -> Result<Layout, InputError> {
         times,
         synthetic: header.synthetic,
         remarks,
+        unused: Unused::default(),
     };
     find_pixels(file, &header, &mut layout)?;
     layout.check(path, "DimSize")?;
+    layout.unused = header
+        .stated
+        .finish(path, &mut layout.remarks)
+        .map_err(|(field, fault)| InputError::new(path, field, fault))?;
     Ok(layout)
 }
 
@@ -199,7 +207,7 @@ fn world(header: &Header, remarks: &mut Remarks) -> Result<World, InputError> {
     let unit = unit(header, remarks);
     let mut spacing = [unit, unit, unit, 1.0];
     let mut named = "TransformMatrix";
-    if let Some((field, _)) = header.first_of(&["ElementSpacing", "ElementSize"]) {
+    if let Some((field, _)) = header.first_of(&SPACING) {
         named = field;
         for (i, value) in header.numbers(field, count)?.into_iter().enumerate() {
             if value <= 0.0 {
@@ -209,7 +217,7 @@ fn world(header: &Header, remarks: &mut Remarks) -> Result<World, InputError> {
         }
     }
     let mut origin = [0.0; 4];
-    if let Some((field, _)) = header.first_of(&["Offset", "Position", "Origin"]) {
+    if let Some((field, _)) = header.first_of(&ORIGIN) {
         origin[..count].copy_from_slice(&header.numbers(field, count)?);
     }
     if spacing[3] != 1.0 || origin[3] != 0.0 {
@@ -220,8 +228,10 @@ fn world(header: &Header, remarks: &mut Remarks) -> Result<World, InputError> {
         remarks.push(("time steps".into(), text));
     }
     let mut axes = [DVec3::X, DVec3::Y, DVec3::Z];
-    if let Some((field, _)) = header.first_of(&["TransformMatrix", "Rotation", "Orientation"]) {
+    if let Some((field, _)) = header.first_of(&MATRIX) {
         named = field;
+        // It names what the matrix states.
+        header.get("AnatomicalOrientation");
         for (i, direction) in header.numbers(field, count * count)?.chunks_exact(count).enumerate() {
             let mut whole = [0.0; 4];
             whole[..count].copy_from_slice(direction);
@@ -362,48 +372,66 @@ fn deflated(pixels: &Pixels) -> Result<Encoding, InputError> {
 const MAX_HEADER_BYTES: u64 = 32 << 20;
 const MAX_HEADER_LINES: usize = 500_000;
 
-/// The fields that are read. All others are skipped, so that no patient's name gets into a message.
-const KEYS: &[&str] = &[
-    "ObjectType",
-    "NDims",
-    "DimSize",
-    "ElementType",
-    "ElementSpacing",
-    "ElementSize",
-    "DistanceUnits",
-    "Kinds",
-    "Offset",
-    "Position",
-    "Origin",
-    "TransformMatrix",
-    "Rotation",
-    "Orientation",
-    "BinaryData",
-    "BinaryDataByteOrderMSB",
-    "ElementByteOrderMSB",
-    "CompressedData",
-    "CompressedDataSize",
-    "ElementNumberOfChannels",
-    "HeaderSize",
-    "ElementDataFile",
-    "UltrasoundImageOrientation",
-    "UltrasoundImageType",
-    "IsTransducerConvex",
-    "TransducerRadius",
-    "ScanLinePitch",
-    "MotorType",
-    "MotorRadius",
-    "FramePitch",
-    "AxialResolution",
+/// The fields, with those of MetaIO that are not read. The values of others are skipped, so that no patient's name gets into a message.
+pub(super) static KEYS: [Key; 49] = [
+    Key::new("ObjectType", Aspect::Storage, Use::Used),
+    Key::new("NDims", Aspect::Geometry, Use::Used),
+    Key::new("DimSize", Aspect::Geometry, Use::Used),
+    Key::new("ElementType", Aspect::Storage, Use::Used),
+    Key::new("ElementNumberOfChannels", Aspect::Value, Use::Used),
+    Key::new("ElementSpacing", Aspect::Geometry, Use::Used),
+    Key::new("ElementSize", Aspect::Geometry, Use::Optional),
+    Key::new("DistanceUnits", Aspect::Geometry, Use::Used),
+    Key::new("Kinds", Aspect::Time, Use::Used),
+    Key::new("Offset", Aspect::Geometry, Use::Used),
+    Key::new("Position", Aspect::Geometry, Use::Used),
+    Key::new("Origin", Aspect::Geometry, Use::Used),
+    Key::new("TransformMatrix", Aspect::Orientation, Use::Used),
+    Key::new("Rotation", Aspect::Orientation, Use::Used),
+    Key::new("Orientation", Aspect::Orientation, Use::Used),
+    Key::new("AnatomicalOrientation", Aspect::Orientation, Use::Warned(&["RAI", "???"])),
+    Key::new("CenterOfRotation", Aspect::Geometry, Use::Warned(&["0"])),
+    Key::new("ElementToIntensityFunctionSlope", Aspect::Value, Use::Warned(&["1"])),
+    Key::new("ElementToIntensityFunctionOffset", Aspect::Value, Use::Warned(&["0"])),
+    Key::new("BinaryData", Aspect::Storage, Use::Used),
+    Key::new("BinaryDataByteOrderMSB", Aspect::Storage, Use::Used),
+    Key::new("ElementByteOrderMSB", Aspect::Storage, Use::Used),
+    Key::new("CompressedData", Aspect::Storage, Use::Used),
+    Key::new("CompressedDataSize", Aspect::Storage, Use::Used),
+    Key::new("HeaderSize", Aspect::Storage, Use::Used),
+    Key::new("HeaderSizePerSlice", Aspect::Storage, Use::Refused(&["0"])),
+    Key::new("ElementDataFile", Aspect::Storage, Use::Used),
+    Key::new("UltrasoundImageOrientation", Aspect::Orientation, Use::Used),
+    Key::new("UltrasoundImageType", Aspect::Value, Use::Used),
+    Key::new("IsTransducerConvex", Aspect::Geometry, Use::Optional),
+    Key::new("TransducerRadius", Aspect::Geometry, Use::Optional),
+    Key::new("ScanLinePitch", Aspect::Geometry, Use::Optional),
+    Key::new("MotorType", Aspect::Geometry, Use::Optional),
+    Key::new("MotorRadius", Aspect::Geometry, Use::Optional),
+    Key::new("FramePitch", Aspect::Geometry, Use::Optional),
+    Key::new("AxialResolution", Aspect::Geometry, Use::Optional),
+    Key::new(COMMENT, Aspect::About, Use::Used),
+    Key::new("ObjectSubType", Aspect::About, Use::Listed),
+    Key::new("Name", Aspect::About, Use::Listed),
+    Key::new("ID", Aspect::About, Use::Listed),
+    Key::new("ParentID", Aspect::About, Use::Listed),
+    Key::new("AcquisitionDate", Aspect::About, Use::Listed),
+    Key::new("Color", Aspect::About, Use::Listed),
+    Key::new("Modality", Aspect::About, Use::Listed),
+    Key::new("SequenceID", Aspect::About, Use::Listed),
+    Key::new("ElementMin", Aspect::About, Use::Listed),
+    Key::new("ElementMax", Aspect::About, Use::Listed),
+    Key::new("ElementNBits", Aspect::About, Use::Listed),
+    Key::new("CompressionLevel", Aspect::About, Use::Listed),
 ];
 
-/// The fields that place the samples in space.
-const PLACEMENT_KEYS: [&str; 8] =
-    ["ElementSpacing", "ElementSize", "Offset", "Position", "Origin", "TransformMatrix", "Rotation", "Orientation"];
+const SPACING: [&str; 2] = ["ElementSpacing", "ElementSize"];
+const ORIGIN: [&str; 3] = ["Offset", "Position", "Origin"];
+const MATRIX: [&str; 3] = ["TransformMatrix", "Rotation", "Orientation"];
 
 struct Header<'a> {
     path: &'a Path,
-    fields: HashMap<&'static str, String>,
+    stated: Stated,
     /// What PLUS says of the frames.
     frames: PlusFrames,
     /// The lines behind `ElementDataFile = LIST`.
@@ -421,7 +449,7 @@ impl<'a> Header<'a> {
         let mut input = BufReader::new(stream.take(MAX_HEADER_BYTES));
         let mut header = Header {
             path,
-            fields: HashMap::new(),
+            stated: Stated::new(&KEYS),
             frames: PlusFrames::default(),
             list: Vec::new(),
             synthetic: false,
@@ -456,14 +484,14 @@ impl<'a> Header<'a> {
                 return Err(InputError::new(path, format!("line {number}"), "is not 'Key = Value'"));
             };
             let (key, value) = (key.trim(), value.trim());
-            if let Some(known) = KEYS.iter().find(|k| **k == key) {
-                if header.fields.insert(known, value.to_string()).is_some() {
-                    return header.fault(known, "is given twice");
-                }
-            } else if key == COMMENT {
+            if key == COMMENT {
                 header.synthetic |= value == DEMO_DATA;
             } else if let Some(of_frame) = key.strip_prefix("Seq_Frame") {
-                header.frames.field(path, of_frame, value)?;
+                if !header.frames.field(path, of_frame, value)? {
+                    header.stated.note(key);
+                }
+            } else if let Err(twice) = header.stated.put(key, value) {
+                return header.fault(twice, "is given twice");
             }
             // The data begin after this line.
             if key == "ElementDataFile" && !header.is_list() {
@@ -488,12 +516,17 @@ impl<'a> Header<'a> {
     }
 
     fn get(&self, field: &str) -> Option<&str> {
-        self.fields.get(field).map(String::as_str)
+        self.stated.get(field)
     }
 
-    /// The first existing field of several spellings, with its value.
+    /// The first existing field of several spellings, with its value. Others that say the same count as used.
     fn first_of<'n>(&self, names: &[&'n str]) -> Option<(&'n str, &str)> {
-        names.iter().find_map(|name| self.get(name).map(|value| (*name, value)))
+        let name = names.iter().find(|name| self.stated.has(name))?;
+        let value = self.get(name)?;
+        for other in names.iter().filter(|other| self.stated.is(other, value)) {
+            self.get(other);
+        }
+        Some((*name, value))
     }
 
     fn need(&self, field: &str) -> Result<&str, InputError> {

@@ -1,7 +1,8 @@
 //! NIfTI-1 and NIfTI-2 (`.nii`, and `.hdr` with `.img`): a header of fixed size in either byte order, then samples. Its world is RAS; it
 //! becomes LPS.
 
-use super::layout::{Cartesian, Layout, LineOrder, StoredGeometry, extent};
+use super::keys::{Aspect, Key, Unused, Use, not_used};
+use super::layout::{Cartesian, Layout, LineOrder, StoredGeometry, extent, warned};
 use super::packed::{Encoding, InputFile, Pixels};
 use super::pixel::{Number, PixelFormat};
 use super::transforms::Poses;
@@ -19,6 +20,78 @@ const SIZE_2: usize = 540;
 const MAX_FRAMES: u64 = 1 << 20;
 /// From RAS to LPS.
 const TO_LPS: DVec3 = DVec3::new(-1.0, -1.0, 1.0);
+
+/// The fields of the header. Those of text may hold a patient's name: none of their values is shown.
+pub(super) static KEYS: [Key; 39] = [
+    Key::new("sizeof_hdr", Aspect::Storage, Use::Used),
+    Key::new("magic", Aspect::Storage, Use::Used),
+    Key::new("dim", Aspect::Geometry, Use::Used),
+    Key::new("datatype", Aspect::Storage, Use::Used),
+    Key::new("bitpix", Aspect::Storage, Use::Used),
+    Key::new("vox_offset", Aspect::Storage, Use::Used),
+    Key::new("pixdim", Aspect::Geometry, Use::Used),
+    Key::new("xyzt_units", Aspect::Geometry, Use::Used),
+    Key::new("sform_code", Aspect::Orientation, Use::Used),
+    Key::new("srow_*", Aspect::Orientation, Use::Used),
+    Key::new("qform_code", Aspect::Orientation, Use::Used),
+    Key::new("quatern_*", Aspect::Orientation, Use::Optional),
+    Key::new("qoffset_*", Aspect::Geometry, Use::Optional),
+    Key::new("scl_slope", Aspect::Value, Use::Used),
+    Key::new("scl_inter", Aspect::Value, Use::Used),
+    Key::new("toffset", Aspect::Time, Use::Used),
+    Key::new("slice_start", Aspect::Time, Use::Listed),
+    Key::new("slice_end", Aspect::Time, Use::Listed),
+    Key::new("slice_code", Aspect::Time, Use::Listed),
+    Key::new("slice_duration", Aspect::Time, Use::Warned(&["0"])),
+    Key::new("dim_info", Aspect::About, Use::Listed),
+    Key::new("intent_code", Aspect::About, Use::Listed),
+    Key::new("intent_p1", Aspect::About, Use::Listed),
+    Key::new("intent_p2", Aspect::About, Use::Listed),
+    Key::new("intent_p3", Aspect::About, Use::Listed),
+    Key::new("intent_name", Aspect::About, Use::Listed),
+    Key::new("cal_max", Aspect::About, Use::Listed),
+    Key::new("cal_min", Aspect::About, Use::Listed),
+    Key::new("descrip", Aspect::About, Use::Listed),
+    Key::new("aux_file", Aspect::About, Use::Listed),
+    Key::new("extension", Aspect::About, Use::Listed),
+    Key::new("data_type", Aspect::About, Use::Listed),
+    Key::new("db_name", Aspect::About, Use::Listed),
+    Key::new("extents", Aspect::About, Use::Listed),
+    Key::new("session_error", Aspect::About, Use::Listed),
+    Key::new("regular", Aspect::About, Use::Listed),
+    Key::new("glmax", Aspect::About, Use::Listed),
+    Key::new("glmin", Aspect::About, Use::Listed),
+    Key::new("unused_str", Aspect::About, Use::Listed),
+];
+
+/// Where the fields are that are not read: name, and offset and bytes in version 1 and in version 2, if they are there.
+const NOT_READ: [(&str, Place, Place); 23] = [
+    ("slice_start", Some((74, 2)), Some((224, 8))),
+    ("slice_end", Some((120, 2)), Some((232, 8))),
+    ("slice_code", Some((122, 1)), Some((496, 4))),
+    ("slice_duration", Some((132, 4)), Some((208, 8))),
+    ("dim_info", Some((39, 1)), Some((524, 1))),
+    ("intent_code", Some((68, 2)), Some((504, 4))),
+    ("intent_p1", Some((56, 4)), Some((80, 8))),
+    ("intent_p2", Some((60, 4)), Some((88, 8))),
+    ("intent_p3", Some((64, 4)), Some((96, 8))),
+    ("intent_name", Some((328, 16)), Some((508, 16))),
+    ("cal_max", Some((124, 4)), Some((192, 8))),
+    ("cal_min", Some((128, 4)), Some((200, 8))),
+    ("descrip", Some((148, 80)), Some((240, 80))),
+    ("aux_file", Some((228, 24)), Some((320, 24))),
+    ("data_type", Some((4, 10)), None),
+    ("db_name", Some((14, 18)), None),
+    ("extents", Some((32, 4)), None),
+    ("session_error", Some((36, 2)), None),
+    ("regular", Some((38, 1)), None),
+    ("glmax", Some((140, 4)), None),
+    ("glmin", Some((144, 4)), None),
+    ("extension", Some((348, 1)), Some((540, 1))),
+    ("unused_str", None, Some((525, 15))),
+];
+/// Offset and bytes.
+type Place = Option<(usize, usize)>;
 
 /// Version 1 or 2, and the byte order, of a file that begins like this.
 fn version(start: &[u8]) -> Option<(u8, bool)> {
@@ -90,7 +163,8 @@ pub(super) fn read(file: &InputFile) -> Result<Layout, InputError> {
     let fault = |field: &str, fault: String| Err(InputError::new(path, field, fault));
     let mut bytes = Vec::new();
     let opened = file.open().map_err(|e| InputError::unreadable(path, &e))?;
-    opened.take(SIZE_2 as u64).read_to_end(&mut bytes).map_err(|e| InputError::unreadable(path, &e))?;
+    // With the first byte after the header, which says whether there is an extension.
+    opened.take(SIZE_2 as u64 + 1).read_to_end(&mut bytes).map_err(|e| InputError::unreadable(path, &e))?;
     let Some((version, big_endian)) = version(&bytes) else {
         return fault("magic", "is not that of NIfTI".into());
     };
@@ -125,6 +199,11 @@ pub(super) fn read(file: &InputFile) -> Result<Layout, InputError> {
     let is_scaled = slope != 0.0 && slope.is_finite() && intercept.is_finite() && (slope, intercept) != (1.0, 0.0);
     let pixel = PixelFormat { number, channels, big_endian, scale: is_scaled.then_some([slope, intercept]) };
     let mut remarks = Vec::new();
+    let bits = header.integer((72, 2), (14, 2));
+    if bits != 0 && bits != 8 * pixel.bytes() as i64 {
+        let text = format!("bitpix is {bits}, but datatype has {} bits and counts", 8 * pixel.bytes());
+        remarks.push(warned(path, "not used", text));
+    }
     let world = world(file, &header, &mut remarks)?;
     let mut layout = Layout {
         format: if version == 1 { "NIfTI-1" } else { "NIfTI-2" },
@@ -138,8 +217,9 @@ pub(super) fn read(file: &InputFile) -> Result<Layout, InputError> {
         volumes: 1,
         states_geometry: true,
         poses: Poses::default(),
-        times: times(&header, size[2], volumes),
+        times: times(file, &header, size[2], volumes, &mut remarks),
         synthetic: false,
+        unused: unused(file, &header, &mut remarks),
         remarks,
     };
     let claimed = layout.frame_bytes() * frames;
@@ -150,6 +230,20 @@ pub(super) fn read(file: &InputFile) -> Result<Layout, InputError> {
     }
     layout.check(path, "dim")?;
     Ok(layout)
+}
+
+/// The fields that are not 0 and not read.
+fn unused(file: &InputFile, header: &Bytes, remarks: &mut Vec<(String, String)>) -> Unused {
+    let mut unused = Unused::default();
+    for (name, one, two) in NOT_READ {
+        let Some((at, length)) = (if header.version == 1 { one } else { two }) else { continue };
+        let is_stated = header.bytes.get(at..at + length).is_some_and(|bytes| bytes.iter().any(|byte| *byte != 0));
+        let Some(key) = KEYS.iter().find(|key| key.name == name).filter(|_| is_stated) else { continue };
+        unused.note(name);
+        // None of them is refused.
+        let _ = not_used(file.path, key, "not 0", remarks);
+    }
+    unused
 }
 
 /// Voxels of a volume, and the number of volumes.
@@ -205,9 +299,18 @@ fn pixels(file: &InputFile, header: &Bytes) -> Result<Pixels, InputError> {
 /// The world: that of the sform, otherwise of the qform, otherwise the spacing alone.
 fn world(file: &InputFile, header: &Bytes, remarks: &mut Vec<(String, String)>) -> Result<World, InputError> {
     let unit = match header.integer((123, 1), (500, 4)) & 7 {
+        0 => {
+            remarks.push(("units".into(), "not stated, taken as mm".into()));
+            1.0
+        }
         1 => 1e3,
+        2 => 1.0,
         3 => 1e-3,
-        _ => 1.0,
+        other => {
+            let text = format!("the unit of lengths has the code {other}, which is not known; taken as mm");
+            remarks.push(warned(file.path, "units", text));
+            1.0
+        }
     };
     let made = |axes: [DVec3; 3], origin: DVec3| World::new(axes.map(|a| a * unit), origin * unit);
     let fault = |field: &str, why: String| InputError::new(file.path, field, why);
@@ -258,15 +361,30 @@ fn quaternion(b: f64, c: f64, d: f64) -> DMat3 {
 }
 
 /// Time stamps of all frames, if there are several volumes and a time between them.
-fn times(header: &Bytes, slices: usize, volumes: usize) -> BTreeMap<usize, f64> {
-    let unit = match header.integer((123, 1), (500, 4)) & 0x38 {
-        16 => 1e-3,
-        24 => 1e-6,
-        _ => 1.0,
-    };
-    let (step, first) = (header.pixdim(4) * unit, header.real(136, 216, 0) * unit);
+fn times(
+    file: &InputFile,
+    header: &Bytes,
+    slices: usize,
+    volumes: usize,
+    remarks: &mut Vec<(String, String)>,
+) -> BTreeMap<usize, f64> {
+    let (step, first) = (header.pixdim(4), header.real(136, 216, 0));
     if volumes < 2 || !(step > 0.0 && step.is_finite() && first.is_finite()) {
         return BTreeMap::new();
     }
-    (0..slices * volumes).map(|frame| (frame, first + step * (frame / slices) as f64)).collect()
+    let unit = match header.integer((123, 1), (500, 4)) & 0x38 {
+        0 => {
+            remarks.push(("unit of time".into(), "not stated, taken as s".into()));
+            1.0
+        }
+        8 => 1.0,
+        16 => 1e-3,
+        24 => 1e-6,
+        _ => {
+            let text = "the fourth axis has no unit of time: there are no time stamps";
+            remarks.push(warned(file.path, "times", text.into()));
+            return BTreeMap::new();
+        }
+    };
+    (0..slices * volumes).map(|frame| (frame, (first + step * (frame / slices) as f64) * unit)).collect()
 }

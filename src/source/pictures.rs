@@ -2,6 +2,7 @@
 
 use crate::files::escaped;
 use crate::files::progress::CountedFile;
+use image::metadata::Orientation;
 use image::{DynamicImage, ImageDecoder, ImageReader};
 use std::io::{self, Read};
 use std::path::{Path, PathBuf};
@@ -28,6 +29,8 @@ pub(super) struct About {
     pub is_colour: bool,
     /// Length of the file, bytes.
     pub length: u64,
+    /// It says that it is to be turned or mirrored (EXIF).
+    pub is_turned: bool,
 }
 
 impl About {
@@ -35,15 +38,50 @@ impl About {
     /// In words: a file that cannot be read, or is no picture that is read.
     pub fn of(picture: &Path) -> Result<About, String> {
         let length = std::fs::metadata(picture).map_err(|e| format!("cannot be read: {e}"))?.len();
-        let decoder = reader(picture)?.into_decoder().map_err(unreadable)?;
+        let mut decoder = reader(picture)?.into_decoder().map_err(unreadable)?;
+        let is_turned = decoder.orientation().is_ok_and(|orientation| orientation != Orientation::NoTransforms);
         let (colour, (width, height)) = (decoder.color_type(), decoder.dimensions());
         let deep = match colour.bytes_per_pixel() / colour.channel_count() {
             1 => false,
             2 => true,
             _ => return Err("has samples of more than 16 bits".into()),
         };
-        Ok(About { size: [width, height], deep, is_colour: colour.has_color(), length })
+        Ok(About { size: [width, height], deep, is_colour: colour.has_color(), length, is_turned })
     }
+}
+
+/// Bytes at the start of a picture in which its parts are looked for.
+const START: u64 = 64 << 10;
+/// Chunks of a PNG that are read.
+const READ: [&[u8]; 5] = [b"IHDR", b"PLTE", b"tRNS", b"sBIT", b"IDAT"];
+
+/// The names of what stands beside the pixels in a PNG or JPEG and is not read, such as the density of pixels.
+pub(super) fn beside_pixels(picture: &Path) -> Vec<String> {
+    let mut start = Vec::new();
+    // What cannot be read was reported before.
+    let _ = std::fs::File::open(picture).and_then(|file| file.take(START).read_to_end(&mut start));
+    let shown = |name: &[u8]| String::from_utf8_lossy(name).into_owned();
+    let mut names = Vec::new();
+    if let Some(mut rest) = start.strip_prefix(b"\x89PNG\r\n\x1a\n") {
+        while let Some(([a, b, c, d, name @ ..], after)) = rest.split_first_chunk::<8>() {
+            names.extend((!READ.contains(&&name[..])).then(|| format!("PNG {}", shown(name))));
+            let length = u32::from_be_bytes([*a, *b, *c, *d]) as usize;
+            let Some(next) = after.get(length.saturating_add(4)..).filter(|_| name != b"IDAT") else { break };
+            rest = next;
+        }
+    } else if let Some(mut rest) = start.strip_prefix(b"\xff\xd8") {
+        // Segments of applications; the samples begin after SOS.
+        while let Some(([0xff, marker, a, b], after)) = rest.split_first_chunk::<4>() {
+            let length = usize::from(u16::from_be_bytes([*a, *b])).saturating_sub(2);
+            if (0xe0..=0xef).contains(marker) {
+                let name = after.split(|byte| *byte == 0).next().unwrap_or_default();
+                names.push(format!("JPEG APP{} {}", marker - 0xe0, shown(name.get(..4).unwrap_or(name))));
+            }
+            let Some(next) = after.get(length..).filter(|_| *marker != 0xda) else { break };
+            rest = next;
+        }
+    }
+    names
 }
 
 /// A reader for the format of a file's content, with the library's limits of memory.

@@ -2,6 +2,7 @@
 //! the axes of a picture lie on the transducer.
 
 use super::describe::number;
+use super::keys::{Aspect, Key, Use};
 use super::layout::{Cartesian, LineOrder, StoredGeometry, warned};
 use super::transforms::{Poses, TransformName, matrix};
 use crate::files::{InputError, quoted};
@@ -11,6 +12,18 @@ use std::path::Path;
 
 /// Pairs of title and text.
 type Remarks = Vec<(String, String)>;
+
+/// What is read of the frames of a sequence, in MetaImage and in NRRD.
+pub(super) static FRAME_KEYS: [Key; 8] = [
+    Key::new("Seq_FrameN_Timestamp", Aspect::Time, Use::Used),
+    Key::new("Seq_FrameN_ElementSpacing", Aspect::Geometry, Use::Used),
+    Key::new("Seq_FrameN_*Transform", Aspect::Geometry, Use::Used),
+    Key::new("Seq_FrameN_*TransformStatus", Aspect::Geometry, Use::Used),
+    Key::new("Seq_FrameN_ImageStatus", Aspect::About, Use::Used),
+    Key::new("Seq_FrameN_Status", Aspect::About, Use::Used),
+    Key::new("Seq_FrameN_UnfilteredTimestamp", Aspect::About, Use::Listed),
+    Key::new("Seq_FrameN_FrameNumber", Aspect::About, Use::Listed),
+];
 
 /// What the fields `Seq_FrameNNNN_...` say, by NNNN.
 #[derive(Default)]
@@ -30,31 +43,32 @@ pub(super) struct PlusFrames {
 
 impl PlusFrames {
     /// `0012_Timestamp`, `0012_ImageStatus`, `0012_ElementSpacing`, `0012_ProbeToTrackerTransform` and its `...Status`, what follows
-    /// `Seq_Frame`; other fields of frames are skipped.
+    /// `Seq_Frame`. False for other fields, which are not used.
     ///
     /// # Errors
     /// A time stamp that is no number, or a spacing that is none.
-    pub(super) fn field(&mut self, path: &Path, key: &str, value: &str) -> Result<(), InputError> {
+    pub(super) fn field(&mut self, path: &Path, key: &str, value: &str) -> Result<bool, InputError> {
         self.is_sequence = true;
-        let Some((number, field)) = key.split_once('_') else { return Ok(()) };
-        let Ok(number) = number.parse::<usize>() else { return Ok(()) };
+        let Some((number, field)) = key.split_once('_') else { return Ok(false) };
+        let Ok(number) = number.parse::<usize>() else { return Ok(false) };
         let fault = |fault: String| Err(InputError::new(path, format!("Seq_Frame{number:04}_{field}"), fault));
         match field {
             "Timestamp" => match value.parse::<f64>() {
                 Ok(time) if time.is_finite() => drop(self.times.insert(number, time)),
                 _ => return fault(format!("{} is not a finite number", quoted(value))),
             },
-            "ImageStatus" | "Status" if value != "OK" => drop(self.not_ok.insert(number)),
+            "ImageStatus" | "Status" => drop((value != "OK").then(|| self.not_ok.insert(number))),
             "ElementSpacing" => match spacing(value) {
                 Some(spacing) => drop(self.spacings.insert(number, spacing)),
                 None => return fault(format!("{} is not 2 or 3 numbers above 0", quoted(value))),
             },
-            _ => self.transform(number, field, value),
+            _ => return Ok(self.transform(number, field, value)),
         }
-        Ok(())
+        Ok(true)
     }
 
-    fn transform(&mut self, number: usize, field: &str, value: &str) {
+    /// False if the field is no transform.
+    fn transform(&mut self, number: usize, field: &str, value: &str) -> bool {
         if let Some(name) = field.strip_suffix("TransformStatus").and_then(|name| name.parse().ok()) {
             if value != "OK" {
                 self.invalid.push((name, number));
@@ -65,7 +79,10 @@ impl PlusFrames {
                 // As programs write what was not tracked: no inverse, not finite.
                 Err(_) => self.invalid.push((name, number)),
             }
+        } else {
+            return false;
         }
+        true
     }
 
     /// The poses whose status is OK. `slices`: of each volume; only pictures are placed by poses.

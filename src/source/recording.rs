@@ -2,6 +2,7 @@
 
 use super::drawn::Drawn;
 use super::formats::read_layout;
+use super::keys::Unused;
 use super::layout::{Layout, LineOrder, StoredGeometry};
 use super::packed::PixelStream;
 use super::samples::Replaced;
@@ -349,6 +350,11 @@ impl Recording {
         rows.extend(describe::times(&self.layout.times));
         rows.extend(self.layout.remarks.iter().cloned());
         rows
+    }
+
+    /// Keys that the file states and that were not used.
+    pub fn unused(&self) -> &Unused {
+        &self.layout.unused
     }
 
     fn frames_to_read(&self) -> usize {

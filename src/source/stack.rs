@@ -1,8 +1,9 @@
 //! Numbered pictures of one size as the slices of a Cartesian volume: those of a folder, or those that a pattern such as `slice-*.png` names.
 
-use super::layout::{Cartesian, Layout, LineOrder, StoredGeometry, extent};
+use super::keys::Unused;
+use super::layout::{Cartesian, Layout, LineOrder, StoredGeometry, extent, warned};
 use super::packed::Pixels;
-use super::pictures::{About, ENDINGS, Pictures};
+use super::pictures::{About, ENDINGS, Pictures, beside_pixels};
 use super::pixel::{Number, PixelFormat};
 use super::transforms::Poses;
 use super::{OpenOptions, describe};
@@ -41,7 +42,7 @@ pub(super) fn read(path: &Path, options: &OpenOptions) -> Result<Layout, InputEr
     let (folder, names) = list(path)?;
     let order = order(&names).map_err(|why| fault("pictures", why))?;
     let pictures: Arc<[PathBuf]> = order.into_iter().map(|n| folder.join(&names[n])).collect();
-    let (mut size, mut is_colour, mut length) = (None, false, 0);
+    let (mut size, mut is_colour, mut is_turned, mut length) = (None, false, false, 0);
     progress::expect_files(pictures.len() as u64);
     for picture in pictures.iter() {
         let about = About::of(picture).map_err(|why| InputError::new(picture, "file", why))?;
@@ -59,6 +60,7 @@ pub(super) fn read(path: &Path, options: &OpenOptions) -> Result<Layout, InputEr
             return Err(InputError::new(picture, "picture", "has not as many bits a pixel as the first"));
         }
         is_colour |= about.is_colour;
+        is_turned |= about.is_turned;
         length += about.length;
     }
     let ([width, height], deep) = size.unwrap_or_default();
@@ -66,7 +68,13 @@ pub(super) fn read(path: &Path, options: &OpenOptions) -> Result<Layout, InputEr
     let side = |which: &str, n: u32| extent(path, "picture", which, n.into());
     let frame_size = [side("width ", width)?, side("height ", height)?];
     let frames = extent(path, "pictures", "number ", pictures.len() as u64)?;
-    let mut remarks = Vec::new();
+    let (mut remarks, mut unused) = (Vec::new(), Unused::default());
+    if is_turned {
+        let text = "pictures say that they are to be turned or mirrored (EXIF): drawn as stored";
+        remarks.push(warned(path, "not drawn so", text.into()));
+    }
+    let beside = pictures.first().map(|first| beside_pixels(first)).unwrap_or_default();
+    beside.iter().for_each(|name| unused.note_as_it_is(name));
     let spacing = match (options.voxel_spacing, options.probe) {
         (Some(_), Some(_)) => {
             return Err(fault("--voxel-spacing", "and --probe say different things; give one".into()));
@@ -111,6 +119,7 @@ pub(super) fn read(path: &Path, options: &OpenOptions) -> Result<Layout, InputEr
         times: BTreeMap::new(),
         synthetic: false,
         remarks,
+        unused,
     };
     layout.check(path, "pictures")?;
     Ok(layout)

@@ -3,6 +3,7 @@
 use super::OpenOptions;
 use super::frame::Source;
 use super::freehand::{CompoundingOptions, FreehandFile, PlacedPicture, PlacedPictures, Pose};
+use super::keys::Unused;
 use super::plus_config::PlusConfig;
 use super::recording::Recording;
 use super::transforms::{Calibration, Chain, HOW};
@@ -93,6 +94,11 @@ impl TrackedVolume {
         let placed = [("tracking", pictures.poses().names()), ("placed", format!("from {from} to {to}"))];
         let placed = placed.map(|(title, value)| (title.to_string(), value)).to_vec();
         self.describe(pictures.format(), placed, to)
+    }
+
+    /// Keys that the file states and that were not used.
+    pub fn unused(&self) -> &Unused {
+        self.placed().pictures.unused()
     }
 }
 

@@ -7,6 +7,7 @@
 //! Complex data and amplitudes become decibels of their envelope, 0 at the largest of the file. Data of both signs are RF and are refused.
 
 use super::describe;
+use super::keys::{Aspect, Key, Unused, Use, not_used};
 use crate::files::{InputError, progress, quoted};
 use crate::probe::file::SLAB;
 use crate::probe::{Advance, Array, Axis, Geometry, Motion, Probe};
@@ -15,6 +16,22 @@ use crate::{SampleType, StoredType};
 use hdf5_reader::group::Group;
 use hdf5_reader::{DEFAULT_CHUNK_CACHE_SLOTS, Dataset, Hdf5File, OpenOptions, SliceInfo, SliceInfoElem};
 use std::path::{Path, PathBuf};
+
+/// What is read of a group of beamformed data, and of what else stands in it what could change a picture.
+pub(super) static KEYS: [Key; 12] = [
+    Key::new("data", Aspect::Storage, Use::Used),
+    Key::new("scan", Aspect::Geometry, Use::Used),
+    Key::new("scan/x_axis", Aspect::Geometry, Use::Used),
+    Key::new("scan/y_axis", Aspect::Geometry, Use::Used),
+    Key::new("scan/z_axis", Aspect::Geometry, Use::Used),
+    Key::new("scan/azimuth_axis", Aspect::Geometry, Use::Used),
+    Key::new("scan/elevation_axis", Aspect::Geometry, Use::Used),
+    Key::new("scan/depth_axis", Aspect::Geometry, Use::Used),
+    Key::new("scan/transform", Aspect::Geometry, Use::Refused(&["0"])),
+    Key::new("scan/origin", Aspect::Geometry, Use::Warned(&["0"])),
+    Key::new("scan/apex", Aspect::Geometry, Use::Warned(&["0"])),
+    Key::new("*", Aspect::About, Use::Listed),
+];
 
 /// Most samples, lines, slices or volumes.
 const MAX_EXTENT: u64 = 65_536;
@@ -46,6 +63,8 @@ pub(super) struct Beamformed {
     scale: Scale,
     volumes: usize,
     next: usize,
+    remarks: Vec<(String, String)>,
+    unused: Unused,
 }
 
 /// Where the numbers of the pixels are.
@@ -149,8 +168,19 @@ impl Beamformed {
         if needed.kept > cache.usual || needed.count > DEFAULT_CHUNK_CACHE_SLOTS as u64 {
             data = file.data(&group(needed.kept.max(cache.usual.min(most)), needed.count)?)?;
         }
-        let mut read =
-            Beamformed { path: path.into(), probe, scan: class, data, scale: Scale::Decibels, volumes, next: 0 };
+        let mut remarks = Vec::new();
+        let unused = file.unused(&opened, &scan, &mut remarks)?;
+        let mut read = Beamformed {
+            path: path.into(),
+            probe,
+            scan: class,
+            data,
+            scale: Scale::Decibels,
+            volumes,
+            next: 0,
+            remarks,
+            unused,
+        };
         read.scale = read.measure()?;
         Ok(read)
     }
@@ -173,7 +203,13 @@ impl Beamformed {
         rows.extend(describe::probe(&self.probe));
         let [low, high] = self.range().map(describe::number);
         rows.push(("value range".into(), format!("{low} .. {high}")));
+        rows.extend(self.remarks.iter().cloned());
         rows
+    }
+
+    /// What stands beside the data and is not used.
+    pub fn unused(&self) -> &Unused {
+        &self.unused
     }
 
     /// What the numbers are, by their signs, and the largest.
@@ -253,6 +289,12 @@ fn numbers(set: &Dataset, selection: &SliceInfo) -> Result<Vec<f64>, hdf5_reader
         }
         hdf5_reader::Datatype::FixedPoint { size: 1, signed: false, .. } => {
             Ok(set.read_slice::<u8>(selection)?.iter().map(|value| f64::from(*value)).collect())
+        }
+        hdf5_reader::Datatype::FixedPoint { size: 8, signed: true, .. } => {
+            Ok(set.read_slice::<i64>(selection)?.iter().map(|value| *value as f64).collect())
+        }
+        hdf5_reader::Datatype::FixedPoint { size: 4, signed: true, .. } => {
+            Ok(set.read_slice::<i32>(selection)?.iter().map(|value| f64::from(*value)).collect())
         }
         _ => Ok(set.read_slice::<f64>(selection)?.iter().copied().collect()),
     }
@@ -416,20 +458,11 @@ impl File<'_> {
         }
     }
 
-    /// Refuses what moves pixels away from their axes: transforms, and several origins of scan lines.
+    /// Refuses what moves pixels away from their axes: nested transforms, and several origins of scan lines.
     fn no_transform(&self, scan: &Group) -> Result<(), InputError> {
-        if let Ok(transform) = scan.group("transform") {
-            let (groups, sets) = transform.members().map_err(|e| self.broken("scan/transform", &e))?;
-            let mut moves = !groups.is_empty();
-            for set in sets {
-                let values = self.vector(&transform, set.name())?.unwrap_or_default();
-                // An identity has ones on its diagonal and nothing else.
-                let is_identity = values.len() == 9 && (0..9).all(|n| values[n] == f64::from(u8::from(n % 4 == 0)));
-                moves |= !is_identity && values.iter().any(|value| *value != 0.0);
-            }
-            if moves {
-                return self.fault("scan/transform", "is there; scans that are moved by one are not read");
-            }
+        let turned = scan.group("transform").and_then(|transform| transform.groups());
+        if turned.is_ok_and(|groups| !groups.is_empty()) {
+            return self.fault("scan/transform", "is there; scans that are moved by one are not read");
         }
         for name in ["origin", "apex"] {
             let Ok(origin) = scan.group(name) else { continue };
@@ -439,6 +472,40 @@ impl File<'_> {
             }
         }
         Ok(())
+    }
+
+    /// The members of the data and of their scan that are not read.
+    fn unused(&self, data: &Group, scan: &Group, remarks: &mut Vec<(String, String)>) -> Result<Unused, InputError> {
+        let mut unused = Unused::default();
+        for (group, within) in [(data, ""), (scan, "scan/")] {
+            let (groups, sets) = group.member_names().map_err(|e| self.broken("file", &e))?;
+            for name in groups.into_iter().chain(sets) {
+                let whole = format!("{within}{name}");
+                let known = KEYS.iter().find(|key| key.name == whole);
+                if known.is_some_and(|key| key.done == Use::Used) {
+                    continue;
+                }
+                unused.note_as_it_is(&whole);
+                if let Some(key) = known {
+                    let value = self.numbers_in(group, &name)?;
+                    not_used(self.path, key, &value, remarks).or_else(|(name, fault)| self.fault(name, fault))?;
+                }
+            }
+        }
+        Ok(unused)
+    }
+
+    /// The numbers of a group's datasets, as text; of an identity there is none.
+    fn numbers_in(&self, parent: &Group, name: &str) -> Result<String, InputError> {
+        let Ok(group) = parent.group(name) else { return Ok(String::new()) };
+        let mut text = String::new();
+        for set in group.datasets().map_err(|e| self.broken(name, &e))? {
+            let values = self.vector(&group, set.name())?.unwrap_or_default();
+            // An identity has ones on its diagonal and nothing else.
+            let is_identity = values.len() == 9 && (0..9).all(|n| values[n] == f64::from(u8::from(n % 4 == 0)));
+            values.iter().filter(|_| !is_identity).for_each(|value| text += &format!("{value} "));
+        }
+        Ok(text)
     }
 
     fn data(&self, group: &Group) -> Result<Data, InputError> {

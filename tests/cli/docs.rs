@@ -4,6 +4,8 @@
 use crate::common::files::repository;
 use crate::common::program::PROGRAM;
 use echolume::low_level::scene::Settings;
+use echolume::low_level::source::formats::FORMATS;
+use echolume::low_level::source::keys::{Row, Use};
 use serde_json::{Map, Value, json};
 use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Write;
@@ -45,6 +47,54 @@ fn hold(name: &str, page: &str) {
         at(&kept),
         at(page)
     );
+}
+
+/// The same for the part of a page between two marks.
+fn hold_part(name: &str, part: &str) {
+    let (begin, end) =
+        ("<!-- Generated: `tools/docs` writes this part. Do not edit it. -->\n", "<!-- End of the generated part. -->");
+    let page = read(name);
+    let (before, rest) = page.split_once(begin).unwrap_or_else(|| panic!("{name} has no generated part"));
+    let (_, after) = rest.split_once(end).unwrap_or_else(|| panic!("{name} has no end of the generated part"));
+    hold(name, &format!("{before}{begin}\n{part}\n{end}{after}"));
+}
+
+// The formats.
+
+/// Keys of a kind: those of each aspect, with the values that change nothing.
+fn keys_of(rows: &[Row], is_one: impl Fn(Use) -> bool) -> String {
+    let mut by_aspect: BTreeMap<&str, Vec<String>> = BTreeMap::new();
+    for row in rows.iter().filter(|row| is_one(row.done)) {
+        let unless = match row.done {
+            Use::Warned(neutral) | Use::Refused(neutral) if !neutral.is_empty() => {
+                format!(" unless {}", neutral.join(" or "))
+            }
+            _ => String::new(),
+        };
+        by_aspect.entry(row.aspect.name()).or_default().push(format!("`{}`{unless}", row.name));
+    }
+    by_aspect.iter().map(|(aspect, keys)| format!("{aspect}: {}", keys.join(", "))).collect::<Vec<_>>().join("; ")
+}
+
+#[test]
+fn generated_tables_of_keys_are_those_of_the_readers() {
+    let mut part = String::new();
+    for format in FORMATS.iter().filter(|format| !format.keys().is_empty()) {
+        let rows = format.keys();
+        writeln!(part, "### {}\n\n| what is done | keys |\n|---|---|", format.name).expect("text");
+        for (title, keys) in [
+            ("used", keys_of(&rows, |done| matches!(done, Use::Used | Use::Optional))),
+            ("not used, with a warning", keys_of(&rows, |done| matches!(done, Use::Warned(_)))),
+            ("refused", keys_of(&rows, |done| matches!(done, Use::Refused(_)))),
+            ("not used, listed by `info -v`", keys_of(&rows, |done| done == Use::Listed)),
+        ] {
+            if !keys.is_empty() {
+                writeln!(part, "| {title} | {keys} |").expect("text");
+            }
+        }
+        part.push('\n');
+    }
+    hold_part("docs/formats.md", part.trim_end());
 }
 
 // The command line.

@@ -4,7 +4,7 @@
 use crate::common::files::{Folder, data};
 use crate::common::program;
 use echolume::low_level::probe::Geometry;
-use echolume::low_level::source::Recording;
+use echolume::low_level::source::{Description, OpenOptions, Recording, description};
 use image::ExtendedColorType;
 use image::codecs::jpeg::JpegEncoder;
 use std::collections::BTreeMap;
@@ -476,4 +476,31 @@ fn a_region_without_a_scale_leaves_it_to_the_pixel_spacing() {
     without.elements.remove(&0x0028_0030);
     refused(&without, &["--voxel-spacing"]);
     refused(&region(0.0, 0.0, 3).text(0x0028_0030, "0\\0"), &["--voxel-spacing"]);
+}
+
+#[test]
+fn elements_that_are_not_used_are_listed_by_their_tags_and_those_that_matter_are_warnings() {
+    let folder = Folder::new("dicom-unused");
+    let found = |more: &[(u32, &str)]| {
+        let file = File::new(LITTLE, 4, 3).pixels(&[9; 12]);
+        let file = more.iter().fold(file, |file, (tag, text)| file.text(*tag, text));
+        description(&file.written(&folder), OpenOptions::default()).expect("read")
+    };
+    let warned = |found: &Description| found.rows.iter().filter(|(title, _)| title == "not used").count();
+    let base = found(&[]).unused.lines();
+    let added =
+        |found: &Description| found.unused.lines().into_iter().filter(|line| !base.contains(line)).collect::<Vec<_>>();
+    let named = found(&[(0x0010_0010, "Doe^Jane"), (0x0028_1050, "40")]);
+    assert_eq!(added(&named), ["(0010,0010)", "WindowCenter (0028,1050)"]);
+    assert!(warned(&named) == 0 && named.rows.iter().all(|(_, text)| !text.contains("Doe")), "{:?}", named.rows);
+    for (tag, name, neutral, other) in [
+        (0x0028_0034, "PixelAspectRatio (0028,0034)", "1\\1", "4\\3"),
+        (0x2050_0020, "PresentationLUTShape (2050,0020)", "IDENTITY", "INVERSE"),
+        (0x0018_7034, "FieldOfViewHorizontalFlip (0018,7034)", "NO", "YES"),
+    ] {
+        let (usual, other) = (found(&[(tag, neutral)]), found(&[(tag, other)]));
+        assert_eq!((added(&usual), warned(&usual)), (vec![name.to_string()], 0), "{:?}", usual.rows);
+        assert_eq!((added(&other), warned(&other)), (vec![name.to_string()], 1), "{:?}", other.rows);
+    }
+    assert_eq!(warned(&found(&[(0x0018_1164, "0.1\\0.1")])), 1);
 }

@@ -20,3 +20,4 @@ mod sources;
 mod stacks;
 mod tracked;
 mod uff;
+mod unused;

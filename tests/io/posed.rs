@@ -405,7 +405,7 @@ fn the_description_of_posed_pictures_is_that_of_their_volume() {
     {
         let said = description(file.as_ref(), OpenOptions::default()).expect("a description");
         let row = |title: &str| -> Vec<&str> {
-            said.iter().filter(|(there, _)| there == title).map(|(_, value)| value.as_str()).collect()
+            said.rows.iter().filter(|(there, _)| there == title).map(|(_, value)| value.as_str()).collect()
         };
         assert_eq!(row("format"), [format!("{format}, freehand")]);
         assert_eq!(row("pictures"), ["8, 7 with a valid pose"]);

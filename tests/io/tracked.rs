@@ -109,13 +109,18 @@ fn every_voxel_is_the_pixel_at_its_place_in_the_reference() {
             assert!((found - value(back.transform_point3(place))).abs() < 1e-3);
         }
         let said = description(Path::new(&path), by_file).expect("a description");
-        assert!(said.iter().any(|(title, text)| title == "placed" && text == "from Image to Reference"), "{said:?}");
+        assert!(
+            said.rows.iter().any(|(title, text)| title == "placed" && text == "from Image to Reference"),
+            "{said:?}"
+        );
         // Without a calibration the pictures are what they were, and say what they are tracked by.
         let plain = open_with(Path::new(&path), OpenOptions::default()).expect("pictures");
         assert_eq!((plain.volumes(), plain.frames_per_volume()), (PICTURES, 1));
         let said = description(Path::new(&path), OpenOptions::default()).expect("a description");
         assert!(
-            said.iter().any(|(title, text)| title == "tracking" && text.contains("ProbeToTracker, ReferenceToTracker"))
+            said.rows
+                .iter()
+                .any(|(title, text)| title == "tracking" && text.contains("ProbeToTracker, ReferenceToTracker"))
         );
     }
 }
@@ -130,7 +135,7 @@ fn pictures_without_a_pose_are_left_out() {
     assert_eq!(source.frames_per_volume(), PICTURES - 2);
     assert!(voxels(source).into_iter().all(|(place, found)| (found - value(place)).abs() < 1e-3));
     let said = description(Path::new(&path), options).expect("a description");
-    assert!(said.iter().any(|(_, text)| text == "6, 4 with a valid pose"), "{said:?}");
+    assert!(said.rows.iter().any(|(_, text)| text == "6, 4 with a valid pose"), "{said:?}");
 }
 
 #[test]

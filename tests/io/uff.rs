@@ -92,7 +92,7 @@ fn what_is_not_read_is_named_in_one_line() {
     let error = description(&file("sector.uff"), options).expect_err("refused").to_string();
     assert!(error.contains("--voxel-spacing"), "{error}");
     let said = description(&file("sector-3d.uff"), OpenOptions::default()).expect("a description");
-    let said = said.iter().map(|(name, value)| format!("{name}: {value}\n")).collect::<String>();
+    let said = said.rows.iter().map(|(name, value)| format!("{name}: {value}\n")).collect::<String>();
     assert!(said.contains("UFF of USTB, sector_scan") && said.contains("decibels of their envelope"), "{said}");
     assert!(!said.contains("uneven"), "axes of f32 are even as far as they can be: {said}");
 }

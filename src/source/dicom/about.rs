@@ -2,7 +2,8 @@
 
 use super::super::describe;
 use super::classes::{Class, class, syntax};
-use super::elements::{self as tags, Elements};
+use super::elements::Elements;
+use super::tags;
 use crate::files::{InputError, escaped, quoted};
 use std::path::Path;
 

@@ -1,181 +1,22 @@
 //! The elements of a DICOM file (PS3.5, PS3.10): preamble, file meta information, then tags with values and nested items.
 //!
-//! Only the elements of [`WANTED`] are kept: all others, and so everything that tells who the patient is, are skipped unread. The place of
+//! Only the elements of [`WANTED`] are kept: all others, and so everything that tells who the patient is, are skipped. Their tags are noted. The place of
 //! pixel data is kept, not the data. A false length is an error before anything is allocated for it.
 
+use super::super::keys::{Key, Unused, Use, not_used};
 use super::super::packed::{InputFile, PixelStream};
 use super::jpeg::has_end;
+use super::tags::{
+    ITEM, ITEM_END, KRETZ_CREATOR, KRETZ_GROUP, Kind, META_CLASS, META_LENGTH, META_SYNTAX, NOT_READ, PIXEL_DATA,
+    SEQUENCE_END, Tag, WANTED, name, shown_name,
+};
 use crate::files::InputError;
+use std::cell::Cell;
 use std::io::Read;
+use std::path::Path;
 
-/// Group in the upper half, element in the lower one.
-pub(super) type Tag = u32;
-
-/// What the value of an element is.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Kind {
-    Text,
-    /// Binary numbers of so many bytes.
-    Numbers(usize),
-    Sequence,
-}
-
-pub(super) const SOP_CLASS: Tag = 0x0008_0016;
-pub(super) const MODALITY: Tag = 0x0008_0060;
-pub(super) const MANUFACTURER: Tag = 0x0008_0070;
-pub(super) const MODEL: Tag = 0x0008_1090;
-pub(super) const SLICE_THICKNESS: Tag = 0x0018_0050;
-pub(super) const SPACING_BETWEEN_SLICES: Tag = 0x0018_0088;
-pub(super) const FRAME_TIME: Tag = 0x0018_1063;
-pub(super) const FRAME_TIME_VECTOR: Tag = 0x0018_1065;
-pub(super) const SLICE_LOCATIONS: Tag = 0x0018_2005;
-pub(super) const REGIONS: Tag = 0x0018_6011;
-pub(super) const REGION_FORMAT: Tag = 0x0018_6012;
-pub(super) const REGION_TYPE: Tag = 0x0018_6014;
-pub(super) const REGION_BOX: [Tag; 4] = [0x0018_6018, 0x0018_601a, 0x0018_601c, 0x0018_601e];
-pub(super) const REFERENCE_PIXEL: [Tag; 2] = [0x0018_6020, 0x0018_6022];
-pub(super) const UNITS: [Tag; 2] = [0x0018_6024, 0x0018_6026];
-pub(super) const REFERENCE_VALUE: [Tag; 2] = [0x0018_6028, 0x0018_602a];
-pub(super) const DELTA: [Tag; 2] = [0x0018_602c, 0x0018_602e];
-pub(super) const DATA_TYPES: Tag = 0x0018_9807;
-pub(super) const DATA_TYPE: Tag = 0x0018_9808;
-pub(super) const SERIES: Tag = 0x0020_000e;
-pub(super) const INSTANCE_NUMBER: Tag = 0x0020_0013;
-pub(super) const POSITION_PATIENT: Tag = 0x0020_0032;
-pub(super) const ORIENTATION_PATIENT: Tag = 0x0020_0037;
-pub(super) const FRAME_CONTENT: Tag = 0x0020_9111;
-pub(super) const PLANE_POSITION: Tag = 0x0020_9113;
-pub(super) const PLANE_ORIENTATION: Tag = 0x0020_9116;
-pub(super) const TEMPORAL_INDEX: Tag = 0x0020_9128;
-pub(super) const POSITION_VOLUME: Tag = 0x0020_9301;
-pub(super) const ORIENTATION_VOLUME: Tag = 0x0020_9302;
-pub(super) const APEX: Tag = 0x0020_9308;
-pub(super) const TO_TRANSDUCER: Tag = 0x0020_9309;
-pub(super) const TIME_OFFSET: Tag = 0x0020_930d;
-pub(super) const PLANE_POSITION_VOLUME: Tag = 0x0020_930e;
-pub(super) const PLANE_ORIENTATION_VOLUME: Tag = 0x0020_930f;
-pub(super) const TEMPORAL_POSITION: Tag = 0x0020_9310;
-pub(super) const SAMPLES: Tag = 0x0028_0002;
-pub(super) const PHOTOMETRIC: Tag = 0x0028_0004;
-pub(super) const PLANAR: Tag = 0x0028_0006;
-pub(super) const FRAMES: Tag = 0x0028_0008;
-pub(super) const FRAME_POINTER: Tag = 0x0028_0009;
-pub(super) const ROWS: Tag = 0x0028_0010;
-pub(super) const COLUMNS: Tag = 0x0028_0011;
-pub(super) const PIXEL_SPACING: Tag = 0x0028_0030;
-pub(super) const BITS_ALLOCATED: Tag = 0x0028_0100;
-pub(super) const BITS_STORED: Tag = 0x0028_0101;
-pub(super) const HIGH_BIT: Tag = 0x0028_0102;
-pub(super) const IS_SIGNED: Tag = 0x0028_0103;
-pub(super) const INTERCEPT: Tag = 0x0028_1052;
-pub(super) const SLOPE: Tag = 0x0028_1053;
-pub(super) const PALETTE_ABOUT: [Tag; 3] = [0x0028_1101, 0x0028_1102, 0x0028_1103];
-pub(super) const PALETTE: [Tag; 3] = [0x0028_1201, 0x0028_1202, 0x0028_1203];
-pub(super) const SEGMENTED_PALETTE: [Tag; 3] = [0x0028_1221, 0x0028_1222, 0x0028_1223];
-pub(super) const PIXEL_MEASURES: Tag = 0x0028_9110;
-/// Philips' Cartesian volumes: the creator, slices, unit and spacing of the third axis, as public readers know them.
-pub(super) const PHILIPS: Tag = 0x3001_0010;
-pub(super) const PHILIPS_SLICES: Tag = 0x3001_1001;
-pub(super) const PHILIPS_UNIT: Tag = 0x3001_1002;
-pub(super) const PHILIPS_DELTA: Tag = 0x3001_1003;
-pub(super) const SHARED_GROUPS: Tag = 0x5200_9229;
-pub(super) const FRAME_GROUPS: Tag = 0x5200_9230;
-pub(super) const EXTENDED_TABLE: Tag = 0x7fe0_0001;
-const PIXEL_DATA: Tag = 0x7fe0_0010;
-const META_LENGTH: Tag = 0x0002_0000;
-const META_CLASS: Tag = 0x0002_0002;
-const META_SYNTAX: Tag = 0x0002_0010;
-const ITEM: Tag = 0xfffe_e000;
-const ITEM_END: Tag = 0xfffe_e00d;
-const SEQUENCE_END: Tag = 0xfffe_e0dd;
-/// The group of GE's private elements that hold a Kretz file, and the creator that reserves a block of it.
-const KRETZ_GROUP: u32 = 0x7fe1;
-const KRETZ_CREATOR: &str = "KRETZ_US";
-
-const WORDS: Kind = Kind::Numbers(2);
-const LONGS: Kind = Kind::Numbers(4);
-const REALS: Kind = Kind::Numbers(8);
-
-/// The elements that are kept.
-const WANTED: &[(Tag, Kind)] = &[
-    (META_LENGTH, LONGS),
-    (META_CLASS, Kind::Text),
-    (META_SYNTAX, Kind::Text),
-    (SOP_CLASS, Kind::Text),
-    (MODALITY, Kind::Text),
-    (MANUFACTURER, Kind::Text),
-    (MODEL, Kind::Text),
-    (SLICE_THICKNESS, Kind::Text),
-    (SPACING_BETWEEN_SLICES, Kind::Text),
-    (FRAME_TIME, Kind::Text),
-    (FRAME_TIME_VECTOR, Kind::Text),
-    (SLICE_LOCATIONS, Kind::Text),
-    (REGIONS, Kind::Sequence),
-    (REGION_FORMAT, WORDS),
-    (REGION_TYPE, WORDS),
-    (REGION_BOX[0], LONGS),
-    (REGION_BOX[1], LONGS),
-    (REGION_BOX[2], LONGS),
-    (REGION_BOX[3], LONGS),
-    (REFERENCE_PIXEL[0], LONGS),
-    (REFERENCE_PIXEL[1], LONGS),
-    (UNITS[0], WORDS),
-    (UNITS[1], WORDS),
-    (REFERENCE_VALUE[0], REALS),
-    (REFERENCE_VALUE[1], REALS),
-    (DELTA[0], REALS),
-    (DELTA[1], REALS),
-    (DATA_TYPES, Kind::Sequence),
-    (DATA_TYPE, Kind::Text),
-    (SERIES, Kind::Text),
-    (INSTANCE_NUMBER, Kind::Text),
-    (POSITION_PATIENT, Kind::Text),
-    (ORIENTATION_PATIENT, Kind::Text),
-    (FRAME_CONTENT, Kind::Sequence),
-    (PLANE_POSITION, Kind::Sequence),
-    (PLANE_ORIENTATION, Kind::Sequence),
-    (TEMPORAL_INDEX, LONGS),
-    (POSITION_VOLUME, REALS),
-    (ORIENTATION_VOLUME, REALS),
-    (APEX, REALS),
-    (TO_TRANSDUCER, REALS),
-    (TIME_OFFSET, REALS),
-    (PLANE_POSITION_VOLUME, Kind::Sequence),
-    (PLANE_ORIENTATION_VOLUME, Kind::Sequence),
-    (TEMPORAL_POSITION, Kind::Sequence),
-    (SAMPLES, WORDS),
-    (PHOTOMETRIC, Kind::Text),
-    (PLANAR, WORDS),
-    (FRAMES, Kind::Text),
-    (FRAME_POINTER, WORDS),
-    (ROWS, WORDS),
-    (COLUMNS, WORDS),
-    (PIXEL_SPACING, Kind::Text),
-    (BITS_ALLOCATED, WORDS),
-    (BITS_STORED, WORDS),
-    (HIGH_BIT, WORDS),
-    (IS_SIGNED, WORDS),
-    (INTERCEPT, Kind::Text),
-    (SLOPE, Kind::Text),
-    (PALETTE_ABOUT[0], WORDS),
-    (PALETTE_ABOUT[1], WORDS),
-    (PALETTE_ABOUT[2], WORDS),
-    (PALETTE[0], WORDS),
-    (PALETTE[1], WORDS),
-    (PALETTE[2], WORDS),
-    (SEGMENTED_PALETTE[0], WORDS),
-    (SEGMENTED_PALETTE[1], WORDS),
-    (SEGMENTED_PALETTE[2], WORDS),
-    (PIXEL_MEASURES, Kind::Sequence),
-    (PHILIPS, Kind::Text),
-    (PHILIPS_SLICES, LONGS),
-    (PHILIPS_UNIT, WORDS),
-    (PHILIPS_DELTA, REALS),
-    (SHARED_GROUPS, Kind::Sequence),
-    (FRAME_GROUPS, Kind::Sequence),
-    (EXTENDED_TABLE, REALS),
-];
-
+/// Longest value of an element that is not read, bytes, which is looked at for whether it changes anything.
+const MAX_LOOKED_AT: u64 = 64;
 /// Longest value that is kept: a palette of 65536 words, or a time for each of as many frames.
 const MAX_VALUE: u64 = 1 << 20;
 /// Most elements: some thirty for each of 65536 frames.
@@ -192,7 +33,15 @@ const UNDEFINED: u32 = u32::MAX;
 /// The elements of a file or of an item of a sequence.
 #[derive(Debug, Default)]
 pub(super) struct Item {
-    elements: Vec<(Tag, Value)>,
+    elements: Vec<Element>,
+}
+
+#[derive(Debug)]
+struct Element {
+    tag: Tag,
+    value: Value,
+    /// Its value was asked for.
+    asked: Cell<bool>,
 }
 
 #[derive(Debug)]
@@ -203,23 +52,25 @@ enum Value {
 }
 
 impl Item {
+    fn value(&self, tag: Tag) -> Option<&Value> {
+        let element = self.elements.iter().find(|element| element.tag == tag)?;
+        element.asked.set(true);
+        Some(&element.value)
+    }
+
     fn bytes(&self, tag: Tag) -> Option<&[u8]> {
-        self.elements.iter().find(|(there, _)| *there == tag).and_then(|(_, value)| match value {
-            Value::Bytes(bytes) => Some(&bytes[..]),
+        match self.value(tag)? {
+            Value::Bytes(bytes) => Some(bytes),
             Value::Items(_) => None,
-        })
+        }
     }
 
     /// The items of a sequence; none if it is absent.
     pub fn items(&self, tag: Tag) -> &[Item] {
-        self.elements
-            .iter()
-            .find(|(there, _)| *there == tag)
-            .and_then(|(_, value)| match value {
-                Value::Items(items) => Some(&items[..]),
-                Value::Bytes(_) => None,
-            })
-            .unwrap_or_default()
+        match self.value(tag) {
+            Some(Value::Items(items)) => items,
+            _ => &[],
+        }
     }
 
     /// Text without the spaces and zeros around it; empty if it is absent.
@@ -298,6 +149,15 @@ pub(super) struct Elements {
     pub pixels: Option<PixelData>,
     /// Offset and length of a Kretz file inside.
     pub kretz: Option<(u64, u64)>,
+    skipped: Skipped,
+}
+
+/// Elements of the data set that were not kept.
+#[derive(Debug, Default)]
+struct Skipped {
+    names: Unused,
+    /// Those of [`NOT_READ`], with what is said of their values.
+    known: Vec<(&'static Key, String)>,
 }
 
 /// True if a file begins like this.
@@ -323,6 +183,7 @@ impl Elements {
             pixels: None,
             creators: Vec::new(),
             kretz: None,
+            skipped: Skipped::default(),
         };
         walk.skip(132, "preamble")?;
         let meta = walk.meta()?;
@@ -342,8 +203,21 @@ impl Elements {
             Err(_) if walk.pixels.is_some() && walk.creators.is_empty() => {}
             other => other?,
         }
-        let Walk { pixels, kretz, big_endian, .. } = walk;
-        Ok(Elements { syntax, class: meta.text(META_CLASS), big_endian, root, pixels, kretz })
+        let Walk { pixels, kretz, big_endian, skipped, .. } = walk;
+        Ok(Elements { syntax, class: meta.text(META_CLASS), big_endian, root, pixels, kretz, skipped })
+    }
+
+    /// The elements that were not used, once everything was read; what a user must know of them is a warning.
+    pub fn unused(self, path: &Path, remarks: &mut Vec<(String, String)>) -> Unused {
+        let Skipped { mut names, known } = self.skipped;
+        for element in self.root.elements.iter().filter(|element| !element.asked.get()) {
+            names.note_as_it_is(&shown_name(element.tag));
+        }
+        for (key, value) in &known {
+            // None of them is refused.
+            let _ = not_used(path, key, value, remarks);
+        }
+        names
     }
 }
 
@@ -368,11 +242,7 @@ struct Walk<'a> {
     /// Blocks of private elements that hold Kretz files.
     creators: Vec<u32>,
     kretz: Option<(u64, u64)>,
-}
-
-/// A tag as the standard writes it.
-fn name(tag: Tag) -> String {
-    format!("({:04X},{:04X})", tag >> 16, tag & 0xffff)
+    skipped: Skipped,
 }
 
 impl Walk<'_> {
@@ -502,10 +372,39 @@ impl Walk<'_> {
         }
     }
 
-    fn element(&mut self, head: &Head, depth: usize, keep: bool, item: &mut Item) -> Result<(), InputError> {
+    /// Skips an element of the data set that is not kept. A short value of one that could change a picture is looked at.
+    fn not_kept(&mut self, head: &Head) -> Result<(), InputError> {
         let Head { tag, vr, length } = *head;
-        let kind = WANTED.iter().find(|(wanted, _)| *wanted == tag).map(|(_, kind)| *kind);
-        let wanted = keep && kind.is_some() && !item.elements.iter().any(|(there, _)| *there == tag);
+        self.skipped.names.note_as_it_is(&shown_name(tag));
+        let known = NOT_READ.iter().find(|(other, _)| *other == tag).map(|(_, key)| key);
+        let is_short = length != UNDEFINED && u64::from(length) <= MAX_LOOKED_AT;
+        if let Some(key) = known.filter(|key| is_short && key.done != Use::Listed && &vr != b"SQ") {
+            self.check(length.into(), &name(tag))?;
+            let value = self.value(tag, length.into())?;
+            let text = String::from_utf8_lossy(&value).trim_matches([' ', '\0']).to_string();
+            self.skipped.known.push((key, text));
+            return Ok(());
+        }
+        if let Some(key) = known.filter(|_| length > 0) {
+            self.skipped.known.push((key, "stated".into()));
+        }
+        self.value_of(head, 0, false, &mut Item::default())
+    }
+
+    fn element(&mut self, head: &Head, depth: usize, keep: bool, item: &mut Item) -> Result<(), InputError> {
+        let tag = head.tag;
+        let is_known = WANTED.iter().any(|wanted| wanted.tag == tag);
+        if depth == 0 && keep && !is_known && tag != PIXEL_DATA && tag & 0xffff != 0 {
+            return self.not_kept(head);
+        }
+        self.value_of(head, depth, keep, item)
+    }
+
+    /// Reads or skips the value of an element.
+    fn value_of(&mut self, head: &Head, depth: usize, keep: bool, item: &mut Item) -> Result<(), InputError> {
+        let Head { tag, vr, length } = *head;
+        let kind = WANTED.iter().find(|wanted| wanted.tag == tag).map(|wanted| wanted.kind);
+        let wanted = keep && kind.is_some() && !item.elements.iter().any(|there| there.tag == tag);
         if tag == PIXEL_DATA && depth == 0 {
             return self.pixel_data(&vr, length);
         }
@@ -518,7 +417,7 @@ impl Walk<'_> {
             self.explicit = explicit;
             let items = items?;
             if wanted && kind == Some(Kind::Sequence) {
-                item.elements.push((tag, Value::Items(items)));
+                item.elements.push(Element { tag, value: Value::Items(items), asked: Cell::new(false) });
             }
             return Ok(());
         }
@@ -537,7 +436,7 @@ impl Walk<'_> {
                 if let (Kind::Numbers(width), true) = (kind, self.big_endian && &vr != b"OB") {
                     bytes.chunks_exact_mut(width).for_each(<[u8]>::reverse);
                 }
-                item.elements.push((tag, Value::Bytes(bytes)));
+                item.elements.push(Element { tag, value: Value::Bytes(bytes), asked: Cell::new(false) });
                 Ok(())
             }
             _ => self.skip(length, &name(tag)),

@@ -5,10 +5,11 @@ use super::super::packed::InputFile;
 use super::super::{OpenOptions, kretz};
 use super::about::{about, accept};
 use super::classes::Class;
-use super::elements::{self as tags, Elements};
+use super::elements::Elements;
 use super::frames::{Arrangement, Coding};
 use super::image::Image;
 use super::placed::{Placed, layout};
+use super::tags;
 use super::{regions, volume};
 use crate::files::InputError;
 
@@ -23,6 +24,7 @@ pub(in super::super) fn read(file: &InputFile, options: &OpenOptions) -> Result<
         let mut layout = kretz::read(&file.window(offset, length))?;
         layout.format = "Kretz volume in DICOM";
         layout.remarks.extend(about(&elements));
+        layout.unused = elements.unused(file.path, &mut layout.remarks);
         return refuse_spacing(file, options).map(|()| layout);
     }
     let kind = accept(file.path, &elements)?;
@@ -52,7 +54,9 @@ pub(in super::super) fn read(file: &InputFile, options: &OpenOptions) -> Result<
     let direct = image.parts.first().filter(|_| is_direct).map(|(offset, _)| file.pixels(*offset));
     let mut remarks = about(&elements);
     remarks.extend(placed.remarks);
-    layout(vec![file.path.into()], file.path.into(), image, Placed { remarks, ..placed }, direct)
+    let mut layout = layout(vec![file.path.into()], file.path.into(), image, Placed { remarks, ..placed }, direct)?;
+    layout.unused = elements.unused(file.path, &mut layout.remarks);
+    Ok(layout)
 }
 
 fn refuse_spacing(file: &InputFile, options: &OpenOptions) -> Result<(), InputError> {

@@ -3,10 +3,11 @@
 use super::super::packed::Encoding;
 use super::super::pixel::{Number, PixelFormat};
 use super::classes::syntax;
-use super::elements::{self as tags, Elements, Fragment, Item, PixelData, Tag};
+use super::elements::{Elements, Fragment, Item, PixelData};
 use super::fragments::{Divided, Stream, divided};
 use super::frames::{Arrangement, Coding, Place};
 use super::palette::{Indices, Palette, Tables};
+use super::tags::{self, Tag};
 use crate::files::{InputError, quoted};
 use std::collections::BTreeSet;
 use std::path::Path;

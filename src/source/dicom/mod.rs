@@ -17,6 +17,7 @@ mod placed;
 mod planes;
 mod regions;
 mod series;
+mod tags;
 mod volume;
 mod write;
 
@@ -24,6 +25,7 @@ pub(super) use elements::is_one;
 pub(super) use file::read;
 pub(super) use frames::{Coding, FrameStream, Frames};
 pub(super) use series::{is_dicom, is_series, read_series};
+pub(super) use tags::rows;
 pub(super) use write::{DicomWriter, Form, MOST_BYTES};
 
 /// Endings of its files, which often have none, or the end of a number.

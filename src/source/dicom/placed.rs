@@ -1,6 +1,7 @@
 //! Where the frames of DICOM files lie, and the layout that follows from it.
 
 use super::super::describe;
+use super::super::keys::Unused;
 use super::super::layout::{Layout, LineOrder, StoredGeometry};
 use super::super::packed::Pixels;
 use super::super::transforms::Poses;
@@ -70,6 +71,7 @@ pub(super) fn layout(
         times,
         synthetic: false,
         remarks,
+        unused: Unused::default(),
     };
     if let Some(direct) = direct {
         layout.pixels = direct;

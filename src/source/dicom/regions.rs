@@ -5,9 +5,10 @@
 use super::super::OpenOptions;
 use super::super::describe::number;
 use super::super::layout::{Cartesian, StoredGeometry};
-use super::elements::{self as tags, Item, Tag};
+use super::elements::Item;
 use super::image::Image;
 use super::placed::{Placed, in_order};
+use super::tags::{self, Tag};
 use super::volume::directions;
 use crate::files::InputError;
 use crate::probe::file::SLAB;

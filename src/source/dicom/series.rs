@@ -5,13 +5,14 @@ use super::super::OpenOptions;
 use super::super::layout::{Cartesian, Layout, StoredGeometry};
 use super::super::packed::InputFile;
 use super::about::{about, accept};
-use super::elements::{self as tags, Elements, is_one};
+use super::elements::{Elements, is_one};
 use super::file::read;
 use super::frames::Place;
 use super::image::Image;
 use super::placed::{Placed, layout};
 use super::planes::{Plane, sorted};
 use super::regions::{Flat, flat, in_patient, of_pictures, spacing_text};
+use super::tags;
 use crate::files::{InputError, progress};
 use crate::probe::{AxisOrder, World};
 use glam::DVec3;
@@ -102,8 +103,9 @@ pub(in super::super) fn read_series(folder: &Path, options: &OpenOptions) -> Res
         return Err(InputError::new(folder, "--voxel-spacing", why));
     }
     let files = all.iter().map(|slice| slice.path.clone()).collect();
-    let mut images = all.into_iter().map(|slice| slice.image);
-    let Some(mut image) = images.next() else { return fault("holds no image".into()) };
+    let mut slices = all.into_iter();
+    let Some(Slice { mut image, elements, .. }) = slices.next() else { return fault("holds no image".into()) };
+    let images = slices.map(|slice| slice.image);
     for (n, next) in images.enumerate() {
         let before = image.parts.len();
         let moved = |place: &Place| Place { file: n + 1, first: place.first + before, ..*place };
@@ -112,7 +114,10 @@ pub(in super::super) fn read_series(folder: &Path, options: &OpenOptions) -> Res
         // What is wrong with many files is said once.
         image.warnings.extend(next.warnings);
     }
-    layout(files, folder.into(), image, placed, None)
+    let mut layout = layout(files, folder.into(), image, placed, None)?;
+    // Those of the first: the others are of the same series.
+    layout.unused = elements.unused(folder, &mut layout.remarks);
+    Ok(layout)
 }
 
 fn name(path: &Path) -> String {

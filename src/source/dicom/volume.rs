@@ -2,10 +2,11 @@
 
 use super::super::describe::number;
 use super::super::layout::{Cartesian, StoredGeometry};
-use super::elements::{self as tags, Elements, Item, Tag};
+use super::elements::{Elements, Item};
 use super::image::Image;
 use super::placed::{Placed, in_order};
 use super::planes::{Plane, sorted};
+use super::tags::{self, Tag};
 use crate::files::{InputError, escaped};
 use crate::probe::file::SLAB;
 use crate::probe::{AxisOrder, World};

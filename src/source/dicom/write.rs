@@ -4,7 +4,8 @@
 //! Nothing is invented: attributes of the patient are empty, dates and the exposure of the acquisition are left out although the standard
 //! demands some of them. Identifiers are made of a digest of everything else in the file, so that the same volume gives the same bytes.
 
-use super::elements::{self as tags, Tag};
+use super::tags;
+use super::tags::Tag;
 use crate::files::Unfinished;
 use crate::probe::World;
 use glam::DVec3;

@@ -220,6 +220,7 @@ impl Axes {
             }
             *axis = place(vector) * sign * scale.of_axis(*n);
         }
+        self.contradicted(header, &scale, remarks);
         if self.space.len() == 2 {
             axes[2] = axes[0].cross(axes[1]).normalize_or_zero();
         }
@@ -245,6 +246,27 @@ impl Axes {
         }
     }
 
+    /// Warns of spacings and units of axes that say something else than the directions, which count.
+    fn contradicted(&self, header: &Header, scale: &Scale, remarks: &mut Remarks) {
+        let is_near = |a: f64, b: f64| (a - b).abs() <= 1e-4 * b.abs();
+        let directed =
+            self.space.iter().filter_map(|n| Some((*n, &self.all[*n], self.all[*n].direction.as_ref()?.as_ref()?)));
+        let mut named = BTreeSet::new();
+        for (n, axis, vector) in directed {
+            let unit = millimetres(&axis.unit).filter(|_| is_said(&axis.unit));
+            named.extend(
+                axis.spacing
+                    .filter(|spacing| !is_near(*spacing, place(vector).length()))
+                    .map(|_| "spacings or axis mins"),
+            );
+            named.extend(unit.filter(|unit| !is_near(*unit, scale.of_axis(n).x)).map(|_| "units"));
+        }
+        for field in named {
+            let text = format!("{field} differ from space directions and their units, which count");
+            remarks.push(warned(header.path, "not used", text));
+        }
+    }
+
     /// Axes along the world by their spacings; returns the origin, mm.
     fn spaced(
         &self,
@@ -254,11 +276,8 @@ impl Axes {
         remarks: &mut Remarks,
     ) -> Result<DVec3, InputError> {
         let stated = header.get("space dimension").and_then(|text| text.parse().ok());
-        let scale = self.scale(
-            header,
-            stated.unwrap_or(if header.get("space").is_some() { 3 } else { self.space.len() }),
-            remarks,
-        )?;
+        let scale =
+            self.scale(header, stated.unwrap_or(if header.has("space") { 3 } else { self.space.len() }), remarks)?;
         let (mut starts, mut not_stated) = (Vec::new(), Vec::new());
         for (c, n) in self.space.iter().copied().enumerate() {
             let axis = &self.all[n];

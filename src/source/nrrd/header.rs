@@ -1,5 +1,6 @@
 //! The header of a NRRD: its fields, the keys that programs add, and the names of its data files.
 
+use super::super::keys::{Aspect, Key, Stated, Unused, Use};
 use super::super::packed::InputFile;
 use super::super::plus::PlusFrames;
 use crate::files::{InputError, quoted};
@@ -14,37 +15,58 @@ const MAX_HEADER_LINES: usize = 500_000;
 /// Most vectors of a field.
 const MAX_VECTORS: usize = 8;
 
-/// The fields that are read. All others are skipped.
-const FIELDS: [&str; 20] = [
-    "type",
-    "dimension",
-    "space",
-    "space dimension",
-    "sizes",
-    "space directions",
-    "spacings",
-    "kinds",
-    "labels",
-    "space units",
-    "units",
-    "space origin",
-    "encoding",
-    "endian",
-    "line skip",
-    "byte skip",
-    "data file",
-    "axis mins",
-    "axis maxs",
-    "centerings",
+/// The fields of the format, and the keys of programs that are read.
+pub(in super::super) static KEYS: [Key; 36] = [
+    Key::new("type", Aspect::Storage, Use::Used),
+    Key::new("dimension", Aspect::Geometry, Use::Used),
+    Key::new("space", Aspect::Orientation, Use::Used),
+    Key::new("space dimension", Aspect::Geometry, Use::Optional),
+    Key::new("sizes", Aspect::Geometry, Use::Used),
+    Key::new("space directions", Aspect::Orientation, Use::Used),
+    Key::new("spacings", Aspect::Geometry, Use::Used),
+    Key::new("kinds", Aspect::Time, Use::Used),
+    Key::new("labels", Aspect::Time, Use::Used),
+    Key::new("space units", Aspect::Geometry, Use::Used),
+    Key::new("units", Aspect::Geometry, Use::Used),
+    Key::new("space origin", Aspect::Geometry, Use::Used),
+    Key::new("encoding", Aspect::Storage, Use::Used),
+    Key::new("endian", Aspect::Storage, Use::Optional),
+    Key::new("line skip", Aspect::Storage, Use::Used),
+    Key::new("byte skip", Aspect::Storage, Use::Used),
+    Key::new("data file", Aspect::Storage, Use::Used),
+    Key::new("axis mins", Aspect::Geometry, Use::Used),
+    Key::new("axis maxs", Aspect::Geometry, Use::Used),
+    Key::new("centerings", Aspect::Geometry, Use::Optional),
+    Key::new(ORIENTATION, Aspect::Orientation, Use::Used),
+    Key::new(IMAGE_TYPE, Aspect::Value, Use::Used),
+    Key::new("axis N index values", Aspect::Time, Use::Used),
+    Key::new("axis N index type", Aspect::Time, Use::Used),
+    Key::new("old min", Aspect::Value, Use::Warned(&[])),
+    Key::new("old max", Aspect::Value, Use::Warned(&[])),
+    Key::new("block size", Aspect::Storage, Use::Listed),
+    Key::new("content", Aspect::About, Use::Listed),
+    Key::new("number", Aspect::About, Use::Listed),
+    Key::new("min", Aspect::About, Use::Listed),
+    Key::new("max", Aspect::About, Use::Listed),
+    Key::new("sample units", Aspect::About, Use::Listed),
+    Key::new("thicknesses", Aspect::About, Use::Listed),
+    // Of vectors and tensors.
+    Key::new("measurement frame", Aspect::About, Use::Listed),
+    Key::new("SegmentN_*", Aspect::About, Use::Listed),
+    Key::new("Segmentation_*", Aspect::About, Use::Listed),
 ];
 /// Other spellings of fields.
-const SPELLINGS: [(&str, &str); 6] = [
+const SPELLINGS: [(&str, &str); 10] = [
     ("datafile", "data file"),
     ("lineskip", "line skip"),
     ("byteskip", "byte skip"),
     ("axismins", "axis mins"),
     ("axismaxs", "axis maxs"),
     ("centers", "centerings"),
+    ("oldmin", "old min"),
+    ("oldmax", "old max"),
+    ("blocksize", "block size"),
+    ("sampleunits", "sample units"),
 ];
 
 /// The keys of PLUS for a whole sequence.
@@ -56,7 +78,7 @@ pub(super) type Vector = Vec<f64>;
 
 pub(super) struct Header<'a> {
     pub path: &'a Path,
-    fields: HashMap<&'static str, String>,
+    stated: Stated,
     /// Keys with values that are read: those of PLUS for a whole sequence, and `axis N index ...`.
     values: HashMap<String, String>,
     /// What PLUS says of the frames.
@@ -74,7 +96,7 @@ impl<'a> Header<'a> {
         let mut input = BufReader::new(file.open().map_err(unreadable)?.take(MAX_HEADER_BYTES));
         let mut header = Header {
             path,
-            fields: HashMap::new(),
+            stated: Stated::new(&KEYS),
             values: HashMap::new(),
             frames: PlusFrames::default(),
             list: Vec::new(),
@@ -91,7 +113,7 @@ impl<'a> Header<'a> {
             let text = text.trim();
             // A detached header may end with the file.
             if text.is_empty() {
-                let is_detached = header.fields.contains_key("data file");
+                let is_detached = header.stated.has("data file");
                 return match line.is_empty() && !is_detached {
                     true => header.fault("header", "is cut short: there is no empty line before the samples"),
                     false => Ok(header),
@@ -116,11 +138,9 @@ impl<'a> Header<'a> {
         };
         let key = key.trim().to_ascii_lowercase();
         let key = SPELLINGS.iter().find(|(other, _)| *other == key).map_or(&*key, |(_, name)| name);
-        match FIELDS.iter().find(|field| **field == key) {
-            Some(known) if self.fields.insert(known, value.trim().to_string()).is_some() => {
-                self.fault(known, "is given twice")
-            }
-            _ => Ok(()),
+        match self.stated.put(key, value.trim()) {
+            Err(twice) => self.fault(twice, "is given twice"),
+            Ok(()) => Ok(()),
         }
     }
 
@@ -128,11 +148,17 @@ impl<'a> Header<'a> {
     /// message.
     fn value_line(&mut self, key: &str, value: &str) -> Result<(), InputError> {
         if let Some(of_frame) = key.strip_prefix("Seq_Frame") {
-            return self.frames.field(self.path, of_frame, value);
+            if !self.frames.field(self.path, of_frame, value)? {
+                self.stated.note(key);
+            }
+            return Ok(());
         }
-        let key = key.to_ascii_lowercase();
-        if key == ORIENTATION || key == IMAGE_TYPE || (key.starts_with("axis ") && key.contains(" index ")) {
-            self.values.insert(key, value.to_string());
+        let lower = key.to_ascii_lowercase();
+        let is_of_axis =
+            lower.starts_with("axis ") && (lower.ends_with(" index values") || lower.ends_with(" index type"));
+        match lower == ORIENTATION || lower == IMAGE_TYPE || is_of_axis {
+            true => drop(self.values.insert(lower, value.to_string())),
+            false => self.stated.note(key),
         }
         Ok(())
     }
@@ -147,11 +173,25 @@ impl<'a> Header<'a> {
     }
 
     pub(super) fn get(&self, field: &str) -> Option<&str> {
-        self.fields.get(field).map(String::as_str)
+        self.stated.get(field)
     }
 
     pub(super) fn need(&self, field: &str) -> Result<&str, InputError> {
         self.get(field).map_or_else(|| self.fault(field, "is missing"), Ok)
+    }
+
+    /// True if a field is stated.
+    pub(super) fn has(&self, field: &str) -> bool {
+        self.stated.has(field)
+    }
+
+    /// What was not used, once everything was read.
+    ///
+    /// # Errors
+    /// A field that is refused.
+    pub(super) fn unused(self, remarks: &mut Vec<(String, String)>) -> Result<Unused, InputError> {
+        let path = self.path;
+        self.stated.finish(path, remarks).map_err(|(field, fault)| InputError::new(path, field, fault))
     }
 
     /// The value of a key that a program added.

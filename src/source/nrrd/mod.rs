@@ -5,6 +5,7 @@ mod axes;
 mod header;
 
 use super::data_files::{self, Pattern};
+use super::keys::Unused;
 use super::layout::Layout;
 use super::packed::{Encoding, InputFile, Pixels};
 use super::pixel::{Number, PixelFormat};
@@ -13,6 +14,8 @@ use crate::files::{InputError, quoted};
 use crate::probe::World;
 use axes::Axes;
 use header::{Header, IMAGE_TYPE, ORIENTATION};
+
+pub(super) use header::KEYS;
 use std::io::{BufRead, BufReader};
 use std::path::Path;
 
@@ -70,7 +73,7 @@ pub(super) fn read(file: &InputFile) -> Result<Layout, InputError> {
     };
     let line_order = words.line_order()?;
     let geometry = words.pictures(axes.size, axes.volumes, world, &line_order, &mut remarks)?;
-    let is_placed = ["space directions", "spacings", "axis mins"].iter().any(|field| header.get(field).is_some());
+    let is_placed = ["space directions", "spacings", "axis mins"].iter().any(|field| header.has(field));
     let states_geometry = is_placed && !words.has_scan_lines();
     if let Some(orientation) = words.orientation.1 {
         remarks.push(("orientation".into(), quoted(orientation)));
@@ -91,9 +94,11 @@ pub(super) fn read(file: &InputFile) -> Result<Layout, InputError> {
         times,
         synthetic: false,
         remarks,
+        unused: Unused::default(),
     };
     find_pixels(file, &header, &mut layout)?;
     layout.check(file.path, "sizes")?;
+    layout.unused = header.unused(&mut layout.remarks)?;
     if let Some(stored) = axes.reorder {
         data_files::reorder(&mut layout, file.path, "sizes", stored)?;
     }

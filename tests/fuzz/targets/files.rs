@@ -61,7 +61,10 @@ pub fn tracked(bytes: &[u8]) -> String {
     let as_pictures = OpenOptions { calibration: &calibration, ..OpenOptions::default() };
     // A pose far away makes a lattice of any size.
     let one = |path: &Path, options| {
-        outcome(echolume::low_level::source::description(path, options).map(|rows| rows.len().to_string()))
+        outcome(
+            echolume::low_level::source::description(path, options)
+                .map(|found| (found.rows.len() + found.unused.lines().len()).to_string()),
+        )
     };
     let config = written("plus.xml", bytes);
     let as_config = OpenOptions { plus_config: Some(&config), ..OpenOptions::default() };

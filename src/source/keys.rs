@@ -1,0 +1,312 @@
+//! What a reader does with each key of its format, and which keys of a file it did not use. docs/formats.md is generated from the tables.
+
+use super::layout::warned;
+use crate::files::escaped;
+use std::cell::RefCell;
+use std::collections::{BTreeMap, BTreeSet, HashMap};
+use std::path::Path;
+
+/// Longest name that is shown, characters, and most different ones that are kept.
+const MAX_NAME: usize = 64;
+const MAX_NAMES: usize = 256;
+
+/// What a key says of the samples.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Aspect {
+    /// Sizes, spacings and places.
+    Geometry,
+    /// What the numbers mean.
+    Value,
+    Time,
+    /// Where the axes point.
+    Orientation,
+    /// Where and how the samples are stored.
+    Storage,
+    /// Anything else.
+    About,
+}
+
+impl Aspect {
+    /// As messages and pages name it.
+    pub fn name(self) -> &'static str {
+        match self {
+            Aspect::Geometry => "geometry",
+            Aspect::Value => "values",
+            Aspect::Time => "times",
+            Aspect::Orientation => "orientation",
+            Aspect::Storage => "storage",
+            Aspect::About => "about",
+        }
+    }
+
+    /// True if whoever looks at a picture must know that such a key was not used.
+    fn matters(self) -> bool {
+        matches!(self, Aspect::Geometry | Aspect::Value | Aspect::Time | Aspect::Orientation)
+    }
+}
+
+/// What becomes of a key. The words of a value that changes nothing are its neutral ones; they are compared as numbers where they are numbers.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Use {
+    /// It is read. Where another key comes before it, that is a warning if it matters.
+    Used,
+    /// It is read, or another key that says the same comes before it.
+    Optional,
+    /// It is not read. A value that is not neutral is a warning.
+    Warned(&'static [&'static str]),
+    /// A file with a value that is not neutral is not read.
+    Refused(&'static [&'static str]),
+    /// It is not read, and changes nothing that is drawn.
+    Listed,
+}
+
+/// A key of a format.
+#[derive(Clone, Copy, Debug)]
+pub struct Key {
+    /// As the format spells it. `N` stands for any number, `*` for anything.
+    pub name: &'static str,
+    pub aspect: Aspect,
+    pub done: Use,
+}
+
+impl Key {
+    pub(super) const fn new(name: &'static str, aspect: Aspect, done: Use) -> Key {
+        Key { name, aspect, done }
+    }
+}
+
+/// A key as docs/formats.md lists it.
+pub struct Row {
+    pub name: String,
+    pub aspect: Aspect,
+    pub done: Use,
+}
+
+/// The rows of tables of keys.
+pub(super) fn rows(tables: &[&[Key]]) -> Vec<Row> {
+    let row = |key: &Key| Row { name: key.name.into(), aspect: key.aspect, done: key.done };
+    tables.iter().flat_map(|table| table.iter().map(row)).collect()
+}
+
+/// Whether a value is one that changes nothing.
+pub(super) fn is_neutral(value: &str, neutral: &[&str]) -> bool {
+    let same = |word: &str, other: &str| match (word.parse::<f64>(), other.parse::<f64>()) {
+        (Ok(a), Ok(b)) => a == b,
+        _ => word.eq_ignore_ascii_case(other),
+    };
+    let mut words = value.split([' ', '\t', '\\', ',', '(', ')']).filter(|word| !word.is_empty());
+    words.all(|word| neutral.iter().any(|other| same(word, other)))
+}
+
+/// The names of the keys that a file states and its reader did not use. Those that differ in numbers alone are one, such as
+/// `Seq_FrameN_FrameNumber`.
+#[derive(Clone, Debug, Default)]
+pub struct Unused {
+    /// By the name without numbers: a name, and how often there is such a one.
+    names: BTreeMap<String, (String, usize)>,
+    /// How many more there are than are kept.
+    more: usize,
+}
+
+impl Unused {
+    /// Notes the name of a key. Never its value, which may be a patient's.
+    pub(super) fn note(&mut self, name: &str) {
+        self.noted(without_numbers(&escaped(name, MAX_NAME)), name);
+    }
+
+    /// The same for a name whose numbers tell it from others.
+    pub(super) fn note_as_it_is(&mut self, name: &str) {
+        self.noted(escaped(name, MAX_NAME), name);
+    }
+
+    fn noted(&mut self, pattern: String, name: &str) {
+        let has_room = self.names.len() < MAX_NAMES;
+        match self.names.get_mut(&pattern) {
+            Some((_, count)) => *count += 1,
+            None if has_room => drop(self.names.insert(pattern, (escaped(name, MAX_NAME), 1))),
+            None => self.more += 1,
+        }
+    }
+
+    /// A line for each.
+    #[must_use]
+    pub fn lines(&self) -> Vec<String> {
+        let line = |(pattern, (name, count)): (&String, &(String, usize))| match count {
+            1 => name.clone(),
+            _ => format!("{pattern} ({count} times)"),
+        };
+        let more = (self.more > 0).then(|| format!("{} more", self.more));
+        self.names.iter().map(line).chain(more).collect()
+    }
+}
+
+/// A name with `N` in the place of every number.
+fn without_numbers(name: &str) -> String {
+    let mut pattern = String::new();
+    for c in name.chars() {
+        match c.is_ascii_digit() {
+            true if pattern.ends_with('N') => {}
+            true => pattern.push('N'),
+            false => pattern.push(c),
+        }
+    }
+    pattern
+}
+
+/// The keys of a text header with their values, and which of them were asked for.
+pub(super) struct Stated {
+    keys: &'static [Key],
+    values: HashMap<&'static str, String>,
+    asked: RefCell<BTreeSet<&'static str>>,
+    unused: Unused,
+}
+
+impl Stated {
+    /// `keys`: of the format.
+    pub(super) fn new(keys: &'static [Key]) -> Stated {
+        Stated { keys, values: HashMap::new(), asked: RefCell::default(), unused: Unused::default() }
+    }
+
+    /// Keeps the value of a key of the format; the names of others are noted.
+    ///
+    /// # Errors
+    /// The name of a key that is given twice.
+    pub(super) fn put(&mut self, name: &str, value: &str) -> Result<(), &'static str> {
+        let Some(key) = self.keys.iter().find(|key| key.name == name) else {
+            self.note(name);
+            return Ok(());
+        };
+        match self.values.insert(key.name, value.to_string()) {
+            Some(_) => Err(key.name),
+            None => Ok(()),
+        }
+    }
+
+    /// Notes the name of a key that is of no use here.
+    pub(super) fn note(&mut self, name: &str) {
+        self.unused.note(name);
+    }
+
+    pub(super) fn has(&self, name: &str) -> bool {
+        self.values.contains_key(name)
+    }
+
+    /// True if a key is stated with this value.
+    pub(super) fn is(&self, name: &str, value: &str) -> bool {
+        self.values.get(name).is_some_and(|other| other == value)
+    }
+
+    /// The value of a key, which then counts as used.
+    pub(super) fn get(&self, name: &str) -> Option<&str> {
+        let (key, value) = self.values.get_key_value(name)?;
+        self.asked.borrow_mut().insert(key);
+        Some(value)
+    }
+
+    /// What was not used, once everything was read; what a user must know of it is a warning.
+    ///
+    /// # Errors
+    /// Name and fault of a key that is refused.
+    pub(super) fn finish(
+        mut self,
+        path: &Path,
+        remarks: &mut Vec<(String, String)>,
+    ) -> Result<Unused, (&'static str, String)> {
+        let asked = self.asked.take();
+        for key in self.keys.iter().filter(|key| !asked.contains(key.name)) {
+            let Some(value) = self.values.get(key.name) else { continue };
+            self.unused.note(key.name);
+            not_used(path, key, value, remarks)?;
+        }
+        Ok(self.unused)
+    }
+}
+
+/// Warns of a key that is stated and was not used, or refuses it, if its value matters.
+///
+/// # Errors
+/// Name and fault of a key that is refused.
+pub(super) fn not_used(
+    path: &Path,
+    key: &Key,
+    value: &str,
+    remarks: &mut Vec<(String, String)>,
+) -> Result<(), (&'static str, String)> {
+    match key.done {
+        Use::Refused(neutral) if !is_neutral(value, neutral) => {
+            Err((key.name, "is stated and is not read: without it the samples would be read wrong".into()))
+        }
+        Use::Used if key.aspect.matters() => {
+            warn(path, key, "another key comes before it", remarks);
+            Ok(())
+        }
+        Use::Warned(neutral) if !is_neutral(value, neutral) => {
+            warn(path, key, "it is not read", remarks);
+            Ok(())
+        }
+        _ => Ok(()),
+    }
+}
+
+fn warn(path: &Path, key: &Key, why: &str, remarks: &mut Vec<(String, String)>) {
+    let text = format!("{} is stated and not used, {why}; it concerns {}", key.name, key.aspect.name());
+    remarks.push(warned(path, "not used", text));
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{Aspect, Key, Stated, Unused, Use, is_neutral};
+    use std::path::Path;
+
+    static KEYS: [Key; 4] = [
+        Key::new("Spacing", Aspect::Geometry, Use::Used),
+        Key::new("Slope", Aspect::Value, Use::Warned(&["1"])),
+        Key::new("SliceHeader", Aspect::Storage, Use::Refused(&["0"])),
+        Key::new("Name", Aspect::About, Use::Listed),
+    ];
+
+    fn finished(fields: &[(&str, &str)], asked: &[&str]) -> (Result<Vec<String>, &'static str>, usize) {
+        let mut stated = Stated::new(&KEYS);
+        for (name, value) in fields {
+            stated.put(name, value).expect("once");
+        }
+        for name in asked {
+            stated.get(name);
+        }
+        let mut remarks = Vec::new();
+        let unused = stated.finish(Path::new("a"), &mut remarks).map(|unused| unused.lines()).map_err(|(name, _)| name);
+        (unused, remarks.len())
+    }
+
+    #[test]
+    fn what_is_stated_and_not_used_is_listed_warned_about_or_refused() {
+        let lines = |lines: &[&str]| Ok(lines.iter().map(ToString::to_string).collect());
+        assert_eq!(finished(&[("Spacing", "1")], &["Spacing"]), (lines(&[]), 0));
+        assert_eq!(finished(&[("Spacing", "1")], &[]), (lines(&["Spacing"]), 1));
+        assert_eq!(finished(&[("Slope", "1.0"), ("Name", "x")], &[]), (lines(&["Name", "Slope"]), 0));
+        assert_eq!(finished(&[("Slope", "2")], &[]), (lines(&["Slope"]), 1));
+        assert_eq!(finished(&[("SliceHeader", "0")], &[]), (lines(&["SliceHeader"]), 0));
+        assert_eq!(finished(&[("SliceHeader", "8")], &[]), (Err("SliceHeader"), 0));
+        assert_eq!(finished(&[("Other", "8")], &[]), (lines(&["Other"]), 0));
+    }
+
+    #[test]
+    fn every_word_of_a_neutral_value_is_neutral() {
+        assert!(is_neutral("0 0.0 -0", &["0"]) && is_neutral("(0,0)", &["0"]) && is_neutral("", &["0"]));
+        assert!(is_neutral("identity", &["IDENTITY"]) && is_neutral("1\\1", &["1"]));
+        assert!(!is_neutral("0 1", &["0"]) && !is_neutral("INVERSE", &["IDENTITY"]));
+    }
+
+    #[test]
+    fn names_that_differ_in_numbers_are_one_and_their_number_is_bounded() {
+        let mut unused = Unused::default();
+        (0..300).for_each(|n| unused.note(&format!("Seq_Frame{n:04}_Angle")));
+        unused.note("axis 3 name");
+        assert_eq!(unused.lines(), ["Seq_FrameN_Angle (300 times)", "axis 3 name"]);
+        let letters = |n: usize| char::from_u32(0x4e00 + n as u32).unwrap_or('a').to_string();
+        (0..300).for_each(|n| unused.note(&letters(n)));
+        let lines = unused.lines();
+        assert!(lines.len() == 257 && lines.last().is_some_and(|line| line == "46 more"), "{lines:?}");
+        unused.note(&"a".repeat(100_000));
+    }
+}
