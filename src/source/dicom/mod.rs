@@ -1,8 +1,8 @@
 //! DICOM: ultrasound images of one or many frames, Enhanced US Volumes, Kretz files in GE's private elements, Philips' Cartesian volumes,
 //! and folders of files as one series. Enhanced US Volumes and secondary captures are written.
 //!
-//! The elements are read here and not by the crate `dicom-parser` (0.9.1): it panics on an item delimiter in a sequence without an item,
-//! and reserves whatever a length field claims.
+//! The elements are read here and not by the crate `dicom-object` (0.10.1): it takes whatever memory a length field claims, and sequences
+//! that are nested some thousand times overflow its stack. "Readers of crates" in docs/experiments.md compares them.
 
 mod about;
 mod classes;
