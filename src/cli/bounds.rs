@@ -1,23 +1,30 @@
 //! `echolume report bounds`.
 
 use crate::args::InputArgs;
-use crate::bounds::{Effort, PictureBounds, fault, picture};
+use crate::bounds::{Effort, PictureBounds, Proof, fault, picture};
 use crate::dump::npy;
-use crate::passes::Texels;
+use crate::gpu::{Renderer, RendererOptions};
+use crate::passes::raycast::tolerance::LEVELS;
+use crate::passes::{Slot, Texels, rendered};
 use crate::picture::{Picture, replace};
 use crate::reference;
+use crate::scene::Scene;
+use crate::source::Frame;
 use crate::statistics::quantile_of;
 use crate::terminal::{Failure, failed, input, say};
 use serde_json::json;
+use std::fmt::{self, Display};
 use std::path::{Path, PathBuf};
 
 #[derive(clap::Args)]
 #[command(
     after_help = "For every ray of volume rendering, low and high contain the exact integral of the sampled field: computed on the CPU in interval \
-                  arithmetic, with the volume that stage 1 makes in f64, before the tone mapping of stage 4.\n\n\
+                  arithmetic, with the volume that stage 1 makes in f64, before the tone mapping of stage 4. With ray.tolerance the scene is also drawn on the \
+                  device, and of each pixel it is said whether its error is within the tolerance by proof, or by its own estimate.\n\n\
                   Examples:\n  \
                   echolume report bounds --mode vr --size 64x64 -o bounds\n  \
-                  echolume report bounds bone.mha --preset bone --mode vr --size 128x128 --width 0.02 -o bounds"
+                  echolume report bounds bone.mha --preset bone --mode vr --size 128x128 --width 0.02 -o bounds\n  \
+                  echolume report bounds bone.mha --preset bone --mode vr --size 96x96 --set light.volume=none --set ray.tolerance=1 -o bounds"
 )]
 pub struct BoundsReport {
     #[command(flatten)]
@@ -33,6 +40,48 @@ pub struct BoundsReport {
     parts: u32,
 }
 
+/// What is known of the errors of a picture: by bounds, else by the estimates of its pixels.
+struct Certificate {
+    /// Levels of 255.
+    tolerance: f64,
+    /// Shares of all pixels: within the tolerance by proof, within by estimate where nothing is proven, and beyond by proof.
+    proven: f64,
+    estimated: f64,
+    broken: f64,
+}
+
+impl Certificate {
+    /// `errors`: what each pixel states, 0..1 of the screen.
+    fn new(proofs: &[Proof], errors: &Texels, tolerance: f64) -> Certificate {
+        // As the shader compares them.
+        let allowed = f64::from((tolerance / LEVELS) as f32);
+        let share = |is_one: &dyn Fn(Proof, f64) -> bool| {
+            let pairs = proofs.iter().zip(&errors.values);
+            pairs.filter(|(proof, error)| is_one(**proof, **error)).count() as f64 / proofs.len().max(1) as f64
+        };
+        Certificate {
+            tolerance,
+            proven: share(&|proof, _| proof == Proof::Kept),
+            estimated: share(&|proof, error| proof == Proof::Open && error <= allowed),
+            broken: share(&|proof, _| proof == Proof::Broken),
+        }
+    }
+}
+
+impl Display for Certificate {
+    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        let Certificate { tolerance, proven, estimated, broken } = self;
+        let levels = if *tolerance == 1.0 { "level" } else { "levels" };
+        let open = (1.0 - proven - estimated - broken).max(0.0);
+        let [proven, estimated, broken, open] = [*proven, *estimated, *broken, open].map(|share| 100.0 * share);
+        write!(
+            f,
+            "the picture: at most {tolerance} {levels} of 255 in {proven:.1} % of the pixels by proof, in {estimated:.1} % by estimate; {open:.1} % may \
+             have more, {broken:.1} % have more by proof"
+        )
+    }
+}
+
 /// Median and 95th percentile of widths, and the share of them within a limit.
 fn summary(widths: &[f64], limit: f64) -> [f64; 3] {
     let at = |share: f64| quantile_of(widths.iter().copied(), share).unwrap_or(0.0);
@@ -45,7 +94,11 @@ impl BoundsReport {
         if !(1e-6..=1.0).contains(&self.width) {
             return Err(input(format!("--width {}: must lie in 1e-6..=1", self.width)));
         }
-        let (mut source, scene) = self.input.open()?;
+        let (mut source, drawn) = self.input.open()?;
+        let tolerance = drawn.tolerance();
+        // The integral has no steps.
+        let mut scene = drawn.clone();
+        scene.settings.ray.tolerance = 0.0;
         if let Some(why) = fault(&scene) {
             return Err(input(format!("report bounds: {why}")));
         }
@@ -56,11 +109,13 @@ impl BoundsReport {
             frames.push(frame);
             Ok(())
         })?;
-        let effort = Effort { width: self.width, parts: self.parts as usize };
+        // What is proven of a drawn pixel needs bounds that are narrow beside the tolerance.
+        let narrow = tolerance.map_or(self.width, |levels| levels / LEVELS / 8.0);
+        let effort = Effort { width: self.width.min(narrow), parts: self.parts as usize };
         let begun = std::time::Instant::now();
         let mut found = None;
-        let frames = reference::decoded(&scene, &frames);
-        reference::render_with(&scene, &frames, &mut |pass, reads, _| {
+        let picture_frames = reference::decoded(&scene, &frames);
+        reference::render_with(&scene, &picture_frames, &mut |pass, reads, _| {
             if pass == "raycast_volume" {
                 found = Some(picture(&scene, reads.get("volume"), effort));
             }
@@ -79,8 +134,36 @@ impl BoundsReport {
             bounds.parts,
             begun.elapsed().as_secs_f64()
         );
+        if let Some(tolerance) = tolerance {
+            say!("{}", self.certified(drawn, &frames, &bounds, tolerance)?);
+        }
         say!("written: low, high and width as .png, low.npy, high.npy, bounds.json in {}", self.output.display());
         Ok(())
+    }
+
+    /// What the bounds and the picture's own estimates say of a picture with a tolerance, levels of 255, drawn on the device.
+    fn certified(
+        &self,
+        scene: Scene,
+        frames: &[Frame],
+        bounds: &PictureBounds,
+        tolerance: f64,
+    ) -> Result<String, Failure> {
+        let context = self.input.open_device(false)?;
+        let slot = rendered(&scene);
+        let mut renderer = Renderer::new(&context, scene, &RendererOptions::default()).map_err(failed)?;
+        for frame in frames {
+            renderer.frame(frame.slice as u32, &frame.bytes, 0).map_err(failed)?;
+        }
+        renderer.show(0).map_err(failed)?;
+        renderer.picture().map_err(failed)?;
+        let [drawn, errors] = [slot, Slot::PixelErrors].map(|slot| renderer.read(slot));
+        let (Some(drawn), Some(errors)) = (drawn.map_err(failed)?, errors.map_err(failed)?) else {
+            return Err(failed("report bounds: the picture states no errors"));
+        };
+        let proofs =
+            bounds.proofs(renderer.scene(), &drawn, tolerance).map_err(|why| input(format!("report bounds: {why}")))?;
+        Ok(Certificate::new(&proofs, &errors, tolerance).to_string())
     }
 
     fn write(&self, bounds: &PictureBounds) -> Result<(), Failure> {

@@ -315,36 +315,51 @@ fn world(file: &InputFile, header: &Bytes, remarks: &mut Vec<(String, String)>) 
     let made = |axes: [DVec3; 3], origin: DVec3| World::new(axes.map(|a| a * unit), origin * unit);
     let fault = |field: &str, why: String| InputError::new(file.path, field, why);
     let [has_qform, has_sform] = [header.integer((252, 2), (344, 4)) > 0, header.integer((254, 2), (348, 4)) > 0];
+    let spacing = [1, 2, 3].map(|n| match header.pixdim(n) {
+        // An axis of one voxel may have none.
+        0.0 => 1.0,
+        length => length.abs(),
+    });
+    let by_quaternion = || {
+        let [b, c, d] = [0, 1, 2].map(|n| header.real(256, 352, n));
+        let origin = DVec3::from([0, 1, 2].map(|n| header.real(268, 376, n))) * TO_LPS;
+        let rotation = quaternion(b, c, d);
+        let hand = if header.pixdim(0) < 0.0 { -1.0 } else { 1.0 };
+        let axes = [
+            rotation.x_axis * TO_LPS * spacing[0],
+            rotation.y_axis * TO_LPS * spacing[1],
+            rotation.z_axis * TO_LPS * spacing[2] * hand,
+        ];
+        made(axes, origin)
+    };
     if has_sform {
         let column = |n: usize| {
             let row = |row: usize| header.real(280, 400, 4 * row + n);
             DVec3::new(row(0), row(1), row(2)) * TO_LPS
         };
         match made([column(0), column(1), column(2)], column(3)) {
-            Ok(world) => return Ok(world),
+            Ok(world) => {
+                let other = by_quaternion().ok().filter(|other| has_qform && !is_same(&world, other));
+                let text = "the qform states another place; the sform counts, as the standard says";
+                remarks.extend(other.map(|_| ("sform".into(), text.into())));
+                return Ok(world);
+            }
             Err(why) if !has_qform => return Err(fault("sform", why)),
             Err(why) => remarks.push(("sform".into(), format!("{why}; the qform is used"))),
         }
     }
-    let spacing = [1, 2, 3].map(|n| match header.pixdim(n) {
-        // An axis of one voxel may have none.
-        0.0 => 1.0,
-        length => length.abs(),
-    });
     if !has_qform {
         let axes = [DVec3::X * spacing[0], DVec3::Y * spacing[1], DVec3::Z * spacing[2]];
         return made(axes, DVec3::ZERO).map_err(|why| fault("pixdim", why));
     }
-    let [b, c, d] = [0, 1, 2].map(|n| header.real(256, 352, n));
-    let origin = DVec3::new(header.real(268, 376, 0), header.real(268, 376, 1), header.real(268, 376, 2)) * TO_LPS;
-    let rotation = quaternion(b, c, d);
-    let hand = if header.pixdim(0) < 0.0 { -1.0 } else { 1.0 };
-    let axes = [
-        rotation.x_axis * TO_LPS * spacing[0],
-        rotation.y_axis * TO_LPS * spacing[1],
-        rotation.z_axis * TO_LPS * spacing[2] * hand,
-    ];
-    made(axes, origin).map_err(|why| fault("qform", why))
+    by_quaternion().map_err(|why| fault("qform", why))
+}
+
+/// Whether two places differ by no more than rounding to f32: a thousandth of a voxel.
+fn is_same(a: &World, b: &World) -> bool {
+    let voxel = a.axis(0).length().min(a.axis(1).length()).min(a.axis(2).length());
+    let near = |a: DVec3, b: DVec3| (a - b).length() <= 1e-3 * voxel.max(1e-3 * a.length());
+    near(a.origin(), b.origin()) && (0..3).all(|n| near(a.axis(n), b.axis(n)))
 }
 
 /// The rotation of a unit quaternion by its last three components.

@@ -186,6 +186,13 @@ fn fields_of_nifti_are_listed_and_no_unit_is_guessed_in_silence() {
     let timed = found(&[(132, &0.1f32.to_le_bytes())]);
     assert!(timed.unused.lines() == ["slice_duration"] && warnings(&timed).len() == 1, "{:?}", timed.rows);
     assert!(warnings(&found(&[(72, &[16])]))[0].contains("bitpix is 16, but datatype has 8 bits"));
+    // An sform of 2 mm beside a qform of 1 mm, and one that says the same: both in RAS.
+    let sform = |mm: f32| {
+        let rows = [[mm, 0.0, 0.0, 0.0], [0.0, mm, 0.0, 0.0], [0.0, 0.0, mm, 0.0]];
+        rows.concat().into_iter().flat_map(f32::to_le_bytes).collect::<Vec<u8>>()
+    };
+    let both = |mm: f32| found(&[(252, &[1, 0, 1, 0]), (280, &sform(mm))]);
+    assert!(says(&both(2.0), "the qform states another place") && !says(&both(1.0), "the qform"));
     // Codes of units: none, lengths that are not known, Hz.
     assert!(says(&found(&[(123, &[0])]), "taken as mm") && says(&found(&[(123, &[0])]), "taken as s"));
     assert!(says(&found(&[(123, &[8 + 5])]), "code 5"));

@@ -10,10 +10,11 @@ use crate::exact_ray::fade::Fade as Kinks;
 use crate::exact_ray::volume::{Medium as Hints, cut};
 use crate::exact_ray::{Line, segments};
 use crate::passes::Texels;
+use crate::passes::postprocess::toned;
 use crate::passes::raycast::ray::span;
 use crate::passes::raycast::volume::{depth_axis, reference_length};
 use crate::scene::transfer::{self, Absorption};
-use crate::scene::{Mode, Scene, Shading};
+use crate::scene::{ColourMap, Mode, Scene, Shading};
 use glam::DVec3;
 use interval::Interval;
 use rayon::prelude::*;
@@ -50,6 +51,50 @@ impl PictureBounds {
     pub fn widths_of_hits(&self) -> Vec<f64> {
         let hits = self.high.values.chunks_exact(4).map(|high| high[3] > 0.0);
         self.widths().into_iter().zip(hits).filter(|(_, hit)| *hit).map(|(width, _)| width).collect()
+    }
+}
+
+/// What bounds prove of a drawn pixel.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Proof {
+    /// Its error is within the tolerance.
+    Kept,
+    /// Its error is beyond the tolerance.
+    Broken,
+    /// The bounds are too wide to tell.
+    Open,
+}
+
+impl PictureBounds {
+    /// What is proven of each pixel of a drawn picture: red, green, blue and opacity before stage 4. `tolerance`: levels of 255 after toning, of the worst
+    /// channel.
+    ///
+    /// # Errors
+    /// In words: a scene whose toning does not keep the order of values, a picture of another size.
+    pub fn proofs(&self, scene: &Scene, drawn: &Texels, tolerance: f64) -> Result<Vec<Proof>, String> {
+        if scene.settings.post.colour_map != ColourMap::None {
+            return Err("post.colour_map shows values in no order of their own: set post.colour_map=none".into());
+        }
+        if drawn.size != self.low.size || drawn.channels != 4 {
+            return Err(format!("the picture has {:?} texels, the bounds {:?}", drawn.size, self.low.size));
+        }
+        let pixels = |of: &Texels| of.values.as_chunks::<4>().0.to_vec();
+        let shown = |[r, g, b, opacity]: [f64; 4]| if opacity > 0.0 { toned(scene, [r, g, b]) } else { [0.0; 3] };
+        let one = |((low, high), drawn): (([f64; 4], [f64; 4]), [f64; 4])| {
+            // Where there may be nothing, the screen may be black.
+            let may_be_black = low[3] <= 0.0;
+            let (low, high, drawn) = (toned(scene, [low[0], low[1], low[2]]), shown(high), shown(drawn));
+            let low = low.map(|value| if may_be_black { value.min(0.0) } else { value });
+            let worst = |of: &dyn Fn(usize) -> f64| (0..3).map(of).fold(f64::MIN, f64::max) * 255.0;
+            let most = worst(&|c| (drawn[c] - low[c]).max(high[c] - drawn[c]));
+            let least = worst(&|c| (low[c] - drawn[c]).max(drawn[c] - high[c]));
+            match (most <= tolerance, least > tolerance) {
+                (true, _) => Proof::Kept,
+                (_, true) => Proof::Broken,
+                _ => Proof::Open,
+            }
+        };
+        Ok(pixels(&self.low).into_iter().zip(pixels(&self.high)).zip(pixels(drawn)).map(one).collect())
     }
 }
 
