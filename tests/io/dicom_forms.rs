@@ -478,3 +478,15 @@ fn a_region_without_a_scale_leaves_it_to_the_pixel_spacing() {
     refused(&without, &["--voxel-spacing"]);
     refused(&region(0.0, 0.0, 3).text(0x0028_0030, "0\\0"), &["--voxel-spacing"]);
 }
+
+#[test]
+fn numbers_of_32_bits_in_words_of_a_big_endian_file_are_refused() {
+    let value = 0x0102_0304u32;
+    let file = |syntax| File::new(syntax, 1, 1).bits(32, 32);
+    refused(
+        &file(BIG).bytes(0x7fe0_0010, b"OW", &value.to_be_bytes()),
+        &["(0028,0100)", "big-endian words of 16 bits"],
+    );
+    let little = file(LITTLE).bytes(0x7fe0_0010, b"OW", &value.to_le_bytes());
+    assert_eq!(plain(&little).concat(), (value as f32).to_le_bytes());
+}

@@ -51,6 +51,9 @@ const SPELLINGS: [(&str, &str); 6] = [
 pub(super) const ORIENTATION: &str = "ultrasound image orientation";
 pub(super) const IMAGE_TYPE: &str = "ultrasound image type";
 
+/// The start of the keys of a segmentation's first segment.
+const SEGMENT: &str = "segment0_";
+
 /// A vector of numbers that are written in brackets.
 pub(super) type Vector = Vec<f64>;
 
@@ -131,7 +134,11 @@ impl<'a> Header<'a> {
             return self.frames.field(self.path, of_frame, value);
         }
         let key = key.to_ascii_lowercase();
-        if key == ORIENTATION || key == IMAGE_TYPE || (key.starts_with("axis ") && key.contains(" index ")) {
+        if key == ORIENTATION
+            || key == IMAGE_TYPE
+            || (key.starts_with("axis ") && key.contains(" index "))
+            || key.starts_with(SEGMENT)
+        {
             self.values.insert(key, value.to_string());
         }
         Ok(())
@@ -157,6 +164,11 @@ impl<'a> Header<'a> {
     /// The value of a key that a program added.
     pub(super) fn value(&self, key: &str) -> Option<&str> {
         self.values.get(key).map(String::as_str)
+    }
+
+    /// True of a segmentation of 3D Slicer.
+    pub(super) fn has_segments(&self) -> bool {
+        self.values.keys().any(|key| key.starts_with(SEGMENT))
     }
 
     /// The words of a field, one for each of `count`; those in quotes may be empty. None if the field is absent.
