@@ -11,6 +11,7 @@ use crate::source::recorder::{Header, Writer};
 use crate::source::segmentation;
 use crate::source::sequence::{self, Sequence};
 use crate::source::volume_file::VolumeFile;
+use crate::source::volume_sequence::{self, VolumeSequence};
 use crate::source::{self, Description, Frame, Source};
 use crate::terminal::{Failure, failed, input, progress_bar, remark, say};
 use std::path::{Path, PathBuf};
@@ -26,10 +27,7 @@ fn read_volume(
     number: usize,
     mut each: impl FnMut(&Geometry, &Frame),
 ) -> Result<(Geometry, Volume, usize), Failure> {
-    if number >= recording.volumes() {
-        let there = recording.volumes();
-        return Err(input(format!("{}: --volume {number}: there are {there}, numbered from 0", file.display())));
-    }
+    check_number(recording, file, number)?;
     let geometry = recording.geometry(number);
     let mut volume = Volume::new(geometry.clone(), recording.stored_type());
     recording.skip_to_volume(number).map_err(input)?;
@@ -43,6 +41,14 @@ fn read_volume(
         there += 1;
     }
     Ok((geometry, volume, there))
+}
+
+fn check_number(recording: &dyn Source, file: &Path, number: usize) -> Result<(), Failure> {
+    let there = recording.volumes();
+    match number < there {
+        true => Ok(()),
+        false => Err(input(format!("{}: --volume {number}: there are {there}, numbered from 0", file.display()))),
+    }
 }
 
 /// Like [`read_volume`], with the share of the range between the darker and the brighter class of echoes, if there are two.
@@ -83,20 +89,21 @@ pub(super) fn target_grid(geometry: &Geometry, spacing: Option<f64>) -> Result<G
 #[command(after_help = "Example:\n  echolume convert sweep.mha volume.nrrd --spacing 0.5\n  \
                         echolume convert sweep.mha sweep.frames    (checksummed, appended frame by frame; a file that is there is not replaced)\n  \
                         echolume convert sweep.mha tissue.seg.nrrd    (for 3D Slicer)\n  \
+                        echolume convert sweep.mha volumes.seq.nrrd    (every volume, as a sequence for 3D Slicer)\n  \
                         echolume convert sweep.frames sweep.mha --sequence    (frames of whole volumes, for other programs)\n  \
                         echolume render volume.mha --mode mip -o mip.png    (the result is a recording, too)")]
 pub struct Convert {
     #[arg(help = recording_help())]
     input: PathBuf,
-    /// File to write: .mha, .nrrd, .nii, .nii.gz or .dcm (Enhanced US Volume) for a volume, .seg.nrrd for the voxels above --threshold as a
+    /// File to write: .mha, .nrrd, .nii, .nii.gz or .dcm (Enhanced US Volume) for a volume, .seq.nrrd for all volumes in time, .seg.nrrd for the voxels above --threshold as a
     /// segmentation, .frames for every frame unchanged, .mha with --sequence
     output: PathBuf,
     /// Voxel spacing along every axis, mm [default: a Cartesian volume keeps its voxels; a sweep gets the sample spacing of a scan line]
     #[arg(long, value_name = "MM", allow_negative_numbers = true)]
     spacing: Option<f64>,
-    /// Volume of the recording to use, counted from 0
-    #[arg(long, value_name = "N", default_value_t = 0)]
-    volume: usize,
+    /// Volume of the recording to use, counted from 0 [default: 0; with .seq.nrrd all]
+    #[arg(long, value_name = "N")]
+    volume: Option<usize>,
     #[command(flatten)]
     geometry: GeometryArgs,
     /// Value of voxels outside the sector, in the file's own units [default: that of no echo, the low end of the sample range, such as -60 of decibels]
@@ -138,29 +145,18 @@ impl Convert {
         if is_segmented {
             return self.segment();
         }
+        if volume_sequence::is_one(&self.output) {
+            return self.volumes();
+        }
         VolumeFile::of(&self.output).map_err(input)?;
         let mut recording = open_recording(&self.input, self.geometry.options())?;
-        let shown = self.input.display();
-        if self.volume >= recording.volumes() {
-            let there = recording.volumes();
-            return Err(input(format!("{shown}: --volume {}: there are {there}, numbered from 0", self.volume)));
-        }
-        let geometry = recording.geometry(self.volume);
-        let grid = target_grid(&geometry, self.spacing)?;
-        let mut target = Target::new(grid, recording.sample_type());
-        if let (Some(world), Geometry::Cartesian(own)) = (recording.world_of(self.volume), &geometry) {
-            target.world = world.on(own, &grid);
-        }
-        let (range, shift) = (recording.range(), recording.sample_type().shift());
-        // A capture has bytes, of which 0 is black.
-        let no_echo = if self.secondary_capture { 0.0 } else { range[0] - shift };
-        target.outside = self.outside.unwrap_or(no_echo);
-        if self.secondary_capture {
-            target = target.captured(recording.range());
-            if target.world != World::of(&grid) {
-                let kept = "a secondary capture does not keep the place in the world";
-                remark(&format!("{}: {kept}", self.output.display()));
-            }
+        let number = self.volume.unwrap_or(0);
+        check_number(&*recording, &self.input, number)?;
+        let target = self.target(&*recording, number)?;
+        let grid = target.grid;
+        if self.secondary_capture && target.world != World::of(&grid) {
+            let kept = "a secondary capture does not keep the place in the world";
+            remark(&format!("{}: {kept}", self.output.display()));
         }
         target.check(&self.output).map_err(input)?;
         if let Some(mask) = &self.mask {
@@ -168,28 +164,98 @@ impl Convert {
         }
         self.check_outputs(&[(OUTPUT, Some(&self.output)), ("--mask", self.mask.as_deref())], &*recording)?;
         let each = recording.frames_per_volume();
-        let (first, volume, there) = read_volume(&mut *recording, &self.input, self.volume, |_, _| ())?;
+        let (geometry, volume, there) = read_volume(&mut *recording, &self.input, number, |_, _| ())?;
         let bar = progress_bar(grid.size[2] as u64).with_message("slices");
         volume.write(&target, &self.output, || bar.inc(1)).map_err(failed)?;
         bar.finish_and_clear();
-        if let Some(mask) = &self.mask {
-            volume.write_mask(&target, mask).map_err(failed)?;
-            say!("mask: {}, 1 inside and 0 outside", mask.display());
-        }
-        let ([x, y, z], [dx, dy, dz]) = (grid.size, grid.spacing);
-        let spacing = if dx == dy && dy == dz { format!("{dx}") } else { format!("{dx} x {dy} x {dz}") };
+        self.write_mask(&volume, &target)?;
         let missing = if there < each { format!(", {there} of {each} frames are there") } else { String::new() };
+        say!("volume: {}, {}{missing}", self.output.display(), self.voxels(&target, &geometry));
+        self.remark_others(&*recording);
+        self.remark_size(&volume, &grid);
+        Ok(())
+    }
+
+    /// Writes all volumes, or the one that was chosen, as a sequence of volumes in time.
+    fn volumes(&self) -> Result<(), Failure> {
+        if let Some(mask) = &self.mask {
+            VolumeFile::of(mask).map_err(input)?;
+        }
+        let mut recording = open_recording(&self.input, self.geometry.options())?;
+        let numbers = self.volume.map_or(0..recording.volumes(), |number| number..number.saturating_add(1));
+        check_number(&*recording, &self.input, numbers.start)?;
+        VolumeSequence::check(&self.target(&*recording, numbers.start)?, &self.output).map_err(input)?;
+        self.check_outputs(&[(OUTPUT, Some(&self.output)), ("--mask", self.mask.as_deref())], &*recording)?;
+        let sequence = VolumeSequence::of(&mut *recording, numbers, &self.input).map_err(input)?;
+        // Of the first volume that is whole.
+        let (geometry, target) = (recording.geometry(sequence.first()), self.target(&*recording, sequence.first())?);
+        let bar = progress_bar(sequence.volumes() as u64).with_message("volumes");
+        sequence.write(&mut *recording, &target, &self.output, || bar.inc(1)).map_err(failed)?;
+        bar.finish_and_clear();
+        let empty = Volume::new(geometry.clone(), recording.stored_type());
+        self.write_mask(&empty, &target)?;
+        let left_out = match sequence.left_out() {
+            0 => String::new(),
+            n => format!("; {n} volumes are left out, with frames missing"),
+        };
+        let (shown, count) = (self.output.display(), sequence.volumes());
+        say!("sequence: {shown}, {count} volumes of {}{left_out}", self.voxels(&target, &geometry));
+        if let Err(why) = sequence.times() {
+            remark(&format!("{shown}: {why}"));
+        }
+        self.remark_size(&empty, &target.grid);
+        Ok(())
+    }
+
+    /// The lattice of a volume, and what is written on it.
+    fn target(&self, recording: &dyn Source, number: usize) -> Result<Target, Failure> {
+        let geometry = recording.geometry(number);
+        let grid = target_grid(&geometry, self.spacing)?;
+        let mut target = Target::new(grid, recording.sample_type());
+        if let (Some(world), Geometry::Cartesian(own)) = (recording.world_of(number), &geometry) {
+            target.world = world.on(own, &grid);
+        }
+        let (range, shift) = (recording.range(), recording.sample_type().shift());
+        // A capture has bytes, of which 0 is black.
+        let no_echo = if self.secondary_capture { 0.0 } else { range[0] - shift };
+        target.outside = self.outside.unwrap_or(no_echo);
+        Ok(if self.secondary_capture { target.captured(range) } else { target })
+    }
+
+    fn write_mask(&self, volume: &Volume, target: &Target) -> Result<(), Failure> {
+        let Some(mask) = &self.mask else { return Ok(()) };
+        volume.write_mask(target, mask).map_err(failed)?;
+        say!("mask: {}, 1 inside and 0 outside", mask.display());
+        Ok(())
+    }
+
+    /// The voxels of a volume in words.
+    fn voxels(&self, target: &Target, geometry: &Geometry) -> String {
+        let ([x, y, z], [dx, dy, dz]) = (target.grid.size, target.grid.spacing);
+        let spacing = if dx == dy && dy == dz { format!("{dx}") } else { format!("{dx} x {dy} x {dz}") };
         let outside = match geometry {
             Geometry::Sweep(_) if !self.secondary_capture => format!(", {} outside of the sector", target.outside),
             _ => String::new(),
         };
-        say!("volume: {}, {x} x {y} x {z} voxels of {spacing} mm{outside}{missing}", self.output.display());
-        if !volume.meets(&grid) {
-            remark(&format!("{}: is empty: {}", self.output.display(), thinner_than(&grid, &first)));
-        } else if let Some(left) = self.spacing.and_then(|mm| what_is_left(mm, &grid, &first)) {
-            remark(&format!("{}: {left}", self.output.display()));
+        format!("{x} x {y} x {z} voxels of {spacing} mm{outside}")
+    }
+
+    /// Says that a recording has more volumes than the file, unless one was chosen.
+    fn remark_others(&self, recording: &dyn Source) {
+        let (count, shown) = (recording.volumes(), self.output.display());
+        if self.volume.is_none() && count > 1 {
+            remark(&format!("{shown}: volume 1 of {count}; NAME.seq.nrrd takes all, --volume another"));
         }
-        Ok(())
+    }
+
+    /// Says if a lattice leaves little or nothing of a volume.
+    fn remark_size(&self, volume: &Volume, grid: &Grid) {
+        let (shown, geometry) = (self.output.display(), volume.geometry());
+        if !volume.meets(grid) {
+            remark(&format!("{shown}: is empty: {}", thinner_than(grid, geometry)));
+        } else if let Some(left) = self.spacing.and_then(|mm| what_is_left(mm, grid, geometry)) {
+            remark(&format!("{shown}: {left}"));
+        }
     }
 
     /// Writes the voxels above a threshold as a segmentation.
@@ -201,28 +267,22 @@ impl Convert {
         let mut recording = open_recording(&self.input, self.geometry.options())?;
         self.check_outputs(&[(OUTPUT, Some(&self.output)), ("--mask", self.mask.as_deref())], &*recording)?;
         let samples = Input { stored: recording.stored_type(), range: recording.range() };
-        let (sample, world) = (recording.sample_type(), recording.world_of(self.volume));
-        let (geometry, volume, found) = read_with_threshold(&mut *recording, &self.input, self.volume, samples)?;
-        let grid = target_grid(&geometry, self.spacing)?;
+        let (sample, number) = (recording.sample_type(), self.volume.unwrap_or(0));
+        let (_, volume, found) = read_with_threshold(&mut *recording, &self.input, number, samples)?;
+        let target = self.target(&*recording, number)?;
         let share = share_of(self.threshold, found.as_ref(), &self.input)?;
         let threshold = samples.range[0] + share * (samples.range[1] - samples.range[0]);
-        let mut target = Target::new(grid, sample);
-        if let (Some(world), Geometry::Cartesian(own)) = (world, &geometry) {
-            target.world = world.on(own, &grid);
-        }
-        let bar = progress_bar(grid.size[2] as u64).with_message("slices");
+        let bar = progress_bar(target.grid.size[2] as u64).with_message("slices");
         volume.write_tissue(&target, threshold, &self.output, || bar.inc(1)).map_err(failed)?;
         bar.finish_and_clear();
-        if let Some(mask) = &self.mask {
-            volume.write_mask(&target, mask).map_err(failed)?;
-            say!("mask: {}, 1 inside and 0 outside", mask.display());
-        }
-        let [x, y, z] = grid.size;
+        self.write_mask(&volume, &target)?;
+        let [x, y, z] = target.grid.size;
         let in_file = threshold - sample.shift();
         let shown = self.output.display();
         say!(
             "segmentation: {shown}, {x} x {y} x {z} voxels, 1 tissue; threshold {share:.3} ({in_file:.4} in the file)"
         );
+        self.remark_others(&*recording);
         Ok(())
     }
 
@@ -254,7 +314,8 @@ impl Convert {
 
     /// Writes every frame of every volume unchanged, as .frames.
     fn record(&self) -> Result<(), Failure> {
-        let is_of_volumes = self.spacing.is_some() || self.volume != 0 || self.outside.is_some() || self.mask.is_some();
+        let is_of_volumes =
+            self.spacing.is_some() || self.volume.is_some() || self.outside.is_some() || self.mask.is_some();
         if is_of_volumes || self.sequence || self.secondary_capture {
             return Err(input(
                 "--spacing, --volume, --outside, --mask, --secondary-capture and --sequence apply to volumes; .frames holds every frame unchanged",

@@ -9,7 +9,7 @@ use crate::probe::{Geometry, Grid, Probe, World};
 use crate::{SampleType, StoredType};
 use glam::DVec3;
 use rayon::prelude::*;
-use std::io::Write;
+use std::io::{self, Write};
 use std::path::Path;
 
 /// Most voxels along an edge, and in total: 32 GiB of floats.
@@ -55,7 +55,11 @@ impl Target {
     /// An extension that is not a format, an axis that is too long for the format, an outside value that the type of the samples does not
     /// have.
     pub fn check(&self, path: &Path) -> Result<(), InputError> {
-        let format = self.format(path)?;
+        self.check_as(self.format(path)?, path)
+    }
+
+    /// The same for a format.
+    pub(super) fn check_as(&self, format: VolumeFile, path: &Path) -> Result<(), InputError> {
         let most = format.most_along_axis();
         if let Some(long) = self.grid.size.iter().find(|n| **n > most) {
             let fault = format!("would have {long} voxels along an axis, the format holds {most}");
@@ -217,6 +221,11 @@ impl Volume {
         write_voxels(target, path, |voxel| self.value(target, voxel), each)
     }
 
+    /// Writes the voxels alone.
+    pub(super) fn write_samples(&self, target: &Target, file: &mut impl Write) -> io::Result<()> {
+        write_slices(target, file, |voxel| self.value(target, voxel), || ())
+    }
+
     /// Writes 1 for voxels inside the insonified region and 0 for those outside, on the same lattice; as a segmentation if the file's name
     /// asks for one.
     ///
@@ -286,9 +295,20 @@ fn write_voxels(
     each: impl Fn(),
 ) -> Result<(), InputError> {
     target.check(path)?;
-    let Target { grid, sample, outside, .. } = *target;
     let written = |e| InputError::unwritable(path, &e);
-    let mut file = target.format(path)?.create(path, grid.size, &target.world, sample).map_err(written)?;
+    let mut file =
+        target.format(path)?.create(path, target.grid.size, &target.world, target.sample).map_err(written)?;
+    write_slices(target, &mut file, value, each).map_err(written)?;
+    file.finish().map_err(written)
+}
+
+fn write_slices(
+    target: &Target,
+    file: &mut impl Write,
+    value: impl Fn([usize; 3]) -> Option<f64> + Sync,
+    each: impl Fn(),
+) -> io::Result<()> {
+    let Target { grid, sample, outside, .. } = *target;
     let shown = |value: f64| match target.capture {
         Some([low, high]) => (255.0 * (value - low) / (high - low)).clamp(0.0, 255.0),
         None => value - sample.shift(),
@@ -300,10 +320,10 @@ fn write_voxels(
                 store(sample, value([x, y, z]).map_or(outside, shown), voxel);
             }
         });
-        file.write_all(&slice).map_err(written)?;
+        file.write_all(&slice)?;
         each();
     }
-    file.finish().map_err(written)
+    Ok(())
 }
 
 /// The centre of a voxel, mm.

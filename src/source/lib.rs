@@ -49,6 +49,7 @@ mod uff;
 mod units;
 mod value_range;
 pub mod volume_file;
+pub mod volume_sequence;
 
 use echolume_base::{files, tree};
 use echolume_probe as probe;

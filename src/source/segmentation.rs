@@ -1,7 +1,7 @@
 //! Label volumes with the names of what they hold: NRRD segmentations (`.seg.nrrd`) as 3D Slicer and its readers take them, one layer of
 //! bytes packed by gzip. A file is whole or does not exist.
 
-use super::volume_file::{nrrd_axes, three};
+use super::volume_file::{self, nrrd_axes, three};
 use crate::files::{InputError, Unfinished};
 use crate::probe::{Grid, World};
 use flate2::Compression;
@@ -29,10 +29,7 @@ pub fn is_one(path: &Path) -> bool {
 
 /// The name of a segmentation's file without its ending.
 pub fn stem(path: &Path) -> Option<String> {
-    let name = path.file_name()?.to_string_lossy();
-    let at = name.len().checked_sub(ENDING.len())?;
-    let (stem, ending) = (name.get(..at)?, name.get(at..)?);
-    ending.eq_ignore_ascii_case(ENDING).then(|| stem.into())
+    volume_file::stem(path, ENDING)
 }
 
 /// Writes the label of each voxel of a lattice; 0 is no segment. `each` is called after every slice.
@@ -68,7 +65,7 @@ pub(super) fn write(
 
 fn header(size: [usize; 3], world: &World, segments: &[Segment]) -> String {
     let [x, y, z] = size.map(|n| n.saturating_sub(1));
-    let axes = nrrd_axes(size, world);
+    let axes = nrrd_axes(size, world, None);
     let mut text = format!("NRRD0004\ntype: uint8\ndimension: 3\n{axes}encoding: gzip\n");
     for (n, Segment { label, name, colour }) in segments.iter().enumerate() {
         let colour = three((*colour).into(), " ");

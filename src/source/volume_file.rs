@@ -40,6 +40,13 @@ impl VolumeFile {
             (".nii.gz", VolumeFile::Nifti { packed: true }),
             (".dcm", VolumeFile::Dicom { capture: false }),
         ];
+        if stem(path, SEQUENCE).is_some() {
+            return Err(InputError::new(
+                path,
+                "file",
+                "is a sequence of volumes by its name, but one volume is written",
+            ));
+        }
         match formats.iter().find(|(ending, _)| name.ends_with(ending)) {
             Some((_, format)) => Ok(*format),
             None => Err(InputError::new(path, "file", "must end in .mha, .nrrd, .nii, .nii.gz or .dcm")),
@@ -111,6 +118,16 @@ impl VolumeFile {
     }
 }
 
+/// The end of the name of a sequence of volumes.
+pub(super) const SEQUENCE: &str = ".seq.nrrd";
+
+/// The name of a file without an ending in any case; None if it has another one.
+pub(super) fn stem(path: &Path, ending: &str) -> Option<String> {
+    let name = path.file_name()?.to_string_lossy();
+    let at = name.len().checked_sub(ending.len())?;
+    name.get(at..)?.eq_ignore_ascii_case(ending).then(|| name[..at].into())
+}
+
 /// Three numbers, without negative zeros.
 pub(super) fn three(v: DVec3, between: &str) -> String {
     v.to_array().map(|n| (n + 0.0).to_string()).join(between)
@@ -130,26 +147,36 @@ fn metaimage([x, y, z]: [usize; 3], world: &World, sample: SampleType) -> String
 }
 
 fn nrrd(size: [usize; 3], world: &World, sample: SampleType) -> String {
+    format!("{}encoding: raw\n\n", nrrd_start(size, world, sample, None))
+}
+
+/// An NRRD header without its encoding and its end. `volumes`: their number, the slowest axis, which is a list.
+pub(super) fn nrrd_start(size: [usize; 3], world: &World, sample: SampleType, volumes: Option<usize>) -> String {
     let kind = match sample {
         SampleType::U8 => "uint8",
         SampleType::U16 => "uint16",
         SampleType::I16 => "int16",
         SampleType::F32 => "float",
     };
+    let dimension = if volumes.is_some() { 4 } else { 3 };
+    let axes = nrrd_axes(size, world, volumes);
     format!(
-        "NRRD0004\n# The axes are lateral, depth and elevation of an ultrasound probe.\ntype: {kind}\ndimension: 3\n{}\
-         endian: little\nencoding: raw\n\n",
-        nrrd_axes(size, world)
+        "NRRD0004\n# The axes are lateral, depth and elevation of an ultrasound probe.\ntype: {kind}\ndimension: {dimension}\n{axes}\
+         endian: little\n"
     )
 }
 
 /// The fields of an NRRD header that say where the voxels are.
-pub(super) fn nrrd_axes([x, y, z]: [usize; 3], world: &World) -> String {
+pub(super) fn nrrd_axes([x, y, z]: [usize; 3], world: &World, volumes: Option<usize>) -> String {
+    let [size, direction, kind] = match volumes {
+        Some(count) => [format!(" {count}"), " none".into(), " list".into()],
+        None => [const { String::new() }; 3],
+    };
     let directions = [0, 1, 2].map(|n| format!("({})", three(world.axis(n), ","))).join(" ");
     let origin = three(world.origin(), ",");
     format!(
-        "space: left-posterior-superior\nsizes: {x} {y} {z}\nspace directions: {directions}\n\
-         kinds: domain domain domain\nspace units: \"mm\" \"mm\" \"mm\"\nspace origin: ({origin})\n"
+        "space: left-posterior-superior\nsizes: {x} {y} {z}{size}\nspace directions: {directions}{direction}\n\
+         kinds: domain domain domain{kind}\nspace units: \"mm\" \"mm\" \"mm\"\nspace origin: ({origin})\n"
     )
 }
 

@@ -8,6 +8,7 @@ use echolume::low_level::source::convert::{Target, Volume, lattice};
 use echolume::low_level::source::volume_file::VolumeFile;
 use echolume::low_level::source::{Frame, Recording, SampleType, StoredType};
 use glam::DVec3;
+use std::io::Read;
 use std::path::Path;
 
 fn probe() -> Probe {
@@ -153,4 +154,134 @@ fn the_command_writes_a_volume_or_one_line_and_nothing() {
     }
     assert_eq!(std::fs::read(&out).expect("still there"), before);
     assert!(folder.names().iter().eq(["volume.mha"]), "a part of a file is left: {:?}", folder.names());
+}
+
+/// A NRRD of three volumes of 3 x 2 x 2 bytes, 0 to 35.
+fn volumes(folder: &Folder, name: &str, times: &str) -> String {
+    let header = format!(
+        "NRRD0004\ntype: uint8\ndimension: 4\nspace: left-posterior-superior\nsizes: 3 2 2 3\n\
+         space directions: (0.5,0,0) (0,1,0) (0,0,2) none\nspace origin: (-3,7,0)\nkinds: domain domain domain list\n\
+         encoding: raw\n{times}\n"
+    );
+    folder.write(name, [header.as_bytes(), &(0..36).collect::<Vec<u8>>()].concat())
+}
+
+/// Volume, slice, time and samples of every frame.
+fn frames(path: impl AsRef<Path>) -> Vec<(u32, usize, Option<f64>, Vec<u8>)> {
+    let mut recording = Recording::open(path.as_ref(), None).unwrap_or_else(|e| panic!("{e}"));
+    let next = || recording.next_frame().unwrap_or_else(|e| panic!("{e}"));
+    std::iter::from_fn(next).map(|frame| (frame.volume, frame.slice, frame.time, frame.bytes)).collect()
+}
+
+#[test]
+fn all_volumes_and_their_times_become_a_sequence() {
+    let folder = Folder::new("sequence");
+    let timed = "units: \"\" \"\" \"\" \"ms\"\naxis 3 index values:=0 50 125\n";
+    let (from, out) = (volumes(&folder, "timed.nrrd", timed), folder.join("out.SEQ.nrrd"));
+    let to = out.to_str().expect("a plain name");
+    let (code, said, remarks) = program::run(&["convert", &from, to]);
+    assert_eq!((code, remarks.as_str()), (Some(0), ""));
+    assert!(said.contains("3 volumes of 3 x 2 x 2 voxels"), "{said}");
+    let bytes = std::fs::read(&out).expect("written");
+    let end = bytes.windows(2).position(|w| w == b"\n\n").expect("an end of the header") + 2;
+    let header = String::from_utf8(bytes[..end].to_vec()).expect("text");
+    for line in [
+        "NRRD0004",
+        "dimension: 4",
+        "space: left-posterior-superior",
+        "sizes: 3 2 2 3",
+        "space directions: (0.5,0,0) (0,1,0) (0,0,2) none",
+        "space origin: (-3,7,0)",
+        "kinds: domain domain domain list",
+        "labels: \"\" \"\" \"\" \"time\"",
+        "units: \"\" \"\" \"\" \"s\"",
+        "encoding: gzip",
+        "DataNodeClassName:=vtkMRMLScalarVolumeNode",
+        "axis 3 index type:=numeric",
+        "axis 3 index values:=0 0.05 0.125",
+    ] {
+        assert!(header.lines().any(|there| there == line), "no {line} in\n{header}");
+    }
+    let mut samples = Vec::new();
+    flate2::read::GzDecoder::new(&bytes[end..]).read_to_end(&mut samples).expect("unpacked");
+    assert_eq!(samples, (0..36).collect::<Vec<u8>>());
+    assert_eq!(frames(&out), frames(&from));
+    assert_eq!(frames(&out)[5].2, Some(0.125), "the time of the last volume");
+    // One of them.
+    assert_eq!(program::run(&["convert", &from, to, "--volume", "1"]).0, Some(0));
+    assert_eq!(frames(&out), [0, 1].map(|slice| (0, slice, Some(0.05), frames(&from)[2 + slice].3.clone())));
+}
+
+#[test]
+fn a_sequence_without_rising_times_has_none_and_says_why() {
+    let folder = Folder::new("untimed");
+    let out = folder.join("out.seq.nrrd");
+    let unit = "units: \"\" \"\" \"\" \"s\"\naxis 3 index values:=";
+    for (times, why) in [(String::new(), "have no time stamps"), (format!("{unit}0 2 2\n"), "do not rise")] {
+        let from = volumes(&folder, "from.nrrd", &times);
+        let (code, _, remarks) = program::run(&["convert", &from, out.to_str().expect("a plain name")]);
+        assert_eq!((code, remarks.lines().count()), (Some(0), 1), "{remarks}");
+        assert!(remarks.contains(why), "{remarks}");
+        let text = std::fs::read(&out).expect("written");
+        let text = String::from_utf8_lossy(&text);
+        assert!(text.contains("\"frame\"\n") && !text.contains("index") && !text.contains("\nunits"), "{text}");
+        let untimed = frames(&from).into_iter().map(|(volume, slice, _, bytes)| (volume, slice, None, bytes));
+        assert!(frames(&out).into_iter().eq(untimed), "{why}");
+    }
+}
+
+#[test]
+fn a_sequence_of_a_sweep_holds_its_whole_volumes_as_they_are_alone() {
+    let folder = Folder::new("swept");
+    let path = |name: &str| folder.join(name).to_str().expect("a plain name").to_string();
+    let run = |arguments: &[&str]| {
+        let (code, said, remarks) = program::run(arguments);
+        assert_eq!(code, Some(0), "{arguments:?}: {remarks}");
+        said + &remarks
+    };
+    let [sweep, whole, cut] = ["sweep.mha", "whole.frames", "cut.frames"].map(path);
+    run(&["phantom", "-o", &sweep, "--volumes", "3", "--frames", "4", "--lines", "16"]);
+    run(&["convert", &sweep, &whole]);
+    let mut bytes = std::fs::read(&whole).expect("recorded");
+    bytes.truncate(bytes.len() * 11 / 12 - 100);
+    std::fs::write(&cut, bytes).expect("written");
+    let (spacing, out) = (["--spacing", "4"], path("out.seq.nrrd"));
+    assert!(run(&[&["convert", &cut, &out][..], &spacing].concat()).contains("2 volumes of"));
+    let together = frames(&out);
+    for volume in ["0", "1"] {
+        let alone = path("alone.nrrd");
+        run(&[&["convert", &sweep, &alone, "--volume", volume][..], &spacing].concat());
+        let alone = frames(&alone).into_iter().map(|(_, slice, _, bytes)| (slice, bytes));
+        let there = together.iter().filter(|(number, ..)| number.to_string() == volume);
+        assert!(there.map(|(_, slice, _, bytes)| (*slice, bytes.clone())).eq(alone), "volume {volume}");
+    }
+    let times: Vec<Option<f64>> = together.iter().map(|frame| frame.2).collect();
+    assert!(times.is_sorted() && times[0].is_some() && times[0] < times[times.len() - 1], "{times:?}");
+}
+
+#[test]
+fn a_file_of_one_volume_says_that_there_are_more() {
+    let folder = Folder::new("first");
+    let from = volumes(&folder, "from.nrrd", "");
+    for name in ["out.nrrd", "out.mha", "out.nii.gz", "out.dcm"] {
+        let out = folder.join(name);
+        let to = out.to_str().expect("a plain name");
+        let (code, _, remarks) = program::run(&["convert", &from, to]);
+        let said = "volume 1 of 3; NAME.seq.nrrd takes all";
+        assert!(code == Some(0) && remarks.contains(said) && remarks.lines().count() == 1, "{name}: {remarks}");
+        let (code, _, remarks) = program::run(&["convert", &from, to, "--volume", "0"]);
+        assert_eq!((code, remarks.as_str()), (Some(0), ""), "{name}");
+    }
+    for (more, named) in [
+        (["--mask", "mask.seq.nrrd"], "one volume is written"),
+        (["--volume", "3"], "--volume 3: there are 3"),
+        (["--spacing", "0"], "--spacing 0 mm"),
+        (["--outside", "-1"], "--outside"),
+    ] {
+        let out = folder.join("all.seq.nrrd");
+        let all = [&["convert", &from, out.to_str().expect("a plain name")], &more[..]].concat();
+        let (code, _, said) = program::run(&all);
+        assert!(code == Some(2) && said.contains(named) && said.lines().count() == 1, "{more:?}: {code:?} {said}");
+        assert!(!out.exists());
+    }
 }

@@ -307,7 +307,8 @@ fn pixel_data_of_another_length_are_said_or_refused() {
     // The program says it on standard error too.
     let folder = Folder::new("dicom-forms");
     let from = File::new(LITTLE, 11, 7).frames("2").pixels(&bytes).written(&folder);
-    let (code, _, said) = program::run(&["convert", from.to_str().expect("a plain name"), &folder.path("out.mha")]);
+    let from = from.to_str().expect("a plain name");
+    let (code, _, said) = program::run(&["convert", from, &folder.path("out.mha"), "--volume", "0"]);
     assert!(code == Some(0) && said.lines().count() == 1 && said.contains("longer than stated"), "{said}");
 }
 
@@ -503,4 +504,16 @@ fn elements_that_are_not_used_are_listed_by_their_tags_and_those_that_matter_are
         assert_eq!((added(&other), warned(&other)), (vec![name.to_string()], 1), "{:?}", other.rows);
     }
     assert_eq!(warned(&found(&[(0x0018_1164, "0.1\\0.1")])), 1);
+}
+
+#[test]
+fn numbers_of_32_bits_in_words_of_a_big_endian_file_are_refused() {
+    let value = 0x0102_0304u32;
+    let file = |syntax| File::new(syntax, 1, 1).bits(32, 32);
+    refused(
+        &file(BIG).bytes(0x7fe0_0010, b"OW", &value.to_be_bytes()),
+        &["(0028,0100)", "big-endian words of 16 bits"],
+    );
+    let little = file(LITTLE).bytes(0x7fe0_0010, b"OW", &value.to_le_bytes());
+    assert_eq!(plain(&little).concat(), (value as f32).to_le_bytes());
 }

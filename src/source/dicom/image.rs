@@ -93,7 +93,12 @@ impl Image {
         let mut swapped = false;
         let (places, parts) = match (coding, pixels) {
             (Coding::Native, PixelData::Native(offset, length, in_words)) => {
-                swapped = *in_words && elements.big_endian && root.word(tags::BITS_ALLOCATED) == Some(8);
+                let allocated = root.word(tags::BITS_ALLOCATED);
+                if *in_words && elements.big_endian && allocated == Some(32) {
+                    let why = "is 32 in big-endian words of 16 bits (OW): which word comes first is not certain";
+                    return fault("bits allocated (0028,0100)", why.into());
+                }
+                swapped = *in_words && elements.big_endian && allocated == Some(8);
                 frames
                     .native(*offset, *length, swapped, &mut warnings)
                     .map_err(|why| InputError::new(path, "data", why))?

@@ -24,6 +24,8 @@ pub(super) enum FaultKind {
     Samples,
     /// A frame without a pose.
     Unpaired,
+    /// 2D images whose place is not known, or does not change.
+    Untracked,
     Pose,
     Outside,
     Volume,
@@ -31,7 +33,7 @@ pub(super) enum FaultKind {
     Incomplete,
 }
 
-const KINDS: [(FaultKind, &str); 14] = [
+const KINDS: [(FaultKind, &str); 15] = [
     (FaultKind::Unreachable, "not connected"),
     (FaultKind::Lost, "connection lost"),
     (FaultKind::Again, "connected again"),
@@ -42,6 +44,7 @@ const KINDS: [(FaultKind, &str); 14] = [
     (FaultKind::Devices, "images of several devices"),
     (FaultKind::Samples, "samples that are not finite or are denormal"),
     (FaultKind::Unpaired, "frames without a pose left out"),
+    (FaultKind::Untracked, "images of one slice have no place"),
     (FaultKind::Pose, "frames refused"),
     (FaultKind::Outside, "frames outside of the volume"),
     (FaultKind::Volume, "no volume for the sweep"),
@@ -120,6 +123,7 @@ mod tests {
             FaultKind::Checksum,
             FaultKind::Samples,
             FaultKind::Unpaired,
+            FaultKind::Untracked,
             FaultKind::Volume,
         ] {
             let mut faults = Faults::new("host");

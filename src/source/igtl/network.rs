@@ -63,6 +63,13 @@ impl Default for NetworkOptions {
 const POLL: Duration = Duration::from_millis(100);
 /// Messages that are processed even if no time is left, so that a caller with zero patience makes progress.
 const MAX_AT_ONCE: usize = 256;
+/// 2D images before the first transform from which on they count as untracked: a server may send an image before its transform.
+const UNTRACKED: u64 = 2;
+/// First 2D images in one place from which on they count as untracked: a tracker is never so still.
+const STILL: u64 = 10;
+/// What a user can do about that.
+const REMEDY: &str = "let the server send the TRANSFORM or TDATA of a tracked probe (--tool NAME), or IMAGEs with its matrix (--tool image); \
+                      frames of a probe with a motor come by a pipe (--source -, --motor)";
 
 /// A live source: the images of an OpenIGTLink server. It reconnects whenever the connection is lost, and never ends by itself.
 ///
@@ -288,6 +295,11 @@ struct TrackedImages {
     is_lps: bool,
     /// Time stamp of the last frame.
     time: Option<f64>,
+    /// 2D images before the first transform.
+    untracked: u64,
+    /// Where the first frame lies, and how many do before one lies elsewhere.
+    first: Option<DAffine3>,
+    still: u64,
 }
 
 impl TrackedImages {
@@ -300,11 +312,31 @@ impl TrackedImages {
         let sweep = Sweep::new(freehand.clone(), schedule.clone(), StoredType::U8);
         let values = ValueRange::new(StoredType::U8);
         let range = [0.0, 255.0];
-        TrackedImages { poses, freehand, schedule, pairing, sweep, values, range, is_lps: false, time: None }
+        TrackedImages {
+            poses,
+            freehand,
+            schedule,
+            pairing,
+            sweep,
+            values,
+            range,
+            is_lps: false,
+            time: None,
+            untracked: 0,
+            first: None,
+            still: 0,
+        }
     }
 
     /// Takes frames and poses; skips other messages.
     fn take(&mut self, message: Message, faults: &mut Faults) {
+        let is_image = matches!(message, Message::Image(_));
+        if is_image && self.poses != Poses::Image && !self.pairing.has_transforms() {
+            self.untracked = self.untracked.saturating_add(1);
+            if self.untracked == UNTRACKED {
+                faults.note(FaultKind::Untracked, 1, &format!("no transform came with them; {REMEDY}"));
+            }
+        }
         match (message, &self.poses) {
             (Message::Image(image), Poses::Image) => self.frame(image, DAffine3::IDENTITY, faults),
             (message, _) => {
@@ -329,6 +361,12 @@ impl TrackedImages {
         self.is_lps = self.poses == Poses::Image && image.coordinates == Coordinates::Lps;
         let own = DAffine3::from_mat4(image.index_to_mm(image.coordinates));
         let pose = Pose { to_space: pose * own, size: [usize::from(columns), usize::from(rows)] };
+        let is_first_place = *self.first.get_or_insert(pose.to_space) == pose.to_space;
+        self.still = if is_first_place { self.still.saturating_add(1) } else { u64::MAX };
+        if self.still == STILL {
+            let what = if self.poses == Poses::Image { "matrix" } else { "transform" };
+            faults.note(FaultKind::Untracked, 1, &format!("the {what} of the first {STILL} is the same; {REMEDY}"));
+        }
         let (stored, time) = (stored(image.scalar), (image.time > 0.0).then_some(image.time));
         let bytes = match samples(image) {
             Ok((bytes, replaced)) => {

@@ -115,6 +115,11 @@ impl Pairing {
         }
     }
 
+    /// True once a TRANSFORM or a tool of TDATA came, also one that is not selected.
+    pub(crate) fn has_transforms(&self) -> bool {
+        self.seen.count() > 0
+    }
+
     /// Why frames get no pose, for users: which transforms came.
     pub(crate) fn why_unpaired(&self) -> String {
         if self.seen.count() == 0 {

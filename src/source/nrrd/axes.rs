@@ -474,6 +474,10 @@ fn roles(header: &Header, all: &[Axis], remarks: &mut Remarks) -> Result<Vec<Rol
                 remarks.push(("axes".into(), format!("axis {n} is a list beside two axes in space: taken as slices")));
                 Role::Space
             }
+            Role::List if header.has_segments() && all[n].size > 1 => {
+                let fault = format!("make axis {n} layers of segments that overlap: only one layer is read");
+                return header.fault("kinds", fault);
+            }
             Role::List => Role::Time,
             Role::Unsaid => unsaid(header, all, &roles, n, remarks)?,
             role => role,

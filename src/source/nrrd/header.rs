@@ -73,6 +73,9 @@ const SPELLINGS: [(&str, &str); 10] = [
 pub(super) const ORIENTATION: &str = "ultrasound image orientation";
 pub(super) const IMAGE_TYPE: &str = "ultrasound image type";
 
+/// The start of the keys of a segmentation's first segment.
+const SEGMENT: &str = "segment0_";
+
 /// A vector of numbers that are written in brackets.
 pub(super) type Vector = Vec<f64>;
 
@@ -81,6 +84,8 @@ pub(super) struct Header<'a> {
     stated: Stated,
     /// Keys with values that are read: those of PLUS for a whole sequence, and `axis N index ...`.
     values: HashMap<String, String>,
+    /// It has keys of segments.
+    has_segments: bool,
     /// What PLUS says of the frames.
     pub frames: PlusFrames,
     /// The lines behind `data file: LIST`.
@@ -98,6 +103,7 @@ impl<'a> Header<'a> {
             path,
             stated: Stated::new(&KEYS),
             values: HashMap::new(),
+            has_segments: false,
             frames: PlusFrames::default(),
             list: Vec::new(),
             length: 0,
@@ -156,9 +162,11 @@ impl<'a> Header<'a> {
         let lower = key.to_ascii_lowercase();
         let is_of_axis =
             lower.starts_with("axis ") && (lower.ends_with(" index values") || lower.ends_with(" index type"));
-        match lower == ORIENTATION || lower == IMAGE_TYPE || is_of_axis {
-            true => drop(self.values.insert(lower, value.to_string())),
-            false => self.stated.note(key),
+        if lower == ORIENTATION || lower == IMAGE_TYPE || is_of_axis {
+            self.values.insert(lower, value.to_string());
+        } else {
+            self.has_segments |= lower.starts_with(SEGMENT);
+            self.stated.note(key);
         }
         Ok(())
     }
@@ -197,6 +205,11 @@ impl<'a> Header<'a> {
     /// The value of a key that a program added.
     pub(super) fn value(&self, key: &str) -> Option<&str> {
         self.values.get(key).map(String::as_str)
+    }
+
+    /// True of a segmentation of 3D Slicer.
+    pub(super) fn has_segments(&self) -> bool {
+        self.has_segments
     }
 
     /// The words of a field, one for each of `count`; those in quotes may be empty. None if the field is absent.

@@ -244,9 +244,41 @@ fn frames_without_a_pose_are_reported_and_do_not_wait_for_ever() {
     // Two have a pose, four are awaited.
     let mut network = connect(messages, sweep_options());
     until(&mut network, is_fault("frames without a pose left out: no transform came; --tool image"));
+    until(&mut network, is_fault("images of one slice have no place"));
     let started = Instant::now();
     assert!(matches!(network.next(Duration::from_millis(50)), Event::Idle));
     assert!((50..5000).contains(&started.elapsed().as_millis()), "{:?}", started.elapsed());
+}
+
+#[test]
+fn pictures_without_a_place_of_their_own_are_said_at_once() {
+    let pictures = |count: u8| (0..count).flat_map(|_| bytes(&Message::Image(tracked(1)))).collect::<Vec<u8>>();
+    let still = |count: u8| (0..count).flat_map(|_| [bytes(&moved(7)), bytes(&Message::Image(tracked(7)))].concat());
+    let slow = NetworkOptions { schedule: Schedule { first: 100, ..Schedule::default() }, ..options() };
+    let by_matrix = NetworkOptions { poses: Poses::Image, ..slow.clone() };
+    let what_to_do =
+        "--tool NAME), or IMAGEs with its matrix (--tool image); frames of a probe with a motor come by a pipe";
+    for (messages, options, said) in [
+        (pictures(2), slow.clone(), "images of one slice have no place: no transform came with them"),
+        (pictures(10), by_matrix.clone(), "have no place: the matrix of the first 10 is the same"),
+        (still(10).collect(), slow.clone(), "have no place: the transform of the first 10 is the same"),
+    ] {
+        let mut network = connect(messages, options);
+        let events = until(&mut network, |event| matches!(event, Event::Fault(_)));
+        assert!(events.len() == 1 && is_fault(said)(&events[0]) && is_fault(what_to_do)(&events[0]), "{events:?}");
+    }
+    // One picture may come before its transform, and a probe may rest for some.
+    let moving =
+        [pictures(1), (0..12).flat_map(|k| [bytes(&moved(k)), bytes(&Message::Image(tracked(k)))].concat()).collect()];
+    let resting = [pictures(9), bytes(&Message::Image(Image { centre: [0.0, 0.0, 1.0], ..tracked(1) })), pictures(9)];
+    for (messages, options, count) in [(moving.concat(), slow, 25), (resting.concat(), by_matrix, 19)] {
+        let mut network = connect(messages, options);
+        received(&network, count);
+        for _ in 0..count {
+            let event = network.next(Duration::ZERO);
+            assert!(matches!(event, Event::Idle), "{event:?}");
+        }
+    }
 }
 
 #[test]

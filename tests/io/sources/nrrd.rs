@@ -376,3 +376,41 @@ fn keys_of_plus_are_those_of_its_metaimages() {
         assert!(error.contains(named), "{keys}: {error}");
     }
 }
+
+fn refused(path: impl AsRef<Path>) -> String {
+    let error = Recording::open(path.as_ref(), None).err().expect("refused").to_string();
+    assert_eq!(error.lines().count(), 1, "{error}");
+    error
+}
+
+#[test]
+fn colours_that_are_no_rgb_and_numbers_as_text_are_refused() {
+    let folder = Folder::new("nrrd-refused");
+    for kind in ["HSV-color", "XYZ-color"] {
+        let fields = format!("dimension: 4\nsizes: 3 2 2 4\nkinds: {kind} domain domain domain\n");
+        let error = refused(folder.write("colours.nrrd", file(&fields, &samples([0, 1, 2, 3]))));
+        assert!(error.contains(&format!("kinds: '{}' is not read", kind.to_lowercase())), "{error}");
+    }
+    for encoding in ["hex", "text", "txt", "ascii", "ASCII"] {
+        let header = format!("NRRD0005\ntype: uint8\ndimension: 2\nsizes: 2 2\nencoding: {encoding}\n\n");
+        let error = refused(folder.write("text.nrrd", header + "1 2\n3 4\n"));
+        let said = format!("encoding: '{}' is not read: raw, gzip and bzip2 are", encoding.to_lowercase());
+        assert!(error.contains(&said), "{error}");
+    }
+}
+
+/// Of segments that overlap 3D Slicer writes layers, as an axis before those of space.
+#[test]
+fn layers_of_a_segmentation_are_not_taken_for_volumes_in_time() {
+    let folder = Folder::new("nrrd-layers");
+    let keys = "Segment0_ID:=Segment_1\nSegment0_LabelValue:=1\nSegment0_Layer:=0\n";
+    let space = format!("{SPACE}space directions: none (1,0,0) (0,1,0) (0,0,1)\nkinds: list domain domain domain\n");
+    let fields = format!("dimension: 4\nsizes: 4 3 2 2\n{space}");
+    let layers = file(&format!("{fields}{keys}"), &samples([3, 0, 1, 2]));
+    let error = refused(folder.write("layers.seg.nrrd", layers));
+    assert!(error.contains("kinds: make axis 0 layers of segments that overlap"), "{error}");
+    // The same axis without segments is time, and one layer is a volume.
+    assert_eq!(open(folder.write("list.nrrd", file(&fields, &samples([3, 0, 1, 2])))).volumes(), 4);
+    let one = file(&format!("dimension: 4\nsizes: 1 3 2 2\n{space}{keys}"), &samples([0, 1, 2, 3])[..12]);
+    assert_eq!(volumes(folder.write("one.seg.nrrd", one)), [(samples([0, 1, 2, 3])[..12].to_vec(), None)]);
+}
