@@ -66,3 +66,27 @@ fn an_error_map_shows_less_error_for_a_finer_step() {
     let (coarse, fine) = (largest("2.0"), largest("0.25"));
     assert!(coarse > 2.0 * fine && fine > 0.0, "{coarse} and {fine}");
 }
+
+#[test]
+fn bounds_prove_how_many_pixels_of_a_picture_keep_its_tolerance() {
+    let folder = Folder::new("certified");
+    let at = folder.path("bounds");
+    let scene = ["report", "bounds", BONE, "--preset", "bone", "--mode", "vr", "--size", "32x24", "-o", &at];
+    let said = |more: &[&str]| done(&[&scene[..], &["--set", "light.volume=none"], more].concat());
+    let shares = |said: &str| -> Vec<f64> {
+        let line = said.lines().find(|line| line.starts_with("the picture: at most")).expect("a certificate");
+        let words = line.split_whitespace().collect::<Vec<_>>();
+        words.windows(2).filter(|pair| pair[1] == "%").map(|pair| pair[0].parse().expect("a share")).collect()
+    };
+    let one = shares(&said(&["--set", "ray.tolerance=1"]));
+    assert!(one.len() == 4 && (one.iter().sum::<f64>() - 100.0).abs() < 0.3, "{one:?}");
+    assert!(one[0] > 95.0 && one[3] < 0.5, "most pixels keep a level by proof: {one:?}");
+    // Ten parts a ray prove less, and no pixel is called broken for it.
+    let few = shares(&said(&["--set", "ray.tolerance=1", "--parts", "16"]));
+    assert!(few[0] < one[0] - 5.0 && few[1] > one[1] && few[3] <= one[3] + 1e-9, "{few:?} and {one:?}");
+    assert!(!said(&[]).contains("the picture:"), "without a tolerance nothing is drawn");
+    let arguments =
+        [&scene[..], &["--set", "light.volume=none", "--set", "ray.tolerance=1", "--set", "post.colour_map=hot"]]
+            .concat();
+    refuses(&arguments, &run(&arguments), 2, &["post.colour_map"]);
+}

@@ -3,7 +3,7 @@
 
 use crate::common::probes::{voxels, wobbler};
 use crate::common::scenes::{FLOATS, scene};
-use echolume::low_level::bounds::{Effort, PictureBounds, fault, picture};
+use echolume::low_level::bounds::{Effort, PictureBounds, Proof, fault, picture};
 use echolume::low_level::exact_ray;
 use echolume::low_level::passes::{Arrays, Texels};
 use echolume::low_level::probe::{Advance, Array, Axis, Geometry, Motion, Probe};
@@ -194,4 +194,25 @@ fn bounds_that_are_too_narrow_or_of_another_volume_are_noticed() {
     }
     println!("{narrow} and {other} of 12 scenes notice");
     assert!(narrow >= 6 && other >= 2, "{narrow} and {other} of 12 scenes notice");
+}
+
+#[test]
+fn a_drawn_pixel_is_kept_broken_or_open() {
+    let scene = scene(voxels([2, 2, 2]), FLOATS, "mode = 'vr'");
+    let texels = |values: [[f64; 4]; 4]| Texels { size: [4, 1, 1], channels: 4, values: values.concat() };
+    let grey = |value: f64, opacity: f64| [value, value, value, opacity];
+    let level = 1.0 / 255.0;
+    let bounds = PictureBounds {
+        low: texels([grey(0.5, 1.0), grey(0.5, 1.0), grey(0.2, 1.0), grey(0.3, 0.0)]),
+        high: texels([grey(0.5 + level, 1.0), grey(0.5 + level, 1.0), grey(0.8, 1.0), grey(0.3, 0.5)]),
+        parts: 1,
+    };
+    let drawn = texels([grey(0.5, 1.0), grey(0.5 - 2.5 * level, 1.0), grey(0.5, 1.0), grey(0.3, 0.0)]);
+    let proofs = |levels: f64| bounds.proofs(&scene, &drawn, levels).expect("the same size");
+    // The last may be black or not.
+    assert_eq!(proofs(2.0), [Proof::Kept, Proof::Broken, Proof::Open, Proof::Open]);
+    assert_eq!(proofs(4.0), [Proof::Kept, Proof::Kept, Proof::Open, Proof::Open]);
+    assert_eq!(proofs(0.5), [Proof::Open, Proof::Broken, Proof::Open, Proof::Open]);
+    let other = Texels { size: [2, 2, 1], ..drawn };
+    assert!(bounds.proofs(&scene, &other, 1.0).is_err());
 }
