@@ -1,8 +1,10 @@
-//! Files that users of other programs could not open, or opened wrongly: what `convert`, `info` and `render` make of them. tests/data/outside/README.md says
-//! what each had, and why the answer is right.
+//! Files with right answers: those that users of other programs could not open, or opened wrongly (tests/data/outside/README.md says what each had), and
+//! random ones (tests/data/generated). What `convert`, `info` and `render` make of them.
 
 use crate::common::files::{Folder, data};
 use crate::common::program::run;
+use echolume::low_level::probe::{Geometry, Indices};
+use echolume::low_level::source::{StoredType, open};
 use glam::{DMat3, DVec3};
 use serde::Deserialize;
 use std::collections::BTreeMap;
@@ -23,6 +25,9 @@ struct Place {
     origin: Option<[f64; 3]>,
     /// Of pictures without a place, mm.
     spacing: Option<[f64; 2]>,
+    /// Of a scan: sample, line and slice, and where they are, mm (lateral, depth, elevation).
+    #[serde(default)]
+    samples: Vec<([usize; 3], [f64; 3])>,
 }
 
 #[derive(Deserialize)]
@@ -37,6 +42,8 @@ struct Case {
     volumes: Option<usize>,
     /// First and last time stamp, s.
     times: Option<[f64; 2]>,
+    /// Time stamp of each volume, s; empty if none has one.
+    stamps: Option<Vec<f64>>,
     tolerance: Option<f64>,
     /// Pixels from one that is compared to the next.
     every: Option<usize>,
@@ -69,6 +76,7 @@ struct Case {
 enum Check {
     Volumes,
     Pictures,
+    Polar,
     Same,
     Centroid,
     Sector,
@@ -144,8 +152,8 @@ fn decoded(kind: &str, bytes: &[u8]) -> Vec<f64> {
 }
 
 /// The arrays of a right answer: one for each volume, with their size, x first.
-fn frames(name: &str) -> (Vec<usize>, Vec<Vec<f64>>) {
-    let bytes = std::fs::read(data(&format!("outside/expected/{name}.npy"))).expect("a right answer");
+fn frames(set: &str, name: &str) -> (Vec<usize>, Vec<Vec<f64>>) {
+    let bytes = std::fs::read(data(&format!("{set}/expected/{name}.npy"))).expect("a right answer");
     assert_eq!(&bytes[..8], b"\x93NUMPY\x01\x00");
     let length = usize::from(u16::from_le_bytes([bytes[8], bytes[9]]));
     let header = std::str::from_utf8(&bytes[10..10 + length]).expect("text");
@@ -156,6 +164,7 @@ fn frames(name: &str) -> (Vec<usize>, Vec<Vec<f64>>) {
     let values = match header.split('\'').nth(3).expect("a type") {
         "|u1" => decoded("MET_UCHAR", samples),
         "<i2" => decoded("MET_SHORT", samples),
+        "<f4" => decoded("MET_FLOAT", samples),
         "<f8" => samples.as_chunks().0.iter().map(|b| f64::from_le_bytes(*b)).collect(),
         other => panic!("{other}"),
     };
@@ -164,8 +173,8 @@ fn frames(name: &str) -> (Vec<usize>, Vec<Vec<f64>>) {
 }
 
 /// A file as a user had it: some are stored packed.
-fn stored(folder: &Folder, file: &str) -> PathBuf {
-    let path = data(&format!("outside/{file}"));
+fn stored(folder: &Folder, set: &str, file: &str) -> PathBuf {
+    let path = data(&format!("{set}/{file}"));
     let Some(name) = file.strip_suffix(".packed") else { return path };
     let mut plain = Vec::new();
     let packed = std::fs::File::open(path).expect("a file");
@@ -174,6 +183,8 @@ fn stored(folder: &Folder, file: &str) -> PathBuf {
 }
 
 struct Checked<'a> {
+    /// The folder below tests/data.
+    set: &'static str,
     case: &'a Case,
     places: &'a BTreeMap<String, Place>,
     folder: &'a Folder,
@@ -181,7 +192,7 @@ struct Checked<'a> {
 
 impl Checked<'_> {
     fn file(&self, file: &str) -> String {
-        stored(self.folder, file).to_str().expect("a plain name").to_string()
+        stored(self.folder, self.set, file).to_str().expect("a plain name").to_string()
     }
 
     fn convert_file(&self, file: &str, volume: usize) -> Result<Written, (Option<i32>, String)> {
@@ -201,8 +212,10 @@ impl Checked<'_> {
                 let mut faults = self.case.expected.iter().map(|name| self.frames(name));
                 let first = faults.next().expect("a right answer");
                 faults.fold(first, |found, other| found.or(other))?;
-                self.times()
+                self.times()?;
+                self.stamps()
             }
+            Check::Polar => self.polar(&self.case.expected[0]).and_then(|()| self.stamps()),
             Check::Same => self.same(),
             Check::Centroid => {
                 let written = self.convert(0)?;
@@ -223,7 +236,7 @@ impl Checked<'_> {
 
     /// Every volume is that of a right answer, and there are no more.
     fn frames(&self, name: &str) -> Result<(), String> {
-        let ((size, all), place) = (frames(name), &self.places[name]);
+        let ((size, all), place) = (frames(self.set, name), &self.places[name]);
         let count = self.case.volumes.unwrap_or(all.len());
         for (t, wanted) in all.iter().take(count).enumerate() {
             let written = self.convert(t)?;
@@ -292,6 +305,52 @@ impl Checked<'_> {
             true => Ok(()),
             false => Err(format!("times from {found:?}")),
         }
+    }
+
+    /// The time of each frame is that of its volume.
+    fn stamps(&self) -> Result<(), String> {
+        let Some(wanted) = &self.case.stamps else { return Ok(()) };
+        let mut source = open(Path::new(&self.file(&self.case.file)), None).map_err(|error| error.to_string())?;
+        while let Some(frame) = source.next_frame().map_err(|error| error.to_string())? {
+            let right = match (frame.time, wanted.get(frame.volume as usize)) {
+                // NIfTI states them in f32.
+                (Some(time), Some(stamp)) => (time - stamp).abs() <= 1e-7 * stamp.abs().max(1.0),
+                (time, stamp) => time.is_none() && stamp.is_none(),
+            };
+            if !right {
+                return Err(format!("the time of volume {} is {:?}", frame.volume, frame.time));
+            }
+        }
+        Ok(())
+    }
+
+    /// Each frame has its samples, in geometric order, and they are at their places.
+    fn polar(&self, name: &str) -> Result<(), String> {
+        let (size, all) = frames(self.set, name);
+        let mut source = open(Path::new(&self.file(&self.case.file)), None).map_err(|error| error.to_string())?;
+        let Geometry::Sweep(probe) = source.geometry(0) else { return Err("no scan lines".into()) };
+        let found = [probe.samples, probe.lines.len(), probe.slices.len(), source.volumes()];
+        if found != [size[0], size[1], size[2], all.len()] {
+            return Err(format!("{found:?} samples, lines, slices and volumes"));
+        }
+        for ([sample, line, slice], place) in &self.places[name].samples {
+            let at = Indices { sample: *sample as f64, line: *line as f64, slice: *slice as f64 };
+            let off = probe.to_space(at).distance(DVec3::from(*place));
+            if off > 1e-3 {
+                return Err(format!("sample {sample} {line} {slice} is {off} mm away"));
+            }
+        }
+        let kind = if source.stored_type() == StoredType::U8 { "MET_UCHAR" } else { "MET_FLOAT" };
+        let (each, mut read) = (size[0] * size[1], 0);
+        while let Some(frame) = source.next_frame().map_err(|error| error.to_string())? {
+            let wanted = &all[frame.volume as usize][frame.slice * each..][..each];
+            let values = decoded(kind, &frame.bytes);
+            if values.len() != each || values.iter().zip(wanted).any(|(a, b)| (a - b).abs() > 1e-4) {
+                return Err(format!("other samples in frame {} of volume {}", frame.slice, frame.volume));
+            }
+            read += 1;
+        }
+        if read == size[2] * all.len() { Ok(()) } else { Err(format!("{read} frames")) }
     }
 
     fn same(&self) -> Result<(), String> {
@@ -399,14 +458,14 @@ impl Checked<'_> {
     }
 }
 
-#[test]
-fn files_of_other_programs_are_read_right_or_refused() {
-    let text = std::fs::read_to_string(data("outside/cases.json")).expect("the cases");
+/// Compares the files of a folder, at least so many.
+fn check_all(set: &'static str, least: usize) {
+    let text = std::fs::read_to_string(data(&format!("{set}/cases.json"))).expect("the cases");
     let all: Cases = serde_json::from_str(&text).expect("JSON");
-    let folder = Folder::new("outside");
+    let folder = Folder::new(set);
     let mut faults = Vec::new();
     for case in &all.cases {
-        let checked = Checked { case, places: &all.expected, folder: &folder };
+        let checked = Checked { set, case, places: &all.expected, folder: &folder };
         if let Err(fault) = checked.check()
             && !checked.is_told()
         {
@@ -414,5 +473,15 @@ fn files_of_other_programs_are_read_right_or_refused() {
         }
     }
     assert!(faults.is_empty(), "{} of {}:\n{}", faults.len(), all.cases.len(), faults.join("\n"));
-    assert!(all.cases.len() >= 82);
+    assert!(all.cases.len() >= least);
+}
+
+#[test]
+fn files_of_other_programs_are_read_right_or_refused() {
+    check_all("outside", 82);
+}
+
+#[test]
+fn random_files_are_read_as_other_programs_read_them() {
+    check_all("generated", 50);
 }
