@@ -1,7 +1,7 @@
 //! `echolume report bounds`.
 
 use crate::args::InputArgs;
-use crate::bounds::{Effort, PictureBounds, Proof, fault, picture};
+use crate::bounds::{Effort, PictureBounds, Proof, fault, picture, proven};
 use crate::dump::npy;
 use crate::gpu::{Renderer, RendererOptions};
 use crate::passes::raycast::tolerance::LEVELS;
@@ -109,19 +109,26 @@ impl BoundsReport {
             frames.push(frame);
             Ok(())
         })?;
-        // What is proven of a drawn pixel needs bounds that are narrow beside the tolerance.
-        let narrow = tolerance.map_or(self.width, |levels| levels / LEVELS / 8.0);
+        let shown =
+            tolerance.map(|tolerance| self.drawn(drawn, &frames).map(|of_it| (tolerance, of_it))).transpose()?;
+        // Pixels whose error is close to the tolerance need bounds that are narrow beside it.
+        let narrow = tolerance.map_or(self.width, |levels| levels / LEVELS / 16.0);
         let effort = Effort { width: self.width.min(narrow), parts: self.parts as usize };
         let begun = std::time::Instant::now();
         let mut found = None;
-        let picture_frames = reference::decoded(&scene, &frames);
-        reference::render_with(&scene, &picture_frames, &mut |pass, reads, _| {
+        let frames = reference::decoded(&scene, &frames);
+        reference::render_with(&scene, &frames, &mut |pass, reads, _| {
             if pass == "raycast_volume" {
-                found = Some(picture(&scene, reads.get("volume"), effort));
+                let volume = reads.get("volume");
+                found = Some(match &shown {
+                    None => Ok((picture(&scene, volume, effort), Vec::new())),
+                    Some((tolerance, [texels, _])) => proven(&scene, volume, effort, texels, *tolerance),
+                });
             }
             found.is_some()
         });
-        let Some(bounds) = found else { return Err(failed("report bounds: no ray is cast in this scene")) };
+        let Some(found) = found else { return Err(failed("report bounds: no ray is cast in this scene")) };
+        let (bounds, proofs) = found.map_err(|why| input(format!("report bounds: {why}")))?;
         self.write(&bounds)?;
         let hit = bounds.widths_of_hits();
         let [median, p95, within] = summary(&hit, self.width);
@@ -134,21 +141,15 @@ impl BoundsReport {
             bounds.parts,
             begun.elapsed().as_secs_f64()
         );
-        if let Some(tolerance) = tolerance {
-            say!("{}", self.certified(drawn, &frames, &bounds, tolerance)?);
+        if let Some((tolerance, [_, errors])) = &shown {
+            say!("{}", Certificate::new(&proofs, errors, *tolerance));
         }
         say!("written: low, high and width as .png, low.npy, high.npy, bounds.json in {}", self.output.display());
         Ok(())
     }
 
-    /// What the bounds and the picture's own estimates say of a picture with a tolerance, levels of 255, drawn on the device.
-    fn certified(
-        &self,
-        scene: Scene,
-        frames: &[Frame],
-        bounds: &PictureBounds,
-        tolerance: f64,
-    ) -> Result<String, Failure> {
+    /// A scene with a tolerance drawn on the device: colours before stage 4, and the errors that its pixels state.
+    fn drawn(&self, scene: Scene, frames: &[Frame]) -> Result<[Texels; 2], Failure> {
         let context = self.input.open_device(false)?;
         let slot = rendered(&scene);
         let mut renderer = Renderer::new(&context, scene, &RendererOptions::default()).map_err(failed)?;
@@ -157,13 +158,11 @@ impl BoundsReport {
         }
         renderer.show(0).map_err(failed)?;
         renderer.picture().map_err(failed)?;
-        let [drawn, errors] = [slot, Slot::PixelErrors].map(|slot| renderer.read(slot));
-        let (Some(drawn), Some(errors)) = (drawn.map_err(failed)?, errors.map_err(failed)?) else {
-            return Err(failed("report bounds: the picture states no errors"));
-        };
-        let proofs =
-            bounds.proofs(renderer.scene(), &drawn, tolerance).map_err(|why| input(format!("report bounds: {why}")))?;
-        Ok(Certificate::new(&proofs, &errors, tolerance).to_string())
+        let [colours, errors] = [slot, Slot::PixelErrors].map(|slot| renderer.read(slot));
+        match (colours.map_err(failed)?, errors.map_err(failed)?) {
+            (Some(colours), Some(errors)) => Ok([colours, errors]),
+            _ => Err(failed("report bounds: the picture states no errors")),
+        }
     }
 
     fn write(&self, bounds: &PictureBounds) -> Result<(), Failure> {

@@ -134,7 +134,7 @@ impl PictureStream {
         let image = reader(picture).and_then(|reader| reader.decode().map_err(unreadable)).map_err(named)?;
         let samples = self.samples(image);
         if samples.len() != self.pictures.each {
-            return Err(named("is not what it was a moment ago".into()));
+            return Err(named("changed while it was being read".into()));
         }
         (self.pixels, self.next) = (io::Cursor::new(samples), self.next + 1);
         Ok(())

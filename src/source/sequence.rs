@@ -90,7 +90,7 @@ impl Sequence {
                 source.skip_to_volume(volume.place)?;
                 for _ in 0..self.frames {
                     let frame = source.next_frame()?.filter(|frame| frame.volume == volume.number);
-                    let gone = || InputError::new(path, "frames", "the input is not what it was a moment ago");
+                    let gone = || InputError::new(path, "frames", "the input changed while it was being read");
                     file.write_all(&frame.ok_or_else(gone)?.bytes).map_err(|e| InputError::unwritable(path, &e))?;
                 }
                 each();

@@ -123,7 +123,7 @@ impl VolumeSequence {
         for whole in &self.kept {
             let mut volume = Volume::new(source.geometry(whole.place), source.stored_type());
             if read(source, whole.place, |frame| volume.take(frame))?.as_ref() != Some(whole) {
-                return Err(InputError::new(path, "frames", "the input is not what it was a moment ago"));
+                return Err(InputError::new(path, "frames", "the input changed while it was being read"));
             }
             volume.write_samples(target, &mut packed).map_err(written)?;
             each();

@@ -3,7 +3,7 @@
 
 use crate::common::probes::{voxels, wobbler};
 use crate::common::scenes::{FLOATS, scene};
-use echolume::low_level::bounds::{Effort, PictureBounds, Proof, fault, picture};
+use echolume::low_level::bounds::{Effort, PictureBounds, Proof, fault, picture, proven};
 use echolume::low_level::exact_ray;
 use echolume::low_level::passes::{Arrays, Texels};
 use echolume::low_level::probe::{Advance, Array, Axis, Geometry, Motion, Probe};
@@ -197,22 +197,28 @@ fn bounds_that_are_too_narrow_or_of_another_volume_are_noticed() {
 }
 
 #[test]
-fn a_drawn_pixel_is_kept_broken_or_open() {
-    let scene = scene(voxels([2, 2, 2]), FLOATS, "mode = 'vr'");
-    let texels = |values: [[f64; 4]; 4]| Texels { size: [4, 1, 1], channels: 4, values: values.concat() };
-    let grey = |value: f64, opacity: f64| [value, value, value, opacity];
-    let level = 1.0 / 255.0;
-    let bounds = PictureBounds {
-        low: texels([grey(0.5, 1.0), grey(0.5, 1.0), grey(0.2, 1.0), grey(0.3, 0.0)]),
-        high: texels([grey(0.5 + level, 1.0), grey(0.5 + level, 1.0), grey(0.8, 1.0), grey(0.3, 0.5)]),
-        parts: 1,
+fn a_drawn_pixel_is_kept_or_broken_by_proof() {
+    let mut draw = Draw(7);
+    let scene = random_scene(&mut draw, "post = { gamma = 1, contrast = 1, brightness = 0 }");
+    let texels = noise(&scene, &mut draw);
+    let exact = integrated(&scene, &texels);
+    let effort = Effort { width: 1e-4, parts: 8000 };
+    let proofs = |levels: f64, by: f64| {
+        let off = |n: usize, value: &f64| if n % 4 < 3 { value + by / 255.0 } else { *value };
+        let drawn =
+            Texels { values: exact.values.iter().enumerate().map(|(n, v)| off(n, v)).collect(), ..exact.clone() };
+        proven(&scene, &texels, effort, &drawn, levels).expect("the same size").1
     };
-    let drawn = texels([grey(0.5, 1.0), grey(0.5 - 2.5 * level, 1.0), grey(0.5, 1.0), grey(0.3, 0.0)]);
-    let proofs = |levels: f64| bounds.proofs(&scene, &drawn, levels).expect("the same size");
-    // The last may be black or not.
-    assert_eq!(proofs(2.0), [Proof::Kept, Proof::Broken, Proof::Open, Proof::Open]);
-    assert_eq!(proofs(4.0), [Proof::Kept, Proof::Kept, Proof::Open, Proof::Open]);
-    assert_eq!(proofs(0.5), [Proof::Open, Proof::Broken, Proof::Open, Proof::Open]);
-    let other = Texels { size: [2, 2, 1], ..drawn };
-    assert!(bounds.proofs(&scene, &other, 1.0).is_err());
+    let hits: Vec<bool> =
+        exact.values.chunks_exact(4).map(|p| p[3] > 0.01 && p.iter().take(3).all(|c| *c < 0.9)).collect();
+    let count = |proofs: Vec<Proof>, which: Proof| {
+        proofs.iter().zip(&hits).filter(|(proof, hit)| **hit && **proof == which).count()
+    };
+    let all = hits.iter().filter(|hit| **hit).count();
+    assert!(all > 8, "{all} of the rays meet something");
+    assert_eq!(count(proofs(1.0, 0.0), Proof::Kept), all, "the exact picture");
+    assert_eq!(count(proofs(1.0, 0.8), Proof::Kept), all, "off by less than the tolerance");
+    assert_eq!(count(proofs(1.0, 1.3), Proof::Broken), all, "off by more");
+    let other = Texels { size: [1, 1, 1], channels: 4, values: vec![0.0; 4] };
+    assert!(proven(&scene, &texels, effort, &other, 1.0).is_err());
 }

@@ -65,36 +65,23 @@ pub enum Proof {
     Open,
 }
 
-impl PictureBounds {
-    /// What is proven of each pixel of a drawn picture: red, green, blue and opacity before stage 4. `tolerance`: levels of 255 after toning, of the worst
+impl Proof {
+    /// What an interval of red, green, blue and opacity before stage 4 proves of a drawn pixel. `tolerance`: levels of 255 after toning, of the worst
     /// channel.
-    ///
-    /// # Errors
-    /// In words: a scene whose toning does not keep the order of values, a picture of another size.
-    pub fn proofs(&self, scene: &Scene, drawn: &Texels, tolerance: f64) -> Result<Vec<Proof>, String> {
-        if scene.settings.post.colour_map != ColourMap::None {
-            return Err("post.colour_map shows values in no order of their own: set post.colour_map=none".into());
+    fn of(scene: &Scene, [r, g, b, opacity]: [Interval; 4], drawn: [f64; 4], tolerance: f64) -> Proof {
+        let shown = |[r, g, b]: [f64; 3], opacity: f64| if opacity > 0.0 { toned(scene, [r, g, b]) } else { [0.0; 3] };
+        let (low, high) = (toned(scene, [r.low, g.low, b.low]), shown([r.high, g.high, b.high], opacity.high));
+        // Where there may be nothing, the screen may be black.
+        let low = low.map(|value| if opacity.low <= 0.0 { value.min(0.0) } else { value });
+        let drawn = shown([drawn[0], drawn[1], drawn[2]], drawn[3]);
+        let worst = |of: &dyn Fn(usize) -> f64| (0..3).map(of).fold(f64::MIN, f64::max) * 255.0;
+        let most = worst(&|c| (drawn[c] - low[c]).max(high[c] - drawn[c]));
+        let least = worst(&|c| (low[c] - drawn[c]).max(drawn[c] - high[c]));
+        match (most <= tolerance, least > tolerance) {
+            (true, _) => Proof::Kept,
+            (_, true) => Proof::Broken,
+            _ => Proof::Open,
         }
-        if drawn.size != self.low.size || drawn.channels != 4 {
-            return Err(format!("the picture has {:?} texels, the bounds {:?}", drawn.size, self.low.size));
-        }
-        let pixels = |of: &Texels| of.values.as_chunks::<4>().0.to_vec();
-        let shown = |[r, g, b, opacity]: [f64; 4]| if opacity > 0.0 { toned(scene, [r, g, b]) } else { [0.0; 3] };
-        let one = |((low, high), drawn): (([f64; 4], [f64; 4]), [f64; 4])| {
-            // Where there may be nothing, the screen may be black.
-            let may_be_black = low[3] <= 0.0;
-            let (low, high, drawn) = (toned(scene, [low[0], low[1], low[2]]), shown(high), shown(drawn));
-            let low = low.map(|value| if may_be_black { value.min(0.0) } else { value });
-            let worst = |of: &dyn Fn(usize) -> f64| (0..3).map(of).fold(f64::MIN, f64::max) * 255.0;
-            let most = worst(&|c| (drawn[c] - low[c]).max(high[c] - drawn[c]));
-            let least = worst(&|c| (low[c] - drawn[c]).max(drawn[c] - high[c]));
-            match (most <= tolerance, least > tolerance) {
-                (true, _) => Proof::Kept,
-                (_, true) => Proof::Broken,
-                _ => Proof::Open,
-            }
-        };
-        Ok(pixels(&self.low).into_iter().zip(pixels(&self.high)).zip(pixels(drawn)).map(one).collect())
     }
 }
 
@@ -125,13 +112,50 @@ pub fn fault(scene: &Scene) -> Option<&'static str> {
 
 /// Bounds of all rays of a scene through a volume: the texels that stage 1 makes.
 pub fn picture(scene: &Scene, volume: &Texels, effort: Effort) -> PictureBounds {
+    enclosed(scene, volume, effort, |_, _| false)
+}
+
+/// The same as far as is needed to prove of each pixel of a drawn picture (red, green, blue and opacity before stage 4) that it keeps a
+/// tolerance, levels of 255 after toning, or that it does not.
+///
+/// # Errors
+/// In words: a scene whose toning does not keep the order of values, a picture of another size.
+pub fn proven(
+    scene: &Scene,
+    volume: &Texels,
+    effort: Effort,
+    drawn: &Texels,
+    tolerance: f64,
+) -> Result<(PictureBounds, Vec<Proof>), String> {
+    if scene.settings.post.colour_map != ColourMap::None {
+        return Err("post.colour_map shows values in no order of their own: set post.colour_map=none".into());
+    }
+    let (pixels, [width, height]) = (drawn.values.as_chunks::<4>().0, scene.ray_size());
+    if drawn.channels != 4 || pixels.len() != width as usize * height as usize {
+        return Err(format!("the picture has {} pixels, and there are {width} x {height} rays", pixels.len()));
+    }
+    let proof = |n: usize, rgba: [Interval; 4]| Proof::of(scene, rgba, pixels[n], tolerance);
+    let bounds = enclosed(scene, volume, effort, |n, found| proof(n, found.rgba) != Proof::Open);
+    let ends = bounds.low.values.as_chunks::<4>().0.iter().zip(bounds.high.values.as_chunks::<4>().0);
+    let interval = |(low, high): (&[f64; 4], &[f64; 4])| std::array::from_fn(|c| Interval::between(low[c], high[c]));
+    let proofs = ends.map(interval).enumerate().map(|(n, rgba)| proof(n, rgba)).collect();
+    Ok((bounds, proofs))
+}
+
+/// Bounds of all rays. `enough`: whether those of a ray are.
+fn enclosed(
+    scene: &Scene,
+    volume: &Texels,
+    effort: Effort,
+    enough: impl Fn(usize, &ray::Bounds) -> bool + Sync,
+) -> PictureBounds {
     let [width, height] = scene.ray_size().map(|n| n as usize);
     let (least, most) = volume.values.iter().fold((f64::MAX, f64::MIN), |(l, h), v| (l.min(*v), h.max(*v)));
     let one = |n: usize| {
         let (origin, direction) = scene.rays.at((n % width) as f64 + 0.5, (n / width) as f64 + 0.5);
         let (enter, leave) = span(scene, scene.volume_view(), origin, direction);
         let line = Line { scene, base: origin + direction * enter, direction };
-        bounds_of(&line, volume, [least, most], leave - enter, effort)
+        bounds_of(&line, volume, [least, most], leave - enter, effort, |found| enough(n, found))
     };
     let found: Vec<ray::Bounds> = (0..width * height).into_par_iter().with_min_len(4).map(one).collect();
     let map = |of: fn(Interval) -> f64| Texels {
@@ -143,7 +167,14 @@ pub fn picture(scene: &Scene, volume: &Texels, effort: Effort) -> PictureBounds 
 }
 
 /// Bounds of one ray from 0 to `path` mm along a line. `range`: smallest and largest texel of the volume.
-fn bounds_of(line: &Line, volume: &Texels, range: [f64; 2], path: f64, effort: Effort) -> ray::Bounds {
+fn bounds_of(
+    line: &Line,
+    volume: &Texels,
+    range: [f64; 2],
+    path: f64,
+    effort: Effort,
+    enough: impl Fn(&ray::Bounds) -> bool,
+) -> ray::Bounds {
     let scene = line.scene;
     let view = scene.volume_view();
     let settings = &scene.settings.volume;
@@ -166,7 +197,7 @@ fn bounds_of(line: &Line, volume: &Texels, range: [f64; 2], path: f64, effort: E
         );
     }
     let field = field::Field::new(line, volume, view.window, range);
-    ray::bounds(&field, &medium, &hints(line, volume, path), effort.width, effort.parts)
+    ray::bounds(&field, &medium, &hints(line, volume, path), effort.width, effort.parts, enough)
 }
 
 /// Where parts should end: cells, the border of the region, the points of the transfer function, and kinks of the fade, to rounding.

@@ -147,14 +147,21 @@ impl Bounds {
     }
 }
 
-/// Halves parts until the widest channel is narrower than `target`, or there are `most` parts. `hints`: places in rising order at
+/// Halves parts until the widest channel is narrower than `target`, the bounds are enough, or there are `most` parts. `hints`: places in rising order at
 /// which a part should end, such as the faces of cells; the bounds hold whatever they are.
-pub fn bounds(field: &Field, medium: &Medium, hints: &[f64], target: f64, most: usize) -> Bounds {
+pub fn bounds(
+    field: &Field,
+    medium: &Medium,
+    hints: &[f64],
+    target: f64,
+    most: usize,
+    enough: impl Fn(&Bounds) -> bool,
+) -> Bounds {
     let part = |from: f64, to: f64| part(field, medium, from, to);
     let mut parts: Vec<Part> = hints.windows(2).filter(|p| p[1] > p[0]).filter_map(|p| part(p[0], p[1])).collect();
     loop {
         let found = Bounds { rgba: composited(&parts), parts: parts.len() };
-        if found.width() <= target || parts.len() >= most {
+        if found.width() <= target || parts.len() >= most || enough(&found) {
             return found;
         }
         let doubt = doubts(&parts);

@@ -360,15 +360,22 @@ impl Axes {
     /// Time stamps by frame, s. What is not in a known unit of time is no time stamp, and a remark says so.
     pub(super) fn times(&self, header: &Header, remarks: &mut Remarks) -> Result<BTreeMap<usize, f64>, InputError> {
         let (slices, frames) = (self.size[2], self.size[2] * self.volumes);
-        for (n, _) in self.all.iter().enumerate().filter(|(n, axis)| axis.has_values && Some(*n) != self.time) {
+        let beside = self.values_beside_colours(header);
+        let is_other = |(n, axis): &(usize, &Axis)| axis.has_values && Some(*n) != self.time && Some(*n) != beside;
+        for (n, _) in self.all.iter().enumerate().filter(is_other) {
             let text = format!("axis {n} index values are not used: the axis is not read as time");
             remarks.push(warned(header.path, "times", text));
         }
         let Some(n) = self.time else { return Ok(BTreeMap::new()) };
         let axis = &self.all[n];
-        let values = match axis.has_values {
-            true => self.index_values(header, n, remarks),
-            false => self.steps(header, n)?,
+        let values = match (axis.has_values, beside) {
+            (true, _) => self.index_values(header, n, remarks),
+            (false, Some(other)) => {
+                let text = format!("axis {other} index values are taken as those of axis {n}, which is time");
+                remarks.push(warned(header.path, "times", text));
+                self.index_values(header, other, remarks)
+            }
+            (false, None) => self.steps(header, n)?,
         };
         let Some(values) = values else { return Ok(BTreeMap::new()) };
         let unit = match header.words("space units", 4) {
@@ -381,6 +388,15 @@ impl Axes {
         };
         let times = values.into_iter().enumerate().map(|(volume, value)| (volume, value * factor)).collect();
         Ok(spread(&times, slices, frames))
+    }
+
+    /// The axis before time whose index values are one for each volume: 3D Slicer counts axes without that of colours.
+    fn values_beside_colours(&self, header: &Header) -> Option<usize> {
+        let before = self.time?.checked_sub(1).filter(|_| self.channels > 1)?;
+        let has_values = |n: usize| self.all.get(n).is_some_and(|axis| axis.has_values);
+        let text = header.value(&format!("axis {before} index values"))?;
+        let count = text.split(is_between).filter(|word| !word.is_empty()).count();
+        (has_values(before) && !self.time.is_some_and(has_values) && count == self.volumes).then_some(before)
     }
 
     /// Why numbers along an axis are no times. That steps have no unit is usual, and no warning.
@@ -401,7 +417,7 @@ impl Axes {
         let text = header.value(&format!("axis {n} index values"))?;
         let is_text =
             header.value(&format!("axis {n} index type")).is_some_and(|word| word.eq_ignore_ascii_case("text"));
-        let words = text.split(|c: char| c.is_whitespace() || c == ',').filter(|word| !word.is_empty());
+        let words = text.split(is_between).filter(|word| !word.is_empty());
         let numbers: Option<Vec<f64>> = words.map(|word| word.parse().ok()).collect();
         let fault = match numbers {
             _ if is_text => "are text".to_string(),
@@ -429,6 +445,11 @@ impl Axes {
         let Some(step) = step.filter(|step| *step != 0.0) else { return Ok(None) };
         Ok(Some((0..self.volumes).map(|volume| start.unwrap_or(0.0) + step * volume as f64).collect()))
     }
+}
+
+/// Whether a character stands between index values.
+fn is_between(c: char) -> bool {
+    c.is_whitespace() || c == ','
 }
 
 /// Factors from the units of a file to mm.

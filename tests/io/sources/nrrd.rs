@@ -414,3 +414,26 @@ fn layers_of_a_segmentation_are_not_taken_for_volumes_in_time() {
     let one = file(&format!("dimension: 4\nsizes: 1 3 2 2\n{space}{keys}"), &samples([0, 1, 2, 3])[..12]);
     assert_eq!(volumes(folder.write("one.seg.nrrd", one)), [(samples([0, 1, 2, 3])[..12].to_vec(), None)]);
 }
+
+#[test]
+fn times_of_colours_may_be_counted_without_the_axis_of_colours() {
+    let folder = Folder::new("nrrd-colour-times");
+    // 3D Slicer writes the list of a sequence of colours as axis 4, and its values as those of axis 3.
+    let fields = |values: &str| {
+        format!(
+            "{SPACE}dimension: 5\nsizes: 3 2 2 1 2\nkinds: RGB-color domain domain domain list\n\
+             space directions: none (1,0,0) (0,1,0) (0,0,1) none\nunits: \"\" \"\" \"\" \"\" \"s\"\naxis 3 index values:={values}\n"
+        )
+    };
+    let times = |values: &str| {
+        let path = folder.write("file.seq.nrrd", file(&fields(values), &[9; 24]));
+        let said = said(&path);
+        (volumes(&path).into_iter().map(|(_, time)| time).collect::<Vec<_>>(), said)
+    };
+    let (found, said) = times("0 0.5");
+    assert_eq!(found, [Some(0.0), Some(0.5)], "{said}");
+    assert!(said.contains("taken as those of axis 4"), "{said}");
+    let (found, said) = times("0 0.5 1");
+    assert_eq!(found, [None, None], "{said}");
+    assert!(said.contains("axis 3 index values are not used"), "{said}");
+}
