@@ -8,7 +8,7 @@ use crate::args::{check_volume, recorded};
 use crate::files::escaped;
 use crate::probe::{Geometry, Grid, World};
 use crate::scene::Scene;
-use crate::source::convert::{Target, Volume, lattice};
+use crate::source::convert::{Target, Volume, lattice, no_echo};
 use crate::source::{self, Frame, Source, StoredType};
 use crate::terminal::{Failure, input};
 use serde_json::{Map, Value, json};
@@ -185,7 +185,7 @@ fn convertible(task: &Task, source: &mut dyn Source) -> Result<Contents, Failure
     if let (Some(world), Geometry::Cartesian(own)) = (source.world_of(work.volume), &geometry) {
         target.world = World::on(&world, own, &grid);
     }
-    target.outside = work.outside;
+    target.outside = work.outside.unwrap_or_else(|| no_echo(source));
     target.check(Path::new(&work.output)).map_err(input)?;
     let mut volume = Volume::new(geometry, source.stored_type());
     frames(work, source)?.into_iter().for_each(|frame| volume.take(frame));

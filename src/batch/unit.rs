@@ -5,6 +5,7 @@ use super::sha256_of_file;
 use crate::args::{GeometryArgs, SceneArgs};
 use crate::scene::Settings;
 use crate::scene::load::Layers;
+use crate::source::segmentation;
 use crate::source::volume_file::VolumeFile;
 use crate::terminal::{Failure, input};
 use clap::{Parser, Subcommand};
@@ -94,8 +95,8 @@ struct ConvertUnit {
     volume: usize,
     #[arg(long, allow_negative_numbers = true)]
     spacing: Option<f64>,
-    #[arg(long, default_value_t = 0.0, allow_negative_numbers = true)]
-    outside: f64,
+    #[arg(long, allow_negative_numbers = true)]
+    outside: Option<f64>,
 }
 
 #[derive(clap::Args)]
@@ -118,8 +119,8 @@ pub struct Work {
     pub layers: Layers,
     /// Voxel spacing of a converted volume, mm.
     pub spacing: Option<f64>,
-    /// Value of a converted volume outside the sector.
-    pub outside: f64,
+    /// Value of a converted volume outside the sector; None: that of no echo.
+    pub outside: Option<f64>,
     /// The name of the output.
     pub output: String,
     /// Hash of all of this, and of the files that settings are read from.
@@ -166,7 +167,7 @@ impl Work {
 
     fn new(kind: Kind, layers: Layers, geometry: GeometryArgs, volume: usize) -> Work {
         let (text, output) = (String::new(), String::new());
-        Work { kind, text, geometry, volume, layers, spacing: None, outside: 0.0, output, digest: Vec::new() }
+        Work { kind, text, geometry, volume, layers, spacing: None, outside: None, output, digest: Vec::new() }
     }
 
     fn parse(command: &[String]) -> Result<Work, Failure> {
@@ -208,6 +209,9 @@ impl Work {
         let name = Path::new(&self.output);
         let ends = |ending: &str| name.extension().is_some_and(|e| e == ending);
         match self.kind {
+            Kind::Convert if segmentation::is_one(name) => {
+                Err(input("outputs: convert of a batch makes volumes; a segmentation is made by echolume convert"))
+            }
             Kind::Convert => VolumeFile::of(name).map(drop).map_err(|e| input(format!("outputs: {e}"))),
             Kind::Render if !ends("png") => Err(input("outputs: render makes a .png")),
             Kind::Measure | Kind::Verify if !ends("json") => {

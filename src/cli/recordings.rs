@@ -5,7 +5,7 @@ use crate::files::signals::Writing;
 use crate::probe::{Geometry, Grid, World};
 use crate::scene::default_look::block_edge;
 use crate::scene::{EchoHistogram, EchoLevels, Input, insonified_box};
-use crate::source::convert::{Target, Volume, lattice};
+use crate::source::convert::{Target, Volume, lattice, no_echo};
 use crate::source::phantom::{Body, Label, Phantom, PhantomOptions, PointSpread, Sampling, Speckle, distance_path};
 use crate::source::recorder::{Header, Writer};
 use crate::source::segmentation;
@@ -215,11 +215,10 @@ impl Convert {
         if let (Some(world), Geometry::Cartesian(own)) = (recording.world_of(number), &geometry) {
             target.world = world.on(own, &grid);
         }
-        let (range, shift) = (recording.range(), recording.sample_type().shift());
         // A capture has bytes, of which 0 is black.
-        let no_echo = if self.secondary_capture { 0.0 } else { range[0] - shift };
-        target.outside = self.outside.unwrap_or(no_echo);
-        Ok(if self.secondary_capture { target.captured(range) } else { target })
+        let usual = if self.secondary_capture { 0.0 } else { no_echo(recording) };
+        target.outside = self.outside.unwrap_or(usual);
+        Ok(if self.secondary_capture { target.captured(recording.range()) } else { target })
     }
 
     fn write_mask(&self, volume: &Volume, target: &Target) -> Result<(), Failure> {

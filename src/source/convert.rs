@@ -3,7 +3,7 @@
 
 use super::segmentation::{self, Segment};
 use super::volume_file::VolumeFile;
-use crate::Frame;
+use crate::{Frame, Source};
 use crate::files::InputError;
 use crate::probe::{Geometry, Grid, Probe, World};
 use crate::{SampleType, StoredType};
@@ -272,6 +272,11 @@ pub(super) fn write_labels(
     label: impl Fn(DVec3) -> u8 + Sync,
 ) -> Result<(), InputError> {
     segmentation::write(path, grid, &World::of(grid), segments, |voxel| label(place_of(grid, voxel)), || ())
+}
+
+/// The value of no echo in a source's own units: the low end of the range that is shown, such as -60 of decibels.
+pub fn no_echo(source: &dyn Source) -> f64 {
+    source.range()[0] - source.sample_type().shift()
 }
 
 /// Writes a function of space, mm, on a grid; None is zero. `each` is called after every slice.

@@ -238,3 +238,21 @@ fn a_unit_that_loses_the_device_comes_last_and_is_given_up() {
     assert!(code == Some(4) && err.contains("is not tried again"), "{code:?} {err}");
     assert_eq!(statuses()[3..], ["done", "failed"]);
 }
+
+#[test]
+fn a_converted_volume_is_that_of_convert_and_a_segmentation_is_refused() {
+    let folder = Folder::new("batch-convert");
+    // Decibels, and a sector: outside of it is no echo, -60.
+    let sector = data("uff/sector-3d.uff").display().to_string();
+    let unit = |output: &str| {
+        let unit = json!({"input": sector, "command": ["convert", "--spacing", "2"], "outputs": [output]});
+        folder.write("units.ndjson", format!("{unit}\n"))
+    };
+    let (made, alone) = (folder.path("made"), folder.path("alone.mha"));
+    done(&["batch", &unit("volume.mha"), "-o", &made]);
+    done(&["convert", &sector, &alone, "--spacing", "2"]);
+    let expected = fs::read(&alone).expect("a volume");
+    assert!(outputs(made.as_ref()).values().any(|bytes| *bytes == expected), "a unit is what convert writes");
+    let manifest = unit("tissue.seg.nrrd");
+    refuses(&["batch"], &run(&["batch", &manifest, "-o", &made]), 2, &["outputs", "a segmentation"]);
+}
