@@ -71,7 +71,7 @@ pub struct Verify {
     /// Render every mode on this device too, and compare the pictures
     #[arg(long, value_name = "N|NAME")]
     against: Option<DeviceChoice>,
-    /// Run only checks whose group or name contains this; may be repeated
+    /// Run only checks whose group or name contains this, or the one whose line of --list it is; may be repeated
     #[arg(long, value_name = "PART")]
     only: Vec<String>,
     /// List the checks and exit
@@ -386,7 +386,9 @@ impl Verify {
     }
 
     fn wants(&self, check: &CheckName) -> bool {
-        let has = |part: &String| check.group.contains(part.as_str()) || check.name.contains(part.as_str());
+        let whole = format!("{} / {}", check.group, check.name);
+        let has =
+            |part: &String| whole == *part || check.group.contains(part.as_str()) || check.name.contains(part.as_str());
         let is_filtered = self.gtest_filter.as_ref().is_none_or(|filter| filter.selects(&gtest::full_name(check)));
         is_filtered && (self.only.is_empty() || self.only.iter().any(has))
     }

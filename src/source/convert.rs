@@ -3,9 +3,9 @@
 
 use super::segmentation::{self, Segment};
 use super::volume_file::VolumeFile;
-use crate::{Frame, Source};
 use crate::files::InputError;
 use crate::probe::{Geometry, Grid, Probe, World};
+use crate::{Frame, Source};
 use crate::{SampleType, StoredType};
 use glam::DVec3;
 use rayon::prelude::*;

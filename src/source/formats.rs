@@ -13,7 +13,9 @@ pub use super::dicom::ENDINGS as DICOM;
 pub use super::pictures::ENDINGS as PICTURES;
 
 /// Bytes that are looked at.
-const START: u64 = 1024;
+pub(super) const START: u64 = 1024;
+/// The mark of a file that is packed as a whole.
+const GZIP: [u8; 2] = [0x1f, 0x8b];
 /// The ending of a file that is packed as a whole.
 const PACKED: &str = "gz";
 
@@ -193,17 +195,25 @@ pub(super) fn read_layout(path: &Path, options: &OpenOptions) -> Result<Layout, 
     let fault = |fault: String| Err(InputError::new(path, "file", fault));
     let name = if file.is_packed() { path.with_extension("") } else { path.to_path_buf() };
     let ending = name.extension().and_then(|e| e.to_str()).unwrap_or("").to_ascii_lowercase();
-    let read = "and folders of DICOM files or numbered pictures, are read";
     match reads {
         Some(Reads::Layout(read)) => read(&file),
         Some(Reads::Frames) => fault("holds frames as they arrived, not a recording".into()),
-        _ => match other_kind(&start) {
-            Some(kind) => fault(format!("is {kind}; {}, {read}", described())),
-            // Its keys may stand in any order.
-            None if metaimage::ENDINGS.contains(&&*ending) => metaimage::read(&file),
-            None => fault(format!("is of no known format; {}, {read}", described())),
-        },
+        // Its keys may stand in any order.
+        _ if other_kind(&start).is_none() && metaimage::ENDINGS.contains(&&*ending) => metaimage::read(&file),
+        _ => fault(unknown(&start)),
     }
+}
+
+/// What is said of bytes that are of no format.
+fn unknown(start: &[u8]) -> String {
+    let kind = other_kind(start).unwrap_or_else(|| "of no known format".into());
+    format!("is {kind}; {}, and folders of DICOM files or numbered pictures, are read", described())
+}
+
+/// Why a file that begins like this is no recording, where that is certain: there are enough bytes, and it is not packed.
+pub(super) fn no_format(start: &[u8]) -> Option<String> {
+    let is_certain = start.len() as u64 >= START && !start.starts_with(&GZIP) && of_start(start).is_none();
+    is_certain.then(|| unknown(start))
 }
 
 /// Kinds of files that users have at hand: where their mark is, the mark, and their name.

@@ -1,11 +1,12 @@
 //! Standard input as a recording: `-` in place of a file. It is kept in a temporary file, once, so that readers can go back in it.
 
+use super::formats;
 use super::frame::{Frame, Header, Source};
 use crate::files::{InputError, Spool};
 use crate::probe::{Geometry, World};
 use crate::{SampleType, StoredType};
 use glam::DAffine3;
-use std::io::IsTerminal;
+use std::io::{IsTerminal, Read};
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
@@ -31,10 +32,10 @@ pub fn forget() {
     kept().take();
 }
 
-/// The file with the bytes of standard input, which is read to its end the first time.
+/// The file with the bytes of standard input, which is read to its end the first time if it begins as a recording does.
 ///
 /// # Errors
-/// Standard input is a terminal, cannot be read, or does not fit on the disk.
+/// Standard input is a terminal, cannot be read, begins as no recording does, or does not fit on the disk.
 pub(super) fn file() -> Result<PathBuf, InputError> {
     let mut kept = kept();
     if let Some(spool) = &*kept {
@@ -45,7 +46,15 @@ pub(super) fn file() -> Result<PathBuf, InputError> {
     if input.is_terminal() {
         return Err(fault("is a terminal; send it a recording, as in: echolume render - <sweep.mha".into()));
     }
-    let spool = Spool::of(&mut input.lock(), MAX_BYTES);
+    let mut input = input.lock();
+    let mut start = Vec::new();
+    let looked_at = (&mut input).take(formats::START).read_to_end(&mut start);
+    looked_at.map_err(|e| fault(format!("cannot be read: {e}")))?;
+    // Whatever is no recording is not kept: it may have no end.
+    if let Some(why) = formats::no_format(&start) {
+        return Err(fault(why));
+    }
+    let spool = Spool::of(&mut start.chain(input), MAX_BYTES);
     let spool = spool.map_err(|e| fault(format!("cannot be kept in {}: {e}", std::env::temp_dir().display())))?;
     let path = spool.path().into();
     *kept = Some(spool);

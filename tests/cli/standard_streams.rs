@@ -3,6 +3,7 @@
 use crate::common::program::*;
 use echolume::low_level::scene::load::PRESETS;
 use std::fs;
+use std::io::Write;
 use std::process::{Command, Stdio};
 
 /// Runs the program with a file as its standard input. Returns its exit code, standard output as bytes, and standard error.
@@ -126,4 +127,21 @@ fn the_help_of_preset_names_the_presets_that_there_are() {
     let list = words.split("Preset of settings: ").nth(1).and_then(|rest| rest.split('.').next()).expect("a list");
     let names: Vec<&str> = PRESETS.iter().map(|(name, _)| *name).collect();
     assert_eq!(list.split(", ").collect::<Vec<_>>(), names);
+}
+
+#[test]
+fn input_without_end_that_is_no_recording_is_refused_by_its_first_bytes() {
+    let mut program = Command::new(PROGRAM);
+    program.args(["info", "-"]).stdin(Stdio::piped()).stdout(Stdio::null()).stderr(Stdio::piped());
+    let mut child = program.spawn().expect("start the program");
+    let mut input = child.stdin.take().expect("a pipe");
+    let zeros = vec![0; 64 << 10];
+    // The pipe breaks once the program has ended; a gigabyte is what a program takes that reads on.
+    let written = (0..16 << 10).take_while(|_| input.write_all(&zeros).is_ok()).count();
+    drop(input);
+    let output = child.wait_with_output().expect("it ends");
+    let said = String::from_utf8_lossy(&output.stderr);
+    assert!(output.status.code() == Some(2) && said.lines().count() == 1, "{said}");
+    assert!(said.contains("standard input: file: is of no known format"), "{said}");
+    assert!(written < 64, "{written} times 64 KiB were read");
 }

@@ -100,8 +100,11 @@ fn the_page_lists_every_known_bug() {
 #[test]
 fn a_run_like_the_baseline_has_not_changed_and_one_that_is_slower_or_wrong_has() {
     let folder = Folder::new("verify-baseline");
-    let chosen = [&FEW[..], &["--only", "median_distance"]].concat();
+    // A check by its line of --list.
+    let chosen = [&FEW[..], &["--only", "passes / median_distance"]].concat();
     let (file, earlier) = kept(&folder, "before.json", &chosen);
+    let passes = earlier.outcomes.iter().filter(|o| o.group == "passes").map(|o| o.name.as_str());
+    assert_eq!(passes.collect::<Vec<_>>(), ["median_distance"]);
     let again = |name: &str, changed: &Run, threshold: &str| {
         let file = folder.write(name, report::to_json(changed).expect("JSON"));
         verify(&[&chosen[..], &["--baseline", &file, "--threshold", threshold]].concat())
@@ -140,6 +143,7 @@ fn refusals_of_verify_are_one_line_with_their_own_exit_code() {
         (vec!["--baseline", "/dev/zero"], "is not a regular file"),
         (vec!["--baseline", &text, "--threshold", "0.5"], "threshold"),
         (vec!["--only", "no such check"], "--list"),
+        (vec!["--only", "passes / no such pass"], "--list"),
     ] {
         refuses(&more, &verify(&more), 2, &[named]);
     }
