@@ -1,5 +1,6 @@
 //! Profiles a scene: renders it repeatedly and records where the time goes, pass by pass.
 
+use crate::baselines::Stored;
 use crate::gpu::{Context, GpuError, Renderer, RendererOptions, Shaders, TimeStamps, pass_runner};
 use crate::machine::{self, CpuTime};
 use crate::passes::measure as loops;
@@ -8,7 +9,7 @@ use crate::passes::{Bind, DispatchArgs, GROUP, Part, Pass, RUN, Slot, Span, chai
 use crate::plan::{Plan, Rerun, Step};
 use crate::profile::export::{self, Track};
 use crate::profile::statistics::Sample;
-use crate::profile::{Acquisition, Ceiling, Ceilings, FORMAT, PassProfile, Profile, Sizes, settings_hash};
+use crate::profile::{Acquisition, Ceiling, Ceilings, PassProfile, Profile, Sizes, settings_hash};
 use crate::scene::Scene;
 use crate::source::Frame;
 use std::sync::Arc;
@@ -155,7 +156,7 @@ impl ProfileRun {
         let resolved = self.renderer.scene();
         let stamped = device.valid_bits > 0;
         let profile = Profile {
-            format: FORMAT.into(),
+            format: Profile::FORMAT.into(),
             program: machine::program(),
             date: machine::date(),
             scene: settings(scene),
