@@ -1,8 +1,8 @@
 //! `echolume report filters`.
 
 use crate::args::{Output, check_outputs, open_device, open_recording, write_report};
+use crate::filter_report::candidate_runs::{MeasureError, MeasureOptions, count, phantom, recording};
 use crate::filter_report::candidates::candidates;
-use crate::filter_report::measure::{MeasureError, MeasureOptions, count, phantom, recording};
 use crate::filter_report::{Area, Areas, Report, export, sheet};
 use crate::gpu::DeviceChoice;
 use crate::machine;

@@ -6,7 +6,7 @@ use crate::baselines::{Stored, Threshold};
 use crate::files::replace;
 use crate::gpu::DeviceChoice;
 use crate::profile as model;
-use crate::profile::measure;
+use crate::profile::timed_run;
 use crate::profile::{compare, export};
 use crate::terminal::{Failure, failed, input, say};
 use std::path::{Path, PathBuf};
@@ -109,7 +109,7 @@ impl Profile {
             frames.push(frame);
             Ok(())
         })?;
-        let options = measure::ProfileOptions {
+        let options = timed_run::ProfileOptions {
             repeats: self.repeat as usize,
             warm_up: self.warm_up as usize,
             still: self.still,
@@ -122,7 +122,7 @@ impl Profile {
             None => None,
         };
         let failure = |fault| self.shaders.failure(fault);
-        let run = |context| measure::ProfileRun::with_shaders(context, &scene, &options, &shaders).map_err(failure);
+        let run = |context| timed_run::ProfileRun::with_shaders(context, &scene, &options, &shaders).map_err(failure);
         let (mut first, mut second) = (run(&context)?, against.as_ref().map(run).transpose()?);
         while first.needs_more() {
             first.repeat(&frames).map_err(failure)?;

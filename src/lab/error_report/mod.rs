@@ -1,13 +1,13 @@
 //! Error against run time (work-precision). Every approximation is a dial; the points of a dial are its settings, each with its
-//! errors and its times on the device. [`measure`] fills a [`Report`], which is stored as JSON, and renders combinations of several
+//! errors and its times on the device. [`errors_and_times`] fills a [`Report`], which is stored as JSON, and renders combinations of several
 //! dials; [`export`] and [`plot`] write it as text and as a diagram, [`choose`] picks settings among the combinations.
 
 pub mod budget;
 pub mod choose;
 pub mod convergence;
 pub mod dials;
+pub mod errors_and_times;
 pub mod export;
-pub mod measure;
 pub mod metrics;
 pub mod plot;
 pub mod richardson;

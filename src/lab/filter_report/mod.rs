@@ -1,10 +1,10 @@
 //! Compares the 2D filters of slices: how well each reduces speckle and keeps edges, over its windows and strengths, and what it
-//! costs (as thesis Figs. 46-53, with figures). [`candidates`] lists the settings, [`quality`] has the measures, [`measure`]
+//! costs (as thesis Figs. 46-53, with figures). [`candidates`] lists the settings, [`quality`] has the measures, [`candidate_runs`]
 //! runs them on a device, [`export`] and [`sheet`] write tables and pictures.
 
+pub mod candidate_runs;
 pub mod candidates;
 pub mod export;
-pub mod measure;
 pub mod quality;
 pub mod sheet;
 

@@ -1,11 +1,11 @@
-//! Profiles: run times of every pass, what they were measured on, and their JSON file. [`measure`] makes a profile, [`compare`]
+//! Profiles: run times of every pass, what they were measured on, and their JSON file. [`timed_run`] makes a profile, [`compare`]
 //! compares two, [`export`] writes them as text and as Chrome traces. [`pipelines`] is about their compilation.
 
 pub mod compare;
 pub mod export;
-pub mod measure;
 pub mod pipelines;
 pub mod statistics;
+pub mod timed_run;
 
 use crate::baselines::Stored;
 use crate::machine::Device;
