@@ -21,7 +21,7 @@ use criterion::{Criterion, SamplingMode, Throughput};
 use echolume::low_level::gpu::pass_runner::PassTimer;
 use echolume::low_level::gpu::{Context, ContextOptions, DeviceChoice, GpuError, Renderer, RendererOptions};
 use echolume::low_level::passes::slots::Initializer;
-use echolume::low_level::passes::{DispatchArgs, Pass, Slot, Texels, measure};
+use echolume::low_level::passes::{DispatchArgs, Pass, Slot, Texels, device_limits};
 use echolume::low_level::scene::Scene;
 use echolume::low_level::source::Frame;
 use scenes::{FULL, SCENES, SMALL, check_that_none_is_forgotten};
@@ -82,8 +82,8 @@ fn all(run: Run) -> Result<(), String> {
         }
     }
     let (edge, pixels) = (sizes.pixels as usize, sizes.picture);
-    let scene = measure::scene(edge, pixels).map_err(|e| e.to_string())?;
-    for pass in measure::MEASURES {
+    let scene = device_limits::scene(edge, pixels).map_err(|e| e.to_string())?;
+    for pass in device_limits::MEASURES {
         bench(&mut criterion, &context, &scene, pass, "noise", || Ok(noise(&scene, pass)));
     }
     ingestion::bench(&mut criterion, &rendering, &phantom, run)?;

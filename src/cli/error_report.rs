@@ -3,7 +3,7 @@
 use crate::args::{InputArgs, Opened, parse_nanoseconds};
 use crate::error_report::choose::Bound;
 use crate::error_report::plot::Figure;
-use crate::error_report::{self, Measure, choose, dials, export, measure, plot};
+use crate::error_report::{self, Measure, choose, dials, errors_and_times, export, plot};
 use crate::files::read_text;
 use crate::picture::replace;
 use crate::scene::Scene;
@@ -90,10 +90,10 @@ impl ErrorReport {
 
     fn measure(&self, by: Measure, bounds: &[Bound]) -> Result<(), Failure> {
         let reference = match self.against.as_str() {
-            "auto" => measure::ReferenceChoice::Auto,
-            "exact" => measure::ReferenceChoice::Exact,
-            "f64" => measure::ReferenceChoice::F64,
-            "converged" => measure::ReferenceChoice::Converged,
+            "auto" => errors_and_times::ReferenceChoice::Auto,
+            "exact" => errors_and_times::ReferenceChoice::Exact,
+            "f64" => errors_and_times::ReferenceChoice::F64,
+            "converged" => errors_and_times::ReferenceChoice::Converged,
             other => return Err(input(format!("--against {other}: must be exact, f64, converged or auto"))),
         };
         let Opened { mut source, recorded, layers, scene } = self.input.open_recorded(&[], None)?;
@@ -110,7 +110,7 @@ impl ErrorReport {
             Ok(())
         })?;
         let (repeats, frames, shown) = (self.repeat, &frames[..], self.input.name());
-        let measurement = measure::ErrorMeasurement {
+        let measurement = errors_and_times::ErrorMeasurement {
             context: &context,
             recorded: &recorded,
             layers: &layers,
@@ -121,7 +121,7 @@ impl ErrorReport {
             reference,
         };
         let settings: usize = dials.iter().map(|d| d.settings.len() + 1).sum();
-        let bar = progress_bar((settings + 1 + measure::MAX_COMBINATIONS) as u64);
+        let bar = progress_bar((settings + 1 + errors_and_times::MAX_COMBINATIONS) as u64);
         bar.set_style(indicatif::ProgressStyle::default_bar().template("{bar:30} {pos}/{len} {msg}").map_err(failed)?);
         bar.set_message("the scene's finest picture");
         let finest = measurement.finest().map_err(failed)?;
@@ -141,8 +141,8 @@ impl ErrorReport {
     /// Chooses settings, renders and times them anew, and prints what held then.
     fn choose(
         &self,
-        measurement: &measure::ErrorMeasurement,
-        finest: &measure::Finest,
+        measurement: &errors_and_times::ErrorMeasurement,
+        finest: &errors_and_times::Finest,
         report: &error_report::Report,
         by: Measure,
         bound: Bound,

@@ -1,9 +1,9 @@
 //! `echolume report filters`.
 
 use crate::args::{Output, check_outputs, open_device, open_recording, write_report};
+use crate::filter_report::candidate_runs::{MeasureError, MeasureOptions, count, phantom, recording};
 use crate::filter_report::candidates::candidates;
-use crate::filter_report::measure::{MeasureError, MeasureOptions, count, phantom, recording};
-use crate::filter_report::{Area, Areas, Report, export, sheet};
+use crate::filter_report::{Area, Areas, Report, contact_sheet, export};
 use crate::gpu::DeviceChoice;
 use crate::machine;
 use crate::source::OpenOptions;
@@ -105,7 +105,7 @@ impl FilterReport {
             write_report(file, &export::csv(&report))?;
         }
         for (file, subject) in sheets.iter().zip(&report.subjects) {
-            sheet::sheet(&report, subject).and_then(|sheet| sheet.save(file)).map_err(failed)?;
+            contact_sheet::contact_sheet(&report, subject).and_then(|sheet| sheet.save(file)).map_err(failed)?;
             say!("written: {}", file.display());
         }
         Ok(())

@@ -50,6 +50,7 @@ mod filter;
 mod filter_report;
 mod machine;
 mod mesh;
+mod mesh_sheet;
 mod one_colour;
 #[cfg(feature = "lab")]
 mod pipelines;
@@ -62,7 +63,6 @@ mod render;
 mod report;
 mod series;
 mod serve;
-mod sheet;
 mod stic;
 mod still;
 mod stream;

@@ -1,7 +1,7 @@
 //! `echolume profile --pipelines`.
 
 use crate::args::{InputArgs, Output, ShaderArgs, check_outputs, open_device_for_statistics, write_report};
-use crate::files::read_text;
+use crate::baselines::Stored;
 use crate::profile::pipelines::compare::compare;
 use crate::profile::pipelines::table::{comparison_table, table};
 use crate::profile::pipelines::{PipelineProfile, measure};
@@ -9,9 +9,6 @@ use crate::scene::Scene;
 use crate::scene::variants;
 use crate::terminal::{Failure, failed, input, remark, say};
 use std::path::{Path, PathBuf};
-
-/// Longest file that is read, bytes.
-const MAX_BYTES: u64 = 64 << 20;
 
 /// What `profile` was asked for.
 pub struct Request<'a> {
@@ -87,7 +84,5 @@ fn every(scene: &Scene) -> Vec<Scene> {
 }
 
 fn read(file: &Path) -> Result<PipelineProfile, Failure> {
-    let fault = |e: &dyn std::fmt::Display| input(format!("{}: {e}", file.display()));
-    let text = read_text(file, MAX_BYTES, "statistics of pipelines").map_err(|e| fault(&e))?;
-    PipelineProfile::from_json(&text).map_err(|e| fault(&e))
+    PipelineProfile::load(file).map_err(input)
 }

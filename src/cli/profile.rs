@@ -2,16 +2,14 @@
 
 use super::pipelines::Request;
 use crate::args::{InputArgs, Output, ShaderArgs, check_outputs, open_device, write_report};
-use crate::files::{read_text, replace};
+use crate::baselines::{Stored, Threshold};
+use crate::files::replace;
 use crate::gpu::DeviceChoice;
 use crate::profile as model;
-use crate::profile::measure;
+use crate::profile::timed_run;
 use crate::profile::{compare, export};
 use crate::terminal::{Failure, failed, input, say};
 use std::path::{Path, PathBuf};
-
-/// Longest profile that is read, bytes.
-const MAX_BYTES: u64 = 256 << 20;
 
 #[derive(clap::Args)]
 #[command(after_help = "A repeat is a whole volume: every frame through stage 1, then the picture.\n\nExamples:\n  \
@@ -111,7 +109,7 @@ impl Profile {
             frames.push(frame);
             Ok(())
         })?;
-        let options = measure::ProfileOptions {
+        let options = timed_run::ProfileOptions {
             repeats: self.repeat as usize,
             warm_up: self.warm_up as usize,
             still: self.still,
@@ -124,7 +122,7 @@ impl Profile {
             None => None,
         };
         let failure = |fault| self.shaders.failure(fault);
-        let run = |context| measure::ProfileRun::with_shaders(context, &scene, &options, &shaders).map_err(failure);
+        let run = |context| timed_run::ProfileRun::with_shaders(context, &scene, &options, &shaders).map_err(failure);
         let (mut first, mut second) = (run(&context)?, against.as_ref().map(run).transpose()?);
         while first.needs_more() {
             first.repeat(&frames).map_err(failure)?;
@@ -149,14 +147,14 @@ impl Profile {
 
     fn compare(&self, old: &Path, new: &Path) -> Result<(), Failure> {
         check_outputs(&[("--json", self.json.as_deref())], [old, new])?;
-        let (old, new) = (read(old)?, read(new)?);
-        self.judge(&old, &new)
+        let [old, new] = [old, new].map(|file| model::Profile::load(file).map_err(input));
+        self.judge(&old?, &new?)
     }
 
     /// Prints the differences. Fails on a regression.
     fn judge(&self, old: &model::Profile, new: &model::Profile) -> Result<(), Failure> {
         let options = compare::CompareOptions {
-            threshold: self.threshold,
+            threshold: Threshold::new(self.threshold).map_err(|e| input(format!("--{e}")))?,
             force: self.force,
             ..compare::CompareOptions::default()
         };
@@ -172,10 +170,4 @@ impl Profile {
             false => Err(failed(format!("slower by more than the threshold: {}", slower.join(", ")))),
         }
     }
-}
-
-fn read(file: &Path) -> Result<model::Profile, Failure> {
-    let fault = |e: &dyn std::fmt::Display| input(format!("{}: {e}", file.display()));
-    let text = read_text(file, MAX_BYTES, "profile").map_err(|e| fault(&e))?;
-    model::Profile::from_json(&text).map_err(|e| fault(&e))
 }

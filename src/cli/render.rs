@@ -2,9 +2,9 @@
 
 use super::budget;
 use super::drawing::{DrawFault, draw_despite_losses, send_volume};
+use super::mesh_sheet;
 use super::one_colour;
 use super::series::{Job, SeriesArgs};
-use super::sheet;
 use super::still::{self, StillArgs};
 use crate::args::{InputArgs, Output, PictureFile, ShaderArgs, check_outputs};
 use crate::dump;
@@ -196,7 +196,7 @@ impl Render {
         }
         if let Some((format, path)) = mesh {
             let volume = self.input.volume()?;
-            sheet::write(&mut renderer, &picture, source.world_of(volume), format, path)?;
+            mesh_sheet::write(&mut renderer, &picture, source.world_of(volume), format, path)?;
         }
         if let Some(folder) = &self.dump {
             self.write_dump(folder, &mut renderer)?;

@@ -6,7 +6,7 @@ use crate::picture::Grey;
 use crate::terminal::{Failure, failed, input, progress_bar, say};
 use crate::thesis_tables::export;
 use crate::thesis_tables::growth::growth;
-use crate::thesis_tables::measure::{TableOptions, run};
+use crate::thesis_tables::row_times::{TableOptions, run};
 use std::path::PathBuf;
 
 /// Warm-up volumes of each row: the driver compiles shaders and the clocks rise.

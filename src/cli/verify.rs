@@ -1,15 +1,16 @@
 //! `echolume verify`.
 
 use crate::args::{check_outputs, device_failure, write_report};
+use crate::baselines::{Stored, Threshold};
+use crate::files::replace_for_all;
 use crate::files::signals::Held;
-use crate::files::{read_text, replace_for_all};
 use crate::gpu::{Context, ContextOptions, DeviceChoice, GpuError};
 use crate::machine;
 use crate::terminal::{Failure, failed, input, say};
 use crate::verify::gtest::{self, Filter};
 use crate::verify::isolation::{self, InjectedCrash, Workers};
 use crate::verify::progress::{self, Progress, Style};
-use crate::verify::report::baseline::{BaselineComparison, BaselineOptions, compare};
+use crate::verify::report::baseline::{BaselineComparison, compare};
 use crate::verify::report::prometheus::prometheus;
 use crate::verify::report::{self, CheckName, Level, Outcome, Run, Verdict, html, junit};
 use crate::verify::reproduce::{ReproduceError, reproduce};
@@ -22,9 +23,6 @@ use std::process::Command;
 use std::sync::Arc;
 use std::sync::mpsc::{self, RecvTimeoutError};
 use std::time::{Duration, Instant};
-
-/// Maximum size of a baseline file, bytes.
-const MAX_BASELINE: u64 = 256 << 20;
 
 #[derive(clap::Args)]
 #[command(
@@ -140,7 +138,7 @@ impl Verify {
         if let (Some(check), Some(folder)) = (&self.reproduce, &self.output) {
             return self.reproduce(level, check, folder);
         }
-        let options = BaselineOptions::new(self.threshold).map_err(|e| input(format!("--{e}")))?;
+        let threshold = Threshold::new(self.threshold).map_err(|e| input(format!("--{e}")))?;
         let files = [
             ("--json", &self.json),
             ("--junit", &self.junit),
@@ -148,7 +146,8 @@ impl Verify {
             ("--prometheus", &self.prometheus),
         ];
         check_outputs(&files.map(|(flag, file)| (flag, file.as_deref())), self.baseline.as_deref())?;
-        let mut earlier = self.baseline.as_deref().map(read).transpose()?;
+        let mut earlier =
+            self.baseline.as_deref().map(Run::load).transpose().map_err(|e| input(format!("--baseline {e}")))?;
         // Checks that were not requested are not missing.
         earlier.iter_mut().for_each(|run| run.outcomes.retain(|o| self.is_selected(o)));
         let (mut run, stopped) = match () {
@@ -157,7 +156,7 @@ impl Verify {
             _ => self.run_here(level)?,
         };
         self.save_pictures(&mut run);
-        let compared = earlier.map(|earlier| compare(&earlier, &run, &options));
+        let compared = earlier.map(|earlier| compare(&earlier, &run, threshold));
         self.write(&run, compared.as_ref())?;
         self.judge(&run, compared.as_ref(), stopped)
     }
@@ -416,7 +415,7 @@ impl Verify {
     }
 
     fn write(&self, run: &Run, compared: Option<&BaselineComparison>) -> Result<(), Failure> {
-        put(&self.json, || report::to_json(run).map_err(|e| e.to_string()))?;
+        put(&self.json, || run.to_json())?;
         put(&self.junit, || junit::junit(run, compared))?;
         put(&self.html, || html::html(run, compared))?;
         let Some(file) = &self.prometheus else { return Ok(()) };
@@ -502,10 +501,4 @@ fn file_name(title: &str) -> String {
         }
     });
     name.chars().take(100).collect::<String>().trim_matches('-').to_string()
-}
-
-fn read(file: &Path) -> Result<Run, Failure> {
-    let fault = |e: &dyn std::fmt::Display| input(format!("--baseline {}: {e}", file.display()));
-    let text = read_text(file, MAX_BASELINE, "--json of verify").map_err(|e| fault(&e))?;
-    report::from_json(&text).map_err(|e| fault(&e))
 }

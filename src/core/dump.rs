@@ -11,14 +11,14 @@ use serde_json::{Value, json};
 /// Width and height of a drawn table, pixels.
 const GRAPH: [usize; 2] = [512, 256];
 
-/// Draws a slot: colours unchanged, a volume as a sheet of its slices, a distance map with near bright and far dark, a table as
+/// Draws a slot: colours unchanged, a volume as its slices side by side, a distance map with near bright and far dark, a table as
 /// curves. A single channel is stretched from its minimum to its maximum unless it is within 0..1.
 pub fn draw(slot: Slot, texels: Option<&Texels>, scene: &Scene) -> Picture {
     match (texels, slot.initializer()) {
         (Some(texels), _) if texels.channels == 4 && texels.size[2] == 1 => colours(texels),
-        (Some(texels), _) if texels.channels == 4 => sheet(texels, |n| colour(&texels.values[4 * n..])),
-        (Some(texels), _) if slot.meaning().miss.is_some() => sheet(texels, grey(distances(texels))),
-        (Some(texels), _) => sheet(texels, grey(stretched(texels))),
+        (Some(texels), _) if texels.channels == 4 => side_by_side(texels, |n| colour(&texels.values[4 * n..])),
+        (Some(texels), _) if slot.meaning().miss.is_some() => side_by_side(texels, grey(distances(texels))),
+        (Some(texels), _) => side_by_side(texels, grey(stretched(texels))),
         (None, Initializer::ByScene(make)) => curves(&make(scene), slot.meaning().channels.len()),
         (None, _) => Picture { width: 1, height: 1, rgba: vec![0, 0, 0, 255] },
     }
@@ -60,8 +60,8 @@ fn distances(texels: &Texels) -> Vec<f64> {
     texels.values.iter().map(|v| if is_hit(*v) { near(*v) } else { 0.0 }).collect()
 }
 
-/// A sheet of all slices, as square as possible, at most 2048 pixels wide. `colour` is that of the texel of this index.
-fn sheet(texels: &Texels, colour: impl Fn(usize) -> [u8; 3]) -> Picture {
+/// All slices side by side, as square as possible, at most 2048 pixels wide. `colour` is that of the texel of this index.
+fn side_by_side(texels: &Texels, colour: impl Fn(usize) -> [u8; 3]) -> Picture {
     let [width, height, slices] = texels.size;
     let across = (((slices * height) as f64 / width as f64).sqrt().ceil() as usize).clamp(1, slices);
     let shrink = (across * width).div_ceil(2048).max(1);

@@ -6,7 +6,7 @@
 //! - `pipelines` compiles shaders, `pipeline_compiler` on a thread of its own, `preparation` before there is a renderer, `pipeline_measure` to measure that; `pipeline_cache` keeps
 //!   what was compiled on disk; `shader_reload` takes shaders from a folder that is watched. `descriptor_sets` are for devices without push
 //!   descriptors.
-//! - `recorder` records command buffers with their barriers and the time stamps of `timing`; `timeline` says when a submission is done,
+//! - `command_recorder` records command buffers with their barriers and the time stamps of `timing`; `timeline` says when a submission is done,
 //!   and `watchdog` gives up a device that does not finish. `bands` divides dispatches that a driver's watchdog might end, and `paced`
 //!   holds bands back while a window's panels are drawn.
 //! - `lost_device` reports why a device was lost, `losses` counts how often the same work lost it, `budget` how much memory it has left; `host_memory` returns what drivers freed.
@@ -16,6 +16,7 @@
 mod bands;
 pub mod budget;
 mod buffers;
+mod command_recorder;
 pub mod context;
 mod descriptor_sets;
 pub mod device_selection;
@@ -35,7 +36,6 @@ pub mod pipeline_measure;
 mod pipelines;
 mod preparation;
 mod recently_used;
-mod recorder;
 mod renderer;
 pub mod resources;
 #[cfg(feature = "hot-reload")]

@@ -26,6 +26,18 @@ pub struct Device {
     pub clocks: Option<String>,
 }
 
+impl Device {
+    /// What times depend on, by names for people.
+    pub fn conditions(&self) -> [(&'static str, String); 4] {
+        [
+            ("device", self.name.clone()),
+            ("driver", self.driver.clone()),
+            ("Vulkan", self.api.clone()),
+            ("clocks", self.clocks.clone().unwrap_or_else(|| "not known".into())),
+        ]
+    }
+}
+
 /// The current time, RFC 3339.
 pub fn date() -> String {
     humantime::format_rfc3339_seconds(SystemTime::now()).to_string()

@@ -1,11 +1,11 @@
 //! Runs a single pass on given inputs: tests compare it with its CPU reference, benchmarks time it.
 
 use super::buffers::{Readback, Upload};
+use super::command_recorder::{BarrierRecorder, CommandRecorder, Dispatch, SlotParts};
 use super::context::Context;
 use super::error::GpuError;
 use super::formats::{self, TexelAccess};
 use super::pipelines::{Pipeline, Pipelines, Prepared, embedded};
-use super::recorder::{BarrierRecorder, Dispatch, Recorder, SlotParts};
 use super::resources::SlotResources;
 use super::timeline::Timelines;
 use super::timing::{TimeStamps, Timings};
@@ -78,7 +78,7 @@ impl PassRunner {
         let plan = Plan { steps: Vec::new(), slots: reads.iter().chain(&writes).map(|b| b.slot).collect() };
         let mut slots = SlotResources::new(&self.context, args.image + 1);
         let mut timelines = Timelines::new(&self.context, 1)?;
-        let mut recorder = Recorder::new(&self.context, 0, pass.name, TimeStamps::None, false)?;
+        let mut recorder = CommandRecorder::new(&self.context, 0, pass.name, TimeStamps::None, false)?;
         let mut barriers = BarrierRecorder::default();
         let pipeline = self.pipelines.get(pass, scene, args)?;
         let new = slots.fit(&plan, scene)?;
@@ -139,7 +139,7 @@ impl PassRunner {
 /// Times a single pass of a scene, with its own slots and pipelines.
 pub struct PassTimer {
     // Fields are dropped in this order, after `drop` has waited for the device.
-    recorder: Recorder,
+    recorder: CommandRecorder,
     /// Every iteration of the pass.
     dispatches: Vec<(DispatchArgs, Arc<Pipeline>)>,
     _pipelines: Arc<Pipelines>,
@@ -197,7 +197,7 @@ impl PassTimer {
         plan.slots.sort();
         plan.slots.dedup();
         let mut timed = PassTimer {
-            recorder: Recorder::new(context, 0, pass.name, TimeStamps::EachPass, false)?,
+            recorder: CommandRecorder::new(context, 0, pass.name, TimeStamps::EachPass, false)?,
             dispatches,
             _pipelines: pipelines,
             slots: SlotResources::new(context, 1),

@@ -593,8 +593,8 @@ impl Press {
                         Command::Plane(name)
                     }
                     None => {
-                        let sheet = scene.sheet();
-                        let pixel = sheet.tiles.get(tile).map_or(sheet.pixel, |tile| tile.pixel);
+                        let tiling = scene.tiling();
+                        let pixel = tiling.tiles.get(tile).map_or(tiling.pixel, |tile| tile.pixel);
                         Command::StepPlane(-y * viewport.scale() * pixel)
                     }
                 }

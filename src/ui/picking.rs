@@ -81,7 +81,7 @@ impl<'a> Viewport<'a> {
             return None;
         }
         if scene.cuts_planes() {
-            let tile = scene.sheet().tiles.iter().position(|tile| is_in(tile.corner, tile.size));
+            let tile = scene.tiling().tiles.iter().position(|tile| is_in(tile.corner, tile.size));
             if let Some(n) = tile {
                 return Some(Pane::Plane(n));
             }
@@ -92,8 +92,8 @@ impl<'a> Viewport<'a> {
     /// The point in space that a tile of planes shows at a position in the window.
     pub(super) fn point_on_plane(&self, tile: usize, at: [f64; 2]) -> Option<DVec3> {
         let (scene, pixel) = self.pixel_at(at)?;
-        let sheet = scene.sheet();
-        Some(sheet.point(sheet.tiles.get(tile)?, pixel))
+        let tiling = scene.tiling();
+        Some(tiling.point(tiling.tiles.get(tile)?, pixel))
     }
 
     /// The body mark at a position in the window, and what of it: the probe is grabbed from `reach` pixels of the window.
@@ -106,8 +106,8 @@ impl<'a> Viewport<'a> {
     /// measurement, index of its point.
     pub(super) fn measure_point_at(&self, tile: usize, at: [f64; 2], reach: f64) -> Option<(usize, usize)> {
         let (scene, pixel) = self.pixel_at(at)?;
-        let sheet = scene.sheet();
-        let corner = sheet.tiles.get(tile)?.corner.map(f64::from);
+        let tiling = scene.tiling();
+        let corner = tiling.tiles.get(tile)?.corner.map(f64::from);
         let reach = reach * self.scale();
         let on_tile = overlay::drawn(scene, self.measures).into_iter().filter(|drawn| drawn.tile[0] == corner);
         // The points of a way make one line.
@@ -121,19 +121,19 @@ impl<'a> Viewport<'a> {
     /// and along which normal alone it is to be moved; none of these at the centre. `reach`: of a line and of the centre, pixels of the window.
     pub(super) fn cross_at(&self, tile: usize, at: [f64; 2], reach: [f64; 2]) -> Option<(DVec3, Option<DVec3>)> {
         let (scene, pixel) = self.pixel_at(at)?;
-        let sheet = scene.sheet();
-        let shown = sheet.tiles.get(tile).filter(|_| scene.shows_three() && scene.draws_lines())?;
+        let tiling = scene.tiling();
+        let shown = tiling.tiles.get(tile).filter(|_| scene.shows_three() && scene.draws_lines())?;
         if shown.section.is_some() {
             return None;
         }
-        let way = scene.plane(PlaneName::A).at - sheet.point(shown, pixel);
-        let others = sheet
+        let way = scene.plane(PlaneName::A).at - tiling.point(shown, pixel);
+        let others = tiling
             .tiles
             .iter()
             .enumerate()
             .filter(|(n, other)| *n != tile && other.section.is_none())
             .map(|(_, other)| other.plane.normal);
-        let away: Vec<(DVec3, f64)> = others.map(|normal| (normal, way.dot(normal).abs() / sheet.pixel)).collect();
+        let away: Vec<(DVec3, f64)> = others.map(|normal| (normal, way.dot(normal).abs() / tiling.pixel)).collect();
         let [of_line, of_centre] = reach.map(|reach| reach * self.scale());
         if away.iter().all(|(_, pixels)| *pixels <= of_centre) {
             return Some((way, None));
@@ -153,7 +153,7 @@ impl<'a> Viewport<'a> {
         let scale = self.scale();
         let pixels = match (self.scene, pane) {
             (Some(scene), Pane::Rendering) => Picker::of(scene).size()[1],
-            (Some(scene), Pane::Plane(n)) => scene.sheet().tiles.get(n).map_or(1.0, |tile| f64::from(tile.size[1])),
+            (Some(scene), Pane::Plane(n)) => scene.tiling().tiles.get(n).map_or(1.0, |tile| f64::from(tile.size[1])),
             (None, _) => 1.0,
         };
         if scale > 0.0 { pixels.max(1.0) / scale } else { f64::INFINITY }
@@ -174,7 +174,7 @@ impl<'a> Viewport<'a> {
 
     /// True if a tile is a curved plane.
     pub(super) fn is_curved(&self, tile: usize) -> bool {
-        self.scene.is_some_and(|scene| scene.sheet().tiles.get(tile).is_some_and(|tile| tile.section.is_some()))
+        self.scene.is_some_and(|scene| scene.tiling().tiles.get(tile).is_some_and(|tile| tile.section.is_some()))
     }
 
     /// A position on a tile of one of the three planes: the plane, and the coordinates there, mm.
@@ -187,7 +187,7 @@ impl<'a> Viewport<'a> {
     /// The point of the line of the curved plane that is drawn within `reach` pixels of the window of a position on a tile.
     pub(super) fn curve_point_at(&self, tile: usize, at: [f64; 2], reach: f64) -> Option<usize> {
         let (scene, pixel) = self.pixel_at(at)?;
-        let line = scene.curve_line(&scene.sheet()).filter(|line| line.tile == tile)?;
+        let line = scene.curve_line(&scene.tiling()).filter(|line| line.tile == tile)?;
         let away = line.points.iter().map(|[x, y]| (x - pixel[0]).hypot(y - pixel[1])).enumerate();
         let near = away.filter(|(_, away)| *away <= reach * self.scale());
         near.min_by(|a, b| a.1.total_cmp(&b.1)).map(|(index, _)| index)

@@ -5,7 +5,7 @@ use super::command::Face;
 use super::picking::Picker;
 use super::view::{FACES, below_face, face_axis, outwards, start_depth};
 use crate::scene::Scene;
-use crate::scene::planes::{Plane, Sheet, Tile};
+use crate::scene::planes::{Plane, Tile, Tiling};
 use crate::scene::start_curve::StartCurve;
 use glam::DVec3;
 
@@ -42,7 +42,7 @@ pub(super) fn is_on_planes(scene: &Scene) -> bool {
 }
 
 /// The sides of the section of the region by the plane of a tile; none if the plane misses the region.
-pub(super) fn section(scene: &Scene, sheet: &Sheet, tile: &Tile) -> Vec<Side> {
+pub(super) fn section(scene: &Scene, tiling: &Tiling, tile: &Tile) -> Vec<Side> {
     let plane = &tile.plane;
     let reach = 4.0 * (scene.high - scene.low).length() + 2.0 * (plane.at - (scene.low + scene.high) / 2.0).length();
     // A square beyond the region, cut to it face by face. With each corner, the face of the side that begins there.
@@ -70,7 +70,7 @@ pub(super) fn section(scene: &Scene, sheet: &Sheet, tile: &Tile) -> Vec<Side> {
     let count = outline.len();
     let sides = (0..count).filter_map(|n| {
         let ((from, face), (to, _)) = (outline[n], outline[(n + 1) % count]);
-        let ends = [from, to].map(|place| sheet.project(tile, place).0);
+        let ends = [from, to].map(|place| tiling.project(tile, place).0);
         Some(Side { face: face?, ends, handle: handle(tile, ends) })
     });
     sides.collect()
@@ -104,16 +104,16 @@ pub(super) enum StartPart {
 
 /// The start line through points, lateral and depth in mm, or straight without any: on a tile, if that shows plane A beside a rendering, not turned
 /// too far. The points may be ahead of the scene, whose picture takes time.
-pub(super) fn start_line(scene: &Scene, sheet: &Sheet, tile: usize, points: &[[f64; 2]]) -> Option<StartLine> {
+pub(super) fn start_line(scene: &Scene, tiling: &Tiling, tile: usize, points: &[[f64; 2]]) -> Option<StartLine> {
     let is_shown = tile == START_TILE && is_on_planes(scene) && scene.renders();
-    let tile = sheet.tiles.get(tile).filter(|_| is_shown)?;
+    let tile = tiling.tiles.get(tile).filter(|_| is_shown)?;
     let Plane { at, normal, .. } = tile.plane;
     if normal.z.abs() < LEAST_FACING {
         return None;
     }
     let on_tile = |x: f64, y: f64| {
         let z = at.z - (normal.x * (x - at.x) + normal.y * (y - at.y)) / normal.z;
-        sheet.project(tile, DVec3::new(x, y, z)).0
+        tiling.project(tile, DVec3::new(x, y, z)).0
     };
     let offset = -below_face(scene, DVec3::ZERO).y;
     let curve = (!points.is_empty()).then(|| StartCurve::new(points));
@@ -134,7 +134,7 @@ pub(super) fn start_at(
     at: [f64; 2],
     reach: [f64; 2],
 ) -> Option<StartPart> {
-    let start = start_line(scene, &scene.sheet(), tile, points)?;
+    let start = start_line(scene, &scene.tiling(), tile, points)?;
     let [of_line, of_handle] = reach;
     let away = |[x, y]: &[f64; 2]| (x - at[0]).hypot(y - at[1]);
     let handles = start.handles.iter().map(away).enumerate().filter(|(_, away)| *away <= of_handle);
@@ -175,8 +175,8 @@ pub(super) fn part_at(scene: &Scene, tile: usize, at: [f64; 2], reach: [f64; 2])
     if !is_on_planes(scene) {
         return None;
     }
-    let sheet = scene.sheet();
-    let sides = section(scene, &sheet, sheet.tiles.get(tile)?);
+    let tiling = scene.tiling();
+    let sides = section(scene, &tiling, tiling.tiles.get(tile)?);
     let [of_side, of_handle] = reach;
     let to_handle = |side: &Side| side.handle.map(|[x, y]| (x - at[0]).hypot(y - at[1]));
     let handles = sides.iter().filter_map(|side| Some((to_handle(side)?, side.face)));
@@ -184,7 +184,7 @@ pub(super) fn part_at(scene: &Scene, tile: usize, at: [f64; 2], reach: [f64; 2])
     let lines = sides.iter().map(|side| (distance(at, side.ends), side.face));
     let line = lines.filter(|(away, _)| *away <= of_side).min_by(|a, b| a.0.total_cmp(&b.0));
     let is_inside = || {
-        let place = sheet.point(&sheet.tiles[tile], at);
+        let place = tiling.point(&tiling.tiles[tile], at);
         place.cmpge(scene.low).all() && place.cmple(scene.high).all()
     };
     match handle.or(line) {

@@ -388,9 +388,9 @@ fn largest(dut: &mut DeviceUnderTest) -> Result<Findings, GpuError> {
         );
         let scene = scene(grid, FLOATS, &toml).map_err(GpuError::Broken)?;
         let picture = render::picture(&dut.context, &scene, &frames(&scene, |at| wave(at[axis] as f64)))?;
-        let sheet = scene.sheet();
-        let [tile] = &sheet.tiles[..] else { return Err(GpuError::Broken("a plane has one tile".into())) };
-        let from_middle = |at: u32, axis: usize| (f64::from(at) + 0.5 - f64::from(size[axis]) / 2.0) * sheet.pixel;
+        let tiling = scene.tiling();
+        let [tile] = &tiling.tiles[..] else { return Err(GpuError::Broken("a plane has one tile".into())) };
+        let from_middle = |at: u32, axis: usize| (f64::from(at) + 0.5 - f64::from(size[axis]) / 2.0) * tiling.pixel;
         for spot in 0..257 {
             // Points along the needle, from end to end.
             let mut at = size.map(|n| n / 2);

@@ -448,14 +448,14 @@ fn ramp_along(
     };
     let full = of([0.0, 1.0])?;
     // The value in the middle of the picture.
-    let middle = full.sheet().tiles.first().map_or(0.5, |tile| level(tile.plane.at));
+    let middle = full.tiling().tiles.first().map_or(0.5, |tile| level(tile.plane.at));
     let window = if shown < 80.0 { [-0.5, 0.5].map(|side| middle + side * shown / 80.0) } else { [0.0, 1.0] };
     let scene = of(window)?;
     let got = render::slot(&dut.context, &scene, &body_frames(&scene, level), Slot::Picture)?;
-    let (sheet, mut largest, mut judged) = (scene.sheet(), 0.0f64, 0);
-    let ([tile], Some(sweep)) = (&sheet.tiles[..], scene.probe()) else { return Ok(f64::NAN) };
+    let (tiling, mut largest, mut judged) = (scene.tiling(), 0.0f64, 0);
+    let ([tile], Some(sweep)) = (&tiling.tiles[..], scene.probe()) else { return Ok(f64::NAN) };
     let (faults, mut known) = (findings.faults.len(), Vec::new());
-    let from_middle = |at: usize, axis: usize| (at as f64 + 0.5 - f64::from(tile.size[axis]) / 2.0) * sheet.pixel;
+    let from_middle = |at: usize, axis: usize| (at as f64 + 0.5 - f64::from(tile.size[axis]) / 2.0) * tiling.pixel;
     for (x, y) in (0..got.size[1]).flat_map(|y| (0..got.size[0]).map(move |x| (x, y))) {
         let p = tile.plane.at + tile.plane.right * from_middle(x, 0) + tile.plane.down * from_middle(y, 1);
         // Only away from the border, where black is mixed in.

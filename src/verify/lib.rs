@@ -32,7 +32,7 @@ pub mod time_stamps;
 
 pub use compare::{Comparison, ExtraTolerance, compare_outputs, compare_picture, expect_same_picture};
 
-use echolume_base::{files, html_page, metrics, picture, terminal, text};
+use echolume_base::{baselines, files, html_page, metrics, picture, terminal, text};
 use echolume_core::{passes, plan, queues, reference, scene, spirv};
 use echolume_gpu::{self as gpu, machine};
 use echolume_lab::profile;
@@ -42,8 +42,9 @@ use crate::gpu::pass_runner::PassRunner;
 use crate::gpu::{Context, ContextOptions, GpuError};
 use crate::passes::fault_injection::Change;
 use crate::scene::Scene;
+use baselines::Stored;
 use render::Drawn;
-use report::{CheckName, FORMAT, Fault, Figure, Level, Outcome, PictureComparison, Run, Verdict};
+use report::{CheckName, Fault, Figure, Level, Outcome, PictureComparison, Run, Verdict};
 use std::path::PathBuf;
 use std::rc::Rc;
 use std::sync::Arc;
@@ -109,7 +110,7 @@ pub fn run_each(
 /// A run of these outcomes that ends now. `device`: what they are of; `validation`: whether the validation layer watched.
 pub fn run_on(device: machine::Device, validation: bool, level: Level, outcomes: Vec<Outcome>, begun: Instant) -> Run {
     Run {
-        format: FORMAT.into(),
+        format: Run::FORMAT.into(),
         program: machine::program(),
         date: machine::date(),
         device,

@@ -8,7 +8,7 @@ use super::compare::{count_figure, texel_comparison};
 use super::each_pass::POISON;
 use super::{Check, DeviceUnderTest, Findings};
 use crate::gpu::{GpuError, formats};
-use crate::passes::measure::{POSITIONS, sample_position};
+use crate::passes::device_limits::{POSITIONS, sample_position};
 use crate::passes::slots::Format;
 use crate::passes::{Arrays, DispatchArgs, Slot, Texels};
 use crate::report::{Fault, Figure, Level, PictureComparison, Unit, Worst};

@@ -3,7 +3,8 @@
 
 use crate::common::program::*;
 use crate::common::wait::eventually;
-use echolume::low_level::verify::report::{self, Verdict};
+use echolume::low_level::baselines::Stored;
+use echolume::low_level::verify::report::{Run, Verdict};
 use rustix::process::{Pid, Signal, kill_process};
 use std::fs;
 use std::io::{BufRead, BufReader, Read};
@@ -117,7 +118,7 @@ fn a_signal_ends_verify_with_what_it_found() {
     child.stderr.take().expect("its errors").read_to_string(&mut error).expect("text");
     assert_eq!(child.wait().expect("it ends").code(), Some(4), "{said:?}");
     assert!(said.iter().any(|line| line.starts_with("SIGINT: stopping after this check")), "{said:?}");
-    let run = report::from_json(&fs::read_to_string(&json).expect("written")).expect("read back");
+    let run = Run::from_json(&fs::read_to_string(&json).expect("written")).expect("read back");
     let (all, left) = (run.outcomes.len(), run.count(Verdict::Interrupted));
     assert_eq!(error.trim_end(), format!("echolume: SIGINT ended the run: {left} of {all} checks were not run"));
     let stopped = run.outcomes.iter().filter(|o| o.verdict == Verdict::Interrupted && o.notes == ["not run: SIGINT"]);
@@ -143,7 +144,7 @@ fn a_signal_ends_an_isolated_run_at_once() {
     signal(&child, Signal::INT);
     let said: Vec<String> = lines.collect();
     assert_eq!(child.wait().expect("it ends").code(), Some(4), "{said:?}");
-    let run = report::from_json(&fs::read_to_string(&json).expect("written")).expect("read back");
+    let run = Run::from_json(&fs::read_to_string(&json).expect("written")).expect("read back");
     assert_eq!((run.count(Verdict::Interrupted), run.outcomes.len()), (2, 2), "{:?}", run.outcomes);
     assert!(run.outcomes.iter().all(|o| o.faults.is_empty() && o.notes[0].ends_with("SIGINT")), "{:?}", run.outcomes);
 }

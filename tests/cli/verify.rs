@@ -2,7 +2,8 @@
 
 use crate::common::files::repository;
 use crate::common::program::*;
-use echolume::low_level::verify::report::{self, Level, Run, Unit, Verdict};
+use echolume::low_level::baselines::Stored;
+use echolume::low_level::verify::report::{Level, Run, Unit, Verdict};
 use echolume::low_level::verify::self_test;
 use std::collections::BTreeSet;
 use std::fs;
@@ -19,7 +20,7 @@ fn kept(folder: &Folder, name: &str, more: &[&str]) -> (String, Run) {
     let file = folder.path(name);
     let (code, out, err) = verify(&[more, &["--json", &file]].concat());
     assert_eq!(code, Some(0), "{out}{err}");
-    (file.clone(), report::from_json(&fs::read_to_string(&file).expect("written")).expect("read back"))
+    (file.clone(), Run::from_json(&fs::read_to_string(&file).expect("written")).expect("read back"))
 }
 
 /// Groups that the command runs, and those that tests/gpu runs in its own process, in passes.rs and verify_groups.rs: all of them would take a
@@ -106,7 +107,7 @@ fn a_run_like_the_baseline_has_not_changed_and_one_that_is_slower_or_wrong_has()
     let passes = earlier.outcomes.iter().filter(|o| o.group == "passes").map(|o| o.name.as_str());
     assert_eq!(passes.collect::<Vec<_>>(), ["median_distance"]);
     let again = |name: &str, changed: &Run, threshold: &str| {
-        let file = folder.write(name, report::to_json(changed).expect("JSON"));
+        let file = folder.write(name, changed.to_json().expect("JSON"));
         verify(&[&chosen[..], &["--baseline", &file, "--threshold", threshold]].concat())
     };
     // A busy machine is no slower device: any time passes that is not a hundred times longer.

@@ -1,7 +1,8 @@
 //! `echolume verify --isolate`: checks in processes of their own, of which one may crash, hang or exit.
 
 use crate::common::program::*;
-use echolume::low_level::verify::report::{self, Run, Unit, Verdict};
+use echolume::low_level::baselines::Stored;
+use echolume::low_level::verify::report::{Run, Unit, Verdict};
 use std::fs;
 
 /// Checks that take no time; one with pictures.
@@ -14,7 +15,7 @@ fn ran(folder: &Folder, name: &str, more: &[&str]) -> (Option<i32>, String, Run)
     let (code, out, err) = run(&[&common, &FEW[..], more].concat());
     let said = format!("{out}{err}");
     let text = fs::read_to_string(&file).unwrap_or_else(|e| panic!("{e}: {said}"));
-    (code, said, report::from_json(&text).expect("read back"))
+    (code, said, Run::from_json(&text).expect("read back"))
 }
 
 /// Without what depends on the moment.
@@ -86,7 +87,7 @@ fn a_crash_in_the_same_process_ends_the_run() {
     let only = ["--only", "every level of a picture", "--only", "a sphere in a sweep"];
     let (code, out, err) = run(&[&["verify", "--full", "--json", &file, "--inject-crash", crash], &only[..]].concat());
     assert_eq!(code, Some(1), "{out}{err}");
-    let full = report::from_json(&fs::read_to_string(&file).expect("written")).expect("read back");
+    let full = Run::from_json(&fs::read_to_string(&file).expect("written")).expect("read back");
     assert_eq!((full.count(Verdict::Failed), full.count(Verdict::Passed)), (1, 1), "{out}");
 }
 

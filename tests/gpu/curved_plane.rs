@@ -17,8 +17,8 @@ const BASE: &str = "slices = { format = 'r32f' }\nray = { sampling = 'exact' }";
 
 /// What the last tile of a picture shows.
 fn last_tile(scene: &Scene, picture: &Texels) -> Texels {
-    let sheet = scene.sheet();
-    let tile = sheet.tiles.last().expect("tiles");
+    let tiling = scene.tiling();
+    let tile = tiling.tiles.last().expect("tiles");
     let ([left, top], [width, height]) = (tile.corner.map(|n| n as usize), tile.size.map(|n| n as usize));
     Texels::from_fn([width, height, 1], 4, |[x, y, _], c| picture.get([left + x, top + y, 0])[c])
 }
@@ -51,10 +51,10 @@ fn along_a_straight_line_it_is_the_oblique_plane() {
                  planes = {{ lines = false, plane = '{plane}', curve = {{ plane = '{plane}', points = [{from:?}, {to:?}] }}{slab} }}"
             );
             let curved = scene(cube(), FLOATS, &toml);
-            let sheet = curved.sheet();
-            let tile = sheet.tiles[1].clone();
+            let tiling = curved.tiling();
+            let tile = tiling.tiles[1].clone();
             if plane == "b" {
-                let right = sheet.point(&tile, [96.5, 32.0]) - sheet.point(&tile, [95.5, 32.0]);
+                let right = tiling.point(&tile, [96.5, 32.0]) - tiling.point(&tile, [95.5, 32.0]);
                 assert!((right / tile.pixel - DVec3::Y).length() < 1e-9, "down on B is the depth: {right}");
                 continue;
             }
@@ -65,7 +65,7 @@ fn along_a_straight_line_it_is_the_oblique_plane() {
                 );
                 scene(cube(), FLOATS, &toml)
             };
-            let plain = plain(plain(1.0).sheet().pixel / tile.pixel);
+            let plain = plain(plain(1.0).tiling().pixel / tile.pixel);
             let wanted = picture(&mut rendered(&device, plain.clone(), &frames));
             let got = last_tile(&curved, &picture(&mut rendered(&device, curved.clone(), &frames)));
             let (mut seen, mut worst) = (0, 0.0f64);
@@ -120,7 +120,7 @@ fn distances_along_the_section_are_the_lengths_of_the_arc() {
         let ball = |p: DVec3| places.iter().map(|place| (-p.distance_squared(*place) / 2.0).exp()).sum::<f64>();
         let frames = body_frames(&scene, ball);
         let picture = last_tile(&scene, &picture(&mut rendered(&device, scene.clone(), &frames)));
-        let tile = scene.sheet().tiles.last().expect("a section").clone();
+        let tile = scene.tiling().tiles.last().expect("a section").clone();
         let length = tile.section.as_ref().expect("a section").line.length();
         assert!((length - radius * 150f64.to_radians()).abs() < 0.02, "{length}");
         let down = if plane == "a" { -1.0 } else { 1.0 };

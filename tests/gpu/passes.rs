@@ -5,7 +5,7 @@ use crate::common::gpu::*;
 use echolume::low_level::gpu::pass_runner::PassRunner;
 use echolume::low_level::gpu::{ContextOptions, Renderer, RendererOptions, TexelAccess};
 use echolume::low_level::passes::slots::Shape;
-use echolume::low_level::passes::{Arrays, DispatchArgs, PASSES, Slot, Texels, measure};
+use echolume::low_level::passes::{Arrays, DispatchArgs, PASSES, Slot, Texels, device_limits};
 use echolume::low_level::probe::Geometry;
 use echolume::low_level::scene::{Sampling, Scene};
 use echolume::low_level::verify::each_pass::{POISON, dispatch_args_of, inputs_of, run_with_reference};
@@ -94,10 +94,10 @@ fn automatic_sampling_is_what_the_device_takes_fastest_and_what_was_asked_for_st
 #[test]
 fn device_measurements_compute_the_stated_result() {
     let device = Device::new();
-    let scene = measure::scene(11, 19).expect("scene");
+    let scene = device_limits::scene(11, 19).expect("scene");
     for fetch in [TexelAccess::Textures, TexelAccess::Storage] {
         let mut single = PassRunner::with_texel_access(&device, fetch).expect("single");
-        for pass in measure::MEASURES {
+        for pass in device_limits::MEASURES {
             let worst =
                 run_with_reference(&mut single, &scene, pass, 0, "noise", 7).expect("dispatch").comparison.worst;
             assert!(worst.is_none(), "{}: {worst:?}", pass.name);

@@ -145,7 +145,7 @@ fn planes_through_the_wobblers_wires_show_them_where_they_are() {
             };
             let picture = picture(renderer);
             // The middle of the picture is the truth.
-            let pixel = scene.sheet().pixel;
+            let pixel = scene.tiling().pixel;
             let values: Vec<(DVec2, f64)> = (0..160 * 160)
                 .map(|i| {
                     (

@@ -21,12 +21,12 @@ fn cross_lines_run_through_the_place_where_the_planes_meet() {
         let scene = scene(Geometry::Sweep(wobbler()), BYTES, &toml.replace(",  }", " }"));
         let frames = frames(&scene, |_| 0.0);
         let screen = rendered(&device, scene.clone(), &frames).picture().expect("picture");
-        let sheet = scene.sheet();
-        assert_eq!(sheet.tiles.len(), 3);
-        for (n, tile) in sheet.tiles.iter().enumerate() {
+        let tiling = scene.tiling();
+        assert_eq!(tiling.tiles.len(), 3);
+        for (n, tile) in tiling.tiles.iter().enumerate() {
             // The intersection of the three planes, in pixels from the corner of the tile.
             let away = position - tile.plane.at;
-            let meet: [f64; 2] = [tile.plane.right, tile.plane.down].map(|axis| away.dot(axis) / sheet.pixel);
+            let meet: [f64; 2] = [tile.plane.right, tile.plane.down].map(|axis| away.dot(axis) / tiling.pixel);
             let meet = [meet[0] + f64::from(tile.size[0]) / 2.0, meet[1] + f64::from(tile.size[1]) / 2.0];
             // Far from the crossing, where there is only one line.
             for axis in 0..2 {

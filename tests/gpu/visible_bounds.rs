@@ -128,7 +128,7 @@ fn sampled(scene: &Scene, noise: &mut Noise) -> Option<DVec3> {
 
 /// The place of a plane, or of its slab, below another; none if that is not shown.
 fn on_plane(scene: &Scene, place: DVec3) -> Option<DVec3> {
-    let plane = scene.sheet().tiles[0].plane;
+    let plane = scene.tiling().tiles[0].plane;
     let share = Noise(place.x.to_bits()).range(-0.5, 0.5);
     let below = place - plane.normal * ((place - plane.at).dot(plane.normal) - scene.settings.planes.thickness * share);
     let is_kept = (0..3).all(|a| below[a] >= scene.low[a] && below[a] <= scene.high[a])

@@ -5,7 +5,7 @@ use crate::common::scenes::FLOATS;
 use crate::scenes::*;
 use echolume::low_level::error_report::choose::Bound;
 use echolume::low_level::error_report::dials::{NAMES, dial};
-use echolume::low_level::error_report::measure::{ErrorMeasurement, MeasureError, ReferenceChoice};
+use echolume::low_level::error_report::errors_and_times::{ErrorMeasurement, MeasureError, ReferenceChoice};
 use echolume::low_level::error_report::{Kind, Measure, Time, metrics};
 use echolume::low_level::exact_ray::picture::{self, Effort};
 use echolume::low_level::gpu::TimeStamps;

@@ -2,7 +2,7 @@
 
 use crate::scenes::*;
 use echolume::low_level::error_report::dials::dial;
-use echolume::low_level::error_report::measure::{ErrorMeasurement, MeasureError, ReferenceChoice};
+use echolume::low_level::error_report::errors_and_times::{ErrorMeasurement, MeasureError, ReferenceChoice};
 use echolume::low_level::error_report::{Measure, Point, Reference, Report};
 use echolume::low_level::scene::Scene;
 use echolume::low_level::scene::default_look::Recorded;

@@ -1,9 +1,10 @@
 //! Profiles on a device: an injected slow pass is found, and identical runs are not called different.
 
 use crate::scenes::*;
+use echolume::low_level::baselines::Stored;
 use echolume::low_level::passes::{DispatchArgs, by_name};
 use echolume::low_level::profile::compare::{CompareOptions, Verdict, compare};
-use echolume::low_level::profile::measure::{ProfileOptions, ProfileRun, run};
+use echolume::low_level::profile::timed_run::{ProfileOptions, ProfileRun, run};
 use echolume::low_level::profile::{Profile, export};
 
 const SETTINGS: &str = "mode = 'sr'

@@ -9,7 +9,9 @@ use echolume::low_level::plan::Plan;
 use echolume::low_level::reference;
 use echolume::low_level::scene::{MAX_WINDOW, Scene};
 use echolume::low_level::thesis_tables::growth::{CENTRES, Growth, SIGMAS, WINDOWS, growth, growth_settings};
-use echolume::low_level::thesis_tables::measure::{BALL_RADIUS, TableOptions, run, scene, surface_depth, sweep_frames};
+use echolume::low_level::thesis_tables::row_times::{
+    BALL_RADIUS, TableOptions, run, scene, surface_depth, sweep_frames,
+};
 use echolume::low_level::thesis_tables::{Conditions, Filter3d, export, tables};
 
 fn pass_names(plan: &Plan, first: bool) -> Vec<&'static str> {

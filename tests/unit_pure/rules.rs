@@ -5,7 +5,7 @@ use crate::common::files::repository;
 use crate::common::probes::{voxels, wobbler};
 use crate::common::scenes::{BYTES, FLOATS, scene};
 use echolume::low_level::gpu::WRITERS_OF_RUNS;
-use echolume::low_level::passes::{DispatchArgs, Frequency, PASSES, Part, Pass, interface_check, measure};
+use echolume::low_level::passes::{DispatchArgs, Frequency, PASSES, Part, Pass, device_limits, interface_check};
 use echolume::low_level::probe::{Advance, Axis, Geometry, Motion, Probe};
 use echolume::low_level::scene::Scene;
 use echolume::low_level::shader_source;
@@ -447,8 +447,8 @@ fn every_pass_agrees_with_every_shader_it_may_use() {
             }
         }
     }
-    let scene = measure::scene(8, 8).expect("scene");
-    for pass in measure::MEASURES.iter().chain([&measure::POSITIONS]) {
+    let scene = device_limits::scene(8, 8).expect("scene");
+    for pass in device_limits::MEASURES.iter().chain([&device_limits::POSITIONS]) {
         let shader = pass.shader(&scene, &DispatchArgs::default());
         let module = spirv::reflect(&spirv::words(spirv::embedded(shader).expect("embedded"))).expect("reflection");
         interface_check::check(pass, &scene, &DispatchArgs::default(), &module).expect("agreement");

@@ -1,7 +1,7 @@
 //! The bounds of the device's linear filter hold for every sampler that Vulkan allows, and for no wrong one.
 
 use echolume::low_level::passes::Texels;
-use echolume::low_level::passes::measure::sample_position;
+use echolume::low_level::passes::device_limits::sample_position;
 use echolume::low_level::passes::slots::Format;
 use echolume::low_level::verify::built_in::Noise;
 use echolume::low_level::verify::sampling::{FilterPrecision, Judged, judge};

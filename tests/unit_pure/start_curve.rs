@@ -107,12 +107,12 @@ fn the_line_on_planes_is_the_curve_within_the_region() {
     };
     let scene = four(curve);
     let lines = unveil::lines(&scene, None);
-    let (sheet, depth) = (scene.sheet(), |x: f64| arc(x) - 24.0);
+    let (tiling, depth) = (scene.tiling(), |x: f64| arc(x) - 24.0);
     assert_eq!(lines.len(), 3);
     let mut extents = [0.0_f64; 3];
-    for ((line, tile), extent) in lines.iter().zip(&sheet.tiles).zip(&mut extents) {
+    for ((line, tile), extent) in lines.iter().zip(&tiling.tiles).zip(&mut extents) {
         for end in line.pieces.iter().flatten() {
-            let place = sheet.point(tile, *end);
+            let place = tiling.point(tile, *end);
             assert!((place.y - depth(place.x)).abs() < 0.1 && place.x.abs() <= 12.0, "{place}");
             *extent = extent.max(if tile.plane.normal.x.abs() > 0.5 { place.z } else { place.x });
         }

@@ -209,14 +209,14 @@ fn the_line_on_planes_is_where_the_surface_is() {
     };
     let start = found(&scene, &volume(&scene, echo));
     let lines = unveil::lines(&scene, Some(&start));
-    let sheet = scene.sheet();
+    let tiling = scene.tiling();
     assert_eq!(lines.len(), 3);
     let mut lengths = [0.0; 3];
-    for ((line, tile), length) in lines.iter().zip(&sheet.tiles).zip(&mut lengths) {
+    for ((line, tile), length) in lines.iter().zip(&tiling.tiles).zip(&mut lengths) {
         for [from, to] in &line.pieces {
-            *length += (to[0] - from[0]).hypot(to[1] - from[1]) * sheet.pixel;
+            *length += (to[0] - from[0]).hypot(to[1] - from[1]) * tiling.pixel;
             for end in [from, to] {
-                let place = sheet.point(tile, *end);
+                let place = tiling.point(tile, *end);
                 // Beyond the middle of the outermost cell the surface is level.
                 let least = if place.x.abs() < 14.0 { 0.55 } else { 0.75 };
                 assert!((place.y - plane(place)).abs() < least, "{place}");

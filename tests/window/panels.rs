@@ -346,7 +346,7 @@ fn a_curved_plane_is_drawn_shown_saved_and_taken_back() {
         echolume::low_level::source::open(workspace.recording(&file).expect("a recording"), None).expect("it opens");
     let input = Input { stored: recording.stored_type(), range: recording.range() };
     let scene = Scene::new(recording.geometry(0), input, settings).expect("a scene");
-    let line = scene.curve_line(&scene.sheet()).expect("a line");
+    let line = scene.curve_line(&scene.tiling()).expect("a line");
     assert_eq!(line.points.len(), clicks.len());
     for ([x, y], clicked) in line.points.iter().zip(clicks) {
         let off = (x - f64::from(clicked[0])).hypot(y - f64::from(clicked[1]));
@@ -380,7 +380,7 @@ fn measure_on_a_plane(desk: &Desk, view: &View, folder: &Folder) {
     let input = Input { stored: recording.stored_type(), range: recording.range() };
     let scene = Scene::new(recording.geometry(0), input, settings.clone()).expect("a scene");
     let found: Vec<f64> = settings.measure.iter().map(|m| outcome::quantities(m).expect("results")[0].value).collect();
-    assert!(found.len() == 2 && (found[0] - 100.0 * scene.sheet().pixel).abs() < 0.1, "{found:?}");
+    assert!(found.len() == 2 && (found[0] - 100.0 * scene.tiling().pixel).abs() < 0.1, "{found:?}");
     assert!((found[1] - 90.0).abs() < 0.1, "{found:?}");
     // `render` draws them: the middle of the caliper is bright.
     let png = folder.path("measured.png");
@@ -531,9 +531,9 @@ fn the_start_line_is_bent_on_plane_a_and_the_rendering_follows() {
         echolume::low_level::scene::Settings::from_toml(&toml).expect("settings"),
     )
     .expect("a scene");
-    let sheet = scene.sheet();
+    let tiling = scene.tiling();
     let middle_handle = (scene.low + scene.high).with_y(2.0 * scene.low.y) / 2.0;
-    let at = sheet.project(&sheet.tiles[0], middle_handle).0;
+    let at = tiling.project(&tiling.tiles[0], middle_handle).0;
     let at: [i16; 2] = std::array::from_fn(|a| (f64::from(corner[a]) + at[a]).round() as i16);
     // Its ring is green below the line.
     let has_handle = |at: [i16; 2]| {
@@ -548,7 +548,7 @@ fn the_start_line_is_bent_on_plane_a_and_the_rendering_follows() {
     let settings = until("the whole workspace", || Workspace::read(&file).ok()).layers.finish().expect("settings");
     let curve = settings.region.start_curve.expect("a curve");
     // The slop of a drag is 6 pixels.
-    let moved = (curve[1][1] - curve[0][1]) / sheet.pixel;
+    let moved = (curve[1][1] - curve[0][1]) / tiling.pixel;
     assert!(curve.len() == 3 && (53.0..60.5).contains(&moved) && (curve[0][1] - 20.0).abs() < 1e-3, "{curve:?}");
     until("the handle where it was dragged to", || has_handle([at[0], at[1] + moved.round() as i16]));
     // Without the box over it.

@@ -208,7 +208,7 @@ fn what_is_drawn_by_the_mouse_is_measured_kept_and_copied() {
     let settings = workspace.layers.clone().finish().expect("settings");
     let recording = echolume::low_level::source::open(SWEEP.as_ref(), None).expect("it opens");
     let input = Input { stored: recording.stored_type(), range: recording.range() };
-    let pixel = Scene::new(recording.geometry(0), input, settings.clone()).expect("a scene").sheet().pixel;
+    let pixel = Scene::new(recording.geometry(0), input, settings.clone()).expect("a scene").tiling().pixel;
     let measured: Vec<(MeasureKind, f64)> =
         settings.measure.iter().map(|m| (m.kind, outcome::quantities(m).expect("results")[0].value)).collect();
     let cm2 = pixel * pixel / 100.0;

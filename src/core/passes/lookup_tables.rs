@@ -206,23 +206,23 @@ pub(super) fn still_medium(scene: &Scene) -> Vec<f32> {
     floats(scene.still_medium(&transfer_of(scene)).into_iter().flatten())
 }
 
-/// The tiles of a picture of planes, as `Sheet::table` lays them out, relative to [`Scene::local_origin`].
+/// The tiles of a picture of planes, as `Tiling::table` lays them out, relative to [`Scene::local_origin`].
 pub(super) fn tile_table(scene: &Scene) -> Vec<f32> {
-    let mut sheet = scene.sheet();
-    for tile in &mut sheet.tiles {
+    let mut tiling = scene.tiling();
+    for tile in &mut tiling.tiles {
         tile.plane.at = scene.to_local(tile.plane.at);
         tile.crossed_by.iter_mut().for_each(|(plane, _)| plane.at = scene.to_local(plane.at));
     }
-    floats(sheet.table(scene.settings.planes.thickness))
+    floats(tiling.table(scene.settings.planes.thickness))
 }
 
-/// The columns of a curved plane, as `Sheet::column_table` lays them out, relative to [`Scene::local_origin`].
+/// The columns of a curved plane, as `Tiling::column_table` lays them out, relative to [`Scene::local_origin`].
 pub(super) fn curve_table(scene: &Scene) -> Vec<f32> {
-    let mut sheet = scene.sheet();
-    if let Some(section) = sheet.tiles.last_mut().and_then(|tile| tile.section.as_mut()) {
+    let mut tiling = scene.tiling();
+    if let Some(section) = tiling.tiles.last_mut().and_then(|tile| tile.section.as_mut()) {
         section.origin = scene.to_local(section.origin);
     }
-    floats(sheet.column_table(scene.settings.planes.thickness))
+    floats(tiling.column_table(scene.settings.planes.thickness))
 }
 
 /// Outward normal and limit of each half-space of the block, relative to [`Scene::local_origin`].

@@ -4,12 +4,12 @@
 pub mod chain;
 pub mod components;
 pub mod cut;
+pub mod device_limits;
 mod edge_coverage;
 pub mod fault_injection;
 pub mod floating;
 pub mod interface_check;
 pub mod lookup_tables;
-pub mod measure;
 pub mod pass;
 pub mod slots;
 pub mod texels;

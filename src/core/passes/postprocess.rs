@@ -3,7 +3,7 @@
 use crate::passes::pass::*;
 use crate::passes::raycast::cap;
 use crate::passes::{chain, edge_coverage};
-use crate::scene::planes::{Frame, Plane, Sheet, Tile};
+use crate::scene::planes::{Frame, Plane, Tile, Tiling};
 use crate::scene::{ColourMap, Layout, Scene, transfer};
 use glam::DVec3;
 
@@ -42,11 +42,11 @@ pub const TONE: Pass = Pass {
 };
 
 fn tone_picture(scene: &Scene, picture: &Texels, screen: &mut Texels) {
-    let sheet = scene.draws_lines().then(|| scene.sheet());
+    let tiling = scene.draws_lines().then(|| scene.tiling());
     for (x, y) in (0..picture.size[1]).flat_map(|y| (0..picture.size[0]).map(move |x| (x, y))) {
         let rgba = picture.get([x, y, 0]);
         let colour = (rgba[3] > 0.0).then_some([rgba[0], rgba[1], rgba[2]]);
-        screen.set([x, y, 0], &reference_pixel(scene, sheet.as_ref(), colour, x, y));
+        screen.set([x, y, 0], &reference_pixel(scene, tiling.as_ref(), colour, x, y));
     }
 }
 
@@ -84,17 +84,17 @@ pub(crate) fn tone_constants(scene: &Scene) -> Vec<(&'static str, i32)> {
     ]
 }
 
-/// The colour on the screen, black where there is none; with the lines of the sheet, if it has any.
+/// The colour on the screen, black where there is none; with the lines of the tiling, if it has any.
 pub(crate) fn reference_pixel(
     scene: &Scene,
-    sheet: Option<&Sheet>,
+    tiling: Option<&Tiling>,
     colour: Option<[f64; 3]>,
     x: usize,
     y: usize,
 ) -> [f64; 4] {
     let mut colour = colour.map_or([0.0; 3], |c| toned(scene, c));
-    if let Some((sheet, tile)) = sheet.and_then(|s| s.tile_at(x, y).map(|tile| (s, tile))) {
-        colour = with_lines(sheet, tile, colour, x, y);
+    if let Some((tiling, tile)) = tiling.and_then(|s| s.tile_at(x, y).map(|tile| (s, tile))) {
+        colour = with_lines(tiling, tile, colour, x, y);
     }
     [colour[0], colour[1], colour[2], 1.0]
 }
@@ -116,8 +116,8 @@ pub fn toned(scene: &Scene, colour: [f64; 3]) -> [f64; 3] {
 }
 
 /// A pixel's colour under the cross-lines and the frame of its tile.
-fn with_lines(sheet: &Sheet, tile: &Tile, mut colour: [f64; 3], x: usize, y: usize) -> [f64; 3] {
-    let place = sheet.place(tile, x, y);
+fn with_lines(tiling: &Tiling, tile: &Tile, mut colour: [f64; 3], x: usize, y: usize) -> [f64; 3] {
+    let place = tiling.place(tile, x, y);
     for (other, line) in &tile.crossed_by {
         let cover = LINE_STRENGTH * (1.0 - distance(&tile.plane, other, place) / tile.pixel).max(0.0);
         colour = std::array::from_fn(|c| colour[c] + (line[c] - colour[c]) * cover);

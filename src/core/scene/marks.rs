@@ -116,8 +116,8 @@ impl Scene {
     pub fn marks_with(&self, marks: &Marks) -> Vec<TileMarks> {
         let mut all = Vec::new();
         if self.cuts_planes() {
-            let sheet = self.sheet();
-            all.extend(sheet.tiles.iter().enumerate().map(|(n, tile)| {
+            let tiling = self.tiling();
+            all.extend(tiling.tiles.iter().enumerate().map(|(n, tile)| {
                 // Along a line that bends away, left and right are no sides of the patient.
                 let heading = tile.section.as_ref().map_or(tile.plane.right, |section| section.heading());
                 let (letters, probe) = sides(marks, heading, tile.plane.down);

@@ -71,7 +71,7 @@ pub enum Frame {
 
 /// The tiles of a picture on a grid of columns and rows. Cells after the last tile are empty.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Sheet {
+pub struct Tiling {
     pub columns: u32,
     pub rows: u32,
     /// Scale of the planes, mm per pixel; a curved plane whose line is too long for its tile has a larger one.
@@ -262,7 +262,7 @@ impl Scene {
     }
 
     /// The tiles of this scene.
-    pub fn sheet(&self) -> Sheet {
+    pub fn tiling(&self) -> Tiling {
         let [columns, rows] = self.tile_grid();
         let [width, height] = self.picture_size();
         let three = [PlaneName::A, PlaneName::B, PlaneName::C];
@@ -319,21 +319,21 @@ impl Scene {
             let pixel = pixel.max(across.max(along) / zoom);
             Tile { plane, corner, size, pixel, section: Some(section), frame, crossed_by }
         }));
-        Sheet { columns, rows, pixel, tiles }
+        Tiling { columns, rows, pixel, tiles }
     }
 
     /// The line of a curved plane on the tile of its plane: the tile, the line and its points, pixels of the picture. Also where the curved plane itself is not
     /// shown.
-    pub fn curve_line(&self, sheet: &Sheet) -> Option<CurveLine> {
-        self.line_on_tile(sheet, self.settings.planes.curve.as_ref()?)
+    pub fn curve_line(&self, tiling: &Tiling) -> Option<CurveLine> {
+        self.line_on_tile(tiling, self.settings.planes.curve.as_ref()?)
     }
 
     /// The same of a line that is not in the settings.
-    pub fn line_on_tile(&self, sheet: &Sheet, curve: &Curve) -> Option<CurveLine> {
+    pub fn line_on_tile(&self, tiling: &Tiling, curve: &Curve) -> Option<CurveLine> {
         let is_its = |n: &usize| self.plane_of_tile(*n) == Some(curve.plane);
-        let number = (0..sheet.tiles.len()).find(is_its).filter(|_| self.cuts_planes())?;
-        let tile = &sheet.tiles[number];
-        let at = |point: [f64; 2]| sheet.project(tile, self.place_on_plane(curve.plane, point)).0;
+        let number = (0..tiling.tiles.len()).find(is_its).filter(|_| self.cuts_planes())?;
+        let tile = &tiling.tiles[number];
+        let at = |point: [f64; 2]| tiling.project(tile, self.place_on_plane(curve.plane, point)).0;
         let outline = Line::through(&curve.points).outline();
         Some(CurveLine {
             tile: number,
@@ -344,8 +344,8 @@ impl Scene {
 
     /// The places along the way between two places of the curved plane that is straight on its tile; none if one of them is not on it. The curved plane is straightened without stretching, so that the length of this way is its length on the tile.
     pub fn way_on_section(&self, from: DVec3, to: DVec3) -> Option<Vec<DVec3>> {
-        let sheet = self.sheet();
-        let tile = sheet.tiles.last().filter(|tile| tile.section.is_some())?;
+        let tiling = self.tiling();
+        let tile = tiling.tiles.last().filter(|tile| tile.section.is_some())?;
         let section = tile.section.as_ref()?;
         let ends = [from, to].map(|place| section.coordinates(tile.plane.down, place));
         // Where the line passes twice, nothing says which passage is meant.
@@ -469,7 +469,7 @@ impl Tile {
     }
 }
 
-impl Sheet {
+impl Tiling {
     /// Where the planes of the other tiles cut the first one, which is perpendicular to them: the ends of a line for each, pixels of the picture.
     /// They reach beyond the tile.
     pub fn slice_lines(&self) -> Vec<[[f64; 2]; 2]> {
@@ -611,20 +611,20 @@ mod tests {
         for plane in ["a", "b", "c"] {
             let curve = format!("planes.curve={{plane='{plane}',points=[[-9,4],[-3,9],[2,6],[9,12]]}}");
             let scene = scene(&["mode='orthogonal'", "planes.azimuth=20", "planes.roll=-12", &curve]);
-            let sheet = scene.sheet();
-            let tile = sheet.tiles.last().filter(|tile| tile.section.is_some()).expect("a section");
+            let tiling = scene.tiling();
+            let tile = tiling.tiles.last().filter(|tile| tile.section.is_some()).expect("a section");
             let middle = tile.middle();
             let at = [[0.0, 0.0], [-12.0, 9.0], [12.0, -9.0]].map(|[x, y]| [middle[0] + x, middle[1] + y]);
-            let places = at.map(|at| sheet.point(tile, at));
+            let places = at.map(|at| tiling.point(tile, at));
             for (at, place) in at.iter().zip(&places) {
-                let (back, off) = sheet.project(tile, *place);
+                let (back, off) = tiling.project(tile, *place);
                 assert!(
                     (back[0] - at[0]).hypot(back[1] - at[1]) < 1e-3 && off.abs() < 1e-6,
                     "{plane}: {at:?} {back:?}"
                 );
             }
             let (_, across) = tile.columns()[tile.size[0] as usize / 2].expect("the middle of the line");
-            let away = sheet.project(tile, places[0] + across * 2.0).1;
+            let away = tiling.project(tile, places[0] + across * 2.0).1;
             assert!(away > 1.8, "{plane}: 2 mm beside it are {away}");
             // The way between two places has the length that the tile shows.
             let way = scene.way_on_section(places[1], places[2]).expect("both are on it");
@@ -641,9 +641,9 @@ mod tests {
         let curve = "planes.curve={plane='a',points=[[-9,4],[-3,9],[9,12]]}";
         let line = |more: &[&str]| {
             let scene = scene(&[&["mode='orthogonal'", curve], more].concat());
-            let sheet = scene.sheet();
-            let line = scene.curve_line(&sheet).expect("a line");
-            (line.points, sheet.point(sheet.tiles.last().expect("tiles"), [150.0, 120.0]), sheet.pixel)
+            let tiling = scene.tiling();
+            let line = scene.curve_line(&tiling).expect("a line");
+            (line.points, tiling.point(tiling.tiles.last().expect("tiles"), [150.0, 120.0]), tiling.pixel)
         };
         let (points, place, pixel) = line(&[]);
         let (stepped, same, _) = line(&["planes.position=[3,18,5]"]);
@@ -671,11 +671,11 @@ mod tests {
     /// Prevents planes that shrink when a line is drawn on them, and a section that does not fit its tile.
     #[test]
     fn a_long_line_makes_the_scale_of_its_tile_smaller_and_no_others() {
-        let sheets = ["[[-5,15],[5,15]]", "[[-18,2],[0,28],[18,2],[0,15],[-18,28]]"]
-            .map(|points| scene(&["mode='orthogonal'", &format!("planes.curve={{points={points}}}")]).sheet());
-        assert_eq!(sheets[0].pixel, sheets[1].pixel);
-        assert_eq!(sheets[0].pixel, scene(&["mode='orthogonal'"]).sheet().pixel);
-        let [short, long] = sheets.map(|sheet| sheet.tiles.last().cloned().expect("tiles"));
+        let tilings = ["[[-5,15],[5,15]]", "[[-18,2],[0,28],[18,2],[0,15],[-18,28]]"]
+            .map(|points| scene(&["mode='orthogonal'", &format!("planes.curve={{points={points}}}")]).tiling());
+        assert_eq!(tilings[0].pixel, tilings[1].pixel);
+        assert_eq!(tilings[0].pixel, scene(&["mode='orthogonal'"]).tiling().pixel);
+        let [short, long] = tilings.map(|tiling| tiling.tiles.last().cloned().expect("tiles"));
         assert_eq!(short.columns().iter().flatten().count(), (10.0 / short.pixel).round() as usize);
         assert!(long.pixel > short.pixel);
         let shown = long.columns();
@@ -686,9 +686,9 @@ mod tests {
     fn the_plane_and_its_section_are_placed_where_they_are_larger() {
         for (size, grid) in [("[200,90]", [2, 1]), ("[100,200]", [1, 2])] {
             let size = format!("picture.size={size}");
-            let sheet = scene(&["mode='plane'", "planes.curve={points=[[-5,15],[5,15]]}", &size]).sheet();
-            assert_eq!(([sheet.columns, sheet.rows], sheet.tiles.len()), (grid, 2), "{size}");
-            assert!(sheet.tiles[0].section.is_none() && sheet.tiles[1].section.is_some());
+            let tiling = scene(&["mode='plane'", "planes.curve={points=[[-5,15],[5,15]]}", &size]).tiling();
+            assert_eq!(([tiling.columns, tiling.rows], tiling.tiles.len()), (grid, 2), "{size}");
+            assert!(tiling.tiles[0].section.is_none() && tiling.tiles[1].section.is_some());
         }
     }
 

@@ -180,9 +180,9 @@ pub(super) fn marched_box(scene: &Scene) -> Option<(DVec3, DVec3)> {
 fn looks(scene: &Scene) -> Vec<Look> {
     let mut looks = looks_of_rays(scene);
     if scene.cuts_planes() {
-        let (clips, sheet): (Vec<_>, _) = (scene.planes_clips().collect(), scene.sheet());
+        let (clips, tiling): (Vec<_>, _) = (scene.planes_clips().collect(), scene.tiling());
         let view = scene.planes_view();
-        looks.extend(sheet.tiles.iter().map(|tile| {
+        looks.extend(tiling.tiles.iter().map(|tile| {
             let planes = [clips.as_slice(), &tile_faces(scene, tile)].concat();
             Look { low: view.low, high: view.high, planes, reach: 0.0 }
         }));

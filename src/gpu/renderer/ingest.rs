@@ -65,7 +65,7 @@ impl SliceBatch {
 
 impl InFlight {
     /// The recorder that reads the staging buffer.
-    fn first(&mut self) -> &mut Recorder {
+    fn first(&mut self) -> &mut CommandRecorder {
         self.copier.as_mut().unwrap_or(&mut self.recorder)
     }
 
@@ -347,10 +347,10 @@ impl Renderer {
         // Slices of a 3D image are not subresources: not every queue can copy a single one.
         let copies = copy != ingest && (self.staging.copied.is_none() || context.queue(copy).copies_slices);
         let entry = |_| {
-            let copier = || Recorder::new(context, copy, "copy", self.time_stamps, false);
+            let copier = || CommandRecorder::new(context, copy, "copy", self.time_stamps, false);
             Ok(InFlight {
                 copier: copies.then(copier).transpose()?,
-                recorder: Recorder::new(context, ingest, "frame", self.time_stamps, self.spans)?,
+                recorder: CommandRecorder::new(context, ingest, "frame", self.time_stamps, self.spans)?,
                 staging: Buffer::new(context, "staging", bytes, Purpose::Staging)?,
             })
         };

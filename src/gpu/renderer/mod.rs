@@ -6,12 +6,12 @@ mod ingest;
 
 use super::bands::{BandLimit, Bands};
 use super::buffers::{Buffer, Purpose, Readback, Upload};
+use super::command_recorder::{BarrierRecorder, BufferLayout, CommandRecorder, Dispatch, SlotParts};
 use super::context::Context;
 use super::error::GpuError;
 use super::formats::{self, TexelAccess};
 use super::pipeline_compiler::{AsyncPipelineCompiler, SceneMaker, Wake};
 use super::pipelines::{Pipeline, Pipelines, Shaders, embedded};
-use super::recorder::{BarrierRecorder, BufferLayout, Dispatch, Recorder, SlotParts};
 use super::resources::SlotResources;
 use super::timeline::Timelines;
 use super::timing::{TimeStamps, Timings};
@@ -82,8 +82,8 @@ impl Default for RendererOptions {
 /// An entry of the ring: one upload in flight.
 struct InFlight {
     /// Copies the samples, if the device has a queue for copies.
-    copier: Option<Recorder>,
-    recorder: Recorder,
+    copier: Option<CommandRecorder>,
+    recorder: CommandRecorder,
     staging: Buffer,
 }
 
@@ -108,7 +108,7 @@ pub(super) fn adapted(
 pub struct Renderer {
     // Fields are dropped in this order, after `drop` has waited for the device.
     ring: Vec<InFlight>,
-    picture: Recorder,
+    picture: CommandRecorder,
     /// `None` if pictures stay on the device.
     readback: Option<Readback>,
     slots: SlotResources,
@@ -188,7 +188,7 @@ impl Renderer {
         let queues = options.queues.unwrap_or(context.queue_count()).clamp(1, MAX_QUEUES);
         let mut renderer = Renderer {
             ring: Vec::new(),
-            picture: Recorder::new(context, 0, "picture", options.time_stamps, options.spans)?,
+            picture: CommandRecorder::new(context, 0, "picture", options.time_stamps, options.spans)?,
             readback: options.readback.then(|| readback(context, &scene)).transpose()?,
             slots: SlotResources::new(context, options.volume_images.max(1)),
             steps,

@@ -2,9 +2,9 @@
 //! a choice computes the same picture.
 //!
 //! A dial is measured alone, and neither errors nor times of several changes follow from those of each. So the dials only propose
-//! combinations ([`proposals`]); [`measure`] renders each proposal, and a choice is made among the measured ones.
+//! combinations ([`proposals`]); [`errors_and_times`] renders each proposal, and a choice is made among the measured ones.
 //!
-//! [`measure`]: super::measure
+//! [`errors_and_times`]: super::errors_and_times
 
 use super::{Combination, Dial, Kind, Measure, Point, Report, Time, Times};
 use std::fmt::Write as _;

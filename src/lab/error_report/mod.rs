@@ -1,18 +1,19 @@
 //! Error against run time (work-precision). Every approximation is a dial; the points of a dial are its settings, each with its
-//! errors and its times on the device. [`measure`] fills a [`Report`], which is stored as JSON, and renders combinations of several
+//! errors and its times on the device. [`errors_and_times`] fills a [`Report`], which is stored as JSON, and renders combinations of several
 //! dials; [`export`] and [`plot`] write it as text and as a diagram, [`choose`] picks settings among the combinations.
 
 pub mod budget;
 pub mod choose;
 pub mod convergence;
 pub mod dials;
+pub mod errors_and_times;
 pub mod export;
-pub mod measure;
 pub mod metrics;
 pub mod plot;
 pub mod richardson;
 mod running;
 
+use crate::baselines::stated_format;
 use crate::scene::Scene;
 use budget::Budget;
 use convergence::Fit;
@@ -338,15 +339,11 @@ impl Report {
     }
 
     fn read(text: &str) -> Result<Report, String> {
-        #[derive(Deserialize)]
-        struct Version {
-            format: String,
-        }
         let unread = |e: serde_json::Error| format!("error report: cannot be read: {e}");
         // The version first: a newer report would otherwise fail by its fields, with a less clear message.
-        let version: Version = serde_json::from_str(text).map_err(unread)?;
-        if version.format != FORMAT {
-            return Err(format!("error report: format is '{}', this program reads '{FORMAT}'", version.format));
+        let format = stated_format(text).map_err(unread)?;
+        if format != FORMAT {
+            return Err(format!("error report: format is '{format}', this program reads '{FORMAT}'"));
         }
         let report: Report = serde_json::from_str(text).map_err(unread)?;
         report.check()?;

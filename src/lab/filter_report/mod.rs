@@ -1,12 +1,12 @@
 //! Compares the 2D filters of slices: how well each reduces speckle and keeps edges, over its windows and strengths, and what it
-//! costs (as thesis Figs. 46-53, with figures). [`candidates`] lists the settings, [`quality`] has the measures, [`measure`]
-//! runs them on a device, [`export`] and [`sheet`] write tables and pictures.
+//! costs (as thesis Figs. 46-53, with figures). [`candidates`] lists the settings, [`quality`] has the measures, [`candidate_runs`]
+//! runs them on a device, [`export`] and [`contact_sheet`] write tables and pictures.
 
+pub mod candidate_runs;
 pub mod candidates;
+pub mod contact_sheet;
 pub mod export;
-pub mod measure;
 pub mod quality;
-pub mod sheet;
 
 use crate::machine::Device;
 use crate::thesis_tables::Spread;
@@ -22,7 +22,7 @@ pub struct Area {
 /// Where a frame is measured.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Areas {
-    /// All measures but SNR and CNR; also what the sheet shows. Must lie inside of the sector.
+    /// All measures but SNR and CNR; also what the contact sheet shows. Must lie inside of the sector.
     pub crop: Area,
     /// Tissue of one kind: SNR, and CNR against `background`.
     pub region: Area,

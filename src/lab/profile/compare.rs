@@ -14,7 +14,8 @@
 //! is reported for that reason.
 
 use super::statistics::{Sample, SampleError, Shift, block_medians, hodges_lehmann, holm, mann_whitney, min_p};
-use super::{LEVEL, PassProfile, Profile, ProfileError};
+use super::{LEVEL, PassProfile, Profile};
+use crate::baselines::{Stored, Threshold, differing, matched};
 use serde::Serialize;
 use std::collections::{BTreeMap, BTreeSet};
 use toml::{Table, Value};
@@ -22,8 +23,8 @@ use toml::{Table, Value};
 /// Thresholds of a comparison.
 #[derive(Clone, Copy, Debug)]
 pub struct CompareOptions {
-    /// Ratio of medians above which a slower pass is a regression; at least 1.
-    pub threshold: f64,
+    /// Of medians: above it a slower pass is a regression.
+    pub threshold: Threshold,
     /// Probability of any false alarm in the whole report, 0..1.
     pub alpha: f64,
     /// Compare even if the profiles ran different work.
@@ -32,7 +33,7 @@ pub struct CompareOptions {
 
 impl Default for CompareOptions {
     fn default() -> CompareOptions {
-        CompareOptions { threshold: 1.05, alpha: 0.05, force: false }
+        CompareOptions { threshold: Threshold::default(), alpha: 0.05, force: false }
     }
 }
 
@@ -40,13 +41,13 @@ impl Default for CompareOptions {
 #[derive(Debug, thiserror::Error)]
 pub enum CompareError {
     #[error("{which} profile: {fault}")]
-    Profile { which: &'static str, fault: ProfileError },
+    Profile { which: &'static str, fault: String },
     #[error("the profiles ran different work ({}); profile the same, or pass --force", .0.join("; "))]
     DifferentWork(Vec<String>),
     #[error("times: {fault}")]
     Times { fault: SampleError },
-    #[error("{field}: {value} {fault}")]
-    Option { field: &'static str, value: f64, fault: &'static str },
+    #[error("alpha: {0} is not a probability between 0 and 1")]
+    Alpha(f64),
 }
 
 /// Result of comparing one line.
@@ -130,34 +131,30 @@ impl Comparison {
 /// # Errors
 /// An option out of range, an inconsistent profile, or profiles of different work unless forced.
 pub fn compare(old: &Profile, new: &Profile, options: &CompareOptions) -> Result<Comparison, CompareError> {
-    let refuse = |field, value, fault| Err(CompareError::Option { field, value, fault });
-    if !(options.threshold.is_finite() && options.threshold >= 1.0) {
-        return refuse("--threshold", options.threshold, "is not a ratio of at least 1 (1.05 is five percent slower)");
-    }
     if !(options.alpha > 0.0 && options.alpha < 1.0) {
-        return refuse("alpha", options.alpha, "is not a probability between 0 and 1");
+        return Err(CompareError::Alpha(options.alpha));
     }
     for (which, profile) in [("old", old), ("new", new)] {
         profile.check().map_err(|fault| CompareError::Profile { which, fault })?;
     }
-    let differences = Differences::between(old, new);
-    if !differences.work.is_empty() && !options.force {
-        return Err(CompareError::DifferentWork(differences.work));
+    let mut notes = settings(&old.scene, &new.scene);
+    notes.extend(differing(work(old), work(new)));
+    if !notes.is_empty() && !options.force {
+        return Err(CompareError::DifferentWork(notes));
     }
     let pairs = pairs(old, new);
     let both = pairs.iter().filter(|p| p.old.is_some() && p.new.is_some()).count();
     let blocks = blocks_needed(both, options.alpha);
     let tick = old.device.timestamp_period_ns.max(new.device.timestamp_period_ns);
     let lines = judge(pairs, blocks, tick, options).map_err(|fault| CompareError::Times { fault })?;
-    let mut notes = differences.work;
-    notes.extend(differences.conditions);
+    notes.extend(differing(conditions(old), conditions(new)));
     notes.extend(common_shift(&lines));
     let test = format!(
         "Mann-Whitney on the medians of {blocks} blocks a run, Holm over {both} lines at {:.0} %, and a shift beyond what the \
          blocks of a run range over",
         options.alpha * 100.0
     );
-    Ok(Comparison { format: "echolume-comparison-1", test, threshold: options.threshold, notes, lines })
+    Ok(Comparison { format: "echolume-comparison-1", test, threshold: options.threshold.ratio(), notes, lines })
 }
 
 /// Times of one line in one run.
@@ -177,15 +174,12 @@ pub struct Pair<'a> {
 }
 
 fn pairs<'a>(old: &'a Profile, new: &'a Profile) -> Vec<Pair<'a>> {
-    let series = |list: &'a [PassProfile], name: &str| {
-        let found = list.iter().find(|p| p.name == name)?;
-        Some(Series { stage: &found.stage, runs: found.runs_per_picture, times: &found.samples_ns })
-    };
+    let series = |p: &'a PassProfile| Series { stage: &p.stage, runs: p.runs_per_picture, times: &p.samples_ns };
     let mut pairs = Vec::new();
     for (kind, old, new) in [(Kind::Pass, &old.passes, &new.passes), (Kind::Host, &old.host, &new.host)] {
-        let gone = old.iter().filter(|p| series(new, &p.name).is_none());
-        for name in new.iter().chain(gone).map(|p| p.name.as_str()) {
-            pairs.push(Pair { kind, name, old: series(old, name), new: series(new, name) });
+        for (old, new) in matched(old, new, |p| &p.name) {
+            let name = new.or(old).map_or("", |p| &p.name);
+            pairs.push(Pair { kind, name, old: old.map(series), new: new.map(series) });
         }
     }
     let wall = |profile: &'a Profile| Some(Series { stage: "", runs: 1, times: &profile.wall_ns });
@@ -193,47 +187,30 @@ fn pairs<'a>(old: &'a Profile, new: &'a Profile) -> Vec<Pair<'a>> {
     pairs
 }
 
-/// Differences between the conditions of two profiles, one text each, old before new.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct Differences {
-    /// Different work: the times are not comparable.
-    pub work: Vec<String>,
-    /// The same work under other conditions: comparable, but worth reporting.
-    pub conditions: Vec<String>,
+/// What a profile worked on: times of different work are not comparable.
+fn work(profile: &Profile) -> [(&'static str, String); 6] {
+    let [frame, volume, picture] = [&profile.sizes.frame[..], &profile.sizes.volume, &profile.sizes.picture]
+        .map(|size| size.iter().map(u32::to_string).collect::<Vec<_>>().join(" x "));
+    [
+        ("input", profile.input.clone()),
+        ("frame", frame + " samples"),
+        ("slices", profile.sizes.slices.to_string()),
+        ("volume", volume + " texels"),
+        ("turn", format!("{} deg", profile.turn)),
+        ("picture", picture + " pixels"),
+    ]
 }
 
-impl Differences {
-    pub fn between(old: &Profile, new: &Profile) -> Differences {
-        let mut found = Differences::default();
-        found.work.extend(settings(&old.scene, &new.scene));
-        let sizes = [&old.sizes, &new.sizes];
-        let work = [
-            ("input", [old, new].map(|p| p.input.clone())),
-            ("frame", sizes.map(|s| format!("{} x {} samples", s.frame[0], s.frame[1]))),
-            ("slices", sizes.map(|s| s.slices.to_string())),
-            ("volume", sizes.map(|s| format!("{} x {} x {} texels", s.volume[0], s.volume[1], s.volume[2]))),
-            ("turn", [old, new].map(|p| format!("{} deg", p.turn))),
-            ("picture", sizes.map(|s| format!("{} x {} pixels", s.picture[0], s.picture[1]))),
-        ];
-        let devices = [&old.device, &new.device];
-        let conditions = [
-            ("device", devices.map(|d| d.name.clone())),
-            ("driver", devices.map(|d| d.driver.clone())),
-            ("Vulkan", devices.map(|d| d.api.clone())),
-            ("clocks", devices.map(|d| d.clocks.clone().unwrap_or_else(|| "not known".into()))),
-            ("ns a tick", devices.map(|d| d.timestamp_period_ns.to_string())),
-            ("time stamp bits", devices.map(|d| d.valid_bits.to_string())),
-            ("program", [old, new].map(|p| p.program.clone())),
-            ("repeats", [old, new].map(|p| p.repeats.to_string())),
-            ("warm-up", [old, new].map(|p| p.warm_up.to_string())),
-        ];
-        for (list, pairs) in [(&mut found.work, &work[..]), (&mut found.conditions, &conditions[..])] {
-            for (what, [old, new]) in pairs.iter().filter(|(_, [old, new])| old != new) {
-                list.push(format!("{what}: {old} -> {new}"));
-            }
-        }
-        found
-    }
+/// What it was measured on and how: comparable if it differs, but worth reporting.
+fn conditions(profile: &Profile) -> impl Iterator<Item = (&'static str, String)> {
+    let measured = [
+        ("ns a tick", profile.device.timestamp_period_ns.to_string()),
+        ("time stamp bits", profile.device.valid_bits.to_string()),
+        ("program", profile.program.clone()),
+        ("repeats", profile.repeats.to_string()),
+        ("warm-up", profile.warm_up.to_string()),
+    ];
+    profile.device.conditions().into_iter().chain(measured)
 }
 
 /// Differences of settings, each under its full key.
@@ -247,11 +224,12 @@ fn settings(old: &str, new: &str) -> Vec<String> {
     let [mut a, mut b] = [BTreeMap::new(), BTreeMap::new()];
     flatten("", &Value::Table(old), &mut a);
     flatten("", &Value::Table(new), &mut b);
-    let missing = "not set";
     let keys: BTreeSet<&String> = a.keys().chain(b.keys()).collect();
-    let value = |side: &BTreeMap<String, String>, key: &String| side.get(key).map_or(missing.into(), String::clone);
-    let pairs = keys.into_iter().map(|key| (key, value(&a, key), value(&b, key)));
-    pairs.filter(|(_, old, new)| old != new).map(|(key, old, new)| format!("scene {key}: {old} -> {new}")).collect()
+    let [old, new] = [&a, &b].map(|side| {
+        let value = |key: &&String| side.get(*key).map_or("not set".into(), String::clone);
+        keys.iter().map(move |key| (format!("scene {key}"), value(key)))
+    });
+    differing(old, new)
 }
 
 fn flatten(key: &str, value: &Value, into: &mut BTreeMap<String, String>) {
@@ -401,7 +379,7 @@ fn line(pair: Pair, ratio: Option<Ratio>, fault: Option<String>, options: &Compa
         new_ns: median(&pair.new),
         ratio,
         note: fault.filter(|f| !f.is_empty()).or(runs),
-        is_regression: verdict == Verdict::Slower && slower_by > options.threshold && pair.kind != Kind::Host,
+        is_regression: verdict == Verdict::Slower && slower_by > options.threshold.ratio() && pair.kind != Kind::Host,
     }
 }
 

@@ -1,54 +1,25 @@
-//! Profiles: run times of every pass, what they were measured on, and their JSON file. [`measure`] makes a profile, [`compare`]
+//! Profiles: run times of every pass, what they were measured on, and their JSON file. [`timed_run`] makes a profile, [`compare`]
 //! compares two, [`export`] writes them as text and as Chrome traces. [`pipelines`] is about their compilation.
 
 pub mod compare;
 pub mod export;
-pub mod measure;
 pub mod pipelines;
 pub mod statistics;
+pub mod timed_run;
 
+use crate::baselines::Stored;
 use crate::machine::Device;
 use serde::{Deserialize, Serialize};
 use statistics::Sample;
 
-/// Version of the JSON format.
-pub const FORMAT: &str = "echolume-profile-2";
-/// The previous version, still read: it has no CPU time and no rotating camera.
-const FORMAT_BEFORE: &str = "echolume-profile-1";
-
 /// Target coverage of confidence intervals.
 pub const LEVEL: f64 = 0.95;
-
-/// Why a profile cannot be read or written.
-#[derive(Debug, thiserror::Error)]
-pub enum ProfileError {
-    #[error("format is {found:?}, this program reads {FORMAT:?}; profile again with it")]
-    Format { found: String },
-    #[error("not a profile: {0}")]
-    Json(String),
-    /// Inconsistent contents.
-    #[error("{field}: {fault}")]
-    Contents { field: String, fault: String },
-}
-
-impl ProfileError {
-    fn on_one_line(self) -> ProfileError {
-        let line = |text: String| crate::text::single_line(&text);
-        match self {
-            ProfileError::Format { found } => ProfileError::Format { found: line(found) },
-            ProfileError::Json(fault) => ProfileError::Json(line(fault)),
-            ProfileError::Contents { field, fault } => {
-                ProfileError::Contents { field: line(field), fault: line(fault) }
-            }
-        }
-    }
-}
 
 /// One run of `echolume profile`. Lists of times have one entry per repeat, in the order measured, in ns.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Profile {
-    /// [`FORMAT`].
+    /// [`Stored::FORMAT`].
     pub format: String,
     /// Name, version and build of the program.
     pub program: String,
@@ -234,16 +205,21 @@ impl Profile {
     pub fn idle_ns(&self) -> Vec<f64> {
         self.device_ns.iter().zip(self.pass_sums()).map(|(span, passes)| span - passes).collect()
     }
+}
 
-    /// Checks that the lists are consistent and all numbers are finite.
-    ///
-    /// # Errors
-    /// The first field that is not.
-    pub fn check(&self) -> Result<(), ProfileError> {
-        let fault = |field: &str, fault: String| Err(ProfileError::Contents { field: field.into(), fault });
-        if self.format != FORMAT {
-            return Err(ProfileError::Format { found: self.format.clone() });
-        }
+impl Stored for Profile {
+    const FORMAT: &'static str = "echolume-profile-2";
+    /// It has no CPU time and no rotating camera.
+    const EARLIER: &'static [&'static str] = &["echolume-profile-1"];
+    const QUOTE: char = '"';
+    const WHAT: &'static str = "a profile";
+    const AGAIN: &'static str = "profile again with it";
+    const KIND: &'static str = "profile";
+    const MAX_BYTES: u64 = 256 << 20;
+
+    /// The lists are consistent and all numbers are finite.
+    fn fault(&self) -> Option<(String, String)> {
+        let fault = |field: &str, fault: String| Some((field.to_string(), fault));
         if self.repeats == 0 {
             return fault("repeats", "is 0; at least one picture must be measured".into());
         }
@@ -282,8 +258,12 @@ impl Profile {
         let rest = self.acquisition.iter().flat_map(|a| [a.seconds, a.sound_speed]);
         match rest.chain([self.device.timestamp_period_ns, self.turn]).find(|v| !v.is_finite()) {
             Some(value) => fault("acquisition, timestamp_period_ns or turn", format!("{value} is not finite")),
-            None => Ok(()),
+            None => None,
         }
+    }
+
+    fn renew(&mut self) {
+        self.format = Self::FORMAT.into();
     }
 }
 
@@ -292,41 +272,4 @@ pub fn settings_hash(scene: &str) -> String {
     let hash =
         scene.bytes().fold(0xcbf2_9ce4_8422_2325, |h: u64, b| (h ^ u64::from(b)).wrapping_mul(0x0000_0100_0000_01b3));
     format!("{hash:016x}")
-}
-
-impl Profile {
-    /// The profile as JSON. Every number is exact: `from_json(to_json(p))` is p.
-    ///
-    /// # Errors
-    /// [`Profile::check`] refuses it.
-    pub fn to_json(&self) -> Result<String, ProfileError> {
-        self.check()?;
-        let mut text = serde_json::to_string_pretty(self).map_err(|e| ProfileError::Json(e.to_string()))?;
-        text.push('\n');
-        Ok(text)
-    }
-
-    /// Reads a profile of this format or the one before. Any text gives a consistent profile or an error.
-    ///
-    /// # Errors
-    /// One line: another format, no JSON of a profile, or contents that [`Profile::check`] refuses.
-    pub fn from_json(text: &str) -> Result<Profile, ProfileError> {
-        read(text).map_err(ProfileError::on_one_line)
-    }
-}
-
-fn read(text: &str) -> Result<Profile, ProfileError> {
-    /// Read first, to distinguish a profile of another version from a file that is none.
-    #[derive(Deserialize)]
-    struct Version {
-        format: String,
-    }
-    let version: Version = serde_json::from_str(text).map_err(|e| ProfileError::Json(e.to_string()))?;
-    if ![FORMAT, FORMAT_BEFORE].contains(&version.format.as_str()) {
-        return Err(ProfileError::Format { found: version.format });
-    }
-    let mut profile: Profile = serde_json::from_str(text).map_err(|e| ProfileError::Json(e.to_string()))?;
-    profile.format = FORMAT.into();
-    profile.check()?;
-    Ok(profile)
 }

@@ -1,10 +1,10 @@
 //! The tables of the thesis, next to the times of this device: Tables 3-6 (4.3), time per rendered volume in surface mode, and
 //! Tables 7-9 (5.5), the growth of filter windows. This file has the rows, their conditions and the figures of the thesis;
-//! [`measure`] and [`growth`] fill them, [`export`] writes Markdown and CSV.
+//! [`row_times`] and [`growth`] fill them, [`export`] writes Markdown and CSV.
 
 pub mod export;
 pub mod growth;
-pub mod measure;
+pub mod row_times;
 
 use crate::machine::Device;
 use crate::profile::statistics::Sample;

@@ -63,13 +63,13 @@ pub(super) fn slices(picture: &mut Picture, scene: &Scene) -> Result<(), String>
     if !scene.has_reference() {
         return Ok(());
     }
-    let sheet = scene.sheet();
-    let Some(first) = sheet.tiles.first() else { return Ok(()) };
+    let tiling = scene.tiling();
+    let Some(first) = tiling.tiles.first() else { return Ok(()) };
     let tile = [first.corner, first.size].map(|corner| corner.map(f64::from));
     for (half, colour) in [(1.5, EDGE), (0.5, LINE)] {
-        sheet.slice_lines().iter().for_each(|ends| stroke(picture, tile, *ends, half, colour));
+        tiling.slice_lines().iter().for_each(|ends| stroke(picture, tile, *ends, half, colour));
     }
-    let text = overlay::spacing_label(&sheet);
+    let text = overlay::spacing_label(&tiling);
     let width = canvas::text_width(&text, TEXT)?.min(tile[1][0]).ceil() as u32 + 6;
     let label = canvas::picture([width, TEXT + 6], &Label(&text))?;
     let bottom = tile[0][1] + tile[1][1] - f64::from(TEXT + 8);
@@ -82,9 +82,9 @@ pub(super) fn slices(picture: &mut Picture, scene: &Scene) -> Result<(), String>
 /// # Errors
 /// One line: the drawing of the label failed.
 pub(super) fn curve(picture: &mut Picture, scene: &Scene) -> Result<(), String> {
-    let sheet = scene.sheet();
-    let (Some(on), Some(_)) = (scene.curve_line(&sheet), scene.curve()) else { return Ok(()) };
-    let tile = &sheet.tiles[on.tile];
+    let tiling = scene.tiling();
+    let (Some(on), Some(_)) = (scene.curve_line(&tiling), scene.curve()) else { return Ok(()) };
+    let tile = &tiling.tiles[on.tile];
     let tile = [tile.corner, tile.size].map(|corner| corner.map(f64::from));
     let mut strokes: Vec<[[f64; 2]; 2]> = on.line.windows(2).map(|ends| [ends[0], ends[1]]).collect();
     strokes.extend(on.head().into_iter().flat_map(|head| overlay::arrow_head(head, HEAD)));

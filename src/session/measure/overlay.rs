@@ -4,7 +4,7 @@
 use super::outcome;
 use super::shapes::Ellipse;
 use crate::scene::picker::Picker;
-use crate::scene::planes::{Sheet, Tile};
+use crate::scene::planes::{Tile, Tiling};
 use crate::scene::{MeasureKind, Measurement, Scene};
 use glam::DVec3;
 
@@ -38,10 +38,10 @@ pub fn drawn(scene: &Scene, all: &[Measurement]) -> Vec<Drawn> {
     }
     let mut found = Vec::new();
     if scene.cuts_planes() {
-        let sheet = scene.sheet();
+        let tiling = scene.tiling();
         let reach = IN_PLANE.max(scene.settings.planes.thickness / 2.0);
-        for tile in &sheet.tiles {
-            let view = OnTile { sheet: &sheet, tile, reach };
+        for tile in &tiling.tiles {
+            let view = OnTile { tiling: &tiling, tile, reach };
             let area = [tile.corner, tile.size].map(|[x, y]| [f64::from(x), f64::from(y)]);
             let drawn = all.iter().enumerate().filter(|(_, measured)| !measured.on_surface);
             // What is straight in space, and its length, is another thing on a curved plane.
@@ -101,8 +101,8 @@ pub fn preview(
 }
 
 /// The distance of the slices of a tomography, for its reference tile.
-pub fn spacing_label(sheet: &Sheet) -> String {
-    match &sheet.tiles[..] {
+pub fn spacing_label(tiling: &Tiling) -> String {
+    match &tiling.tiles[..] {
         [_, first, second, ..] => format!("every {:.1} mm", second.plane.at.distance(first.plane.at)),
         _ => String::new(),
     }
@@ -128,14 +128,14 @@ pub fn label_corner(drawn: &Drawn, size: [f64; 2]) -> [f64; 2] {
 }
 
 struct OnTile<'a> {
-    sheet: &'a Sheet,
+    tiling: &'a Tiling,
     tile: &'a Tile,
     reach: f64,
 }
 
 impl OnTile<'_> {
     fn project(&self, point: DVec3) -> Option<[f64; 2]> {
-        let (at, off) = self.sheet.project(self.tile, point);
+        let (at, off) = self.tiling.project(self.tile, point);
         (off.abs() <= self.reach).then_some(at)
     }
 }
@@ -238,7 +238,7 @@ mod tests {
             assert_eq!(found.len(), tiles, "{toml}");
             for Drawn { points, label, .. } in &found {
                 let apart = points[1].1[0] - points[0].1[0];
-                assert!((apart * scene.sheet().pixel - 10.0).abs() < 1e-9, "{apart} pixels");
+                assert!((apart * scene.tiling().pixel - 10.0).abs() < 1e-9, "{apart} pixels");
                 assert_eq!(label, "1: 10.0 mm");
             }
         }
@@ -254,18 +254,18 @@ mod tests {
             let plane = format!("planes.plane='{plane}'");
             let scene =
                 scene(&["mode='tomography'", "planes.reference=true", "planes.spacing=3", "planes.azimuth=20", &plane]);
-            let sheet = scene.sheet();
-            let (reference, lines) = (&sheet.tiles[0], sheet.slice_lines());
-            assert_eq!((sheet.tiles.len(), lines.len()), (12, 11));
-            assert!(reference.plane.normal.dot(sheet.tiles[1].plane.normal).abs() < 1e-12, "across the slices");
-            for (slice, ends) in sheet.tiles[1..].iter().zip(&lines) {
+            let tiling = scene.tiling();
+            let (reference, lines) = (&tiling.tiles[0], tiling.slice_lines());
+            assert_eq!((tiling.tiles.len(), lines.len()), (12, 11));
+            assert!(reference.plane.normal.dot(tiling.tiles[1].plane.normal).abs() < 1e-12, "across the slices");
+            for (slice, ends) in tiling.tiles[1..].iter().zip(&lines) {
                 for end in ends {
                     // Each end is a point of both planes.
-                    let off = sheet.project(slice, sheet.point(reference, *end)).1;
+                    let off = tiling.project(slice, tiling.point(reference, *end)).1;
                     assert!(off.abs() < 1e-9, "{plane}: {off} mm");
                 }
             }
-            assert_eq!(spacing_label(&sheet), "every 3.0 mm");
+            assert_eq!(spacing_label(&tiling), "every 3.0 mm");
         }
         assert!(!scene(&["mode='tomography'"]).has_reference(), "only if asked for");
     }
@@ -283,7 +283,7 @@ mod tests {
             ..Measurement::default()
         };
         let found = drawn(&scene, &[arrow.clone(), text]);
-        let pixel = |point: [f64; 3]| scene.sheet().project(&scene.sheet().tiles[0], scene.place_of(point)).0;
+        let pixel = |point: [f64; 3]| scene.tiling().project(&scene.tiling().tiles[0], scene.place_of(point)).0;
         let [tip, tail] = [arrow.points[0], arrow.points[1]].map(pixel);
         let (drawn, head) = (&found[0], found[0].head.expect("a head"));
         assert_eq!((head, &drawn.lines[..], drawn.label.as_str()), ([tip, tail], &[vec![tip, tail]][..], "lip"));

@@ -193,7 +193,7 @@ impl Controls {
         }
     }
 
-    /// Sets width and height of the picture, pixels. The minimum is 64, so that a sheet of tiles has a pixel for each tile; a smaller
+    /// Sets width and height of the picture, pixels. The minimum is 64, so that a picture of tiles has a pixel for each tile; a smaller
     /// window shows the picture scaled down.
     pub(super) fn resize(&mut self, size: [u32; 2]) {
         let rays = self.settings.ray.rays.max(self.start.ray.rays);

@@ -44,7 +44,7 @@ pub(super) fn paint(ui: &Ui, state: &PanelState, scale: f32) {
     // While it is bent, plane A has the line as it will be, not as the picture has it.
     let is_shown = state.controls.tool() == Tool::Region
         && !scene.unveils()
-        && region_box::start_line(scene, &scene.sheet(), 0, state.controls.start_line()).is_some();
+        && region_box::start_line(scene, &scene.tiling(), 0, state.controls.start_line()).is_some();
     for line in state.start_lines.iter().skip(usize::from(is_shown)) {
         let [corner, size] = line.tile.map(|[x, y]| vec2(x as f32, y as f32) / scale);
         let painter = painter.with_clip_rect(Rect::from_min_size(picture.min + corner, size).intersect(picture));
@@ -252,15 +252,15 @@ fn bar(painter: &Painter, taken: &mut Taken, area: Rect, per_point: f64) {
 
 /// Where the slices of a tomography are, on its reference tile, and their distance.
 fn slices(painter: &Painter, taken: &mut Taken, origin: Pos2, area: Rect, scene: &Scene, scale: f32) {
-    let sheet = scene.sheet();
+    let tiling = scene.tiling();
     let painter = painter.with_clip_rect(area);
-    for ends in sheet.slice_lines() {
+    for ends in tiling.slice_lines() {
         let ends = ends.map(|[x, y]| origin + vec2(x as f32, y as f32) / scale);
         stroke(&painter, ends, 1.0, MEASURE);
     }
     // Above the letter of the lower edge, or higher.
     let places = (0..5).map(|n| area.center_bottom() - vec2(0.0, 6.0 + 20.0 * n as f32));
-    text_at_one_of(&painter, taken, places, Align2::CENTER_BOTTOM, &overlay::spacing_label(&sheet), TEXT);
+    text_at_one_of(&painter, taken, places, Align2::CENTER_BOTTOM, &overlay::spacing_label(&tiling), TEXT);
 }
 
 /// The axes of the volume in camera view, in the lower left corner.

@@ -22,9 +22,10 @@ pub(super) fn paint(ui: &Ui, state: &PanelState, scale: f32) {
     }
     let picture = picture_rect(state, scale);
     let painter = ui.ctx().layer_painter(egui::LayerId::background()).with_clip_rect(picture);
-    let sheet = scene.sheet();
+    let tiling = scene.tiling();
     let area = |tile: usize| {
-        let [corner, size] = [sheet.tiles[tile].corner, sheet.tiles[tile].size].map(|[x, y]| vec2(x as f32, y as f32));
+        let [corner, size] =
+            [tiling.tiles[tile].corner, tiling.tiles[tile].size].map(|[x, y]| vec2(x as f32, y as f32));
         Rect::from_min_size(picture.min + corner / scale, size / scale)
     };
     let draw = |line: &CurveLine, has_points: bool| {
@@ -35,15 +36,15 @@ pub(super) fn paint(ui: &Ui, state: &PanelState, scale: f32) {
     let hover = hover.map(|at| ((at - picture.min) * scale).into()).map(|[x, y]: [f32; 2]| [x, y].map(f64::from));
     // The tile under the pointer, and the place in space.
     let under = hover.and_then(|at| {
-        let tile = sheet.tile_at(at[0].max(0.0) as usize, at[1].max(0.0) as usize)?;
-        let number = sheet.tiles.iter().position(|other| other.corner == tile.corner)?;
-        Some((number, sheet.point(tile, at)))
+        let tile = tiling.tile_at(at[0].max(0.0) as usize, at[1].max(0.0) as usize)?;
+        let number = tiling.tiles.iter().position(|other| other.corner == tile.corner)?;
+        Some((number, tiling.point(tile, at)))
     });
-    if let Some(line) = scene.curve_line(&sheet) {
+    if let Some(line) = scene.curve_line(&tiling) {
         draw(&line, is_chosen && work.is_none());
         // Where on the line the pointer over the section is.
-        if let Some((_, place)) = under.filter(|(number, _)| sheet.tiles[*number].section.is_some()) {
-            let [x, y] = sheet.project(&sheet.tiles[line.tile], place).0.map(|v| v as f32);
+        if let Some((_, place)) = under.filter(|(number, _)| tiling.tiles[*number].section.is_some()) {
+            let [x, y] = tiling.project(&tiling.tiles[line.tile], place).0.map(|v| v as f32);
             let at = picture.min + vec2(x, y) / scale;
             let painter = painter.with_clip_rect(area(line.tile).intersect(picture));
             [Stroke::new(4.0, OUTLINE), Stroke::new(2.0, colours::of_scene(CURVE_COLOUR))].into_iter().for_each(
@@ -61,7 +62,7 @@ pub(super) fn paint(ui: &Ui, state: &PanelState, scale: f32) {
     let under = under.filter(|[x, y]| last.is_some_and(|last| (last[0] - x).hypot(last[1] - y) >= scene.least_apart()));
     let points = work.points.iter().copied().chain(under).collect();
     let shown = Curve { plane: work.plane, points };
-    if let Some(mut line) = scene.line_on_tile(&sheet, &shown) {
+    if let Some(mut line) = scene.line_on_tile(&tiling, &shown) {
         line.points.truncate(work.points.len());
         draw(&line, true);
     }

@@ -224,10 +224,10 @@ fn place_at(scene: &Scene, at: [f32; 2]) -> Option<([f64; 3], bool)> {
     if !scene.cuts_planes() {
         return None;
     }
-    let sheet = scene.sheet();
+    let tiling = scene.tiling();
     let at = at.map(f64::from);
-    let tile = sheet.tile_at(at[0].max(0.0) as usize, at[1].max(0.0) as usize)?;
-    Some((scene.point_of(sheet.point(tile, at)), tile.section.is_some()))
+    let tile = tiling.tile_at(at[0].max(0.0) as usize, at[1].max(0.0) as usize)?;
+    Some((scene.point_of(tiling.point(tile, at)), tile.section.is_some()))
 }
 
 struct Canvas {

@@ -27,15 +27,15 @@ pub(super) fn paint(ui: &Ui, state: &PanelState, scale: f32) {
     };
     let painter = ui.ctx().layer_painter(egui::LayerId::background()).with_clip_rect(picture);
     if region_box::is_on_planes(scene) {
-        let sheet = scene.sheet();
-        for (n, tile) in sheet.tiles.iter().enumerate() {
+        let tiling = scene.tiling();
+        for (n, tile) in tiling.tiles.iter().enumerate() {
             let [corner, size] = [tile.corner, tile.size].map(|v| v.map(f64::from));
             let area = Rect::from_min_max(at(corner), at([corner[0] + size[0], corner[1] + size[1]]));
             let painter = painter.with_clip_rect(area.intersect(picture));
-            let sides = region_box::section(scene, &sheet, tile);
+            let sides = region_box::section(scene, &tiling, tile);
             sides.iter().for_each(|side| line(&painter, side.ends.map(at), 1.5));
             sides.iter().filter_map(|side| side.handle).for_each(|place| handle(&painter, at(place)));
-            if let Some(start) = region_box::start_line(scene, &sheet, n, state.controls.start_line()) {
+            if let Some(start) = region_box::start_line(scene, &tiling, n, state.controls.start_line()) {
                 let ends: Vec<Pos2> = start.line.into_iter().map(at).collect();
                 for (width, colour) in [(2.0 + 2.5, OUTLINE), (2.0, START)] {
                     ends.windows(2).for_each(|two| {

@@ -410,10 +410,10 @@ fn what_colours_alone_do_not_tell_has_another_sign() {
     }
     let mut measured = Shown::new("mode='orthogonal'");
     measured.apply(Command::Tool(Tool::Measure(crate::scene::MeasureKind::Distance)));
-    let sheet = measured.scene.sheet();
-    let tile = sheet.tile_at(100, 100).expect("the first tile");
+    let tiling = measured.scene.tiling();
+    let tile = tiling.tile_at(100, 100).expect("the first tile");
     for at in [[100.0, 100.0], [180.0, 140.0]] {
-        measured.apply(Command::Point(measured.scene.point_of(sheet.point(tile, at)), false));
+        measured.apply(Command::Point(measured.scene.point_of(tiling.point(tile, at)), false));
     }
     let found = overlay::drawn(&measured.scene, measured.controls.measures());
     assert!(!found.is_empty() && found.iter().all(|drawn| drawn.points.len() == 2), "{found:?}");

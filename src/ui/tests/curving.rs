@@ -8,8 +8,8 @@ use crate::workspace::{self, Origin};
 /// Where a tile shows coordinates of its plane, pixels of the picture.
 fn pixel(window: &TestWindow, tile: usize, point: [f64; 2]) -> [f64; 2] {
     let (scene, name) = (window.scene(), [PlaneName::A, PlaneName::B, PlaneName::C][tile]);
-    let sheet = scene.sheet();
-    sheet.project(&sheet.tiles[tile], scene.place_on_plane(name, point)).0
+    let tiling = scene.tiling();
+    tiling.project(&tiling.tiles[tile], scene.place_on_plane(name, point)).0
 }
 
 fn click(window: &mut TestWindow, at: [f64; 2]) {
@@ -53,7 +53,7 @@ fn a_line_is_drawn_on_any_plane_by_clicks_and_ends_by_a_double_click() {
         near(&curve(&window).expect("a curve"), plane, &points);
         let settings = window.controls.settings();
         assert_eq!((settings.mode, settings.layout, settings.planes.plane), (Mode::Orthogonal, Layout::Single, plane));
-        assert_eq!(window.scene().sheet().tiles.len(), 4);
+        assert_eq!(window.scene().tiling().tiles.len(), 4);
         // As one step.
         let after = window.controls.settings().clone();
         assert_eq!(apply(&mut window, Command::Undo), Change::Settings);
@@ -71,13 +71,13 @@ fn a_drag_draws_a_straight_line_and_its_ends_are_dragged_afterwards() {
     let ends = [from, to].map(|point| pixel(&window, 0, point));
     window.drag(Button::Left, ends[0], ends[1]);
     near(&curve(&window).expect("a curve"), PlaneName::A, &[from, to]);
-    assert_eq!(window.scene().sheet().tiles.len(), 2, "the plane, and the section beside it");
+    assert_eq!(window.scene().tiling().tiles.len(), 2, "the plane, and the section beside it");
     // A point that is grabbed follows the pointer; a drag is one step.
     let moved = [-20.0, 50.0];
     let (start, end) = (pixel(&window, 0, from), pixel(&window, 0, moved));
     window.drag(Button::Left, start, end);
     let found = curve(&window).expect("a curve").points[0];
-    let slop = 6.0 / 2.0 * window.scene().sheet().pixel;
+    let slop = 6.0 / 2.0 * window.scene().tiling().pixel;
     assert!((found[0] - moved[0]).hypot(found[1] - moved[1]) <= slop + 1e-6, "{found:?}");
     apply(&mut window, Command::Undo);
     near(&curve(&window).expect("a curve"), PlaneName::A, &[from, to]);
@@ -88,7 +88,7 @@ fn a_drag_draws_a_straight_line_and_its_ends_are_dragged_afterwards() {
     assert_eq!(apply(&mut window, Command::MoveCurvePoint(9, to)), Change::Nothing);
     assert_eq!(apply(&mut window, Command::MoveCurvePoint(0, [f64::NAN, 0.0])), Change::Nothing);
     assert_eq!(apply(&mut window, Command::ClearCurve), Change::Settings);
-    assert_eq!((curve(&window), window.scene().sheet().tiles.len()), (None, 1));
+    assert_eq!((curve(&window), window.scene().tiling().tiles.len()), (None, 1));
     apply(&mut window, Command::Undo);
     assert!(curve(&window).is_some());
 }
@@ -133,8 +133,8 @@ fn a_caliper_on_the_section_measures_along_the_line() {
     let on_section = |window: &TestWindow, degrees: f64, up: f64| {
         let (scene, (sin, cos)) = (window.scene(), degrees.to_radians().sin_cos());
         let place = scene.place_on_plane(PlaneName::A, [radius * sin, 35.0 + radius * cos]) + DVec3::Z * up;
-        let sheet = scene.sheet();
-        let (at, off) = sheet.project(&sheet.tiles[3], place);
+        let tiling = scene.tiling();
+        let (at, off) = tiling.project(&tiling.tiles[3], place);
         assert!(off < 0.02, "{off} mm beside the section");
         at
     };
@@ -154,7 +154,7 @@ fn a_caliper_on_the_section_measures_along_the_line() {
         let label = outcome::label(n + 1, &measured);
         assert!(label.ends_with(" mm along the line"), "{label}");
         let scene = window.scene();
-        let section = scene.sheet().tiles[3].corner.map(f64::from);
+        let section = scene.tiling().tiles[3].corner.map(f64::from);
         let drawn = overlay::drawn(&scene, &[measured]);
         let shown = drawn.iter().find(|drawn| drawn.tile[0] == section).expect("it is drawn on the section");
         let off = [0, 1].map(|end| {
@@ -169,7 +169,7 @@ fn a_caliper_on_the_section_measures_along_the_line() {
         ..Default::default()
     };
     let scene = window.scene();
-    let section = scene.sheet().tiles[3].corner.map(f64::from);
+    let section = scene.tiling().tiles[3].corner.map(f64::from);
     assert!(overlay::drawn(&scene, &[straight]).iter().all(|drawn| drawn.tile[0] != section));
     // One end on A is no distance on the section; an angle is refused in words, whether clicked or dragged.
     let beside = pixel(&window, 0, [0.0, 20.0]);
@@ -209,7 +209,7 @@ fn a_workspace_keeps_the_curved_plane() {
 #[test]
 fn the_section_steps_and_shows_its_own_plane() {
     let mut window = TestWindow::new("mode='orthogonal'\nplanes.curve={plane='b',points=[[-9,40],[9,50]]}");
-    let tile = window.scene().sheet().tiles[3].clone();
+    let tile = window.scene().tiling().tiles[3].clone();
     let at = [0, 1].map(|n| f64::from(tile.corner[n]) + f64::from(tile.size[n]) / 2.0);
     window.input(Input::Moved(window.at(at)));
     let before = window.scene().plane(PlaneName::B).at;
@@ -222,5 +222,5 @@ fn the_section_steps_and_shows_its_own_plane() {
     window.click(at);
     let settings = window.controls.settings();
     assert_eq!((settings.mode, settings.planes.plane), (Mode::Plane, PlaneName::B));
-    assert_eq!(window.scene().sheet().tiles.len(), 2);
+    assert_eq!(window.scene().tiling().tiles.len(), 2);
 }

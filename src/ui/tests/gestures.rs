@@ -77,7 +77,7 @@ fn dragging_up_moves_the_clip_plane_and_the_plane_deeper_by_the_same_distance() 
     window.tool(Tool::Plane);
     let before = window.scene().plane(PlaneName::C).at.y;
     window.drag(Button::Left, [200.0, 300.0], [200.0, 197.0]);
-    near_mm(window.scene().plane(PlaneName::C).at.y - before, window.scene().sheet().pixel);
+    near_mm(window.scene().plane(PlaneName::C).at.y - before, window.scene().tiling().pixel);
 }
 
 /// Expects the distance of 103 pixels, 3 of which are the slop.
@@ -162,7 +162,7 @@ fn a_click_on_a_plane_moves_the_crossing_of_the_planes() {
     for toml in
         ["mode='orthogonal'", "layout='four'", "mode='tomography'", "layout='four'\nplanes.tilt=20\nplanes.azimuth=-15"]
     {
-        let tiles = TestWindow::new(toml).scene().sheet().tiles;
+        let tiles = TestWindow::new(toml).scene().tiling().tiles;
         for (n, tile) in tiles.iter().enumerate() {
             let mut window = TestWindow::new(toml);
             window.tool(Tool::Plane);
@@ -170,12 +170,12 @@ fn a_click_on_a_plane_moves_the_crossing_of_the_planes() {
             let clicked = window.click(at);
             assert!(matches!(clicked[..], [Command::MoveCrossing(_)]), "{toml} {n}: {clicked:?}");
             let scene = window.scene();
-            let (sheet, place) = (scene.sheet(), scene.plane(PlaneName::A).at);
+            let (tiling, place) = (scene.tiling(), scene.plane(PlaneName::A).at);
             // The crossing is in the plane of the clicked tile, at the clicked pixel.
-            let tile = if scene.shows_three() { &sheet.tiles[n] } else { tile };
+            let tile = if scene.shows_three() { &tiling.tiles[n] } else { tile };
             let from = place - tile.plane.at;
             near(from.dot(tile.plane.normal), 0.0, 1e-9);
-            let pixel = [from.dot(tile.plane.right), from.dot(tile.plane.down)].map(|mm| mm / sheet.pixel);
+            let pixel = [from.dot(tile.plane.right), from.dot(tile.plane.down)].map(|mm| mm / tiling.pixel);
             for a in 0..2 {
                 near(f64::from(tile.corner[a]) + f64::from(tile.size[a]) / 2.0 + pixel[a], at[a], 1e-6);
             }

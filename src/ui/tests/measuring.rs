@@ -26,8 +26,8 @@ impl OnBall {
     /// Where a tile shows a place of its plane, pixels of the picture.
     fn pixel(&self, tile: usize, place: DVec3) -> [f64; 2] {
         let scene = self.window.scene();
-        let sheet = scene.sheet();
-        sheet.project(&sheet.tiles[tile], place).0
+        let tiling = scene.tiling();
+        tiling.project(&tiling.tiles[tile], place).0
     }
 
     fn click(&mut self, tile: usize, place: DVec3) {
@@ -39,7 +39,7 @@ impl OnBall {
 
     /// Axes of a tile's plane.
     fn axes(&self, tile: usize) -> [DVec3; 3] {
-        let plane = self.window.scene().sheet().tiles[tile].plane;
+        let plane = self.window.scene().tiling().tiles[tile].plane;
         [plane.right, plane.down, plane.normal]
     }
 
@@ -82,7 +82,7 @@ fn the_balls_diameter_area_and_angle_are_measured_to_a_tenth_of_a_millimetre() {
     {
         for turned in ["", "\nplanes.azimuth=25\nplanes.tilt=-15\nplanes.roll=40"] {
             let mut on = OnBall::new(&format!("{toml}{turned}"));
-            let tiles = on.window.scene().sheet().tiles.len();
+            let tiles = on.window.scene().tiling().tiles.len();
             for tile in 0..tiles {
                 let [right, down, _] = on.axes(tile);
                 let (centre, radius) = (on.centre, on.radius);
@@ -104,7 +104,7 @@ fn the_balls_diameter_area_and_angle_are_measured_to_a_tenth_of_a_millimetre() {
                 near(&on.last()[0], area, 0.01, 0.0);
                 // It is drawn where it was set.
                 let scene = on.window.scene();
-                let corner = scene.sheet().tiles[tile].corner.map(f64::from);
+                let corner = scene.tiling().tiles[tile].corner.map(f64::from);
                 let drawn = overlay::drawn(&scene, on.window.controls.measures());
                 let caliper = drawn.iter().find(|d| d.tile[0] == corner && d.points.len() == 2).expect("drawn");
                 let at = on.pixel(tile, centre - right * radius);
@@ -282,20 +282,23 @@ fn the_cross_is_grabbed_where_it_is_and_a_line_moves_alone() {
         let mut window = TestWindow::new("mode='orthogonal'");
         window.tool(tool);
         let scene = window.scene();
-        let (sheet, common) = (scene.sheet(), scene.plane(PlaneName::A).at);
-        let tile = sheet.tiles[0].clone();
-        let [x, y] = sheet.project(&tile, common).0;
+        let (tiling, common) = (scene.tiling(), scene.plane(PlaneName::A).at);
+        let tile = tiling.tiles[0].clone();
+        let [x, y] = tiling.project(&tile, common).0;
         // Three pixels beside it: it does not jump there. The slop of 3 pixels is not dragged.
         window.drag(Button::Left, [x + 2.0, y + 2.0], [x + 2.0 + 23.0, y + 2.0]);
         let moved = window.scene().plane(PlaneName::A).at - common;
-        let wanted = tile.plane.right * 23.0 * sheet.pixel;
-        assert!((moved - wanted).length() < 0.6 * sheet.pixel, "{tool:?}: {moved} {wanted}");
+        let wanted = tile.plane.right * 23.0 * tiling.pixel;
+        assert!((moved - wanted).length() < 0.6 * tiling.pixel, "{tool:?}: {moved} {wanted}");
         let mut window = TestWindow::new("mode='orthogonal'");
         window.tool(tool);
         // The line of plane B runs down through the cross: it moves across only.
         window.drag(Button::Left, [x + 1.0, y + 60.0], [x + 31.0, y + 90.0]);
         let moved = window.scene().plane(PlaneName::A).at - common;
-        assert!(moved.dot(tile.plane.down).abs() < 1e-9 && moved.dot(tile.plane.right) > 20.0 * sheet.pixel, "{moved}");
+        assert!(
+            moved.dot(tile.plane.down).abs() < 1e-9 && moved.dot(tile.plane.right) > 20.0 * tiling.pixel,
+            "{moved}"
+        );
     }
     let mut window = TestWindow::new("mode='orthogonal'\nplanes.position=[1,50,2]");
     window.tool(Tool::Plane);

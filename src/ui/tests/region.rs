@@ -7,8 +7,8 @@ use crate::region_box::{Part, is_on_planes, part_at, rendered_handles, section, 
 const FOUR: &str = "mode='surface'\nlayout='four'\nplanes.smooth={lateral=1,depth=1}\nregion.lateral=[-12,15]\nregion.depth=[30,60]\nregion.elevation=[-10,14]";
 
 fn sides(scene: &Scene, tile: usize) -> Vec<crate::region_box::Side> {
-    let sheet = scene.sheet();
-    section(scene, &sheet, &sheet.tiles[tile])
+    let tiling = scene.tiling();
+    section(scene, &tiling, &tiling.tiles[tile])
 }
 
 fn handle(scene: &Scene, tile: usize, face: Face) -> [f64; 2] {
@@ -25,13 +25,13 @@ fn distance(at: [f64; 2], [from, to]: [[f64; 2]; 2]) -> f64 {
 fn each_plane_shows_the_sides_of_the_region_where_they_are() {
     let scene = TestWindow::new(FOUR).scene();
     assert!(is_on_planes(&scene));
-    let sheet = scene.sheet();
+    let tiling = scene.tiling();
     for (tile, through) in [(0, 2), (1, 0), (2, 1)] {
         let sides = sides(&scene, tile);
         assert_eq!(sides.len(), 4, "tile {tile}: {sides:?}");
         for side in &sides {
             assert_ne!(side.face.axis, through, "the plane is parallel to that face");
-            let ends = side.ends.map(|end| sheet.point(&sheet.tiles[tile], end)[side.face.axis]);
+            let ends = side.ends.map(|end| tiling.point(&tiling.tiles[tile], end)[side.face.axis]);
             let wanted = if side.face.high { scene.high } else { scene.low }[side.face.axis];
             assert!(ends.iter().all(|end| (end - wanted).abs() < 1e-9), "tile {tile}: {ends:?}, not {wanted}");
         }
@@ -62,8 +62,8 @@ fn a_side_follows_the_pointer_on_every_plane() {
             window.tool(Tool::Region);
             let before = window.scene();
             let from = handle(&before, tile, face);
-            let sheet = before.sheet();
-            let inwards = sheet.project(&sheet.tiles[tile], (before.low + before.high) / 2.0).0;
+            let tiling = before.tiling();
+            let inwards = tiling.project(&tiling.tiles[tile], (before.low + before.high) / 2.0).0;
             let to = [0, 1].map(|a| from[a] + 0.3 * (inwards[a] - from[a]));
             window.drag(Button::Left, from, to);
             let after = window.scene();
@@ -89,14 +89,14 @@ fn a_drag_within_moves_all_of_the_region_as_far_as_the_data_reach() {
     let mut window = TestWindow::new(FOUR);
     window.tool(Tool::Region);
     let before = window.scene();
-    let sheet = before.sheet();
-    let middle = sheet.project(&sheet.tiles[0], (before.low + before.high) / 2.0).0;
+    let tiling = before.tiling();
+    let middle = tiling.project(&tiling.tiles[0], (before.low + before.high) / 2.0).0;
     assert_eq!(part_at(&before, 0, middle, [4.0, 6.0]), Some(Part::Inside));
     window.drag(Button::Left, middle, [middle[0] - 20.0, middle[1] + 12.0]);
     let after = window.scene();
     let moved = after.low - before.low;
     assert!((moved - (after.high - before.high)).length() < 1e-9, "it keeps its size");
-    assert!((moved - DVec3::new(-20.0, 12.0, 0.0) * sheet.pixel).length() < 3.1 * sheet.pixel, "{moved}");
+    assert!((moved - DVec3::new(-20.0, 12.0, 0.0) * tiling.pixel).length() < 3.1 * tiling.pixel, "{moved}");
     // Far out it stops where the data end, and comes back with the pointer.
     window.drag(Button::Left, [middle[0] - 20.0, middle[1] + 12.0], [middle[0] - 4000.0, middle[1] + 12.0]);
     let out = window.scene();
@@ -142,13 +142,13 @@ fn the_right_button_steps_the_plane_under_it_and_moves_a_rendering() {
             let mut window = TestWindow::new(FOUR);
             window.tool(tool);
             let before = window.scene();
-            let tile = &before.sheet().tiles[1];
+            let tile = &before.tiling().tiles[1];
             let middle = [0, 1].map(|a| f64::from(tile.corner[a]) + f64::from(tile.size[a]) / 2.0);
             window.drag(button, middle, [middle[0], middle[1] - 10.0]);
             let after = window.scene();
             assert_eq!(after.settings.planes.plane, PlaneName::B);
             let moved = after.plane(PlaneName::B).at - before.plane(PlaneName::B).at;
-            let wanted = tile.plane.normal * 10.0 * before.sheet().pixel;
+            let wanted = tile.plane.normal * 10.0 * before.tiling().pixel;
             assert!((moved - wanted).length() < 1e-6, "{tool:?} {button:?}: {moved}, not {wanted}");
             let centre = Picker::of(&after).centre();
             window.drag(button, centre, [centre[0] + 15.0, centre[1]]);

@@ -22,7 +22,7 @@ fn curved() -> TestWindow {
 
 fn shown(window: &TestWindow) -> StartLine {
     let scene = window.scene();
-    start_line(&scene, &scene.sheet(), 0, window.controls.start_line()).expect("a line")
+    start_line(&scene, &scene.tiling(), 0, window.controls.start_line()).expect("a line")
 }
 
 fn points(window: &TestWindow) -> Vec<[f64; 2]> {
@@ -40,8 +40,8 @@ fn the_line_and_its_handles_are_on_plane_a_where_rendering_starts() {
     for turned in ["", "\nplanes.azimuth=25\nplanes.tilt=-20"] {
         let window = TestWindow::new(&format!("{FOUR}\n{CURVED}{turned}"));
         let (scene, start) = (window.scene(), shown(&window));
-        let (sheet, curve) = (scene.sheet(), scene.start_curve().expect("a curve"));
-        let place = |at: &[f64; 2]| sheet.point(&sheet.tiles[0], *at);
+        let (tiling, curve) = (scene.tiling(), scene.start_curve().expect("a curve"));
+        let place = |at: &[f64; 2]| tiling.point(&tiling.tiles[0], *at);
         let ends = [0, start.line.len() - 1].map(|n| place(&start.line[n]).x);
         assert!((ends[0] + 12.0).abs() < 1e-9 && (ends[1] - 15.0).abs() < 1e-9, "across the region: {ends:?}");
         assert!(start.line.iter().map(place).all(|p| (p.y - curve.depth(p.x)).abs() < 1e-9));
@@ -50,15 +50,15 @@ fn the_line_and_its_handles_are_on_plane_a_where_rendering_starts() {
             assert!((lateral - point[0]).abs() < 1e-9 && (depth - point[1]).abs() < 1e-9);
         }
         assert_eq!(start.handles.len(), 3);
-        let others = [1, 2].map(|tile| start_line(&scene, &sheet, tile, window.controls.start_line()));
+        let others = [1, 2].map(|tile| start_line(&scene, &tiling, tile, window.controls.start_line()));
         assert_eq!(others, [None, None]);
     }
     // A line that is straight is the near face, and has no handles.
     let straight = TestWindow::new(FOUR);
     let (scene, start) = (straight.scene(), shown(&straight));
-    let sheet = scene.sheet();
+    let tiling = scene.tiling();
     assert!(start.handles.is_empty() && start.line.len() == 2);
-    assert!(start.line.iter().all(|at| (sheet.point(&sheet.tiles[0], *at).y - scene.low.y).abs() < 1e-9));
+    assert!(start.line.iter().all(|at| (tiling.point(&tiling.tiles[0], *at).y - scene.low.y).abs() < 1e-9));
     // Where its form cannot be seen, and where nothing starts at it, there is none.
     for toml in [
         FOUR.to_string() + "\nplanes.azimuth=85",
@@ -67,7 +67,7 @@ fn the_line_and_its_handles_are_on_plane_a_where_rendering_starts() {
         FOUR.replace("layout='four'", "layout='single'"),
     ] {
         let scene = TestWindow::new(&toml).scene();
-        assert!(!scene.is_flat() && start_line(&scene, &scene.sheet(), 0, &[]).is_none(), "{toml}");
+        assert!(!scene.is_flat() && start_line(&scene, &scene.tiling(), 0, &[]).is_none(), "{toml}");
     }
 }
 

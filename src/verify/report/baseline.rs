@@ -2,40 +2,12 @@
 //! reporting before any check fails.
 
 use super::{Figure, Outcome, Run, Unit, Verdict, amount, change, number};
+use crate::baselines::{Threshold, differing, matched};
 use crate::profile::compare as profile;
 use crate::profile::compare::{Kind, Line, Series};
 use crate::text::escaped;
-use std::collections::{BTreeMap, HashMap, HashSet};
+use std::collections::{BTreeMap, HashSet};
 use std::fmt::{Display, Formatter};
-
-/// Thresholds of the comparison.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct BaselineOptions {
-    threshold: f64,
-}
-
-impl Default for BaselineOptions {
-    fn default() -> BaselineOptions {
-        BaselineOptions { threshold: 1.05 }
-    }
-}
-
-impl BaselineOptions {
-    /// `threshold`: ratio of times, at least 1, above which a slower check fails the run.
-    ///
-    /// # Errors
-    /// One line: it is not finite or below 1.
-    pub fn new(threshold: f64) -> Result<BaselineOptions, String> {
-        match threshold.is_finite() && threshold >= 1.0 {
-            true => Ok(BaselineOptions { threshold }),
-            false => Err(format!("threshold: {threshold} is not a ratio of at least 1 (1.05 is five percent slower)")),
-        }
-    }
-
-    pub fn threshold(&self) -> f64 {
-        self.threshold
-    }
-}
 
 /// Severity of a change.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -133,50 +105,51 @@ struct Pair<'a> {
     new: &'a Figure,
 }
 
-/// Compares the checks and figures of `new` with those of the same name in `old`.
-pub fn compare(old: &Run, new: &Run, options: &BaselineOptions) -> BaselineComparison {
-    let before: HashMap<_, _> = old.outcomes.iter().map(|o| ((&o.group, &o.name), o)).collect();
-    let now: HashSet<_> = new.outcomes.iter().map(|o| (&o.group, &o.name)).collect();
+/// Compares the checks and figures of `new` with those of the same name in `old`. `threshold`: a slower check fails the run above it.
+pub fn compare(old: &Run, new: &Run, threshold: Threshold) -> BaselineComparison {
     let (mut changes, mut notes, mut pairs) = (Vec::new(), Vec::new(), Vec::new());
-    let (mut still_failing, mut only_new) = (0, 0);
-    for outcome in &new.outcomes {
-        let Some(earlier) = before.get(&(&outcome.group, &outcome.name)) else {
-            only_new += 1;
-            changes.extend(arrived(outcome, old.level == new.level));
-            continue;
-        };
-        still_failing += usize::from([earlier.verdict, outcome.verdict] == [Verdict::Failed; 2]);
-        changes.extend(verdict(earlier, outcome));
-        changes.extend(figures(earlier, outcome, &mut pairs));
+    let (mut still_failing, mut only_new, mut gone, mut both) = (0, 0, 0, Vec::new());
+    let is_same_level = old.level == new.level;
+    for found in matched(&old.outcomes, &new.outcomes, |o| (&o.group, &o.name)) {
+        match found {
+            (Some(earlier), Some(outcome)) => {
+                both.push(outcome);
+                still_failing += usize::from([earlier.verdict, outcome.verdict] == [Verdict::Failed; 2]);
+                changes.extend(verdict(earlier, outcome));
+                changes.extend(figures(earlier, outcome, &mut pairs));
+            }
+            (earlier, Some(outcome)) => {
+                only_new += usize::from(earlier.is_none());
+                changes.extend(arrived(outcome, is_same_level));
+            }
+            (earlier, None) => {
+                gone += 1;
+                changes.extend(earlier.filter(|_| is_same_level).map(missing));
+            }
+        }
     }
-    let gone: Vec<&Outcome> = old.outcomes.iter().filter(|o| !now.contains(&(&o.group, &o.name))).collect();
-    if old.level == new.level {
-        let missing = |o: &&Outcome| Change::new(Class::Changed, o, format!("missing; before it {}", was(o.verdict)));
-        changes.extend(gone.iter().map(missing));
-    } else {
+    if !is_same_level {
         let [was, is] = [old, new].map(|run| run.level.word());
         notes.push(format!(
             "the levels differ ({was} -> {is}), and with them the inputs of passes: an error that is another may say nothing of the device"
         ));
-        if gone.len() + only_new > 0 {
-            let gone = gone.len();
+        if gone + only_new > 0 {
             notes.push(format!(
                 "checks that only the earlier run has, {gone}, and that only this one has, {only_new}, are not compared"
             ));
         }
     }
-    let times = judge_times(&pairs, [old, new], options);
+    let times = judge_times(&pairs, [old, new], threshold);
     changes.extend(error_changes(&pairs));
     changes.extend(times.changes);
     notes.extend(times.notes);
     // The sort is stable: within a class the order stays.
     changes.sort_by_key(|c| c.class);
     let touched: HashSet<_> = changes.iter().map(|c| (&c.group, &c.name)).collect();
-    let is_same = |o: &&Outcome| before.contains_key(&(&o.group, &o.name)) && !touched.contains(&(&o.group, &o.name));
-    let same = new.outcomes.iter().filter(is_same).count();
+    let same = both.iter().filter(|o| !touched.contains(&(&o.group, &o.name))).count();
     BaselineComparison {
         baseline: described(old),
-        differences: differences(old, new),
+        differences: differing(conditions(old), conditions(new)),
         notes,
         changes,
         same,
@@ -184,13 +157,10 @@ pub fn compare(old: &Run, new: &Run, options: &BaselineOptions) -> BaselineCompa
     }
 }
 
-fn was(verdict: Verdict) -> &'static str {
-    match verdict {
-        Verdict::Passed => "passed",
-        Verdict::Failed => "failed",
-        Verdict::LeftOut => "was left out",
-        Verdict::Interrupted => "was interrupted",
-    }
+/// The change for a check that only the old run has.
+fn missing(earlier: &Outcome) -> Change {
+    let was = if matches!(earlier.verdict, Verdict::Passed | Verdict::Failed) { "" } else { "was " };
+    Change::new(Class::Changed, earlier, format!("missing; before it {was}{}", earlier.verdict.word()))
 }
 
 /// The change for a check that only the new run has: reported if both should have it, and always if it fails.
@@ -226,19 +196,16 @@ fn figures<'a>(old: &'a Outcome, new: &'a Outcome, pairs: &mut Vec<Pair<'a>>) ->
     let mut report = |figure: &Figure, what: &str| {
         changes.push(Change::new(Class::Changed, new, format!("{}: {what}", escaped(&figure.what))));
     };
-    for figure in new.figures.iter().filter(|f| !f.fleeting) {
-        match old.figures.iter().find(|f| f.what == figure.what) {
-            Some(earlier) if earlier.unit == figure.unit => pairs.push(Pair { of: new, old: earlier, new: figure }),
-            Some(_) => report(figure, "measured in another unit than before, not compared"),
+    for found in matched(&old.figures, &new.figures, |figure| &figure.what) {
+        match found {
+            (_, Some(figure)) | (Some(figure), None) if figure.fleeting => {}
+            (Some(old), Some(figure)) if old.unit == figure.unit => pairs.push(Pair { of: new, old, new: figure }),
+            (Some(_), Some(figure)) => report(figure, "measured in another unit than before, not compared"),
             // Runs of earlier versions have no times of compilation.
-            None if both_passed && !figure.is_single_time() => report(figure, "not measured before"),
-            None => {}
+            (None, Some(figure)) if both_passed && !figure.is_single_time() => report(figure, "not measured before"),
+            (Some(figure), None) if both_passed => report(figure, "measured before, and not now"),
+            _ => {}
         }
-    }
-    for figure in
-        old.figures.iter().filter(|f| both_passed && !f.fleeting && new.figures.iter().all(|g| g.what != f.what))
-    {
-        report(figure, "measured before, and not now");
     }
     changes
 }
@@ -249,19 +216,13 @@ fn described(run: &Run) -> String {
     format!("the run of {date} ({program}, {}) on {device}, {driver}", run.level.word())
 }
 
-fn differences(old: &Run, new: &Run) -> Vec<String> {
-    let of = |what: fn(&Run) -> String| [old, new].map(|run| escaped(&what(run)));
-    let conditions = [
-        ("device", of(|r| r.device.name.clone())),
-        ("driver", of(|r| r.device.driver.clone())),
-        ("Vulkan", of(|r| r.device.api.clone())),
-        ("clocks", of(|r| r.device.clocks.clone().unwrap_or_else(|| "not known".into()))),
-        ("program", of(|r| r.program.clone())),
-        ("level", of(|r| r.level.word().into())),
-        ("validation layer", of(|r| if r.validation { "watching" } else { "not watching" }.into())),
+fn conditions(run: &Run) -> impl Iterator<Item = (&'static str, String)> {
+    let others = [
+        ("program", run.program.clone()),
+        ("level", run.level.word().into()),
+        ("validation layer", if run.validation { "watching" } else { "not watching" }.into()),
     ];
-    let differing = conditions.into_iter().filter(|(_, [old, new])| old != new);
-    differing.map(|(what, [old, new])| format!("{what}: {old} -> {new}")).collect()
+    run.device.conditions().into_iter().chain(others).map(|(what, text)| (what, escaped(&text)))
 }
 
 /// Relative difference above which a change of an error is reported.
@@ -342,7 +303,7 @@ struct TimeChanges {
 }
 
 /// Changes of times by more than the noise of the device, by the method of `profile --compare`. `runs`: old, new.
-fn judge_times(pairs: &[Pair], runs: [&Run; 2], options: &BaselineOptions) -> TimeChanges {
+fn judge_times(pairs: &[Pair], runs: [&Run; 2], threshold: Threshold) -> TimeChanges {
     let times: Vec<&Pair> = pairs.iter().filter(|p| p.new.unit == Unit::Ns && !p.new.is_single_time()).collect();
     let because = incomparable(runs);
     let mut found = TimeChanges::default();
@@ -361,7 +322,7 @@ fn judge_times(pairs: &[Pair], runs: [&Run; 2], options: &BaselineOptions) -> Ti
         old: series(p.old),
         new: series(p.new),
     });
-    let criteria = profile::CompareOptions { threshold: options.threshold(), alpha: ALPHA, force: true };
+    let criteria = profile::CompareOptions { threshold, alpha: ALPHA, force: true };
     let lines = match profile::judge(lines.collect(), blocks, tick, &criteria) {
         Ok(lines) => lines,
         Err(fault) => {
@@ -373,7 +334,7 @@ fn judge_times(pairs: &[Pair], runs: [&Run; 2], options: &BaselineOptions) -> Ti
     for (pair, line) in times.iter().zip(&lines) {
         match &line.note {
             Some(why) if line.verdict == profile::Verdict::NotComparable => *left.entry(why.clone()).or_default() += 1,
-            _ => found.changes.extend(time_change(pair, line, options, because.is_some())),
+            _ => found.changes.extend(time_change(pair, line, threshold, because.is_some())),
         }
     }
     found.notes.extend(because.map(|why| format!("{why}: times are told, and fail nothing")));
@@ -418,7 +379,7 @@ fn incomparable([old, new]: [&Run; 2]) -> Option<&'static str> {
     }
 }
 
-fn time_change(pair: &Pair, line: &Line, options: &BaselineOptions, is_informative: bool) -> Option<Change> {
+fn time_change(pair: &Pair, line: &Line, threshold: Threshold, is_informative: bool) -> Option<Change> {
     let ratio = line.ratio?;
     let class = match line.verdict {
         profile::Verdict::Slower if line.is_regression && !is_informative => Class::Worse,
@@ -432,7 +393,7 @@ fn time_change(pair: &Pair, line: &Line, options: &BaselineOptions, is_informati
     };
     let medians = line.old_ns.zip(line.new_ns).map_or_else(String::new, |(old, new)| change(old, new, Unit::Ns));
     let under = match line.verdict == profile::Verdict::Slower && !line.is_regression {
-        true => format!(", within the threshold of {} %", number(100.0 * (options.threshold() - 1.0))),
+        true => format!(", within the threshold of {} %", number(100.0 * (threshold.ratio() - 1.0))),
         false => String::new(),
     };
     let what = format!(

@@ -4,6 +4,7 @@ use super::baseline::{BaselineComparison, Class};
 use super::{
     Figure, Outcome, PictureComparison, Run, Unit, Verdict, amount, fault_items, percent, seconds, value_of_limit,
 };
+use crate::baselines::Stored;
 use crate::html_page::page;
 use crate::picture::Picture;
 use crate::profile::LEVEL;
@@ -22,7 +23,7 @@ const MAX_OPEN: usize = 40;
 /// # Errors
 /// One line: [`Run::check`] refuses the run.
 pub fn html(run: &Run, compared: Option<&BaselineComparison>) -> Result<String, String> {
-    run.check().map_err(|e| e.to_string())?;
+    run.check()?;
     let mut embedded = EmbeddedPictures::default();
     let failures: Vec<&Outcome> = run.failures().collect();
     let result = match overall(run, compared) {

@@ -9,6 +9,7 @@ pub mod html;
 pub mod junit;
 pub mod prometheus;
 
+use crate::baselines::Stored;
 use crate::machine::Device;
 use crate::picture::Picture;
 use crate::profile::statistics::{Sample, SampleError};
@@ -18,21 +19,6 @@ use serde::{Deserialize, Serialize};
 use std::collections::{HashMap, HashSet};
 use std::fmt::Write as _;
 use std::time::Duration;
-
-/// Version of the JSON format.
-pub const FORMAT: &str = "echolume-verify-1";
-
-/// Why a run cannot be read or written.
-#[derive(Debug, thiserror::Error)]
-pub enum VerifyError {
-    #[error("format is '{found}', this program reads '{FORMAT}'; verify again with it")]
-    Format { found: String },
-    #[error("not a verification: {0}")]
-    Json(String),
-    /// Inconsistent contents.
-    #[error("{field}: {fault}")]
-    Contents { field: String, fault: String },
-}
 
 /// How much to check.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
@@ -48,7 +34,7 @@ pub enum Level {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Run {
-    /// [`FORMAT`].
+    /// [`Stored::FORMAT`].
     pub format: String,
     /// Name, version and build of the program.
     pub program: String,
@@ -332,54 +318,16 @@ pub const MAX_OUTCOMES: usize = 100_000;
 /// Maximum number of times of one figure in a file.
 pub const MAX_SAMPLES: usize = 100_000;
 
-/// A run as JSON. Every number is exact, including NaN and infinities; pictures are omitted.
-///
-/// # Errors
-/// One line: [`Run::check`] refuses it.
-pub fn to_json(run: &Run) -> Result<String, VerifyError> {
-    run.check()?;
-    let mut text = serde_json::to_string_pretty(run).map_err(|e| VerifyError::Json(escaped(&e.to_string())))?;
-    text.push('\n');
-    Ok(text)
-}
+/// Names are unique, lists bounded, and times and limits finite. Errors and values may be anything, since NaN from a device is a valid
+/// finding. Pictures are not written.
+impl Stored for Run {
+    const FORMAT: &'static str = "echolume-verify-1";
+    const WHAT: &'static str = "a verification";
+    const AGAIN: &'static str = "verify again with it";
+    const KIND: &'static str = "--json of verify";
+    const MAX_BYTES: u64 = 256 << 20;
 
-/// Reads a run. Any text gives a consistent run or an error.
-///
-/// # Errors
-/// One line: another format, no JSON of a run, or contents that [`Run::check`] refuses.
-pub fn from_json(text: &str) -> Result<Run, VerifyError> {
-    /// Read first, to distinguish a run of another version from a file that is none.
-    #[derive(Deserialize)]
-    struct Version {
-        format: String,
-    }
-    let fault = |e: serde_json::Error| VerifyError::Json(escaped(&e.to_string()));
-    let version: Version = serde_json::from_str(text).map_err(fault)?;
-    if version.format != FORMAT {
-        return Err(VerifyError::Format { found: escaped(&version.format) });
-    }
-    let run: Run = serde_json::from_str(text).map_err(fault)?;
-    run.check()?;
-    Ok(run)
-}
-
-/// A field, and what is wrong with it.
-type FieldFault = (String, String);
-
-impl Run {
-    /// Checks that names are unique, lists bounded, and times and limits finite. Errors and values may be anything, since NaN from a
-    /// device is a valid finding.
-    ///
-    /// # Errors
-    /// One line: the first inconsistent field.
-    pub fn check(&self) -> Result<(), VerifyError> {
-        if self.format != FORMAT {
-            return Err(VerifyError::Format { found: escaped(&self.format) });
-        }
-        self.fault().map_or(Ok(()), |(field, fault)| Err(VerifyError::Contents { field, fault }))
-    }
-
-    fn fault(&self) -> Option<FieldFault> {
+    fn fault(&self) -> Option<(String, String)> {
         if let Some(fault) = not_a_time(self.seconds) {
             return Some(("seconds".into(), fault));
         }

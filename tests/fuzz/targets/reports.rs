@@ -1,6 +1,7 @@
 //! Reports of earlier runs, and ordinary pictures.
 
 use super::{told, written};
+use echolume::low_level::baselines::{Stored, Threshold};
 use echolume::low_level::error_report::choose::Bound;
 use echolume::low_level::error_report::{Measure, Report, choose, export as error_export};
 use echolume::low_level::picture::Grey;
@@ -61,14 +62,14 @@ pub fn picture(bytes: &[u8]) -> String {
 
 /// An accepted run round-trips, does not differ from itself, and makes reports.
 pub fn verification(bytes: &[u8]) -> String {
-    let run = match report::from_json(&String::from_utf8_lossy(bytes)) {
+    let run = match report::Run::from_json(&String::from_utf8_lossy(bytes)) {
         Ok(run) => run,
         Err(error) => return told(error),
     };
-    let written = report::to_json(&run).expect("JSON");
-    let again = report::from_json(&written).expect("what was written out is right");
-    assert_eq!(report::to_json(&again).expect("JSON"), written);
-    let compared = baseline::compare(&run, &again, &baseline::BaselineOptions::default());
+    let written = run.to_json().expect("JSON");
+    let again = report::Run::from_json(&written).expect("what was written out is right");
+    assert_eq!(again.to_json().expect("JSON"), written);
+    let compared = baseline::compare(&run, &again, Threshold::default());
     assert!(compared.lines().is_empty(), "{:?}", compared.lines());
     junit::junit(&run, Some(&compared)).expect("XML");
     page::html(&run, Some(&compared)).expect("a page");

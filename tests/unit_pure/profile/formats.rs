@@ -1,6 +1,7 @@
 //! Tables, CSV and JSON of a profile.
 
 use super::simulated::{Noise, Random, pass, profile, run};
+use echolume::low_level::baselines::Stored;
 use echolume::low_level::profile::export::{csv, csv_samples, profile_table};
 use echolume::low_level::profile::{Profile, settings_hash};
 

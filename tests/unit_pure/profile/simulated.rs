@@ -1,9 +1,8 @@
 //! Simulated runs with a known truth.
 
+use echolume::low_level::baselines::Stored;
 use echolume::low_level::machine::Device;
-use echolume::low_level::profile::{
-    Acquisition, Ceiling, Ceilings, FORMAT, PassProfile, Profile, Sizes, settings_hash,
-};
+use echolume::low_level::profile::{Acquisition, Ceiling, Ceilings, PassProfile, Profile, Sizes, settings_hash};
 
 /// Vigna's splitmix64: the same numbers everywhere.
 pub struct Random(pub u64);
@@ -93,7 +92,7 @@ pub fn profile(repeats: usize) -> Profile {
     let scene = "mode = \"vr\"\n[ray]\nstep = 0.5\n";
     let ceiling = |median: f64| Ceiling { median, low: 0.97 * median, high: 1.02 * median };
     Profile {
-        format: FORMAT.into(),
+        format: Profile::FORMAT.into(),
         program: "echolume 0.1.0, release".into(),
         date: "2026-01-02T03:04:05Z".into(),
         device: Device {

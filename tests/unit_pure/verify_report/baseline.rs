@@ -3,13 +3,14 @@
 use super::profile;
 use super::profile::Random;
 use super::simulated::{any_run, check, fail, outcome, run, slower};
-use echolume::low_level::verify::report::baseline::{BaselineComparison, BaselineOptions, Class, compare};
+use echolume::low_level::baselines::Threshold;
+use echolume::low_level::verify::report::baseline::{BaselineComparison, Class, compare};
 use echolume::low_level::verify::report::{self, Figure, Level, Run, Unit, Verdict};
 use proptest::prelude::*;
 use std::time::Duration;
 
 fn compared(old: &Run, new: &Run) -> BaselineComparison {
-    compare(old, new, &BaselineOptions::default())
+    compare(old, new, Threshold::default())
 }
 
 /// Class and text of every change.
@@ -206,17 +207,8 @@ fn slower_within_the_threshold_is_reported_and_fails_nothing() {
     assert!(!small.is_worse() && small.changes.len() == 1, "{:?}", small.lines());
     assert!(small.lines()[0].starts_with("speed / shade: device time 3.0 % slower (1.0"), "{:?}", small.lines());
     assert!(small.lines()[0].ends_with(", within the threshold of 5 %"), "{:?}", small.lines());
-    let strict = BaselineOptions::new(1.01).expect("options");
-    assert!(compare(&old, &new, &strict).is_worse());
-}
-
-#[test]
-fn a_threshold_below_one_is_refused() {
-    for threshold in [0.99, f64::NAN, f64::INFINITY, -1.0] {
-        let error = BaselineOptions::new(threshold).expect_err("refused");
-        assert!(error.ends_with("is not a ratio of at least 1 (1.05 is five percent slower)"), "{error}");
-    }
-    assert_eq!(BaselineOptions::default().threshold(), 1.05);
+    let strict = Threshold::new(1.01).expect("a ratio");
+    assert!(compare(&old, &new, strict).is_worse());
 }
 
 #[test]
@@ -286,9 +278,9 @@ proptest! {
 
     #[test]
     fn any_two_runs_compare_in_lines_and_none_differs_from_itself(old in any_run(), new in any_run()) {
-        let compared = compare(&old, &new, &BaselineOptions::default());
+        let compared = compare(&old, &new, Threshold::default());
         prop_assert!(compared.lines().iter().all(|line| !line.chars().any(char::is_control)));
-        let itself = compare(&new, &new, &BaselineOptions::default());
+        let itself = compare(&new, &new, Threshold::default());
         prop_assert!(itself.lines().is_empty(), "{:?}", itself.lines());
     }
 }

@@ -1,14 +1,15 @@
 //! The page, read back as a browser would.
 
 use super::simulated::{any_run, check, fail, outcome, run, shown, slower};
-use echolume::low_level::verify::report::baseline::{BaselineOptions, compare};
+use echolume::low_level::baselines::Threshold;
+use echolume::low_level::verify::report::baseline::compare;
 use echolume::low_level::verify::report::html::html;
 use echolume::low_level::verify::report::{Fault, Figure, Run, Unit, Verdict};
 use proptest::prelude::*;
 use scraper::{ElementRef, Html, Selector};
 
 fn page(run: &Run, old: Option<&Run>) -> String {
-    let compared = old.map(|old| compare(old, run, &BaselineOptions::default()));
+    let compared = old.map(|old| compare(old, run, Threshold::default()));
     html(run, compared.as_ref()).expect("page")
 }
 

@@ -1,22 +1,23 @@
 //! Runs as JSON.
 
 use super::simulated::{any_run, check, empty, fail, run};
+use echolume::low_level::baselines::Stored;
 use echolume::low_level::verify::report::{Figure, Run, Unit};
-use echolume::low_level::verify::report::{MAX_OUTCOMES, MAX_SAMPLES, from_json, to_json};
+use echolume::low_level::verify::report::{MAX_OUTCOMES, MAX_SAMPLES};
 use proptest::prelude::*;
 
 /// Non-finite numbers make runs unequal to themselves: they are compared by their text.
 fn comes_back(run: &Run) {
-    let text = to_json(run).expect("JSON");
-    let again = from_json(&text).expect("run");
-    assert_eq!(to_json(&again).expect("JSON"), text);
+    let text = run.to_json().expect("JSON");
+    let again = Run::from_json(&text).expect("run");
+    assert_eq!(again.to_json().expect("JSON"), text);
     assert_eq!(format!("{again:?}"), format!("{run:?}"));
 }
 
 #[test]
 fn a_run_round_trips_without_a_change() {
     let whole = run(1);
-    assert_eq!(from_json(&to_json(&whole).expect("JSON")).expect("run"), whole);
+    assert_eq!(Run::from_json(&whole.to_json().expect("JSON")).expect("run"), whole);
     comes_back(&whole);
     comes_back(&empty());
 }
@@ -31,7 +32,7 @@ fn non_finite_findings_are_kept() {
         let worst = shade.faults[0].worst.as_mut().expect("worst");
         (worst.got, worst.expected) = (value, -0.0);
         shade.figures[0].value = value;
-        let text = to_json(&run).expect("JSON");
+        let text = run.to_json().expect("JSON");
         assert!(text.contains(&format!("\"got\": \"{word}\"")) && !text.contains("null"), "{text}");
         comes_back(&run);
     }
@@ -41,15 +42,15 @@ fn non_finite_findings_are_kept() {
 fn pictures_are_not_written() {
     let mut run = run(3);
     fail(&mut run, "passes", "shade");
-    let again = from_json(&to_json(&run).expect("JSON")).expect("run");
+    let again = Run::from_json(&run.to_json().expect("JSON")).expect("run");
     assert!(again.outcomes.iter().all(|o| o.pictures.is_empty()));
 }
 
 #[test]
 fn other_versions_other_files_and_contradictions_are_refused_in_one_line() {
-    let good = to_json(&run(4)).expect("JSON");
+    let good = run(4).to_json().expect("JSON");
     let error = |text: &str| {
-        let line = from_json(text).expect_err("refused").to_string();
+        let line = Run::from_json(text).expect_err("refused").to_string();
         assert!(!line.chars().any(char::is_control) && line.len() < 1000, "{line:?}");
         line
     };
@@ -86,7 +87,7 @@ fn what_contradicts_itself_is_neither_read_nor_written() {
     let broken = |change: &dyn Fn(&mut Run)| {
         let mut run = run(5);
         change(&mut run);
-        let line = to_json(&run).expect_err("refused").to_string();
+        let line = run.to_json().expect_err("refused").to_string();
         assert_eq!(line.lines().count(), 1, "{line}");
         line
     };
@@ -126,7 +127,7 @@ proptest! {
 
     #[test]
     fn any_text_gives_a_run_or_one_line(text in any::<String>()) {
-        if let Err(error) = from_json(&text) {
+        if let Err(error) = Run::from_json(&text) {
             prop_assert_eq!(error.to_string().lines().count(), 1);
         }
     }

@@ -1,14 +1,15 @@
 //! JUnit XML, read back by another parser.
 
 use super::simulated::{any_run, check, fail, run};
-use echolume::low_level::verify::report::baseline::{BaselineOptions, compare};
+use echolume::low_level::baselines::Threshold;
+use echolume::low_level::verify::report::baseline::compare;
 use echolume::low_level::verify::report::junit::junit;
 use echolume::low_level::verify::report::{Run, Verdict};
 use proptest::prelude::*;
 use roxmltree::{Document, Node};
 
 fn written(run: &Run, old: Option<&Run>) -> String {
-    let compared = old.map(|old| compare(old, run, &BaselineOptions::default()));
+    let compared = old.map(|old| compare(old, run, Threshold::default()));
     junit(run, compared.as_ref()).expect("XML")
 }
 

@@ -2,7 +2,8 @@
 
 use super::simulated::{any_run, check, fail, run};
 use crate::metrics::{Metrics, parsed};
-use echolume::low_level::verify::report::baseline::{BaselineOptions, compare};
+use echolume::low_level::baselines::Threshold;
+use echolume::low_level::verify::report::baseline::compare;
 use echolume::low_level::verify::report::prometheus::prometheus;
 use echolume::low_level::verify::report::{Run, Verdict};
 use proptest::prelude::*;
@@ -47,7 +48,7 @@ fn checks_that_became_worse_are_counted_where_there_is_a_baseline() {
     fail(&mut new, "modes", "plane");
     assert_eq!(value(&parsed(&prometheus(&new, None)), "checks_worse", None), None);
     for (run, worse) in [(&old, 0.0), (&new, 2.0)] {
-        let compared = compare(&old, run, &BaselineOptions::default());
+        let compared = compare(&old, run, Threshold::default());
         assert_eq!(value(&parsed(&prometheus(run, Some(&compared))), "checks_worse", None), Some(worse));
     }
 }

@@ -2,9 +2,10 @@
 
 use super::profile;
 use super::profile::{Noise, Random};
+use echolume::low_level::baselines::Stored;
 use echolume::low_level::picture::Picture;
 use echolume::low_level::verify::report::{
-    FORMAT, Fault, Figure, Level, Outcome, PictureComparison, Run, Unit, Verdict, Worst,
+    Fault, Figure, Level, Outcome, PictureComparison, Run, Unit, Verdict, Worst,
 };
 use proptest::prelude::*;
 
@@ -31,7 +32,7 @@ pub fn outcome(group: &str, name: &str, verdict: Verdict) -> Outcome {
 /// A run without checks.
 pub fn empty() -> Run {
     Run {
-        format: FORMAT.into(),
+        format: Run::FORMAT.into(),
         program: "echolume 0.1.0, release".into(),
         date: "2026-01-02T03:04:05Z".into(),
         device: profile::profile(1).device,

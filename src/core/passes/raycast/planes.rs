@@ -4,7 +4,7 @@
 use super::ray;
 use crate::passes::pass::*;
 use crate::passes::postprocess;
-use crate::scene::planes::{Column, Sheet, Tile};
+use crate::scene::planes::{Column, Tile, Tiling};
 use crate::scene::{Scene, Slab};
 use glam::DVec3;
 
@@ -36,10 +36,10 @@ pub(crate) const PASS: Pass = Pass {
     reference: |scene, _, reads, writes| {
         let volume = reads.get("volume");
         let picture = writes.get_mut("picture");
-        let sheet = Cut::of(scene);
+        let cut = Cut::of(scene);
         let [width, height, _] = picture.size;
         for (x, y) in (0..height).flat_map(|y| (0..width).map(move |x| (x, y))) {
-            let rgba = value_at(scene, volume, &sheet, x, y).map_or([0.0; 4], |v| [v, v, v, 1.0]);
+            let rgba = value_at(scene, volume, &cut, x, y).map_or([0.0; 4], |v| [v, v, v, 1.0]);
             picture.set([x, y, 0], &rgba);
         }
     },
@@ -66,11 +66,11 @@ pub(crate) const TONED: Pass = Pass {
     reference: |scene, _, reads, writes| {
         let volume = reads.get("volume");
         let screen = writes.get_mut("screen");
-        let sheet = Cut::of(scene);
+        let cut = Cut::of(scene);
         let [width, height, _] = screen.size;
         for (x, y) in (0..height).flat_map(|y| (0..width).map(move |x| (x, y))) {
-            let colour = value_at(scene, volume, &sheet, x, y).map(|v| [v; 3]);
-            screen.set([x, y, 0], &postprocess::reference_pixel(scene, Some(&sheet.sheet), colour, x, y));
+            let colour = value_at(scene, volume, &cut, x, y).map(|v| [v; 3]);
+            screen.set([x, y, 0], &postprocess::reference_pixel(scene, Some(&cut.tiling), colour, x, y));
         }
     },
     ..PASS
@@ -110,25 +110,25 @@ fn run(scene: &Scene) -> u32 {
     if scene.is_for_cpu() { 8 } else { 1 }
 }
 
-/// The sheet, and the columns of its curved plane.
+/// The tiling, and the columns of its curved plane.
 struct Cut {
-    sheet: Sheet,
+    tiling: Tiling,
     columns: Vec<Option<Column>>,
 }
 
 impl Cut {
     fn of(scene: &Scene) -> Cut {
-        let sheet = scene.sheet();
-        let columns = sheet.tiles.last().map_or(Vec::new(), Tile::columns);
-        Cut { sheet, columns }
+        let tiling = scene.tiling();
+        let columns = tiling.tiles.last().map_or(Vec::new(), Tile::columns);
+        Cut { tiling, columns }
     }
 }
 
 /// The value of a pixel; none outside all tiles, beyond the ends of a curved plane, and outside the insonified region.
-fn value_at(scene: &Scene, volume: &Texels, Cut { sheet, columns }: &Cut, x: usize, y: usize) -> Option<f64> {
-    let tile = sheet.tile_at(x, y)?;
+fn value_at(scene: &Scene, volume: &Texels, Cut { tiling, columns }: &Cut, x: usize, y: usize) -> Option<f64> {
+    let tile = tiling.tile_at(x, y)?;
     if tile.section.is_none() {
-        return slab(scene, volume, sheet.place(tile, x, y), tile.plane.normal);
+        return slab(scene, volume, tiling.place(tile, x, y), tile.plane.normal);
     }
     let (place, across) = columns[x - tile.corner[0] as usize]?;
     let down = (y as f64 + 0.5 - f64::from(tile.corner[1]) - f64::from(tile.size[1]) / 2.0) * tile.pixel;
@@ -139,9 +139,9 @@ fn value_at(scene: &Scene, volume: &Texels, Cut { sheet, columns }: &Cut, x: usi
 /// pixels, and their direction is that through the slab.
 fn unmoved(scene: &Scene) -> Scene {
     let zero = DVec3::ZERO;
-    let sheet = scene.sheet();
-    let vectors = match &sheet.tiles[..] {
-        [tile] => sheet.vectors(tile, scene.settings.planes.thickness),
+    let tiling = scene.tiling();
+    let vectors = match &tiling.tiles[..] {
+        [tile] => tiling.vectors(tile, scene.settings.planes.thickness),
         _ => [zero, zero, zero, DVec3::Y],
     };
     let mut still = ray::unmoved(scene, vectors);

@@ -86,11 +86,11 @@ fn largest_edge(scene: &Scene, [low, high]: [f64; 2], samples: &[Option<f64>]) -
 }
 
 fn planes(scene: &Scene, volume: &Texels, survey: &mut Survey) {
-    let sheet = scene.sheet();
+    let tiling = scene.tiling();
     let [width, height] = scene.picture_size().map(|n| n as usize);
     for (x, y) in (0..height).flat_map(|y| (0..width).map(move |x| (x, y))) {
-        let Some(tile) = sheet.tile_at(x, y) else { continue };
-        let place = sheet.point(tile, [x, y].map(|n| n as f64 + 0.5));
+        let Some(tile) = tiling.tile_at(x, y) else { continue };
+        let place = tiling.point(tile, [x, y].map(|n| n as f64 + 0.5));
         let within = (0..3).all(|axis| place[axis] >= scene.low[axis] && place[axis] <= scene.high[axis]);
         if !within || scene.clips().any(|(normal, limit)| normal.dot(place) > limit) {
             continue;

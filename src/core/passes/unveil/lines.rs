@@ -2,7 +2,7 @@
 
 use super::Unveiled;
 use crate::passes::raycast::ray;
-use crate::scene::planes::{Sheet, Tile};
+use crate::scene::planes::{Tile, Tiling};
 use crate::scene::start_curve::StartCurve;
 use crate::scene::{Layout, Scene};
 use glam::DVec3;
@@ -32,8 +32,8 @@ pub fn lines(scene: &Scene, unveiled: Option<&Unveiled>) -> Vec<StartLine> {
     if !is_shown || (start.surface.is_none() && start.curve.is_none()) {
         return Vec::new();
     }
-    let sheet = scene.sheet();
-    sheet.tiles.iter().map(|tile| on_tile(scene, &start, &sheet, tile)).collect()
+    let tiling = scene.tiling();
+    tiling.tiles.iter().map(|tile| on_tile(scene, &start, &tiling, tile)).collect()
 }
 
 /// What rendering starts at.
@@ -71,7 +71,7 @@ fn behind(scene: &Scene, unveiled: &Unveiled, place: DVec3) -> Option<f64> {
 }
 
 /// Marching squares (Lorensen and Cline 1987, in the plane) over cells of the tile.
-fn on_tile(scene: &Scene, start: &Start, sheet: &Sheet, tile: &Tile) -> StartLine {
+fn on_tile(scene: &Scene, start: &Start, tiling: &Tiling, tile: &Tile) -> StartLine {
     let [corner, size] = [tile.corner, tile.size].map(|edge| edge.map(f64::from));
     let at = |x: usize, y: usize| -> [f64; 2] {
         let share = [x, y].map(|n| n as f64 / CELLS as f64);
@@ -80,7 +80,7 @@ fn on_tile(scene: &Scene, start: &Start, sheet: &Sheet, tile: &Tile) -> StartLin
     let width = CELLS + 1;
     let points: Vec<[usize; 2]> = (0..width).flat_map(|y| (0..width).map(move |x| [x, y])).collect();
     let values: Vec<Option<f64>> =
-        points.iter().map(|[x, y]| start.behind(scene, sheet.point(tile, at(*x, *y)))).collect();
+        points.iter().map(|[x, y]| start.behind(scene, tiling.point(tile, at(*x, *y)))).collect();
     let mut pieces = Vec::new();
     for (x, y) in (0..CELLS).flat_map(|y| (0..CELLS).map(move |x| (x, y))) {
         // Around the cell.

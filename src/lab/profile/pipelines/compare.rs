@@ -2,8 +2,8 @@
 //! any spill is a fact, and a few instructions or registers more are not worth a word.
 
 use super::{Pipeline, PipelineProfile};
+use crate::baselines::{differing, matched};
 use serde::Serialize;
-use std::collections::HashMap;
 
 /// Ratio above which more registers or instructions are reported as worse.
 const GROWTH: f64 = 1.05;
@@ -76,20 +76,18 @@ pub fn compare(old: &PipelineProfile, new: &PipelineProfile, force: bool) -> Res
     if old.device != new.device && !force {
         return Err(CompareError::Devices { old: old.device.clone(), new: new.device.clone() });
     }
-    let key = |p: &Pipeline| (p.shader.clone(), p.constants.clone(), p.formats.clone());
-    let before: HashMap<_, &Pipeline> = old.pipelines.iter().map(|p| (key(p), p)).collect();
     let (mut changes, mut new_spills, mut compared, mut cold_ms) = (Vec::new(), Vec::new(), 0, [0.0; 2]);
-    for pipeline in &new.pipelines {
-        match before.get(&key(pipeline)) {
-            Some(earlier) => {
+    for both in matched(&old.pipelines, &new.pipelines, |p| (&p.shader, &p.constants, &p.formats)) {
+        match both {
+            (Some(earlier), Some(pipeline)) => {
                 compared += 1;
                 cold_ms = [cold_ms[0] + earlier.cold_ms, cold_ms[1] + pipeline.cold_ms];
                 changes.extend(changes_of(old, earlier, new, pipeline));
             }
-            None if new.columns(pipeline).spills.is_some_and(|spills| spills > 0.0) => {
+            (None, Some(pipeline)) if new.columns(pipeline).spills.is_some_and(|spills| spills > 0.0) => {
                 new_spills.push(pipeline.title())
             }
-            None => {}
+            _ => {}
         }
     }
     if compared == 0 {
@@ -98,8 +96,7 @@ pub fn compare(old: &PipelineProfile, new: &PipelineProfile, force: bool) -> Res
     // The sort is stable: the order of use stays.
     changes.sort_by_key(|change| !change.is_worse);
     let conditions =
-        [("device", &old.device, &new.device), ("driver", &old.driver, &new.driver), ("input", &old.input, &new.input)];
-    let differing = conditions.into_iter().filter(|(_, old, new)| old != new);
+        |p: &PipelineProfile| [("device", p.device.clone()), ("driver", p.driver.clone()), ("input", p.input.clone())];
     Ok(PipelineComparison {
         format: "echolume-pipeline-comparison-1",
         compared,
@@ -108,7 +105,7 @@ pub fn compare(old: &PipelineProfile, new: &PipelineProfile, force: bool) -> Res
         changes,
         new_spills,
         cold_ms,
-        notes: differing.map(|(what, old, new)| format!("{what}: {old} -> {new}")).collect(),
+        notes: differing(conditions(old), conditions(new)),
     })
 }
 
@@ -136,8 +133,9 @@ fn changes_of(old: &PipelineProfile, earlier: &Pipeline, new: &PipelineProfile, 
 
 #[cfg(test)]
 mod tests {
-    use super::super::{Executable, FORMAT};
+    use super::super::Executable;
     use super::*;
+    use crate::baselines::Stored;
 
     /// Waves, spills, registers, instructions of pipelines that differ by a constant.
     fn profile(pipelines: &[(i32, [f64; 4])]) -> PipelineProfile {
@@ -156,7 +154,7 @@ mod tests {
             }],
         };
         PipelineProfile {
-            format: FORMAT.into(),
+            format: PipelineProfile::FORMAT.into(),
             program: "p".into(),
             date: "d".into(),
             device: "GPU".into(),
@@ -223,7 +221,7 @@ mod tests {
         let text = plain.to_json().expect("json");
         assert_eq!(PipelineProfile::from_json(&text).expect("read back"), plain);
         assert_eq!(text.lines().count(), 4, "a line for each pipeline: {text}");
-        assert!(PipelineProfile::from_json(&text.replace(FORMAT, "echolume-profile-2")).is_err());
+        assert!(PipelineProfile::from_json(&text.replace(PipelineProfile::FORMAT, "echolume-profile-2")).is_err());
         assert!(PipelineProfile::from_json(&text.replace("\"N\":2", "\"N\":1")).is_err(), "twice the same");
         assert!(PipelineProfile::from_json(&text.replace("48.0,0.0,", "48.0,")).is_err(), "a value is missing");
         assert!(PipelineProfile::from_json(&text.replace("\"cold_ms\":2.0", "\"cold_ms\":-2.0")).is_err());

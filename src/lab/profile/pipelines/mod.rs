@@ -9,6 +9,7 @@ pub mod table;
 pub use columns::Columns;
 pub use table::table;
 
+use crate::baselines::Stored;
 use crate::gpu::pipeline_measure::{self, MeasuredPipeline};
 use crate::gpu::{Context, GpuError, Shaders};
 use crate::machine;
@@ -17,25 +18,11 @@ use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
-/// Version of the JSON format.
-pub const FORMAT: &str = "echolume-pipelines-1";
-
-/// Why a file cannot be read or written.
-#[derive(Debug, thiserror::Error)]
-pub enum PipelinesError {
-    #[error("format is '{found}', this program reads '{FORMAT}'; profile the pipelines again with it")]
-    Format { found: String },
-    #[error("not statistics of pipelines: {0}")]
-    Json(String),
-    #[error("{field}: {fault}")]
-    Contents { field: String, fault: String },
-}
-
 /// Statistics of pipelines on one device.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct PipelineProfile {
-    /// [`FORMAT`].
+    /// [`Stored::FORMAT`].
     pub format: String,
     /// Name, version and build of the program.
     pub program: String,
@@ -118,7 +105,7 @@ pub fn measure(
     }
     let device = machine::device(context);
     Ok(PipelineProfile {
-        format: FORMAT.into(),
+        format: PipelineProfile::FORMAT.into(),
         program: machine::program(),
         date: machine::date(),
         device: device.name,
@@ -160,43 +147,44 @@ impl PipelineProfile {
     pub fn columns(&self, pipeline: &Pipeline) -> Columns {
         Columns::of(&self.statistics, pipeline)
     }
+}
 
-    /// Checks that the lists are consistent and all numbers are finite.
-    ///
-    /// # Errors
-    /// The first field that is not.
-    fn check(&self) -> Result<(), PipelinesError> {
-        let fault = |field: &str, fault: String| Err(PipelinesError::Contents { field: field.into(), fault });
+impl Stored for PipelineProfile {
+    const FORMAT: &'static str = "echolume-pipelines-1";
+    const WHAT: &'static str = "statistics of pipelines";
+    const AGAIN: &'static str = "profile the pipelines again with it";
+    const KIND: &'static str = "statistics of pipelines";
+    const MAX_BYTES: u64 = 64 << 20;
+
+    /// The lists are consistent and all numbers are finite.
+    fn fault(&self) -> Option<(String, String)> {
         let mut known = std::collections::BTreeSet::new();
         for pipeline in &self.pipelines {
-            let title = crate::text::escaped(&pipeline.title());
+            let title = pipeline.title();
             if !known.insert((&pipeline.shader, &pipeline.constants, &pipeline.formats)) {
-                return fault(&title, "is listed twice".into());
+                return Some((title, "is listed twice".into()));
             }
             let times = [pipeline.cold_ms, pipeline.warm_ms];
             if let Some(ms) = times.iter().find(|ms| !(ms.is_finite() && **ms >= 0.0)) {
-                return fault(&title, format!("a time is {ms} ms; a time is finite and not below 0"));
+                return Some((title, format!("a time is {ms} ms; a time is finite and not below 0")));
             }
             for executable in &pipeline.executables {
                 let (count, expected) = (executable.values.len(), self.statistics.len());
                 if count != expected {
-                    return fault(&title, format!("has {count} values for {expected} statistics"));
+                    return Some((title, format!("has {count} values for {expected} statistics")));
                 }
                 if executable.values.iter().flatten().any(|value| !value.is_finite()) {
-                    return fault(&title, "has a value that is not finite".into());
+                    return Some((title, "has a value that is not finite".into()));
                 }
             }
         }
-        Ok(())
+        None
     }
 
-    /// The statistics as JSON, a line for each pipeline.
-    ///
-    /// # Errors
-    /// A number that is not finite.
-    pub fn to_json(&self) -> Result<String, PipelinesError> {
+    /// A line for each pipeline.
+    fn to_json(&self) -> Result<String, String> {
         self.check()?;
-        let json = |fault: serde_json::Error| PipelinesError::Json(fault.to_string());
+        let json = |fault: serde_json::Error| fault.to_string();
         let without = PipelineProfile { pipelines: Vec::new(), ..self.clone() };
         let head = serde_json::to_string(&without).map_err(json)?;
         let lines: Result<Vec<String>, _> = self.pipelines.iter().map(serde_json::to_string).collect();
@@ -204,25 +192,5 @@ impl PipelineProfile {
         // The list of pipelines is the last field and empty.
         let head = head.strip_suffix("]}").unwrap_or(&head);
         Ok(format!("{head}\n{lines}\n]}}\n"))
-    }
-
-    /// Reads what [`PipelineProfile::to_json`] wrote. Any text gives consistent statistics or an error.
-    ///
-    /// # Errors
-    /// One line: another format, no JSON of statistics, or contents that are not consistent.
-    pub fn from_json(text: &str) -> Result<PipelineProfile, PipelinesError> {
-        /// Read first, to distinguish another version from a file that is none.
-        #[derive(Deserialize)]
-        struct Version {
-            format: String,
-        }
-        let json = |fault: serde_json::Error| PipelinesError::Json(crate::text::single_line(&fault.to_string()));
-        let version: Version = serde_json::from_str(text).map_err(json)?;
-        if version.format != FORMAT {
-            return Err(PipelinesError::Format { found: crate::text::single_line(&version.format) });
-        }
-        let profile: PipelineProfile = serde_json::from_str(text).map_err(json)?;
-        profile.check()?;
-        Ok(profile)
     }
 }

@@ -71,7 +71,7 @@ pub(super) fn bladder(user: &mut User) -> String {
     user.console.execute(&Command::StepPlane(first), Instant::now());
     user.settle();
     for n in 0..planes {
-        let off = (user.scene().sheet().tiles[0].plane.at - centre).dot(user.scene().sheet().tiles[0].plane.normal);
+        let off = (user.scene().tiling().tiles[0].plane.at - centre).dot(user.scene().tiling().tiles[0].plane.normal);
         assert!((off - first - STEP * n as f64).abs() < 1e-6, "the wheel moved the plane to {off}");
         user.trace(off);
         user.wheel(STEP);

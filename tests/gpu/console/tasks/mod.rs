@@ -296,8 +296,8 @@ impl User {
 
     /// Where the window shows a place on the first tile of planes.
     fn on_tile(&mut self, place: DVec3) -> [f64; 2] {
-        let sheet = self.scene().sheet();
-        in_window(sheet.project(&sheet.tiles[0], place).0)
+        let tiling = self.scene().tiling();
+        in_window(tiling.project(&tiling.tiles[0], place).0)
     }
 
     /// Places in the plane of the first tile, relative to the middle of the ball: right, down, mm.
@@ -308,21 +308,21 @@ impl User {
     }
 
     fn place(&mut self, right: f64, down: f64) -> DVec3 {
-        let plane = self.scene().sheet().tiles[0].plane;
+        let plane = self.scene().tiling().tiles[0].plane;
         self.ball.0 + plane.right * right + plane.down * down
     }
 
     /// Drags round the section of the ball, `off` its middle.
     fn trace(&mut self, off: f64) {
         let (centre, radius) = self.ball;
-        let sheet = self.scene().sheet();
-        let plane = sheet.tiles[0].plane;
+        let tiling = self.scene().tiling();
+        let plane = tiling.tiles[0].plane;
         let section = (radius * radius - off * off).sqrt();
         let way: Vec<_> = (0..120)
             .map(|n| {
                 let (sin, cos) = (f64::from(n) * TAU / 120.0).sin_cos();
                 let place = centre + plane.normal * off + (plane.right * cos + plane.down * sin) * section;
-                in_window(sheet.project(&sheet.tiles[0], place).0)
+                in_window(tiling.project(&tiling.tiles[0], place).0)
             })
             .collect();
         self.drag(&way);

@@ -35,10 +35,10 @@ pub(super) fn straight_section(user: &mut User) -> String {
     let [from, to] = ends.map(|place| user.on_tile(place));
     user.drag(&[from, [from[0] + 20.0, from[1]], to]);
     let scene = user.scene();
-    let tile = scene.sheet().tiles.pop().filter(|tile| tile.section.is_some()).expect("a section");
+    let tile = scene.tiling().tiles.pop().filter(|tile| tile.section.is_some()).expect("a section");
     let length = tile.section.as_ref().map_or(0.0, |section| section.line.length());
     assert!((length - 3.0 * radius).abs() < LENGTH, "{length} mm");
-    let (middle, off) = scene.sheet().project(&tile, user.ball.0);
+    let (middle, off) = scene.tiling().project(&tile, user.ball.0);
     let wanted = [0, 1].map(|a| f64::from(tile.corner[a]) + f64::from(tile.size[a]) / 2.0);
     assert!(off.abs() < LENGTH && (middle[0] - wanted[0]).abs() * tile.pixel < LENGTH, "{middle:?} {wanted:?}");
     user.count()

@@ -17,7 +17,7 @@ const CAPTION: usize = 40;
 ///
 /// # Errors
 /// One line: the drawing failed.
-pub fn sheet(report: &Report, subject: &Subject) -> Result<Picture, String> {
+pub fn contact_sheet(report: &Report, subject: &Subject) -> Result<Picture, String> {
     let mut tiles: Vec<Tile> = Vec::new();
     for row in report.chosen().iter().filter_map(|n| subject.rows.get(*n)) {
         tiles.push(Tile { name: name(row), note: note(row), pixels: &row.pixels });

@@ -1,14 +1,15 @@
 //! Profiles a scene: renders it repeatedly and records where the time goes, pass by pass.
 
+use crate::baselines::Stored;
 use crate::gpu::{Context, GpuError, Renderer, RendererOptions, Shaders, TimeStamps, pass_runner};
 use crate::machine::{self, CpuTime};
-use crate::passes::measure as loops;
+use crate::passes::device_limits as loops;
 use crate::passes::slots::Shape;
 use crate::passes::{Bind, DispatchArgs, GROUP, Part, Pass, RUN, Slot, Span, chain, filter, layers, slices};
 use crate::plan::{Plan, Rerun, Step};
 use crate::profile::export::{self, Track};
 use crate::profile::statistics::Sample;
-use crate::profile::{Acquisition, Ceiling, Ceilings, FORMAT, PassProfile, Profile, Sizes, settings_hash};
+use crate::profile::{Acquisition, Ceiling, Ceilings, PassProfile, Profile, Sizes, settings_hash};
 use crate::scene::Scene;
 use crate::source::Frame;
 use std::sync::Arc;
@@ -155,7 +156,7 @@ impl ProfileRun {
         let resolved = self.renderer.scene();
         let stamped = device.valid_bits > 0;
         let profile = Profile {
-            format: FORMAT.into(),
+            format: Profile::FORMAT.into(),
             program: machine::program(),
             date: machine::date(),
             scene: settings(scene),
@@ -357,7 +358,7 @@ fn fetches(pass: &Pass, scene: &Scene, step: &Step) -> Option<u64> {
 /// Repeats of each ceiling loop; the median is reported.
 const CEILING_REPEATS: u32 = 15;
 
-/// Measures the device's roofline ceilings with the loops of [`crate::passes::measure`]; None if it has no time stamps.
+/// Measures the device's roofline ceilings with the loops of [`crate::passes::device_limits`]; None if it has no time stamps.
 ///
 /// # Errors
 /// The device cannot hold a volume of 128^3 and pictures of 2048^2, or fails.

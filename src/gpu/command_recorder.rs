@@ -61,7 +61,7 @@ pub(crate) struct BufferLayout {
 }
 
 /// Command buffers that are recorded and submitted again and again. One is enough, except for work in bands.
-pub(crate) struct Recorder {
+pub(crate) struct CommandRecorder {
     context: Arc<Context>,
     pool: vk::CommandPool,
     /// The one that is being recorded.
@@ -98,7 +98,7 @@ pub(crate) struct Recorder {
     queue: usize,
 }
 
-impl Recorder {
+impl CommandRecorder {
     /// With `statistics`, the invocations of every dispatch that is timed are counted, if the device can.
     pub fn new(
         context: &Arc<Context>,
@@ -106,7 +106,7 @@ impl Recorder {
         label: &'static str,
         time_stamps: TimeStamps,
         statistics: bool,
-    ) -> Result<Recorder, GpuError> {
+    ) -> Result<CommandRecorder, GpuError> {
         let create = vk::CommandPoolCreateInfo::default().queue_family_index(context.queue(queue).family);
         let params = Buffer::new(context, "params", PARAMS_BYTES, Purpose::Params)?;
         let statistics = statistics && time_stamps == TimeStamps::EachPass;
@@ -117,7 +117,7 @@ impl Recorder {
         // SAFETY: the create structure is complete.
         let pool = unsafe { context.device.create_command_pool(&create, None) }.context(|| "create commands".into())?;
         context.name(pool, label);
-        let mut recorder = Recorder {
+        let mut recorder = CommandRecorder {
             context: context.clone(),
             pool,
             commands: vk::CommandBuffer::null(),
@@ -241,7 +241,7 @@ impl Recorder {
         Ok(())
     }
 
-    /// Waits for the last submission, and keeps its time stamps for a later [`Recorder::collect`]. Where too many wait already, its work is
+    /// Waits for the last submission, and keeps its time stamps for a later [`CommandRecorder::collect`]. Where too many wait already, its work is
     /// counted as not timed.
     pub fn set_aside(&mut self, timelines: &Timelines, timings: &mut Timings) -> Result<(), GpuError> {
         self.wait(timelines)?;
@@ -300,7 +300,7 @@ impl Recorder {
         self.dispatch_by(barriers, dispatch, None)
     }
 
-    /// As [`Recorder::dispatch`], in bands that `limit` allows, each in a submission of its own.
+    /// As [`CommandRecorder::dispatch`], in bands that `limit` allows, each in a submission of its own.
     ///
     /// # Errors
     /// More parameters than one command buffer can hold; a device that fails.
@@ -512,7 +512,7 @@ enum DescriptorInfo {
     Texels(usize),
 }
 
-impl Recorder {
+impl CommandRecorder {
     /// Binds the slots by the names that the shader gives them, and the parameters.
     fn bind(&mut self, dispatch: &Dispatch, params_offset: u64, params_size: u64) -> Result<(), GpuError> {
         let Dispatch { slots, pipeline, scene, pass, args } = *dispatch;
@@ -598,7 +598,7 @@ impl Recorder {
     }
 }
 
-impl Recorder {
+impl CommandRecorder {
     /// Moves new images from UNDEFINED to GENERAL and clears them to zero. Passes rely on this: they never write pixels outside the
     /// sector.
     pub(crate) fn clear_new(&mut self, barriers: &mut BarrierRecorder, slots: &SlotResources, new: &[(Slot, u32)]) {
@@ -749,7 +749,7 @@ fn region(image: &Image, parts: Range<u32>, rows: Range<u32>, layout: BufferLayo
     }
 }
 
-impl Drop for Recorder {
+impl Drop for CommandRecorder {
     fn drop(&mut self) {
         if self.context.is_given_up() {
             return;

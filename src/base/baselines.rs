@@ -1,0 +1,156 @@
+//! Results of earlier runs: JSON files that state their format and its version, and what two runs have in common and not.
+
+use crate::files::read_text;
+use crate::text::escaped;
+use serde::de::DeserializeOwned;
+use serde::{Deserialize, Serialize};
+use std::collections::{HashMap, HashSet};
+use std::fmt::Display;
+use std::hash::Hash;
+use std::path::Path;
+
+/// A result that is kept in a JSON file, whose field `format` is the name and the version of the format.
+pub trait Stored: Serialize + DeserializeOwned {
+    /// The format that is written.
+    const FORMAT: &'static str;
+    /// Earlier versions that are read, too.
+    const EARLIER: &'static [&'static str] = &[];
+    /// Around names of formats in messages.
+    const QUOTE: char = '\'';
+    /// What a file of it is, in messages: `a profile`.
+    const WHAT: &'static str;
+    /// How to make one in this format, in messages: `profile again with it`.
+    const AGAIN: &'static str;
+    /// Its kind where a file is too long, in messages: `profile`.
+    const KIND: &'static str;
+    /// Longest file that is read, bytes.
+    const MAX_BYTES: u64;
+
+    /// The first field that contradicts others or that no run gives, and what is wrong with it.
+    fn fault(&self) -> Option<(String, String)>;
+
+    /// Makes what was read in an earlier version one of [`Stored::FORMAT`].
+    fn renew(&mut self) {}
+
+    /// Checks that the contents are consistent.
+    ///
+    /// # Errors
+    /// One line: the first field that is not.
+    fn check(&self) -> Result<(), String> {
+        self.fault().map_or(Ok(()), |(field, fault)| Err(format!("{}: {}", escaped(&field), escaped(&fault))))
+    }
+
+    /// The result as JSON. Every number is exact: what is read back is the same.
+    ///
+    /// # Errors
+    /// One line: [`Stored::check`] refuses it.
+    fn to_json(&self) -> Result<String, String> {
+        self.check()?;
+        serde_json::to_string_pretty(self).map(|text| text + "\n").map_err(|e| escaped(&e.to_string()))
+    }
+
+    /// Reads a result. Any text gives a consistent one or an error.
+    ///
+    /// # Errors
+    /// One line: another format, no JSON of such a result, or contents that [`Stored::check`] refuses.
+    fn from_json(text: &str) -> Result<Self, String> {
+        let json = |e: serde_json::Error| format!("not {}: {}", Self::WHAT, escaped(&e.to_string()));
+        let format = stated_format(text).map_err(json)?;
+        if format != Self::FORMAT && !Self::EARLIER.contains(&format.as_str()) {
+            let (found, reads, quote, again) = (escaped(&format), Self::FORMAT, Self::QUOTE, Self::AGAIN);
+            return Err(format!("format is {quote}{found}{quote}, this program reads {quote}{reads}{quote}; {again}"));
+        }
+        let mut result: Self = serde_json::from_str(text).map_err(json)?;
+        result.renew();
+        result.check()?;
+        Ok(result)
+    }
+
+    /// Reads a result from a file.
+    ///
+    /// # Errors
+    /// One line that names the file: it cannot be read, or those of [`Stored::from_json`].
+    fn load(file: &Path) -> Result<Self, String> {
+        let text = read_text(file, Self::MAX_BYTES, Self::KIND);
+        text.and_then(|text| Self::from_json(&text)).map_err(|e| format!("{}: {e}", file.display()))
+    }
+}
+
+/// The format that a text states. It is read first, to tell another version from a file that is none.
+///
+/// # Errors
+/// The text is no JSON of a table with a format.
+pub fn stated_format(text: &str) -> serde_json::Result<String> {
+    #[derive(Deserialize)]
+    struct Version {
+        format: String,
+    }
+    serde_json::from_str(text).map(|Version { format }| format)
+}
+
+/// An entry of the old run and the one of the new run; one of them is None if the other run alone has it.
+pub type Match<'a, T> = (Option<&'a T>, Option<&'a T>);
+
+/// The entries of two runs by a key that is unique in each: those of the new run in its order, then those that only the old one has.
+pub fn matched<'a, T, K: Eq + Hash>(old: &'a [T], new: &'a [T], key: impl Fn(&'a T) -> K) -> Vec<Match<'a, T>> {
+    let before: HashMap<K, &T> = old.iter().map(|entry| (key(entry), entry)).collect();
+    let now: HashSet<K> = new.iter().map(&key).collect();
+    let gone = old.iter().filter(|entry| !now.contains(&key(entry))).map(|entry| (Some(entry), None));
+    new.iter().map(|entry| (before.get(&key(entry)).copied(), Some(entry))).chain(gone).collect()
+}
+
+/// The conditions that differ, one line each, old before new. Both runs list the same names in the same order.
+pub fn differing<N: Display>(
+    old: impl IntoIterator<Item = (N, String)>,
+    new: impl IntoIterator<Item = (N, String)>,
+) -> Vec<String> {
+    let both = old.into_iter().zip(new).filter(|((_, old), (_, new))| old != new);
+    both.map(|((name, old), (_, new))| format!("{name}: {old} -> {new}")).collect()
+}
+
+/// Ratio of times, new over old, above which what is slower fails a comparison.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Threshold(f64);
+
+impl Default for Threshold {
+    fn default() -> Threshold {
+        Threshold(1.05)
+    }
+}
+
+impl Threshold {
+    /// # Errors
+    /// One line: it is not finite or below 1.
+    pub fn new(ratio: f64) -> Result<Threshold, String> {
+        match ratio.is_finite() && ratio >= 1.0 {
+            true => Ok(Threshold(ratio)),
+            false => Err(format!("threshold: {ratio} is not a ratio of at least 1 (1.05 is five percent slower)")),
+        }
+    }
+
+    pub fn ratio(self) -> f64 {
+        self.0
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn entries_of_both_runs_are_matched_in_the_order_of_the_new_one() {
+        let (old, new) = ([("a", 1), ("b", 2), ("c", 3)], [("d", 4), ("c", 5), ("a", 6)]);
+        let found = matched(&old, &new, |entry| entry.0);
+        let values: Vec<_> = found.iter().map(|(old, new)| [old, new].map(|entry| entry.map_or(0, |e| e.1))).collect();
+        assert_eq!(values, [[0, 4], [3, 5], [1, 6], [2, 0]]);
+    }
+
+    #[test]
+    fn a_threshold_below_one_is_refused() {
+        for ratio in [0.99, f64::NAN, f64::INFINITY, -1.0] {
+            let error = Threshold::new(ratio).expect_err("refused");
+            assert!(error.ends_with("is not a ratio of at least 1 (1.05 is five percent slower)"), "{error}");
+        }
+        assert_eq!(Threshold::new(1.05), Ok(Threshold::default()));
+    }
+}
