@@ -10,9 +10,10 @@ use crate::gpu::shader_reload::ShaderFolder;
 use crate::gpu::window::{MonitorChoice, PresentMode};
 use crate::gpu::{Context, Wake};
 use crate::kiosk::config::{self, Config};
+use crate::live::StreamOptions;
 use crate::live::cine::CineLimits;
 use crate::terminal::{Failure, failed, input, say};
-use crate::ui::console::{Console, ConsoleOptions, OpenFile, Opened, StartupFault};
+use crate::ui::console::{Console, ConsoleOptions, OpenFile, Opened, OpeningOptions, StartupFault};
 use crate::ui::recordings::{MAX_OPEN, Recordings};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -173,10 +174,11 @@ impl View {
                 }
             };
             view.list(wanted.source.as_ref());
-            let (open, options) = wanted.options(factor, wake, startup_fault);
-            let open_file = Some(view.open_file()).filter(|_| !view.kiosk);
-            let (shaders, recordings) = (shaders.clone(), view.opened.recordings.clone());
-            Console::new(context, open, ConsoleOptions { shaders, open_file, recordings, ..options }, size)
+            let (open, mut options) = wanted.options(factor, wake, startup_fault);
+            options.stream.shaders = shaders.clone();
+            options.opening.open_file = Some(view.open_file()).filter(|_| !view.kiosk);
+            options.opening.recordings = view.opened.recordings.clone();
+            Console::new(context, open, options, size)
         };
         let ran = place.run(Box::new(make)).map_err(device_failure);
         finish(ran?)
@@ -209,8 +211,8 @@ impl View {
         options.retry = options.retry.or(Some(usual.live.retry)).filter(|_| self.kiosk);
         options.overlay = !self.no_ui;
         options.prometheus = self.prometheus.clone().or(options.prometheus.take());
-        (options.images, options.queues) = (self.stream.images, self.stream.queues());
-        options.time_stamps = self.stream.time_stamps();
+        (options.stream.images, options.stream.queues) = (self.stream.images, self.stream.queues());
+        options.stream.time_stamps = self.stream.time_stamps();
         Ok(wanted)
     }
 
@@ -265,15 +267,18 @@ impl View {
         };
         let options = ConsoleOptions {
             settings: layers.clone().finish().map_err(input)?,
-            // The settings of a workspace are complete.
-            chosen: Some(layers).filter(|_| !is_complete),
+            stream: StreamOptions {
+                // The settings of a workspace are complete.
+                chosen: Some(layers).filter(|_| !is_complete),
+                update: self.stream.update()?,
+                cine: CineLimits { volumes: self.cine as usize, bytes: (self.cine_memory as usize) << 20 },
+                ..StreamOptions::default()
+            },
             origin: Some(source.origin()),
             plays_once: source.plays_once(),
-            recent: recent_list().filter(|_| !self.kiosk),
+            opening: OpeningOptions { recent: recent_list().filter(|_| !self.kiosk), ..OpeningOptions::default() },
             first_steps: first_steps().filter(|_| !self.kiosk && !self.no_ui && !self.no_panels),
             presets: presets_file().filter(|_| !self.kiosk),
-            update: self.stream.update()?,
-            cine: CineLimits { volumes: self.cine as usize, bytes: (self.cine_memory as usize) << 20 },
             budget: self.budget()?,
             rungs: rungs(self.report.as_deref())?,
             record: self.record.clone(),

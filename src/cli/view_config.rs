@@ -5,6 +5,7 @@ use crate::args::{SceneArgs, SourceArgs, pipeline_folder};
 use crate::gpu::window::{MonitorChoice, PresentMode};
 use crate::gpu::{Context, ContextOptions, GpuError, Wake};
 use crate::kiosk::config::{Config, Present};
+use crate::live::StreamOptions;
 use crate::live::cine::CineLimits;
 use crate::source::live::Live;
 use crate::source::live::SourceKind;
@@ -128,9 +129,12 @@ impl ConsoleConfig {
         let layers = scene.layers_over(layers, &[])?;
         let options = ConsoleOptions {
             settings: layers.clone().finish().map_err(input)?,
-            chosen: Some(layers),
-            update: live.update,
-            cine: CineLimits { volumes: live.cine_volumes as usize, bytes: (live.cine_memory_mb as usize) << 20 },
+            stream: StreamOptions {
+                chosen: Some(layers),
+                update: live.update,
+                cine: CineLimits { volumes: live.cine_volumes as usize, bytes: (live.cine_memory_mb as usize) << 20 },
+                ..StreamOptions::default()
+            },
             budget: display.budget,
             rungs: rungs(display.report.as_deref())?,
             retry: Some(live.retry),
@@ -151,7 +155,7 @@ impl ConsoleConfig {
     pub fn begun(mut self) -> Result<ConsoleConfig, Failure> {
         let Some(source) = self.source.clone().filter(|_| self.first.is_none()) else { return Ok(self) };
         let (sender, opened) = channel();
-        let progress = self.options.progress.clone();
+        let progress = self.options.opening.progress.clone();
         let work = move || {
             // The receiver may be gone.
             let _ = sender.send(progress.during(|| source.open()));
@@ -170,7 +174,7 @@ impl ConsoleConfig {
     pub fn options(self, factor: f32, wake: Wake, startup_fault: Option<StartupFault>) -> (OpenSource, ConsoleOptions) {
         let scale = self.options.scale * factor;
         let kind = self.source.as_ref().map_or(SourceKind::default(), SourceArgs::kind);
-        let (source, first, progress) = (self.source, Mutex::new(self.first), self.options.progress.clone());
+        let (source, first, progress) = (self.source, Mutex::new(self.first), self.options.opening.progress.clone());
         let open: OpenSource = Arc::new(move || {
             let first = first.lock().unwrap_or_else(|e| e.into_inner()).take();
             let opened = match (first, &source) {

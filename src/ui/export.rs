@@ -36,13 +36,25 @@ pub(super) struct Exporter {
     threads: Vec<JoinHandle<()>>,
     /// The export that was begun last: its name and its thread.
     export: Option<(&'static str, Arc<Export>, JoinHandle<()>)>,
+    /// How far it was at the last look.
+    progress: Option<Progress>,
 }
 
 impl Exporter {
     /// `folder`: where files are saved; it is created with the first one. `wake` is called when a file is done.
     pub(super) fn new(folder: PathBuf, wake: Wake) -> Exporter {
         let (sender, receiver) = channel();
-        Exporter { folder, sender, receiver, pending: 0, number: 0, wake, threads: Vec::new(), export: None }
+        Exporter {
+            folder,
+            sender,
+            receiver,
+            pending: 0,
+            number: 0,
+            wake,
+            threads: Vec::new(),
+            export: None,
+            progress: None,
+        }
     }
 
     /// The next file that was saved since the last call, or why it was not.
@@ -115,10 +127,16 @@ impl Exporter {
         self.export.as_ref().filter(|(_, export, thread)| is_at_work(export, thread)).map(|(name, ..)| *name)
     }
 
-    /// How far the export in work is, as far as it says so.
+    /// Looks how far the export in work is. True if it is further than at the last look.
+    pub(super) fn look(&mut self) -> bool {
+        let export = self.export.as_ref().filter(|_| self.exporting().is_some());
+        let progress = export.and_then(|(_, export, _)| export.progress());
+        std::mem::replace(&mut self.progress, progress) != progress
+    }
+
+    /// How far the export in work was at the last look, as far as it says so.
     pub(super) fn progress(&self) -> Option<Progress> {
-        self.exporting()?;
-        self.export.as_ref().and_then(|(_, export, _)| export.progress())
+        self.progress
     }
 
     /// Ends the export in work, if there is one.

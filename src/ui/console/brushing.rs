@@ -1,7 +1,7 @@
 //! The brush: where a drag over a rendering went along its surface.
 
 use super::Console;
-use super::measuring::SurfaceMap;
+use super::surface::SurfaceMap;
 use crate::controls::Change;
 use crate::passes::chain;
 use crate::scene::Scene;
@@ -28,9 +28,8 @@ impl Console {
         };
         match change {
             Change::Settings => {
-                self.last_change = now;
-                self.unsent_input.get_or_insert(now);
-                self.pace.forget();
+                self.activity.changes_settings(now);
+                self.quality.scene_changed();
             }
             Change::Refused(why) => self.notify(why, true),
             _ => {}

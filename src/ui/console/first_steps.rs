@@ -1,9 +1,7 @@
 //! The hints of the first start: when they are shown, and that they do not come again.
 
-use super::Console;
 use crate::command::Command;
 use crate::files;
-use crate::panels::first_steps;
 use std::path::{Path, PathBuf};
 
 /// The hints of the first start.
@@ -20,7 +18,7 @@ impl FirstSteps {
     }
 
     /// Shows them if that is due, and keeps that they were shown. True while they are.
-    fn show(&mut self) -> bool {
+    pub(super) fn show(&mut self) -> bool {
         let Some(file) = &self.file else { return false };
         if !std::mem::replace(&mut self.is_shown, true) {
             keep(file);
@@ -29,7 +27,7 @@ impl FirstSteps {
     }
 
     /// Ends them with the first action of the user. True if the command was meant for them alone.
-    fn end(&mut self, command: &Command) -> bool {
+    pub(super) fn end(&mut self, command: &Command) -> bool {
         if !std::mem::take(&mut self.is_shown) {
             return *command == Command::CloseHints;
         }
@@ -43,29 +41,6 @@ fn keep(file: &Path) {
     let folder = file.parent().map_or(Ok(()), std::fs::create_dir_all).map_err(|e| e.to_string());
     if let Err(why) = folder.and_then(|()| files::replace(file, b"")) {
         tracing::debug!("that the hints were shown is not kept: {why}");
-    }
-}
-
-impl Console {
-    /// True if the hints of the first start are shown now: over a picture, while nothing else is.
-    pub(super) fn shows_first_steps(&mut self, is_free: bool) -> bool {
-        let is_seen = self.fixed.overlay && self.shows_panels && !self.fixed.is_kiosk;
-        let has_room = first_steps::has_room(self.picture_area().1, self.panels.scale());
-        let is_open = self.shows_help
-            || self.shows_times
-            || self.shows_exports
-            || self.asks_to_leave
-            || self.opening.is_shown()
-            || self.presets.is_shown()
-            || (self.rail.is_open && self.has_drawer());
-        is_free && is_seen && has_room && !is_open && self.notes.is_empty() && self.first_steps.show()
-    }
-
-    /// Ends the hints of the first start. True if the command does nothing else.
-    pub(super) fn end_first_steps(&mut self, command: &Command) -> bool {
-        let is_done = self.first_steps.end(command);
-        self.needs_redraw |= is_done;
-        is_done
     }
 }
 

@@ -1,11 +1,10 @@
 //! Measuring in the console: points of the rendered surface, counted voxels, typed texts, and results that leave the program.
 
 use super::Console;
+use super::surface::SurfaceMap;
 use crate::command::{Command, Tool};
-use crate::gpu::Wake;
 use crate::input::{Input, Key};
 use crate::measure::{outcome, voxels};
-use crate::mesh::sheet::STEEPEST;
 use crate::passes::chain;
 use crate::scene::picker::Picker;
 use crate::scene::{MeasureKind, Measurement, Mode, Scene, insonified_box};
@@ -13,86 +12,11 @@ use crate::source::Frame;
 use crate::source::convert::Volume;
 use crate::texts;
 use crate::workspace;
-use glam::DVec3;
 use std::sync::Arc;
-use std::sync::mpsc::{Receiver, TryRecvError, channel};
 use std::time::Instant;
 
-/// Distances along a ray from here on mean that it met no surface, mm.
-const MISSED: f64 = 1e30;
-/// Distance between the points of a path along the surface, mm: less would follow the noise of the surface.
-const PATH_STEP: f64 = 1.0;
-/// Most points of such a path.
-const PATH_POINTS: usize = 256;
 /// Edge of the voxels that are counted, mm.
 const VOXEL: f64 = 0.5;
-
-/// Counts voxels in a thread.
-pub(super) struct Counting {
-    wake: Wake,
-    counted: Option<Receiver<Option<Measurement>>>,
-}
-
-impl Counting {
-    pub(super) fn new(wake: Wake) -> Counting {
-        Counting { wake, counted: None }
-    }
-}
-
-/// The points of the rendered surface.
-pub(super) struct SurfaceMap<'a> {
-    pub(super) picker: Picker<'a>,
-    pub(super) size: [u32; 2],
-    pub(super) distances: crate::passes::Texels,
-}
-
-impl SurfaceMap<'_> {
-    /// The point under a pixel of the picture; none where no surface is.
-    pub(super) fn at(&self, pixel: [f64; 2]) -> Option<DVec3> {
-        let on_nearest = || {
-            let ([x, y], (origin, direction)) = self.picker.nearest_ray(pixel, self.size)?;
-            Some(origin + direction * self.distance([x, y])?)
-        };
-        self.between(pixel).or_else(on_nearest)
-    }
-
-    /// The distance along a ray; none where it hits nothing.
-    fn distance(&self, [x, y]: [usize; 2]) -> Option<f64> {
-        Some(self.distances.one(x, y, 0)).filter(|away| away.abs() < MISSED)
-    }
-
-    /// The point between the four rays around a pixel, if they hit one surface: while the view moves, rays are up to four pixels apart.
-    fn between(&self, pixel: [f64; 2]) -> Option<DVec3> {
-        let ([x, y], [right, down]) = self.picker.rays_around(pixel, self.size)?;
-        let mut away = [0.0; 4];
-        for (n, away) in away.iter_mut().enumerate() {
-            *away = self.distance([x + n % 2, y + n / 2])?;
-        }
-        let mean = away.iter().sum::<f64>() / 4.0;
-        let place = |x: usize, y: usize| {
-            let (origin, direction) = self.picker.ray_at([x, y]);
-            origin + direction * mean
-        };
-        let [low, high] = [f64::min, f64::max].map(|least| away.into_iter().fold(mean, least));
-        if high - low > STEEPEST * place(x, y).distance(place(x + 1, y + 1)) {
-            return None;
-        }
-        let across = |a: f64, b: f64, share: f64| a + (b - a) * share;
-        let away = across(across(away[0], away[1], right), across(away[2], away[3], right), down);
-        let (origin, direction) = self.picker.ray(pixel);
-        Some(origin + direction * away)
-    }
-
-    /// The points of the surface along a straight line on the picture between two points on it.
-    fn path(&self, from: DVec3, to: DVec3) -> Option<Vec<DVec3>> {
-        let (a, b) = (self.picker.project(from)?, self.picker.project(to)?);
-        let pixels = (b[0] - a[0]).hypot(b[1] - a[1]);
-        let count = (pixels * self.picker.mm_per_pixel() / PATH_STEP).ceil().clamp(1.0, PATH_POINTS as f64) as usize;
-        let share = |n: usize| n as f64 / count as f64;
-        let between = (1..count).filter_map(|n| self.at([0, 1].map(|i| a[i] + (b[i] - a[i]) * share(n))));
-        Some([from].into_iter().chain(between).chain([to]).collect())
-    }
-}
 
 impl Console {
     /// Picks the point of the surface under a pixel of the picture, for the tool in use.
@@ -104,7 +28,7 @@ impl Console {
                 if let crate::controls::Change::Refused(why) = change {
                     self.notify(why, true);
                 }
-                self.last_change = Instant::now();
+                self.activity.changes(Instant::now());
             }
             Ok(None) => {}
             Err(why) => self.notify(&why, true),
@@ -118,7 +42,7 @@ impl Console {
         }
         // Undo may have taken the first end back.
         let is_begun = self.controls.work().is_some_and(|work| work.kind == MeasureKind::Surface);
-        let from = self.surface_from.filter(|_| is_begun);
+        let from = self.survey.first_end().filter(|_| is_begun);
         let no_surface = texts::POINT_NEEDS_SURFACE;
         let renderer = self.stream.renderer().filter(|r| r.has_drawn()).ok_or(texts::NO_PICTURE_TO_USE)?;
         let slot = match renderer.scene().has_distance() {
@@ -136,14 +60,14 @@ impl Console {
             return Ok(None);
         }
         let Some(from) = from else {
-            self.surface_from = Some(place);
+            self.survey.begin_distance(place);
             let now = Instant::now();
             self.execute(&Command::Point(point, true), now);
             return Ok(None);
         };
         let path = map.path(from, place).ok_or(texts::FIRST_END_BEHIND_CAMERA)?;
         let points = path.into_iter().map(|place| scene.point_of(place)).collect();
-        self.surface_from = None;
+        self.survey.end_distance();
         self.controls.leave_work();
         Ok(Some(Measurement { kind, points, on_surface: true, ..Measurement::default() }))
     }
@@ -151,28 +75,17 @@ impl Console {
     /// Begins to count the voxels of the region whose echo reaches the threshold of the mode.
     pub(super) fn count_voxels(&mut self) {
         match self.voxels_to_count() {
-            Ok(count) => {
-                let (sender, receiver) = channel();
-                let wake = self.counting.wake.clone();
-                let work = move || {
-                    let _ = sender.send(count());
-                    wake();
-                };
-                match std::thread::Builder::new().name("counting".into()).spawn(work) {
-                    Ok(_) => {
-                        self.counting.counted = Some(receiver);
-                        self.notify(texts::COUNTING_VOXELS, false);
-                    }
-                    Err(e) => self.notify(&texts::no_voxels_counted(e), true),
-                }
-            }
+            Ok(count) => match self.survey.count(count) {
+                Ok(()) => self.notify(texts::COUNTING_VOXELS, false),
+                Err(e) => self.notify(&texts::no_voxels_counted(e), true),
+            },
             Err(why) => self.notify(why, true),
         }
     }
 
     /// What counts the voxels of the volume that is shown.
     fn voxels_to_count(&self) -> Result<impl FnOnce() -> Option<Measurement> + Send + 'static, &'static str> {
-        if self.counting.counted.is_some() {
+        if self.survey.is_counting() {
             return Err(texts::STILL_COUNTING_VOXELS);
         }
         let (Some(scene), Some(header)) = (self.stream.scene(), self.stream.header()) else {
@@ -200,15 +113,11 @@ impl Console {
 
     /// Takes what was counted.
     pub(super) fn poll_counting(&mut self) {
-        let counted = match self.counting.counted.as_ref().map(Receiver::try_recv) {
-            None | Some(Err(TryRecvError::Empty)) => return,
-            Some(Ok(counted)) => counted,
-            Some(Err(TryRecvError::Disconnected)) => None,
-        };
-        (self.counting.counted, self.needs_redraw) = (None, true);
+        let Some(counted) = self.survey.poll() else { return };
+        self.presentation.redraw();
         match counted.map(|measured| self.controls.add_measure(measured)) {
             Some(crate::controls::Change::Refused(why)) => self.notify(why, true),
-            Some(_) => self.last_change = Instant::now(),
+            Some(_) => self.activity.changes(Instant::now()),
             None => self.notify(texts::REGION_IS_EMPTY, true),
         }
     }
@@ -218,7 +127,7 @@ impl Console {
         if self.controls.measures().is_empty() {
             return self.notify(texts::NO_MEASUREMENTS_YET, true);
         }
-        match self.clipboard.copy(outcome::csv(self.controls.measures())) {
+        match self.survey.copy(outcome::csv(self.controls.measures())) {
             Ok(()) => self.notify(texts::RESULTS_COPIED, false),
             Err(fault) => {
                 self.notify(&texts::no_clipboard(fault), true);
@@ -263,7 +172,7 @@ impl Console {
 
     /// Leaves what is being measured, or typed, or the tool. False if nothing is.
     pub(super) fn leave_measuring(&mut self) -> bool {
-        self.surface_from = None;
+        self.survey.end_distance();
         if self.controls.work().is_some() || self.controls.typing().is_some() {
             self.execute(&Command::CancelMeasure, Instant::now());
             return true;
@@ -282,11 +191,11 @@ impl Console {
     /// The commands of a key that is typed into a text, ends a contour, or chooses a file or a format. None if the key is one of the view's own.
     pub(super) fn typed(&mut self, input: &Input) -> Option<Vec<Command>> {
         let Input::Key { key, pressed: true } = *input else { return None };
-        let modifiers = self.keys.modifiers();
-        if modifiers.control || modifiers.alt || self.asks_to_leave {
+        let modifiers = self.hands.modifiers();
+        if modifiers.control || modifiers.alt || self.leaving.asks() {
             return None;
         }
-        if self.opening.is_shown() || self.shows_exports {
+        if self.opening.is_shown() || self.visible.exports {
             let choose = if self.opening.is_shown() { Command::OpenFile } else { Command::Export };
             return match key {
                 Key::Char(digit @ '1'..='9') => Some(vec![choose(digit as usize - '1' as usize)]),
@@ -295,7 +204,9 @@ impl Console {
             };
         }
         if self.presets.is_shown() {
-            return self.key_of_presets(key, modifiers.shift);
+            let commands = self.presets.key(key, modifiers.shift);
+            self.presentation.redraw_if(self.presets.is_naming());
+            return commands;
         }
         if self.controls.typing().is_some() {
             return Some(match key {
@@ -321,7 +232,7 @@ impl Console {
 
     /// True while a list is open whose entries have keys.
     pub(super) fn shows_list(&self) -> bool {
-        self.opening.is_shown() || self.shows_exports || self.presets.is_shown()
+        self.opening.is_shown() || self.visible.exports || self.presets.is_shown()
     }
 }
 
@@ -334,52 +245,4 @@ fn threshold(scene: &Scene) -> Option<f64> {
         _ => return None,
     };
     (share > 0.0).then(|| (low + share * (high - low)).clamp(0.0, 1.0))
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::measure::shapes;
-    use crate::passes::Texels;
-    use crate::probe::{Geometry, Grid};
-    use crate::scene::{Input as Samples, load::Layers};
-    use crate::source::StoredType;
-
-    /// A ball of 15 mm, as a distance map shows it: the path along it is an arc of known length.
-    #[test]
-    fn a_path_along_a_ball_has_the_length_of_its_arc() {
-        // Also as it is drawn while the view moves.
-        for (toml, within) in [
-            (&["picture.size=[300,240]"][..], 0.002),
-            (&["picture.size=[301,240]", "layout='four'", "camera.azimuth=30"], 0.002),
-            (&["picture.size=[300,240]", "ray.subsampling=4"], 0.005),
-        ] {
-            let mut layers = Layers::default();
-            toml.iter().for_each(|line| layers.set(line).expect(line));
-            let grid = Grid { size: [41, 41, 41], spacing: [1.0; 3], origin: [-20.0, 0.0, -20.0] };
-            let input = Samples { stored: StoredType::U8, range: [0.0, 255.0] };
-            let scene =
-                Scene::new(Geometry::Cartesian(grid), input, layers.finish().expect("settings")).expect("scene");
-            let (centre, radius) = (scene.rays.target, 15.0);
-            let size = scene.ray_size();
-            let distances = Texels::from_fn([size[0] as usize, size[1] as usize, 1], 1, |[x, y, _], _| {
-                let (origin, direction) = scene.rays.at(x as f64 + 0.5, y as f64 + 0.5);
-                let middle = (centre - origin).dot(direction);
-                let off = (origin + direction * middle - centre).length_squared();
-                if off < radius * radius { middle - (radius * radius - off).sqrt() } else { f64::from(f32::MAX) }
-            });
-            let map = SurfaceMap { picker: Picker::of(&scene), size, distances };
-            let on_ball = |angle: f64| {
-                let place = centre + (scene.rays.right * angle.sin() - scene.rays.forward * angle.cos()) * radius;
-                let pixel = map.picker.project(place).expect("in front");
-                map.at(pixel).expect("on the ball")
-            };
-            let ends = [on_ball(-0.6), on_ball(0.7)];
-            let path = map.path(ends[0], ends[1]).expect("a path");
-            let (found, truth) = (shapes::length(&path), 1.3 * radius);
-            assert!((found / truth - 1.0).abs() < within, "{toml:?}: {found} of {truth}");
-            assert!((ends[0].distance(centre) - radius).abs() < 0.05, "{toml:?}: {}", ends[0].distance(centre));
-            assert!(map.at([0.5, 0.5]).is_none(), "beside the ball");
-        }
-    }
 }

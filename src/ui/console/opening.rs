@@ -1,14 +1,12 @@
 //! Opening recordings and workspaces while the view runs, from a list, by dropping files, or from those that are open already: what is shown stays
 //! until the next one is open, and is kept as it was left.
 
-use super::{Console, OpenFile, Opened};
+use super::options::{OpenFile, Opened, OpeningOptions};
 use crate::files::progress::{Progress, Share};
 use crate::gpu::Wake;
 use crate::open_list::{self, Kind};
 use crate::panels::Reading;
 use crate::recordings::{Display, Kept, MAX_OPEN, Named, OpenRecordings, Recordings};
-use crate::source::live::SourceKind;
-use crate::source_supervisor::SourceState;
 use crate::texts;
 use std::path::{Path, PathBuf};
 use std::sync::MutexGuard;
@@ -38,7 +36,8 @@ pub(super) struct Opening {
     told: Option<Reading>,
 }
 
-struct BeingRead {
+/// A file that is read in the background.
+pub(super) struct BeingRead {
     path: PathBuf,
     progress: Progress,
     opened: Receiver<Result<Opened, String>>,
@@ -75,13 +74,8 @@ struct List {
 }
 
 impl Opening {
-    pub(super) fn new(
-        open: Option<OpenFile>,
-        recent: Option<PathBuf>,
-        recordings: OpenRecordings,
-        source: Progress,
-        wake: Wake,
-    ) -> Opening {
+    pub(super) fn new(options: OpeningOptions, wake: Wake) -> Opening {
+        let OpeningOptions { open_file: open, recent, recordings, progress: source } = options;
         let (file, dropped, list, told) = (None, Vec::new(), None, None);
         Opening { open, recent, wake, recordings, file, dropped, list, source, told }
     }
@@ -132,85 +126,67 @@ impl Opening {
         }
         List { title: folder.display().to_string(), entries, names }
     }
-}
 
-impl Console {
-    /// Shows the list of files to open, or closes it.
-    pub(super) fn toggle_files(&mut self) {
-        self.opening.list = match self.opening.list {
-            Some(_) => None,
-            None if self.opening.open.is_none() => {
-                self.notify(texts::OPENS_NO_OTHER_FILES, true);
-                None
-            }
-            None => {
-                let recording = self.fixed.origin.as_ref().and_then(|origin| origin.recording.as_deref());
-                let beside = recording.and_then(Path::parent).filter(|folder| folder.is_dir());
-                let folder = beside.unwrap_or(self.exporter.folder()).to_path_buf();
-                Some(self.opening.list(&folder, true))
-            }
-        };
-        self.needs_redraw = true;
+    /// True if other files can be opened.
+    pub(super) fn is_offered(&self) -> bool {
+        self.open.is_some()
     }
 
-    /// Opens the n-th entry of the list: a file, or a folder, whose list is shown then.
-    pub(super) fn open_entry(&mut self, n: usize) {
-        let chosen = self.opening.list.as_ref().and_then(|list| list.entries.get(n)).cloned();
-        let Some((kind, path)) = chosen else { return };
-        if matches!(kind, Kind::Folder | Kind::FolderAbove) {
-            self.opening.list = Some(self.opening.list(&path, false));
-            self.needs_redraw = true;
-        } else {
-            self.opening.list = None;
-            self.open_path(&path);
-        }
+    /// Shows the list of a folder, with the recent files first.
+    pub(super) fn show_list(&mut self, folder: &Path) {
+        self.list = Some(self.list(folder, true));
     }
 
-    /// Takes a file that was dropped on the window. Of several that are dropped together the first is shown, the others are listed.
-    pub fn drop_file(&mut self, path: &Path) {
-        self.opening.dropped.push(path.to_path_buf());
+    /// Closes the list. False if it is not shown.
+    pub(super) fn close_list(&mut self) -> bool {
+        self.list.take().is_some()
     }
 
-    fn open_dropped(&mut self) {
-        let dropped = std::mem::take(&mut self.opening.dropped);
-        let Some((first, others)) = dropped.split_first() else { return };
-        self.open_path(first);
-        if self.opening.file.is_none() {
-            return;
-        }
-        let is_full = {
-            let mut list = self.opening.recordings();
-            others.iter().filter(|path| !list.add(path)).count() > 0
-        };
-        if is_full {
-            self.notify(&texts::too_many_recordings(MAX_OPEN), true);
-        }
+    /// Takes the n-th entry of the list: a file, which is returned to be opened, or a folder, whose list is shown then.
+    pub(super) fn choose(&mut self, n: usize) -> Option<PathBuf> {
+        let (kind, path) = self.list.as_ref()?.entries.get(n)?.clone();
+        let is_folder = matches!(kind, Kind::Folder | Kind::FolderAbove);
+        self.list = is_folder.then(|| self.list(&path, false));
+        (!is_folder).then_some(path)
     }
 
-    /// Opens a recording or a workspace and shows it. The one that is shown already is read anew.
-    pub fn open_path(&mut self, path: &Path) {
-        self.read(path, false);
+    /// Takes a file that was dropped on the window.
+    pub(super) fn drop_file(&mut self, path: &Path) {
+        self.dropped.push(path.to_path_buf());
     }
 
-    /// Reads a file in the background, in place of another one that is being read. `closes`: the recording that is shown is closed for it.
-    fn read(&mut self, path: &Path, closes: bool) {
-        let Some(open) = self.opening.open.clone() else {
-            return self.notify(texts::OPENS_NO_OTHER_FILES, true);
-        };
-        if self.has_unsaved_loop() {
-            return self.notify(texts::SAVE_THE_LOOP_FIRST, true);
-        }
-        // What was being read stays in the list.
-        self.opening.file = None;
+    /// The files that were dropped since the last call.
+    pub(super) fn take_dropped(&mut self) -> Vec<PathBuf> {
+        std::mem::take(&mut self.dropped)
+    }
+
+    /// Puts recordings on the list of those that are open. False if there is no room for all.
+    pub(super) fn add(&self, paths: &[PathBuf]) -> bool {
+        let mut list = self.recordings();
+        paths.iter().filter(|path| !list.add(path)).count() == 0
+    }
+
+    pub(super) fn is_reading(&self) -> bool {
+        self.file.is_some()
+    }
+
+    /// Reads a file in the background, in place of another one that is being read, which stays in the list. `closes`: the recording that is shown is
+    /// closed for it.
+    ///
+    /// # Errors
+    /// One line: no other files can be opened, too many are, or no thread can be started.
+    pub(super) fn read(&mut self, path: &Path, closes: bool) -> Result<(), String> {
+        let open = self.open.clone().ok_or(texts::OPENS_NO_OTHER_FILES)?;
+        self.file = None;
         let (is_new, has_room) = {
-            let mut list = self.opening.recordings();
+            let mut list = self.recordings();
             (list.index(path).is_none(), list.add(path))
         };
         if !has_room {
-            return self.notify(&texts::too_many_recordings(MAX_OPEN), true);
+            return Err(texts::too_many_recordings(MAX_OPEN));
         }
         let (sender, opened) = channel();
-        let (wake, progress) = (self.opening.wake.clone(), Progress::default());
+        let (wake, progress) = (self.wake.clone(), Progress::default());
         let (path, own) = (path.to_path_buf(), progress.clone());
         let file = path.clone();
         let work = move || {
@@ -218,169 +194,118 @@ impl Console {
             wake();
         };
         let being_read = BeingRead { path, progress, opened, since: Instant::now(), is_new, closes, is_opened: false };
-        self.needs_redraw = true;
         match std::thread::Builder::new().name("opening".into()).spawn(work) {
-            Ok(_) => self.opening.file = Some(being_read),
+            Ok(_) => self.file = Some(being_read),
             Err(e) => {
-                let name = self.opening.recordings().name(&being_read.path);
+                let name = self.recordings().name(&being_read.path);
                 self.forget(&being_read);
-                self.notify(&texts::cannot_be_opened(name, e), true);
+                return Err(texts::cannot_be_opened(name, e));
             }
         }
+        Ok(())
     }
 
     /// A file that was not opened leaves the list, unless it was there before.
     fn forget(&self, file: &BeingRead) {
-        let mut list = self.opening.recordings();
+        let mut list = self.recordings();
         if let Some(n) = list.index(&file.path).filter(|_| file.is_new) {
             list.remove(n);
         }
     }
 
     /// Ends the reading of a file. Its name, if one was being read.
-    fn end_reading(&mut self) -> Option<String> {
-        let file = self.opening.file.take()?;
-        let name = self.opening.recordings().name(&file.path);
+    pub(super) fn end_reading(&mut self) -> Option<String> {
+        let file = self.file.take()?;
+        let name = self.recordings().name(&file.path);
         self.forget(&file);
-        self.needs_redraw = true;
         Some(name)
     }
 
-    /// Ends what is being read, at the wish of the user. False if nothing is.
-    pub(super) fn cancel_reading(&mut self) -> bool {
-        if let Some(name) = self.end_reading() {
-            self.notify(&texts::not_read_further(name), false);
-            return true;
-        }
-        let is_cancelled = self.reads_source() && self.source.cancel();
-        if is_cancelled {
-            self.opening.source.cancel();
-            self.needs_redraw = true;
-        }
-        is_cancelled
+    /// The source of the console is wanted no longer.
+    pub(super) fn cancel_source(&self) {
+        self.source.cancel();
     }
 
-    /// True while the source of this console is being opened and the user may end that.
-    fn reads_source(&self) -> bool {
-        let is_opening = *self.source.state() == SourceState::Opening && self.startup_fault.is_none();
-        is_opening && self.fixed.source == SourceKind::Recording && !self.fixed.is_kiosk
+    /// The n-th of the recordings that are open, and whether it is the one that is shown.
+    pub(super) fn recording(&self, n: usize) -> Option<(PathBuf, bool)> {
+        let list = self.recordings();
+        let path = list.path(n)?;
+        Some((path.to_path_buf(), Some(path) == list.shown()))
     }
 
-    /// Shows the n-th of the recordings that are open.
-    pub(super) fn show_recording(&mut self, n: usize) {
-        let (path, is_shown) = {
-            let list = self.opening.recordings();
-            let path = list.path(n).map(Path::to_path_buf);
-            let is_shown = path.as_deref() == list.shown();
-            (path, is_shown)
-        };
-        match path {
-            // Who chooses it again stays with it.
-            Some(_) if is_shown => _ = self.end_reading(),
-            Some(path) => self.read(&path, false),
-            None => {}
-        }
+    /// The recording so many places further than the one that is shown, or on its way to be. None if there is no other one.
+    pub(super) fn further(&self, by: i32) -> Option<usize> {
+        let list = self.recordings();
+        let from = self.file.as_ref().map(|file| file.path.as_path()).or(list.shown())?;
+        list.index(list.step(from, by)?).filter(|_| list.list().len() > 1)
     }
 
-    /// Shows a recording so many places further than the one that is shown, or on its way to be.
-    pub(super) fn step_recording(&mut self, by: i32) {
-        let next = {
-            let list = self.opening.recordings();
-            let from = self.opening.file.as_ref().map(|file| file.path.as_path()).or(list.shown());
-            from.and_then(|from| list.index(list.step(from, by)?)).filter(|_| list.list().len() > 1)
-        };
-        match next {
-            Some(next) => self.show_recording(next),
-            None => self.notify(texts::ONLY_RECORDING, false),
-        }
-    }
-
-    /// Closes the n-th recording. In place of the one that is shown comes the next, or else the one before.
-    pub(super) fn close_recording(&mut self, n: usize) {
-        let list = self.opening.recordings().list();
+    /// Closes the n-th recording, or the one that is shown if that is more than there can be. The name of one that is closed now; of the one that is shown,
+    /// which one comes in its place: the next, or else the one before. None if there is no such one.
+    pub(super) fn close(&mut self, n: usize) -> Option<Result<String, Option<PathBuf>>> {
+        let list = self.named();
         let shown = list.iter().position(|named| named.is_shown);
         let n = if n == usize::MAX { shown.unwrap_or(n) } else { n };
-        let Some(name) = list.get(n).map(|named| named.name.clone()) else { return };
-        if shown != Some(n) {
-            let path = self.opening.recordings().path(n).map(Path::to_path_buf);
-            if self.opening.file.as_ref().is_some_and(|file| Some(&file.path) == path.as_ref()) {
-                self.opening.file = None;
+        let name = list.get(n)?.name.clone();
+        if shown == Some(n) {
+            let next = if n + 1 < list.len() { Some(n + 1) } else { n.checked_sub(1) };
+            return Some(Err(next.and_then(|next| self.recordings().path(next).map(Path::to_path_buf))));
+        }
+        let path = self.recordings().path(n).map(Path::to_path_buf);
+        if self.file.as_ref().is_some_and(|file| Some(&file.path) == path.as_ref()) {
+            self.file = None;
+        }
+        let mut list = self.recordings();
+        if let Some(n) = path.and_then(|path| list.index(&path)) {
+            list.remove(n);
+        }
+        Some(Ok(name))
+    }
+
+    /// The file that was opened since the last call, which is to be shown.
+    ///
+    /// # Errors
+    /// One line: why it was not. It is read no longer.
+    pub(super) fn poll(&mut self) -> Option<Result<BeingRead, String>> {
+        let fault = match self.file.as_ref()?.opened.try_recv() {
+            Err(TryRecvError::Empty) => return None,
+            Ok(Ok(opened)) => {
+                let mut file = self.file.take()?;
+                file.is_opened = true;
+                opened();
+                self.remember(&file.path);
+                return Some(Ok(file));
             }
-            let mut list = self.opening.recordings();
-            if let Some(n) = path.and_then(|path| list.index(&path)) {
-                list.remove(n);
-            }
-            drop(list);
-            return self.notify(&texts::is_closed(name), false);
-        }
-        let next = if n + 1 < list.len() { Some(n + 1) } else { n.checked_sub(1) };
-        let next = next.and_then(|next| self.opening.recordings().path(next).map(Path::to_path_buf));
-        match next {
-            Some(next) => self.read(&next, true),
-            None => self.notify(texts::ONLY_RECORDING, false),
-        }
-    }
-
-    /// Takes what was opened: the console asks to be replaced by one that shows it.
-    pub(super) fn poll_opening(&mut self, now: Instant) {
-        self.open_dropped();
-        let opened = self.opening.file.as_ref().map(|file| file.opened.try_recv());
-        match opened {
-            None | Some(Err(TryRecvError::Empty)) => {}
-            Some(Ok(Ok(opened))) => self.show_opened(opened),
-            Some(Ok(Err(fault))) => self.not_opened(&fault),
-            Some(Err(TryRecvError::Disconnected)) => self.not_opened(texts::WHY_FILE_NOT_READ),
-        }
-        let told = self.being_read(now);
-        self.needs_redraw |= told != self.opening.told;
-        self.opening.told = told;
-    }
-
-    fn show_opened(&mut self, opened: Opened) {
-        let Some(mut file) = self.opening.file.take() else { return };
-        file.is_opened = true;
-        opened();
-        self.opening.remember(&file.path);
-        let (kept, display) = (self.kept(), self.display());
-        self.opening.recordings().show(&file.path, kept, file.closes, display);
-        self.request.restart = true;
-    }
-
-    fn not_opened(&mut self, fault: &str) {
-        self.end_reading();
-        self.notify(&texts::not_opened(fault), true);
-    }
-
-    /// What is kept of the recording that is shown. Nothing before its first picture: its settings do not follow from it
-    /// yet.
-    fn kept(&mut self) -> Option<Kept> {
-        let has_drawn = self.stream.renderer().is_some_and(|renderer| renderer.has_drawn());
-        if !has_drawn && !self.is_kept {
-            return None;
-        }
-        let volumes = self.stream.cine().volumes();
-        let is_numbered = self.fixed.plays_once && self.fixed.source == SourceKind::Recording;
-        let shown = self.stream.cine_position().and_then(|at| volumes.get(at)).map(|kept| kept.volume);
-        let frozen = self.frozen_volume.or(shown.filter(|_| self.stream.is_frozen() && is_numbered));
-        Some(Kept { controls: self.controls.set_aside(), frozen })
-    }
-
-    fn display(&self) -> Display {
-        let (panels, times, bar) = (self.shows_panels, self.shows_times, self.controls.settings().marks.bar);
-        Display { panels, times, bar, has_focus: self.panels.has_focus() }
-    }
-
-    /// What is being read, and how far it is.
-    fn being_read(&self, now: Instant) -> Option<Reading> {
-        let (path, progress, since) = match &self.opening.file {
-            Some(file) => (Some(file.path.as_path()), &file.progress, file.since),
-            None => (None, &self.opening.source, self.started),
+            Ok(Err(fault)) => fault,
+            Err(TryRecvError::Disconnected) => texts::WHY_FILE_NOT_READ.into(),
         };
-        let is_shown = now.saturating_duration_since(since) >= SHOWN_AFTER && (path.is_some() || self.reads_source());
-        if !is_shown {
+        self.end_reading();
+        Some(Err(fault))
+    }
+
+    /// The next console shows this file. `kept`: of the recording that is shown now.
+    pub(super) fn show(&self, file: &BeingRead, kept: Option<Kept>, display: Display) {
+        self.recordings().show(&file.path, kept, file.closes, display);
+    }
+
+    /// Looks how far what is being read is. `source_since`: when the source of the console began to be opened, while it is. True if the window says
+    /// something else then.
+    pub(super) fn look(&mut self, source_since: Option<Instant>, now: Instant) -> bool {
+        let told = self.being_read(source_since, now);
+        let is_other = told != self.told;
+        self.told = told;
+        is_other
+    }
+
+    fn being_read(&self, source_since: Option<Instant>, now: Instant) -> Option<Reading> {
+        let (path, progress, since) = match &self.file {
+            Some(file) => (Some(file.path.as_path()), &file.progress, file.since),
+            None => (None, &self.source, source_since?),
+        };
+        if now.saturating_duration_since(since) < SHOWN_AFTER {
             return None;
         }
-        let list = self.opening.recordings();
+        let list = self.recordings();
         let name = path.or(list.shown()).map_or(String::new(), |path| list.name(path));
         let (share, text) = match progress.share() {
             Share::Unknown => (None, String::new()),
@@ -392,27 +317,57 @@ impl Console {
         Some(Reading { name, share, text })
     }
 
-    /// When it is to be looked at what is being read.
-    pub(super) fn reading_wakes_at(&self, now: Instant) -> Option<Instant> {
-        let is_reading = self.opening.file.is_some() || self.reads_source();
-        is_reading.then_some(now + LOOK_INTERVAL)
+    /// When it is to be looked at what is being read. `reads_source`: the source of the console is being opened.
+    pub(super) fn due(&self, reads_source: bool, now: Instant) -> Option<Instant> {
+        (self.is_reading() || reads_source).then_some(now + LOOK_INTERVAL)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::source::live::SourceKind;
+    use std::sync::mpsc::{Receiver, Sender};
+    use std::sync::{Arc, Mutex};
+
+    /// Files whose name says whether they can be opened, each read when the test says so.
+    fn opening() -> (Opening, Sender<()>, Receiver<()>) {
+        let (sender, woken) = channel();
+        let (release, released) = channel();
+        let released = Mutex::new(released);
+        let open: OpenFile = Arc::new(move |path, _| {
+            released.lock().map_err(|e| e.to_string())?.recv().map_err(|e| e.to_string())?;
+            match path.ends_with("good") {
+                true => Ok(Box::new(|| ()) as Opened),
+                false => Err("it is bad".into()),
+            }
+        });
+        let recordings = Arc::new(Mutex::new(Recordings::of(SourceKind::Recording, Path::new("shown"))));
+        let options = OpeningOptions { open_file: Some(open), recordings, ..OpeningOptions::default() };
+        (Opening::new(options, Arc::new(move || _ = sender.send(()))), release, woken)
     }
 
-    /// Freezes the volume of a recording that was frozen when it was left, once it is there: at the end of the recording, or when the loop would
-    /// drop it.
-    pub(super) fn refreeze(&mut self) {
-        let Some(wanted) = self.frozen_volume else { return };
-        let volumes = self.stream.cine().volumes();
-        let at = volumes.iter().position(|kept| kept.volume == wanted);
-        let is_over = matches!(self.source.state(), SourceState::Ended(_));
-        let is_full = volumes.len() >= self.fixed.cine_volumes;
-        match at {
-            Some(at) if is_over || (is_full && at < 2) => {
-                self.frozen_volume = None;
-                self.show_cine_volume(at);
-            }
-            None if is_over => self.frozen_volume = None,
-            _ => {}
-        }
+    /// Prevents a file that could not be read from staying in the list, and a window that flickers at every fast one.
+    #[test]
+    fn a_file_is_shown_when_it_is_read_and_leaves_the_list_if_it_cannot_be() {
+        let (mut opening, release, woken) = opening();
+        assert!(opening.poll().is_none() && opening.due(false, Instant::now()).is_none());
+        opening.read(Path::new("bad"), false).expect("a thread");
+        let begun = Instant::now();
+        assert!(opening.poll().is_none() && opening.is_reading() && opening.named().len() == 2);
+        assert!(!opening.look(None, begun) && opening.told().is_none(), "too short to be told");
+        assert!(opening.look(None, begun + SHOWN_AFTER) && opening.told().is_some());
+        release.send(()).expect("it waits");
+        woken.recv().expect("it was read");
+        assert_eq!(opening.poll().map(|read| read.err()), Some(Some("it is bad".into())));
+        assert!(!opening.is_reading() && opening.named().len() == 1);
+        opening.read(Path::new("good"), false).expect("a thread");
+        release.send(()).expect("it waits");
+        woken.recv().expect("it was read");
+        assert!(opening.poll().is_some_and(|read| read.is_ok()) && opening.named().len() == 2);
+        // Ended by the user.
+        opening.read(Path::new("other"), false).expect("a thread");
+        assert_eq!((opening.end_reading().as_deref(), opening.named().len()), (Some("other"), 2));
+        assert_eq!(opening.end_reading(), None);
     }
 }

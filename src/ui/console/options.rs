@@ -2,14 +2,11 @@
 
 use crate::files::progress::Progress;
 use crate::frame_budget::{Rung, built_in_ladder};
-use crate::gpu::shader_reload::ShaderFolder;
-use crate::gpu::{TimeStamps, Wake};
+use crate::gpu::Wake;
 use crate::kiosk::chord::Chord;
-use crate::live::Update;
-use crate::live::cine::CineLimits;
+use crate::live::StreamOptions;
 use crate::recordings::OpenRecordings;
 use crate::scene::Settings;
-use crate::scene::load::Layers;
 use crate::source::live::SourceKind;
 use crate::workspace::Origin;
 use std::path::{Path, PathBuf};
@@ -19,17 +16,11 @@ use std::time::Duration;
 /// What a console is created with.
 pub struct ConsoleOptions {
     pub settings: Settings,
-    /// What was chosen of them: the rest follows from the source. None: the settings are complete.
-    pub chosen: Option<Layers>,
-    pub update: Update,
-    /// Number of volume images, 2 or 3.
-    pub images: u32,
-    pub queues: Option<usize>,
-    /// What the display of times shows of the device.
-    pub time_stamps: TimeStamps,
+    /// Of the stream: what was chosen of the settings, volume images, queues, time stamps, the cine loop, and shaders, whose folder is watched. The console sets
+    /// what follows from its window.
+    pub stream: StreamOptions,
     /// Interval of the statistics in the log and in the display of times.
     pub statistics_interval: Duration,
-    pub cine: CineLimits,
     /// The frame budget: longest time of a picture while the view moves.
     pub budget: Option<Duration>,
     /// The quality ladder, from full quality down.
@@ -57,14 +48,7 @@ pub struct ConsoleOptions {
     pub origin: Option<Origin>,
     /// The volumes of the source are numbered as in its recording.
     pub plays_once: bool,
-    /// How another recording or workspace is opened. None: none is.
-    pub open_file: Option<OpenFile>,
-    /// The recordings that are open, of which one is shown.
-    pub recordings: OpenRecordings,
-    /// How far the source of the console is read while it is being opened.
-    pub progress: Progress,
-    /// The file with the list of recent files.
-    pub recent: Option<PathBuf>,
+    pub opening: OpeningOptions,
     /// The file that keeps that the hints of the first start were shown. None: they are not to be shown.
     pub first_steps: Option<PathBuf>,
     /// The file with the presets of the user.
@@ -73,8 +57,6 @@ pub struct ConsoleOptions {
     pub wake: Wake,
     /// A fault that prevents the view: only its message is shown.
     pub startup_fault: Option<StartupFault>,
-    /// Shaders to use instead of the embedded ones. The folder is watched, and shaders that change are loaded again.
-    pub shaders: Option<Arc<ShaderFolder>>,
     /// Compiles the pipelines of every mode, layout and preset in advance while the user rests.
     pub warms: bool,
 }
@@ -84,13 +66,8 @@ impl Default for ConsoleOptions {
     fn default() -> ConsoleOptions {
         ConsoleOptions {
             settings: Settings::default(),
-            chosen: None,
-            update: Update::Whole,
-            images: 3,
-            queues: None,
-            time_stamps: TimeStamps::default(),
+            stream: StreamOptions::default(),
             statistics_interval: Duration::from_secs(1),
-            cine: CineLimits::default(),
             budget: None,
             rungs: built_in_ladder(),
             retry: None,
@@ -105,18 +82,27 @@ impl Default for ConsoleOptions {
             is_kiosk: false,
             origin: None,
             plays_once: false,
-            open_file: None,
-            recordings: OpenRecordings::default(),
-            progress: Progress::default(),
-            recent: None,
+            opening: OpeningOptions::default(),
             first_steps: None,
             presets: None,
             wake: Arc::new(|| ()),
             startup_fault: None,
-            shaders: None,
             warms: true,
         }
     }
+}
+
+/// What else can be opened than the source of the console.
+#[derive(Clone, Default)]
+pub struct OpeningOptions {
+    /// How another recording or workspace is opened. None: none is.
+    pub open_file: Option<OpenFile>,
+    /// The recordings that are open, of which one is shown.
+    pub recordings: OpenRecordings,
+    /// How far the source of the console is read while it is being opened.
+    pub progress: Progress,
+    /// The file with the list of recent files.
+    pub recent: Option<PathBuf>,
 }
 
 /// Opens a recording or a workspace, or returns the reason in one line. It may take long; how far it is is in the progress, by which it can be

@@ -1,14 +1,12 @@
 //! The list of presets: built-in ones as they look with the present volume, and those of the user, which are saved, renamed and deleted here.
 
-use super::Console;
 use crate::command::Command;
-use crate::controls::{Change, EXAMS};
+use crate::controls::{Controls, EXAMS};
 use crate::gpu::Wake;
 use crate::input::Key;
 use crate::panels::{PresetTile, PresetsShown};
 use crate::picture::Picture;
 use crate::scene::{Scene, Settings};
-use crate::source::live::SourceKind;
 use crate::texts;
 use crate::thumbnails::{Job, Thumbnails};
 use crate::user_presets::{self, MAX_NAME, MAX_PRESETS, UserPreset, checked_name};
@@ -82,7 +80,7 @@ impl Presets {
         self.made_of = None;
     }
 
-    fn close(&mut self) {
+    pub(super) fn close(&mut self) {
         (self.is_shown, self.naming, self.before, self.made_of) = (false, None, None, None);
         self.thumbnails.clear();
     }
@@ -122,6 +120,213 @@ impl Presets {
             can_restore: self.before.is_some(),
         })
     }
+
+    /// Shows the list, or closes it. The fault, if those of the user cannot be read.
+    pub(super) fn toggle(&mut self) -> Option<&str> {
+        if self.is_shown {
+            self.close();
+            return None;
+        }
+        self.read();
+        self.is_shown = true;
+        self.fault.as_deref()
+    }
+
+    /// Number of presets, built-in ones and those of the user.
+    pub(super) fn count(&self) -> usize {
+        EXAMS.len() + self.own.len()
+    }
+
+    /// The settings of the n-th preset with what `controls` have besides; `is_phantom`: the built-in ones suit the phantom then.
+    ///
+    /// # Errors
+    /// One line: there is no such preset, or the volume cannot be drawn so.
+    pub(super) fn settings(
+        &self,
+        n: usize,
+        controls: &Controls,
+        scene: &Scene,
+        is_phantom: bool,
+    ) -> Result<Settings, String> {
+        if n < EXAMS.len() {
+            return controls.with_exam(n, scene, is_phantom).map_err(str::to_string);
+        }
+        let own = self.own.get(n - EXAMS.len()).ok_or_else(|| texts::NO_SUCH_PRESET.to_string())?;
+        controls.with_look(&own.look()?, scene).map_err(str::to_string)
+    }
+
+    /// Begins to type a name: of a new preset, or of the n-th of the user. False if there is nothing to name.
+    ///
+    /// # Errors
+    /// One line: the user has as many as there can be.
+    pub(super) fn begin_naming(&mut self, of: Option<usize>) -> Result<bool, String> {
+        if !self.is_shown || self.file.is_none() || self.fault.is_some() {
+            return Ok(false);
+        }
+        let of = match of {
+            None if self.own.len() >= MAX_PRESETS => return Err(texts::too_many_presets(MAX_PRESETS)),
+            None => None,
+            Some(n) => match self.own.get(n) {
+                Some(preset) => Some(preset.name.clone()),
+                None => return Ok(false),
+            },
+        };
+        self.naming = Some(Naming { text: of.clone().unwrap_or_default(), of });
+        Ok(true)
+    }
+
+    /// Keeps the name that was typed: these settings under it, or another name of a preset. What is said of it; none if no name is typed.
+    ///
+    /// # Errors
+    /// One line: it cannot be kept. The name can be corrected.
+    pub(super) fn end_naming(&mut self, settings: &Settings) -> Result<Option<String>, String> {
+        let Some(naming) = self.naming.take() else { return Ok(None) };
+        let kept = self.keep_named(&naming, settings);
+        if kept.is_err() {
+            self.naming = Some(naming);
+        }
+        kept.map(Some)
+    }
+
+    fn keep_named(&mut self, naming: &Naming, settings: &Settings) -> Result<String, String> {
+        let name = checked_name(&naming.text)?;
+        // Another window may have changed them.
+        self.read();
+        let mut own = self.own.clone();
+        let same = own.iter().position(|preset| preset.name == name);
+        let said = match (&naming.of, same) {
+            (Some(of), Some(_)) if *of != name => return Err(texts::name_is_taken(name)),
+            (Some(of), _) => {
+                let preset = own.iter_mut().find(|preset| preset.name == *of).ok_or(texts::WHY_PRESET_IS_GONE)?;
+                preset.name.clone_from(&name);
+                texts::preset_is_called(name)
+            }
+            (None, Some(n)) => {
+                own[n] = UserPreset::new(&name, settings)?;
+                texts::preset_is_replaced(name)
+            }
+            (None, None) => {
+                own.push(UserPreset::new(&name, settings)?);
+                texts::preset_is_kept(name)
+            }
+        };
+        self.keep(own)?;
+        Ok(said)
+    }
+
+    /// Writes the presets of the user; the earlier ones can be brought back.
+    fn keep(&mut self, own: Vec<UserPreset>) -> Result<(), String> {
+        let file = self.file.as_deref().ok_or(texts::WHY_NO_PRESETS)?;
+        user_presets::write(file, &own)?;
+        self.before = Some(std::mem::replace(&mut self.own, own));
+        // Pictures belong to places in the list, and it has others now.
+        self.thumbnails.keep_first(EXAMS.len());
+        self.made_of = None;
+        Ok(())
+    }
+
+    /// Deletes the n-th preset of the user. What is said of it; none if there is no such one.
+    ///
+    /// # Errors
+    /// One line: that cannot be written.
+    pub(super) fn delete(&mut self, n: usize) -> Result<Option<String>, String> {
+        let Some(name) = self.own.get(n).map(|preset| preset.name.clone()) else { return Ok(None) };
+        self.read();
+        let mut own = self.own.clone();
+        own.retain(|preset| preset.name != name);
+        self.keep(own)?;
+        Ok(Some(texts::preset_is_deleted(name)))
+    }
+
+    /// Brings the presets of the user back as they were before the last change. False if there was none.
+    ///
+    /// # Errors
+    /// One line: another window changed them since, or they cannot be written.
+    pub(super) fn restore(&mut self) -> Result<bool, String> {
+        let Some(before) = self.before.clone() else { return Ok(false) };
+        let known = self.own.clone();
+        self.read();
+        if self.own != known {
+            self.before = None;
+            return Err(texts::PRESETS_CHANGED_ELSEWHERE.into());
+        }
+        self.keep(before)?;
+        Ok(true)
+    }
+
+    /// Leaves the name that is being typed, or the list. False if the list is not shown.
+    pub(super) fn leave(&mut self) -> bool {
+        if self.naming.take().is_none() && self.is_shown {
+            self.close();
+            return true;
+        }
+        self.is_shown
+    }
+
+    /// What a key does in the list; none for Escape. `is_upper`: a letter is a capital one.
+    pub(super) fn key(&mut self, key: Key, is_upper: bool) -> Option<Vec<Command>> {
+        let Some(naming) = &mut self.naming else {
+            return match key {
+                Key::Char(digit @ '1'..='9') => Some(vec![Command::Preset(digit as usize - '1' as usize)]),
+                Key::Char('s') => Some(vec![Command::NamePreset]),
+                Key::Char('z') => Some(vec![Command::RestorePresets]),
+                Key::Escape => None,
+                _ => Some(Vec::new()),
+            };
+        };
+        let letter = match key {
+            Key::Enter => return Some(vec![Command::EndNaming]),
+            Key::Escape => return None,
+            Key::Backspace => {
+                naming.text.pop();
+                None
+            }
+            Key::Space => Some(' '),
+            Key::Char(letter) if is_upper => letter.to_uppercase().next(),
+            Key::Char(letter) => Some(letter),
+            _ => None,
+        };
+        if naming.text.chars().count() < MAX_NAME {
+            naming.text.extend(letter);
+        }
+        Some(Vec::new())
+    }
+
+    /// The small pictures; none while the list is not shown.
+    pub(super) fn thumbnails(&self) -> &[Option<Arc<Picture>>] {
+        self.thumbnails.pictures()
+    }
+
+    /// Goes on with the thumbnails; `acted`: when the user acted last. True if there are new ones.
+    pub(super) fn poll(&mut self, acted: Instant, is_drawing: bool, now: Instant) -> bool {
+        self.is_shown && self.thumbnails.poll(now >= acted + REST && !is_drawing)
+    }
+
+    /// True if thumbnails are to be made: of another volume, another view, or other presets. Those of volumes that go on coming are made more rarely than
+    /// those of one that is `frozen`.
+    pub(super) fn wants_thumbnails(&self, volume: u32, settings: &Settings, frozen: bool, now: Instant) -> bool {
+        if !self.is_shown || self.thumbnails.is_working() {
+            return false;
+        }
+        self.made_of.as_ref().is_none_or(|made| {
+            let is_rare = frozen || now.saturating_duration_since(made.at) >= LIVE_INTERVAL;
+            let is_other_volume = made.volume != volume && is_rare;
+            made.own != self.own || is_other_volume || differs_much(&made.settings, settings)
+        })
+    }
+
+    /// Begins to make thumbnails of a volume.
+    pub(super) fn make_thumbnails(&mut self, job: Job, volume: u32, settings: &Settings, now: Instant) {
+        self.made_of = Some(MadeOf { volume, settings: settings.clone(), own: self.own.clone(), at: now });
+        self.thumbnails.begin(job);
+    }
+
+    /// When thumbnails are looked at again, while the list is shown.
+    pub(super) fn due(&self, now: Instant) -> Option<Instant> {
+        let at = if self.thumbnails.is_working() { Duration::from_millis(50) } else { REST };
+        let is_waiting = self.thumbnails.is_working() || self.made_of.is_none();
+        (self.is_shown && is_waiting).then_some(now + at)
+    }
 }
 
 /// True if a view changed so much that its thumbnails look wrong.
@@ -148,241 +353,6 @@ fn differs_much(a: &Settings, b: &Settings) -> bool {
         || a.planes.curve != b.planes.curve
 }
 
-impl Console {
-    /// The small pictures of the list of presets; none while it is not shown.
-    pub fn thumbnails(&self) -> &[Option<Arc<Picture>>] {
-        self.presets.thumbnails.pictures()
-    }
-
-    pub(super) fn toggle_presets(&mut self) {
-        match self.presets.is_shown {
-            true => self.presets.close(),
-            false => {
-                self.presets.read();
-                self.presets.is_shown = true;
-                if let Some(fault) = self.presets.fault.clone() {
-                    self.notify(&fault, true);
-                }
-            }
-        }
-        self.needs_redraw = true;
-    }
-
-    fn with_preset(&self, n: usize, scene: &Scene) -> Result<Settings, String> {
-        if n < EXAMS.len() {
-            let is_phantom = self.fixed.source == SourceKind::Demo;
-            return self.controls.with_exam(n, scene, is_phantom).map_err(str::to_string);
-        }
-        let own = self.presets.own.get(n - EXAMS.len()).ok_or_else(|| texts::NO_SUCH_PRESET.to_string())?;
-        self.controls.with_look(&own.look()?, scene).map_err(str::to_string)
-    }
-
-    /// Takes the n-th preset of the list, and closes the list.
-    pub(super) fn take_preset(&mut self, n: usize, now: Instant) {
-        if n >= EXAMS.len() + self.presets.own.len() {
-            return;
-        }
-        let settings = match self.stream.scene() {
-            Some(scene) => self.with_preset(n, scene),
-            None => Err(texts::NO_VOLUME_YET.into()),
-        };
-        match settings {
-            Ok(settings) => {
-                self.presets.close();
-                if self.controls.take(settings, &Command::Preset(n)) == Change::Settings {
-                    self.last_change = now;
-                    self.unsent_input.get_or_insert(now);
-                    self.pace.forget();
-                }
-            }
-            Err(why) => self.notify(&why, true),
-        }
-    }
-
-    /// Begins to type a name: of a new preset, or of the n-th of the user.
-    pub(super) fn begin_naming(&mut self, of: Option<usize>) {
-        if !self.presets.is_shown || self.presets.file.is_none() || self.presets.fault.is_some() {
-            return;
-        }
-        let of = match of {
-            None if self.presets.own.len() >= MAX_PRESETS => {
-                return self.notify(&texts::too_many_presets(MAX_PRESETS), true);
-            }
-            None => None,
-            Some(n) => match self.presets.own.get(n) {
-                Some(preset) => Some(preset.name.clone()),
-                None => return,
-            },
-        };
-        // Space and Enter are the name's.
-        self.panels.drop_focus();
-        self.presets.naming = Some(Naming { text: of.clone().unwrap_or_default(), of });
-    }
-
-    /// Keeps the name that was typed: the present look under it, or another name of a preset.
-    pub(super) fn end_naming(&mut self) {
-        let Some(naming) = self.presets.naming.take() else { return };
-        if let Err(why) = self.keep_named(&naming) {
-            self.notify(&why, true);
-            // It can be corrected.
-            self.presets.naming = Some(naming);
-        }
-    }
-
-    fn keep_named(&mut self, naming: &Naming) -> Result<(), String> {
-        let name = checked_name(&naming.text)?;
-        // Another window may have changed them.
-        self.presets.read();
-        let mut own = self.presets.own.clone();
-        let same = own.iter().position(|preset| preset.name == name);
-        let said = match (&naming.of, same) {
-            (Some(of), Some(_)) if *of != name => return Err(texts::name_is_taken(name)),
-            (Some(of), _) => {
-                let preset = own.iter_mut().find(|preset| preset.name == *of).ok_or(texts::WHY_PRESET_IS_GONE)?;
-                preset.name.clone_from(&name);
-                texts::preset_is_called(name)
-            }
-            (None, Some(n)) => {
-                own[n] = UserPreset::new(&name, self.controls.settings())?;
-                texts::preset_is_replaced(name)
-            }
-            (None, None) => {
-                own.push(UserPreset::new(&name, self.controls.settings())?);
-                texts::preset_is_kept(name)
-            }
-        };
-        self.keep_presets(own)?;
-        self.notify(&said, false);
-        Ok(())
-    }
-
-    /// Writes the presets of the user; the earlier ones can be brought back.
-    fn keep_presets(&mut self, own: Vec<UserPreset>) -> Result<(), String> {
-        let file = self.presets.file.as_deref().ok_or(texts::WHY_NO_PRESETS)?;
-        user_presets::write(file, &own)?;
-        self.presets.before = Some(std::mem::replace(&mut self.presets.own, own));
-        // Pictures belong to places in the list, and it has others now.
-        self.presets.thumbnails.keep_first(EXAMS.len());
-        self.presets.made_of = None;
-        Ok(())
-    }
-
-    pub(super) fn delete_preset(&mut self, n: usize) {
-        let Some(name) = self.presets.own.get(n).map(|preset| preset.name.clone()) else { return };
-        self.presets.read();
-        let mut own = self.presets.own.clone();
-        own.retain(|preset| preset.name != name);
-        match self.keep_presets(own) {
-            Ok(()) => {
-                self.notify(&texts::preset_is_deleted(name), false);
-            }
-            Err(why) => self.notify(&why, true),
-        }
-    }
-
-    /// Brings the presets of the user back as they were before the last change.
-    pub(super) fn restore_presets(&mut self) {
-        let Some(before) = self.presets.before.clone() else { return };
-        let known = self.presets.own.clone();
-        self.presets.read();
-        if self.presets.own != known {
-            self.presets.before = None;
-            return self.notify(texts::PRESETS_CHANGED_ELSEWHERE, true);
-        }
-        match self.keep_presets(before) {
-            Ok(()) => self.notify(texts::PRESETS_RESTORED, false),
-            Err(why) => self.notify(&why, true),
-        }
-    }
-
-    /// Leaves the name that is being typed, or the list. False if the list is not shown.
-    pub(super) fn leave_presets(&mut self) -> bool {
-        if self.presets.naming.take().is_none() && self.presets.is_shown {
-            self.presets.close();
-            return true;
-        }
-        self.presets.is_shown
-    }
-
-    /// What a key does in the list.
-    pub(super) fn key_of_presets(&mut self, key: Key, is_upper: bool) -> Option<Vec<Command>> {
-        if let Some(naming) = &mut self.presets.naming {
-            let letter = match key {
-                Key::Enter => return Some(vec![Command::EndNaming]),
-                Key::Escape => return None,
-                Key::Backspace => {
-                    naming.text.pop();
-                    None
-                }
-                Key::Space => Some(' '),
-                Key::Char(letter) if is_upper => letter.to_uppercase().next(),
-                Key::Char(letter) => Some(letter),
-                _ => None,
-            };
-            if naming.text.chars().count() < MAX_NAME {
-                naming.text.extend(letter);
-            }
-            self.needs_redraw = true;
-            return Some(Vec::new());
-        }
-        match key {
-            Key::Char(digit @ '1'..='9') => Some(vec![Command::Preset(digit as usize - '1' as usize)]),
-            Key::Char('s') => Some(vec![Command::NamePreset]),
-            Key::Char('z') => Some(vec![Command::RestorePresets]),
-            Key::Escape => None,
-            _ => Some(Vec::new()),
-        }
-    }
-
-    /// While the list is shown, makes thumbnails of the present volume, and makes them again when volume or view change much.
-    pub(super) fn poll_thumbnails(&mut self, now: Instant) {
-        if !self.presets.is_shown {
-            return;
-        }
-        let rests = now >= self.last_input + REST && !self.stream.is_drawing();
-        self.needs_redraw |= self.presets.thumbnails.poll(rests);
-        if self.presets.thumbnails.is_working() {
-            return;
-        }
-        let volumes = self.stream.cine().volumes();
-        let shown = self.stream.cine_position().and_then(|at| volumes.get(at)).or(volumes.back());
-        let (Some(shown), Some(scene), Some(header)) = (shown, self.stream.scene(), self.stream.header()) else {
-            return;
-        };
-        let settings = self.controls.settings();
-        let is_due = self.presets.made_of.as_ref().is_none_or(|made| {
-            let is_other_volume = made.volume != shown.volume
-                && (self.stream.is_frozen() || now.saturating_duration_since(made.at) >= LIVE_INTERVAL);
-            made.own != self.presets.own || is_other_volume || differs_much(&made.settings, settings)
-        });
-        if !is_due {
-            return;
-        }
-        let is_backward = shown.frames.first().is_some_and(|frame| frame.backward);
-        let geometry = if is_backward { header.backward.clone() } else { header.forward.clone() };
-        let count = EXAMS.len() + self.presets.own.len();
-        let job = Job {
-            context: self.context.clone(),
-            geometry,
-            input: scene.input,
-            frames: shown.frames.clone(),
-            settings: (0..count).map(|n| self.with_preset(n, scene).ok()).collect(),
-        };
-        let made_of =
-            MadeOf { volume: shown.volume, settings: settings.clone(), own: self.presets.own.clone(), at: now };
-        self.presets.made_of = Some(made_of);
-        self.presets.thumbnails.begin(job);
-    }
-
-    /// When thumbnails are looked at again, while the list is shown.
-    pub(super) fn thumbnails_at(&self, now: Instant) -> Option<Instant> {
-        let is_shown = self.presets.is_shown;
-        let at = if self.presets.thumbnails.is_working() { Duration::from_millis(50) } else { REST };
-        let is_waiting = self.presets.thumbnails.is_working() || self.presets.made_of.is_none();
-        (is_shown && is_waiting).then_some(now + at)
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -404,5 +374,37 @@ mod tests {
         for much in ["camera.azimuth=-160", "camera.zoom=2", "region.depth=[40,80]", "region.lateral=[-10,10]"] {
             assert!(changed(much), "{much}");
         }
+    }
+
+    /// Prevents a preset of the user that is lost by a key, a name that is taken twice, and a list that Escape does not leave.
+    #[test]
+    fn presets_are_named_deleted_and_brought_back() {
+        let folder = crate::files::WorkFolder::new(&std::env::temp_dir(), "echolume-test-").expect("a folder");
+        let mut presets = Presets::new(Some(folder.path().join("presets.toml")), Arc::new(|| ()));
+        let settings = Settings::default();
+        assert_eq!(presets.begin_naming(None), Ok(false), "the list is not shown");
+        assert_eq!(presets.toggle(), None);
+        assert_eq!(presets.count(), EXAMS.len());
+        for name in ["b", "A"] {
+            assert_eq!(presets.begin_naming(None), Ok(true));
+            let letter = name.to_lowercase().chars().next().expect("a letter");
+            assert_eq!(presets.key(Key::Char(letter), name == "A"), Some(Vec::new()));
+            assert_eq!(presets.key(Key::Enter, false), Some(vec![Command::EndNaming]));
+            assert!(presets.end_naming(&settings).is_ok_and(|said| said.is_some()), "{name}");
+        }
+        assert_eq!(presets.count(), EXAMS.len() + 2);
+        assert_eq!(presets.begin_naming(Some(1)), Ok(true));
+        presets.key(Key::Backspace, false);
+        presets.key(Key::Char('b'), false);
+        assert!(presets.end_naming(&settings).is_err() && presets.is_naming(), "taken; it can be corrected");
+        assert!(presets.leave() && !presets.is_naming() && presets.is_shown());
+        assert!(presets.delete(9).is_ok_and(|said| said.is_none()));
+        assert!(presets.delete(0).is_ok_and(|said| said.is_some()));
+        assert_eq!((presets.count(), presets.restore()), (EXAMS.len() + 1, Ok(true)));
+        assert_eq!(presets.count(), EXAMS.len() + 2);
+        let now = Instant::now();
+        assert!(presets.wants_thumbnails(3, &settings, false, now) && presets.due(now) == Some(now + REST));
+        assert!(presets.leave() && !presets.is_shown() && !presets.leave());
+        assert!(!presets.wants_thumbnails(3, &settings, false, now) && presets.due(now).is_none());
     }
 }

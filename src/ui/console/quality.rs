@@ -1,62 +1,135 @@
 //! The quality of the next picture: what is left out of it while the view moves, and the pipelines of that, compiled in advance.
 
-use super::{Console, REST_BEFORE_WARMING};
 use crate::command::Tool;
-use crate::frame_budget::{self, Quality};
-use crate::scene::{Follows, Layout, Settings, variants};
-use std::time::Instant;
+use crate::controls::Controls;
+use crate::frame_budget::{self, Pace, Quality, Rung};
+use crate::live::Lowered;
+use crate::plan::Work;
+use crate::scene::{Follows, Layout, Scene, Settings, variants};
+use std::sync::Arc;
+use std::time::{Duration, Instant};
 
-impl Console {
-    /// While the user rests, compiles what may be asked for next: every mode, layout and preset, and the lower rungs of the quality
-    /// ladder. Frames that arrive meanwhile are drawn as before.
-    pub(super) fn warm(&mut self, now: Instant) {
-        let is_due = self.fixed.warms && now >= self.last_input + REST_BEFORE_WARMING;
-        let is_done = self.stream.has_warmed() && self.warmed.as_ref() == Some(self.controls.settings());
-        // The first picture in full has the processor for itself.
-        let has_drawn = self.has_started && self.stream.renderer().is_some_and(|renderer| renderer.has_drawn());
-        if !is_due || is_done || !has_drawn {
-            return;
+/// How long after the last input pipelines that may be needed next are compiled.
+const REST_BEFORE_WARMING: Duration = Duration::from_secs(1);
+
+/// What the pictures leave out, and the settings that the stream has.
+pub(super) struct PictureQuality {
+    pace: Pace,
+    rungs: Arc<Vec<Rung>>,
+    /// What the settings that the stream was given last leave out.
+    quality: Quality,
+    /// The settings that the stream was given last.
+    sent: Option<Settings>,
+    /// Settings that could not be drawn, to report them only once.
+    rejected: Option<Settings>,
+    /// Number of volumes that had come from a live source.
+    live_volumes: u64,
+    /// When a light moved last.
+    light_moved: Option<Instant>,
+    /// Compiles pipelines in advance.
+    warms: bool,
+    /// The settings around which that was done last.
+    warmed: Option<Settings>,
+}
+
+impl PictureQuality {
+    /// `first`: the rung of a view that moves before any picture was timed; `warms`: compiles pipelines in advance while the user rests.
+    pub(super) fn new(budget: Option<Duration>, rungs: Vec<Rung>, first: usize, warms: bool) -> PictureQuality {
+        PictureQuality {
+            pace: Pace::new(budget, &rungs, first),
+            rungs: Arc::new(rungs),
+            quality: Quality::default(),
+            sent: None,
+            rejected: None,
+            live_volumes: 0,
+            light_moved: None,
+            warms,
+            warmed: None,
         }
-        let (_, settings) = self.effective_settings(now);
-        let lowered = self.rungs.iter().skip(1).filter(|_| self.pace.budget().is_some());
-        let lowered = lowered.flat_map(|rung| {
-            let lowered = rung.apply(&settings);
-            let coarsely_lit = frame_budget::coarsely_lit(lowered.clone());
-            let is_another = coarsely_lit != lowered;
-            let both = [Some(lowered), is_another.then_some(coarsely_lit)];
-            both.into_iter().flatten().map(|one| (one, Some(settings.clone()))).collect::<Vec<_>>()
-        });
-        let switches = variants::switches(&settings, |to| self.controls.switched(to)).into_iter();
-        let next = lowered.chain(switches.map(|variant| (variant.settings, None))).collect();
-        self.stream.warm(next);
-        self.warmed = Some(self.controls.settings().clone());
     }
 
-    /// When pipelines are compiled in advance, if that is not yet done.
-    pub(super) fn warms_at(&self, now: Instant) -> Option<Instant> {
-        let at = self.last_input + REST_BEFORE_WARMING;
-        (self.fixed.warms && self.warmed.is_none() && at > now).then_some(at)
+    /// What the rungs make of a scene at full quality; none without a budget.
+    pub(super) fn lowered(&self) -> Option<Lowered> {
+        let rungs = self.rungs.clone();
+        self.budget().map(|_| Arc::new(move |scene: &Scene| frame_budget::lowered(&rungs, scene)) as Lowered)
     }
 
-    /// The settings of a view at rest.
-    pub(super) fn full_settings(&self) -> Settings {
-        let mut full = self.controls.settings().clone().without_drawings();
-        // A region that grows and a plane that moves show slices that were left out. With all of them processed, dragging needs no frame
-        // again.
-        let cuts_planes = full.mode.is_flat() || full.layout == Layout::Four;
-        full.slices.everything |= cuts_planes || matches!(self.controls.tool(), Tool::Region | Tool::Clip);
-        full
+    pub(super) fn budget(&self) -> Option<Duration> {
+        self.pace.budget()
+    }
+
+    /// What the last settings that were sent to the stream leave out.
+    pub(super) fn now(&self) -> Quality {
+        self.quality
+    }
+
+    /// The same for the display of times.
+    pub(super) fn label(&self) -> &str {
+        frame_budget::label(self.quality, &self.rungs)
+    }
+
+    /// The user moved what takes this work.
+    pub(super) fn moved(&mut self, work: Work, now: Instant) {
+        self.pace.moved(work, now);
+    }
+
+    pub(super) fn light_moved(&mut self, now: Instant) {
+        self.light_moved = Some(now);
+    }
+
+    /// Another scene takes another time.
+    pub(super) fn scene_changed(&mut self) {
+        self.pace.forget();
+    }
+
+    /// Measures how often volumes come. `count`: of those that came from a live source; none without one.
+    pub(super) fn follow_volumes(&mut self, count: Option<u64>, now: Instant) {
+        match count {
+            Some(count) if count > self.live_volumes => self.pace.volumes_came(count - self.live_volumes, now),
+            Some(_) => {}
+            None => self.pace.volumes_stopped(),
+        }
+        self.live_volumes = count.unwrap_or(self.live_volumes);
+    }
+
+    pub(super) fn picture_took(&mut self, work: Work, time: Duration) {
+        self.pace.picture_took(work, self.quality, time);
+    }
+
+    /// When a moving view comes to rest.
+    pub(super) fn rests_at(&self, now: Instant) -> Option<Instant> {
+        self.pace.rests_at(now)
+    }
+
+    /// The quality and the settings that the stream is to be given now; none if it has them, or cannot draw them.
+    pub(super) fn to_send(&self, controls: &Controls, now: Instant) -> Option<(Quality, Settings)> {
+        let (quality, settings) = self.effective(controls, now);
+        let is_known = self.sent.as_ref() == Some(&settings) || self.rejected.as_ref() == Some(&settings);
+        (!is_known).then_some((quality, settings))
+    }
+
+    /// The stream is given settings of this quality. True if it is another one.
+    pub(super) fn choose(&mut self, quality: Quality) -> bool {
+        std::mem::replace(&mut self.quality, quality) != quality
+    }
+
+    pub(super) fn sent(&mut self, settings: Settings) {
+        self.sent = Some(settings);
+    }
+
+    pub(super) fn rejected(&mut self, settings: Settings) {
+        self.rejected = Some(settings);
     }
 
     /// The quality that keeps the frame budget now, and the settings of it.
-    pub(super) fn effective_settings(&self, now: Instant) -> (Quality, Settings) {
+    fn effective(&self, controls: &Controls, now: Instant) -> (Quality, Settings) {
         let quality = self.pace.quality(now);
-        let full = self.full_settings();
+        let full = full_settings(controls);
         let lowered = match self.rungs.get(quality.rays) {
             Some(rung) => rung.apply(&full),
             None => full,
         };
-        let lowered = match quality.rays > 0 && self.makes_light(now) {
+        let lowered = match quality.rays > 0 && self.makes_light(controls.settings(), now) {
             true => frame_budget::coarsely_lit(lowered),
             false => lowered,
         };
@@ -65,8 +138,104 @@ impl Console {
 
     /// True if the light of a light volume is made again for every picture of a view that moves: the light itself moves, or follows the camera, or volumes keep
     /// coming.
-    fn makes_light(&self, now: Instant) -> bool {
+    fn makes_light(&self, settings: &Settings, now: Instant) -> bool {
         let has_moved = self.light_moved.is_some_and(|at| now.saturating_duration_since(at) < frame_budget::REST_DELAY);
-        has_moved || self.pace.is_live(now) || self.controls.settings().light.follows == Follows::Camera
+        has_moved || self.pace.is_live(now) || settings.light.follows == Follows::Camera
+    }
+
+    /// While the user rests, what may be asked for next: every mode, layout and preset, and the lower rungs of the quality ladder. Each with the
+    /// settings at full quality if it is lower. `acted`: when the user acted last; `has_warmed`: the stream was given such settings since the last source.
+    pub(super) fn warm(
+        &mut self,
+        controls: &Controls,
+        acted: Instant,
+        has_warmed: bool,
+        now: Instant,
+    ) -> Option<Vec<(Settings, Option<Settings>)>> {
+        let is_due = self.warms && now >= acted + REST_BEFORE_WARMING;
+        if !is_due || (has_warmed && self.warmed.as_ref() == Some(controls.settings())) {
+            return None;
+        }
+        let (_, settings) = self.effective(controls, now);
+        let lowered = self.rungs.iter().skip(1).filter(|_| self.pace.budget().is_some());
+        let lowered = lowered.flat_map(|rung| {
+            let lowered = rung.apply(&settings);
+            let coarsely_lit = frame_budget::coarsely_lit(lowered.clone());
+            let is_another = coarsely_lit != lowered;
+            let both = [Some(lowered), is_another.then_some(coarsely_lit)];
+            both.into_iter().flatten().map(|one| (one, Some(settings.clone()))).collect::<Vec<_>>()
+        });
+        let switches = variants::switches(&settings, |to| controls.switched(to)).into_iter();
+        let next = lowered.chain(switches.map(|variant| (variant.settings, None))).collect();
+        self.warmed = Some(controls.settings().clone());
+        Some(next)
+    }
+
+    /// The user acts: nothing more is compiled in advance. True if something was.
+    pub(super) fn stop_warming(&mut self) -> bool {
+        self.warmed.take().is_some()
+    }
+
+    /// When pipelines are compiled in advance, if that is not yet done.
+    pub(super) fn warms_at(&self, acted: Instant, now: Instant) -> Option<Instant> {
+        let at = acted + REST_BEFORE_WARMING;
+        (self.warms && self.warmed.is_none() && at > now).then_some(at)
+    }
+}
+
+/// The settings of a view at rest.
+pub(super) fn full_settings(controls: &Controls) -> Settings {
+    let mut full = controls.settings().clone().without_drawings();
+    // A region that grows and a plane that moves show slices that were left out. With all of them processed, dragging needs no frame
+    // again.
+    let cuts_planes = full.mode.is_flat() || full.layout == Layout::Four;
+    full.slices.everything |= cuts_planes || matches!(controls.tool(), Tool::Region | Tool::Clip);
+    full
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn quality(warms: bool) -> (PictureQuality, Controls) {
+        let rungs = frame_budget::built_in_ladder();
+        let controls = Controls::new(Settings::default());
+        (PictureQuality::new(Some(Duration::from_millis(16)), rungs, 1, warms), controls)
+    }
+
+    /// Prevents settings that are sent or refused again and again, and a view at rest that leaves something out.
+    #[test]
+    fn settings_are_sent_once_and_a_moving_view_sends_lower_ones_until_it_rests() {
+        let (mut quality, controls) = quality(false);
+        let begin = Instant::now();
+        let at = |ms: u64| begin + Duration::from_millis(ms);
+        let (rung, full) = quality.to_send(&controls, at(0)).expect("the first");
+        assert_eq!((rung, &full), (Quality::default(), &full_settings(&controls)));
+        assert!(!quality.choose(rung));
+        quality.sent(full.clone());
+        assert!(quality.to_send(&controls, at(1)).is_none());
+        quality.moved(Work::Rays, at(10));
+        let (rung, lower) = quality.to_send(&controls, at(11)).expect("it moves");
+        assert!(rung.rays == 1 && lower != full && quality.choose(rung) && !quality.choose(rung));
+        assert_eq!((quality.now(), quality.rests_at(at(11))), (rung, Some(at(260))));
+        quality.rejected(lower);
+        assert!(quality.to_send(&controls, at(12)).is_none(), "it was refused");
+        assert!(quality.to_send(&controls, at(260)).is_none(), "the stream still has those at rest");
+    }
+
+    #[test]
+    fn pipelines_are_compiled_once_after_a_second_of_rest() {
+        let begin = Instant::now();
+        let at = |ms: u64| begin + Duration::from_millis(ms);
+        let (mut never, controls) = quality(false);
+        assert!(never.warm(&controls, begin, false, at(5000)).is_none() && never.warms_at(begin, begin).is_none());
+        let (mut quality, controls) = quality(true);
+        assert_eq!(quality.warms_at(begin, at(999)), Some(at(1000)));
+        assert!(quality.warm(&controls, begin, false, at(999)).is_none() && !quality.stop_warming());
+        let next = quality.warm(&controls, begin, false, at(1000)).expect("due");
+        assert!(next.iter().any(|(_, full)| full.is_some()) && next.iter().any(|(_, full)| full.is_none()));
+        assert!(quality.warm(&controls, begin, true, at(2000)).is_none(), "done");
+        assert!(quality.warm(&controls, begin, false, at(2000)).is_some(), "another source");
+        assert!(quality.stop_warming() && !quality.stop_warming());
     }
 }

@@ -14,7 +14,7 @@ impl Console {
     /// What the pictures are of, if that is no patient: the phantom, also where a recording of it is played.
     pub(super) fn origin(&self) -> Option<&'static str> {
         let is_synthetic = self.stream.header().is_some_and(|header| header.synthetic);
-        (self.fixed.source == SourceKind::Demo || is_synthetic).then_some(texts::DEMO_DATA)
+        (self.connection.kind() == SourceKind::Demo || is_synthetic).then_some(texts::DEMO_DATA)
     }
 
     /// Saves the picture that is shown, with its measurements, and its bar if that is switched on.
@@ -72,7 +72,7 @@ impl Console {
     /// Exports the volume that is shown, or else the newest, in the n-th format of the menu.
     pub(super) fn export_volume(&mut self, n: usize) {
         let Some(format) = FORMATS.get(n).copied() else { return };
-        self.shows_exports = false;
+        self.visible.close_exports();
         let cine = self.stream.cine().volumes();
         let shown = || self.stream.cine_position().and_then(|at| cine.get(at)).or(cine.back()).cloned();
         let volumes = if format.takes_the_loop() { self.marked_volumes() } else { shown().into_iter().collect() };
@@ -96,16 +96,30 @@ impl Console {
             Err(fault) => self.notify(&texts::not_exported(fault), true),
         }
     }
-    /// Takes how far the export in work is.
-    pub(super) fn poll_export(&mut self) {
-        let progress = self.exporter.progress();
-        self.needs_redraw |= std::mem::replace(&mut self.export_progress, progress) != progress;
+
+    /// Takes what was saved since the last update.
+    pub(super) fn poll_saved(&mut self) {
+        while let Some(saved) = self.exporter.poll() {
+            match saved.file {
+                Ok(file) => {
+                    self.request.exit |= self.leaving.saved(saved.complete_to);
+                    if file.extension().is_some_and(|end| end == "toml") {
+                        self.opening.remember(&file);
+                    }
+                    self.notify(&texts::saved(file.display()), false);
+                }
+                Err(fault) => {
+                    self.leaving.not_saved(saved.complete_to);
+                    self.notify(&texts::not_saved(fault), true);
+                }
+            }
+        }
     }
 
     /// A note about the export in work that stays as long as that, once it says how far it is. Where its list is shown, that says so.
     pub(super) fn export_note(&self) -> Option<Note> {
-        let name = self.exporter.exporting().filter(|_| !self.shows_exports)?;
-        let Progress { done, of } = self.export_progress?;
+        let name = self.exporter.exporting().filter(|_| !self.visible.exports)?;
+        let Progress { done, of } = self.exporter.progress()?;
         Some(Note { text: texts::export_so_far(name, done, of), is_fault: false })
     }
 }

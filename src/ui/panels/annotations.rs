@@ -24,7 +24,7 @@ pub(super) fn paint(ui: &Ui, state: &PanelState, scale: f32) {
     let Some(scene) = state.scene else { return };
     let picture = picture_rect(state, scale);
     // During a resize the scene has another size for a moment.
-    if scene.picture_size() != state.picture.1 {
+    if scene.picture_size() != state.room.picture.1 {
         return;
     }
     let painter = ui.ctx().layer_painter(egui::LayerId::background()).with_clip_rect(picture);

@@ -19,7 +19,7 @@ pub(super) fn paint(ui: &Ui, state: &PanelState, scale: f32) {
     let painter = ui.ctx().layer_painter(egui::LayerId::background()).with_clip_rect(picture);
     let is_chosen = state.controls.tool() == Tool::BodyMark;
     let about = state.controls.body_mark().map(|(index, _)| index);
-    for drawn in body_marks::drawn(state.controls.body_marks(), state.picture.1.map(f64::from)) {
+    for drawn in body_marks::drawn(state.controls.body_marks(), state.room.picture.1.map(f64::from)) {
         if is_chosen {
             let colour = if about == Some(drawn.index) { MEASURE } else { WEAK_TEXT };
             let edge = vec2(1.0, 1.0) * drawn.edge as f32 / scale;
@@ -33,7 +33,7 @@ pub(super) fn paint(ui: &Ui, state: &PanelState, scale: f32) {
 /// The squares that the marks take from other marks of the picture, points.
 pub(super) fn areas(state: &PanelState, scale: f32) -> Vec<Rect> {
     let picture = picture_rect(state, scale);
-    let marks = body_marks::drawn(state.controls.body_marks(), state.picture.1.map(f64::from));
+    let marks = body_marks::drawn(state.controls.body_marks(), state.room.picture.1.map(f64::from));
     let area = |drawn: Drawn| {
         Rect::from_min_size(at(&picture, scale, drawn.corner), vec2(1.0, 1.0) * drawn.edge as f32 / scale)
     };

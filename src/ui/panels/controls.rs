@@ -121,7 +121,7 @@ fn show_tools(ui: &mut Ui, state: &PanelState, width: f32, execute: &mut dyn FnM
                 hints::of_tool,
                 |t| execute(Command::Tool(t)),
             );
-            if !state.has_column {
+            if !state.room.has_column {
                 tools::clip(ui, state, width - 16.0, execute);
                 tools::cuts(ui, state, width - 16.0, execute);
                 tools::start_line(ui, state, width - 16.0, execute);
@@ -144,14 +144,14 @@ fn show_tools(ui: &mut Ui, state: &PanelState, width: f32, execute: &mut dyn FnM
                     execute(Command::Recentre);
                 }
             }
-            if !state.has_column {
+            if !state.room.has_column {
                 tools::curve(ui, state, width - 16.0, execute);
             }
             names::group(ui, texts::MEASURE, |ui| {
                 heading(ui, texts::MEASURE);
                 measures::show_tools(ui, state, width - 16.0, execute);
             });
-            if !state.has_column {
+            if !state.room.has_column {
                 body_marks::show(ui, state, width - 16.0, execute);
                 measures::show_results(ui, state, width - 24.0, execute);
             }
@@ -307,7 +307,7 @@ fn show_controls(ui: &mut Ui, state: &PanelState, width: f32, execute: &mut dyn 
                     None => absent(ui, name),
                 }
             }
-            if state.has_column {
+            if state.room.has_column {
                 measures::show_results(ui, state, width - 40.0, execute);
                 tools::clip(ui, state, width - 32.0, execute);
                 tools::cuts(ui, state, width - 32.0, execute);
@@ -478,7 +478,7 @@ pub(super) fn show_cine_bar(ui: &mut Ui, state: &PanelState, height: f32, execut
             let mut shown = Vec::new();
             let between = ui.spacing().item_spacing.x;
             for (label, width, command, hint) in
-                [save].into_iter().chain(state.has_drawer.then_some(drawer)).chain(buttons)
+                [save].into_iter().chain(state.room.has_drawer.then_some(drawer)).chain(buttons)
             {
                 let wanted = width + between;
                 // The loop needs its buttons and some of its slider.
@@ -517,7 +517,7 @@ pub(super) fn show_cine_bar(ui: &mut Ui, state: &PanelState, height: f32, execut
                     };
                     let button = ui.add(Button::new(label).min_size(vec2(width, touch))).tell(hint).named(name);
                     let button = match command {
-                        Command::ToggleDrawer => button.expanded(state.rail.is_open),
+                        Command::ToggleDrawer => button.expanded(state.visible.rail.is_open),
                         _ => button,
                     };
                     if button.clicked() {

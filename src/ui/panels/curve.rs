@@ -17,7 +17,7 @@ pub(super) fn paint(ui: &Ui, state: &PanelState, scale: f32) {
     let Some(scene) = state.scene else { return };
     let (is_chosen, work) = (state.controls.tool() == Tool::Curve, state.controls.line());
     // During a resize the scene has another size for a moment.
-    if scene.picture_size() != state.picture.1 || (scene.settings.planes.curve.is_none() && work.is_none()) {
+    if scene.picture_size() != state.room.picture.1 || (scene.settings.planes.curve.is_none() && work.is_none()) {
         return;
     }
     let picture = picture_rect(state, scale);

@@ -40,16 +40,11 @@ pub(super) fn show_files(ui: &Ui, files: (&str, &[String]), execute: &mut dyn Fn
 }
 
 /// Shows the formats of an export. `running`: the name of the one in work; `progress`: how far it is.
-pub(super) fn show_exports(
-    ui: &Ui,
-    running: Option<&str>,
-    progress: Option<Progress>,
-    execute: &mut dyn FnMut(Command),
-) {
-    let about = match (running, progress) {
-        (Some(name), Some(progress)) => texts::is_exported_so_far(name, progress.done, progress.of),
-        (Some(name), None) => texts::is_being_exported(name),
-        (None, _) => texts::VOLUME_SHOWN.into(),
+pub(super) fn show_exports(ui: &Ui, running: Option<(&str, Option<Progress>)>, execute: &mut dyn FnMut(Command)) {
+    let about = match running {
+        Some((name, Some(progress))) => texts::is_exported_so_far(name, progress.done, progress.of),
+        Some((name, None)) => texts::is_being_exported(name),
+        None => texts::VOLUME_SHOWN.into(),
     };
     let list =
         List { title: texts::EXPORT, about: &about, close: (texts::CLOSE_EXPORT_HINT, Command::Exports), empty: "" };

@@ -180,7 +180,7 @@ pub(super) fn paint(ui: &Ui, state: &PanelState, scale: f32) {
     let (measures, outline) = (state.controls.measures(), state.controls.outline());
     let is_brush = state.controls.tool() == Tool::Brush && !scene.is_flat();
     let is_empty = measures.is_empty() && state.controls.work().is_none() && outline.is_empty() && !is_brush;
-    if is_empty || scene.picture_size() != state.picture.1 {
+    if is_empty || scene.picture_size() != state.room.picture.1 {
         return;
     }
     let picture = picture_rect(state, scale);

@@ -21,13 +21,14 @@ mod recordings;
 mod region;
 mod sides;
 mod tools;
+mod visible;
 mod walking;
 mod widgets;
 
 use self::colours::{BACKGROUND, BUTTON, EDGE, ON_SELECTED, PANEL, SELECTED, TEXT, WEAK_TEXT};
 pub(super) use self::presets::{PresetTile, PresetsShown};
-pub(super) use self::rail::Rail;
 pub(super) use self::recordings::Reading;
+pub(super) use self::visible::Visible;
 use super::command::Command;
 use super::input::{Button, Input, Key, Modifiers, Phase};
 use crate::cine_player::CineState;
@@ -229,20 +230,20 @@ impl Panels {
                 return;
             }
             names::picture(ui, state, self.scale);
-            let shows_panels = state.shows_panels && state.picture.1 != size;
+            let shows_panels = state.visible.panels && state.room.picture.1 != size;
             if shows_panels {
                 let Edges { left, right, below } = Edges::of(points.into(), true);
                 controls::show_cine_bar(ui, state, below, execute);
                 if left > 0.0 {
                     controls::show_modes(ui, state, left, execute);
-                } else if state.rail.is_open {
+                } else if state.visible.rail.is_open {
                     controls::show_drawer(ui, state, rail::drawer_size(points.into(), below), execute);
                 }
                 if right > 0.0 {
                     controls::show_column(ui, state, right, execute);
                 }
             }
-            match state.shows_panels {
+            match state.visible.panels {
                 true if state.has_drawn => annotations::paint(ui, state, self.scale),
                 false if state.has_drawn => annotations::paint_origin(ui, state, self.scale),
                 _ => {}
@@ -253,7 +254,7 @@ impl Panels {
                 measures::paint(ui, state, self.scale);
                 body_marks::paint(ui, state, self.scale);
             }
-            if state.shows_times {
+            if state.visible.times {
                 overlays::show_times(ui, state, self.scale);
             }
             let taken = recordings::show_reading(ui, state, self.scale, execute);
@@ -261,14 +262,15 @@ impl Panels {
             if state.shows_first_steps {
                 first_steps::show(ui, state, self.scale, execute);
             }
-            if state.shows_help {
+            // egui panics if a list has a negative height.
+            if state.visible.help && size[1] as f32 > MIN_HELP_HEIGHT * self.scale {
                 overlays::show_help(ui, state, execute);
             }
             if let Some(files) = state.files {
                 lists::show_files(ui, files, execute);
             }
-            if state.shows_exports {
-                lists::show_exports(ui, state.exporting, state.export_progress, execute);
+            if state.visible.exports {
+                lists::show_exports(ui, state.exporting, execute);
             }
             if let Some(shown) = &state.presets {
                 presets::show(ui, shown, &thumbnails, execute);
@@ -403,6 +405,8 @@ const MIN_FOR_CONTROLS: f32 = 440.0;
 const HIGH_WINDOW: f32 = 600.0;
 /// Largest share of the width that both columns have together: the picture keeps half of the window.
 const COLUMNS_SHARE: f32 = 0.42;
+/// The help needs a window of this height, points.
+const MIN_HELP_HEIGHT: f32 = 200.0;
 
 /// What the panels take of a window at its edges, points; 0 without a panel.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -431,19 +435,8 @@ pub(super) struct PanelState<'a> {
     pub(super) controls: &'a Controls,
     pub(super) scene: Option<&'a Scene>,
     pub(super) times: &'a Times,
-    /// Upper left corner and size of the picture, pixels.
-    pub(super) picture: ([u32; 2], [u32; 2]),
-    pub(super) shows_panels: bool,
-    /// There is a column of controls on the right.
-    pub(super) has_column: bool,
-    /// Tools and controls are in a drawer.
-    pub(super) has_drawer: bool,
-    pub(super) rail: Rail,
-    pub(super) shows_help: bool,
-    pub(super) shows_times: bool,
-    /// What the help is searched for, while it is.
-    pub(super) help_search: Option<&'a str>,
-    /// Saves pictures with a bar.
+    pub(super) room: Room,
+    pub(super) visible: &'a Visible,
     /// What the pictures show, if that is no patient.
     pub(super) origin: Option<&'a str>,
     /// Shows the hints of the first start.
@@ -457,22 +450,18 @@ pub(super) struct PanelState<'a> {
     /// The recordings that are open, and what is being read.
     pub(super) recordings: &'a [Named],
     pub(super) reading: Option<&'a Reading>,
-    pub(super) shows_exports: bool,
     /// The list of presets, while it is shown.
     pub(super) presets: Option<PresetsShown<'a>>,
-    /// The name of the export in work.
     /// The view turns by itself.
     pub(super) is_turning: bool,
-    pub(super) exporting: Option<&'a str>,
-    /// How far it is.
-    pub(super) export_progress: Option<Progress>,
+    /// The name of the export in work, and how far it is.
+    pub(super) exporting: Option<(&'a str, Option<Progress>)>,
     pub(super) is_frozen: bool,
     pub(super) cine: CineState,
     /// True after the first picture.
     pub(super) has_drawn: bool,
     /// The current rung of the quality ladder, and the frame budget.
-    pub(super) quality: &'a str,
-    pub(super) budget: Option<Duration>,
+    pub(super) quality: (&'a str, Option<Duration>),
     pub(super) banner: Option<Banner>,
     pub(super) notes: &'a [Note],
     /// The keys that end the program, for the help.
@@ -507,15 +496,24 @@ pub fn picture_area(size: [u32; 2], scale: f32, shows_panels: bool) -> ([u32; 2]
     ([left, 0], [size[0].saturating_sub(left + right).max(1), size[1].saturating_sub(below).max(1)])
 }
 
-/// True if a window of this size has a column of controls on the right.
-pub(super) fn has_column(size: [u32; 2], scale: f32, shows_panels: bool) -> bool {
-    Edges::of(size.map(|n| n as f32 / scale), shows_panels).right > 0.0
+/// What the panels leave and have in a window.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct Room {
+    /// Upper left corner and size of the picture, pixels.
+    pub(super) picture: ([u32; 2], [u32; 2]),
+    /// There is a column of controls on the right.
+    pub(super) has_column: bool,
+    /// Tools and controls are in a drawer: there is no room for a rail.
+    pub(super) has_drawer: bool,
 }
 
-/// True if a window of this size has its tools and controls in a drawer: there is no room for a rail.
-pub(super) fn has_drawer(size: [u32; 2], scale: f32, shows_panels: bool) -> bool {
-    let Edges { left, below, .. } = Edges::of(size.map(|n| n as f32 / scale), shows_panels);
-    left == 0.0 && below > 0.0
+impl Room {
+    /// `size`: of the window, pixels; `scale`: pixels per point.
+    pub(super) fn of(size: [u32; 2], scale: f32, shows_panels: bool) -> Room {
+        let Edges { left, right, below } = Edges::of(size.map(|n| n as f32 / scale), shows_panels);
+        let picture = picture_area(size, scale, shows_panels);
+        Room { picture, has_column: right > 0.0, has_drawer: left == 0.0 && below > 0.0 }
+    }
 }
 
 /// A small heading above a group of controls.
@@ -525,7 +523,7 @@ fn heading(ui: &mut egui::Ui, text: &str) {
 
 /// The area of the picture in points.
 fn picture_rect(state: &PanelState, scale: f32) -> Rect {
-    let ([x, y], [w, h]) = state.picture;
+    let ([x, y], [w, h]) = state.room.picture;
     let [x, y, w, h] = [x, y, w, h].map(|n| n as f32 / scale);
     Rect::from_min_size(pos2(x, y), vec2(w, h))
 }

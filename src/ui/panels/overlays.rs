@@ -158,19 +158,20 @@ pub(super) fn show_times(ui: &mut Ui, state: &PanelState, scale: f32) {
 fn figures(ui: &mut Ui, state: &PanelState) {
     let times = state.times;
     let ms = |value: Option<f64>| value.map_or("-".into(), texts::milliseconds);
-    let colour_of_time = match (state.budget, times.pictures.percentile(0.95)) {
+    let (quality, budget) = state.quality;
+    let colour_of_time = match (budget, times.pictures.percentile(0.95)) {
         (Some(budget), Some(p95)) if p95 > budget.as_secs_f64() * 1e3 => WARNING,
         (Some(_), Some(_)) => GOOD,
         _ => TEXT,
     };
     ui.label(RichText::new(texts::picture_time(ms(times.pictures.newest()))).size(LARGE_TEXT).color(colour_of_time));
-    let budget = state.budget.map_or(texts::NO_BUDGET.into(), |b| texts::budget(b.as_secs_f64() * 1e3));
+    let budget = budget.map_or(texts::NO_BUDGET.into(), |b| texts::budget(b.as_secs_f64() * 1e3));
     small(
         ui,
         texts::picture_times(ms(times.pictures.percentile(0.5)), ms(times.pictures.percentile(0.95)), budget),
         WEAK_TEXT,
     );
-    small(ui, state.quality.to_string(), ACCENT);
+    small(ui, quality.to_string(), ACCENT);
     small(ui, texts::rates(times.volumes, times.frames, times.shown), TEXT);
     if let Some(acquisition_time) = times.acquisition_time.filter(|f| *f > 0.0) {
         let share = 100.0 * times.volumes * acquisition_time;
@@ -301,12 +302,12 @@ pub(super) fn show_help(ui: &mut Ui, state: &PanelState, execute: &mut dyn FnMut
                     ui.heading(texts::KEYS_AND_GESTURES);
                     ui.with_layout(egui::Layout::right_to_left(egui::Align::Center), |ui| {
                         is_closed = ui.button(texts::CLOSE).tell(texts::CLOSE_HELP_HINT).clicked();
-                        let label = match state.help_search {
+                        let label = match &state.visible.search {
                             Some(text) => texts::searching_for(text),
                             None => texts::SEARCH_BUTTON.into(),
                         };
                         let button = ui.button(label).tell(texts::SEARCH_HINT).named(texts::SEARCH);
-                        if button.with_value(state.help_search.unwrap_or_default()).clicked() {
+                        if button.with_value(state.visible.search.as_deref().unwrap_or_default()).clicked() {
                             execute(Command::SearchHelp);
                         }
                     });
@@ -314,7 +315,7 @@ pub(super) fn show_help(ui: &mut Ui, state: &PanelState, execute: &mut dyn FnMut
                 let height = (screen.height() - 110.0).max(0.0);
                 let lines = lines_of(&found(
                     state.exit_key,
-                    state.help_search.unwrap_or_default(),
+                    state.visible.search.as_deref().unwrap_or_default(),
                     state.keyboard_pointer.is_some(),
                 ));
                 ScrollArea::vertical().max_height(height).min_scrolled_height(height).show(ui, |ui| {

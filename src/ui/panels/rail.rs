@@ -55,12 +55,12 @@ pub(super) fn show_rail(
     show: impl FnOnce(&mut Ui, RailTab, &mut dyn FnMut(Command)),
 ) {
     Panel::left("rail").exact_size(width).resizable(false).show_separator_line(false).show(ui, |ui| {
-        if state.has_column {
+        if state.room.has_column {
             return show(ui, RailTab::Tools, execute);
         }
         ui.add_space(6.0);
         tabs(ui, state, [width, TOUCH_SIZE * 0.75], execute);
-        show(ui, state.rail.tab, execute);
+        show(ui, state.visible.rail.tab, execute);
     });
 }
 
@@ -86,7 +86,7 @@ pub(super) fn show_drawer(
             ui.set_max_size(inner);
             let tab = if height < LOW_DRAWER { 28.0 } else { TOUCH_SIZE * 0.75 };
             tabs(ui, state, [width, tab], execute);
-            show(ui, state.rail.tab, execute);
+            show(ui, state.visible.rail.tab, execute);
         });
     });
 }
@@ -96,7 +96,7 @@ fn tabs(ui: &mut Ui, state: &PanelState, [width, height]: [f32; 2], execute: &mu
     ui.horizontal(|ui| {
         names::name(ui, Role::TabList, texts::TABS);
         for (tab, name, hint) in TABS {
-            let is_chosen = state.rail.tab == tab;
+            let is_chosen = state.visible.rail.tab == tab;
             let button = Button::selectable(is_chosen, name).frame_when_inactive(true).min_size(each);
             if ui.add(button).tell(hint).with_role(Role::Tab).chosen(is_chosen).clicked() {
                 execute(Command::RailTab(tab));

@@ -17,7 +17,7 @@ const DASH: f32 = 6.0;
 pub(super) fn paint(ui: &Ui, state: &PanelState, scale: f32) {
     let Some(scene) = state.scene.filter(|_| state.controls.tool() == Tool::Region) else { return };
     // During a resize the scene has another size for a moment.
-    if scene.picture_size() != state.picture.1 {
+    if scene.picture_size() != state.room.picture.1 {
         return;
     }
     let picture = picture_rect(state, scale);

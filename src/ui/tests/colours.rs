@@ -53,7 +53,7 @@ fn middle([left, top, right, bottom]: Area) -> [f32; 2] {
 
 /// What is behind a place before the n-th thing is drawn, the picture being of one colour.
 fn behind(shown: &Shown, n: usize, at: [f32; 2], picture: [f64; 3]) -> [f64; 3] {
-    let ([x, y], [w, h]) = crate::panels::picture_area(shown.size, 1.0, shown.shows_panels);
+    let ([x, y], [w, h]) = crate::panels::picture_area(shown.size, 1.0, shown.visible.panels);
     let is_on_picture = holds([x as f32, y as f32, (x + w) as f32, (y + h) as f32], at);
     let from = if is_on_picture { picture } else { opaque(BACKGROUND.to_array()) };
     shown.drawn[..n].iter().filter(|drawn| holds(drawn.clip, at)).fold(from, |below, drawn| match &drawn.kind {
@@ -237,11 +237,11 @@ fn everything_that_is_drawn_has_the_contrast_that_wcag_demands() {
     check(&shown, "a line in work");
     let mut shown = Shown::new("mode='surface'");
     shown.is_frozen = true;
-    shown.pointer = Some([600.0, 400.0]);
+    shown.pointers.0 = Some([600.0, 400.0]);
     shown.budget = Some(Duration::from_millis(16));
     shown.times.passes = vec![("surface", 1.0, 3), ("shade", 0.5, 3)];
     for (n, what) in ["help", "times", "exports", "the question"].into_iter().enumerate() {
-        shown.open = std::array::from_fn(|open| open == n);
+        shown.open(n);
         for picture in [Duration::from_millis(5), Duration::from_secs(1)] {
             // The first is within the budget; with the second the 95th percentile is over it.
             shown.times.pictures.add(picture);
@@ -249,7 +249,7 @@ fn everything_that_is_drawn_has_the_contrast_that_wcag_demands() {
             check(&shown, what);
         }
     }
-    shown.open = [false; 4];
+    shown.close();
     shown.files = Some(("/data".into(), vec!["a.mha".into(), "b.toml".into()]));
     shown.settle();
     check(&shown, "files");

@@ -30,7 +30,7 @@ fn the_hints_stay_in_the_picture_and_are_closed() {
         assert_eq!(has_hints(&shown), 0);
         let ([x, y], [width, height]) = panels::picture_area(size, scale, true);
         assert!(first_steps::has_room([width, height], scale));
-        shown.shows_first_steps = true;
+        shown.shows[0] = true;
         // An area is placed by its size of the layout before.
         (0..3).for_each(|_| shown.settle());
         assert_eq!(has_hints(&shown), 3, "{size:?}");
@@ -51,12 +51,13 @@ fn demo_data_is_named_without_panels_too() {
     let mut shown = Shown::new("mode='surface'");
     let is_named = |shown: &Shown| texts_of(shown).iter().any(|(text, _)| text == "Demo data (phantom)");
     assert!(is_named(&shown));
-    shown.shows_panels = false;
+    shown.visible.panels = false;
     shown.apply(Command::Mode(Mode::Surface));
     shown.lay_out();
     assert!(is_named(&shown));
-    shown.shows_only_origin = true;
-    shown.open = [true; 4];
+    shown.shows[1] = true;
+    shown.open(3);
+    (shown.visible.help, shown.visible.times, shown.visible.exports) = (true, true, true);
     shown.settle();
     let all = texts_of(&shown);
     assert!(all.iter().all(|(text, _)| text == "Demo data (phantom)") && is_named(&shown), "{all:?}");

@@ -211,17 +211,18 @@ fn the_controls_in_front_are_reached_in_every_window() {
             }
             shown.settle();
         };
-        if panels::has_drawer(size, scale, true) {
+        let room = panels::Room::of(size, scale, true);
+        if room.has_drawer {
             press(&mut shown, "Cine loop", Role::Button, "Tools and controls");
-            assert!(shown.rail.is_open, "{what}");
+            assert!(shown.visible.rail.is_open, "{what}");
         }
-        if !panels::has_column(size, scale, true) {
+        if !room.has_column {
             press(&mut shown, "Tools or controls", Role::Tab, "Controls");
         }
-        if !panels::has_drawer(size, scale, true) {
+        if !room.has_drawer {
             check(&shown, &format!("{what}, the controls"));
         }
-        assert_eq!(shown.rail.tab == RailTab::Controls, !panels::has_column(size, scale, true), "{what}");
+        assert_eq!(shown.visible.rail.tab == RailTab::Controls, !room.has_column, "{what}");
         let [window, picture] = places(&shown);
         let above_bar = [0.0, 0.0, window[2], picture[3]];
         for name in ["Threshold", "Gain", "Smooth", "Brightness", "Light", "Depth"] {
@@ -322,7 +323,7 @@ fn dialogs_fit_into_the_window() {
             if n == 0 && size[1] as f32 <= 200.0 * scale {
                 continue;
             }
-            shown.open = std::array::from_fn(|open| open == n);
+            shown.open(n);
             let names = (0..30).map(|n| format!("recording-{n}.mha")).collect();
             shown.files = (n == 4).then(|| ("/data".into(), names));
             let own = (0..12).map(|n| format!("Preset of a rather long name {n}")).collect();

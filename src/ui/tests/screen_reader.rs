@@ -276,12 +276,12 @@ fn lists_and_questions_are_answered_by_a_screen_reader() {
     let state = |shown: &Shown, name: &str| shown.tree[&shown.find("Recordings", Role::Button, name)].toggled();
     assert_eq!([state(&shown, "a.mha"), state(&shown, "b.mha")], [Some(Toggled::False), Some(Toggled::True)]);
     for (n, what) in ["help", "times", "exports"].into_iter().enumerate() {
-        shown.open = std::array::from_fn(|open| open == n);
+        shown.open(n);
         shown.lay_out();
         shown.lay_out();
         shown.check(what);
     }
-    shown.open = [false; 4];
+    shown.close();
     shown.presets = Some((vec!["Profile".into(), "12 weeks".into()], None));
     shown.settle();
     shown.check("presets");
@@ -302,11 +302,11 @@ fn lists_and_questions_are_answered_by_a_screen_reader() {
     let keep = shown.find("Presets", Role::Button, "Keep");
     assert_eq!(shown.ask(keep, Action::Click, None), [Command::EndNaming]);
     shown.presets = None;
-    shown.open = [false, false, true, false];
+    shown.open(2);
     shown.settle();
     let cancel = shown.find("Export", Role::Button, "Cancel the export");
     assert_eq!(shown.ask(cancel, Action::Click, None), [Command::CancelExport]);
-    shown.open = [false, false, false, true];
+    shown.open(3);
     shown.lay_out();
     shown.lay_out();
     shown.check("the question");
@@ -387,10 +387,10 @@ fn tab_reaches_every_control_and_marks_it() {
     shown.settle();
     shown.tab_reaches_all("the files to open");
     shown.files = None;
-    shown.open = [false, false, true, false];
+    shown.open(2);
     shown.settle();
     shown.tab_reaches_all("the exports");
-    shown.open = [false; 4];
+    shown.close();
     shown.presets = Some((vec!["Profile".into()], None));
     shown.settle();
     shown.tab_reaches_all("the presets");
@@ -469,7 +469,7 @@ impl Shown {
 
     /// Executes a command for the rail, as the console does.
     pub(super) fn rail_does(&mut self, command: &Command) {
-        assert!(self.rail.apply(command, panels::has_drawer(self.size, self.panels.scale(), true)));
+        assert!(self.visible.apply(command, panels::Room::of(self.size, self.panels.scale(), true).has_drawer));
         self.settle();
     }
 
@@ -508,7 +508,7 @@ fn arrows_walk_through_lists_and_enter_chooses() {
     shown.key(Key::Tab, false);
     assert_eq!(shown.tree[&shown.focus.expect("the next one")].label(), Some("1.mha"), "Tab goes on from there");
     shown.files = None;
-    shown.open = [false, false, true, false];
+    shown.open(2);
     shown.settle();
     let names: Vec<&str> = crate::volume_export::FORMATS.iter().map(|format| format.name).collect();
     assert_eq!(shown.walked(&[End], false), names[names.len() - 1]);
@@ -519,7 +519,7 @@ fn arrows_walk_through_lists_and_enter_chooses() {
     assert!(shown.panels.key(Key::Enter, Modifiers::default()));
     let commands: Vec<Command> = (0..4).flat_map(|_| shown.lay_out()).collect();
     assert_eq!(commands, [Command::Export(1)]);
-    shown.open = [false; 4];
+    shown.close();
     shown.presets = Some(((0..8).map(|n| format!("Own {n}")).collect(), None));
     shown.settle();
     assert_eq!(shown.walked(&[Down], true), "Face");

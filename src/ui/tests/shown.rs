@@ -7,7 +7,9 @@ use crate::keyboard_pointer::PointerMark;
 use crate::live::cine::CineVolume;
 use crate::panels::accesskit::{Action, ActionData, ActionRequest, Node, NodeId, TreeId, TreeUpdate};
 use crate::panels::drawn::Drawn;
-use crate::panels::{self, Banner, Note, PanelOutput, PanelState, Panels, PresetTile, PresetsShown, Rail, Reading};
+use crate::panels::{
+    self, Banner, Note, PanelOutput, PanelState, Panels, PresetTile, PresetsShown, Reading, Room, Visible,
+};
 use crate::passes::unveil::StartLine;
 use crate::picture::Picture;
 use crate::progress_lines::Progress;
@@ -29,10 +31,10 @@ pub(super) struct Shown {
     pub(super) times: Times,
     pub(super) budget: Option<Duration>,
     pub(super) time: f64,
-    pub(super) shows_panels: bool,
-    pub(super) shows_first_steps: bool,
-    pub(super) shows_only_origin: bool,
-    pub(super) rail: Rail,
+    /// Shows the hints of the first start; shows nothing but what the picture is of.
+    pub(super) shows: [bool; 2],
+    pub(super) visible: Visible,
+    pub(super) asks_to_leave: bool,
     pub(super) has_drawn: bool,
     pub(super) is_frozen: bool,
     pub(super) cine: CineState,
@@ -44,11 +46,9 @@ pub(super) struct Shown {
     pub(super) reading: Option<Reading>,
     /// The names of the presets of the user, while the list of presets is shown; and the name that is being typed.
     pub(super) presets: Option<(Vec<String>, Option<String>)>,
-    /// Help, times, exports, the question whether to leave.
-    pub(super) open: [bool; 4],
     pub(super) start_lines: Vec<StartLine>,
-    pub(super) pointer: Option<[f64; 2]>,
-    pub(super) keyboard_pointer: Option<PointerMark>,
+    /// That of no windowing system, and that by keyboard.
+    pub(super) pointers: (Option<[f64; 2]>, Option<PointerMark>),
     /// What the last layout said.
     pub(super) tree: BTreeMap<NodeId, Node>,
     pub(super) focus: Option<NodeId>,
@@ -79,10 +79,9 @@ impl Shown {
             times: Times::default(),
             budget: None,
             time: 0.0,
-            shows_panels: true,
-            shows_first_steps: false,
-            shows_only_origin: false,
-            rail: Rail::default(),
+            shows: [false; 2],
+            visible: Visible { panels: true, ..Visible::default() },
+            asks_to_leave: false,
             has_drawn: true,
             is_frozen: false,
             cine: CinePlayer::default().state(
@@ -95,10 +94,8 @@ impl Shown {
             recordings: Vec::new(),
             reading: None,
             presets: None,
-            open: [false; 4],
             start_lines: Vec::new(),
-            pointer: None,
-            keyboard_pointer: None,
+            pointers: (None, None),
             tree: BTreeMap::new(),
             focus: None,
             corners: Vec::new(),
@@ -106,6 +103,17 @@ impl Shown {
         };
         shown.settle();
         shown
+    }
+
+    /// Opens the n-th of help, times, exports and the question whether to leave, and closes the others; any other number closes all.
+    pub(super) fn open(&mut self, n: usize) {
+        let [help, times, exports, asks] = std::array::from_fn(|open| open == n);
+        (self.visible.help, self.visible.times, self.visible.exports, self.asks_to_leave) =
+            (help, times, exports, asks);
+    }
+
+    pub(super) fn close(&mut self) {
+        self.open(usize::MAX);
     }
 
     /// Lays the panels out until they stay: scroll areas know their content from the layout before, and what opens fades in.
@@ -126,45 +134,36 @@ impl Shown {
     pub(super) fn lay_out(&mut self) -> Vec<Command> {
         self.time += 0.1;
         let scale = self.panels.scale();
-        let [shows_help, shows_times, shows_exports, asks_to_leave] = self.open;
         let named =
             |(n, name): (usize, &String)| Named { name: name.clone(), path: format!("/data/{name}"), is_shown: n == 1 };
         let recordings: Vec<Named> = self.recordings.iter().enumerate().map(named).collect();
+        let room = Room::of(self.size, scale, self.visible.panels);
         let state = PanelState {
             controls: &self.controls,
             scene: Some(&self.scene),
             times: &self.times,
-            picture: panels::picture_area(self.size, scale, self.shows_panels),
-            shows_panels: self.shows_panels,
-            has_column: panels::has_column(self.size, scale, self.shows_panels),
-            has_drawer: panels::has_drawer(self.size, scale, self.shows_panels),
-            rail: self.rail,
-            shows_help,
-            shows_times,
-            help_search: None,
+            room,
+            visible: &self.visible,
             origin: Some("Demo data (phantom)"),
-            shows_first_steps: self.shows_first_steps,
-            shows_only_origin: self.shows_only_origin,
-            asks_to_leave,
+            shows_first_steps: self.shows[0],
+            shows_only_origin: self.shows[1],
+            asks_to_leave: self.asks_to_leave,
             files: self.files.as_ref().map(|(title, names)| (title.as_str(), names.as_slice())),
             recordings: &recordings,
             reading: self.reading.as_ref(),
-            shows_exports,
             is_turning: false,
-            exporting: Some("Surface"),
-            export_progress: Some(Progress { done: 12, of: 72 }),
+            exporting: Some(("Surface", Some(Progress { done: 12, of: 72 }))),
             presets: self.presets.as_ref().map(|(own, naming)| presets(own, naming.as_deref())),
             is_frozen: self.is_frozen,
             cine: self.cine.clone(),
             has_drawn: self.has_drawn,
-            quality: "full",
-            budget: self.budget,
+            quality: ("full", self.budget),
             banner: self.banner.clone(),
             notes: &self.notes,
             exit_key: "",
             start_lines: &self.start_lines,
-            pointer: self.pointer,
-            keyboard_pointer: self.keyboard_pointer,
+            pointer: self.pointers.0,
+            keyboard_pointer: self.pointers.1,
         };
         let output = self.panels.lay_out(&state, self.size, self.time);
         self.corners = output.corners();
@@ -176,7 +175,7 @@ impl Shown {
         self.focus = Some(focus).filter(|focus| *focus != root);
         for command in &commands {
             self.controls.apply(command, Some(&self.scene));
-            self.rail.apply(command, panels::has_drawer(self.size, scale, self.shows_panels));
+            self.visible.rail.apply(command, room.has_drawer);
         }
         self.scene = scene(&self.scene.geometry, &self.controls.settings().clone().without_drawings());
         commands

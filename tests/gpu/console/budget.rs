@@ -58,11 +58,11 @@ fn tone_casts_no_ray_light_keeps_the_distance_map_and_no_rung_runs_stage_1() {
     settings.distance.median = 3;
     // With a part of the volume hidden, longer steps reach further than short ones.
     settings.region.depth = Some([6.0, 14.0]);
-    let (budget, time_stamps) = (Some(Duration::from_nanos(1)), TimeStamps::EachPass);
+    let stream = StreamOptions { time_stamps: TimeStamps::EachPass, ..options().stream };
+    let budget = Some(Duration::from_nanos(1));
     // The statistics are read here alone: the console would take those of some passes.
     let statistics_interval = Duration::from_secs(3600);
-    let mut desk =
-        Desk::new(&device, ConsoleOptions { settings, budget, time_stamps, statistics_interval, ..options() });
+    let mut desk = Desk::new(&device, ConsoleOptions { settings, budget, stream, statistics_interval, ..options() });
     desk.begin();
     desk.live(0);
     desk.press(Key::Space);

@@ -21,15 +21,14 @@ use crate::common::wait;
 use crate::live::header;
 use crate::live_control::{BOUND, Fed, ROOM};
 use echolume::low_level::gpu::{self, Context, Renderer};
-use echolume::low_level::live::Update;
-use echolume::low_level::live::Views;
+use echolume::low_level::live::{StreamOptions, Update, Views};
 use echolume::low_level::picture::Picture;
 use echolume::low_level::scene::{Layout, Settings};
 use echolume::low_level::source::Frame;
 use echolume::low_level::source::live::SourceKind;
 use echolume::low_level::source::live::{Event, Live};
 use echolume::low_level::ui::command::{Command, Tool};
-use echolume::low_level::ui::console::{Console, ConsoleError, ConsoleOptions, LoopRequest};
+use echolume::low_level::ui::console::{Console, ConsoleError, ConsoleOptions, LoopRequest, OpeningOptions};
 use echolume::low_level::ui::frame_budget::{Quality, built_in_ladder};
 use echolume::low_level::ui::input::{Button, Input, Key, Modifiers};
 use echolume::low_level::ui::source_supervisor::OpenSource;
@@ -49,13 +48,8 @@ pub fn plain() -> Settings {
 pub fn options() -> ConsoleOptions {
     ConsoleOptions {
         settings: plain(),
-        chosen: None,
-        update: Update::Whole,
-        images: 3,
-        queues: None,
-        time_stamps: echolume::low_level::gpu::TimeStamps::default(),
+        stream: StreamOptions { cine: ROOM, ..StreamOptions::default() },
         statistics_interval: Duration::from_secs(1),
-        cine: ROOM,
         budget: None,
         rungs: built_in_ladder(),
         retry: None,
@@ -71,14 +65,10 @@ pub fn options() -> ConsoleOptions {
         wake: Arc::new(|| ()),
         origin: None,
         plays_once: false,
-        open_file: None,
         first_steps: None,
-        recordings: Arc::default(),
-        progress: echolume::low_level::files::progress::Progress::default(),
-        recent: None,
+        opening: OpeningOptions::default(),
         presets: None,
         startup_fault: None,
-        shaders: None,
         warms: false,
     }
 }

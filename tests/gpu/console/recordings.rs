@@ -65,13 +65,16 @@ impl Window {
             source: SourceKind::Recording,
             plays_once: true,
             panels: true,
-            recordings: recordings.clone(),
-            progress,
-            open_file: Some(Arc::new(move |path, progress| {
-                read(path, progress)?;
-                let (next, path) = (next.clone(), path.to_path_buf());
-                Ok(Box::new(move || *next.lock().expect("lock") = path))
-            })),
+            opening: OpeningOptions {
+                recordings: recordings.clone(),
+                progress,
+                open_file: Some(Arc::new(move |path, progress| {
+                    read(path, progress)?;
+                    let (next, path) = (next.clone(), path.to_path_buf());
+                    Ok(Box::new(move || *next.lock().expect("lock") = path))
+                })),
+                recent: None,
+            },
             ..options()
         };
         let mut console = Console::new(device, open, options, WINDOW);
@@ -356,11 +359,14 @@ fn a_loop_that_is_not_saved_is_not_left() {
     let opened = Arc::new(Mutex::new(0));
     let count = opened.clone();
     let options = ConsoleOptions {
-        recordings: recordings.clone(),
-        open_file: Some(Arc::new(move |_, _| {
-            *count.lock().expect("lock") += 1;
-            Ok(Box::new(|| ()))
-        })),
+        opening: OpeningOptions {
+            recordings: recordings.clone(),
+            open_file: Some(Arc::new(move |_, _| {
+                *count.lock().expect("lock") += 1;
+                Ok(Box::new(|| ()))
+            })),
+            ..OpeningOptions::default()
+        },
         ..options()
     };
     let mut desk = Desk::new(&device, options);

@@ -70,7 +70,8 @@ fn negative(picture: &Picture) -> Picture {
 #[test]
 fn an_edited_shader_is_drawn_with_and_a_broken_one_leaves_the_last_good_picture() {
     let (device, glsl) = (Device::alone(), Glsl::new());
-    let mut desk = Desk::new(&device, ConsoleOptions { shaders: Some(glsl.folder()), ..options() });
+    let stream = StreamOptions { shaders: Some(glsl.folder()), ..options().stream };
+    let mut desk = Desk::new(&device, ConsoleOptions { stream, ..options() });
     desk.begin();
     let first = desk.live(0);
     assert!(difference(&first, &headless(&device, &desk.drawn(), &body(0))).1 <= 1.0, "compiled with other options");

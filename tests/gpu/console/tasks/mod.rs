@@ -148,11 +148,14 @@ impl User {
         let all = opened.clone();
         let options = ConsoleOptions {
             origin: Some(Origin::of(Some(PathBuf::from("phantom")))),
-            open_file: Some(Arc::new(move |path, _| {
-                all.lock().expect("lock").push(path.to_path_buf());
-                Ok(Box::new(|| ()))
-            })),
-            recent: Some(folder.0.join("recent")),
+            opening: OpeningOptions {
+                open_file: Some(Arc::new(move |path, _| {
+                    all.lock().expect("lock").push(path.to_path_buf());
+                    Ok(Box::new(|| ()))
+                })),
+                recent: Some(folder.0.join("recent")),
+                ..OpeningOptions::default()
+            },
             presets: Some(folder.0.join("presets.toml")),
             ..ball_options(&folder)
         };

@@ -1,0 +1,105 @@
+//! When the user acted and changed something, and how long an input waits for the picture that shows its effect.
+
+use std::time::{Duration, Instant};
+
+/// A pause after which the same drag or key is another step for undo.
+const STEP_PAUSE: Duration = Duration::from_millis(500);
+
+/// What the user did last, and what of it no picture shows yet.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Activity {
+    acted: Instant,
+    changed: Instant,
+    /// The first input whose settings the stream has not been given yet.
+    unsent: Option<Instant>,
+    /// The first input that no picture shows yet, and when its settings were given to the stream.
+    unshown: Option<(Instant, Instant)>,
+}
+
+impl Activity {
+    pub(super) fn new(now: Instant) -> Activity {
+        Activity { acted: now, changed: now, unsent: None, unshown: None }
+    }
+
+    /// The user did something.
+    pub(super) fn acts(&mut self, now: Instant) {
+        self.acted = self.acted.max(now);
+    }
+
+    /// When the user did something last.
+    pub(super) fn acted(&self) -> Instant {
+        self.acted
+    }
+
+    /// Something changed: settings, or marks on the picture.
+    pub(super) fn changes(&mut self, now: Instant) {
+        self.changed = now;
+    }
+
+    /// The user changed settings: a picture will show it.
+    pub(super) fn changes_settings(&mut self, now: Instant) {
+        self.changes(now);
+        self.awaits_picture(now);
+    }
+
+    /// A picture will show what the user did.
+    pub(super) fn awaits_picture(&mut self, now: Instant) {
+        self.unsent.get_or_insert(now);
+    }
+
+    /// True if nothing changed for so long that the next change is another step for undo.
+    pub(super) fn has_paused(&self, now: Instant) -> bool {
+        now.saturating_duration_since(self.changed) > STEP_PAUSE
+    }
+
+    /// Other settings were given to the stream.
+    pub(super) fn settings_sent(&mut self, now: Instant) {
+        let first = self.unsent.take().or(self.unshown.map(|(input, _)| input));
+        self.unshown = first.map(|input| (input, now));
+    }
+
+    /// A picture is shown that was begun then. The input whose effect it is the first to show, if there is one.
+    pub(super) fn answered_by(&mut self, begun: Option<Instant>) -> Option<Instant> {
+        let answered = self.unshown.take_if(|(_, sent)| begun.is_some_and(|begun| begun >= *sent));
+        answered.map(|(input, _)| input)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Prevents latencies of a picture that was begun before the settings of the input, or of a later input than the first.
+    #[test]
+    fn the_first_input_is_answered_by_the_first_picture_begun_after_its_settings() {
+        let begin = Instant::now();
+        let at = |ms: u64| begin + Duration::from_millis(ms);
+        let mut activity = Activity::new(begin);
+        activity.settings_sent(at(1));
+        assert_eq!(activity.answered_by(Some(at(2))), None, "the settings of nobody's input");
+        activity.changes_settings(at(10));
+        activity.changes_settings(at(12));
+        assert_eq!(activity.answered_by(Some(at(13))), None, "not sent yet");
+        activity.settings_sent(at(14));
+        assert_eq!(activity.answered_by(None), None);
+        assert_eq!(activity.answered_by(Some(at(13))), None, "of earlier settings");
+        // The view rests and is drawn in full: the input still waits.
+        activity.settings_sent(at(20));
+        assert_eq!(activity.answered_by(Some(at(15))), None);
+        assert_eq!(activity.answered_by(Some(at(20))), Some(at(10)));
+        assert_eq!(activity.answered_by(Some(at(30))), None, "once");
+    }
+
+    #[test]
+    fn half_a_second_without_a_change_begins_another_step() {
+        let begin = Instant::now();
+        let at = |ms: u64| begin + Duration::from_millis(ms);
+        let mut activity = Activity::new(begin);
+        activity.changes(at(100));
+        activity.awaits_picture(at(500));
+        assert!(!activity.has_paused(at(600)) && activity.has_paused(at(601)));
+        activity.acts(at(700));
+        activity.acts(at(650));
+        assert_eq!(activity.acted(), at(700), "inputs may be handled late");
+    }
+}

@@ -1,0 +1,268 @@
+//! Commands in the console: what they do besides changing settings.
+
+use super::Console;
+use crate::cine_player::Loop;
+use crate::command::Command;
+use crate::controls::{Change, Controls};
+use crate::live::Stream;
+use crate::plan::Work;
+use crate::scene::{Scene, Settings};
+use crate::texts;
+use std::time::{Duration, Instant};
+
+/// Escape leaves the program no sooner after another recording came: it was meant for the reading of it.
+const ESCAPE_PAUSE: Duration = Duration::from_secs(1);
+
+impl Console {
+    /// Executes a command.
+    pub fn execute(&mut self, command: &Command, now: Instant) {
+        tracing::debug!("{command:?}");
+        self.user_acts(now);
+        if self.first_steps.end(command) {
+            return self.presentation.redraw();
+        }
+        let stops = self.turntable.stop_for(command);
+        self.presentation.redraw_if(stops);
+        let before = is_of_tone(command).then(|| self.controls.settings().clone());
+        // A drag by keyboard is one step, however long it rests.
+        if self.activity.has_paused(now) && !self.hands.holds() {
+            self.controls.seal();
+        }
+        match self.controls.apply(command, self.stream.scene()) {
+            Change::Nothing => return,
+            Change::Tool => self.survey.end_distance(),
+            Change::Marks => self.activity.changes(now),
+            Change::Refused(why) => self.notify(why, true),
+            Change::Settings => {
+                self.activity.changes_settings(now);
+                if command.is_continuous() {
+                    if before.as_ref().is_some_and(|before| before.light != self.controls.settings().light) {
+                        self.quality.light_moved(now);
+                    }
+                    let work = before.map_or(Work::Rays, |before| self.work_since(before));
+                    self.quality.moved(work, now);
+                } else {
+                    // Another scene takes another time.
+                    self.quality.scene_changed();
+                }
+            }
+            Change::Caller(command) => self.execute_own(&command, now),
+        }
+        self.presentation.redraw();
+    }
+
+    /// How much of the picture a change from these settings draws again.
+    fn work_since(&self, before: Settings) -> Work {
+        let Some(shown) = self.stream.scene() else { return Work::Rays };
+        let scene = |settings: Settings| Scene::new(shown.geometry.clone(), shown.input, settings);
+        match (scene(before), scene(self.controls.settings().clone())) {
+            (Ok(before), Ok(after)) => Work::between(&before, &after),
+            _ => Work::Rays,
+        }
+    }
+
+    /// Executes a command that does not concern settings.
+    fn execute_own(&mut self, command: &Command, now: Instant) {
+        let count = self.stream.cine().volumes().len();
+        if matches!(*command, Command::Freeze | Command::StepCine(_) | Command::SeekCine(_) | Command::PlayCine) {
+            self.replay.forget_frozen();
+        }
+        match *command {
+            Command::Freeze => {
+                self.replay.stop();
+                self.stream.freeze(!self.stream.is_frozen());
+            }
+            Command::StepCine(by) => {
+                let at = self.stream.cine_position().unwrap_or(count.saturating_sub(1)) as i64 + i64::from(by);
+                self.show_cine_volume(at.clamp(0, count.saturating_sub(1) as i64) as usize);
+                self.activity.awaits_picture(now);
+            }
+            Command::SeekCine(index) => {
+                self.show_cine_volume(index.min(count.saturating_sub(1)));
+                self.activity.awaits_picture(now);
+            }
+            Command::PlayCine => {
+                self.stream.freeze(true);
+                self.replay.toggle(loop_of(&self.controls, &self.stream), now);
+            }
+            Command::MarkCine(end) => {
+                let at = self.stream.cine_position().unwrap_or(count.saturating_sub(1));
+                let volume = self.stream.cine().volumes().get(at).map(|kept| kept.volume);
+                if volume.is_some_and(|volume| self.controls.mark_cine(volume, end) == Change::Marks) {
+                    self.activity.changes(now);
+                }
+            }
+            Command::SavePicture => self.save_picture(),
+            Command::SaveLoop => _ = self.save_loop(),
+            Command::TogglePanels => {
+                self.visible.panels = !self.visible.panels && self.fixed.overlay;
+                self.resize_picture();
+            }
+            Command::FocusPanels if self.fixed.overlay => {
+                self.visible.panels = true;
+                self.resize_picture();
+                self.panels.toggle_focus();
+            }
+            Command::KeyboardPointer => self.toggle_keyboard_pointer(now),
+            Command::ToggleFullScreen => self.request.toggle_full_screen |= !self.fixed.is_kiosk,
+            Command::EndCut => self.end_stroke(now),
+            Command::PickSurface(at) => self.pick_surface(at),
+            Command::CountVoxels => self.count_voxels(),
+            Command::CopyMeasures => self.copy_measures(),
+            Command::SaveMeasures => self.save_measures(),
+            Command::SaveWorkspace => self.save_workspace(),
+            Command::OpenFiles => self.toggle_files(),
+            Command::OpenFile(n) => self.open_entry(n),
+            Command::Turntable => self.toggle_turning(now),
+            Command::ShowRecording(n) => self.show_recording(n),
+            Command::StepRecording(by) => self.step_recording(by),
+            Command::CloseRecording(n) => self.close_recording(n),
+            Command::CancelReading => _ = self.cancel_reading(),
+            Command::Export(n) => self.export_volume(n),
+            Command::CancelExport => self.exporter.cancel_export(),
+            Command::Presets => self.toggle_presets(),
+            Command::Preset(n) => self.take_preset(n, now),
+            Command::NamePreset => self.begin_naming(None),
+            Command::RenamePreset(n) => self.begin_naming(Some(n)),
+            Command::EndNaming => self.end_naming(),
+            Command::DeletePreset(n) => self.delete_preset(n),
+            Command::RestorePresets => self.restore_presets(),
+            Command::Back => self.go_back(),
+            // A kiosk ends only with its exit keys: a sleeve may press Escape.
+            Command::Exit if self.fixed.is_kiosk => {}
+            // Without panels nobody sees a question.
+            Command::Exit if self.fixed.overlay && self.has_unsaved_loop() => self.leaving.ask(),
+            Command::Exit | Command::Discard => self.request.exit |= !self.fixed.is_kiosk,
+            Command::SaveAndExit => {
+                self.leaving.dismiss();
+                // The question names all volumes.
+                self.controls.apply(&Command::WholeCine, None);
+                let newest = self.stream.cine().volumes().back().map(|newest| newest.volume);
+                let newest = newest.filter(|_| self.save_loop());
+                self.leaving.after(newest);
+            }
+            _ => _ = self.visible.apply(command, self.room().has_drawer),
+        }
+    }
+
+    pub(super) fn show_cine_volume(&mut self, index: usize) {
+        self.replay.stop();
+        self.stream.freeze(true);
+        self.stream.show_cine_volume(index);
+    }
+
+    /// Begins to turn, or ends it.
+    fn toggle_turning(&mut self, now: Instant) {
+        let turns = self.stream.scene().is_some_and(|scene| !scene.is_flat());
+        match (self.turntable.stop(), turns) {
+            (true, _) => {}
+            (false, true) => self.turntable.begin(now),
+            (false, false) => self.notify(texts::NOTHING_TURNS, true),
+        }
+    }
+
+    /// Turns on, if the view turns by itself.
+    pub(super) fn turn(&mut self, now: Instant) {
+        let can_draw = !self.stream.is_drawing() && self.stream.is_idle();
+        let Some(by) = self.turntable.step(can_draw, now) else { return };
+        let is_flat = self.stream.scene().is_none_or(|scene| scene.is_flat());
+        match self.controls.apply(&Command::Rotate([by, 0.0]), self.stream.scene()) {
+            Change::Settings => {
+                self.activity.changes(now);
+                self.quality.moved(Work::Rays, now);
+            }
+            // The mode has nothing that turns.
+            _ if is_flat => {
+                self.turntable.stop();
+                self.presentation.redraw();
+            }
+            _ => {}
+        }
+    }
+
+    /// The cine loop as it is played.
+    pub(super) fn cine_loop(&self) -> Loop<'_> {
+        loop_of(&self.controls, &self.stream)
+    }
+
+    /// Shows the next volume of the cine loop when it is due.
+    pub(super) fn advance_cine(&mut self, now: Instant) {
+        if self.stream.is_replaying() {
+            return;
+        }
+        let shown = self.stream.cine_position();
+        if let Some(next) = self.replay.advance(loop_of(&self.controls, &self.stream), shown, now) {
+            self.stream.show_cine_volume(next);
+        }
+    }
+
+    /// Closes the uppermost of what is open; else leaves full screen; else leaves the program.
+    fn go_back(&mut self) {
+        let is_closed = self.leaving.dismiss()
+            || self.opening.close_list()
+            || self.visible.close_exports()
+            || self.presets.leave()
+            || self.visible.close_help()
+            || self.cancel_reading()
+            || self.visible.close_times()
+            || self.visible.close_drawer(self.room().has_drawer);
+        if is_closed {
+            return;
+        }
+        if self.hands.points() && self.controls.work().is_none() && self.controls.line().is_none() {
+            self.toggle_keyboard_pointer(Instant::now());
+        } else if self.leave_measuring() || self.turntable.stop() {
+            // The view shows it.
+        } else if self.presentation.is_full_screen() && !self.fixed.is_kiosk {
+            self.request.toggle_full_screen = true;
+        } else if !self.fixed.follows_another || self.fixed.started.elapsed() >= ESCAPE_PAUSE {
+            self.execute_own(&Command::Exit, Instant::now());
+        }
+    }
+
+    /// True if volumes of the loop exist nowhere else: neither in a file that they were read from or recorded to, nor in one that was saved.
+    pub(super) fn has_unsaved_loop(&self) -> bool {
+        let newest = self.stream.cine().volumes().back().map(|kept| kept.volume);
+        self.leaving.loses(newest, self.stream.feed_counts().unrecorded)
+    }
+
+    /// The user asked the windowing system to close the window: asks first if that loses a loop. False if it may be closed at once.
+    pub(crate) fn asks_before_closing(&mut self) -> bool {
+        if self.leaving.asks() || !self.fixed.overlay || !self.has_unsaved_loop() {
+            return false;
+        }
+        self.leaving.ask();
+        self.presentation.redraw();
+        true
+    }
+
+    /// Tells whether the window fills the screen and can leave it.
+    pub fn set_full_screen(&mut self, is_full_screen: bool) {
+        self.presentation.set_full_screen(is_full_screen);
+    }
+
+    /// True while the console asks whether to save the loop before it leaves.
+    pub fn asks_to_leave(&self) -> bool {
+        self.leaving.asks()
+    }
+}
+
+/// The cine loop as it is played.
+fn loop_of<'a>(controls: &'a Controls, stream: &'a Stream) -> Loop<'a> {
+    Loop { cine: &controls.settings().cine, volumes: stream.cine().volumes() }
+}
+
+/// True for continuous commands that may leave the rays as they are.
+fn is_of_tone(command: &Command) -> bool {
+    use Command::{MoveCrossing, MoveCurvePoint, MoveLight, RotatePlanes, SetSlider, StepPlane, StepSlider};
+    matches!(
+        command,
+        MoveCurvePoint(..)
+            | MoveLight(_)
+            | StepPlane(_)
+            | MoveCrossing(_)
+            | RotatePlanes(_)
+            | SetSlider(..)
+            | StepSlider(..)
+    )
+}

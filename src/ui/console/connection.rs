@@ -1,0 +1,164 @@
+//! The source of the console: whether it is open, connected, or silent.
+
+use crate::live::Feed;
+use crate::silence::Silence;
+use crate::source::live::SourceKind;
+use crate::source_supervisor::{SourceNotice, SourceState, SourceSupervisor};
+use std::time::{Duration, Instant};
+
+/// The source and what came from it.
+pub(super) struct Connection {
+    source: SourceSupervisor,
+    kind: SourceKind,
+    silence: Silence,
+    /// Why it is not connected, as it was shown last.
+    disconnected: Option<String>,
+    /// Number of frames that came.
+    frames: u64,
+}
+
+impl Connection {
+    pub(super) fn new(source: SourceSupervisor, kind: SourceKind, now: Instant) -> Connection {
+        Connection { source, kind, silence: Silence::new(now), disconnected: None, frames: 0 }
+    }
+
+    pub(super) fn kind(&self) -> SourceKind {
+        self.kind
+    }
+
+    pub(super) fn is_opening(&self) -> bool {
+        *self.source.state() == SourceState::Opening
+    }
+
+    pub(super) fn is_open(&self) -> bool {
+        matches!(self.source.state(), SourceState::Open)
+    }
+
+    /// True if it ended for good.
+    pub(super) fn is_over(&self) -> bool {
+        matches!(self.source.state(), SourceState::Ended(_))
+    }
+
+    /// How often it could not be opened.
+    pub(super) fn not_opened(&self) -> u64 {
+        self.source.not_opened()
+    }
+
+    /// Why there was nothing to show: it could not be opened.
+    pub(super) fn fault(&self) -> Option<String> {
+        match self.source.state() {
+            SourceState::Ended(why) if self.not_opened() > 0 => why.clone(),
+            _ => None,
+        }
+    }
+
+    /// Waits no longer for the source that is being opened. False if none is.
+    pub(super) fn cancel(&mut self) -> bool {
+        self.source.cancel()
+    }
+
+    /// An update of the console begins.
+    pub(super) fn begin_update(&mut self, now: Instant) {
+        self.silence.begin_update(now);
+    }
+
+    /// The update that began at `now` ends after `took`; `is_busy`: the device still works.
+    pub(super) fn end_update(&mut self, now: Instant, took: Duration, is_busy: bool) {
+        self.silence.end_update(now, took, is_busy);
+    }
+
+    /// What was opened since the last call. `is_wanted`: it is to be shown.
+    pub(super) fn poll(&mut self, is_wanted: bool, now: Instant) -> Option<Feed> {
+        let feed = self.source.poll(now).filter(|_| is_wanted);
+        if feed.is_some() {
+            self.silence.frames_came(now);
+        }
+        feed
+    }
+
+    /// Takes how many frames came in all, and why the source is not connected. True if the reason is another one.
+    pub(super) fn follow(&mut self, frames: u64, disconnected: Option<String>, now: Instant) -> bool {
+        if frames != self.frames {
+            self.frames = frames;
+            self.silence.frames_came(now);
+        }
+        let is_other = disconnected != self.disconnected;
+        self.disconnected = disconnected;
+        is_other
+    }
+
+    /// The source ended. `why`: the fault, if that was unexpected.
+    pub(super) fn ended(&mut self, why: Option<String>, now: Instant) {
+        if let Some(why) = &why {
+            tracing::warn!("source: {why}");
+        }
+        self.source.ended(why, now);
+    }
+
+    /// What there is to say of it. `disconnected`: why it is not connected. `has_shown`: a volume was shown.
+    pub(super) fn notice(
+        &self,
+        disconnected: Option<&str>,
+        is_frozen: bool,
+        has_shown: bool,
+        now: Instant,
+    ) -> Option<SourceNotice> {
+        let is_silent = self.silence.is_silent(now) && !is_frozen;
+        self.source.state().notice(self.kind, disconnected, is_silent, has_shown)
+    }
+
+    /// When to look at it again.
+    pub(super) fn due(&self, is_frozen: bool, now: Instant) -> impl Iterator<Item = Instant> {
+        let is_listening = self.is_open() && !is_frozen;
+        let silence = Some(self.silence.due()).filter(|at| is_listening && *at > now);
+        self.source.wakes_at().into_iter().chain(silence)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::source::live::{Event, Live};
+    use std::sync::Arc;
+    use std::sync::mpsc::channel;
+
+    struct Silent;
+
+    impl Live for Silent {
+        fn next(&mut self, patience: Duration) -> Event {
+            std::thread::park_timeout(patience);
+            Event::Idle
+        }
+
+        fn can_wait(&self) -> bool {
+            true
+        }
+    }
+
+    /// Prevents a probe that is silent unnoticed, and a picture that the user froze called silent.
+    #[test]
+    fn an_open_source_is_silent_after_three_seconds_without_frames() {
+        let (sender, woken) = channel();
+        let wake = Arc::new(move || _ = sender.send(()));
+        let open = Arc::new(|| Ok(Box::new(Silent) as Box<dyn Live>));
+        let now = Instant::now();
+        let mut source = Connection::new(SourceSupervisor::new(open, None, None, wake), SourceKind::Probe, now);
+        assert!(source.is_opening() && source.poll(true, Instant::now()).is_none());
+        woken.recv().expect("opened");
+        let now = Instant::now();
+        assert!(source.poll(true, now).is_some() && source.is_open());
+        let at = |ms: u64| now + Duration::from_millis(ms);
+        let says =
+            |source: &Connection, is_frozen, ms| source.notice(None, is_frozen, true, at(ms)).map(|notice| notice.2);
+        assert_eq!(says(&source, false, 2999), None);
+        assert_eq!(says(&source, false, 3000), Some(true));
+        assert_eq!(says(&source, true, 3000), None, "frozen");
+        assert_eq!(source.due(false, now).collect::<Vec<_>>(), [at(3000)]);
+        assert_eq!(source.due(true, now).count() + source.due(false, at(3000)).count(), 0);
+        assert!(!source.follow(1, None, at(2000)));
+        assert_eq!(says(&source, false, 3000), None, "a frame came");
+        assert!(source.follow(1, Some("cable".into()), at(2000)) && !source.follow(1, Some("cable".into()), at(2000)));
+        source.ended(Some("gone".into()), at(9000));
+        assert!(source.is_over() && source.fault().is_none(), "it was open before");
+    }
+}

@@ -1,0 +1,105 @@
+//! The keys that are held, the gestures of mice and fingers, and the pointer by keyboard.
+
+use crate::command::{Command, HeldKeys, Tool};
+use crate::gestures::Gestures;
+use crate::input::{Input, Key, Modifiers};
+use crate::keyboard_pointer::{KeyboardPointer, PictureArea, Pointed, PointerMark};
+use crate::picking::Viewport;
+
+/// What the hands of the user do.
+#[derive(Default)]
+pub(super) struct Hands {
+    gestures: Gestures,
+    keys: HeldKeys,
+    pointer: KeyboardPointer,
+}
+
+impl Hands {
+    pub(super) fn modifiers(&self) -> Modifiers {
+        self.keys.modifiers()
+    }
+
+    /// Takes note of an input, whoever it is for.
+    pub(super) fn see(&mut self, input: &Input) {
+        self.pointer.other_input(input);
+    }
+
+    /// The command of a key.
+    pub(super) fn key(&mut self, input: &Input) -> Option<Command> {
+        self.keys.input(input)
+    }
+
+    /// The commands of a gesture on the picture.
+    pub(super) fn gesture(&mut self, input: &Input, on: &Viewport, tool: Tool, modifiers: Modifiers) -> Vec<Command> {
+        self.gestures.input(input, on, tool, modifiers)
+    }
+
+    /// Where an input is, or else the pointer, pixels of the window.
+    pub(super) fn place(&self, input: &Input) -> Option<[f64; 2]> {
+        match input {
+            Input::Moved(at) | Input::Touch { at, .. } => Some(*at),
+            _ => self.gestures.pointer(),
+        }
+    }
+
+    /// True while the pointer by keyboard is on.
+    pub(super) fn points(&self) -> bool {
+        self.pointer.is_on()
+    }
+
+    /// True while it drags: a drag may pause between two keys.
+    pub(super) fn holds(&self) -> bool {
+        self.pointer.is_held()
+    }
+
+    /// Turns the pointer by keyboard on or off. Returns what it does, as if a mouse did it.
+    pub(super) fn toggle_pointer(&mut self, picture: PictureArea) -> Vec<Pointed> {
+        self.pointer.toggle(self.gestures.pointer(), picture)
+    }
+
+    /// What a key does with the pointer; none if it is none of the pointer's.
+    pub(super) fn point(&mut self, key: Key, picture: PictureArea) -> Option<Vec<Pointed>> {
+        self.pointer.key(key, &self.keys, picture)
+    }
+
+    /// What is drawn of the pointer.
+    pub(super) fn mark(&self, picture: PictureArea) -> Option<PointerMark> {
+        self.pointer.mark(picture)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::time::Duration;
+
+    /// Prevents a pointer by keyboard that begins elsewhere than the mouse, and a shift key that counts for one of them only.
+    #[test]
+    fn the_pointer_by_keyboard_goes_on_from_the_mouse_with_the_keys_that_are_held() {
+        let (mut hands, area) = (Hands::default(), ([0, 0], [200, 100]));
+        let on = Viewport {
+            corner: [0.0; 2],
+            size: [200.0, 100.0],
+            scene: None,
+            measures: &[],
+            body_marks: &[],
+            start_line: &[],
+            has_work: false,
+            is_covered: false,
+            now: Duration::ZERO,
+        };
+        let moved = Input::Moved([40.0, 30.0]);
+        hands.see(&moved);
+        assert!(hands.gesture(&moved, &on, Tool::default(), Modifiers::default()).is_empty());
+        assert_eq!(hands.place(&Input::FocusLost), Some([40.0, 30.0]));
+        assert!(!hands.points() && hands.point(Key::Right, area).is_none());
+        let begun = hands.toggle_pointer(area);
+        assert_eq!(begun, [(moved, Modifiers::default())]);
+        let shift = Modifiers { shift: true, ..Modifiers::default() };
+        assert_eq!(hands.key(&Input::Modifiers(shift)), None);
+        let pointed = hands.point(Key::Right, area).expect("a step");
+        assert_eq!(pointed, [(Input::Moved([41.0, 30.0]), Modifiers::default())], "one pixel with Shift");
+        assert_eq!(hands.point(Key::Space, area).map(|pointed| pointed.len()), Some(2));
+        assert!(hands.points() && hands.holds());
+    }
+}

@@ -1,0 +1,81 @@
+//! The panels of the console: what they show, and the commands that they give.
+
+use super::Console;
+use crate::gpu;
+use crate::panels::{Banner, PanelState, first_steps};
+use std::time::Instant;
+
+impl Console {
+    /// Lays out the panels and executes the commands that they give.
+    pub(super) fn lay_out_panels(&mut self, now: Instant, has_drawn: bool) -> gpu::window::Panels {
+        let banner = self.banner(now);
+        let shows_first_steps = self.shows_first_steps(has_drawn && banner.is_none());
+        let notes: Vec<_> = self.export_note().into_iter().chain(self.notes.shown()).collect();
+        let recordings = self.opening.named();
+        let exit_key = self.fixed.exit.as_ref().filter(|_| self.fixed.is_kiosk).map(ToString::to_string);
+        let room = self.room();
+        let state = PanelState {
+            shows_first_steps,
+            controls: &self.controls,
+            scene: self.stream.scene(),
+            times: self.measured.times(),
+            room,
+            visible: &self.visible,
+            files: self.opening.shown(),
+            recordings: &recordings,
+            reading: self.opening.told(),
+            is_turning: self.turntable.is_on(),
+            exporting: self.exporter.exporting().map(|name| (name, self.exporter.progress())),
+            presets: self.presets.shown(),
+            origin: self.origin(),
+            shows_only_origin: !self.fixed.overlay,
+            asks_to_leave: self.leaving.asks(),
+            is_frozen: self.stream.is_frozen(),
+            cine: self.replay.state(self.cine_loop(), self.stream.cine_position()),
+            has_drawn,
+            quality: (self.quality.label(), self.quality.budget()),
+            banner,
+            notes: &notes,
+            exit_key: exit_key.as_deref().unwrap_or_default(),
+            start_lines: self.render_start.lines(),
+            pointer: self.presentation.pointer(),
+            keyboard_pointer: self.hands.mark(room.picture),
+        };
+        let time = now.saturating_duration_since(self.fixed.started).as_secs_f64();
+        let output = self.panels.lay_out(&state, self.presentation.size(), time);
+        self.presentation.laid_out(output.tree, output.repaint_after, now);
+        for command in output.commands {
+            self.execute(&command, now);
+        }
+        output.panels
+    }
+
+    /// True if the hints of the first start are shown now: over a picture, while nothing else is.
+    fn shows_first_steps(&mut self, is_free: bool) -> bool {
+        let room = self.room();
+        let is_seen = self.fixed.overlay && self.visible.panels && !self.fixed.is_kiosk;
+        let is_open = self.visible.is_any_open(room.has_drawer)
+            || self.leaving.asks()
+            || self.opening.is_shown()
+            || self.presets.is_shown();
+        let has_room = first_steps::has_room(room.picture.1, self.panels.scale());
+        is_free && is_seen && has_room && !is_open && self.notes.is_empty() && self.first_steps.show()
+    }
+
+    /// The message that lasts: a fault, or what is waited for.
+    fn banner(&self, now: Instant) -> Option<Banner> {
+        if let Some(banner) = self.faults.banner() {
+            return Some(banner);
+        }
+        let gone = self.stream.disconnected();
+        let (is_frozen, has_shown) = (self.stream.is_frozen(), self.stream.volumes_shown() > 0);
+        // What is being read says it itself.
+        if self.connection.is_opening() && self.opening.told().is_some() {
+            return None;
+        }
+        let (title, text, is_fault) = self.connection.notice(gone.as_deref(), is_frozen, has_shown, now)?;
+        let is_start = !is_fault && text.is_empty() && self.connection.is_open();
+        let of_start = self.start.banner(title).filter(|_| is_start);
+        of_start.or_else(|| Some(Banner { title: title.into(), text, is_fault }))
+    }
+}

@@ -1,0 +1,111 @@
+//! Presets in the console: taking one, keeping the present look, and the pictures of the list.
+
+use super::Console;
+use crate::command::Command;
+use crate::controls::Change;
+use crate::picture::Picture;
+use crate::scene::{Scene, Settings};
+use crate::source::live::SourceKind;
+use crate::texts;
+use crate::thumbnails::Job;
+use std::sync::Arc;
+use std::time::Instant;
+
+impl Console {
+    /// The small pictures of the list of presets; none while it is not shown.
+    pub fn thumbnails(&self) -> &[Option<Arc<Picture>>] {
+        self.presets.thumbnails()
+    }
+
+    pub(super) fn toggle_presets(&mut self) {
+        if let Some(fault) = self.presets.toggle().map(str::to_string) {
+            self.notify(&fault, true);
+        }
+        self.presentation.redraw();
+    }
+
+    fn with_preset(&self, n: usize, scene: &Scene) -> Result<Settings, String> {
+        self.presets.settings(n, &self.controls, scene, self.connection.kind() == SourceKind::Demo)
+    }
+
+    /// Takes the n-th preset of the list, and closes the list.
+    pub(super) fn take_preset(&mut self, n: usize, now: Instant) {
+        if n >= self.presets.count() {
+            return;
+        }
+        let settings = match self.stream.scene() {
+            Some(scene) => self.with_preset(n, scene),
+            None => Err(texts::NO_VOLUME_YET.into()),
+        };
+        match settings {
+            Ok(settings) => {
+                self.presets.close();
+                if self.controls.take(settings, &Command::Preset(n)) == Change::Settings {
+                    self.activity.changes_settings(now);
+                    self.quality.scene_changed();
+                }
+            }
+            Err(why) => self.notify(&why, true),
+        }
+    }
+
+    /// Begins to type a name: of a new preset, or of the n-th of the user.
+    pub(super) fn begin_naming(&mut self, of: Option<usize>) {
+        match self.presets.begin_naming(of) {
+            // Space and Enter are the name's.
+            Ok(true) => self.panels.drop_focus(),
+            Ok(false) => {}
+            Err(why) => self.notify(&why, true),
+        }
+    }
+
+    /// Keeps the name that was typed: the present look under it, or another name of a preset.
+    pub(super) fn end_naming(&mut self) {
+        let said = self.presets.end_naming(self.controls.settings());
+        self.say(said);
+    }
+
+    pub(super) fn delete_preset(&mut self, n: usize) {
+        let said = self.presets.delete(n);
+        self.say(said);
+    }
+
+    /// Brings the presets of the user back as they were before the last change.
+    pub(super) fn restore_presets(&mut self) {
+        let restored = self.presets.restore();
+        self.say(restored.map(|is_done| is_done.then(|| texts::PRESETS_RESTORED.to_string())));
+    }
+
+    fn say(&mut self, said: Result<Option<String>, String>) {
+        match said {
+            Ok(None) => {}
+            Ok(Some(said)) => self.notify(&said, false),
+            Err(why) => self.notify(&why, true),
+        }
+    }
+
+    /// While the list is shown, makes thumbnails of the present volume, and makes them again when volume or view change much.
+    pub(super) fn poll_thumbnails(&mut self, now: Instant) {
+        let has_new = self.presets.poll(self.activity.acted(), self.stream.is_drawing(), now);
+        self.presentation.redraw_if(has_new);
+        let volumes = self.stream.cine().volumes();
+        let shown = self.stream.cine_position().and_then(|at| volumes.get(at)).or(volumes.back());
+        let (Some(shown), Some(scene), Some(header)) = (shown, self.stream.scene(), self.stream.header()) else {
+            return;
+        };
+        let (volume, settings) = (shown.volume, self.controls.settings());
+        if !self.presets.wants_thumbnails(volume, settings, self.stream.is_frozen(), now) {
+            return;
+        }
+        let is_backward = shown.frames.first().is_some_and(|frame| frame.backward);
+        let geometry = if is_backward { header.backward.clone() } else { header.forward.clone() };
+        let job = Job {
+            context: self.context.clone(),
+            geometry,
+            input: scene.input,
+            frames: shown.frames.clone(),
+            settings: (0..self.presets.count()).map(|n| self.with_preset(n, scene).ok()).collect(),
+        };
+        self.presets.make_thumbnails(job, volume, settings, now);
+    }
+}

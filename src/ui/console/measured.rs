@@ -1,0 +1,133 @@
+//! What the view measures of itself: the display of times, the log, the summary at the end, and metrics in a file.
+
+use crate::gpu::{Context, GpuError};
+use crate::live::metrics::{LiveMetrics, SourceStatus};
+use crate::live::volume_pool::VolumeCounts;
+use crate::live::{Statistics, Stream};
+use crate::times::{RecentTimes, Times};
+use std::time::{Duration, Instant};
+
+/// The times of the view, and when statistics are due.
+pub(super) struct Measured {
+    times: Times,
+    /// When statistics were taken last.
+    taken: Instant,
+    interval: Duration,
+    metrics: Option<LiveMetrics>,
+}
+
+impl Measured {
+    /// Statistics at this interval. Metrics, if there are any, are written at their own.
+    pub(super) fn new(interval: Duration, metrics: Option<LiveMetrics>, now: Instant) -> Measured {
+        Measured { times: Times::default(), taken: now, interval, metrics }
+    }
+
+    pub(super) fn times(&self) -> &Times {
+        &self.times
+    }
+
+    /// Time from the start of a picture to its end.
+    pub(super) fn picture_took(&mut self, time: Duration) {
+        self.times.pictures.add(time);
+    }
+
+    /// Time from an input to the picture that shows its effect.
+    pub(super) fn input_waited(&mut self, time: Duration) {
+        self.times.input_latency.add(time);
+    }
+
+    /// Time from a presentation to the monitor.
+    pub(super) fn reached_monitor(&mut self, time: Duration) {
+        self.times.scan_out.add(time);
+    }
+
+    /// True if statistics are to be taken now: once an interval.
+    pub(super) fn is_due(&mut self, now: Instant) -> bool {
+        let is_due = now.saturating_duration_since(self.taken) >= self.interval;
+        if is_due {
+            self.taken = now;
+        }
+        is_due
+    }
+
+    /// Adds the statistics of an interval. `acquisition_time`: least time to acquire a volume, s; `totals`: a line of all intervals. True if anything
+    /// came or was drawn.
+    pub(super) fn add(
+        &mut self,
+        statistics: &Statistics,
+        acquisition_time: Option<f64>,
+        totals: impl FnOnce() -> String,
+    ) -> bool {
+        let is_active = statistics.pictures > 0 || statistics.frames > 0;
+        // A volume may also end while nothing arrives.
+        if is_active || statistics.volumes != VolumeCounts::default() {
+            tracing::debug!("{}; {}", statistics.line(acquisition_time), totals());
+        }
+        self.times.add(statistics, acquisition_time);
+        self.metrics.iter_mut().for_each(|metrics| metrics.add(statistics));
+        is_active
+    }
+
+    /// When they are due again, while the display of times is shown and has something to say; and when metrics are.
+    pub(super) fn due(&self, shows_times: bool) -> impl Iterator<Item = Instant> {
+        let has_pictures = self.times.pictures.newest().is_some();
+        let statistics = (shows_times && has_pictures).then_some(self.taken + self.interval);
+        statistics.into_iter().chain(self.metrics.as_ref().map(LiveMetrics::due))
+    }
+
+    pub(super) fn device_lost(&mut self, why: &GpuError) {
+        self.metrics.iter_mut().for_each(|metrics| metrics.device_lost(why));
+    }
+
+    /// Writes the metrics if they are due.
+    pub(super) fn write(&mut self, stream: &Stream, context: &Context, source: SourceStatus, now: Instant) {
+        if let Some(metrics) = self.metrics.as_mut().filter(|metrics| now >= metrics.due()) {
+            metrics.write(now, stream, context, source);
+        }
+    }
+
+    /// Writes the metrics for the last time: the program ends in order.
+    pub(super) fn end(&mut self, stream: &mut Stream, context: &Context) {
+        let Some(mut metrics) = self.metrics.take() else { return };
+        if let Ok(statistics) = stream.take_statistics() {
+            metrics.add(&statistics);
+        }
+        metrics.end(stream, context);
+    }
+
+    /// Percentiles of the times, in one line.
+    pub(super) fn line(&self) -> String {
+        let ms = |value: Option<f64>| value.map_or("-".into(), |ms| format!("{ms:.1}"));
+        let percentiles =
+            |times: &RecentTimes| format!("p50 {} p95 {}", ms(times.percentile(0.5)), ms(times.percentile(0.95)));
+        let Times { pictures, input_latency, scan_out, .. } = &self.times;
+        let monitor = scan_out.newest().map(|_| format!(", presentation to monitor {}", percentiles(scan_out)));
+        let monitor = monitor.unwrap_or_default();
+        format!("ms: picture {}, input to picture {}{monitor}", percentiles(pictures), percentiles(input_latency))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Prevents a display of times that keeps the program awake before there is a picture, and lines that a script no longer reads.
+    #[test]
+    fn statistics_are_taken_once_an_interval_and_wake_only_a_display_that_shows_them() {
+        let begin = Instant::now();
+        let at = |ms: u64| begin + Duration::from_millis(ms);
+        let mut measured = Measured::new(Duration::from_secs(1), None, begin);
+        assert!(!measured.is_due(at(999)) && measured.is_due(at(1000)) && !measured.is_due(at(1001)));
+        assert_eq!(measured.due(true).count(), 0, "no picture yet");
+        assert_eq!(measured.line(), "ms: picture p50 - p95 -, input to picture p50 - p95 -");
+        measured.picture_took(Duration::from_millis(12));
+        assert_eq!(measured.due(true).collect::<Vec<_>>(), [at(2000)]);
+        assert_eq!(measured.due(false).count(), 0);
+        measured.reached_monitor(Duration::from_millis(8));
+        let line =
+            "ms: picture p50 12.0 p95 12.0, input to picture p50 - p95 -, presentation to monitor p50 8.0 p95 8.0";
+        assert_eq!(measured.line(), line);
+        let one = Statistics { time: Duration::from_secs(1), frames: 1, ..Statistics::default() };
+        assert!(measured.add(&one, None, String::new) && !measured.add(&Statistics::default(), None, String::new));
+    }
+}

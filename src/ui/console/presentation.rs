@@ -1,0 +1,278 @@
+//! The window: what of it is out of date, and when it is presented again. Nothing is presented unless something changed.
+
+use crate::gpu::window::Screen;
+use crate::panels::accesskit::TreeUpdate;
+use std::time::{Duration, Instant};
+
+/// While the next picture is not ready, the window keeps the old content for so long: less disturbing than a black moment.
+const BLANK_DELAY: Duration = Duration::from_millis(400);
+/// Panels that changed wait so long for the picture that is being drawn: presented on their own they take the device from it, and a picture of a view that
+/// moves is done sooner.
+const PICTURE_PATIENCE: Duration = Duration::from_millis(100);
+/// Interval of the attempts to present while there is no surface.
+const PRESENT_RETRY: Duration = Duration::from_millis(100);
+/// Interval of the updates while there is no picture to show.
+const BLANK_INTERVAL: Duration = Duration::from_millis(20);
+/// Panels that want to be drawn again later than this are not.
+const LATEST_REPAINT: Duration = Duration::from_secs(3600);
+
+/// How far the picture is when the window is to be presented.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct PictureState {
+    /// There is one of the present volume.
+    pub(super) has_drawn: bool,
+    /// One is being drawn.
+    pub(super) is_drawing: bool,
+    /// Time since that was begun.
+    pub(super) drawn_for: Option<Duration>,
+    /// Panels can be drawn while a picture is.
+    pub(super) is_paced: bool,
+    /// Nothing is to be drawn.
+    pub(super) is_idle: bool,
+    /// One was drawn in full: the start is over.
+    pub(super) has_started: bool,
+}
+
+/// The window and what of it is out of date.
+pub(super) struct Presentation {
+    pub(super) screen: Option<Screen>,
+    /// Pixels.
+    size: [u32; 2],
+    is_full_screen: bool,
+    /// Something besides the picture changed.
+    needs_redraw: bool,
+    /// A picture was drawn that has not been shown.
+    has_new_picture: bool,
+    /// Since when there is no picture to show.
+    blank_since: Option<Instant>,
+    /// When the panels want to be drawn again.
+    repaint_at: Option<Instant>,
+    /// There was no surface to present to; do not try again before this time.
+    retry_at: Option<Instant>,
+    /// Number of presentations of the panels while a picture was being drawn.
+    shown_between: u64,
+    /// Where to draw the pointer, pixels of the window.
+    pointer: Option<[f64; 2]>,
+    /// What a screen reader says of the panels, since they were laid out last.
+    tree: Option<TreeUpdate>,
+}
+
+impl Presentation {
+    /// A window of this size, pixels, that has no screen yet.
+    pub(super) fn new(size: [u32; 2]) -> Presentation {
+        Presentation {
+            screen: None,
+            size,
+            is_full_screen: false,
+            needs_redraw: true,
+            has_new_picture: false,
+            blank_since: None,
+            repaint_at: None,
+            retry_at: None,
+            shown_between: 0,
+            pointer: None,
+            tree: None,
+        }
+    }
+
+    /// Sets the screen to present to.
+    pub(super) fn set_screen(&mut self, screen: Option<Screen>) {
+        // Drop the old one first: a window has one surface at a time.
+        self.screen = None;
+        self.screen = screen;
+        self.redraw();
+    }
+
+    /// Sets the size, pixels; 0 while the window is minimised. False if it stays.
+    pub(super) fn resize(&mut self, size: [u32; 2]) -> bool {
+        if let Some(screen) = &mut self.screen {
+            screen.resize(size);
+        }
+        let is_open = !size.contains(&0);
+        if is_open {
+            self.size = size;
+        }
+        is_open
+    }
+
+    /// Pixels.
+    pub(super) fn size(&self) -> [u32; 2] {
+        self.size
+    }
+
+    /// True if it fills the screen and can leave it.
+    pub(super) fn is_full_screen(&self) -> bool {
+        self.is_full_screen
+    }
+
+    pub(super) fn set_full_screen(&mut self, is_full_screen: bool) {
+        self.is_full_screen = is_full_screen;
+    }
+
+    /// Number of presentations, and of those while a picture was being drawn.
+    pub(super) fn shown(&self) -> [u64; 2] {
+        [self.screen.as_ref().map_or(0, |screen| screen.shown()), self.shown_between]
+    }
+
+    /// Something besides the picture changed.
+    pub(super) fn redraw(&mut self) {
+        self.needs_redraw = true;
+    }
+
+    /// The same, if it did.
+    pub(super) fn redraw_if(&mut self, has_changed: bool) {
+        self.needs_redraw |= has_changed;
+    }
+
+    /// The content of the window was lost, or there is a surface again.
+    pub(super) fn content_lost(&mut self) {
+        (self.needs_redraw, self.retry_at) = (true, None);
+    }
+
+    pub(super) fn picture_finished(&mut self) {
+        self.has_new_picture = true;
+    }
+
+    /// Where to draw the pointer, pixels of the window, if no windowing system draws one.
+    pub(super) fn set_pointer(&mut self, at: Option<[f64; 2]>) {
+        self.needs_redraw |= self.pointer != at;
+        self.pointer = at;
+    }
+
+    pub(super) fn pointer(&self) -> Option<[f64; 2]> {
+        self.pointer
+    }
+
+    /// What a screen reader says of the panels, if they were laid out since the last call.
+    pub(super) fn take_tree(&mut self) -> Option<TreeUpdate> {
+        self.tree.take()
+    }
+
+    /// The panels were laid out: what a screen reader says of them, and after which time they want to be laid out again.
+    pub(super) fn laid_out(&mut self, tree: Option<TreeUpdate>, repaint_after: Duration, now: Instant) {
+        self.repaint_at = (repaint_after < LATEST_REPAINT).then(|| now + repaint_after);
+        self.tree = tree.or(self.tree.take());
+    }
+
+    /// The panels are drawn again if they wanted that by now.
+    pub(super) fn repaint(&mut self, now: Instant) {
+        self.needs_redraw |= self.repaint_at.is_some_and(|at| at <= now);
+    }
+
+    /// True if the window is to be presented now.
+    pub(super) fn is_due(&mut self, picture: &PictureState, now: Instant) -> bool {
+        // While a picture is being drawn, its image is the device's: panels get the last one, of which the screen has a copy, if they can be
+        // drawn before the picture is done, and if that takes long. Otherwise both are presented together.
+        let takes_long = picture.drawn_for.is_some_and(|time| time >= PICTURE_PATIENCE);
+        let gets_between = picture.has_started && picture.is_paced && takes_long;
+        let is_late = picture.is_drawing && !gets_between;
+        let is_new = self.has_new_picture || self.needs_redraw;
+        if !is_new || is_late || self.retry_at.is_some_and(|until| now < until) {
+            return false;
+        }
+        // At the start there is no old content to keep.
+        if !picture.has_drawn && !picture.is_idle && picture.has_started {
+            let since = *self.blank_since.get_or_insert(now);
+            if now.saturating_duration_since(since) < BLANK_DELAY {
+                return false;
+            }
+        }
+        self.blank_since = None;
+        true
+    }
+
+    /// The old content stays: there is nothing to draw over it.
+    pub(super) fn keep_content(&mut self) {
+        self.needs_redraw = false;
+    }
+
+    /// The panels show what there is. `has_more`: inputs for them remain.
+    pub(super) fn up_to_date(&mut self, has_more: bool) {
+        (self.has_new_picture, self.needs_redraw) = (false, has_more);
+    }
+
+    /// The window was presented. `is_between`: while a picture was being drawn.
+    pub(super) fn presented(&mut self, is_between: bool, has_more: bool) {
+        self.up_to_date(has_more);
+        self.shown_between += u64::from(is_between);
+        self.retry_at = None;
+    }
+
+    /// There is no surface to present to.
+    pub(super) fn not_presentable(&mut self, now: Instant) {
+        self.retry_at = Some(now + PRESENT_RETRY);
+    }
+
+    /// True if something is to be presented, and can be.
+    pub(super) fn waits(&self) -> bool {
+        let can_present = self.screen.is_some() && self.blank_since.is_none() && self.retry_at.is_none();
+        self.needs_redraw && can_present
+    }
+
+    /// When to look at it again.
+    pub(super) fn due(&self, now: Instant) -> impl Iterator<Item = Instant> {
+        [self.retry_at, self.repaint_at, self.blank_since.map(|_| now + BLANK_INTERVAL)].into_iter().flatten()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const SHOWN: PictureState = PictureState {
+        has_drawn: true,
+        is_drawing: false,
+        drawn_for: None,
+        is_paced: true,
+        is_idle: true,
+        has_started: true,
+    };
+
+    /// Prevents a window that is drawn although nothing changed, panels that hold a picture up, and a black moment between two volumes.
+    #[test]
+    fn a_window_is_presented_when_something_changed_and_a_picture_is_not_held_up() {
+        let begin = Instant::now();
+        let at = |ms: u64| begin + Duration::from_millis(ms);
+        let mut window = Presentation::new([64, 64]);
+        assert!(window.is_due(&SHOWN, at(0)), "the first time");
+        window.presented(false, false);
+        assert!(!window.is_due(&SHOWN, at(1)), "nothing changed");
+        window.picture_finished();
+        assert!(window.is_due(&SHOWN, at(2)));
+        window.presented(false, true);
+        assert!(window.is_due(&SHOWN, at(3)), "inputs for the panels remain");
+        // A picture is being drawn.
+        let drawn_for = |ms| PictureState { is_drawing: true, drawn_for: Some(Duration::from_millis(ms)), ..SHOWN };
+        assert!(!window.is_due(&drawn_for(99), at(4)) && window.is_due(&drawn_for(100), at(4)));
+        assert!(!window.is_due(&PictureState { is_paced: false, ..drawn_for(900) }, at(4)));
+        assert!(!window.is_due(&PictureState { has_started: false, ..drawn_for(900) }, at(4)));
+        window.presented(true, false);
+        assert_eq!(window.shown(), [0, 1]);
+        // The next volume has no picture yet.
+        let blank = PictureState { has_drawn: false, is_idle: false, ..SHOWN };
+        window.redraw();
+        assert!(!window.is_due(&blank, at(10)) && !window.is_due(&blank, at(409)) && window.is_due(&blank, at(410)));
+        assert!(window.is_due(&PictureState { has_started: false, ..blank }, at(411)), "the start has no old content");
+    }
+
+    #[test]
+    fn a_window_without_a_surface_is_tried_again_after_a_while_or_when_it_comes_back() {
+        let begin = Instant::now();
+        let at = |ms: u64| begin + Duration::from_millis(ms);
+        let mut window = Presentation::new([64, 64]);
+        window.not_presentable(at(0));
+        assert!(!window.is_due(&SHOWN, at(99)) && window.is_due(&SHOWN, at(100)));
+        assert_eq!(window.due(at(0)).collect::<Vec<_>>(), [at(100)]);
+        window.content_lost();
+        assert!(window.is_due(&SHOWN, at(1)));
+        window.presented(false, false);
+        window.laid_out(None, Duration::from_millis(50), at(10));
+        window.repaint(at(59));
+        assert!(!window.is_due(&SHOWN, at(59)), "no panel moves yet");
+        window.repaint(at(60));
+        assert!(window.is_due(&SHOWN, at(60)));
+        window.laid_out(None, Duration::MAX, at(60));
+        assert_eq!(window.due(at(60)).count(), 0);
+        assert!(!window.resize([0, 64]) && window.resize([32, 16]) && window.size() == [32, 16], "minimised");
+    }
+}

@@ -1,0 +1,107 @@
+//! The start: what is done before the first picture, as the screen says it.
+
+use crate::live::StartStep;
+use crate::panels::Banner;
+use crate::texts;
+use std::time::{Duration, Instant};
+
+/// Longest that the screen says less of the start than is known: each drawing of it takes the processor from what it tells of.
+const START_INTERVAL: Duration = Duration::from_millis(100);
+
+/// How far the start is.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Start {
+    /// What the screen says of it, and since when.
+    step: Option<StartStep>,
+    step_at: Instant,
+    /// The screen says that the first picture is being drawn.
+    tells_of_picture: bool,
+    /// A picture was drawn in full.
+    is_over: bool,
+}
+
+impl Start {
+    pub(super) fn new(now: Instant) -> Start {
+        Start { step: None, step_at: now, tells_of_picture: false, is_over: false }
+    }
+
+    pub(super) fn is_over(&self) -> bool {
+        self.is_over
+    }
+
+    /// True once, before the first picture is drawn: no panels may be presented while the device draws, so that the screen says before what it is about
+    /// to do.
+    pub(super) fn tells_first(&mut self, step: Option<StartStep>) -> bool {
+        let is_first = !self.tells_of_picture && step == Some(StartStep::Picture);
+        self.tells_of_picture |= is_first;
+        is_first
+    }
+
+    /// A picture is finished. `is_coarse`: with few rays.
+    pub(super) fn picture_finished(&mut self, is_coarse: bool) {
+        if !self.is_over {
+            tracing::debug!("start: a picture {}", if is_coarse { "with few rays" } else { "in full" });
+        }
+        self.is_over |= !is_coarse;
+    }
+
+    /// Goes on to what the stream does now. True if the screen is to say it.
+    pub(super) fn follow(&mut self, step: Option<StartStep>, now: Instant) -> bool {
+        let kind = |step: Option<StartStep>| step.map(|step| std::mem::discriminant(&step));
+        let is_due = now.saturating_duration_since(self.step_at) >= START_INTERVAL;
+        let is_said = kind(step) != kind(self.step) || (step != self.step && is_due);
+        if is_said {
+            (self.step, self.step_at) = (step, now);
+        }
+        is_said
+    }
+
+    /// Notes in the log what the screen says.
+    pub(super) fn presented(&self) {
+        if let Some(step) = self.step.filter(|_| !self.is_over) {
+            tracing::debug!("start: the screen says {step:?}");
+        }
+    }
+
+    /// What the screen says. `title`: what the source does. None: nothing but that.
+    pub(super) fn banner(&self, title: &str) -> Option<Banner> {
+        let banner = |title: &str, text: &str| Banner { title: title.into(), text: text.into(), is_fault: false };
+        Some(match self.step? {
+            StartStep::Compiling { count: 0, .. } => banner(texts::PREPARING_THE_DEVICE, ""),
+            StartStep::Compiling { done, count } => {
+                banner(texts::PREPARING_THE_DEVICE, &texts::shaders_compiled(done, count))
+            }
+            StartStep::Frames { done: 0, .. } => banner(title, texts::WAITING_FOR_FRAME),
+            StartStep::Frames { done, count } => banner(title, &texts::frames_of_first_volume(done, count)),
+            StartStep::Picture => banner(texts::DRAWING_FIRST_PICTURE, ""),
+            StartStep::Source => return None,
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Prevents a start that takes longer because the screen tells of every frame, and one that does not say what it does.
+    #[test]
+    fn the_screen_says_another_step_at_once_and_progress_ten_times_a_second() {
+        let begin = Instant::now();
+        let at = |ms: u64| begin + Duration::from_millis(ms);
+        let frames = |done| Some(StartStep::Frames { done, count: 9 });
+        let mut start = Start::new(begin);
+        assert!(start.banner("Waiting").is_none() && !start.follow(None, at(0)));
+        assert!(start.follow(Some(StartStep::Source), at(1)) && start.follow(frames(0), at(2)));
+        assert!(!start.follow(frames(1), at(50)), "a moment later");
+        assert!(start.follow(frames(5), at(102)) && !start.follow(frames(5), at(900)));
+        assert_eq!(start.banner("Waiting").map(|banner| banner.title).as_deref(), Some("Waiting"));
+        assert!(start.follow(Some(StartStep::Picture), at(103)));
+        assert!(!start.tells_first(frames(9)) && start.tells_first(Some(StartStep::Picture)), "before it is drawn");
+        assert!(!start.tells_first(Some(StartStep::Picture)), "once");
+        start.picture_finished(true);
+        assert!(!start.is_over(), "it has few rays");
+        start.picture_finished(false);
+        start.picture_finished(true);
+        assert!(start.is_over());
+    }
+}

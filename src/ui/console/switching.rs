@@ -1,0 +1,155 @@
+//! Recordings and workspaces in the console: which is opened, and how the one that is shown is left.
+
+use super::Console;
+use crate::recordings::{Display, Kept, MAX_OPEN};
+use crate::source::live::SourceKind;
+use crate::texts;
+use std::path::Path;
+use std::time::Instant;
+
+impl Console {
+    /// Shows the list of files to open, or closes it.
+    pub(super) fn toggle_files(&mut self) {
+        if !self.opening.close_list() {
+            if !self.opening.is_offered() {
+                return self.notify(texts::OPENS_NO_OTHER_FILES, true);
+            }
+            let recording = self.fixed.origin.as_ref().and_then(|origin| origin.recording.as_deref());
+            let beside = recording.and_then(Path::parent).filter(|folder| folder.is_dir());
+            self.opening.show_list(beside.unwrap_or(self.exporter.folder()));
+        }
+        self.presentation.redraw();
+    }
+
+    /// Opens the n-th entry of the list: a file, or a folder, whose list is shown then.
+    pub(super) fn open_entry(&mut self, n: usize) {
+        if let Some(path) = self.opening.choose(n) {
+            self.open_path(&path);
+        }
+    }
+
+    /// Takes a file that was dropped on the window. Of several that are dropped together the first is shown, the others are listed.
+    pub fn drop_file(&mut self, path: &Path) {
+        self.opening.drop_file(path);
+    }
+
+    fn open_dropped(&mut self) {
+        let dropped = self.opening.take_dropped();
+        let Some((first, others)) = dropped.split_first() else { return };
+        self.open_path(first);
+        if self.opening.is_reading() && !self.opening.add(others) {
+            self.notify(&texts::too_many_recordings(MAX_OPEN), true);
+        }
+    }
+
+    /// Opens a recording or a workspace and shows it. The one that is shown already is read anew.
+    pub fn open_path(&mut self, path: &Path) {
+        self.read(path, false);
+    }
+
+    /// Reads a file in the background. `closes`: the recording that is shown is closed for it.
+    fn read(&mut self, path: &Path, closes: bool) {
+        if self.opening.is_offered() && self.has_unsaved_loop() {
+            return self.notify(texts::SAVE_THE_LOOP_FIRST, true);
+        }
+        match self.opening.read(path, closes) {
+            Ok(()) => self.presentation.redraw(),
+            Err(why) => self.notify(&why, true),
+        }
+    }
+
+    /// Ends what is being read, at the wish of the user. False if nothing is.
+    pub(super) fn cancel_reading(&mut self) -> bool {
+        if let Some(name) = self.opening.end_reading() {
+            self.notify(&texts::not_read_further(name), false);
+            return true;
+        }
+        let is_cancelled = self.reads_source() && self.connection.cancel();
+        if is_cancelled {
+            self.opening.cancel_source();
+            self.presentation.redraw();
+        }
+        is_cancelled
+    }
+
+    /// True while the source of this console is being opened and the user may end that.
+    pub(super) fn reads_source(&self) -> bool {
+        let is_opening = self.connection.is_opening() && !self.faults.prevents_view();
+        is_opening && self.connection.kind() == SourceKind::Recording && !self.fixed.is_kiosk
+    }
+
+    /// Shows the n-th of the recordings that are open.
+    pub(super) fn show_recording(&mut self, n: usize) {
+        match self.opening.recording(n) {
+            // Who chooses it again stays with it.
+            Some((_, true)) => {
+                let is_ended = self.opening.end_reading().is_some();
+                self.presentation.redraw_if(is_ended);
+            }
+            Some((path, false)) => self.read(&path, false),
+            None => {}
+        }
+    }
+
+    /// Shows a recording so many places further than the one that is shown, or on its way to be.
+    pub(super) fn step_recording(&mut self, by: i32) {
+        match self.opening.further(by) {
+            Some(next) => self.show_recording(next),
+            None => self.notify(texts::ONLY_RECORDING, false),
+        }
+    }
+
+    /// Closes the n-th recording. In place of the one that is shown comes the next, or else the one before.
+    pub(super) fn close_recording(&mut self, n: usize) {
+        match self.opening.close(n) {
+            Some(Ok(name)) => self.notify(&texts::is_closed(name), false),
+            Some(Err(Some(next))) => self.read(&next, true),
+            Some(Err(None)) => self.notify(texts::ONLY_RECORDING, false),
+            None => {}
+        }
+    }
+
+    /// Takes what was opened: the console asks to be replaced by one that shows it.
+    pub(super) fn poll_opening(&mut self, now: Instant) {
+        self.open_dropped();
+        match self.opening.poll() {
+            None => {}
+            Some(Ok(file)) => {
+                let (kept, display) = (self.kept(), self.display());
+                self.opening.show(&file, kept, display);
+                self.request.restart = true;
+            }
+            Some(Err(fault)) => self.notify(&texts::not_opened(fault), true),
+        }
+        let source_since = self.reads_source().then_some(self.fixed.started);
+        let is_other = self.opening.look(source_since, now);
+        self.presentation.redraw_if(is_other);
+    }
+
+    /// What is kept of the recording that is shown. Nothing before its first picture: its settings do not follow from it
+    /// yet.
+    fn kept(&mut self) -> Option<Kept> {
+        let has_drawn = self.stream.renderer().is_some_and(|renderer| renderer.has_drawn());
+        if !has_drawn && !self.fixed.is_kept {
+            return None;
+        }
+        let volumes = self.stream.cine().volumes();
+        let is_numbered = self.fixed.plays_once && self.connection.kind() == SourceKind::Recording;
+        let shown = self.stream.cine_position().and_then(|at| volumes.get(at)).map(|kept| kept.volume);
+        let frozen = self.replay.frozen().or(shown.filter(|_| self.stream.is_frozen() && is_numbered));
+        Some(Kept { controls: self.controls.set_aside(), frozen })
+    }
+
+    fn display(&self) -> Display {
+        let (panels, times, bar) = (self.visible.panels, self.visible.times, self.controls.settings().marks.bar);
+        Display { panels, times, bar, has_focus: self.panels.has_focus() }
+    }
+
+    /// Freezes the volume of a recording that was frozen when it was left, once it is there.
+    pub(super) fn refreeze(&mut self) {
+        let volumes = self.stream.cine().volumes().iter().map(|kept| kept.volume);
+        if let Some(at) = self.replay.refreeze(volumes, self.fixed.cine_volumes, self.connection.is_over()) {
+            self.show_cine_volume(at);
+        }
+    }
+}
