@@ -89,7 +89,7 @@ pub(super) fn rows(tables: &[&[Key]]) -> Vec<Row> {
 }
 
 /// Whether a value is one that changes nothing.
-pub(super) fn is_neutral(value: &str, neutral: &[&str]) -> bool {
+fn is_neutral(value: &str, neutral: &[&str]) -> bool {
     let same = |word: &str, other: &str| match (word.parse::<f64>(), other.parse::<f64>()) {
         (Ok(a), Ok(b)) => a == b,
         _ => word.eq_ignore_ascii_case(other),
