@@ -3,7 +3,7 @@
 
 use crate::common::files::repository;
 use crate::common::program::PROGRAM;
-use echolume::low_level::scene::Settings;
+use echolume::low_level::scene::{Number, Settings, numbers};
 use echolume::low_level::source::formats::FORMATS;
 use echolume::low_level::source::keys::{Row, Use};
 use serde_json::{Map, Value, json};
@@ -434,7 +434,11 @@ impl SettingsPage<'_> {
                         (false, value) => value_words(value),
                     };
                     let of = type_words(&key.of, types);
-                    let about = if key.doc.is_empty() { type_summary(&key.of, types) } else { key.doc.clone() };
+                    let mut about = if key.doc.is_empty() { type_summary(&key.of, types) } else { key.doc.clone() };
+                    let row = numbers().find(|number| number.key == below.join("."));
+                    if let Some(allowed) = row.map(Number::allowed).filter(|allowed| !allowed.is_empty()) {
+                        about += &format!(" Allowed: {allowed}.");
+                    }
                     writeln!(self.text, "| `{}` | {of} | {} | {} |", key.name, cell(&value), cell(&about))
                         .expect("text");
                 }

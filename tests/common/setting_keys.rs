@@ -32,23 +32,37 @@ fn sections() -> BTreeMap<String, Vec<Vec<String>>> {
 pub fn all() -> Vec<Key> {
     let sections = sections();
     let mut found = Vec::new();
-    collect("", "Top level", &sections, &mut found);
+    collect("", "Top level", &sections, false, &mut found);
     assert!(found.len() > 150, "the page has changed its form: {} keys", found.len());
     found
 }
 
-fn collect(prefix: &str, title: &str, sections: &BTreeMap<String, Vec<Vec<String>>>, found: &mut Vec<Key>) {
+/// All keys, those of the tables of lists without a place in the list.
+pub fn with_lists() -> Vec<Key> {
+    let mut found = Vec::new();
+    collect("", "Top level", &sections(), true, &mut found);
+    found
+}
+
+fn collect(
+    prefix: &str,
+    title: &str,
+    sections: &BTreeMap<String, Vec<Vec<String>>>,
+    has_lists: bool,
+    found: &mut Vec<Key>,
+) {
     for row in &sections[title] {
         let [name, of, ..] = &row[..] else { panic!("{title}: {row:?}") };
         let path = format!("{prefix}{name}");
         // "[Type](#type)", "[Type](#type) or none".
-        let linked = of.strip_prefix('[').and_then(|rest| rest.split(']').next());
+        let element = of.strip_prefix("list of ").filter(|_| has_lists).unwrap_or(of);
+        let linked = element.strip_prefix('[').and_then(|rest| rest.split(']').next());
         match linked {
             Some(inner) if sections.get(inner).is_some_and(|rows| rows.iter().all(|row| row.len() >= 4)) => {
                 if of.ends_with("or none") {
                     found.push(Key { path: path.clone(), of: "table or none".into(), words: Vec::new() });
                 }
-                collect(&format!("{path}."), inner, sections, found);
+                collect(&format!("{path}."), inner, sections, has_lists, found);
             }
             Some(inner) => {
                 let rows = sections.get(inner).map_or(&[][..], |rows| rows);

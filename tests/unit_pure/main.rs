@@ -21,6 +21,7 @@ mod measure;
 mod metrics;
 mod module_cycles;
 mod named_profiles;
+mod numbers;
 mod phantom;
 mod plan;
 mod profile;

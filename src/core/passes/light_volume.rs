@@ -409,7 +409,7 @@ pub(crate) const PROPAGATE_BACK: Pass = Pass {
 };
 
 /// Light that tissue scatters, along one axis a dispatch.
-pub const DIFFUSE: Pass = Pass {
+pub(crate) const DIFFUSE: Pass = Pass {
     name: "light_diffuse",
     shader: |_, _| "light_volume/diffuse",
     needed: |s| match s.lit_by_volume() {
@@ -482,7 +482,7 @@ fn scatter(scene: &Scene) -> [f64; 3] {
 }
 
 /// Light from everywhere above, and from behind.
-pub const AMBIENT: Pass = Pass {
+pub(crate) const AMBIENT: Pass = Pass {
     name: "light_ambient",
     shader: |_, _| "light_volume/ambient",
     reads: |s, _| {

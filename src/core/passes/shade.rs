@@ -347,7 +347,7 @@ const ROUGHNESS: f64 = 0.1;
 
 /// Ambient occlusion in image space: surfaces that rise above a pixel's tangent plane nearby occlude ambient light. (Mittring 2007;
 /// Bavoil and Sainz 2008.)
-pub const OCCLUSION: Pass = Pass {
+pub(crate) const OCCLUSION: Pass = Pass {
     name: "occlusion",
     stage: Stage::Shade,
     frequency: Frequency::Picture,

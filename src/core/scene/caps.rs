@@ -10,7 +10,7 @@ const LEAST_LEVEL: f64 = 1e-6;
 
 impl Settings {
     /// True if there is something that clip planes cut, whether or not their cut faces are shown.
-    pub fn can_cap(&self) -> bool {
+    pub(crate) fn can_cap(&self) -> bool {
         let is_cut = match self.mode {
             Mode::Surface | Mode::Mixed => self.surface.sign != Sign::Dark,
             mode => mode == Mode::Volume,

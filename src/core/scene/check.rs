@@ -1,17 +1,13 @@
-//! Checks of settings. Each error names the setting and its limits.
+//! Checks of several settings together, and of what is no number; `number` checks each number alone. Each error names the setting and its limits.
 
 use super::planes::{MAX_SLAB, MAX_TILES, SAME_POINT};
 use super::{
-    Bilateral, CINE_SPEEDS, Cine, Clip, Compositing, Conditioning, Curve, Distance, Edge, Elevation, EnhancedSigma,
-    Layout, Light, MAX_CLIPS, MAX_CURVE_POINTS, MAX_DEVIATION, MAX_PICTURE, MAX_WINDOW, Mode, Noise, PeronaMalik,
-    Scene, SceneError, Scheme, Settings, Sigma, Smooth, refuse, transfer,
+    Cine, Clip, Compositing, Conditioning, Curve, Distance, Elevation, EnhancedSigma, Layout, Light, MAX_BODY_MARKS,
+    MAX_CLIPS, MAX_CURVE_POINTS, MAX_DEVIATION, MAX_PICTURE, Mode, Noise, PeronaMalik, Scene, SceneError, Scheme,
+    Settings, Smooth, refuse, transfer,
 };
 use crate::probe::Geometry;
 use glam::DVec3;
-
-/// The least and the largest length of a setting, mm: a thousandth of the smallest voxel that a volume may have, and a thousand of the largest. A scene may so
-/// be drawn at any size.
-pub(super) const LENGTHS: [f64; 2] = [1e-9, 1e9];
 
 /// A tolerance needs rays whose samples another step takes as well, and whose colour is all that makes a pixel.
 fn check_tolerance(settings: &Settings) -> Result<(), SceneError> {
@@ -19,7 +15,6 @@ fn check_tolerance(settings: &Settings) -> Result<(), SceneError> {
     if levels == 0.0 {
         return Ok(());
     }
-    within("ray.tolerance", levels, 0.01, 64.0)?;
     if settings.mode != Mode::Volume || settings.still.is_some() {
         return Ok(());
     }
@@ -35,26 +30,8 @@ fn check_tolerance(settings: &Settings) -> Result<(), SceneError> {
 
 /// Checks that need no geometry.
 pub(super) fn check(settings: &Settings) -> Result<(), SceneError> {
-    let [width, height] = settings.picture.size;
-    if !(1..=MAX_PICTURE).contains(&width) || !(1..=MAX_PICTURE).contains(&height) {
-        return refuse("picture.size", format!("is {width}x{height}, each edge must lie in 1..={MAX_PICTURE}"));
-    }
-    within("ray.spread", settings.ray.spread, 0.0, 1.0)?;
-    within("ray.samples_per_voxel", f64::from(settings.ray.samples_per_voxel.unwrap_or(1)), 1.0, 16.0)?;
-    if let Some(brick) = settings.ray.brick.filter(|brick| *brick != 0) {
-        within("ray.brick", f64::from(brick), 4.0, 64.0)?;
-    }
-    within("ray.entries", f64::from(settings.ray.entries), 2.0, 65536.0)?;
-    if !matches!(settings.ray.sliding, 0 | 3 | 5) {
-        return refuse("ray.sliding", format!("is {}, must be 0 (none), 3 or 5", settings.ray.sliding));
-    }
     check_clip(&settings.clip)?;
-    within("cap.level", settings.cap.level.unwrap_or(0.0), 0.0, 1.0)?;
-    within("ray.rays", f64::from(settings.ray.rays), 1.0, 4.0)?;
     let ray = &settings.ray;
-    if !matches!(ray.subsampling, 1 | 2 | 4 | 8) {
-        return refuse("ray.subsampling", format!("is {}, must be 1 (every pixel), 2, 4 or 8", ray.subsampling));
-    }
     if ray.subsampling > 1 && ray.rays > 1 {
         let (pixels, rays) = (ray.subsampling.pow(2), ray.rays);
         return refuse(
@@ -73,32 +50,16 @@ pub(super) fn check(settings: &Settings) -> Result<(), SceneError> {
     if settings.layout == Layout::Pair && settings.mode != Mode::Surface {
         return refuse("layout", "pair shows a volume and the surface found in the same march: set mode=surface");
     }
-    within("floating", settings.floating, 0.0, LENGTHS[1].powi(3))?;
-    within("unveil.offset", settings.unveil.offset, -100.0, 100.0)?;
-    within("unveil.smoothing", settings.unveil.smoothing, 0.0, 20.0)?;
     let s = &settings.slices;
-    within("slices.pixels", f64::from(s.pixels), 2.0, 4096.0)?;
-    check_smooth(
-        s.smooth,
-        [
-            "slices.smooth.lateral",
-            "slices.smooth.depth",
-            "slices.smooth.elevation",
-            "slices.smooth.elevation_mm",
-            "slices.smooth.kernel",
-        ],
-    )?;
+    check_smooth(s.smooth, "slices.smooth.kernel")?;
     let smooths =
         s.smooth.is_some_and(|smooth| smooth.elevation_mm.unwrap_or(smooth.elevation) > 0.0 || smooth.kernel.is_some());
     if settings.ray.elevation == Elevation::BsplineSharp && smooths {
         return refuse("ray.elevation", "bspline-sharp sharpens across slices, slices.smooth smooths: set one of them");
     }
-    check_sigma("slices.sigma", s.sigma)?;
-    within("slices.estimator_edge", s.estimator_edge, 0.0, f64::INFINITY)?;
     check_enhanced("slices.enhanced_sigma", s.enhanced_sigma)?;
     check_perona_malik("slices.perona_malik", s.perona_malik)?;
     check_distance(&settings.distance)?;
-    check_sigma("post.sigma", settings.post.sigma)?;
     check_enhanced("post.enhanced_sigma", settings.post.enhanced_sigma)?;
     check_perona_malik("post.perona_malik", settings.post.perona_malik)?;
     if settings.post.perona_malik.is_some_and(|p| matches!(p.scheme, Scheme::AosRichardson | Scheme::Rkl1)) {
@@ -128,26 +89,6 @@ pub(super) fn check(settings: &Settings) -> Result<(), SceneError> {
             return refuse(field, format!("[{low}, {high}] must be finite and rise"));
         }
     }
-    let c = &settings.camera;
-    for (field, value) in [("camera.azimuth", c.azimuth), ("camera.elevation", c.elevation), ("camera.roll", c.roll)] {
-        within(field, value, -360.0, 360.0)?;
-    }
-    within("camera.zoom", c.zoom, 1e-3, 1e3)?;
-    within("camera.field_of_view", c.field_of_view, 0.0, 150.0)?;
-    if c.field_of_view > 0.0 && c.field_of_view < 1.0 {
-        // The camera would be so far away that f32 cannot resolve the body.
-        return refuse(
-            "camera.field_of_view",
-            format!("is {}, must be 0 (parallel) or at least 1 deg", c.field_of_view),
-        );
-    }
-    for value in c.target.iter().flatten() {
-        within("camera.target", *value, -1e10, 1e10)?;
-    }
-    if let Some(step) = settings.ray.step {
-        length("ray.step", step)?;
-    }
-    within("ray.early_end", settings.ray.early_end, 0.0, 1.0)?;
     if let Some(fault) = transfer::fault(&settings.volume.transfer) {
         return refuse("volume.transfer", fault);
     }
@@ -155,26 +96,12 @@ pub(super) fn check(settings: &Settings) -> Result<(), SceneError> {
         let field = if settings.volume.entries.is_some() { "volume.entries" } else { "volume.transfer" };
         return refuse(field, fault);
     }
-    let v = &settings.volume;
-    within("volume.threshold", v.threshold, 0.0, 1.0)?;
-    within("volume.hit", v.hit, 1e-3, 1.0)?;
-    within("volume.veil", v.veil, 0.0, 1.0)?;
-    for tint in [v.near_tint, v.far_tint] {
-        tint.iter().try_for_each(|c| within("volume.near_tint, volume.far_tint", *c, 0.0, 10.0))?;
-    }
-    let f = &settings.surface;
-    within("surface.threshold", f.threshold, 1e-6, 1.0)?;
-    within("surface.rough_threshold", f.rough_threshold.unwrap_or(f.threshold), 1e-6, 1.0)?;
-    if let Some(Edge::Length(edge)) = f.edge {
-        length("surface.edge", edge)?;
-    }
-    within("surface.noise", f.noise, 0.0, 10.0)?;
-    within("surface.rough", f64::from(f.rough), 1.0, 8.0)?;
-    within("surface.number", f64::from(f.number), 1.0, 8.0)?;
-    length("surface.colour_depth", f.colour_depth)?;
     check_light(&settings.light)?;
-    within("region.fade", settings.region.fade, 0.0, LENGTHS[1])?;
-    within("volume.extinction", settings.volume.extinction.unwrap_or(1.0), 1.0 / LENGTHS[1], 1.0 / LENGTHS[0])?;
+    check_cine(&settings.cine)?;
+    if settings.body_marks.len() > MAX_BODY_MARKS {
+        let count = settings.body_marks.len();
+        return refuse("body_marks", format!("has {count} entries, at most {MAX_BODY_MARKS}"));
+    }
     if settings.volume.compositing == Compositing::Exponential {
         let table = "needs volume.compositing=riemann, corrected or pre-integrated: exponential takes the light of a step from a table";
         if settings.light.volume.is_some() {
@@ -184,9 +111,7 @@ pub(super) fn check(settings: &Settings) -> Result<(), SceneError> {
             return refuse("region.fade", table);
         }
     }
-    within("post.brightness", settings.post.brightness, -1.0, 1.0)?;
-    within("post.contrast", settings.post.contrast, 0.0, 10.0)?;
-    within("post.gamma", settings.post.gamma, 0.1, 10.0)
+    Ok(())
 }
 
 fn check_clip(planes: &[Clip]) -> Result<(), SceneError> {
@@ -194,9 +119,6 @@ fn check_clip(planes: &[Clip]) -> Result<(), SceneError> {
         return refuse("clip", format!("has {} planes, at most {MAX_CLIPS}", planes.len()));
     }
     for plane in planes {
-        for value in plane.at {
-            within("clip.at", value, -1e10, 1e10)?;
-        }
         let normal = DVec3::from(plane.normal);
         if !normal.is_finite() || normal.length() < 1e-9 {
             return refuse("clip.normal", "must be finite and not zero");
@@ -208,24 +130,9 @@ fn check_clip(planes: &[Clip]) -> Result<(), SceneError> {
 /// Checks the conditioning of lines by itself and against the geometry of the frames.
 pub(super) fn check_conditioning(c: &Conditioning, geometry: &Geometry) -> Result<(), SceneError> {
     for (i, point) in c.tgc.iter().enumerate() {
-        within("conditioning.tgc", point.depth, 0.0, 1e4)?;
-        within("conditioning.tgc", point.gain, -120.0, 120.0)?;
         if i > 0 && c.tgc[i - 1].depth >= point.depth {
             return refuse("conditioning.tgc", format!("point {}: depths must rise from point to point", i + 1));
         }
-    }
-    if let Some(range) = c.dynamic_range {
-        within("conditioning.dynamic_range", range, 1.0, 200.0)?;
-    }
-    within("conditioning.compressed_range", c.compressed_range, 1.0, 200.0)?;
-    if let Some(deviation) = c.low_pass {
-        within("conditioning.low_pass", deviation, 0.0, MAX_DEVIATION)?;
-    }
-    if let Some(mm) = c.low_pass_mm {
-        within("conditioning.low_pass_mm", mm, 0.0, LENGTHS[1])?;
-    }
-    if let Some(samples) = c.samples {
-        within("conditioning.samples", f64::from(samples), 2.0, 65536.0)?;
     }
     match geometry {
         Geometry::Cartesian(_) => {
@@ -265,12 +172,6 @@ fn check_light(l: &Light) -> Result<(), SceneError> {
     if !l.direction.is_finite() || l.direction.length() < 1e-6 {
         return refuse("light.direction", "must be finite and not zero");
     }
-    for value in l.position.iter().flat_map(|p| p.to_array()) {
-        within("light.position", value, -1e10, 1e10)?;
-    }
-    let shadow = l.shadow.unwrap_or_default();
-    let occlusion = l.occlusion.unwrap_or_default();
-    let skin = l.skin.unwrap_or_default();
     let volume = l.volume.unwrap_or_default();
     if !volume.back_direction.is_finite() || volume.back_direction.length() < 1e-6 {
         return refuse("light.volume.back_direction", "must be finite and not zero");
@@ -278,53 +179,10 @@ fn check_light(l: &Light) -> Result<(), SceneError> {
     if l.volume.is_some() && l.position.is_some() {
         return refuse("light.volume", "takes a distant light: leave light.position out");
     }
-    let [least, most] = LENGTHS;
-    for (field, value, low, high) in [
-        ("light.ambient", l.ambient, 0.0, 10.0),
-        ("light.diffuse", l.diffuse, 0.0, 10.0),
-        ("light.specular", l.specular, 0.0, 10.0),
-        ("light.shininess", l.shininess, 0.0, 1e6),
-        ("light.texture", l.texture, 0.0, 1.0),
-        ("light.cliff", l.cliff, 0.0, most),
-        ("light.shadow.strength", shadow.strength, 0.0, 1.0),
-        ("light.shadow.softness", shadow.softness, 0.0, 10.0),
-        ("light.shadow.reach", shadow.reach, least, most),
-        ("light.shadow.thickness", shadow.thickness, 0.0, most),
-        ("light.shadow.bias", shadow.bias, 0.0, most),
-        ("light.occlusion.radius", occlusion.radius, least, most),
-        ("light.occlusion.strength", occlusion.strength, 0.0, 4.0),
-        ("light.skin.wrap", skin.wrap, 0.0, 1.0),
-        ("light.skin.translucency", skin.translucency, 0.0, 1.0),
-        ("light.skin.depth", skin.depth, 0.0, most),
-        ("light.volume.cell", volume.cell.unwrap_or(1.0), least, most),
-        ("light.volume.cells", f64::from(volume.cells), 1e3, 1e9),
-        ("light.volume.taps", f64::from(volume.taps), 1.0, 4.0),
-        ("light.volume.depth", volume.depth, least, most),
-        ("light.volume.warmth", volume.warmth, 0.0, 2.0),
-        ("light.volume.widening", volume.widening, 0.0, most.sqrt()),
-        ("light.volume.scatter", volume.scatter, 0.0, most),
-        ("light.volume.reach", volume.reach, least, most),
-        ("light.volume.slope", volume.slope, 1.0 / most, 1.0 / least),
-        ("light.volume.relief", volume.relief, 0.0, 1.0),
-        ("light.volume.wrap", volume.wrap, 0.0, 1.0),
-        ("light.volume.back", volume.back, 0.0, 10.0),
-        ("light.volume.exposure", volume.exposure, 0.0, 100.0),
-    ] {
-        within(field, value, low, high)?;
-    }
-    let colours = [
-        ("light.colour", l.colour),
-        ("light.surface_colour", l.surface_colour),
-        ("light.skin.colour", skin.colour),
-        ("light.volume.back_colour", volume.back_colour),
-        ("light.volume.ground.middle", volume.ground.unwrap_or_default().middle),
-        ("light.volume.ground.edge", volume.ground.unwrap_or_default().edge),
-    ];
-    colours.iter().try_for_each(|(field, colour)| colour.iter().try_for_each(|v| within(field, *v, 0.0, 10.0)))
+    Ok(())
 }
 
-pub(super) fn check_cine(cine: &Cine) -> Result<(), SceneError> {
-    within("cine.speed", cine.speed, CINE_SPEEDS[0], CINE_SPEEDS[1])?;
+fn check_cine(cine: &Cine) -> Result<(), SceneError> {
     match (cine.first, cine.last) {
         (Some(first), Some(last)) if first > last => {
             refuse("cine.last", format!("is {last}, must not be below cine.first, {first}"))
@@ -333,62 +191,12 @@ pub(super) fn check_cine(cine: &Cine) -> Result<(), SceneError> {
     }
 }
 
-pub(super) fn within(field: &'static str, value: f64, low: f64, high: f64) -> Result<(), SceneError> {
-    match value >= low && value <= high {
-        true => Ok(()),
-        false => refuse(field, format!("is {value}, must lie in {low}..={high}")),
-    }
-}
-
-/// A length, mm.
-fn length(field: &'static str, mm: f64) -> Result<(), SceneError> {
-    let [least, most] = LENGTHS;
-    match (least..=most).contains(&mm) {
-        true => Ok(()),
-        false => refuse(field, format!("is {mm} mm, must lie in {least:e}..={most:e} mm")),
-    }
-}
-
-/// A size of a filter in mm.
-fn in_mm(field: &'static str, mm: Option<f64>) -> Result<(), SceneError> {
-    mm.map_or(Ok(()), |mm| length(field, mm))
-}
-
-/// `key`: the name of the window in that table, as the user wrote it.
-fn check_window(field: &'static str, key: &str, window: u32) -> Result<(), SceneError> {
-    match window % 2 == 1 && (3..=MAX_WINDOW).contains(&window) {
-        true => Ok(()),
-        false => refuse(field, format!("{key} is {window}, must be odd and lie in 3..={MAX_WINDOW}")),
-    }
-}
-
-fn check_sigma(field: &'static str, sigma: Option<Sigma>) -> Result<(), SceneError> {
-    let Some(sigma) = sigma else { return Ok(()) };
-    in_mm(field, sigma.window_mm)?;
-    check_window(field, "window", sigma.window)?;
-    // Infinity is allowed: the filter is then the box mean.
-    match sigma.sigma >= 0.0 {
-        true => Ok(()),
-        false => refuse(field, format!("sigma is {}, must be at least 0", sigma.sigma)),
-    }
-}
-
 const NO_GROWTH: &str = "growth is counted on slices only: leave it out";
 
 fn check_distance(d: &Distance) -> Result<(), SceneError> {
-    in_mm("distance.median_mm", d.median_mm)?;
-    if d.median > 0 {
-        check_window("distance.median", "window", d.median)?;
+    if d.bilateral.is_some_and(|b| b.mm.is_none() && b.pixels == 0.0) {
+        return refuse("distance.bilateral.pixels", "is 0: set it, or distance.bilateral.mm");
     }
-    if let Some(b) = d.bilateral {
-        match b.mm {
-            Some(mm) => in_mm("distance.bilateral.mm", Some(mm))?,
-            None => within("distance.bilateral.pixels", b.pixels, Bilateral::MIN_PIXELS, Bilateral::MAX_PIXELS)?,
-        }
-        length("distance.bilateral.distance", b.distance)?;
-        within("distance.bilateral.repeat", f64::from(b.repeat), 1.0, 16.0)?;
-    }
-    check_sigma("distance.sigma", d.sigma)?;
     check_enhanced("distance.enhanced_sigma", d.enhanced_sigma)?;
     check_perona_malik("distance.perona_malik", d.perona_malik)?;
     let noises =
@@ -415,10 +223,6 @@ fn check_distance(d: &Distance) -> Result<(), SceneError> {
 
 fn check_enhanced(field: &'static str, enhanced: Option<EnhancedSigma>) -> Result<(), SceneError> {
     let Some(e) = enhanced else { return Ok(()) };
-    check_sigma(field, Some(Sigma { window: e.window, window_mm: e.window_mm, sigma: e.sigma, noise: e.noise }))?;
-    in_mm(field, e.largest_mm)?;
-    check_window(field, "largest", e.largest)?;
-    check_edge(field, e.edge)?;
     // A window in mm is resolved to one that is no larger than the largest.
     match e.largest < e.window && e.window_mm.is_none() && e.largest_mm.is_none() {
         true => refuse(field, format!("largest is {}, less than window {}", e.largest, e.window)),
@@ -428,11 +232,6 @@ fn check_enhanced(field: &'static str, enhanced: Option<EnhancedSigma>) -> Resul
 
 fn check_perona_malik(field: &'static str, settings: Option<PeronaMalik>) -> Result<(), SceneError> {
     let Some(p) = settings else { return Ok(()) };
-    check_edge(field, p.edge)?;
-    in_mm(field, p.width_mm)?;
-    if !(1..=1000).contains(&p.repeat) {
-        return refuse(field, format!("repeat is {}, must lie in 1..=1000", p.repeat));
-    }
     match p.scheme {
         // With four neighbours and a step above 1/4, a checkerboard grows at every step.
         Scheme::Explicit if !(p.step > 0.0 && p.step <= 0.25) => refuse(
@@ -452,75 +251,22 @@ fn check_perona_malik(field: &'static str, settings: Option<PeronaMalik>) -> Res
     }
 }
 
-/// Checks an edge constant. Infinity is allowed: no difference is then an edge.
-fn check_edge(field: &'static str, edge: f64) -> Result<(), SceneError> {
-    match edge >= 0.0 {
-        true => Ok(()),
-        false => refuse(field, format!("edge is {edge}, must be at least 0")),
-    }
-}
-
-/// `fields`: the names of its settings.
-fn check_smooth(smooth: Option<Smooth>, fields: [&'static str; 5]) -> Result<(), SceneError> {
-    let Some(smooth) = smooth else { return Ok(()) };
-    let [lateral, depth, elevation, elevation_mm, kernel] = fields;
-    let deviations = [
-        (lateral, smooth.lateral, LENGTHS[1]),
-        (depth, smooth.depth, LENGTHS[1]),
-        (elevation, smooth.elevation, 1000.0),
-        (elevation_mm, smooth.elevation_mm.unwrap_or(0.0), LENGTHS[1]),
-    ];
-    deviations.iter().try_for_each(|(field, deviation, most)| within(field, *deviation, 0.0, *most))?;
-    match smooth.kernel {
-        Some(taps) if taps != 3 && taps != 5 => refuse(kernel, format!("is {taps}, must be 3 or 5")),
-        Some(_) if deviations.iter().any(|(_, deviation, _)| *deviation != 0.0) => {
-            refuse(kernel, "stands instead of lateral, depth and elevation: set it, or them")
+/// `field`: the name of its kernel.
+fn check_smooth(smooth: Option<Smooth>, field: &'static str) -> Result<(), SceneError> {
+    match smooth {
+        Some(Smooth { kernel: Some(_), lateral, depth, elevation, elevation_mm })
+            if [lateral, depth, elevation, elevation_mm.unwrap_or(0.0)] != [0.0; 4] =>
+        {
+            refuse(field, "stands instead of lateral, depth and elevation: set it, or them")
         }
         _ => Ok(()),
     }
 }
 
-/// Checks of planes, tiles and the block that need no geometry.
+/// Checks of planes that need no geometry.
 pub(super) fn check_planes(settings: &Settings) -> Result<(), SceneError> {
-    let p = &settings.planes;
-    for value in p.position.iter().flatten() {
-        within("planes.position", *value, -1e10, 1e10)?;
-    }
-    for (field, value) in [("planes.azimuth", p.azimuth), ("planes.tilt", p.tilt), ("planes.roll", p.roll)] {
-        within(field, value, -360.0, 360.0)?;
-    }
-    check_smooth(
-        p.smooth,
-        [
-            "planes.smooth.lateral",
-            "planes.smooth.depth",
-            "planes.smooth.elevation",
-            "planes.smooth.elevation_mm",
-            "planes.smooth.kernel",
-        ],
-    )?;
-    within("planes.thickness", p.thickness, 0.0, LENGTHS[1])?;
-    within("planes.zoom", p.zoom, 1e-3, 1e3)?;
-    within("planes.columns", f64::from(p.columns), 1.0, f64::from(MAX_TILES))?;
-    within("planes.rows", f64::from(p.rows), 1.0, f64::from(MAX_TILES))?;
-    if let Some(spacing) = p.spacing {
-        length("planes.spacing", spacing)?;
-    }
-    check_curve(p.curve.as_ref())?;
-    let (inset, tilt) = (&settings.cube.inset, &settings.cube.tilt);
-    for (field, inset, tilt) in [
-        ("cube.inset.left, cube.tilt.left", inset.left, tilt.left),
-        ("cube.inset.right, cube.tilt.right", inset.right, tilt.right),
-        ("cube.inset.near, cube.tilt.near", inset.near, tilt.near),
-        ("cube.inset.far, cube.tilt.far", inset.far, tilt.far),
-        ("cube.inset.bottom, cube.tilt.bottom", inset.bottom, tilt.bottom),
-        ("cube.inset.top, cube.tilt.top", inset.top, tilt.top),
-    ] {
-        within(field, inset, 0.0, LENGTHS[1])?;
-        // A face that is tilted to 90 degrees would no longer bound its side.
-        tilt.iter().try_for_each(|angle| within(field, *angle, -80.0, 80.0))?;
-    }
-    within("cube.shading", settings.cube.shading, 0.0, 1.0)
+    check_smooth(settings.planes.smooth, "planes.smooth.kernel")?;
+    check_curve(settings.planes.curve.as_ref())
 }
 
 fn check_curve(curve: Option<&Curve>) -> Result<(), SceneError> {
@@ -530,7 +276,6 @@ fn check_curve(curve: Option<&Curve>) -> Result<(), SceneError> {
         let fault = format!("has {count} points, a line has 2 to {MAX_CURVE_POINTS}");
         return refuse(field, fault);
     }
-    points.iter().flatten().try_for_each(|value| within(field, *value, -LENGTHS[1], LENGTHS[1]))?;
     let apart = |pair: &[[f64; 2]]| (pair[1][0] - pair[0][0]).hypot(pair[1][1] - pair[0][1]);
     let extent = points.iter().map(|point| apart(&[points[0], *point])).fold(0.0, f64::max);
     match points.windows(2).position(|pair| apart(pair) <= SAME_POINT * extent) {

@@ -5,7 +5,6 @@ mod bricks;
 pub mod camera;
 mod caps;
 mod check;
-mod check_body_marks;
 mod check_measures;
 pub mod cube;
 pub mod curve;
@@ -17,6 +16,7 @@ mod light_lattice;
 pub mod load;
 pub mod look;
 pub mod marks;
+mod number;
 pub mod picker;
 pub mod planes;
 mod region;
@@ -40,6 +40,7 @@ pub use camera::Rays;
 pub use echo_levels::{EchoHistogram, EchoLevels};
 pub use light_lattice::{AmbientCones, LightLattice, Propagation};
 pub use marks::VolumeAxis;
+pub use number::{Group, Number, Slider, start_depths};
 pub use region::{depth_offset, insonified_box};
 pub use settings::*;
 pub use still::{DistantLight, StillLights};
@@ -224,10 +225,9 @@ impl Settings {
     /// # Errors
     /// Names the first setting that is invalid for every geometry, and its limits.
     pub fn check(&self) -> Result<(), SceneError> {
+        numbers().try_for_each(|number| number.check(self))?;
         check::check(self)?;
         check_measures::check_measures(&self.measure)?;
-        check_body_marks::check_body_marks(&self.body_marks)?;
-        check::check_cine(&self.cine)?;
         still::check(self)?;
         cuts::check(&self.cuts)?;
         start_curve::check(self)?;

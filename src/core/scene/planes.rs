@@ -706,8 +706,8 @@ mod tests {
             ("[[1,2]]".into(), "has 1 points, a line has 2 to 64"),
             (many, "has 65 points, a line has 2 to 64"),
             ("[[1,2],[3,4],[3,4],[5,6]]".into(), "points 2 and 3 coincide: leave one of them out"),
-            ("[[1,2],[nan,4]]".into(), "is NaN, must lie in -1000000000..=1000000000"),
-            ("[[1,2],[inf,4]]".into(), "is inf, must lie in -1000000000..=1000000000"),
+            ("[[1,2],[nan,4]]".into(), "is NaN, must lie in -1e9..=1e9 mm"),
+            ("[[1,2],[inf,4]]".into(), "is inf, must lie in -1e9..=1e9 mm"),
         ] {
             let fault = fault(points);
             assert!(fault.contains("planes.curve.points") && fault.contains(says) && !fault.contains('\n'), "{fault}");

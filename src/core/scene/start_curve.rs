@@ -4,12 +4,8 @@
 //! `PchipInterpolator` is the same). It has no corners at its points and never leaves the depths of the two points that it is between: where
 //! neighbours have the same depth it is level, and it turns at points only. Beyond its ends it stays at their depths.
 
-use super::check::{LENGTHS, within};
 use super::{MAX_START_POINTS, MIN_START_POINTS, Scene, SceneError, Settings, cuts, refuse, region};
 use glam::DVec3;
-
-/// The largest coordinates of a point, mm.
-const LARGEST: f64 = LENGTHS[1];
 
 /// Least lateral distance of neighbouring points, as a share of the distance from the first to the last: a micrometre of a curve over 100 mm.
 const LEAST_GAP: f64 = 1e-5;
@@ -131,7 +127,6 @@ pub(super) fn check(settings: &Settings) -> Result<(), SceneError> {
         let count = points.len();
         return refuse(FIELD, format!("has {count} points, must have {MIN_START_POINTS} to {MAX_START_POINTS}"));
     }
-    points.iter().flatten().try_for_each(|value| within(FIELD, *value, -LARGEST, LARGEST))?;
     let width = points.iter().map(|point| (point[0] - points[0][0]).abs()).fold(0.0, f64::max);
     for (n, two) in points.windows(2).enumerate() {
         let ([before, _], [lateral, _]) = (two[0], two[1]);

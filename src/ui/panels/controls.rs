@@ -10,8 +10,9 @@ use super::{PanelState, TEXT_SIZE, TOUCH_SIZE, heading};
 use super::{body_marks, measures, rail, recordings, sides, tools};
 use crate::cine_player::{CineState, SPEEDS};
 use crate::command::{Command, RailTab, Tool};
+use crate::scene::Slider as Control;
 use crate::scene::{ColourMap, Layout, Mode, PlaneName, Settings, Transfer, TransferName};
-use crate::sliders::{Group, SLIDERS, Slider as Control};
+use crate::sliders::{GROUPS, SLIDERS};
 use crate::texts;
 use crate::texts::hints;
 use crate::view;
@@ -37,14 +38,14 @@ const NARROW: f32 = 220.0;
 
 const PLANES: [(PlaneName, &str); 3] = [(PlaneName::A, "A"), (PlaneName::B, "B"), (PlaneName::C, "C")];
 
-/// The controls in front: their names, and the sliders of which the first that the mode has is meant.
+/// The controls in front: their names, and the keys of the sliders of which the first that the mode has is meant.
 const FRONT: [(&str, &[&str]); 6] = [
-    (texts::THRESHOLD, &[texts::THRESHOLD]),
-    (texts::GAIN, &[texts::GAIN]),
-    (texts::SMOOTH, &[texts::SMOOTHING]),
-    (texts::BRIGHTNESS, &[texts::EXPOSURE, texts::GAMMA]),
-    (texts::LIGHT, &[texts::DIFFUSE]),
-    (texts::DEPTH, &[texts::START_DEPTH]),
+    (texts::THRESHOLD, &["threshold"]),
+    (texts::GAIN, &["post.brightness"]),
+    (texts::SMOOTH, &["smoothing"]),
+    (texts::BRIGHTNESS, &["light.volume.exposure", "post.gamma"]),
+    (texts::LIGHT, &["light.diffuse"]),
+    (texts::DEPTH, &["start_depth"]),
 ];
 
 pub(super) fn show_modes(ui: &mut Ui, state: &PanelState, width: f32, execute: &mut dyn FnMut(Command)) {
@@ -289,7 +290,7 @@ fn show_controls(ui: &mut Ui, state: &PanelState, width: f32, execute: &mut dyn 
             heading(ui, texts::CONTROLS);
             let in_front = FRONT.map(|(name, sliders)| (name, front(sliders, settings)));
             let with_cuts = tools::depth_of_cut(state);
-            let start = [texts::AUTO_RENDER_START, texts::START_OFFSET].map(|name| front(&[name], settings));
+            let start = ["unveil.enabled", "unveil.offset"].map(|key| front(&[key], settings));
             let elsewhere = [&start[..], &tools::of_clip(settings)[..], &[with_cuts]].concat();
             for (name, number) in in_front {
                 match number {
@@ -333,8 +334,7 @@ fn show_controls(ui: &mut Ui, state: &PanelState, width: f32, execute: &mut dyn 
                     Colour::Map(map) => execute(Command::ColourMap(map)),
                 },
             );
-            let is_lit = SLIDERS.iter().any(|slider| slider.name == texts::SHADOW && slider.applies(settings));
-            if is_lit {
+            if front(&["light.shadow.strength"], settings).is_some() {
                 let mut on = settings.light.shadow.is_some_and(|shadow| shadow.strength > 0.0);
                 if switch(ui, &mut on, texts::CAST_SHADOWS, texts::CAST_SHADOWS_HINT) {
                     execute(Command::Shadow(on));
@@ -358,7 +358,7 @@ fn show_controls(ui: &mut Ui, state: &PanelState, width: f32, execute: &mut dyn 
             sides::show(ui, state, width - 32.0, execute);
             ui.add_space(8.0);
             heading(ui, texts::ADVANCED);
-            for (group, name) in Group::ALL {
+            for (group, name) in GROUPS {
                 let is_there = |(number, s): &(usize, &Control)| {
                     let is_elsewhere =
                         elsewhere.contains(&Some(*number)) || in_front.iter().any(|(_, front)| *front == Some(*number));
@@ -654,7 +654,7 @@ mod tests {
         }
         for (name, sliders) in FRONT {
             for slider in sliders {
-                assert!(SLIDERS.iter().any(|s| s.name == *slider), "{name}: no slider {slider}");
+                assert!(SLIDERS.iter().any(|s| s.key == *slider), "{name}: no slider {slider}");
             }
         }
     }

@@ -9,7 +9,7 @@ use super::{LARGE_TEXT, Note, PanelState, SMALL_TEXT, TEXT_SIZE, TOUCH_SIZE, pic
 use crate::command::{self, Command};
 use crate::sliders::SLIDERS;
 use crate::texts;
-use crate::texts::{hints, keys};
+use crate::texts::keys;
 use egui::accesskit::Role;
 use egui::text::LayoutJob;
 use egui::{
@@ -259,7 +259,7 @@ fn found(exit_key: &str, search: &str, has_keyboard_pointer: bool) -> Vec<(&'sta
     let in_table = command::help().map(|(key, label)| (key, label.to_string()));
     let exit = (!exit_key.is_empty()).then(|| (exit_key.to_string(), texts::QUIT.to_string()));
     let gestures = GESTURES.iter().map(|(gesture, label)| (gesture.to_string(), label.to_string()));
-    let controls = SLIDERS.iter().map(|slider| (slider.name, hints::of_slider(slider.name)));
+    let controls = SLIDERS.iter().map(|slider| (slider.name, slider.hint));
     let controls = controls.chain([(texts::SIDES, texts::SIDES_HINT)]);
     let controls = controls.map(|(name, hint)| (name.to_string(), hint.to_string()));
     // Without a search all of it has to fit one page.

@@ -7,14 +7,14 @@ use super::{PanelState, SMALL_TEXT, TOUCH_SIZE, heading};
 use crate::command::{Command, Tool};
 use crate::controls::BRUSH_RADII;
 use crate::scene::{KeptSide, MAX_START_POINTS, MIN_START_POINTS, Settings};
-use crate::sliders::{SLIDERS, Slider as Control};
+use crate::sliders::SLIDERS;
 use crate::texts;
 use crate::view;
 use egui::{Button, Label, RichText, Ui, vec2};
 
 /// The numbers of the controls of clip faces that are there.
 pub(super) fn of_clip(settings: &Settings) -> [Option<usize>; 2] {
-    [texts::CLIP_ECHOES, texts::CLIP_THRESHOLD].map(|name| front(&[name], settings))
+    ["cap.enabled", "cap.level"].map(|key| front(&[key], settings))
 }
 
 /// While there are clip planes, whether their faces show echoes, and from which on.
@@ -34,8 +34,7 @@ pub(super) fn clip(ui: &mut Ui, state: &PanelState, width: f32, execute: &mut dy
 
 /// The number of the slider that is with the cuts while their tool is chosen, if it is there.
 pub(super) fn depth_of_cut(state: &PanelState) -> Option<usize> {
-    let is_it = |slider: &Control| slider.name == texts::DEPTH_OF_CUT && slider.applies(state.controls.settings());
-    SLIDERS.iter().position(is_it).filter(|_| state.controls.tool() == Tool::Cut)
+    front(&["cuts.depth"], state.controls.settings()).filter(|_| state.controls.tool() == Tool::Cut)
 }
 
 /// With the tool for cuts, which side of a contour stays, and how deep the last cut is; and what removes the cuts, while there are any.
@@ -59,7 +58,7 @@ pub(super) fn cuts(ui: &mut Ui, state: &PanelState, width: f32, execute: &mut dy
             brush_radius(ui, state, execute);
         }
         if let Some(number) = depth_of_cut(state) {
-            slider(ui, state, number, texts::DEPTH_OF_CUT, false, execute);
+            slider(ui, state, number, SLIDERS[number].name, false, execute);
         }
         if !state.controls.settings().cuts.is_empty() {
             let size = vec2(width, TOUCH_SIZE * 0.75);

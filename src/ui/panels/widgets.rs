@@ -7,16 +7,15 @@ use crate::command::Command;
 use crate::scene::Settings;
 use crate::sliders::SLIDERS;
 use crate::texts;
-use crate::texts::hints;
 use egui::accesskit::Role;
 use egui::{
     Align, FontId, PointerButton, Rect, RichText, Sense, Slider, Stroke, StrokeKind, Ui, WidgetInfo, WidgetType, pos2,
     vec2,
 };
 
-/// The index of the slider of a control in front, if the mode has one.
-pub(super) fn front(sliders: &[&str], settings: &Settings) -> Option<usize> {
-    sliders.iter().find_map(|name| SLIDERS.iter().position(|s| s.name == *name && s.applies(settings)))
+/// The index of the first slider of these keys that the mode has.
+pub(super) fn front(keys: &[&str], settings: &Settings) -> Option<usize> {
+    keys.iter().find_map(|key| SLIDERS.iter().position(|s| s.key == *key && s.applies(settings)))
 }
 
 pub(super) fn slider(
@@ -28,13 +27,12 @@ pub(super) fn slider(
     execute: &mut dyn FnMut(Command),
 ) {
     let slider = &SLIDERS[number];
-    let hint = hints::of_slider(slider.name);
     let settings = state.controls.settings();
     let [low, high] = state.scene.map_or(slider.range, |scene| slider.range_in(scene));
     let before = slider.get(settings);
-    if slider.range == [0.0, 1.0] && slider.step == 1.0 {
+    if slider.is_switch() {
         let mut on = before >= 0.5;
-        if switch(ui, &mut on, name, hint) {
+        if switch(ui, &mut on, name, slider.hint) {
             execute(Command::SetSlider(number, f64::from(u8::from(on))));
         }
         return;
@@ -42,9 +40,9 @@ pub(super) fn slider(
     let mut value = before.clamp(low, high.max(low));
     let digits = (-slider.step.log10().floor()).clamp(0.0, 3.0) as usize;
     let space = if slider.unit.is_empty() || slider.unit == "°" { "" } else { " " };
-    let shown = match slider.name {
-        texts::DEPTH_OF_CUT if before <= 0.0 => texts::THROUGH_ALL.to_string(),
-        texts::CLIP_THRESHOLD if before <= 0.0 => texts::AUTOMATIC.to_string(),
+    let shown = match slider.key {
+        "cuts.depth" if before <= 0.0 => texts::THROUGH_ALL.to_string(),
+        "cap.level" if before <= 0.0 => texts::AUTOMATIC.to_string(),
         _ => format!("{before:.digits$}{space}{}", slider.unit),
     };
     let text = RichText::new(name);
@@ -53,7 +51,7 @@ pub(super) fn slider(
     // Tall enough for a finger, although the rail is thin.
     ui.spacing_mut().interact_size.y = TOUCH_SIZE * if is_large { 0.62 } else { 0.5 };
     let response = ui.add(Slider::new(&mut value, low..=high.max(low)).show_value(false).step_by(slider.step));
-    let response = response.tell(&texts::slider_hint(hint)).named(name).with_value(&shown);
+    let response = response.tell(&texts::slider_hint(slider.hint)).named(name).with_value(&shown);
     // egui's sliders are dragged, not clicked.
     let is_on_it = response.drag_stopped() || response.contains_pointer();
     if is_on_it && ui.input(|input| input.pointer.button_double_clicked(PointerButton::Primary)) {

@@ -3,7 +3,9 @@
 use super::shown::Shown;
 use super::*;
 use crate::panels::accesskit::Role;
-use crate::texts::{CLIP_ECHOES, CLIP_THRESHOLD};
+
+const CLIP_ECHOES: &str = "Clip echoes";
+const CLIP_THRESHOLD: &str = "Clip threshold";
 
 fn slider(name: &str) -> usize {
     SLIDERS.iter().position(|slider| slider.name == name).expect("a slider")

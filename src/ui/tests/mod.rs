@@ -186,7 +186,8 @@ fn sliders_have_unique_names_and_the_indices_that_keys_use() {
     assert_eq!([GAIN, THRESHOLD, PLANES_ZOOM].map(|n| SLIDERS[n].name), ["Gain", "Threshold", "Planes zoom"]);
     for (i, slider) in SLIDERS.iter().enumerate() {
         assert!(SLIDERS[..i].iter().all(|other| other.name != slider.name), "{}", slider.name);
-        assert!(slider.range[0] < slider.range[1] && slider.step > 0.0);
+        assert!(SLIDERS[..i].iter().all(|other| other.key != slider.key), "{}", slider.key);
+        assert!(slider.range[0] < slider.range[1] && slider.step > 0.0 && slider.hint.ends_with('.'));
     }
 }
 

@@ -6,7 +6,9 @@ use crate::panels;
 use crate::panels::colours::START;
 use crate::panels::drawn::Kind;
 use crate::passes::unveil::StartLine;
-use crate::texts::{AUTO_RENDER_START as AUTO_START, START_OFFSET};
+use crate::texts::AUTO_RENDER_START as AUTO_START;
+
+const START_OFFSET: &str = "Start offset";
 
 fn slider(name: &str) -> usize {
     SLIDERS.iter().position(|slider| slider.name == name).expect("a slider")

@@ -1,4 +1,5 @@
-//! Every text of the window, in English: a translation is another copy of this folder. Names of modes are in [`Mode`](crate::scene::Mode), faults that the
+//! Every text of the window, in English: a translation is another copy of this folder. Names of modes are in [`Mode`](crate::scene::Mode), those of sliders
+//! and what they do at their settings; faults that the
 //! panels pass on are of the modules that found them.
 
 mod exports;

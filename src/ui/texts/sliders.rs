@@ -1,52 +1,28 @@
-//! Names of the sliders and of their groups.
+//! Names of the groups of sliders, and names and hints of sliders of no single setting; those of others are in the rows of the settings.
 
-pub const IMAGE: &str = "Image";
-pub const FILTERS: &str = "Filters";
+pub(crate) const IMAGE: &str = "Image";
+pub(crate) const FILTERS: &str = "Filters";
 pub(crate) const QUALITY: &str = "Quality";
+/// The name of the switch `unveil.enabled`.
 pub(crate) const AUTO_RENDER_START: &str = "Auto render start";
-pub(crate) const CLIP_ECHOES: &str = "Clip echoes";
-pub(crate) const CLIP_THRESHOLD: &str = "Clip threshold";
-pub(crate) const START_OFFSET: &str = "Start offset";
-pub(crate) const CONTRAST: &str = "Contrast";
-pub(crate) const WINDOW_LOW: &str = "Window low";
-pub(crate) const WINDOW_HIGH: &str = "Window high";
-pub(crate) const PLANES_ZOOM: &str = "Planes zoom";
-pub const SLAB: &str = "Slab";
-pub const SPACING: &str = "Spacing";
-pub(crate) const PLANES_AZIMUTH: &str = "Planes azimuth";
-pub(crate) const PLANES_TILT: &str = "Planes tilt";
-pub(crate) const PLANES_ROLL: &str = "Planes roll";
-pub(crate) const PLANES_WINDOW_LOW: &str = "Planes window low";
-pub(crate) const PLANES_WINDOW_HIGH: &str = "Planes window high";
-pub(crate) const CUT_LEFT: &str = "Cut left";
-pub(crate) const CUT_RIGHT: &str = "Cut right";
-pub(crate) const CUT_NEAR: &str = "Cut near";
-pub(crate) const CUT_FAR: &str = "Cut far";
-pub(crate) const CUT_BOTTOM: &str = "Cut bottom";
-pub(crate) const CUT_TOP: &str = "Cut top";
-pub(crate) const FACE_SHADING: &str = "Face shading";
-pub(crate) const OPACITY: &str = "Opacity";
-pub(crate) const OPACITY_OF_A_HIT: &str = "Opacity of a hit";
-pub(crate) const VEIL: &str = "Veil";
-pub(crate) const VOLUME_THRESHOLD: &str = "Volume threshold";
-pub(crate) const VOLUME_WINDOW_LOW: &str = "Volume window low";
-pub(crate) const VOLUME_WINDOW_HIGH: &str = "Volume window high";
-pub(crate) const VOLUME_START_DEPTH: &str = "Volume start depth";
-pub(crate) const SURFACE_MEDIAN: &str = "Surface median";
-pub(crate) const SURFACE_SMOOTHING: &str = "Surface smoothing";
-pub(crate) const SURFACE_EDGE: &str = "Surface edge";
-pub const AMBIENT: &str = "Ambient";
-pub(crate) const SPECULAR: &str = "Specular";
-pub(crate) const LIGHT_DEPTH: &str = "Light depth";
-pub(crate) const LIGHT_WARMTH: &str = "Light warmth";
-pub const OCCLUSION: &str = "Occlusion";
-pub(crate) const TRANSLUCENCY: &str = "Translucency";
-pub(crate) const MEDIAN: &str = "Median";
-pub(crate) const SPECKLE: &str = "Speckle";
-pub(crate) const SPECKLE_ENHANCED: &str = "Speckle, enhanced";
-pub(crate) const PICTURE_SPECKLE: &str = "Picture speckle";
-pub(crate) const START_SMOOTHING: &str = "Start smoothing";
-pub const STEP: &str = "Step";
-pub(crate) const FIELD_OF_VIEW: &str = "Field of view";
-pub(crate) const RAYS_A_PIXEL: &str = "Rays a pixel";
-pub(crate) const LARGEST_ERROR: &str = "Largest error";
+pub(crate) const THRESHOLD_OF_MODE: [&str; 2] =
+    [super::THRESHOLD, "Echoes weaker than this are not shown: raise it until fluid and noise are gone."];
+pub(crate) const WINDOW_LOW: [&str; 2] = ["Window low", "Echoes up to this value are black or transparent."];
+pub(crate) const WINDOW_HIGH: [&str; 2] = ["Window high", "Echoes from this value on have full brightness."];
+pub(crate) const START_DEPTH: [&str; 2] =
+    ["Start depth", "Hides everything nearer to the probe, such as the wall in front of the face."];
+pub(crate) const DEPTH_OF_CUT: [&str; 2] = [
+    "Depth of cut",
+    "How deep the last cut is, from where its contour meets the region. 0: it goes through everything.",
+];
+pub(crate) const PLANES_WINDOW_LOW: [&str; 2] =
+    ["Planes window low", "In the planes, echoes up to this value are black."];
+pub(crate) const PLANES_WINDOW_HIGH: [&str; 2] =
+    ["Planes window high", "In the planes, echoes from this value on are white."];
+pub(crate) const OPACITY: [&str; 2] = ["Opacity", "How much tissue hides what is behind it."];
+pub(crate) const VOLUME_WINDOW_LOW: [&str; 2] =
+    ["Volume window low", "In the volume layer, echoes up to this value are transparent."];
+pub(crate) const VOLUME_WINDOW_HIGH: [&str; 2] =
+    ["Volume window high", "In the volume layer, echoes from this value on have full brightness."];
+pub(crate) const SMOOTHING: [&str; 2] =
+    ["Smoothing", "Smooths the volume: less speckle, softer outlines. The volume is filtered again."];

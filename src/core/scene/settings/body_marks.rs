@@ -1,6 +1,8 @@
 //! Settings of body marks: small outlines of a part of the body with the place and the direction of the probe. No pass reads them: the viewer draws
 //! them over the picture, and `render` into the picture that it writes.
 
+use crate::scene::number::Allowed::Range;
+use crate::scene::number::{ANGLE, Number, SHARE, number};
 use serde::{Deserialize, Serialize};
 
 /// Most body marks of a scene.
@@ -17,13 +19,13 @@ pub struct BodyMark {
     /// Left and right are exchanged: the left breast, a fetus whose back is on the other side.
     #[serde(skip_serializing_if = "std::ops::Not::not")]
     pub mirrored: bool,
-    /// Its centre, as shares of the picture's width and height from the upper left corner, 0..=1. The whole mark stays on the picture.
+    /// Its centre, as shares of the picture's width and height from the upper left corner. The whole mark stays on the picture.
     pub at: [f64; 2],
-    /// Its edge, as a share of the picture's shorter edge, 0.06..=0.5.
+    /// Its edge, as a share of the picture's shorter edge.
     pub size: f64,
-    /// Where on the body the probe is: right and down from the centre of the mark, -1..=1 from edge to edge.
+    /// Where on the body the probe is: right and down from the centre of the mark; its edges are at -1 and 1.
     pub probe: [f64; 2],
-    /// Where the marker of the probe points, degrees clockwise from up, -360..=360. The body is seen from the front: -90 is its right side.
+    /// Where the marker of the probe points, degrees clockwise from up. The body is seen from the front: -90 is its right side.
     pub angle: f64,
 }
 
@@ -91,3 +93,10 @@ impl Body {
         }
     }
 }
+
+pub(super) const NUMBERS: &[Number] = &[
+    number!(body_marks => at, "", SHARE),
+    number!(body_marks => size, "", Range(BODY_MARK_SIZES[0], BODY_MARK_SIZES[1])),
+    number!(body_marks => probe, "", Range(-1.0, 1.0)),
+    number!(body_marks => angle, "°", ANGLE),
+];

@@ -1,9 +1,8 @@
 //! Settings of the cine loop: what of it is played, and how. No pass reads them.
 
+use crate::scene::number::Allowed::Range;
+use crate::scene::number::{Number, number};
 use serde::{Deserialize, Serialize};
-
-/// Slowest and fastest play of a cine loop, as multiples of the speed of the acquisition.
-pub(crate) const CINE_SPEEDS: [f64; 2] = [0.1, 8.0];
 
 /// The cine loop. The viewer plays it; `render --volumes loop` draws it.
 #[derive(Clone, Copy, Debug, PartialEq, Deserialize, Serialize)]
@@ -13,7 +12,7 @@ pub struct Cine {
     pub first: Option<u32>,
     /// The last volume that is played. Absent: the last one.
     pub last: Option<u32>,
-    /// How fast the viewer plays it, as a multiple of the speed of the acquisition, 0.1..=8.
+    /// How fast the viewer plays it, as a multiple of the speed of the acquisition.
     pub speed: f64,
     /// The loop is played to its last volume and back, also in a film. Otherwise it begins again after the last volume.
     pub back_and_forth: bool,
@@ -43,6 +42,8 @@ impl Cine {
         order
     }
 }
+
+pub(super) const NUMBERS: &[Number] = &[number!(cine.speed, "", Range(0.1, 8.0))];
 
 #[cfg(test)]
 mod tests {

@@ -1,5 +1,7 @@
 //! Settings of cuts: contours drawn on a rendering, along whose view the volume is removed from renderings, and what a brush went over.
 
+use crate::scene::number::Allowed::Range;
+use crate::scene::number::{LARGEST, LENGTH, LENGTH_OR_0, Number, PLACE, number};
 use serde::{Deserialize, Serialize};
 
 /// Most cuts of a scene.
@@ -25,7 +27,7 @@ pub struct Cut {
     /// The side of the contour that stays.
     #[serde(default)]
     pub keep: KeptSide,
-    /// How deep the cut is: nothing is removed more than so many mm behind the contour's plane, 0..=1e9. Absent: it goes through everything.
+    /// How deep the cut is: nothing is removed more than so many mm behind the contour's plane. Absent: it goes through everything.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub depth: Option<f64>,
     /// A brush in place of a contour; `keep` and `depth` are then absent.
@@ -37,7 +39,7 @@ pub struct Cut {
 #[derive(Clone, Debug, Default, PartialEq, Deserialize, Serialize)]
 #[serde(deny_unknown_fields)]
 pub struct Brush {
-    /// 1e-9..=1e9 mm.
+    /// Distance from its strokes within which it removes.
     pub radius: f64,
     /// Points that straight lines join, mm: lateral, depth (from the probe's face), elevation. A stroke of one point is a ball. All strokes have 1 to
     /// 512 points together.
@@ -61,7 +63,7 @@ pub struct CutView {
     pub direction: [f64; 3],
     /// The upward direction, not parallel to the other; of it, what lies in the plane.
     pub up: [f64; 3],
-    /// Perspective: distance of the viewer's eye from the contour's plane, in front of its origin, 1e-9..=1e9 mm. Absent: a parallel view.
+    /// Perspective: distance of the viewer's eye from the contour's plane, in front of its origin. Absent: a parallel view.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub eye: Option<f64>,
 }
@@ -83,3 +85,12 @@ pub enum KeptSide {
     /// What is outside of the contour is removed.
     Inside,
 }
+
+pub(super) const NUMBERS: &[Number] = &[
+    number!(cuts => contour, "mm", Range(-LARGEST, LARGEST)),
+    number!(cuts => view.at, "mm", PLACE),
+    number!(cuts => view.eye, "mm", LENGTH),
+    number!(cuts => depth, "mm", LENGTH_OR_0),
+    number!(cuts => brush => radius, "mm", LENGTH),
+    number!(cuts => brush => strokes, "mm", Range(-LARGEST, LARGEST)),
+];

@@ -1,6 +1,8 @@
 //! Settings of measurements and annotations: calipers, contours, texts and arrows in the space of the volume. No pass reads them: the viewer
 //! draws them over the picture, and `render` into the picture that it writes.
 
+use crate::scene::number::Allowed::Range;
+use crate::scene::number::{Number, SHARE, number};
 use serde::{Deserialize, Serialize};
 
 /// Most measurements and annotations of a scene.
@@ -31,7 +33,7 @@ pub struct Measurement {
     /// Text beside it, at most 80 characters.
     #[serde(default, skip_serializing_if = "String::is_empty")]
     pub text: String,
-    /// Of a threshold volume: the echo from which on a voxel counts, 0..=1 of the sample range.
+    /// Of a threshold volume: the echo from which on a voxel counts, as a share of the sample range.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub threshold: Option<f64>,
     /// Of a threshold volume: what was counted, mm^3. It belongs to the volume that was shown then.
@@ -126,3 +128,10 @@ impl MeasureKind {
         }
     }
 }
+
+pub(super) const NUMBERS: &[Number] = &[
+    number!(measure => points, "mm", Range(-1e6, 1e6)),
+    number!(measure => contours, "mm", Range(-1e6, 1e6)),
+    number!(measure => threshold, "", SHARE),
+    number!(measure => counted, "mm^3", Range(0.0, 1e18)),
+];

@@ -26,6 +26,9 @@ pub use shading::*;
 pub use still::*;
 pub use unveil::*;
 
+use super::MAX_PICTURE;
+use super::number::Allowed::{Any, Range};
+use super::number::{Group, LARGEST, LENGTH_OR_0, Number, PLACE, SHARE, number};
 use serde::{Deserialize, Serialize};
 
 /// Fewest and most points of a curved render start.
@@ -194,7 +197,7 @@ pub enum Layout {
 #[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct Picture {
-    /// Width and height in pixels, 1..=16384.
+    /// Width and height in pixels.
     pub size: [u32; 2],
 }
 
@@ -230,7 +233,7 @@ pub struct Region {
     /// green on its planes. With `unveil`, start depths and the region, rendering starts at the deepest of them. Takes a second volume. Absent:
     /// rendering starts at the region's near face.
     pub start_curve: Option<Vec<[f64; 2]>>,
-    /// Length over which what is composited fades towards the faces of the region, except the shallowest, 0..=1e9 mm. It is also the radius of the
+    /// Length over which what is composited fades towards the faces of the region, except the shallowest. It is also the radius of the
     /// region's edges and corners.
     pub fade: f64,
 }
@@ -254,7 +257,7 @@ pub struct Clip {
 pub struct Cap {
     /// Show the echoes of cut faces.
     pub enabled: bool,
-    /// The echo from which on there is tissue, 0..1 before any grey window: a mean over the length of an edge (`surface.edge`). Absent: what is
+    /// The echo from which on there is tissue, before any grey window: a mean over the length of an edge (`surface.edge`). Absent: what is
     /// rendered as solid, from the surface's threshold on, or from the echo on from which all are opaque. Less fills darker tissue too, such as the brain
     /// within a skull.
     pub level: Option<f64>,
@@ -265,3 +268,49 @@ impl Default for Cap {
         Cap { enabled: true, level: None }
     }
 }
+
+/// Every number with a row, in the order of their sliders.
+pub fn numbers() -> impl Iterator<Item = &'static Number> {
+    NUMBERS.iter().copied().flatten()
+}
+
+const NUMBERS: &[&[Number]] = &[
+    shading::NUMBERS,
+    unveil::NUMBERS,
+    COMMON,
+    planes::NUMBERS,
+    raycast::NUMBERS,
+    preprocess::NUMBERS,
+    preprocess::FILTERS[0],
+    preprocess::FILTERS[1],
+    preprocess::FILTERS[2],
+    preprocess::FILTERS[3],
+    preprocess::FILTERS[4],
+    cuts::NUMBERS,
+    still::NUMBERS,
+    measure::NUMBERS,
+    body_marks::NUMBERS,
+    cine::NUMBERS,
+];
+
+const COMMON: &[Number] = &[
+    number!(cap.enabled, "", Any).switch(
+        Group::Image,
+        "Clip echoes",
+        Settings::can_cap,
+        "Tissue that a clip plane cuts shows its echoes there, as planes do. Off: what is behind it is drawn, lit. Fluid is open either way.",
+    ),
+    number!(cap.level, "", SHARE).slider(
+        Group::Image,
+        "Clip threshold",
+        [0.0, 1.0],
+        0.01,
+        |s| s.can_cap() && s.cap.enabled,
+        "Weaker echoes stay open on the clip face: lower it to fill dark tissue, such as the brain. 0: what is rendered as solid is filled.",
+    ),
+    number!(floating, "mm^3", Range(0.0, 1e27)),
+    number!(picture.size, "", Range(1.0, MAX_PICTURE as f64)),
+    number!(region.fade, "mm", LENGTH_OR_0),
+    number!(region.start_curve, "mm", Range(-LARGEST, LARGEST)),
+    number!(clip => at, "mm", PLACE),
+];

@@ -1,6 +1,11 @@
 //! Settings of the modes that show sections: planes, and the volume as a solid block.
 
 use super::Smooth;
+use crate::scene::number::Allowed::Range;
+use crate::scene::number::Group::Planes as Group;
+use crate::scene::number::{ANGLE, Allowed, LARGEST, LENGTH, LENGTH_OR_0, Number, PLACE, SHARE, number};
+use crate::scene::planes::MAX_TILES;
+use crate::scene::{Mode, Scene, Settings};
 use serde::{Deserialize, Serialize};
 
 /// Modes plane, orthogonal and tomography, and the planes of a 4-up picture. A position and three angles define one coordinate frame for
@@ -125,7 +130,7 @@ pub struct Cube {
     pub inset: Inset,
     /// Tilt of each face about its middle.
     pub tilt: Tilt,
-    /// Darkening of a face that is seen edge-on, 0..1; 0 shows samples unchanged.
+    /// Darkening of a face that is seen edge-on; 0 shows samples unchanged.
     pub shading: f64,
     /// Draws thin lines where two faces meet. The borders of the insonified region count as faces.
     pub edges: bool,
@@ -173,3 +178,98 @@ pub struct Tilt {
     /// +elevation.
     pub top: [f64; 2],
 }
+
+/// An inset of a face that leaves 2 mm to the opposite face, whose inset is `across`.
+fn inset_limits(scene: &Scene, axis: usize, across: f64) -> [f64; 2] {
+    [0.0, (scene.high - scene.low)[axis] - across - 2.0]
+}
+
+/// The row of a face's inset.
+macro_rules! inset {
+    ($face:ident, $axis:expr, $opposite:ident, $name:expr, $hint:expr) => {
+        number!(cube.inset.$face, "mm", LENGTH_OR_0)
+            .slider(Group, $name, [0.0, 400.0], 1.0, Settings::is_cube, $hint)
+            .within(|scene| inset_limits(scene, $axis, scene.settings.cube.inset.$opposite))
+    };
+}
+
+/// A face that is tilted to 90 degrees would no longer bound its side.
+const TILT: Allowed = Range(-80.0, 80.0);
+const TURN: [f64; 2] = [-180.0, 180.0];
+
+pub(super) const NUMBERS: &[Number] = &[
+    number!(planes.position, "mm", PLACE),
+    number!(planes.zoom, "", Range(1e-3, 1e3)).slider(
+        Group,
+        "Planes zoom",
+        [0.2, 20.0],
+        0.1,
+        Settings::shows_planes,
+        "Enlarges the planes.",
+    ),
+    number!(planes.thickness, "mm", LENGTH_OR_0).slider(
+        Group,
+        "Slab",
+        [0.0, 40.0],
+        0.5,
+        Settings::shows_planes,
+        "Thickness of the planes: a thick slab shows less speckle and more of what runs along it.",
+    ),
+    number!(planes.spacing, "mm", LENGTH)
+        .slider(
+            Group,
+            "Spacing",
+            [0.0, 40.0],
+            0.5,
+            |s| s.mode == Mode::Tomography,
+            "Distance between neighbouring slices. 0: they divide the region evenly.",
+        )
+        .off_below(0.1),
+    number!(planes.azimuth, "°", ANGLE).slider(
+        Group,
+        "Planes azimuth",
+        TURN,
+        5.0,
+        Settings::shows_planes,
+        "Turns the planes about the depth axis.",
+    ),
+    number!(planes.tilt, "°", ANGLE).slider(
+        Group,
+        "Planes tilt",
+        TURN,
+        5.0,
+        Settings::shows_planes,
+        "Tilts the planes about the lateral axis.",
+    ),
+    number!(planes.roll, "°", ANGLE).slider(
+        Group,
+        "Planes roll",
+        TURN,
+        5.0,
+        Settings::shows_planes,
+        "Turns the planes about the elevation axis.",
+    ),
+    number!(planes.columns, "", Range(1.0, MAX_TILES as f64)),
+    number!(planes.rows, "", Range(1.0, MAX_TILES as f64)),
+    number!(planes.curve => points, "mm", Range(-LARGEST, LARGEST)),
+    inset!(left, 0, right, "Cut left", "Cuts the block from its left face."),
+    inset!(right, 0, left, "Cut right", "Cuts the block from its right face."),
+    inset!(near, 1, far, "Cut near", "Cuts the block from the face next to the probe."),
+    inset!(far, 1, near, "Cut far", "Cuts the block from its deepest face."),
+    inset!(bottom, 2, top, "Cut bottom", "Cuts the block from the first slice on."),
+    inset!(top, 2, bottom, "Cut top", "Cuts the block from the last slice on."),
+    number!(cube.tilt.left, "°", TILT),
+    number!(cube.tilt.right, "°", TILT),
+    number!(cube.tilt.near, "°", TILT),
+    number!(cube.tilt.far, "°", TILT),
+    number!(cube.tilt.bottom, "°", TILT),
+    number!(cube.tilt.top, "°", TILT),
+    number!(cube.shading, "", SHARE).slider(
+        Group,
+        "Face shading",
+        [0.0, 1.0],
+        0.05,
+        Settings::is_cube,
+        "Darkens faces of the block that are turned away.",
+    ),
+];

@@ -1,5 +1,9 @@
 //! Settings of stage 1: conditioning of polar lines, filters of slices, storage of the volume.
 
+use crate::scene::number::Allowed::{Any, Odd, OneOf, Range};
+use crate::scene::number::Group::Filters;
+use crate::scene::number::{Allowed, LENGTH, LENGTH_OR_0, NOT_NEGATIVE, Number, number};
+use crate::scene::{MAX_DEVIATION, MAX_WINDOW};
 use serde::{Deserialize, Serialize};
 
 /// Conditioning of the samples of polar frames before scan conversion (thesis 4.3), in this order: time gain compensation, low pass and
@@ -9,16 +13,16 @@ use serde::{Deserialize, Serialize};
 pub struct Conditioning {
     /// Time gain compensation: gains at increasing depths. Linear in dB between them, constant beyond the first and the last.
     pub tgc: Vec<Gain>,
-    /// Dynamic range of log compression, dB, 1..=200, for linear envelopes (20 dB per decade). Absent: the samples are compressed already.
+    /// Dynamic range of log compression, dB, for linear envelopes (20 dB per decade). Absent: the samples are compressed already.
     pub dynamic_range: Option<f64>,
-    /// Dynamic range that 0..1 stands for in samples that are compressed already, dB, 1..=200. Scales the effect of a gain.
+    /// Dynamic range that 0..1 stands for in samples that are compressed already, dB. Scales the effect of a gain.
     pub compressed_range: f64,
-    /// Standard deviation of the Gaussian low pass along each line, samples, 0..=32; 0 for none. Absent: half the decimation factor if
+    /// Standard deviation of the Gaussian low pass along each line, samples; 0 for none. Absent: half the decimation factor if
     /// lines are decimated, else none.
     pub low_pass: Option<f64>,
-    /// The same in mm along the line, 0..=1e9, in place of `low_pass`; at most 32 samples.
+    /// The same in mm along the line, in place of `low_pass`; at most 32 samples.
     pub low_pass_mm: Option<f64>,
-    /// Most samples per line, 2..=65536. Longer lines are low-passed and decimated by the smallest integer factor that meets this.
+    /// Most samples per line. Longer lines are low-passed and decimated by the smallest integer factor that meets this.
     pub samples: Option<u32>,
 }
 
@@ -41,7 +45,7 @@ impl Default for Conditioning {
 pub struct Gain {
     /// Depth along the line from the probe's face, mm.
     pub depth: f64,
-    /// Gain, dB, -120..=120.
+    /// Gain, dB.
     pub gain: f64,
 }
 
@@ -83,7 +87,7 @@ pub struct Slices {
     pub median: bool,
     /// A local estimator as a filter.
     pub estimator: Option<Estimator>,
-    /// Edge constant k of a Perona-Malik estimator, 0..1.
+    /// Edge constant k of a Perona-Malik estimator.
     pub estimator_edge: f64,
     /// Sigma filter.
     pub sigma: Option<Sigma>,
@@ -161,9 +165,9 @@ impl VolumeFormat {
 #[derive(Clone, Copy, Debug, PartialEq, Deserialize, Serialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct Sigma {
-    /// Window size, pixels; odd.
+    /// Window size, pixels.
     pub window: u32,
-    /// The same in mm, 1e-9..=1e9, in place of `window`: the nearest odd number of pixels, at most 63; less than two are no filter. Not
+    /// The same in mm, in place of `window`: the nearest odd number of pixels, at most 63; less than two are no filter. Not
     /// in `post`.
     pub window_mm: Option<f64>,
     /// Standard deviation of the noise. A neighbour counts within 2 sigma. In 0..1 on slices and pictures, in mm on distances; relative to
@@ -195,11 +199,11 @@ pub enum Noise {
 #[derive(Clone, Copy, Debug, PartialEq, Deserialize, Serialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct EnhancedSigma {
-    /// Starting window size, pixels; odd.
+    /// Starting window size, pixels.
     pub window: u32,
-    /// Largest window size, pixels; odd. Thesis Tables 7-9: 17, 19, 19, 21, 21, 23 for starts of 3, 5, 7, 9, 11, 13.
+    /// Largest window size, pixels. Thesis Tables 7-9: 17, 19, 19, 21, 21, 23 for starts of 3, 5, 7, 9, 11, 13.
     pub largest: u32,
-    /// The starting window in mm, 1e-9..=1e9, in place of `window`: the nearest odd number of pixels, 3..=63. Not in `post`.
+    /// The starting window in mm, in place of `window`: the nearest odd number of pixels. Not in `post`.
     pub window_mm: Option<f64>,
     /// The largest window in mm, in place of `largest`: as large as the first at least; less than two pixels are no filter. Not in `post`.
     pub largest_mm: Option<f64>,
@@ -273,9 +277,9 @@ pub struct PeronaMalik {
     /// Diffusion time of one step, pixels^2: lambda of the explicit scheme, at most 1/4, where a checkerboard, the highest frequency, only flips its sign at
     /// each step; at 1/5 three fifths of it are left. tau of AOS, unlimited; of RKL1 at most 200.
     pub step: f64,
-    /// Number of steps, 1..=1000.
+    /// Number of steps.
     pub repeat: u32,
-    /// Width of the diffusion in mm, 1e-9..=1e9: the standard deviation of the Gaussian that it is where no edge stops it. It takes the
+    /// Width of the diffusion in mm: the standard deviation of the Gaussian that it is where no edge stops it. It takes the
     /// place of `repeat` in the explicit scheme, whose step is then at most `step`, and of `step` in the others. Not in `post`.
     pub width_mm: Option<f64>,
 }
@@ -351,12 +355,100 @@ pub struct Smooth {
     pub depth: f64,
     /// Standard deviation along elevation, slices.
     pub elevation: f64,
-    /// The same in mm at the middle of the region, 0..=1e9, in place of `elevation`: it follows the slice pitch. At most 32 slices.
+    /// The same in mm at the middle of the region, in place of `elevation`: it follows the slice pitch. At most 32 slices.
     pub elevation_mm: Option<f64>,
-    /// Taps along each axis, 3 or 5, in place of the deviations above: a Gaussian in pixels, pixels and slices with the deviation
+    /// Taps along each axis, in place of the deviations above: a Gaussian in pixels, pixels and slices with the deviation
     /// sqrt(n - 1) / 2 of the binomial of n taps, cut off there.
     pub kernel: Option<u32>,
 }
+
+fn with_sigma(filter: Option<Sigma>, sigma: f64) -> Option<Sigma> {
+    (sigma > 0.0).then(|| Sigma { sigma, ..filter.unwrap_or_default() })
+}
+
+fn with_enhanced_sigma(filter: Option<EnhancedSigma>, sigma: f64) -> Option<EnhancedSigma> {
+    (sigma > 0.0).then(|| EnhancedSigma { sigma, ..filter.unwrap_or_default() })
+}
+
+const WINDOW: Allowed = Odd(3.0, MAX_WINDOW as f64);
+
+/// The rows of the filters that slices, distances and pictures have, but for those with sliders.
+macro_rules! filters {
+    ($of:ident) => {
+        &[
+            number!($of.sigma => window, "", WINDOW),
+            number!($of.sigma => window_mm, "mm", LENGTH),
+            number!($of.enhanced_sigma => window, "", WINDOW),
+            number!($of.enhanced_sigma => largest, "", WINDOW),
+            number!($of.enhanced_sigma => window_mm, "mm", LENGTH),
+            number!($of.enhanced_sigma => largest_mm, "mm", LENGTH),
+            number!($of.enhanced_sigma => edge, "", NOT_NEGATIVE),
+            number!($of.perona_malik => edge, "", NOT_NEGATIVE),
+            number!($of.perona_malik => repeat, "", Range(1.0, 1000.0)),
+            number!($of.perona_malik => width_mm, "mm", LENGTH),
+        ]
+    };
+}
+
+/// The rows of a Gaussian.
+macro_rules! smooth {
+    ($of:ident) => {
+        &[
+            number!($of.smooth => lateral, "mm", LENGTH_OR_0),
+            number!($of.smooth => depth, "mm", LENGTH_OR_0),
+            number!($of.smooth => elevation, "slices", Range(0.0, 1000.0)),
+            number!($of.smooth => elevation_mm, "mm", LENGTH_OR_0),
+            number!($of.smooth => kernel, "", OneOf(&[3.0, 5.0])),
+        ]
+    };
+}
+
+pub(super) const FILTERS: [&[Number]; 5] =
+    [filters!(slices), filters!(distance), filters!(post), smooth!(slices), smooth!(planes)];
+
+pub(super) const NUMBERS: &[Number] = &[
+    number!(conditioning.tgc => depth, "mm", Range(0.0, 1e4)),
+    number!(conditioning.tgc => gain, "dB", Range(-120.0, 120.0)),
+    number!(conditioning.dynamic_range, "dB", Range(1.0, 200.0)),
+    number!(conditioning.compressed_range, "dB", Range(1.0, 200.0)),
+    number!(conditioning.low_pass, "", Range(0.0, MAX_DEVIATION)),
+    number!(conditioning.low_pass_mm, "mm", LENGTH_OR_0),
+    number!(conditioning.samples, "", Range(2.0, 65536.0)),
+    number!(slices.pixels, "", Range(2.0, 4096.0)),
+    number!(slices.estimator_edge, "", NOT_NEGATIVE),
+    number!(slices.median, "", Any).switch(
+        Filters,
+        "Median",
+        |_| true,
+        "Removes speckle from each slice and keeps its edges. The volume is filtered again.",
+    ),
+    number!(slices.sigma => sigma, "", NOT_NEGATIVE)
+        .slider(
+            Filters,
+            "Speckle",
+            [0.0, 0.5],
+            0.01,
+            |_| true,
+            "Averages speckle within tissue of one brightness. The volume is filtered again.",
+        )
+        .set_by(|s, v| s.slices.sigma = with_sigma(s.slices.sigma, v)),
+    number!(slices.enhanced_sigma => sigma, "", NOT_NEGATIVE)
+        .slider(
+            Filters,
+            "Speckle, enhanced",
+            [0.0, 0.5],
+            0.01,
+            |_| true,
+            "The same with a window that follows the tissue. The volume is filtered again.",
+        )
+        .set_by(|s, v| s.slices.enhanced_sigma = with_enhanced_sigma(s.slices.enhanced_sigma, v)),
+    number!(post.sigma => sigma, "", NOT_NEGATIVE)
+        .slider(Filters, "Picture speckle", [0.0, 0.5], 0.01, |_| true, "Averages speckle in the finished picture.")
+        .set_by(|s, v| s.post.sigma = with_sigma(s.post.sigma, v)),
+    number!(post.enhanced_sigma => sigma, "", NOT_NEGATIVE),
+    number!(distance.sigma => sigma, "", NOT_NEGATIVE),
+    number!(distance.enhanced_sigma => sigma, "", NOT_NEGATIVE),
+];
 
 #[cfg(test)]
 mod tests {

@@ -1,5 +1,9 @@
 //! Settings of stage 2, ray casting: camera, rays, volume rendering, surface rendering and projections.
 
+use crate::scene::number::Allowed::{Any, OffOr, OneOf, Range};
+use crate::scene::number::Group::{Quality, Volume as Group};
+use crate::scene::number::{ANGLE, LENGTH, Number, PLACE, SHARE, number, start_depths};
+use crate::scene::{Mode, Settings};
 use serde::{Deserialize, Serialize};
 
 /// The camera. With all angles zero it looks from the probe into the body, with lateral to the right.
@@ -32,7 +36,7 @@ impl Default for Camera {
 pub struct Ray {
     /// Distance between samples, mm. Absent: one slice pixel.
     pub step: Option<f64>,
-    /// Samples along the smallest side of a voxel, 1..=16: the step is at most that side divided by this, whatever `step` says. The side
+    /// Samples along the smallest side of a voxel: the step is at most that side divided by this, whatever `step` says. The side
     /// is that of a slice pixel, or the slice pitch of a Cartesian volume if it is smaller. Thesis 3.5.2.1 takes 2. Absent: `step` alone.
     pub samples_per_voxel: Option<u32>,
     /// Early ray termination of VR: a ray ends when its transmittance falls below this. The error is at most this; 0 never ends early.
@@ -49,26 +53,26 @@ pub struct Ray {
     pub sliding: u32,
     /// How the slice index at a position of the sweep is computed.
     pub slice_index: SliceIndex,
-    /// Entries of the look-up tables of the sweep (where it has one) and the lines, 2..=65536. The error of linear interpolation is h^2/8 times the second
+    /// Entries of the look-up tables of the sweep (where it has one) and the lines. The error of linear interpolation is h^2/8 times the second
     /// derivative of the half tangent: with 1025 entries under 1e-6 slices for a sweep of 142 frames over 85 deg.
     pub entries: u32,
-    /// Rays per pixel along each axis, 1..=4: the picture is rendered larger and averaged.
+    /// Rays per pixel along each axis: the picture is rendered larger and averaged.
     pub rays: u32,
     /// Adaptive supersampling: all of `rays` only in pixels at edges, where the colour bends by more than two levels of 8 bits; one in each of the
     /// others. The picture is that of all rays within a level. In mode volume without first-hit shading and without cut faces; other pictures have all
     /// rays.
     pub adaptive: bool,
-    /// Largest error of a pixel that its rays and their steps may leave, in levels of 8 bits of the finished picture, 0.01..=64; 0 takes the same steps in all pixels. A ray
+    /// Largest error of a pixel that its rays and their steps may leave, in levels of 8 bits of the finished picture; 0 takes the same steps in all pixels. A ray
     /// through every other pixel of every other row begins with `step`, at most a slice pixel, and takes shorter steps, down to a 32nd, where steps of twice the length differ by
     /// more. The pixels between are means of these rays where the picture bends little from ray to ray, and have rays of their own elsewhere. Light is
     /// integrated between samples whatever `volume.compositing` says. The error is an estimate; pixels whose rays meet only empty bricks have none. In
     /// mode volume without first-hit shading.
     pub tolerance: f64,
-    /// Brick size of empty-space skipping, texels: 4..=64; 0 takes every sample. Rays skip bricks that cannot change the picture, so
+    /// Brick size of empty-space skipping, texels; 0 takes every sample. Rays skip bricks that cannot change the picture, so
     /// that it stays the same bit for bit. Absent: 8; a CPU skips only where one picture of a volume saves more time than the ranges of
     /// the bricks take, or with `slices.still`.
     pub brick: Option<u32>,
-    /// Pixels from ray to ray along each axis, 1, 2, 4 or 8: 2 casts one ray for four pixels. The picture is enlarged, along the edges of surfaces, for a view
+    /// Pixels from ray to ray along each axis: 2 casts one ray for four pixels. The picture is enlarged, along the edges of surfaces, for a view
     /// that moves. The filters of the distance map cover the same part of the picture with fewer rays per axis. Above 1 `rays` must be 1.
     pub subsampling: u32,
 }
@@ -161,25 +165,25 @@ pub struct Volume {
     pub start_depth: Option<f64>,
     /// Transfer function.
     pub transfer: Transfer,
-    /// Extinction where the transfer function's opacity is 1, in proportion to the opacity, 1e-9..=1e9 1/mm. Absent: opacities are those of one voxel
+    /// Extinction where the transfer function's opacity is 1, in proportion to the opacity. Absent: opacities are those of one voxel
     /// (one slice pixel).
     pub extinction: Option<f64>,
     /// Entries of its table, 16..=4096 (1024 with pre-integrated compositing); absorption is linear between two. Absent: 256, or
     /// as many as it takes to meet points of the transfer function that are closer than an entry.
     pub entries: Option<u32>,
-    /// Samples below this are transparent, 0..1 after the window.
+    /// Samples below this are transparent, after the window.
     pub threshold: f64,
     /// Compositing rule.
     pub compositing: Compositing,
     /// Shading.
     pub shading: Shading,
-    /// Depth-coded shading: factor of the colours at the nearest point of the box, 0..10.
+    /// Depth-coded shading: factor of the colours at the nearest point of the box.
     pub near_tint: [f64; 3],
-    /// Depth-coded shading: factor of the colours at the farthest point of the box, 0..10.
+    /// Depth-coded shading: factor of the colours at the farthest point of the box.
     pub far_tint: [f64; 3],
-    /// First-hit shading: the accumulated opacity that counts as the hit, 0.001..1.
+    /// First-hit shading: the accumulated opacity that counts as the hit.
     pub hit: f64,
-    /// Mode mixed: opacity factor of the volume layer over the surface, 0..1.
+    /// Mode mixed: opacity factor of the volume layer over the surface.
     pub veil: f64,
 }
 
@@ -283,7 +287,7 @@ pub struct Surface {
     pub start_depth: Option<f64>,
     /// Detection rule.
     pub detector: Detector,
-    /// Adaptive and lasting detector: an edge counts at once if it exceeds this many standard deviations of the noise before it, 0..=10.
+    /// Adaptive and lasting detector: an edge counts at once if it exceeds this many standard deviations of the noise before it.
     pub noise: f64,
     /// Length of an edge, mm: the difference is the mean echo over this length behind a place minus the mean echo over this length in front
     /// of it, at any step of the rays. The detector takes at least 4 and at most 256 samples of this length. `samples`: 4 steps of the
@@ -293,18 +297,18 @@ pub struct Surface {
     pub threshold: f64,
     /// Threshold of the rough detector. Absent: that of the fine one.
     pub rough_threshold: Option<f64>,
-    /// Step of the rough detector in fine steps, 1..=8; 1 disables it. It passes over specks and some noise, and misses walls that are weak or
+    /// Step of the rough detector in fine steps; 1 disables it. It passes over specks and some noise, and misses walls that are weak or
     /// thinner than its ring. The thesis has one of 2.
     pub rough: u32,
     /// Sign of the edge.
     pub sign: Sign,
     /// Location of the surface within the edge.
     pub place: Place,
-    /// Which surface along the ray, 1..=8; 1 is the outermost.
+    /// Which surface along the ray; 1 is the outermost.
     pub number: u32,
     /// What is lit: a constant colour, or the volume through the transfer function.
     pub colour: SurfaceColour,
-    /// Depth of the volume behind the surface that gives it its colour with `colour = "behind"`, 1e-9..=1e9 mm.
+    /// Depth of the volume behind the surface that gives it its colour with `colour = "behind"`.
     pub colour_depth: f64,
 }
 
@@ -414,3 +418,102 @@ impl Default for Projection {
         Projection { window: [0.0, 1.0], start_depth: None }
     }
 }
+
+pub(super) const NUMBERS: &[Number] = &[
+    number!(volume.hit, "", Range(1e-3, 1.0)).slider(
+        Group,
+        "Opacity of a hit",
+        [0.01, 1.0],
+        0.02,
+        Settings::is_first_hit,
+        "How much the first surface hides what is behind it.",
+    ),
+    number!(volume.veil, "", SHARE).slider(
+        Group,
+        "Veil",
+        [0.0, 1.0],
+        0.05,
+        |s| s.mode == Mode::Mixed,
+        "How much of the volume is laid over the surface.",
+    ),
+    number!(volume.threshold, "", SHARE).slider(
+        Group,
+        "Volume threshold",
+        [0.0, 1.0],
+        0.01,
+        Settings::has_own_volume,
+        "The threshold of the volume layer alone.",
+    ),
+    number!(volume.start_depth, "mm", Any)
+        .slider(
+            Group,
+            "Volume start depth",
+            [0.0, 400.0],
+            1.0,
+            Settings::has_own_volume,
+            "The start depth of the volume layer alone.",
+        )
+        .within(start_depths),
+    number!(volume.extinction, "1/mm", LENGTH),
+    number!(volume.near_tint, "", Range(0.0, 10.0)),
+    number!(volume.far_tint, "", Range(0.0, 10.0)),
+    number!(ray.step, "mm", LENGTH)
+        .slider(
+            Quality,
+            "Step",
+            [0.0, 2.0],
+            0.05,
+            Settings::renders_rays,
+            "Distance of samples along a ray: short is exact, long is fast. 0: one slice pixel.",
+        )
+        .off_below(0.05),
+    number!(camera.field_of_view, "°", OffOr(1.0, 150.0))
+        .slider(
+            Quality,
+            "Field of view",
+            [0.0, 90.0],
+            5.0,
+            Settings::renders_rays,
+            "0 draws without perspective; more draws near things larger.",
+        )
+        .off_below(1.0),
+    number!(ray.rays, "", Range(1.0, 4.0))
+        .slider(
+            Quality,
+            "Rays a pixel",
+            [1.0, 4.0],
+            1.0,
+            |s| s.renders_rays() && s.ray.subsampling == 1,
+            "More rays give smoother edges and take longer.",
+        )
+        .set_by(|s, v| s.ray.rays = if s.ray.subsampling > 1 { 1 } else { v.round() as u32 }),
+    number!(ray.tolerance, "", OffOr(0.01, 64.0))
+        .slider(
+            Quality,
+            "Largest error",
+            [0.0, 8.0],
+            0.5,
+            Settings::can_tolerate,
+            "Of a pixel by its steps, levels of 255. 0 takes the same steps everywhere.",
+        )
+        .off_below(0.25),
+    number!(ray.samples_per_voxel, "", Range(1.0, 16.0)),
+    number!(ray.early_end, "", SHARE),
+    number!(ray.spread, "", SHARE),
+    number!(ray.sliding, "", OneOf(&[0.0, 3.0, 5.0])),
+    number!(ray.entries, "", Range(2.0, 65536.0)),
+    number!(ray.brick, "", OffOr(4.0, 64.0)),
+    number!(ray.subsampling, "", OneOf(&[1.0, 2.0, 4.0, 8.0])),
+    number!(camera.azimuth, "°", ANGLE),
+    number!(camera.elevation, "°", ANGLE),
+    number!(camera.roll, "°", ANGLE),
+    number!(camera.zoom, "", Range(1e-3, 1e3)),
+    number!(camera.target, "mm", PLACE),
+    number!(surface.noise, "", Range(0.0, 10.0)),
+    number!(surface.edge, "mm", LENGTH),
+    number!(surface.threshold, "", Range(1e-6, 1.0)),
+    number!(surface.rough_threshold, "", Range(1e-6, 1.0)),
+    number!(surface.rough, "", Range(1.0, 8.0)),
+    number!(surface.number, "", Range(1.0, 8.0)),
+    number!(surface.colour_depth, "mm", LENGTH),
+];

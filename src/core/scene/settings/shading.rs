@@ -1,6 +1,10 @@
 //! Settings of stages 3 and 4: filters of the distance map, light, shadow, occlusion and skin; filters, tone and colour of the picture.
 
 use super::preprocess::{EnhancedSigma, PeronaMalik, Sigma};
+use crate::scene::number::Allowed::{OffOr, OffOrOdd, Range};
+use crate::scene::number::Group::{Image, Light as Group, Surface};
+use crate::scene::number::{Allowed, LENGTH, LENGTH_OR_0, Number, PLACE, SHARE, number};
+use crate::scene::{MAX_WINDOW, Settings};
 use glam::DVec3;
 use serde::{Deserialize, Serialize};
 
@@ -8,9 +12,9 @@ use serde::{Deserialize, Serialize};
 #[derive(Clone, Debug, Default, PartialEq, Deserialize, Serialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct Distance {
-    /// Window size of the median filter, pixels; odd, 0 for none.
+    /// Window size of the median filter, pixels; 0 for none.
     pub median: u32,
-    /// The same in mm at the middle of the region, 1e-9..=1e9, in place of `median`: the nearest odd number of pixels, at most 63; less
+    /// The same in mm at the middle of the region, in place of `median`: the nearest odd number of pixels, at most 63; less
     /// than two are no filter.
     pub median_mm: Option<f64>,
     /// Bilateral filter.
@@ -54,15 +58,15 @@ impl Distance {
 #[derive(Clone, Copy, Debug, PartialEq, Deserialize, Serialize)]
 #[serde(deny_unknown_fields)]
 pub struct Bilateral {
-    /// Standard deviation in the picture, pixels, 0.1..=10.
+    /// Standard deviation in the picture, pixels.
     #[serde(default)]
     pub pixels: f64,
-    /// The same in mm at the middle of the region, 1e-9..=1e9, in place of `pixels`: at most 10 pixels; less than a tenth is no filter.
+    /// The same in mm at the middle of the region, in place of `pixels`: at most 10 pixels; less than a tenth is no filter.
     #[serde(default)]
     pub mm: Option<f64>,
     /// Standard deviation of the distance, mm.
     pub distance: f64,
-    /// Number of repetitions, 1..=16.
+    /// Number of repetitions.
     #[serde(default = "once")]
     pub repeat: u32,
 }
@@ -87,19 +91,19 @@ pub struct Light {
     pub follows: Follows,
     /// Position of a near (point) light, mm from the camera's target. Absent: the light is distant.
     pub position: Option<DVec3>,
-    /// Ambient coefficient of Blinn-Phong shading, 0..10.
+    /// Ambient coefficient of Blinn-Phong shading.
     pub ambient: f64,
-    /// Diffuse coefficient, 0..10.
+    /// Diffuse coefficient.
     pub diffuse: f64,
-    /// Specular coefficient, 0..10.
+    /// Specular coefficient.
     pub specular: f64,
-    /// Specular exponent, 0..1e6.
+    /// Specular exponent.
     pub shininess: f64,
-    /// Colour of the light, 0..10.
+    /// Colour of the light.
     pub colour: [f64; 3],
-    /// Colour of the surface, 0..10.
+    /// Colour of the surface.
     pub surface_colour: [f64; 3],
-    /// How much a weak echo at the surface darkens its colour, 0..1.
+    /// How much a weak echo at the surface darkens its colour.
     pub texture: f64,
     /// Neighbours whose distances differ by more than this belong to two surfaces, mm. Normals do not cross the gap.
     pub cliff: f64,
@@ -155,38 +159,38 @@ impl Default for Light {
 #[derive(Clone, Copy, Debug, PartialEq, Deserialize, Serialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct LightVolume {
-    /// Edge of a cell, 1e-9..=1e9 mm. Absent: half the standard deviation of the Gaussian that the volume is smoothed with (`slices.smooth`), and a slice
+    /// Edge of a cell. Absent: half the standard deviation of the Gaussian that the volume is smoothed with (`slices.smooth`), and a slice
     /// pixel at least. Where there would be more cells than `cells` they are larger; `--explain` says what they are and why.
     pub cell: Option<f64>,
-    /// Most cells, nearly, 1000..=1000000000; also at most 1024 along an edge. A cell takes 44 bytes of the device's memory.
+    /// Most cells, nearly; also at most 1024 along an edge. A cell takes 44 bytes of the device's memory.
     pub cells: u32,
-    /// Samples along each edge of a cell, 1..=4.
+    /// Samples along each edge of a cell.
     pub taps: u32,
-    /// Depth of light: the path through the most opaque tissue after which 1/e of green light is left, 1e-9..=1e9 mm.
+    /// Depth of light: the path through the most opaque tissue after which 1/e of green light is left.
     pub depth: f64,
-    /// Warmth: how much deeper red light goes than green, and green than blue, 0..=2; 0 is grey.
+    /// Warmth: how much deeper red light goes than green, and green than blue; 0 is grey.
     pub warmth: f64,
-    /// Standard deviation over which light has spread after 1 mm, mm, 0..=3e4; it grows with the square root of the path. The lattice spreads light
+    /// Standard deviation over which light has spread after 1 mm, mm; it grows with the square root of the path. The lattice spreads light
     /// over at least half a cell a layer.
     pub widening: f64,
-    /// Standard deviation over which tissue scatters green light, 0..=1e9 mm; red further, blue less.
+    /// Standard deviation over which tissue scatters green light; red further, blue less.
     pub scatter: f64,
-    /// Reach of ambient light, 1e-9..=1e9 mm: matter farther away than this keeps none of it off.
+    /// Reach of ambient light: matter farther away than this keeps none of it off.
     pub reach: f64,
-    /// Slope of the echo from which on the orientation of a surface is certain, 1e-9..=1e9 1/mm: half that of skin in fluid after a Gaussian of 1.5 mm. Where the
+    /// Slope of the echo from which on the orientation of a surface is certain: half that of skin in fluid after a Gaussian of 1.5 mm. Where the
     /// echo is flatter, light depends less on the orientation.
     pub slope: f64,
-    /// How much light depends on the orientation of the tissue's surface, 0..=1.
+    /// How much light depends on the orientation of the tissue's surface.
     pub relief: f64,
-    /// Wrap-around of the light, 0..=1.
+    /// Wrap-around of the light.
     pub wrap: f64,
-    /// Coefficient of the back light, 0..=10.
+    /// Coefficient of the back light.
     pub back: f64,
     /// Direction from the tissue to the back light, in the same axes as `light.direction`.
     pub back_direction: DVec3,
     /// Colour of the back light.
     pub back_colour: [f64; 3],
-    /// Exposure: factor of the light before the response curve, 0..=100.
+    /// Exposure: factor of the light before the response curve.
     pub exposure: f64,
     /// What is behind a volume that fills the picture. Absent: black.
     pub ground: Option<Ground>,
@@ -197,9 +201,9 @@ pub struct LightVolume {
 #[derive(Clone, Copy, Debug, PartialEq, Deserialize, Serialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct Ground {
-    /// Colour in the middle, 0..=1.
+    /// Colour in the middle.
     pub middle: [f64; 3],
-    /// Colour at the edges, 0..=1.
+    /// Colour at the edges.
     pub edge: [f64; 3],
 }
 
@@ -236,7 +240,7 @@ impl Default for LightVolume {
 #[derive(Clone, Copy, Debug, PartialEq, Deserialize, Serialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct Shadow {
-    /// Shadow coefficient: the share of what it dims that a shadow removes, 0..1.
+    /// Shadow coefficient: the share of what it dims that a shadow removes.
     pub strength: f64,
     /// Width of the shadow's edge per mm of distance to the obstacle; 0 is a hard edge.
     pub softness: f64,
@@ -273,7 +277,7 @@ impl Default for Shadow {
 pub struct Occlusion {
     /// Radius, mm.
     pub radius: f64,
-    /// Strength, 0..4; 1 is the share of the hemisphere that is hidden.
+    /// Strength; 1 is the share of the hemisphere that is hidden.
     pub strength: f64,
 }
 
@@ -287,9 +291,9 @@ impl Default for Occlusion {
 #[derive(Clone, Copy, Debug, PartialEq, Deserialize, Serialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct Skin {
-    /// Wrap-around of the light, 0..1.
+    /// Wrap-around of the light.
     pub wrap: f64,
-    /// Translucency: light that passes through thin tissue, 0..1.
+    /// Translucency: light that passes through thin tissue.
     pub translucency: f64,
     /// Depth behind the surface over which echoes are averaged, mm.
     pub depth: f64,
@@ -316,11 +320,11 @@ pub struct Post {
     /// Antialiasing of surfaces, and of cut faces, that have one ray a pixel: pixels at outlines and folds mix what is near and what is far by the share that
     /// each covers, by the edge's places in the distance map around them. Folds are steps of `light.cliff`.
     pub antialias: bool,
-    /// Added to the brightness, -1..1.
+    /// Added to the brightness.
     pub brightness: f64,
-    /// Contrast factor about middle grey, 0..10.
+    /// Contrast factor about middle grey.
     pub contrast: f64,
-    /// Gamma, 0.1..10: the exponent is 1 / gamma, so that values above 1 brighten dark parts.
+    /// Gamma: the exponent is 1 / gamma, so that values above 1 brighten dark parts.
     pub gamma: f64,
     /// Colour map.
     pub colour_map: ColourMap,
@@ -360,3 +364,168 @@ pub enum ColourMap {
     /// Blue to white.
     Ice,
 }
+
+/// The nearest odd window size; 0 is off.
+fn odd(value: f64) -> u32 {
+    if value < 2.0 { 0 } else { 2 * ((value - 1.0) / 2.0).round() as u32 + 1 }
+}
+
+fn set_bilateral(s: &mut Settings, pixels: f64) {
+    let filter = s.distance.bilateral.unwrap_or(Bilateral { pixels: 0.0, mm: None, distance: 2.0, repeat: 1 });
+    s.distance.bilateral = (pixels > 0.0).then_some(Bilateral { pixels, mm: None, ..filter });
+}
+
+/// An effect with another strength. It stays set at strength 0, for which no pass runs, so that its other values are kept.
+fn with_strength<T: Copy + Default>(effect: Option<T>, value: f64, strength: fn(&mut T) -> &mut f64) -> Option<T> {
+    if effect.is_none() && value == 0.0 {
+        return None;
+    }
+    let mut effect = effect.unwrap_or_default();
+    *strength(&mut effect) = value;
+    Some(effect)
+}
+
+const COEFFICIENT: Allowed = Range(0.0, 10.0);
+
+pub(super) const NUMBERS: &[Number] = &[
+    number!(post.brightness, "", Range(-1.0, 1.0)).slider(
+        Image,
+        "Gain",
+        [-1.0, 1.0],
+        0.02,
+        |_| true,
+        "Makes the picture brighter or darker as a whole.",
+    ),
+    number!(post.contrast, "", Range(0.0, 10.0)).slider(
+        Image,
+        "Contrast",
+        [0.0, 3.0],
+        0.05,
+        |_| true,
+        "Spreads bright and dark apart.",
+    ),
+    number!(post.gamma, "", Range(0.1, 10.0)).slider(
+        Image,
+        "Gamma",
+        [0.3, 3.0],
+        0.05,
+        |_| true,
+        "Brightens (above 1) or darkens the middle tones; black and white stay.",
+    ),
+    number!(distance.median, "px", OffOrOdd(3.0, MAX_WINDOW as f64))
+        .slider(
+            Surface,
+            "Surface median",
+            [0.0, 31.0],
+            2.0,
+            Settings::is_lit,
+            "Removes single outliers from the surface.",
+        )
+        .set_by(|s, v| (s.distance.median, s.distance.median_mm) = (odd(v), None)),
+    number!(distance.median_mm, "mm", LENGTH),
+    number!(distance.bilateral => pixels, "px", OffOr(Bilateral::MIN_PIXELS, Bilateral::MAX_PIXELS))
+        .slider(
+            Surface,
+            "Surface smoothing",
+            [0.0, 10.0],
+            0.5,
+            Settings::is_lit,
+            "Smooths the surface and keeps its steps.",
+        )
+        .set_by(set_bilateral)
+        .off_below(Bilateral::MIN_PIXELS),
+    number!(distance.bilateral => distance, "mm", LENGTH).slider(
+        Surface,
+        "Surface edge",
+        [0.1, 20.0],
+        0.2,
+        |s| s.is_lit() && s.distance.bilateral.is_some(),
+        "Steps of the surface beyond this height stay sharp.",
+    ),
+    number!(distance.bilateral => mm, "mm", LENGTH),
+    number!(distance.bilateral => repeat, "", Range(1.0, 16.0)),
+    number!(light.ambient, "", COEFFICIENT).slider(
+        Group,
+        "Ambient",
+        [0.0, 2.0],
+        0.02,
+        Settings::has_light,
+        "Light from everywhere: brightens shaded places.",
+    ),
+    number!(light.diffuse, "", COEFFICIENT).slider(
+        Group,
+        "Diffuse",
+        [0.0, 2.0],
+        0.02,
+        Settings::has_light,
+        "Strength of the lamp on matt skin.",
+    ),
+    number!(light.specular, "", COEFFICIENT).slider(
+        Group,
+        "Specular",
+        [0.0, 2.0],
+        0.02,
+        Settings::has_light,
+        "Strength of glossy highlights.",
+    ),
+    number!(light.volume => depth, "mm", LENGTH).slider(
+        Group,
+        "Light depth",
+        [0.2, 8.0],
+        0.1,
+        Settings::is_lit_inside,
+        "How deep light enters tissue.",
+    ),
+    number!(light.volume => warmth, "", Range(0.0, 2.0)).slider(
+        Group,
+        "Light warmth",
+        [0.0, 2.0],
+        0.05,
+        Settings::is_lit_inside,
+        "How much tissue reddens the light in it.",
+    ),
+    number!(light.volume => exposure, "", Range(0.0, 100.0)).slider(
+        Group,
+        "Exposure",
+        [0.1, 4.0],
+        0.05,
+        Settings::is_lit_inside,
+        "Brightness of the light inside tissue.",
+    ),
+    number!(light.shadow => strength, "", SHARE)
+        .slider(Group, "Shadow", [0.0, 1.0], 0.05, Settings::is_lit, "How dark cast shadows are.")
+        .set_by(|s, v| s.light.shadow = with_strength(s.light.shadow, v, |l: &mut Shadow| &mut l.strength)),
+    number!(light.occlusion => strength, "", Range(0.0, 4.0))
+        .slider(Group, "Occlusion", [0.0, 4.0], 0.1, Settings::is_lit, "How dark folds and corners are.")
+        .set_by(|s, v| s.light.occlusion = with_strength(s.light.occlusion, v, |l: &mut Occlusion| &mut l.strength)),
+    number!(light.skin => translucency, "", SHARE)
+        .slider(Group, "Translucency", [0.0, 1.0], 0.05, Settings::is_lit, "How much light shines through skin.")
+        .set_by(|s, v| s.light.skin = with_strength(s.light.skin, v, |l: &mut Skin| &mut l.translucency)),
+    number!(light.position, "mm", PLACE),
+    number!(light.shininess, "", Range(0.0, 1e6)),
+    number!(light.colour, "", COEFFICIENT),
+    number!(light.surface_colour, "", COEFFICIENT),
+    number!(light.texture, "", SHARE),
+    number!(light.cliff, "mm", LENGTH_OR_0),
+    number!(light.shadow => softness, "", Range(0.0, 10.0)),
+    number!(light.shadow => reach, "mm", LENGTH),
+    number!(light.shadow => thickness, "mm", LENGTH_OR_0),
+    number!(light.shadow => bias, "mm", LENGTH_OR_0),
+    number!(light.occlusion => radius, "mm", LENGTH),
+    number!(light.skin => wrap, "", SHARE),
+    number!(light.skin => depth, "mm", LENGTH_OR_0),
+    number!(light.skin => colour, "", COEFFICIENT),
+    number!(light.volume => cell, "mm", LENGTH),
+    number!(light.volume => cells, "", Range(1e3, 1e9)),
+    number!(light.volume => taps, "", Range(1.0, 4.0)),
+    number!(light.volume => widening, "mm", Range(0.0, 3e4)),
+    number!(light.volume => scatter, "mm", LENGTH_OR_0),
+    number!(light.volume => reach, "mm", LENGTH),
+    number!(light.volume => slope, "1/mm", LENGTH),
+    number!(light.volume => relief, "", SHARE),
+    number!(light.volume => wrap, "", SHARE),
+    number!(light.volume => back, "", COEFFICIENT),
+    number!(light.volume => back_colour, "", COEFFICIENT),
+    number!(light.volume => ground => middle, "", COEFFICIENT),
+    number!(light.volume => ground => edge, "", COEFFICIENT),
+];

@@ -1,5 +1,7 @@
 //! Settings of stills: volume rendering by paths of light.
 
+use crate::scene::number::Allowed::Range;
+use crate::scene::number::{Number, SHARE, number};
 use serde::{Deserialize, Serialize};
 
 /// A still: mode volume by paths of light that collide many times, without a denoiser. The transfer function is the medium: opacities are
@@ -9,19 +11,19 @@ use serde::{Deserialize, Serialize};
 #[derive(Clone, Copy, Debug, PartialEq, Deserialize, Serialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct Still {
-    /// Paths of a pixel, 1..=65536. The standard error of the picture goes as one over the root of it.
+    /// Paths of a pixel. The standard error of the picture goes as one over the root of it.
     pub samples: u32,
     /// Seed of the random numbers. The same seed and number of samples give the same picture.
     pub seed: u32,
-    /// Factor of the extinction, 0..=100.
+    /// Factor of the extinction.
     pub extinction: f64,
-    /// Factor of the albedo, 0..=1.
+    /// Factor of the albedo.
     pub albedo: f64,
-    /// Anisotropy: the mean cosine of Henyey and Greenstein's phase function, -0.95..=0.95; 0 scatters evenly.
+    /// Anisotropy: the mean cosine of Henyey and Greenstein's phase function; 0 scatters evenly.
     pub anisotropy: f64,
-    /// Most collisions of a path, 1..=1024; what light would do after them is missing.
+    /// Most collisions of a path; what light would do after them is missing.
     pub events: u32,
-    /// Samples of a dispatch, 1..=64; more where all of them would take over 64 dispatches. It changes no bit of the picture.
+    /// Samples of a dispatch; more where all of them would take over 64 dispatches. It changes no bit of the picture.
     pub batch: u32,
 }
 
@@ -47,3 +49,12 @@ impl Still {
         self.samples.div_ceil(self.samples_at_once())
     }
 }
+
+pub(super) const NUMBERS: &[Number] = &[
+    number!(still => samples, "", Range(1.0, Still::MAX_SAMPLES as f64)),
+    number!(still => extinction, "", Range(0.0, 100.0)),
+    number!(still => albedo, "", SHARE),
+    number!(still => anisotropy, "", Range(-0.95, 0.95)),
+    number!(still => events, "", Range(1.0, 1024.0)),
+    number!(still => batch, "", Range(1.0, 64.0)),
+];

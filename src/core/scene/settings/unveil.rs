@@ -1,5 +1,8 @@
 //! Settings of unveiling: the render start that follows the fluid.
 
+use crate::scene::Settings;
+use crate::scene::number::Allowed::{Any, Range};
+use crate::scene::number::{Group, Number, number};
 use serde::{Deserialize, Serialize};
 
 /// Automatic render start: what lies in front of the fluid before a face, such as the uterine wall, is not rendered. In each volume the start surface
@@ -11,9 +14,9 @@ use serde::{Deserialize, Serialize};
 pub struct Unveil {
     /// Find the fluid and start there.
     pub enabled: bool,
-    /// How far behind the near face of the fluid rendering starts, mm, -100..=100: more removes more.
+    /// How far behind the near face of the fluid rendering starts, mm: more removes more.
     pub offset: f64,
-    /// Standard deviation of the Gaussian that smooths the start surface, mm, 0..=20.
+    /// Standard deviation of the Gaussian that smooths the start surface, mm.
     pub smoothing: f64,
 }
 
@@ -22,3 +25,32 @@ impl Default for Unveil {
         Unveil { enabled: false, offset: 1.0, smoothing: 2.0 }
     }
 }
+
+fn unveils(s: &Settings) -> bool {
+    s.can_unveil() && s.unveil.enabled
+}
+
+pub(super) const NUMBERS: &[Number] = &[
+    number!(unveil.enabled, "", Any).switch(
+        Group::Image,
+        "Auto render start",
+        Settings::can_unveil,
+        "Starts rendering at the fluid before the face: the wall in front of it goes. Where no fluid is found, nothing changes.",
+    ),
+    number!(unveil.offset, "mm", Range(-100.0, 100.0)).slider(
+        Group::Image,
+        "Start offset",
+        [-10.0, 30.0],
+        0.5,
+        unveils,
+        "How far behind the near face of the fluid rendering starts: more removes more.",
+    ),
+    number!(unveil.smoothing, "mm", Range(0.0, 20.0)).slider(
+        Group::Image,
+        "Start smoothing",
+        [0.0, 10.0],
+        0.5,
+        unveils,
+        "Smooths the surface at which rendering starts.",
+    ),
+];

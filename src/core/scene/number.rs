@@ -1,0 +1,486 @@
+//! Numbers of the settings. A row beside each field, in `settings`, says what is allowed and which slider of the view sets it; the check, its message, the
+//! slider, its name for screen readers and the line of docs/settings.md follow from it.
+
+use super::region::depth_offset;
+use super::{Edge, Layout, Mode, Scene, SceneError, Settings, Shading, refuse};
+use glam::DVec3;
+
+/// The largest length of a setting, mm, and what lengths may be: from a thousandth of the smallest voxel that a volume may have to a thousand of the largest. A scene may so
+/// be drawn at any size.
+pub(super) const LARGEST: f64 = 1e9;
+pub(super) const LENGTH: Allowed = Allowed::Range(1e-9, LARGEST);
+pub(super) const LENGTH_OR_0: Allowed = Allowed::Range(0.0, LARGEST);
+/// A place, mm.
+pub(super) const PLACE: Allowed = Allowed::Range(-1e10, 1e10);
+/// An angle, degrees.
+pub(super) const ANGLE: Allowed = Allowed::Range(-360.0, 360.0);
+pub(super) const SHARE: Allowed = Allowed::Range(0.0, 1.0);
+/// Infinity is allowed, and has a meaning.
+pub(super) const NOT_NEGATIVE: Allowed = Allowed::Range(0.0, f64::INFINITY);
+
+/// Values that a number may have.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) enum Allowed {
+    /// Every number, as far as this one alone is concerned.
+    Any,
+    Range(f64, f64),
+    /// 0, which switches something off, or what lies in a range.
+    OffOr(f64, f64),
+    /// Odd, in a range.
+    Odd(f64, f64),
+    /// 0, which switches something off, or what is odd in a range.
+    OffOrOdd(f64, f64),
+    OneOf(&'static [f64]),
+}
+
+impl Allowed {
+    fn has(self, value: f64) -> bool {
+        let within = |low, high| value >= low && value <= high;
+        match self {
+            Allowed::Any => true,
+            Allowed::Range(low, high) => within(low, high),
+            Allowed::OffOr(low, high) => value == 0.0 || within(low, high),
+            Allowed::Odd(low, high) => value % 2.0 == 1.0 && within(low, high),
+            Allowed::OffOrOdd(low, high) => value == 0.0 || Allowed::Odd(low, high).has(value),
+            Allowed::OneOf(values) => values.contains(&value),
+        }
+    }
+
+    fn words(self) -> String {
+        let range = |low, high| format!("{}..={}", short(low), short(high));
+        match self {
+            Allowed::Any => String::new(),
+            Allowed::Range(low, f64::INFINITY) => format!("at least {}", short(low)),
+            Allowed::Range(low, high) => range(low, high),
+            Allowed::OffOr(low, high) => format!("0 or {}", range(low, high)),
+            Allowed::Odd(low, high) => format!("odd, {}", range(low, high)),
+            Allowed::OffOrOdd(low, high) => format!("0 or odd, {}", range(low, high)),
+            Allowed::OneOf(values) => {
+                let words: Vec<String> = values.iter().map(f64::to_string).collect();
+                words.split_last().map_or(String::new(), |(last, before)| format!("{} or {last}", before.join(", ")))
+            }
+        }
+    }
+}
+
+/// A number without many zeros.
+fn short(value: f64) -> String {
+    if value == 0.0 || (1e-3..1e6).contains(&value.abs()) { value.to_string() } else { format!("{value:e}") }
+}
+
+/// A group of sliders in the panel.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Group {
+    Image,
+    Surface,
+    Volume,
+    Light,
+    Planes,
+    Filters,
+    Quality,
+}
+
+/// Gives each value of a number that is there.
+type Each = fn(&Settings, &mut dyn FnMut(f64));
+
+/// A slider of the view.
+#[derive(Clone, Copy, Debug)]
+pub struct Slider {
+    /// The setting that it changes, or a word of its own where it changes several.
+    pub key: &'static str,
+    pub name: &'static str,
+    /// What it does: a sentence.
+    pub hint: &'static str,
+    /// Unit of its value; may be empty.
+    pub unit: &'static str,
+    pub group: Group,
+    /// Its range for any volume; [`Slider::range_in`] gives the range for one scene.
+    pub range: [f64; 2],
+    /// How far a key moves it.
+    pub step: f64,
+    /// Values below are 0.
+    least: f64,
+    applies: fn(&Settings) -> bool,
+    each: Each,
+    put: fn(&mut Settings, f64),
+    limits: fn(&Scene) -> [f64; 2],
+}
+
+impl Slider {
+    /// A slider of what is no single setting.
+    pub const fn of_several(
+        [key, name, unit, hint]: [&'static str; 4],
+        group: Group,
+        range: [f64; 2],
+        step: f64,
+        each: Each,
+        put: fn(&mut Settings, f64),
+    ) -> Slider {
+        let limits: fn(&Scene) -> [f64; 2] = |_| [f64::NEG_INFINITY, f64::INFINITY];
+        Slider {
+            key,
+            name,
+            hint,
+            unit,
+            group,
+            range,
+            step,
+            least: f64::NEG_INFINITY,
+            applies: |_| true,
+            each,
+            put,
+            limits,
+        }
+    }
+
+    /// The same slider, of which pictures depend only with some settings.
+    pub const fn when(self, applies: fn(&Settings) -> bool) -> Slider {
+        Slider { applies, ..self }
+    }
+
+    /// The same slider with a range that depends on the scene.
+    pub const fn within(self, limits: fn(&Scene) -> [f64; 2]) -> Slider {
+        Slider { limits, ..self }
+    }
+
+    /// True if the picture depends on it.
+    pub fn applies(&self, settings: &Settings) -> bool {
+        (self.applies)(settings)
+    }
+
+    /// Its value; outside of the range if a scene file set it so, 0 if there is none.
+    pub fn get(&self, settings: &Settings) -> f64 {
+        let mut found = None;
+        (self.each)(settings, &mut |value| found = found.or(Some(value)));
+        found.unwrap_or(0.0)
+    }
+
+    /// Sets the nearest value in the range. NaN changes nothing.
+    pub fn set(&self, settings: &mut Settings, value: f64) {
+        if !value.is_nan() {
+            let value = value.clamp(self.range[0], self.range[1]);
+            (self.put)(settings, if value < self.least { 0.0 } else { value });
+        }
+    }
+
+    /// The range for this scene; never empty.
+    pub fn range_in(&self, scene: &Scene) -> [f64; 2] {
+        let [low, high] = (self.limits)(scene);
+        let low = self.range[0].max(low).min(self.range[1]);
+        [low, self.range[1].min(high).max(low)]
+    }
+
+    /// True if it is a switch: 0 is off and 1 on.
+    pub fn is_switch(&self) -> bool {
+        self.range == [0.0, 1.0] && self.step == 1.0
+    }
+}
+
+/// A number of the settings, or several of one meaning, such as the coordinates of a point.
+#[derive(Clone, Copy, Debug)]
+pub struct Number {
+    /// Its path in a scene file.
+    pub key: &'static str,
+    /// Unit of its values; may be empty.
+    pub unit: &'static str,
+    allowed: Allowed,
+    pub slider: Option<Slider>,
+    each: Each,
+    put: fn(&mut Settings, f64),
+}
+
+impl Number {
+    pub(super) const fn new(
+        [key, unit]: [&'static str; 2],
+        allowed: Allowed,
+        each: Each,
+        put: fn(&mut Settings, f64),
+    ) -> Number {
+        Number { key, unit, allowed, slider: None, each, put }
+    }
+
+    /// The same number with a slider.
+    pub(super) const fn slider(
+        self,
+        group: Group,
+        name: &'static str,
+        range: [f64; 2],
+        step: f64,
+        applies: fn(&Settings) -> bool,
+        hint: &'static str,
+    ) -> Number {
+        let slider = Slider::of_several([self.key, name, self.unit, hint], group, range, step, self.each, self.put);
+        Number { slider: Some(slider.when(applies)), ..self }
+    }
+
+    /// A switch of what is no number.
+    pub(super) const fn switch(
+        self,
+        group: Group,
+        name: &'static str,
+        applies: fn(&Settings) -> bool,
+        hint: &'static str,
+    ) -> Number {
+        self.slider(group, name, [0.0, 1.0], 1.0, applies, hint)
+    }
+
+    const fn with(self, slider: Slider) -> Number {
+        Number { slider: Some(slider), ..self }
+    }
+
+    /// The slider sets 0, or no value, below `least`.
+    pub(super) const fn off_below(self, least: f64) -> Number {
+        match self.slider {
+            Some(slider) => self.with(Slider { least, ..slider }),
+            None => self,
+        }
+    }
+
+    /// The slider's range depends on the scene.
+    pub(super) const fn within(self, limits: fn(&Scene) -> [f64; 2]) -> Number {
+        match self.slider {
+            Some(slider) => self.with(slider.within(limits)),
+            None => self,
+        }
+    }
+
+    /// The slider sets more than the number.
+    pub(super) const fn set_by(self, put: fn(&mut Settings, f64)) -> Number {
+        match self.slider {
+            Some(slider) => self.with(Slider { put, ..slider }),
+            None => self,
+        }
+    }
+
+    /// The values that are allowed, with their unit; empty for all.
+    pub fn allowed(&self) -> String {
+        match (self.allowed.words(), self.unit) {
+            (words, _) if words.is_empty() => words,
+            (words, unit) => words + &suffix(unit),
+        }
+    }
+
+    pub(super) fn check(&self, settings: &Settings) -> Result<(), SceneError> {
+        let mut wrong = None;
+        (self.each)(settings, &mut |value| {
+            if !self.allowed.has(value) {
+                wrong.get_or_insert(value);
+            }
+        });
+        let Some(value) = wrong else { return Ok(()) };
+        let verb = match self.allowed {
+            Allowed::Range(_, high) if high.is_finite() => "lie in",
+            _ => "be",
+        };
+        let unit = if value.is_finite() { suffix(self.unit) } else { String::new() };
+        refuse(self.key, format!("is {}{unit}, must {verb} {}", short(value), self.allowed()))
+    }
+}
+
+/// A unit behind a number.
+fn suffix(unit: &str) -> String {
+    if unit.is_empty() || unit == "°" { unit.to_string() } else { format!(" {unit}") }
+}
+
+/// What a slider depends on.
+impl Settings {
+    pub(super) fn renders_rays(&self) -> bool {
+        !self.mode.is_flat()
+    }
+
+    /// True if rendering may start at the fluid.
+    pub(super) fn can_unveil(&self) -> bool {
+        self.renders_rays() && self.mode != Mode::Cube
+    }
+
+    /// True if each pixel may have steps of its own.
+    pub(super) fn can_tolerate(&self) -> bool {
+        let is_alone = self.mode == Mode::Volume && self.volume.shading != Shading::FirstHit && self.still.is_none();
+        is_alone && self.ray.sliding == 0 && !self.ray.adaptive
+    }
+
+    pub(super) fn shows_planes(&self) -> bool {
+        self.mode.is_flat() || self.layout == Layout::Four
+    }
+
+    pub(super) fn is_cube(&self) -> bool {
+        self.mode == Mode::Cube
+    }
+
+    /// True if a volume is shown with a surface: it has a window, a threshold and a start depth of its own.
+    pub fn has_own_volume(&self) -> bool {
+        self.mode == Mode::Mixed || self.layout == Layout::Pair
+    }
+
+    pub(super) fn is_first_hit(&self) -> bool {
+        self.mode == Mode::Volume && self.volume.shading == Shading::FirstHit
+    }
+
+    pub(super) fn is_lit(&self) -> bool {
+        matches!(self.mode, Mode::Surface | Mode::Mixed) || self.is_first_hit()
+    }
+
+    /// True if light goes through the volume.
+    pub(super) fn is_lit_inside(&self) -> bool {
+        self.light.volume.is_some() && matches!(self.mode, Mode::Volume | Mode::Mixed)
+    }
+
+    pub(super) fn has_light(&self) -> bool {
+        self.is_lit() || self.is_lit_inside()
+    }
+}
+
+/// The start depths that leave 1 mm of the region.
+pub fn start_depths(scene: &Scene) -> [f64; 2] {
+    [f64::NEG_INFINITY, scene.high.y - depth_offset(&scene.geometry) - 1.0]
+}
+
+/// Values of settings as numbers.
+pub(super) trait Numeric: Sized {
+    /// Gives each of its numbers.
+    fn each(&self, take: &mut dyn FnMut(f64));
+
+    /// The value that a number stands for; none of several numbers.
+    fn of(_number: f64) -> Option<Self> {
+        None
+    }
+}
+
+impl Numeric for f64 {
+    fn each(&self, take: &mut dyn FnMut(f64)) {
+        take(*self);
+    }
+
+    fn of(number: f64) -> Option<f64> {
+        Some(number)
+    }
+}
+
+impl Numeric for u32 {
+    fn each(&self, take: &mut dyn FnMut(f64)) {
+        take(f64::from(*self));
+    }
+
+    fn of(number: f64) -> Option<u32> {
+        Some(number.round() as u32)
+    }
+}
+
+impl Numeric for bool {
+    fn each(&self, take: &mut dyn FnMut(f64)) {
+        take(f64::from(u8::from(*self)));
+    }
+
+    fn of(number: f64) -> Option<bool> {
+        Some(number >= 0.5)
+    }
+}
+
+/// 0 stands for no value.
+impl<T: Numeric> Numeric for Option<T> {
+    fn each(&self, take: &mut dyn FnMut(f64)) {
+        self.iter().for_each(|value| value.each(take));
+    }
+
+    fn of(number: f64) -> Option<Option<T>> {
+        if number > 0.0 { T::of(number).map(Some) } else { Some(None) }
+    }
+}
+
+impl<T: Numeric, const N: usize> Numeric for [T; N] {
+    fn each(&self, take: &mut dyn FnMut(f64)) {
+        self.iter().for_each(|value| value.each(take));
+    }
+}
+
+impl<T: Numeric> Numeric for Vec<T> {
+    fn each(&self, take: &mut dyn FnMut(f64)) {
+        self.iter().for_each(|value| value.each(take));
+    }
+}
+
+impl Numeric for DVec3 {
+    fn each(&self, take: &mut dyn FnMut(f64)) {
+        self.to_array().each(take);
+    }
+}
+
+impl Numeric for Edge {
+    fn each(&self, take: &mut dyn FnMut(f64)) {
+        if let Edge::Length(mm) = self {
+            take(*mm);
+        }
+    }
+}
+
+/// Sets a value to a number.
+pub(super) fn put<T: Numeric>(value: &mut T, number: f64) {
+    if let Some(new) = T::of(number) {
+        *value = new;
+    }
+}
+
+/// The row of a number: its path, its unit and what is allowed. `=>` stands behind a table that may be absent, and behind a list.
+macro_rules! number {
+    (@each $of:expr, $take:expr, $($field:ident).+) => {
+        $crate::scene::number::Numeric::each(&$of.$($field).+, &mut *$take)
+    };
+    (@each $of:expr, $take:expr, $($field:ident).+ => $($rest:tt)+) => {
+        for inner in $of.$($field).+.iter() { number!(@each inner, $take, $($rest)+) }
+    };
+    (@put $of:expr, $value:expr, $($field:ident).+) => {
+        $crate::scene::number::put(&mut $of.$($field).+, $value)
+    };
+    (@put $of:expr, $value:expr, $($field:ident).+ => $($rest:tt)+) => {
+        for inner in $of.$($field).+.iter_mut() { number!(@put inner, $value, $($rest)+) }
+    };
+    ($first:ident $(. $field:ident)* $(=> $table:ident $(. $below:ident)*)*, $unit:expr, $allowed:expr) => {
+        $crate::scene::number::Number::new(
+            [concat!(stringify!($first) $(, ".", stringify!($field))* $(, ".", stringify!($table) $(, ".", stringify!($below))*)*), $unit],
+            $allowed,
+            |s, take| number!(@each s, take, $first $(. $field)* $(=> $table $(. $below)*)*),
+            |s, value| number!(@put s, value, $first $(. $field)* $(=> $table $(. $below)*)*),
+        )
+    };
+}
+pub(super) use number;
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scene::{Bilateral, BodyMark, Measurement, Slices, numbers};
+
+    #[test]
+    fn a_number_beyond_its_limits_is_refused_in_one_line_that_names_them() {
+        let mark = BodyMark { probe: [0.0, f64::NAN], ..BodyMark::default() };
+        let point = Measurement { points: vec![[0.0; 3], [2e6, 0.0, 0.0]], ..Measurement::default() };
+        let filter = Bilateral { pixels: 2.0, mm: None, distance: -1.0, repeat: 1 };
+        let mut all = [(); 6].map(|()| Settings::default());
+        all[0].body_marks = vec![BodyMark::default(), mark];
+        all[1].measure = vec![Measurement { points: vec![[0.0; 3]; 2], ..Measurement::default() }, point];
+        all[2].distance.bilateral = Some(filter);
+        all[3].ray.sliding = 4;
+        all[4].ray.brick = Some(3);
+        all[5].slices = Slices { estimator_edge: -1.0, ..Slices::default() };
+        let said = all.map(|settings| settings.check().expect_err("refused").to_string());
+        assert_eq!(
+            said,
+            [
+                "scene: body_marks.probe: is NaN, must lie in -1..=1",
+                "scene: measure.points: is 2e6 mm, must lie in -1e6..=1e6 mm",
+                "scene: distance.bilateral.distance: is -1 mm, must lie in 1e-9..=1e9 mm",
+                "scene: ray.sliding: is 4, must be 0, 3 or 5",
+                "scene: ray.brick: is 3, must be 0 or 4..=64",
+                "scene: slices.estimator_edge: is -1, must be at least 0",
+            ]
+        );
+        assert!(Settings::default().check().is_ok());
+    }
+
+    #[test]
+    fn a_key_has_one_row() {
+        let mut keys: Vec<&str> = numbers().map(|number| number.key).collect();
+        keys.sort_unstable();
+        assert!(keys.windows(2).all(|two| two[0] != two[1]), "{keys:?}");
+    }
+}
