@@ -23,7 +23,6 @@ pub const TAB: u32 = 0xff09;
 pub const ESCAPE: u32 = 0xff1b;
 pub const F1: u32 = 0xffbe;
 pub const RETURN: u32 = 0xff0d;
-pub const SHIFT: u32 = 0xffe1;
 pub const CONTROL: u32 = 0xffe3;
 pub const ALT: u32 = 0xffe9;
 

@@ -1,10 +1,7 @@
 //! Panels: buttons and drags act on the picture, which equals the headless one where nothing is drawn over it.
 
 use crate::desktop::*;
-use echolume::low_level::measure::outcome;
 use echolume::low_level::picture::Picture;
-use echolume::low_level::scene::{Input, Scene};
-use echolume::low_level::workspace::Workspace;
 use std::path::PathBuf;
 use std::time::Duration;
 
@@ -36,30 +33,6 @@ fn buttons_act_on_the_picture_and_reset_takes_it_all_back() {
     view.shows_middle(&plain(size, &["--mode", "vr"]), "what was before the reset");
     view.click(155, 28);
     view.shows_middle(&start, "reset again");
-    view.leave();
-}
-
-/// What a clip plane cuts, with the echoes of its face and without, by the switch in the column, and back by undo.
-#[test]
-fn a_switch_shows_the_echoes_of_the_clip_face_and_undo_takes_it_back() {
-    let desk = Desk::new(false);
-    let (_, size) = picture();
-    let clipped = ["--mode", "sr", "--set", "clip=[{at=[3,52,-2],normal=[0,0,1]}]", "--set", "camera.elevation=-60"];
-    let [on, off] =
-        ["true", "false"].map(|is| plain(size, &[&clipped[..], &["--set", &format!("cap.enabled={is}")]].concat()));
-    assert_ne!(on, off);
-    let view = desk.view(&[&["--size", "1000x700", PLAIN[0], PLAIN[1], "--source", SWEEP][..], &clipped].concat());
-    view.shows_middle(&on, "the echoes");
-    // The switch below the heading of the clip, which follows the controls in front.
-    view.click(954, 486);
-    view.shows_middle(&off, "the lit inside");
-    let control_z = |view: &View| {
-        view.desk.press(CONTROL, true);
-        view.desk.tap('z');
-        view.desk.press(CONTROL, false);
-    };
-    control_z(&view);
-    view.shows_middle(&on, "the echoes again");
     view.leave();
 }
 
@@ -130,7 +103,6 @@ fn saved_pictures_and_loops_have_names_without_patient_data() {
     assert!(saved.width == start.width && saved.height > start.height);
     let (from, middle) = (size.map(|n| n / 4), size.map(|n| n / 2));
     assert_eq!(crop(&saved, from, middle), crop(&start, from, middle), "without panels");
-    measure_on_a_plane(&desk, &view, &folder);
     view.leave();
 }
 
@@ -270,128 +242,6 @@ fn presets_are_pictures_and_show_what_the_command_renders() {
     view.leave();
 }
 
-/// Saves a workspace by its key; the only one in the folder.
-/// What is drawn round is removed at once, stays removed in the workspace, and comes back.
-#[test]
-fn a_cut_is_shown_saved_and_taken_back() {
-    let desk = Desk::new(false);
-    let folder = Folder::new("cut");
-    let view =
-        desk.view(&["--size", "1000x700", PLAIN[0], PLAIN[1], "--source", SWEEP, "--save-to", &folder.path("kept")]);
-    let (corner, size) = picture();
-    let start = plain(size, &[]);
-    view.shows_middle(&start, "the start");
-    desk.tap('f');
-    let round = |n: i32| {
-        let (sin, cos) = (f64::from(n) * std::f64::consts::TAU / 40.0).sin_cos();
-        let at = [cos, sin].map(|by| 0.12 * f64::from(size[1]) * by);
-        [0, 1].map(|a| (corner[a] + size[a] / 2) as i16 + at[a] as i16)
-    };
-    let begin = round(0);
-    view.hover(begin[0], begin[1]);
-    view.button(1, true);
-    for at in (1..40).map(round) {
-        view.hover(at[0], at[1]);
-        pace(Duration::from_millis(10));
-    }
-    view.button(1, false);
-    let file = desk.save_workspace(&folder.path("kept"));
-    until("the whole workspace", || Workspace::read(&file).ok());
-    let cut = of_workspace(&file, &folder.path("cut.png"), size);
-    let changed = cut.rgba.chunks(4).zip(start.rgba.chunks(4)).filter(|(a, b)| a != b).count();
-    assert!(changed > 1000, "{changed} pixels differ from those without the cut");
-    view.shows_middle(&cut, "the cut");
-    desk.control('z');
-    view.shows_middle(&start, "taken back");
-    desk.control('y');
-    view.shows_middle(&cut, "done again");
-    desk.press(SHIFT, true);
-    desk.tap('f');
-    desk.press(SHIFT, false);
-    view.shows_middle(&start, "no cuts");
-    view.leave();
-}
-
-/// A line that is clicked on plane A is in the workspace as it was clicked, and the window shows the section that the command renders.
-#[test]
-fn a_curved_plane_is_drawn_shown_saved_and_taken_back() {
-    let desk = Desk::new(false);
-    let folder = Folder::new("curve");
-    let view =
-        desk.view(&["--size", "1000x700", PLAIN[0], PLAIN[1], "--source", SWEEP, "--save-to", &folder.path("kept")]);
-    let (corner, size) = picture();
-    view.shows_middle(&plain(size, &[]), "the start");
-    desk.tap('8');
-    let start = plain(size, &["--mode", "orthogonal"]);
-    // The lower right tile, without its borders and labels.
-    let part = |wanted: &Picture, what: &str| {
-        let from = size.map(|n| n / 2 + n / 8);
-        view.shows_at(wanted, [corner[0] + from[0], corner[1] + from[1]], from, size.map(|n| n / 4), what);
-    };
-    part(&start, "three planes and no section");
-    desk.press(SHIFT, true);
-    desk.tap('c');
-    desk.press(SHIFT, false);
-    let clicks = [[60, 120], [110, 170], [180, 150], [230, 190]];
-    for [x, y] in clicks {
-        view.click(corner[0] as i16 + x, corner[1] as i16 + y);
-        // Not a double click.
-        pace(Duration::from_millis(500));
-    }
-    desk.tap(0xff0d_u32);
-    let file = desk.save_workspace(&folder.path("kept"));
-    let workspace = until("the whole workspace", || Workspace::read(&file).ok());
-    let settings = workspace.layers.clone().finish().expect("settings");
-    let recording =
-        echolume::low_level::source::open(workspace.recording(&file).expect("a recording"), None).expect("it opens");
-    let input = Input { stored: recording.stored_type(), range: recording.range() };
-    let scene = Scene::new(recording.geometry(0), input, settings).expect("a scene");
-    let line = scene.curve_line(&scene.tiling()).expect("a line");
-    assert_eq!(line.points.len(), clicks.len());
-    for ([x, y], clicked) in line.points.iter().zip(clicks) {
-        let off = (x - f64::from(clicked[0])).hypot(y - f64::from(clicked[1]));
-        assert!(off < 0.6, "{off} pixels beside {clicked:?}");
-    }
-    let curved = of_workspace(&file, &folder.path("curve.png"), size);
-    part(&curved, "the section");
-    desk.control('z');
-    part(&start, "taken back");
-    desk.control('y');
-    part(&curved, "done again");
-    view.leave();
-}
-
-/// A caliper of 100 pixels and an angle on plane A, whose workspace renders with them. Requirement: 0.1 mm.
-fn measure_on_a_plane(desk: &Desk, view: &View, folder: &Folder) {
-    let (corner, size) = picture();
-    desk.tap('7');
-    view.shows_middle(&plain(size, &["--mode", "mpr"]), "the plane");
-    let at = |x: i16, y: i16| view.click(corner[0] as i16 + x, corner[1] as i16 + y);
-    desk.tap('m');
-    at(200, 60);
-    at(300, 60);
-    desk.tap('n');
-    [(200, 80), (200, 180), (300, 180)].iter().for_each(|(x, y)| at(*x, *y));
-    let file = desk.save_workspace(&folder.path("kept"));
-    let workspace = until("the whole workspace", || Workspace::read(&file).ok());
-    let settings = workspace.layers.clone().finish().expect("settings");
-    let recording =
-        echolume::low_level::source::open(workspace.recording(&file).expect("a recording"), None).expect("it opens");
-    let input = Input { stored: recording.stored_type(), range: recording.range() };
-    let scene = Scene::new(recording.geometry(0), input, settings.clone()).expect("a scene");
-    let found: Vec<f64> = settings.measure.iter().map(|m| outcome::quantities(m).expect("results")[0].value).collect();
-    assert!(found.len() == 2 && (found[0] - 100.0 * scene.tiling().pixel).abs() < 0.1, "{found:?}");
-    assert!((found[1] - 90.0).abs() < 0.1, "{found:?}");
-    // `render` draws them: the middle of the caliper is bright.
-    let png = folder.path("measured.png");
-    let run = std::process::Command::new(PROGRAM).args(["render", &file.to_string_lossy(), "-o", &png]).output();
-    let run = run.expect("the program runs");
-    assert!(run.status.success(), "{}", String::from_utf8_lossy(&run.stderr));
-    let drawn = Picture::load(png.as_ref()).expect("a picture");
-    let pixel = 4 * (60 * drawn.width + 250) as usize;
-    assert!(drawn.rgba[pixel] > 200 && drawn.rgba[pixel + 2] < 150, "{:?}", &drawn.rgba[pixel..pixel + 3]);
-}
-
 /// Exports are those of the commands; one that is not finished when the view ends leaves nothing.
 #[test]
 fn the_volume_is_exported_as_the_commands_do() {
@@ -496,79 +346,4 @@ fn a_turntable_and_a_loop_are_exported_with_marks_as_asked() {
         assert_ne!(middle(0), middle(got.len() / 2), "{ending}");
     }
     view.leave();
-}
-
-/// The start line is bent by a drag on plane A: it is drawn in green, the rendering follows, the workspace keeps it, and undo takes it back.
-#[test]
-fn the_start_line_is_bent_on_plane_a_and_the_rendering_follows() {
-    let desk = Desk::new(false);
-    let folder = Folder::new("start-line");
-    let smooth = "planes.smooth={lateral=1,depth=1}";
-    let four = ["--mode", "vr", "--set", "layout=four", "--set", "region.depth=[20,80]", "--set", smooth];
-    let kept = folder.path("kept");
-    let view = desk.view(
-        &[&["--size", "1000x700", PLAIN[0], PLAIN[1], "--source", SWEEP, "--save-to", &kept][..], &four].concat(),
-    );
-    let (corner, size) = picture();
-    // The middle of the rendering, in the last quarter of the picture; marks are at its edges.
-    let (from, middle) = (size.map(|n| n * 5 / 8), size.map(|n| n / 4));
-    let renders = |more: &[&str], what: &str| {
-        let wanted = plain(size, &[&four, more].concat());
-        view.shows_at(&wanted, [corner[0] + from[0], corner[1] + from[1]], from, middle, what);
-    };
-    renders(&[], "the start");
-    desk.tap('g');
-    desk.press(SHIFT, true);
-    desk.tap('g');
-    desk.press(SHIFT, false);
-    // Where its handles are.
-    let recording = echolume::low_level::source::open(SWEEP.as_ref(), None).expect("it opens");
-    let input = Input { stored: recording.stored_type(), range: recording.range() };
-    let toml = format!("mode='vr'\nlayout='four'\nregion.depth=[20,80]\npicture.size={size:?}\n{smooth}");
-    let scene = Scene::new(
-        recording.geometry(0),
-        input,
-        echolume::low_level::scene::Settings::from_toml(&toml).expect("settings"),
-    )
-    .expect("a scene");
-    let tiling = scene.tiling();
-    let middle_handle = (scene.low + scene.high).with_y(2.0 * scene.low.y) / 2.0;
-    let at = tiling.project(&tiling.tiles[0], middle_handle).0;
-    let at: [i16; 2] = std::array::from_fn(|a| (f64::from(corner[a]) + at[a]).round() as i16);
-    // Its ring is green below the line.
-    let has_handle = |at: [i16; 2]| {
-        let is_green = |p: &[u8]| p[1] > 180 && p[0] < 110 && p[2] < 140;
-        let seen = view.look_at([at[0] as u32, at[1] as u32], [16, 8])?;
-        let pixel = |x: usize, y: usize| &seen.rgba[4 * (16 * y + x)..4 * (16 * y + x) + 4];
-        (is_green(pixel(0, 5)) && !is_green(pixel(12, 5))).then_some(())
-    };
-    until("a handle in green", || has_handle(at));
-    view.drag(at, [at[0], at[1] + 60]);
-    let file = desk.save_workspace(&folder.path("kept"));
-    let settings = until("the whole workspace", || Workspace::read(&file).ok()).layers.finish().expect("settings");
-    let curve = settings.region.start_curve.expect("a curve");
-    // The slop of a drag is 6 pixels.
-    let moved = (curve[1][1] - curve[0][1]) / tiling.pixel;
-    assert!(curve.len() == 3 && (53.0..60.5).contains(&moved) && (curve[0][1] - 20.0).abs() < 1e-3, "{curve:?}");
-    until("the handle where it was dragged to", || has_handle([at[0], at[1] + moved.round() as i16]));
-    // Without the box over it.
-    desk.tap('t');
-    let set = format!("region.start_curve={curve:?}");
-    renders(&["--set", &set], "below the curve");
-    desk.control('z');
-    desk.control('z');
-    renders(&[], "the start again");
-    view.leave();
-}
-
-/// The picture that `render` makes of a workspace, without the bar below: saved pictures have one.
-fn of_workspace(file: &std::path::Path, png: &str, size: [u32; 2]) -> Picture {
-    let run = std::process::Command::new(PROGRAM)
-        .args(["render", &file.to_string_lossy(), "-o", png, "--size", &format!("{}x{}", size[0], size[1])])
-        .output()
-        .expect("the program runs");
-    assert!(run.status.success(), "{}", String::from_utf8_lossy(&run.stderr));
-    let whole = Picture::load(png.as_ref()).expect("a picture");
-    assert!(whole.height > size[1], "{} rows", whole.height);
-    crop(&whole, [0, 0], size).expect("a picture of this size")
 }

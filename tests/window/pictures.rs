@@ -1,7 +1,6 @@
 //! A window shows what `echolume render` writes, byte for byte.
 
 use crate::desktop::*;
-use std::time::Duration;
 
 #[test]
 fn every_mode_in_a_window_is_the_headless_picture_byte_for_byte() {
@@ -44,15 +43,4 @@ fn a_window_that_is_resized_shows_a_picture_of_its_size() {
     view.resize(200, 160);
     view.shows(&plain([200, 160], &[]), "back from one pixel");
     view.leave();
-}
-
-#[test]
-fn an_idle_window_dispatches_nothing() {
-    let desk = Desk::new(false);
-    let view = desk.view(&["--no-ui", "--size", "200x160", PLAIN[0], PLAIN[1], "--source", SWEEP]);
-    view.shows(&plain([200, 160], &[]), "the picture");
-    watch(Duration::from_millis(1500));
-    let said = view.leave();
-    let still = said.split("none in the last ").nth(1).and_then(|s| s.split(' ').next()?.parse::<f64>().ok());
-    assert!(still.is_some_and(|s| s >= 1.4), "{said}");
 }

@@ -3,8 +3,6 @@
 use super::*;
 use echolume::low_level::source::recorder::Reader;
 
-const SHIFT: Modifiers = Modifiers { shift: true, control: false, alt: false };
-
 /// Prevents a drag that ends elsewhere than the pointer, and a reset that does not restore the start.
 #[test]
 fn a_drag_turns_the_picture_and_a_reset_brings_back_the_first_one() {
@@ -38,25 +36,6 @@ fn a_drag_turns_the_picture_and_a_reset_brings_back_the_first_one() {
     desk.press(Key::Char('t'));
     desk.rest();
     assert!(desk.picture() == first);
-}
-
-/// Prevents a key that shows another mode than its own, or keeps a part of the previous mode.
-#[test]
-fn every_key_of_a_mode_or_layout_shows_what_its_settings_say() {
-    let (device, plain) = (Device::new(), Device::new());
-    let mut desk = Desk::new(&device, options());
-    desk.begin();
-    let mut seen = vec![desk.live(1)];
-    let keys = "2345678901".chars().map(|c| (Modifiers::default(), Key::Char(c)));
-    let layouts = [(Modifiers::default(), Key::Tab), (SHIFT, Key::Tab)];
-    for (held, key) in keys.chain(layouts) {
-        desk.held(held, key);
-        desk.rest();
-        let picture = desk.picture();
-        assert!(picture == headless(&plain, &desk.drawn(), &body(1)), "{key:?}");
-        assert!(seen.last() != Some(&picture), "{key:?} changes nothing");
-        seen.push(picture);
-    }
 }
 
 /// The places of the next seven volumes of a loop that plays.

@@ -54,6 +54,9 @@ fn control_tab_gives_the_keyboard_to_the_panels_and_back() {
     desk.press(Key::Tab);
     desk.rest();
     assert_eq!(desk.console.controls().settings().layout, Layout::Four);
+    desk.held(SHIFT, Key::Tab);
+    desk.rest();
+    assert_eq!(desk.console.controls().settings().layout, Layout::Single);
     desk.held(CONTROL, Key::Tab);
     desk.held(CONTROL, Key::Tab);
     assert_eq!(focused(&mut desk), None, "there and back");
