@@ -288,7 +288,7 @@ const NUMBERS: &[&[Number]] = &[
     preprocess::FILTERS[4],
     cuts::NUMBERS,
     still::NUMBERS,
-    measure::NUMBERS,
+    measurements::NUMBERS,
     body_marks::NUMBERS,
     cine::NUMBERS,
 ];
