@@ -17,10 +17,11 @@ pub(super) const GROUPS: [(Group, &str); 7] = [
     (Group::Quality, texts::QUALITY),
 ];
 
-/// Indices in [`SLIDERS`] that keys and gestures use.
+/// Sliders that keys and gestures use are in front, so that their indices in [`SLIDERS`] stay.
+const USED_BY_KEYS: [&str; 3] = ["post.brightness", "threshold", "planes.zoom"];
 pub(super) const GAIN: usize = 0;
-pub(super) const THRESHOLD: usize = 3;
-pub(super) const PLANES_ZOOM: usize = 25;
+pub(super) const THRESHOLD: usize = 1;
+pub(super) const PLANES_ZOOM: usize = 2;
 
 /// All sliders, those of a group in display order. Those of windows, thresholds and start depths change the values of the current mode. A mixed picture has
 /// them for its surface, and again for its volume layer.
@@ -30,6 +31,7 @@ pub static SLIDERS: LazyLock<Vec<Slider>> = LazyLock::new(|| {
         let at = all.iter().position(|slider| slider.key == ahead_of).unwrap_or(all.len());
         all.splice(at..at, sliders.iter().copied());
     }
+    all.sort_by_key(|slider| USED_BY_KEYS.iter().position(|key| *key == slider.key).unwrap_or(USED_BY_KEYS.len()));
     all
 });
 

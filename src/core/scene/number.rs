@@ -213,17 +213,6 @@ impl Number {
         Number { slider: Some(slider.when(applies)), ..self }
     }
 
-    /// A switch of what is no number.
-    pub(super) const fn switch(
-        self,
-        group: Group,
-        name: &'static str,
-        applies: fn(&Settings) -> bool,
-        hint: &'static str,
-    ) -> Number {
-        self.slider(group, name, [0.0, 1.0], 1.0, applies, hint)
-    }
-
     const fn with(self, slider: Slider) -> Number {
         Number { slider: Some(slider), ..self }
     }
@@ -420,8 +409,12 @@ pub(super) fn put<T: Numeric>(value: &mut T, number: f64) {
     }
 }
 
-/// The row of a number: its path, its unit and what is allowed. `=>` stands behind a table that may be absent, and behind a list.
+/// The row of a number: its path, its unit and what is allowed. `=>` stands behind a table that may be absent, and behind a list. Then of its slider, if it has
+/// one: group, name, range, step, with which settings pictures depend on it, and what it does.
 macro_rules! number {
+    ($first:ident $(. $field:ident)* $(=> $table:ident $(. $below:ident)*)*, $unit:expr, $allowed:expr; $($slider:expr),+) => {
+        number!($first $(. $field)* $(=> $table $(. $below)*)*, $unit, $allowed).slider($($slider),+)
+    };
     (@each $of:expr, $take:expr, $($field:ident).+) => {
         $crate::scene::number::Numeric::each(&$of.$($field).+, &mut *$take)
     };

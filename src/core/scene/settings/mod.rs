@@ -294,20 +294,12 @@ const NUMBERS: &[&[Number]] = &[
 ];
 
 const COMMON: &[Number] = &[
-    number!(cap.enabled, "", Any).switch(
-        Group::Image,
-        "Clip echoes",
-        Settings::can_cap,
-        "Tissue that a clip plane cuts shows its echoes there, as planes do. Off: what is behind it is drawn, lit. Fluid is open either way.",
-    ),
-    number!(cap.level, "", SHARE).slider(
-        Group::Image,
-        "Clip threshold",
-        [0.0, 1.0],
-        0.01,
-        |s| s.can_cap() && s.cap.enabled,
-        "Weaker echoes stay open on the clip face: lower it to fill dark tissue, such as the brain. 0: what is rendered as solid is filled.",
-    ),
+    number!(cap.enabled, "", Any;
+        Group::Image, "Clip echoes", [0.0, 1.0], 1.0, Settings::can_cap,
+        "Tissue that a clip plane cuts shows its echoes there, as planes do. Off: what is behind it is drawn, lit. Fluid is open either way."),
+    number!(cap.level, "", SHARE;
+        Group::Image, "Clip threshold", [0.0, 1.0], 0.01, |s| s.can_cap() && s.cap.enabled,
+        "Weaker echoes stay open on the clip face: lower it to fill dark tissue, such as the brain. 0: what is rendered as solid is filled."),
     number!(floating, "mm^3", Range(0.0, 1e27)),
     number!(picture.size, "", Range(1.0, MAX_PICTURE as f64)),
     number!(region.fade, "mm", LENGTH_OR_0),

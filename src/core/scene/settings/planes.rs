@@ -199,56 +199,20 @@ const TURN: [f64; 2] = [-180.0, 180.0];
 
 pub(super) const NUMBERS: &[Number] = &[
     number!(planes.position, "mm", PLACE),
-    number!(planes.zoom, "", Range(1e-3, 1e3)).slider(
-        Group,
-        "Planes zoom",
-        [0.2, 20.0],
-        0.1,
-        Settings::shows_planes,
-        "Enlarges the planes.",
-    ),
-    number!(planes.thickness, "mm", LENGTH_OR_0).slider(
-        Group,
-        "Slab",
-        [0.0, 40.0],
-        0.5,
-        Settings::shows_planes,
-        "Thickness of the planes: a thick slab shows less speckle and more of what runs along it.",
-    ),
-    number!(planes.spacing, "mm", LENGTH)
-        .slider(
-            Group,
-            "Spacing",
-            [0.0, 40.0],
-            0.5,
-            |s| s.mode == Mode::Tomography,
-            "Distance between neighbouring slices. 0: they divide the region evenly.",
-        )
+    number!(planes.zoom, "", Range(1e-3, 1e3);
+        Group, "Planes zoom", [0.2, 20.0], 0.1, Settings::shows_planes, "Enlarges the planes."),
+    number!(planes.thickness, "mm", LENGTH_OR_0;
+        Group, "Slab", [0.0, 40.0], 0.5, Settings::shows_planes,
+        "Thickness of the planes: a thick slab shows less speckle and more of what runs along it."),
+    number!(planes.spacing, "mm", LENGTH;
+        Group, "Spacing", [0.0, 40.0], 0.5, |s| s.mode == Mode::Tomography, "Distance between neighbouring slices. 0: they divide the region evenly.")
         .off_below(0.1),
-    number!(planes.azimuth, "°", ANGLE).slider(
-        Group,
-        "Planes azimuth",
-        TURN,
-        5.0,
-        Settings::shows_planes,
-        "Turns the planes about the depth axis.",
-    ),
-    number!(planes.tilt, "°", ANGLE).slider(
-        Group,
-        "Planes tilt",
-        TURN,
-        5.0,
-        Settings::shows_planes,
-        "Tilts the planes about the lateral axis.",
-    ),
-    number!(planes.roll, "°", ANGLE).slider(
-        Group,
-        "Planes roll",
-        TURN,
-        5.0,
-        Settings::shows_planes,
-        "Turns the planes about the elevation axis.",
-    ),
+    number!(planes.azimuth, "°", ANGLE;
+        Group, "Planes azimuth", TURN, 5.0, Settings::shows_planes, "Turns the planes about the depth axis."),
+    number!(planes.tilt, "°", ANGLE;
+        Group, "Planes tilt", TURN, 5.0, Settings::shows_planes, "Tilts the planes about the lateral axis."),
+    number!(planes.roll, "°", ANGLE;
+        Group, "Planes roll", TURN, 5.0, Settings::shows_planes, "Turns the planes about the elevation axis."),
     number!(planes.columns, "", Range(1.0, MAX_TILES as f64)),
     number!(planes.rows, "", Range(1.0, MAX_TILES as f64)),
     number!(planes.curve => points, "mm", Range(-LARGEST, LARGEST)),
@@ -264,12 +228,6 @@ pub(super) const NUMBERS: &[Number] = &[
     number!(cube.tilt.far, "°", TILT),
     number!(cube.tilt.bottom, "°", TILT),
     number!(cube.tilt.top, "°", TILT),
-    number!(cube.shading, "", SHARE).slider(
-        Group,
-        "Face shading",
-        [0.0, 1.0],
-        0.05,
-        Settings::is_cube,
-        "Darkens faces of the block that are turned away.",
-    ),
+    number!(cube.shading, "", SHARE;
+        Group, "Face shading", [0.0, 1.0], 0.05, Settings::is_cube, "Darkens faces of the block that are turned away."),
 ];

@@ -416,34 +416,16 @@ pub(super) const NUMBERS: &[Number] = &[
     number!(conditioning.samples, "", Range(2.0, 65536.0)),
     number!(slices.pixels, "", Range(2.0, 4096.0)),
     number!(slices.estimator_edge, "", NOT_NEGATIVE),
-    number!(slices.median, "", Any).switch(
-        Filters,
-        "Median",
-        |_| true,
-        "Removes speckle from each slice and keeps its edges. The volume is filtered again.",
-    ),
-    number!(slices.sigma => sigma, "", NOT_NEGATIVE)
-        .slider(
-            Filters,
-            "Speckle",
-            [0.0, 0.5],
-            0.01,
-            |_| true,
-            "Averages speckle within tissue of one brightness. The volume is filtered again.",
-        )
+    number!(slices.median, "", Any;
+        Filters, "Median", [0.0, 1.0], 1.0, |_| true, "Removes speckle from each slice and keeps its edges. The volume is filtered again."),
+    number!(slices.sigma => sigma, "", NOT_NEGATIVE;
+        Filters, "Speckle", [0.0, 0.5], 0.01, |_| true, "Averages speckle within tissue of one brightness. The volume is filtered again.")
         .set_by(|s, v| s.slices.sigma = with_sigma(s.slices.sigma, v)),
-    number!(slices.enhanced_sigma => sigma, "", NOT_NEGATIVE)
-        .slider(
-            Filters,
-            "Speckle, enhanced",
-            [0.0, 0.5],
-            0.01,
-            |_| true,
-            "The same with a window that follows the tissue. The volume is filtered again.",
-        )
+    number!(slices.enhanced_sigma => sigma, "", NOT_NEGATIVE;
+        Filters, "Speckle, enhanced", [0.0, 0.5], 0.01, |_| true, "The same with a window that follows the tissue. The volume is filtered again.")
         .set_by(|s, v| s.slices.enhanced_sigma = with_enhanced_sigma(s.slices.enhanced_sigma, v)),
-    number!(post.sigma => sigma, "", NOT_NEGATIVE)
-        .slider(Filters, "Picture speckle", [0.0, 0.5], 0.01, |_| true, "Averages speckle in the finished picture.")
+    number!(post.sigma => sigma, "", NOT_NEGATIVE;
+        Filters, "Picture speckle", [0.0, 0.5], 0.01, |_| true, "Averages speckle in the finished picture.")
         .set_by(|s, v| s.post.sigma = with_sigma(s.post.sigma, v)),
     number!(post.enhanced_sigma => sigma, "", NOT_NEGATIVE),
     number!(distance.sigma => sigma, "", NOT_NEGATIVE),

@@ -420,82 +420,31 @@ impl Default for Projection {
 }
 
 pub(super) const NUMBERS: &[Number] = &[
-    number!(volume.hit, "", Range(1e-3, 1.0)).slider(
-        Group,
-        "Opacity of a hit",
-        [0.01, 1.0],
-        0.02,
-        Settings::is_first_hit,
-        "How much the first surface hides what is behind it.",
-    ),
-    number!(volume.veil, "", SHARE).slider(
-        Group,
-        "Veil",
-        [0.0, 1.0],
-        0.05,
-        |s| s.mode == Mode::Mixed,
-        "How much of the volume is laid over the surface.",
-    ),
-    number!(volume.threshold, "", SHARE).slider(
-        Group,
-        "Volume threshold",
-        [0.0, 1.0],
-        0.01,
-        Settings::has_own_volume,
-        "The threshold of the volume layer alone.",
-    ),
-    number!(volume.start_depth, "mm", Any)
-        .slider(
-            Group,
-            "Volume start depth",
-            [0.0, 400.0],
-            1.0,
-            Settings::has_own_volume,
-            "The start depth of the volume layer alone.",
-        )
+    number!(volume.hit, "", Range(1e-3, 1.0);
+        Group, "Opacity of a hit", [0.01, 1.0], 0.02, Settings::is_first_hit, "How much the first surface hides what is behind it."),
+    number!(volume.veil, "", SHARE;
+        Group, "Veil", [0.0, 1.0], 0.05, |s| s.mode == Mode::Mixed, "How much of the volume is laid over the surface."),
+    number!(volume.threshold, "", SHARE;
+        Group, "Volume threshold", [0.0, 1.0], 0.01, Settings::has_own_volume, "The threshold of the volume layer alone."),
+    number!(volume.start_depth, "mm", Any;
+        Group, "Volume start depth", [0.0, 400.0], 1.0, Settings::has_own_volume, "The start depth of the volume layer alone.")
         .within(start_depths),
     number!(volume.extinction, "1/mm", LENGTH),
     number!(volume.near_tint, "", Range(0.0, 10.0)),
     number!(volume.far_tint, "", Range(0.0, 10.0)),
-    number!(ray.step, "mm", LENGTH)
-        .slider(
-            Quality,
-            "Step",
-            [0.0, 2.0],
-            0.05,
-            Settings::renders_rays,
-            "Distance of samples along a ray: short is exact, long is fast. 0: one slice pixel.",
-        )
+    number!(ray.step, "mm", LENGTH;
+        Quality, "Step", [0.0, 2.0], 0.05, Settings::renders_rays,
+        "Distance of samples along a ray: short is exact, long is fast. 0: one slice pixel.")
         .off_below(0.05),
-    number!(camera.field_of_view, "°", OffOr(1.0, 150.0))
-        .slider(
-            Quality,
-            "Field of view",
-            [0.0, 90.0],
-            5.0,
-            Settings::renders_rays,
-            "0 draws without perspective; more draws near things larger.",
-        )
+    number!(camera.field_of_view, "°", OffOr(1.0, 150.0);
+        Quality, "Field of view", [0.0, 90.0], 5.0, Settings::renders_rays, "0 draws without perspective; more draws near things larger.")
         .off_below(1.0),
-    number!(ray.rays, "", Range(1.0, 4.0))
-        .slider(
-            Quality,
-            "Rays a pixel",
-            [1.0, 4.0],
-            1.0,
-            |s| s.renders_rays() && s.ray.subsampling == 1,
-            "More rays give smoother edges and take longer.",
-        )
+    number!(ray.rays, "", Range(1.0, 4.0);
+        Quality, "Rays a pixel", [1.0, 4.0], 1.0, |s| s.renders_rays() && s.ray.subsampling == 1, "More rays give smoother edges and take longer.")
         .set_by(|s, v| s.ray.rays = if s.ray.subsampling > 1 { 1 } else { v.round() as u32 }),
-    number!(ray.tolerance, "", OffOr(0.01, 64.0))
-        .slider(
-            Quality,
-            "Largest error",
-            [0.0, 8.0],
-            0.5,
-            Settings::can_tolerate,
-            "Of a pixel by its steps, levels of 255. 0 takes the same steps everywhere.",
-        )
+    number!(ray.tolerance, "", OffOr(0.01, 64.0);
+        Quality, "Largest error", [0.0, 8.0], 0.5, Settings::can_tolerate,
+        "Of a pixel by its steps, levels of 255. 0 takes the same steps everywhere.")
         .off_below(0.25),
     number!(ray.samples_per_voxel, "", Range(1.0, 16.0)),
     number!(ray.early_end, "", SHARE),

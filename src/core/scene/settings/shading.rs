@@ -388,119 +388,46 @@ fn with_strength<T: Copy + Default>(effect: Option<T>, value: f64, strength: fn(
 const COEFFICIENT: Allowed = Range(0.0, 10.0);
 
 pub(super) const NUMBERS: &[Number] = &[
-    number!(post.brightness, "", Range(-1.0, 1.0)).slider(
-        Image,
-        "Gain",
-        [-1.0, 1.0],
-        0.02,
-        |_| true,
-        "Makes the picture brighter or darker as a whole.",
-    ),
-    number!(post.contrast, "", Range(0.0, 10.0)).slider(
-        Image,
-        "Contrast",
-        [0.0, 3.0],
-        0.05,
-        |_| true,
-        "Spreads bright and dark apart.",
-    ),
-    number!(post.gamma, "", Range(0.1, 10.0)).slider(
-        Image,
-        "Gamma",
-        [0.3, 3.0],
-        0.05,
-        |_| true,
-        "Brightens (above 1) or darkens the middle tones; black and white stay.",
-    ),
-    number!(distance.median, "px", OffOrOdd(3.0, MAX_WINDOW as f64))
-        .slider(
-            Surface,
-            "Surface median",
-            [0.0, 31.0],
-            2.0,
-            Settings::is_lit,
-            "Removes single outliers from the surface.",
-        )
-        .set_by(|s, v| (s.distance.median, s.distance.median_mm) = (odd(v), None)),
+    number!(post.brightness, "", Range(-1.0, 1.0);
+        Image, "Gain", [-1.0, 1.0], 0.02, |_| true, "Makes the picture brighter or darker as a whole."),
+    number!(post.contrast, "", Range(0.0, 10.0);
+        Image, "Contrast", [0.0, 3.0], 0.05, |_| true, "Spreads bright and dark apart."),
+    number!(post.gamma, "", Range(0.1, 10.0);
+        Image, "Gamma", [0.3, 3.0], 0.05, |_| true, "Brightens (above 1) or darkens the middle tones; black and white stay."),
+    number!(distance.median, "px", OffOrOdd(3.0, MAX_WINDOW as f64);
+        Surface, "Surface median", [0.0, 31.0], 2.0, Settings::is_lit, "Removes single outliers from the surface.")
+    .set_by(|s, v| (s.distance.median, s.distance.median_mm) = (odd(v), None)),
     number!(distance.median_mm, "mm", LENGTH),
-    number!(distance.bilateral => pixels, "px", OffOr(Bilateral::MIN_PIXELS, Bilateral::MAX_PIXELS))
-        .slider(
-            Surface,
-            "Surface smoothing",
-            [0.0, 10.0],
-            0.5,
-            Settings::is_lit,
-            "Smooths the surface and keeps its steps.",
-        )
-        .set_by(set_bilateral)
-        .off_below(Bilateral::MIN_PIXELS),
-    number!(distance.bilateral => distance, "mm", LENGTH).slider(
-        Surface,
-        "Surface edge",
-        [0.1, 20.0],
-        0.2,
-        |s| s.is_lit() && s.distance.bilateral.is_some(),
-        "Steps of the surface beyond this height stay sharp.",
-    ),
+    number!(distance.bilateral => pixels, "px", OffOr(Bilateral::MIN_PIXELS, Bilateral::MAX_PIXELS);
+        Surface, "Surface smoothing", [0.0, 10.0], 0.5, Settings::is_lit, "Smooths the surface and keeps its steps.")
+    .set_by(set_bilateral)
+    .off_below(Bilateral::MIN_PIXELS),
+    number!(distance.bilateral => distance, "mm", LENGTH;
+        Surface, "Surface edge", [0.1, 20.0], 0.2, |s| s.is_lit() && s.distance.bilateral.is_some(),
+        "Steps of the surface beyond this height stay sharp."),
     number!(distance.bilateral => mm, "mm", LENGTH),
     number!(distance.bilateral => repeat, "", Range(1.0, 16.0)),
-    number!(light.ambient, "", COEFFICIENT).slider(
-        Group,
-        "Ambient",
-        [0.0, 2.0],
-        0.02,
-        Settings::has_light,
-        "Light from everywhere: brightens shaded places.",
-    ),
-    number!(light.diffuse, "", COEFFICIENT).slider(
-        Group,
-        "Diffuse",
-        [0.0, 2.0],
-        0.02,
-        Settings::has_light,
-        "Strength of the lamp on matt skin.",
-    ),
-    number!(light.specular, "", COEFFICIENT).slider(
-        Group,
-        "Specular",
-        [0.0, 2.0],
-        0.02,
-        Settings::has_light,
-        "Strength of glossy highlights.",
-    ),
-    number!(light.volume => depth, "mm", LENGTH).slider(
-        Group,
-        "Light depth",
-        [0.2, 8.0],
-        0.1,
-        Settings::is_lit_inside,
-        "How deep light enters tissue.",
-    ),
-    number!(light.volume => warmth, "", Range(0.0, 2.0)).slider(
-        Group,
-        "Light warmth",
-        [0.0, 2.0],
-        0.05,
-        Settings::is_lit_inside,
-        "How much tissue reddens the light in it.",
-    ),
-    number!(light.volume => exposure, "", Range(0.0, 100.0)).slider(
-        Group,
-        "Exposure",
-        [0.1, 4.0],
-        0.05,
-        Settings::is_lit_inside,
-        "Brightness of the light inside tissue.",
-    ),
-    number!(light.shadow => strength, "", SHARE)
-        .slider(Group, "Shadow", [0.0, 1.0], 0.05, Settings::is_lit, "How dark cast shadows are.")
-        .set_by(|s, v| s.light.shadow = with_strength(s.light.shadow, v, |l: &mut Shadow| &mut l.strength)),
-    number!(light.occlusion => strength, "", Range(0.0, 4.0))
-        .slider(Group, "Occlusion", [0.0, 4.0], 0.1, Settings::is_lit, "How dark folds and corners are.")
-        .set_by(|s, v| s.light.occlusion = with_strength(s.light.occlusion, v, |l: &mut Occlusion| &mut l.strength)),
-    number!(light.skin => translucency, "", SHARE)
-        .slider(Group, "Translucency", [0.0, 1.0], 0.05, Settings::is_lit, "How much light shines through skin.")
-        .set_by(|s, v| s.light.skin = with_strength(s.light.skin, v, |l: &mut Skin| &mut l.translucency)),
+    number!(light.ambient, "", COEFFICIENT;
+        Group, "Ambient", [0.0, 2.0], 0.02, Settings::has_light, "Light from everywhere: brightens shaded places."),
+    number!(light.diffuse, "", COEFFICIENT;
+        Group, "Diffuse", [0.0, 2.0], 0.02, Settings::has_light, "Strength of the lamp on matt skin."),
+    number!(light.specular, "", COEFFICIENT;
+        Group, "Specular", [0.0, 2.0], 0.02, Settings::has_light, "Strength of glossy highlights."),
+    number!(light.volume => depth, "mm", LENGTH;
+        Group, "Light depth", [0.2, 8.0], 0.1, Settings::is_lit_inside, "How deep light enters tissue."),
+    number!(light.volume => warmth, "", Range(0.0, 2.0);
+        Group, "Light warmth", [0.0, 2.0], 0.05, Settings::is_lit_inside, "How much tissue reddens the light in it."),
+    number!(light.volume => exposure, "", Range(0.0, 100.0);
+        Group, "Exposure", [0.1, 4.0], 0.05, Settings::is_lit_inside, "Brightness of the light inside tissue."),
+    number!(light.shadow => strength, "", SHARE;
+        Group, "Shadow", [0.0, 1.0], 0.05, Settings::is_lit, "How dark cast shadows are.")
+    .set_by(|s, v| s.light.shadow = with_strength(s.light.shadow, v, |l: &mut Shadow| &mut l.strength)),
+    number!(light.occlusion => strength, "", Range(0.0, 4.0);
+        Group, "Occlusion", [0.0, 4.0], 0.1, Settings::is_lit, "How dark folds and corners are.")
+    .set_by(|s, v| s.light.occlusion = with_strength(s.light.occlusion, v, |l: &mut Occlusion| &mut l.strength)),
+    number!(light.skin => translucency, "", SHARE;
+        Group, "Translucency", [0.0, 1.0], 0.05, Settings::is_lit, "How much light shines through skin.")
+    .set_by(|s, v| s.light.skin = with_strength(s.light.skin, v, |l: &mut Skin| &mut l.translucency)),
     number!(light.position, "mm", PLACE),
     number!(light.shininess, "", Range(0.0, 1e6)),
     number!(light.colour, "", COEFFICIENT),

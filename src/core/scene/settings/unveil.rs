@@ -31,26 +31,11 @@ fn unveils(s: &Settings) -> bool {
 }
 
 pub(super) const NUMBERS: &[Number] = &[
-    number!(unveil.enabled, "", Any).switch(
-        Group::Image,
-        "Auto render start",
-        Settings::can_unveil,
-        "Starts rendering at the fluid before the face: the wall in front of it goes. Where no fluid is found, nothing changes.",
-    ),
-    number!(unveil.offset, "mm", Range(-100.0, 100.0)).slider(
-        Group::Image,
-        "Start offset",
-        [-10.0, 30.0],
-        0.5,
-        unveils,
-        "How far behind the near face of the fluid rendering starts: more removes more.",
-    ),
-    number!(unveil.smoothing, "mm", Range(0.0, 20.0)).slider(
-        Group::Image,
-        "Start smoothing",
-        [0.0, 10.0],
-        0.5,
-        unveils,
-        "Smooths the surface at which rendering starts.",
-    ),
+    number!(unveil.enabled, "", Any;
+        Group::Image, "Auto render start", [0.0, 1.0], 1.0, Settings::can_unveil,
+        "Starts rendering at the fluid before the face: the wall in front of it goes. Where no fluid is found, nothing changes."),
+    number!(unveil.offset, "mm", Range(-100.0, 100.0);
+        Group::Image, "Start offset", [-10.0, 30.0], 0.5, unveils, "How far behind the near face of the fluid rendering starts: more removes more."),
+    number!(unveil.smoothing, "mm", Range(0.0, 20.0);
+        Group::Image, "Start smoothing", [0.0, 10.0], 0.5, unveils, "Smooths the surface at which rendering starts."),
 ];
