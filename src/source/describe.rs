@@ -97,6 +97,12 @@ pub(super) fn times(times: &BTreeMap<usize, f64>) -> Option<(String, String)> {
     Some(("time stamps".into(), format!("{} .. {} s, {} of them", number(*first), number(*last), times.len())))
 }
 
+/// A remark that is a warning, too: what a user must know before they trust a picture.
+pub(super) fn warned(file: &Path, title: &str, text: String) -> (String, String) {
+    tracing::warn!(file = %path(file), "{text}");
+    (title.into(), text)
+}
+
 #[cfg(test)]
 mod tests {
     use super::number;

@@ -1,6 +1,6 @@
 //! What a reader does with each key of its format, and which keys of a file it did not use. docs/formats.md is generated from the tables.
 
-use super::layout::warned;
+use super::describe::warned;
 use crate::files::escaped;
 use std::cell::RefCell;
 use std::collections::{BTreeMap, BTreeSet, HashMap};

@@ -1,6 +1,6 @@
 //! The layout of a recorded file: what a reader finds out before any sample is read.
 
-use super::describe;
+pub(super) use super::describe::warned;
 use super::keys::Unused;
 use super::packed::Pixels;
 use super::pixel::PixelFormat;
@@ -107,10 +107,4 @@ pub(super) fn extent(file: &Path, field: &str, which: &str, value: u64) -> Resul
         1..=MAX_EXTENT => Ok(value as usize),
         _ => Err(InputError::new(file, field, format!("{which}is {value}, must be at most {MAX_EXTENT}"))),
     }
-}
-
-/// A remark that is a warning, too: what a user must know before they trust a picture.
-pub(super) fn warned(path: &Path, title: &str, text: String) -> (String, String) {
-    tracing::warn!(file = %describe::path(path), "{text}");
-    (title.into(), text)
 }
