@@ -125,7 +125,7 @@ fn no_wrong_setting_is_refused_without_its_flag_or_name() {
     let folder = Folder::new("settings");
     let wrong = "--device 4096 | available: 0 ;--device no such card | available: 0 ;--preset foetal | bone, face;\
                  --mode sideways | --mode;--volume 1 | --volume 1;--size 64 | --size;--size 64x | --size;\
-                 --size 64x48x2 | --size;--size 1.5x2 | --size;--size 0x0 | 0x0;--size 16385x1 | 16384;\
+                 --size 64x48x2 | --size;--size 1.5x2 | --size;--size 0x0 | picture.size: is 0;--size 16385x1 | 16384;\
                  --camera azimuth | --camera;--camera azimuth=east | --camera;--camera azimut=1 | --camera;\
                  --camera target=1:2 | --camera;--camera azimuth=nan | camera.azimuth;--camera zoom=0 | camera.zoom;\
                  --camera a\nb | --camera;--roi depth=5 | --roi;--roi width=1:2 | --roi;\

@@ -79,7 +79,7 @@ fn no_wrong_flag_is_taken_for_a_default() {
         (&["estimator:kind=mode"], &["--filter estimator:kind=mode", "nagao-matsuyama"]),
         (&["perona-malik:step=0.3"], &["slices.perona_malik", "0.25"]),
         (&["enhanced-sigma:largest=3"], &["slices.enhanced_sigma", "less than window"]),
-        (&["enhanced-sigma:largest=99"], &["slices.enhanced_sigma", "largest is 99", "3..=63"]),
+        (&["enhanced-sigma:largest=99"], &["slices.enhanced_sigma.largest", "is 99", "3..=63"]),
         (&["median", "median"], &["median is given twice"]),
         (&["gaussian"], &["give lateral, depth or both"]),
         (&["gaussian:elevation=1"], &["need several slices"]),
