@@ -119,8 +119,8 @@ impl Connection {
 mod tests {
     use super::*;
     use crate::source::live::{Event, Live};
-    use std::sync::Arc;
     use std::sync::mpsc::channel;
+    use std::sync::{Arc, Barrier};
 
     struct Silent;
 
@@ -140,10 +140,17 @@ mod tests {
     fn an_open_source_is_silent_after_three_seconds_without_frames() {
         let (sender, woken) = channel();
         let wake = Arc::new(move || _ = sender.send(()));
-        let open = Arc::new(|| Ok(Box::new(Silent) as Box<dyn Live>));
+        // It opens once it was looked at.
+        let may_open = Arc::new(Barrier::new(2));
+        let waiting = may_open.clone();
+        let open = Arc::new(move || {
+            waiting.wait();
+            Ok(Box::new(Silent) as Box<dyn Live>)
+        });
         let now = Instant::now();
         let mut source = Connection::new(SourceSupervisor::new(open, None, None, wake), SourceKind::Probe, now);
         assert!(source.is_opening() && source.poll(true, Instant::now()).is_none());
+        may_open.wait();
         woken.recv().expect("opened");
         let now = Instant::now();
         assert!(source.poll(true, now).is_some() && source.is_open());
