@@ -237,11 +237,11 @@ pub(super) fn not_used(
             Err((key.name, "is stated and is not read: without it the samples would be read wrong".into()))
         }
         Use::Used if key.aspect.matters() => {
-            warn(path, key, "another key comes before it", remarks);
+            warn(path, key, "is stated, but another key comes before it", remarks);
             Ok(())
         }
         Use::Warned(neutral) if !is_neutral(value, neutral) => {
-            warn(path, key, "it is not read", remarks);
+            warn(path, key, "is stated and is not read", remarks);
             Ok(())
         }
         _ => Ok(()),
@@ -249,7 +249,7 @@ pub(super) fn not_used(
 }
 
 fn warn(path: &Path, key: &Key, why: &str, remarks: &mut Vec<(String, String)>) {
-    let text = format!("{} is stated and not used, {why}; it concerns {}", key.name, key.aspect.name());
+    let text = format!("{} {why}; it concerns {}", key.name, key.aspect.name());
     remarks.push(warned(path, "not used", text));
 }
 

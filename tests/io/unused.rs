@@ -231,9 +231,31 @@ fn what_stands_beside_pixels_and_beside_beamformed_data_is_listed() {
     let options = OpenOptions { voxel_spacing: Some([1.0; 3]), ..OpenOptions::default() };
     assert_eq!(description(&folder.0, options).expect("read").unused.lines(), ["PNG pHYs"]);
 
-    let found = described(data("uff/sector.uff")).expect("read");
-    let listed = found.unused.lines();
-    assert!(listed.iter().all(|name| !["data", "scan", "scan/depth_axis"].contains(&name.as_str())), "{listed:?}");
+    // EXIF with the orientation 6: the picture is to be turned by a quarter.
+    let turned = Folder::new("unused-turned");
+    let path = turned.path("1.jpg");
+    picture.save(&path).expect("written");
+    let mut bytes = std::fs::read(&path).expect("a picture");
+    let exif = b"\xff\xe1\x00\x22Exif\0\0MM\0*\0\0\0\x08\0\x01\x01\x12\0\x03\0\0\0\x01\0\x06\0\0\0\0\0\0";
+    bytes.splice(2..2, *exif);
+    std::fs::write(&path, bytes).expect("written");
+    let found = description(&turned.0, options).expect("read");
+    assert!(found.rows.iter().any(|(_, text)| text.contains("EXIF")), "{:?}", found.rows);
+    assert!(found.unused.lines().iter().any(|name| name == "JPEG APP1 Exif"), "{:?}", found.unused.lines());
+
+    for (name, listed, warned) in [
+        ("sector.uff", ["frame_rate", "scan/origin"], 0),
+        ("linear.uff", ["frame_rate", "scan/transform"], 0),
+        // The same scan about an origin that is 10 mm away.
+        ("moved.uff", ["frame_rate", "scan/origin"], 1),
+    ] {
+        let found = described(data("uff").join(name)).expect("read");
+        assert_eq!(
+            (found.unused.lines(), warnings(&found).len()),
+            (listed.map(String::from).to_vec(), warned),
+            "{name}"
+        );
+    }
 }
 
 #[test]

@@ -6,7 +6,7 @@
 
 The positions are those of USTB's scans: ndgrid of depth, azimuth (x) and elevation (y), and sph2cart for sectors. The envelope of a pixel is
 10^(-d/20) with d = (7 i + 11 j + 5 k + 3 v) mod 41 dB of sample i, line j, slice k and volume v; the phase of complex data turns with i."""
-import json, pathlib
+import json, pathlib, shutil
 import h5py
 import numpy as np
 
@@ -121,3 +121,8 @@ with h5py.File(here / "channel-data.uff", "w", libver="earliest") as made:
 with h5py.File(here / "other.h5", "w") as made:
     made["table"] = np.arange(4)
 (here / "expected.json").write_text(json.dumps(expected, indent=1) + "\n")
+
+# The sector about an origin that is 10 mm away, which no scan of USTB has.
+shutil.copy(here / "sector.uff", here / "moved.uff")
+with h5py.File(here / "moved.uff", "r+") as moved:
+    moved["b_data/scan/origin/distance"][...] = 0.01
