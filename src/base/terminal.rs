@@ -37,6 +37,8 @@ pub enum Failure {
     Interrupted(String),
     /// Some units of a `batch` failed, and the others are done: exit code 4.
     SomeFailed(String),
+    /// `verify --bisect` has no device to check: exit code 125, by which `git bisect run` passes over a version.
+    Untestable(String),
 }
 
 impl Failure {
@@ -46,7 +48,8 @@ impl Failure {
         | Failure::Failed(message)
         | Failure::NoDevice(message)
         | Failure::Interrupted(message)
-        | Failure::SomeFailed(message)) = self;
+        | Failure::SomeFailed(message)
+        | Failure::Untestable(message)) = self;
         message
     }
 
@@ -57,6 +60,7 @@ impl Failure {
             Failure::Input(_) => 2,
             Failure::NoDevice(_) => 3,
             Failure::Interrupted(_) | Failure::SomeFailed(_) => 4,
+            Failure::Untestable(_) => 125,
         }
     }
 }
@@ -114,7 +118,8 @@ pub fn print_failure(failure: &Failure) {
     | Failure::Failed(message)
     | Failure::NoDevice(message)
     | Failure::Interrupted(message)
-    | Failure::SomeFailed(message)) = failure;
+    | Failure::SomeFailed(message)
+    | Failure::Untestable(message)) = failure;
     let _ = writeln!(std::io::stderr(), "echolume: {}", single_line(message));
 }
 

@@ -26,7 +26,7 @@ use std::time::{Duration, Instant};
 
 #[derive(clap::Args)]
 #[command(
-    after_help = "Exit codes: 0 all checks passed, 1 a check failed or a report could not be written, 2 usage or an input, 3 no device, 4 interrupted by a signal before all checks were run and none had failed.\n\nExamples:\n  \
+    after_help = "Exit codes: 0 all checks passed, 1 a check failed or a report could not be written, 2 usage or an input, 3 no device, 4 interrupted by a signal before all checks were run and none had failed, 125 with --bisect if the device cannot be started.\n\nExamples:\n  \
                         echolume verify                                         (some minutes on a CPU, less on a GPU)\n  \
                         echolume verify --full --json before.json               (before the driver is updated)\n  \
                         echolume verify --full --baseline before.json --html after.html\n  \
@@ -75,6 +75,9 @@ pub struct Verify {
     /// List the checks and exit
     #[arg(long)]
     list: bool,
+    /// List what the checks exercise, and exit: shaders, pipelines, constants, classes of instructions and Vulkan commands
+    #[arg(long, conflicts_with_all = ["list", "self_test", "only"])]
+    coverage: bool,
     /// Write one dispatch of this check's pass for a bug report: shader, inputs, expected values, and a script for Amber. The smallest
     /// that fails, or the smallest
     #[arg(long, value_name = "CHECK", requires = "output")]
@@ -89,7 +92,10 @@ pub struct Verify {
     /// Run all checks in this process, with --full too
     #[arg(long)]
     no_isolate: bool,
-    /// Time limit of a check in a process of its own, s
+    /// For `git bisect run` over versions of a driver: each check in a process of its own, and exit code 125 if the device cannot be started
+    #[arg(long, conflicts_with_all = ["no_isolate", "self_test"])]
+    bisect: bool,
+    /// Time limit of a check in a process of its own, and of the start of the device, s
     #[arg(long, value_name = "SECONDS", default_value_t = 1200, value_parser = clap::value_parser!(u64).range(1..=86400))]
     check_timeout: u64,
     /// List the checks as a GoogleTest program lists its tests, and exit
@@ -108,7 +114,7 @@ pub struct Verify {
     /// Run checks for another process
     #[arg(long, hide = true)]
     worker: bool,
-    /// Let a check crash: KIND:GROUP / NAME, where KIND is segv, abort, hang or exit
+    /// Let a check crash: KIND:GROUP / NAME, where KIND is segv, abort, hang, exit, flake or unsynchronized, or KIND:start
     #[arg(long, hide = true, value_name = "KIND:CHECK")]
     inject_crash: Option<InjectedCrash>,
 }
@@ -119,6 +125,11 @@ impl Verify {
             let device = self.device.clone().unwrap_or(DeviceChoice::Best);
             let context = context(&ContextOptions { device, ..ContextOptions::default() })?;
             say!("{}", verify::determinism::digest(&context).map_err(failed)?.trim_end());
+            return Ok(());
+        }
+        if self.coverage {
+            let scenes = verify::built_in::scenes(verify::built_in::SHARED_MEMORY).map_err(failed)?;
+            say!("{}", verify::coverage::text(&scenes).trim_end());
             return Ok(());
         }
         let level = if self.full { Level::Full } else { Level::Quick };
@@ -152,7 +163,12 @@ impl Verify {
         earlier.iter_mut().for_each(|run| run.outcomes.retain(|o| self.is_selected(o)));
         let (mut run, stopped) = match () {
             _ if self.self_test => (self.run_self_test(level)?, None),
-            _ if self.isolate || (self.full && !self.no_isolate) => self.run_isolated(level)?,
+            _ if self.isolate || self.bisect || (self.full && !self.no_isolate) => {
+                self.run_isolated(level).map_err(|why| match why {
+                    Failure::NoDevice(why) if self.bisect => Failure::Untestable(why),
+                    other => other,
+                })?
+            }
             _ => self.run_here(level)?,
         };
         self.save_pictures(&mut run);
@@ -191,7 +207,10 @@ impl Verify {
         let what = "ending; the running check is interrupted";
         announcing_signals(&held, what, || {
             let bar = progress::bar();
-            let (mut workers, ready) = Workers::start(&command, limit, &signal, progress::echo(&bar))?;
+            let (mut workers, ready) = match Workers::start(&command, limit, &signal, progress::echo(&bar)) {
+                Err(Failure::Failed(why)) => return Ok((verify::unstarted(level, why, begun), held.signal())),
+                started => started?,
+            };
             ready.lines.iter().for_each(|line| say!("{line}"));
             let chosen = self.chosen(&ready.checks)?;
             let names = &ready.checks;
@@ -248,6 +267,8 @@ impl Verify {
 
     /// Runs checks for another process, which asks for them on standard input.
     fn serve(&self, level: Level) -> Result<(), Failure> {
+        isolation::tell_calls();
+        self.inject_crash.iter().for_each(InjectedCrash::at_start);
         let mut lines = Vec::new();
         let opened = self.open(level, &mut lines).and_then(|dut| {
             announce(&dut, &mut lines);
@@ -445,6 +466,9 @@ impl Verify {
             (0, 0) => {
                 let signal = stopped.unwrap_or("a signal");
                 Err(Failure::Interrupted(format!("{signal} ended the run: {interrupted} of {all} checks were not run")))
+            }
+            (1, _) if self.bisect && run.is_unstarted() => {
+                Err(Failure::Untestable("the device cannot be started".into()))
             }
             (0, worse) => Err(failed(format!("{worse} checks became worse since the baseline{rest}"))),
             (count, _) => Err(failed(format!("{count} of {all} checks failed{rest}"))),

@@ -4,6 +4,7 @@
 use super::context::Context;
 use super::error::{ErrorContext, GpuError};
 use super::memory::{Reserve, free, reserve};
+use crate::passes::fault_injection::Command;
 use crate::passes::slots::Shape;
 use ash::vk;
 use gpu_allocator::MemoryLocation;
@@ -275,7 +276,7 @@ impl Readback {
     /// A device that fails.
     pub fn bytes(&self) -> Result<Cow<'_, [u8]>, GpuError> {
         let stale: Vec<_> = self.pieces.iter().filter_map(|(_, buffer)| buffer.range_to_invalidate()).collect();
-        if !stale.is_empty() {
+        if !stale.is_empty() && !self.context.faults.breaks(Command::Invalidate) {
             // SAFETY: the ranges are aligned, inside mapped memory, and belong to these buffers alone.
             unsafe { self.context.device.invalidate_mapped_memory_ranges(&stale) }
                 .context(|| "read results back".into())?;

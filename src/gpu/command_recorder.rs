@@ -11,6 +11,7 @@ use super::resources::{Image, Resource, SlotResources, WHOLE};
 use super::timeline::{Submission, Timelines};
 use super::timing::{Stamps, TimeStamps, Timings};
 use crate::barriers::{self, Access, Barrier, PipelineStage, PipelineStages};
+use crate::passes::fault_injection::Command;
 use crate::passes::slots::Shape;
 use crate::passes::{DispatchArgs, Part, Pass, Slot, interface_check};
 use crate::queues::oracle::{Event, SubmissionLog};
@@ -381,6 +382,7 @@ impl CommandRecorder {
         // Before any query begins, because lavapipe reads the pipeline then.
         // SAFETY: the pipeline is alive until the device is done.
         unsafe { device.cmd_bind_pipeline(commands, vk::PipelineBindPoint::COMPUTE, pipeline.handle) };
+        let is_first = band.base == [0, 0, 0] || self.context.faults.breaks(Command::DispatchBase);
         let ([x, y, z], [wide, high, deep]) = (band.base, band.groups);
         let is_counted = pass.reads(dispatch.scene, dispatch.args).iter().any(|bind| bind.part == Part::Groups);
         let repeat = || {
@@ -392,10 +394,11 @@ impl CommandRecorder {
                 // SAFETY: everything the pipeline's layout names was bound, and it allows a base; extents are within limits checked with
                 // the formats.
                 unsafe {
-                    match (band.base, &self.groups) {
-                        (_, Some(groups)) if is_counted => device.cmd_dispatch_indirect(commands, groups.handle, 0),
+                    match &self.groups {
+                        Some(_) if is_counted && self.context.faults.breaks(Command::DispatchIndirect) => {}
+                        Some(groups) if is_counted => device.cmd_dispatch_indirect(commands, groups.handle, 0),
                         // Synchronization validation of older layers (1.3.239) ignores dispatches with a base.
-                        ([0, 0, 0], _) => device.cmd_dispatch(commands, wide, high, deep),
+                        _ if is_first => device.cmd_dispatch(commands, wide, high, deep),
                         _ => device.cmd_dispatch_base(commands, x, y, z, wide, high, deep),
                     }
                 }
@@ -633,8 +636,9 @@ impl CommandRecorder {
             let access = Access::of_slot(slot, n, 0..image.shape.parts(), true, PipelineStage::Copy);
             self.barrier(barriers, &[access]);
             let poison = self.context.faults.poisoned().filter(|_| !slot.starts_clear());
+            let cleared = if self.context.faults.breaks(Command::Clear) { 1.0 } else { 0.0 };
             let value =
-                poison.map_or(vk::ClearColorValue { float32: [0.0; 4] }, |p| formats::clear_value(p, image.format));
+                poison.map_or(vk::ClearColorValue { float32: [cleared; 4] }, |p| formats::clear_value(p, image.format));
             // SAFETY: the image is in GENERAL since the transition above.
             unsafe {
                 device.cmd_clear_color_image(self.commands, image.handle, vk::ImageLayout::GENERAL, &value, &[WHOLE]);
@@ -660,15 +664,20 @@ impl CommandRecorder {
                 .map(|(offset, part)| region(image, part..part + 1, rows.clone(), BufferLayout { offset, ..layout }))
                 .collect(),
         };
-        // SAFETY: the buffer holds the bytes of these parts (its maker sized it so) and both live until the device is done.
+        // The buffer holds the bytes of these parts: its maker sized it so.
+        self.copy_to_image(from, image, regions);
+    }
+
+    /// Both must live until the device is done, and the buffer must hold the bytes of the regions.
+    fn copy_to_image(&self, from: &Buffer, image: &Image, mut regions: Vec<vk::BufferImageCopy>) {
+        let several = |r: &vk::BufferImageCopy| r.image_subresource.layer_count > 1 || r.image_extent.depth > 1;
+        if regions.iter().any(several) && self.context.faults.breaks(Command::CopyToImage) {
+            regions.iter_mut().for_each(|r| (r.image_subresource.layer_count, r.image_extent.depth) = (1, 1));
+        }
+        let layout = vk::ImageLayout::GENERAL;
+        // SAFETY: as the function demands; the image is in GENERAL since it was made.
         unsafe {
-            self.context.device.cmd_copy_buffer_to_image(
-                self.commands,
-                from.handle,
-                image.handle,
-                vk::ImageLayout::GENERAL,
-                &regions,
-            );
+            self.context.device.cmd_copy_buffer_to_image(self.commands, from.handle, image.handle, layout, &regions);
         }
     }
 
@@ -685,16 +694,7 @@ impl CommandRecorder {
         self.barrier(barriers, &[Access::of_slot(to.slot, to.copy, to.parts, true, PipelineStage::Copy)]);
         for (piece, buffer) in from.pieces() {
             let region = region(image, piece.parts.clone(), piece.rows.clone(), BufferLayout::default());
-            // SAFETY: the buffer holds the bytes of this piece and both live until the device is done.
-            unsafe {
-                self.context.device.cmd_copy_buffer_to_image(
-                    self.commands,
-                    buffer.handle,
-                    image.handle,
-                    vk::ImageLayout::GENERAL,
-                    &[region],
-                );
-            }
+            self.copy_to_image(buffer, image, vec![region]);
         }
     }
 
@@ -714,6 +714,9 @@ impl CommandRecorder {
         self.barrier(barriers, &[read, write]);
         for (piece, buffer) in to.pieces() {
             let region = region(image, piece.parts.clone(), piece.rows.clone(), BufferLayout::default());
+            if self.context.faults.breaks(Command::CopyToBuffer) {
+                continue;
+            }
             // SAFETY: the buffer is as large as its piece of the image and both live until the device is done.
             unsafe {
                 self.context.device.cmd_copy_image_to_buffer(

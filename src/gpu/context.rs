@@ -2,6 +2,7 @@
 //! order.
 
 use super::budget::MemoryBudget;
+use super::calls;
 use super::device_selection::{self, Candidate, DeviceChoice, QueueInfo};
 use super::error::{ErrorContext, GpuError};
 use super::faults::{Faults, InjectionPoint};
@@ -432,9 +433,15 @@ impl Context {
         }
         let queue = &self.queues[queue.min(self.queues.len() - 1)];
         let queue = queue.lock().unwrap_or_else(|e| e.into_inner());
+        calls::begins("vkQueueSubmit2", "");
         // SAFETY: the lock keeps the queue to one thread; the command buffers submitted are recorded and what they name is alive until
         // the timeline says it is done.
-        unsafe { self.device.queue_submit2(*queue, submits, done) }
+        unsafe { self.device.queue_submit2(*queue, submits, done) }?;
+        match self.faults.waits() {
+            // SAFETY: the lock keeps the queue to this thread.
+            true => unsafe { self.device.queue_wait_idle(*queue) },
+            false => Ok(()),
+        }
     }
 
     /// Waits for a fence of a submission that was made at `since`.
@@ -634,6 +641,7 @@ fn create_instance(
         Some(_) => create.push_next(&mut by_features),
         None => create,
     };
+    calls::begins("vkCreateInstance", "");
     // SAFETY: every pointer in `create` outlives the call.
     let instance = unsafe { entry.create_instance(&create, None) };
     match instance {
@@ -708,6 +716,7 @@ fn create_device(
     if waits {
         create = create.push_next(&mut present_id).push_next(&mut present_wait);
     }
+    calls::begins("vkCreateDevice", &candidate.name);
     // SAFETY: `choose` checked that every requested feature is supported; every pointer outlives the call.
     unsafe { instance.create_device(candidate.handle, &create, None) }
         .context(|| format!("create device '{}'", candidate.name))

@@ -1,6 +1,7 @@
 //! Device selection: the properties of each device, what it lacks, and which one is used.
 
 use super::budget::MemoryBudget;
+use super::calls;
 use super::error::GpuError;
 use super::pipeline_cache::DriverIdentity;
 use ash::vk;
@@ -133,6 +134,7 @@ impl Candidate {
 
 /// Every device of an instance, in the driver's order.
 pub fn candidates(entry: &ash::Entry, instance: &ash::Instance) -> Result<Vec<Candidate>, GpuError> {
+    calls::begins("vkEnumeratePhysicalDevices", "");
     // SAFETY: the instance is alive; the call only reads.
     let handles = unsafe { instance.enumerate_physical_devices() }
         .map_err(|result| GpuError::Vulkan { operation: "list devices".into(), result })?;

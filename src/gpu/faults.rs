@@ -3,7 +3,7 @@
 
 use super::budget::{HeapBudget, MemoryBudget};
 use super::lost_device::LossReport;
-use crate::passes::fault_injection::Change;
+use crate::passes::fault_injection::{Change, Command};
 use crate::passes::slots::{Format, Initializer};
 use crate::passes::{DispatchArgs, Params, Pass, Slot};
 use crate::scene::Scene;
@@ -87,6 +87,8 @@ pub struct Faults {
     changes: AtomicU64,
     /// A loss was injected that the driver knows nothing of.
     has_lost: AtomicBool,
+    /// The host waits for each submission before the next.
+    waits: AtomicBool,
 }
 
 impl Faults {
@@ -128,6 +130,16 @@ impl Faults {
             }
             None => false,
         }
+    }
+
+    /// From now on the host waits for each submission before the next. This is no fault: it hides those of synchronization, which tells
+    /// them from others.
+    pub fn wait_for_each_submission(&self) {
+        self.waits.store(true, Ordering::Relaxed);
+    }
+
+    pub(super) fn waits(&self) -> bool {
+        self.waits.load(Ordering::Relaxed)
     }
 
     /// Cancels a planned failure that has not happened.
@@ -198,6 +210,11 @@ impl Faults {
             self.changes.fetch_add(1, Ordering::Relaxed);
         }
         changed
+    }
+
+    /// True if the driver is to carry out this command wrongly.
+    pub(super) fn breaks(&self, command: Command) -> bool {
+        self.apply(|change| matches!(change, Change::Command(broken) if *broken == command))
     }
 
     /// The arguments of a dispatch; `None` if it is left out.

@@ -16,6 +16,7 @@
 mod bands;
 pub mod budget;
 mod buffers;
+pub mod calls;
 mod command_recorder;
 pub mod context;
 mod descriptor_sets;

@@ -27,6 +27,30 @@ pub struct Device {
 }
 
 impl Device {
+    /// A device of which nothing is known.
+    pub fn unknown() -> Device {
+        let unknown = || "not known".to_string();
+        Device {
+            name: unknown(),
+            driver: unknown(),
+            api: unknown(),
+            is_software: false,
+            timestamp_period_ns: 0.0,
+            valid_bits: 0,
+            calibrated: false,
+            clocks: None,
+        }
+    }
+
+    /// The name without the versions that some drivers put in parentheses behind it, such as that of LLVM: the same before and after an update.
+    pub fn identity(&self) -> String {
+        let Some((name, rest)) = self.name.split_once(" (") else { return self.name.clone() };
+        let is_version = |word: &str| word.contains('.') && word.starts_with(|c: char| c.is_ascii_digit());
+        let lasting = |part: &&str| !part.split(' ').any(is_version);
+        let parts: Vec<&str> = rest.trim_end_matches(')').split(", ").filter(lasting).collect();
+        if parts.is_empty() { name.into() } else { format!("{name} ({})", parts.join(", ")) }
+    }
+
     /// What times depend on, by names for people.
     pub fn conditions(&self) -> [(&'static str, String); 4] {
         [
@@ -130,6 +154,20 @@ fn clocks(is_software: bool) -> Option<String> {
 mod tests {
     use super::*;
     use std::sync::mpsc;
+
+    #[test]
+    fn an_update_of_a_driver_leaves_the_identity_of_a_device() {
+        for (name, identity) in [
+            ("llvmpipe (LLVM 15.0.6, 256 bits)", "llvmpipe (256 bits)"),
+            ("llvmpipe (LLVM 20.1.2, 256 bits)", "llvmpipe (256 bits)"),
+            ("llvmpipe (LLVM 20.1.2, 512 bits)", "llvmpipe (512 bits)"),
+            ("AMD RADV NAVI10 (LLVM 11.0.0)", "AMD RADV NAVI10"),
+            ("AMD Radeon RX 7900 XTX (RADV NAVI31)", "AMD Radeon RX 7900 XTX (RADV NAVI31)"),
+            ("NVIDIA H200", "NVIDIA H200"),
+        ] {
+            assert_eq!(Device { name: name.into(), ..Device::unknown() }.identity(), identity, "{name}");
+        }
+    }
 
     #[test]
     fn cpu_time_is_attributed_to_the_thread_that_used_it() {

@@ -1,5 +1,6 @@
 //! Runs a single pass on given inputs: tests compare it with its CPU reference, benchmarks time it.
 
+use super::bands::BandLimit;
 use super::buffers::{Readback, Upload};
 use super::command_recorder::{BarrierRecorder, CommandRecorder, Dispatch, SlotParts};
 use super::context::Context;
@@ -73,6 +74,23 @@ impl PassRunner {
         inputs: &Arrays,
         poison: f64,
     ) -> Result<Arrays, GpuError> {
+        self.run_within(scene, pass, args, inputs, poison, u64::MAX)
+    }
+
+    /// As [`PassRunner::run`], in bands of at most `most` invocations, but at least one row of workgroups. A dispatch whose workgroups a
+    /// pass counts is not divided.
+    ///
+    /// # Errors
+    /// As of [`PassRunner::run`].
+    pub fn run_within(
+        &mut self,
+        scene: &Scene,
+        pass: &'static Pass,
+        args: &DispatchArgs,
+        inputs: &Arrays,
+        poison: f64,
+        most: u64,
+    ) -> Result<Arrays, GpuError> {
         let scene = &self.adapted(scene);
         let (reads, writes) = (pass.reads(scene, args), pass.writes(scene, args));
         let plan = Plan { steps: Vec::new(), slots: reads.iter().chain(&writes).map(|b| b.slot).collect() };
@@ -112,7 +130,8 @@ impl PassRunner {
             recorder.upload(&mut barriers, &upload, image, SlotParts { slot: bind.slot, copy, parts });
             keep.push(upload);
         }
-        recorder.dispatch(&mut barriers, &Dispatch { slots: &slots, pipeline: &pipeline, scene, pass, args })?;
+        let dispatch = Dispatch { slots: &slots, pipeline: &pipeline, scene, pass, args };
+        recorder.dispatch_in_bands(&mut barriers, &mut timelines, &dispatch, &BandLimit::Invocations(most))?;
         let mut results = Vec::new();
         for bind in &writes {
             let Some(image) = slots.image(bind.slot, args.image) else { continue };

@@ -3,10 +3,12 @@
 
 use super::bands::InvocationTime;
 use super::buffers::has_texels;
+use super::calls;
 use super::context::Context;
 use super::error::{ErrorContext, GpuError};
 use super::formats::{self, TexelAccess};
 use super::recently_used::RecentlyUsed;
+use crate::passes::fault_injection::Command;
 use crate::passes::slots::{Format, Shape};
 use crate::passes::{DispatchArgs, Pass, Slot, interface_check};
 use crate::plan::Plan;
@@ -389,7 +391,10 @@ impl Pipeline {
             .context(operation)?;
         context.name(shader, name);
         // A module that is specialized already gets none: a layer would specialize and validate it again for each pipeline.
-        let values = if context.specializes { Vec::new() } else { by_id(&pipeline.module, &constants) };
+        let mut values = if context.specializes { Vec::new() } else { by_id(&pipeline.module, &constants) };
+        if !values.is_empty() && context.faults.breaks(Command::Specialize) {
+            values.clear();
+        }
         let entries: Vec<_> = values
             .iter()
             .enumerate()
@@ -410,6 +415,7 @@ impl Pipeline {
             .stage(stage)
             .layout(pipeline.layout)
             .push_next(&mut feedbacks);
+        calls::begins("vkCreateComputePipelines", name);
         let begun = Instant::now();
         // SAFETY: as above; the shader module is alive until after the call, and the cache is of this device.
         let made = unsafe { device.create_compute_pipelines(how.cache, &[create], None) };

@@ -162,6 +162,7 @@ impl Timeline {
         }
         let (semaphores, values) = ([self.semaphore], [value]);
         let wait = vk::SemaphoreWaitInfo::default().semaphores(&semaphores).values(&values);
+        super::calls::begins("vkWaitSemaphores", "");
         // SAFETY: the semaphore is alive; the arrays outlive the call.
         let attempt = |ns| unsafe { self.context.device.wait_semaphores(&wait, ns) };
         let done = self.context.watchdog.wait(&operation, || self.busy_since(), attempt);

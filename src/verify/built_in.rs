@@ -38,8 +38,15 @@ impl SceneSpec {
     }
 }
 
-/// Scenes that together need every pass, in every variant of the geometry.
-pub fn scenes() -> Vec<SceneSpec> {
+/// Scenes by name that together need every pass, in every variant of the geometry. `shared_memory`: that of the device, bytes.
+///
+/// # Errors
+/// One line: a scene is invalid.
+pub fn scenes(shared_memory: u32) -> Result<Vec<(String, Scene)>, String> {
+    specs(shared_memory).into_iter().map(|spec| Ok((spec.name.clone(), spec.build()?))).collect()
+}
+
+fn specs(shared_memory: u32) -> Vec<SceneSpec> {
     let planes = plane_scenes();
     // Planes that are rendered directly to 8 bits are also rendered via floats.
     let straight = planes.iter().filter(|spec| spec.build().is_ok_and(|scene| scene.tones_planes()));
@@ -52,15 +59,118 @@ pub fn scenes() -> Vec<SceneSpec> {
     let in_both_ways = rays.iter().filter(|spec| keys.iter().any(|key| spec.toml.contains(key)));
     let in_workgroups = in_both_ways.map(|spec| SceneSpec {
         name: format!("{}, in workgroups", spec.name),
-        shared_memory: LEAST_SHARED_MEMORY,
+        shared_memory,
         ..spec.clone()
     });
     let in_workgroups: Vec<SceneSpec> = in_workgroups.collect();
-    rays.into_iter().chain(in_workgroups).chain(planes).chain(in_floats).collect()
+    rays.into_iter().chain(in_workgroups).chain(planes).chain(in_floats).chain(wide_scenes()).collect()
 }
 
-/// Shared memory that every device has, bytes.
-const LEAST_SHARED_MEMORY: u32 = 16 << 10;
+/// Scenes whose dispatches have more than eight workgroups along an axis, as those of real pictures have, and few along the others.
+fn wide_scenes() -> Vec<SceneSpec> {
+    let mut scenes = Vec::new();
+    for size in [[80, 5, 31], [5, 80, 31]] {
+        for filters in [
+            "median = true",
+            "estimator = 'median'",
+            "sigma = { window = 5, sigma = 0.083 }",
+            "enhanced_sigma = { window = 3, largest = 5, sigma = 0.083, growth = true }",
+            "enhanced_sigma = { window = 3, largest = 5, sigma = 0.083 }",
+            "perona_malik = { repeat = 1 }",
+            "perona_malik = { scheme = 'rkl1', step = 2.0, repeat = 1 }",
+            "perona_malik = { scheme = 'aos', step = 2.0, repeat = 1 }",
+            "perona_malik = { scheme = 'aos-richardson', step = 2.0, repeat = 1 }",
+            "smooth = { lateral = 0.8, depth = 0.8, elevation = 0.8 }",
+        ] {
+            let toml = format!(
+                "mode = 'vr'\npicture = {{ size = [9, 7] }}\nslices = {{ format = 'r32f', {filters} }}\nray.sampling = 'exact'\nplanes.smooth = {{}}"
+            );
+            scenes.push(SceneSpec::new(
+                &format!("Cartesian of {size:?} voxels, {filters}"),
+                &cartesian(size),
+                BYTES,
+                toml,
+            ));
+        }
+    }
+    for size in [[160, 5, 31], [5, 160, 31]] {
+        for (name, rest) in [
+            ("small bricks", "mode = 'vr'\nray.brick = 4"),
+            ("small bricks of a surface", "mode = 'sr'\nray.brick = 4"),
+            ("small bricks of a still", "mode = 'vr'\nstill = { samples = 1, events = 4 }\nray.brick = 4"),
+            ("planes of all samples", "mode = 'vr'\nlayout = 'four'\nplanes.smooth = {}"),
+        ] {
+            let toml = format!("{rest}\nray.sampling = 'exact'\npicture.size = [9, 7]");
+            scenes.push(SceneSpec::new(
+                &format!("Cartesian of {size:?} voxels, {name}"),
+                &cartesian(size),
+                BYTES,
+                toml,
+            ));
+        }
+    }
+    let sweep =
+        Geometry::Sweep(Probe { lines: Axis::centred(0.02, 70), slices: Axis::centred(0.012, 31), ..wobbler() });
+    for (name, rest) in [
+        ("cuts", TWO_CUTS),
+        ("parts that float", "mode = 'vr'\nfloating = 30\nlight = { volume = { cell = 1.2, back = 0.5 } }"),
+        (
+            "planes of all samples",
+            "mode = 'vr'\nlayout = 'four'\nplanes.smooth = { lateral = 1.5, depth = 1, elevation = 1.2 }",
+        ),
+        ("conditioning", "mode = 'mip'\nconditioning = { samples = 17, low_pass = 1.3, dynamic_range = 20 }"),
+        ("packed neighbours", "mode = 'mip'\nray.sampling = 'quads'"),
+    ] {
+        let sampling = if rest.contains("quads") { "" } else { "ray.sampling = 'exact'\n" };
+        let toml = format!("{rest}\n{sampling}picture.size = [9, 7]\nslices.pixels = 75");
+        scenes.push(SceneSpec::new(&format!("fan of 31 slices, {name}"), &sweep, BYTES, toml));
+    }
+    let small = Geometry::Sweep(wobbler());
+    let others = [
+        ("planes", "mode = 'orthogonal'\nray.sampling = 'exact'"),
+        ("two rays at edges", "mode = 'vr'\nray = { rays = 2, adaptive = true, sampling = 'exact' }"),
+        ("steps by their error", "mode = 'vr'\nray = { tolerance = 0.5, step = 2, sampling = 'exact' }"),
+        ("still", "mode = 'vr'\nstill = { samples = 1, events = 4 }\nray.sampling = 'exact'"),
+        (
+            "cap",
+            "mode = 'sr'\ncap = { level = 0.5 }\nclip = [{ at = [0, 25, 0], normal = [0.3, -1, 0.2] }]\nray.sampling = 'exact'",
+        ),
+        ("in floats", "mode = 'plane'\npost = { floats = true }\nray.sampling = 'exact'"),
+        (
+            "diffusion",
+            "mode = 'vr'\nray.sampling = 'exact'\ndistance = { perona_malik = { repeat = 1 } }\npost = { perona_malik = { repeat = 1 } }",
+        ),
+        (
+            "enhanced sigmas",
+            "mode = 'sr'\nray.sampling = 'exact'\ndistance = { enhanced_sigma = { window = 3, largest = 5, sigma = 0.3 } }\n\
+             post = { enhanced_sigma = { window = 3, largest = 5, sigma = 0.1 } }",
+        ),
+        (
+            "AOS",
+            "mode = 'vr'\nray.sampling = 'exact'\npost = { perona_malik = { scheme = 'aos', step = 5.0, repeat = 1 } }",
+        ),
+        ("diffused distances", "mode = 'sr'\nray.sampling = 'exact'\ndistance = { perona_malik = { repeat = 1 } }"),
+    ];
+    for size in ["[79, 9]", "[9, 79]"] {
+        let wide = ALL_FILTERS.replace("[37, 29]", size);
+        for (name, toml) in MODES {
+            scenes.push(SceneSpec::new(
+                &format!("picture of {size}, {name}"),
+                &small,
+                BYTES,
+                format!("{toml}\n{wide}"),
+            ));
+        }
+        for (name, toml) in others {
+            let toml = format!("{toml}\npicture.size = {size}\nslices.pixels = 24");
+            scenes.push(SceneSpec::new(&format!("picture of {size}, {name}"), &small, BYTES, toml));
+        }
+    }
+    scenes
+}
+
+/// Shared memory with which every pass has the shader that it has on a GPU, bytes.
+pub const SHARED_MEMORY: u32 = 32 << 10;
 
 /// Edge of a brick where a scene states none, texels.
 const BRICK: u32 = 8;

@@ -13,6 +13,7 @@ pub use crate::passes::{Arrays, Bind, DispatchArgs, Frequency, MISS, PASSES, Par
 use crate::plan::Plan;
 use crate::report::{Fault, Figure, Level, Unit};
 use crate::scene::Scene;
+use crate::spirv;
 use std::collections::HashSet;
 use std::hash::{DefaultHasher, Hash, Hasher};
 
@@ -21,6 +22,9 @@ pub const POISON: f64 = 0.654_321;
 
 /// Maximum mean signed error of a dispatch, as a share of the allowed error of a texel. Rounding errors have both signs.
 const MAX_BIAS: f64 = 0.1;
+
+/// Bands into which a dispatch is divided, where it has as many rows of workgroups.
+const BANDS: u64 = 3;
 
 /// Maximum number of faults of one pass that are listed.
 const MAX_FAULTS: usize = 8;
@@ -73,7 +77,10 @@ pub(super) fn seed_of(pass: &Pass, kind: usize) -> u64 {
     hashed ^ kind as u64
 }
 
-type Variant = (&'static str, Vec<(&'static str, i32)>, Vec<Format>);
+pub(super) type Variant = (&'static str, Vec<(&'static str, i32)>, Vec<Format>, [bool; 3]);
+
+/// Invocations along each axis in eight workgroups of most shaders.
+const EIGHT_WORKGROUPS: [u32; 3] = [64, 64, 8];
 
 /// What distinguishes a dispatch on inputs of one kind: two that are equal here give the same results, because the device is given nothing else.
 fn dispatch_key(scene: &Scene, pass: &Pass) -> u64 {
@@ -92,11 +99,20 @@ fn dispatch_key(scene: &Scene, pass: &Pass) -> u64 {
     hasher.finish()
 }
 
-/// What distinguishes a pipeline: its shader, its constants, and the formats of its bindings.
-fn variant(scene: &Scene, pass: &Pass) -> Variant {
+/// True if the shader of a pass has invocations of a subgroup vote.
+fn votes(scene: &Scene, pass: &Pass) -> bool {
+    let name = pass.shader(scene, &dispatch_args_of(scene, pass, 0));
+    spirv::embedded(name).is_some_and(|bytes| spirv::has_votes(&spirv::words(bytes)))
+}
+
+/// What distinguishes a pipeline: its shader, its constants, and the formats of its bindings; and along which axes a dispatch has more than
+/// eight workgroups.
+pub(super) fn variant(scene: &Scene, pass: &Pass) -> Variant {
     let args = dispatch_args_of(scene, pass, 0);
     let bound = pass.reads(scene, &args).into_iter().chain(pass.writes(scene, &args));
-    (pass.shader(scene, &args), pass.constants(scene, &args), bound.map(|b| b.slot.format(scene)).collect())
+    let extent = pass.invocations(scene, &args);
+    let is_wide = std::array::from_fn(|axis| extent[axis] > EIGHT_WORKGROUPS[axis]);
+    (pass.shader(scene, &args), pass.constants(scene, &args), bound.map(|b| b.slot.format(scene)).collect(), is_wide)
 }
 
 fn check(dut: &mut DeviceUnderTest, pass: &'static Pass) -> Result<Findings, GpuError> {
@@ -143,14 +159,43 @@ impl PassSummary {
         let (scenes, level) = (dut.scenes(), dut.level);
         let (name, scene) = &scenes[s];
         for (k, kind) in KINDS.iter().enumerate() {
-            // Always noise; at the quick level only one of the extremes, alternating.
-            if k > 0 && (!is_new || level == Level::Quick && 1 + s % (KINDS.len() - 1) != k) {
+            // Always noise; at the quick level only one of the extremes, alternating, and what votes decide on.
+            let is_decided = *kind == SPLIT && is_new && votes(scene, pass);
+            if k > 0 && !is_decided && (!is_new || level == Level::Quick && 1 + s % (KINDS.len() - 1) != k) {
                 continue;
             }
             for iteration in 0..(pass.repeat)(scene) {
                 let result = run_with_reference(dut.pass_runner(), scene, pass, iteration, kind, seed_of(pass, k))?;
                 self.record(pass, name, iteration, kind, &result);
+                if is_new && (k, iteration) == (0, 0) {
+                    self.divide(dut.pass_runner(), (name, scene), pass, &result)?;
+                }
             }
+        }
+        Ok(())
+    }
+
+    /// Runs the first dispatch of a scene once more in bands, and compares it with the undivided one bit for bit: an invocation works alone,
+    /// whatever workgroup the dispatch begins with.
+    fn divide(
+        &mut self,
+        runner: &mut PassRunner,
+        (name, scene): (&str, &Scene),
+        pass: &'static Pass,
+        whole: &DispatchComparison,
+    ) -> Result<(), GpuError> {
+        let args = dispatch_args_of(scene, pass, 0);
+        let invocations: u64 = (pass.extent)(&runner.adapted(scene), &args).iter().map(|n| u64::from(*n)).product();
+        let got = runner.run_within(scene, pass, &args, &whole.inputs, POISON, invocations.div_ceil(BANDS))?;
+        for bind in &whole.writes {
+            let pairs = whole.got.get(bind.name).values.iter().zip(&got.get(bind.name).values);
+            let apart = pairs.filter(|(a, b)| a.to_bits() != b.to_bits()).count();
+            self.findings.expect(apart == 0, || {
+                format!(
+                    "{}: {apart} values of {} differ if the dispatch is divided into bands, '{name}'",
+                    pass.name, bind.name
+                )
+            });
         }
         Ok(())
     }
@@ -188,7 +233,7 @@ impl PassSummary {
         });
     }
 
-    fn into_findings(self, pass: &Pass) -> Findings {
+    pub(super) fn into_findings(self, pass: &Pass) -> Findings {
         let PassSummary { mut findings, runs, failed, largest, used, outliers, bias } = self;
         findings.expect(runs > 0, || format!("no scene needs '{}'", pass.name));
         findings.expect(failed <= MAX_FAULTS, || format!("{} more inputs beyond tolerance", failed - MAX_FAULTS));
@@ -208,9 +253,13 @@ impl PassSummary {
     }
 }
 
-/// Kinds of inputs: noise, all zero, all one, a single bright texel. Noise of distances is a smooth surface with cliffs and misses, of
+/// Kinds of inputs: noise, all zero, all one, a single bright texel, noise beside nothing. Noise of distances is a smooth surface with cliffs and misses, of
 /// volumes blurred, so that it resembles tissue.
-pub const KINDS: [&str; 4] = ["noise", "zero", "one", "hot"];
+pub const KINDS: [&str; 5] = ["noise", "zero", "one", "hot", SPLIT];
+
+/// Noise to one side of a column, and nothing to the other, so that some invocations of a subgroup are done before the others: only then do its
+/// votes decide anything.
+const SPLIT: &str = "split";
 
 /// `slices`: those of the dispatch.
 fn input(scene: &Scene, bind: &Bind, slices: u32, kind: &str, noise: &mut Noise) -> Texels {
@@ -231,6 +280,12 @@ fn input(scene: &Scene, bind: &Bind, slices: u32, kind: &str, noise: &mut Noise)
     let one = if matches!(bind.slot.shape(scene), Shape::Layers(_)) { count / size[2] } else { count };
     for i in 0..count {
         let (x, y) = ((i / format.channels() % size[0]) as f64, (i / format.channels() / size[0]) as f64);
+        // No multiple of a subgroup's width.
+        let kind = match kind {
+            SPLIT if x < (size[0] / 2 + 3) as f64 => "noise",
+            SPLIT => "zero",
+            _ => kind,
+        };
         texels.values[i] = match (kind, is_distance) {
             ("noise", true) => match noise.next() {
                 share if share < 0.1 => MISS,
@@ -270,7 +325,9 @@ fn input(scene: &Scene, bind: &Bind, slices: u32, kind: &str, noise: &mut Noise)
     if bind.slot == Slot::Surface || bind.slot == Slot::Cap {
         texels.values.chunks_exact_mut(2).for_each(|p| p[1] = p[1].round());
     }
-    if [Slot::Volume, Slot::of_rays(scene), Slot::of_planes(scene)].contains(&bind.slot) && kind == "noise" {
+    if [Slot::Volume, Slot::of_rays(scene), Slot::of_planes(scene)].contains(&bind.slot)
+        && (kind == "noise" || kind == SPLIT)
+    {
         texels = blurred(&texels);
     }
     // Both the device and the reference get values that the format can store.

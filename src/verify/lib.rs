@@ -10,6 +10,7 @@
 
 pub mod built_in;
 mod compare;
+pub mod coverage;
 pub mod determinism;
 pub mod each_pass;
 pub mod failures;
@@ -26,6 +27,7 @@ pub mod report;
 pub mod reproduce;
 pub mod sampling;
 pub mod self_test;
+mod specialization;
 mod speed;
 pub mod stress;
 pub mod time_stamps;
@@ -45,6 +47,7 @@ use crate::scene::Scene;
 use baselines::Stored;
 use render::Drawn;
 use report::{CheckName, Fault, Figure, Level, Outcome, PictureComparison, Run, Verdict};
+use std::cell::RefCell;
 use std::path::PathBuf;
 use std::rc::Rc;
 use std::sync::Arc;
@@ -54,6 +57,7 @@ use std::time::Instant;
 pub fn checks(level: Level) -> Vec<Check> {
     let groups = [
         each_pass::checks,
+        specialization::checks,
         sampling::checks,
         known_answers::checks,
         modes::checks,
@@ -121,6 +125,13 @@ pub fn run_on(device: machine::Device, validation: bool, level: Level, outcomes:
     }
 }
 
+/// The run of a device that could not be started: one failed check, which says why.
+pub fn unstarted(level: Level, why: String, begun: Instant) -> Run {
+    let check = CheckName { group: report::START.into(), name: "start of the device".into() };
+    let outcome = Outcome { seconds: begun.elapsed().as_secs_f64(), ..Outcome::unrun(&check, Verdict::Failed, why) };
+    run_on(machine::Device::unknown(), false, level, vec![outcome], begun)
+}
+
 /// What a check measured and detected.
 #[derive(Default)]
 pub struct Findings {
@@ -174,8 +185,30 @@ impl Check {
         Check { group, name: name.into(), work: Box::new(work) }
     }
 
-    /// Runs the check. An error of the device is a fault; after a lost device the next check gets a new context.
+    /// Runs the check, and if it fails, as [`Outcome::explained`] says. An error of the device is a fault; after a lost device the next check gets
+    /// a new context.
     pub fn run(&self, dut: &mut DeviceUnderTest) -> Outcome {
+        let first = self.run_once(dut);
+        if first.verdict != Verdict::Failed {
+            return first;
+        }
+        let dut = RefCell::new(dut);
+        first.explained(|| self.run_once(&mut dut.borrow_mut()), || self.run_waiting(&mut dut.borrow_mut()))
+    }
+
+    /// Runs the check once while the host waits for each submission before the next.
+    pub(crate) fn run_waiting(&self, dut: &mut DeviceUnderTest) -> Outcome {
+        let renew = |dut: &mut DeviceUnderTest, waits| {
+            dut.waits = waits;
+            dut.renew().unwrap_or_else(|error| tracing::warn!("the old device goes on: {error}"));
+        };
+        renew(dut, true);
+        let outcome = self.run_once(dut);
+        renew(dut, false);
+        outcome
+    }
+
+    fn run_once(&self, dut: &mut DeviceUnderTest) -> Outcome {
         let begun = Instant::now();
         let mut findings = self.findings(dut).unwrap_or_else(|error| {
             let mut findings = Findings::default();
@@ -231,6 +264,7 @@ impl Check {
             figures: findings.figures,
             faults: findings.faults,
             notes: findings.notes,
+            failed_before: 0,
             pictures: findings.pictures,
         }
     }
@@ -251,6 +285,8 @@ pub struct DeviceUnderTest {
     modes: Option<Rc<Vec<Drawn>>>,
     /// Fault injected into every new context.
     injected_fault: Option<Change>,
+    /// Every new context waits for each submission before the next.
+    waits: bool,
     /// Number of validation messages already reported.
     messages_read: usize,
     /// The validation layer is active but does not notice a missing barrier.
@@ -276,9 +312,8 @@ impl DeviceUnderTest {
         let context = Context::new(options)?;
         prepare.iter().for_each(|prepare| prepare(&context));
         let pass_runner = PassRunner::new(&context)?;
-        let made = |spec: &built_in::SceneSpec| Ok((spec.name.clone(), spec.build()?));
-        let scenes: Result<Vec<_>, String> = built_in::scenes().iter().map(made).collect();
-        let scenes = Rc::new(scenes.map_err(GpuError::Broken)?);
+        let scenes = built_in::scenes(context.limits.max_compute_shared_memory_size).map_err(GpuError::Broken)?;
+        let scenes = Rc::new(scenes);
         Ok(DeviceUnderTest {
             context,
             level,
@@ -287,6 +322,7 @@ impl DeviceUnderTest {
             scenes,
             prepare,
             injected_fault: None,
+            waits: false,
             program: std::env::current_exe().ok(),
             modes: None,
             messages_read: 0,
@@ -341,7 +377,15 @@ impl DeviceUnderTest {
     /// # Errors
     /// As [`DeviceUnderTest::new`].
     pub fn another(&self) -> Result<Arc<Context>, GpuError> {
-        let context = Context::new(&self.options)?;
+        self.another_with(self.options.clone())
+    }
+
+    /// The same with other options.
+    fn another_with(&self, options: ContextOptions) -> Result<Arc<Context>, GpuError> {
+        let context = Context::new(&options)?;
+        if self.waits {
+            context.faults.wait_for_each_submission();
+        }
         self.injected_fault.iter().for_each(|change| context.faults.inject_change(*change));
         self.prepare.iter().for_each(|prepare| prepare(&context));
         Ok(context)

@@ -1,21 +1,24 @@
 //! Group "memory": nothing reads memory that was not written. New memory is filled with poison values that no pass computes; pictures and
 //! slots must stay the same, and some pass must write every texel of every slot.
 
-use super::compare::{add_picture_counts, expect_same_picture, texel_comparison};
+use super::compare::{add_picture_counts, count_figure, expect_same_picture, texel_comparison};
 use super::{Check, DeviceUnderTest, Findings, IsolatedContext, render};
 use crate::gpu::faults::Poison;
-use crate::gpu::{Context, GpuError, RendererOptions};
+use crate::gpu::{Context, GpuError, Renderer, RendererOptions};
 use crate::passes::slots::{Initializer, Shape};
 use crate::passes::{Slot, Texels};
 use crate::picture::Picture;
+use crate::plan::Plan;
 use crate::report::{Fault, Figure, Level, PictureComparison, Unit, Worst};
 use crate::scene::Scene;
+use std::collections::BTreeSet;
 use std::sync::Arc;
 
 pub fn checks(_: Level) -> Vec<Check> {
     vec![
         Check::new("memory", "every mode on poisoned memory", modes),
         Check::new("memory", "every variant on poisoned memory", variants),
+        Check::new("memory", "slots that start at zero", zeros),
     ]
 }
 
@@ -169,5 +172,29 @@ fn variants(dut: &mut DeviceUnderTest) -> Result<Findings, GpuError> {
     }
     isolated.report_validation(&mut findings);
     add_totals(&mut findings, &totals);
+    Ok(findings)
+}
+
+/// Slots that are read before a pass has written all of them hold zeros in a new renderer.
+fn zeros(dut: &mut DeviceUnderTest) -> Result<Findings, GpuError> {
+    let (mut findings, scenes) = (Findings::default(), dut.scenes());
+    let isolated = IsolatedContext::of_changes(dut)?;
+    let mut seen = BTreeSet::new();
+    for (name, scene) in scenes.iter() {
+        let slots = Plan::new(scene).slots;
+        let new: Vec<Slot> = slots.into_iter().filter(|slot| slot.starts_clear() && seen.insert(*slot)).collect();
+        if new.is_empty() {
+            continue;
+        }
+        let mut renderer = Renderer::new(&isolated.context, scene.clone(), &RendererOptions::default())?;
+        for slot in new {
+            let texels = renderer.read(slot)?;
+            let values = texels.iter().flat_map(|texels| &texels.values);
+            let wrong = values.filter(|value| **value != 0.0).count();
+            findings.expect(wrong == 0, || format!("'{name}': {wrong} values of '{}' are not 0 at first", slot.name()));
+        }
+    }
+    isolated.report_validation(&mut findings);
+    findings.figures.push(count_figure("slots that start at zero", seen.len()));
     Ok(findings)
 }

@@ -73,6 +73,50 @@ fn a_check_that_crashes_or_hangs_is_one_failed_case_and_the_rest_goes_on() {
     }
 }
 
+/// A check that passes when it is run again does not fail the run, but is counted; one that passes only while the host waits for each submission is
+/// told from others.
+#[test]
+fn flakes_and_missing_synchronization_are_told_from_other_failures() {
+    let folder = Folder::new("verify-flake");
+    let named = |kind: &str| format!("{kind}:known answers / every level of a picture");
+    for isolated in ["--isolate", "--no-isolate"] {
+        let junit = folder.path("flake.xml");
+        let flags = [isolated, "--inject-crash", &named("flake"), "--junit", &junit];
+        let (code, said, run) = ran(&folder, "flake.json", &flags);
+        assert_eq!(code, Some(0), "{said}");
+        assert!(said.contains(" (flaky: 1), failed 0"), "{said}");
+        let flaky: Vec<_> = run.outcomes.iter().filter(|o| o.failed_before > 0).collect();
+        assert_eq!(flaky.len(), 1);
+        assert_eq!((flaky[0].failed_before, &flaky[0].notes[0][..]), (1, "flaky: it failed 1 of 2 times: injected"));
+        assert!(fs::read_to_string(&junit).expect("written").contains("<flakyFailure"));
+
+        let flags = [isolated, "--inject-crash", &named("unsynchronized")];
+        let (code, said, run) = ran(&folder, "unsynchronized.json", &flags);
+        assert_eq!(code, Some(1), "{said}");
+        let failed: Vec<_> = run.failures().collect();
+        assert!(failed.len() == 1 && failed[0].notes.iter().any(|n| n.contains("synchronization")), "{failed:?}");
+    }
+}
+
+/// A driver that crashes or hangs before the first check is one failed check in every report, and names the call where one was begun.
+#[test]
+fn a_device_that_cannot_be_started_is_a_failed_check() {
+    let folder = Folder::new("verify-start");
+    let junit = folder.path("start.xml");
+    let (code, said, run) =
+        ran(&folder, "start.json", &["--isolate", "--inject-crash", "segv:start", "--junit", &junit]);
+    assert_eq!(code, Some(1), "{said}");
+    assert_eq!(run.outcomes.len(), 1);
+    assert_eq!((run.outcomes[0].name.as_str(), run.outcomes[0].verdict), ("start of the device", Verdict::Failed));
+    let what = &run.outcomes[0].faults[0].what;
+    assert!(what.contains("signal 11 (SIGSEGV)") && what.contains("before the first check"), "{what}");
+    assert_eq!(fs::read_to_string(&junit).expect("written").matches("<failure").count(), 1);
+    let (code, said, _) = ran(&folder, "bisect.json", &["--bisect", "--inject-crash", "segv:start"]);
+    assert_eq!(code, Some(125), "{said}");
+    let without = finish(without_device(std::process::Command::new(PROGRAM).args(["verify", "--bisect"])));
+    refuses(&["no driver"], &without, 125, &["no Vulkan device"]);
+}
+
 /// It is the isolation that saves the rest.
 #[test]
 fn a_crash_in_the_same_process_ends_the_run() {

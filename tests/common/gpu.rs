@@ -146,7 +146,7 @@ pub fn same_slot(device: &Device, a: &Option<Texels>, b: &Option<Texels>, tolera
 
 /// Scenes by name that together need every pass.
 pub fn scenes() -> Vec<(String, Scene)> {
-    built_in::scenes().iter().map(|asked| (asked.name.clone(), asked.build().expect("scene"))).collect()
+    built_in::scenes(built_in::SHARED_MEMORY).expect("scenes")
 }
 
 pub fn frame_format(scene: &Scene) -> Format {

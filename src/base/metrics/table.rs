@@ -44,6 +44,8 @@ metrics! {
     VERIFY_INFO: Gauge "echolume_verify_info" ["device", "driver", "vulkan", "program", "level", "validation"]
         "The device, its driver and the program, as labels; always 1.";
     VERIFY_CHECKS: Gauge "echolume_verify_checks" ["result"] "Number of checks of the last run by result.";
+    VERIFY_CHECKS_FLAKY: Gauge "echolume_verify_checks_flaky" []
+        "Number of checks that passed in the last run only when they were run again.";
     VERIFY_CHECK_FAILED: Gauge "echolume_verify_check_failed" ["group", "check"]
         "1 for each check that failed in the last run.";
     VERIFY_CHECKS_WORSE: Gauge "echolume_verify_checks_worse" []

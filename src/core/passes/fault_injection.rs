@@ -1,12 +1,14 @@
 //! Fault injection: deliberate faults that test whether the checks detect them. A fault changes what the device gets; the input of the
 //! f64 reference stays the same. Pure: the renderer applies the changes where it passes data to the device.
 
-use super::pass::{DispatchArgs, Params, Pass, Slot};
+use super::pass::{DispatchArgs, Params, Part, Pass, Slot};
 use super::slots::Initializer;
 use crate::scene::Scene;
-use crate::spirv::SpirvError;
+use crate::spirv::mutants::{self, Mutation};
+use crate::spirv::{self, SpirvError};
 
 /// A fault with its name.
+#[derive(Clone, Copy)]
 pub struct InjectedFault {
     pub name: &'static str,
     /// The real fault that it represents, in a driver or in this program.
@@ -35,6 +37,29 @@ pub enum Change {
     Frame(fn([usize; 3], &mut [u8])),
     /// The sampler takes the nearest texel.
     Nearest,
+    /// One instruction of a class in every shader that has one, which the compiler translates wrongly: at this share (0 to 1) of those there are.
+    Mutant(&'static Mutation, f32),
+    /// A command that the driver carries out wrongly.
+    Command(Command),
+}
+
+/// A Vulkan command, and what a faulty driver makes of it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Command {
+    /// `vkCmdDispatchBase` begins with the first workgroup.
+    DispatchBase,
+    /// `vkCmdDispatchIndirect` dispatches nothing.
+    DispatchIndirect,
+    /// `vkCmdCopyBufferToImage` copies the first layer or slice alone.
+    CopyToImage,
+    /// `vkCmdCopyImageToBuffer` copies nothing.
+    CopyToBuffer,
+    /// `vkCmdClearColorImage` clears to one.
+    Clear,
+    /// `vkCreateComputePipelines` leaves specialization constants at their defaults.
+    Specialize,
+    /// `vkInvalidateMappedMemoryRanges` does nothing.
+    Invalidate,
 }
 
 impl Change {
@@ -60,6 +85,14 @@ impl Change {
                 let other = by(words)?;
                 Ok(std::mem::replace(words, other) != *words)
             }
+            Change::Mutant(mutation, share) => match mutants::count(words, mutation) {
+                0 => Ok(false),
+                count => {
+                    let site = (share * count as f32) as usize;
+                    *words = mutants::mutant(words, mutation, site.min(count - 1))?;
+                    Ok(true)
+                }
+            },
             _ => Ok(false),
         }
     }
@@ -117,6 +150,16 @@ impl Change {
                     reads(*slot) && matches!(slot.initializer(), Initializer::ByScene(make) if made(make))
                 }
                 Change::Frame(_) => reads(Slot::Frames),
+                Change::Mutant(mutation, _) => {
+                    let shader = spirv::embedded(pass.shader(scene, &turns[0])).map(spirv::words);
+                    shader.is_some_and(|words| mutants::count(&words, mutation) > 0)
+                }
+                Change::Command(Command::DispatchIndirect) => {
+                    pass.reads(scene, &turns[0]).iter().any(|bind| bind.part == Part::Groups)
+                }
+                Change::Command(command) => {
+                    matches!(command, Command::DispatchBase | Command::CopyToImage | Command::CopyToBuffer)
+                }
                 Change::Nearest => pass.reads(scene, &turns[0]).iter().any(|b| b.filtered),
             }
     }

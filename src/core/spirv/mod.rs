@@ -2,9 +2,11 @@
 //! pipeline is made: for a scene (`strip_bindings`, `volumes_to_layers`), for a software device (`hoist_uniforms`, `texture_to_storage`,
 //! `storage_to_texel_buffer`), for a validation layer (`specialize`, `dead_code`), and for fault injection (`mutate`).
 
+mod classes;
 pub mod dead_code;
 pub(crate) mod hoist_uniforms;
 mod module;
+pub mod mutants;
 pub mod mutate;
 mod reflect;
 pub mod specialize;
@@ -13,5 +15,6 @@ pub(crate) mod strip_bindings;
 pub(crate) mod texture_to_storage;
 pub(crate) mod volumes_to_layers;
 
+pub use classes::{classes, has_votes};
 pub use module::{EMBEDDED, SOURCES, SpirvError, embedded, set_tool_version, words};
 pub use reflect::{Access, Binding, Constant, Dimension, Kind, Member, Module, reflect};

@@ -1,9 +1,11 @@
-//! Crashes on purpose: a check that ends its process as a faulty driver does, to show that the rest of a run goes on, and that a CI which
-//! reads the reports sees it.
+//! Crashes on purpose: a check that ends its process as a faulty driver does, or fails now and then, to show that the rest of a run goes on, and that
+//! a CI which reads the reports sees it.
 
 use crate::files::signals;
+use crate::report::Fault;
 use crate::{Check, Findings};
 use std::str::FromStr;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
 /// How a check crashes.
@@ -17,9 +19,14 @@ enum Kind {
     Hang,
     /// The driver ends the process.
     Exit,
+    /// It fails once, and passes from then on.
+    Flake,
+    /// It fails unless the host waits for each submission.
+    Unsynchronized,
 }
 
-/// A check that is to crash: `segv:GROUP / NAME`, or `abort`, `hang` and `exit` instead of `segv`.
+/// A check that is to crash: `segv:GROUP / NAME`, or `abort`, `hang`, `exit`, `flake` and `unsynchronized` instead of `segv`. With `start` instead of a
+/// check the process crashes before it opens the device.
 #[derive(Clone, Debug)]
 pub struct InjectedCrash {
     kind: Kind,
@@ -38,7 +45,9 @@ impl FromStr for InjectedCrash {
             "abort" => Kind::Abort,
             "hang" => Kind::Hang,
             "exit" => Kind::Exit,
-            _ => return Err(format!("'{kind}' is none of segv, abort, hang, exit")),
+            "flake" => Kind::Flake,
+            "unsynchronized" => Kind::Unsynchronized,
+            _ => return Err(format!("'{kind}' is none of segv, abort, hang, exit, flake, unsynchronized")),
         };
         Ok(InjectedCrash { kind, check: check.trim().into(), text: text.into() })
     }
@@ -50,18 +59,37 @@ impl InjectedCrash {
         &self.text
     }
 
+    /// Crashes, if that is to happen before the device is opened.
+    pub fn at_start(&self) {
+        if self.check == START {
+            crash(self.kind);
+        }
+    }
+
     /// Replaces the work of the check with the crash. Returns whether there is such a check.
     pub fn inject(&self, checks: &mut [Check]) -> bool {
+        if self.check == START {
+            return true;
+        }
         let is_named = |check: &&mut Check| format!("{} / {}", check.group, check.name) == self.check;
         let Some(check) = checks.iter_mut().find(is_named) else { return false };
-        let kind = self.kind;
-        *check = Check::new(check.group, check.name.clone(), move |_| {
+        let (kind, has_failed) = (self.kind, AtomicBool::new(false));
+        *check = Check::new(check.group, check.name.clone(), move |dut| {
             crash(kind);
-            Ok(Findings::default())
+            let fails = match kind {
+                Kind::Flake => !has_failed.swap(true, Ordering::Relaxed),
+                Kind::Unsynchronized => !dut.waits,
+                _ => false,
+            };
+            let faults = if fails { vec![Fault::new("injected".to_string())] } else { Vec::new() };
+            Ok(Findings { faults, ..Findings::default() })
         });
         true
     }
 }
+
+/// In place of a check.
+const START: &str = "start";
 
 fn crash(kind: Kind) {
     match kind {
@@ -71,5 +99,6 @@ fn crash(kind: Kind) {
         Kind::Hang => loop {
             std::thread::sleep(Duration::from_secs(1));
         },
+        Kind::Flake | Kind::Unsynchronized => {}
     }
 }

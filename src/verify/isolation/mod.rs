@@ -5,12 +5,13 @@ mod injection;
 mod worker;
 
 pub use injection::InjectedCrash;
-pub use worker::{Ready, refuse, serve};
+pub use worker::{Ready, refuse, serve, tell_calls};
 
 use crate::files::signals;
 use crate::report::{CheckName, Outcome, Verdict};
 use crate::terminal::Failure;
 use crate::text::single_line;
+use std::cell::RefCell;
 use std::collections::VecDeque;
 use std::io::{BufRead, BufReader, Read, Write};
 use std::process::{Child, ChildStdin, Command, ExitStatus, Stdio};
@@ -18,10 +19,12 @@ use std::sync::mpsc::{self, Receiver, RecvTimeoutError};
 use std::sync::{Arc, Mutex};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
-use worker::Message;
+use worker::{Message, Request};
 
-/// Time limit of the start of a worker: it opens the device and proves that validation sees something.
+/// The longest time limit of the start of a worker.
 const START: Duration = Duration::from_secs(600);
+/// The shortest: it does more than most checks.
+const LEAST_START: Duration = Duration::from_secs(60);
 /// How often a wait looks for signals.
 const OFTEN: Duration = Duration::from_millis(50);
 /// How long a worker that is not needed any more may take to end.
@@ -66,10 +69,15 @@ impl<'a> Workers<'a> {
         Ok((workers, ready))
     }
 
+    /// Time limit of the start of a worker: it opens the device and proves that validation sees something.
+    fn start_limit(&self) -> Duration {
+        self.limit.clamp(LEAST_START, START)
+    }
+
     fn renew(&mut self) -> Result<Ready, Failure> {
         let failed = |why: String| Failure::Failed(format!("the process that runs the checks {why}"));
         let mut worker = Worker::spawn(&mut (self.command)(), &self.echo).map_err(failed)?;
-        match worker.receive(START, self.signal) {
+        match worker.receive(self.start_limit(), self.signal) {
             Ok(Message::Ready(ready)) => {
                 self.current = Some(worker);
                 Ok(*ready)
@@ -77,57 +85,76 @@ impl<'a> Workers<'a> {
             Ok(Message::Refused { code: 2, message }) => Err(Failure::Input(message)),
             Ok(Message::Refused { code: 3, message }) => Err(Failure::NoDevice(message)),
             Ok(Message::Refused { message, .. }) => Err(Failure::Failed(message)),
-            Ok(Message::Done(_)) => Err(failed("answered before it was asked".into())),
+            Ok(Message::Done(_) | Message::Calls(..)) => Err(failed("answered before it was asked".into())),
             Err(Ended::BySignal(signal)) => Err(Failure::Interrupted(format!("{signal} ended the run"))),
-            Err(Ended::Late) => Err(failed(format!("had no device after {} s", START.as_secs()))),
-            Err(Ended::Itself { how, .. }) => Err(failed(format!("{how} before the first check"))),
+            Err(Ended::Late) => {
+                Err(failed(format!("had no device after {} s{}", self.start_limit().as_secs(), worker.in_call())))
+            }
+            Err(Ended::Itself { how, .. }) => Err(failed(format!("{how}{} before the first check", worker.in_call()))),
         }
     }
 
     /// Runs the check at this place of [`Ready::checks`].
     pub fn run(&mut self, place: usize, name: &CheckName) -> Outcome {
+        let (first, has_crashed) = self.attempt(Request { place, waits: false }, name);
+        // What failed without a crash the worker has run again itself.
+        if !has_crashed {
+            return first;
+        }
+        let workers = RefCell::new(self);
+        let run = |waits| workers.borrow_mut().attempt(Request { place, waits }, name).0;
+        first.explained(|| run(false), || run(true))
+    }
+
+    /// The outcome of one run, and whether its process crashed.
+    fn attempt(&mut self, request: Request, name: &CheckName) -> (Outcome, bool) {
         let begun = Instant::now();
         let failed = |why: String| Outcome::unrun(name, Verdict::Failed, why);
         if self.current.is_none() {
             if self.failed_starts >= MAX_STARTS {
-                return failed(format!("not run: {MAX_STARTS} processes in a row had no device"));
+                return (failed(format!("not run: {MAX_STARTS} processes in a row had no device")), false);
             }
             match self.renew() {
                 Ok(_) => self.failed_starts = 0,
                 Err(Failure::Interrupted(why)) => {
-                    return Outcome::unrun(name, Verdict::Interrupted, format!("not run: {why}"));
+                    return (Outcome::unrun(name, Verdict::Interrupted, format!("not run: {why}")), false);
                 }
                 Err(why) => {
                     self.failed_starts += 1;
-                    return failed(format!("not run: {}", why.message()));
+                    return (failed(format!("not run: {}", why.message())), false);
                 }
             }
         }
-        let Some(mut worker) = self.current.take() else { return failed("not run: there is no process".into()) };
-        let reply = worker.ask(place).and_then(|()| worker.receive(self.limit, self.signal));
+        let Some(mut worker) = self.current.take() else {
+            return (failed("not run: there is no process".into()), false);
+        };
+        let reply = worker.ask(&request).and_then(|()| worker.receive(self.limit, self.signal));
+        let mut has_crashed = false;
         let outcome = match reply {
             Ok(Message::Done(done)) => {
                 self.current = Some(worker);
-                return done.received();
+                return (done.received(), false);
             }
             Ok(_) => failed("the process that ran it answered something else".into()),
             Err(Ended::BySignal(signal)) => {
                 Outcome::unrun(name, Verdict::Interrupted, format!("not to its end: {signal}"))
             }
             Err(Ended::Late) => {
-                failed(format!("did not end within {} s; its process was killed", self.limit.as_secs()))
+                let call = worker.in_call();
+                failed(format!("did not end within {} s{call}; its process was killed", self.limit.as_secs()))
             }
             // Whoever ends all processes of a service ends the worker, too.
             Err(Ended::Itself { by: Some(signal @ ("SIGINT" | "SIGTERM" | "SIGHUP")), .. }) => {
                 Outcome::unrun(name, Verdict::Interrupted, format!("its process was ended by {signal}"))
             }
             Err(Ended::Itself { how, said, .. }) => {
-                let mut outcome = failed(format!("its process {how}"));
+                has_crashed = true;
+                let mut outcome = failed(format!("its process {how}{}", worker.in_call()));
                 outcome.notes.extend(said.iter().map(|line| format!("it said: {line}")));
                 outcome
             }
         };
-        Outcome { seconds: begun.elapsed().as_secs_f64(), ..outcome }
+        (Outcome { seconds: begun.elapsed().as_secs_f64(), ..outcome }, has_crashed)
     }
 }
 
@@ -150,6 +177,8 @@ enum Ended {
 struct Worker {
     child: Child,
     requests: Option<ChildStdin>,
+    /// The last Vulkan call that began.
+    call: Option<String>,
     replies: Receiver<Message>,
     said: Arc<Mutex<VecDeque<String>>>,
     readers: Vec<JoinHandle<()>>,
@@ -189,12 +218,18 @@ impl Worker {
             })
         }));
         readers.extend(child.stderr.take().map(|err| read_lines(err, of_stderr)));
-        Ok(Worker { requests: child.stdin.take(), child, replies, said, readers })
+        Ok(Worker { requests: child.stdin.take(), call: None, child, replies, said, readers })
     }
 
-    fn ask(&mut self, place: usize) -> Result<(), Ended> {
+    /// The last call that began, to end a sentence with.
+    fn in_call(&self) -> String {
+        self.call.as_ref().map_or_else(String::new, |call| format!(" in {call}"))
+    }
+
+    fn ask(&mut self, request: &Request) -> Result<(), Ended> {
+        self.call = None;
         let requests = self.requests.as_mut();
-        match requests.map(|to| writeln!(to, "{place}").and_then(|()| to.flush())) {
+        match requests.map(|to| writeln!(to, "{}", request.line()).and_then(|()| to.flush())) {
             Some(Ok(())) => Ok(()),
             _ => Err(self.ended()),
         }
@@ -204,7 +239,10 @@ impl Worker {
         let begun = Instant::now();
         loop {
             match self.replies.recv_timeout(OFTEN) {
-                Ok(message) => return Ok(message),
+                Ok(message) => match message.call() {
+                    Some(call) => self.call = Some(call),
+                    None => return Ok(message),
+                },
                 Err(RecvTimeoutError::Disconnected) => {
                     return Err(match signal() {
                         Some(signal) => self.killed(Ended::BySignal(signal)),

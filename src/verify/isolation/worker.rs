@@ -4,6 +4,7 @@
 //! The worker reads the places of checks from its standard input, one a line, and ends with it: when the process that asked has ended,
 //! even if a check hangs.
 
+use crate::gpu::calls;
 use crate::machine::Device;
 use crate::picture::Picture;
 use crate::report::{CheckName, Outcome, PictureComparison};
@@ -25,6 +26,8 @@ const GRACE: Duration = Duration::from_secs(2);
 /// What a worker says.
 #[derive(Serialize, Deserialize)]
 pub(super) enum Message {
+    /// It begins a Vulkan call, of a shader or a device.
+    Calls(String, String),
     /// First: it has a device.
     Ready(Box<Ready>),
     /// First: it has none. The exit code says why; see [`Failure::exit_code`].
@@ -112,6 +115,15 @@ impl Done {
 }
 
 impl Message {
+    /// The call that it names, as a report quotes it.
+    pub(super) fn call(&self) -> Option<String> {
+        match self {
+            Message::Calls(call, of) if of.is_empty() => Some(call.clone()),
+            Message::Calls(call, of) => Some(format!("{call} ('{of}')")),
+            _ => None,
+        }
+    }
+
     /// The message in a line, if it has the mark.
     pub(super) fn parse(line: &str) -> Option<Message> {
         let (_, json) = line.split_once(MARK)?;
@@ -127,6 +139,12 @@ impl Message {
     }
 }
 
+/// From now on the process that asks is told of the Vulkan calls in which this one may crash.
+pub fn tell_calls() {
+    // Nobody listens any more if this fails, and the next answer says so.
+    calls::tell(|call, of| drop(Message::Calls(call.into(), of.into()).send()));
+}
+
 /// Reports that there is nothing to run checks on.
 pub fn refuse(failure: Failure) -> Result<(), String> {
     let code = failure.exit_code();
@@ -140,21 +158,41 @@ pub fn refuse(failure: Failure) -> Result<(), String> {
 pub fn serve(dut: &mut DeviceUnderTest, checks: &[Check], ready: Ready) -> Result<(), String> {
     Message::Ready(Box::new(ready)).send()?;
     let mut group = None;
-    for place in requests() {
+    for Request { place, waits } in requests() {
         let Some(check) = checks.get(place) else { return Err(format!("there is no check {place}")) };
-        let outcome = check.run_after(&mut group, dut);
+        let outcome = if waits { check.run_waiting(dut) } else { check.run_after(&mut group, dut) };
         Message::Done(Box::new(Done::new(outcome))).send()?;
     }
     Ok(())
 }
 
-/// The numbers on standard input. When it ends the process does, too, even if its main thread hangs in the driver.
-fn requests() -> mpsc::Receiver<usize> {
+/// A line of standard input: the place of a check, and whether the host waits for each of its submissions.
+pub(super) struct Request {
+    pub place: usize,
+    pub waits: bool,
+}
+
+impl Request {
+    pub(super) fn line(&self) -> String {
+        format!("{}{}", self.place, if self.waits { WAITING } else { "" })
+    }
+
+    fn parse(line: &str) -> Option<Request> {
+        let (place, waits) = line.trim().strip_suffix(WAITING).map_or((line, false), |place| (place, true));
+        Some(Request { place: place.trim().parse().ok()?, waits })
+    }
+}
+
+/// Ends the line of a check whose submissions the host waits for.
+const WAITING: &str = " waiting";
+
+/// The requests on standard input. When it ends the process does, too, even if its main thread hangs in the driver.
+fn requests() -> mpsc::Receiver<Request> {
     let (send, receive) = mpsc::channel();
     std::thread::spawn(move || {
         let lines = std::io::stdin().lock().lines().map_while(Result::ok);
-        for place in lines.filter_map(|line| line.trim().parse().ok()) {
-            if send.send(place).is_err() {
+        for request in lines.filter_map(|line| Request::parse(&line)) {
+            if send.send(request).is_err() {
                 return;
             }
         }

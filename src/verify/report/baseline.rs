@@ -373,7 +373,7 @@ fn usable(figure: &Figure) -> &[f64] {
 /// Why the times of the runs cannot fail the new one.
 fn incomparable([old, new]: [&Run; 2]) -> Option<&'static str> {
     match () {
-        _ if old.device.name != new.device.name => Some("the devices differ"),
+        _ if old.device.identity() != new.device.identity() => Some("the devices differ"),
         _ if old.validation != new.validation => Some("the validation layer watched one run only"),
         _ => None,
     }

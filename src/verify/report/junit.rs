@@ -3,7 +3,7 @@
 use super::baseline::BaselineComparison;
 use super::{Outcome, Run, Verdict, comparison, failure, value_of_limit};
 use crate::text::escaped;
-use quick_junit::{NonSuccessKind, Report, TestCase, TestCaseStatus, TestSuite};
+use quick_junit::{NonSuccessKind, Report, TestCase, TestCaseStatus, TestRerun, TestSuite};
 use std::time::Duration;
 
 /// The XML file. A comparison adds a suite, whose only case fails if anything is worse.
@@ -54,7 +54,17 @@ fn suite(run: &Run, group: &str, outcomes: &[&Outcome]) -> TestSuite {
 
 fn case(outcome: &Outcome) -> TestCase {
     let status = match outcome.verdict {
-        Verdict::Passed => TestCaseStatus::success(),
+        Verdict::Passed => {
+            let mut status = TestCaseStatus::success();
+            for _ in 0..outcome.failed_before {
+                let mut rerun = TestRerun::new(NonSuccessKind::Failure);
+                rerun
+                    .set_type("flaky")
+                    .set_message(outcome.notes.first().map_or_else(String::new, |note| escaped(note)));
+                status.add_rerun(rerun);
+            }
+            status
+        }
         Verdict::Failed => {
             let mut status = TestCaseStatus::non_success(NonSuccessKind::Failure);
             let first = outcome.faults.first().map_or_else(|| "failed".into(), |fault| escaped(&fault.what));

@@ -56,6 +56,16 @@ impl Run {
         self.outcomes.iter().filter(|o| o.verdict == Verdict::Failed)
     }
 
+    /// Outcomes of the checks that passed only when they were run again.
+    pub(crate) fn flaky(&self) -> impl Iterator<Item = &Outcome> {
+        self.outcomes.iter().filter(|o| o.failed_before > 0)
+    }
+
+    /// True if the device could not be started, so that no check was run.
+    pub fn is_unstarted(&self) -> bool {
+        self.outcomes.iter().any(|o| o.group == START)
+    }
+
     /// Number of checks with this verdict.
     pub fn count(&self, verdict: Verdict) -> usize {
         self.outcomes.iter().filter(|o| o.verdict == verdict).count()
@@ -95,6 +105,9 @@ pub struct Outcome {
     /// Remarks: why it was left out, which fallbacks were used.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub notes: Vec<String>,
+    /// Number of runs that failed before the one of this outcome passed: a flake, unless 0.
+    #[serde(default, skip_serializing_if = "is_zero")]
+    pub failed_before: u32,
     /// Comparison pictures, of passed checks too.
     #[serde(skip)]
     pub pictures: Vec<PictureComparison>,
@@ -269,8 +282,34 @@ impl Outcome {
             figures: Vec::new(),
             faults,
             notes,
+            failed_before: 0,
             pictures: Vec::new(),
         }
+    }
+
+    /// What became of a check that failed at first: `again` runs it once more, and `waiting` too, while the host waits for each submission before
+    /// the next. One that passes when it is run again is a flake. One that passes only while the host waits lacks synchronization.
+    pub(crate) fn explained(self, mut again: impl FnMut() -> Outcome, waiting: impl FnOnce() -> Outcome) -> Outcome {
+        let first = self.faults.first().map_or_else(String::new, |fault| format!(": {}", fault.what));
+        for failed in 1..=RERUNS {
+            let next = again();
+            match next.verdict {
+                Verdict::Failed => {}
+                Verdict::Passed => {
+                    let note = format!("flaky: it failed {failed} of {} times{first}", failed + 1);
+                    let notes = [vec![note], next.notes].concat();
+                    return Outcome { notes, failed_before: failed, seconds: self.seconds + next.seconds, ..next };
+                }
+                _ => return self,
+            }
+        }
+        let mut outcome = self;
+        if waiting().verdict == Verdict::Passed {
+            outcome.notes.push(
+                "it passes while the host waits for each submission before the next: synchronization is the likely cause".into(),
+            );
+        }
+        outcome
     }
 
     /// The figure that is closest to its limit, or furthest beyond.
@@ -438,6 +477,16 @@ mod any_number {
     }
 }
 
+/// Group of the outcome of a device that could not be started.
+pub(crate) const START: &str = "start";
+
+/// How often a check that failed is run once more.
+const RERUNS: u32 = 3;
+
+fn is_zero(count: &u32) -> bool {
+    *count == 0
+}
+
 /// Maximum number of changes of a class that are listed, except those that fail the run.
 const MAX_CHANGES: usize = 40;
 
@@ -522,8 +571,12 @@ pub fn summary(run: &Run) -> String {
         0 => String::new(),
         count => format!(", interrupted {count}"),
     };
+    let flaky = match run.flaky().count() {
+        0 => String::new(),
+        count => format!(" (flaky: {count})"),
+    };
     format!(
-        "passed {}, failed {}, left out {}{interrupted} in {} on {}, {}, Vulkan {} ({}{validation})",
+        "passed {}{flaky}, failed {}, left out {}{interrupted} in {} on {}, {}, Vulkan {} ({}{validation})",
         run.count(Verdict::Passed),
         run.count(Verdict::Failed),
         run.count(Verdict::LeftOut),

@@ -34,6 +34,7 @@ pub fn prometheus(run: &Run, compared: Option<&BaselineComparison>) -> String {
     let mut text = Exposition::default();
     text.numbers(&table::VERIFY_INFO, [(conditions.map(String::clone).to_vec(), 1.0)]);
     text.numbers(&table::VERIFY_CHECKS, words.map(|(verdict, word)| (vec![word.into()], run.count(verdict) as f64)));
+    text.number(&table::VERIFY_CHECKS_FLAKY, run.flaky().count() as f64);
     text.numbers(&table::VERIFY_CHECK_FAILED, failed);
     text.numbers(&table::VERIFY_CHECKS_WORSE, compared.map(|compared| (Vec::new(), compared.worse_checks() as f64)));
     text.numbers(&table::VERIFY_PASS_SECONDS, times);

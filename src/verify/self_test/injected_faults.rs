@@ -1,10 +1,11 @@
 //! The faults for fault injection: in frames on their way in, in slices, in what is stored, in rays and empty-space skipping, in light,
 //! and in the screen.
 
-use crate::passes::fault_injection::{Change, InjectedFault};
+use crate::passes::fault_injection::{Change, Command, InjectedFault};
 use crate::passes::slots::frames_per_batch;
 use crate::passes::{DispatchArgs, Params, Slot, Value};
 use crate::scene::Scene;
+use crate::spirv::mutants::MUTATIONS;
 use crate::spirv::mutate::{F_ADD, F_SUB, FMAX, FMIN, add_to_writes, replace_last, replace_last_opcode, round_to_half};
 use half::f16;
 
@@ -356,4 +357,29 @@ pub(super) const FAULTS: &[InjectedFault] = &[
         what: "edges of shadows are a tenth too wide",
         change: Change::Numbers { pass: "shadow", by: |_, params| times(params, "softness", 1.1) },
     },
+    of_command("vkCmdDispatchBase", "a dispatch with a base begins with the first workgroup", Command::DispatchBase),
+    of_command(
+        "vkCmdDispatchIndirect",
+        "a dispatch whose workgroups the device counts runs none",
+        Command::DispatchIndirect,
+    ),
+    of_command("vkCmdCopyBufferToImage", "an upload ends after its first layer or slice", Command::CopyToImage),
+    of_command("vkCmdCopyImageToBuffer", "nothing is read back", Command::CopyToBuffer),
+    of_command("vkCmdClearColorImage", "images are cleared to one instead of zero", Command::Clear),
+    of_command("vkCreateComputePipelines", "specialization constants keep their defaults", Command::Specialize),
+    of_command("vkInvalidateMappedMemoryRanges", "what the device wrote does not reach the host", Command::Invalidate),
 ];
+
+const fn of_command(name: &'static str, what: &'static str, command: Command) -> InjectedFault {
+    InjectedFault { name, what, change: Change::Command(command) }
+}
+
+/// One fault for each class of instructions.
+pub(super) fn of_instructions() -> impl Iterator<Item = InjectedFault> {
+    MUTATIONS.iter().map(|mutation| InjectedFault {
+        name: mutation.class,
+        what: mutation.what,
+        // The first and the last are often checks of bounds, which no invocation inside the picture notices.
+        change: Change::Mutant(mutation, 0.5),
+    })
+}

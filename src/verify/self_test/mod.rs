@@ -14,12 +14,15 @@ use crate::probe::Geometry;
 use crate::queues::oracle::SubmissionLog;
 use crate::report::{Fault, Level, Outcome, Verdict};
 use crate::scene::Scene;
-use crate::{Check, DeviceUnderTest, Findings, credible_messages, each_pass, known_answers, render, sampling};
-use std::collections::BTreeMap;
+use crate::{
+    Check, DeviceUnderTest, Findings, credible_messages, each_pass, known_answers, memory, render, sampling,
+    specialization,
+};
+use std::collections::{BTreeMap, HashSet};
 use std::sync::Arc;
 use std::time::Instant;
 
-/// Maximum number of scenes in which each pass is checked.
+/// Maximum number of scenes, each with another pipeline, in which each pass is checked.
 const SCENES: usize = 6;
 
 /// An injected fault, and the check that detected it.
@@ -59,6 +62,7 @@ impl Detection {
             figures: Vec::new(),
             faults,
             notes: [Some(self.what.clone()), note].into_iter().flatten().chain(self.history()).collect(),
+            failed_before: 0,
             pictures: Vec::new(),
         }
     }
@@ -83,9 +87,10 @@ pub fn crash(outcome: &Outcome) -> Detection {
     }
 }
 
-/// All faults to inject, in running order. Dropped barriers are tested in addition.
-pub fn faults() -> impl Iterator<Item = &'static InjectedFault> {
-    injected_faults::FAULTS.iter()
+/// All faults to inject, in running order: those of single passes and commands, then one for each class of instructions. Dropped barriers are tested
+/// in addition.
+pub fn faults() -> impl Iterator<Item = InjectedFault> {
+    injected_faults::FAULTS.iter().copied().chain(injected_faults::of_instructions())
 }
 
 /// Injects every fault and drops every barrier; calls `tell` after each. The last detection states whether the checks that detected
@@ -107,20 +112,20 @@ pub fn run(options: &ContextOptions, mut tell: impl FnMut(&Detection)) -> Result
 ///
 /// # Errors
 /// As of [`run`].
-pub fn run_faults<'a>(
+pub fn run_faults(
     options: &ContextOptions,
-    faults: impl Iterator<Item = &'a InjectedFault>,
+    faults: impl Iterator<Item = InjectedFault>,
     mut tell: impl FnMut(&Detection),
 ) -> Result<Vec<Detection>, GpuError> {
     // Validation does not affect results, and would take most of the time.
     let options = ContextOptions { validation: false, ..options.clone() };
     let sound = DeviceUnderTest::new(&options, Level::Quick)?;
-    let mut answers = known_answers::checks(Level::Quick);
-    answers.extend(sampling::checks(Level::Quick));
+    let answers = [known_answers::checks, sampling::checks, specialization::checks, memory::checks];
+    let answers = answers.into_iter().flat_map(|group| group(Level::Quick)).collect();
     let mut search = DetectionSearch { sound, answers, alarms: BTreeMap::new() };
     let mut all = Vec::new();
     for fault in faults {
-        let detection = search.detection(fault)?;
+        let detection = search.detection(&fault)?;
         tell(&detection);
         all.push(detection);
     }
@@ -144,13 +149,14 @@ impl DetectionSearch {
         let looked = self.look(fault, &mut dut);
         let struck = dut.context.faults.change_count();
         let (by, message) = match looked {
-            Ok((by, message)) => (Some(by), message),
+            Ok((by, message)) => (Some(by), format!("{message} (met {struck} times)")),
             Err(Some(error)) => (None, format!("the device refused it, and no check compared anything: {error}")),
-            Err(None) if struck == 0 => (None, "nothing that a check runs is changed by it".into()),
+            Err(None) if struck == 0 => (None, "not tested: nothing that a check runs here meets it".into()),
             Err(None) => (None, format!("{struck} changes, and every check passes")),
         };
         let seconds = begun.elapsed().as_secs_f64();
-        Ok(Detection { fault: fault.name.into(), what: fault.what.into(), by, message, left_out: false, seconds })
+        let left_out = by.is_none() && struck == 0;
+        Ok(Detection { fault: fault.name.into(), what: fault.what.into(), by, message, left_out, seconds })
     }
 
     /// The first check that fails with the fault and passes without it. Otherwise the error of the device, if any: an error is no
@@ -159,7 +165,9 @@ impl DetectionSearch {
         let (scenes, mut refused) = (dut.scenes(), None);
         for (n, pass) in PASSES.iter().enumerate() {
             let concerned = (0..scenes.len()).filter(|s| fault.change.concerns(pass, &scenes[*s].1));
-            for s in concerned.take(SCENES) {
+            let mut variants = HashSet::new();
+            let different = concerned.filter(|s| variants.insert(each_pass::variant(&scenes[*s].1, pass)));
+            for s in different.take(SCENES) {
                 let Some(message) = alarm(each_pass::in_scene(dut, n, s), &mut refused) else { continue };
                 let (by, sound) = (format!("passes, {}", pass.name), &mut self.sound);
                 let alarms = self.alarms.entry(format!("{by}, '{}'", scenes[s].0));

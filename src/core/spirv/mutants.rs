@@ -1,0 +1,269 @@
+//! Faults by class of instruction: for each class one way in which the compiler of a driver translates an instruction wrongly. A mutant is a
+//! module with one instruction changed so; it is valid, and ends.
+
+use super::classes::class;
+use super::module::{BOUND, HEADER_WORDS, Instruction, SpirvError, decode, encode, error, op};
+use std::collections::{BTreeMap, BTreeSet};
+
+/// What replaces an instruction.
+enum Change {
+    /// Nothing.
+    Dropped,
+    /// This opcode, with the same operands.
+    Opcode(u32),
+    /// This instruction of GLSL.std.450, with the same operands.
+    Extended(u32),
+    /// The operands at these two places change places.
+    Swapped(usize, usize),
+    /// The float that it yields is negated.
+    Negated,
+    /// The components of the vector that it yields are reversed.
+    Reversed,
+    /// The float that it converts is rounded to the nearest integer first.
+    Rounded,
+}
+
+/// A fault of the instructions of a class.
+pub struct Mutation {
+    pub class: &'static str,
+    pub what: &'static str,
+    /// Not where a module has loops, which might not end.
+    spares_loops: bool,
+    change: fn(opcode: u32, operands: &[u32]) -> Option<Change>,
+}
+
+/// The instruction of GLSL.std.450 becomes the other of a pair.
+fn extended(operands: &[u32], pairs: &[(u32, u32)]) -> Option<Change> {
+    let number = operands.get(3)?;
+    pairs.iter().find(|(from, _)| from == number).map(|(_, to)| Change::Extended(*to))
+}
+
+/// The opcode becomes the other of a pair, in either direction.
+fn paired(opcode: u32, pairs: &[(u32, u32)]) -> Option<Change> {
+    let other = |(a, b): &(u32, u32)| if *a == opcode { Some(*b) } else { (*b == opcode).then_some(*a) };
+    pairs.iter().find_map(other).map(Change::Opcode)
+}
+
+const fn of(class: &'static str, what: &'static str, change: fn(u32, &[u32]) -> Option<Change>) -> Mutation {
+    Mutation { class, what, spares_loops: false, change }
+}
+
+/// One fault for each class. A class that is not here has none that leaves every module valid.
+pub const MUTATIONS: &[Mutation] = &[
+    of("comparisons of floats", "equal numbers compare the other way", |opcode, _| {
+        paired(opcode, &[(184, 188), (185, 189), (186, 190), (187, 191), (180, 182), (181, 183)])
+    }),
+    of("comparisons of integers", "equal numbers compare the other way", |opcode, _| {
+        paired(opcode, &[(172, 174), (173, 175), (176, 178), (177, 179), (170, 171)])
+    }),
+    of("barriers in a workgroup", "a barrier is left out", |_, _| Some(Change::Dropped)),
+    of("votes of a subgroup", "any and all are mixed up", |opcode, _| paired(opcode, &[(334, 335)])),
+    of("logic", "any and all, or and and, are mixed up", |opcode, _| {
+        paired(opcode, &[(154, 155), (166, 167), (164, 165)])
+    }),
+    of("selections", "the other value is selected", |_, _| Some(Change::Swapped(3, 4))),
+    of("conversions of numbers", "a float is rounded to the nearest integer instead of towards zero", |opcode, _| {
+        matches!(opcode, 109 | 110).then_some(Change::Rounded)
+    }),
+    of("floats rounded to integers", "rounding goes in another direction", |_, operands| {
+        extended(operands, &[(1, 8), (2, 8), (3, 9), (8, 9), (9, 8)])
+    }),
+    of("minima, maxima and clamps", "minimum and maximum are mixed up", |_, operands| {
+        extended(operands, &[(37, 40), (40, 37), (38, 41), (41, 38), (39, 42), (42, 39)])
+    }),
+    of("absolute values and signs", "the absolute value is negative", |_, operands| {
+        (operands.get(3) == Some(&4)).then_some(Change::Negated)
+    }),
+    of("powers, exponentials and roots", "another base, or the reciprocal", |_, operands| {
+        extended(operands, &[(27, 29), (28, 30), (29, 27), (30, 28), (31, 32), (32, 31)])
+            .or_else(|| (operands.get(3) == Some(&26)).then_some(Change::Swapped(4, 5)))
+    }),
+    of("angles and trigonometry", "sine and cosine, or the two legs, are mixed up", |_, operands| {
+        extended(operands, &[(13, 14), (14, 13), (16, 17), (17, 16)])
+            .or_else(|| (operands.get(3) == Some(&25)).then_some(Change::Swapped(4, 5)))
+    }),
+    of("mixtures and fused sums", "the ends of a mixture change places", |_, operands| {
+        (operands.get(3) == Some(&46)).then_some(Change::Swapped(4, 5))
+    }),
+    of("packed numbers", "halves are read as shares of 65535", |_, operands| extended(operands, &[(58, 57), (62, 61)])),
+    of("lengths and other functions of vectors", "what a function of vectors yields is negated", |_, operands| {
+        matches!(operands.get(3), Some(66..=71)).then_some(Change::Negated)
+    }),
+    of("products of vectors and matrices", "the product is negated", |_, _| Some(Change::Negated)),
+    Mutation {
+        class: "arithmetic of floats",
+        what: "a sum is a difference",
+        spares_loops: true,
+        change: |opcode, _| paired(opcode, &[(op::F_ADD, op::F_SUB)]),
+    },
+    Mutation {
+        class: "arithmetic of integers",
+        what: "a sum is a difference",
+        spares_loops: true,
+        change: |opcode, _| paired(opcode, &[(op::I_ADD, op::I_SUB)]),
+    },
+    of("quotients of floats", "a quotient is a product", |opcode, _| {
+        (opcode == op::F_DIV).then_some(Change::Opcode(op::F_MUL))
+    }),
+    of("quotients of integers", "quotient and remainder are mixed up", |opcode, _| {
+        paired(opcode, &[(134, 137), (135, 138)])
+    }),
+    of("bits of integers", "shifts go the other way, or and and are mixed up", |opcode, _| {
+        paired(opcode, &[(op::SHIFT_RIGHT_LOGICAL, 196), (197, 199)])
+    }),
+    of("sizes of images", "the wrong component of an image's size", |_, _| Some(Change::Reversed)),
+    of("reads of texels", "the components of a texel are reversed", |_, _| Some(Change::Reversed)),
+    of("filtered samples", "the components of a sample are reversed", |_, _| Some(Change::Reversed)),
+    of("writes of texels", "a write is lost", |_, _| Some(Change::Dropped)),
+];
+
+/// The instructions of a module that a mutation can change, by place.
+fn sites(instructions: &[Instruction], mutation: &Mutation) -> Vec<usize> {
+    let has_loops = || instructions.iter().any(|i| i.opcode == op::LOOP_MERGE);
+    if mutation.spares_loops && has_loops() {
+        return Vec::new();
+    }
+    let types = Types::of(instructions);
+    let suits = |i: &Instruction| {
+        class(i.opcode, i.operands) == Some(mutation.class)
+            && match (mutation.change)(i.opcode, i.operands) {
+                Some(Change::Reversed) => types.vectors.contains_key(&i.operands[0]),
+                Some(Change::Negated) => types.floats.contains(&i.operands[0]),
+                Some(Change::Rounded) => i.operands.get(2).is_some_and(|of| types.of_float(*of).is_some()),
+                Some(_) => true,
+                None => false,
+            }
+    };
+    (0..instructions.len()).filter(|n| suits(&instructions[*n])).collect()
+}
+
+/// Types of a module by their identifiers.
+#[derive(Default)]
+struct Types {
+    /// Vectors, with the number of their components.
+    vectors: BTreeMap<u32, u32>,
+    /// Floats and vectors of them.
+    floats: BTreeSet<u32>,
+    /// The type of each result.
+    of_result: BTreeMap<u32, u32>,
+    /// The extended instruction set.
+    extended: u32,
+}
+
+impl Types {
+    fn of(instructions: &[Instruction]) -> Types {
+        let mut types = Types::default();
+        for i in instructions {
+            match (i.opcode, i.operands) {
+                (op::TYPE_FLOAT, [id, ..]) => drop(types.floats.insert(*id)),
+                (op::TYPE_VECTOR, [id, of, count, ..]) => {
+                    types.vectors.insert(*id, *count);
+                    if types.floats.contains(of) {
+                        types.floats.insert(*id);
+                    }
+                }
+                (11, [id, ..]) => types.extended = *id,
+                // Those that yield something.
+                (12 | 41..=61 | 65..=70 | 77..=98 | 100..=223 | 227..=245 | 333..=366, [of, id, ..]) => {
+                    types.of_result.insert(*id, *of);
+                }
+                _ => {}
+            }
+        }
+        types
+    }
+
+    /// The type of a result, if it is a float or a vector of them.
+    fn of_float(&self, result: u32) -> Option<u32> {
+        self.of_result.get(&result).copied().filter(|of| self.floats.contains(of))
+    }
+}
+
+/// Number of mutants that a mutation has of a module; 0 for words that are no module.
+pub fn count(words: &[u32], mutation: &Mutation) -> usize {
+    decode(words).map_or(0, |instructions| sites(&instructions, mutation).len())
+}
+
+/// A mutant of a module, by its number below [`count`].
+///
+/// # Errors
+/// A module that breaks the format, or has no such mutant.
+pub fn mutant(words: &[u32], mutation: &Mutation, number: usize) -> Result<Vec<u32>, SpirvError> {
+    let instructions = decode(words)?;
+    let Some(site) = sites(&instructions, mutation).get(number).copied() else {
+        return error(format!("no instruction of class '{}' to change", mutation.class));
+    };
+    let types = Types::of(&instructions);
+    let mut out = words[..HEADER_WORDS].to_vec();
+    let new = words[BOUND];
+    for (n, i) in instructions.iter().enumerate() {
+        let change = if n == site { (mutation.change)(i.opcode, i.operands) } else { None };
+        let with = |at: usize, to: u32| {
+            let mut operands = i.operands.to_vec();
+            operands[at] = to;
+            operands
+        };
+        match change {
+            None => out.extend(encode(i.opcode, i.operands)),
+            Some(Change::Dropped) => {}
+            Some(Change::Opcode(to)) => out.extend(encode(to, i.operands)),
+            Some(Change::Extended(to)) => out.extend(encode(i.opcode, &with(3, to))),
+            Some(Change::Swapped(a, b)) => {
+                let mut operands = i.operands.to_vec();
+                if a.max(b) < operands.len() {
+                    operands.swap(a, b);
+                }
+                out.extend(encode(i.opcode, &operands));
+            }
+            Some(Change::Negated) => {
+                out.extend(encode(i.opcode, &with(1, new)));
+                out.extend(encode(F_NEGATE, &[i.operands[0], i.operands[1], new]));
+            }
+            Some(Change::Reversed) => {
+                let components = types.vectors.get(&i.operands[0]).copied().unwrap_or(0);
+                out.extend(encode(i.opcode, &with(1, new)));
+                let order: Vec<u32> = (0..components).rev().collect();
+                let shuffle = [&[i.operands[0], i.operands[1], new, new][..], &order].concat();
+                out.extend(encode(op::VECTOR_SHUFFLE, &shuffle));
+            }
+            Some(Change::Rounded) => {
+                let of = types.of_float(i.operands[2]).unwrap_or(0);
+                out.extend(encode(op::EXT_INST, &[of, new, types.extended, ROUND, i.operands[2]]));
+                out.extend(encode(i.opcode, &with(2, new)));
+            }
+        }
+    }
+    out[BOUND] = new + 1;
+    Ok(out)
+}
+
+const F_NEGATE: u32 = 127;
+/// Of GLSL.std.450.
+const ROUND: u32 = 1;
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::spirv::module::{EMBEDDED, words};
+    use crate::spirv::reflect::reflect;
+
+    #[test]
+    fn a_mutant_differs_in_one_place_and_declares_the_same_interface() {
+        let mut seen = BTreeSet::new();
+        for (name, bytes) in EMBEDDED {
+            let before = words(bytes);
+            for mutation in MUTATIONS {
+                let all = count(&before, mutation);
+                for number in [0, all.saturating_sub(1)].into_iter().take(all) {
+                    let after = mutant(&before, mutation, number).unwrap();
+                    assert_ne!(before, after, "{name}, {}", mutation.class);
+                    assert_eq!(reflect(&before).unwrap(), reflect(&after).unwrap(), "{name}, {}", mutation.class);
+                    seen.insert(mutation.class);
+                }
+                assert!(mutant(&before, mutation, all).is_err());
+            }
+        }
+        let unused: Vec<_> = MUTATIONS.iter().map(|m| m.class).filter(|class| !seen.contains(class)).collect();
+        assert!(unused.is_empty(), "no shader has anything to change for {unused:?}");
+    }
+}
