@@ -32,6 +32,7 @@ mod pictures;
 pub mod piped;
 mod piped_file;
 mod pixel;
+mod piped_record;
 mod plus;
 mod plus_config;
 pub mod posed;
