@@ -110,6 +110,7 @@ left_out!(verify, Verify, "verify");
 left_out!(view, View, "view");
 
 use crate::kiosk::log_rotation::{self, RotatingLog};
+use crate::memory;
 use crate::source::standard_input;
 use crate::terminal::{self, Failure, failed, input};
 use clap::{CommandFactory, Parser, Subcommand};
@@ -144,6 +145,10 @@ struct Arguments {
     /// Write the log to this file. At 10 MiB it is rotated to FILE.1 and so on up to FILE.4; the oldest is deleted
     #[arg(long, value_name = "FILE", global = true)]
     log_file: Option<PathBuf>,
+    /// Refuse recordings whose volumes take more memory than this, such as 8G; none: take any [default: half of the memory that this
+    /// process may have; info: none]
+    #[arg(long, value_name = "SIZE", global = true, value_parser = memory::parse)]
+    max_memory: Option<u64>,
 }
 
 #[derive(Subcommand)]
@@ -202,6 +207,9 @@ pub fn run() -> ExitCode {
             return if error.use_stderr() { ExitCode::from(2) } else { ExitCode::SUCCESS };
         }
     };
+    // A description needs one frame at a time.
+    let all = matches!(arguments.command, Command::Info(_)).then_some(u64::MAX);
+    arguments.max_memory.or(all).into_iter().for_each(memory::set_limit);
     let reports_validation = matches!(arguments.command, Command::Verify(_));
     let log = start_log(arguments.verbose, arguments.log_file.as_deref(), arguments.command.log(), reports_validation);
     let done = log.and_then(|()| match arguments.command {

@@ -15,6 +15,7 @@ mod features;
 mod filter;
 mod frames;
 mod inputs;
+mod memory;
 mod mesh;
 mod one_colour;
 mod oracle;
