@@ -70,6 +70,10 @@ pub struct Batch {
     #[arg(long, conflicts_with_all = ["make", "report"])]
     resume: bool,
     /// Draw this share of the finished pictures again and compare: bit for bit on the same device and driver, within the tolerance of
+    /// Read the outputs of finished units and compare them with the digests of their records. One that differs is one line, and its unit is done
+    /// again. Without this flag an output of the right length counts as whole
+    #[arg(long, conflicts_with_all = ["make", "report"])]
+    verify: bool,
     /// verify on others
     #[arg(long, value_name = "SHARE", default_value_t = 0.0)]
     recheck: f64,
@@ -150,6 +154,7 @@ impl Batch {
             device: DeviceOptions { device: self.device.clone(), deadline: Deadline::ByDevice, stop: is_grace_over },
             recheck: self.recheck,
             earlier,
+            verifies: self.verify,
             resumes: self.resume,
             stops: &|| held.signal().is_some(),
         };
