@@ -109,13 +109,14 @@ left_out!(verify, Verify, "verify");
 #[cfg(not(feature = "view"))]
 left_out!(view, View, "view");
 
+use crate::files::signals::hangups;
 use crate::kiosk::log_rotation::{self, RotatingLog};
 use crate::memory;
 use crate::source::standard_input;
 use crate::terminal::{self, Failure, failed, input};
 use clap::{CommandFactory, Parser, Subcommand};
 use std::io::Write;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::sync::Mutex;
 use tracing_subscriber::filter::filter_fn;
@@ -210,8 +211,8 @@ pub fn run() -> ExitCode {
     // A description needs one frame at a time.
     let all = matches!(arguments.command, Command::Info(_)).then_some(u64::MAX);
     arguments.max_memory.or(all).into_iter().for_each(memory::set_limit);
-    let reports_validation = matches!(arguments.command, Command::Verify(_));
-    let log = start_log(arguments.verbose, arguments.log_file.as_deref(), arguments.command.log(), reports_validation);
+    let log = arguments.command.log();
+    let log = start_log(arguments.verbose, arguments.log_file.as_deref(), log, &arguments.command);
     let done = log.and_then(|()| match arguments.command {
         Command::Render(render) => render.run(),
         Command::Stream(stream) => stream.run(),
@@ -251,15 +252,34 @@ impl Command {
             _ => None,
         }
     }
+
+    /// True if SIGHUP opens the log again instead of ending the program: it runs until it is stopped.
+    fn reopens_log(&self) -> bool {
+        match self {
+            #[cfg(feature = "view")]
+            Command::View(view) => view.is_kiosk(),
+            _ => false,
+        }
+    }
 }
 
-/// Starts logging. With `reports_validation` the command itself reports validation messages, so that they are logged only with `-v`.
+/// Opens a log.
+fn open_log(path: &Path, bytes: u64, files: u32, command: &Command) -> Result<RotatingLog, String> {
+    let log = RotatingLog::open(path, bytes, files)?;
+    match command.reopens_log() {
+        true => hangups().map(|reopens| log.reopened(reopens)).map_err(|e| format!("SIGHUP cannot be caught: {e}")),
+        false => Ok(log),
+    }
+}
+
+/// Starts logging. A command that reports validation messages itself logs them only with `-v`.
 fn start_log(
     verbose: u8,
-    file: Option<&std::path::Path>,
+    file: Option<&Path>,
     configured: Option<(PathBuf, u64, u32)>,
-    reports_validation: bool,
+    command: &Command,
 ) -> Result<(), Failure> {
+    let reports_validation = matches!(command, Command::Verify(_));
     let level = match verbose {
         0 => tracing::Level::WARN,
         1 => tracing::Level::INFO,
@@ -268,7 +288,7 @@ fn start_log(
     let log = tracing_subscriber::fmt().with_max_level(level).with_target(false);
     // A kiosk without a log still shows pictures.
     let configured = configured.filter(|_| file.is_none()).and_then(|(path, bytes, files)| {
-        let opened = RotatingLog::open(&path, bytes, files);
+        let opened = open_log(&path, bytes, files, command);
         opened
             .inspect_err(|fault| drop(writeln!(std::io::stderr(), "echolume: log: {fault}; logging to standard error")))
             .ok()
@@ -295,7 +315,7 @@ fn start_log(
                 .init();
         }
         Some(path) => {
-            let file = RotatingLog::open(path, log_rotation::DEFAULT_FILE_BYTES, log_rotation::DEFAULT_FILES);
+            let file = open_log(path, log_rotation::DEFAULT_FILE_BYTES, log_rotation::DEFAULT_FILES, command);
             let file = file.map_err(|fault| input(format!("--log-file {fault}")))?;
             log.with_ansi(false).with_writer(Mutex::new(file)).init();
         }

@@ -184,6 +184,10 @@ impl View {
         finish(ran?)
     }
 
+    pub fn is_kiosk(&self) -> bool {
+        self.kiosk
+    }
+
     /// The log of the configuration: path, bytes per file, number of files.
     pub fn log(&self) -> Option<(PathBuf, u64, u32)> {
         let files = self.config()?.ok()?.files;

@@ -49,10 +49,15 @@ fn a_missing_source_is_reported_and_shown_when_it_appears() {
     let view = desk.view(&["--kiosk", "--config", &file]);
     until("why", || is_amiss(&view).then_some(()));
     until("a line in the log", || (logged(&missing) > 0).then_some(()));
+    // As logrotate does.
+    let before = fs::read_to_string(&log).expect("the log");
+    fs::rename(&log, folder.path("kiosk.log.old")).expect("renamed");
+    view.signal(rustix::process::Signal::HUP);
     fs::copy(SWEEP, &later).expect("copy");
     let full = headless([1024, 768], &[]);
     view.shows_part(&full, [256, 192], [512, 384], "the source that came");
-    assert_eq!((logged(&missing), logged("INFO source: it is open now")), (1, 1), "each is said once");
+    assert_eq!((logged(&missing), logged("INFO source: it is open now")), (0, 1), "in the new log");
+    assert_eq!(before.matches(&missing).count(), 1, "each is said once");
     leave(view);
 }
 
