@@ -110,6 +110,7 @@ left_out!(verify, Verify, "verify");
 left_out!(view, View, "view");
 
 use crate::files::signals::hangups;
+use crate::files::Lock;
 use crate::kiosk::log_rotation::{self, RotatingLog};
 use crate::memory;
 use crate::source::standard_input;
@@ -213,6 +214,8 @@ pub fn run() -> ExitCode {
     arguments.max_memory.or(all).into_iter().for_each(memory::set_limit);
     let log = arguments.command.log();
     let log = start_log(arguments.verbose, arguments.log_file.as_deref(), log, &arguments.command);
+    // To the end no other process writes to the log.
+    let (_lock, log) = log.map_or_else(|failure| (None, Err(failure)), |lock| (lock, Ok(())));
     let done = log.and_then(|()| match arguments.command {
         Command::Render(render) => render.run(),
         Command::Stream(stream) => stream.run(),
@@ -263,7 +266,7 @@ impl Command {
     }
 }
 
-/// Opens a log.
+/// Opens a log that no other process writes to.
 fn open_log(path: &Path, bytes: u64, files: u32, command: &Command) -> Result<RotatingLog, String> {
     let log = RotatingLog::open(path, bytes, files)?;
     match command.reopens_log() {
@@ -272,14 +275,16 @@ fn open_log(path: &Path, bytes: u64, files: u32, command: &Command) -> Result<Ro
     }
 }
 
-/// Starts logging. A command that reports validation messages itself logs them only with `-v`.
+/// Starts logging, and locks the log. A command that reports validation messages itself logs them only with `-v`.
 fn start_log(
     verbose: u8,
     file: Option<&Path>,
     configured: Option<(PathBuf, u64, u32)>,
     command: &Command,
-) -> Result<(), Failure> {
+) -> Result<Option<Lock>, Failure> {
     let reports_validation = matches!(command, Command::Verify(_));
+    let path = file.or(configured.as_ref().map(|(path, ..)| path.as_path()));
+    let lock = path.map(Lock::take).transpose().map_err(|fault| failed(format!("log {fault}")))?;
     let level = match verbose {
         0 => tracing::Level::WARN,
         1 => tracing::Level::INFO,
@@ -302,7 +307,7 @@ fn start_log(
             .with_ansi(false)
             .with_writer(Mutex::new(file))
             .init();
-        return Ok(());
+        return Ok(lock);
     }
     match file {
         None => {
@@ -320,5 +325,5 @@ fn start_log(
             log.with_ansi(false).with_writer(Mutex::new(file)).init();
         }
     }
-    Ok(())
+    Ok(lock)
 }

@@ -15,6 +15,7 @@ mod features;
 mod filter;
 mod frames;
 mod inputs;
+mod locks;
 mod memory;
 mod mesh;
 mod one_colour;

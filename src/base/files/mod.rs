@@ -3,10 +3,12 @@
 //! [`Unfinished`] is a file that is either complete or absent. [`InputError`] is an error of an input file: one line that names the file,
 //! the field and the fault. Some errors omit the file's name, because the caller adds it.
 
+mod lock;
 pub mod progress;
 pub mod signals;
 mod spool;
 
+pub use lock::Lock;
 pub use spool::Spool;
 
 use signals::Writing;

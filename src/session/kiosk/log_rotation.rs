@@ -35,7 +35,7 @@ type Opener = Box<dyn FnMut(&Path) -> io::Result<Box<dyn Sink>> + Send>;
 ///
 /// Writing never fails. Lines that cannot be written, on a full disk or in a deleted folder, are counted. Every later write tries again,
 /// and the first one that succeeds reports how many lines are missing. No line is split between two files, and all files together hold
-/// at most `bytes` times `files`. Only one process at a time may write to a log.
+/// at most `bytes` times `files`. Only one process at a time may write to a log ([`files::Lock`](crate::files::Lock)).
 pub struct RotatingLog {
     path: PathBuf,
     bytes: u64,
