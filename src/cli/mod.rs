@@ -110,7 +110,7 @@ left_out!(verify, Verify, "verify");
 left_out!(view, View, "view");
 
 use crate::files::signals::hangups;
-use crate::files::Lock;
+use crate::files::{self, Lock};
 use crate::kiosk::log_rotation::{self, RotatingLog};
 use crate::memory;
 use crate::source::standard_input;
@@ -136,7 +136,8 @@ use tracing_subscriber::util::SubscriberInitExt;
     after_long_help = "Exit codes of every command: 0 done, 1 failed, 2 bad input or usage, 3 no Vulkan device or not the one asked for, 4 \
                        stopped by a signal before all was done (verify). `batch`: also 3, device lost, and 4, some units failed. Any other command ends by the signal itself. `-` as a recording \
                        is standard input; `-o -` writes a picture to standard output, and every line to standard error. \
-                       ECHOLUME_PROGRESS=lines in the environment writes how far the work is as lines to standard error, for a program that runs this one."
+                       ECHOLUME_PROGRESS=lines in the environment writes how far the work is as lines to standard error, for a program that runs this one. \
+                       Recordings, pictures, volumes, workspaces and logs can be read by their owner alone; ECHOLUME_PRIVATE=0 lets the umask decide."
 )]
 struct Arguments {
     #[command(subcommand)]
@@ -212,10 +213,14 @@ pub fn run() -> ExitCode {
     // A description needs one frame at a time.
     let all = matches!(arguments.command, Command::Info(_)).then_some(u64::MAX);
     arguments.max_memory.or(all).into_iter().for_each(memory::set_limit);
+    if !arguments.command.is_private() {
+        files::follow_umask();
+    }
     let log = arguments.command.log();
     let log = start_log(arguments.verbose, arguments.log_file.as_deref(), log, &arguments.command);
     // To the end no other process writes to the log.
     let (_lock, log) = log.map_or_else(|failure| (None, Err(failure)), |lock| (lock, Ok(())));
+    let log = log.and_then(|()| check_environment());
     let done = log.and_then(|()| match arguments.command {
         Command::Render(render) => render.run(),
         Command::Stream(stream) => stream.run(),
@@ -256,6 +261,15 @@ impl Command {
         }
     }
 
+    /// False where the command's configuration lets the umask say who may read files.
+    fn is_private(&self) -> bool {
+        match self {
+            #[cfg(feature = "view")]
+            Command::View(view) => view.is_private(),
+            _ => true,
+        }
+    }
+
     /// True if SIGHUP opens the log again instead of ending the program: it runs until it is stopped.
     fn reopens_log(&self) -> bool {
         match self {
@@ -263,6 +277,16 @@ impl Command {
             Command::View(view) => view.is_kiosk(),
             _ => false,
         }
+    }
+}
+
+/// Refuses a variable of the environment that would mean nothing.
+fn check_environment() -> Result<(), Failure> {
+    match std::env::var_os(files::PRIVATE) {
+        Some(value) if value != "0" && value != "1" => {
+            Err(input(format!("{}={}: must be 0 or 1", files::PRIVATE, value.display())))
+        }
+        _ => Ok(()),
     }
 }
 

@@ -192,6 +192,11 @@ impl View {
         self.kiosk
     }
 
+    /// False where the configuration lets the umask say who may read files.
+    pub fn is_private(&self) -> bool {
+        self.config().and_then(Result::ok).is_none_or(|config| config.files.private)
+    }
+
     /// Locks what no other process may write to at the same time: the metrics, and the folders of a kiosk.
     fn locks(&self) -> Result<Vec<Lock>, Failure> {
         let config = self.config().and_then(Result::ok).unwrap_or_default();

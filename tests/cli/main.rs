@@ -23,6 +23,7 @@ mod oracle;
 mod outputs;
 mod pipelines;
 mod presets;
+mod privacy;
 mod series;
 mod service;
 mod shaders;

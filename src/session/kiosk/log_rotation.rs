@@ -1,5 +1,6 @@
 //! Log rotation: a full file becomes NAME.1, NAME.1 becomes NAME.2, and the oldest one is deleted.
 
+use crate::files::private;
 use std::ffi::OsString;
 use std::fs::{self, File, OpenOptions};
 use std::io::{self, ErrorKind, Read, Seek, SeekFrom, Write};
@@ -76,7 +77,7 @@ impl RotatingLog {
             }
         }
         let opener = |path: &Path| -> io::Result<Box<dyn Sink>> {
-            Ok(Box::new(OpenOptions::new().create(true).append(true).open(path)?))
+            Ok(Box::new(private(OpenOptions::new().create(true).append(true)).open(path)?))
         };
         RotatingLog::with(path, bytes, files, Box::new(opener))
             .map_err(|e| format!("{}: cannot be written: {e}", path.display()))
