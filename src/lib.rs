@@ -193,6 +193,7 @@ pub mod low_level {
 
 #[cfg(feature = "verify")]
 use echolume_base::html_page;
+use echolume_base::memory;
 use echolume_base::statistics;
 use echolume_base::terminal;
 use low_level::*;

@@ -2,7 +2,7 @@
 
 use super::digest_of;
 use super::manifest::Numbered;
-use super::results::{Record, read_record};
+use super::results::{Record, Verified, read_record};
 use super::unit::{Key, Kind, Work};
 use crate::args::{check_volume, recorded};
 use crate::files::escaped;
@@ -59,14 +59,15 @@ pub enum Contents {
     Figures(Map<String, Value>),
 }
 
-/// Reads what a task needs. A unit whose record is in `folder` is not read if its digest is known, unless `again` chooses its key.
-pub fn read(task: Task, folder: &Path, again: impl Fn(&Key) -> bool) -> Read {
+/// Reads what a task needs. A unit whose record is in `folder` is not read if its digest is known, unless `again` chooses its key. `verified`: the
+/// digests of its outputs are compared.
+pub(super) fn read(task: Task, folder: &Path, verified: Option<&Verified>, again: impl Fn(&Key) -> bool) -> Read {
     let begun = Instant::now();
     let (mut key, mut earlier) = (None, None);
     // A digest that the manifest gives names the outputs before anything is read.
     if let Some(digest) = &task.numbered.unit.digest {
         let named = task.work.key(digest);
-        match read_record(folder, &named) {
+        match read_record(folder, &named, verified) {
             Some(record) if !again(&named) => return Read::Finished(task, Box::new(record)),
             there => earlier = there.map(Box::new),
         }
@@ -85,7 +86,7 @@ pub fn read(task: Task, folder: &Path, again: impl Fn(&Key) -> bool) -> Read {
         }
         if key.is_none() {
             let named = task.work.key(&digest);
-            match read_record(folder, &named) {
+            match read_record(folder, &named, verified) {
                 Some(record) if !again(&named) => {
                     key = Some(named);
                     return Ok(Err(record));

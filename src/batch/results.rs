@@ -1,8 +1,10 @@
 //! What is kept of a unit: its record, which says that it is done, and a line of its shard's results.
 
 use super::agreement::{Agreement, Drawer};
+use super::sha256_of_file;
 use super::shard::Shard;
 use super::unit::Key;
+use crate::terminal::remark;
 use crate::{files, machine};
 use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value};
@@ -11,6 +13,7 @@ use std::fs::{self, File, OpenOptions};
 use std::hash::{DefaultHasher, Hash, Hasher};
 use std::io::{self, BufRead, BufReader, Read, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicU64, Ordering};
 
 /// Version of the format of records.
 pub const FORMAT: &str = "echolume-batch-1";
@@ -87,15 +90,42 @@ pub struct Record {
     pub agreement: Option<Agreement>,
 }
 
-/// The record of a unit that is done: it is there, whole, and so are its outputs.
-pub(super) fn read_record(folder: &Path, key: &Key) -> Option<Record> {
+/// Counts of outputs that were read again, for their digests.
+#[derive(Default)]
+pub(super) struct Verified {
+    pub whole: AtomicU64,
+    /// Of these one line each is said, and their units are done again.
+    pub damaged: AtomicU64,
+}
+
+impl Verified {
+    /// True if an output is what its record says.
+    fn is_whole(&self, folder: &Path, output: &OutputFile) -> bool {
+        let file = folder.join(&output.file);
+        let fault = match sha256_of_file(&file) {
+            Ok((sha256, _)) if sha256 == output.sha256 => None,
+            Ok((sha256, _)) => Some(format!("has the digest {sha256}, its record says {}", output.sha256)),
+            Err(e) => Some(format!("cannot be read: {e}")),
+        };
+        let count = if fault.is_none() { &self.whole } else { &self.damaged };
+        count.fetch_add(1, Ordering::Relaxed);
+        fault.is_none_or(|fault| {
+            remark(&format!("{}: {fault}; it is made again", file.display()));
+            false
+        })
+    }
+}
+
+/// The record of a unit that is done: it is there, whole, and so are its outputs. `verified`: their digests are compared, too.
+pub(super) fn read_record(folder: &Path, key: &Key, verified: Option<&Verified>) -> Option<Record> {
     let bytes = files::read(&folder.join(key.record()), MAX_LINE, "record").ok()?;
     let record: Record = serde_json::from_slice(&bytes).ok()?;
     let is_there = |output: &OutputFile| {
         fs::metadata(folder.join(&output.file)).is_ok_and(|there| there.is_file() && there.len() == output.bytes)
     };
     let is_done = record.format == FORMAT && record.status == Status::Done && record.key == key.text();
-    (is_done && record.outputs.iter().all(is_there)).then_some(record)
+    let is_whole = |output: &OutputFile| verified.is_none_or(|verified| verified.is_whole(folder, output));
+    (is_done && record.outputs.iter().all(is_there) && record.outputs.iter().all(is_whole)).then_some(record)
 }
 
 /// A unit by its recording and its work: what is kept of a million units.

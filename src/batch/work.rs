@@ -5,7 +5,7 @@ use super::manifest::Numbered;
 use super::painter::{DeviceOptions, Painter, against_reference};
 use super::progress::Progress;
 use super::reading::{Contents, Read, Task, read, shown};
-use super::results::{Earlier, FORMAT, OutputFile, Record, Results, Seconds, Status};
+use super::results::{Earlier, FORMAT, OutputFile, Record, Results, Seconds, Status, Verified};
 use super::shard::Shard;
 use super::unit::{Key, Kind, Work};
 use super::{sha256, sha256_of_file};
@@ -19,6 +19,7 @@ use std::collections::HashMap;
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
+use std::sync::atomic::Ordering;
 use std::sync::mpsc::sync_channel;
 use std::time::{Duration, Instant, SystemTime};
 
@@ -36,6 +37,8 @@ pub struct Job<'a> {
     pub folder: &'a Path,
     pub shard: Shard,
     pub device: DeviceOptions,
+    /// The digests of finished outputs are compared with their records.
+    pub verifies: bool,
     /// Share of the finished pictures that are drawn again and compared, 0..=1.
     pub recheck: f64,
     /// What earlier processes wrote of this shard. Taken by the run.
@@ -104,13 +107,14 @@ impl Job<'_> {
         let mut ended = Ended { units: tasks.len(), ..Ended::default() };
         let folder = self.folder;
         let recheck = self.recheck;
+        let (verifies, verified) = (self.verifies, &Verified::default());
         let outcome = std::thread::scope(|scope| {
             // Without a buffer: one recording waits while another is drawn.
             let (sender, receiver) = sync_channel(0);
             scope.spawn(move || {
                 for task in tasks {
                     let again = |key: &Key| task.work.kind == Kind::Render && key.share() < recheck;
-                    let read = read(task.clone(), folder, again);
+                    let read = read(task.clone(), folder, verifies.then_some(verified), again);
                     if sender.send(read).is_err() {
                         return;
                     }
@@ -199,6 +203,10 @@ impl Job<'_> {
             }
         });
         say!("{}", progress.finish());
+        if verifies {
+            let [whole, damaged] = [&verified.whole, &verified.damaged].map(|count| count.load(Ordering::Relaxed));
+            say!("verified: {whole} outputs are as their records say, {damaged} were not");
+        }
         outcome.map(|()| ended)
     }
 

@@ -65,7 +65,7 @@ fn page(command: &Command) -> Result<Vec<u8>, Failure> {
 /// Writes the page of a command, and of those below it. Returns their number.
 fn write(command: &Command, folder: &Path) -> Result<usize, Failure> {
     let name = command.get_display_name().unwrap_or(command.get_name());
-    files::replace(&folder.join(format!("{name}.1")), &page(command)?).map_err(failed)?;
+    files::replace_shared(&folder.join(format!("{name}.1")), &page(command)?).map_err(failed)?;
     let mut count = 1;
     for below in command.get_subcommands().filter(|below| !below.is_hide_set() && below.get_name() != "help") {
         count += write(below, folder)?;

@@ -8,6 +8,7 @@ use crate::batch::results::{Asked, Earlier};
 use crate::batch::shard::{Shard, assign};
 use crate::batch::work::Job;
 use crate::batch::{manifest, results, unit};
+use crate::files::replace;
 use crate::files::signals::{self, Held};
 use crate::gpu::{Deadline, DeviceChoice};
 use crate::terminal::{Failure, failed, input, remark, say};
@@ -69,6 +70,10 @@ pub struct Batch {
     /// such as a mistyped one. Without this flag finished units are skipped as well, and a folder without results is where a new batch begins
     #[arg(long, conflicts_with_all = ["make", "report"])]
     resume: bool,
+    /// Read the outputs of finished units and compare them with the digests of their records. One that differs is one line, and its unit is done
+    /// again. Without this flag an output of the right length counts as whole
+    #[arg(long, conflicts_with_all = ["make", "report"])]
+    verify: bool,
     /// Draw this share of the finished pictures again and compare: bit for bit on the same device and driver, within the tolerance of
     /// verify on others
     #[arg(long, value_name = "SHARE", default_value_t = 0.0)]
@@ -149,6 +154,7 @@ impl Batch {
             shard,
             device: DeviceOptions { device: self.device.clone(), deadline: Deadline::ByDevice, stop: is_grace_over },
             recheck: self.recheck,
+            verifies: self.verify,
             earlier,
             resumes: self.resume,
             stops: &|| held.signal().is_some(),
@@ -186,7 +192,8 @@ impl Batch {
     fn write_page(&self, folder: &Path) -> Result<(), Failure> {
         let (records, torn) = results::read_all(folder).map_err(input)?;
         let file = self.output.clone().unwrap_or_else(|| folder.join("report.html"));
-        write_report(&file, &report::html(&records, torn, folder))?;
+        replace(&file, report::html(&records, torn, folder).as_bytes()).map_err(failed)?;
+        say!("written: {}", file.display());
         let merged = Merged::of(&records);
         let failures = merged.failures().count();
         say!("{} units: {} done, {failures} failed", merged.units.len(), merged.done().count());

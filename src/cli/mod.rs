@@ -109,12 +109,15 @@ left_out!(verify, Verify, "verify");
 #[cfg(not(feature = "view"))]
 left_out!(view, View, "view");
 
+use crate::files::signals::hangups;
+use crate::files::{self, Lock};
 use crate::kiosk::log_rotation::{self, RotatingLog};
+use crate::memory;
 use crate::source::standard_input;
 use crate::terminal::{self, Failure, failed, input};
 use clap::{CommandFactory, Parser, Subcommand};
 use std::io::Write;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::sync::Mutex;
 use tracing_subscriber::filter::filter_fn;
@@ -133,7 +136,8 @@ use tracing_subscriber::util::SubscriberInitExt;
     after_long_help = "Exit codes of every command: 0 done, 1 failed, 2 bad input or usage, 3 no Vulkan device or not the one asked for, 4 \
                        stopped by a signal before all was done (verify). `batch`: also 3, device lost, and 4, some units failed. Any other command ends by the signal itself. `-` as a recording \
                        is standard input; `-o -` writes a picture to standard output, and every line to standard error. \
-                       ECHOLUME_PROGRESS=lines in the environment writes how far the work is as lines to standard error, for a program that runs this one."
+                       ECHOLUME_PROGRESS=lines in the environment writes how far the work is as lines to standard error, for a program that runs this one. \
+                       Recordings, pictures, volumes, workspaces and logs can be read by their owner alone; ECHOLUME_PRIVATE=0 lets the umask decide."
 )]
 struct Arguments {
     #[command(subcommand)]
@@ -144,6 +148,10 @@ struct Arguments {
     /// Write the log to this file. At 10 MiB it is rotated to FILE.1 and so on up to FILE.4; the oldest is deleted
     #[arg(long, value_name = "FILE", global = true)]
     log_file: Option<PathBuf>,
+    /// Refuse recordings whose volumes take more memory than this, such as 8G; none: take any [default: half of the memory that this
+    /// process may have; info: none]
+    #[arg(long, value_name = "SIZE", global = true, value_parser = memory::parse)]
+    max_memory: Option<u64>,
 }
 
 #[derive(Subcommand)]
@@ -202,8 +210,17 @@ pub fn run() -> ExitCode {
             return if error.use_stderr() { ExitCode::from(2) } else { ExitCode::SUCCESS };
         }
     };
-    let reports_validation = matches!(arguments.command, Command::Verify(_));
-    let log = start_log(arguments.verbose, arguments.log_file.as_deref(), arguments.command.log(), reports_validation);
+    // A description needs one frame at a time.
+    let all = matches!(arguments.command, Command::Info(_)).then_some(u64::MAX);
+    arguments.max_memory.or(all).into_iter().for_each(memory::set_limit);
+    if !arguments.command.is_private() {
+        files::follow_umask();
+    }
+    let log = arguments.command.log();
+    let log = start_log(arguments.verbose, arguments.log_file.as_deref(), log, &arguments.command);
+    // To the end no other process writes to the log.
+    let (_lock, log) = log.map_or_else(|failure| (None, Err(failure)), |lock| (lock, Ok(())));
+    let log = log.and_then(|()| check_environment());
     let done = log.and_then(|()| match arguments.command {
         Command::Render(render) => render.run(),
         Command::Stream(stream) => stream.run(),
@@ -243,15 +260,55 @@ impl Command {
             _ => None,
         }
     }
+
+    /// False where the command's configuration lets the umask say who may read files.
+    fn is_private(&self) -> bool {
+        match self {
+            #[cfg(feature = "view")]
+            Command::View(view) => view.is_private(),
+            _ => true,
+        }
+    }
+
+    /// True if SIGHUP opens the log again instead of ending the program: it runs until it is stopped.
+    fn reopens_log(&self) -> bool {
+        match self {
+            #[cfg(feature = "view")]
+            Command::View(view) => view.is_kiosk(),
+            _ => false,
+        }
+    }
 }
 
-/// Starts logging. With `reports_validation` the command itself reports validation messages, so that they are logged only with `-v`.
+/// Refuses a variable of the environment that would mean nothing.
+fn check_environment() -> Result<(), Failure> {
+    match std::env::var_os(files::PRIVATE) {
+        Some(value) if value != "0" && value != "1" => {
+            Err(input(format!("{}={}: must be 0 or 1", files::PRIVATE, value.display())))
+        }
+        _ => Ok(()),
+    }
+}
+
+/// Opens a log that no other process writes to.
+fn open_log(path: &Path, bytes: u64, files: u32, command: &Command) -> Result<RotatingLog, String> {
+    let log = RotatingLog::open(path, bytes, files)?;
+    match command.reopens_log() {
+        true => hangups().map(|reopens| log.reopened(reopens)).map_err(|e| format!("SIGHUP cannot be caught: {e}")),
+        false => Ok(log),
+    }
+}
+
+/// Starts logging, and locks the log. A command that reports validation messages itself logs them only with `-v`.
 fn start_log(
     verbose: u8,
-    file: Option<&std::path::Path>,
+    file: Option<&Path>,
     configured: Option<(PathBuf, u64, u32)>,
-    reports_validation: bool,
-) -> Result<(), Failure> {
+    command: &Command,
+) -> Result<Option<Lock>, Failure> {
+    let reports_validation = matches!(command, Command::Verify(_));
+    let path = file.or(configured.as_ref().map(|(path, ..)| path.as_path()));
+    let lock = path.map(Lock::take).transpose().map_err(|fault| failed(format!("log {fault}")))?;
     let level = match verbose {
         0 => tracing::Level::WARN,
         1 => tracing::Level::INFO,
@@ -260,7 +317,7 @@ fn start_log(
     let log = tracing_subscriber::fmt().with_max_level(level).with_target(false);
     // A kiosk without a log still shows pictures.
     let configured = configured.filter(|_| file.is_none()).and_then(|(path, bytes, files)| {
-        let opened = RotatingLog::open(&path, bytes, files);
+        let opened = open_log(&path, bytes, files, command);
         opened
             .inspect_err(|fault| drop(writeln!(std::io::stderr(), "echolume: log: {fault}; logging to standard error")))
             .ok()
@@ -274,7 +331,7 @@ fn start_log(
             .with_ansi(false)
             .with_writer(Mutex::new(file))
             .init();
-        return Ok(());
+        return Ok(lock);
     }
     match file {
         None => {
@@ -287,10 +344,10 @@ fn start_log(
                 .init();
         }
         Some(path) => {
-            let file = RotatingLog::open(path, log_rotation::DEFAULT_FILE_BYTES, log_rotation::DEFAULT_FILES);
+            let file = open_log(path, log_rotation::DEFAULT_FILE_BYTES, log_rotation::DEFAULT_FILES, command);
             let file = file.map_err(|fault| input(format!("--log-file {fault}")))?;
             log.with_ansi(false).with_writer(Mutex::new(file)).init();
         }
     }
-    Ok(())
+    Ok(lock)
 }

@@ -3,7 +3,7 @@
 use super::pipelines::Request;
 use crate::args::{InputArgs, Output, ShaderArgs, check_outputs, open_device, write_report};
 use crate::baselines::{Stored, Threshold};
-use crate::files::replace;
+use crate::files::replace_shared;
 use crate::gpu::DeviceChoice;
 use crate::profile as model;
 use crate::profile::timed_run;
@@ -162,7 +162,7 @@ impl Profile {
         say!("{}", export::comparison_table(&compared).trim_end());
         if let (Some(file), true) = (&self.json, !self.compare.is_empty()) {
             let text = serde_json::to_string_pretty(&compared).map_err(failed)?;
-            replace(file, text.as_bytes()).map_err(failed)?;
+            replace_shared(file, text.as_bytes()).map_err(failed)?;
         }
         let slower: Vec<&str> = compared.regressions().map(|l| l.name.as_str()).collect();
         match slower.is_empty() {

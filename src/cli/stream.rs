@@ -3,6 +3,7 @@
 use super::one_colour;
 use super::serve::{ServeArgs, Serving};
 use crate::args::{SceneArgs, SourceArgs, StreamArgs, check_outputs};
+use crate::files::Lock;
 use crate::files::signals::Held;
 use crate::gpu::{Context, GpuError, Losses};
 use crate::live::feed::Observer;
@@ -83,6 +84,7 @@ impl Stream {
             check_record(file, self.source.path())?;
         }
         check_outputs(&[("--prometheus", self.prometheus.as_deref())], [self.source.path()])?;
+        let _lock = self.prometheus.as_deref().map(Lock::take).transpose().map_err(failed)?;
         let source = self.source.open()?;
         let mut serving = self.serve.start()?;
         let mut context = self.scene.open_device(self.validate)?;

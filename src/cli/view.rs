@@ -6,6 +6,7 @@ use crate::args::{
     SceneArgs, SourceArgs, StreamArgs, check_outputs, device_failure, first_steps, parse_nanoseconds, presets_file,
     recent_list,
 };
+use crate::files::Lock;
 use crate::gpu::shader_reload::ShaderFolder;
 use crate::gpu::window::{MonitorChoice, PresentMode};
 use crate::gpu::{Context, Wake};
@@ -130,6 +131,7 @@ impl View {
             let read = self.config.is_none().then(|| self.source.path());
             check_outputs(&[("--prometheus", self.prometheus.as_deref())], read)?;
         }
+        let locks = self.locks()?;
         let deadline = self.scene.deadline()?;
         let mut place = match self.config() {
             None => self.place()?,
@@ -181,7 +183,26 @@ impl View {
             Console::new(context, open, options, size)
         };
         let ran = place.run(Box::new(make)).map_err(device_failure);
-        finish(ran?)
+        let finished = finish(ran?);
+        drop(locks);
+        finished
+    }
+
+    pub fn is_kiosk(&self) -> bool {
+        self.kiosk
+    }
+
+    /// False where the configuration lets the umask say who may read files.
+    pub fn is_private(&self) -> bool {
+        self.config().and_then(Result::ok).is_none_or(|config| config.files.private)
+    }
+
+    /// Locks what no other process may write to at the same time: the metrics, and the folders of a kiosk.
+    fn locks(&self) -> Result<Vec<Lock>, Failure> {
+        let config = self.config().and_then(Result::ok).unwrap_or_default();
+        let metrics = self.prometheus.clone().or(config.files.prometheus);
+        let folders = [config.files.pictures, config.live.record].into_iter().flatten().filter(|_| self.kiosk);
+        metrics.into_iter().chain(folders).map(|place| Lock::take(&place).map_err(failed)).collect()
     }
 
     /// The log of the configuration: path, bytes per file, number of files.

@@ -14,6 +14,7 @@ use super::window::target::Target;
 use crate::queues::MAX_QUEUES;
 use crate::scene::WindowTexels;
 use ash::vk;
+use gpu_allocator::AllocationSizes;
 use gpu_allocator::vulkan::{Allocator, AllocatorCreateDesc};
 use std::any::Any;
 use std::collections::{BTreeSet, HashMap};
@@ -28,6 +29,8 @@ const MAX_UNUSED_PIPELINES: usize = 256;
 
 /// Waits for timelines between two idle queues that an older layer is shown: showing it one after each wait took four times the CPU time.
 const UNSEEN_WAITS: u64 = 512;
+/// Size of a block of memory on a software device, bytes.
+const SOFTWARE_BLOCK: u64 = 8 << 20;
 
 /// Which device a [`Context`] uses, and how.
 #[derive(Clone, Debug)]
@@ -164,6 +167,15 @@ pub fn list() -> Result<Vec<Candidate>, GpuError> {
     candidates
 }
 
+/// Sizes of the blocks of memory. What is larger than a block has one of its own, which is given back at once. On a GPU that takes time, on a software device
+/// blocks are memory of the machine: after a resize large ones would keep what the larger window had touched of them.
+fn block_sizes(candidate: &Candidate) -> AllocationSizes {
+    match candidate.is_software() {
+        true => AllocationSizes::new(SOFTWARE_BLOCK, SOFTWARE_BLOCK),
+        false => AllocationSizes::default(),
+    }
+}
+
 impl Context {
     /// Opens a device.
     ///
@@ -223,7 +235,7 @@ impl Context {
             physical_device: candidate.handle,
             debug_settings: Default::default(),
             buffer_device_address: false,
-            allocation_sizes: Default::default(),
+            allocation_sizes: block_sizes(&candidate),
         });
         let allocator = match allocator {
             Ok(allocator) => allocator,

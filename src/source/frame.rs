@@ -1,6 +1,7 @@
 //! The header of a sequence of frames, and the trait of sources that are read on demand.
 
 use crate::files::InputError;
+use crate::memory;
 pub use crate::probe::{Advance, Frame, Geometry, SampleType, StoredType, World, is_rigid};
 use glam::{DAffine3, DMat4, DVec3};
 use serde::{Deserialize, Serialize};
@@ -11,6 +12,19 @@ use std::path::{Path, PathBuf};
 const MAX_SLICES: usize = 1 << 16;
 /// Largest frame, bytes.
 const MAX_FRAME_BYTES: u64 = 1 << 30;
+
+/// Refuses volumes that take more memory than they may.
+pub(super) fn check_memory(path: &Path, geometry: &Geometry, stored: StoredType) -> Result<(), InputError> {
+    memory_fault(geometry, stored).map_or(Ok(()), |fault| Err(InputError::new(path, "volume", fault)))
+}
+
+fn memory_fault(geometry: &Geometry, stored: StoredType) -> Option<String> {
+    let [width, height] = geometry.frame_size();
+    let edges = [width, height, geometry.slices()];
+    let bytes = edges.iter().fold(stored.bytes() as u64, |bytes, edge| bytes.saturating_mul(*edge as u64));
+    let [x, y, z] = edges;
+    memory::check(bytes).err().map(|fault| format!("of {x} x {y} x {z} samples {fault}"))
+}
 
 /// What all frames of a file or of a live source have in common.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -97,6 +111,9 @@ impl Header {
         }
         if self.frame_bytes().is_none() {
             return Err(("forward", format!("makes frames of more than {MAX_FRAME_BYTES} bytes")));
+        }
+        if let Some(fault) = memory_fault(&self.forward, self.stored) {
+            return Err(("volume", fault));
         }
         let [low, high] = self.range;
         match low.is_finite() && high.is_finite() && low < high {

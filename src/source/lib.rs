@@ -2,7 +2,8 @@
 //! placed by the motor's position.
 //!
 //! Every reader is total: any bytes give frames or an [`InputError`], never a panic. No reader takes more memory than the bytes of its
-//! file account for, or than a live source documents.
+//! file account for, or than a live source documents. A volume that is larger than half of the memory of this machine is refused
+//! ([`memory`]).
 
 #![forbid(unsafe_code)]
 
@@ -31,6 +32,7 @@ pub mod phantom;
 mod pictures;
 pub mod piped;
 mod piped_file;
+mod piped_record;
 mod pixel;
 mod plus;
 mod plus_config;
@@ -51,7 +53,7 @@ mod value_range;
 pub mod volume_file;
 pub mod volume_sequence;
 
-use echolume_base::{files, tree};
+use echolume_base::{files, memory, tree};
 use echolume_probe as probe;
 
 pub use crate::files::InputError;
@@ -197,9 +199,10 @@ fn uff(path: &Path, options: OpenOptions) -> Result<(Box<dyn Source>, Descriptio
         _ => {
             options.freehand.refused(path)?;
             #[cfg(feature = "uff")]
-            return uff::Beamformed::open(path).map(|file| {
+            return uff::Beamformed::open(path).and_then(|file| {
+                frame::check_memory(path, &file.geometry(0), file.stored_type())?;
                 let description = Description { rows: file.description(), unused: file.unused().clone() };
-                (Box::new(file) as Box<dyn Source>, description)
+                Ok((Box::new(file) as Box<dyn Source>, description))
             });
             #[cfg(not(feature = "uff"))]
             Err(InputError::new(path, "file", left_out("UFF (HDF5)", "uff")))

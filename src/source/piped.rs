@@ -4,29 +4,35 @@
 //!
 //! | key | meaning |
 //! |---|---|
-//! | `echolume` | 1 or 2, the version of this format; 2 has `posed` |
+//! | `echolume` | 1, 2 or 3, the version of this format; 2 has `posed`, 3 has it too, and markers and checksums |
 //! | `samples`, `lines`, `frames` | samples a line, lines a frame, frames a volume; each 1 to 65536 |
 //! | `type` | `"u8"`, `"u16"` or `"f32"`, little-endian |
 //! | `range` | the two values that are shown as 0 and 1; otherwise `samples.range` of the probe, otherwise all of an integer type. f32 needs one |
 //! | `both_ways` | every second volume is swept backwards; otherwise that of the probe |
 //! | `speed_ratio` | fraction of the distance to the next frame that the motor travels during one, 0..=1; otherwise that of the probe |
-//! | `stamped` | `true`: each frame is preceded by its time stamp, an f64 in s. A value that is not finite means none |
+//! | `stamped` | `true`: each frame is preceded by its time stamp, an f64 in s, 0 to 1e10, at most 60 s before that of the last frame and a day behind it. NaN means none. Another value ends the stream: bytes were lost or added |
 //! | `posed` | `true`: each frame is preceded by its pose, after its time stamp: 12 f64, the upper three rows of a 4 x 4 matrix, row by row. It takes mm in the space of the probe or the lattice to those of a tracker or the world (LPS), and must be rigid. NaN means none. Frames of a lattice of one slice become a freehand volume |
-//! | `lines_at_once` | frames are passed on in parts of so many lines |
+//! | `lines_at_once` | frames are passed on in parts of so many lines. Not in version 3, whose checksums are of whole frames |
 //! | `probe` | the tables of a probe file as objects: `{"array": {"kind": "curved", ...}, ...}`. A probe file given by the user takes precedence |
 //! | `cartesian` | instead of a probe: `{"size": [x, y, z], "spacing": [x, y, z], "origin": [x, y, z]}`, mm; `samples`, `lines` and `frames` may then be left out |
 //!
-//! The frames follow in order of acquisition, line by line (samples fastest), with nothing between them but their time stamps. The
+//! The frames follow in order of acquisition, line by line (samples fastest), with nothing between them but their time stamps and poses. The
 //! stream may end after any frame. `tools/pipe_frames.py` writes such a stream.
+//!
+//! In version 3 each frame is: the 8 bytes `89 45 43 48 4f 46 52 0a`, its number from 0 (u64), its time stamp and its pose if the first line says so, its samples,
+//! and the CRC-32 (ISO-HDLC, zlib's) of all of this but the marker (u32), little-endian. A frame that is damaged is left out up to the next marker, and a line says so;
+//! the frames after it keep their places by their numbers. Frames whose number is not above that of the last one are left out, too.
 
 use super::frame::{Header, POSE_BYTES, read_pose};
 use super::freehand::CompoundingOptions;
 use super::live::{Event, Live};
+use super::piped_record::{self, OVERHEAD, Stamps};
 use super::samples::{self, Replaced};
 use crate::Frame;
 use crate::SampleType;
 use crate::files::InputError;
 use crate::probe::{Geometry, Grid, Probe, ProbeFile, Volumes};
+use glam::DAffine3;
 use serde::Deserialize;
 use std::collections::VecDeque;
 use std::io::{self, BufRead, BufReader, Read};
@@ -44,8 +50,8 @@ const MAX_WAITING_FRAMES: usize = 4;
 
 /// A stream of frames as a live source.
 ///
-/// Memory: up to four queued frames of at most 256 MiB in total (or a single one), and the one that is being read, of at most 1 GiB. Before
-/// the first complete frame, no more than twice the bytes that arrived.
+/// Memory: up to four queued frames of at most 256 MiB in total (or a single one), and the one that is being read, of at most 1 GiB; of version 3
+/// twice. Before the first complete frame, no more than twice the bytes that arrived.
 pub struct Piped {
     queue: Arc<Queue>,
     compounding: CompoundingOptions,
@@ -99,8 +105,8 @@ impl Drop for Piped {
 
 /// Most samples, lines and frames.
 const MAX_EXTENT: usize = 1 << 16;
-/// The versions that are read. The second one has `posed`.
-const VERSIONS: [u64; 2] = [1, 2];
+/// The versions that are read. The second one has `posed`, the third checksums.
+const VERSIONS: [u64; 3] = [1, 2, 3];
 /// Margin of a freehand volume around its first pictures, mm: more come.
 const MARGIN: f64 = 20.0;
 
@@ -148,10 +154,20 @@ pub(super) struct StreamHeader {
     pub header: Header,
     pub sample: SampleType,
     pub stamped: bool,
+    /// Frames have markers, numbers and checksums.
+    pub checked: bool,
     lines: usize,
     /// Equal to `lines` if frames are passed on as a whole.
     lines_at_once: usize,
     pub volumes: Volumes,
+}
+
+/// What a frame consists of.
+pub(super) struct Parts<'a> {
+    pub time: Option<f64>,
+    /// None: it states none; Some(None): what it states is no pose.
+    pub pose: Option<Option<DAffine3>>,
+    pub samples: &'a [u8],
 }
 
 fn fault<T>(key: &str, fault: impl AsRef<str>) -> Result<T, InputError> {
@@ -170,7 +186,7 @@ impl StreamHeader {
         // Checked before the keys: another version may have other keys.
         match value.get("echolume").map(serde_json::Value::as_u64) {
             Some(Some(version)) if VERSIONS.contains(&version) => {}
-            Some(_) => return fault("echolume", "must be 1 or 2, the versions that this program reads"),
+            Some(_) => return fault("echolume", "must be 1, 2 or 3, the versions that this program reads"),
             None => return fault("header", "has no key \"echolume\": this is no stream of frames"),
         }
         let keys: Keys = serde_json::from_slice(line).map_err(no_json)?;
@@ -216,17 +232,46 @@ impl StreamHeader {
         let header = Header { forward, backward, stored: sample.stored(), range, posed, synthetic: false };
         header.check().or_else(|(key, wrong)| fault(key, wrong))?;
         let lines = size[1];
+        let checked = keys.version == 3;
         let lines_at_once = match keys.lines_at_once {
+            Some(_) if checked => {
+                return fault("lines_at_once", "is for versions 1 and 2; the checksums of 3 are of whole frames");
+            }
             Some(0) => return fault("lines_at_once", "is 0, must be at least 1"),
             given => given.unwrap_or(lines).min(lines),
         };
-        Ok(StreamHeader { header, sample, stamped: keys.stamped, lines, lines_at_once, volumes })
+        Ok(StreamHeader { header, sample, stamped: keys.stamped, checked, lines, lines_at_once, volumes })
     }
 
-    /// Size of what precedes the samples of a frame, bytes.
-    pub fn before(&self) -> usize {
+    /// Size of a frame in the stream, bytes.
+    pub(super) fn record_bytes(&self) -> usize {
+        // A header with frames of no size was refused.
+        self.before() + self.header.frame_bytes().unwrap_or(1) as usize + if self.checked { OVERHEAD } else { 0 }
+    }
+
+    /// Size of the time stamp and the pose of a frame, bytes.
+    fn before(&self) -> usize {
         let stamp = if self.stamped { size_of::<f64>() } else { 0 };
         stamp + if self.header.posed { POSE_BYTES } else { 0 }
+    }
+
+    /// Time stamp, pose and samples of a frame, from the bytes of all of these.
+    ///
+    /// # Errors
+    /// A time stamp that cannot be.
+    pub fn parts<'a>(&self, bytes: &'a [u8], stamps: &mut Stamps) -> Result<Parts<'a>, InputError> {
+        let (mut time, mut pose, mut samples) = (None, None, bytes);
+        if let Some((stamp, rest)) = samples.split_first_chunk().filter(|_| self.stamped) {
+            let taken = stamps.take(f64::from_le_bytes(*stamp));
+            (time, samples) = (taken.map_err(|wrong| stream_error("time stamp", wrong))?, rest);
+        }
+        if let Some((stated, rest)) = samples.split_first_chunk::<POSE_BYTES>().filter(|_| self.header.posed) {
+            // All NaN is a frame that states that it has none.
+            let is_stated = stated.as_chunks::<8>().0.iter().any(|word| !f64::from_le_bytes(*word).is_nan());
+            pose = is_stated.then(|| read_pose(stated));
+            samples = rest;
+        }
+        Ok(Parts { time, pose, samples })
     }
 
     /// The frame at an index of the stream, from 0, without samples.
@@ -312,6 +357,22 @@ struct Reader<'a, R> {
     proven: bool,
     /// A pose was reported as none.
     refused_pose: bool,
+    stamps: Stamps,
+    /// Bytes that came and are not yet part of a frame with a checksum.
+    record: Vec<u8>,
+}
+
+/// What the end of a stream means, `came` bytes into a frame: between two frames it is the regular one.
+fn cut(stream: &StreamHeader, index: u64, error: &io::Error, came: usize) -> Result<bool, InputError> {
+    match error.kind() {
+        io::ErrorKind::UnexpectedEof if came == 0 => Ok(false),
+        io::ErrorKind::UnexpectedEof => {
+            let Frame { volume, number, .. } = stream.frame(index, None);
+            let there = format!("{came} of {} bytes of frame {number} of volume {volume} came", stream.record_bytes());
+            Err(stream_error("samples", format!("cut short, {there} (both numbered from 0)")))
+        }
+        _ => Err(stream_error("samples", format!("cannot be read: {error}"))),
+    }
 }
 
 fn stream_error(field: &str, fault: impl AsRef<str>) -> InputError {
@@ -344,6 +405,8 @@ impl<'a, R: Read> Reader<'a, R> {
             replaced: Replaced::default(),
             proven: false,
             refused_pose: false,
+            stamps: Stamps::default(),
+            record: Vec::new(),
         }
     }
 
@@ -360,6 +423,10 @@ impl<'a, R: Read> Reader<'a, R> {
         let mut index = 0;
         let mut goes_on = Ok(self.queue.push(begin));
         while let Ok(true) = goes_on {
+            if stream.checked {
+                goes_on = self.checked_frame(&stream, &mut index);
+                continue;
+            }
             goes_on = self.frame(&stream, index);
             index += 1;
         }
@@ -373,57 +440,21 @@ impl<'a, R: Read> Reader<'a, R> {
 
     /// Reads the next frame, as a whole or in parts. False: there is none, or the receiver was dropped.
     fn frame(&mut self, stream: &StreamHeader, index: u64) -> Result<bool, InputError> {
-        let whole = stream.header.frame_bytes().unwrap_or(0) as usize;
-        let (line, stamp) = (whole / stream.lines, if stream.stamped { size_of::<f64>() } else { 0 });
-        let before = stream.before();
-        let mut came = 0;
-        // An end between two frames is the regular end of the stream.
-        let cut = |error: io::Error, came: usize| match error.kind() {
-            io::ErrorKind::UnexpectedEof if came == 0 => Ok(false),
-            io::ErrorKind::UnexpectedEof => {
-                let Frame { volume, number, .. } = stream.frame(index, None);
-                let there = format!("{came} of {} bytes of frame {number} of volume {volume} came", whole + before);
-                Err(stream_error("samples", format!("cut short, {there} (both numbered from 0)")))
-            }
-            _ => Err(stream_error("samples", format!("cannot be read: {error}"))),
-        };
-        let mut time = None;
-        if stream.stamped {
-            let mut bytes = Vec::with_capacity(stamp);
-            if let Err(error) = self.fill(stamp, &mut bytes, &mut came, false) {
-                return cut(error, came);
-            }
-            time = bytes.first_chunk().map(|b| f64::from_le_bytes(*b)).filter(|t| t.is_finite());
+        let (before, mut came, mut head) = (stream.before(), 0, Vec::new());
+        if let Err(error) = self.fill(before, &mut head, &mut came, false) {
+            return cut(stream, index, &error, came);
         }
-        let mut pose = None;
-        if stream.header.posed {
-            let mut bytes = Vec::with_capacity(POSE_BYTES);
-            if let Err(error) = self.fill(POSE_BYTES, &mut bytes, &mut came, false) {
-                return cut(error, came);
-            }
-            pose = bytes.first_chunk().and_then(read_pose);
-            // All NaN is a frame that states that it has none.
-            let is_stated = bytes.as_chunks::<8>().0.iter().any(|word| !f64::from_le_bytes(*word).is_nan());
-            if pose.is_none() && is_stated && !std::mem::replace(&mut self.refused_pose, true) {
-                let Frame { volume, number, .. } = stream.frame(index, None);
-                let what = "has a pose that is not rigid and finite; it and others like it count as none";
-                self.queue.push(Event::Fault(format!("{NAME}: frame {number} of volume {volume} {what}")));
-            }
-        }
+        let Parts { time, pose, .. } = stream.parts(&head, &mut self.stamps)?;
+        let pose = self.pose(pose, stream, index);
+        let line = (stream.record_bytes() - before) / stream.lines;
         let mut first = 0;
         while first < stream.lines {
             let lines = stream.lines_at_once.min(stream.lines - first);
             let mut frame = Frame { pose, ..stream.frame(index, time) };
             if let Err(error) = self.fill(lines * line, &mut frame.bytes, &mut came, true) {
-                return cut(error, came);
+                return cut(stream, index, &error, came);
             }
-            let known = self.replaced == Replaced::default();
-            self.replaced += samples::store(stream.sample, false, &mut frame.bytes);
-            if known && self.replaced != Replaced::default() {
-                let Frame { volume, number, .. } = frame;
-                let what = "has samples that are not finite or are denormal; from here on they read as 0";
-                self.queue.push(Event::Fault(format!("{NAME}: frame {number} of volume {volume} {what}")));
-            }
+            self.store(stream, &mut frame);
             let event = match lines == stream.lines {
                 true => Event::Frame(frame),
                 false => Event::Lines { frame, first },
@@ -434,6 +465,78 @@ impl<'a, R: Read> Reader<'a, R> {
             first += lines;
         }
         Ok(true)
+    }
+
+    /// Reads the next frame that has a checksum, and leaves out what is none before it. `next`: the number that comes next. False: there is none, or
+    /// the receiver was dropped.
+    fn checked_frame(&mut self, stream: &StreamHeader, next: &mut u64) -> Result<bool, InputError> {
+        let (mut record, mut left_out) = (std::mem::take(&mut self.record), 0);
+        let whole = stream.record_bytes();
+        let number = loop {
+            let mut came = record.len();
+            if let Err(error) = self.fill(whole - record.len(), &mut record, &mut came, false) {
+                self.left_out(left_out, 0);
+                return cut(stream, *next, &error, came);
+            }
+            if let Some((number, _)) = piped_record::content(&record) {
+                if number >= *next {
+                    break number;
+                }
+                let what = format!("{NAME}: frame {number}, counted from 0, came again; it is left out");
+                if !self.queue.push(Event::Fault(what)) {
+                    return Ok(false);
+                }
+                record.clear();
+                continue;
+            }
+            // Of a stream without any frame nothing would notice that nobody listens.
+            if self.queue.lock().closed {
+                return Ok(false);
+            }
+            let start = piped_record::next_start(&record);
+            left_out += start as u64;
+            record.drain(..start);
+        };
+        self.proven = true;
+        self.left_out(left_out, number - *next);
+        *next = number + 1;
+        let Some((_, content)) = piped_record::content(&record) else { return Ok(false) };
+        let Parts { time, pose, samples } = stream.parts(content, &mut self.stamps)?;
+        let mut frame = Frame { bytes: samples.to_vec(), ..stream.frame(number, time) };
+        frame.pose = self.pose(pose, stream, number);
+        self.store(stream, &mut frame);
+        record.clear();
+        self.record = record;
+        Ok(self.queue.push(Event::Frame(frame)))
+    }
+
+    /// Says what was left out before a frame, if anything was.
+    fn left_out(&self, bytes: u64, frames: u64) {
+        if bytes + frames > 0 {
+            let what = format!("{NAME}: {bytes} bytes are no frame and are left out; {frames} frames are missing");
+            self.queue.push(Event::Fault(what));
+        }
+    }
+
+    /// A pose that is one. The first that is none is reported.
+    fn pose(&mut self, stated: Option<Option<DAffine3>>, stream: &StreamHeader, index: u64) -> Option<DAffine3> {
+        if stated == Some(None) && !std::mem::replace(&mut self.refused_pose, true) {
+            let Frame { volume, number, .. } = stream.frame(index, None);
+            let what = "has a pose that is not rigid and finite; it and others like it count as none";
+            self.queue.push(Event::Fault(format!("{NAME}: frame {number} of volume {volume} {what}")));
+        }
+        stated.flatten()
+    }
+
+    /// Stores samples as frames have them.
+    fn store(&mut self, stream: &StreamHeader, frame: &mut Frame) {
+        let known = self.replaced == Replaced::default();
+        self.replaced += samples::store(stream.sample, false, &mut frame.bytes);
+        if known && self.replaced != Replaced::default() {
+            let Frame { volume, number, .. } = frame;
+            let what = "has samples that are not finite or are denormal; from here on they read as 0";
+            self.queue.push(Event::Fault(format!("{NAME}: frame {number} of volume {volume} {what}")));
+        }
     }
 
     /// Appends `count` bytes. `came` counts the bytes that arrived, also if some are missing. `are_samples`: a complete part of a frame, after

@@ -3,6 +3,7 @@
 use super::describe;
 use super::frame::{Header, POSE_BYTES, Source, read_pose};
 use super::piped::{StreamHeader, first_line};
+use super::piped_record::{self, BEFORE, Stamps};
 use super::samples;
 use crate::Frame;
 use crate::files::InputError;
@@ -28,6 +29,7 @@ pub(super) struct PipedFile {
     /// Bytes after the last whole volume.
     left_over: u64,
     next: u64,
+    stamps: Stamps,
 }
 
 impl PipedFile {
@@ -65,6 +67,7 @@ impl PipedFile {
             volumes,
             left_over: samples % whole,
             next: 0,
+            stamps: Stamps::default(),
         })
     }
 
@@ -103,12 +106,13 @@ impl PipedFile {
 
     /// The first pose of the frames of these volumes, read without moving the position.
     fn first_pose(&self, volumes: Range<usize>) -> Option<DAffine3> {
-        let stamp = if self.stream.stamped { size_of::<f64>() as u64 } else { 0 };
+        let stamp = if self.stream.stamped { size_of::<f64>() } else { 0 };
+        let before = (stamp + if self.stream.checked { BEFORE } else { 0 }) as u64;
         let [first, end] = [volumes.start, volumes.end].map(|n| n.min(self.volumes) as u64 * self.frames());
         let mut file = File::open(&self.path).ok().filter(|_| self.stream.header.posed)?;
         for n in first..end {
             let mut pose = [0; POSE_BYTES];
-            file.seek(SeekFrom::Start(self.start + n * frame_bytes(&self.stream) + stamp)).ok()?;
+            file.seek(SeekFrom::Start(self.start + n * frame_bytes(&self.stream) + before)).ok()?;
             file.read_exact(&mut pose).ok()?;
             if let Some(pose) = read_pose(&pose) {
                 return Some(pose);
@@ -129,8 +133,7 @@ impl PipedFile {
 
 /// Size of a frame with its time stamp and pose, bytes.
 fn frame_bytes(stream: &StreamHeader) -> u64 {
-    // A header with frames of no size was refused.
-    stream.header.frame_bytes().unwrap_or(1) + stream.before() as u64
+    stream.record_bytes() as u64
 }
 
 impl Source for PipedFile {
@@ -165,6 +168,7 @@ impl Source for PipedFile {
             return Err(InputError::new(&self.path, "volume", fault));
         }
         self.next = volume as u64 * self.frames();
+        self.stamps = Stamps::default();
         let at = self.start + self.next * frame_bytes(&self.stream);
         self.input.seek(SeekFrom::Start(at)).map_err(|e| InputError::unreadable(&self.path, &e))?;
         Ok(())
@@ -174,20 +178,26 @@ impl Source for PipedFile {
         if self.next >= self.volumes as u64 * self.frames() {
             return Ok(None);
         }
-        let mut stamp = [0; 8];
-        if self.stream.stamped {
-            self.read(&mut stamp)?;
-        }
-        let time = Some(f64::from_le_bytes(stamp)).filter(|time| self.stream.stamped && time.is_finite());
-        let mut pose = [0; POSE_BYTES];
-        if self.stream.header.posed {
-            self.read(&mut pose)?;
-        }
-        let pose = read_pose(&pose).filter(|_| self.stream.header.posed);
-        let mut frame = Frame { pose, ..self.stream.frame(self.next, time) };
         // The file has so many bytes.
-        frame.bytes = vec![0; self.stream.header.frame_bytes().unwrap_or(0) as usize];
-        self.read(&mut frame.bytes)?;
+        let mut bytes = vec![0; self.stream.record_bytes()];
+        self.read(&mut bytes)?;
+        let content = match self.stream.checked {
+            true => {
+                piped_record::content(&bytes).filter(|(number, _)| *number == self.next).map(|(_, content)| content)
+            }
+            false => Some(&bytes[..]),
+        };
+        let Some(content) = content else {
+            let fault = format!(
+                "frame {} (from 0) is damaged or missing; `echolume stream --source - --record FILE.frames` takes what is intact",
+                self.next
+            );
+            return Err(InputError::new(&self.path, "frames", fault));
+        };
+        let name = self.path.display().to_string();
+        let parts = self.stream.parts(content, &mut self.stamps).map_err(|error| error.renamed(&name))?;
+        let mut frame = Frame { bytes: parts.samples.to_vec(), ..self.stream.frame(self.next, parts.time) };
+        frame.pose = parts.pose.flatten();
         samples::store(self.stream.sample, false, &mut frame.bytes);
         self.next += 1;
         Ok(Some(frame))

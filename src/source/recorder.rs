@@ -23,7 +23,7 @@ use super::describe::{self, number};
 use super::frame::{POSE_BYTES, Source, read_pose, stored_pose};
 use crate::Frame;
 use crate::files::progress::CountedFile;
-use crate::files::{InputError, progress};
+use crate::files::{InputError, private, progress};
 use crate::probe::{Geometry, World};
 use crate::{SampleType, StoredType};
 use crc::{CRC_32_ISO_HDLC, Crc, Table};
@@ -80,8 +80,9 @@ impl Writer {
                 format!("has {} bytes, at most {MAX_HEADER_BYTES}", text.len()),
             ));
         }
-        let file =
-            OpenOptions::new().write(true).create_new(true).open(path).map_err(|e| InputError::unwritable(path, &e))?;
+        let file = private(OpenOptions::new().write(true).create_new(true))
+            .open(path)
+            .map_err(|e| InputError::unwritable(path, &e))?;
         let mut start = Vec::with_capacity(text.len() + 20);
         start.extend(MAGIC);
         start.extend(VERSION.to_le_bytes());

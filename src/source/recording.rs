@@ -2,6 +2,7 @@
 
 use super::drawn::Drawn;
 use super::formats::read_layout;
+use super::frame::check_memory;
 use super::keys::Unused;
 use super::layout::{Layout, LineOrder, StoredGeometry};
 use super::packed::PixelStream;
@@ -113,6 +114,7 @@ impl Recording {
             turned: None,
             next_drawn: 0,
         };
+        check_memory(path, &recording.geometry(0), recording.stored_type())?;
         match probe_file.and_then(|f| f.range()) {
             Some(range) => recording.range = range.map(|v| v + recording.sample_type().shift()),
             None if recording.stored_type() == StoredType::U8 => {}

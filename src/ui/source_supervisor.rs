@@ -84,6 +84,8 @@ pub(super) struct SourceSupervisor {
     next_attempt: Option<Instant>,
     /// How often the source could not be opened.
     not_opened: u64,
+    /// Why it could not be, as the log has it: each reason is said once.
+    logged: Option<String>,
 }
 
 impl SourceSupervisor {
@@ -103,6 +105,7 @@ impl SourceSupervisor {
             opening: None,
             next_attempt: Some(Instant::now()),
             not_opened: 0,
+            logged: None,
         }
     }
 
@@ -140,11 +143,13 @@ impl SourceSupervisor {
         match feed {
             Ok(feed) => {
                 self.state = SourceState::Open;
+                if self.logged.take().is_some() {
+                    tracing::info!("source: it is open now");
+                }
                 Some(feed)
             }
             Err(why) => {
-                self.not_opened += 1;
-                self.ended(Some(why), now);
+                self.cannot_open(why, now);
                 None
             }
         }
@@ -170,6 +175,16 @@ impl SourceSupervisor {
         }
     }
 
+    /// The source could not be opened. Without another attempt that is what the program ends with, and the log need not have it.
+    fn cannot_open(&mut self, why: String, now: Instant) {
+        self.not_opened += 1;
+        if self.retry.is_some() && self.logged.as_ref() != Some(&why) {
+            tracing::warn!("source: {why}; trying again");
+            self.logged = Some(why.clone());
+        }
+        self.ended(Some(why), now);
+    }
+
     fn start_opening(&mut self, now: Instant) {
         let (sender, opening) = channel();
         let (open, wake) = (self.open.clone(), self.wake.clone());
@@ -180,10 +195,7 @@ impl SourceSupervisor {
         };
         match std::thread::Builder::new().name("opening".into()).spawn(work) {
             Ok(_) => self.opening = Some(opening),
-            Err(e) => {
-                self.not_opened += 1;
-                self.ended(Some(texts::why_no_thread(e)), now);
-            }
+            Err(e) => self.cannot_open(texts::why_no_thread(e), now),
         }
         // The reason stays visible until the source is open.
         if !matches!(self.state, SourceState::Retrying(_)) {

@@ -167,6 +167,28 @@ fn no_unit_is_lost_or_half_written_whatever_ends_the_processes() {
         lines(one.as_ref()).into_iter().filter(|line| line["agreement"]["same_bytes"] == true).collect();
     assert!(code == Some(0) && again.len() == 2, "{err}: {again:?}");
 
+    // An output that was damaged and kept its length is found by its digest alone, and made again.
+    let (code, said, err) = blind(&["batch", &good, "-o", &many, "--verify"]);
+    assert!(
+        code == Some(0) && err.is_empty() && said.contains("verified: 5 outputs are as their records say, 0 were not"),
+        "{said}{err}"
+    );
+    let (path, bytes) =
+        expected.iter().find(|(path, _)| path.extension().is_some_and(|e| e == "json")).expect("figures");
+    let file = Path::new(&many).join("units").join(path);
+    fs::write(&file, vec![b' '; bytes.len()]).expect("damaged");
+    let (code, said, _) = blind(&["batch", &good, "-o", &many]);
+    assert!(code == Some(0) && said.contains("5 were done before"), "{said}");
+    let (code, said, err) = run(&["batch", &good, "-o", &many, "--verify"]);
+    assert!(
+        code == Some(0) && said.contains("verified: 4 outputs are as their records say, 1 were not"),
+        "{said}{err}"
+    );
+    assert!(
+        err.lines().count() == 1 && err.contains("its record says") && fs::read(&file).expect("made again") == *bytes,
+        "{err}"
+    );
+
     let said = done(&["batch", "--report", &one, "-o", &page]);
     assert!(said.contains("6 units: 5 done, 1 failed"), "{said}");
     let html = fs::read_to_string(&page).expect("the page");

@@ -181,7 +181,8 @@ fn wrong_first_lines_are_refused_by_name() {
         (json!({"colour": true}), "unknown field `colour`"),
         (json!({"probe": unknown}), "unknown field `radus_mm`"),
         (json!({"cartesian": {"size": [1, 1, 1], "spacing": [1, 1, 1], "orgin": [0, 0, 0]}}), "unknown field `orgin`"),
-        (json!({"echolume": 3}), "echolume: must be 1 or 2"),
+        (json!({"echolume": 4}), "echolume: must be 1, 2 or 3"),
+        (json!({"echolume": 3, "lines_at_once": 1}), "lines_at_once: is for versions 1 and 2"),
         (json!({"echolume": null}), "no stream of frames"),
         (json!({"samples": huge}), "samples: is 1152921504606846976, must be 1 to 65536"),
         (json!({"lines": 0}), "lines: is 0"),
@@ -230,6 +231,114 @@ fn a_stream_cut_within_a_frame_says_so_and_between_frames_does_not() {
                 assert!(why.as_ref().is_some_and(|w| w.contains(&expected)), "{why:?}");
             }
         }
+    }
+}
+
+/// A frame of version 3.
+fn checked(number: u64, content: &[u8]) -> Vec<u8> {
+    let body = [&number.to_le_bytes(), content].concat();
+    let mut sum = flate2::Crc::new();
+    sum.update(&body);
+    [b"\x89ECHOFR\n", &body[..], &sum.sum().to_le_bytes()].concat()
+}
+
+fn faults(events: &[Event]) -> Vec<&String> {
+    events.iter().filter_map(|e| if let Event::Fault(fault) = e { Some(fault) } else { None }).collect()
+}
+
+/// Four frames of version 3, with the samples that begin with 10, 20, 30 and 40.
+fn four() -> (Value, [Vec<u8>; 4]) {
+    let record = |n: u64| {
+        let samples: Vec<u8> = (0..8).map(|k| 10 * (n as u8 + 1) + k).collect();
+        checked(n, &[&(1e9 + n as f64).to_le_bytes()[..], &samples].concat())
+    };
+    (changed(json!({"echolume": 3, "stamped": true})), [0, 1, 2, 3].map(record))
+}
+
+/// Prevents that a lost or a repeated byte, or one that differs, costs more than the frame that it was in, or is not said.
+#[test]
+fn a_frame_with_a_checksum_is_found_again_after_damage() {
+    let (keys, records) = four();
+    let damages: [fn(&mut Vec<u8>, usize); 4] = [
+        |bytes, at| _ = bytes.remove(at),
+        |bytes, at| bytes.insert(at, bytes[at]),
+        |bytes, at| bytes[at] ^= 1,
+        |bytes, at| bytes.truncate(at),
+    ];
+    for (kind, damage) in damages.into_iter().enumerate() {
+        for at in 0..records[1].len() {
+            let mut damaged = records.clone();
+            damage(&mut damaged[1], at);
+            let (events, why) = all(piped(stream(&keys, &damaged.concat())));
+            let came = frames(&events);
+            let firsts: Vec<(u32, u32, u8)> = came.iter().map(|f| (f.volume, f.number, f.bytes[0])).collect();
+            let whole = [(0, 0, 10), (0, 1, 20), (0, 2, 30), (1, 0, 40)];
+            // A byte that is repeated at an end of the frame is outside of it. Nothing is missing from what is cut before its first byte.
+            let is_whole = kind == 1 && firsts == whole;
+            assert!(is_whole || firsts == [whole[0], whole[2], whole[3]], "{kind} at {at}: {firsts:?}");
+            assert!(came.iter().all(|f| f.bytes.iter().enumerate().all(|(n, b)| *b == f.bytes[0] + n as u8)));
+            assert_eq!(came[came.len() - 1].time, Some(1e9 + 3.0));
+            let (faults, missing) = (faults(&events), if is_whole { 0 } else { 1 });
+            assert_eq!((why, faults.len()), (None, 1), "{kind} at {at}: {faults:?}");
+            assert!(faults[0].ends_with(&format!("{missing} frames are missing")), "{kind} at {at}: {faults:?}");
+        }
+    }
+}
+
+#[test]
+fn frames_with_a_checksum_come_once_in_their_places_and_end_between_frames() {
+    let (keys, [first, second, third, fourth]) = four();
+    let all_of = |records: &[&Vec<u8>]| {
+        all(piped(stream(&keys, &records.iter().copied().flatten().copied().collect::<Vec<_>>())))
+    };
+    let (events, why) = all_of(&[&first, &second, &first, &fourth]);
+    let numbers: Vec<_> = frames(&events).iter().map(|f| (f.volume, f.number)).collect();
+    assert_eq!((numbers, why), (vec![(0, 0), (0, 1), (1, 0)], None));
+    let faults = faults(&events);
+    assert!(faults.len() == 2 && faults[0].contains("frame 0, counted from 0, came again"), "{faults:?}");
+    assert!(faults[1].ends_with("0 bytes are no frame and are left out; 1 frames are missing"), "{faults:?}");
+    let whole = [&first[..], &second, &third].concat();
+    for length in 0..=whole.len() {
+        let (events, why) = all(piped(stream(&keys, &whole[..length])));
+        assert_eq!(frames(&events).len(), length / first.len());
+        let is_cut = why.is_some_and(|why| why.contains("cut short, "));
+        assert_eq!(is_cut, length % first.len() > 0, "{length}");
+    }
+    // In a file, where each is at its place.
+    let folder = crate::common::files::Folder::new("checked");
+    let mut bytes = stream(&keys, &whole);
+    let file = folder.write("a.stream", &bytes);
+    let read = |file: &str| {
+        let mut source = echolume::low_level::source::open(Path::new(file), None).expect("a stream");
+        std::iter::from_fn(move || source.next_frame().map_err(|e| e.to_string()).transpose())
+            .collect::<Result<Vec<_>, _>>()
+    };
+    let frames = read(&file).expect("frames");
+    assert_eq!(
+        frames.iter().map(|f| (f.bytes[0], f.time)).collect::<Vec<_>>(),
+        [(10, Some(1e9)), (20, Some(1e9 + 1.0)), (30, Some(1e9 + 2.0))]
+    );
+    let at = bytes.len() - 1;
+    bytes[at] ^= 1;
+    let why = read(&folder.write("b.stream", &bytes)).expect_err("damaged");
+    assert!(why.contains("frames: frame 2 (from 0) is damaged or missing"), "{why}");
+}
+
+/// Prevents frames that are shifted by a byte and recorded with stamps of 1e247 s: versions without checksums end there.
+#[test]
+fn a_lost_byte_shows_in_the_stamps_of_a_stream_without_checksums() {
+    for version in [1, 2] {
+        let keys = changed(json!({"echolume": version, "stamped": true}));
+        let record = |n: u8| [&(1.8e9 + f64::from(n)).to_le_bytes()[..], &[n; 8]].concat();
+        let mut bytes: Vec<u8> = (0..6).flat_map(record).collect();
+        assert_eq!(all(piped(stream(&keys, &bytes))).1, None);
+        bytes.remove(2 * 16 + 10);
+        let (events, why) = all(piped(stream(&keys, &bytes)));
+        assert_eq!(frames(&events).len(), 3, "the one that lacks a byte has that of the next");
+        assert!(
+            why.as_ref().is_some_and(|w| w.starts_with("pipe: time stamp: is ") && w.contains("version 3")),
+            "{why:?}"
+        );
     }
 }
 

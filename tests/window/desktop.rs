@@ -294,6 +294,12 @@ impl View<'_> {
         self.desk.connection.flush().expect("flush");
     }
 
+    /// Sends a signal to its process.
+    pub fn signal(&self, signal: rustix::process::Signal) {
+        let process = rustix::process::Pid::from_child(self.program.as_ref().expect("it runs"));
+        rustix::process::kill_process(process, signal).expect("a signal");
+    }
+
     pub fn is_running(&mut self) -> bool {
         self.program.as_mut().is_some_and(|program| program.try_wait().expect("look").is_none())
     }
@@ -309,9 +315,8 @@ impl View<'_> {
 
     /// Ends it by SIGTERM.
     pub fn terminate(mut self) {
+        self.signal(rustix::process::Signal::TERM);
         let mut program = self.program.take().expect("it ends once");
-        let process = rustix::process::Pid::from_child(&program);
-        rustix::process::kill_process(process, rustix::process::Signal::TERM).expect("a signal");
         until("the end", || program.try_wait().expect("look after the program"));
     }
 

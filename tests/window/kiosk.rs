@@ -37,13 +37,27 @@ fn a_wrong_configuration_is_reported_and_loaded_once_it_is_corrected() {
 fn a_missing_source_is_reported_and_shown_when_it_appears() {
     let (desk, folder) = (Desk::new(true), Folder::new("source"));
     let (file, later) = (folder.path("cart.toml"), folder.path("sweep.mha"));
-    let text = format!("source = '{later}'\n[live]\nretry = '200ms'\n[display]\npanels = false\n");
+    let log = folder.path("kiosk.log");
+    let text =
+        format!("source = '{later}'\n[live]\nretry = '200ms'\n[display]\npanels = false\n[files]\nlog = '{log}'\n");
     fs::write(&file, text).expect("write");
+    let logged = |what: &str| {
+        let text = fs::read_to_string(&log).unwrap_or_default();
+        text.lines().filter(|line| line.contains(what)).count()
+    };
+    let missing = format!("WARN source: {later}: file: ");
     let view = desk.view(&["--kiosk", "--config", &file]);
     until("why", || is_amiss(&view).then_some(()));
+    until("a line in the log", || (logged(&missing) > 0).then_some(()));
+    // As logrotate does.
+    let before = fs::read_to_string(&log).expect("the log");
+    fs::rename(&log, folder.path("kiosk.log.old")).expect("renamed");
+    view.signal(rustix::process::Signal::HUP);
     fs::copy(SWEEP, &later).expect("copy");
     let full = headless([1024, 768], &[]);
     view.shows_part(&full, [256, 192], [512, 384], "the source that came");
+    assert_eq!((logged(&missing), logged("INFO source: it is open now")), (0, 1), "in the new log");
+    assert_eq!(before.matches(&missing).count(), 1, "each is said once");
     leave(view);
 }
 

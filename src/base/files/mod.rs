@@ -3,16 +3,19 @@
 //! [`Unfinished`] is a file that is either complete or absent. [`InputError`] is an error of an input file: one line that names the file,
 //! the field and the fault. Some errors omit the file's name, because the caller adds it.
 
+mod lock;
 pub mod progress;
 pub mod signals;
 mod spool;
 
+pub use lock::Lock;
 pub use spool::Spool;
 
 use signals::Writing;
 use std::fs::{File, OpenOptions, metadata};
 use std::io::{self, BufWriter, Read, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicBool, Ordering};
 use tempfile::NamedTempFile;
 
 /// Reads a file of at most `max_bytes` bytes. `what` names its kind in messages.
@@ -44,24 +47,71 @@ pub fn read_text(path: &Path, max_bytes: u64, what: &str) -> Result<String, Stri
     String::from_utf8(read(path, max_bytes, what)?).map_err(|_| "cannot be read: it is not UTF-8 text".into())
 }
 
-/// Replaces a file atomically: writes a temporary file next to it, then renames. A full disk or a signal leaves the old file unchanged.
+/// Who may read a new file. Only its owner writes to it.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Readers {
+    /// Its owner, because it may hold frames of a patient, unless [`follow_umask`] was called or `ECHOLUME_PRIVATE` is 0.
+    Owner,
+    /// Whom the umask lets.
+    Umask,
+    /// Everyone, whatever the umask says.
+    All,
+}
+
+/// The files of this process follow the umask.
+static FOLLOWS_UMASK: AtomicBool = AtomicBool::new(false);
+
+/// Lets the umask say from now on who may read the files that are made.
+pub fn follow_umask() {
+    FOLLOWS_UMASK.store(true, Ordering::Relaxed);
+}
+
+/// Options of a file that may hold frames of a patient: one that is made is for its owner alone, as those of [`Unfinished`] and [`replace`].
+pub fn private(options: &mut OpenOptions) -> &mut OpenOptions {
+    #[cfg(unix)]
+    std::os::unix::fs::OpenOptionsExt::mode(options, Readers::Owner.mode());
+    options
+}
+
+impl Readers {
+    /// The mode of a new file, before the umask.
+    #[cfg(unix)]
+    fn mode(self) -> u32 {
+        let follows_umask =
+            || FOLLOWS_UMASK.load(Ordering::Relaxed) || std::env::var_os(PRIVATE).is_some_and(|is| is == "0");
+        if self == Readers::Owner && !follows_umask() { 0o600 } else { 0o666 }
+    }
+}
+
+/// The variable of the environment that is 0 where files follow the umask.
+pub const PRIVATE: &str = "ECHOLUME_PRIVATE";
+
+/// Replaces a file atomically: writes a temporary file next to it, then renames. A full disk or a signal leaves the old file unchanged. Only
+/// its owner may read the new one.
 ///
 /// # Errors
 /// One line that names the file and the fault.
 pub fn replace(file: &Path, bytes: &[u8]) -> Result<(), String> {
-    replace_file(file, bytes, false)
+    replace_file(file, bytes, Readers::Owner)
 }
 
-/// Like [`replace`], and every user may read the file, whatever the umask says: for what tells nothing about patients, and is read by
-/// another service.
+/// Like [`replace`], and the umask says who may read the file: for what tells nothing about patients.
+///
+/// # Errors
+/// As for [`replace`].
+pub fn replace_shared(file: &Path, bytes: &[u8]) -> Result<(), String> {
+    replace_file(file, bytes, Readers::Umask)
+}
+
+/// Like [`replace_shared`], and every user may read the file, whatever the umask says: it is read by another service.
 ///
 /// # Errors
 /// As for [`replace`].
 pub fn replace_for_all(file: &Path, bytes: &[u8]) -> Result<(), String> {
-    replace_file(file, bytes, true)
+    replace_file(file, bytes, Readers::All)
 }
 
-fn replace_file(file: &Path, bytes: &[u8], for_all: bool) -> Result<(), String> {
+fn replace_file(file: &Path, bytes: &[u8], readers: Readers) -> Result<(), String> {
     let cannot = |e: &dyn std::fmt::Display| format!("{}: cannot be written: {e}", file.display());
     if is_special(file) {
         // Write to a device or a pipe directly: renaming would replace it.
@@ -69,8 +119,8 @@ fn replace_file(file: &Path, bytes: &[u8], for_all: bool) -> Result<(), String> 
         return opened.and_then(|mut f| f.write_all(bytes)).map_err(|e| cannot(&e));
     }
     check_place(file)?;
-    let mut unfinished = Unfinished::create(file).map_err(|e| cannot(&e))?;
-    let readable = if for_all { unfinished.make_readable() } else { Ok(()) };
+    let mut unfinished = Unfinished::with(file, readers).map_err(|e| cannot(&e))?;
+    let readable = if readers == Readers::All { unfinished.make_readable() } else { Ok(()) };
     readable
         .and_then(|()| unfinished.write_all(bytes))
         .and_then(|()| unfinished.finish())
@@ -143,9 +193,16 @@ struct Part {
 }
 
 impl Unfinished {
+    /// A file that only its owner may read.
+    ///
     /// # Errors
     /// The folder cannot be written, or the target exists and is not a regular file.
     pub fn create(target: &Path) -> io::Result<Unfinished> {
+        Unfinished::with(target, Readers::Owner)
+    }
+
+    #[cfg_attr(not(unix), expect(unused_variables, reason = "files have no mode"))]
+    fn with(target: &Path, readers: Readers) -> io::Result<Unfinished> {
         // Resolve links, and use the target's folder, so that renaming is atomic within one file system.
         let target = target.canonicalize().unwrap_or_else(|_| target.to_path_buf());
         if metadata(&target).is_ok_and(|there| !there.is_file()) {
@@ -156,9 +213,9 @@ impl Unfinished {
         named.prefix(".echolume-").suffix(".part");
         #[cfg(unix)]
         {
-            // The process' umask applies, as for any new file.
+            // The process' umask applies, too, as for any new file.
             use std::os::unix::fs::PermissionsExt;
-            named.permissions(std::fs::Permissions::from_mode(0o666));
+            named.permissions(std::fs::Permissions::from_mode(readers.mode()));
         }
         let signals = Writing::begin();
         let file = named.tempfile_in(folder)?;

@@ -1,5 +1,5 @@
 //! SIGINT, SIGTERM and SIGHUP for code that must finish something first: a moving motor, a recording without its index, an incomplete
-//! file. Otherwise the signals end the process by default.
+//! file. Otherwise the signals end the process by default. Where SIGHUP means something else ([`hangups`]) it does neither.
 
 use signal_hook::SigId;
 use signal_hook::consts::{SIGINT, SIGTERM};
@@ -50,13 +50,29 @@ fn handlers() -> &'static Handlers {
     })
 }
 
-/// The signals to catch: all except those that the parent process made this one ignore, as `nohup` does.
+/// Becomes true with SIGHUP, where that does not end the process.
+static HANGUPS: OnceLock<Arc<AtomicBool>> = OnceLock::new();
+
+/// From now on SIGHUP does not end this process: it makes the value true. To be called before signals are held.
+///
+/// # Errors
+/// The signal cannot be caught.
+pub fn hangups() -> std::io::Result<Arc<AtomicBool>> {
+    let hangups = HANGUPS.get_or_init(Arc::default).clone();
+    #[cfg(unix)]
+    flag::register(signal_hook::consts::SIGHUP, hangups.clone())?;
+    Ok(hangups)
+}
+
+/// The signals to catch: all except those that the parent process made this one ignore, as `nohup` does, and that mean something else.
 fn caught() -> impl Iterator<Item = i32> {
     let ignored = std::fs::read_to_string("/proc/self/status").ok().and_then(|status| {
         let mask = status.lines().find_map(|line| line.strip_prefix("SigIgn:"))?;
         u64::from_str_radix(mask.trim(), 16).ok()
     });
-    SIGNALS.iter().copied().filter(move |signal| ignored.is_none_or(|mask| mask >> (signal - 1) & 1 == 0))
+    let is_ending = |signal: &i32| HANGUPS.get().is_none() || [SIGINT, SIGTERM].contains(signal);
+    let is_ignored = move |signal: &i32| ignored.is_some_and(|mask| mask >> (signal - 1) & 1 == 1);
+    SIGNALS.iter().copied().filter(move |signal| is_ending(signal) && !is_ignored(signal))
 }
 
 impl Handlers {

@@ -23,7 +23,7 @@ metrics! {
     MEMORY: Gauge "echolume_resident_memory_bytes" [] "Resident memory of the process.";
     FRAMES: Counter "echolume_frames_total" [] "Frames that arrived and were taken.";
     FRAMES_DROPPED: Counter "echolume_frames_dropped_total" ["reason"]
-        "Frames that no picture shows: full (the queue was full), refused (wrong size or slice), late (their volume was over).";
+        "Frames that no picture shows: full (the queue was full), refused (wrong size or slice), late (their volume was over), frozen (the user keeps the picture).";
     FRAMES_UNRECORDED: Counter "echolume_frames_unrecorded_total" [] "Frames that could not be recorded.";
     VOLUMES: Counter "echolume_volumes_total" ["result"]
         "Volumes that are over: shown, dropped (complete, but a newer one was shown), incomplete.";

@@ -1,9 +1,12 @@
 //! Log rotation: a full file becomes NAME.1, NAME.1 becomes NAME.2, and the oldest one is deleted.
 
+use crate::files::private;
 use std::ffi::OsString;
 use std::fs::{self, File, OpenOptions};
 use std::io::{self, ErrorKind, Read, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::SystemTime;
 
 /// Default size of one log file, bytes.
@@ -33,7 +36,7 @@ type Opener = Box<dyn FnMut(&Path) -> io::Result<Box<dyn Sink>> + Send>;
 ///
 /// Writing never fails. Lines that cannot be written, on a full disk or in a deleted folder, are counted. Every later write tries again,
 /// and the first one that succeeds reports how many lines are missing. No line is split between two files, and all files together hold
-/// at most `bytes` times `files`. Only one process at a time may write to a log.
+/// at most `bytes` times `files`. Only one process at a time may write to a log ([`files::Lock`](crate::files::Lock)).
 pub struct RotatingLog {
     path: PathBuf,
     bytes: u64,
@@ -50,6 +53,8 @@ pub struct RotatingLog {
     partial_line: Vec<u8>,
     /// Number of lines that were lost since the last one that was written.
     lost_lines: u64,
+    /// Becomes true when the file is to be opened again: it was renamed.
+    reopens: Arc<AtomicBool>,
 }
 
 impl RotatingLog {
@@ -72,7 +77,7 @@ impl RotatingLog {
             }
         }
         let opener = |path: &Path| -> io::Result<Box<dyn Sink>> {
-            Ok(Box::new(OpenOptions::new().create(true).append(true).open(path)?))
+            Ok(Box::new(private(OpenOptions::new().create(true).append(true)).open(path)?))
         };
         RotatingLog::with(path, bytes, files, Box::new(opener))
             .map_err(|e| format!("{}: cannot be written: {e}", path.display()))
@@ -93,9 +98,17 @@ impl RotatingLog {
             rotates,
             partial_line: Vec::new(),
             lost_lines: 0,
+            reopens: Arc::default(),
         };
         log.measure();
         Ok(log)
+    }
+
+    /// The same log, whose file is opened anew before the next line each time that `reopens` becomes true: who renamed it gets no more lines.
+    #[must_use]
+    pub fn reopened(mut self, reopens: Arc<AtomicBool>) -> RotatingLog {
+        self.reopens = reopens;
+        self
     }
 
     /// Reads size and end of the existing file: the power may have failed in the middle of a line.
@@ -118,6 +131,10 @@ impl RotatingLog {
 
     /// Writes a complete event, or returns an error and writes nothing.
     fn write_event(&mut self, event: &[u8]) -> io::Result<()> {
+        if self.reopens.swap(false, Ordering::Relaxed) {
+            self.sink = None;
+            self.measure();
+        }
         let mut text = Vec::with_capacity(event.len() + 128);
         if self.lost_lines > 0 {
             let now = humantime::format_rfc3339_micros(SystemTime::now());
@@ -246,8 +263,8 @@ pub(super) fn is_log_file(path: &Path) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use std::sync::atomic::{AtomicU64, Ordering};
-    use std::sync::{Arc, Mutex};
+    use std::sync::Mutex;
+    use std::sync::atomic::AtomicU64;
 
     /// A folder of one test, deleted at its end.
     struct Folder(PathBuf);
@@ -313,6 +330,28 @@ mod tests {
         let mut log = RotatingLog::open(&folder.log(), 5000, 2).expect("open");
         log.write_all(line(7).as_bytes()).expect("never fails");
         assert_eq!(folder.text(0), format!("2026-01-01T00:00:00.000000Z  INFO half\n{}", line(7)));
+    }
+
+    #[test]
+    fn a_log_that_was_renamed_is_opened_again_when_that_is_said() {
+        let folder = Folder::new("reopened");
+        let reopens: Arc<AtomicBool> = Arc::default();
+        let mut log = RotatingLog::open(&folder.log(), 5000, 2).expect("open").reopened(reopens.clone());
+        let mut write = |n: usize| log.write_all(line(n).as_bytes()).expect("never fails");
+        write(0);
+        let aside = folder.0.join("aside");
+        fs::rename(folder.log(), &aside).expect("renamed");
+        write(1);
+        reopens.store(true, Ordering::Relaxed);
+        write(2);
+        write(3);
+        assert_eq!(fs::read_to_string(&aside).expect("aside"), line(0) + &line(1));
+        assert_eq!(folder.text(0), line(2) + &line(3));
+        // Without a new name the file goes on, and its size counts.
+        reopens.store(true, Ordering::Relaxed);
+        (4..100).for_each(write);
+        let texts = folder.texts();
+        assert!(texts.len() == 2 && texts.iter().all(|t| t.len() <= 5000), "{}", texts.len());
     }
 
     #[test]

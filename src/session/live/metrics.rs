@@ -66,7 +66,8 @@ pub fn text(totals: &Statistics, conditions: &Conditions) -> String {
     text.number(&table::WRITE_FAILURES, conditions.write_failures as f64);
     text.numbers(&table::MEMORY, conditions.memory.map(|bytes| (Vec::new(), bytes as f64)));
     text.number(&table::FRAMES, totals.frames as f64);
-    let dropped = [("full", totals.lost), ("refused", totals.refused), ("late", volumes.left_out)];
+    let dropped =
+        [("full", totals.lost), ("refused", totals.refused), ("late", volumes.left_out), ("frozen", totals.frozen)];
     text.numbers(&table::FRAMES_DROPPED, dropped.map(|(reason, count)| labelled(reason, count)));
     text.number(&table::FRAMES_UNRECORDED, totals.unrecorded as f64);
     let results = [("shown", volumes.shown), ("dropped", volumes.dropped), ("incomplete", volumes.incomplete)];

@@ -36,6 +36,8 @@ pub struct Statistics {
     pub lost: u64,
     /// Frames that the renderer refused, for example of the wrong size.
     pub refused: u64,
+    /// Frames that were passed over because the picture is frozen.
+    pub frozen: u64,
     /// Frames that could not be recorded, and other failures of the recording.
     pub unrecorded: u64,
     pub faults: SourceFaults,
@@ -59,6 +61,7 @@ impl Default for Statistics {
             frames: 0,
             lost: 0,
             refused: 0,
+            frozen: 0,
             unrecorded: 0,
             faults: SourceFaults::default(),
             pictures: 0,
@@ -101,6 +104,7 @@ impl Statistics {
             frames: self.frames.saturating_sub(before.frames),
             lost: self.lost.saturating_sub(before.lost),
             refused: self.refused.saturating_sub(before.refused),
+            frozen: self.frozen.saturating_sub(before.frozen),
             unrecorded: self.unrecorded.saturating_sub(before.unrecorded),
             faults: SourceFaults {
                 reported: self.faults.reported.saturating_sub(before.faults.reported),
@@ -119,6 +123,7 @@ impl Statistics {
         self.frames += later.frames;
         self.lost += later.lost;
         self.refused += later.refused;
+        self.frozen += later.frozen;
         self.unrecorded += later.unrecorded;
         self.faults.reported += later.faults.reported;
         self.faults.ended += later.faults.ended;
@@ -146,8 +151,10 @@ impl Statistics {
     /// The counts on one line, of statistics since the beginning: every frame that arrived and every volume that ended is in one of them.
     pub fn totals(&self) -> String {
         let VolumeCounts { shown, dropped, incomplete, left_out } = self.volumes;
+        let frozen =
+            if self.frozen > 0 { format!(", {} passed over while frozen", self.frozen) } else { String::new() };
         format!(
-            "in all: {} frames, {} lost, {} refused, {left_out} left out; volumes: {shown} shown, {dropped} dropped, {incomplete} incomplete; \
+            "in all: {} frames, {} lost, {} refused, {left_out} left out{frozen}; volumes: {shown} shown, {dropped} dropped, {incomplete} incomplete; \
              {} pictures",
             self.frames, self.lost, self.refused, self.pictures
         )
@@ -168,8 +175,12 @@ impl Statistics {
             let _ = write!(line, " ({:.0} % of what sound allows)", 100.0 * rate(shown) * floor);
         }
         let _ = write!(line, "  dropped {dropped}");
-        for (count, what) in [(incomplete, "incomplete"), (self.lost, "frames lost"), (self.refused, "frames refused")]
-        {
+        for (count, what) in [
+            (incomplete, "incomplete"),
+            (self.lost, "frames lost"),
+            (self.refused, "frames refused"),
+            (self.frozen, "frames passed over while frozen"),
+        ] {
             if count > 0 {
                 let _ = write!(line, ", {count} {what}");
             }
@@ -228,6 +239,12 @@ mod tests {
         let totals =
             "in all: 74 frames, 0 lost, 0 refused, 0 left out; volumes: 2 shown, 1 dropped, 3 incomplete; 4 pictures";
         assert_eq!(statistics.totals(), totals);
+        let frozen = Statistics { frozen: 5, ..Statistics::default() };
+        twice.add(&frozen);
+        assert_eq!((twice.frozen, twice.since(&frozen).frozen), (5, 0));
+        for text in [twice.line(None), twice.totals()] {
+            assert!(text.contains(", 5 ") && text.contains("passed over while frozen"), "{text}");
+        }
         assert!(!line.contains("lost") && !line.contains("not timed") && !line.contains('\n'), "{line}");
         let mut all = statistics.clone();
         all.untimed = 3;

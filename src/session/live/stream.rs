@@ -367,7 +367,8 @@ impl Stream {
                 let is_new = self.session.is_none() || Some(&*header) != self.header.as_ref();
                 self.next_header = is_new.then_some(*header);
             }
-            Event::Frame(_) | Event::Lines { .. } if self.is_frozen || self.next_header.is_some() => {}
+            Event::Frame(_) | Event::Lines { first: 0, .. } if self.passes_over() => self.statistics.frozen += 1,
+            Event::Lines { .. } if self.passes_over() => {}
             Event::Frame(mut frame) => {
                 frame.volume = frame.volume.saturating_add(self.volume_base);
                 let result = self.upload(&frame, None, at);
@@ -400,6 +401,12 @@ impl Stream {
             Event::Idle => {}
         }
         Ok(Step::Progress)
+    }
+
+    /// True while frames are not taken: the picture is frozen, and with it the geometry. Outside of that a new geometry begins before its frames
+    /// are taken.
+    fn passes_over(&self) -> bool {
+        self.is_frozen || self.next_header.is_some()
     }
 
     /// Uploads a whole frame, or lines of one from line `first` on.

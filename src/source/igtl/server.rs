@@ -32,6 +32,8 @@ pub struct ServerOptions {
     pub queue_bytes: usize,
     /// A client that reads nothing for so long is disconnected.
     pub stall_timeout: Duration,
+    /// A client whose message takes so long from its first byte to its last is disconnected, however many bytes come meanwhile.
+    pub message_timeout: Duration,
     /// How long dropping the server waits until its last messages are sent.
     pub last: Duration,
     /// Who answers queries of the status, and text of its STRING.
@@ -45,6 +47,7 @@ impl Default for ServerOptions {
             queue_messages: 2,
             queue_bytes: BODY_LIMIT,
             stall_timeout: Duration::from_secs(10),
+            message_timeout: Duration::from_secs(10),
             last: Duration::from_secs(2),
             name: "Echolume".into(),
         }
@@ -351,7 +354,7 @@ impl Shared {
 
     /// Reads queries of a client and answers them, until it leaves.
     fn read(&self, mut stream: &TcpStream, number: u64) {
-        let mut bytes = Vec::new();
+        let (mut bytes, mut begun) = (Vec::new(), Begun::default());
         let mut block = [0; 4096];
         loop {
             let skipped = match decode(&bytes, QUERY_LIMIT) {
@@ -370,7 +373,12 @@ impl Shared {
             };
             if skipped > 0 {
                 bytes.drain(..skipped);
+                begun = Begun::default();
                 continue;
+            }
+            if begun.is_late(!bytes.is_empty(), Instant::now(), self.options.message_timeout) {
+                let why = format!("its message did not end within {} ms", self.options.message_timeout.as_millis());
+                return self.refuse(stream, number, &why);
             }
             match stream.read(&mut block) {
                 // It has closed the connection.
@@ -458,6 +466,18 @@ impl Shared {
     }
 }
 
+/// When the first byte of a message came that has not ended.
+#[derive(Default)]
+struct Begun(Option<Instant>);
+
+impl Begun {
+    /// True if the message takes longer than it may. `has_begun`: bytes of it are there.
+    fn is_late(&mut self, has_begun: bool, now: Instant, most: Duration) -> bool {
+        self.0 = self.0.or(Some(now)).filter(|_| has_begun);
+        self.0.is_some_and(|since| now.saturating_duration_since(since) > most)
+    }
+}
+
 /// The time, s since 1970, for a stamp; 0, which is none, for a clock before that.
 pub(super) fn now() -> f64 {
     std::time::SystemTime::now().duration_since(std::time::UNIX_EPOCH).map_or(0.0, |t| t.as_secs_f64())
@@ -469,6 +489,17 @@ mod tests {
 
     fn packet(device: Option<&str>, bytes: usize) -> Packet {
         Packet { device: device.map(str::to_string), bytes: vec![0; bytes].into() }
+    }
+
+    /// Prevents a client that keeps its place for ever by a byte a second. One that is silent between messages only listens.
+    #[test]
+    fn a_message_has_a_time_to_end_and_silence_has_none() {
+        let (start, most, mut begun) = (Instant::now(), Duration::from_secs(10), Begun::default());
+        let at = |seconds: u64| start + Duration::from_secs(seconds);
+        assert!((0..100).all(|second| !begun.is_late(false, at(second), most)));
+        assert!((100..=110).all(|second| !begun.is_late(true, at(second), most)));
+        assert!(begun.is_late(true, at(111), most));
+        assert!(!begun.is_late(false, at(112), most) && !begun.is_late(true, at(113), most), "another message");
     }
 
     /// Prevents that a client which asks for the last image again and again, and reads slowly, pins a copy of each that there was.

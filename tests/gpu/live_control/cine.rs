@@ -29,7 +29,9 @@ fn frames_received_while_frozen_are_recorded_and_change_no_picture() {
         assert!(update == Update::Rolling || shown.is_empty(), "a volume that lacks frames");
         let after = bench.live(4);
         assert!(after == fresh(&device, "mode = 'mip'", &header(0.3), update, &speckled(4)), "{update:?}");
-        let counts = bench.stream.statistics().expect("statistics").volumes;
+        let statistics = bench.stream.statistics().expect("statistics");
+        assert_eq!(statistics.frozen, 2 * 9 + 4, "each frame that was passed over is counted");
+        let counts = statistics.volumes;
         assert_eq!((counts.shown, counts.dropped, bench.faults.len()), (2, 0, 0), "{counts:?}");
         drop(bench);
         let recording = Reader::open(&file).expect("recording");

@@ -95,6 +95,24 @@ fn a_dead_client_stalls_nobody() {
     drop(dead);
 }
 
+/// A client that sends a byte again and again, and never a whole message, does not keep its place; one that sends nothing does.
+#[test]
+fn a_message_without_an_end_costs_the_client_its_place() {
+    let options = ServerOptions { message_timeout: Duration::from_millis(200), clients: 2, ..ServerOptions::default() };
+    let server = server(options);
+    let (listens, mut drips) = (by_hand(&server), by_hand(&server));
+    let status = query("GET_STATUS", "");
+    let mut drops = status[..50].chunks(1);
+    until("it is given up", || {
+        // After the end of the connection nothing can be sent.
+        let _ = drops.next().map(|drop| drips.write_all(drop));
+        (server.statistics().clients == 1).then_some(())
+    });
+    assert_eq!(server.statistics().disconnected, 1);
+    server.send(&Message::Image(image(1.0, [4, 3, 2]))).expect("an image");
+    assert_eq!(read(&mut { listens }).0, "IMAGE");
+}
+
 #[test]
 fn queries_are_answered() {
     let server = server(ServerOptions::default());

@@ -176,6 +176,8 @@ pub struct Files {
     pub log_files: u32,
     /// File for metrics of Prometheus, rewritten every 15 s. Default: none.
     pub prometheus: Option<PathBuf>,
+    /// Recordings, pictures, workspaces and logs are for the user of the program alone, whatever the umask; false: they follow it. Default: true.
+    pub private: bool,
 }
 
 impl Default for Config {
@@ -237,7 +239,7 @@ impl Default for Live {
 
 impl Default for Files {
     fn default() -> Files {
-        Files { pictures: None, log: None, log_size_mb: 10, log_files: 5, prometheus: None }
+        Files { pictures: None, log: None, log_size_mb: 10, log_files: 5, prometheus: None, private: true }
     }
 }
 
@@ -708,6 +710,7 @@ const ALLOWED: &[(&str, &str)] = &[
     ("files.log_size_mb", "1 to 1024 MiB"),
     ("files.log_files", "1 to 100"),
     ("files.prometheus", "a file"),
+    ("files.private", "true or false"),
 ];
 
 /// The allowed values of a key.
