@@ -18,11 +18,11 @@ use crate::{
     Check, DeviceUnderTest, Findings, credible_messages, each_pass, known_answers, memory, render, sampling,
     specialization,
 };
-use std::collections::{BTreeMap, HashSet};
+use std::collections::{BTreeMap, BTreeSet, HashSet};
 use std::sync::Arc;
 use std::time::Instant;
 
-/// Maximum number of scenes, each with another pipeline, in which each pass is checked.
+/// Maximum number of scenes in which each pass is checked, and of further ones, each with another pipeline.
 const SCENES: usize = 6;
 
 /// An injected fault, and the check that detected it.
@@ -164,10 +164,12 @@ impl DetectionSearch {
     fn look(&mut self, fault: &InjectedFault, dut: &mut DeviceUnderTest) -> Result<(String, String), Option<String>> {
         let (scenes, mut refused) = (dut.scenes(), None);
         for (n, pass) in PASSES.iter().enumerate() {
-            let concerned = (0..scenes.len()).filter(|s| fault.change.concerns(pass, &scenes[*s].1));
+            // The first, and the first of each pipeline: numbers may matter, or what the shader does.
+            let concerned = || (0..scenes.len()).filter(|s| fault.change.concerns(pass, &scenes[*s].1));
             let mut variants = HashSet::new();
-            let different = concerned.filter(|s| variants.insert(each_pass::variant(&scenes[*s].1, pass)));
-            for s in different.take(SCENES) {
+            let different = concerned().filter(|s| variants.insert(each_pass::variant(&scenes[*s].1, pass)));
+            let chosen: BTreeSet<usize> = concerned().take(SCENES).chain(different.take(SCENES)).collect();
+            for s in chosen {
                 let Some(message) = alarm(each_pass::in_scene(dut, n, s), &mut refused) else { continue };
                 let (by, sound) = (format!("passes, {}", pass.name), &mut self.sound);
                 let alarms = self.alarms.entry(format!("{by}, '{}'", scenes[s].0));
