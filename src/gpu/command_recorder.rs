@@ -224,7 +224,8 @@ impl CommandRecorder {
 
     /// Adds the times of the last submission, and of those that were set aside, once, when they are done.
     pub fn collect(&mut self, timelines: &Timelines, timings: &mut Timings) -> Result<(), GpuError> {
-        let (bits, period) = (self.context.queue(self.queue).valid_bits, self.context.limits.timestamp_period);
+        let (bits, period) =
+            (self.context.queue(self.queue).valid_bits, self.context.candidate.limits.timestamp_period);
         while let Some(stamps) = self.unread.first() {
             timings.add(&stamps.read(bits, period)?, bits, period);
             self.spare.push(self.unread.remove(0));
@@ -440,7 +441,7 @@ impl CommandRecorder {
 
     /// Copies parameters into the uniform buffer; returns their byte offset.
     fn place_params(&mut self, block: &[u8]) -> Result<u64, GpuError> {
-        let alignment = self.context.limits.min_uniform_buffer_offset_alignment.max(16);
+        let alignment = self.context.candidate.limits.min_uniform_buffer_offset_alignment.max(16);
         let offset = self.params_used.next_multiple_of(alignment);
         let end = offset + block.len() as u64;
         if end > PARAMS_BYTES {

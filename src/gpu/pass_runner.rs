@@ -43,7 +43,7 @@ impl PassRunner {
 
     /// Number of fractional bits of the weights in the device's texture filter.
     pub fn filter_bits(&self) -> u32 {
-        self.context.limits.sub_texel_precision_bits
+        self.context.candidate.limits.sub_texel_precision_bits
     }
 
     /// The scene as [`PassRunner::run`] runs it: with what the device resolves, except what dispatches there are, since those are the caller's.

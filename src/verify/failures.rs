@@ -296,7 +296,7 @@ fn refused(findings: &mut Findings, context: &Arc<Context>, what: &str, scene: S
 fn beyond(dut: &mut DeviceUnderTest) -> Result<Findings, GpuError> {
     let mut findings = Findings::default();
     let context = &dut.context;
-    let three = context.limits.max_image_dimension3_d as usize;
+    let three = context.candidate.limits.max_image_dimension3_d as usize;
     let small = "mode = 'vr'\npicture = { size = [4, 4] }";
     for axis in 0..3 {
         let mut size = [2; 3];
@@ -318,7 +318,7 @@ fn beyond(dut: &mut DeviceUnderTest) -> Result<Findings, GpuError> {
     });
     // A context with lower limits.
     let lesser = IsolatedContext::lacking(dut, |context| {
-        context.limits.max_image_dimension2_d = 64;
+        context.candidate.limits.max_image_dimension2_d = 64;
         context.candidate.max_allocation = 1 << 20;
     })?;
     let wide = cartesian_scene([4; 3], "mode = 'vr'\npicture = { size = [65, 8] }")?;
@@ -328,7 +328,7 @@ fn beyond(dut: &mut DeviceUnderTest) -> Result<Findings, GpuError> {
     lesser.report_validation(&mut findings);
     findings.notes.push(format!(
         "images to {0} x {0} and {three} x {three} x {three} texels, allocations to {1} MiB",
-        context.limits.max_image_dimension2_d,
+        context.candidate.limits.max_image_dimension2_d,
         bytes >> 20
     ));
     Ok(findings)
@@ -343,7 +343,7 @@ fn beyond_memory(dut: &mut DeviceUnderTest) -> Result<Findings, GpuError> {
     }
     let (mut findings, isolated) = (Findings::default(), IsolatedContext::new(dut)?);
     let context = &isolated.context;
-    let edge = (context.limits.max_image_dimension3_d as usize).min(1024);
+    let edge = (context.candidate.limits.max_image_dimension3_d as usize).min(1024);
     let toml = "mode = 'mip'\npicture = { size = [4, 4] }\nslices = { format = 'r8' }\nray = { sampling = 'exact' }";
     let scene = cartesian_scene([edge; 3], toml)?;
     let images = context.memory() / (edge as u64).pow(3) + 2;
@@ -374,7 +374,7 @@ fn wave(at: f64) -> f64 {
 
 fn largest(dut: &mut DeviceUnderTest) -> Result<Findings, GpuError> {
     let mut findings = Findings::default();
-    let limit = dut.context.limits.max_image_dimension2_d.min(MAX_PICTURE);
+    let limit = dut.context.candidate.limits.max_image_dimension2_d.min(MAX_PICTURE);
     let other = if dut.level == Level::Quick { 16 } else { limit / 8 };
     let mut largest = 0.0f64;
     let mut pixels = 0;
