@@ -104,12 +104,6 @@ impl Program {
     }
 }
 
-/// A frame of which some lines have arrived.
-struct PartialFrame {
-    slice: u32,
-    image: u32,
-}
-
 /// Renders one scene: frames are sent into volume images, and pictures come out. The scene can be changed at any time.
 pub struct Renderer {
     // Fields are dropped in this order, after `drop` has waited for the device.
@@ -127,12 +121,6 @@ pub struct Renderer {
     contents: Contents,
     /// The error that left the last change of scene incomplete.
     broken: Option<String>,
-    /// The frame whose lines are arriving.
-    partial: Option<PartialFrame>,
-    /// Its bytes that have arrived, in host memory: staging memory is slow to read, and a batch may be submitted before they are complete.
-    received: Vec<u8>,
-    /// Frames that were dropped because another began before all of their lines had arrived.
-    incomplete: u64,
     /// Frames that are not visible in their scene.
     skipped: u64,
 }
@@ -162,9 +150,6 @@ impl Renderer {
             queues,
             context: context.clone(),
             broken: None,
-            partial: None,
-            received: Vec::new(),
-            incomplete: 0,
             skipped: 0,
         };
         renderer.fit()?;
@@ -258,66 +243,12 @@ impl Renderer {
     /// A frame of the wrong size, a slice or image that does not exist, a device that fails.
     pub fn frame(&mut self, slice: u32, bytes: &[u8], image: u32) -> Result<(), GpuError> {
         self.check(image)?;
-        if bytes.len() != self.frame_bytes() {
-            return Err(GpuError::FrameSize { got: bytes.len(), expected: self.frame_bytes() });
-        }
-        self.lines(slice, 0, bytes, image).map(|_| ())
-    }
-
-    /// Takes scan lines of a frame as they arrive, from line `first` on. Returns true if they completed the frame, which then goes
-    /// to stage 1 as with [`Renderer::frame`]. Lines arrive in order. Line 0 begins a frame; a frame that was not complete is dropped and counted.
-    ///
-    /// # Errors
-    /// A partial line, lines out of order, or too many; a slice or image that does not exist; a device that fails.
-    pub fn lines(&mut self, slice: u32, first: u32, bytes: &[u8], image: u32) -> Result<bool, GpuError> {
-        self.check(image)?;
-        if slice >= self.program.scene.slices() {
-            return Err(GpuError::FrameSlice { slice, slices: self.program.scene.slices() });
-        }
-        let (frame_bytes, line) =
-            (self.frame_bytes(), self.frame_bytes() / self.program.scene.frame_size()[1] as usize);
-        let (at, received) = (first as usize * line, self.received.len());
-        let follows = self.partial.as_ref().is_some_and(|a| (a.slice, a.image) == (slice, image)) && received == at;
-        // No lines are kept of a frame that is not visible, so the order of its lines is not checked.
-        let is_visible = self.program.scene.visible_frames().contains(&slice);
-        if !bytes.len().is_multiple_of(line)
-            || at + bytes.len() > frame_bytes
-            || !(first == 0 || follows || !is_visible)
-        {
-            let received = self.partial.as_ref().map_or(0, |_| received / line) as u32;
-            return Err(GpuError::FrameLines { slice, first, bytes: bytes.len(), received });
-        }
+        self.check_frame(slice as usize, bytes)?;
         self.volumes.set_filtered(self.program.scene.visible_bounds);
-        if !is_visible {
-            self.skipped += u64::from(first == 0);
-            return Ok(at + bytes.len() == frame_bytes);
+        if !self.program.scene.visible_frames().contains(&slice) {
+            self.skipped += 1;
+            return Ok(());
         }
-        if first == 0 {
-            self.received.clear();
-            self.incomplete += u64::from(self.partial.take().is_some());
-        }
-        if at + bytes.len() < frame_bytes {
-            self.received.extend_from_slice(bytes);
-            self.partial = Some(PartialFrame { slice, image });
-            return Ok(false);
-        }
-        self.partial = None;
-        if first == 0 {
-            self.send(slice, image, bytes)?;
-        } else {
-            let mut whole = std::mem::take(&mut self.received);
-            whole.extend_from_slice(bytes);
-            let sent = self.send(slice, image, &whole);
-            // Its memory is for the next frame.
-            self.received = whole;
-            sent?;
-        }
-        Ok(true)
-    }
-
-    /// Writes a complete frame into the staging buffer, after the batch or after submitting it, and submits the batch that nothing can
-    /// follow.
-    fn send(&mut self, slice: u32, image: u32, bytes: &[u8]) -> Result<(), GpuError> {
         if !self.ring.continues(image, slice) {
             self.flush()?;
             self.ring.wait(&mut self.queues, self.drawing.is_in_flight())?;
@@ -326,6 +257,19 @@ impl Renderer {
         self.ring.write(&mut self.queues, image, slice, &bytes);
         self.volumes.replaced(image, slice);
         if self.ring.is_complete(self.program.scene.visible_frames()) { self.flush() } else { Ok(()) }
+    }
+
+    /// Checks slice and size of a frame.
+    ///
+    /// # Errors
+    /// A slice that does not exist, or a frame of the wrong size.
+    pub fn check_frame(&self, slice: usize, bytes: &[u8]) -> Result<(), GpuError> {
+        let (slices, expected) = (self.program.scene.slices(), self.frame_bytes());
+        match (slice < slices as usize, bytes.len() == expected) {
+            (false, _) => Err(GpuError::FrameSlice { slice, slices }),
+            (_, false) => Err(GpuError::FrameSize { got: bytes.len(), expected }),
+            _ => Ok(()),
+        }
     }
 
     /// True if the next frame is taken without a wait for the device.
@@ -348,11 +292,6 @@ impl Renderer {
     /// Submits the batch.
     fn flush(&mut self) -> Result<(), GpuError> {
         self.ring.flush(&mut self.queues, &self.slots, &self.program)
-    }
-
-    /// Number of frames that were dropped because another began before all of their lines had arrived.
-    pub fn incomplete_frames(&self) -> u64 {
-        self.incomplete
     }
 }
 
@@ -492,7 +431,6 @@ impl Renderer {
                 self.volumes.invalidate(&self.program.scene);
                 if *rerun == Rerun::Everything {
                     // The next frames may have another size.
-                    self.incomplete += u64::from(self.partial.take().is_some());
                     self.slots.clear();
                     self.ring.restart(&self.program.scene, &self.queues)?;
                 }

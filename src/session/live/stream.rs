@@ -367,24 +367,13 @@ impl Stream {
                 let is_new = self.session.is_none() || Some(&*header) != self.header.as_ref();
                 self.next_header = is_new.then_some(*header);
             }
-            Event::Frame(_) | Event::Lines { .. } if self.is_frozen || self.next_header.is_some() => {}
+            Event::Frame(_) if self.is_frozen || self.next_header.is_some() => {}
             Event::Frame(mut frame) => {
                 frame.volume = frame.volume.saturating_add(self.volume_base);
-                let result = self.upload(&frame, None, at);
-                self.look_at(&frame, None);
+                let result = self.upload(&frame, at);
+                self.look_at(&frame);
                 if matches!(result, Ok(Step::Progress)) {
                     self.cine.frame(frame);
-                }
-                return result;
-            }
-            Event::Lines { mut frame, first } => {
-                frame.volume = frame.volume.saturating_add(self.volume_base);
-                let result = self.upload(&frame, Some(first), at);
-                self.look_at(&frame, Some(first));
-                if let (Ok(Step::Progress), Some(session)) = (&result, &self.session) {
-                    let (total, lines) =
-                        (session.renderer.frame_bytes(), session.renderer.scene().frame_size()[1] as usize);
-                    self.cine.lines(frame, first * (total / lines), total);
                 }
                 return result;
             }
@@ -397,57 +386,37 @@ impl Stream {
                 self.session.iter_mut().for_each(|session| session.pool.end());
                 self.end = Some(why);
             }
-            Event::Idle => {}
+            // The feed assembles lines.
+            Event::Lines { .. } | Event::Idle => {}
         }
         Ok(Step::Progress)
     }
 
-    /// Uploads a whole frame, or lines of one from line `first` on.
-    fn upload(&mut self, frame: &Frame, first: Option<usize>, at: Instant) -> Result<Step, StreamError> {
-        self.statistics.frames += u64::from(first.unwrap_or(0) == 0);
+    /// Uploads a frame.
+    fn upload(&mut self, frame: &Frame, at: Instant) -> Result<Step, StreamError> {
+        self.statistics.frames += 1;
         let feed = &self.feed;
         let Some(session) = &mut self.session else {
             return Ok(Step::Fault("a frame has a geometry that was not announced or cannot be drawn".into()));
         };
-        let (slice, slices) = (frame.slice as u32, session.renderer.scene().slices());
-        let (got, expected) = (frame.bytes.len(), session.renderer.frame_bytes());
-        // Checked before the frame's volume number has any effect.
-        let wrong = match first {
-            _ if frame.slice >= slices as usize => Some(GpuError::FrameSlice { slice, slices }),
-            None if got != expected => Some(GpuError::FrameSize { got, expected }),
-            _ => None,
-        };
-        let first = first.unwrap_or(0) as u32;
-        // The image of a frame that is complete.
-        let uploaded = match wrong {
-            Some(wrong) => Err(wrong),
-            None => match session.pool.place(frame.volume, || feed.is_behind(frame.volume - self.volume_base)) {
-                Some(image) => session
-                    .renderer
-                    .lines(slice, first, &frame.bytes, image)
-                    .map(|is_complete| is_complete.then_some(image)),
-                None => Ok(None),
-            },
-        };
-        match uploaded {
-            Ok(Some(image)) => {
-                session.frame_arrived(image, frame.volume, at);
-                self.newest = self.newest.max(Some(frame.volume));
-                session.pool.arrived(frame.slice, frame.backward);
-                Ok(Step::Progress)
-            }
-            Ok(None) => Ok(Step::Progress),
-            Err(error @ (GpuError::FrameSize { .. } | GpuError::FrameLines { .. } | GpuError::FrameSlice { .. })) => {
-                self.statistics.refused += 1;
-                Ok(Step::Fault(error.to_string()))
-            }
-            Err(error) => Err(error.into()),
+        // Before the frame's volume number has any effect.
+        if let Err(refused) = session.renderer.check_frame(frame.slice, &frame.bytes) {
+            self.statistics.refused += 1;
+            return Ok(Step::Fault(refused.to_string()));
         }
+        let image = session.pool.place(frame.volume, || feed.is_behind(frame.volume - self.volume_base));
+        if let Some(image) = image {
+            session.renderer.frame(frame.slice as u32, &frame.bytes, image)?;
+            session.frame_arrived(image, frame.volume, at);
+            self.newest = self.newest.max(Some(frame.volume));
+            session.pool.arrived(frame.slice, frame.backward);
+        }
+        Ok(Step::Progress)
     }
 
     /// Looks for the levels of the first whole volume, and draws by them from then on.
-    fn look_at(&mut self, frame: &Frame, first: Option<usize>) {
-        let Some(found) = self.first_volume.as_mut().and_then(|search| search.frame(frame, first)) else { return };
+    fn look_at(&mut self, frame: &Frame) {
+        let Some(found) = self.first_volume.as_mut().and_then(|search| search.frame(frame)) else { return };
         // A user may have changed settings meanwhile. The caller knows, and lays its own over these.
         match found.settings().map(|settings| Settings { picture: self.settings.picture.clone(), ..settings }) {
             Ok(settings) => {
