@@ -159,100 +159,41 @@ impl Stream {
         result
     }
 
-    fn advance(&mut self, patience: Duration) -> Result<Step, StreamError> {
+    /// Chooses the next piece of work and does it.
+    fn advance(&mut self, mut patience: Duration) -> Result<Step, StreamError> {
         // The picture in flight is finished first, and no more events are taken.
         let is_ending = self.end.is_some() || (self.next_header.is_some() && !self.is_frozen);
-        match self.session.as_ref().map(|session| &session.phase) {
-            None => self.next_event(patience),
-            Some(Phase::Drawing { .. }) => self.step_drawing(is_ending, patience),
-            Some(Phase::Draining { .. }) if !is_ending => self.step_draining(),
-            Some(Phase::Idle | Phase::Replaying(_) | Phase::Draining { .. }) => self.step_between_pictures(patience),
-        }
-    }
-
-    fn step_drawing(&mut self, is_ending: bool, patience: Duration) -> Result<Step, StreamError> {
-        let Some(session) = &mut self.session else { return Ok(Step::Progress) };
-        // Who has no patience looks again.
-        if !session.renderer.is_drawing()? || (is_ending && !patience.is_zero()) {
-            let queued = if session.pool.is_rolling() && !is_ending { self.feed.waiting() } else { 0 };
-            let picture = session.finish(queued, &mut self.statistics)?;
-            let is_coarse = self.draw_in_full()?;
-            return Ok(Step::Picture(FinishedPicture { is_coarse, ..picture }));
-        }
-        if is_ending {
-            return Ok(Step::Progress);
-        }
-        let patience = patience.min(DRAWING_WAIT);
-        let is_full = session.renderer.is_paced() && !session.renderer.takes_frame()?;
-        if is_full || (self.feed.can_wait() && session.pool.is_waiting()) {
-            // A frame would wait for the picture; a further volume would replace the one that waits to be shown.
-            std::thread::sleep(patience);
-            return Ok(Step::Progress);
-        }
-        self.replay_or_next_event(patience)
-    }
-
-    /// The first picture is there: what follows is drawn in full. True if it had fewer rays.
-    fn draw_in_full(&mut self) -> Result<bool, StreamError> {
-        let was_coarse = std::mem::take(&mut self.is_coarse) && coarse(&self.settings) != self.settings;
-        if let (true, Some(session), Some(header)) = (was_coarse, &mut self.session, &self.header) {
-            let full = views(header, &self.settings, self.full.as_ref(), &self.options)?;
-            session.pending = Pending::Ready(full);
-        }
-        Ok(was_coarse)
-    }
-
-    fn step_draining(&mut self) -> Result<Step, StreamError> {
-        let arrived = self.feed.next(Duration::ZERO);
         if let Some(session) = &mut self.session {
-            session.phase.drained(arrived.is_none());
-        }
-        let step = match arrived {
-            Some(Arrived { event, at }) => self.take(event, at),
-            None => Ok(Step::Progress),
-        };
-        self.submit_last()?;
-        step
-    }
-
-    fn step_between_pictures(&mut self, patience: Duration) -> Result<Step, StreamError> {
-        let Some(session) = &mut self.session else { return Ok(Step::Progress) };
-        if let Some(folder) = &self.options.shaders
-            && let Some(changed) = folder.take_changed()
-        {
-            match session.reload_shaders(&changed) {
-                Ok(()) => folder.accept(),
-                Err(error) if error.is_device_lost() => return Err(error.into()),
-                // The previous pipelines remain.
-                Err(error) => folder.refuse(changed, error.to_string()),
-            }
-        }
-        match session.begin()? {
-            Begun::Picture => return Ok(Step::Progress),
-            Begun::Refused(fault) => {
-                // Another geometry or device does not try the refused settings again.
-                if session.pending.is_none() {
-                    let shown = session.views.first().settings.clone();
-                    let ray = if self.is_coarse { self.settings.ray.clone() } else { shown.ray.clone() };
-                    (self.settings, self.full) = (Settings { ray, ..shown }, None);
+            let mut replays = true;
+            match session.phase {
+                Phase::Drawing { .. } => {
+                    // Who has no patience looks again.
+                    if !session.renderer.is_drawing()? || (is_ending && !patience.is_zero()) {
+                        return self.finish_picture(is_ending);
+                    }
+                    if is_ending {
+                        return Ok(Step::Progress);
+                    }
+                    patience = patience.min(DRAWING_WAIT);
+                    let is_full = session.renderer.is_paced() && !session.renderer.takes_frame()?;
+                    if is_full || (self.feed.can_wait() && session.pool.is_waiting()) {
+                        // A frame would wait for the picture; a further volume would replace the one that waits to be shown.
+                        std::thread::sleep(patience);
+                        return Ok(Step::Progress);
+                    }
                 }
-                return Ok(Step::Fault(fault));
+                Phase::Draining { .. } if !is_ending => (patience, replays) = (Duration::ZERO, false),
+                Phase::Idle | Phase::Replaying(_) | Phase::Draining { .. } => {
+                    if let Some(step) = self.begin_picture()? {
+                        return Ok(step);
+                    }
+                }
             }
-            Begun::Restore(volume) => session.restore(volume, &self.cine),
-            Begun::Nothing => {}
+            if let Some(session) = self.session.as_mut().filter(|session| replays && session.phase.replay().is_some()) {
+                session.continue_replay()?;
+                return Ok(Step::Progress);
+            }
         }
-        self.replay_or_next_event(patience)
-    }
-
-    fn replay_or_next_event(&mut self, patience: Duration) -> Result<Step, StreamError> {
-        if let Some(session) = self.session.as_mut().filter(|session| session.phase.replay().is_some()) {
-            session.continue_replay()?;
-            return Ok(Step::Progress);
-        }
-        self.next_event(patience)
-    }
-
-    fn next_event(&mut self, patience: Duration) -> Result<Step, StreamError> {
         // A new geometry would discard the volume that is frozen.
         let shows_frozen = self.is_frozen && self.session.is_some();
         if self.next_header.is_some() && !shows_frozen {
@@ -267,12 +208,62 @@ impl Stream {
         if let Some(end) = &self.end {
             return Ok(Step::End(end.clone()));
         }
-        let step = match self.feed.next(patience) {
-            Some(Arrived { event, at }) => self.take(event, at),
-            None => Ok(Step::Progress),
-        };
+        let arrived = self.feed.next(patience);
+        if let Some(session) = &mut self.session {
+            session.phase.drained(arrived.is_none());
+        }
+        let step = arrived.map_or(Ok(Step::Progress), |Arrived { event, at }| self.take(event, at));
         self.submit_last()?;
         step
+    }
+
+    /// Waits for the picture in flight.
+    fn finish_picture(&mut self, is_ending: bool) -> Result<Step, StreamError> {
+        let Some(session) = &mut self.session else { return Ok(Step::Progress) };
+        let queued = if session.pool.is_rolling() && !is_ending { self.feed.waiting() } else { 0 };
+        let picture = session.finish(queued, &mut self.statistics)?;
+        let is_coarse = self.draw_in_full()?;
+        Ok(Step::Picture(FinishedPicture { is_coarse, ..picture }))
+    }
+
+    /// The first picture is there: what follows is drawn in full. True if it had fewer rays.
+    fn draw_in_full(&mut self) -> Result<bool, StreamError> {
+        let was_coarse = std::mem::take(&mut self.is_coarse) && coarse(&self.settings) != self.settings;
+        if let (true, Some(session), Some(header)) = (was_coarse, &mut self.session, &self.header) {
+            let full = views(header, &self.settings, self.full.as_ref(), &self.options)?;
+            session.pending = Pending::Ready(full);
+        }
+        Ok(was_coarse)
+    }
+
+    /// Begins a picture if there is anything new to show. None if there is nothing that a step would end with.
+    fn begin_picture(&mut self) -> Result<Option<Step>, StreamError> {
+        let Some(session) = &mut self.session else { return Ok(None) };
+        if let Some(folder) = &self.options.shaders
+            && let Some(changed) = folder.take_changed()
+        {
+            match session.reload_shaders(&changed) {
+                Ok(()) => folder.accept(),
+                Err(error) if error.is_device_lost() => return Err(error.into()),
+                // The previous pipelines remain.
+                Err(error) => folder.refuse(changed, error.to_string()),
+            }
+        }
+        match session.begin()? {
+            Begun::Picture => return Ok(Some(Step::Progress)),
+            Begun::Refused(fault) => {
+                // Another geometry or device does not try the refused settings again.
+                if session.pending.is_none() {
+                    let shown = session.views.first().settings.clone();
+                    let ray = if self.is_coarse { self.settings.ray.clone() } else { shown.ray.clone() };
+                    (self.settings, self.full) = (Settings { ray, ..shown }, None);
+                }
+                return Ok(Some(Step::Fault(fault)));
+            }
+            Begun::Restore(volume) => session.restore(volume, &self.cine),
+            Begun::Nothing => {}
+        }
+        Ok(None)
     }
 
     /// True if the next geometry can begin: what it needs is compiled, or will be when it begins. Otherwise that is being compiled.
