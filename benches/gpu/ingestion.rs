@@ -12,10 +12,9 @@ use std::hint::black_box;
 use std::sync::Arc;
 
 /// Name, settings, and whether the frames are slices of a Cartesian volume already.
-const CASES: [(&str, &[&str], bool); 4] = [
+const CASES: [(&str, &[&str], bool); 3] = [
     ("slices as they are", &["slices.format=r8"], true),
     ("scan conversion", &["slices.format=r8"], false),
-    ("scan conversion, line by line", &["slices.format=r8"], false),
     ("scan conversion and sigma filter", &["slices.format=r8", "slices.sigma={ window = 5 }"], false),
 ];
 
@@ -47,14 +46,11 @@ pub fn bench(criterion: &mut Criterion, context: &Arc<Context>, phantom: &Phanto
         let scene = Scene::new(geometry, BYTES, settings).map_err(|e| e.to_string())?;
         let options = RendererOptions { volume_images: 2, ..RendererOptions::default() };
         let mut renderer = Renderer::new(context, scene, &options).map_err(|e| e.to_string())?;
-        let lines = if name.ends_with("line by line") { 1 } else { probe.lines.len() };
         let mut image = 0;
         let mut volume = || -> Result<(), GpuError> {
             image = 1 - image;
             for (slice, frame) in sent.iter().enumerate() {
-                for (n, part) in frame.chunks(lines * probe.samples).enumerate() {
-                    renderer.lines(slice as u32, (n * lines) as u32, part, image)?;
-                }
+                renderer.frame(slice as u32, frame, image)?;
             }
             renderer.take_times().map(|_| ())
         };

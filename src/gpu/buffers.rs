@@ -43,7 +43,7 @@ const TEXELS: [vk::Format; 3] = [vk::Format::R32_SFLOAT, vk::Format::R32G32_SFLO
 
 /// True if a lookup table of this size can be a texel buffer, for any size of its entries.
 pub(crate) fn has_texels(context: &Context, bytes: u64) -> bool {
-    bytes >= 16 && bytes / 4 <= u64::from(context.limits.max_texel_buffer_elements)
+    bytes >= 16 && bytes / 4 <= u64::from(context.candidate.limits.max_texel_buffer_elements)
 }
 
 /// The memory type for results that the host reads, and whether it is coherent. Reading uncached memory takes up to 87 times as long as
@@ -94,7 +94,7 @@ impl Buffer {
                     requirements.memory_type_bits = 1 << kind;
                     if !is_coherent {
                         // What is invalidated belongs to this buffer alone.
-                        let atom = context.limits.non_coherent_atom_size.max(1);
+                        let atom = context.candidate.limits.non_coherent_atom_size.max(1);
                         requirements.alignment = requirements.alignment.max(atom);
                         requirements.size = requirements.size.next_multiple_of(atom);
                     }

@@ -4,18 +4,18 @@ use super::bands::{Band, BandLimit, Work};
 use super::buffers::{Buffer, Purpose, Readback, Upload};
 use super::context::Context;
 use super::descriptor_sets::DescriptorSets;
+use super::device_queues::DeviceQueues;
 use super::error::{ErrorContext, GpuError};
 use super::formats;
 use super::pipelines::{Pipeline, descriptor_type};
 use super::resources::{Image, Resource, SlotResources, WHOLE};
-use super::timeline::{Submission, Timelines};
-use super::timing::{Stamps, TimeStamps, Timings};
-use crate::barriers::{self, Access, Barrier, PipelineStage, PipelineStages};
+use super::timeline::Submission;
+use super::timing::{Stamps, TimeStamps};
+use crate::barriers::{self, Access, PipelineStage};
 use crate::passes::fault_injection::Command;
 use crate::passes::slots::Shape;
 use crate::passes::{DispatchArgs, Part, Pass, Slot, interface_check};
-use crate::queues::oracle::{Event, SubmissionLog};
-use crate::queues::{QueueTracker, Wait};
+use crate::queues::oracle::Event;
 use crate::scene::Scene;
 use crate::spirv::Kind;
 use ash::vk;
@@ -156,9 +156,9 @@ impl CommandRecorder {
     }
 
     /// Waits until the last submission is done, then begins a new recording.
-    pub fn begin(&mut self, barriers: &mut BarrierRecorder, timelines: &Timelines) -> Result<(), GpuError> {
-        barriers.begin(self.queue);
-        self.wait(timelines)?;
+    pub fn begin(&mut self, queues: &mut DeviceQueues) -> Result<(), GpuError> {
+        queues.begin(self.queue);
+        self.wait(queues)?;
         // SAFETY: the device is done with every command buffer of this pool.
         unsafe { self.context.device.reset_command_pool(self.pool, vk::CommandPoolResetFlags::empty()) }
             .context(|| format!("record '{}'", self.label))?;
@@ -169,11 +169,11 @@ impl CommandRecorder {
         if let Some(stamps) = &mut self.stamps {
             stamps.begin();
         }
-        self.begin_commands(barriers)
+        self.begin_commands(queues)
     }
 
     /// Begins the next command buffer of the recording.
-    fn begin_commands(&mut self, barriers: &mut BarrierRecorder) -> Result<(), GpuError> {
+    fn begin_commands(&mut self, queues: &mut DeviceQueues) -> Result<(), GpuError> {
         if self.used == self.allocated.len() {
             self.allocate()?;
         }
@@ -187,24 +187,24 @@ impl CommandRecorder {
             .context(|| format!("record '{}'", self.label))?;
         if let Some(stamps) = &mut self.stamps {
             if self.time_stamps == TimeStamps::EachPass {
-                serialize(&self.context.device, self.commands, self.queue, barriers);
+                serialize(&self.context.device, self.commands, self.queue, queues);
             }
             stamps.start(self.commands);
-            barriers.stamped(self.queue);
-            self.after_stamp(barriers);
+            queues.stamped(self.queue);
+            self.after_stamp(queues);
         }
         Ok(())
     }
 
     /// Ends the recording here and continues it in another command buffer, which is submitted on its own.
-    pub fn cut(&mut self, barriers: &mut BarrierRecorder, timelines: &mut Timelines) -> Result<(), GpuError> {
-        self.submit(barriers, timelines)?;
+    pub fn cut(&mut self, queues: &mut DeviceQueues) -> Result<(), GpuError> {
+        self.submit(queues)?;
         // Where each pass is timed, that of a band is a run of its own.
         if let Some(stamps) = self.stamps.as_mut().filter(|_| self.time_stamps == TimeStamps::Ends) {
             stamps.continues();
         }
-        barriers.begin(self.queue);
-        self.begin_commands(barriers)?;
+        queues.begin(self.queue);
+        self.begin_commands(queues)?;
         if self.context.presentation.is_some() {
             // Older layers ignore dispatches with a base, and forget the barrier of a command buffer that has no other: those of bands. Headless,
             // nothing hides what they see.
@@ -214,45 +214,46 @@ impl CommandRecorder {
     }
 
     /// What has to follow a time stamp: where passes are timed, nothing may begin before it.
-    fn after_stamp(&self, barriers: &mut BarrierRecorder) {
+    fn after_stamp(&self, queues: &mut DeviceQueues) {
         // Once anything was drawn on a window, llvmpipe (Mesa 22.3, `lp_setup_end_query`) writes a time stamp only at its next flush, so
         // that the following dispatch would seem to take no time. A barrier is a flush.
         let needs_flush = self.context.presentation.is_some() && self.context.candidate.is_software();
         if self.time_stamps == TimeStamps::EachPass || needs_flush {
-            serialize(&self.context.device, self.commands, self.queue, barriers);
+            serialize(&self.context.device, self.commands, self.queue, queues);
         }
     }
 
     /// Adds the times of the last submission, and of those that were set aside, once, when they are done.
-    pub fn collect(&mut self, timelines: &Timelines, timings: &mut Timings) -> Result<(), GpuError> {
-        let (bits, period) = (self.context.queue(self.queue).valid_bits, self.context.limits.timestamp_period);
+    pub fn collect(&mut self, queues: &mut DeviceQueues) -> Result<(), GpuError> {
+        let (bits, period) =
+            (self.context.queue(self.queue).valid_bits, self.context.candidate.limits.timestamp_period);
         while let Some(stamps) = self.unread.first() {
-            timings.add(&stamps.read(bits, period)?, bits, period);
+            queues.timings.add(&stamps.read(bits, period)?, bits, period);
             self.spare.push(self.unread.remove(0));
         }
         if self.collected_to == self.done_at {
             return Ok(());
         }
-        self.wait(timelines)?;
+        self.wait(queues)?;
         self.collected_to = self.done_at;
         if let Some(stamps) = &self.stamps {
-            timings.add(&stamps.read(bits, period)?, bits, period);
-            timings.leave_out(stamps.left_out());
+            queues.timings.add(&stamps.read(bits, period)?, bits, period);
+            queues.timings.leave_out(stamps.left_out());
         }
         Ok(())
     }
 
     /// Waits for the last submission, and keeps its time stamps for a later [`CommandRecorder::collect`]. Where too many wait already, its work is
     /// counted as not timed.
-    pub fn set_aside(&mut self, timelines: &Timelines, timings: &mut Timings) -> Result<(), GpuError> {
-        self.wait(timelines)?;
+    pub fn set_aside(&mut self, queues: &mut DeviceQueues) -> Result<(), GpuError> {
+        self.wait(queues)?;
         if self.collected_to == self.done_at {
             return Ok(());
         }
         self.collected_to = self.done_at;
         let Some(stamps) = &self.stamps else { return Ok(()) };
         if self.unread.len() >= MAX_UNREAD {
-            timings.leave_out(stamps.count());
+            queues.timings.leave_out(stamps.count());
             return Ok(());
         }
         let next = match self.spare.pop() {
@@ -264,67 +265,49 @@ impl CommandRecorder {
     }
 
     /// Blocks until the last submission is done.
-    pub fn wait(&self, timelines: &Timelines) -> Result<(), GpuError> {
-        timelines.of(self.queue).wait(self.done_at)
+    pub fn wait(&self, queues: &DeviceQueues) -> Result<(), GpuError> {
+        queues.timelines.of(self.queue).wait(self.done_at)
     }
 
     /// True if the last submission is done.
-    pub fn is_done(&self, timelines: &Timelines) -> Result<bool, GpuError> {
-        timelines.of(self.queue).is_done(self.done_at)
+    pub fn is_done(&self, queues: &DeviceQueues) -> Result<bool, GpuError> {
+        queues.timelines.of(self.queue).is_done(self.done_at)
     }
 
     /// Submits the recording, after waits for other queues.
-    pub fn submit(&mut self, barriers: &mut BarrierRecorder, timelines: &mut Timelines) -> Result<(), GpuError> {
+    pub fn submit(&mut self, queues: &mut DeviceQueues) -> Result<(), GpuError> {
         if let Some(stamps) = self.stamps.as_mut().filter(|_| self.time_stamps == TimeStamps::Ends) {
             stamps.end_of(self.commands, self.label, self.runs, std::mem::take(&mut self.open));
-            barriers.stamped(self.queue);
-            self.after_stamp(barriers);
+            queues.stamped(self.queue);
+            self.after_stamp(queues);
         }
         // SAFETY: the command buffer is being recorded.
         unsafe { self.context.device.end_command_buffer(self.commands) }
             .context(|| format!("record '{}'", self.label))?;
-        let waits = barriers.queues.waits(self.queue);
-        let waited = waits.iter().map(|wait| (timelines.of(wait.queue).semaphore, wait.value)).collect();
+        let waits = queues.tracker.waits(self.queue);
+        let waited = waits.iter().map(|wait| (queues.timelines.of(wait.queue).semaphore, wait.value)).collect();
         let (queue, commands, label) = (self.queue, self.commands, self.label);
         let expected = std::mem::take(&mut self.expected);
         let work = Submission { queue, commands, waits: waited, label, expected };
-        self.done_at = timelines.of_mut(queue).submit(work)?;
-        barriers.submitted(self.queue, &waits, self.done_at);
+        self.done_at = queues.timelines.of_mut(queue).submit(work)?;
+        queues.submitted(self.queue, &waits, self.done_at);
         Ok(())
     }
 
-    /// Records a dispatch, with the barrier that it needs.
-    ///
-    /// # Errors
-    /// More parameters than one command buffer can hold.
-    pub fn dispatch(&mut self, barriers: &mut BarrierRecorder, dispatch: &Dispatch) -> Result<(), GpuError> {
-        self.dispatch_by(barriers, dispatch, None)
-    }
-
-    /// As [`CommandRecorder::dispatch`], in bands that `limit` allows, each in a submission of its own.
+    /// Records a dispatch, with the barrier that it needs; with `limit`, in the bands that it allows, each in a submission of its own.
     ///
     /// # Errors
     /// More parameters than one command buffer can hold; a device that fails.
-    pub(crate) fn dispatch_in_bands(
+    pub fn dispatch(
         &mut self,
-        barriers: &mut BarrierRecorder,
-        timelines: &mut Timelines,
+        queues: &mut DeviceQueues,
         dispatch: &Dispatch,
-        limit: &BandLimit,
-    ) -> Result<(), GpuError> {
-        self.dispatch_by(barriers, dispatch, Some((timelines, limit)))
-    }
-
-    fn dispatch_by(
-        &mut self,
-        barriers: &mut BarrierRecorder,
-        dispatch: &Dispatch,
-        mut by: Option<(&mut Timelines, &BandLimit)>,
+        limit: Option<&BandLimit>,
     ) -> Result<(), GpuError> {
         let Dispatch { pipeline, scene, pass, args, .. } = *dispatch;
         let accesses = barriers::accesses(scene, pass, args);
         let Some(args) = &self.context.faults.args(pass, scene, args) else {
-            self.barrier(barriers, &accesses);
+            self.barrier(queues, &accesses);
             return Ok(());
         };
         let dispatch = &Dispatch { args, ..*dispatch };
@@ -335,10 +318,10 @@ impl CommandRecorder {
         let counted = pass.reads(scene, args).into_iter().find(|bind| bind.part == Part::Groups);
         let mut bands = vec![Band { base: [0; 3], groups }];
         let mut expected = 0.0;
-        if let Some((timelines, limit)) = &mut by {
+        if let Some(limit) = limit {
             expected = limit.expected(pass, &pipeline.time, invocations(extent));
             if limit.is_full(self.open.iter().map(|work| work.expected).sum(), expected) {
-                self.cut(barriers, timelines)?;
+                self.cut(queues)?;
             }
             // Only the device knows how many workgroups a counted dispatch has.
             if counted.is_none() {
@@ -346,7 +329,7 @@ impl CommandRecorder {
             }
         }
         if let Some(bind) = counted {
-            self.copy_groups(barriers, dispatch, bind.slot)?;
+            self.copy_groups(queues, dispatch, bind.slot)?;
         }
         let block = interface_check::pack(&pipeline.module, &self.context.faults.numbers(pass, scene, args));
         let offset = self.place_params(&block)?;
@@ -359,23 +342,23 @@ impl CommandRecorder {
             });
             let share = invocations(size) as f64 / invocations(extent).max(1) as f64;
             let work = Work { time: pipeline.time.clone(), expected: share * expected, invocations: invocations(size) };
-            self.barrier(barriers, &accesses);
+            self.barrier(queues, &accesses);
             self.context.begin_label(self.commands, pass.name);
             self.context.loss.mark(self.commands, pass.name);
             self.bind(dispatch, offset, block.len() as u64)?;
-            self.dispatch_band(barriers, dispatch, band, work);
+            self.dispatch_band(queues, dispatch, band, work);
             self.context.end_label(self.commands);
-            if let Some(dispatched) = &mut barriers.dispatched {
+            if let Some(dispatched) = &mut queues.dispatched {
                 dispatched.push((pass.name, size));
             }
-            if let (Some((timelines, _)), true) = (&mut by, n < last) {
-                self.cut(barriers, timelines)?;
+            if limit.is_some() && n < last {
+                self.cut(queues)?;
             }
         }
         Ok(())
     }
 
-    fn dispatch_band(&mut self, barriers: &mut BarrierRecorder, dispatch: &Dispatch, band: &Band, work: Work) {
+    fn dispatch_band(&mut self, queues: &mut DeviceQueues, dispatch: &Dispatch, band: &Band, work: Work) {
         self.expected += work.expected;
         let Dispatch { pipeline, pass, .. } = *dispatch;
         let (device, commands) = (&self.context.device, self.commands);
@@ -407,8 +390,8 @@ impl CommandRecorder {
         match (&mut self.stamps, self.time_stamps) {
             (Some(stamps), TimeStamps::EachPass) => {
                 stamps.dispatch(commands, pass.name, self.runs, vec![work], repeat);
-                barriers.stamped(self.queue);
-                self.after_stamp(barriers);
+                queues.stamped(self.queue);
+                self.after_stamp(queues);
             }
             _ => {
                 repeat();
@@ -419,9 +402,9 @@ impl CommandRecorder {
     }
 
     /// Copies the numbers of workgroups that passes have left in a slot to where the next counted dispatch reads them.
-    fn copy_groups(&mut self, barriers: &mut BarrierRecorder, dispatch: &Dispatch, slot: Slot) -> Result<(), GpuError> {
+    fn copy_groups(&mut self, queues: &mut DeviceQueues, dispatch: &Dispatch, slot: Slot) -> Result<(), GpuError> {
         let Some(image) = dispatch.slots.image(slot, 0) else { return Ok(()) };
-        self.barrier(barriers, &[Access::of_slot(slot, 0, 0..1, false, PipelineStage::Copy)]);
+        self.barrier(queues, &[Access::of_slot(slot, 0, 0..1, false, PipelineStage::Copy)]);
         if self.groups.is_none() {
             let bytes = image.shape.texels() * image.format.texel_bytes() as u64;
             self.groups = Some(Buffer::new(&self.context, "groups", bytes, Purpose::Groups)?);
@@ -443,7 +426,7 @@ impl CommandRecorder {
 
     /// Copies parameters into the uniform buffer; returns their byte offset.
     fn place_params(&mut self, block: &[u8]) -> Result<u64, GpuError> {
-        let alignment = self.context.limits.min_uniform_buffer_offset_alignment.max(16);
+        let alignment = self.context.candidate.limits.min_uniform_buffer_offset_alignment.max(16);
         let offset = self.params_used.next_multiple_of(alignment);
         let end = offset + block.len() as u64;
         if end > PARAMS_BYTES {
@@ -459,16 +442,16 @@ impl CommandRecorder {
     }
 
     /// Where each pass is timed, writes a time stamp; the work since the last one is called `name`.
-    pub fn stamp(&mut self, barriers: &mut BarrierRecorder, name: &'static str) {
+    pub fn stamp(&mut self, queues: &mut DeviceQueues, name: &'static str) {
         if let Some(stamps) = self.stamps.as_mut().filter(|_| self.time_stamps == TimeStamps::EachPass) {
             stamps.end_of(self.commands, name, self.runs, Vec::new());
-            barriers.stamped(self.queue);
-            self.after_stamp(barriers);
+            queues.stamped(self.queue);
+            self.after_stamp(queues);
         }
     }
 
-    fn barrier(&self, barriers: &mut BarrierRecorder, accesses: &[Access]) {
-        barriers.before(&self.context, self.queue, self.commands, accesses);
+    fn barrier(&self, queues: &mut DeviceQueues, accesses: &[Access]) {
+        queues.before(&self.context, self.queue, self.commands, accesses);
     }
 }
 
@@ -503,9 +486,9 @@ fn order(
 
 /// Records an execution barrier between everything before and after it. It covers no memory, so that validation still notices a
 /// memory barrier that is missing.
-fn serialize(device: &ash::Device, commands: vk::CommandBuffer, queue: usize, barriers: &mut BarrierRecorder) {
+fn serialize(device: &ash::Device, commands: vk::CommandBuffer, queue: usize, queues: &mut DeviceQueues) {
     flush(device, commands, vk::AccessFlags2::NONE);
-    barriers.log.iter_mut().for_each(|log| log.event(queue, Event::Serialize));
+    queues.log.iter_mut().for_each(|log| log.event(queue, Event::Serialize));
 }
 
 /// The index of a binding's descriptor in the list of its kind.
@@ -604,7 +587,7 @@ impl CommandRecorder {
 impl CommandRecorder {
     /// Moves new images from UNDEFINED to GENERAL and clears them to zero. Passes rely on this: they never write pixels outside the
     /// sector.
-    pub(crate) fn clear_new(&mut self, barriers: &mut BarrierRecorder, slots: &SlotResources, new: &[(Slot, u32)]) {
+    pub(crate) fn clear_new(&mut self, queues: &mut DeviceQueues, slots: &SlotResources, new: &[(Slot, u32)]) {
         let images: Vec<(&Image, Slot, u32)> =
             new.iter().filter_map(|&(slot, n)| slots.image(slot, n).map(|image| (image, slot, n))).collect();
         let transitions: Vec<_> = images
@@ -634,7 +617,7 @@ impl CommandRecorder {
         }
         for (image, slot, n) in images {
             let access = Access::of_slot(slot, n, 0..image.shape.parts(), true, PipelineStage::Copy);
-            self.barrier(barriers, &[access]);
+            self.barrier(queues, &[access]);
             let poison = self.context.faults.poisoned().filter(|_| !slot.starts_clear());
             let cleared = if self.context.faults.breaks(Command::Clear) { 1.0 } else { 0.0 };
             let value =
@@ -649,13 +632,13 @@ impl CommandRecorder {
     /// Copies texels of a staging buffer into layers or slices of an image.
     pub(crate) fn copy_in(
         &mut self,
-        barriers: &mut BarrierRecorder,
+        queues: &mut DeviceQueues,
         (from, layout): (&Buffer, BufferLayout),
         image: &Image,
         to: SlotParts,
     ) {
         let parts = to.parts.clone();
-        self.barrier(barriers, &[Access::of_slot(to.slot, to.copy, to.parts, true, PipelineStage::Copy)]);
+        self.barrier(queues, &[Access::of_slot(to.slot, to.copy, to.parts, true, PipelineStage::Copy)]);
         let rows = 0..image.extent.height;
         let regions: Vec<_> = match layout.descending {
             None => vec![region(image, parts, rows, layout)],
@@ -690,8 +673,8 @@ impl CommandRecorder {
     }
 
     /// Copies everything that an upload holds into its parts of an image.
-    pub fn upload(&mut self, barriers: &mut BarrierRecorder, from: &Upload, image: &Image, to: SlotParts) {
-        self.barrier(barriers, &[Access::of_slot(to.slot, to.copy, to.parts, true, PipelineStage::Copy)]);
+    pub fn upload(&mut self, queues: &mut DeviceQueues, from: &Upload, image: &Image, to: SlotParts) {
+        self.barrier(queues, &[Access::of_slot(to.slot, to.copy, to.parts, true, PipelineStage::Copy)]);
         for (piece, buffer) in from.pieces() {
             let region = region(image, piece.parts.clone(), piece.rows.clone(), BufferLayout::default());
             self.copy_to_image(buffer, image, vec![region]);
@@ -699,19 +682,12 @@ impl CommandRecorder {
     }
 
     /// Copies a complete image into the buffers of a readback and makes them visible to the host.
-    pub(crate) fn copy_out(
-        &mut self,
-        barriers: &mut BarrierRecorder,
-        image: &Image,
-        slot: Slot,
-        copy: u32,
-        to: &Readback,
-    ) {
+    pub(crate) fn copy_out(&mut self, queues: &mut DeviceQueues, image: &Image, slot: Slot, copy: u32, to: &Readback) {
         let parts = image.shape.parts();
         let read = Access::of_slot(slot, copy, 0..parts, false, PipelineStage::Copy);
         let resource = barriers::Resource::Readback;
         let write = Access { resource, parts: 0..1, write: true, stage: PipelineStage::Copy };
-        self.barrier(barriers, &[read, write]);
+        self.barrier(queues, &[read, write]);
         for (piece, buffer) in to.pieces() {
             let region = region(image, piece.parts.clone(), piece.rows.clone(), BufferLayout::default());
             if self.context.faults.breaks(Command::CopyToBuffer) {
@@ -728,7 +704,7 @@ impl CommandRecorder {
                 );
             }
         }
-        self.barrier(barriers, &[Access { resource, parts: 0..1, write: false, stage: PipelineStage::Host }]);
+        self.barrier(queues, &[Access { resource, parts: 0..1, write: false, stage: PipelineStage::Host }]);
     }
 }
 
@@ -760,104 +736,4 @@ impl Drop for CommandRecorder {
         // SAFETY: the owner waited for the device before it drops its recorders. The pool frees its command buffer.
         unsafe { self.context.device.destroy_command_pool(self.pool, None) };
     }
-}
-
-/// The barriers and waits of everything that uses the same slots, and a count of the barriers. It records the barriers that
-/// [`crate::barriers`] derives as Vulkan commands.
-#[derive(Default)]
-pub(crate) struct BarrierRecorder {
-    pub queues: QueueTracker,
-    pub count: u32,
-    /// The names and invocations of the dispatched passes, in order, while they are counted.
-    pub dispatched: Option<Vec<(&'static str, [u32; 3])>>,
-    /// Fault injection: leaves out the n-th barrier.
-    pub drop_barrier: Option<u32>,
-    /// Everything recorded and submitted, if it is logged.
-    pub log: Option<SubmissionLog>,
-}
-
-impl BarrierRecorder {
-    /// Records the barrier that an operation with these accesses needs, if it needs one.
-    pub(super) fn before(&mut self, context: &Context, queue: usize, commands: vk::CommandBuffer, accesses: &[Access]) {
-        let barrier = self.queues.record(queue, accesses);
-        self.count += u32::from(barrier.is_some());
-        let is_dropped = self.drop_barrier == Some(self.count);
-        // A transfer queue has no shader stages.
-        let computes = context.queue(queue).computes;
-        let supported = |all: PipelineStages| if computes { all } else { all.without(PipelineStage::Compute) };
-        let barrier = barrier.filter(|_| !is_dropped).map(|b| Barrier { from: supported(b.from), to: supported(b.to) });
-        if let Some(log) = &mut self.log {
-            log.record(queue, barrier, accesses);
-        }
-        let Some(Barrier { from, to }) = barrier else { return };
-        let barrier = [vk::MemoryBarrier2::default()
-            .src_stage_mask(stages(from))
-            .src_access_mask(writes(from))
-            .dst_stage_mask(stages(to))
-            .dst_access_mask(reads(to) | writes(to))];
-        let dependency = vk::DependencyInfo::default().memory_barriers(&barrier);
-        // SAFETY: the command buffer is being recorded, outside any render pass.
-        unsafe { context.device.cmd_pipeline_barrier2(commands, &dependency) };
-    }
-
-    /// A time stamp was recorded on this queue.
-    fn stamped(&mut self, queue: usize) {
-        self.log.iter_mut().for_each(|log| log.event(queue, Event::Stamp));
-    }
-
-    /// Begins the recording of a submission to this queue.
-    pub(super) fn begin(&mut self, queue: usize) {
-        self.queues.begin(queue);
-        self.log.iter_mut().for_each(|log| log.begin(queue));
-    }
-
-    /// The recording of this queue was submitted with these waits; it is done at this value of the queue's timeline.
-    pub(super) fn submitted(&mut self, queue: usize, waits: &[Wait], value: u64) {
-        self.queues.submitted(queue, waits, value);
-        self.log.iter_mut().for_each(|log| log.submit(queue, waits, value));
-    }
-}
-
-fn flags<T: std::ops::BitOr<Output = T> + Default>(workers: PipelineStages, of: [(PipelineStage, T); 3]) -> T {
-    of.into_iter().filter(|(worker, _)| workers.has(*worker)).fold(T::default(), |all, (_, flags)| all | flags)
-}
-
-fn stages(workers: PipelineStages) -> vk::PipelineStageFlags2 {
-    flags(
-        workers,
-        [
-            (PipelineStage::Compute, vk::PipelineStageFlags2::COMPUTE_SHADER),
-            (PipelineStage::Copy, vk::PipelineStageFlags2::ALL_TRANSFER),
-            (PipelineStage::Host, vk::PipelineStageFlags2::HOST),
-        ],
-    )
-}
-
-fn writes(workers: PipelineStages) -> vk::AccessFlags2 {
-    flags(
-        workers,
-        [
-            (PipelineStage::Compute, vk::AccessFlags2::SHADER_STORAGE_WRITE),
-            (PipelineStage::Copy, vk::AccessFlags2::TRANSFER_WRITE),
-            (PipelineStage::Host, vk::AccessFlags2::NONE),
-        ],
-    )
-}
-
-fn reads(workers: PipelineStages) -> vk::AccessFlags2 {
-    flags(
-        workers,
-        [
-            // Numbers of passes are written by the host, and need no barrier. But their buffer may take memory that a readback had before:
-            // the host waited in between, which layers older than 1.3.297 do not know of timelines.
-            (
-                PipelineStage::Compute,
-                vk::AccessFlags2::SHADER_SAMPLED_READ
-                    | vk::AccessFlags2::SHADER_STORAGE_READ
-                    | vk::AccessFlags2::UNIFORM_READ,
-            ),
-            (PipelineStage::Copy, vk::AccessFlags2::TRANSFER_READ),
-            (PipelineStage::Host, vk::AccessFlags2::HOST_READ),
-        ],
-    )
 }

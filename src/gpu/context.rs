@@ -27,8 +27,6 @@ use std::time::Instant;
 /// 64 MiB where a driver keeps 256 KiB for a pipeline, and 0.8 GiB on lavapipe, which keeps 3 MiB.
 const MAX_UNUSED_PIPELINES: usize = 256;
 
-/// Waits for timelines between two idle queues that an older layer is shown: showing it one after each wait took four times the CPU time.
-const UNSEEN_WAITS: u64 = 512;
 /// Size of a block of memory on a software device, bytes.
 const SOFTWARE_BLOCK: u64 = 8 << 20;
 
@@ -82,12 +80,7 @@ pub struct Context {
     pub(super) presentation: Option<Presentation>,
     /// With validation.
     messenger: Option<Messenger>,
-    /// The validation layer handles waits for timeline semaphores.
-    layer_knows_timelines: bool,
-    /// Waits for timelines that the validation layer did not see.
-    unseen_waits: AtomicU64,
     pub candidate: Candidate,
-    pub limits: vk::PhysicalDeviceLimits,
     pub device: ash::Device,
     /// `None` if the device cannot push descriptors: they are then sets of a pool.
     pub push_descriptor: Option<ash::khr::push_descriptor::Device>,
@@ -245,7 +238,7 @@ impl Context {
                 return Err(GpuError::Memory { operation: "create allocator".into(), fault: e.to_string() });
             }
         };
-        let messenger = match layer.map(|_| Messenger::new(&entry, instance)).transpose() {
+        let messenger = match layer.map(|layer| Messenger::new(&entry, instance, layer)).transpose() {
             Ok(messenger) => messenger,
             Err(error) => {
                 drop(allocator);
@@ -278,7 +271,6 @@ impl Context {
                 candidate.queues.iter().map(|q| Mutex::new(get(q))).collect()
             },
             queue_families: candidate.queues.iter().map(|q| q.family).collect::<BTreeSet<_>>().into_iter().collect(),
-            limits: candidate.limits,
             presentation: target.map(|target| Presentation {
                 surfaces: ash::khr::surface::Instance::new(&entry, instance),
                 swapchains: ash::khr::swapchain::Device::new(instance, &device),
@@ -288,8 +280,6 @@ impl Context {
             instance: instance.clone(),
             entry,
             messenger,
-            layer_knows_timelines: layer.is_some_and(Layer::knows_timelines),
-            unseen_waits: AtomicU64::new(1),
             candidate,
             device,
             allocator: Mutex::new(Some(allocator)),
@@ -315,7 +305,7 @@ impl Context {
     /// True if hazards between submissions that validation reports are real. Older layers ignore that a queue waits for the timeline
     /// of another; with a single queue that does not matter.
     pub fn validates_timelines(&self) -> bool {
-        self.layer_knows_timelines || self.queue_count() == 1
+        !self.layer_misses_waits() || self.queue_count() == 1
     }
 
     /// Bytes of device memory in use.
@@ -507,11 +497,8 @@ impl Context {
     /// # Errors
     /// A device that fails or is given up.
     pub(super) fn show_layer_an_idle_queue(&self) -> Result<(), GpuError> {
-        let is_needed = self.layer_misses_waits() && self.queues.len() == 1;
-        if !is_needed || !self.unseen_waits.fetch_add(1, Ordering::Relaxed).is_multiple_of(UNSEEN_WAITS) {
-            return Ok(());
-        }
-        self.wait_queue(0)
+        let is_due = self.queues.len() == 1 && self.messenger.as_ref().is_some_and(Messenger::needs_an_idle_queue);
+        if is_due { self.wait_queue(0) } else { Ok(()) }
     }
 
     /// As [`Context::show_layer_an_idle_queue`], at once and on any number of queues: to be called where another timeline goes on with what the first
@@ -525,7 +512,7 @@ impl Context {
 
     /// True if validation is on and its layer is one of those that do not see that a timeline is waited for.
     pub(super) fn layer_misses_waits(&self) -> bool {
-        self.messenger.is_some() && !self.layer_knows_timelines
+        self.messenger.as_ref().is_some_and(Messenger::misses_waits)
     }
 
     /// Waits until a queue has done what was submitted to it so far.

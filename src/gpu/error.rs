@@ -41,11 +41,7 @@ pub enum GpuError {
     #[error("frame: {got} bytes arrived, the scene's frames have {expected}")]
     FrameSize { got: usize, expected: usize },
     #[error("frame for slice {slice}: the volume has {slices} slices")]
-    FrameSlice { slice: u32, slices: u32 },
-    #[error(
-        "frame for slice {slice}: {bytes} bytes from line {first} on are not complete lines that follow the {received} that have arrived"
-    )]
-    FrameLines { slice: u32, first: u32, bytes: usize, received: u32 },
+    FrameSlice { slice: usize, slices: u32 },
     #[error("volume image {image}: there are only {images}")]
     VolumeImage { image: u32, images: u32 },
     #[error("the last change of scene failed ({0}); the next one rebuilds everything")]

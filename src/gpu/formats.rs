@@ -104,7 +104,7 @@ pub fn adapt_scene(context: &Context, texel_access: TexelAccess, mut scene: Scen
     let mut scene = scene.sampled(if filters { texel_access.sampling() } else { Sampling::Exact });
     match context.candidate.is_software() {
         true => scene.frames_at_once = FRAMES_IN_CACHE,
-        false => scene.shared_memory = context.limits.max_compute_shared_memory_size,
+        false => scene.shared_memory = context.candidate.limits.max_compute_shared_memory_size,
     }
     scene.window_texels = window_texels(context);
     let format = vulkan(Slot::PackedNeighbours.format(&scene));
@@ -142,7 +142,7 @@ pub fn filters(context: &Context, format: Format) -> bool {
 /// # Errors
 /// The first slot that exceeds a limit or whose format is not supported.
 pub fn check(context: &Context, plan: &Plan, scene: &Scene) -> Result<(), GpuError> {
-    let limits = &context.limits;
+    let limits = &context.candidate.limits;
     for &slot in &plan.slots {
         let what = || {
             let image = format!("image '{}' ({:?} {:?})", slot.name(), slot.shape(scene), slot.format(scene));

@@ -3,10 +3,10 @@
 //! - `context` owns instance, device, queues and allocator; `device_selection` picks the device; `faults` injects faults.
 //! - `resources` are images and the slots of a scene, `buffers` what is uploaded and read back, `memory` where both lie, `formats` what
 //!   the device can do with them.
-//! - `pipelines` compiles shaders, `pipeline_compiler` on a thread of its own, `preparation` before there is a renderer, `pipeline_measure` to measure that; `pipeline_cache` keeps
+//! - `pipelines` compiles shaders, `scene_compiler` those of a scene, `pipeline_compiler` on a thread of its own, `preparation` before there is a renderer, `pipeline_measure` to measure that; `pipeline_cache` keeps
 //!   what was compiled on disk; `shader_reload` takes shaders from a folder that is watched. `descriptor_sets` are for devices without push
 //!   descriptors.
-//! - `command_recorder` records command buffers with their barriers and the time stamps of `timing`; `timeline` says when a submission is done,
+//! - `command_recorder` records command buffers with the barriers of `device_queues` and the time stamps of `timing`; `timeline` says when a submission is done,
 //!   and `watchdog` gives up a device that does not finish. `bands` divides dispatches that a driver's watchdog might end, and `paced`
 //!   holds bands back while a window's panels are drawn.
 //! - `lost_device` reports why a device was lost, `losses` counts how often the same work lost it, `budget` how much memory it has left; `host_memory` returns what drivers freed.
@@ -20,6 +20,7 @@ pub mod calls;
 mod command_recorder;
 pub mod context;
 mod descriptor_sets;
+mod device_queues;
 pub mod device_selection;
 pub mod error;
 pub mod faults;
@@ -39,6 +40,7 @@ mod preparation;
 mod recently_used;
 mod renderer;
 pub mod resources;
+mod scene_compiler;
 #[cfg(feature = "hot-reload")]
 mod shader_compile;
 pub mod shader_reload;

@@ -89,7 +89,7 @@ pub fn device(context: &Context) -> Device {
         driver: candidate.driver.trim().into(),
         api: candidate.api_version(),
         is_software: candidate.is_software(),
-        timestamp_period_ns: f64::from(context.limits.timestamp_period),
+        timestamp_period_ns: f64::from(context.candidate.limits.timestamp_period),
         valid_bits: candidate.valid_bits(),
         calibrated: candidate.calibrated_timestamps,
         clocks: clocks(candidate.is_software()),

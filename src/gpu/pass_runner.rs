@@ -2,14 +2,14 @@
 
 use super::bands::BandLimit;
 use super::buffers::{Readback, Upload};
-use super::command_recorder::{BarrierRecorder, CommandRecorder, Dispatch, SlotParts};
+use super::command_recorder::{CommandRecorder, Dispatch, SlotParts};
 use super::context::Context;
+use super::device_queues::DeviceQueues;
 use super::error::GpuError;
 use super::formats::{self, TexelAccess};
 use super::pipelines::{Pipeline, Pipelines, Prepared, embedded};
 use super::resources::SlotResources;
-use super::timeline::Timelines;
-use super::timing::{TimeStamps, Timings};
+use super::timing::TimeStamps;
 use crate::passes::slots::{Initializer, Shape};
 use crate::passes::{Arrays, Bind, DispatchArgs, Frequency, Part, Pass, Slot, Texels};
 use crate::plan::Plan;
@@ -44,7 +44,7 @@ impl PassRunner {
 
     /// Number of fractional bits of the weights in the device's texture filter.
     pub fn filter_bits(&self) -> u32 {
-        self.context.limits.sub_texel_precision_bits
+        self.context.candidate.limits.sub_texel_precision_bits
     }
 
     /// The scene as [`PassRunner::run`] runs it: with what the device resolves, except what dispatches there are, since those are the caller's.
@@ -95,9 +95,8 @@ impl PassRunner {
         let (reads, writes) = (pass.reads(scene, args), pass.writes(scene, args));
         let plan = Plan { steps: Vec::new(), slots: reads.iter().chain(&writes).map(|b| b.slot).collect() };
         let mut slots = SlotResources::new(&self.context, args.image + 1);
-        let mut timelines = Timelines::new(&self.context, 1)?;
+        let mut queues = DeviceQueues::new(&self.context, 1, false)?;
         let mut recorder = CommandRecorder::new(&self.context, 0, pass.name, TimeStamps::None, false)?;
-        let mut barriers = BarrierRecorder::default();
         let pipeline = self.pipelines.get(pass, scene, args)?;
         let new = slots.fit(&plan, scene)?;
 
@@ -116,8 +115,8 @@ impl PassRunner {
             staged.push((Bind { part: Part::Whole, ..*bind }, poisoned.encode(format)));
         }
 
-        recorder.begin(&mut barriers, &timelines)?;
-        recorder.clear_new(&mut barriers, &slots, &new);
+        recorder.begin(&mut queues)?;
+        recorder.clear_new(&mut queues, &slots, &new);
         let mut keep = Vec::new();
         for (bind, bytes) in staged {
             let Some(image) = slots.image(bind.slot, args.image) else { continue };
@@ -127,23 +126,23 @@ impl PassRunner {
             };
             let copy = if bind.slot.is_multibuffered() { args.image } else { 0 };
             let upload = Upload::new(&self.context, "input", image.layout(), parts.clone(), &bytes)?;
-            recorder.upload(&mut barriers, &upload, image, SlotParts { slot: bind.slot, copy, parts });
+            recorder.upload(&mut queues, &upload, image, SlotParts { slot: bind.slot, copy, parts });
             keep.push(upload);
         }
         let dispatch = Dispatch { slots: &slots, pipeline: &pipeline, scene, pass, args };
-        recorder.dispatch_in_bands(&mut barriers, &mut timelines, &dispatch, &BandLimit::Invocations(most))?;
+        recorder.dispatch(&mut queues, &dispatch, Some(&BandLimit::Invocations(most)))?;
         let mut results = Vec::new();
         for bind in &writes {
             let Some(image) = slots.image(bind.slot, args.image) else { continue };
             let buffer = Readback::new(&self.context, "output", image.shape, image.format.texel_bytes())?;
             let copy = if bind.slot.is_multibuffered() { args.image } else { 0 };
-            recorder.copy_out(&mut barriers, image, bind.slot, copy, &buffer);
+            recorder.copy_out(&mut queues, image, bind.slot, copy, &buffer);
             results.push((bind, image.shape.size(), image.format, buffer));
         }
-        recorder.submit(&mut barriers, &mut timelines)?;
-        let done = timelines.wait_all();
+        recorder.submit(&mut queues)?;
+        let done = queues.wait_all();
         // Everything above is freed at the end, also when waiting failed.
-        timelines.drain();
+        queues.timelines.drain();
         done?;
         let mut outputs = Arrays::default();
         for (bind, size, format, buffer) in results {
@@ -163,8 +162,7 @@ pub struct PassTimer {
     dispatches: Vec<(DispatchArgs, Arc<Pipeline>)>,
     _pipelines: Arc<Pipelines>,
     slots: SlotResources,
-    timelines: Timelines,
-    barriers: BarrierRecorder,
+    queues: DeviceQueues,
     context: Arc<Context>,
     scene: Scene,
     pass: &'static Pass,
@@ -220,8 +218,7 @@ impl PassTimer {
             dispatches,
             _pipelines: pipelines,
             slots: SlotResources::new(context, 1),
-            timelines: Timelines::new(context, 1)?,
-            barriers: BarrierRecorder::default(),
+            queues: DeviceQueues::new(context, 1, false)?,
             context: context.clone(),
             scene: scene.clone(),
             pass,
@@ -233,8 +230,8 @@ impl PassTimer {
 
     fn fill(&mut self, plan: &Plan, contents: &[(Slot, Texels)]) -> Result<(), GpuError> {
         let new = self.slots.fit(plan, &self.scene)?;
-        self.recorder.begin(&mut self.barriers, &self.timelines)?;
-        self.recorder.clear_new(&mut self.barriers, &self.slots, &new);
+        self.recorder.begin(&mut self.queues)?;
+        self.recorder.clear_new(&mut self.queues, &self.slots, &new);
         let mut keep = Vec::new();
         for &(slot, copy) in &new {
             let given = contents.iter().find(|(s, _)| *s == slot);
@@ -247,13 +244,13 @@ impl PassTimer {
             let Some(image) = self.slots.image(slot, copy) else { continue };
             let place = SlotParts { slot, copy, parts: 0..image.shape.parts() };
             let upload = Upload::new(&self.context, "contents", image.layout(), place.parts.clone(), &bytes)?;
-            self.recorder.upload(&mut self.barriers, &upload, image, place);
+            self.recorder.upload(&mut self.queues, &upload, image, place);
             keep.push(upload);
         }
-        self.recorder.submit(&mut self.barriers, &mut self.timelines)?;
-        let done = self.timelines.wait_all();
+        self.recorder.submit(&mut self.queues)?;
+        let done = self.queues.wait_all();
         // The staging buffers are freed at the end, also when waiting failed.
-        self.timelines.drain();
+        self.queues.timelines.drain();
         done
     }
 
@@ -263,15 +260,14 @@ impl PassTimer {
     /// # Errors
     /// A device that fails.
     pub fn run(&mut self) -> Result<Option<f64>, GpuError> {
-        self.recorder.begin(&mut self.barriers, &self.timelines)?;
+        self.recorder.begin(&mut self.queues)?;
         for (args, pipeline) in &self.dispatches {
             let dispatch = Dispatch { slots: &self.slots, pipeline, scene: &self.scene, pass: self.pass, args };
-            self.recorder.dispatch(&mut self.barriers, &dispatch)?;
+            self.recorder.dispatch(&mut self.queues, &dispatch, None)?;
         }
-        self.recorder.submit(&mut self.barriers, &mut self.timelines)?;
-        let mut timings = Timings::new(&self.context, false);
-        self.recorder.collect(&self.timelines, &mut timings)?;
-        Ok(timings.take_times().iter().find(|t| t.name == self.pass.name).map(|t| t.total))
+        self.recorder.submit(&mut self.queues)?;
+        self.recorder.collect(&mut self.queues)?;
+        Ok(self.queues.timings.take_times().iter().find(|t| t.name == self.pass.name).map(|t| t.total))
     }
 
     /// The current content of an image slot; `None` for a slot that the pass does not use, or a lookup table in a buffer.
@@ -281,12 +277,12 @@ impl PassTimer {
     pub fn read(&mut self, slot: Slot) -> Result<Option<Texels>, GpuError> {
         let Some(image) = self.slots.image(slot, 0) else { return Ok(None) };
         let buffer = Readback::new(&self.context, "read", image.shape, image.format.texel_bytes())?;
-        self.recorder.begin(&mut self.barriers, &self.timelines)?;
-        self.recorder.copy_out(&mut self.barriers, image, slot, 0, &buffer);
-        self.recorder.submit(&mut self.barriers, &mut self.timelines)?;
-        let done = self.timelines.wait_all();
+        self.recorder.begin(&mut self.queues)?;
+        self.recorder.copy_out(&mut self.queues, image, slot, 0, &buffer);
+        self.recorder.submit(&mut self.queues)?;
+        let done = self.queues.wait_all();
         // The buffer is freed at the end, also when waiting failed.
-        self.timelines.drain();
+        self.queues.timelines.drain();
         done?;
         let part = Texels::decode(image.shape.size(), image.format, &buffer.bytes()?);
         Ok(Some(part.with_outside(slot, &self.scene, 0.0)))
@@ -295,7 +291,7 @@ impl PassTimer {
 
 impl Drop for PassTimer {
     fn drop(&mut self) {
-        self.timelines.drain();
+        self.queues.timelines.drain();
     }
 }
 

@@ -191,16 +191,11 @@ impl Pipelines {
         Ok(pipeline)
     }
 
-    /// The pipelines of a plan, by step. Those that are missing are compiled at the same time.
+    /// The pipelines of a plan, by step. Those that are missing are compiled at the same time, while `goes_on` returns true, which is told before the
+    /// first and after each how many of them are compiled, and how many they are. If it returns false, some are left out.
     ///
     /// # Errors
     /// As of [`Pipelines::get`]: the first of the plan that fails. Those that were compiled are kept.
-    pub(crate) fn of_plan(&self, plan: &Plan, scene: &Scene) -> Result<Vec<Arc<Pipeline>>, GpuError> {
-        self.of_plan_while(plan, scene, &|_, _| true)
-    }
-
-    /// The same while `goes_on` returns true, which is told before the first and after each how many of those that are missing are compiled, and how
-    /// many these are. If it returns false, some are left out.
     pub(super) fn of_plan_while(
         &self,
         plan: &Plan,
@@ -216,7 +211,7 @@ impl Pipelines {
     /// step. The device must have finished with the previous pipelines, and no other thread may compile any.
     ///
     /// # Errors
-    /// As of [`Pipelines::of_plan`]; the previous pipelines stay.
+    /// As of [`Pipelines::of_plan_while`]; the previous pipelines stay.
     pub(super) fn recompile(
         &self,
         shaders: &HashSet<String>,

@@ -2,11 +2,10 @@
 
 use super::context::Context;
 use super::error::GpuError;
-use super::formats::{self, TexelAccess};
 use super::pipeline_compiler::Wake;
-use super::pipelines::{Pipeline, Pipelines, embedded};
-use super::renderer::{RendererOptions, adapted};
-use crate::plan::Plan;
+use super::pipelines::{Pipeline, embedded};
+use super::renderer::RendererOptions;
+use super::scene_compiler::SceneCompiler;
 use crate::scene::Scene;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
@@ -14,7 +13,7 @@ use std::thread::JoinHandle;
 
 /// The pipelines of a scene. A renderer that is made while this is held compiles none of them.
 pub struct Prepared {
-    _pipelines: Arc<Pipelines>,
+    _compiler: SceneCompiler,
     _made: Vec<Arc<Pipeline>>,
 }
 
@@ -60,17 +59,14 @@ impl Preparation {
         if !Arc::ptr_eq(&options.shaders, &embedded()) {
             return Ok(None);
         }
-        let texel_access = options.texel_access.unwrap_or(TexelAccess::for_device(&context.candidate));
-        let (context, shaders, frames_at_once) = (context.clone(), options.shaders.clone(), options.frames_at_once);
+        let (context, options) = (context.clone(), RendererOptions { wake: None, ..options.clone() });
         let progress = Arc::new(Progress::default());
         let own = progress.clone();
         let work = move || {
             let _end = End { progress: own.clone(), wake: wake.clone() };
             let compile = || {
-                let scene = adapted(&context, texel_access, frames_at_once, scene);
-                let plan = Plan::new(&scene);
-                formats::check(&context, &plan, &scene)?;
-                let pipelines = Pipelines::shared(&context, shaders, texel_access)?;
+                let compiler = options.compiler(&context)?;
+                let (scene, plan) = compiler.plan(scene);
                 let goes_on = |done: usize, count: usize| {
                     own.count.store(count, Ordering::Relaxed);
                     // Two may end at the same time.
@@ -78,10 +74,10 @@ impl Preparation {
                     wake();
                     !own.is_cancelled.load(Ordering::Relaxed)
                 };
-                let made = pipelines.of_plan_while(&plan, &scene, &goes_on)?;
+                let made = compiler.compile_while(&plan, &scene, &goes_on)?;
                 let count = own.done.load(Ordering::Relaxed) as u64;
                 context.counts.async_pipelines.fetch_add(count, Ordering::Relaxed);
-                Ok(Prepared { _pipelines: pipelines, _made: made })
+                Ok(Prepared { _compiler: compiler, _made: made })
             };
             compile()
         };

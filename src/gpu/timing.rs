@@ -276,16 +276,16 @@ impl Timings {
         self.spans.as_ref()?.deviation
     }
 
-    /// Runs host work, and records its span if spans are enabled.
-    pub fn host<T>(&mut self, name: &'static str, work: impl FnOnce() -> T) -> T {
-        let Some(began) = self.spans.as_ref().map(|s| s.began) else { return work() };
-        let begin = began.elapsed();
-        let done = work();
-        let (begin, end) = (begin.as_nanos() as f64, began.elapsed().as_nanos() as f64);
-        self.spans
-            .iter_mut()
-            .for_each(|s| s.list.push(Span { name, on_device: false, begin, end, runs: 1, invocations: None }));
-        done
+    /// Time since the run began, ns; `None` without spans.
+    pub(super) fn since_began(&self) -> Option<f64> {
+        self.spans.as_ref().map(|spans| spans.began.elapsed().as_nanos() as f64)
+    }
+
+    /// Records host work that began at this time, if spans are enabled, and ends now.
+    pub(super) fn add_host(&mut self, name: &'static str, begin: Option<f64>) {
+        if let (Some(begin), Some(end), Some(spans)) = (begin, self.since_began(), &mut self.spans) {
+            spans.list.push(Span { name, on_device: false, begin, end, runs: 1, invocations: None });
+        }
     }
 
     /// Adds the stamps of one command buffer.

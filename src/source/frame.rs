@@ -81,7 +81,7 @@ impl Header {
     }
 
     /// Sizes of a line and of a frame, bytes; 0 where [`Header::frame_bytes`] is None.
-    pub fn line_and_frame(&self) -> (usize, usize) {
+    pub(crate) fn line_and_frame(&self) -> (usize, usize) {
         let frame = self.frame_bytes().unwrap_or(0) as usize;
         (frame / self.forward.frame_size()[1].max(1), frame)
     }

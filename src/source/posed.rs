@@ -40,8 +40,6 @@ pub struct Posed {
     /// The header of the volume was emitted.
     begun: bool,
     left_out: LeftOut,
-    /// Parts of pictures were refused.
-    has_refused_lines: bool,
 }
 
 /// Pictures that were left out since the last report.
@@ -94,15 +92,7 @@ impl LeftOut {
 
 impl Posed {
     pub fn new(options: CompoundingOptions) -> Posed {
-        Posed {
-            options,
-            sweep: None,
-            time: None,
-            volumes: 0,
-            begun: false,
-            left_out: LeftOut::default(),
-            has_refused_lines: false,
-        }
+        Posed { options, sweep: None, time: None, volumes: 0, begun: false, left_out: LeftOut::default() }
     }
 
     /// What becomes of an event: itself, or volumes of the pictures so far. A volume is emitted by an event after its interval, of any kind.
@@ -122,12 +112,6 @@ impl Posed {
             }
             Event::Frame(frame) if self.sweep.is_some() => {
                 self.picture(frame);
-                self.emit(false, &mut events);
-            }
-            Event::Lines { .. } if self.sweep.is_some() => {
-                if !std::mem::replace(&mut self.has_refused_lines, true) {
-                    events.push(Event::Fault("posed pictures must come whole, not in parts of lines".into()));
-                }
                 self.emit(false, &mut events);
             }
             Event::End(why) => {

@@ -231,7 +231,7 @@ fn lost(dut: &mut DeviceUnderTest) -> Result<Findings, GpuError> {
     Ok(findings)
 }
 
-/// Frames of a wrong size, slice or volume image, and lines out of sequence, are refused with a specific error; the picture is unchanged.
+/// Frames of a wrong size, slice or volume image are refused with a specific error; the picture is unchanged.
 fn unexpected_frames(dut: &mut DeviceUnderTest) -> Result<Findings, GpuError> {
     let (mut findings, isolated) = (Findings::default(), IsolatedContext::new(dut)?);
     let context = &isolated.context;
@@ -243,7 +243,6 @@ fn unexpected_frames(dut: &mut DeviceUnderTest) -> Result<Findings, GpuError> {
     let size = |e: &GpuError| matches!(e, GpuError::FrameSize { .. });
     let slice = |e: &GpuError| matches!(e, GpuError::FrameSlice { .. });
     let image = |e: &GpuError| matches!(e, GpuError::VolumeImage { .. });
-    let lines = |e: &GpuError| matches!(e, GpuError::FrameLines { .. });
     type Named = (&'static str, Result<(), GpuError>, fn(&GpuError) -> bool);
     let tried: Vec<Named> = vec![
         ("7 bytes", renderer.frame(0, &frame[..7], 0), size),
@@ -253,9 +252,7 @@ fn unexpected_frames(dut: &mut DeviceUnderTest) -> Result<Findings, GpuError> {
         ("the last of all numbers", renderer.frame(u32::MAX, &frame, 0), slice),
         ("a volume image that is not there", renderer.frame(0, &frame, 1), image),
         ("showing an image that is not there", renderer.show(3), image),
-        ("half a line", renderer.lines(0, 0, &frame[..line / 2], 0).map(|_| ()), lines),
-        ("lines that follow nothing", renderer.lines(0, 5, &frame[..line], 0).map(|_| ()), lines),
-        ("lines beyond the frame", renderer.lines(0, 0, &[&frame[..], &frame[..line]].concat(), 0).map(|_| ()), lines),
+        ("a line too few", renderer.frame(0, &frame[line..], 0), size),
     ];
     findings.figures.push(count_figure("refused", tried.len()));
     for (what, done, is) in tried {
@@ -296,7 +293,7 @@ fn refused(findings: &mut Findings, context: &Arc<Context>, what: &str, scene: S
 fn beyond(dut: &mut DeviceUnderTest) -> Result<Findings, GpuError> {
     let mut findings = Findings::default();
     let context = &dut.context;
-    let three = context.limits.max_image_dimension3_d as usize;
+    let three = context.candidate.limits.max_image_dimension3_d as usize;
     let small = "mode = 'vr'\npicture = { size = [4, 4] }";
     for axis in 0..3 {
         let mut size = [2; 3];
@@ -318,7 +315,7 @@ fn beyond(dut: &mut DeviceUnderTest) -> Result<Findings, GpuError> {
     });
     // A context with lower limits.
     let lesser = IsolatedContext::lacking(dut, |context| {
-        context.limits.max_image_dimension2_d = 64;
+        context.candidate.limits.max_image_dimension2_d = 64;
         context.candidate.max_allocation = 1 << 20;
     })?;
     let wide = cartesian_scene([4; 3], "mode = 'vr'\npicture = { size = [65, 8] }")?;
@@ -328,7 +325,7 @@ fn beyond(dut: &mut DeviceUnderTest) -> Result<Findings, GpuError> {
     lesser.report_validation(&mut findings);
     findings.notes.push(format!(
         "images to {0} x {0} and {three} x {three} x {three} texels, allocations to {1} MiB",
-        context.limits.max_image_dimension2_d,
+        context.candidate.limits.max_image_dimension2_d,
         bytes >> 20
     ));
     Ok(findings)
@@ -343,7 +340,7 @@ fn beyond_memory(dut: &mut DeviceUnderTest) -> Result<Findings, GpuError> {
     }
     let (mut findings, isolated) = (Findings::default(), IsolatedContext::new(dut)?);
     let context = &isolated.context;
-    let edge = (context.limits.max_image_dimension3_d as usize).min(1024);
+    let edge = (context.candidate.limits.max_image_dimension3_d as usize).min(1024);
     let toml = "mode = 'mip'\npicture = { size = [4, 4] }\nslices = { format = 'r8' }\nray = { sampling = 'exact' }";
     let scene = cartesian_scene([edge; 3], toml)?;
     let images = context.memory() / (edge as u64).pow(3) + 2;
@@ -374,7 +371,7 @@ fn wave(at: f64) -> f64 {
 
 fn largest(dut: &mut DeviceUnderTest) -> Result<Findings, GpuError> {
     let mut findings = Findings::default();
-    let limit = dut.context.limits.max_image_dimension2_d.min(MAX_PICTURE);
+    let limit = dut.context.candidate.limits.max_image_dimension2_d.min(MAX_PICTURE);
     let other = if dut.level == Level::Quick { 16 } else { limit / 8 };
     let mut largest = 0.0f64;
     let mut pixels = 0;

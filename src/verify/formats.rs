@@ -43,7 +43,7 @@ fn uses(dut: &mut DeviceUnderTest) -> Result<Findings, GpuError> {
         "{} queues; time stamps of {} bits, {} ns a tick",
         context.queue_count(),
         context.candidate.valid_bits(),
-        context.limits.timestamp_period
+        context.candidate.limits.timestamp_period
     ));
     findings.notes.extend(context.candidate.missing_optional.iter().map(|what| format!("without {what}")));
     let scenes = dut.scenes();
@@ -156,12 +156,17 @@ fn missing_features() -> Vec<MissingFeature> {
             reading(TexelAccess::Storage),
             Some(Sampling::Exact),
         ),
-        of("no tables as texels", |c| c.limits.max_texel_buffer_elements = 0, reading(TexelAccess::Storage), None),
+        of(
+            "no tables as texels",
+            |c| c.candidate.limits.max_texel_buffer_elements = 0,
+            reading(TexelAccess::Storage),
+            None,
+        ),
         MissingFeature {
             tables: &[65, 1025],
             ..of(
                 "small tables as texels",
-                |c| c.limits.max_texel_buffer_elements = 300,
+                |c| c.candidate.limits.max_texel_buffer_elements = 300,
                 reading(TexelAccess::Storage),
                 None,
             )
@@ -170,7 +175,12 @@ fn missing_features() -> Vec<MissingFeature> {
         of("texels by imageLoad", |_| (), reading(TexelAccess::Storage), None),
         of("no pushed descriptors", |c| c.push_descriptor = None, plain(), None),
         of("one queue", |_| (), RendererOptions { queues: Some(1), ..plain() }, None),
-        of("parameters 4096 bytes apart", |c| c.limits.min_uniform_buffer_offset_alignment = 4096, plain(), None),
+        of(
+            "parameters 4096 bytes apart",
+            |c| c.candidate.limits.min_uniform_buffer_offset_alignment = 4096,
+            plain(),
+            None,
+        ),
         of("no time stamps", |c| c.candidate.queues.iter_mut().for_each(|q| q.valid_bits = 0), plain(), None),
         of("no counts", |c| c.candidate.pipeline_statistics = false, RendererOptions { spans: true, ..plain() }, None),
         of(

@@ -312,7 +312,8 @@ impl DeviceUnderTest {
         let context = Context::new(options)?;
         prepare.iter().for_each(|prepare| prepare(&context));
         let pass_runner = PassRunner::new(&context)?;
-        let scenes = built_in::scenes(context.limits.max_compute_shared_memory_size).map_err(GpuError::Broken)?;
+        let scenes =
+            built_in::scenes(context.candidate.limits.max_compute_shared_memory_size).map_err(GpuError::Broken)?;
         let scenes = Rc::new(scenes);
         Ok(DeviceUnderTest {
             context,

@@ -61,7 +61,7 @@ fn bits_and_period(dut: &mut DeviceUnderTest) -> Result<Findings, GpuError> {
         findings.expect(bits == 0 || (36..=64).contains(&bits), || format!("queue {n}: time stamps of {bits} bits"));
         findings.figures.push(count_figure(&format!("bits of queue {n}"), bits as usize));
     }
-    let period = f64::from(context.limits.timestamp_period);
+    let period = f64::from(context.candidate.limits.timestamp_period);
     findings.expect(!has_stamps(context) || (period > 0.0 && period.is_finite()), || format!("a tick of {period} ns"));
     findings.figures.push(informative("period", period, Unit::Ns));
     if !has_stamps(context) {
@@ -231,12 +231,12 @@ fn others(dut: &mut DeviceUnderTest) -> Result<Findings, GpuError> {
     let names = |times: &[PassTime]| times.iter().map(|t| t.name).collect::<Vec<_>>();
     findings.expect(names(&masked) == names(&own), || format!("of 36 bits: times of {:?}", names(&masked)));
     // The range of a counter of 36 bits.
-    let most = f64::from(dut.context.limits.timestamp_period) * (1u64 << 36) as f64;
+    let most = f64::from(dut.context.candidate.limits.timestamp_period) * (1u64 << 36) as f64;
     for time in &masked {
         let holds = (0.0..=most * f64::from(time.runs)).contains(&time.total);
         findings.expect(holds, || format!("of 36 bits: '{}' takes {} ns", time.name, time.total));
     }
-    let longer = as_if(dut, &mut findings, |c| c.limits.timestamp_period *= 1000.0)?.1;
+    let longer = as_if(dut, &mut findings, |c| c.candidate.limits.timestamp_period *= 1000.0)?.1;
     let sum = |times: &[PassTime]| times.iter().map(|t| t.total).sum::<f64>();
     let times = sum(&longer) / sum(&own);
     // A wide range: there is one run each, and either may be disturbed.

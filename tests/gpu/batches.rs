@@ -195,7 +195,8 @@ fn a_frame_that_arrives_alone_is_submitted_at_once_and_those_that_wait_together(
     let settings = || settings("mode = 'mip'\nslices.median = true");
     let mut frames = volume(0, |slice, i| (slice * 31 + i) as u8);
     let dispatches_of = |told: Vec<Event>, frames: u64| {
-        let count = told.len();
+        // The header, and frames that are whole.
+        let count = 1 + frames as usize;
         let feed = Feed::new(Box::new(Pausing(Told(told.into(), Duration::ZERO, true))), None).expect("thread");
         let begun = Instant::now();
         while feed.waiting() < count {

@@ -319,7 +319,7 @@ fn pictures_of_one_pixel_and_of_16384_by_one_are_drawn_and_larger_ones_refused()
     let plan = Plan::new(&largest);
     assert_eq!(Slot::Picture.bytes(&largest), 16384 * 16384 * 8);
     assert!(plan.bytes(&largest) >= 3 << 30, "{}", plan.bytes(&largest));
-    let limits = device.limits;
+    let limits = device.candidate.limits;
     if limits.max_image_dimension2_d < 16384 || device.candidate.max_allocation < Slot::Picture.bytes(&largest) {
         let refused = Renderer::new(&device, largest, &RendererOptions::default()).err().expect("no room").to_string();
         assert!(refused.contains("image '") && refused.contains("the device allows"), "{refused}");

@@ -231,25 +231,3 @@ fn settings_that_need_new_frames_show_complete_volumes_only() {
         assert!(checked > 0, "{toml}: {pictures} pictures, none after the change");
     }
 }
-
-/// Prevents a picture from tearing a frame that arrives line by line, if many slices are copied at once.
-#[test]
-fn lines_that_wait_in_a_slab_outlive_a_picture() {
-    let device = Device::alone();
-    let scene =
-        scene(cartesian([16, 12, 6]), BYTES, "mode = 'mip'\npicture = { size = [16, 16] }\nslices.format = 'r8'");
-    let frame = |k: usize| -> Vec<u8> { (0..16 * 12).map(|i| (i * 7 + k * 31) as u8).collect() };
-    let mut renderer = Renderer::new(&device, scene, &RendererOptions::default()).expect("renderer");
-    for k in 0..6u32 {
-        let bytes = frame(k as usize);
-        renderer.lines(k, 0, &bytes[..16 * 5], 0).expect("lines");
-        renderer.show(0).expect("show");
-        renderer.picture().expect("picture");
-        assert!(renderer.lines(k, 5, &bytes[16 * 5..], 0).expect("lines"));
-    }
-    renderer.show(0).expect("show");
-    let volume = volume_of(&mut renderer);
-    let expected: Vec<f64> = (0..6).flat_map(frame).map(|v| f64::from(v) / 255.0).collect();
-    let off = volume.values.iter().zip(&expected).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
-    assert!(off < 1e-6 && renderer.incomplete_frames() == 0, "{off}");
-}

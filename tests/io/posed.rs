@@ -325,11 +325,6 @@ fn pictures_that_are_left_out_are_counted_on_few_lines() {
     let said = [take(&mut stream, short), stream.take(Event::End(None))].concat();
     let [fault] = faults(&said)[..] else { panic!("{said:?}") };
     assert!(fault.starts_with("50 pictures are refused, the last: ") && fault.contains("samples"), "{fault}");
-    // Parts of pictures.
-    let mut stream = begun();
-    let part = Event::Lines { frame: frame(0, Some(pose(0)), vec![0; 4 * x]), first: 0 };
-    let said = [take(&mut stream, part), stream.take(Event::End(None))].concat();
-    assert_eq!(faults(&said).len(), 1, "{said:?}");
 }
 
 /// A recording of the stream, and the stream itself in a file.

@@ -1,14 +1,34 @@
-//! Stage 1: frames arrive complete or line by line, in a ring of staging buffers, and are converted into slices of a volume
-//! image, consecutive ones in a batch: one submission, and one dispatch of each pass. If frames need no conversion, the batch is copied.
+//! Stage 1: frames arrive in a ring of staging buffers, and are converted into slices of a volume image, consecutive ones in a batch: one submission,
+//! and one dispatch of each pass. If frames need no conversion, the batch is copied.
 
-use super::*;
+use super::Program;
+use crate::buffers::{Buffer, Purpose};
+use crate::command_recorder::{BufferLayout, CommandRecorder, SlotParts};
+use crate::context::Context;
+use crate::device_queues::DeviceQueues;
+use crate::error::GpuError;
+use crate::passes::slots::{BATCHES_IN_FLIGHT, Format, batch_bytes, frames_per_batch};
+use crate::passes::{DispatchArgs, Frequency, Slot, chain};
 use crate::probe::StoredType;
+use crate::queues::QueueRole;
+use crate::resources::SlotResources;
+use crate::scene::Scene;
+use crate::timing::TimeStamps;
 use std::mem::MaybeUninit;
 use std::ops::Range;
+use std::sync::Arc;
+
+/// An entry of the ring: one upload in flight.
+struct InFlight {
+    /// Copies the samples, if the device has a queue for copies.
+    copier: Option<CommandRecorder>,
+    recorder: CommandRecorder,
+    staging: Buffer,
+}
 
 /// How frames are written into the staging buffers.
 #[derive(Clone, Copy)]
-pub(super) struct Staging {
+struct Staging {
     /// The slot that they are copied into, if no pass converts them.
     copied: Option<Slot>,
     /// Bytes of each.
@@ -22,7 +42,7 @@ pub(super) struct Staging {
 
 impl Staging {
     /// `max_buffer`: bytes of the largest buffer of the device.
-    pub(super) fn new(scene: &Scene, max_buffer: u64) -> Staging {
+    fn new(scene: &Scene, max_buffer: u64) -> Staging {
         let bytes = staged_bytes(scene);
         let copied = chain::copied(scene);
         let frames = match copied {
@@ -35,7 +55,7 @@ impl Staging {
 }
 
 /// Consecutive slices in the staging buffer of a ring entry that are not submitted yet, in the order in which they arrived.
-pub(super) struct SliceBatch {
+struct SliceBatch {
     image: u32,
     first: u32,
     count: u32,
@@ -64,183 +84,145 @@ impl SliceBatch {
 }
 
 impl InFlight {
-    /// The recorder that reads the staging buffer.
-    fn first(&mut self) -> &mut CommandRecorder {
-        self.copier.as_mut().unwrap_or(&mut self.recorder)
-    }
-
     /// Waits until the entry is free, and adds up its times.
-    pub(super) fn collect(&mut self, timelines: &Timelines, timings: &mut Timings) -> Result<(), GpuError> {
-        if let Some(copier) = &mut self.copier {
-            copier.collect(timelines, timings)?;
-        }
-        self.recorder.collect(timelines, timings)
+    fn collect(&mut self, queues: &mut DeviceQueues) -> Result<(), GpuError> {
+        self.copier.iter_mut().try_for_each(|copier| copier.collect(queues))?;
+        self.recorder.collect(queues)
     }
 
     /// Waits until the entry is free, and keeps its time stamps for [`InFlight::collect`].
-    fn set_aside(&mut self, timelines: &Timelines, timings: &mut Timings) -> Result<(), GpuError> {
-        if let Some(copier) = &mut self.copier {
-            copier.set_aside(timelines, timings)?;
-        }
-        self.recorder.set_aside(timelines, timings)
+    fn set_aside(&mut self, queues: &mut DeviceQueues) -> Result<(), GpuError> {
+        self.copier.iter_mut().try_for_each(|copier| copier.set_aside(queues))?;
+        self.recorder.set_aside(queues)
     }
 
-    /// Copies the staging buffer into layers of the frame array, in a submission of its own if there is a queue for copies. The
-    /// recorder of the frames is open afterwards.
+    /// Records a copy of the staging buffer into parts of a slot. Returns what recorded it, for the queue of copies if there is one.
     fn copy(
         &mut self,
-        barriers: &mut BarrierRecorder,
-        timelines: &mut Timelines,
+        queues: &mut DeviceQueues,
         slots: &SlotResources,
         (place, layout): (SlotParts, BufferLayout),
-    ) -> Result<(), GpuError> {
-        let frames = place.parts.len() as u32;
-        let by = self.first();
-        by.begin(barriers, timelines)?;
-        by.runs = frames;
+        runs: u32,
+    ) -> Result<&mut CommandRecorder, GpuError> {
+        let by = self.copier.as_mut().unwrap_or(&mut self.recorder);
+        by.begin(queues)?;
+        by.runs = runs;
         if let Some(target) = slots.image(place.slot, place.copy) {
-            let InFlight { copier, recorder, staging } = self;
-            let by = copier.as_mut().unwrap_or(recorder);
-            by.copy_in(barriers, (staging, layout), target, place);
-            by.stamp(barriers, "upload");
+            by.copy_in(queues, (&self.staging, layout), target, place);
+            by.stamp(queues, "upload");
         }
-        if let Some(copier) = &mut self.copier {
-            copier.submit(barriers, timelines)?;
-            self.recorder.begin(barriers, timelines)?;
-            self.recorder.runs = frames;
-        }
-        Ok(())
+        Ok(by)
     }
 }
 
-impl Renderer {
-    /// Sends one frame to stage 1, which writes slice `slice` of volume image `image`. `bytes` are samples of the stored type,
-    /// line by line. Returns when the bytes are copied; waits only if the ring is full. A frame that is not visible in this
-    /// scene is skipped and counted.
-    ///
-    /// Consecutive slices, up or down, go through stage 1 together. The frame waits for its successors until the batch is full, no
-    /// visible slice can follow, another slice comes, [`Renderer::submit_frames`] is called, anything reads the volume, or the scene
-    /// changes.
-    ///
-    /// # Errors
-    /// A frame of the wrong size, a slice or image that does not exist, a device that fails.
-    pub fn frame(&mut self, slice: u32, bytes: &[u8], image: u32) -> Result<(), GpuError> {
-        self.check(image)?;
-        if bytes.len() != self.frame_bytes() {
-            return Err(GpuError::FrameSize { got: bytes.len(), expected: self.frame_bytes() });
-        }
-        self.lines(slice, 0, bytes, image).map(|_| ())
+/// Frames on their way into volume images. What returns an error fails where the device does, or has no memory.
+pub(super) struct Ring {
+    entries: Vec<InFlight>,
+    /// The entry of the batch, or of the next one.
+    at: usize,
+    staging: Staging,
+    /// Frames that will be submitted together.
+    batch: Option<SliceBatch>,
+    context: Arc<Context>,
+    time_stamps: TimeStamps,
+    spans: bool,
+}
+
+impl Ring {
+    pub fn new(
+        context: &Arc<Context>,
+        scene: &Scene,
+        queues: &DeviceQueues,
+        time_stamps: TimeStamps,
+        spans: bool,
+    ) -> Result<Ring, GpuError> {
+        let count = queues.tracker.count();
+        let staging = Staging::new(scene, context.candidate.max_buffer);
+        let bytes = u64::from(staging.frames) * staging.bytes as u64;
+        let (copy, ingest) = (QueueRole::Copy.queue(count), QueueRole::Ingest.queue(count));
+        // Slices of a 3D image are not subresources: not every queue can copy a single one.
+        let copies = copy != ingest && (staging.copied.is_none() || context.queue(copy).copies_slices);
+        let entry = |_| {
+            let copier = || CommandRecorder::new(context, copy, "copy", time_stamps, false);
+            Ok(InFlight {
+                copier: copies.then(copier).transpose()?,
+                recorder: CommandRecorder::new(context, ingest, "frame", time_stamps, spans)?,
+                staging: Buffer::new(context, "staging", bytes, Purpose::Staging)?,
+            })
+        };
+        let entries = (0..BATCHES_IN_FLIGHT).map(entry).collect::<Result<_, GpuError>>()?;
+        Ok(Ring { entries, at: 0, staging, batch: None, context: context.clone(), time_stamps, spans })
     }
 
-    /// Takes scan lines of a frame as they arrive, from line `first` on. Returns true if they completed the frame, which then goes
-    /// to stage 1 as with [`Renderer::frame`]. Lines arrive in order. Line 0 begins a frame; a frame that was not complete is dropped and counted.
-    ///
-    /// # Errors
-    /// A partial line, lines out of order, or too many; a slice or image that does not exist; a device that fails.
-    pub fn lines(&mut self, slice: u32, first: u32, bytes: &[u8], image: u32) -> Result<bool, GpuError> {
-        self.check(image)?;
-        if slice >= self.scene.slices() {
-            return Err(GpuError::FrameSlice { slice, slices: self.scene.slices() });
-        }
-        let (frame_bytes, line) = (self.frame_bytes(), self.frame_bytes() / self.scene.frame_size()[1] as usize);
-        let (at, received) = (first as usize * line, self.received.len());
-        let follows = self.partial.as_ref().is_some_and(|a| (a.slice, a.image) == (slice, image)) && received == at;
-        // No lines are kept of a frame that is not visible, so the order of its lines is not checked.
-        let is_visible = self.scene.visible_frames().contains(&slice);
-        if !bytes.len().is_multiple_of(line)
-            || at + bytes.len() > frame_bytes
-            || !(first == 0 || follows || !is_visible)
-        {
-            let received = self.partial.as_ref().map_or(0, |_| received / line) as u32;
-            return Err(GpuError::FrameLines { slice, first, bytes: bytes.len(), received });
-        }
-        self.filtered_bounds = self.scene.visible_bounds;
-        if !is_visible {
-            self.skipped += u64::from(first == 0);
-            return Ok(at + bytes.len() == frame_bytes);
-        }
-        if first == 0 {
-            self.received.clear();
-            self.incomplete += u64::from(self.partial.take().is_some());
-        }
-        if at + bytes.len() < frame_bytes {
-            self.received.extend_from_slice(bytes);
-            self.partial = Some(PartialFrame { slice, image });
-            return Ok(false);
-        }
-        self.partial = None;
-        if first == 0 {
-            self.send(slice, image, bytes)?;
-        } else {
-            let mut whole = std::mem::take(&mut self.received);
-            whole.extend_from_slice(bytes);
-            let sent = self.send(slice, image, &whole);
-            // Its memory is for the next frame.
-            self.received = whole;
-            sent?;
-        }
-        Ok(true)
+    /// Begins again, for frames of another size. The device must be idle. The batch is given up.
+    pub fn restart(&mut self, scene: &Scene, queues: &DeviceQueues) -> Result<(), GpuError> {
+        self.batch = None;
+        *self = Ring::new(&self.context, scene, queues, self.time_stamps, self.spans)?;
+        Ok(())
     }
 
-    /// Writes a complete frame into the staging buffer, after the batch or after submitting it, and submits the batch that nothing can
-    /// follow.
-    fn send(&mut self, slice: u32, image: u32, bytes: &[u8]) -> Result<(), GpuError> {
-        let follows =
-            |batch: &SliceBatch| batch.image == image && batch.continuations(&self.staging).any(|next| next == slice);
-        if !self.batch.as_ref().is_some_and(follows) {
-            self.flush()?;
-            self.wait_for_ring()?;
-        }
-        let bytes = self.context.faults.changed_frame(&self.scene, bytes);
+    /// True if a slice of a volume image can be added to the batch.
+    pub fn continues(&self, image: u32, slice: u32) -> bool {
+        self.batch
+            .as_ref()
+            .is_some_and(|batch| batch.image == image && batch.continuations(&self.staging).any(|next| next == slice))
+    }
+
+    /// True if none of these slices can follow the batch.
+    pub fn is_complete(&self, visible: Range<u32>) -> bool {
+        let grows = |batch: &SliceBatch| batch.continuations(&self.staging).any(|next| visible.contains(&next));
+        !self.batch.as_ref().is_some_and(grows)
+    }
+
+    /// Writes a frame into the staging buffer, as the next of the batch. The first of a batch needs [`Ring::wait`] before.
+    pub fn write(&mut self, queues: &mut DeviceQueues, image: u32, slice: u32, bytes: &[u8]) {
         let Staging { bytes: length, write, .. } = self.staging;
         let at = self.batch.as_ref().map_or(0, |batch| batch.count as usize) * length;
-        let space = self.ring[self.ring_index].staging.space();
-        self.timings.host("stage", || write(&bytes, &mut space[at..at + length]));
+        let space = self.entries[self.at].staging.space();
+        queues.host("stage", |_| write(bytes, &mut space[at..at + length]));
         match &mut self.batch {
             Some(batch) => batch.add(slice),
             None => self.batch = Some(SliceBatch { image, first: slice, count: 1, is_descending: false }),
         }
-        self.unprocessed[image as usize][slice as usize] = true;
-        self.found.retain(|(_, of)| *of != image);
-        let visible = self.scene.visible_frames();
-        let grows = |batch: &SliceBatch| batch.continuations(&self.staging).any(|next| visible.contains(&next));
-        if self.batch.as_ref().is_some_and(grows) { Ok(()) } else { self.flush() }
     }
 
     /// True if the next frame is taken without a wait for the device.
-    ///
-    /// # Errors
-    /// A device that fails.
-    pub fn takes_frame(&self) -> Result<bool, GpuError> {
+    pub fn is_free(&self, queues: &DeviceQueues) -> Result<bool, GpuError> {
         // The buffer of a batch that has begun was waited for; it ends with a frame that needs the next one.
-        let next = if self.batch.is_some() { self.ring_index + 1 } else { self.ring_index };
-        let entry = &self.ring[next % self.ring.len()];
-        let is_copied = entry.copier.as_ref().map_or(Ok(true), |copier| copier.is_done(&self.timelines))?;
-        Ok(is_copied && entry.recorder.is_done(&self.timelines)?)
+        let next = if self.batch.is_some() { self.at + 1 } else { self.at };
+        let entry = &self.entries[next % self.entries.len()];
+        let is_copied = entry.copier.as_ref().map_or(Ok(true), |copier| copier.is_done(queues))?;
+        Ok(is_copied && entry.recorder.is_done(queues)?)
     }
 
-    /// Submits the frames that wait for their successors, so that the device works on them until more arrive. What is only copied goes on
-    /// waiting: submitting a slice takes longer than copying it.
-    ///
-    /// # Errors
-    /// A device that fails.
-    pub fn submit_frames(&mut self) -> Result<(), GpuError> {
-        if self.staging.copied.is_some() { Ok(()) } else { self.flush() }
+    /// True if frames are only copied: submitting a slice takes longer than copying it.
+    pub(crate) fn only_copies(&self) -> bool {
+        self.staging.copied.is_some()
     }
 
     /// Waits until the next entry is free, and adds up its times.
-    fn wait_for_ring(&mut self) -> Result<(), GpuError> {
-        let entry = &mut self.ring[self.ring_index];
+    pub fn wait(&mut self, queues: &mut DeviceQueues, is_drawing: bool) -> Result<(), GpuError> {
+        let entry = &mut self.entries[self.at];
         // Reading time stamps makes lavapipe wait for the complete device (Mesa 22.3, `lvp_GetQueryPoolResults`), also for a picture in
         // flight. Those of this entry are then read when no picture is in flight.
-        match self.drawing && self.context.candidate.is_software() {
-            true => entry.set_aside(&self.timelines, &mut self.timings),
-            false => entry.collect(&self.timelines, &mut self.timings),
+        match is_drawing && self.context.candidate.is_software() {
+            true => entry.set_aside(queues),
+            false => entry.collect(queues),
         }
     }
 
+    /// Waits until every entry is free, and adds up their times.
+    pub fn collect(&mut self, queues: &mut DeviceQueues) -> Result<(), GpuError> {
+        self.entries.iter_mut().try_for_each(|entry| entry.collect(queues))
+    }
+
     /// Submits the batch. If that fails it is kept, and submitted again with the next frame.
-    pub(super) fn flush(&mut self) -> Result<(), GpuError> {
+    pub fn flush(
+        &mut self,
+        queues: &mut DeviceQueues,
+        slots: &SlotResources,
+        program: &Program,
+    ) -> Result<(), GpuError> {
         let Some(batch) = &self.batch else { return Ok(()) };
         let (image, slices) = (batch.image, batch.slices());
         let layout = BufferLayout {
@@ -248,55 +230,65 @@ impl Renderer {
             ..BufferLayout::default()
         };
         match self.staging.copied {
-            Some(slot) => self.copy_slices(slot, image, slices, layout)?,
-            None => self.convert(image, slices, layout)?,
+            Some(slot) => {
+                let copy = copy_of_slices(slot, image, slices, &program.scene, layout);
+                let by = self.entries[self.at].copy(queues, slots, copy, 1)?;
+                queues.host("submit", |queues| by.submit(queues))?;
+            }
+            None => self.convert(queues, slots, program, (image, slices, layout))?,
         }
         self.batch = None;
-        self.ring_index = (self.ring_index + 1) % self.ring.len();
+        self.at = (self.at + 1) % self.entries.len();
         Ok(())
     }
 
-    /// Submits the frames in the entry's staging buffer: a copy to its layers, then the passes of stage 1.
-    fn convert(&mut self, image: u32, slices: Range<u32>, layout: BufferLayout) -> Result<(), GpuError> {
-        let (slice, slices) = (slices.start, slices.end - slices.start);
-        let layer = self.ring_index as u32 * self.staging.frames;
-        let entry = &mut self.ring[self.ring_index];
-        let place = SlotParts { slot: Slot::Frames, copy: 0, parts: layer..layer + slices };
-        entry.copy(&mut self.barriers, &mut self.timelines, &self.slots, (place, layout))?;
-        for (i, step) in self.plan.steps_of(Frequency::Frame) {
-            let args = DispatchArgs { layer, slice, slices, iteration: step.iteration, image };
-            let (slots, pipeline, scene) = (&self.slots, &*self.steps[i], &self.scene);
-            entry
-                .recorder
-                .dispatch(&mut self.barriers, &Dispatch { slots, pipeline, scene, pass: step.pass, args: &args })?;
-        }
-        let (recorder, barriers, timelines) = (&mut entry.recorder, &mut self.barriers, &mut self.timelines);
-        self.timings.host("submit", || recorder.submit(barriers, timelines))
-    }
-
-    /// Submits a copy of the slices in the entry's staging buffer into a volume image. No pass follows it.
-    fn copy_slices(
+    /// Submits the frames in the entry's staging buffer: a copy to its layers of the frame array, in a submission of its own if there is a queue for
+    /// copies, then the passes of stage 1.
+    fn convert(
         &mut self,
-        slot: Slot,
-        image: u32,
-        slices: Range<u32>,
-        layout: BufferLayout,
+        queues: &mut DeviceQueues,
+        slots: &SlotResources,
+        program: &Program,
+        (image, slices, layout): (u32, Range<u32>, BufferLayout),
     ) -> Result<(), GpuError> {
-        let [column, row, first] = slot.first_texel(&self.scene);
-        let place = SlotParts { slot, copy: image, parts: slices.start - first..slices.end - first };
-        // Of each frame what is stored.
-        let [row_length, image_height] = self.scene.frame_size();
-        let texel = u64::from(row) * u64::from(row_length) + u64::from(column);
-        let offset = texel * slot.format(&self.scene).texel_bytes() as u64;
-        let layout = BufferLayout { offset, row_length, image_height, ..layout };
-        let entry = &mut self.ring[self.ring_index];
-        entry.submit_copy(&mut self.barriers, &mut self.timelines, &self.slots, (place, layout), &mut self.timings)
+        let (slice, slices) = (slices.start, slices.end - slices.start);
+        let layer = self.at as u32 * self.staging.frames;
+        let entry = &mut self.entries[self.at];
+        let place = SlotParts { slot: Slot::Frames, copy: 0, parts: layer..layer + slices };
+        entry.copy(queues, slots, (place, layout), slices)?;
+        if let Some(copier) = &mut entry.copier {
+            copier.submit(queues)?;
+            entry.recorder.begin(queues)?;
+            entry.recorder.runs = slices;
+        }
+        for (i, step) in program.plan.steps_of(Frequency::Frame) {
+            let args = DispatchArgs { layer, slice, slices, iteration: step.iteration, image };
+            entry.recorder.dispatch(queues, &program.dispatch(i, slots, &args), None)?;
+        }
+        queues.host("submit", |queues| entry.recorder.submit(queues))
     }
+}
 
-    /// Number of frames that were dropped because another began before all of their lines had arrived.
-    pub fn incomplete_frames(&self) -> u64 {
-        self.incomplete
-    }
+/// Where slices of a volume image lie in the staging buffer, if no pass converts them.
+fn copy_of_slices(
+    slot: Slot,
+    image: u32,
+    slices: Range<u32>,
+    scene: &Scene,
+    layout: BufferLayout,
+) -> (SlotParts, BufferLayout) {
+    let [column, row, first] = slot.first_texel(scene);
+    let place = SlotParts { slot, copy: image, parts: slices.start - first..slices.end - first };
+    // Of each frame what is stored.
+    let [row_length, image_height] = scene.frame_size();
+    let texel = u64::from(row) * u64::from(row_length) + u64::from(column);
+    let offset = texel * slot.format(scene).texel_bytes() as u64;
+    (place, BufferLayout { offset, row_length, image_height, ..layout })
+}
+
+/// Bytes of a frame.
+pub(super) fn frame_bytes(scene: &Scene) -> u64 {
+    Slot::Frames.bytes(scene) / u64::from(Slot::Frames.shape(scene).parts())
 }
 
 /// Bytes of a frame in the staging buffer: where it is copied into the volume, in the volume's format.
@@ -336,44 +328,4 @@ fn copy_clamped(from: &[u8], to: &mut Space) {
         let value = if value.is_nan() { 0.0 } else { value.clamp(0.0, 1.0) };
         value.to_ne_bytes()
     });
-}
-
-impl Renderer {
-    /// Allocates the ring.
-    pub(super) fn new_ring(&self) -> Result<Vec<InFlight>, GpuError> {
-        let (context, count) = (&self.context, self.barriers.queues.count());
-        let bytes = u64::from(self.staging.frames) * self.staging.bytes as u64;
-        let (copy, ingest) = (QueueRole::Copy.queue(count), QueueRole::Ingest.queue(count));
-        // Slices of a 3D image are not subresources: not every queue can copy a single one.
-        let copies = copy != ingest && (self.staging.copied.is_none() || context.queue(copy).copies_slices);
-        let entry = |_| {
-            let copier = || CommandRecorder::new(context, copy, "copy", self.time_stamps, false);
-            Ok(InFlight {
-                copier: copies.then(copier).transpose()?,
-                recorder: CommandRecorder::new(context, ingest, "frame", self.time_stamps, self.spans)?,
-                staging: Buffer::new(context, "staging", bytes, Purpose::Staging)?,
-            })
-        };
-        (0..BATCHES_IN_FLIGHT).map(entry).collect()
-    }
-}
-
-impl InFlight {
-    /// Submits the copy of the staging buffer into an image. No pass follows it.
-    fn submit_copy(
-        &mut self,
-        barriers: &mut BarrierRecorder,
-        timelines: &mut Timelines,
-        slots: &SlotResources,
-        (place, layout): (SlotParts, BufferLayout),
-        timings: &mut Timings,
-    ) -> Result<(), GpuError> {
-        let by = self.copier.as_mut().unwrap_or(&mut self.recorder);
-        by.begin(barriers, timelines)?;
-        if let Some(target) = slots.image(place.slot, place.copy) {
-            by.copy_in(barriers, (&self.staging, layout), target, place);
-            by.stamp(barriers, "upload");
-        }
-        timings.host("submit", || by.submit(barriers, timelines))
-    }
 }

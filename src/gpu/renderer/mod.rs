@@ -2,32 +2,34 @@
 //! frame array, command buffer), so that several are in flight. A picture runs only the passes whose inputs changed.
 
 mod draw;
+mod drawing;
 mod ingest;
+mod volumes;
 
-use super::bands::{BandLimit, Bands};
-use super::buffers::{Buffer, Purpose, Readback, Upload};
-use super::command_recorder::{BarrierRecorder, BufferLayout, CommandRecorder, Dispatch, SlotParts};
+use super::bands::Bands;
+use super::buffers::Readback;
+use super::command_recorder::Dispatch;
 use super::context::Context;
+use super::device_queues::DeviceQueues;
 use super::error::GpuError;
-use super::formats::{self, TexelAccess};
-use super::pipeline_compiler::{AsyncPipelineCompiler, SceneMaker, Wake};
-use super::pipelines::{Pipeline, Pipelines, Shaders, embedded};
+use super::formats::TexelAccess;
+use super::pipeline_compiler::{SceneMaker, Wake};
+use super::pipelines::{Pipeline, Shaders, embedded};
 use super::resources::SlotResources;
-use super::timeline::Timelines;
-use super::timing::{TimeStamps, Timings};
-use crate::passes::chain;
-use crate::passes::slots::{BATCHES_IN_FLIGHT, Format, Initializer, batch_bytes, frames_per_batch};
-use crate::passes::unveil::Unveiled;
+use super::scene_compiler::SceneCompiler;
+use super::timing::TimeStamps;
+use crate::passes::slots::{Format, Initializer};
 use crate::passes::{DispatchArgs, Frequency, PassTime, Slot, Span, Stage, Texels};
-use crate::picture::Picture;
-use crate::plan::{Contents, Plan, Rerun, Work, affected};
+use crate::plan::{Contents, Plan, Rerun, Step};
+use crate::queues::MAX_QUEUES;
 use crate::queues::oracle::SubmissionLog;
-use crate::queues::{MAX_QUEUES, QueueRole, QueueTracker};
 use crate::scene::{Scene, VisibleBounds};
-use ingest::{SliceBatch, Staging};
+use drawing::Drawing;
+use ingest::{Ring, frame_bytes};
 use std::collections::HashSet;
 use std::sync::Arc;
 use std::time::Duration;
+use volumes::Volumes;
 
 /// How a [`Renderer`] runs.
 #[derive(Clone)]
@@ -79,97 +81,48 @@ impl Default for RendererOptions {
     }
 }
 
-/// An entry of the ring: one upload in flight.
-struct InFlight {
-    /// Copies the samples, if the device has a queue for copies.
-    copier: Option<CommandRecorder>,
-    recorder: CommandRecorder,
-    staging: Buffer,
+impl RendererOptions {
+    /// Plans scenes and compiles their pipelines as a renderer with these options does.
+    pub(super) fn compiler(&self, context: &Arc<Context>) -> Result<SceneCompiler, GpuError> {
+        SceneCompiler::new(context, &self.shaders, self.texel_access, self.frames_at_once, self.wake.clone())
+    }
 }
 
-/// A frame of which some lines have arrived.
-struct PartialFrame {
-    slice: u32,
-    image: u32,
-}
-
-/// The scene with the fields that the device resolves, and this many frames through stage 1 at once if that is given.
-pub(super) fn adapted(
-    context: &Context,
-    texel_access: TexelAccess,
-    frames_at_once: Option<u32>,
+/// A scene, with the fields that the device resolves, and what runs for it.
+struct Program {
     scene: Scene,
-) -> Scene {
-    let adapted = formats::adapt_scene(context, texel_access, scene);
-    Scene { frames_at_once: frames_at_once.unwrap_or(adapted.frames_at_once), ..adapted }
+    plan: Plan,
+    /// By step of the plan.
+    pipelines: Vec<Arc<Pipeline>>,
+}
+
+impl Program {
+    /// A dispatch of a step.
+    fn dispatch<'a>(&'a self, step: usize, slots: &'a SlotResources, args: &'a DispatchArgs) -> Dispatch<'a> {
+        let pass = self.plan.steps[step].pass;
+        Dispatch { slots, pipeline: &self.pipelines[step], scene: &self.scene, pass, args }
+    }
 }
 
 /// Renders one scene: frames are sent into volume images, and pictures come out. The scene can be changed at any time.
 pub struct Renderer {
     // Fields are dropped in this order, after `drop` has waited for the device.
-    ring: Vec<InFlight>,
-    picture: CommandRecorder,
-    /// `None` if pictures stay on the device.
-    readback: Option<Readback>,
+    ring: Ring,
+    drawing: Drawing,
     slots: SlotResources,
-    steps: Vec<Arc<Pipeline>>,
-    /// Started at its first use.
-    compiler: Option<AsyncPipelineCompiler>,
-    pipelines: Arc<Pipelines>,
-    timelines: Timelines,
-    barriers: BarrierRecorder,
+    program: Program,
+    compiler: SceneCompiler,
+    queues: DeviceQueues,
     context: Arc<Context>,
-    plan: Plan,
-    scene: Scene,
+    volumes: Volumes,
     /// By step of the plan: it has to run before the next picture.
     stale: Vec<bool>,
     /// The step that last wrote each slot.
     contents: Contents,
-    /// By volume image and slice: the passes over the volume have not processed it yet.
-    unprocessed: Vec<Vec<bool>>,
-    /// By volume image: what the CPU found of its volume, where the render start follows the fluid.
-    unveiled: Vec<Option<Unveiled>>,
-    /// What the CPU found and the device has: the slot that holds it, and the volume image that it was found in.
-    found: Vec<(Slot, u32)>,
     /// The error that left the last change of scene incomplete.
     broken: Option<String>,
-    /// Buffers of a single copy, kept until the device is done with them.
-    uploads: Vec<Upload>,
-    unread: Vec<Readback>,
-    volume_images: u32,
-    ring_index: usize,
-    /// The frame whose lines are arriving.
-    partial: Option<PartialFrame>,
-    /// Its bytes that have arrived, in host memory: staging memory is slow to read, and a batch may be submitted before they are complete.
-    received: Vec<u8>,
-    /// Frames that were dropped because another began before all of their lines had arrived.
-    incomplete: u64,
-    /// Frames that will be submitted together.
-    batch: Option<SliceBatch>,
-    /// As [`RendererOptions::frames_at_once`].
-    frames_at_once: Option<u32>,
-    staging: Staging,
-    /// A picture has been submitted and not waited for.
-    drawing: bool,
-    /// The picture's image holds a picture, or will when the device is done.
-    drawn: bool,
-    /// How much of the picture was drawn last.
-    drawn_work: Work,
-    /// The value of queue 0's timeline at which the last presentation is done.
-    presented: u64,
-    /// The volume image that pictures show.
-    shown: u32,
-    /// The smallest region that stage 1 has filtered for any frame since the last reset.
-    filtered_bounds: VisibleBounds,
     /// Frames that are not visible in their scene.
     skipped: u64,
-    timings: Timings,
-    spans: bool,
-    time_stamps: TimeStamps,
-    /// `None` if no dispatch is divided.
-    limit: Option<BandLimit>,
-    texel_access: TexelAccess,
-    wake: Option<Wake>,
 }
 
 impl Renderer {
@@ -178,125 +131,72 @@ impl Renderer {
     /// # Errors
     /// A slot that the device cannot hold, or a shader that does not compile; the error names it.
     pub fn new(context: &Arc<Context>, scene: Scene, options: &RendererOptions) -> Result<Renderer, GpuError> {
-        let texel_access = options.texel_access.unwrap_or(TexelAccess::for_device(&context.candidate));
-        let scene = adapted(context, texel_access, options.frames_at_once, scene);
-        let plan = Plan::new(&scene);
-        formats::check(context, &plan, &scene)?;
-        let pipelines = Pipelines::shared(context, options.shaders.clone(), texel_access)?;
-        let steps = pipelines.of_plan(&plan, &scene)?;
-        let staging = Staging::new(&scene, context.candidate.max_buffer);
+        let compiler = options.compiler(context)?;
+        let (scene, plan) = compiler.plan(scene);
+        let pipelines = compiler.compile(&plan, &scene)?;
         let queues = options.queues.unwrap_or(context.queue_count()).clamp(1, MAX_QUEUES);
+        let mut queues = DeviceQueues::new(context, queues, options.spans)?;
+        queues.log = options.log.then(SubmissionLog::default);
+        let images = options.volume_images.max(1);
         let mut renderer = Renderer {
-            ring: Vec::new(),
-            picture: CommandRecorder::new(context, 0, "picture", options.time_stamps, options.spans)?,
-            readback: options.readback.then(|| readback(context, &scene)).transpose()?,
-            slots: SlotResources::new(context, options.volume_images.max(1)),
-            steps,
-            compiler: None,
-            pipelines,
-            timelines: Timelines::new(context, queues)?,
-            barriers: BarrierRecorder {
-                queues: QueueTracker::new(queues),
-                log: options.log.then(SubmissionLog::default),
-                ..BarrierRecorder::default()
-            },
-            context: context.clone(),
+            ring: Ring::new(context, &scene, &queues, options.time_stamps, options.spans)?,
+            drawing: Drawing::new(context, &scene, options, &mut queues)?,
+            slots: SlotResources::new(context, images),
             stale: vec![true; plan.steps.len()],
             contents: Contents::new(),
-            unprocessed: Vec::new(),
-            unveiled: Vec::new(),
-            found: Vec::new(),
+            volumes: Volumes::new(images, &scene),
+            program: Program { scene, plan, pipelines },
+            compiler,
+            queues,
+            context: context.clone(),
             broken: None,
-            uploads: Vec::new(),
-            unread: Vec::new(),
-            volume_images: options.volume_images.max(1),
-            plan,
-            filtered_bounds: scene.visible_bounds,
             skipped: 0,
-            scene,
-            ring_index: 0,
-            partial: None,
-            received: Vec::new(),
-            incomplete: 0,
-            batch: None,
-            frames_at_once: options.frames_at_once,
-            staging,
-            drawing: false,
-            drawn: false,
-            drawn_work: Work::Rays,
-            presented: 0,
-            shown: 0,
-            timings: Timings::new(context, options.spans),
-            spans: options.spans,
-            time_stamps: options.time_stamps,
-            limit: match options.paced && queues == 1 {
-                true => BandLimit::paced(options.bands, context.candidate.is_software()),
-                false => BandLimit::new(options.bands, context.candidate.is_software()),
-            },
-            texel_access,
-            wake: options.wake.clone(),
         };
-        if let Some(limit) = renderer.limit.filter(|_| options.paced) {
-            renderer.timelines.pace(limit.in_flight());
-        }
-        renderer.ring = renderer.new_ring()?;
-        renderer.invalidate_volumes();
         renderer.fit()?;
         Ok(renderer)
     }
 
     /// The passes and slots of the current scene.
     pub fn plan(&self) -> &Plan {
-        &self.plan
+        &self.program.plan
     }
 
     /// The current scene, with the fields that the device resolves.
     pub fn scene(&self) -> &Scene {
-        &self.scene
+        &self.program.scene
     }
 
     /// How single texels are read.
     pub fn texel_access(&self) -> TexelAccess {
-        self.texel_access
+        self.compiler.texel_access()
     }
 
     /// Bytes of a frame of the current scene.
     pub fn frame_bytes(&self) -> usize {
-        frame_bytes(&self.scene) as usize
-    }
-
-    /// Marks every slice of every volume image as unprocessed.
-    fn invalidate_volumes(&mut self) {
-        self.unprocessed = vec![vec![true; self.scene.slices() as usize]; self.volume_images as usize];
+        frame_bytes(&self.program.scene) as usize
     }
 
     /// Allocates and fills the slots that are missing. What passes over the volume and the picture wrote into those that were replaced has
     /// to be made again.
     fn fit(&mut self) -> Result<(), GpuError> {
-        let new = self.slots.fit(&self.plan, &self.scene)?;
-        self.found.retain(|(slot, _)| self.plan.slots.contains(slot) && new.iter().all(|(made, _)| made != slot));
-        let mut is_volume_lost = false;
-        for (i, step) in self.plan.steps.iter().enumerate() {
-            let is_lost = step.writes(&self.scene).iter().any(|slot| new.iter().any(|(made, _)| made == slot));
-            if is_lost && step.pass.frequency != Frequency::Frame {
-                self.stale[i] = true;
-                is_volume_lost |= step.pass.frequency == Frequency::Volume;
-            }
+        let Program { scene, plan, .. } = &self.program;
+        let new = self.slots.fit(plan, scene)?;
+        let is_new = |slot: &Slot| new.iter().any(|(made, _)| made == slot);
+        self.volumes.keep_found(|slot| plan.slots.contains(&slot) && !is_new(&slot));
+        let is_lost = |step: &Step| step.pass.frequency != Frequency::Frame && step.writes(scene).iter().any(is_new);
+        let lost: Vec<_> = plan.steps.iter().enumerate().filter(|(_, step)| is_lost(step)).collect();
+        lost.iter().for_each(|(i, _)| self.stale[*i] = true);
+        if lost.iter().any(|(_, step)| step.pass.frequency == Frequency::Volume) {
+            self.volumes.invalidate(scene);
         }
-        if is_volume_lost {
-            self.invalidate_volumes();
-        }
-        self.drawn &= !new.iter().any(|(slot, _)| *slot == Slot::Screen);
+        self.drawing.clear(&mut self.queues, &self.slots, &new)?;
         if new.is_empty() {
             return Ok(());
         }
-        self.picture.begin(&mut self.barriers, &self.timelines)?;
-        self.picture.clear_new(&mut self.barriers, &self.slots, &new);
-        self.picture.submit(&mut self.barriers, &mut self.timelines)?;
         for (slot, _) in new {
             self.fill(slot)?;
         }
-        self.timelines.wait_all()?;
+        self.queues.wait_all()?;
         // The next frame may write what was cleared here.
         self.context.show_layer_the_wait()
     }
@@ -304,27 +204,13 @@ impl Renderer {
     /// Uploads a slot that the CPU computes from the scene. Nothing that reads it may be in flight.
     fn fill(&mut self, slot: Slot) -> Result<(), GpuError> {
         let Initializer::ByScene(make) = slot.initializer() else { return Ok(()) };
+        let scene = &self.program.scene;
         if self.slots.image(slot, 0).is_none() {
-            self.slots.fill(slot, &self.scene);
+            self.slots.fill(slot, scene);
             return Ok(());
         }
-        let values = self.context.faults.table(slot, &self.scene, make(&self.scene));
-        self.upload(slot, 0, bytemuck::cast_slice(&values))
-    }
-
-    fn upload(&mut self, slot: Slot, copy: u32, bytes: &[u8]) -> Result<(), GpuError> {
-        let Some(image) = self.slots.image(slot, copy) else { return Ok(()) };
-        let place = SlotParts { slot, copy, parts: 0..image.shape.parts() };
-        let upload = Upload::new(&self.context, "upload", image.layout(), place.parts.clone(), bytes)?;
-        self.picture.begin(&mut self.barriers, &self.timelines)?;
-        // A layer that tracks submissions of two threads forgets what was between this upload and the last one.
-        self.picture.show_layer_the_wait();
-        self.picture.upload(&mut self.barriers, &upload, image, place);
-        self.uploads.push(upload);
-        self.picture.submit(&mut self.barriers, &mut self.timelines)?;
-        self.timelines.wait_all()?;
-        self.uploads.clear();
-        Ok(())
+        let values = self.context.faults.table(slot, scene, make(scene));
+        self.drawing.upload(&mut self.queues, &self.slots, slot, bytemuck::cast_slice(&values))
     }
 
     /// An error if the last change of scene failed, or if there is no such volume image.
@@ -332,34 +218,89 @@ impl Renderer {
         if let Some(fault) = &self.broken {
             return Err(GpuError::Broken(fault.clone()));
         }
-        match image < self.volume_images {
-            true => Ok(()),
-            false => Err(GpuError::VolumeImage { image, images: self.volume_images }),
-        }
+        self.volumes.check(image)
     }
 
     /// Waits until the device is idle, and adds up the measured times.
     fn collect(&mut self) -> Result<(), GpuError> {
         self.flush()?;
-        self.timelines.wait_all()?;
-        for entry in &mut self.ring {
-            entry.collect(&self.timelines, &mut self.timings)?;
+        self.queues.wait_all()?;
+        self.ring.collect(&mut self.queues)?;
+        self.drawing.collect(&mut self.queues)
+    }
+}
+
+impl Renderer {
+    /// Sends one frame to stage 1, which writes slice `slice` of volume image `image`. `bytes` are samples of the stored type,
+    /// line by line. Returns when the bytes are copied; waits only if the ring is full. A frame that is not visible in this
+    /// scene is skipped and counted.
+    ///
+    /// Consecutive slices, up or down, go through stage 1 together. The frame waits for its successors until the batch is full, no
+    /// visible slice can follow, another slice comes, [`Renderer::submit_frames`] is called, anything reads the volume, or the scene
+    /// changes.
+    ///
+    /// # Errors
+    /// A frame of the wrong size, a slice or image that does not exist, a device that fails.
+    pub fn frame(&mut self, slice: u32, bytes: &[u8], image: u32) -> Result<(), GpuError> {
+        self.check(image)?;
+        self.check_frame(slice as usize, bytes)?;
+        self.volumes.set_filtered(self.program.scene.visible_bounds);
+        if !self.program.scene.visible_frames().contains(&slice) {
+            self.skipped += 1;
+            return Ok(());
         }
-        self.picture.collect(&self.timelines, &mut self.timings)
+        if !self.ring.continues(image, slice) {
+            self.flush()?;
+            self.ring.wait(&mut self.queues, self.drawing.is_in_flight())?;
+        }
+        let bytes = self.context.faults.changed_frame(&self.program.scene, bytes);
+        self.ring.write(&mut self.queues, image, slice, &bytes);
+        self.volumes.replaced(image, slice);
+        if self.ring.is_complete(self.program.scene.visible_frames()) { self.flush() } else { Ok(()) }
+    }
+
+    /// Checks slice and size of a frame.
+    ///
+    /// # Errors
+    /// A slice that does not exist, or a frame of the wrong size.
+    pub fn check_frame(&self, slice: usize, bytes: &[u8]) -> Result<(), GpuError> {
+        let (slices, expected) = (self.program.scene.slices(), self.frame_bytes());
+        match (slice < slices as usize, bytes.len() == expected) {
+            (false, _) => Err(GpuError::FrameSlice { slice, slices }),
+            (_, false) => Err(GpuError::FrameSize { got: bytes.len(), expected }),
+            _ => Ok(()),
+        }
+    }
+
+    /// True if the next frame is taken without a wait for the device.
+    ///
+    /// # Errors
+    /// A device that fails.
+    pub fn takes_frame(&self) -> Result<bool, GpuError> {
+        self.ring.is_free(&self.queues)
+    }
+
+    /// Submits the frames that wait for their successors, so that the device works on them until more arrive. What is only copied goes on
+    /// waiting: submitting a slice takes longer than copying it.
+    ///
+    /// # Errors
+    /// A device that fails.
+    pub fn submit_frames(&mut self) -> Result<(), GpuError> {
+        if self.ring.only_copies() { Ok(()) } else { self.flush() }
+    }
+
+    /// Submits the batch.
+    fn flush(&mut self) -> Result<(), GpuError> {
+        self.ring.flush(&mut self.queues, &self.slots, &self.program)
     }
 }
 
 impl Renderer {
     /// True if `scene` differs from the current one, ignoring fields that the device resolves.
     pub fn differs_from(&self, scene: &Scene) -> bool {
+        let old = &self.program.scene;
         (&scene.geometry, &scene.settings, scene.input, scene.visible_bounds, &scene.shared)
-            != (
-                &self.scene.geometry,
-                &self.scene.settings,
-                self.scene.input,
-                self.scene.visible_bounds,
-                &self.scene.shared,
-            )
+            != (&old.geometry, &old.settings, old.input, old.visible_bounds, &old.shared)
     }
 
     /// True if the last change of scene failed halfway: nothing can be drawn until another change succeeds.
@@ -373,18 +314,7 @@ impl Renderer {
     /// # Errors
     /// A shader that does not compile, or a slot that the device cannot hold.
     pub fn prepare(&mut self, scene: &Scene) -> Result<bool, GpuError> {
-        let scene = adapted(&self.context, self.texel_access, self.frames_at_once, scene.clone());
-        let plan = Plan::new(&scene);
-        formats::check(&self.context, &plan, &scene)?;
-        self.compiler()?.prepare(&plan, &scene)
-    }
-
-    fn compiler(&mut self) -> Result<&mut AsyncPipelineCompiler, GpuError> {
-        let compiler = match self.compiler.take() {
-            Some(compiler) => compiler,
-            None => AsyncPipelineCompiler::new(&self.pipelines, self.texel_access, self.wake.clone())?,
-        };
-        Ok(self.compiler.insert(compiler))
+        self.compiler.prepare(scene)
     }
 
     /// Compiles the pipelines of further scenes in the background while nothing else is to be compiled, in this order, instead of those
@@ -393,18 +323,17 @@ impl Renderer {
     /// # Errors
     /// The thread cannot be started.
     pub fn warm(&mut self, scenes: Vec<SceneMaker>) -> Result<(), GpuError> {
-        self.compiler()?.warm(scenes);
-        Ok(())
+        self.compiler.warm(scenes)
     }
 
     /// Forgets the scenes of [`Renderer::warm`] that are left. A pipeline in the making is finished.
     pub fn stop_warming(&self) {
-        self.compiler.iter().for_each(AsyncPipelineCompiler::stop_warming);
+        self.compiler.stop_warming();
     }
 
     /// True while pipelines of [`Renderer::warm`] are left to compile.
     pub fn is_warming(&self) -> bool {
-        self.compiler.as_ref().is_some_and(AsyncPipelineCompiler::is_warming)
+        self.compiler.is_warming()
     }
 
     /// Changes the scene. The next picture runs the passes that this affects. If it returns [`Rerun::Everything`] or
@@ -416,51 +345,52 @@ impl Renderer {
     pub fn change(&mut self, scene: Scene) -> Result<Rerun, GpuError> {
         // Frames that wait go through the stage 1 that they were sent to.
         self.flush()?;
-        let mut scene = adapted(&self.context, self.texel_access, self.frames_at_once, scene.keeping(&self.scene));
-        let plan = Plan::new(&scene);
+        let old = &self.program;
+        let (mut scene, plan) = self.compiler.plan(scene.keeping(&old.scene));
         // After the visible region shrank, the volume still holds the larger one.
-        let before = Scene { visible_bounds: self.filtered_bounds, ..self.scene.clone() };
+        let before = Scene { visible_bounds: self.volumes.filtered(), ..old.scene.clone() };
         let rerun = if self.broken.is_some() { Rerun::Everything } else { plan.rerun(&before, &scene) };
         let sends_frames = !matches!(rerun, Rerun::Steps { .. });
         if sends_frames {
             scene.kept_bounds = VisibleBounds::default();
         }
-        formats::check(&self.context, &plan, &scene)?;
-        let steps = self.pipelines.of_plan(&plan, &scene)?;
+        let pipelines = self.compiler.compile(&plan, &scene)?;
         // Frames in flight use nothing that such a change touches, so only the picture is waited for.
         let touched = |slots: &[Slot]| {
             plan.steps_of(Frequency::Frame).any(|(_, s)| s.reads(&scene).iter().any(|r| slots.contains(r)))
         };
         // Frames in flight may run a pass that the new plan leaves out, such as that of packed neighbours for a picture with fewer rays: its
         // pipeline ends with the old plan.
-        let old = self.plan.steps.iter().zip(&self.steps).filter(|(step, _)| step.pass.frequency != Frequency::Picture);
-        let ends_a_pipeline = old.clone().any(|(_, old)| !steps.iter().any(|new| Arc::ptr_eq(old, new)));
-        self.wait_presented()?;
+        let steps = old.plan.steps.iter().zip(&old.pipelines);
+        let mut of_frames = steps.filter(|(step, _)| step.pass.frequency != Frequency::Picture);
+        let ends_a_pipeline = of_frames.any(|(_, old)| !pipelines.iter().any(|new| Arc::ptr_eq(old, new)));
+        self.drawing.wait_presented(&self.queues)?;
         match &rerun {
             Rerun::Steps { slots, .. } if !touched(slots) && !ends_a_pipeline => self.wait_drawn()?,
             _ => self.collect()?,
         }
+        let old = &self.program;
         // Of slots that are made again with the images, `fit` uploads the content.
         let changed: Vec<Slot> = match &rerun {
             Rerun::Steps { slots, .. } => slots.clone(),
-            Rerun::Frames => plan.slots.iter().copied().filter(|s| s.differs(&self.scene, &scene)).collect(),
+            Rerun::Frames => plan.slots.iter().copied().filter(|s| s.differs(&old.scene, &scene)).collect(),
             Rerun::Everything => Vec::new(),
         };
-        let kept: Vec<_> = self.plan.steps.iter().zip(&self.stale).filter(|s| *s.1).map(|s| s.0.id()).collect();
+        let kept: Vec<_> = old.plan.steps.iter().zip(&self.stale).filter(|s| *s.1).map(|s| s.0.id()).collect();
         self.stale = plan.steps.iter().map(|s| kept.contains(&s.id())).collect();
         // Of frames that were not sent, none may be counted on where smoothing across slices reaches further than it did for them.
-        if sends_frames || scene.reach_across_slices() != self.scene.reach_across_slices() {
-            self.filtered_bounds = scene.visible_bounds;
+        if sends_frames || scene.reach_across_slices() != old.scene.reach_across_slices() {
+            self.volumes.set_filtered(scene.visible_bounds);
         }
         // Rays of smaller steps take longer than the last ones did, and so do cuts of more corners.
-        for (step, pipeline) in plan.steps.iter().zip(&steps) {
+        for (step, pipeline) in plan.steps.iter().zip(&pipelines) {
             if step.pass.stage == Stage::Raycast {
-                pipeline.time.lengthen(self.scene.step / scene.step);
+                pipeline.time.lengthen(old.scene.step / scene.step);
             } else if step.writes(&scene).contains(&Slot::CutVolume) {
-                pipeline.time.lengthen(scene.cut_corners() as f64 / self.scene.cut_corners().max(1) as f64);
+                pipeline.time.lengthen(scene.cut_corners() as f64 / old.scene.cut_corners().max(1) as f64);
             }
         }
-        (self.plan, self.steps, self.scene) = (plan, steps, scene);
+        self.program = Program { scene, plan, pipelines };
         self.broken = None;
         self.rebuild(&rerun, &changed).inspect_err(|error| self.broken = Some(error.to_string()))?;
         Ok(rerun)
@@ -476,18 +406,14 @@ impl Renderer {
             return Err(GpuError::Broken(fault.clone()));
         }
         // Its thread may be compiling the previous source.
-        self.compiler = None;
-        self.wait_presented()?;
+        self.compiler.stop();
+        self.drawing.wait_presented(&self.queues)?;
         self.collect()?;
-        self.steps = self.pipelines.recompile(shaders, &self.plan, &self.scene)?;
-        let rerun = self.plan.rerun_shaders(&self.scene, |shader| shaders.contains(shader));
+        let Program { scene, plan, pipelines } = &mut self.program;
+        *pipelines = self.compiler.recompile(shaders, plan, scene)?;
+        let rerun = plan.rerun_shaders(scene, |shader| shaders.contains(shader));
         self.rebuild(&rerun, &[]).inspect_err(|error| self.broken = Some(error.to_string()))?;
         Ok(rerun)
-    }
-
-    /// Waits until the last presentation has read the picture's image.
-    fn wait_presented(&self) -> Result<(), GpuError> {
-        self.timelines.of(0).wait(self.presented)
     }
 
     /// Prepares what has to run again. `changed`: the slots whose content the CPU makes differently of the current scene.
@@ -495,34 +421,27 @@ impl Renderer {
         match rerun {
             Rerun::Steps { steps, .. } => {
                 steps.iter().for_each(|i| self.stale[*i] = true);
-                if steps.iter().any(|i| self.plan.steps[*i].pass.frequency == Frequency::Volume) {
-                    self.invalidate_volumes();
+                if steps.iter().any(|i| self.program.plan.steps[*i].pass.frequency == Frequency::Volume) {
+                    self.volumes.invalidate(&self.program.scene);
                 }
             }
             Rerun::Frames | Rerun::Everything => {
-                self.found.clear();
-                self.stale.iter_mut().for_each(|stale| *stale = true);
-                self.invalidate_volumes();
+                self.volumes.keep_found(|_| false);
+                self.stale.fill(true);
+                self.volumes.invalidate(&self.program.scene);
                 if *rerun == Rerun::Everything {
                     // The next frames may have another size.
-                    self.incomplete += u64::from(self.partial.take().is_some());
-                    self.batch = None;
                     self.slots.clear();
-                    self.staging = Staging::new(&self.scene, self.context.candidate.max_buffer);
-                    self.ring = self.new_ring()?;
-                    self.ring_index = 0;
+                    self.ring.restart(&self.program.scene, &self.queues)?;
                 }
             }
         }
         self.fit()?;
-        self.found.retain(|(slot, _)| !changed.contains(slot));
+        self.volumes.keep_found(|slot| !changed.contains(&slot));
         for slot in changed {
             self.fill(*slot)?;
         }
-        if self.readback.as_ref().is_some_and(|r| r.size != Slot::Screen.bytes(&self.scene)) {
-            self.readback = Some(readback(&self.context, &self.scene)?);
-        }
-        Ok(())
+        self.drawing.fit(&self.program.scene)
     }
 }
 
@@ -535,58 +454,45 @@ impl Renderer {
         let Some((readback, size, format)) = self.bring_back(slot)? else { return Ok(None) };
         let part = Texels::decode(size, format, &readback.bytes()?);
         // What is not stored of a volume is what no pass would have written.
-        Ok(Some(part.with_outside(slot, &self.scene, 0.0)))
+        Ok(Some(part.with_outside(slot, &self.program.scene, 0.0)))
     }
 
     /// The current bytes of an image slot, its texels along x, y, z, and their format.
-    pub(super) fn bring_back(&mut self, slot: Slot) -> Result<Option<(Readback, [usize; 3], Format)>, GpuError> {
-        self.check(self.shown)?;
+    fn bring_back(&mut self, slot: Slot) -> Result<Option<(Readback, [usize; 3], Format)>, GpuError> {
+        let shown = self.volumes.shown();
+        self.check(shown)?;
         self.flush()?;
-        let Some(image) = self.slots.image(slot, self.shown) else { return Ok(None) };
-        let buffer = Readback::new(&self.context, "read", image.shape, image.format.texel_bytes())?;
-        let (format, size) = (image.format, image.shape.size());
-        let copy = if slot.is_multibuffered() { self.shown } else { 0 };
-        self.picture.collect(&self.timelines, &mut self.timings)?;
-        self.picture.begin(&mut self.barriers, &self.timelines)?;
-        self.picture.copy_out(&mut self.barriers, image, slot, copy, &buffer);
-        self.picture.submit(&mut self.barriers, &mut self.timelines)?;
-        let done = self.timelines.wait_all();
-        if done.is_err() {
-            // The copy may still be running: the buffer must outlive it.
-            self.unread.push(buffer);
-            return done.map(|()| None);
-        }
-        Ok(Some((buffer, size, format)))
+        self.drawing.bring_back(&mut self.queues, &self.slots, (slot, shown))
     }
 
     /// Waits for the device, and returns the times of what [`RendererOptions::time_stamps`] selects since the last call, ns. Empty if the
     /// device has no time stamps.
     pub fn take_times(&mut self) -> Result<Vec<PassTime>, GpuError> {
         self.collect()?;
-        Ok(self.timings.take_times())
+        Ok(self.queues.timings.take_times())
     }
 
     /// Number of passes and copies since the last call that could not be timed: too many frames arrived while a picture was drawn.
     pub fn take_untimed(&mut self) -> u64 {
-        self.timings.take_untimed()
+        self.queues.timings.take_untimed()
     }
 
     /// As [`Renderer::take_times`], without waiting for work in flight.
     pub fn times_so_far(&mut self) -> Vec<PassTime> {
-        self.timings.take_times()
+        self.queues.timings.take_times()
     }
 
     /// Waits for the device, and returns every span since the last call, ns on the host's clock; empty without
     /// [`RendererOptions::spans`].
     pub fn take_spans(&mut self) -> Result<Vec<Span>, GpuError> {
         self.collect()?;
-        Ok(self.timings.take_spans())
+        Ok(self.queues.timings.take_spans())
     }
 
     /// The largest error, ns, with which spans of the device were placed on the host's clock; `None` without spans, and if the device's
     /// clock cannot be read.
     pub fn clock_deviation(&self) -> Option<u64> {
-        self.timings.clock_deviation()
+        self.queues.timings.clock_deviation()
     }
 
     /// The names of the passes that `work` dispatches, in order.
@@ -604,9 +510,9 @@ impl Renderer {
         work: impl FnOnce(&mut Renderer) -> Result<T, GpuError>,
     ) -> Result<Vec<(&'static str, [u32; 3])>, GpuError> {
         self.flush()?;
-        self.barriers.dispatched = Some(Vec::new());
+        self.queues.dispatched = Some(Vec::new());
         let done = work(self).and_then(|done| self.flush().map(|()| done));
-        let dispatched = self.barriers.dispatched.take().unwrap_or_default();
+        let dispatched = self.queues.dispatched.take().unwrap_or_default();
         done.map(|_| dispatched)
     }
 
@@ -617,30 +523,22 @@ impl Renderer {
 
     /// Number of barriers recorded so far.
     pub fn barriers(&self) -> u32 {
-        self.barriers.count
+        self.queues.count
     }
 
     /// Everything recorded and submitted so far, with [`RendererOptions::log`].
     pub fn log(&self) -> Option<&SubmissionLog> {
-        self.barriers.log.as_ref()
+        self.queues.log.as_ref()
     }
 
     /// Fault injection: leaves out the n-th barrier (1 is the first ever recorded).
     pub fn drop_barrier(&mut self, n: u32) {
-        self.barriers.drop_barrier = Some(n);
+        self.queues.drop_barrier = Some(n);
     }
-}
-
-fn frame_bytes(scene: &Scene) -> u64 {
-    Slot::Frames.bytes(scene) / u64::from(Slot::Frames.shape(scene).parts())
-}
-
-fn readback(context: &Arc<Context>, scene: &Scene) -> Result<Readback, GpuError> {
-    Readback::new(context, "readback", Slot::Screen.shape(scene), Slot::Screen.format(scene).texel_bytes())
 }
 
 impl Drop for Renderer {
     fn drop(&mut self) {
-        self.timelines.drain();
+        self.queues.timelines.drain();
     }
 }

@@ -6,13 +6,12 @@ use super::panel_textures::{PanelTextures, failed};
 use super::swapchain::{PresentMode, Swapchain};
 use super::target::{MonitorChoice, Target, choose_monitor};
 use crate::barriers::{Access, PipelineStage};
-use crate::command_recorder::BarrierRecorder;
 use crate::context::Context;
+use crate::device_queues::DeviceQueues;
 use crate::error::{ErrorContext, GpuError};
 use crate::formats;
 use crate::passes::Slot;
 use crate::resources::{Image, WHOLE};
-use crate::timeline::Timelines;
 use ash::vk;
 use egui_ash_renderer::allocator::DefaultAllocator;
 use egui_ash_renderer::{DynamicRendering, Options, RenderMode, Renderer};
@@ -35,8 +34,7 @@ pub enum PresentOutcome {
 /// The picture of a renderer, and what orders its use among the renderer's work.
 pub struct Drawn<'a> {
     pub image: &'a Image,
-    pub barriers: &'a mut BarrierRecorder,
-    pub(crate) timelines: &'a mut Timelines,
+    pub(crate) queues: &'a mut DeviceQueues,
     /// The upper left corner of the picture in the window, pixels.
     pub at: [u32; 2],
     /// The picture is shown again while the next one is drawn.
@@ -172,7 +170,7 @@ impl Screen {
         self.wait()?;
         if let Content::Picture(drawn) = &content {
             // What is held back of the picture comes before its copy.
-            drawn.timelines.release()?;
+            drawn.queues.timelines.release()?;
             if drawn.is_kept && self.kept.as_ref().is_none_or(|kept| !kept.is_like(drawn.image)) {
                 self.kept = None;
                 self.kept = Some(drawn.image.another(&self.context, Slot::Screen)?);
@@ -354,16 +352,16 @@ impl Screen {
         let visible = region.filter(|(_, [w, h])| *w > 0 && *h > 0).map(|(region, _)| region);
         match content {
             Content::Picture(drawn) => {
-                drawn.barriers.begin(0);
+                drawn.queues.begin(0);
                 let read = Access::of_slot(Slot::Screen, 0, 0..drawn.image.shape.parts(), false, PipelineStage::Copy);
-                drawn.barriers.before(&self.context, 0, commands, &[read]);
+                drawn.queues.before(&self.context, 0, commands, &[read]);
                 if let Some(region) = visible {
                     place_picture(drawn.image, region);
                 }
                 if let Some(kept) = self.kept.as_ref().filter(|_| drawn.is_kept) {
                     drawn.image.copy_to(&device, commands, kept);
                 }
-                queued = Some((&mut *drawn.barriers, &mut *drawn.timelines));
+                queued = Some(&mut *drawn.queues);
             }
             Content::Kept(_) => {
                 if let (Some(kept), Some(region)) = (&self.kept, visible) {
@@ -428,25 +426,21 @@ impl Screen {
         Ok(place)
     }
 
-    fn submit(
-        &mut self,
-        drawn: vk::Semaphore,
-        queued: Option<(&mut BarrierRecorder, &mut Timelines)>,
-    ) -> Result<(), GpuError> {
+    fn submit(&mut self, drawn: vk::Semaphore, queued: Option<&mut DeviceQueues>) -> Result<(), GpuError> {
         let everything = vk::PipelineStageFlags2::ALL_COMMANDS;
         let semaphore = |handle| vk::SemaphoreSubmitInfo::default().semaphore(handle);
         let mut waits = vec![semaphore(self.free).stage_mask(vk::PipelineStageFlags2::ALL_TRANSFER)];
         let mut signals = vec![semaphore(drawn).stage_mask(everything)];
         let commands = [vk::CommandBufferSubmitInfo::default().command_buffer(self.commands)];
         let mut after = Vec::new();
-        if let Some((barriers, timelines)) = &queued {
-            after = barriers.queues.waits(0);
+        if let Some(queues) = &queued {
+            after = queues.tracker.waits(0);
             let wait = |w: &crate::queues::Wait| {
-                semaphore(timelines.of(w.queue).semaphore).value(w.value).stage_mask(everything)
+                semaphore(queues.timelines.of(w.queue).semaphore).value(w.value).stage_mask(everything)
             };
             waits.extend(after.iter().map(wait));
             // Later work of the renderer waits for this too.
-            let timeline = timelines.of(0);
+            let timeline = queues.timelines.of(0);
             signals.push(semaphore(timeline.semaphore).value(timeline.submitted + 1).stage_mask(everything));
         }
         let submit = vk::SubmitInfo2::default()
@@ -462,10 +456,9 @@ impl Screen {
             self.signal();
             return Err(error);
         }
-        if let Some((barriers, timelines)) = queued {
-            let timeline = timelines.of_mut(0);
-            timeline.advance("window");
-            barriers.submitted(0, &after, timeline.submitted);
+        if let Some(queues) = queued {
+            queues.timelines.of_mut(0).advance("window");
+            queues.submitted(0, &after, queues.timelines.of(0).submitted);
         }
         Ok(())
     }

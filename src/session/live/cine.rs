@@ -2,8 +2,6 @@
 //! still be changed. Bounded in volumes and bytes. Pure.
 
 use crate::source::Frame;
-use crate::source::parts::FrameParts;
-use std::borrow::Cow;
 use std::collections::VecDeque;
 use std::sync::Arc;
 
@@ -37,15 +35,13 @@ pub struct Cine {
     slices: usize,
     volumes: VecDeque<CineVolume>,
     filling: Option<Filling>,
-    /// A frame whose lines are arriving.
-    partial: FrameParts,
     bytes: usize,
 }
 
 impl Cine {
     /// An empty loop of volumes of `slices` frames.
     pub fn new(limits: CineLimits, slices: usize) -> Cine {
-        Cine { limits, slices, volumes: VecDeque::new(), filling: None, partial: FrameParts::default(), bytes: 0 }
+        Cine { limits, slices, volumes: VecDeque::new(), filling: None, bytes: 0 }
     }
 
     /// True if the volumes have so many frames.
@@ -70,20 +66,10 @@ impl Cine {
 
     /// Removes the volume that is being filled: its remaining frames will not come.
     pub(crate) fn discard_partial(&mut self) {
-        (self.filling, self.partial) = (None, FrameParts::default());
+        self.filling = None;
     }
 
-    /// Adds lines of a frame of `total` bytes, `at` bytes into it. Lines that do not continue those before are discarded.
-    pub fn lines(&mut self, frame: Frame, at: usize, total: usize) {
-        if self.limits.volumes == 0 {
-            return;
-        }
-        if let Some(frame) = self.partial.add(Cow::Owned(frame), at, total) {
-            self.frame(frame);
-        }
-    }
-
-    /// Adds a complete frame.
+    /// Adds a frame.
     pub fn frame(&mut self, frame: Frame) {
         if self.limits.volumes == 0 || frame.slice >= self.slices {
             return;
@@ -154,22 +140,9 @@ mod tests {
     }
 
     #[test]
-    fn lines_make_a_frame_unless_there_is_a_gap() {
-        let mut cine = Cine::new(CineLimits { volumes: 2, bytes: 100 }, 1);
-        cine.lines(frame(0, 0, vec![1, 2]), 0, 4);
-        cine.lines(frame(0, 0, vec![3, 4]), 2, 4);
-        assert_eq!(cine.volumes()[0].frames[0].bytes, [1, 2, 3, 4]);
-        cine.lines(frame(1, 0, vec![1]), 0, 4);
-        cine.lines(frame(1, 0, vec![3, 4]), 2, 4);
-        cine.lines(frame(1, 0, vec![3, 4]), 2, 4);
-        assert_eq!(numbers(&cine), [0]);
-    }
-
-    #[test]
     fn a_loop_of_size_zero_keeps_nothing() {
         let mut cine = Cine::new(CineLimits::default(), 1);
         cine.frame(frame(0, 0, vec![1]));
-        cine.lines(frame(1, 0, vec![1]), 0, 1);
         assert!(cine.volumes().is_empty() && cine.bytes() == 0);
     }
 }

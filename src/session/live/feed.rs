@@ -1,13 +1,12 @@
-//! A live source on its own thread, and a bounded queue of what it reported. If the queue is full, a source that can wait is kept
+//! A live source on its own thread, and a bounded queue of what it reported. Frames that arrive in lines are assembled here, so that
+//! everything that follows has whole ones. If the queue is full, a source that can wait is kept
 //! waiting; a source that cannot wait loses frames, which are counted. The thread also records the frames.
 
 use crate::gpu::Wake;
-use crate::source::Frame;
 use crate::source::live::{Event, Live};
-use crate::source::parts::FrameParts;
+use crate::source::parts::WholeFrames;
 use crate::source::posed::Posed;
 use crate::source::recorder::{Header, Writer};
-use std::borrow::Cow;
 use std::collections::VecDeque;
 use std::io;
 use std::path::{Path, PathBuf};
@@ -36,7 +35,7 @@ pub type Observer = Box<dyn FnMut(&Event) + Send>;
 /// What a feed counted.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct FeedCounts {
-    /// Frames, or parts of frames that arrive line by line, that were lost because the queue was full.
+    /// Frames that were lost because the queue was full.
     pub lost: u64,
     /// Frames that could not be recorded, and other failures of the recording.
     pub unrecorded: u64,
@@ -88,7 +87,7 @@ struct Queue {
 
 fn bytes_of(event: &Event) -> usize {
     match event {
-        Event::Frame(frame) | Event::Lines { frame, .. } => frame.bytes.len(),
+        Event::Frame(frame) => frame.bytes.len(),
         _ => 0,
     }
 }
@@ -115,7 +114,7 @@ impl Shared {
         let bytes = bytes_of(&arrived.event);
         let mut queue = self.lock();
         let is_full = |q: &Queue| !q.events.is_empty() && (q.bytes + bytes > MAX_BYTES || q.events.len() >= MAX_EVENTS);
-        if let Event::Frame(frame) | Event::Lines { frame, .. } = &arrived.event {
+        if let Event::Frame(frame) = &arrived.event {
             while can_wait && is_full(&queue) && !self.stop.load(Ordering::Relaxed) {
                 queue = self.changed.wait_timeout(queue, PATIENCE).map_or_else(|e| e.into_inner().0, |w| w.0);
             }
@@ -233,7 +232,8 @@ impl Drop for Feed {
     }
 }
 
-fn listen(mut source: Box<dyn Live>, mut tap: Option<RecordingTap>, mut observer: Option<Observer>, shared: &Shared) {
+fn listen(source: Box<dyn Live>, mut tap: Option<RecordingTap>, mut observer: Option<Observer>, shared: &Shared) {
+    let mut source = WholeFrames::new(source);
     let (can_wait, records) = (source.can_wait(), tap.is_some());
     // After the recording: that has the pictures themselves.
     let mut posed = source.compounding().map(Posed::new);
@@ -242,7 +242,7 @@ fn listen(mut source: Box<dyn Live>, mut tap: Option<RecordingTap>, mut observer
         let event = source.next(PATIENCE);
         let at = Instant::now();
         shared.set_disconnected(source.disconnected());
-        let is_frame = matches!(event, Event::Frame(_) | Event::Lines { .. });
+        let is_frame = matches!(event, Event::Frame(_));
         if records && is_frame && tap.is_none() {
             shared.unrecorded.fetch_add(1, Ordering::Relaxed);
         }
@@ -300,25 +300,16 @@ struct RecordingTap {
     files: u32,
     writer: Option<Writer>,
     header: Option<Header>,
-    /// A frame whose lines are arriving.
-    partial: FrameParts,
     /// The last frame could not be written.
     is_failing: bool,
 }
 
 impl RecordingTap {
     fn new(path: &Path) -> RecordingTap {
-        RecordingTap {
-            path: path.into(),
-            files: 0,
-            writer: None,
-            header: None,
-            partial: FrameParts::default(),
-            is_failing: false,
-        }
+        RecordingTap { path: path.into(), files: 0, writer: None, header: None, is_failing: false }
     }
 
-    /// Writes a frame, or collects lines until their frame is complete.
+    /// Writes a frame, or begins the next file.
     ///
     /// # Errors
     /// A file that cannot be created, or a frame that cannot be written. The next frame may succeed.
@@ -329,19 +320,13 @@ impl RecordingTap {
         match event {
             Event::Begin(header) if self.header.as_ref() != Some(header) => {
                 self.finish_file()?;
-                self.partial = FrameParts::default();
                 let path = self.free_name();
                 self.writer = Some(Writer::create(&path, (**header).clone()).map_err(|e| e.to_string())?);
                 self.header = Some((**header).clone());
                 Ok(())
             }
-            Event::Frame(frame) => self.frame(frame, seconds),
-            Event::Lines { frame, first } => {
-                let Some((line, total)) = self.header.as_ref().map(Header::line_and_frame) else { return Ok(()) };
-                match self.partial.add(Cow::Borrowed(frame), first * line, total) {
-                    Some(frame) => self.frame(&frame, seconds),
-                    None => Ok(()),
-                }
+            Event::Frame(frame) => {
+                self.writer.as_mut().map_or(Ok(()), |w| w.frame(frame, seconds)).map_err(|e| e.to_string())
             }
             _ => Ok(()),
         }
@@ -362,10 +347,6 @@ impl RecordingTap {
         }
     }
 
-    fn frame(&mut self, frame: &Frame, at: f64) -> Result<(), String> {
-        self.writer.as_mut().map_or(Ok(()), |w| w.frame(frame, at)).map_err(|e| e.to_string())
-    }
-
     fn finish_file(&mut self) -> Result<(), String> {
         self.writer.take().map_or(Ok(()), Writer::finish).map_err(|e| e.to_string())
     }
@@ -379,6 +360,7 @@ impl RecordingTap {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::source::Frame;
 
     /// Volumes of three frames, as fast as they are asked for.
     struct FastSource {

@@ -5,9 +5,7 @@ use crate::scene::default_look::{Defaults, block_edge};
 use crate::scene::load::Layers;
 use crate::scene::{EchoHistogram, EchoLevels, Input};
 use crate::source::Frame;
-use crate::source::parts::FrameParts;
 use crate::source::recorder::Header;
-use std::borrow::Cow;
 
 /// The search for the levels of a stream's echoes.
 pub(super) struct FirstVolume {
@@ -23,8 +21,6 @@ struct Collected {
     volume: Option<u32>,
     /// By slice: it was taken.
     seen: Vec<bool>,
-    /// A frame that arrives in pieces.
-    partial: FrameParts,
 }
 
 impl FirstVolume {
@@ -51,18 +47,10 @@ impl FirstVolume {
         Defaults { layers: self.layers.clone(), geometry: header.forward.clone(), levels }
     }
 
-    /// Takes a frame, or lines of it from `first` on. What settings follow from, if it makes the first volume whole.
-    pub fn frame(&mut self, frame: &Frame, first: Option<usize>) -> Option<Defaults> {
+    /// Takes a frame. What settings follow from, if it makes the first volume whole.
+    pub fn frame(&mut self, frame: &Frame) -> Option<Defaults> {
         let (header, collected) = (self.header.as_ref()?, self.collected.as_mut()?);
-        let is_whole = match first {
-            None => collected.take(header, frame),
-            Some(first) => {
-                let (line, total) = header.line_and_frame();
-                let complete = collected.partial.add(Cow::Borrowed(frame), first * line, total);
-                complete.is_some_and(|frame| collected.take(header, &frame))
-            }
-        };
-        if !is_whole {
+        if !collected.take(header, frame) {
             return None;
         }
         let levels = collected.histogram.levels();
@@ -83,11 +71,10 @@ impl Collected {
             histogram: EchoHistogram::new(&header.forward, input, block_edge(&header.forward)),
             volume: None,
             seen: vec![false; header.forward.slices()],
-            partial: FrameParts::default(),
         }
     }
 
-    /// Takes a complete frame. True if all of its volume were taken.
+    /// Takes a frame. True if all of its volume were taken.
     fn take(&mut self, header: &Header, frame: &Frame) -> bool {
         if self.volume.replace(frame.volume) != Some(frame.volume) {
             // The volume before was not whole.
@@ -132,38 +119,16 @@ mod tests {
         let settings = |found: Option<Defaults>| -> Option<Settings> { Some(found?.settings().expect("settings")) };
         let begun = settings(first.begin(&header())).expect("by geometry");
         assert_eq!(begun.mode, Mode::Volume);
-        assert!(first.frame(&frame(0, 1, 240), None).is_none());
+        assert!(first.frame(&frame(0, 1, 240)).is_none());
         // Volume 0 lacks a slice.
-        assert!(first.frame(&frame(1, 0, 120), None).is_none());
-        assert!(first.frame(&frame(1, 0, 120), None).is_none(), "the same slice again");
-        let found = settings(first.frame(&frame(1, 1, 120), None)).expect("whole");
+        assert!(first.frame(&frame(1, 0, 120)).is_none());
+        assert!(first.frame(&frame(1, 0, 120)).is_none(), "the same slice again");
+        let found = settings(first.frame(&frame(1, 1, 120))).expect("whole");
         assert_ne!(found.volume.transfer, begun.volume.transfer);
         let points = crate::scene::transfer::resolved(&found.volume.transfer);
         assert!((points[points.len() - 1].at - 120.0 / 255.0).abs() < 0.01, "{points:?}");
-        assert!(first.frame(&frame(2, 0, 250), None).is_none());
-        assert!(first.frame(&frame(2, 1, 250), None).is_none(), "the picture does not pump");
+        assert!(first.frame(&frame(2, 0, 250)).is_none());
+        assert!(first.frame(&frame(2, 1, 250)).is_none(), "the picture does not pump");
         assert!(first.begin(&header()).is_none());
-    }
-
-    #[test]
-    fn frames_in_pieces_count_when_they_are_complete() {
-        let mut first = FirstVolume::new(Layers::default());
-        first.begin(&header());
-        // Ten lines in the middle were lost: no volume.
-        for slice in 0..2 {
-            let whole = frame(0, slice, 120);
-            for (line, bytes) in [(0, &whole.bytes[..320]), (20, &whole.bytes[640..])] {
-                assert!(first.frame(&Frame { bytes: bytes.to_vec(), ..whole.clone() }, Some(line)).is_none());
-            }
-        }
-        let mut found = None;
-        for slice in 0..2 {
-            let whole = frame(1, slice, 120);
-            for (line, bytes) in [(0, &whole.bytes[..320]), (10, &whole.bytes[320..])] {
-                assert!(found.is_none());
-                found = first.frame(&Frame { bytes: bytes.to_vec(), ..whole.clone() }, Some(line));
-            }
-        }
-        assert!(found.is_some());
     }
 }

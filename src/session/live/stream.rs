@@ -159,100 +159,41 @@ impl Stream {
         result
     }
 
-    fn advance(&mut self, patience: Duration) -> Result<Step, StreamError> {
+    /// Chooses the next piece of work and does it.
+    fn advance(&mut self, mut patience: Duration) -> Result<Step, StreamError> {
         // The picture in flight is finished first, and no more events are taken.
         let is_ending = self.end.is_some() || (self.next_header.is_some() && !self.is_frozen);
-        match self.session.as_ref().map(|session| &session.phase) {
-            None => self.next_event(patience),
-            Some(Phase::Drawing { .. }) => self.step_drawing(is_ending, patience),
-            Some(Phase::Draining { .. }) if !is_ending => self.step_draining(),
-            Some(Phase::Idle | Phase::Replaying(_) | Phase::Draining { .. }) => self.step_between_pictures(patience),
-        }
-    }
-
-    fn step_drawing(&mut self, is_ending: bool, patience: Duration) -> Result<Step, StreamError> {
-        let Some(session) = &mut self.session else { return Ok(Step::Progress) };
-        // Who has no patience looks again.
-        if !session.renderer.is_drawing()? || (is_ending && !patience.is_zero()) {
-            let queued = if session.pool.is_rolling() && !is_ending { self.feed.waiting() } else { 0 };
-            let picture = session.finish(queued, &mut self.statistics)?;
-            let is_coarse = self.draw_in_full()?;
-            return Ok(Step::Picture(FinishedPicture { is_coarse, ..picture }));
-        }
-        if is_ending {
-            return Ok(Step::Progress);
-        }
-        let patience = patience.min(DRAWING_WAIT);
-        let is_full = session.renderer.is_paced() && !session.renderer.takes_frame()?;
-        if is_full || (self.feed.can_wait() && session.pool.is_waiting()) {
-            // A frame would wait for the picture; a further volume would replace the one that waits to be shown.
-            std::thread::sleep(patience);
-            return Ok(Step::Progress);
-        }
-        self.replay_or_next_event(patience)
-    }
-
-    /// The first picture is there: what follows is drawn in full. True if it had fewer rays.
-    fn draw_in_full(&mut self) -> Result<bool, StreamError> {
-        let was_coarse = std::mem::take(&mut self.is_coarse) && coarse(&self.settings) != self.settings;
-        if let (true, Some(session), Some(header)) = (was_coarse, &mut self.session, &self.header) {
-            let full = views(header, &self.settings, self.full.as_ref(), &self.options)?;
-            session.pending = Pending::Ready(full);
-        }
-        Ok(was_coarse)
-    }
-
-    fn step_draining(&mut self) -> Result<Step, StreamError> {
-        let arrived = self.feed.next(Duration::ZERO);
         if let Some(session) = &mut self.session {
-            session.phase.drained(arrived.is_none());
-        }
-        let step = match arrived {
-            Some(Arrived { event, at }) => self.take(event, at),
-            None => Ok(Step::Progress),
-        };
-        self.submit_last()?;
-        step
-    }
-
-    fn step_between_pictures(&mut self, patience: Duration) -> Result<Step, StreamError> {
-        let Some(session) = &mut self.session else { return Ok(Step::Progress) };
-        if let Some(folder) = &self.options.shaders
-            && let Some(changed) = folder.take_changed()
-        {
-            match session.reload_shaders(&changed) {
-                Ok(()) => folder.accept(),
-                Err(error) if error.is_device_lost() => return Err(error.into()),
-                // The previous pipelines remain.
-                Err(error) => folder.refuse(changed, error.to_string()),
-            }
-        }
-        match session.begin()? {
-            Begun::Picture => return Ok(Step::Progress),
-            Begun::Refused(fault) => {
-                // Another geometry or device does not try the refused settings again.
-                if session.pending.is_none() {
-                    let shown = session.views.first().settings.clone();
-                    let ray = if self.is_coarse { self.settings.ray.clone() } else { shown.ray.clone() };
-                    (self.settings, self.full) = (Settings { ray, ..shown }, None);
+            let mut replays = true;
+            match session.phase {
+                Phase::Drawing { .. } => {
+                    // Who has no patience looks again.
+                    if !session.renderer.is_drawing()? || (is_ending && !patience.is_zero()) {
+                        return self.finish_picture(is_ending);
+                    }
+                    if is_ending {
+                        return Ok(Step::Progress);
+                    }
+                    patience = patience.min(DRAWING_WAIT);
+                    let is_full = session.renderer.is_paced() && !session.renderer.takes_frame()?;
+                    if is_full || (self.feed.can_wait() && session.pool.is_waiting()) {
+                        // A frame would wait for the picture; a further volume would replace the one that waits to be shown.
+                        std::thread::sleep(patience);
+                        return Ok(Step::Progress);
+                    }
                 }
-                return Ok(Step::Fault(fault));
+                Phase::Draining { .. } if !is_ending => (patience, replays) = (Duration::ZERO, false),
+                Phase::Idle | Phase::Replaying(_) | Phase::Draining { .. } => {
+                    if let Some(step) = self.begin_picture()? {
+                        return Ok(step);
+                    }
+                }
             }
-            Begun::Restore(volume) => session.restore(volume, &self.cine),
-            Begun::Nothing => {}
+            if let Some(session) = self.session.as_mut().filter(|session| replays && session.phase.replay().is_some()) {
+                session.continue_replay()?;
+                return Ok(Step::Progress);
+            }
         }
-        self.replay_or_next_event(patience)
-    }
-
-    fn replay_or_next_event(&mut self, patience: Duration) -> Result<Step, StreamError> {
-        if let Some(session) = self.session.as_mut().filter(|session| session.phase.replay().is_some()) {
-            session.continue_replay()?;
-            return Ok(Step::Progress);
-        }
-        self.next_event(patience)
-    }
-
-    fn next_event(&mut self, patience: Duration) -> Result<Step, StreamError> {
         // A new geometry would discard the volume that is frozen.
         let shows_frozen = self.is_frozen && self.session.is_some();
         if self.next_header.is_some() && !shows_frozen {
@@ -267,12 +208,62 @@ impl Stream {
         if let Some(end) = &self.end {
             return Ok(Step::End(end.clone()));
         }
-        let step = match self.feed.next(patience) {
-            Some(Arrived { event, at }) => self.take(event, at),
-            None => Ok(Step::Progress),
-        };
+        let arrived = self.feed.next(patience);
+        if let Some(session) = &mut self.session {
+            session.phase.drained(arrived.is_none());
+        }
+        let step = arrived.map_or(Ok(Step::Progress), |Arrived { event, at }| self.take(event, at));
         self.submit_last()?;
         step
+    }
+
+    /// Waits for the picture in flight.
+    fn finish_picture(&mut self, is_ending: bool) -> Result<Step, StreamError> {
+        let Some(session) = &mut self.session else { return Ok(Step::Progress) };
+        let queued = if session.pool.is_rolling() && !is_ending { self.feed.waiting() } else { 0 };
+        let picture = session.finish(queued, &mut self.statistics)?;
+        let is_coarse = self.draw_in_full()?;
+        Ok(Step::Picture(FinishedPicture { is_coarse, ..picture }))
+    }
+
+    /// The first picture is there: what follows is drawn in full. True if it had fewer rays.
+    fn draw_in_full(&mut self) -> Result<bool, StreamError> {
+        let was_coarse = std::mem::take(&mut self.is_coarse) && coarse(&self.settings) != self.settings;
+        if let (true, Some(session), Some(header)) = (was_coarse, &mut self.session, &self.header) {
+            let full = views(header, &self.settings, self.full.as_ref(), &self.options)?;
+            session.pending = Pending::Ready(full);
+        }
+        Ok(was_coarse)
+    }
+
+    /// Begins a picture if there is anything new to show. None if there is nothing that a step would end with.
+    fn begin_picture(&mut self) -> Result<Option<Step>, StreamError> {
+        let Some(session) = &mut self.session else { return Ok(None) };
+        if let Some(folder) = &self.options.shaders
+            && let Some(changed) = folder.take_changed()
+        {
+            match session.reload_shaders(&changed) {
+                Ok(()) => folder.accept(),
+                Err(error) if error.is_device_lost() => return Err(error.into()),
+                // The previous pipelines remain.
+                Err(error) => folder.refuse(changed, error.to_string()),
+            }
+        }
+        match session.begin()? {
+            Begun::Picture => return Ok(Some(Step::Progress)),
+            Begun::Refused(fault) => {
+                // Another geometry or device does not try the refused settings again.
+                if session.pending.is_none() {
+                    let shown = session.views.first().settings.clone();
+                    let ray = if self.is_coarse { self.settings.ray.clone() } else { shown.ray.clone() };
+                    (self.settings, self.full) = (Settings { ray, ..shown }, None);
+                }
+                return Ok(Some(Step::Fault(fault)));
+            }
+            Begun::Restore(volume) => session.restore(volume, &self.cine),
+            Begun::Nothing => {}
+        }
+        Ok(None)
     }
 
     /// True if the next geometry can begin: what it needs is compiled, or will be when it begins. Otherwise that is being compiled.
@@ -367,25 +358,13 @@ impl Stream {
                 let is_new = self.session.is_none() || Some(&*header) != self.header.as_ref();
                 self.next_header = is_new.then_some(*header);
             }
-            Event::Frame(_) | Event::Lines { first: 0, .. } if self.passes_over() => self.statistics.frozen += 1,
-            Event::Lines { .. } if self.passes_over() => {}
+            Event::Frame(_) if self.passes_over() => self.statistics.frozen += 1,
             Event::Frame(mut frame) => {
                 frame.volume = frame.volume.saturating_add(self.volume_base);
-                let result = self.upload(&frame, None, at);
-                self.look_at(&frame, None);
+                let result = self.upload(&frame, at);
+                self.look_at(&frame);
                 if matches!(result, Ok(Step::Progress)) {
                     self.cine.frame(frame);
-                }
-                return result;
-            }
-            Event::Lines { mut frame, first } => {
-                frame.volume = frame.volume.saturating_add(self.volume_base);
-                let result = self.upload(&frame, Some(first), at);
-                self.look_at(&frame, Some(first));
-                if let (Ok(Step::Progress), Some(session)) = (&result, &self.session) {
-                    let (total, lines) =
-                        (session.renderer.frame_bytes(), session.renderer.scene().frame_size()[1] as usize);
-                    self.cine.lines(frame, first * (total / lines), total);
                 }
                 return result;
             }
@@ -398,7 +377,8 @@ impl Stream {
                 self.session.iter_mut().for_each(|session| session.pool.end());
                 self.end = Some(why);
             }
-            Event::Idle => {}
+            // The feed assembles lines.
+            Event::Lines { .. } | Event::Idle => {}
         }
         Ok(Step::Progress)
     }
@@ -409,52 +389,31 @@ impl Stream {
         self.is_frozen || self.next_header.is_some()
     }
 
-    /// Uploads a whole frame, or lines of one from line `first` on.
-    fn upload(&mut self, frame: &Frame, first: Option<usize>, at: Instant) -> Result<Step, StreamError> {
-        self.statistics.frames += u64::from(first.unwrap_or(0) == 0);
+    /// Uploads a frame.
+    fn upload(&mut self, frame: &Frame, at: Instant) -> Result<Step, StreamError> {
+        self.statistics.frames += 1;
         let feed = &self.feed;
         let Some(session) = &mut self.session else {
             return Ok(Step::Fault("a frame has a geometry that was not announced or cannot be drawn".into()));
         };
-        let (slice, slices) = (frame.slice as u32, session.renderer.scene().slices());
-        let (got, expected) = (frame.bytes.len(), session.renderer.frame_bytes());
-        // Checked before the frame's volume number has any effect.
-        let wrong = match first {
-            _ if frame.slice >= slices as usize => Some(GpuError::FrameSlice { slice, slices }),
-            None if got != expected => Some(GpuError::FrameSize { got, expected }),
-            _ => None,
-        };
-        let first = first.unwrap_or(0) as u32;
-        // The image of a frame that is complete.
-        let uploaded = match wrong {
-            Some(wrong) => Err(wrong),
-            None => match session.pool.place(frame.volume, || feed.is_behind(frame.volume - self.volume_base)) {
-                Some(image) => session
-                    .renderer
-                    .lines(slice, first, &frame.bytes, image)
-                    .map(|is_complete| is_complete.then_some(image)),
-                None => Ok(None),
-            },
-        };
-        match uploaded {
-            Ok(Some(image)) => {
-                session.frame_arrived(image, frame.volume, at);
-                self.newest = self.newest.max(Some(frame.volume));
-                session.pool.arrived(frame.slice, frame.backward);
-                Ok(Step::Progress)
-            }
-            Ok(None) => Ok(Step::Progress),
-            Err(error @ (GpuError::FrameSize { .. } | GpuError::FrameLines { .. } | GpuError::FrameSlice { .. })) => {
-                self.statistics.refused += 1;
-                Ok(Step::Fault(error.to_string()))
-            }
-            Err(error) => Err(error.into()),
+        // Before the frame's volume number has any effect.
+        if let Err(refused) = session.renderer.check_frame(frame.slice, &frame.bytes) {
+            self.statistics.refused += 1;
+            return Ok(Step::Fault(refused.to_string()));
         }
+        let image = session.pool.place(frame.volume, || feed.is_behind(frame.volume - self.volume_base));
+        if let Some(image) = image {
+            session.renderer.frame(frame.slice as u32, &frame.bytes, image)?;
+            session.frame_arrived(image, frame.volume, at);
+            self.newest = self.newest.max(Some(frame.volume));
+            session.pool.arrived(frame.slice, frame.backward);
+        }
+        Ok(Step::Progress)
     }
 
     /// Looks for the levels of the first whole volume, and draws by them from then on.
-    fn look_at(&mut self, frame: &Frame, first: Option<usize>) {
-        let Some(found) = self.first_volume.as_mut().and_then(|search| search.frame(frame, first)) else { return };
+    fn look_at(&mut self, frame: &Frame) {
+        let Some(found) = self.first_volume.as_mut().and_then(|search| search.frame(frame)) else { return };
         // A user may have changed settings meanwhile. The caller knows, and lays its own over these.
         match found.settings().map(|settings| Settings { picture: self.settings.picture.clone(), ..settings }) {
             Ok(settings) => {

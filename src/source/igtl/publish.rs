@@ -7,11 +7,9 @@ use super::message::{Coordinates, Image, Message, Region, Scalar};
 use super::server::{Server, ServerOptions, ServerStatistics, now};
 use crate::convert::{Volume, lattice};
 use crate::live::Event;
-use crate::parts::FrameParts;
 use crate::probe::{Geometry, Grid, World};
 use crate::{Frame, Header};
 use glam::{DAffine3, DVec3};
-use std::borrow::Cow;
 use std::io;
 use std::net::SocketAddr;
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
@@ -150,7 +148,7 @@ impl Publisher {
     /// What is to see every event of a source: it hands over each volume that is whole.
     pub fn listener(&self) -> impl FnMut(&Event) + Send + use<> {
         let (shared, server) = (self.shared.clone(), self.server.clone());
-        let mut listener = Listener { shared, server, header: None, filling: None, partial: FrameParts::default() };
+        let mut listener = Listener { shared, server, header: None, filling: None };
         move |event| listener.look_at(event)
     }
 }
@@ -273,7 +271,6 @@ struct Listener {
     header: Option<Header>,
     /// The volume that is being collected, and its number.
     filling: Option<(u32, Box<Whole>)>,
-    partial: FrameParts,
 }
 
 impl Listener {
@@ -281,23 +278,12 @@ impl Listener {
         match event {
             Event::Begin(header) => {
                 self.header = Some((**header).clone());
-                self.begin_again();
+                self.filling = None;
             }
-            _ if !self.server.has_clients() => self.begin_again(),
+            _ if !self.server.has_clients() => self.filling = None,
             Event::Frame(frame) => self.frame(frame.clone()),
-            Event::Lines { frame, first } => {
-                let Some((line, total)) = self.header.as_ref().map(Header::line_and_frame) else { return };
-                if let Some(frame) = self.partial.add(Cow::Borrowed(frame), first * line, total) {
-                    self.frame(frame);
-                }
-            }
             _ => {}
         }
-    }
-
-    /// Forgets the volume and the frame that are not whole.
-    fn begin_again(&mut self) {
-        (self.filling, self.partial) = (None, FrameParts::default());
     }
 
     fn frame(&mut self, frame: Frame) {

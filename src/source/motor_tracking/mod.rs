@@ -19,13 +19,12 @@ pub use passes::TrackingCounts;
 
 use super::frame::{Frame, Header, Source};
 use super::live::{Event, Live};
-use super::parts::FrameParts;
+use super::parts::WholeFrames;
 use super::phantom::{Phantom, PhantomOptions, PhantomSource};
 use crate::files::InputError;
 use crate::probe::motor::{ArrayState, BackgroundSweep, PositionLog};
 use crate::probe::{Advance, Axis, Geometry, Motion, Probe};
 use passes::{MAX_FILLED, Passes};
-use std::borrow::Cow;
 use std::collections::VecDeque;
 use std::time::{Duration, Instant};
 
@@ -60,14 +59,12 @@ pub struct MotorTrackingOptions {
 ///
 /// Memory: 32 frames that wait for a position, two that may be the nearest to their slice, and copies for missing slices.
 pub struct MotorTracked {
-    source: Box<dyn Live>,
+    source: WholeFrames,
     motor: BackgroundSweep,
     options: MotorTrackingOptions,
     tracking: Option<Tracking>,
     /// Frames that are not placed yet: the time of the first line on the motor's clock, until when they wait, and the frame.
     waiting: VecDeque<(f64, Instant, Frame)>,
-    /// A frame whose lines are arriving.
-    lines: FrameParts,
     out: VecDeque<Event>,
     /// Why the source ended.
     ended: Option<Option<String>>,
@@ -82,20 +79,17 @@ struct Tracking {
     passes: Passes,
     /// Time that sound needs for a frame, s.
     frame_time: f64,
-    /// Of a line and of a frame, bytes.
-    sizes: (usize, usize),
 }
 
 impl MotorTracked {
     /// Places the frames of `source` by the positions of `motor`.
     pub fn new(source: Box<dyn Live>, motor: BackgroundSweep, options: MotorTrackingOptions) -> MotorTracked {
         MotorTracked {
-            source,
+            source: WholeFrames::new(source),
             motor,
             options,
             tracking: None,
             waiting: VecDeque::new(),
-            lines: FrameParts::default(),
             out: VecDeque::new(),
             ended: None,
             counts: TrackingCounts::default(),
@@ -114,18 +108,10 @@ impl MotorTracked {
         match event {
             Event::Begin(header) => self.begin(*header),
             Event::Frame(frame) => self.arrived(frame),
-            Event::Lines { frame, first } => self.lines(frame, first),
             Event::Fault(fault) => self.out.push_back(Event::Fault(fault)),
-            Event::Idle => {}
+            // Frames are whole.
+            Event::Lines { .. } | Event::Idle => {}
             Event::End(why) => self.ended = Some(why),
-        }
-    }
-
-    /// A frame that arrives in parts is placed when it is complete.
-    fn lines(&mut self, frame: Frame, first: usize) {
-        let Some(Tracking { sizes: (line, total), .. }) = self.tracking else { return };
-        if let Some(frame) = self.lines.add(Cow::Owned(frame), first * line, total) {
-            self.arrived(frame);
         }
     }
 
@@ -134,13 +120,11 @@ impl MotorTracked {
         if let Some(mut tracking) = self.tracking.take() {
             tracking.passes.end(&mut self.counts, &mut self.out);
         }
-        self.lines = FrameParts::default();
         match motor_header(header, self.motor.speed()) {
             Ok((header, slices, frame_time)) => {
-                let sizes = header.line_and_frame();
                 self.out.push_back(Event::Begin(Box::new(header)));
                 self.warn_of_edges(&slices);
-                self.tracking = Some(Tracking { passes: Passes::new(slices), frame_time, sizes });
+                self.tracking = Some(Tracking { passes: Passes::new(slices), frame_time });
             }
             Err(fault) => self.ended = Some(Some(fault)),
         }

@@ -222,35 +222,6 @@ fn sweeps(geometry: &Geometry, stored: StoredType, pose: Option<DAffine3>) -> Sw
     }
 }
 
-/// Prevents volumes of lines that were lost on the way: what the client gets has every line in its place.
-#[test]
-fn lines_that_do_not_follow_one_another_make_no_volume() {
-    let publisher = Publisher::bind(HERE, None, ServerOptions::default()).expect("a free port");
-    let client = Client::connect(&publisher.address().to_string(), super::client::quick()).expect("a thread");
-    until("a client", || (publisher.statistics().server.clients == 1).then_some(()));
-    let grid = Grid { size: [2, 3, 2], spacing: [1.0; 3], origin: [0.0; 3] };
-    let sweeps = sweeps(&Geometry::Cartesian(grid), StoredType::U8, None);
-    let mut listener = publisher.listener();
-    listener(&Event::Begin(Box::new(Header { range: [0.0, 255.0], ..sweeps.header })));
-    let line = |volume: u32, slice: usize, first: usize| {
-        let bytes = sweeps.frames[slice].bytes[2 * first..2 * first + 2].to_vec();
-        Event::Lines { frame: Frame { volume, bytes, ..sweeps.frames[slice].clone() }, first }
-    };
-    // A middle line is lost, two are swapped, one comes again: as many bytes as a frame has, or more.
-    for (volume, lines) in [&[0, 2][..], &[0, 2, 1], &[0, 0, 2], &[0, 1, 1], &[1, 2, 2]].into_iter().enumerate() {
-        for slice in 0..2 {
-            lines.iter().for_each(|first| listener(&line(volume as u32, slice, *first)));
-        }
-    }
-    for slice in 0..2 {
-        (0..3).for_each(|first| listener(&line(9, slice, first)));
-    }
-    drop(listener);
-    let Message::Image(image) = take(&client) else { panic!("a volume") };
-    assert_eq!(image.bytes, [&sweeps.frames[0].bytes[..], &sweeps.frames[1].bytes].concat());
-    assert_eq!(publisher.finish().volumes, 1);
-}
-
 /// The first volume that a client gets of a stream, and the first picture.
 fn published(geometry: &Geometry, stored: StoredType, pose: Option<DAffine3>, spacing: Option<f64>) -> [Image; 2] {
     let publisher = Publisher::bind(HERE, spacing, ServerOptions::default()).expect("a free port");

@@ -26,6 +26,7 @@ pub fn outcome(group: &str, name: &str, verdict: Verdict) -> Outcome {
         faults: Vec::new(),
         notes: Vec::new(),
         pictures: Vec::new(),
+        failed_before: 0,
     }
 }
 
@@ -192,7 +193,17 @@ pub fn any_run() -> impl Strategy<Value = Run> {
             // Names must be unique.
             figures.iter_mut().enumerate().for_each(|(i, figure)| figure.what.push_str(&i.to_string()));
             let (group, name) = (format!("{group}g"), format!("{name}{i}"));
-            run.outcomes.push(Outcome { group, name, verdict, seconds, figures, faults, notes, pictures: Vec::new() });
+            run.outcomes.push(Outcome {
+                group,
+                name,
+                verdict,
+                seconds,
+                figures,
+                faults,
+                notes,
+                failed_before: 0,
+                pictures: Vec::new(),
+            });
         }
         run
     })

@@ -1,0 +1,139 @@
+//! The queues of a device, as one user of them sees it: the barriers and waits that order its work, what of that is done, and how long it took.
+
+use super::context::Context;
+use super::error::GpuError;
+use super::timeline::Timelines;
+use super::timing::Timings;
+use crate::barriers::{Access, Barrier, PipelineStage, PipelineStages};
+use crate::queues::oracle::{Event, SubmissionLog};
+use crate::queues::{QueueTracker, Wait};
+use ash::vk;
+use std::sync::Arc;
+
+/// What orders everything that uses the same slots, a count of its barriers, and its times. It records the barriers that [`crate::barriers`] derives
+/// as Vulkan commands.
+pub(crate) struct DeviceQueues {
+    pub tracker: QueueTracker,
+    pub(super) timelines: Timelines,
+    pub timings: Timings,
+    /// Number of barriers recorded so far.
+    pub count: u32,
+    /// The names and invocations of the dispatched passes, in order, while they are counted.
+    pub dispatched: Option<Vec<(&'static str, [u32; 3])>>,
+    /// Fault injection: leaves out the n-th barrier.
+    pub drop_barrier: Option<u32>,
+    /// Everything recorded and submitted, if it is logged.
+    pub log: Option<SubmissionLog>,
+}
+
+impl DeviceQueues {
+    /// The first `count` queues. `spans`: each operation of host and device has its span.
+    pub fn new(context: &Arc<Context>, count: usize, spans: bool) -> Result<DeviceQueues, GpuError> {
+        Ok(DeviceQueues {
+            tracker: QueueTracker::new(count),
+            timelines: Timelines::new(context, count)?,
+            timings: Timings::new(context, spans),
+            count: 0,
+            dispatched: None,
+            drop_barrier: None,
+            log: None,
+        })
+    }
+
+    /// Blocks until everything submitted is done.
+    pub(crate) fn wait_all(&self) -> Result<(), GpuError> {
+        self.timelines.wait_all()
+    }
+
+    /// Runs host work, and records its span if spans are enabled.
+    pub fn host<T>(&mut self, name: &'static str, work: impl FnOnce(&mut DeviceQueues) -> T) -> T {
+        let begin = self.timings.since_began();
+        let done = work(self);
+        self.timings.add_host(name, begin);
+        done
+    }
+
+    /// Records the barrier that an operation with these accesses needs, if it needs one.
+    pub(super) fn before(&mut self, context: &Context, queue: usize, commands: vk::CommandBuffer, accesses: &[Access]) {
+        let barrier = self.tracker.record(queue, accesses);
+        self.count += u32::from(barrier.is_some());
+        let is_dropped = self.drop_barrier == Some(self.count);
+        // A transfer queue has no shader stages.
+        let computes = context.queue(queue).computes;
+        let supported = |all: PipelineStages| if computes { all } else { all.without(PipelineStage::Compute) };
+        let barrier = barrier.filter(|_| !is_dropped).map(|b| Barrier { from: supported(b.from), to: supported(b.to) });
+        if let Some(log) = &mut self.log {
+            log.record(queue, barrier, accesses);
+        }
+        let Some(Barrier { from, to }) = barrier else { return };
+        let barrier = [vk::MemoryBarrier2::default()
+            .src_stage_mask(stages(from))
+            .src_access_mask(writes(from))
+            .dst_stage_mask(stages(to))
+            .dst_access_mask(reads(to) | writes(to))];
+        let dependency = vk::DependencyInfo::default().memory_barriers(&barrier);
+        // SAFETY: the command buffer is being recorded, outside any render pass.
+        unsafe { context.device.cmd_pipeline_barrier2(commands, &dependency) };
+    }
+
+    /// A time stamp was recorded on this queue.
+    pub(super) fn stamped(&mut self, queue: usize) {
+        self.log.iter_mut().for_each(|log| log.event(queue, Event::Stamp));
+    }
+
+    /// Begins the recording of a submission to this queue.
+    pub(super) fn begin(&mut self, queue: usize) {
+        self.tracker.begin(queue);
+        self.log.iter_mut().for_each(|log| log.begin(queue));
+    }
+
+    /// The recording of this queue was submitted with these waits; it is done at this value of the queue's timeline.
+    pub(super) fn submitted(&mut self, queue: usize, waits: &[Wait], value: u64) {
+        self.tracker.submitted(queue, waits, value);
+        self.log.iter_mut().for_each(|log| log.submit(queue, waits, value));
+    }
+}
+
+fn flags<T: std::ops::BitOr<Output = T> + Default>(workers: PipelineStages, of: [(PipelineStage, T); 3]) -> T {
+    of.into_iter().filter(|(worker, _)| workers.has(*worker)).fold(T::default(), |all, (_, flags)| all | flags)
+}
+
+fn stages(workers: PipelineStages) -> vk::PipelineStageFlags2 {
+    flags(
+        workers,
+        [
+            (PipelineStage::Compute, vk::PipelineStageFlags2::COMPUTE_SHADER),
+            (PipelineStage::Copy, vk::PipelineStageFlags2::ALL_TRANSFER),
+            (PipelineStage::Host, vk::PipelineStageFlags2::HOST),
+        ],
+    )
+}
+
+fn writes(workers: PipelineStages) -> vk::AccessFlags2 {
+    flags(
+        workers,
+        [
+            (PipelineStage::Compute, vk::AccessFlags2::SHADER_STORAGE_WRITE),
+            (PipelineStage::Copy, vk::AccessFlags2::TRANSFER_WRITE),
+            (PipelineStage::Host, vk::AccessFlags2::NONE),
+        ],
+    )
+}
+
+fn reads(workers: PipelineStages) -> vk::AccessFlags2 {
+    flags(
+        workers,
+        [
+            // Numbers of passes are written by the host, and need no barrier. But their buffer may take memory that a readback had before:
+            // the host waited in between, which layers older than 1.3.297 do not know of timelines.
+            (
+                PipelineStage::Compute,
+                vk::AccessFlags2::SHADER_SAMPLED_READ
+                    | vk::AccessFlags2::SHADER_STORAGE_READ
+                    | vk::AccessFlags2::UNIFORM_READ,
+            ),
+            (PipelineStage::Copy, vk::AccessFlags2::TRANSFER_READ),
+            (PipelineStage::Host, vk::AccessFlags2::HOST_READ),
+        ],
+    )
+}

@@ -1,0 +1,270 @@
+//! What is recorded for the queue that draws: pictures, and copies between slots and the host.
+
+use super::RendererOptions;
+use crate::bands::BandLimit;
+use crate::buffers::{Readback, Upload};
+use crate::command_recorder::{CommandRecorder, Dispatch, SlotParts};
+use crate::context::Context;
+use crate::device_queues::DeviceQueues;
+use crate::error::GpuError;
+use crate::passes::Slot;
+use crate::passes::slots::Format;
+use crate::plan::Work;
+use crate::resources::{Image, SlotResources};
+use crate::scene::Scene;
+use std::sync::Arc;
+
+/// The picture in the making or the last one, and the buffers of copies. What returns an error fails where the device does.
+pub(super) struct Drawing {
+    // Dropped first.
+    recorder: CommandRecorder,
+    /// `None` if pictures stay on the device.
+    readback: Option<Readback>,
+    /// Buffers of a single copy, kept until the device is done with them.
+    uploads: Vec<Upload>,
+    unread: Vec<Readback>,
+    context: Arc<Context>,
+    /// `None` if no dispatch is divided.
+    limit: Option<BandLimit>,
+    /// A picture has been submitted and not waited for.
+    is_in_flight: bool,
+    /// The picture's image holds a picture, or will when the device is done.
+    has_picture: bool,
+    /// How much of the picture was drawn last.
+    work: Work,
+    /// The value of queue 0's timeline at which the last presentation is done.
+    presented: u64,
+}
+
+impl Drawing {
+    pub fn new(
+        context: &Arc<Context>,
+        scene: &Scene,
+        options: &RendererOptions,
+        queues: &mut DeviceQueues,
+    ) -> Result<Drawing, GpuError> {
+        let is_software = context.candidate.is_software();
+        let limit = match options.paced && queues.tracker.count() == 1 {
+            true => BandLimit::paced(options.bands, is_software),
+            false => BandLimit::new(options.bands, is_software),
+        };
+        if let Some(limit) = limit.filter(|_| options.paced) {
+            queues.timelines.pace(limit.in_flight());
+        }
+        Ok(Drawing {
+            recorder: CommandRecorder::new(context, 0, "picture", options.time_stamps, options.spans)?,
+            readback: options.readback.then(|| readback(context, scene)).transpose()?,
+            uploads: Vec::new(),
+            unread: Vec::new(),
+            context: context.clone(),
+            limit,
+            is_in_flight: false,
+            has_picture: false,
+            work: Work::Rays,
+            presented: 0,
+        })
+    }
+
+    /// Fits the buffer of the picture to the scene.
+    pub fn fit(&mut self, scene: &Scene) -> Result<(), GpuError> {
+        if self.readback.as_ref().is_some_and(|r| r.size != Slot::Screen.bytes(scene)) {
+            self.readback = Some(readback(&self.context, scene)?);
+        }
+        Ok(())
+    }
+
+    /// Clears new images of slots. If that of the picture is among them, there is no picture any more.
+    pub fn clear(
+        &mut self,
+        queues: &mut DeviceQueues,
+        slots: &SlotResources,
+        new: &[(Slot, u32)],
+    ) -> Result<(), GpuError> {
+        self.has_picture &= !new.iter().any(|(slot, _)| *slot == Slot::Screen);
+        if new.is_empty() {
+            return Ok(());
+        }
+        self.recorder.begin(queues)?;
+        self.recorder.clear_new(queues, slots, new);
+        self.recorder.submit(queues)
+    }
+
+    /// Uploads the texels of a slot, and waits. Nothing that reads it may be in flight.
+    pub fn upload(
+        &mut self,
+        queues: &mut DeviceQueues,
+        slots: &SlotResources,
+        slot: Slot,
+        bytes: &[u8],
+    ) -> Result<(), GpuError> {
+        let Some(there) = slots.image(slot, 0) else { return Ok(()) };
+        // Before the recording: what was begun has to be submitted.
+        let (upload, place) = self.staged("upload", there, (slot, 0), bytes)?;
+        self.recorder.begin(queues)?;
+        // A layer that tracks submissions of two threads forgets what was between this upload and the last one.
+        self.recorder.show_layer_the_wait();
+        self.recorder.upload(queues, &upload, there, place);
+        self.uploads.push(upload);
+        self.recorder.submit(queues)?;
+        queues.wait_all()?;
+        self.uploads.clear();
+        Ok(())
+    }
+
+    /// The current bytes of an image slot, of this volume image where there are several, its texels along x, y, z, and their format.
+    pub(crate) fn bring_back(
+        &mut self,
+        queues: &mut DeviceQueues,
+        slots: &SlotResources,
+        (slot, image): (Slot, u32),
+    ) -> Result<Option<(Readback, [usize; 3], Format)>, GpuError> {
+        let Some(there) = slots.image(slot, image) else { return Ok(None) };
+        // Before the recording: what was begun has to be submitted.
+        let buffer = Readback::new(&self.context, "read", there.shape, there.format.texel_bytes())?;
+        self.recorder.collect(queues)?;
+        self.recorder.begin(queues)?;
+        let buffer = self.copy_out(queues, there, (slot, image), buffer, CommandRecorder::submit)?;
+        Ok(Some((buffer, there.shape.size(), there.format)))
+    }
+
+    /// Begins the recording of a picture, of which this much is drawn.
+    pub fn begin(&mut self, queues: &mut DeviceQueues, work: Work) -> Result<(), GpuError> {
+        self.work = work;
+        self.recorder.collect(queues)?;
+        self.recorder.begin(queues)?;
+        // Those of the last picture, which is done.
+        self.uploads.clear();
+        Ok(())
+    }
+
+    /// Records a dispatch of the picture.
+    pub fn dispatch(&mut self, queues: &mut DeviceQueues, dispatch: &Dispatch) -> Result<(), GpuError> {
+        self.recorder.dispatch(queues, dispatch, self.limit.as_ref())
+    }
+
+    /// Does what was recorded of the picture, and copies an image slot to the host. The recording goes on afterwards.
+    pub fn fetch(
+        &mut self,
+        queues: &mut DeviceQueues,
+        slots: &SlotResources,
+        name: &'static str,
+        place: (Slot, u32),
+    ) -> Result<Option<Readback>, GpuError> {
+        let Some(there) = slots.image(place.0, place.1) else { return Ok(None) };
+        let buffer = Readback::new(&self.context, name, there.shape, there.format.texel_bytes())?;
+        self.copy_out(queues, there, place, buffer, CommandRecorder::cut).map(Some)
+    }
+
+    /// Records a copy of a slot, of this volume image where there are several, `submit`s and waits.
+    fn copy_out(
+        &mut self,
+        queues: &mut DeviceQueues,
+        there: &Image,
+        (slot, image): (Slot, u32),
+        buffer: Readback,
+        submit: fn(&mut CommandRecorder, &mut DeviceQueues) -> Result<(), GpuError>,
+    ) -> Result<Readback, GpuError> {
+        self.recorder.copy_out(queues, there, slot, if slot.is_multibuffered() { image } else { 0 }, &buffer);
+        match submit(&mut self.recorder, queues).and_then(|()| queues.wait_all()) {
+            Ok(()) => Ok(buffer),
+            Err(error) => {
+                // The copy may still be running: the buffer must outlive it.
+                self.unread.push(buffer);
+                Err(error)
+            }
+        }
+    }
+
+    /// Records an upload to a slot, of this volume image where there are several, as part of the picture.
+    pub(crate) fn record_upload(
+        &mut self,
+        queues: &mut DeviceQueues,
+        slots: &SlotResources,
+        name: &'static str,
+        (slot, image): (Slot, u32),
+        texels: &[u8],
+    ) -> Result<(), GpuError> {
+        let Some(there) = slots.image(slot, image) else { return Ok(()) };
+        let (upload, place) = self.staged(name, there, (slot, image), texels)?;
+        self.recorder.upload(queues, &upload, there, place);
+        self.uploads.push(upload);
+        Ok(())
+    }
+
+    fn staged(
+        &self,
+        name: &'static str,
+        there: &Image,
+        (slot, image): (Slot, u32),
+        texels: &[u8],
+    ) -> Result<(Upload, SlotParts), GpuError> {
+        let copy = if slot.is_multibuffered() { image } else { 0 };
+        let place = SlotParts { slot, copy, parts: 0..there.shape.parts() };
+        Ok((Upload::new(&self.context, name, there.layout(), place.parts.clone(), texels)?, place))
+    }
+
+    /// Submits the picture.
+    pub fn submit(&mut self, queues: &mut DeviceQueues, slots: &SlotResources) -> Result<(), GpuError> {
+        if let (Some(screen), Some(readback)) = (slots.image(Slot::Screen, 0), &self.readback) {
+            self.recorder.copy_out(queues, screen, Slot::Screen, 0, readback);
+            self.recorder.stamp(queues, "readback");
+        }
+        queues.host("submit", |queues| self.recorder.submit(queues))?;
+        (self.is_in_flight, self.has_picture) = (true, true);
+        Ok(())
+    }
+
+    /// A picture has been submitted and not waited for.
+    pub(crate) fn is_in_flight(&self) -> bool {
+        self.is_in_flight
+    }
+
+    /// There is a picture of the current size, done or in flight.
+    pub(crate) fn has_picture(&self) -> bool {
+        self.has_picture
+    }
+
+    /// The device is at work on a picture. Submits what is held back of it and due.
+    pub fn is_drawing(&self, queues: &DeviceQueues) -> Result<bool, GpuError> {
+        Ok(self.is_in_flight && !self.recorder.is_done(queues)?)
+    }
+
+    /// How much of the last picture was drawn.
+    pub fn work(&self) -> Work {
+        self.work
+    }
+
+    /// Waits for the picture in flight.
+    pub fn wait(&mut self, queues: &mut DeviceQueues) -> Result<(), GpuError> {
+        if self.is_in_flight {
+            queues.host("wait", |queues| self.recorder.wait(queues))?;
+            self.is_in_flight = false;
+        }
+        Ok(())
+    }
+
+    /// Adds the times of the last picture, when it is done.
+    pub fn collect(&mut self, queues: &mut DeviceQueues) -> Result<(), GpuError> {
+        self.recorder.collect(queues)
+    }
+
+    /// The last picture on the host, which must have been waited for; `None` if pictures stay on the device.
+    pub fn readback(&self) -> Option<&Readback> {
+        self.readback.as_ref()
+    }
+
+    /// The picture was presented by what was submitted last.
+    #[cfg(feature = "view")]
+    pub fn presented(&mut self, queues: &DeviceQueues) {
+        self.presented = queues.timelines.of(0).submitted;
+    }
+
+    /// Waits until the last presentation has read the picture's image.
+    pub(crate) fn wait_presented(&self, queues: &DeviceQueues) -> Result<(), GpuError> {
+        queues.timelines.of(0).wait(self.presented)
+    }
+}
+
+fn readback(context: &Arc<Context>, scene: &Scene) -> Result<Readback, GpuError> {
+    Readback::new(context, "readback", Slot::Screen.shape(scene), Slot::Screen.format(scene).texel_bytes())
+}

@@ -1,0 +1,122 @@
+//! The volume images of a renderer: which of them pictures show, what of them passes have to process again, and what the CPU found in them.
+
+use crate::error::GpuError;
+use crate::passes::Slot;
+use crate::passes::slots::Search;
+use crate::passes::unveil::Unveiled;
+use crate::plan::{Step, affected};
+use crate::scene::{Scene, VisibleBounds};
+use std::ops::Range;
+
+/// The state of each volume image.
+pub(super) struct Volumes {
+    count: u32,
+    shown: u32,
+    /// By volume image and slice: the passes over the volume have not processed it yet.
+    unprocessed: Vec<Vec<bool>>,
+    /// The smallest region that stage 1 has filtered for any frame since the last reset.
+    filtered: VisibleBounds,
+    /// What the CPU found and the device has: the slot that holds it, and the volume image that it was found in.
+    found: Vec<(Slot, u32)>,
+    /// By volume image: what the CPU found of its volume, where the render start follows the fluid.
+    unveiled: Vec<Option<Unveiled>>,
+}
+
+impl Volumes {
+    /// This many images, of which nothing is processed.
+    pub fn new(count: u32, scene: &Scene) -> Volumes {
+        let mut volumes = Volumes {
+            count,
+            shown: 0,
+            unprocessed: Vec::new(),
+            filtered: scene.visible_bounds,
+            found: Vec::new(),
+            unveiled: vec![None; count as usize],
+        };
+        volumes.invalidate(scene);
+        volumes
+    }
+
+    /// # Errors
+    /// There is no such image.
+    pub fn check(&self, image: u32) -> Result<(), GpuError> {
+        if image < self.count { Ok(()) } else { Err(GpuError::VolumeImage { image, images: self.count }) }
+    }
+
+    /// The image that pictures show.
+    pub fn shown(&self) -> u32 {
+        self.shown
+    }
+
+    pub fn show(&mut self, image: u32) {
+        self.shown = image;
+    }
+
+    /// Every slice of every image has to be processed.
+    pub fn invalidate(&mut self, scene: &Scene) {
+        self.unprocessed = vec![vec![true; scene.slices() as usize]; self.count as usize];
+    }
+
+    /// A slice is replaced.
+    pub fn replaced(&mut self, image: u32, slice: u32) {
+        self.unprocessed[image as usize][slice as usize] = true;
+        self.found.retain(|(_, of)| *of != image);
+    }
+
+    /// The smallest region that stage 1 has filtered for any frame since it was last set.
+    pub fn filtered(&self) -> VisibleBounds {
+        self.filtered
+    }
+
+    /// Stage 1 filters this region from now on.
+    pub(crate) fn set_filtered(&mut self, bounds: VisibleBounds) {
+        self.filtered = bounds;
+    }
+
+    /// The slices of the image shown that a pass over the volume has to process.
+    pub(crate) fn due_slices(&self, step: &Step, scene: &Scene) -> Vec<Range<u32>> {
+        let (low, high) = (scene.visible_bounds.low[2], scene.visible_bounds.high[2]);
+        let runs = affected(&self.unprocessed[self.shown as usize], step.reach(scene)).into_iter();
+        runs.map(|run| run.start.max(low)..run.end.min(high)).filter(|run| !run.is_empty()).collect()
+    }
+
+    /// All passes over the volume have processed the image shown.
+    pub fn processed(&mut self) {
+        self.unprocessed[self.shown as usize].fill(false);
+    }
+
+    /// What the CPU has to find in the image shown before this pass over it runs, by the slot that takes it. Forgets what these and the pass replace.
+    pub(crate) fn due_searches(&mut self, step: &Step, scene: &Scene) -> Vec<(Slot, Search)> {
+        let (shown, writes) = (self.shown, step.writes(scene));
+        let reads = step.reads(scene).into_iter().filter_map(|slot| Some((slot, slot.search()?)));
+        let due: Vec<_> = reads.filter(|(slot, _)| !self.found.contains(&(*slot, shown))).collect();
+        self.found.retain(|(slot, image)| {
+            // Nothing is known of what is about to be replaced, should this picture fail.
+            let is_replaced = due.iter().any(|(due, _)| due == slot) && (*image == shown || !slot.is_multibuffered());
+            // In a volume that changes it is looked for again.
+            let changes = *image == shown && slot.search().is_some_and(|search| writes.contains(&search.within));
+            !is_replaced && !changes
+        });
+        due
+    }
+
+    /// The device has what was found in the image shown.
+    pub fn found(&mut self, slots: &[Slot]) {
+        self.found.retain(|(slot, _)| slot.is_multibuffered() || !slots.contains(slot));
+        self.found.extend(slots.iter().map(|slot| (*slot, self.shown)));
+    }
+
+    /// Forgets what was found, but for these slots.
+    pub(crate) fn keep_found(&mut self, keeps: impl Fn(Slot) -> bool) {
+        self.found.retain(|(slot, _)| keeps(*slot));
+    }
+
+    /// What the CPU last found before a face in the image shown.
+    pub fn unveiled(&self) -> Option<&Unveiled> {
+        self.unveiled[self.shown as usize].as_ref()
+    }
+
+    pub(crate) fn set_unveiled(&mut self, unveiled: Unveiled) {
+        self.unveiled[self.shown as usize] = Some(unveiled);
+    }
+}

@@ -1,0 +1,120 @@
+//! Makes scenes ready to run on a device: their plans, and the pipelines of these, compiled at once or in the background.
+
+use super::context::Context;
+use super::error::GpuError;
+use super::formats::{self, TexelAccess};
+use super::pipeline_compiler::{AsyncPipelineCompiler, SceneMaker, Wake};
+use super::pipelines::{Pipeline, Pipelines, Shaders};
+use crate::plan::Plan;
+use crate::scene::Scene;
+use std::collections::HashSet;
+use std::sync::Arc;
+
+/// Plans scenes and compiles their pipelines.
+pub(super) struct SceneCompiler {
+    /// Started at its first use. It ends before the pipelines do.
+    background: Option<AsyncPipelineCompiler>,
+    pipelines: Arc<Pipelines>,
+    texel_access: TexelAccess,
+    frames_at_once: Option<u32>,
+    wake: Option<Wake>,
+}
+
+impl SceneCompiler {
+    /// As the fields of the same names of [`super::RendererOptions`].
+    pub fn new(
+        context: &Arc<Context>,
+        shaders: &Arc<Shaders>,
+        texel_access: Option<TexelAccess>,
+        frames_at_once: Option<u32>,
+        wake: Option<Wake>,
+    ) -> Result<SceneCompiler, GpuError> {
+        let texel_access = texel_access.unwrap_or(TexelAccess::for_device(&context.candidate));
+        let pipelines = Pipelines::shared(context, shaders.clone(), texel_access)?;
+        Ok(SceneCompiler { background: None, pipelines, texel_access, frames_at_once, wake })
+    }
+
+    /// How single texels are read.
+    pub fn texel_access(&self) -> TexelAccess {
+        self.texel_access
+    }
+
+    /// The scene with the fields that the device resolves, and its plan.
+    pub fn plan(&self, scene: Scene) -> (Scene, Plan) {
+        let adapted = formats::adapt_scene(self.pipelines.context(), self.texel_access, scene);
+        let scene = Scene { frames_at_once: self.frames_at_once.unwrap_or(adapted.frames_at_once), ..adapted };
+        let plan = Plan::new(&scene);
+        (scene, plan)
+    }
+
+    /// The pipelines of a plan, by step. The rest is as of [`Pipelines::of_plan_while`].
+    ///
+    /// # Errors
+    /// A slot that the device cannot hold, or a shader that does not compile.
+    pub(crate) fn compile_while(
+        &self,
+        plan: &Plan,
+        scene: &Scene,
+        goes_on: &(dyn Fn(usize, usize) -> bool + Sync),
+    ) -> Result<Vec<Arc<Pipeline>>, GpuError> {
+        formats::check(self.pipelines.context(), plan, scene)?;
+        self.pipelines.of_plan_while(plan, scene, goes_on)
+    }
+
+    /// The pipelines of a plan, by step.
+    ///
+    /// # Errors
+    /// A slot that the device cannot hold, or a shader that does not compile.
+    pub fn compile(&self, plan: &Plan, scene: &Scene) -> Result<Vec<Arc<Pipeline>>, GpuError> {
+        self.compile_while(plan, scene, &|_, _| true)
+    }
+
+    /// The pipelines of a plan, of which those that use `shaders` are compiled again.
+    pub(crate) fn recompile(
+        &mut self,
+        shaders: &HashSet<String>,
+        plan: &Plan,
+        scene: &Scene,
+    ) -> Result<Vec<Arc<Pipeline>>, GpuError> {
+        self.pipelines.recompile(shaders, plan, scene)
+    }
+
+    /// Ends what is compiled in the background, which may be the previous source of a shader.
+    pub fn stop(&mut self) {
+        self.background = None;
+    }
+
+    /// True if every pipeline of the scene is compiled. Those that are not are compiled in the background from now on.
+    ///
+    /// # Errors
+    /// A shader that does not compile, a slot that the device cannot hold, a thread that cannot be started.
+    pub fn prepare(&mut self, scene: &Scene) -> Result<bool, GpuError> {
+        let (scene, plan) = self.plan(scene.clone());
+        formats::check(self.pipelines.context(), &plan, &scene)?;
+        self.background()?.prepare(&plan, &scene)
+    }
+
+    fn background(&mut self) -> Result<&mut AsyncPipelineCompiler, GpuError> {
+        let background = match self.background.take() {
+            Some(background) => background,
+            None => AsyncPipelineCompiler::new(&self.pipelines, self.texel_access, self.wake.clone())?,
+        };
+        Ok(self.background.insert(background))
+    }
+
+    /// See [`AsyncPipelineCompiler::warm`].
+    pub fn warm(&mut self, scenes: Vec<SceneMaker>) -> Result<(), GpuError> {
+        self.background()?.warm(scenes);
+        Ok(())
+    }
+
+    /// See [`AsyncPipelineCompiler::stop_warming`].
+    pub fn stop_warming(&self) {
+        self.background.iter().for_each(AsyncPipelineCompiler::stop_warming);
+    }
+
+    /// See [`AsyncPipelineCompiler::is_warming`].
+    pub fn is_warming(&self) -> bool {
+        self.background.as_ref().is_some_and(AsyncPipelineCompiler::is_warming)
+    }
+}
