@@ -129,7 +129,6 @@ fn wide_scenes() -> Vec<SceneSpec> {
     let others = [
         ("planes", "mode = 'orthogonal'\nray.sampling = 'exact'"),
         ("two rays at edges", "mode = 'vr'\nray = { rays = 2, adaptive = true, sampling = 'exact' }"),
-        ("steps by their error", "mode = 'vr'\nray = { tolerance = 0.5, step = 2, sampling = 'exact' }"),
         ("still", "mode = 'vr'\nstill = { samples = 1, events = 4 }\nray.sampling = 'exact'"),
         (
             "cap",
@@ -151,6 +150,13 @@ fn wide_scenes() -> Vec<SceneSpec> {
         ),
         ("diffused distances", "mode = 'sr'\nray.sampling = 'exact'\ndistance = { perona_malik = { repeat = 1 } }"),
     ];
+    // The first rays are cast for every second pixel.
+    for size in ["[159, 9]", "[9, 159]"] {
+        let toml = format!(
+            "mode = 'vr'\nray = {{ tolerance = 0.5, step = 2, sampling = 'exact' }}\npicture.size = {size}\nslices.pixels = 24"
+        );
+        scenes.push(SceneSpec::new(&format!("picture of {size}, steps by their error"), &small, BYTES, toml));
+    }
     for size in ["[79, 9]", "[9, 79]"] {
         let wide = ALL_FILTERS.replace("[37, 29]", size);
         for (name, toml) in MODES {
