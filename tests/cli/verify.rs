@@ -26,7 +26,8 @@ fn kept(folder: &Folder, name: &str, more: &[&str]) -> (String, Run) {
 /// Groups that the command runs, and those that tests/gpu runs in its own process, in passes.rs and verify_groups.rs: all of them would take a
 /// quarter of the gate's time for this command, whose pipelines validation inspects one by one.
 const GROUPS: [&str; 5] = ["known answers", "modes", "sampling", "speed", "time stamps"];
-const GROUPS_OF_GPU: [&str; 7] = ["determinism", "failures", "formats", "hazards", "memory", "passes", "stress"];
+const GROUPS_OF_GPU: [&str; 8] =
+    ["determinism", "failures", "formats", "hazards", "memory", "passes", "specialization", "stress"];
 
 #[test]
 fn no_group_of_checks_is_left_out() {

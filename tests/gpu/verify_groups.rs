@@ -65,7 +65,7 @@ fn quick_checks_of_determinism_hazards_and_stress_pass_on_this_device() {
 
 #[test]
 fn quick_checks_of_failures_formats_and_memory_pass_on_this_device() {
-    all_pass(&["failures", "formats", "memory"]);
+    all_pass(&["failures", "formats", "memory", "specialization"]);
 }
 
 /// Spans of a picture: the host's, and two passes of the device.
