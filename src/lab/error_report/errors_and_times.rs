@@ -93,6 +93,8 @@ pub struct Finest {
 pub struct Verified {
     /// As measured again.
     pub choice: Combination,
+    /// Times of the scene as it is, measured in turn with the choice; None without time stamps.
+    pub unchanged: Option<Times>,
     /// Those that did not keep it then.
     pub failed: Vec<Combination>,
 }
@@ -249,9 +251,16 @@ impl ErrorMeasurement<'_> {
     ///
     /// # Errors
     /// As [`ErrorMeasurement::report`].
-    fn measure_again(&self, finest: &Finest, choice: &Combination, runs: u32) -> Result<Combination, MeasureError> {
-        let (errors, times) = self.measure_set(finest, &choice.set, runs)?;
-        Ok(Combination { errors, times, reference_error: finest.error, ..choice.clone() })
+    /// The choice as measured anew, and the times of the scene as it is, in turn with it.
+    fn measure_again(
+        &self,
+        finest: &Finest,
+        choice: &Combination,
+        runs: u32,
+    ) -> Result<(Combination, Option<Times>), MeasureError> {
+        let (errors, runs) = self.measure_set(finest, &choice.set, runs)?;
+        let times = Times::of(&runs.own);
+        Ok((Combination { errors, times, reference_error: finest.error, ..choice.clone() }, Times::of(&runs.default)))
     }
 
     /// Chooses a combination of the report, and measures it anew. What does not keep the bound then is no choice, and the next best is
@@ -275,13 +284,13 @@ impl ErrorMeasurement<'_> {
                 let contenders = choose::contenders(report, measure, error, &refused);
                 found = self.fastest(report, &contenders, runs)?.unwrap_or(found);
             }
-            let again = self.measure_again(finest, &report.choices[found], runs)?;
+            let (again, unchanged) = self.measure_again(finest, &report.choices[found], runs)?;
             let kept = match bound {
                 Bound::Error(error) => again.error_limit(measure).is_some_and(|limit| limit <= error),
                 Bound::Time(time) => again.times.is_some_and(|t| t.total.p95 * (1.0 + choose::TIME_MARGIN) <= time),
             };
             if kept {
-                return Ok(Verified { choice: again, failed });
+                return Ok(Verified { choice: again, unchanged, failed });
             }
             refused.push(found);
             failed.push(again);
@@ -320,14 +329,15 @@ impl ErrorMeasurement<'_> {
         let (changed, sets): (Vec<_>, Vec<_>) =
             points.map(|(dial, point)| ((dial.name.clone(), point.label.clone()), point.set.clone())).unzip();
         let set = sets.concat();
-        let (errors, times) = self.measure_set(finest, &set, self.repeats)?;
+        let (errors, runs) = self.measure_set(finest, &set, self.repeats)?;
+        let times = Times::of(&runs.own);
         Ok(Combination { changed, set, errors, reference_error: finest.error, times })
     }
 
-    fn measure_set(&self, finest: &Finest, set: &[String], runs: u32) -> Result<(Errors, Option<Times>), MeasureError> {
+    fn measure_set(&self, finest: &Finest, set: &[String], runs: u32) -> Result<(Errors, Runs), MeasureError> {
         let mut default = self.running(self.scene)?;
         let (rendering, runs) = self.in_turn(&self.scene_with("combination", set)?, &mut default, runs)?;
-        Ok((compare("combination", set, &rendering, &finest.rendering)?, Times::of(&runs.own)))
+        Ok((compare("combination", set, &rendering, &finest.rendering)?, runs))
     }
 
     fn measure_dial(
