@@ -6,7 +6,7 @@ use echolume::low_level::passes::fault_injection::{Change, InjectedFault};
 use echolume::low_level::passes::{Arrays, PASSES};
 use echolume::low_level::spirv::mutants::MUTATIONS;
 use echolume::low_level::verify::DeviceUnderTest;
-use echolume::low_level::verify::each_pass::run_with_reference;
+use echolume::low_level::verify::each_pass::{KINDS, run_with_reference};
 use echolume::low_level::verify::report::{Level, Verdict};
 use echolume::low_level::verify::self_test::{self, Detection};
 
@@ -61,11 +61,11 @@ fn an_injected_fault_without_effect_is_reported_as_uncaught() {
 /// Places among the instructions of a class, as shares.
 const PLACES: [f32; 3] = [0.2, 0.5, 0.8];
 
-/// Scenes in which each mutant is run.
-const SCENES: usize = 4;
+/// Dispatches in which each mutant is run, with each kind of input.
+const DISPATCHES: usize = 40;
 
 /// Every class of instructions, in three places of the shader of each pass: of the mutants that change any bit of an output, how many the
-/// checks of single passes catch. Those that they miss are printed.
+/// checks of single passes catch with the inputs of `verify --full`. Those that they miss are printed.
 #[test]
 #[ignore = "takes an hour; docs/verify.md has its figures"]
 fn mutants_that_change_a_bit_are_caught() {
@@ -74,35 +74,35 @@ fn mutants_that_change_a_bit_are_caught() {
     let bits = |arrays: &Arrays| -> Vec<u64> {
         arrays.iter().flat_map(|(_, texels)| texels.values.iter().map(|v| v.to_bits())).collect()
     };
-    for mutation in MUTATIONS {
-        for place in PLACES {
-            let change = Change::Mutant(mutation, place);
-            let mut faulty = sound.with_fault(change).expect("a device");
-            for pass in PASSES {
-                let (mut differs, mut is_caught) = (false, false);
-                let concerned = scenes.iter().filter(|(_, scene)| change.concerns(pass, scene)).take(SCENES);
-                for (_, scene) in concerned {
-                    for kind in ["noise", "split"] {
-                        let right =
-                            run_with_reference(sound.pass_runner(), scene, pass, 0, kind, 3).expect("a dispatch");
-                        let Ok(wrong) = run_with_reference(faulty.pass_runner(), scene, pass, 0, kind, 3) else {
-                            continue;
-                        };
-                        differs |= bits(&right.got) != bits(&wrong.got);
-                        is_caught |= wrong.comparison.worst.is_some() || wrong.comparison.bias > 0.1;
-                    }
+    for (mutation, place) in MUTATIONS.iter().flat_map(|mutation| PLACES.map(|place| (mutation, place))) {
+        let change = Change::Mutant(mutation, place);
+        let mut faulty = sound.with_fault(change).expect("a device");
+        for pass in PASSES {
+            let (mut differs, mut is_caught) = (false, false);
+            let concerned = scenes.iter().filter(|(_, scene)| change.concerns(pass, scene));
+            let dispatches = concerned.flat_map(|(_, scene)| (0..(pass.repeat)(scene)).map(move |n| (scene, n)));
+            'dispatches: for (scene, iteration) in dispatches.take(DISPATCHES) {
+                for (seed, kind) in (0..).zip(KINDS) {
+                    let run = |dut: &mut DeviceUnderTest| {
+                        run_with_reference(dut.pass_runner(), scene, pass, iteration, kind, seed)
+                    };
+                    let right = run(&mut sound).expect("a dispatch");
+                    let Ok(wrong) = run(&mut faulty) else { continue };
+                    differs |= bits(&right.got) != bits(&wrong.got);
+                    is_caught |= wrong.comparison.worst.is_some() || wrong.comparison.bias > 0.1;
                     if is_caught {
-                        break;
+                        break 'dispatches;
                     }
-                }
-                changed += usize::from(differs || is_caught);
-                caught += usize::from(is_caught);
-                if differs && !is_caught {
-                    missed.push(format!("{}: {}, at {place}", pass.name, mutation.class));
                 }
             }
-            println!("{} at {place}: {caught} of {changed} so far", mutation.class);
+            changed += usize::from(differs || is_caught);
+            caught += usize::from(is_caught);
+            if differs && !is_caught {
+                missed.push(format!("{}: {}, at {place}", pass.name, mutation.class));
+                println!("missed: {}", missed[missed.len() - 1]);
+            }
         }
+        println!("{} at {place}: {caught} of {changed} so far", mutation.class);
     }
     println!("{caught} of {changed} are caught; missed:\n{}", missed.join("\n"));
     assert!(caught as f64 >= 0.9 * changed as f64, "{caught} of {changed}");
