@@ -105,7 +105,9 @@ impl Rewrite {
     fn instruction(&mut self, opcode: u32, a: &[u32], out: &mut Vec<u32>) -> Result<(), SpirvError> {
         let is_loaded = |id: &u32| self.loaded.contains(id);
         let rewritten = match (opcode, a) {
-            (op::NAME | op::TYPE_IMAGE | op::TYPE_SAMPLED_IMAGE, [id, ..]) if self.same.contains_key(id) => return Ok(()),
+            (op::NAME | op::TYPE_IMAGE | op::TYPE_SAMPLED_IMAGE, [id, ..]) if self.same.contains_key(id) => {
+                return Ok(());
+            }
             (op::TYPE_IMAGE | op::TYPE_SAMPLED_IMAGE, _) => encode(opcode, &self.type_of_image(opcode, a)),
             (op::TYPE_POINTER, [id, class, to]) => encode(opcode, &[*id, *class, self.kept(*to)]),
             (op::FUNCTION, _) => {
@@ -222,13 +224,19 @@ mod tests {
                     binding.dimension = Dimension::Two;
                 }
                 assert_eq!(new, old, "{name}");
-                let count = |words: &[u32], opcode| decode(words).unwrap().iter().filter(|i| i.opcode == opcode).count();
+                let count =
+                    |words: &[u32], opcode| decode(words).unwrap().iter().filter(|i| i.opcode == opcode).count();
                 for opcode in [op::IMAGE_FETCH, op::IMAGE_WRITE, op::IMAGE_QUERY_SIZE, op::IMAGE_QUERY_SIZE_LOD] {
                     assert_eq!(count(&after, opcode), count(&before, opcode), "{name}");
                 }
                 let types = decode(&after).unwrap();
-                let images: Vec<_> = types.iter().filter(|i| i.opcode == op::TYPE_IMAGE).map(|i| &i.operands[1..]).collect();
-                assert_eq!(images.iter().collect::<HashSet<_>>().len(), images.len(), "{name}: a type is declared twice");
+                let images: Vec<_> =
+                    types.iter().filter(|i| i.opcode == op::TYPE_IMAGE).map(|i| &i.operands[1..]).collect();
+                assert_eq!(
+                    images.iter().collect::<HashSet<_>>().len(),
+                    images.len(),
+                    "{name}: a type is declared twice"
+                );
             }
         }
         assert!(changed > 20, "{changed} modules have arrays of images");
