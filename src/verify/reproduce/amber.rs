@@ -327,7 +327,7 @@ fn number(value: f64) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::verify::reproduce::Expected;
+    use crate::reproduce::Expected;
 
     /// An output of one texel.
     fn output(format: Format, values: &[f64], tolerances: &[f64]) -> Array {
