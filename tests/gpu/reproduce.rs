@@ -6,6 +6,7 @@ use echolume::low_level::gpu::ContextOptions;
 use echolume::low_level::gpu::pass_runner::PassRunner;
 use echolume::low_level::passes::slots::Format;
 use echolume::low_level::passes::{self, Arrays, Texels};
+use echolume::low_level::spirv::{Dimension, reflect, words as words_of};
 use echolume::low_level::verify::DeviceUnderTest;
 use echolume::low_level::verify::each_pass::{POISON, dispatch_args_of};
 use echolume::low_level::verify::report::Level;
@@ -100,8 +101,13 @@ fn the_files_are_the_dispatch_and_give_the_expected_values_again() {
         for file in &made.files {
             assert!(folder.join(file).exists(), "{file}");
         }
-        if made.without_script.is_none() {
-            amber_holds(&folder, &about);
+        assert_eq!(made.without_script, None, "{name}");
+        let scripts: Vec<_> = made.files.iter().filter(|file| file.ends_with(".amber")).collect();
+        let readme = String::from_utf8(bytes(&folder, "README.md")).expect("text");
+        assert_eq!(scripts.len(), layers_of(&about).unwrap_or(1), "{name}: {scripts:?}");
+        for script in scripts {
+            assert!(readme.contains(script.as_str()), "{name}: README.md does not name {script}");
+            amber_holds(&folder, script, &about);
         }
     }
     assert!(matches!(reproduce(&mut bench, "known answers", &folder.join("none")), Err(ReproduceError::NoPass(_))));
@@ -121,58 +127,72 @@ fn a_failure_is_written_and_not_the_smallest_dispatch() {
     assert!(!shader.is_empty() && shader != sound, "the shader is the one that the driver got");
 }
 
-/// What a script declares: bytes a texel and channels of each array.
+/// Layers of the dispatch, where images have layers: what it has groups for along z.
+fn layers_of(about: &Value) -> Option<usize> {
+    let arrays = about["arrays"].as_array().expect("arrays");
+    let is_layered = arrays.iter().any(|array| array["dimension"] == "Layers");
+    is_layered.then(|| about["workgroups"][2].as_u64().expect("a number") as usize)
+}
+
+/// What a script declares: bytes a texel, channels and values of each array.
 type Declared = BTreeMap<String, (usize, usize, usize)>;
 
 /// Reads a script as Amber's parser does, with the commands that it uses.
-fn amber_holds(folder: &Path, about: &Value) {
-    let text = String::from_utf8(bytes(folder, "reproduce.amber")).expect("text");
+fn amber_holds(folder: &Path, script: &str, about: &Value) {
+    let text = String::from_utf8(bytes(folder, script)).expect("text");
     let mut lines = text.lines().map(|line| line.split('#').next().unwrap_or("").trim()).peekable();
     assert!(text.starts_with("#!amber\n"), "Amber's first line");
     let (mut declared, mut bound, mut ran, mut expectations) = (Declared::new(), Vec::new(), 0, 0);
-    let mut constants = 0;
+    let (mut constants, mut of_params) = (0, String::new());
+    // Images whose content comes from a file, and how many of the three copies that this takes were seen.
+    let mut loaded: BTreeMap<String, usize> = BTreeMap::new();
     while let Some(line) = lines.next() {
         let words: Vec<&str> = line.split_whitespace().collect();
-        let mut until_end = |what: &str| -> Vec<String> {
-            let inside: Vec<String> = lines
-                .by_ref()
-                .take_while(|l| *l != "END")
-                .flat_map(|l| l.split_whitespace().map(String::from))
-                .collect();
-            assert!(!inside.is_empty(), "{what} is empty");
-            inside
-        };
         match words[..] {
             [] => {}
             ["DEVICE_FEATURE", _] => {}
-            // Its words are looked at above.
-            ["SHADER", "compute", "pass", "SPIRV-BIN", "FILE", file] => assert_eq!(file, "shader.spv"),
-            ["BUFFER", "params", "DATA_TYPE", "uint32", "DATA"] => {
-                let words = until_end("params");
-                let block: Vec<u8> = (words.iter())
-                    .flat_map(|w| {
-                        u32::from_str_radix(w.strip_prefix("0x").expect("hex"), 16).expect("a word").to_le_bytes()
-                    })
-                    .collect();
-                assert_eq!(block, bytes(folder, "params.raw"));
+            ["SHADER", "compute", "pass", "SPIRV-BIN", "FILE", file] => {
+                assert_eq!(file, if layers_of(about).is_some() { "shader.layer.spv" } else { "shader.spv" });
+                let module = reflect(&words_of(&bytes(folder, file))).expect("a module");
+                assert!(
+                    module.bindings.iter().all(|b| b.dimension != Dimension::Layers),
+                    "{file} has arrays of images"
+                );
             }
-            ["BUFFER", name, "DATA_TYPE", kind, "DATA"] => {
+            ["BUFFER", "params", "DATA_TYPE", "uint32", "SIZE", count, "FILE", "BINARY", file] => {
+                assert_eq!(4 * number(count), bytes(folder, file).len());
+                of_params = file.into();
+            }
+            ["BUFFER", name, "DATA_TYPE", kind, "SIZE", count, "FILE", "BINARY", file] => {
                 let (bytes_each, channels) = texel(kind);
-                let count = until_end(name).len();
-                declared.insert(name.into(), (bytes_each, channels, count));
+                assert_eq!(bytes_each * channels * number(count), bytes(folder, file).len(), "{line}");
+                declared.insert(name.into(), (bytes_each, channels, channels * number(count)));
+            }
+            ["BUFFER", name, "FORMAT", kind, "FILE", "BINARY", file] => {
+                let image = name.strip_prefix("file_of_").expect("of an image");
+                let (bytes_each, channels, values) = declared[image];
+                assert_eq!((bytes_each, channels), texel(kind), "{line}");
+                assert_eq!(bytes_each * values, bytes(folder, file).len(), "{line}");
+                assert_eq!(declared[image], declared[&format!("size_of_{image}")], "{line}");
+                loaded.insert(image.into(), 0);
             }
             ["IMAGE", name, "FORMAT", kind, dimension, ref rest @ ..] => {
                 let (bytes_each, channels) = texel(kind);
-                let sides: Vec<usize> = match (dimension, rest) {
-                    ("DIM_2D", ["WIDTH", w, "HEIGHT", h, "DATA"]) => vec![number(w), number(h)],
-                    ("DIM_3D", ["WIDTH", w, "HEIGHT", h, "DEPTH", d, "DATA"]) => vec![number(w), number(h), number(d)],
+                let has_data = rest.last() == Some(&"DATA");
+                let sides: Vec<usize> = match (dimension, &rest[..rest.len() - usize::from(has_data)]) {
+                    ("DIM_2D", ["WIDTH", w, "HEIGHT", h]) => vec![number(w), number(h)],
+                    ("DIM_3D", ["WIDTH", w, "HEIGHT", h, "DEPTH", d]) => vec![number(w), number(h), number(d)],
                     other => panic!("{other:?}"),
                 };
-                let values = until_end(name);
-                assert_eq!(values.len(), channels * sides.iter().product::<usize>(), "{name}");
-                let is_integer = kind.ends_with("UNORM") || kind.ends_with("UINT");
-                assert!(values.iter().all(|v| v.contains('.') != is_integer && !v.contains('e')), "{name}");
-                declared.insert(name.into(), (bytes_each, channels, values.len()));
+                let count = channels * sides.iter().product::<usize>();
+                if has_data {
+                    let inside = lines.by_ref().take_while(|l| *l != "END").flat_map(str::split_whitespace);
+                    let values: Vec<&str> = inside.collect();
+                    assert_eq!(values.len(), count, "{name}");
+                    let is_integer = kind.ends_with("UNORM") || kind.ends_with("UINT");
+                    assert!(values.iter().all(|v| v.contains('.') != is_integer && !v.contains('e')), "{name}");
+                }
+                declared.insert(name.into(), (bytes_each, channels, count));
             }
             ["SAMPLER", "linear", ..] => assert_eq!(words.len() % 2, 0, "{line}"),
             ["PIPELINE", "compute", "pipeline"] => {
@@ -193,14 +213,34 @@ fn amber_holds(folder: &Path, about: &Value) {
                     }
                 }
             }
+            // The content before the dispatch; sizes after all expectations.
+            ["COPY", from, "TO", to] => {
+                let image = to.strip_prefix("file_of_").unwrap_or(to);
+                let copies = loaded.get_mut(image).expect("an image with a file");
+                let wanted = match *copies {
+                    0 => (format!("file_of_{image}"), image.into(), 0),
+                    1 => (format!("size_of_{image}"), format!("file_of_{image}"), 1),
+                    _ => (format!("size_of_{image}"), image.to_string(), 1),
+                };
+                assert_eq!((from.into(), to.into(), ran), wanted, "{line}");
+                *copies += 1;
+            }
             ["RUN", "pipeline", x, y, z] => {
-                let groups = [x, y, z].map(|n| Value::from(number(n)));
-                assert_eq!(about["workgroups"], Value::from(groups.to_vec()));
+                let mut groups = about["workgroups"].clone();
+                if layers_of(about).is_some() {
+                    groups[2] = 1.into();
+                }
+                assert_eq!(groups, Value::from([x, y, z].map(number).to_vec()));
                 ran += 1;
             }
-            ["EXPECT", name, "IDX", at, "TOLERANCE", ref rest @ ..] => {
+            ["EXPECT", name, "IDX", at, ref rest @ ..] => {
                 let (bytes_each, channels, values) = declared[name];
-                assert!(ran == 1 && rest.len() == 2 * channels + 1 && rest[channels] == "EQ", "{line}");
+                let compared = match rest {
+                    ["TOLERANCE", _, "EQ", compared @ ..] | ["GE" | "LE", compared @ ..] => compared,
+                    _ => panic!("{line}"),
+                };
+                assert!(ran == 1 && compared.len() == channels, "{line}");
+                assert!(loaded.values().all(|copies| *copies == 1), "{line}: a size is given back too early");
                 assert!(number(at).is_multiple_of(bytes_each * channels) && number(at) < bytes_each * values, "{line}");
                 expectations += 1;
             }
@@ -210,6 +250,8 @@ fn amber_holds(folder: &Path, about: &Value) {
     assert_eq!(constants, about["constants"].as_array().expect("constants").len());
     let arrays = about["arrays"].as_array().expect("arrays");
     let params = usize::from(!about["params_binding"].is_null());
+    assert_eq!(of_params.len() > 1, params == 1);
+    assert!(loaded.values().all(|copies| *copies == 3), "{loaded:?}");
     assert!(bound.len() == arrays.len() + params && expectations > 20 && ran == 1, "{bound:?}, {expectations}");
 }
 

@@ -48,6 +48,7 @@ pub(super) mod op {
     pub(crate) const MEMBER_DECORATE: u32 = 72;
     pub(crate) const VECTOR_EXTRACT_DYNAMIC: u32 = 77;
     pub(crate) const VECTOR_SHUFFLE: u32 = 79;
+    pub(crate) const COMPOSITE_CONSTRUCT: u32 = 80;
     pub(crate) const COMPOSITE_EXTRACT: u32 = 81;
     pub(crate) const COPY_OBJECT: u32 = 83;
     pub(crate) const TRANSPOSE: u32 = 84;

@@ -8,17 +8,22 @@ use super::compare::{ExtraTolerance, tolerance_of};
 use super::each_pass::{KINDS, POISON, dispatch_args_of, inputs_of, run_with_reference, seed_of};
 use crate::files;
 use crate::gpu::GpuError;
+use crate::gpu::pass_runner::PassRunner;
 use crate::machine;
 use crate::passes::slots::Format;
-use crate::passes::{Arrays, Bind, DispatchArgs, PASSES, Pass, Texels, interface_check};
+use crate::passes::{Arrays, Bind, DispatchArgs, Frequency, PASSES, Pass, Texels, interface_check};
 use crate::scene::Scene;
+use crate::spirv::one_layer::one_layer;
 use crate::spirv::{Access, Dimension, Kind};
 use serde_json::json;
 use std::fmt::Write as _;
 use std::path::Path;
 
-/// Name of the file of the shader in the folder of a reproduction.
+/// Names of files in the folder of a reproduction: the shader, and the same for a single layer.
 const SHADER: &str = "shader.spv";
+const LAYER_SHADER: &str = "shader.layer.spv";
+/// The uniform block.
+const PARAMS: &str = "params.raw";
 
 /// Minimum number of texels of the outputs of a dispatch that does not fail: fewer say little.
 const MIN_TEXELS: u64 = 64;
@@ -39,6 +44,8 @@ struct Case {
     params_binding: Option<u32>,
     groups: [u32; 3],
     arrays: Vec<Array>,
+    /// Where images have layers, each of which an invocation keeps to: the same a layer, with single images. Otherwise nothing, or why not.
+    layers: Result<Vec<Case>, String>,
     /// Share of the texels of an output that may be beyond their tolerance.
     outliers: f64,
     why: &'static str,
@@ -54,8 +61,9 @@ struct Array {
     format: Format,
     /// Texels along x, y and z; of a buffer, floats.
     size: [usize; 3],
-    /// Before the dispatch.
+    /// Before the dispatch; also the content of the file of this name.
     bytes: Vec<u8>,
+    file: String,
     /// Of an output.
     expected: Option<Expected>,
 }
@@ -73,8 +81,15 @@ impl Array {
         Texels::decode(self.size, self.format, &self.bytes)
     }
 
-    fn file(&self) -> String {
-        format!("{}.raw", self.name)
+    /// Keeps the first layer, as an image of its own.
+    fn keep_layer(&mut self, file: String) {
+        let texels = self.size[0] * self.size[1];
+        self.bytes.truncate(self.bytes.len() / self.size[2]);
+        for values in self.expected.iter_mut().flat_map(|e| [&mut e.values, &mut e.tolerances]) {
+            values.truncate(texels * self.format.channels());
+        }
+        self.size[2] = 1;
+        (self.dimension, self.file) = (Dimension::Two, file);
     }
 }
 
@@ -157,30 +172,78 @@ struct Choice<'a> {
 
 fn case(dut: &mut DeviceUnderTest, pass: &'static Pass, choice: &Choice) -> Result<Case, GpuError> {
     let runner = dut.pass_runner();
-    let scene = &runner.adapted(choice.scene);
     // Of the frame array there are the layers of the dispatch.
-    let args = DispatchArgs { layer: 0, ..dispatch_args_of(scene, pass, choice.iteration) };
+    let args = DispatchArgs { layer: 0, ..dispatch_args_of(&runner.adapted(choice.scene), pass, choice.iteration) };
     // The inputs of the check, which come from the scene before it is adapted.
     let inputs = inputs_of(choice.scene, pass, &args, choice.kind, choice.seed);
+    let mut case = case_of(runner, pass, choice, &args, &inputs)?;
+    let Some(layered) = case.arrays.iter().find(|array| array.dimension == Dimension::Layers) else { return Ok(case) };
+    case.layers = match pass.frequency {
+        Frequency::Frame => {
+            (0..args.slices).map(|n| layer(runner, pass, choice, (&args, n), &inputs)).collect::<Result<_, _>>()?
+        }
+        _ => {
+            Err(format!("an invocation reads several layers of '{}', and Amber has no arrays of images", layered.name))
+        }
+    };
+    Ok(case)
+}
+
+/// The dispatch of one frame of those of `args`, on single images.
+fn layer(
+    runner: &mut PassRunner,
+    pass: &'static Pass,
+    choice: &Choice,
+    (args, n): (&DispatchArgs, u32),
+    inputs: &Arrays,
+) -> Result<Result<Case, String>, GpuError> {
+    let scene = &runner.adapted(choice.scene);
+    let args = DispatchArgs { slice: args.slice + n, slices: 1, ..*args };
+    let mut own = inputs.clone();
+    for bind in pass.reads(scene, &args).iter().filter(|bind| bind.slot.is_layered(scene)) {
+        let all = inputs.get(bind.name);
+        let [width, height, depth] = all.size;
+        let at = depth.saturating_sub(1).min(n as usize);
+        own.insert(bind.name, Texels::from_fn([width, height, 1], all.channels, |[x, y, _], c| all.get([x, y, at])[c]));
+    }
+    let mut case = case_of(runner, pass, choice, &args, &own)?;
+    for array in case.arrays.iter_mut().filter(|array| array.dimension == Dimension::Layers) {
+        array.keep_layer(format!("{}.layer{n}.raw", array.name));
+    }
+    case.title += &format!(", layer {n}");
+    Ok(match one_layer(&case.words) {
+        Ok(words) => Ok(Case { words, ..case }),
+        Err(why) => Err(why.to_string()),
+    })
+}
+
+fn case_of(
+    runner: &mut PassRunner,
+    pass: &'static Pass,
+    choice: &Choice,
+    args: &DispatchArgs,
+    inputs: &Arrays,
+) -> Result<Case, GpuError> {
+    let scene = &runner.adapted(choice.scene);
     let mut expected = Arrays::default();
-    let writes = pass.writes(scene, &args);
+    let writes = pass.writes(scene, args);
     for bind in &writes {
         let channels = bind.slot.format(scene).channels();
         expected.insert(bind.name, Texels::untouched(bind.slot.array_size(scene), channels));
     }
-    pass.expected(choice.scene, &args, &inputs, &mut expected);
-    let shader = runner.shader(scene, pass, &args)?;
-    let extra = ExtraTolerance::of(pass, scene, &args, runner.filter_bits());
+    pass.expected(choice.scene, args, inputs, &mut expected);
+    let shader = runner.shader(scene, pass, args)?;
+    let extra = ExtraTolerance::of(pass, scene, args, runner.filter_bits());
     let (mut arrays, mut params_binding) = (Vec::new(), None);
     for binding in &shader.module.bindings {
         if binding.kind == Kind::Params {
             params_binding = Some(binding.binding);
             continue;
         }
-        let reads = pass.reads(scene, &args);
+        let reads = pass.reads(scene, args);
         let is_output = writes.iter().find(|bind| bind.name == binding.name);
         let Some(bind) = is_output.or_else(|| reads.iter().find(|bind| bind.name == binding.name)) else { continue };
-        let (bytes, size) = before(scene, bind, &inputs, is_output.is_some());
+        let (bytes, size) = before(scene, bind, inputs, is_output.is_some());
         let format = bind.slot.format(scene);
         let expected = is_output.map(|bind| {
             let values = expected.get(bind.name).stored_part(bind.slot, scene).values;
@@ -196,11 +259,12 @@ fn case(dut: &mut DeviceUnderTest, pass: &'static Pass, choice: &Choice) -> Resu
             format,
             size,
             bytes,
+            file: format!("{}.raw", binding.name),
             expected,
         });
     }
-    let params = interface_check::pack(&shader.module, &pass.numbers(scene, &args));
-    let extent = pass.invocations(scene, &args);
+    let params = interface_check::pack(&shader.module, &pass.numbers(scene, args));
+    let extent = pass.invocations(scene, args);
     let groups = std::array::from_fn(|axis| extent[axis].div_ceil(shader.module.local_size[axis]));
     let ids = shader.module.constants.iter().filter_map(|constant| {
         let (_, value) = shader.constants.iter().find(|(name, _)| *name == constant.name)?;
@@ -219,6 +283,7 @@ fn case(dut: &mut DeviceUnderTest, pass: &'static Pass, choice: &Choice) -> Resu
         params_binding,
         groups,
         arrays,
+        layers: Ok(Vec::new()),
         outliers: pass.tolerance.outliers + extra.outliers,
         why: pass.tolerance.why,
     })
@@ -246,23 +311,33 @@ fn write(case: &Case, device: &machine::Device, folder: &Path) -> Result<(Vec<St
         written.push(name.to_string());
         files::replace(&folder.join(name), bytes)
     };
+    let of_words = |words: &[u32]| words.iter().flat_map(|w| w.to_le_bytes()).collect::<Vec<u8>>();
     let of_f64 = |values: &[f64]| values.iter().flat_map(|v| v.to_le_bytes()).collect::<Vec<u8>>();
-    put(SHADER, &case.words.iter().flat_map(|w| w.to_le_bytes()).collect::<Vec<u8>>())?;
-    put("params.raw", &case.params)?;
+    put(SHADER, &of_words(&case.words))?;
+    put(PARAMS, &case.params)?;
     for array in &case.arrays {
-        put(&array.file(), &array.bytes)?;
+        put(&array.file, &array.bytes)?;
         if let Some(expected) = &array.expected {
             put(&format!("{}.expected.f64", array.name), &of_f64(&expected.values))?;
             put(&format!("{}.tolerance.f64", array.name), &of_f64(&expected.tolerances))?;
         }
     }
-    let without_script = match amber::script(case) {
-        Ok(script) => put(amber::FILE, script.as_bytes()).map(|()| None)?,
-        Err(why) => Some(why),
-    };
+    let scripts = amber::scripts(case);
+    for script in scripts.iter().flatten() {
+        put(&script.name, script.text.as_bytes())?;
+        if script.is_of_layer {
+            put(&script.params, &script.case.params)?;
+            for array in script.case.arrays.iter().filter(|array| array.file != format!("{}.raw", array.name)) {
+                put(&array.file, &array.bytes)?;
+            }
+        }
+    }
+    if let Some(script) = scripts.iter().flatten().find(|script| script.is_of_layer) {
+        put(LAYER_SHADER, &of_words(&script.case.words))?;
+    }
     put("dispatch.json", (described(case, device) + "\n").as_bytes())?;
-    put("README.md", readme(case, device, without_script.as_deref()).as_bytes())?;
-    Ok((written, without_script))
+    put("README.md", readme(case, device, &scripts).as_bytes())?;
+    Ok((written, scripts.err()))
 }
 
 /// The dispatch for programs: what is bound where, in which file.
@@ -276,7 +351,7 @@ fn described(case: &Case, device: &machine::Device) -> String {
             "dimension": format!("{:?}", array.dimension),
             "size": array.size,
             "is_output": array.expected.is_some(),
-            "file": array.file(),
+            "file": array.file,
             "bytes": array.bytes.len(),
         })
     };
@@ -300,7 +375,7 @@ fn described(case: &Case, device: &machine::Device) -> String {
     format!("{all:#}")
 }
 
-fn readme(case: &Case, device: &machine::Device, without_script: Option<&str>) -> String {
+fn readme(case: &Case, device: &machine::Device, scripts: &Result<Vec<amber::Script>, String>) -> String {
     let mut text = format!(
         "# One compute dispatch and its expected result\n\n{}. Written by {} on {}, {}, Vulkan {}.\n\n",
         case.title,
@@ -322,14 +397,8 @@ fn readme(case: &Case, device: &machine::Device, without_script: Option<&str>) -
         let _ = writeln!(text, "At most {} % of the texels may be further off.", 100.0 * case.outliers);
     }
     text.push('\n');
-    let _ = match without_script {
-        None => writeln!(
-            text,
-            "With Amber (google/amber): `amber -t spv1.5 -v 1.3 {}`. The shader's uniform block has scalar layout, for which Amber enables no \
-             feature.",
-            amber::FILE
-        ),
-        Some(why) => writeln!(text, "There is no Amber script: {why}."),
-    };
-    text
+    match scripts {
+        Ok(scripts) => text + &amber::about(case, scripts),
+        Err(why) => text + &format!("There is no Amber script: {why}.\n"),
+    }
 }
