@@ -38,9 +38,9 @@ fn size_of(array: &Value) -> [usize; 3] {
     std::array::from_fn(|axis| array["size"][axis].as_u64().expect("a size") as usize)
 }
 
-/// Share of the values of all outputs that are beyond their tolerance when the dispatch runs from the files, with `change` made to each
-/// input.
-fn share_beyond(bench: &DeviceUnderTest, folder: &Path, change: impl Fn(&mut Texels)) -> f64 {
+/// Shares of the values of all outputs that are beyond their tolerance, and that are what the device wrote before, when the dispatch runs from the files
+/// with `change` made to each input.
+fn shares(bench: &DeviceUnderTest, folder: &Path, change: impl Fn(&mut Texels)) -> [f64; 2] {
     let about: Value = serde_json::from_slice(&bytes(folder, "dispatch.json")).expect("JSON");
     let pass = passes::by_name(about["pass"].as_str().expect("a pass")).expect("a pass");
     let scenes = bench.scenes();
@@ -59,20 +59,22 @@ fn share_beyond(bench: &DeviceUnderTest, folder: &Path, change: impl Fn(&mut Tex
         inputs.insert(bind.name, texels.with_outside(bind.slot, &adapted, 0.0));
     }
     let outputs = runner.run(scene, pass, &args, &inputs, POISON).expect("the dispatch");
-    let (mut beyond, mut all) = (0, 0);
+    let (mut beyond, mut same, mut all) = (0, 0, 0);
     for bind in pass.writes(&adapted, &args) {
         let got = outputs.get(bind.name).stored_part(bind.slot, &adapted).values;
         let expected = doubles(folder, &format!("{}.expected.f64", bind.name));
         let tolerance = doubles(folder, &format!("{}.tolerance.f64", bind.name));
         assert!(got.len() == expected.len() && got.len() == tolerance.len(), "{}", bind.name);
+        let before = doubles(folder, &format!("{}.got.f64", bind.name));
+        same += got.iter().zip(&before).filter(|(a, b)| a.to_bits() == b.to_bits()).count();
         let written = got.iter().zip(&expected).zip(&tolerance).filter(|((_, e), _)| !e.is_nan());
+        all += got.len();
         for ((got, expected), tolerance) in written {
-            all += 1;
             beyond += usize::from((got - expected).abs() > *tolerance);
         }
     }
     assert!(all > 20, "{all} values");
-    f64::from(beyond as u32) / f64::from(all as u32)
+    [beyond, same].map(|count| count as f64 / all as f64)
 }
 
 #[test]
@@ -94,9 +96,10 @@ fn the_files_are_the_dispatch_and_give_the_expected_values_again() {
         }
         assert!(bytes(&folder, "shader.spv").starts_with(&[3, 2, 0x23, 7]), "{name}");
         let allowed = about["outliers"].as_f64().expect("a share");
-        let share = share_beyond(&bench, &folder, |_| ());
+        let [share, same] = shares(&bench, &folder, |_| ());
         assert!(share <= allowed, "{name}: {share} of the values are beyond their tolerance, {allowed} may be");
-        let wrong = share_beyond(&bench, &folder, |texels| texels.values.iter_mut().for_each(|v| *v = 0.3 * *v + 0.1));
+        assert_eq!(same, 1.0, "{name}: the device wrote something else before");
+        let [wrong, _] = shares(&bench, &folder, |texels| texels.values.iter_mut().for_each(|v| *v = 0.3 * *v + 0.1));
         assert!(wrong > 0.1, "{name}: other inputs give the same values: {wrong}");
         for file in &made.files {
             assert!(folder.join(file).exists(), "{file}");

@@ -341,7 +341,7 @@ mod tests {
             size: [1; 3],
             bytes: vec![0; format.channels() * format.channel_bytes()],
             file: "target.raw".into(),
-            expected: Some(Expected { values: values.into(), tolerances: tolerances.into() }),
+            expected: Some(Expected { values: values.into(), tolerances: tolerances.into(), got: values.into() }),
         }
     }
 

@@ -73,6 +73,8 @@ struct Expected {
     /// By the f64 reference; NaN where the pass writes nothing.
     values: Vec<f64>,
     tolerances: Vec<f64>,
+    /// What this device wrote.
+    got: Vec<f64>,
 }
 
 impl Array {
@@ -234,6 +236,7 @@ fn case_of(
     pass.expected(choice.scene, args, inputs, &mut expected);
     let shader = runner.shader(scene, pass, args)?;
     let extra = ExtraTolerance::of(pass, scene, args, runner.filter_bits());
+    let got = runner.run(choice.scene, pass, args, inputs, POISON)?;
     let (mut arrays, mut params_binding) = (Vec::new(), None);
     for binding in &shader.module.bindings {
         if binding.kind == Kind::Params {
@@ -248,7 +251,7 @@ fn case_of(
         let expected = is_output.map(|bind| {
             let values = expected.get(bind.name).stored_part(bind.slot, scene).values;
             let tolerances = values.iter().map(|e| tolerance_of(pass, extra, bind.slot, format, *e)).collect();
-            Expected { values, tolerances }
+            Expected { values, tolerances, got: got.get(bind.name).stored_part(bind.slot, scene).values }
         });
         arrays.push(Array {
             name: binding.name.clone(),
@@ -320,6 +323,7 @@ fn write(case: &Case, device: &machine::Device, folder: &Path) -> Result<(Vec<St
         if let Some(expected) = &array.expected {
             put(&format!("{}.expected.f64", array.name), &of_f64(&expected.values))?;
             put(&format!("{}.tolerance.f64", array.name), &of_f64(&expected.tolerances))?;
+            put(&format!("{}.got.f64", array.name), &of_f64(&expected.got))?;
         }
     }
     let scripts = amber::scripts(case);
@@ -390,7 +394,8 @@ fn readme(case: &Case, device: &machine::Device, scripts: &Result<Vec<amber::Scr
         "`shader.spv` (entry point `main`) runs once with {x} x {y} x {z} workgroups, descriptor set 0 and the specialization constants of \
          `dispatch.json`, which also lists all bindings. `params.raw` is the uniform block, `NAME.raw` the content of each binding before the \
          dispatch, rows from the top, without padding. `NAME.expected.f64` holds what an output must hold after it (little-endian doubles; NaN \
-         where nothing is written), `NAME.tolerance.f64` the largest error of each value ({}).",
+         where nothing is written), `NAME.tolerance.f64` the largest error of each value ({}). \
+         `NAME.got.f64` holds what this device wrote.",
         case.why
     );
     if case.outliers > 0.0 {
