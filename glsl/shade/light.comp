@@ -4,7 +4,7 @@
 layout(constant_id = 0) const int POINT = 0; // 0: directional light, 1: point light
 layout(constant_id = 1) const int SKIN = 0;
 layout(constant_id = 2) const int DIMS_PIXEL = 0; // 1: a shadow dims ambient light too
-layout(constant_id = 3) const int AMBIENT_ONLY = 0; // 1: the volume's colour is that of ambient light alone (thesis 4-5)
+layout(constant_id = 3) const int AMBIENT_ONLY = 0; // 1: the volume's colour is that of ambient light, which the light does not colour (thesis 4-5)
 layout(constant_id = 4) const int ECHO = 1; // 0: neither texture nor skin needs the echo at the surface
 const int BEHIND_LAYER = 1; // a surface behind a composited volume
 const int COMPOSITED = 2;   // the volume itself, where rays hit it first
@@ -101,13 +101,16 @@ void main() {
         float thin = echo.y * (1.0 - clamp(echo.z, 0.0, 1.0));
         glow = through * thin * (0.35 + 0.65 * max(-cosine, 0.0));
     }
-    vec3 body = SUBJECT == COLOURED ? ambient_colour * ambient * open + colour * diffuse * diffused * mix(1.0, open, 0.3)
-                                    : colour * (ambient * open + diffuse * diffused * mix(1.0, open, 0.3));
+    vec3 unlit = AMBIENT_ONLY == 1 ? dimmed * ambient_colour * ambient * open : vec3(0.0);
+    vec3 body = AMBIENT_ONLY == 1 ? colour * diffuse * diffused * mix(1.0, open, 0.3)
+        : SUBJECT == COLOURED     ? ambient_colour * ambient * open + colour * diffuse * diffused * mix(1.0, open, 0.3)
+                                  : colour * (ambient * open + diffuse * diffused * mix(1.0, open, 0.3));
     vec3 sum = dimmed * (body + glow * open);
     vec3 highlight = vec3(specular * shine * lit * dimmed * (facing > 0.0 ? 1.0 : 0.0));
     // Of a composited volume lighting is weighted by opacity.
     vec4 rgba = SUBJECT == COMPOSITED
         ? vec4(before.rgb * mix(vec3(1.0), light_colour * sum, before.a) + before.a * light_colour * highlight, before.a)
-        : vec4(before.rgb + (1.0 - before.a) * light_colour * (sum + highlight), 1.0);
+        : AMBIENT_ONLY == 1   ? vec4(unlit + light_colour * (sum + highlight), 1.0)
+                              : vec4(before.rgb + (1.0 - before.a) * light_colour * (sum + highlight), 1.0);
     imageStore(picture, pixel, capped(cut, rgba));
 }

@@ -5,12 +5,13 @@
 layout(constant_id = 0) const int POINT = 0;
 layout(constant_id = 1) const int PERSPECTIVE = 0;
 layout(constant_id = 2) const int SOFT = 1;
-layout(constant_id = 3) const int STEPS = 96;
+layout(constant_id = 3) const int MOST_STEPS = 2048;
 layout(scalar) uniform Params {
 #include "camera_params.glsl"
     vec3 forward;
     vec3 light_at;
-    float reach;     // mm
+    float reach;     // mm; no obstacle in the picture is further away than this
+    vec2 pitch;      // stride across the view: pixels' size in mm, and per mm of distance
     float thickness; // mm
     float bias;      // mm
     float softness;  // mm of edge per mm
@@ -60,9 +61,13 @@ void main() {
             to_light = far > 1e-7 * distance ? to_light / far : -ray_direction(at);
             length_to_light = min(reach, far);
         }
-        float stride = length_to_light / float(STEPS);
+        // Whatever the reach, so that a longer one never loses an obstacle.
+        float across = length(cross(to_light, ray_direction(at)));
+        float pixel_size = pitch.x + pitch.y * distance;
+        float stride = max(min(pixel_size / max(across, 1e-6), 0.5 * thickness / max(sqrt(max(1.0 - across * across, 0.0)), 1e-6)), 0.25 * pixel_size);
+        int steps = int(min(length_to_light / stride, float(MOST_STEPS)));
         vec2 size = vec2(textureSize(distance_map, 0));
-        for (int i = 1; i <= STEPS; ++i) {
+        for (int i = 1; i <= steps; ++i) {
             float travelled = float(i) * stride;
             vec3 pixel_place = projected(place + to_light * travelled);
             if (any(lessThan(pixel_place.xy, vec2(0.0))) || any(greaterThanEqual(pixel_place.xy, size)) || pixel_place.z < 0.0) break;

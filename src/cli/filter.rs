@@ -191,7 +191,7 @@ impl Filter {
             Some(smooth) if smooth.lateral == 0.0 && smooth.depth == 0.0 => {
                 Err(input("--filter gaussian: give lateral, depth or both, standard deviations in pixels"))
             }
-            Some(_) if settings.slices.blur => {
+            Some(_) if settings.slices.blur.is_on(settings.mode.is_flat()) => {
                 Err(input("--filter blur: cannot be combined with gaussian, which blurs already"))
             }
             _ => Ok(settings),

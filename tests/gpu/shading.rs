@@ -51,8 +51,8 @@ fn a_shadow_ends_where_geometry_puts_it() {
         let expected = 80.0 + (10.0 - 0.5) / pixel;
         let row = |x: usize| shadow.one(x, 120, 0);
         let edge = (80..244).find(|x| row(*x) > 0.5).expect("the shadow ends") as f64;
-        // A step towards the light is 40 mm / 96; a pixel is a quarter of a mm.
-        assert!((edge - expected).abs() * pixel < 0.6, "ends at {edge}, not at {expected}");
+        // A step towards the light crosses a pixel, a quarter of a mm.
+        assert!((edge - expected).abs() * pixel < 0.4, "ends at {edge}, not at {expected}");
         assert_eq!(row(82), 0.0, "right behind the step");
         assert_eq!((row(40), row(200)), (1.0, 1.0), "on the step, and beyond its shadow");
         let width = (80..244).filter(|x| row(*x) > 0.02 && row(*x) < 0.98).count() as f64 * pixel;
@@ -67,6 +67,33 @@ fn a_shadow_ends_where_geometry_puts_it() {
     let scene = plate("light = { direction = [1.0, 0.0, 1.0], shadow = { softness = 0.0 } }");
     let distances = map(&scene, |x, _| if x < 80 { 40.0 } else { 50.0 });
     assert!(run(&device, &scene, "shadow", &distances).values.iter().all(|v| *v == 1.0));
+}
+
+/// Obstacles of all sizes, near and far, thinner than the assumed thickness allows to look through: a longer reach finds what a shorter one finds.
+#[test]
+fn a_longer_reach_never_removes_a_shadow() {
+    let device = Device::new();
+    let hills = |x: usize, y: usize| {
+        let wave = |period: f64, height: f64| height * ((x as f64 + 0.4 * y as f64) / period).sin();
+        45.0 + wave(1.5, 0.6) + wave(9.0, 2.0) + wave(40.0, 5.0)
+    };
+    for look in ["camera = { field_of_view = 0 }", "camera = { field_of_view = 40 }"] {
+        for light in ["direction = [-1.0, 0.3, 0.4]", "position = [-30.0, 10.0, 0.0]"] {
+            let mut before: Option<(f64, Texels)> = None;
+            for reach in [3.0, 10.0, 31.0, 40.0, 90.0, 1e6] {
+                let shadow = format!("shadow = {{ softness = 0.1, bias = 0.1, thickness = 8.0, reach = {reach:?} }}");
+                let scene = plate(&format!("{look}\nlight = {{ {light}, {shadow} }}"));
+                let found = run(&device, &scene, "shadow", &map(&scene, hills));
+                if let Some((shorter, before)) = before {
+                    let lost = found.values.iter().zip(&before.values).filter(|(far, near)| far > near).count();
+                    assert_eq!(lost, 0, "{look}, {light}: {shorter} mm has shadows that {reach} mm lacks");
+                    let shaded = found.values.iter().filter(|light| **light < 0.5).count();
+                    assert!(shaded > 3000, "{look}, {light}, {reach} mm: only {shaded} pixels in shadow");
+                }
+                before = Some((reach, found));
+            }
+        }
+    }
 }
 
 #[test]

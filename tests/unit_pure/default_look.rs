@@ -8,7 +8,7 @@ use echolume::low_level::scene::{
     Camera, ColourMap, EchoHistogram, EchoLevels, Input, Layout, Mode, Settings, Slices, transfer,
 };
 use echolume::low_level::source::StoredType;
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 
 fn grid(size: [usize; 3]) -> Geometry {
@@ -467,4 +467,21 @@ fn defaults_of_extreme_voxels_are_cut_and_not_refused() {
     assert!(scene.found.iter().any(|line| line.contains("ray.step") && line.contains("65536")), "{:?}", scene.found);
     let said = recorded.scene(&layers(&[], &["mode=vr", "ray.step=0.003"])).expect_err("too many").to_string();
     assert!(said.contains("ray.step") && !said.contains("65536 samples on a ray, at most 65536"), "{said}");
+}
+
+/// What the preset of the thesis keeps of what was set before: region, windows, threshold, camera and transfer function.
+const KEPT_BY_THESIS: [&str; 6] =
+    ["camera.", "region.", "surface.threshold", "surface.window", "volume.transfer", "volume.window"];
+
+#[test]
+fn the_preset_of_the_thesis_is_the_same_after_every_other() {
+    let values = |presets: &[&str]| flat(&layers(presets, &[]).finish().expect("settings"));
+    let alone = values(&["thesis"]);
+    for (before, _) in PRESETS {
+        let both = values(&[before, "thesis"]);
+        let keys: BTreeSet<_> = alone.keys().chain(both.keys()).collect();
+        let differing = keys.into_iter().filter(|key| alone.get(*key) != both.get(*key));
+        let left: Vec<_> = differing.filter(|key| !KEPT_BY_THESIS.iter().any(|kept| key.starts_with(kept))).collect();
+        assert!(left.is_empty(), "after {before}: {left:?}");
+    }
 }

@@ -60,7 +60,7 @@ pub const LIGHT: Pass = Pass {
             ("POINT", light.position.is_some() as i32),
             ("SKIN", s.skin().is_some() as i32),
             ("DIMS_PIXEL", dims_pixel as i32),
-            ("AMBIENT_ONLY", (s.settings.surface.colour == SurfaceColour::Rendered) as i32),
+            ("AMBIENT_ONLY", keeps_ambient(s) as i32),
             ("ECHO", s.lights_by_echo() as i32),
             ("SUBJECT", subject),
             ("SHADOWED", casts_shadow(s) as i32),
@@ -110,6 +110,11 @@ fn lit_thing(scene: &Scene) -> Lit {
         (false, _) if scene.colours_surface() => Lit::Coloured,
         (false, _) => Lit::Surface,
     }
+}
+
+/// True if the rendered colour is that of ambient light, which the light does not colour (thesis 4-5).
+fn keeps_ambient(scene: &Scene) -> bool {
+    lit_thing(scene) == Lit::Coloured && scene.settings.surface.colour == SurfaceColour::Rendered
 }
 
 /// The colour of a pixel: its light (body and highlight), with the composited volume in front of it or lit by it.
@@ -186,8 +191,8 @@ fn lit(scene: &Scene, reads: &Arrays, x: usize, y: usize) -> Option<(DVec3, DVec
                 Lit::Coloured => DVec3::from_slice(&reads.get("volume_layer").get([x, y, 0])[..3]),
                 _ => DVec3::from(light.surface_colour),
             };
-            let ambient_only = lit == Lit::Coloured && scene.settings.surface.colour == SurfaceColour::Rendered;
-            (colour * texture, if ambient_only { DVec3::splat(texture) } else { colour * texture }, found, behind)
+            let own = if keeps_ambient(scene) { DVec3::splat(texture) } else { colour * texture };
+            (colour * texture, own, found, behind)
         }
     };
 
@@ -211,13 +216,43 @@ fn lit(scene: &Scene, reads: &Arrays, x: usize, y: usize) -> Option<(DVec3, DVec
     };
     let shine = if facing > 0.0 { light.specular * gloss * arrives } else { 0.0 };
     let [ambient, diffuse] = coefficients(scene);
-    let body = ambient_colour * ambient * open + colour * diffuse * diffused * (1.0 + 0.3 * (open - 1.0));
+    let ambient = ambient_colour * ambient * open;
+    let diffused = colour * diffuse * diffused * (1.0 + 0.3 * (open - 1.0));
     let colour = DVec3::from(light.colour);
-    Some((colour * (body + glow * open) * dimmed, colour * shine * dimmed))
+    let body = match keeps_ambient(scene) {
+        true => ambient + colour * (diffused + glow * open),
+        false => colour * (ambient + diffused + glow * open),
+    };
+    Some((body * dimmed, colour * shine * dimmed))
 }
 
-/// Samples on the segment to the light.
-const SHADOW_STEPS: u32 = 96;
+/// Stride of a shadow's samples across the view, pixels.
+const STRIDE: f64 = 1.0;
+
+/// The most samples of a shadow, so that a view from close by does not take for ever.
+const MOST_STEPS: u32 = 2048;
+
+/// The greatest distance of an obstacle, mm: the setting, or what the rendered box and the assumed thickness of its surface leave.
+fn reach(scene: &Scene) -> f64 {
+    let shadow = scene.settings.light.shadow.unwrap_or_default();
+    shadow.reach.min((scene.high - scene.low).length() + shadow.thickness)
+}
+
+/// Stride across the view, mm, and mm per mm of distance.
+fn pitch(scene: &Scene) -> [f64; 2] {
+    let rays = &scene.rays;
+    let smaller = |dx: DVec3, dy: DVec3| STRIDE * dx.length().min(dy.length());
+    [smaller(rays.origin_dx, rays.origin_dy), smaller(rays.direction_dx, rays.direction_dy)]
+}
+
+/// Stride towards the light, mm: a pixel across the view, and at most half of the thickness along it, but no less than a quarter of a pixel.
+fn stride(scene: &Scene, distance: f64, to_light: DVec3, along: DVec3) -> f64 {
+    let shadow = scene.settings.light.shadow.unwrap_or_default();
+    let [own, per_distance] = pitch(scene);
+    let (pixel, across) = (own + per_distance * distance, to_light.cross(along).length());
+    let behind = (1.0 - across * across).max(0.0).sqrt();
+    (pixel / across.max(1e-6)).min(0.5 * shadow.thickness / behind.max(1e-6)).max(0.25 * pixel)
+}
 
 /// Shadow, by tracing the distance map towards the light (thesis Fig. 41): the map is taken as the front of matter that is
 /// `thickness` deep, and a place on the way to the light that lies in it is where the light is blocked.
@@ -242,7 +277,8 @@ pub const SHADOW: Pass = Pass {
         camera_params(s)
             .vec3("forward", s.rays.forward)
             .vec3("light_at", light_at(s))
-            .f32("reach", shadow.reach)
+            .f32("reach", reach(s))
+            .vec2("pitch", pitch(s))
             .f32("thickness", shadow.thickness)
             .f32("bias", shadow.bias)
             .f32("softness", shadow.softness)
@@ -253,7 +289,7 @@ pub const SHADOW: Pass = Pass {
             ("POINT", s.settings.light.position.is_some() as i32),
             ("PERSPECTIVE", s.rays.is_perspective as i32),
             ("SOFT", soft as i32),
-            ("STEPS", SHADOW_STEPS as i32),
+            ("MOST_STEPS", MOST_STEPS as i32),
         ]
     },
     tolerance: Tolerance {
@@ -269,7 +305,7 @@ pub const SHADOW: Pass = Pass {
         for y in 0..shadow.size[1] {
             for x in 0..shadow.size[0] {
                 let arrives = place(scene, distances, x as i64, y as i64)
-                    .map_or(1.0, |(place, _)| arriving(scene, distances, x, y, place));
+                    .map_or(1.0, |(place, distance)| arriving(scene, distances, x, y, place, distance));
                 shadow.set([x, y, 0], &[arrives]);
             }
         }
@@ -282,14 +318,15 @@ fn casts_shadow(scene: &Scene) -> bool {
 }
 
 /// Share of the light that arrives at a place which pixel (x, y) sees.
-fn arriving(scene: &Scene, distances: &Texels, x: usize, y: usize, place: DVec3) -> f64 {
+fn arriving(scene: &Scene, distances: &Texels, x: usize, y: usize, place: DVec3, distance: f64) -> f64 {
     let shadow = scene.settings.light.shadow.unwrap_or_default();
     let (_, along) = scene.rays.at(x as f64 + 0.5, y as f64 + 0.5);
     let (direction, far) = to_light(scene, place, -along);
-    let way = shadow.reach.min(far);
+    let stride = stride(scene, distance, direction, along);
+    let steps = (reach(scene).min(far) / stride).min(MOST_STEPS.into()) as u32;
     let mut arrives = 1.0f64;
-    for i in 1..=SHADOW_STEPS {
-        let gone = f64::from(i) * way / f64::from(SHADOW_STEPS);
+    for i in 1..=steps {
+        let gone = f64::from(i) * stride;
         let Some((at, distance)) = seen_at(scene, place + direction * gone, distances.size) else { break };
         let Some(nearest) = map_at(scene, distances, at) else { continue };
         let inside = distance - nearest - shadow.bias;

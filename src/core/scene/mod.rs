@@ -728,7 +728,8 @@ impl Scene {
     /// True if slices get the slight blur against wood grain: it is set, and no smoothing blurs them in their plane.
     fn blurs(&self) -> bool {
         let smooth = self.slice_filters.smooth.unwrap_or_default();
-        self.settings.slices.blur && smooth.kernel.is_none() && smooth.lateral == 0.0 && smooth.depth == 0.0
+        let blur = self.settings.slices.blur.is_on(self.is_flat());
+        blur && smooth.kernel.is_none() && smooth.lateral == 0.0 && smooth.depth == 0.0
     }
 
     /// Estimator of the centre of an enhanced sigma filter: Perona-Malik for planes, the median otherwise (thesis 5.5).

@@ -97,9 +97,9 @@ pub struct Slices {
     pub perona_malik: Option<PeronaMalik>,
     /// Gaussian smoothing.
     pub smooth: Option<Smooth>,
-    /// Slight Gaussian blur of 3x3 against wood grain, the trace of the pixel lattice on a tilted surface (thesis Fig. 32, 33). Has no
-    /// effect where `smooth` blurs slices already.
-    pub blur: bool,
+    /// Slight Gaussian blur of 3x3 against wood grain, the trace of the pixel lattice on a tilted surface (thesis Fig. 32, 33); `rendered`: in modes that
+    /// cast rays, and not in planes. Has no effect where `smooth` blurs slices already.
+    pub blur: Blur,
     /// Storage of the volume.
     pub format: VolumeFormat,
     /// Converts and filters the whole volume, not only the part that the region, start depths and clip planes leave visible, or that the
@@ -122,7 +122,7 @@ impl Default for Slices {
             enhanced_sigma: None,
             perona_malik: None,
             smooth: None,
-            blur: false,
+            blur: Blur::default(),
             format: VolumeFormat::Auto,
             everything: false,
             still: false,
@@ -454,6 +454,38 @@ mod tests {
                 assert!((2..=most as usize).contains(&kept(factor)), "{samples} to {most}");
                 assert!(factor == 1 || kept(factor - 1) > most as usize, "{samples} to {most}");
             }
+        }
+    }
+}
+
+/// Whether slices get a slight blur.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, Serialize)]
+#[serde(untagged, expecting = "must be true, false, or \"rendered\"")]
+pub enum Blur {
+    Always(bool),
+    Named(BlurName),
+}
+
+/// The named choices of a blur.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum BlurName {
+    /// In modes that cast rays.
+    Rendered,
+}
+
+impl Default for Blur {
+    fn default() -> Blur {
+        Blur::Always(false)
+    }
+}
+
+impl Blur {
+    /// True if slices are blurred in a mode that shows planes (`is_flat`), or casts rays.
+    pub fn is_on(self, is_flat: bool) -> bool {
+        match self {
+            Blur::Always(on) => on,
+            Blur::Named(BlurName::Rendered) => !is_flat,
         }
     }
 }
