@@ -127,12 +127,6 @@ impl InputArgs {
         self.input.as_deref().is_some_and(|file| file.as_os_str() == STANDARD)
     }
 
-    /// True if the recording is standard input, which can be read once.
-    #[cfg(feature = "lab")]
-    pub fn is_standard_input(&self) -> bool {
-        self.input.as_ref().is_some_and(|file| file.as_os_str() == STANDARD)
-    }
-
     /// The recording as it was typed, or `phantom`.
     pub fn name(&self) -> String {
         match &self.input {

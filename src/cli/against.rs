@@ -30,7 +30,9 @@ impl FromStr for Other {
         let path = Path::new(text);
         Ok(match () {
             _ if path.is_dir() => Other::Shaders(path.into()),
-            _ if path.is_file() || path.components().count() > 1 => Other::Program(path.into()),
+            // A name alone would be looked for in PATH.
+            _ if path.is_file() => Other::Program(Path::new(".").join(path)),
+            _ if path.components().count() > 1 => Other::Program(path.into()),
             _ => Other::Device(text.into()),
         })
     }
@@ -143,6 +145,7 @@ mod tests {
         let source = concat!(env!("CARGO_MANIFEST_DIR"), "/src");
         assert_eq!(source.parse(), Ok(Other::Shaders(source.into())));
         assert_eq!("./no-such/program".parse(), Ok(Other::Program("./no-such/program".into())));
+        assert_eq!("Cargo.toml".parse(), Ok(Other::Program("./Cargo.toml".into())));
         assert_eq!("llvmpipe".parse(), Ok(Other::Device("llvmpipe".into())));
         assert_eq!("1".parse(), Ok(Other::Device("1".into())));
     }

@@ -17,7 +17,7 @@ use std::path::{Path, PathBuf};
                         echolume profile --mode vr --trace trace.json    (open it in Perfetto or chrome://tracing)\n  \
                         echolume profile volume.mha --mode mip --still --turn 2    (the picture alone, each from another angle)\n  \
                         echolume profile --compare before.json after.json    (exit code 1 if a pass became slower, 5 if the noise may hide it)\n  \
-                        echolume profile sweep.mha --against ../before/echolume    (or a folder of shaders, or a device)\n  \
+                        echolume profile sweep.mha --against target/release/echolume    (or a folder of shaders, or a device: exit code 1 if it is slower)\n  \
                         echolume profile --pipelines --all --json gpu.json    (what the driver makes of every shader)\n  \
                         echolume profile --pipelines --all --compare gpu.json    (exit code 1 on a spill or a loss of occupancy)\n  \
                         echolume profile --pipelines --glsl glsl    (what an edited shader costs in registers, without a build)")]
@@ -55,8 +55,9 @@ pub struct Profile {
     /// devices CPU time is compared. With --pipelines, OLD alone is compared with what is measured
     #[arg(long, num_args = 1..=2, value_names = ["OLD", "NEW"])]
     compare: Vec<PathBuf>,
-    /// Measure this too, in turn, and compare as --compare does: another echolume program, a folder of shaders (as --glsl), or a device (as
-    /// --device). Each block of volumes is a process of its own, and has its --warm-up
+    /// Measure this in turn with what the other options say, and compare as --compare does: another echolume program, a folder of shaders
+    /// (as --glsl), or a device (as --device). Exit code 1 if it is slower. Each block of volumes is a process of its own with its own
+    /// --warm-up
     #[arg(long, value_name = "PROGRAM|DIR|DEVICE", conflicts_with_all = ["compare", "csv", "csv_samples", "trace"])]
     against: Option<Other>,
     #[command(flatten)]
@@ -137,7 +138,7 @@ impl Profile {
 
     /// Measures in turn with another run, and compares them.
     fn measure_against(&self, other: &Other) -> Result<(), Failure> {
-        if self.input.is_standard_input() {
+        if self.input.is_standard() {
             return Err(input("--against: standard input can be read once only; name a file"));
         }
         check_outputs(&[("--json", self.json.as_deref())], [])?;
