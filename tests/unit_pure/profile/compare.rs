@@ -283,7 +283,7 @@ fn what_the_noise_may_hide_is_said_and_a_slowdown_beyond_it_is_found() {
         let after = compared(&old, &new);
         let is_told = line(&after, &slowed).is_regression || after.cannot_tell().is_some();
         assert!(is_told, "{}", comparison_table(&after));
-        assert_eq!(comparison_table(&after).contains("nothing is slower"), false);
+        assert!(!comparison_table(&after).contains("nothing is slower"));
         hidden += u32::from(!line(&after, &slowed).is_regression);
         // Beyond the limit of the line, from the same times.
         slow(&mut new, 1.01 * limit.expect("a limit") / estimate.expect("a ratio") / 3.0);
