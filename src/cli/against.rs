@@ -1,15 +1,17 @@
-//! `profile --against`: two runs in turn, each block of them a process of its own, so that other load on the machine, its clocks and where memory
-//! lies affect both alike.
+//! `profile --against`: two runs in turn, volume by volume, so that other load on the machine and its clocks affect both alike; each block of them
+//! is a pair of processes of its own, so that where memory lies does too.
 
 use crate::baselines::Stored;
 use crate::files::WorkFolder;
 use crate::profile::Profile;
 use crate::profile::compare::{CompareOptions, Comparison, blocks_in_turn, in_turn};
-use crate::terminal::{Failure, failed, input, progress_bar};
+use crate::terminal::{Failure, failed, input, progress_bar, say};
 use std::convert::Infallible;
 use std::ffi::OsString;
+use std::fs::{self, File};
+use std::io::{BufRead, BufReader, Write};
 use std::path::{Path, PathBuf};
-use std::process::{Command, Stdio};
+use std::process::{Child, Command, Stdio};
 use std::str::FromStr;
 
 /// What a run is measured against.
@@ -77,32 +79,113 @@ struct Side {
 }
 
 impl Side {
-    /// Measures a block.
-    fn block(&mut self, folder: &Path, [repeats, warm_up]: [u32; 2]) -> Result<(), Failure> {
-        let file = folder.join("block.json");
+    /// Starts a block of so many volumes, whose profile and errors are written to `folder`.
+    fn start(&self, folder: PathBuf, [repeats, warm_up]: [u32; 2]) -> Result<Block, Failure> {
+        fs::create_dir_all(&folder).map_err(failed)?;
+        let errors = File::create(folder.join(ERRORS)).map_err(failed)?;
         let mut command = Command::new(&self.program);
-        command.args(&self.arguments).arg("--no-ceilings").arg("--json").arg(&file);
+        command.args(&self.arguments).args(["--in-turn", "--no-ceilings", "--json"]).arg(folder.join(PROFILE));
         command.args(["--repeat", &repeats.to_string(), "--warm-up", &warm_up.to_string()]);
-        command.stdin(Stdio::null()).stdout(Stdio::null());
-        let ran = command.output().map_err(|e| input(format!("--against: {}: {e}", self.program.display())))?;
-        if !ran.status.success() {
-            let said = String::from_utf8_lossy(&ran.stderr);
-            let last = said.lines().last().map(|line| line.trim_start_matches("echolume: "));
-            let why = format!("--against: {}: {}", self.name, last.unwrap_or(&ran.status.to_string()));
-            return Err(match ran.status.code() {
+        command.stdin(Stdio::piped()).stdout(Stdio::piped()).stderr(errors);
+        let started = command.spawn().map_err(|e| input(format!("--against: {}: {e}", self.program.display())));
+        started.map(|child| Block { child, folder })
+    }
+
+    /// Waits for the end of a block, and keeps its profile.
+    fn finish(&mut self, block: &mut Block) -> Result<(), Failure> {
+        let Block { child, folder } = block;
+        if let Some(mut rest) = child.stdout.take() {
+            std::io::copy(&mut rest, &mut std::io::sink()).map_err(failed)?;
+        }
+        let status = child.wait().map_err(failed)?;
+        if !status.success() {
+            let said = fs::read_to_string(folder.join(ERRORS)).unwrap_or_default();
+            // Of a wrong command line the first line, otherwise the last.
+            let fault = said.lines().find_map(|line| line.strip_prefix("error: ")).or(said.lines().last());
+            let fault = fault.map(|line| line.trim_start_matches("echolume: "));
+            let why = format!("--against: {}: {}", self.name, fault.unwrap_or(&status.to_string()));
+            return Err(match status.code() {
                 Some(2) => Failure::Input(why),
                 Some(3) => Failure::NoDevice(why),
                 _ => Failure::Failed(why),
             });
         }
-        self.blocks.push(Profile::load(&file).map_err(failed)?);
+        self.blocks.push(Profile::load(&folder.join(PROFILE)).map_err(failed)?);
         Ok(())
     }
 }
 
-/// Measures this program with its own arguments and `other` in turn, A B B A, and compares them. `repeats` in all for each; each block has
-/// `warm_up` before its own.
+/// Files of a block.
+const PROFILE: &str = "profile.json";
+const ERRORS: &str = "errors";
+
+/// A process that measures a block.
+struct Block {
+    child: Child,
+    folder: PathBuf,
+}
+
+impl Block {
+    /// Asks for a volume and waits until it is done. False if the process ended instead.
+    fn repeat(&mut self) -> bool {
+        let (Some(asks), Some(answers)) = (&mut self.child.stdin, &mut self.child.stdout) else { return false };
+        let is_done = |line: std::io::Result<String>| line.is_ok_and(|line| line == DONE);
+        // It says nothing else between a question and its answer, so that nothing is lost in the buffer.
+        asks.write_all(b"\n").is_ok() && BufReader::new(answers).lines().any(is_done)
+    }
+}
+
+/// What a process says when a volume is done.
+const DONE: &str = "in turn: done";
+
+/// In a process that measures a block: waits until a volume is asked for, by a line of standard input.
+pub fn await_turn() -> Result<(), Failure> {
+    match std::io::stdin().read_line(&mut String::new()) {
+        Ok(length) if length > 0 => Ok(()),
+        _ => Err(failed("--in-turn: standard input ended before all volumes were asked for")),
+    }
+}
+
+/// Says that the volume is done.
+pub fn end_turn() {
+    say!("{DONE}");
+}
+
+/// Measures this program with its own arguments and `other` in turn, A B B A, and compares them. `repeats` in all for each, in blocks that are a
+/// pair of processes; each block has `warm_up` before its own.
 pub fn compared(other: &Other, repeats: u32, warm_up: u32, options: &CompareOptions) -> Result<Comparison, Failure> {
+    let mut sides = sides(other)?;
+    let folder = WorkFolder::new(&std::env::temp_dir(), "echolume-profile-").map_err(failed)?;
+    let (mut pairs, mut done) = (blocks_in_turn(0, options.alpha), 0);
+    let bar = progress_bar(pairs as u64).with_message("blocks");
+    while done < pairs {
+        let repeats = repeats.div_ceil(pairs as u32);
+        let start = |at: usize| sides[at].start(folder.path().join(at.to_string()), [repeats, warm_up]);
+        let mut blocks = [start(0)?, start(1)?];
+        for turn in 0..repeats + warm_up {
+            let first = (done + turn as usize) % 2;
+            for at in [first, 1 - first] {
+                if !blocks[at].repeat() {
+                    sides[at].finish(&mut blocks[at])?;
+                    return Err(failed(format!("--against: {}: ended before its volumes were done", sides[at].name)));
+                }
+            }
+        }
+        sides.iter_mut().zip(&mut blocks).try_for_each(|(side, block)| side.finish(block))?;
+        done += 1;
+        bar.inc(1);
+        // The first pair tells how many passes there are.
+        let passes = sides.iter().flat_map(|side| &side.blocks).map(|block| block.passes.len()).max();
+        pairs = blocks_in_turn(passes.unwrap_or(0), options.alpha);
+        bar.set_length(pairs as u64);
+    }
+    bar.finish_and_clear();
+    let [old, new] = &sides;
+    in_turn(&old.blocks, &new.blocks, options).map_err(input)
+}
+
+/// This program with its own arguments, and the other.
+fn sides(other: &Other) -> Result<[Side; 2], Failure> {
     let program = std::env::current_exe().map_err(|e| failed(format!("this program's file is not known: {e}")))?;
     let own = without(std::env::args_os().skip(1), &KEPT_BACK);
     let with = |flag: &str, value: &OsString| {
@@ -115,25 +198,7 @@ pub fn compared(other: &Other, repeats: u32, warm_up: u32, options: &CompareOpti
         Other::Device(device) => (device.clone(), program.clone(), with("--device", &device.into())),
     };
     let side = |name, program, arguments| Side { name, program, arguments, blocks: Vec::new() };
-    let mut sides = [side("this program".into(), program, own), side(name, command, arguments)];
-    let folder = WorkFolder::new(&std::env::temp_dir(), "echolume-profile-").map_err(failed)?;
-    let (mut pairs, mut done) = (blocks_in_turn(0, options.alpha), 0);
-    let bar = progress_bar(2 * pairs as u64).with_message("blocks");
-    while done < pairs {
-        let first = done % 2;
-        for at in [first, 1 - first] {
-            sides[at].block(folder.path(), [repeats.div_ceil(pairs as u32), warm_up])?;
-            bar.inc(1);
-        }
-        done += 1;
-        // The first pair tells how many passes there are.
-        let passes = sides[0].blocks.iter().chain(&sides[1].blocks).map(|block| block.passes.len()).max();
-        pairs = blocks_in_turn(passes.unwrap_or(0), options.alpha);
-        bar.set_length(2 * pairs as u64);
-    }
-    bar.finish_and_clear();
-    let [old, new] = &sides;
-    in_turn(&old.blocks, &new.blocks, options).map_err(input)
+    Ok([side("this program".into(), program, own), side(name, command, arguments)])
 }
 
 #[cfg(test)]

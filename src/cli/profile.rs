@@ -56,10 +56,13 @@ pub struct Profile {
     #[arg(long, num_args = 1..=2, value_names = ["OLD", "NEW"])]
     compare: Vec<PathBuf>,
     /// Measure this in turn with what the other options say, and compare as --compare does: another echolume program, a folder of shaders
-    /// (as --glsl), or a device (as --device). Exit code 1 if it is slower. Each block of volumes is a process of its own with its own
-    /// --warm-up
+    /// (as --glsl), or a device (as --device). Exit code 1 if it is slower. Each of some 12 blocks of volumes is a pair of processes with
+    /// its own --warm-up
     #[arg(long, value_name = "PROGRAM|DIR|DEVICE", conflicts_with_all = ["compare", "csv", "csv_samples", "trace"])]
     against: Option<Other>,
+    /// In a process of --against: a volume for each line of standard input, and a line of answer
+    #[arg(long, hide = true)]
+    in_turn: bool,
     #[command(flatten)]
     shaders: ShaderArgs,
     /// Compile the pipelines of the scene, and print what the driver makes of them: registers, occupancy, spills, instructions, time to
@@ -126,7 +129,13 @@ impl Profile {
         let failure = |fault| self.shaders.failure(fault);
         let mut run = timed_run::ProfileRun::with_shaders(&context, &scene, &options, &shaders).map_err(failure)?;
         while run.needs_more() {
+            if self.in_turn {
+                against::await_turn()?;
+            }
             run.repeat(&frames).map_err(failure)?;
+            if self.in_turn {
+                against::end_turn();
+            }
         }
         let (profile, spans) = run.finish();
         say!("{}", export::profile_table(&profile).trim_end());

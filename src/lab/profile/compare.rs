@@ -10,8 +10,8 @@
 //!    whose blocks happen to be close together is not steadier than the device: the floor is at least the range of the typical
 //!    pass (median over the passes, weighted by their time) and one clock tick per dispatch.
 //!
-//! [`in_turn`] compares runs whose blocks were measured in turn, A B B A: a pair of neighbours had the same conditions, so that the ratios of the
-//! pairs are tested (Wilcoxon's signed ranks), and what both runs share is no noise.
+//! [`in_turn`] compares runs whose repeats were measured in turn, A B B A: neighbours had the same conditions, so that what both runs share is no noise.
+//! Each block, which is a pair of processes, has the median of the ratios of its neighbours, and these are tested (Wilcoxon's signed ranks).
 //!
 //! What is not called slower is not therefore as fast: [`Line::limit`] is the smallest slowdown that would have been called so.
 //!
@@ -180,13 +180,13 @@ pub fn compare(old: &Profile, new: &Profile, options: &CompareOptions) -> Result
     compare_repeats(old, new, options, Repeats::Apart)
 }
 
-/// Compares two runs whose blocks were measured in turn, the n-th of both next to each other.
+/// Compares two runs that were measured in turn, the n-th repeats of the n-th blocks of both next to each other.
 ///
 /// # Errors
 /// As of [`compare`]; blocks of one run that are of different work.
 pub fn in_turn(old: &[Profile], new: &[Profile], options: &CompareOptions) -> Result<Comparison, CompareError> {
     let [old, new] = [("old", old), ("new", new)]
-        .map(|(which, blocks)| blocks_as_repeats(blocks).map_err(|fault| CompareError::Profile { which, fault }));
+        .map(|(which, blocks)| blocks_as_repeats(blocks, old).map_err(|fault| CompareError::Profile { which, fault }));
     compare_repeats(&old?, &new?, options, Repeats::InTurn)
 }
 
@@ -197,8 +197,17 @@ pub fn blocks_in_turn(passes: usize, alpha: f64) -> usize {
     (10..100).step_by(2).find(|n| min_signed_p(n - 2) * lines <= alpha).unwrap_or(100)
 }
 
-/// A run of one repeat for each block: the median of its times.
-fn blocks_as_repeats(blocks: &[Profile]) -> Result<Profile, String> {
+/// The median of times; where there are as many of a neighbour, by the median of the ratios to them, and theirs.
+fn median_beside(times: &[f64], neighbours: Option<Vec<f64>>) -> Option<f64> {
+    let median = |list: &[f64]| Some(Sample::new(list).ok()?.median());
+    let is_usable = |other: &Vec<f64>| other.len() == times.len() && times.iter().chain(other).all(|ns| *ns > 0.0);
+    let Some(other) = neighbours.filter(is_usable) else { return median(times) };
+    let ratios: Vec<f64> = times.iter().zip(&other).map(|(ns, other)| ns / other).collect();
+    Some(median(&other)? * median(&ratios)?)
+}
+
+/// A run of one repeat for each block, with the medians of its times beside those of `neighbours`.
+fn blocks_as_repeats(blocks: &[Profile], neighbours: &[Profile]) -> Result<Profile, String> {
     let Some(first) = blocks.first() else { return Err("has no blocks".into()) };
     for block in blocks {
         block.check()?;
@@ -207,7 +216,7 @@ fn blocks_as_repeats(blocks: &[Profile]) -> Result<Profile, String> {
         }
     }
     let medians = |times: &dyn Fn(&Profile) -> Option<Vec<f64>>| -> Vec<f64> {
-        let each = blocks.iter().map(|block| Some(Sample::new(&times(block)?).ok()?.median()));
+        let each = blocks.iter().zip(neighbours).map(|(block, other)| median_beside(&times(block)?, times(other)));
         each.collect::<Option<_>>().unwrap_or_default()
     };
     let of = |block: &Profile, name: &str| block.passes.iter().find(|pass| pass.name == name).cloned();
@@ -264,7 +273,10 @@ fn compare_repeats(
              blocks of a run range over"
         ),
         Method::InTurn => {
-            format!("Wilcoxon's signed ranks of {} blocks in turn, Holm over {both} lines at {alpha:.0} %", old.repeats)
+            format!(
+                "Wilcoxon's signed ranks of {} blocks of repeats in turn, Holm over {both} lines at {alpha:.0} %",
+                old.repeats
+            )
         }
     };
     if !cpu && old.device.is_software && new.device.is_software {

@@ -335,17 +335,17 @@ fn cpu_time_decides_on_software_devices() {
     assert!(compared(&old, &new).regressions().next().is_none());
 }
 
-/// Blocks of two runs in turn, all of a pair slowed by the same load, and one pass of the second by `factor`.
+/// Blocks of two runs in turn, neighbours slowed by the same load, and one pass of the second by `factor`.
 fn blocks(random: &mut Random, factor: f64) -> [Vec<Profile>; 2] {
     let count = blocks_in_turn(12, 0.05);
     assert!(count.is_multiple_of(2) && count >= 12, "{count}");
     let mut sides = [Vec::new(), Vec::new()];
     for _ in 0..count {
-        let load = random.between(1.0, 2.0);
+        let loads = [(); 3].map(|()| random.between(1.0, 2.0));
         for (side, by) in [(0, 1.0), (1, factor)] {
             let mut block = run(random, 12, 3, Noise { spread: 0.01, outliers: 0.02, ..STEADY });
-            block.passes.iter_mut().flat_map(|pass| &mut pass.samples_ns).for_each(|ns| *ns *= load);
-            block.wall_ns.iter_mut().for_each(|ns| *ns *= load);
+            let lists = block.passes.iter_mut().map(|pass| &mut pass.samples_ns).chain([&mut block.wall_ns]);
+            lists.for_each(|list| list.iter_mut().zip(loads).for_each(|(ns, load)| *ns *= load));
             block.passes[5].samples_ns.iter_mut().for_each(|ns| *ns *= by);
             sides[side].push(block);
         }
@@ -361,7 +361,7 @@ fn runs_in_turn_show_five_percent_under_a_load_that_doubles_times() {
         let [old, new] = blocks(&mut random, factor);
         let comparison = in_turn(&old, &new, &options).expect("comparison");
         assert!(
-            comparison.test.starts_with("Wilcoxon's signed ranks of 12 blocks in turn, Holm over 13 lines"),
+            comparison.test.starts_with("Wilcoxon's signed ranks of 12 blocks of repeats in turn, Holm over 13 lines"),
             "{}",
             comparison.test
         );
