@@ -6,6 +6,8 @@ use crate::files::WorkFolder;
 use crate::profile::Profile;
 use crate::profile::compare::{CompareOptions, Comparison, blocks_in_turn, in_turn};
 use crate::terminal::{Failure, failed, input, progress_bar, say};
+#[cfg(target_os = "linux")]
+use rustix::thread::CpuSet;
 use std::convert::Infallible;
 use std::ffi::OsString;
 use std::fs::{self, File};
@@ -137,6 +139,21 @@ impl Block {
 
 /// What a process says when a volume is done.
 const DONE: &str = "in turn: done";
+
+/// Keeps this process, which measures a block, on the last core that it may run on. Where the threads of a software device and of other load lie on
+/// several cores differs between two processes, and stays so for seconds: volumes in turn would not share it, and more of them not even it out.
+pub fn keep_to_one_core() {
+    #[cfg(target_os = "linux")]
+    if let Ok(cores) = rustix::thread::sched_getaffinity(None)
+        && let Some(last) = (0..CpuSet::MAX_CPU).rev().find(|core| cores.is_set(*core))
+    {
+        let mut one = CpuSet::new();
+        one.set(last);
+        if let Err(e) = rustix::thread::sched_setaffinity(None, &one) {
+            tracing::warn!("--in-turn: stays on all cores: {e}");
+        }
+    }
+}
 
 /// In a process that measures a block: waits until a volume is asked for, by a line of standard input.
 pub fn await_turn() -> Result<(), Failure> {

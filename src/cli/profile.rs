@@ -98,6 +98,9 @@ impl Profile {
     }
 
     fn measure(&self) -> Result<(), Failure> {
+        if self.in_turn {
+            against::keep_to_one_core();
+        }
         let (mut source, mut scene) = self.input.open()?;
         scene.settings.slices.still |= self.still;
         let targets: [Output; 4] = [
