@@ -97,16 +97,14 @@ fn a_profile_is_written_compared_with_itself_and_refused_where_it_cannot_be() {
 fn what_is_measured_in_turn_is_another_program_or_a_folder_of_shaders() {
     let _alone = alone();
     let folder = Folder::new("against");
-    let glsl = repository("glsl");
-    copy_tree(&glsl, &folder.join("slow"));
+    copy_tree(&repository("glsl"), &folder.join("slow"));
     let shader = folder.join("slow/shade/light.comp");
     let text = fs::read_to_string(&shader).expect("a shader");
     let slow = "void main() {\n    float spent = 0.5;\n    for (int n = 0; n < 3000; n++) spent = sin(spent + 0.1);\n    if (spent == 7.0) return;\n";
     assert!(text.contains("void main() {\n"), "the shader has another form: {text}");
     fs::write(&shader, text.replace("void main() {\n", slow)).expect("written");
     let ask = [&["profile"], &SMALL[..], &["--repeat", "10", "--warm-up", "1"]].concat();
-    let (slow, glsl) = (folder.path("slow"), glsl.to_str().expect("a plain name").to_string());
-    let (code, out, err) = run(&[&ask[..], &["--glsl", &glsl, "--against", &slow, "--threshold", "3"]].concat());
+    let (code, out, err) = run(&[&ask[..], &["--against", &folder.path("slow"), "--threshold", "3"]].concat());
     assert_eq!(code, Some(1), "{out}{err}");
     assert_eq!(err.lines().last(), Some("echolume: slower by more than the threshold: light"), "{out}{err}");
     assert!(out.contains("compared: CPU time of each pass") || !cfg!(target_os = "linux"), "{out}");
@@ -123,6 +121,7 @@ fn what_is_measured_in_turn_is_another_program_or_a_folder_of_shaders() {
     refused(&[&ask[..], &["--against", BONE]].concat(), 2, &["bone.mha"]);
     refused(&["profile", "-", "--against", PROGRAM], 2, &["standard input"]);
     refused(&[&ask[..], &["--against", "/bin/false"]].concat(), 1, &["/bin/false", "exit status: 1"]);
+    refused(&[&ask[..], &["--against", "/bin/true"]].concat(), 1, &["profile.json"]);
 }
 
 /// Copies a folder with all that is in it.
