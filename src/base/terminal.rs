@@ -37,6 +37,8 @@ pub enum Failure {
     Interrupted(String),
     /// Some units of a `batch` failed, and the others are done: exit code 4.
     SomeFailed(String),
+    /// `profile --compare` or `--against`: a slowdown that counts may have been overlooked: exit code 5.
+    CannotTell(String),
     /// `verify --bisect` has no device to check: exit code 125, by which `git bisect run` passes over a version.
     Untestable(String),
 }
@@ -49,6 +51,7 @@ impl Failure {
         | Failure::NoDevice(message)
         | Failure::Interrupted(message)
         | Failure::SomeFailed(message)
+        | Failure::CannotTell(message)
         | Failure::Untestable(message)) = self;
         message
     }
@@ -60,6 +63,7 @@ impl Failure {
             Failure::Input(_) => 2,
             Failure::NoDevice(_) => 3,
             Failure::Interrupted(_) | Failure::SomeFailed(_) => 4,
+            Failure::CannotTell(_) => 5,
             Failure::Untestable(_) => 125,
         }
     }
@@ -119,6 +123,7 @@ pub fn print_failure(failure: &Failure) {
     | Failure::NoDevice(message)
     | Failure::Interrupted(message)
     | Failure::SomeFailed(message)
+    | Failure::CannotTell(message)
     | Failure::Untestable(message)) = failure;
     let _ = writeln!(std::io::stderr(), "echolume: {}", single_line(message));
 }

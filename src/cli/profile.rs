@@ -1,10 +1,10 @@
 //! `echolume profile`.
 
+use super::against::{self, Other};
 use super::pipelines::Request;
-use crate::args::{InputArgs, Output, ShaderArgs, check_outputs, open_device, write_report};
+use crate::args::{InputArgs, Output, ShaderArgs, check_outputs, write_report};
 use crate::baselines::{Stored, Threshold};
 use crate::files::replace_shared;
-use crate::gpu::DeviceChoice;
 use crate::profile as model;
 use crate::profile::timed_run;
 use crate::profile::{compare, export};
@@ -16,7 +16,8 @@ use std::path::{Path, PathBuf};
                         echolume profile sweep.mha --preset fetal --json before.json\n  \
                         echolume profile --mode vr --trace trace.json    (open it in Perfetto or chrome://tracing)\n  \
                         echolume profile volume.mha --mode mip --still --turn 2    (the picture alone, each from another angle)\n  \
-                        echolume profile --compare before.json after.json    (exit code 1 if a pass became slower)\n  \
+                        echolume profile --compare before.json after.json    (exit code 1 if a pass became slower, 5 if the noise may hide it)\n  \
+                        echolume profile sweep.mha --against target/release/echolume    (or a folder of shaders, or a device: exit code 1 if it is slower)\n  \
                         echolume profile --pipelines --all --json gpu.json    (what the driver makes of every shader)\n  \
                         echolume profile --pipelines --all --compare gpu.json    (exit code 1 on a spill or a loss of occupancy)\n  \
                         echolume profile --pipelines --glsl glsl    (what an edited shader costs in registers, without a build)")]
@@ -38,7 +39,7 @@ pub struct Profile {
     /// Do not measure the device's ceilings (copies, samples, fetches)
     #[arg(long)]
     no_ceilings: bool,
-    /// Write all measurements (JSON), for --compare
+    /// Write all measurements (JSON), for --compare. With --compare or --against: the comparison
     #[arg(long, value_name = "FILE")]
     json: Option<PathBuf>,
     /// Write one line per pass (CSV)
@@ -50,13 +51,18 @@ pub struct Profile {
     /// Write a trace for Perfetto or Chrome
     #[arg(long, value_name = "FILE")]
     trace: Option<PathBuf>,
-    /// Compare two profiles pass by pass, without measuring; exit code 1 on a regression. With --pipelines, OLD alone is compared with
-    /// what is measured
+    /// Compare two profiles pass by pass, without measuring; exit code 1 on a regression, 5 if the noise may hide one. On software
+    /// devices CPU time is compared. With --pipelines, OLD alone is compared with what is measured
     #[arg(long, num_args = 1..=2, value_names = ["OLD", "NEW"])]
     compare: Vec<PathBuf>,
-    /// Measure on this device too, alternating with the other, and compare them
-    #[arg(long, value_name = "N|NAME", conflicts_with = "compare")]
-    against: Option<DeviceChoice>,
+    /// Measure this in turn with what the other options say, and compare as --compare does: another echolume program, a folder of shaders
+    /// (as --glsl), or a device (as --device). Exit code 1 if it is slower. Each of some 12 blocks of volumes is a pair of processes with
+    /// its own --warm-up
+    #[arg(long, value_name = "PROGRAM|DIR|DEVICE", conflicts_with_all = ["compare", "csv", "csv_samples", "trace"])]
+    against: Option<Other>,
+    /// In a process of --against: a volume for each line of standard input, and a line of answer
+    #[arg(long, hide = true)]
+    in_turn: bool,
     #[command(flatten)]
     shaders: ShaderArgs,
     /// Compile the pipelines of the scene, and print what the driver makes of them: registers, occupancy, spills, instructions, time to
@@ -84,11 +90,17 @@ impl Profile {
         match self.compare.as_slice() {
             [old, new] => self.compare(old, new),
             [_] => Err(input("--compare: needs two profiles, OLD and NEW; with --pipelines one")),
-            _ => self.measure(),
+            _ => match &self.against {
+                Some(other) => self.measure_against(other),
+                None => self.measure(),
+            },
         }
     }
 
     fn measure(&self) -> Result<(), Failure> {
+        if self.in_turn {
+            against::keep_to_one_core();
+        }
         let (mut source, mut scene) = self.input.open()?;
         scene.settings.slices.still |= self.still;
         let targets: [Output; 4] = [
@@ -117,27 +129,32 @@ impl Profile {
             input: self.input.name(),
             ceilings: !self.no_ceilings,
         };
-        let against = match &self.against {
-            Some(choice) => Some(open_device(Some(choice.clone()), false)?),
-            None => None,
-        };
         let failure = |fault| self.shaders.failure(fault);
-        let run = |context| timed_run::ProfileRun::with_shaders(context, &scene, &options, &shaders).map_err(failure);
-        let (mut first, mut second) = (run(&context)?, against.as_ref().map(run).transpose()?);
-        while first.needs_more() {
-            first.repeat(&frames).map_err(failure)?;
-            second.as_mut().map_or(Ok(()), |s| s.repeat(&frames)).map_err(failure)?;
+        let mut run = timed_run::ProfileRun::with_shaders(&context, &scene, &options, &shaders).map_err(failure)?;
+        while run.needs_more() {
+            if self.in_turn {
+                against::await_turn()?;
+            }
+            run.repeat(&frames).map_err(failure)?;
+            if self.in_turn {
+                against::end_turn();
+            }
         }
-        let (profile, spans) = first.finish();
+        let (profile, spans) = run.finish();
         say!("{}", export::profile_table(&profile).trim_end());
         self.write(&self.json, || profile.to_json().map_err(failed))?;
         self.write(&self.csv, || Ok(export::csv(&profile)))?;
         self.write(&self.csv_samples, || Ok(export::csv_samples(&profile)))?;
-        self.write(&self.trace, || export::chrome_trace(&profile, &spans).map_err(failed))?;
-        match second {
-            Some(second) => self.judge(&profile, &second.finish().0),
-            None => Ok(()),
+        self.write(&self.trace, || export::chrome_trace(&profile, &spans).map_err(failed))
+    }
+
+    /// Measures in turn with another run, and compares them.
+    fn measure_against(&self, other: &Other) -> Result<(), Failure> {
+        if self.input.is_standard() {
+            return Err(input("--against: standard input can be read once only; name a file"));
         }
+        check_outputs(&[("--json", self.json.as_deref())], [])?;
+        self.judge(&against::compared(other, self.repeat, self.warm_up, &self.criteria()?)?)
     }
 
     fn write(&self, file: &Option<PathBuf>, text: impl FnOnce() -> Result<String, Failure>) -> Result<(), Failure> {
@@ -148,26 +165,29 @@ impl Profile {
     fn compare(&self, old: &Path, new: &Path) -> Result<(), Failure> {
         check_outputs(&[("--json", self.json.as_deref())], [old, new])?;
         let [old, new] = [old, new].map(|file| model::Profile::load(file).map_err(input));
-        self.judge(&old?, &new?)
+        self.judge(&compare::compare(&old?, &new?, &self.criteria()?).map_err(input)?)
     }
 
-    /// Prints the differences. Fails on a regression.
-    fn judge(&self, old: &model::Profile, new: &model::Profile) -> Result<(), Failure> {
-        let options = compare::CompareOptions {
+    fn criteria(&self) -> Result<compare::CompareOptions, Failure> {
+        Ok(compare::CompareOptions {
             threshold: Threshold::new(self.threshold).map_err(|e| input(format!("--{e}")))?,
             force: self.force,
             ..compare::CompareOptions::default()
-        };
-        let compared = compare::compare(old, new, &options).map_err(input)?;
-        say!("{}", export::comparison_table(&compared).trim_end());
-        if let (Some(file), true) = (&self.json, !self.compare.is_empty()) {
-            let text = serde_json::to_string_pretty(&compared).map_err(failed)?;
+        })
+    }
+
+    /// Prints the differences. Fails on a regression, and where one may have been overlooked.
+    fn judge(&self, compared: &compare::Comparison) -> Result<(), Failure> {
+        say!("{}", export::comparison_table(compared).trim_end());
+        if let Some(file) = &self.json {
+            let text = serde_json::to_string_pretty(compared).map_err(failed)?;
             replace_shared(file, text.as_bytes()).map_err(failed)?;
         }
         let slower: Vec<&str> = compared.regressions().map(|l| l.name.as_str()).collect();
-        match slower.is_empty() {
-            true => Ok(()),
-            false => Err(failed(format!("slower by more than the threshold: {}", slower.join(", ")))),
+        match compared.cannot_tell() {
+            _ if !slower.is_empty() => Err(failed(format!("slower by more than the threshold: {}", slower.join(", ")))),
+            Some(why) => Err(Failure::CannotTell(why)),
+            None => Ok(()),
         }
     }
 }

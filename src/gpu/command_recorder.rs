@@ -157,6 +157,7 @@ impl CommandRecorder {
 
     /// Waits until the last submission is done, then begins a new recording.
     pub fn begin(&mut self, queues: &mut DeviceQueues) -> Result<(), GpuError> {
+        queues.timings.cpu_of(None);
         queues.begin(self.queue);
         self.wait(queues)?;
         // SAFETY: the device is done with every command buffer of this pool.
@@ -210,6 +211,17 @@ impl CommandRecorder {
             // nothing hides what they see.
             self.show_layer_the_wait();
         }
+        Ok(())
+    }
+
+    /// Where CPU time is counted, waits until what was recorded is done: the time since the last call is that of `pass`.
+    fn count_cpu(&mut self, queues: &mut DeviceQueues, pass: &'static str) -> Result<(), GpuError> {
+        if !queues.timings.counts_cpu() {
+            return Ok(());
+        }
+        self.cut(queues)?;
+        self.wait(queues)?;
+        queues.timings.cpu_of(Some(pass));
         Ok(())
     }
 
@@ -355,7 +367,7 @@ impl CommandRecorder {
                 self.cut(queues)?;
             }
         }
-        Ok(())
+        self.count_cpu(queues, pass.name)
     }
 
     fn dispatch_band(&mut self, queues: &mut DeviceQueues, dispatch: &Dispatch, band: &Band, work: Work) {
@@ -442,12 +454,16 @@ impl CommandRecorder {
     }
 
     /// Where each pass is timed, writes a time stamp; the work since the last one is called `name`.
-    pub fn stamp(&mut self, queues: &mut DeviceQueues, name: &'static str) {
+    ///
+    /// # Errors
+    /// A device that fails, where CPU time is counted.
+    pub fn stamp(&mut self, queues: &mut DeviceQueues, name: &'static str) -> Result<(), GpuError> {
         if let Some(stamps) = self.stamps.as_mut().filter(|_| self.time_stamps == TimeStamps::EachPass) {
             stamps.end_of(self.commands, name, self.runs, Vec::new());
             queues.stamped(self.queue);
             self.after_stamp(queues);
         }
+        self.count_cpu(queues, name)
     }
 
     fn barrier(&self, queues: &mut DeviceQueues, accesses: &[Access]) {

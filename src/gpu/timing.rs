@@ -4,6 +4,7 @@
 use super::bands::{self, Work};
 use super::context::Context;
 use super::error::{ErrorContext, GpuError};
+use super::machine::CpuTime;
 use crate::passes::{PassTime, Span};
 use ash::vk;
 use std::sync::Arc;
@@ -248,6 +249,13 @@ pub(crate) struct Timings {
     /// Passes and copies that could not be timed.
     untimed: u64,
     spans: Option<SpanLog>,
+    cpu: Option<CpuLog>,
+}
+
+/// CPU time of each pass since it was last taken, ns.
+struct CpuLog {
+    since: CpuTime,
+    passes: Vec<(&'static str, f64)>,
 }
 
 struct SpanLog {
@@ -268,7 +276,29 @@ impl Timings {
             let (began, monotonic) = context.clocks_now();
             SpanLog { context: context.clone(), list: Vec::new(), began, monotonic, anchor: (0, 0.0), deviation: None }
         });
-        Timings { times: Vec::new(), untimed: 0, spans }
+        Timings { times: Vec::new(), untimed: 0, spans, cpu: None }
+    }
+
+    /// Counts CPU time too, if the system reports it.
+    pub fn start_cpu(&mut self) {
+        self.cpu = CpuTime::now().map(|since| CpuLog { since, passes: Vec::new() });
+    }
+
+    pub fn counts_cpu(&self) -> bool {
+        self.cpu.is_some()
+    }
+
+    /// The CPU time of all threads since the last call was that of this pass; of none if it has no name.
+    pub fn cpu_of(&mut self, pass: Option<&'static str>) {
+        let Some(log) = &mut self.cpu else { return };
+        let Some(now) = CpuTime::now() else { return };
+        log.passes.extend(pass.map(|name| (name, now.since(&log.since))));
+        log.since = now;
+    }
+
+    /// The CPU times since the last call, ns, one entry for each run.
+    pub fn take_cpu(&mut self) -> Vec<(&'static str, f64)> {
+        self.cpu.as_mut().map(|log| std::mem::take(&mut log.passes)).unwrap_or_default()
     }
 
     /// The largest error, ns, with which a time of the device was placed on the host's clock; `None` if its clock cannot be read.
@@ -385,7 +415,7 @@ mod tests {
 
     #[test]
     fn runs_of_one_pass_are_added_up() {
-        let mut timings = Timings { times: Vec::new(), untimed: 0, spans: None };
+        let mut timings = Timings { times: Vec::new(), untimed: 0, spans: None, cpu: None };
         let stamp = |name, from, to| Stamp { name, from, to, invocations: None, runs: 1 };
         timings.add(&[stamp("a", 0, 1), stamp("b", 1, 3)], 64, 1.0);
         timings.add(&[stamp("a", 5, 8)], 64, 1.0);

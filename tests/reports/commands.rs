@@ -3,6 +3,7 @@
 use crate::common::program::*;
 use crate::scenes::alone;
 use std::fs;
+use std::path::Path;
 
 /// Small and quick.
 const SMALL: [&str; 6] = [BONE, "--preset", "bone", "--size", "48x32", "--set=distance.median=3"];
@@ -27,8 +28,42 @@ fn a_profile_is_written_compared_with_itself_and_refused_where_it_cannot_be() {
     for word in ["raycast_surface", "median_distance", "wall", "time stamps"] {
         assert!(out.contains(word), "{word} is missing from\n{out}");
     }
-    let same = done(&["profile", "--compare", &json, &json]);
+    // Times that do not vary, so that what the noise of this machine hides does not matter.
+    let read = |file: &str| -> serde_json::Value {
+        serde_json::from_str(&fs::read_to_string(file).expect("a profile")).expect("json")
+    };
+    let mut still = read(&json);
+    for list in ["passes", "host"] {
+        for pass in still[list].as_array_mut().expect("passes") {
+            pass["samples_ns"] = serde_json::json!(vec![1e6; 8]);
+            pass["cpu_ns"] = serde_json::json!(if list == "passes" { vec![1e6; 8] } else { Vec::new() });
+        }
+    }
+    (still["wall_ns"], still["cpu_ns"]) = (serde_json::json!(vec![9e7; 8]), serde_json::json!(vec![9e7; 8]));
+    let steady = folder.path("steady.json");
+    fs::write(&steady, still.to_string()).expect("written");
+    let same = done(&["profile", "--compare", &steady, &steady]);
     assert!(same.contains("Mann-Whitney") && same.contains("nothing is slower"), "{same}");
+    // With noise in one pass that would hide a slowdown by the threshold it is no pass.
+    still["passes"].as_array_mut().expect("passes").iter_mut().filter(|pass| pass["name"] == "light").for_each(
+        |pass| {
+            let noise: Vec<f64> = (0..8).map(|n| 1e6 + 3e5 * f64::from(n % 4)).collect();
+            (pass["samples_ns"], pass["cpu_ns"]) = (serde_json::json!(noise), serde_json::json!(noise));
+        },
+    );
+    let noisy = folder.path("noisy.json");
+    fs::write(&noisy, still.to_string()).expect("written");
+    let (code, out, err) = run(&["profile", "--compare", &steady, &noisy, "--json", &folder.path("compared.json")]);
+    assert_eq!(code, Some(5), "{out}{err}");
+    assert!(
+        err.starts_with("echolume: cannot tell below ") && err.contains("light below") && err.lines().count() == 1,
+        "{err}"
+    );
+    assert!(out.contains("cannot tell below") && !out.contains("nothing is slower"), "{out}");
+    let compared = read(&folder.path("compared.json"));
+    let lines = compared["lines"].as_array().expect("lines");
+    let unseen: Vec<_> = lines.iter().filter(|line| line["is_unseen"] == true).map(|line| &line["name"]).collect();
+    assert_eq!(unseen, ["light"]);
     assert!(fs::read_to_string(&csv).expect("csv").lines().count() > 8);
     let traced: serde_json::Value = serde_json::from_str(&fs::read_to_string(&trace).expect("trace")).expect("json");
     assert!(traced["traceEvents"].as_array().is_some_and(|e| e.len() > 50));
@@ -38,11 +73,13 @@ fn a_profile_is_written_compared_with_itself_and_refused_where_it_cannot_be() {
     let ask = ["--repeat", "8", "--no-ceilings", "--set=distance.median=5", "--json", &other];
     done(&[&["profile"], &SMALL[..], &ask[..]].concat());
     refused(&["profile", "--compare", &json, &other], 2, &["distance.median"]);
-    let mut slower: serde_json::Value = serde_json::from_str(&fs::read_to_string(&json).expect("json")).expect("json");
+    let mut slower = read(&json);
     for pass in slower["passes"].as_array_mut().expect("passes") {
         let factor = if pass["name"] == "median_distance" { 1e6 } else { 1.0 };
-        let times = pass["samples_ns"].as_array_mut().expect("times");
-        times.iter_mut().for_each(|t| *t = serde_json::json!(t.as_f64().expect("number") * factor));
+        for list in ["samples_ns", "cpu_ns"] {
+            let times = pass[list].as_array_mut().expect("times");
+            times.iter_mut().for_each(|t| *t = serde_json::json!(t.as_f64().expect("number") * factor));
+        }
     }
     let slow = folder.path("slow.json");
     fs::write(&slow, slower.to_string()).expect("written");
@@ -53,6 +90,47 @@ fn a_profile_is_written_compared_with_itself_and_refused_where_it_cannot_be() {
     refused(&["profile", "--compare", &json, &folder.path("none.json")], 2, &["none.json", "cannot be read"]);
     refused(&["profile", "--compare", &json, &json, "--threshold", "0.5"], 2, &["0.5"]);
     refused(&[&["profile"], &SMALL[..], &["--json", "/no/such/folder/a.json"]].concat(), 1, &["/no/such/folder"]);
+}
+
+/// `--against` runs another program, and a folder of shaders: one that works a hundred times as long is found.
+#[test]
+fn what_is_measured_in_turn_is_another_program_or_a_folder_of_shaders() {
+    let _alone = alone();
+    let folder = Folder::new("against");
+    copy_tree(&repository("glsl"), &folder.join("slow"));
+    let shader = folder.join("slow/shade/light.comp");
+    let text = fs::read_to_string(&shader).expect("a shader");
+    let slow = "void main() {\n    float spent = 0.5;\n    for (int n = 0; n < 3000; n++) spent = sin(spent + 0.1);\n    if (spent == 7.0) return;\n";
+    assert!(text.contains("void main() {\n"), "the shader has another form: {text}");
+    fs::write(&shader, text.replace("void main() {\n", slow)).expect("written");
+    let ask = [&["profile"], &SMALL[..], &["--repeat", "10", "--warm-up", "1"]].concat();
+    let (code, out, err) = run(&[&ask[..], &["--against", &folder.path("slow"), "--threshold", "3"]].concat());
+    assert_eq!(code, Some(1), "{out}{err}");
+    assert_eq!(err.lines().last(), Some("echolume: slower by more than the threshold: light"), "{out}{err}");
+    assert!(out.contains("compared: CPU time of each pass") || !cfg!(target_os = "linux"), "{out}");
+    assert!(out.contains("Wilcoxon's signed ranks"), "{out}");
+    // The same program: whatever the noise of this machine lets be said, it is no regression.
+    let json = folder.path("compared.json");
+    let (code, out, err) = run(&[&ask[..], &["--against", PROGRAM, "--threshold", "3", "--json", &json]].concat());
+    assert!(matches!(code, Some(0 | 5)), "{out}{err}");
+    let compared: serde_json::Value = serde_json::from_str(&fs::read_to_string(&json).expect("json")).expect("json");
+    assert_eq!(compared["format"], "echolume-comparison-2");
+
+    refused(&[&ask[..], &["--against", &folder.path("none")]].concat(), 2, &["against/none", "No such file"]);
+    refused(&[&ask[..], &["--against", "no such device"]].concat(), 3, &["no such device"]);
+    refused(&[&ask[..], &["--against", BONE]].concat(), 2, &["bone.mha"]);
+    refused(&["profile", "-", "--against", PROGRAM], 2, &["standard input"]);
+    refused(&[&ask[..], &["--against", "/bin/false"]].concat(), 1, &["/bin/false", "exit status: 1"]);
+    refused(&[&ask[..], &["--against", "/bin/true"]].concat(), 1, &["profile.json"]);
+}
+
+/// Copies a folder with all that is in it.
+fn copy_tree(from: &Path, to: &Path) {
+    fs::create_dir_all(to).expect("created");
+    for file in fs::read_dir(from).expect("a list").map(|entry| entry.expect("an entry").path()) {
+        let to = to.join(file.file_name().expect("a name"));
+        if file.is_dir() { copy_tree(&file, &to) } else { _ = fs::copy(&file, to).expect("copied") }
+    }
 }
 
 #[test]

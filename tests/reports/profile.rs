@@ -111,6 +111,13 @@ fn a_profile_is_consistent_and_round_trips() {
     let [width, height, _] = sigma.invocations(&scene(SETTINGS), &DispatchArgs::default()).map(u64::from);
     assert_eq!(of("sigma_slice").invocations, Some(15 * width.next_multiple_of(8) * height.next_multiple_of(8)));
     assert_eq!(of("sigma_slice").fetches, Some(15 * width * height * 3 * 6));
+    // On a CPU each pass has its part of the CPU time of a repeat.
+    if context.candidate.is_software() && cfg!(target_os = "linux") {
+        for (n, all) in profile.cpu_ns.iter().enumerate() {
+            let parts: Vec<f64> = profile.passes.iter().map(|pass| pass.cpu_ns[n]).collect();
+            assert!(parts.iter().all(|ns| *ns > 0.0) && parts.iter().sum::<f64>() <= *all, "{all} ns: {parts:?}");
+        }
+    }
     assert_eq!(of("tone").bytes_written, 96 * 96 * 4);
     assert_eq!(of("tone").bytes_read, 96 * 96 * 8);
     assert_eq!(of("upload").bytes_read, 15 * 60 * 128 * 4);

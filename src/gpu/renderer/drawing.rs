@@ -207,7 +207,7 @@ impl Drawing {
     pub fn submit(&mut self, queues: &mut DeviceQueues, slots: &SlotResources) -> Result<(), GpuError> {
         if let (Some(screen), Some(readback)) = (slots.image(Slot::Screen, 0), &self.readback) {
             self.recorder.copy_out(queues, screen, Slot::Screen, 0, readback);
-            self.recorder.stamp(queues, "readback");
+            self.recorder.stamp(queues, "readback")?;
         }
         queues.host("submit", |queues| self.recorder.submit(queues))?;
         (self.is_in_flight, self.has_picture) = (true, true);

@@ -109,7 +109,7 @@ impl InFlight {
         by.runs = runs;
         if let Some(target) = slots.image(place.slot, place.copy) {
             by.copy_in(queues, (&self.staging, layout), target, place);
-            by.stamp(queues, "upload");
+            by.stamp(queues, "upload")?;
         }
         Ok(by)
     }

@@ -40,6 +40,8 @@ pub struct RendererOptions {
     pub shaders: Arc<Shaders>,
     /// Record a span of time for each host and device operation; where each pass is timed, count shader invocations too.
     pub spans: bool,
+    /// On a device that is the CPU, count the CPU time of each pass: [`Renderer::take_cpu_times`]. Each is then submitted alone and waited for.
+    pub cpu_times: bool,
     /// What is timed on the device.
     pub time_stamps: TimeStamps,
     /// How the passes over the volume and the picture are divided, so that no submission takes too long.
@@ -68,6 +70,7 @@ impl Default for RendererOptions {
             volume_images: 1,
             shaders: embedded(),
             spans: false,
+            cpu_times: false,
             time_stamps: TimeStamps::default(),
             bands: Bands::default(),
             paced: false,
@@ -137,6 +140,9 @@ impl Renderer {
         let queues = options.queues.unwrap_or(context.queue_count()).clamp(1, MAX_QUEUES);
         let mut queues = DeviceQueues::new(context, queues, options.spans)?;
         queues.log = options.log.then(SubmissionLog::default);
+        if options.cpu_times && context.candidate.is_software() {
+            queues.timings.start_cpu();
+        }
         let images = options.volume_images.max(1);
         let mut renderer = Renderer {
             ring: Ring::new(context, &scene, &queues, options.time_stamps, options.spans)?,
@@ -487,6 +493,12 @@ impl Renderer {
     pub fn take_spans(&mut self) -> Result<Vec<Span>, GpuError> {
         self.collect()?;
         Ok(self.queues.timings.take_spans())
+    }
+
+    /// CPU time of the passes since the last call, ns, one entry for each run; empty without [`RendererOptions::cpu_times`], on a GPU, and where
+    /// the system does not report it. Recording a pass is part of it.
+    pub fn take_cpu_times(&mut self) -> Vec<(&'static str, f64)> {
+        self.queues.timings.take_cpu()
     }
 
     /// The largest error, ns, with which spans of the device were placed on the host's clock; `None` without spans, and if the device's

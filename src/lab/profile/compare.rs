@@ -10,10 +10,20 @@
 //!    whose blocks happen to be close together is not steadier than the device: the floor is at least the range of the typical
 //!    pass (median over the passes, weighted by their time) and one clock tick per dispatch.
 //!
+//! [`in_turn`] compares runs whose repeats were measured in turn, A B B A: neighbours had the same conditions, so that what both runs share is no noise.
+//! Each block, which is a pair of processes, has the median of the ratios of its neighbours, and these are tested (Wilcoxon's signed ranks).
+//!
+//! What is not called slower is not therefore as fast: [`Line::limit`] is the smallest slowdown that would have been called so.
+//!
+//! On a device that is the CPU the CPU time of each pass is compared: it varies less with the load of the machine.
+//!
 //! No test on two runs can detect conditions that held during one whole run and not the other. A common shift of all passes
 //! is reported for that reason.
 
-use super::statistics::{Sample, SampleError, Shift, block_medians, hodges_lehmann, holm, mann_whitney, min_p};
+use super::statistics::{
+    Sample, SampleError, Shift, block_medians, hodges_lehmann, holm, mann_whitney, min_p, min_signed_p, paired_shift,
+    signed_rank,
+};
 use super::{LEVEL, PassProfile, Profile};
 use crate::baselines::{Stored, Threshold, differing, matched};
 use serde::Serialize;
@@ -71,6 +81,8 @@ pub enum Kind {
     Host,
     /// From submission until the device is idle.
     Wall,
+    /// CPU time of all threads over the same interval.
+    Cpu,
 }
 
 /// New over old; below 1 is faster.
@@ -106,12 +118,18 @@ pub struct Line {
     pub note: Option<String>,
     /// True if slower by more than the threshold.
     pub is_regression: bool,
+    /// The smallest slowdown that the noise would have let be called slower, a ratio; None if none would.
+    pub limit: Option<f64>,
+    /// True if a slowdown by more than the threshold may have been overlooked.
+    pub is_unseen: bool,
 }
 
 /// Comparison of two profiles.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Comparison {
     pub format: &'static str,
+    /// Description of the time that was compared.
+    pub time: &'static str,
     /// Description of the statistical test.
     pub test: String,
     pub threshold: f64,
@@ -124,13 +142,107 @@ impl Comparison {
     pub fn regressions(&self) -> impl Iterator<Item = &Line> {
         self.lines.iter().filter(|l| l.is_regression)
     }
+
+    /// Why it cannot be said that nothing is slower by more than the threshold, in one line: the smallest slowdown that would have been seen, and
+    /// where more would not have been. None if all would.
+    pub fn cannot_tell(&self) -> Option<String> {
+        let mut unseen: Vec<&Line> = self.lines.iter().filter(|line| line.is_unseen).collect();
+        unseen.sort_by(|a, b| b.limit.unwrap_or(f64::MAX).total_cmp(&a.limit.unwrap_or(f64::MAX)));
+        let below = |line: &Line| {
+            line.limit.map_or("anything".to_string(), |limit| format!("below {:.1} %", 100.0 * (limit - 1.0)))
+        };
+        let listed: Vec<String> = unseen.iter().map(|line| format!("{} {}", line.name, below(line))).collect();
+        let more = listed.len().saturating_sub(MAX_NAMED);
+        let named = listed[..listed.len() - more].join(", ");
+        let rest = if more > 0 { format!(", and {more} more") } else { String::new() };
+        unseen.first().map(|worst| format!("cannot tell {}: {named}{rest}", below(worst)))
+    }
 }
 
-/// Compares two profiles. Lines are in this order: passes of the new profile, passes only in the old one, host spans, wall time.
+/// Most lines that [`Comparison::cannot_tell`] names.
+const MAX_NAMED: usize = 4;
+
+/// How the repeats of two runs belong together.
+#[derive(Clone, Copy, PartialEq)]
+enum Repeats {
+    /// One run after the other.
+    Apart,
+    /// The n-th of both are neighbours in time.
+    InTurn,
+}
+
+/// Compares two profiles. Lines are in this order: passes of the new profile, passes only in the old one, host spans, wall time,
+/// CPU time where it is compared.
 ///
 /// # Errors
 /// An option out of range, an inconsistent profile, or profiles of different work unless forced.
 pub fn compare(old: &Profile, new: &Profile, options: &CompareOptions) -> Result<Comparison, CompareError> {
+    compare_repeats(old, new, options, Repeats::Apart)
+}
+
+/// Compares two runs that were measured in turn, the n-th repeats of the n-th blocks of both next to each other.
+///
+/// # Errors
+/// As of [`compare`]; blocks of one run that are of different work.
+pub fn in_turn(old: &[Profile], new: &[Profile], options: &CompareOptions) -> Result<Comparison, CompareError> {
+    let [old, new] = [("old", old), ("new", new)]
+        .map(|(which, blocks)| blocks_as_repeats(blocks, old).map_err(|fault| CompareError::Profile { which, fault }));
+    compare_repeats(&old?, &new?, options, Repeats::InTurn)
+}
+
+/// The number of blocks of each run that [`in_turn`] needs to tell differences of so many passes, and two that may disagree; even, so that each run
+/// is as often the first.
+pub fn blocks_in_turn(passes: usize, alpha: f64) -> usize {
+    let lines = passes as f64 + 1.0;
+    (10..100).step_by(2).find(|n| min_signed_p(n - 2) * lines <= alpha).unwrap_or(100)
+}
+
+/// The median of times; where there are as many of a neighbour, by the median of the ratios to them, and theirs.
+fn median_beside(times: &[f64], neighbours: Option<Vec<f64>>) -> Option<f64> {
+    let median = |list: &[f64]| Some(Sample::new(list).ok()?.median());
+    let is_usable = |other: &Vec<f64>| other.len() == times.len() && times.iter().chain(other).all(|ns| *ns > 0.0);
+    let Some(other) = neighbours.filter(is_usable) else { return median(times) };
+    let ratios: Vec<f64> = times.iter().zip(&other).map(|(ns, other)| ns / other).collect();
+    Some(median(&other)? * median(&ratios)?)
+}
+
+/// A run of one repeat for each block, with the medians of its times beside those of `neighbours`.
+fn blocks_as_repeats(blocks: &[Profile], neighbours: &[Profile]) -> Result<Profile, String> {
+    let Some(first) = blocks.first() else { return Err("has no blocks".into()) };
+    for block in blocks {
+        block.check()?;
+        if work(block) != work(first) || block.scene != first.scene {
+            return Err("its blocks ran different work".into());
+        }
+    }
+    let medians = |times: &dyn Fn(&Profile) -> Option<Vec<f64>>| -> Vec<f64> {
+        let each = blocks.iter().zip(neighbours).map(|(block, other)| median_beside(&times(block)?, times(other)));
+        each.collect::<Option<_>>().unwrap_or_default()
+    };
+    let of = |block: &Profile, name: &str| block.passes.iter().find(|pass| pass.name == name).cloned();
+    let in_all = |pass: &&PassProfile| blocks.iter().all(|block| of(block, &pass.name).is_some());
+    let pass = |pass: &PassProfile| PassProfile {
+        samples_ns: medians(&|block| Some(of(block, &pass.name)?.samples_ns)),
+        cpu_ns: medians(&|block| Some(of(block, &pass.name)?.cpu_ns)),
+        ..pass.clone()
+    };
+    Ok(Profile {
+        repeats: blocks.len(),
+        passes: first.passes.iter().filter(in_all).map(pass).collect(),
+        host: Vec::new(),
+        wall_ns: medians(&|block| Some(block.wall_ns.clone())),
+        cpu_ns: medians(&|block| Some(block.cpu_ns.clone())),
+        device_ns: medians(&|block| Some(block.device_ns.clone())),
+        ..first.clone()
+    })
+}
+
+fn compare_repeats(
+    old: &Profile,
+    new: &Profile,
+    options: &CompareOptions,
+    repeats: Repeats,
+) -> Result<Comparison, CompareError> {
     if !(options.alpha > 0.0 && options.alpha < 1.0) {
         return Err(CompareError::Alpha(options.alpha));
     }
@@ -142,19 +254,45 @@ pub fn compare(old: &Profile, new: &Profile, options: &CompareOptions) -> Result
     if !notes.is_empty() && !options.force {
         return Err(CompareError::DifferentWork(notes));
     }
-    let pairs = pairs(old, new);
+    let counted = [old, new].map(counts_cpu);
+    let cpu = counted == [true; 2];
+    let pairs = pairs(old, new, cpu, repeats);
     let both = pairs.iter().filter(|p| p.old.is_some() && p.new.is_some()).count();
-    let blocks = blocks_needed(both, options.alpha);
+    let method = match repeats {
+        Repeats::Apart => Method::Apart { blocks: blocks_needed(both, options.alpha) },
+        Repeats::InTurn => Method::InTurn,
+    };
     let tick = old.device.timestamp_period_ns.max(new.device.timestamp_period_ns);
-    let lines = judge(pairs, blocks, tick, options).map_err(|fault| CompareError::Times { fault })?;
+    let lines = judge(pairs, method, tick, options).map_err(|fault| CompareError::Times { fault })?;
     notes.extend(differing(conditions(old), conditions(new)));
     notes.extend(common_shift(&lines));
-    let test = format!(
-        "Mann-Whitney on the medians of {blocks} blocks a run, Holm over {both} lines at {:.0} %, and a shift beyond what the \
-         blocks of a run range over",
-        options.alpha * 100.0
-    );
-    Ok(Comparison { format: "echolume-comparison-1", test, threshold: options.threshold.ratio(), notes, lines })
+    let alpha = options.alpha * 100.0;
+    let test = match method {
+        Method::Apart { blocks } => format!(
+            "Mann-Whitney on the medians of {blocks} blocks a run, Holm over {both} lines at {alpha:.0} %, and a shift beyond what the \
+             blocks of a run range over"
+        ),
+        Method::InTurn => {
+            format!(
+                "Wilcoxon's signed ranks of {} blocks of repeats in turn, Holm over {both} lines at {alpha:.0} %",
+                old.repeats
+            )
+        }
+    };
+    if !cpu && old.device.is_software && new.device.is_software {
+        let which = if counted[0] { "new" } else { "old" };
+        notes.push(format!(
+            "the {which} profile has no CPU time of passes, which varies less than the time that is compared"
+        ));
+    }
+    let time = if cpu { "CPU time of each pass" } else { "time of each pass by the device's clock" };
+    Ok(Comparison { format: "echolume-comparison-2", time, test, threshold: options.threshold.ratio(), notes, lines })
+}
+
+/// True if the device is the CPU and every pass that runs has its CPU time.
+fn counts_cpu(profile: &Profile) -> bool {
+    let has = |pass: &PassProfile| pass.runs_per_picture == 0 || !pass.cpu_ns.is_empty();
+    profile.device.is_software && !profile.cpu_ns.is_empty() && profile.passes.iter().all(has)
 }
 
 /// Times of one line in one run.
@@ -173,8 +311,11 @@ pub struct Pair<'a> {
     pub new: Option<Series<'a>>,
 }
 
-fn pairs<'a>(old: &'a Profile, new: &'a Profile) -> Vec<Pair<'a>> {
-    let series = |p: &'a PassProfile| Series { stage: &p.stage, runs: p.runs_per_picture, times: &p.samples_ns };
+fn pairs<'a>(old: &'a Profile, new: &'a Profile, cpu: bool, repeats: Repeats) -> Vec<Pair<'a>> {
+    let series = |p: &'a PassProfile| {
+        let times = if cpu && p.runs_per_picture > 0 && p.stage != "host" { &p.cpu_ns } else { &p.samples_ns };
+        Series { stage: &p.stage, runs: p.runs_per_picture, times }
+    };
     let mut pairs = Vec::new();
     for (kind, old, new) in [(Kind::Pass, &old.passes, &new.passes), (Kind::Host, &old.host, &new.host)] {
         for (old, new) in matched(old, new, |p| &p.name) {
@@ -182,8 +323,20 @@ fn pairs<'a>(old: &'a Profile, new: &'a Profile) -> Vec<Pair<'a>> {
             pairs.push(Pair { kind, name, old: old.map(series), new: new.map(series) });
         }
     }
-    let wall = |profile: &'a Profile| Some(Series { stage: "", runs: 1, times: &profile.wall_ns });
-    pairs.push(Pair { kind: Kind::Wall, name: "wall", old: wall(old), new: wall(new) });
+    let whole = |times: &'a [f64]| Some(Series { stage: "", runs: 1, times });
+    if !cpu || repeats == Repeats::Apart {
+        // Beside the CPU time it is told, but not judged.
+        let kind = if cpu { Kind::Host } else { Kind::Wall };
+        pairs.push(Pair { kind, name: "wall", old: whole(&old.wall_ns), new: whole(&new.wall_ns) });
+    }
+    if cpu {
+        pairs.push(Pair {
+            kind: Kind::Cpu,
+            name: "CPU, all threads",
+            old: whole(&old.cpu_ns),
+            new: whole(&new.cpu_ns),
+        });
+    }
     pairs
 }
 
@@ -257,11 +410,22 @@ pub fn blocks_needed(lines: usize, alpha: f64) -> usize {
     (MIN_BLOCKS..100).find(|b| min_p(*b) * lines as f64 <= alpha).unwrap_or(100)
 }
 
+/// How two series are compared.
+#[derive(Clone, Copy)]
+pub enum Method {
+    /// By the medians of so many blocks of each.
+    Apart { blocks: usize },
+    /// Time by time.
+    InTurn,
+}
+
 /// Test result of two series, before correction for the other lines.
 struct BlockTest {
     p: f64,
     /// Of the logarithms of times.
     shift: Shift,
+    /// The smallest shift that the test would have reported, whatever the other lines.
+    seen: f64,
     /// Largest range of block medians within one run, logarithm of a ratio.
     range: f64,
     /// One clock tick per dispatch, logarithm of a ratio.
@@ -270,8 +434,18 @@ struct BlockTest {
     weight: f64,
 }
 
-/// Tests the block medians of two series; Err(reason) if there is nothing to compare. `tick` in ns.
-fn test(old: &Series, new: &Series, blocks: usize, tick: f64) -> Result<Result<BlockTest, String>, SampleError> {
+/// Tests two series; Err(reason) if there is nothing to compare. `tick` in ns, `alpha` of one line.
+fn test(
+    old: &Series,
+    new: &Series,
+    method: Method,
+    tick: f64,
+    alpha: f64,
+) -> Result<Result<BlockTest, String>, SampleError> {
+    let blocks = match method {
+        Method::Apart { blocks } => blocks,
+        Method::InTurn => old.times.len().max(1),
+    };
     let mut logs = Vec::new();
     for (which, series) in [("old", old), ("new", new)] {
         let Some(medians) = block_medians(series.times, blocks)? else {
@@ -287,20 +461,27 @@ fn test(old: &Series, new: &Series, blocks: usize, tick: f64) -> Result<Result<B
         }
         logs.push(medians.into_iter().map(f64::ln).collect::<Vec<f64>>());
     }
+    let differences: Vec<f64> = logs[0].iter().zip(&logs[1]).map(|(old, new)| new - old).collect();
+    let (p, shift, strict) = match method {
+        Method::Apart { .. } => {
+            let shift = |level| hodges_lehmann(&logs[0], &logs[1], level);
+            (mann_whitney(&logs[0], &logs[1])?.p, shift(LEVEL)?, shift(1.0 - alpha)?)
+        }
+        Method::InTurn => {
+            let shift = |level| paired_shift(&differences, level);
+            (signed_rank(&differences)?, shift(LEVEL)?, shift(1.0 - alpha)?)
+        }
+    };
+    let seen = if strict.coverage < 1.0 - alpha { f64::INFINITY } else { strict.estimate - strict.low };
     let mut range: f64 = 0.0;
-    for medians in &logs {
+    // What neighbours share is no noise.
+    for medians in logs.iter().filter(|_| !matches!(method, Method::InTurn)) {
         let sample = Sample::new(medians)?;
         range = range.max(sample.max() - sample.min());
     }
     let (old_ns, new_ns) = (Sample::new(old.times)?.median(), Sample::new(new.times)?.median());
     let runs = f64::from(old.runs.max(new.runs));
-    Ok(Ok(BlockTest {
-        p: mann_whitney(&logs[0], &logs[1])?.p,
-        shift: hodges_lehmann(&logs[0], &logs[1], LEVEL)?,
-        range,
-        tick: (tick * runs / old_ns.min(new_ns)).ln_1p(),
-        weight: new_ns,
-    }))
+    Ok(Ok(BlockTest { p, shift, seen, range, tick: (tick * runs / old_ns.min(new_ns)).ln_1p(), weight: new_ns }))
 }
 
 /// Median range over the passes, weighted by their time.
@@ -317,13 +498,15 @@ fn typical_range(passes: &[&BlockTest]) -> f64 {
 }
 
 /// Compares all pairs. `tick`: resolution of the device's clock, ns.
-pub fn judge(pairs: Vec<Pair>, blocks: usize, tick: f64, options: &CompareOptions) -> Result<Vec<Line>, SampleError> {
+pub fn judge(pairs: Vec<Pair>, method: Method, tick: f64, options: &CompareOptions) -> Result<Vec<Line>, SampleError> {
+    let both = pairs.iter().filter(|pair| pair.old.is_some() && pair.new.is_some()).count();
+    let alpha = options.alpha / both.max(1) as f64;
     let mut tested = Vec::new();
     for pair in &pairs {
         // The host's clock has a resolution of 1 ns.
         let tick = if pair.kind == Kind::Pass { tick } else { 1.0 };
         tested.push(match (&pair.old, &pair.new) {
-            (Some(old), Some(new)) => test(old, new, blocks, tick)?,
+            (Some(old), Some(new)) => test(old, new, method, tick, alpha)?,
             _ => Err(String::new()),
         });
     }
@@ -333,7 +516,7 @@ pub fn judge(pairs: Vec<Pair>, blocks: usize, tick: f64, options: &CompareOption
     let mut corrected = holm(&p).into_iter();
     let lines = pairs.into_iter().zip(tested).map(|(pair, tested)| {
         let (ratio, fault) = match tested {
-            Ok(tested) => (corrected.next().map(|p_holm| ratio(&tested, typical, p_holm)), None),
+            Ok(tested) => (corrected.next().map(|p_holm| (ratio(&tested, typical, p_holm), tested.seen.exp())), None),
             Err(fault) => (None, Some(fault)),
         };
         line(pair, ratio, fault, options)
@@ -354,7 +537,9 @@ fn ratio(tested: &BlockTest, typical: f64, p_holm: f64) -> Ratio {
     }
 }
 
-fn line(pair: Pair, ratio: Option<Ratio>, fault: Option<String>, options: &CompareOptions) -> Line {
+/// `ratio` with the smallest one that the test would have reported.
+fn line(pair: Pair, ratio: Option<(Ratio, f64)>, fault: Option<String>, options: &CompareOptions) -> Line {
+    let (ratio, seen) = (ratio.map(|(ratio, _)| ratio), ratio.map(|(_, seen)| seen));
     let verdict = match (&pair.old, &pair.new, &ratio) {
         (None, _, _) => Verdict::New,
         (_, None, _) => Verdict::Gone,
@@ -370,6 +555,18 @@ fn line(pair: Pair, ratio: Option<Ratio>, fault: Option<String>, options: &Compa
     };
     let median = |series: &Option<Series>| series.and_then(|s| Sample::new(s.times).ok()).map(|s| s.median());
     let slower_by = ratio.map_or(0.0, |r| r.estimate);
+    let threshold = options.threshold.ratio();
+    let is_judged = pair.kind != Kind::Host;
+    let is_regression = verdict == Verdict::Slower && slower_by > threshold && is_judged;
+    // Ties may hide what the interval alone would show.
+    let least = if verdict == Verdict::WithinNoise { slower_by } else { 1.0 };
+    let limit = ratio.zip(seen).map(|(r, seen)| seen.max(r.floor).max(least)).filter(|limit| limit.is_finite());
+    let runs_nowhere = pair.old.is_some_and(|old| old.runs == 0) && pair.new.is_some_and(|new| new.runs == 0);
+    let can_hide = match verdict {
+        Verdict::WithinNoise | Verdict::Slower => limit.is_none_or(|limit| limit > threshold),
+        Verdict::NotComparable => !runs_nowhere,
+        Verdict::Faster | Verdict::New | Verdict::Gone => false,
+    };
     Line {
         name: pair.name.into(),
         stage: pair.new.or(pair.old).map_or(String::new(), |s| s.stage.into()),
@@ -379,7 +576,9 @@ fn line(pair: Pair, ratio: Option<Ratio>, fault: Option<String>, options: &Compa
         new_ns: median(&pair.new),
         ratio,
         note: fault.filter(|f| !f.is_empty()).or(runs),
-        is_regression: verdict == Verdict::Slower && slower_by > options.threshold.ratio() && pair.kind != Kind::Host,
+        is_regression,
+        limit,
+        is_unseen: can_hide && is_judged && !is_regression,
     }
 }
 

@@ -297,7 +297,19 @@ fn notes(profile: &Profile) -> Vec<String> {
 
 /// A comparison as a table for a terminal: differing conditions, one line per pass, the test, the regressions.
 pub fn comparison_table(comparison: &Comparison) -> String {
-    let head = ["stage", "pass", "old ms", "new ms", "ratio", "95 % interval", "p (Holm)", "noise", "verdict", ""];
+    let head = [
+        "stage",
+        "pass",
+        "old ms",
+        "new ms",
+        "ratio",
+        "95 % interval",
+        "p (Holm)",
+        "noise",
+        "sees from",
+        "verdict",
+        "",
+    ];
     let mut rows = vec![head.map(String::from).to_vec()];
     rows.extend(comparison.lines.iter().map(comparison_row));
     let mut text = String::new();
@@ -305,12 +317,14 @@ pub fn comparison_table(comparison: &Comparison) -> String {
         let _ = writeln!(text, "{note}");
     }
     text.push_str(&aligned(&rows, 2));
+    let _ = writeln!(text, "compared: {}", comparison.time);
     let _ = writeln!(text, "test: {}", comparison.test);
     let regressions: Vec<&str> = comparison.regressions().map(|l| l.name.as_str()).collect();
     let by = 100.0 * (comparison.threshold - 1.0);
-    let _ = match regressions.is_empty() {
-        true => writeln!(text, "nothing is slower by more than {by:.1} %"),
-        false => writeln!(text, "slower by more than {by:.1} %: {}", regressions.join(", ")),
+    let _ = match (regressions.is_empty(), comparison.cannot_tell()) {
+        (true, None) => writeln!(text, "nothing is slower by more than {by:.1} %"),
+        (true, Some(why)) => writeln!(text, "{why}"),
+        (false, _) => writeln!(text, "slower by more than {by:.1} %: {}", regressions.join(", ")),
     };
     text
 }
@@ -327,7 +341,7 @@ fn comparison_row(line: &Line) -> Vec<String> {
     let group = match line.kind {
         Kind::Pass => line.stage.as_str(),
         Kind::Host => "host",
-        Kind::Wall => "",
+        Kind::Wall | Kind::Cpu => "",
     };
     let [old, new] = [line.old_ns, line.new_ns].map(|ns| ns.map_or_else(String::new, ms));
     let mut row = vec![group.into(), line.name.clone(), old, new];
@@ -340,6 +354,7 @@ fn comparison_row(line: &Line) -> Vec<String> {
             format!("{:.1} %", 100.0 * (r.floor - 1.0)),
         ],
     });
+    row.push(line.limit.map_or_else(String::new, |limit| format!("{:.1} %", 100.0 * (limit - 1.0))));
     row.extend([verdict.to_string(), line.note.clone().unwrap_or_default()]);
     row
 }

@@ -98,6 +98,9 @@ pub struct PassProfile {
     pub runs_per_picture: u32,
     /// Sum over all runs of a repeat, ns. Empty without time stamps.
     pub samples_ns: Vec<f64>,
+    /// CPU time of all threads in a repeat, ns, where the device is the CPU; else empty.
+    #[serde(default)]
+    pub cpu_ns: Vec<f64>,
     /// Minimum bytes read in a repeat: every texel of every bound slot once.
     pub bytes_read: u64,
     /// Bytes that a repeat writes.
@@ -208,9 +211,9 @@ impl Profile {
 }
 
 impl Stored for Profile {
-    const FORMAT: &'static str = "echolume-profile-2";
-    /// It has no CPU time and no rotating camera.
-    const EARLIER: &'static [&'static str] = &["echolume-profile-1"];
+    const FORMAT: &'static str = "echolume-profile-3";
+    /// They have no CPU time of passes; the first has none at all, and no rotating camera.
+    const EARLIER: &'static [&'static str] = &["echolume-profile-1", "echolume-profile-2"];
     const QUOTE: char = '"';
     const WHAT: &'static str = "a profile";
     const AGAIN: &'static str = "profile again with it";
@@ -236,6 +239,8 @@ impl Stored for Profile {
                     return fault(kind, format!("{:?} is there twice", span.name));
                 }
                 lists.push((&span.name, expected, &span.samples_ns));
+                let counted = if span.cpu_ns.is_empty() { 0 } else { self.repeats };
+                lists.push((&span.name, counted, &span.cpu_ns));
             }
         }
         for (name, expected, times) in lists {

@@ -261,6 +261,67 @@ pub fn hodges_lehmann(a: &[f64], b: &[f64], level: f64) -> Result<Shift, SampleE
     Ok(Shift { estimate: differences.median(), low: sorted[k - 1], high: sorted[sorted.len() - k], coverage })
 }
 
+/// Number of subsets of some ranks for each rank sum, whatever their count.
+fn all_rank_sums(ranks: &[usize]) -> Vec<f64> {
+    let mut counts = vec![0.0; ranks.iter().sum::<usize>() + 1];
+    counts[0] = 1.0;
+    for rank in ranks {
+        for sum in (*rank..counts.len()).rev() {
+            counts[sum] += counts[sum - rank];
+        }
+    }
+    counts
+}
+
+/// F. Wilcoxon, Individual comparisons by ranking methods, 1945: the probability, two-sided, of rank sums at least as extreme if differences
+/// of pairs lie symmetrically about 0. The exact distribution of the midranks; differences of 0 are left out.
+///
+/// # Errors
+/// `differences` is no sample.
+pub fn signed_rank(differences: &[f64]) -> Result<f64, SampleError> {
+    Sample::new(differences)?;
+    let moved: Vec<f64> = differences.iter().copied().filter(|d| *d != 0.0).collect();
+    // Twice the midrank of each distance: integers.
+    let doubled = |d: f64| {
+        moved.iter().map(|o| usize::from(o.abs() < d.abs()) + usize::from(o.abs() <= d.abs())).sum::<usize>() + 1
+    };
+    let ranks: Vec<usize> = moved.iter().map(|d| doubled(*d)).collect();
+    let sum: usize = moved.iter().zip(&ranks).filter(|(d, _)| **d > 0.0).map(|(_, rank)| rank).sum();
+    let counts = all_rank_sums(&ranks);
+    let tail = counts[..=sum].iter().sum::<f64>().min(counts[sum..].iter().sum());
+    Ok((2.0 * tail / counts.iter().sum::<f64>()).min(1.0))
+}
+
+/// Minimum p value of [`signed_rank`] of `n` pairs.
+pub fn min_signed_p(n: usize) -> f64 {
+    2.0 * 0.5f64.powi(n as i32)
+}
+
+/// The median of the means of all two differences of pairs, each with itself too (Hodges and Lehmann, 1963). The interval holds every shift that
+/// [`signed_rank`] would not reject; `coverage` is below `level` if there are too few pairs.
+///
+/// # Errors
+/// `differences` is no sample.
+pub fn paired_shift(differences: &[f64], level: f64) -> Result<Shift, SampleError> {
+    let sorted = Sample::new(differences)?;
+    let each = sorted.sorted();
+    let means: Vec<f64> = (0..each.len()).flat_map(|i| each[..=i].iter().map(move |x| (x + each[i]) / 2.0)).collect();
+    let means = Sample::new(&means)?;
+    let counts = all_rank_sums(&(1..=each.len()).collect::<Vec<_>>());
+    let total: f64 = counts.iter().sum();
+    let (mut k, mut tail) = (1, counts[0] / total);
+    let mut below = tail;
+    for next in 2..=means.count().div_ceil(2) {
+        below += counts[next - 1] / total;
+        if 1.0 - 2.0 * below < level {
+            break;
+        }
+        (k, tail) = (next, below);
+    }
+    let (low, high) = (means.sorted()[k - 1], means.sorted()[means.count() - k]);
+    Ok(Shift { estimate: means.median(), low, high, coverage: (1.0 - 2.0 * tail).max(0.0) })
+}
+
 /// S. Holm, A simple sequentially rejective multiple test procedure, 1979: adjusted p values, in the order given. Rejecting those
 /// up to alpha gives a family-wise error rate of at most alpha, whatever their dependence.
 pub fn holm(p: &[f64]) -> Vec<f64> {

@@ -82,6 +82,7 @@ impl ProfileRun {
         let ceilings = if options.ceilings { measure_ceilings(context)? } else { None };
         let renderer_options = RendererOptions {
             spans: true,
+            cpu_times: true,
             time_stamps: TimeStamps::EachPass,
             shaders: shaders.clone(),
             ..RendererOptions::default()
@@ -123,10 +124,10 @@ impl ProfileRun {
         self.renderer.picture()?;
         let wall = (self.began.elapsed() - start).as_nanos() as f64;
         let cpu = CpuTime::now().zip(cpu).map(|(now, then)| now.since(&then));
-        let spans = self.renderer.take_spans()?;
+        let (spans, passes) = (self.renderer.take_spans()?, self.renderer.take_cpu_times());
         self.done += 1;
         if self.done > self.options.warm_up {
-            self.repeats.push(Repeat { wall, cpu, spans });
+            self.repeats.push(Repeat { wall, cpu, spans, passes });
         }
         Ok(())
     }
@@ -195,6 +196,8 @@ struct Repeat {
     /// CPU time of the process over the same interval, ns; None if the system does not report it.
     cpu: Option<f64>,
     spans: Vec<Span>,
+    /// CPU time of each run of a pass, ns.
+    passes: Vec<(&'static str, f64)>,
 }
 
 impl Repeat {
@@ -204,6 +207,12 @@ impl Repeat {
 
     fn sum(&self, name: &str, on_device: bool) -> f64 {
         self.of(name, on_device).map(|s| s.end - s.begin).sum()
+    }
+
+    /// CPU time of a pass, ns; None if it was not counted.
+    fn cpu_of(&self, pass: &str) -> Option<f64> {
+        let runs: Vec<f64> = self.passes.iter().filter(|(name, _)| *name == pass).map(|(_, ns)| *ns).collect();
+        (!runs.is_empty()).then(|| runs.iter().sum())
     }
 
     /// From the begin of the first pass to the end of the last, ns.
@@ -264,6 +273,7 @@ fn passes(plan: &Plan, scene: &Scene, repeats: &[Repeat], stamped: bool) -> Vec<
             stage: steps.first().map_or("copies".into(), |s| s.pass.stage.name().into()),
             runs_per_picture: runs,
             samples_ns: repeats.iter().map(|r| r.sum(name, true)).collect(),
+            cpu_ns: repeats.iter().map(|r| r.cpu_of(name)).collect::<Option<_>>().unwrap_or_default(),
             bytes_read: bytes(|s, scene| s.pass.reads(scene, &s.args())) + copied,
             bytes_written: bytes(|s, scene| s.pass.writes(scene, &s.args())) + copied,
             fetches: steps.iter().map(|s| fetches(s.pass, scene, s)).sum::<Option<u64>>().map(|n| n * times),
@@ -287,6 +297,7 @@ fn hosts(repeats: &[Repeat]) -> Vec<PassProfile> {
         stage: "host".into(),
         runs_per_picture: repeats.first().map_or(0, |r| r.of(name, false).count() as u32),
         samples_ns: repeats.iter().map(|r| r.sum(name, false)).collect(),
+        cpu_ns: Vec::new(),
         bytes_read: 0,
         bytes_written: 0,
         fetches: None,

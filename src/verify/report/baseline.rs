@@ -313,7 +313,7 @@ fn judge_times(pairs: &[Pair], runs: [&Run; 2], threshold: Threshold) -> TimeCha
         return found;
     }
     let both = times.iter().filter(|p| !usable(p.old).is_empty() && !usable(p.new).is_empty()).count();
-    let blocks = profile::blocks_needed(both, ALPHA);
+    let method = profile::Method::Apart { blocks: profile::blocks_needed(both, ALPHA) };
     let tick = runs[0].device.timestamp_period_ns.max(runs[1].device.timestamp_period_ns);
     let series = |figure| Some(Series { stage: "", runs: 1, times: usable(figure) });
     let lines = times.iter().map(|p| profile::Pair {
@@ -323,7 +323,7 @@ fn judge_times(pairs: &[Pair], runs: [&Run; 2], threshold: Threshold) -> TimeCha
         new: series(p.new),
     });
     let criteria = profile::CompareOptions { threshold, alpha: ALPHA, force: true };
-    let lines = match profile::judge(lines.collect(), blocks, tick, &criteria) {
+    let lines = match profile::judge(lines.collect(), method, tick, &criteria) {
         Ok(lines) => lines,
         Err(fault) => {
             found.notes.push(format!("times are not compared: {fault}"));

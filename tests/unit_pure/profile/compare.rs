@@ -3,7 +3,9 @@
 use super::simulated::{Noise, Random, pass, profile, run};
 use echolume::low_level::baselines::Threshold;
 use echolume::low_level::profile::Profile;
-use echolume::low_level::profile::compare::{CompareError, CompareOptions, Comparison, Kind, Line, Verdict, compare};
+use echolume::low_level::profile::compare::{
+    CompareError, CompareOptions, Comparison, Kind, Line, Verdict, blocks_in_turn, compare, in_turn,
+};
 use echolume::low_level::profile::export::comparison_table;
 
 const PAIRS: u32 = 400;
@@ -255,4 +257,122 @@ fn broken_profiles_are_refused() {
     broken.wall_ns[3] = f64::NAN;
     let message = compare(&good, &broken, &CompareOptions::default()).expect_err("NaN").to_string();
     assert_eq!(message, "new profile: wall_ns: time 3 is NaN ns; a time is finite and not below 0");
+}
+
+/// Prevents "nothing is slower" where the noise hides a pass that takes three times as long, and a limit that the test does not keep: a pass slowed by
+/// more than its own limit is called slower.
+#[test]
+fn what_the_noise_may_hide_is_said_and_a_slowdown_beyond_it_is_found() {
+    let mut random = Random(71);
+    let loud = Noise { spread: 0.5, memory: 0.8, drift: 0.8, own_drift: 0.5, outliers: 0.2, ..STEADY };
+    let mut hidden = 0;
+    for pair in 0..100 {
+        let (old, mut new) = (run(&mut random, 6, 12, loud), run(&mut random, 6, 12, loud));
+        let slowed = format!("pass {}", pair % 6);
+        let before = compared(&old, &new);
+        let [limit, estimate] = [line(&before, &slowed).limit, line(&before, &slowed).ratio.map(|r| r.estimate)];
+        let slow = |profile: &mut Profile, by: f64| {
+            profile
+                .passes
+                .iter_mut()
+                .filter(|p| p.name == slowed)
+                .flat_map(|p| &mut p.samples_ns)
+                .for_each(|ns| *ns *= by);
+        };
+        slow(&mut new, 3.0);
+        let after = compared(&old, &new);
+        let is_told = line(&after, &slowed).is_regression || after.cannot_tell().is_some();
+        assert!(is_told, "{}", comparison_table(&after));
+        assert!(!comparison_table(&after).contains("nothing is slower"));
+        hidden += u32::from(!line(&after, &slowed).is_regression);
+        // Beyond the limit of the line, from the same times.
+        slow(&mut new, 1.01 * limit.expect("a limit") / estimate.expect("a ratio") / 3.0);
+        let beyond = line(&compared(&old, &new), &slowed).clone();
+        assert!(
+            beyond.verdict == Verdict::Slower || beyond.ratio.is_some_and(|r| r.p * 7.0 <= 0.05 && r.floor > 1.0),
+            "{beyond:?}"
+        );
+    }
+    assert!(hidden > 10, "the noise hides it in {hidden} of 100 pairs: too few to test anything");
+    let quiet = Noise { spread: 0.001, ..STEADY };
+    let (old, new) = (run(&mut random, 6, 30, quiet), run(&mut random, 6, 30, quiet));
+    assert!(compared(&old, &new).cannot_tell().is_none());
+    assert!(comparison_table(&compared(&old, &new)).contains("nothing is slower by more than 5.0 %"));
+    let few = run(&mut random, 3, 5, quiet);
+    let said = compared(&few, &few).cannot_tell().expect("five repeats tell nothing");
+    assert!(said.starts_with("cannot tell anything: pass 0 anything"), "{said}");
+}
+
+/// On a CPU the CPU time decides, and it is said: other load on the machine lengthens every pass, but not its CPU time.
+#[test]
+fn cpu_time_decides_on_software_devices() {
+    let mut random = Random(81);
+    let mut software = |slow: f64| {
+        let mut profile = run(&mut random, 4, 30, Noise { spread: 0.3, ..STEADY });
+        profile.device.is_software = true;
+        for (n, pass) in profile.passes.iter_mut().enumerate() {
+            let by = if n == 2 { slow } else { 1.0 };
+            pass.cpu_ns = (0..30).map(|i| by * (1e6 + f64::from(i % 7))).collect();
+        }
+        profile
+    };
+    let (old, new) = (software(1.0), software(1.06));
+    let comparison = compared(&old, &new);
+    assert_eq!(comparison.regressions().map(|l| l.name.as_str()).collect::<Vec<_>>(), ["pass 2"]);
+    assert_eq!(line(&comparison, "wall").kind, Kind::Host);
+    assert_eq!(line(&comparison, "CPU, all threads").kind, Kind::Cpu);
+    assert!(comparison_table(&comparison).contains("compared: CPU time of each pass\n"));
+    // A profile of an earlier version has none.
+    let mut earlier = old.clone();
+    earlier.passes.iter_mut().for_each(|pass| pass.cpu_ns.clear());
+    let comparison = compared(&earlier, &new);
+    assert!(comparison.notes.iter().any(|note| note.starts_with("the old profile has no CPU time of passes")));
+    assert!(comparison_table(&comparison).contains("compared: time of each pass by the device's clock\n"));
+    assert_eq!(line(&comparison, "wall").kind, Kind::Wall);
+    // On a GPU the device's clock decides.
+    let [mut old, mut new] = [old, new];
+    [&mut old, &mut new].into_iter().for_each(|profile| profile.device.is_software = false);
+    assert!(compared(&old, &new).regressions().next().is_none());
+}
+
+/// Blocks of two runs in turn, neighbours slowed by the same load, and one pass of the second by `factor`.
+fn blocks(random: &mut Random, factor: f64) -> [Vec<Profile>; 2] {
+    let count = blocks_in_turn(12, 0.05);
+    assert!(count.is_multiple_of(2) && count >= 12, "{count}");
+    let mut sides = [Vec::new(), Vec::new()];
+    for _ in 0..count {
+        let loads = [(); 3].map(|()| random.between(1.0, 2.0));
+        for (side, by) in [(0, 1.0), (1, factor)] {
+            let mut block = run(random, 12, 3, Noise { spread: 0.01, outliers: 0.02, ..STEADY });
+            let lists = block.passes.iter_mut().map(|pass| &mut pass.samples_ns).chain([&mut block.wall_ns]);
+            lists.for_each(|list| list.iter_mut().zip(loads).for_each(|(ns, load)| *ns *= load));
+            block.passes[5].samples_ns.iter_mut().for_each(|ns| *ns *= by);
+            sides[side].push(block);
+        }
+    }
+    sides
+}
+
+#[test]
+fn runs_in_turn_show_five_percent_under_a_load_that_doubles_times() {
+    let mut random = Random(91);
+    let options = CompareOptions { threshold: Threshold::new(1.02).expect("a ratio"), ..CompareOptions::default() };
+    let mut told = |factor: f64| -> Vec<String> {
+        let [old, new] = blocks(&mut random, factor);
+        let comparison = in_turn(&old, &new, &options).expect("comparison");
+        assert!(
+            comparison.test.starts_with("Wilcoxon's signed ranks of 12 blocks of repeats in turn, Holm over 13 lines"),
+            "{}",
+            comparison.test
+        );
+        comparison.regressions().map(|line| line.name.clone()).collect()
+    };
+    let found = (0..100).filter(|_| told(1.05) == ["pass 5"]).count();
+    let alarms = (0..100).filter(|_| !told(1.0).is_empty()).count();
+    println!("found {found} of 100, false alarms {alarms} of 100");
+    assert!(found >= 95 && alarms <= 5, "found {found} of 100, false alarms {alarms} of 100");
+    let [old, mut new] = blocks(&mut random, 1.0);
+    new[3].sizes.slices += 1;
+    let error = in_turn(&old, &new, &options).expect_err("another size").to_string();
+    assert_eq!(error, "new profile: its blocks ran different work");
 }

@@ -42,10 +42,10 @@ fn json_round_trips_without_a_change() {
 fn other_versions_other_files_and_contradictions_are_refused() {
     let good = measured().to_json().expect("JSON");
     let error = |text: &str| Profile::from_json(text).expect_err("refused").to_string();
-    let other = good.replace("echolume-profile-2", "echolume-profile-9");
+    let other = good.replace("echolume-profile-3", "echolume-profile-9");
     assert_eq!(
         error(&other),
-        "format is \"echolume-profile-9\", this program reads \"echolume-profile-2\"; profile again with it"
+        "format is \"echolume-profile-9\", this program reads \"echolume-profile-3\"; profile again with it"
     );
     for text in
         ["", "[]", "{}", "{\"format\": 3}", "nonsense", &good[..good.len() / 2], &good.replace("warm_up", "warm")]
@@ -66,15 +66,20 @@ fn other_versions_other_files_and_contradictions_are_refused() {
     assert!(broken(|p| p.ceilings.as_mut().unwrap().fetch.low = f64::INFINITY).starts_with("fetch: ceiling"));
 }
 
-/// A file of the previous version has neither CPU time nor a rotating camera.
+/// A file of the first version has neither CPU time nor a rotating camera, one of the second no CPU time of passes.
 #[test]
-fn a_profile_of_the_previous_version_is_read() {
+fn profiles_of_earlier_versions_are_read() {
     let mut before = measured();
     before.cpu_ns.clear();
-    let text = before.to_json().expect("JSON").replace("echolume-profile-2", "echolume-profile-1");
-    let without: Vec<&str> = text.lines().filter(|l| !l.contains("\"cpu_ns\"") && !l.contains("\"turn\"")).collect();
-    assert_eq!(text.lines().count() - without.len(), 2);
-    assert_eq!(Profile::from_json(&without.join("\n")).expect("profile"), before);
+    let text = before.to_json().expect("JSON");
+    let lists = text.lines().filter(|l| l.contains("\"cpu_ns\"")).count();
+    assert_eq!(lists, 1 + before.passes.len() + before.host.len());
+    for version in [1, 2] {
+        let is_kept = |line: &&str| !(line.contains("\"cpu_ns\"") || version == 1 && line.contains("\"turn\""));
+        let lines: Vec<&str> = text.lines().filter(is_kept).collect();
+        let text = lines.join("\n").replace("echolume-profile-3", &format!("echolume-profile-{version}"));
+        assert_eq!(Profile::from_json(&text).expect("profile"), before, "version {version}");
+    }
 }
 
 #[test]
@@ -86,6 +91,9 @@ fn cpu_time_is_shown_and_written_where_it_is_known() {
     assert!(!profile_table(&unknown).contains("CPU, all threads") && !csv(&unknown).contains("cpu,"));
     let short = Profile { cpu_ns: vec![1.0; 29], ..measured() };
     assert_eq!(short.to_json().expect_err("refused").to_string(), "cpu_ns: has 29 times for 30 repeats");
+    let mut short = measured();
+    short.passes[1].cpu_ns = vec![1.0; 29];
+    assert_eq!(short.to_json().expect_err("refused").to_string(), "pass 1: has 29 times for 30 repeats");
 }
 
 #[test]

@@ -78,6 +78,7 @@ pub fn pass(name: &str, samples_ns: Vec<f64>) -> PassProfile {
         stage: "raycast".into(),
         runs_per_picture: 1,
         samples_ns,
+        cpu_ns: Vec::new(),
         bytes_read: 3_000_000,
         bytes_written: 1_000_000,
         fetches: None,

@@ -1,7 +1,8 @@
 //! Expected numbers: scipy 1.17.1 and numpy, in the calls named beside them.
 
 use echolume::low_level::profile::statistics::{
-    Sample, SampleError, block_medians, drift, hodges_lehmann, holm, mann_whitney, min_p, normal_tail,
+    Sample, SampleError, block_medians, drift, hodges_lehmann, holm, mann_whitney, min_p, min_signed_p, normal_tail,
+    paired_shift, signed_rank,
 };
 
 fn close(got: f64, expected: f64, relative: f64) {
@@ -189,4 +190,22 @@ fn drift_is_the_second_half_over_the_first() {
     assert_eq!(drift(&[1.0, 1.0, 50.0, 2.0, 2.0]), Ok(Some(2.0)));
     assert_eq!(drift(&[1.0]), Ok(None));
     assert_eq!(drift(&[0.0, 0.0, 1.0, 1.0]), Ok(None));
+}
+
+/// Against scipy.stats.wilcoxon(method="exact"), and by counting.
+#[test]
+fn signed_ranks_have_the_exact_distribution() {
+    let close = |got: f64, expected: f64| assert!((got - expected).abs() < 1e-12, "{got} instead of {expected}");
+    close(signed_rank(&[1.0, 2.0, 3.0, 4.0, 5.0]).expect("p"), 0.0625);
+    close(min_signed_p(5), 0.0625);
+    // Rank sums of 0 and 1: two of 64.
+    close(signed_rank(&[-1.0, 2.0, 3.0, 4.0, 5.0, 6.0]).expect("p"), 0.0625);
+    close(signed_rank(&[-3.0, 1.0, -2.0, 4.0]).expect("p"), 1.0);
+    // A difference of 0 tells nothing; of two equal distances either sign is as likely.
+    close(signed_rank(&[0.0, 2.0, 2.0]).expect("p"), 0.5);
+    close(signed_rank(&[0.0, 0.0]).expect("p"), 1.0);
+    assert!(signed_rank(&[]).is_err());
+    let shift = paired_shift(&[3.0, 1.0, 2.0, 4.0, 5.0, 6.0], 0.9).expect("shift");
+    assert_eq!((shift.estimate, shift.low, shift.high), (3.5, 2.0, 5.0));
+    close(shift.coverage, 1.0 - 2.0 * 3.0 / 64.0);
 }
