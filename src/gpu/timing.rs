@@ -280,7 +280,7 @@ impl Timings {
     }
 
     /// Counts CPU time too, if the system reports it.
-    pub fn start_cpu(&mut self) {
+    pub(crate) fn start_cpu(&mut self) {
         self.cpu = CpuTime::now().map(|since| CpuLog { since, passes: Vec::new() });
     }
 
@@ -297,7 +297,7 @@ impl Timings {
     }
 
     /// The CPU times since the last call, ns, one entry for each run.
-    pub fn take_cpu(&mut self) -> Vec<(&'static str, f64)> {
+    pub(crate) fn take_cpu(&mut self) -> Vec<(&'static str, f64)> {
         self.cpu.as_mut().map(|log| std::mem::take(&mut log.passes)).unwrap_or_default()
     }
 
