@@ -15,6 +15,7 @@ layout(scalar) uniform Params {
     float thickness; // mm
     float bias;      // mm
     float softness;  // mm of edge per mm
+    float growth;    // of SOFT: stride per mm of distance to the surface, mm
 };
 #include "distance_map.glsl"
 uniform writeonly image2D shadow;
@@ -65,10 +66,11 @@ void main() {
         float across = length(cross(to_light, ray_direction(at)));
         float pixel_size = pitch.x + pitch.y * distance;
         float stride = max(min(pixel_size / max(across, 1e-6), 0.5 * thickness / max(sqrt(max(1.0 - across * across, 0.0)), 1e-6)), 0.25 * pixel_size);
-        int steps = int(min(length_to_light / stride, float(MOST_STEPS)));
         vec2 size = vec2(textureSize(distance_map, 0));
-        for (int i = 1; i <= steps; ++i) {
-            float travelled = float(i) * stride;
+        float travelled = 0.0;
+        for (int i = 0; i < MOST_STEPS; ++i) {
+            travelled += SOFT == 1 ? max(stride, growth * travelled) : stride;
+            if (travelled > length_to_light) break;
             vec3 pixel_place = projected(place + to_light * travelled);
             if (any(lessThan(pixel_place.xy, vec2(0.0))) || any(greaterThanEqual(pixel_place.xy, size)) || pixel_place.z < 0.0) break;
             float nearest = map_at(pixel_place.xy);

@@ -3,7 +3,7 @@
 
 use crate::passes::pass::*;
 use crate::passes::raycast::cap;
-use crate::scene::{Dims, Mode, Scene, Skin, SurfaceColour};
+use crate::scene::{Dims, Mode, Scene, Shadow, Skin, SurfaceColour};
 use glam::DVec3;
 
 /// Blinn-Phong (thesis 4-4..4-7) with a directional or point light, with shadow, occlusion and the look of skin where requested.
@@ -245,6 +245,12 @@ fn pitch(scene: &Scene) -> [f64; 2] {
     [smaller(rays.origin_dx, rays.origin_dy), smaller(rays.direction_dx, rays.direction_dy)]
 }
 
+/// Stride per mm of distance to the surface, mm, where that is more than a pixel: a third of the width of the shadow's edge there, which no finer
+/// obstacle shows in.
+fn growth(shadow: Shadow) -> f64 {
+    (shadow.softness / 3.0).min(0.1)
+}
+
 /// Stride towards the light, mm: a pixel across the view, and at most half of the thickness along it, but no less than a quarter of a pixel.
 fn stride(scene: &Scene, distance: f64, to_light: DVec3, along: DVec3) -> f64 {
     let shadow = scene.settings.light.shadow.unwrap_or_default();
@@ -282,6 +288,7 @@ pub const SHADOW: Pass = Pass {
             .f32("thickness", shadow.thickness)
             .f32("bias", shadow.bias)
             .f32("softness", shadow.softness)
+            .f32("growth", growth(shadow))
     },
     constants: |s, _| {
         let soft = s.settings.light.shadow.is_some_and(|s| s.softness > 0.0);
@@ -323,10 +330,10 @@ fn arriving(scene: &Scene, distances: &Texels, x: usize, y: usize, place: DVec3,
     let (_, along) = scene.rays.at(x as f64 + 0.5, y as f64 + 0.5);
     let (direction, far) = to_light(scene, place, -along);
     let stride = stride(scene, distance, direction, along);
-    let steps = (reach(scene).min(far) / stride).min(MOST_STEPS.into()) as u32;
+    let next = |gone: &f64| Some(gone + stride.max(growth(shadow) * gone));
+    let places = std::iter::successors(Some(stride), next).take(MOST_STEPS as usize);
     let mut arrives = 1.0f64;
-    for i in 1..=steps {
-        let gone = f64::from(i) * stride;
+    for gone in places.take_while(|gone| *gone <= reach(scene).min(far)) {
         let Some((at, distance)) = seen_at(scene, place + direction * gone, distances.size) else { break };
         let Some(nearest) = map_at(scene, distances, at) else { continue };
         let inside = distance - nearest - shadow.bias;
