@@ -67,7 +67,7 @@ const DISPATCHES: usize = 40;
 /// Every class of instructions, in three places of the shader of each pass: of the mutants that change any bit of an output, how many the
 /// checks of single passes catch with the inputs of `verify --full`. Those that they miss are printed.
 #[test]
-#[ignore = "takes an hour; docs/verify.md has its figures"]
+#[ignore = "takes 20 minutes; docs/verify.md has its figures"]
 fn mutants_that_change_a_bit_are_caught() {
     let mut sound = DeviceUnderTest::new(&options(), Level::Quick).expect("a device");
     let (scenes, mut changed, mut caught, mut missed) = (sound.scenes(), 0, 0, Vec::new());
