@@ -3,7 +3,7 @@
 use crate::scenes::*;
 use echolume::low_level::baselines::Stored;
 use echolume::low_level::passes::{DispatchArgs, by_name};
-use echolume::low_level::profile::compare::{CompareOptions, Verdict, compare};
+use echolume::low_level::profile::compare::{CompareOptions, Kind, Verdict, compare};
 use echolume::low_level::profile::timed_run::{ProfileOptions, ProfileRun, run};
 use echolume::low_level::profile::{Profile, export};
 
@@ -53,7 +53,8 @@ fn an_injected_slow_pass_is_found_and_no_other_pass_blamed_as_much() {
     assert!(inverse < 1.0 / 3.0, "{inverse} for a sixth of the work");
 }
 
-/// 20 pairs of identical interleaved runs: at most 5 % of them may be called different in any line.
+/// 20 pairs of identical interleaved runs, of which each goes first as often: 5 % of them may be called different in some pass. Then more than 4 of 20 are with a
+/// probability of 0.3 % (binomial distribution).
 #[test]
 fn identical_runs_are_hardly_ever_called_different() {
     let _alone = alone();
@@ -62,18 +63,24 @@ fn identical_runs_are_hardly_ever_called_different() {
     for pair in 0..20 {
         let mut old = ProfileRun::new(&context, &scene, &asked(12)).expect("run");
         let mut new = ProfileRun::new(&context, &scene, &asked(12)).expect("run");
-        while old.needs_more() {
-            old.repeat(&frames).expect("repeat");
-            new.repeat(&frames).expect("repeat");
+        for turn in 0.. {
+            let [first, last] = if turn % 2 == 0 { [&mut old, &mut new] } else { [&mut new, &mut old] };
+            first.repeat(&frames).expect("repeat");
+            last.repeat(&frames).expect("repeat");
+            if !old.needs_more() {
+                break;
+            }
         }
         let compared = compare(&old.finish().0, &new.finish().0, &CompareOptions::default()).expect("comparison");
-        let called = compared.lines.iter().filter(|l| matches!(l.verdict, Verdict::Faster | Verdict::Slower));
+        // Spans of the host are told, and never judged: where memory lies makes some several times as long.
+        let judged = compared.lines.iter().filter(|l| l.kind != Kind::Host);
+        let called = judged.filter(|l| matches!(l.verdict, Verdict::Faster | Verdict::Slower));
         different.extend(called.map(|l| (pair, l.name.clone(), l.ratio.as_ref().map(|r| r.estimate))));
     }
     let mut pairs: Vec<_> = different.iter().map(|d| d.0).collect();
     pairs.dedup();
     println!("called different: {different:?}");
-    assert!(pairs.len() <= 1, "{} of 20 pairs: {different:?}", pairs.len());
+    assert!(pairs.len() <= 4, "{} of 20 pairs: {different:?}", pairs.len());
 }
 
 /// A written profile holds all measurements on one clock.
