@@ -8,7 +8,7 @@ use crate::live::Update;
 use crate::probe::Geometry;
 use crate::source::formats::described;
 use crate::source::freehand::FreehandArguments;
-use crate::source::igtl::{Network, NetworkOptions, Poses, SCHEME};
+use crate::source::igtl::{self, Network, NetworkOptions, Poses, SCHEME};
 #[cfg(feature = "view")]
 use crate::source::live::SourceKind;
 use crate::source::live::{Live, Playback, PlaybackSource};
@@ -190,6 +190,9 @@ impl SourceArgs {
         } else if let Some(address) = network {
             if address.is_empty() {
                 return Err(input(format!("--source {}: must read igtl://HOST or igtl://HOST:PORT", self.source)));
+            }
+            if igtl::port(address).is_none_or(|port| port == 0) {
+                return Err(input(format!("--source {}: its port must lie in 1..=65535", self.source)));
             }
             if sweep.is_some() {
                 return Err(input(format!(

@@ -43,9 +43,10 @@ impl FromStr for Other {
 }
 
 /// Options of `profile` that are not passed on, and whether a value follows. They say what is done with the measurements, or are given anew.
-const KEPT_BACK: [(&str, bool); 8] = [
+const KEPT_BACK: [(&str, bool); 9] = [
     ("--against", true),
     ("--threshold", true),
+    ("--minor", true),
     ("--force", false),
     ("--json", true),
     ("--repeat", true),

@@ -75,6 +75,9 @@ pub struct Profile {
     /// Ratio that a pass must exceed to be a regression
     #[arg(long, value_name = "RATIO", default_value_t = 1.05)]
     threshold: f64,
+    /// Share of the time of all passes, 0..1, below which a pass may hide a slowdown in the noise: exit code 0, with a note, and not 5
+    #[arg(long, value_name = "SHARE", default_value_t = 0.0)]
+    minor: f64,
     /// Compare also profiles of different scenes or sizes
     #[arg(long)]
     force: bool,
@@ -171,6 +174,7 @@ impl Profile {
     fn criteria(&self) -> Result<compare::CompareOptions, Failure> {
         Ok(compare::CompareOptions {
             threshold: Threshold::new(self.threshold).map_err(|e| input(format!("--{e}")))?,
+            minor: self.minor,
             force: self.force,
             ..compare::CompareOptions::default()
         })

@@ -1,6 +1,6 @@
 //! `--serve` of `echolume stream`: what it says of the clients.
 
-use crate::source::igtl::{Publisher, PublisherStatistics, SCHEME, ServerOptions, with_port};
+use crate::source::igtl::{self, Publisher, PublisherStatistics, SCHEME, ServerOptions, with_port};
 use crate::terminal::{Failure, failed, input, remark, say};
 use std::io::ErrorKind;
 use std::time::Instant;
@@ -31,6 +31,9 @@ impl ServeArgs {
         let Some(place) = place else {
             return Err(input(format!("--serve {given}: must read igtl://HOST or igtl://HOST:PORT")));
         };
+        if igtl::port(place).is_none() {
+            return Err(input(format!("--serve {given}: its port must lie in 0..=65535")));
+        }
         if let Some(mm) = self.serve_spacing.filter(|mm| !(0.01..=1000.0).contains(mm)) {
             return Err(input(format!("--serve-spacing {mm}: must lie in 0.01..=1000 mm")));
         }

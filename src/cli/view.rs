@@ -1,7 +1,7 @@
 //! `echolume view`.
 
 use super::view_config::{ConsoleConfig, First, WindowConfig, rungs};
-use super::view_open::{OpenedInWindow, Shown, check_later};
+use super::view_open::{OpenedInWindow, Shown, check_later, locked};
 use crate::args::{
     SceneArgs, SourceArgs, StreamArgs, check_outputs, device_failure, first_steps, parse_nanoseconds, presets_file,
     recent_list,
@@ -17,7 +17,7 @@ use crate::terminal::{Failure, failed, input, say};
 use crate::ui::console::{Console, ConsoleOptions, OpenFile, Opened, OpeningOptions, StartupFault};
 use crate::ui::recordings::{MAX_OPEN, Recordings};
 use std::path::{Path, PathBuf};
-use std::sync::Arc;
+use std::sync::{Arc, Mutex};
 use std::time::Duration;
 
 #[derive(clap::Args)]
@@ -45,6 +45,9 @@ pub struct View {
     /// What was opened in the window since.
     #[arg(skip)]
     opened: OpenedInWindow,
+    /// What no other process may write to at the same time.
+    #[arg(skip)]
+    locks: Arc<Mutex<Vec<(PathBuf, Lock)>>>,
     /// Kiosk mode: only the configured keys (Ctrl+Alt+Q) end it. A failing source or configuration is shown and retried for ever
     #[arg(long)]
     kiosk: bool,
@@ -131,7 +134,8 @@ impl View {
             let read = self.config.is_none().then(|| self.source.path());
             check_outputs(&[("--prometheus", self.prometheus.as_deref())], read)?;
         }
-        let locks = self.locks()?;
+        let locks = self.locks.clone();
+        self.lock(&self.config().and_then(Result::ok).unwrap_or_default())?;
         let deadline = self.scene.deadline()?;
         let mut place = match self.config() {
             None => self.place()?,
@@ -184,7 +188,7 @@ impl View {
         };
         let ran = place.run(Box::new(make)).map_err(device_failure);
         let finished = finish(ran?);
-        drop(locks);
+        locked(&locks).clear();
         finished
     }
 
@@ -197,12 +201,17 @@ impl View {
         self.config().and_then(Result::ok).is_none_or(|config| config.files.private)
     }
 
-    /// Locks what no other process may write to at the same time: the metrics, and the folders of a kiosk.
-    fn locks(&self) -> Result<Vec<Lock>, Failure> {
-        let config = self.config().and_then(Result::ok).unwrap_or_default();
-        let metrics = self.prometheus.clone().or(config.files.prometheus);
-        let folders = [config.files.pictures, config.live.record].into_iter().flatten().filter(|_| self.kiosk);
-        metrics.into_iter().chain(folders).map(|place| Lock::take(&place).map_err(failed)).collect()
+    /// Locks what no other process may write to at the same time, unless this one has it already: the metrics, and the folders of a kiosk.
+    fn lock(&self, config: &Config) -> Result<(), Failure> {
+        let Config { files, live, .. } = config;
+        let folders = [&files.pictures, &live.record].into_iter().flatten().filter(|_| self.kiosk);
+        let mut held = locked(&self.locks);
+        for place in self.prometheus.as_ref().or(files.prometheus.as_ref()).into_iter().chain(folders) {
+            if held.iter().all(|(other, _)| other != place) {
+                held.push((place.clone(), Lock::take(place).map_err(failed)?));
+            }
+        }
+        Ok(())
     }
 
     /// The log of the configuration: path, bytes per file, number of files.
@@ -221,6 +230,8 @@ impl View {
         let (mut wanted, exit) = match self.config().filter(|_| !self.opened.is_some()) {
             Some(config) => {
                 let config = config.map_err(input)?;
+                // A file with a fault at the start named no place.
+                self.lock(&config)?;
                 (ConsoleConfig::configured(&config, &self.scene)?, config.keys.exit)
             }
             None => (self.config_from_flags()?, usual.keys.exit),

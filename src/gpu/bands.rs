@@ -2,7 +2,7 @@
 //! long, and the device is lost: after 2 s (Windows), 7.5 s (i915) or 10 s (amdgpu). The size of a band follows from the time that
 //! the pass took on this device.
 //!
-//! Workgroups of every pass are independent: no shader has an atomic operation, and only invocations of one workgroup share memory. So any
+//! Workgroups of every pass are independent: only invocations of one workgroup share memory, and atomic operations are on that alone. So any
 //! division between workgroups gives the same texels. A software device has no watchdog and gets no bands, until it is lost.
 
 use crate::passes::{Pass, Stage};

@@ -107,7 +107,7 @@ fn votes(scene: &Scene, pass: &Pass) -> bool {
 
 /// What distinguishes a pipeline: its shader, its constants, and the formats of its bindings; and along which axes a dispatch has more than
 /// eight workgroups.
-pub(super) fn variant(scene: &Scene, pass: &Pass) -> Variant {
+pub fn variant(scene: &Scene, pass: &Pass) -> Variant {
     let args = dispatch_args_of(scene, pass, 0);
     let bound = pass.reads(scene, &args).into_iter().chain(pass.writes(scene, &args));
     let extent = pass.invocations(scene, &args);

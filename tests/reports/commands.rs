@@ -64,6 +64,10 @@ fn a_profile_is_written_compared_with_itself_and_refused_where_it_cannot_be() {
     let lines = compared["lines"].as_array().expect("lines");
     let unseen: Vec<_> = lines.iter().filter(|line| line["is_unseen"] == true).map(|line| &line["name"]).collect();
     assert_eq!(unseen, ["light"]);
+    // Unless it is excused as a pass of little time, which is said.
+    let excused = done(&["profile", "--compare", &steady, &noisy, "--minor", "0.9"]);
+    assert!(excused.contains("less than 90 % of the time may hide a slowdown: light below"), "{excused}");
+    refused(&["profile", "--compare", &steady, &noisy, "--minor", "2"], 2, &["minor: 2 is not a share"]);
     assert!(fs::read_to_string(&csv).expect("csv").lines().count() > 8);
     let traced: serde_json::Value = serde_json::from_str(&fs::read_to_string(&trace).expect("trace")).expect("json");
     assert!(traced["traceEvents"].as_array().is_some_and(|e| e.len() > 50));

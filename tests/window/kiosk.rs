@@ -2,6 +2,7 @@
 
 use crate::common::layer::under_layer;
 use crate::desktop::*;
+use echolume::low_level::files::Lock;
 use std::fs;
 use std::process::Command;
 
@@ -26,11 +27,17 @@ fn a_wrong_configuration_is_reported_and_loaded_once_it_is_corrected() {
     let mut view = desk.view(&["--kiosk", "--config", &file]);
     until("why", || is_amiss(&view).then_some(()));
     assert!(view.is_running());
-    fs::write(&file, format!("source = '{SWEEP}'\nloop = true\n[display]\npanels = false\n")).expect("write");
+    let saved = folder.join("saved");
+    fs::create_dir(&saved).expect("a folder");
+    let text = format!("source = '{SWEEP}'\nloop = true\n[display]\npanels = false\n[files]\npictures = 'saved'\n");
+    fs::write(&file, text).expect("write");
     until("the picture", || (!is_amiss(&view)).then_some(()));
     let full = headless([1024, 768], &[]);
     view.shows_part(&full, [256, 192], [512, 384], "what the configuration says");
+    let why = Lock::take(&saved).expect_err("another kiosk with this folder is refused");
+    assert!(why.contains("is in use by process"), "{why}");
     leave(view);
+    Lock::take(&saved).expect("free again");
 }
 
 #[test]

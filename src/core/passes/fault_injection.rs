@@ -37,8 +37,9 @@ pub enum Change {
     Frame(fn([usize; 3], &mut [u8])),
     /// The sampler takes the nearest texel.
     Nearest,
-    /// One instruction of a class in every shader that has one, which the compiler translates wrongly: at this share (0 to 1) of those there are.
-    Mutant(&'static Mutation, f32),
+    /// One instruction of a class in every shader of the pass that has one, which the compiler translates wrongly: at this share (0 to 1) of those there
+    /// are.
+    Mutant { pass: &'static str, mutation: &'static Mutation, share: f32 },
     /// A command that the driver carries out wrongly.
     Command(Command),
 }
@@ -85,14 +86,16 @@ impl Change {
                 let other = by(words)?;
                 Ok(std::mem::replace(words, other) != *words)
             }
-            Change::Mutant(mutation, share) => match mutants::count(words, mutation) {
-                0 => Ok(false),
-                count => {
-                    let site = (share * count as f32) as usize;
-                    *words = mutants::mutant(words, mutation, site.min(count - 1))?;
-                    Ok(true)
+            Change::Mutant { pass: name, mutation, share } if pass.starts_with(name) => {
+                match mutants::count(words, mutation) {
+                    0 => Ok(false),
+                    count => {
+                        let site = (share * count as f32) as usize;
+                        *words = mutants::mutant(words, mutation, site.min(count - 1))?;
+                        Ok(true)
+                    }
                 }
-            },
+            }
             _ => Ok(false),
         }
     }
@@ -150,9 +153,9 @@ impl Change {
                     reads(*slot) && matches!(slot.initializer(), Initializer::ByScene(make) if made(make))
                 }
                 Change::Frame(_) => reads(Slot::Frames),
-                Change::Mutant(mutation, _) => {
+                Change::Mutant { pass: name, mutation, .. } => {
                     let shader = spirv::embedded(pass.shader(scene, &turns[0])).map(spirv::words);
-                    shader.is_some_and(|words| mutants::count(&words, mutation) > 0)
+                    pass.name.starts_with(name) && shader.is_some_and(|words| mutants::count(&words, mutation) > 0)
                 }
                 Change::Command(Command::DispatchIndirect) => {
                     pass.reads(scene, &turns[0]).iter().any(|bind| bind.part == Part::Groups)

@@ -37,13 +37,15 @@ pub struct CompareOptions {
     pub threshold: Threshold,
     /// Probability of any false alarm in the whole report, 0..1.
     pub alpha: f64,
+    /// A pass with a smaller share of the time of all passes (0..1) may hide a slowdown.
+    pub minor: f64,
     /// Compare even if the profiles ran different work.
     pub force: bool,
 }
 
 impl Default for CompareOptions {
     fn default() -> CompareOptions {
-        CompareOptions { threshold: Threshold::default(), alpha: 0.05, force: false }
+        CompareOptions { threshold: Threshold::default(), alpha: 0.05, minor: 0.0, force: false }
     }
 }
 
@@ -58,6 +60,8 @@ pub enum CompareError {
     Times { fault: SampleError },
     #[error("alpha: {0} is not a probability between 0 and 1")]
     Alpha(f64),
+    #[error("minor: {0} is not a share from 0 to 1")]
+    Minor(f64),
 }
 
 /// Result of comparing one line.
@@ -122,6 +126,8 @@ pub struct Line {
     pub limit: Option<f64>,
     /// True if a slowdown by more than the threshold may have been overlooked.
     pub is_unseen: bool,
+    /// True if it may be, as a pass of little time.
+    pub is_minor: bool,
 }
 
 /// Comparison of two profiles.
@@ -146,17 +152,30 @@ impl Comparison {
     /// Why it cannot be said that nothing is slower by more than the threshold, in one line: the smallest slowdown that would have been seen, and
     /// where more would not have been. None if all would.
     pub fn cannot_tell(&self) -> Option<String> {
-        let mut unseen: Vec<&Line> = self.lines.iter().filter(|line| line.is_unseen).collect();
-        unseen.sort_by(|a, b| b.limit.unwrap_or(f64::MAX).total_cmp(&a.limit.unwrap_or(f64::MAX)));
-        let below = |line: &Line| {
-            line.limit.map_or("anything".to_string(), |limit| format!("below {:.1} %", 100.0 * (limit - 1.0)))
-        };
-        let listed: Vec<String> = unseen.iter().map(|line| format!("{} {}", line.name, below(line))).collect();
-        let more = listed.len().saturating_sub(MAX_NAMED);
-        let named = listed[..listed.len() - more].join(", ");
-        let rest = if more > 0 { format!(", and {more} more") } else { String::new() };
-        unseen.first().map(|worst| format!("cannot tell {}: {named}{rest}", below(worst)))
+        let (worst, named) = hidden(self.lines.iter().filter(|line| line.is_unseen && !line.is_minor))?;
+        Some(format!("cannot tell {worst}: {named}"))
     }
+}
+
+/// What the noise hides of these lines: the most, and where. None of none.
+fn hidden<'a>(lines: impl Iterator<Item = &'a Line>) -> Option<(String, String)> {
+    let mut unseen: Vec<&Line> = lines.collect();
+    unseen.sort_by(|a, b| b.limit.unwrap_or(f64::MAX).total_cmp(&a.limit.unwrap_or(f64::MAX)));
+    let below = |line: &Line| {
+        line.limit.map_or("anything".to_string(), |limit| format!("below {:.1} %", 100.0 * (limit - 1.0)))
+    };
+    let listed: Vec<String> = unseen.iter().map(|line| format!("{} {}", line.name, below(line))).collect();
+    let more = listed.len().saturating_sub(MAX_NAMED);
+    let named = listed[..listed.len() - more].join(", ");
+    let rest = if more > 0 { format!(", and {more} more") } else { String::new() };
+    unseen.first().map(|worst| (below(worst), format!("{named}{rest}")))
+}
+
+/// A note of the passes that may hide a slowdown.
+fn excused(lines: &[Line], options: &CompareOptions) -> Option<String> {
+    let (_, named) = hidden(lines.iter().filter(|line| line.is_unseen && line.is_minor))?;
+    let share = 100.0 * options.minor;
+    Some(format!("passes with less than {share} % of the time may hide a slowdown: {named}"))
 }
 
 /// Most lines that [`Comparison::cannot_tell`] names.
@@ -246,6 +265,9 @@ fn compare_repeats(
     if !(options.alpha > 0.0 && options.alpha < 1.0) {
         return Err(CompareError::Alpha(options.alpha));
     }
+    if !(0.0..=1.0).contains(&options.minor) {
+        return Err(CompareError::Minor(options.minor));
+    }
     for (which, profile) in [("old", old), ("new", new)] {
         profile.check().map_err(|fault| CompareError::Profile { which, fault })?;
     }
@@ -266,6 +288,7 @@ fn compare_repeats(
     let lines = judge(pairs, method, tick, options).map_err(|fault| CompareError::Times { fault })?;
     notes.extend(differing(conditions(old), conditions(new)));
     notes.extend(common_shift(&lines));
+    notes.extend(excused(&lines, options));
     let alpha = options.alpha * 100.0;
     let test = match method {
         Method::Apart { blocks } => format!(
@@ -511,15 +534,18 @@ pub fn judge(pairs: Vec<Pair>, method: Method, tick: f64, options: &CompareOptio
         });
     }
     let passes = pairs.iter().zip(&tested).filter(|(pair, _)| pair.kind == Kind::Pass);
-    let typical = typical_range(&passes.filter_map(|(_, t)| t.as_ref().ok()).collect::<Vec<_>>());
+    let passes: Vec<&BlockTest> = passes.filter_map(|(_, t)| t.as_ref().ok()).collect();
+    let typical = typical_range(&passes);
+    let least = options.minor * passes.iter().map(|t| t.weight).sum::<f64>();
     let p: Vec<f64> = tested.iter().flatten().map(|t| t.p).collect();
     let mut corrected = holm(&p).into_iter();
     let lines = pairs.into_iter().zip(tested).map(|(pair, tested)| {
+        let is_minor = pair.kind == Kind::Pass && tested.as_ref().is_ok_and(|tested| tested.weight < least);
         let (ratio, fault) = match tested {
             Ok(tested) => (corrected.next().map(|p_holm| (ratio(&tested, typical, p_holm), tested.seen.exp())), None),
             Err(fault) => (None, Some(fault)),
         };
-        line(pair, ratio, fault, options)
+        Line { is_minor, ..line(pair, ratio, fault, options) }
     });
     Ok(lines.collect())
 }
@@ -579,6 +605,7 @@ fn line(pair: Pair, ratio: Option<(Ratio, f64)>, fault: Option<String>, options:
         is_regression,
         limit,
         is_unseen: can_hide && is_judged && !is_regression,
+        is_minor: false,
     }
 }
 

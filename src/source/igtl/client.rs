@@ -1,10 +1,11 @@
 //! A connection on a thread of its own, which reconnects, and the queue that the thread fills.
 
+use super::begun::Begun;
 use super::codec::{BODY_LIMIT, DecodeError, Decoded, decode_with};
 use super::message::Message;
 use crate::files::escaped;
 use std::collections::VecDeque;
-use std::io::{self, BufReader, ErrorKind, Read};
+use std::io::{self, BufRead, BufReader, ErrorKind};
 use std::net::{IpAddr, Shutdown, TcpStream, ToSocketAddrs};
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::thread::{self, JoinHandle};
@@ -20,12 +21,12 @@ const POLL: Duration = Duration::from_millis(100);
 const MIN_WAIT: Duration = Duration::from_millis(10);
 /// How long dropping a client waits for its thread, which may be resolving a name.
 const STOP: Duration = Duration::from_secs(1);
-/// A message is read in steps of so many bytes, so that memory grows with the data and not with the claimed size.
-const STEP: usize = 1 << 20;
 /// Largest buffer that is kept for the next message, bytes.
 const MAX_KEPT_BYTES: usize = 16 << 20;
 /// Most addresses of one name that are tried.
 const MAX_ADDRESSES: usize = 8;
+/// The least rate of a message that is longer than its time-out allows at this rate, bytes a second.
+const LEAST_RATE: f64 = 1e6;
 /// Longest description of an error, characters.
 const MAX_ERROR_CHARACTERS: usize = 600;
 
@@ -36,6 +37,9 @@ pub struct ClientOptions {
     pub connect_timeout: Duration,
     /// Longest pause within a message before the connection is closed.
     pub stall_timeout: Duration,
+    /// Longest time from the first byte of a message to its last, and a second more for each megabyte of it: a peer that sends a byte a second is no
+    /// source.
+    pub message_timeout: Duration,
     /// Longest time without any message before the connection is closed: a peer that lost power does not close it.
     pub silence_timeout: Duration,
     /// Wait before the first reconnection. Doubled with every connection that brings no message.
@@ -57,6 +61,7 @@ impl Default for ClientOptions {
         ClientOptions {
             connect_timeout: Duration::from_secs(2),
             stall_timeout: Duration::from_secs(5),
+            message_timeout: Duration::from_secs(10),
             silence_timeout: Duration::from_secs(30),
             first_wait: Duration::from_millis(250),
             longest_wait: Duration::from_secs(5),
@@ -278,7 +283,7 @@ impl Shared {
         // Holds one message at most, so that no bytes have to be moved.
         let mut bytes = Vec::new();
         let mut useful = false;
-        let mut last = Instant::now();
+        let (mut last, mut begun) = (Instant::now(), Begun::default());
         loop {
             let missing = match decode_with(&bytes, options.body_limit, options.takes_no_checksum) {
                 Ok(Decoded::Need(missing)) => missing,
@@ -286,6 +291,7 @@ impl Shared {
                     self.deliver(message);
                     useful = true;
                     clear(&mut bytes);
+                    begun = Begun::default();
                     continue;
                 }
                 Err(DecodeError::Framing { error }) => {
@@ -295,25 +301,35 @@ impl Shared {
                 Err(skipped) => {
                     self.skip(&skipped);
                     clear(&mut bytes);
+                    begun = Begun::default();
                     continue;
                 }
             };
-            let before = bytes.len();
-            let step = missing.min(STEP);
-            let read = Read::take(&mut input, step as u64).read_to_end(&mut bytes);
-            let came = bytes.len() - before;
+            // What is known of its length.
+            let length = bytes.len() + missing;
+            let read = input.fill_buf().map(|there| {
+                let came = &there[..there.len().min(missing)];
+                bytes.extend_from_slice(came);
+                came.len()
+            });
+            let came = *read.as_ref().unwrap_or(&0);
+            input.consume(came);
             let mut state = self.lock();
             state.statistics.bytes += came as u64;
             if state.stop {
                 return ConnectionEnd { why: "stopped".into(), useful };
             }
+            let most = options.message_timeout + Duration::from_secs_f64(length as f64 / LEAST_RATE);
+            let is_late = begun.is_late(!bytes.is_empty(), Instant::now(), most);
             let why = match read {
-                _ if came > 0 && came == step => None,
-                Ok(_) if bytes.is_empty() => Some("the peer closed the connection".into()),
-                Ok(_) => Some(format!("the peer closed the connection {} bytes into a message", bytes.len())),
-                Err(e) if matches!(e.kind(), ErrorKind::WouldBlock | ErrorKind::TimedOut) => {
+                _ if came > 0 && came == missing => None,
+                _ if is_late => Some(format!("a message did not end within {} ms", most.as_millis())),
+                Ok(1..) => None,
+                Ok(0) if bytes.is_empty() => Some("the peer closed the connection".into()),
+                Ok(0) => Some(format!("the peer closed the connection {} bytes into a message", bytes.len())),
+                Err(e) if matches!(e.kind(), ErrorKind::WouldBlock | ErrorKind::TimedOut | ErrorKind::Interrupted) => {
                     let most = if bytes.is_empty() { options.silence_timeout } else { options.stall_timeout };
-                    (came == 0 && last.elapsed() > most).then(|| format!("nothing came for {} ms", most.as_millis()))
+                    (last.elapsed() > most).then(|| format!("nothing came for {} ms", most.as_millis()))
                 }
                 Err(e) => Some(format!("cannot be read: {e}")),
             };
@@ -358,6 +374,11 @@ pub fn with_port(address: &str) -> String {
         Err(_) if address.contains(':') && !address.ends_with(']') => address.to_string(),
         _ => format!("{address}:{PORT}"),
     }
+}
+
+/// The port of an address, [`PORT`] if it has none. None: it is no number that a port can have.
+pub fn port(address: &str) -> Option<u16> {
+    with_port(address).rsplit(':').next()?.parse().ok()
 }
 
 /// A message, and when it arrived.
@@ -417,7 +438,9 @@ mod tests {
             ("[::1]:7", "[::1]:7"),
         ] {
             assert_eq!(with_port(given), whole);
+            assert_eq!(port(given), if whole.ends_with(":7") { Some(7) } else { Some(PORT) });
         }
+        assert!(["scanner:99999", "scanner:", "scanner:-1", "scanner:igtl"].iter().all(|given| port(given).is_none()));
     }
 }
 

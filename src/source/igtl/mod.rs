@@ -6,6 +6,7 @@
 //! The format is OpenIGTLink's protocol 3 (its repository's Documents/Protocol). Where that document and the bytes of
 //! the reference library differ, this module follows the bytes: the document's extended header has 8 or 14 bytes, the library's 12.
 
+mod begun;
 mod cartesian;
 mod client;
 mod codec;
@@ -18,7 +19,7 @@ mod pixels;
 mod publish;
 mod server;
 
-pub use client::{Client, ClientOptions, ClientStatistics, PORT, Received, SCHEME, with_port};
+pub use client::{Client, ClientOptions, ClientStatistics, PORT, Received, SCHEME, port, with_port};
 pub use codec::{BODY_LIMIT, DecodeError, Decoded, HEADER, MessageError, Version, crc64, decode, encode};
 pub use message::{
     Coordinates, Image, Message, Other, Region, Scalar, Status, Text, Tool, ToolKind, TrackingData, Transform,

@@ -1,5 +1,6 @@
 //! A server on threads of its own: messages go to every client that is connected, and a slow client loses the oldest of its own.
 
+use super::begun::Begun;
 use super::codec::{self, BODY_LIMIT, DecodeError, Decoded, MessageError, Version, decode, encode};
 use super::message::{Message, Status, Text};
 use std::collections::{BTreeMap, VecDeque};
@@ -466,18 +467,6 @@ impl Shared {
     }
 }
 
-/// When the first byte of a message came that has not ended.
-#[derive(Default)]
-struct Begun(Option<Instant>);
-
-impl Begun {
-    /// True if the message takes longer than it may. `has_begun`: bytes of it are there.
-    fn is_late(&mut self, has_begun: bool, now: Instant, most: Duration) -> bool {
-        self.0 = self.0.or(Some(now)).filter(|_| has_begun);
-        self.0.is_some_and(|since| now.saturating_duration_since(since) > most)
-    }
-}
-
 /// The time, s since 1970, for a stamp; 0, which is none, for a clock before that.
 pub(super) fn now() -> f64 {
     std::time::SystemTime::now().duration_since(std::time::UNIX_EPOCH).map_or(0.0, |t| t.as_secs_f64())
@@ -489,17 +478,6 @@ mod tests {
 
     fn packet(device: Option<&str>, bytes: usize) -> Packet {
         Packet { device: device.map(str::to_string), bytes: vec![0; bytes].into() }
-    }
-
-    /// Prevents a client that keeps its place for ever by a byte a second. One that is silent between messages only listens.
-    #[test]
-    fn a_message_has_a_time_to_end_and_silence_has_none() {
-        let (start, most, mut begun) = (Instant::now(), Duration::from_secs(10), Begun::default());
-        let at = |seconds: u64| start + Duration::from_secs(seconds);
-        assert!((0..100).all(|second| !begun.is_late(false, at(second), most)));
-        assert!((100..=110).all(|second| !begun.is_late(true, at(second), most)));
-        assert!(begun.is_late(true, at(111), most));
-        assert!(!begun.is_late(false, at(112), most) && !begun.is_late(true, at(113), most), "another message");
     }
 
     /// Prevents that a client which asks for the last image again and again, and reads slowly, pins a copy of each that there was.

@@ -322,7 +322,7 @@ fn judge_times(pairs: &[Pair], runs: [&Run; 2], threshold: Threshold) -> TimeCha
         old: series(p.old),
         new: series(p.new),
     });
-    let criteria = profile::CompareOptions { threshold, alpha: ALPHA, force: true };
+    let criteria = profile::CompareOptions { threshold, alpha: ALPHA, force: true, ..Default::default() };
     let lines = match profile::judge(lines.collect(), method, tick, &criteria) {
         Ok(lines) => lines,
         Err(fault) => {

@@ -380,6 +380,6 @@ pub(super) fn of_instructions() -> impl Iterator<Item = InjectedFault> {
         name: mutation.class,
         what: mutation.what,
         // The first and the last are often checks of bounds, which no invocation inside the picture notices.
-        change: Change::Mutant(mutation, 0.5),
+        change: Change::Mutant { pass: "", mutation, share: 0.5 },
     })
 }

@@ -206,6 +206,25 @@ fn a_stalled_peer_is_given_up() {
     assert_eq!(client.statistics().cut_short, 1);
 }
 
+/// Prevents a peer that sends a byte again and again, so that it is never silent, from being waited for.
+#[test]
+fn a_message_without_an_end_is_given_up() {
+    let drips: Script = Box::new(|mut stream| {
+        let message = stored("Image_Motor_v1.bin");
+        // After the end of the connection nothing can be sent.
+        let _ = message.iter().try_for_each(|byte| {
+            wait::pace(Duration::from_millis(20));
+            stream.write_all(&[*byte])
+        });
+    });
+    let whole = bytes(&transform("Probe", 1.0, 1.0));
+    let options = ClientOptions { message_timeout: Duration::from_millis(300), ..quick() };
+    let client = Client::connect(&serve(vec![drips, send_and_stay(whole)]), options).unwrap();
+    assert_eq!(take(&client).time(), 1.0);
+    assert_eq!(client.last_error().unwrap(), "a message did not end within 300 ms");
+    assert_eq!(client.statistics().cut_short, 1);
+}
+
 #[test]
 fn tries_come_apart_and_no_further_than_the_longest_wait() {
     let (sender, accepted) = mpsc::channel();
@@ -266,6 +285,7 @@ fn options_of_zero_do_no_harm() {
     let options = ClientOptions {
         connect_timeout: zero,
         stall_timeout: zero,
+        message_timeout: zero,
         silence_timeout: zero,
         first_wait: zero,
         longest_wait: zero,

@@ -1,0 +1,31 @@
+//! How long a message takes that has not ended: a peer that sends a byte a second is not silent.
+
+use std::time::{Duration, Instant};
+
+/// When the first byte of a message came that has not ended.
+#[derive(Default)]
+pub(super) struct Begun(Option<Instant>);
+
+impl Begun {
+    /// True if the message takes longer than it may. `has_begun`: bytes of it are there.
+    pub(super) fn is_late(&mut self, has_begun: bool, now: Instant, most: Duration) -> bool {
+        self.0 = self.0.or(Some(now)).filter(|_| has_begun);
+        self.0.is_some_and(|since| now.saturating_duration_since(since) > most)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Prevents a peer that keeps its place for ever by a byte a second. One that is silent between messages only listens.
+    #[test]
+    fn a_message_has_a_time_to_end_and_silence_has_none() {
+        let (start, most, mut begun) = (Instant::now(), Duration::from_secs(10), Begun::default());
+        let at = |seconds: u64| start + Duration::from_secs(seconds);
+        assert!((0..100).all(|second| !begun.is_late(false, at(second), most)));
+        assert!((100..=110).all(|second| !begun.is_late(true, at(second), most)));
+        assert!(begun.is_late(true, at(111), most));
+        assert!(!begun.is_late(false, at(112), most) && !begun.is_late(true, at(113), most), "another message");
+    }
+}
