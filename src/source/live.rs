@@ -48,6 +48,11 @@ pub trait Live: Send {
     /// instead when the caller is slow.
     fn can_wait(&self) -> bool;
 
+    /// True if it is a recording that is read as fast as it is taken: what comes while the picture is frozen belongs to the loop.
+    fn is_recording(&self) -> bool {
+        false
+    }
+
     /// How pictures with poses become a volume ([`Posed`](super::posed::Posed)); None: they do not.
     fn compounding(&self) -> Option<CompoundingOptions> {
         None
@@ -194,5 +199,9 @@ impl Live for PlaybackSource {
 
     fn can_wait(&self) -> bool {
         self.playback == Playback::Fast
+    }
+
+    fn is_recording(&self) -> bool {
+        self.can_wait()
     }
 }

@@ -80,6 +80,10 @@ impl Live for WholeFrames {
         self.source.can_wait()
     }
 
+    fn is_recording(&self) -> bool {
+        self.source.is_recording()
+    }
+
     fn compounding(&self) -> Option<CompoundingOptions> {
         self.source.compounding()
     }

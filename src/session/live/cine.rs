@@ -59,6 +59,12 @@ impl Cine {
         self.bytes
     }
 
+    /// True if a further volume like the newest would remove the oldest.
+    pub(crate) fn is_full(&self) -> bool {
+        let next = self.volumes.back().map_or(0, |newest| newest.bytes);
+        self.volumes.len() >= self.limits.volumes || (next > 0 && self.bytes + next > self.limits.bytes)
+    }
+
     /// Removes all volumes.
     pub fn clear(&mut self) {
         *self = Cine::new(self.limits, self.slices);
@@ -69,21 +75,20 @@ impl Cine {
         self.filling = None;
     }
 
-    /// Adds a frame.
-    pub fn frame(&mut self, frame: Frame) {
+    /// Adds a frame. True if it completes a volume.
+    pub fn frame(&mut self, frame: Frame) -> bool {
         if self.limits.volumes == 0 || frame.slice >= self.slices {
-            return;
+            return false;
         }
         if self.filling.as_ref().is_none_or(|f| f.volume != frame.volume) {
             let frames = vec![None; self.slices];
             self.filling = Some(Filling { volume: frame.volume, frames, missing: self.slices });
         }
-        let Some(filling) = &mut self.filling else { return };
+        let Some(filling) = &mut self.filling else { return false };
         let slice = frame.slice;
         filling.missing -= usize::from(filling.frames[slice].replace(Arc::new(frame)).is_none());
-        if filling.missing == 0
-            && let Some(Filling { volume, frames, .. }) = self.filling.take()
-        {
+        let is_complete = filling.missing == 0;
+        if is_complete && let Some(Filling { volume, frames, .. }) = self.filling.take() {
             let frames: Vec<_> = frames.into_iter().flatten().collect();
             let bytes = frames.iter().map(|f| f.bytes.len()).sum();
             self.bytes += bytes;
@@ -93,6 +98,7 @@ impl Cine {
             let removed = self.volumes.pop_front();
             self.bytes -= removed.map_or(0, |volume| volume.bytes);
         }
+        is_complete
     }
 }
 
@@ -113,7 +119,10 @@ mod tests {
         let mut cine = Cine::new(CineLimits { volumes: 3, bytes: 1000 }, 4);
         for volume in 0..6 {
             // A frame of volume 2 is missing.
-            (0..4).filter(|slice| (volume, *slice) != (2, 1)).for_each(|s| cine.frame(frame(volume, s, vec![0; 10])));
+            let came = (0..4).filter(|slice| (volume, *slice) != (2, 1));
+            let complete = came.filter(|s| cine.frame(frame(volume, *s, vec![0; 10]))).count();
+            assert_eq!(complete, usize::from(volume != 2));
+            assert_eq!(cine.is_full(), volume >= 3);
         }
         assert_eq!(numbers(&cine), [3, 4, 5]);
         assert_eq!(cine.bytes(), 120);
@@ -124,7 +133,7 @@ mod tests {
     fn the_bytes_are_bounded_but_the_newest_volume_stays() {
         let mut cine = Cine::new(CineLimits { volumes: 9, bytes: 100 }, 2);
         for (volume, bytes) in [(0, 30), (1, 30), (2, 10), (3, 200)] {
-            (0..2).for_each(|s| cine.frame(frame(volume, s, vec![0; bytes])));
+            assert!(!cine.frame(frame(volume, 0, vec![0; bytes])) && cine.frame(frame(volume, 1, vec![0; bytes])));
             assert!(cine.bytes() <= 100 || cine.volumes().len() == 1);
         }
         assert_eq!(numbers(&cine), [3]);
@@ -133,7 +142,7 @@ mod tests {
     #[test]
     fn a_repeated_frame_counts_once_and_one_beyond_the_volume_is_ignored() {
         let mut cine = Cine::new(CineLimits { volumes: 2, bytes: 100 }, 2);
-        [0, 0, 7].into_iter().for_each(|s| cine.frame(frame(1, s, vec![1])));
+        assert!(![0, 0, 7].into_iter().any(|s| cine.frame(frame(1, s, vec![1]))));
         assert!(cine.volumes().is_empty());
         cine.frame(frame(1, 1, vec![2]));
         assert_eq!(numbers(&cine), [1]);
@@ -143,6 +152,6 @@ mod tests {
     fn a_loop_of_size_zero_keeps_nothing() {
         let mut cine = Cine::new(CineLimits::default(), 1);
         cine.frame(frame(0, 0, vec![1]));
-        assert!(cine.volumes().is_empty() && cine.bytes() == 0);
+        assert!(cine.volumes().is_empty() && cine.bytes() == 0 && cine.is_full());
     }
 }

@@ -58,6 +58,7 @@ impl FeedCounts {
 pub struct Feed {
     shared: Arc<Shared>,
     can_wait: bool,
+    is_recording: bool,
     thread: Option<JoinHandle<()>>,
 }
 
@@ -149,7 +150,7 @@ impl Feed {
 
     /// A feed without a source: no event ever arrives.
     pub fn none() -> Feed {
-        Feed { shared: Arc::default(), can_wait: true, thread: None }
+        Feed { shared: Arc::default(), can_wait: true, is_recording: false, thread: None }
     }
 
     /// As [`Feed::new`]. `wake` is called after each event.
@@ -170,12 +171,13 @@ impl Feed {
         wake: Option<Wake>,
         observer: Option<Observer>,
     ) -> io::Result<Feed> {
-        let (shared, can_wait) = (Arc::new(Shared { wake, ..Shared::default() }), source.can_wait());
+        let shared = Arc::new(Shared { wake, ..Shared::default() });
+        let (can_wait, is_recording) = (source.can_wait(), source.is_recording());
         let theirs = shared.clone();
         let tap = record.map(RecordingTap::new);
         let thread =
             std::thread::Builder::new().name("source".into()).spawn(move || listen(source, tap, observer, &theirs))?;
-        Ok(Feed { shared, can_wait, thread: Some(thread) })
+        Ok(Feed { shared, can_wait, is_recording, thread: Some(thread) })
     }
 
     /// The oldest queued event. Waits for one for at most `patience`.
@@ -195,6 +197,11 @@ impl Feed {
     /// True if the source loses nothing while it is kept waiting.
     pub fn can_wait(&self) -> bool {
         self.can_wait
+    }
+
+    /// True if the source is a recording that is read as fast as it is taken.
+    pub fn is_recording(&self) -> bool {
+        self.is_recording
     }
 
     /// Number of queued events.

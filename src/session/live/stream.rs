@@ -167,7 +167,7 @@ impl Stream {
             let mut replays = true;
             match session.phase {
                 Phase::Drawing { .. } => {
-                    // Who has no patience looks again.
+                    // With zero patience the call does not block.
                     if !session.renderer.is_drawing()? || (is_ending && !patience.is_zero()) {
                         return self.finish_picture(is_ending);
                     }
@@ -207,6 +207,10 @@ impl Stream {
         }
         if let Some(end) = &self.end {
             return Ok(Step::End(end.clone()));
+        }
+        if self.is_held() {
+            std::thread::sleep(patience);
+            return Ok(Step::Progress);
         }
         let arrived = self.feed.next(patience);
         if let Some(session) = &mut self.session {
@@ -358,6 +362,7 @@ impl Stream {
                 let is_new = self.session.is_none() || Some(&*header) != self.header.as_ref();
                 self.next_header = is_new.then_some(*header);
             }
+            Event::Frame(frame) if self.keeps() => return Ok(self.keep(frame)),
             Event::Frame(_) if self.passes_over() => self.statistics.frozen += 1,
             Event::Frame(mut frame) => {
                 frame.volume = frame.volume.saturating_add(self.volume_base);
@@ -387,6 +392,33 @@ impl Stream {
     /// are taken.
     fn passes_over(&self) -> bool {
         self.is_frozen || self.next_header.is_some()
+    }
+
+    /// True while frames come into the loop only: those of a recording while the picture is frozen.
+    fn keeps(&self) -> bool {
+        self.is_frozen && self.next_header.is_none() && self.feed.is_recording()
+    }
+
+    /// True while frames wait until the picture is no longer frozen, because there is no room in the loop.
+    fn is_held(&self) -> bool {
+        self.keeps() && self.session.is_some() && self.cine.is_full()
+    }
+
+    /// Keeps a frame in the loop.
+    fn keep(&mut self, mut frame: Frame) -> Step {
+        self.statistics.frames += 1;
+        frame.volume = frame.volume.saturating_add(self.volume_base);
+        let Some(session) = &mut self.session else { return Step::Progress };
+        if let Err(refused) = session.renderer.check_frame(frame.slice, &frame.bytes) {
+            self.statistics.refused += 1;
+            return Step::Fault(refused.to_string());
+        }
+        let volume = frame.volume;
+        self.newest = self.newest.max(Some(volume));
+        if self.cine.frame(frame) {
+            session.pool.pass_over(volume);
+        }
+        Step::Progress
     }
 
     /// Uploads a frame.
@@ -512,14 +544,17 @@ impl Stream {
         Ok(())
     }
 
-    /// Freezes the display, or continues. While it is frozen, frames that arrive are recorded but not shown.
+    /// Freezes the display, or continues. While it is frozen, frames that arrive are recorded but not shown; those of a recording that is read come into
+    /// the loop as long as there is room, and then wait.
     pub fn freeze(&mut self, is_frozen: bool) {
         if self.is_frozen == is_frozen {
             return;
         }
         self.is_frozen = is_frozen;
         // The volume that is being filled stays incomplete: its remaining frames are not shown, or its first ones were not.
-        self.cine.discard_partial();
+        if !self.feed.is_recording() {
+            self.cine.discard_partial();
+        }
         if let Some(session) = &mut self.session {
             session.pool.end();
         }
@@ -621,7 +656,7 @@ impl Stream {
         let Some(session) = self.session.as_ref().filter(|session| session.phase.is_drawing()) else { return false };
         // A device that fails is reported by the step.
         let is_full = session.renderer.is_paced() && !session.renderer.takes_frame().unwrap_or(true);
-        is_full || self.feed.waiting() == 0
+        is_full || self.feed.waiting() == 0 || self.is_held()
     }
 
     /// True while frames may arrive: the source has not ended, and is connected.
@@ -645,7 +680,7 @@ impl Stream {
             return is_working;
         }
         let is_busy = self.session.as_ref().is_some_and(Session::is_busy);
-        !is_busy && !self.is_replaying() && self.feed.waiting() == 0
+        !is_busy && !self.is_replaying() && (self.feed.waiting() == 0 || self.is_held())
     }
 
     /// Dispatches on the device so far, by all its users.

@@ -193,6 +193,13 @@ impl VolumePool {
         }
     }
 
+    /// A volume is complete that no frame was placed of: it is not shown.
+    pub(crate) fn pass_over(&mut self, volume: u32) {
+        if self.over < Some(volume) {
+            (self.over, self.counts.dropped) = (Some(volume), self.counts.dropped + 1);
+        }
+    }
+
     /// A frame is in the image that [`VolumePool::place`] gave. True if it completes its volume.
     pub fn arrived(&mut self, slice: usize, backward: bool) -> bool {
         let Some(filling) = self.filling.as_mut().filter(|_| slice < self.slices) else { return false };

@@ -152,7 +152,7 @@ fn live_volumes_that_come_faster_than_pictures_go_down_the_ladder_until_they_are
     let (say, said) = channel();
     let said = Mutex::new(Some(said));
     let open: OpenSource = Arc::new(move || match said.lock().expect("lock").take() {
-        Some(said) => Ok(Box::new(Hasty(Fed(said))) as Box<dyn Live>),
+        Some(said) => Ok(Box::new(Hasty(Fed { said, is_recording: false })) as Box<dyn Live>),
         None => Err("no probe".into()),
     });
     let options = ConsoleOptions { settings: plain(), budget, ..options() };

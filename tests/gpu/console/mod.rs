@@ -114,7 +114,7 @@ impl Desk {
     /// Its sources are taken from the end of `sources`; opening fails if there is none.
     pub fn of(device: &Arc<Context>, options: ConsoleOptions, sources: Arc<Mutex<Vec<Receiver<Event>>>>) -> Desk {
         let open: OpenSource = Arc::new(move || match sources.lock().expect("lock").pop() {
-            Some(said) => Ok(Box::new(Fed(said)) as Box<dyn Live>),
+            Some(said) => Ok(Box::new(Fed { said, is_recording: false }) as Box<dyn Live>),
             None => Err("no probe".into()),
         });
         Desk { console: Console::new(device, open, options, SIZE), say: channel().0 }

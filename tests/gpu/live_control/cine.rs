@@ -39,6 +39,50 @@ fn frames_received_while_frozen_are_recorded_and_change_no_picture() {
     }
 }
 
+/// Prevents a recording that loses volumes because the picture was frozen while it was read, and one that drops those that are viewed.
+#[test]
+fn a_recording_is_read_on_while_it_is_frozen() {
+    let device = Device::alone();
+    for update in [Update::Whole, Update::Rolling] {
+        let mut bench = Bench::reading(&device, "mode = 'mip'", kept(update));
+        let numbers = |bench: &Bench| -> Vec<u32> { bench.stream.cine().volumes().iter().map(|v| v.volume).collect() };
+        bench.begin(header(0.3));
+        bench.live(0);
+        bench.frames(speckled(1).drain(..4));
+        bench.settle();
+        bench.stream.freeze(true);
+        let dispatches = bench.dispatches();
+        bench.frames(speckled(1).drain(4..));
+        bench.frames((2..6).flat_map(speckled));
+        assert!(bench.settle().is_empty());
+        assert_eq!((bench.dispatches(), numbers(&bench)), (dispatches, (0..6).collect()), "{update:?}");
+        bench.stream.show_cine_volume(1);
+        assert!(
+            bench.picture() == (1, fresh(&device, "mode = 'mip'", &header(0.3), update, &speckled(1))),
+            "{update:?}"
+        );
+        // What the loop has no room for waits.
+        bench.frames((6..10).flat_map(speckled));
+        let begun = Instant::now();
+        while !bench.stream.is_idle() || numbers(&bench).len() < ROOM.volumes {
+            assert!(
+                begun.elapsed() < BOUND && matches!(bench.stream.step(Duration::from_millis(1)), Ok(Step::Progress))
+            );
+        }
+        assert_eq!(numbers(&bench), (0..8).collect::<Vec<_>>(), "{update:?}");
+        bench.stream.freeze(false);
+        assert!(
+            bench.picture() == (9, fresh(&device, "mode = 'mip'", &header(0.3), update, &speckled(9))),
+            "{update:?}"
+        );
+        assert_eq!(numbers(&bench), (2..10).collect::<Vec<_>>(), "{update:?}");
+        let statistics = bench.stream.statistics().expect("statistics");
+        let counts = statistics.volumes;
+        assert_eq!((counts.shown, counts.dropped, counts.incomplete), (3, 6, 1), "{update:?}: {counts:?}");
+        assert_eq!((statistics.frames, statistics.frozen, bench.faults.len()), (10 * 9, 0, 0), "{update:?}");
+    }
+}
+
 /// Prevents a replay of something that was not shown, volumes that are counted twice, and a cine position that points at another volume.
 #[test]
 fn a_replayed_volume_is_identical_to_the_live_picture() {

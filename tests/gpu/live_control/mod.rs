@@ -25,11 +25,14 @@ pub const ROOM: CineLimits = CineLimits { volumes: 8, bytes: 1 << 24 };
 const MARK: &str = "so far";
 
 /// A source that yields the events that it is sent.
-pub struct Fed(pub Receiver<Event>);
+pub struct Fed {
+    pub said: Receiver<Event>,
+    pub is_recording: bool,
+}
 
 impl Live for Fed {
     fn next(&mut self, patience: Duration) -> Event {
-        match self.0.recv_timeout(patience) {
+        match self.said.recv_timeout(patience) {
             Ok(event) => event,
             Err(RecvTimeoutError::Timeout) => Event::Idle,
             Err(RecvTimeoutError::Disconnected) => Event::End(None),
@@ -39,11 +42,15 @@ impl Live for Fed {
     fn can_wait(&self) -> bool {
         true
     }
+
+    fn is_recording(&self) -> bool {
+        self.is_recording
+    }
 }
 
 pub fn fed(record: Option<&Path>) -> (Sender<Event>, Feed) {
     let (say, said) = channel();
-    (say, Feed::new(Box::new(Fed(said)), record).expect("thread"))
+    (say, Feed::new(Box::new(Fed { said, is_recording: false }), record).expect("thread"))
 }
 
 /// A stream with its sender of events.
@@ -60,6 +67,13 @@ impl Bench {
 
     fn recorded(device: &Device, toml: &str, options: live::StreamOptions, record: Option<&Path>) -> Bench {
         let (say, feed) = fed(record);
+        Bench { stream: Stream::new(device, feed, settings(toml), options), say, faults: Vec::new() }
+    }
+
+    /// Of a recording that is read.
+    fn reading(device: &Device, toml: &str, options: live::StreamOptions) -> Bench {
+        let (say, said) = channel();
+        let feed = Feed::new(Box::new(Fed { said, is_recording: true }), None).expect("thread");
         Bench { stream: Stream::new(device, feed, settings(toml), options), say, faults: Vec::new() }
     }
 

@@ -90,7 +90,7 @@ impl Monkey {
             let n = opened.fetch_add(1, Ordering::Relaxed);
             match is_calm.load(Ordering::Relaxed) {
                 true => match sources.lock().expect("lock").pop() {
-                    Some(said) => Ok(Box::new(Fed(said)) as Box<dyn Live>),
+                    Some(said) => Ok(Box::new(Fed { said, is_recording: false }) as Box<dyn Live>),
                     None => Err("no probe".into()),
                 },
                 false if n % 5 == 4 => Err("no probe".into()),
