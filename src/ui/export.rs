@@ -1,5 +1,6 @@
 //! Saves pictures, recordings and exports of the view in background threads. File names contain the time and nothing about the patient.
 
+use super::controls::Handiwork;
 use super::volume_export::{Export, Job, write_frames};
 use crate::files;
 use crate::gpu::Wake;
@@ -17,11 +18,23 @@ use std::time::{SystemTime, UNIX_EPOCH};
 /// Largest number of files that are being saved: a key that is held must not fill the disk.
 const MAX_PENDING: usize = 4;
 
+/// What a file holds that would otherwise be lost.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) enum Holds {
+    Nothing,
+    /// The complete cine loop up to the volume of this number.
+    Loop(u32),
+    /// What was made by hand, of the recording that is shown or of one that is kept.
+    Work {
+        kept: Option<PathBuf>,
+        work: Handiwork,
+    },
+}
+
 /// What became of a file.
 pub(super) struct Saved {
     pub(super) file: Result<PathBuf, String>,
-    /// Of a complete cine loop, the number of its newest volume.
-    pub(super) complete_to: Option<u32>,
+    pub(super) holds: Holds,
 }
 
 /// Saves files in the background.
@@ -72,15 +85,15 @@ impl Exporter {
         &mut self,
         make: impl FnOnce() -> Result<Picture, String> + Send + 'static,
     ) -> Result<(), String> {
-        self.keep(|own| own.save("png", None, move |file| make()?.save(file)))
+        self.keep(|own| own.save("png", Holds::Nothing, move |file| make()?.save(file)))
     }
 
     /// Saves a text under a name with this ending.
     ///
     /// # Errors
     /// As for [`Exporter::picture`].
-    pub(super) fn text(&mut self, ending: &'static str, text: String) -> Result<(), String> {
-        self.keep(|own| own.save(ending, None, move |file| files::replace(file, text.as_bytes())))
+    pub(super) fn text(&mut self, ending: &'static str, text: String, holds: Holds) -> Result<(), String> {
+        self.keep(|own| own.save(ending, holds, move |file| files::replace(file, text.as_bytes())))
     }
 
     /// The folder of saved files.
@@ -88,17 +101,12 @@ impl Exporter {
         &self.folder
     }
 
-    /// Saves volumes as a recording of frames. `complete_to`: as [`Saved::complete_to`].
+    /// Saves volumes as a recording of frames.
     ///
     /// # Errors
     /// As for [`Exporter::picture`].
-    pub(super) fn volumes(
-        &mut self,
-        header: Header,
-        volumes: Vec<CineVolume>,
-        complete_to: Option<u32>,
-    ) -> Result<(), String> {
-        self.keep(|own| own.save("frames", complete_to, move |file| write_frames(file, header, &volumes)))
+    pub(super) fn volumes(&mut self, header: Header, volumes: Vec<CineVolume>, holds: Holds) -> Result<(), String> {
+        self.keep(|own| own.save("frames", holds, move |file| write_frames(file, header, &volumes)))
     }
 
     /// Exports a volume. One export runs at a time.
@@ -111,7 +119,7 @@ impl Exporter {
         }
         let export = Arc::new(Export::default());
         let (own, name) = (export.clone(), job.format.name);
-        let thread = self.save(job.format.ending, None, move |file| {
+        let thread = self.save(job.format.ending, Holds::Nothing, move |file| {
             let done = own.run(&job, file);
             own.finish();
             done
@@ -157,7 +165,7 @@ impl Exporter {
     fn save(
         &mut self,
         extension: &'static str,
-        complete_to: Option<u32>,
+        holds: Holds,
         write: impl FnOnce(&Path) -> Result<(), String> + Send + 'static,
     ) -> Result<JoinHandle<()>, String> {
         if self.pending >= MAX_PENDING {
@@ -172,7 +180,7 @@ impl Exporter {
                 let file = unused_name(&folder, &timestamp(SystemTime::now()), number, extension);
                 write(&file).map(|()| file)
             });
-            let _ = sender.send(Saved { file, complete_to });
+            let _ = sender.send(Saved { file, holds });
             wake();
         };
         let started = std::thread::Builder::new().name("saving".into()).spawn(work);

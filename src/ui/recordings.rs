@@ -1,7 +1,7 @@
 //! The recordings that are open in a window. One of them is shown, and only that one is in memory; of the others is kept what the user made of
 //! them: settings, measurements and the volume that was frozen.
 
-use super::controls::Controls;
+use super::controls::{Controls, Handiwork};
 use super::texts;
 use crate::source::live::SourceKind;
 use std::path::{Path, PathBuf};
@@ -170,6 +170,18 @@ impl Recordings {
         left.kept = kept.or(left.kept.take());
         if closes || !left.returns {
             self.remove(before);
+        }
+    }
+
+    /// What is kept of the n-th, if something made by hand is in no file.
+    pub(super) fn unsaved(&self, n: usize) -> Option<&Kept> {
+        self.all.get(n)?.kept.as_ref().filter(|kept| n != self.shown && kept.controls.is_unsaved())
+    }
+
+    /// What was made of this recording is in a file.
+    pub(super) fn saved(&mut self, path: &Path, work: Handiwork) {
+        if let Some(kept) = self.index(path).and_then(|n| self.all[n].kept.as_mut()) {
+            kept.controls.saved(work);
         }
     }
 

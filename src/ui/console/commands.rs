@@ -7,7 +7,7 @@ use crate::controls::{Change, Controls};
 use crate::live::Stream;
 use crate::plan::Work;
 use crate::scene::{Scene, Settings};
-use crate::texts;
+use crate::texts::{self, Unsaved};
 use std::time::{Duration, Instant};
 
 /// Escape leaves the program no sooner after another recording came: it was meant for the reading of it.
@@ -110,13 +110,13 @@ impl Console {
             Command::CountVoxels => self.count_voxels(),
             Command::CopyMeasures => self.copy_measures(),
             Command::SaveMeasures => self.save_measures(),
-            Command::SaveWorkspace => self.save_workspace(),
+            Command::SaveWorkspace => _ = self.save_workspace(),
             Command::OpenFiles => self.toggle_files(),
             Command::OpenFile(n) => self.open_entry(n),
             Command::Turntable => self.toggle_turning(now),
             Command::ShowRecording(n) => self.show_recording(n),
             Command::StepRecording(by) => self.step_recording(by),
-            Command::CloseRecording(n) => self.close_recording(n),
+            Command::CloseRecording(n) => self.close_recording(n, now),
             Command::CancelReading => _ = self.cancel_reading(),
             Command::Export(n) => self.export_volume(n),
             Command::CancelExport => self.exporter.cancel_export(),
@@ -130,17 +130,9 @@ impl Console {
             Command::Back => self.go_back(),
             // A kiosk ends only with its exit keys: a sleeve may press Escape.
             Command::Exit if self.fixed.is_kiosk => {}
-            // Without panels nobody sees a question.
-            Command::Exit if self.fixed.overlay && self.has_unsaved_loop() => self.leaving.ask(),
+            Command::Exit if self.asks_before_leaving() => {}
             Command::Exit | Command::Discard => self.request.exit |= !self.fixed.is_kiosk,
-            Command::SaveAndExit => {
-                self.leaving.dismiss();
-                // The question names all volumes.
-                self.controls.apply(&Command::WholeCine, None);
-                let newest = self.stream.cine().volumes().back().map(|newest| newest.volume);
-                let newest = newest.filter(|_| self.save_loop());
-                self.leaving.after(newest);
-            }
+            Command::SaveAndExit => self.save_and_leave(),
             _ => _ = self.visible.apply(command, self.room().has_drawer),
         }
     }
@@ -220,20 +212,54 @@ impl Console {
         }
     }
 
+    /// Saves what would be lost, and leaves once all of it is saved.
+    fn save_and_leave(&mut self) {
+        self.leaving.dismiss();
+        let mut saved = Vec::new();
+        if self.has_unsaved_loop() {
+            // The question names all volumes.
+            self.controls.apply(&Command::WholeCine, None);
+            saved.push(self.save_loop());
+        }
+        if self.controls.is_unsaved() {
+            saved.push(self.save_workspace());
+        }
+        for (path, kept) in self.opening.unsaved() {
+            saved.push(self.save_kept(path, &kept));
+        }
+        let files = if saved.iter().all(|is_saved| *is_saved) { saved.len() } else { 0 };
+        self.leaving.after(files);
+    }
+
+    /// What leaving would lose.
+    fn unsaved(&self) -> Option<&'static Unsaved> {
+        let has_work = self.controls.is_unsaved() || !self.opening.unsaved().is_empty();
+        match (self.has_unsaved_loop(), has_work) {
+            (true, false) => Some(&texts::UNSAVED_LOOP),
+            (false, true) => Some(&texts::UNSAVED_WORK),
+            (true, true) => Some(&texts::UNSAVED_LOOP_AND_WORK),
+            (false, false) => None,
+        }
+    }
+
+    /// Asks, if leaving loses anything. Without panels nobody sees a question.
+    fn asks_before_leaving(&mut self) -> bool {
+        let question = self.unsaved().filter(|_| self.fixed.overlay);
+        question.iter().for_each(|question| self.leaving.ask(question));
+        question.is_some()
+    }
+
     /// True if volumes of the loop exist nowhere else: neither in a file that they were read from or recorded to, nor in one that was saved.
     pub(super) fn has_unsaved_loop(&self) -> bool {
         let newest = self.stream.cine().volumes().back().map(|kept| kept.volume);
         self.leaving.loses(newest, self.stream.feed_counts().unrecorded)
     }
 
-    /// The user asked the windowing system to close the window: asks first if that loses a loop. False if it may be closed at once.
+    /// The user asked the windowing system to close the window: asks first if that loses anything. False if it may be closed at once.
     pub(crate) fn asks_before_closing(&mut self) -> bool {
-        if self.leaving.asks() || !self.fixed.overlay || !self.has_unsaved_loop() {
-            return false;
-        }
-        self.leaving.ask();
-        self.presentation.redraw();
-        true
+        let asks = !self.leaving.asks() && self.asks_before_leaving();
+        self.presentation.redraw_if(asks);
+        asks
     }
 
     /// Tells whether the window fills the screen and can leave it.
@@ -241,7 +267,7 @@ impl Console {
         self.presentation.set_full_screen(is_full_screen);
     }
 
-    /// True while the console asks whether to save the loop before it leaves.
+    /// True while the console asks whether to save what would be lost before it leaves.
     pub fn asks_to_leave(&self) -> bool {
         self.leaving.asks()
     }

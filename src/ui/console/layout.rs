@@ -29,7 +29,7 @@ impl Console {
             presets: self.presets.shown(),
             origin: self.origin(),
             shows_only_origin: !self.fixed.overlay,
-            asks_to_leave: self.leaving.asks(),
+            leaving: self.leaving.question(),
             is_frozen: self.stream.is_frozen(),
             cine: self.replay.state(self.cine_loop(), self.stream.cine_position()),
             has_drawn,

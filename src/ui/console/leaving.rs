@@ -1,21 +1,30 @@
-//! Leaving the program: whether that loses volumes that exist nowhere else, the question about them, and leaving once they are saved. Volumes are
-//! named by their numbers.
+//! Leaving the program: whether that loses volumes that exist nowhere else, the question about them and about what was made by hand, and leaving once
+//! all is saved. Volumes are named by their numbers.
 
+use crate::export::Holds;
 use crate::source::live::SourceKind;
+use crate::texts::Unsaved;
+use std::path::{Path, PathBuf};
+use std::time::{Duration, Instant};
+
+/// How long a warning holds: what is asked for again within this time is done.
+const WARNED: Duration = Duration::from_secs(10);
 
 /// What was saved of the cine loop, and what is asked before the program ends.
-#[derive(Clone, Copy, Debug, Default)]
+#[derive(Debug, Default)]
 pub(super) struct Leaving {
     /// The volumes of the source can be had once only.
     comes_once: bool,
     /// Everything that arrives is recorded to a file.
     is_recorded: bool,
-    /// The question is shown.
-    asks: bool,
-    /// The program ends when the loop up to this volume is saved.
-    awaited: Option<u32>,
+    /// The question that is shown.
+    question: Option<&'static Unsaved>,
+    /// The program ends when so many files are saved.
+    awaited: Option<usize>,
     /// The newest volume of the loops that were saved whole.
     saved: Option<u32>,
+    /// The recording that was not closed at once, and when.
+    warned: Option<(PathBuf, Instant)>,
 }
 
 impl Leaving {
@@ -33,44 +42,60 @@ impl Leaving {
     }
 
     pub(super) fn asks(&self) -> bool {
-        self.asks
+        self.question.is_some()
     }
 
-    pub(super) fn ask(&mut self) {
-        self.asks = true;
+    pub(super) fn question(&self) -> Option<&'static Unsaved> {
+        self.question
+    }
+
+    pub(super) fn ask(&mut self, question: &'static Unsaved) {
+        self.question = Some(question);
     }
 
     /// Asks no longer. False if nothing was asked.
     pub(super) fn dismiss(&mut self) -> bool {
-        std::mem::take(&mut self.asks)
+        self.question.take().is_some()
     }
 
-    /// The program ends as soon as the loop is saved up to this volume; never, if there is none.
-    pub(super) fn after(&mut self, newest: Option<u32>) {
-        self.awaited = newest;
+    /// The program ends as soon as so many files are saved; never, if there are none.
+    pub(super) fn after(&mut self, files: usize) {
+        self.awaited = Some(files).filter(|files| *files > 0);
     }
 
-    /// A file was saved; of a complete loop with its newest volume. True if the program ends now.
-    pub(super) fn saved(&mut self, complete_to: Option<u32>) -> bool {
-        self.saved = self.saved.max(complete_to);
-        self.awaits(complete_to)
+    /// A file was saved. True if the program ends now.
+    pub(super) fn saved(&mut self, holds: &Holds) -> bool {
+        if let Holds::Loop(newest) = holds {
+            self.saved = self.saved.max(Some(*newest));
+        }
+        if *holds != Holds::Nothing {
+            self.awaited = self.awaited.map(|files| files.saturating_sub(1));
+        }
+        self.awaited == Some(0)
     }
 
-    /// A file was not saved: the program goes on if it is the one that it waits for.
-    pub(super) fn not_saved(&mut self, complete_to: Option<u32>) {
-        if self.awaits(complete_to) {
+    /// A file was not saved: the program goes on if it is one that it waits for.
+    pub(super) fn not_saved(&mut self, holds: &Holds) {
+        if *holds != Holds::Nothing {
             self.awaited = None;
         }
     }
 
-    fn awaits(&self, complete_to: Option<u32>) -> bool {
-        complete_to.is_some() && complete_to == self.awaited
+    /// True if closing a recording is to be warned of: it was not within the last seconds.
+    pub(super) fn warns_of(&mut self, recording: &Path, now: Instant) -> bool {
+        let is_warned =
+            |(path, at): (PathBuf, Instant)| path == recording && now.saturating_duration_since(at) < WARNED;
+        let warns = !self.warned.take().is_some_and(is_warned);
+        self.warned = warns.then(|| (recording.to_path_buf(), now));
+        warns
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::controls::Handiwork;
+    use crate::texts;
 
     /// Requirement: what a probe sent is not lost without a question, and nobody is asked about what is in a file.
     #[test]
@@ -84,8 +109,8 @@ mod tests {
             let mut leaving = Leaving::new(source, false);
             assert!(!leaving.loses(None, 0), "{source:?}: an empty loop");
             assert_eq!(leaving.loses(Some(3), 0), comes_once, "{source:?}");
-            assert!(!leaving.saved(Some(3)) && !leaving.loses(Some(3), 0), "{source:?}: saved");
-            assert!(!leaving.saved(None), "{source:?}: a picture");
+            assert!(!leaving.saved(&Holds::Loop(3)) && !leaving.loses(Some(3), 0), "{source:?}: saved");
+            assert!(!leaving.saved(&Holds::Nothing), "{source:?}: a picture");
             assert_eq!(leaving.loses(Some(4), 0), comes_once, "{source:?}: one came since");
             let recorded = Leaving::new(source, true);
             assert!(!recorded.loses(Some(3), 0), "{source:?}");
@@ -94,15 +119,29 @@ mod tests {
     }
 
     #[test]
-    fn the_program_ends_with_the_loop_that_it_waits_for_and_not_with_a_fault() {
-        let mut leaving = Leaving::new(SourceKind::Probe, false);
-        leaving.ask();
+    fn the_program_ends_with_the_files_that_it_waits_for_and_not_with_a_fault() {
+        let (mut leaving, work) =
+            (Leaving::new(SourceKind::Probe, false), || Holds::Work { kept: None, work: Handiwork::default() });
+        leaving.ask(&texts::UNSAVED_LOOP);
         assert!(leaving.asks() && leaving.dismiss() && !leaving.dismiss());
-        leaving.after(Some(7));
-        assert!(!leaving.saved(None) && !leaving.saved(Some(5)) && leaving.saved(Some(7)));
-        leaving.after(Some(9));
-        leaving.not_saved(None);
-        leaving.not_saved(Some(9));
-        assert!(!leaving.saved(Some(9)), "the user saves it later, and stays");
+        assert!(!leaving.saved(&Holds::Loop(5)), "nothing is waited for");
+        leaving.after(2);
+        assert!(!leaving.saved(&Holds::Nothing) && !leaving.saved(&work()) && leaving.saved(&Holds::Loop(7)));
+        leaving.after(1);
+        leaving.not_saved(&Holds::Nothing);
+        leaving.not_saved(&work());
+        assert!(!leaving.saved(&work()), "the user saves it later, and stays");
+        leaving.after(0);
+        assert!(!leaving.saved(&work()), "nothing could be saved");
+    }
+
+    #[test]
+    fn a_recording_with_unsaved_work_is_closed_when_that_is_asked_twice() {
+        let (mut leaving, now) = (Leaving::default(), Instant::now());
+        let mut warns =
+            |name: &str, seconds: u64| leaving.warns_of(Path::new(name), now + Duration::from_secs(seconds));
+        assert!(warns("a", 0) && !warns("a", 3), "at the second time");
+        assert!(warns("a", 4) && warns("b", 5) && warns("a", 6), "another one");
+        assert!(warns("a", 17), "long ago");
     }
 }

@@ -3,15 +3,18 @@
 use super::Console;
 use super::surface::SurfaceMap;
 use crate::command::{Command, Tool};
+use crate::export::Holds;
 use crate::input::{Input, Key};
 use crate::measure::{outcome, voxels};
 use crate::passes::chain;
+use crate::recordings::Kept;
 use crate::scene::picker::Picker;
 use crate::scene::{MeasureKind, Measurement, Mode, Scene, insonified_box};
 use crate::source::Frame;
 use crate::source::convert::Volume;
 use crate::texts;
-use crate::workspace;
+use crate::workspace::{self, Origin};
+use std::path::PathBuf;
 use std::sync::Arc;
 use std::time::Instant;
 
@@ -140,7 +143,7 @@ impl Console {
     pub(super) fn save_measures(&mut self) {
         let saved = match self.controls.measures().is_empty() {
             true => Err(texts::WHY_NO_MEASUREMENTS.into()),
-            false => self.exporter.text("csv", outcome::csv(self.controls.measures())),
+            false => self.exporter.text("csv", outcome::csv(self.controls.measures()), Holds::Nothing),
         };
         if let Err(fault) = saved {
             self.notify(&texts::results_not_saved(fault), true);
@@ -148,7 +151,7 @@ impl Console {
     }
 
     /// Saves settings, recording and measurements as a workspace.
-    pub(super) fn save_workspace(&mut self) {
+    pub(super) fn save_workspace(&mut self) -> bool {
         let origin = self.fixed.origin.clone().ok_or_else(|| texts::WHY_NO_ORIGIN.to_string());
         let saved = origin.and_then(|mut origin| {
             let volumes = self.stream.cine().volumes();
@@ -161,13 +164,30 @@ impl Console {
                 (settings.cine.first, settings.cine.last) = (None, None);
             }
             let text = workspace::text(&settings, &origin)?;
-            self.exporter.text("toml", text).map(|()| is_live)
+            let holds = Holds::Work { kept: None, work: self.controls.handiwork() };
+            self.exporter.text("toml", text, holds).map(|()| is_live)
         });
+        let is_saved = saved.is_ok();
         match saved {
             Ok(false) => {}
             Ok(true) => self.notify(texts::VOLUMES_ARE_LIVE, false),
             Err(fault) => self.notify(&texts::workspace_not_saved(fault), true),
         }
+        is_saved
+    }
+
+    /// Saves what was made by hand of a recording that is kept. False if it cannot be.
+    pub(super) fn save_kept(&mut self, path: PathBuf, kept: &Kept) -> bool {
+        let work = kept.controls.handiwork();
+        // The flags of the geometry are those of all recordings.
+        let mut origin = self.fixed.origin.clone().unwrap_or_else(|| Origin::of(None));
+        (origin.recording, origin.volume) = (Some(path.clone()), kept.frozen.unwrap_or(0) as usize);
+        let text = workspace::text(kept.controls.settings(), &origin);
+        let saved = text.and_then(|text| self.exporter.text("toml", text, Holds::Work { kept: Some(path), work }));
+        if let Err(fault) = &saved {
+            self.notify(&texts::workspace_not_saved(fault), true);
+        }
+        saved.is_ok()
     }
 
     /// Leaves what is being measured, or typed, or the tool. False if nothing is.

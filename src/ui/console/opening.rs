@@ -2,6 +2,7 @@
 //! until the next one is open, and is kept as it was left.
 
 use super::options::{OpenFile, Opened, OpeningOptions};
+use crate::controls::Handiwork;
 use crate::files::progress::{Progress, Share};
 use crate::gpu::Wake;
 use crate::open_list::{self, Kind};
@@ -260,6 +261,29 @@ impl Opening {
             list.remove(n);
         }
         Some(Ok(name))
+    }
+
+    /// The recording that [`Opening::close`] would close in place of another one: its name, its path, and what is kept of it if that is not saved; that
+    /// it is shown, if it is. None if it would close none.
+    pub(super) fn to_close(&self, n: usize) -> Option<(String, PathBuf, bool)> {
+        let list = self.named();
+        let shown = list.iter().position(|named| named.is_shown);
+        let n = if n == usize::MAX { shown? } else { n };
+        let recordings = self.recordings();
+        let path = recordings.path(n).filter(|_| list.len() > 1)?.to_path_buf();
+        Some((list.get(n)?.name.clone(), path, shown == Some(n)))
+    }
+
+    /// The recordings that are not shown of which something made by hand is in no file, with what is kept of them.
+    pub(super) fn unsaved(&self) -> Vec<(PathBuf, Kept)> {
+        let recordings = self.recordings();
+        let of = |n: usize| Some((recordings.path(n)?.to_path_buf(), recordings.unsaved(n)?.clone()));
+        (0..MAX_OPEN).filter_map(of).collect()
+    }
+
+    /// What was made of this recording is in a file.
+    pub(super) fn saved(&self, path: &Path, work: Handiwork) {
+        self.recordings().saved(path, work);
     }
 
     /// The file that was opened since the last call, which is to be shown.

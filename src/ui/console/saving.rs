@@ -1,6 +1,7 @@
 //! Saving what is shown: the picture, the cine loop, and the volume in the formats of other programs.
 
 use super::Console;
+use crate::export::Holds;
 use crate::live::cine::CineVolume;
 use crate::marked;
 use crate::panels::Note;
@@ -59,7 +60,7 @@ impl Console {
         let saved = match self.stream.header() {
             Some(header) if !volumes.is_empty() => {
                 let header = header.clone();
-                self.exporter.volumes(header, volumes, complete_to)
+                self.exporter.volumes(header, volumes, complete_to.map_or(Holds::Nothing, Holds::Loop))
             }
             _ => Err(texts::WHY_NO_VOLUMES.into()),
         };
@@ -102,14 +103,19 @@ impl Console {
         while let Some(saved) = self.exporter.poll() {
             match saved.file {
                 Ok(file) => {
-                    self.request.exit |= self.leaving.saved(saved.complete_to);
+                    self.request.exit |= self.leaving.saved(&saved.holds);
+                    match saved.holds {
+                        Holds::Work { kept: None, work } => self.controls.saved(work),
+                        Holds::Work { kept: Some(path), work } => self.opening.saved(&path, work),
+                        Holds::Loop(_) | Holds::Nothing => {}
+                    }
                     if file.extension().is_some_and(|end| end == "toml") {
                         self.opening.remember(&file);
                     }
                     self.notify(&texts::saved(file.display()), false);
                 }
                 Err(fault) => {
-                    self.leaving.not_saved(saved.complete_to);
+                    self.leaving.not_saved(&saved.holds);
                     self.notify(&texts::not_saved(fault), true);
                 }
             }

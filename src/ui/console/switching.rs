@@ -4,7 +4,7 @@ use super::Console;
 use crate::recordings::{Display, Kept, MAX_OPEN};
 use crate::source::live::SourceKind;
 use crate::texts;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 impl Console {
@@ -51,6 +51,10 @@ impl Console {
     fn read(&mut self, path: &Path, closes: bool) {
         if self.opening.is_offered() && self.has_unsaved_loop() {
             return self.notify(texts::SAVE_THE_LOOP_FIRST, true);
+        }
+        // A pipe leaves the list.
+        if self.opening.is_offered() && self.connection.kind() == SourceKind::Pipe && self.controls.is_unsaved() {
+            return self.notify(texts::SAVE_THE_WORKSPACE_FIRST, true);
         }
         match self.opening.read(path, closes) {
             Ok(()) => self.presentation.redraw(),
@@ -99,8 +103,16 @@ impl Console {
         }
     }
 
-    /// Closes the n-th recording. In place of the one that is shown comes the next, or else the one before.
-    pub(super) fn close_recording(&mut self, n: usize) {
+    /// Closes the n-th recording. In place of the one that is shown comes the next, or else the one before. What was made of it by hand and is in no file
+    /// is lost only when that is asked for twice.
+    pub(super) fn close_recording(&mut self, n: usize, now: Instant) {
+        if let Some((name, path, is_shown)) = self.opening.to_close(n) {
+            let is_kept = |(other, _): &(PathBuf, Kept)| *other == path;
+            let loses = if is_shown { self.controls.is_unsaved() } else { self.opening.unsaved().iter().any(is_kept) };
+            if loses && self.leaving.warns_of(&path, now) {
+                return self.notify(&texts::loses_work(name), true);
+            }
+        }
         match self.opening.close(n) {
             Some(Ok(name)) => self.notify(&texts::is_closed(name), false),
             Some(Err(Some(next))) => self.read(&next, true),

@@ -17,8 +17,8 @@ use crate::scene::default_look::Defaults;
 use crate::scene::load;
 use crate::scene::planes::MAX_TILES;
 use crate::scene::{
-    Camera, Cube, Curve, Inset, KeptSide, Layout, MAX_PICTURE, Measurement, Mode, Planes, Scene, Settings, Shadow,
-    Tilt, Transfer,
+    BodyMark, Camera, Cube, Curve, Cut, Inset, KeptSide, Layout, MAX_PICTURE, Measurement, Mode, Planes, Scene,
+    Settings, Shadow, Tilt, Transfer,
 };
 pub(super) use cutting::BRUSH_RADII;
 use glam::DVec3;
@@ -42,11 +42,28 @@ pub(super) enum Change {
     Caller(Command),
 }
 
+/// What a user makes by hand: measurements with annotations, body marks, and cuts.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub(super) struct Handiwork {
+    measure: Vec<Measurement>,
+    body_marks: Vec<BodyMark>,
+    cuts: Vec<Cut>,
+}
+
+impl Handiwork {
+    fn of(settings: &Settings) -> Handiwork {
+        let Settings { measure, body_marks, cuts, .. } = settings;
+        Handiwork { measure: measure.clone(), body_marks: body_marks.clone(), cuts: cuts.clone() }
+    }
+}
+
 /// The settings of the view and the tool of drags.
 #[derive(Clone, Debug)]
 pub struct Controls {
     settings: Settings,
     start: Settings,
+    /// As it is in a file.
+    saved: Handiwork,
     tool: Tool,
     /// The last mode that renders the volume: a 4-up picture returns to it.
     rendered: Mode,
@@ -74,6 +91,7 @@ impl Controls {
         let rendered = if settings.mode.is_flat() { Mode::default() } else { settings.mode };
         Controls {
             start: settings.clone(),
+            saved: Handiwork::of(&settings),
             settings,
             tool: Tool::default(),
             rendered,
@@ -95,6 +113,22 @@ impl Controls {
 
     pub fn tool(&self) -> Tool {
         self.tool
+    }
+
+    /// What was made by hand.
+    pub(super) fn handiwork(&self) -> Handiwork {
+        Handiwork::of(&self.settings)
+    }
+
+    /// True if something was made by hand that is in no file.
+    pub(super) fn is_unsaved(&self) -> bool {
+        let work = self.handiwork();
+        work != self.saved && work != Handiwork::default()
+    }
+
+    /// This is in a file.
+    pub(super) fn saved(&mut self, work: Handiwork) {
+        self.saved = work;
     }
 
     /// All of it for a later time, without what is in work and with the last steps that can be undone.

@@ -39,6 +39,7 @@ use crate::passes::unveil::StartLine;
 use crate::progress_lines::Progress;
 use crate::recordings::Named;
 use crate::scene::Scene;
+use crate::texts::Unsaved;
 use crate::times::Times;
 pub use egui::accesskit;
 use egui::accesskit::{ActionRequest, TreeUpdate};
@@ -275,10 +276,10 @@ impl Panels {
             if let Some(shown) = &state.presets {
                 presets::show(ui, shown, &thumbnails, execute);
             }
-            if state.asks_to_leave {
+            if let Some(unsaved) = state.leaving {
                 // A screen reader reaches what a pointer does not.
                 commands.truncate(from_panels);
-                overlays::ask_to_leave(ui, &mut |command| commands.push(command));
+                overlays::ask_to_leave(ui, unsaved, &mut |command| commands.push(command));
             }
             names::mark_focus(ui.ctx());
             overlays::paint_pointer(ui, state, self.scale);
@@ -443,8 +444,8 @@ pub(super) struct PanelState<'a> {
     pub(super) shows_first_steps: bool,
     /// Shows nothing over the picture but what it is of, if that is no patient.
     pub(super) shows_only_origin: bool,
-    /// Asks whether to save the loop before leaving.
-    pub(super) asks_to_leave: bool,
+    /// The question about what leaving would lose.
+    pub(super) leaving: Option<&'static Unsaved>,
     /// The list of files to open, while it is shown: its title and its entries.
     pub(super) files: Option<(&'a str, &'a [String])>,
     /// The recordings that are open, and what is being read.

@@ -8,8 +8,8 @@ use super::names::{self, Tell};
 use super::{LARGE_TEXT, Note, PanelState, SMALL_TEXT, TEXT_SIZE, TOUCH_SIZE, picture_rect};
 use crate::command::{self, Command};
 use crate::sliders::SLIDERS;
-use crate::texts;
 use crate::texts::keys;
+use crate::texts::{self, Unsaved};
 use egui::accesskit::Role;
 use egui::text::LayoutJob;
 use egui::{
@@ -386,8 +386,8 @@ pub(super) fn first<'a>(text: RichText) -> Button<'a> {
 /// In a lower window lists and questions are as small as they can be, points.
 pub(super) const LOW_WINDOW: f32 = 360.0;
 
-/// Asks whether to save the loop before the program ends.
-pub(super) fn ask_to_leave(ui: &Ui, execute: &mut dyn FnMut(Command)) {
+/// Asks whether to save what is lost when the program ends.
+pub(super) fn ask_to_leave(ui: &Ui, unsaved: &Unsaved, execute: &mut dyn FnMut(Command)) {
     let screen = ui.ctx().content_rect();
     // Nothing behind it reacts.
     let shade = Area::new(Id::new("shade")).order(Order::Foreground).fixed_pos(screen.min);
@@ -398,7 +398,7 @@ pub(super) fn ask_to_leave(ui: &Ui, execute: &mut dyn FnMut(Command)) {
     });
     let area = Area::new(Id::new("leave")).order(Order::Tooltip).anchor(Align2::CENTER_CENTER, vec2(0.0, 0.0));
     area.show(ui.ctx(), |ui| {
-        names::name(ui, Role::AlertDialog, texts::LOOP_NOT_SAVED);
+        names::name(ui, Role::AlertDialog, unsaved.title);
         // In a low window the three answers go before all else.
         let is_low = screen.height() < LOW_WINDOW;
         let (margin, title, text) = if is_low { (8, TEXT_SIZE, SMALL_TEXT) } else { (20, LARGE_TEXT, TEXT_SIZE) };
@@ -411,14 +411,14 @@ pub(super) fn ask_to_leave(ui: &Ui, execute: &mut dyn FnMut(Command)) {
                 ui.spacing_mut().interact_size.y = height;
                 ui.spacing_mut().button_padding.y = 1.0;
             }
-            ui.label(RichText::new(texts::LOOP_NOT_SAVED).size(title));
+            ui.label(RichText::new(unsaved.title).size(title));
             if !is_low {
-                ui.label(RichText::new(texts::LOOP_NOT_SAVED_ABOUT).size(text));
+                ui.label(RichText::new(unsaved.about).size(text));
                 ui.add_space(8.0);
             }
             let answers = [
-                (texts::SAVE_AND_LEAVE, texts::SAVE_AND_LEAVE_HINT, true, Command::SaveAndExit),
-                (texts::LEAVE_WITHOUT_SAVING, texts::LEAVE_WITHOUT_SAVING_HINT, false, Command::Discard),
+                (texts::SAVE_AND_LEAVE, unsaved.save, true, Command::SaveAndExit),
+                (texts::LEAVE_WITHOUT_SAVING, unsaved.discard, false, Command::Discard),
                 (texts::STAY, texts::STAY_HINT, false, Command::Back),
             ];
             for (answer, hint, is_first, command) in answers {

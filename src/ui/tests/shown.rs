@@ -16,6 +16,7 @@ use crate::progress_lines::Progress;
 use crate::recordings::Named;
 use crate::scene::Cine;
 use crate::source::phantom::{Phantom, PhantomOptions};
+use crate::texts::{UNSAVED_LOOP, Unsaved};
 use crate::times::Times;
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -34,7 +35,7 @@ pub(super) struct Shown {
     /// Shows the hints of the first start; shows nothing but what the picture is of.
     pub(super) shows: [bool; 2],
     pub(super) visible: Visible,
-    pub(super) asks_to_leave: bool,
+    pub(super) leaving: Option<&'static Unsaved>,
     pub(super) has_drawn: bool,
     pub(super) is_frozen: bool,
     pub(super) cine: CineState,
@@ -81,7 +82,7 @@ impl Shown {
             time: 0.0,
             shows: [false; 2],
             visible: Visible { panels: true, ..Visible::default() },
-            asks_to_leave: false,
+            leaving: None,
             has_drawn: true,
             is_frozen: false,
             cine: CinePlayer::default().state(
@@ -108,8 +109,8 @@ impl Shown {
     /// Opens the n-th of help, times, exports and the question whether to leave, and closes the others; any other number closes all.
     pub(super) fn open(&mut self, n: usize) {
         let [help, times, exports, asks] = std::array::from_fn(|open| open == n);
-        (self.visible.help, self.visible.times, self.visible.exports, self.asks_to_leave) =
-            (help, times, exports, asks);
+        (self.visible.help, self.visible.times, self.visible.exports, self.leaving) =
+            (help, times, exports, asks.then_some(&UNSAVED_LOOP));
     }
 
     pub(super) fn close(&mut self) {
@@ -147,7 +148,7 @@ impl Shown {
             origin: Some("Demo data (phantom)"),
             shows_first_steps: self.shows[0],
             shows_only_origin: self.shows[1],
-            asks_to_leave: self.asks_to_leave,
+            leaving: self.leaving,
             files: self.files.as_ref().map(|(title, names)| (title.as_str(), names.as_slice())),
             recordings: &recordings,
             reading: self.reading.as_ref(),

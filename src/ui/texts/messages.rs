@@ -32,6 +32,13 @@ pub(crate) fn files_as_series(count: usize) -> String {
     format!("all {count} DICOM files of this folder as one recording")
 }
 pub(crate) const OPENS_NO_OTHER_FILES: &str = "This view opens no other files";
+pub(crate) const SAVE_THE_WORKSPACE_FIRST: &str =
+    "Measurements or cuts are not saved: save the workspace first (Ctrl+S)";
+pub fn loses_work(name: impl Display) -> String {
+    format!(
+        "Measurements or cuts of {name} are not saved: save the workspace first (Ctrl+S), or close it again to lose them"
+    )
+}
 pub(crate) const SAVE_THE_LOOP_FIRST: &str = "The loop is not saved: save it first (R)";
 pub fn reading(name: impl Display) -> String {
     format!("Reading {name}")

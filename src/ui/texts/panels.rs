@@ -330,14 +330,37 @@ pub(crate) const SEARCH_HINT: &str = "Finds keys, gestures and controls ( / ).";
 pub(crate) const SEARCH: &str = "Search";
 pub(crate) const NOTHING_FOUND: &str = "Nothing is found.";
 pub(crate) const NO_MEDICAL_DEVICE: &str = "Echolume is not a medical device.";
-pub(crate) const LOOP_NOT_SAVED: &str = "The loop is not saved";
-pub(crate) const LOOP_NOT_SAVED_ABOUT: &str = "Its volumes are lost when the program ends.";
 pub(crate) const SAVE_AND_LEAVE: &str = "Save and leave  (Enter)";
 pub(crate) const LEAVE_WITHOUT_SAVING: &str = "Leave without saving  (L)";
 pub(crate) const STAY: &str = "Stay  (Esc)";
-pub(crate) const SAVE_AND_LEAVE_HINT: &str = "Saves all volumes of the loop as a recording, then ends the program.";
-pub(crate) const LEAVE_WITHOUT_SAVING_HINT: &str = "Ends the program; the volumes are lost.";
 pub(crate) const STAY_HINT: &str = "Goes on as before.";
+
+/// The question before leaving: what is not saved, and what the answers do.
+#[derive(Debug)]
+pub(crate) struct Unsaved {
+    pub(crate) title: &'static str,
+    pub(crate) about: &'static str,
+    pub(crate) save: &'static str,
+    pub(crate) discard: &'static str,
+}
+pub(crate) static UNSAVED_LOOP: Unsaved = Unsaved {
+    title: "The loop is not saved",
+    about: "Its volumes are lost when the program ends.",
+    save: "Saves all volumes of the loop as a recording, then ends the program.",
+    discard: "Ends the program; the volumes are lost.",
+};
+pub(crate) static UNSAVED_WORK: Unsaved = Unsaved {
+    title: "Measurements or cuts are not saved",
+    about: "They are lost when the program ends.",
+    save: "Saves a workspace of each recording that has any, then ends the program.",
+    discard: "Ends the program; measurements and cuts are lost.",
+};
+pub(crate) static UNSAVED_LOOP_AND_WORK: Unsaved = Unsaved {
+    title: "The loop and measurements are not saved",
+    about: "Volumes, measurements and cuts are lost when the program ends.",
+    save: "Saves the loop as a recording and measurements as a workspace, then ends the program.",
+    discard: "Ends the program; volumes, measurements and cuts are lost.",
+};
 pub(crate) const CLOSE_HELP_HINT: &str = "Closes the help (H).";
 
 // Presets of examinations.

@@ -8,6 +8,7 @@ use echolume::low_level::source::live::{Playback, PlaybackSource};
 use echolume::low_level::source::phantom::{CachedPhantom, Phantom, PhantomOptions, Speckle};
 use echolume::low_level::ui::panels::accesskit::{Node, Role};
 use echolume::low_level::ui::recordings::{OpenRecordings, Recordings};
+use echolume::low_level::workspace::{Origin, Workspace};
 use std::path::{Path, PathBuf};
 
 const WINDOW: [u32; 2] = [900, 700];
@@ -23,6 +24,7 @@ struct Window {
     read: Read,
     /// What the next console shows.
     next: Arc<Mutex<PathBuf>>,
+    folder: Arc<Folder>,
     tree: Vec<Node>,
     exits: bool,
 }
@@ -48,8 +50,9 @@ impl Window {
         let mut list = Recordings::of(SourceKind::Recording, Path::new(first));
         assert!(others.iter().all(|path| list.add(Path::new(path))));
         let (recordings, next) = (Arc::new(Mutex::new(list)), Arc::new(Mutex::new(PathBuf::from(first))));
-        let console = Window::console(device, &recordings, &read, &next, Arc::new(phantom_source), Progress::default());
-        Window { device: device.clone(), console, recordings, read, next, tree: Vec::new(), exits: false }
+        let (folder, source) = (Arc::new(Folder::new("recordings")), Arc::new(phantom_source));
+        let console = Window::console(device, &recordings, &read, &next, &folder, source, Progress::default());
+        Window { device: device.clone(), console, recordings, read, next, folder, tree: Vec::new(), exits: false }
     }
 
     fn console(
@@ -57,13 +60,17 @@ impl Window {
         recordings: &OpenRecordings,
         read: &Read,
         next: &Arc<Mutex<PathBuf>>,
+        folder: &Folder,
         open: OpenSource,
         progress: Progress,
     ) -> Console {
+        let origin = Origin::of(Some(next.lock().expect("lock").clone()));
         let (read, next) = (read.clone(), next.clone());
         let options = ConsoleOptions {
             source: SourceKind::Recording,
             plays_once: true,
+            folder: folder.0.clone(),
+            origin: Some(origin),
             panels: true,
             opening: OpeningOptions {
                 recordings: recordings.clone(),
@@ -93,7 +100,8 @@ impl Window {
             assert!(request.wake_at.is_some_and(|at| at <= now), "nothing else may wake the new console");
             let source: OpenSource = Arc::new(phantom_source);
             let progress = Progress::default();
-            self.console = Window::console(&self.device, &self.recordings, &self.read, &self.next, source, progress);
+            let (recordings, next) = (&self.recordings, &self.next);
+            self.console = Window::console(&self.device, recordings, &self.read, next, &self.folder, source, progress);
         }
     }
 
@@ -228,6 +236,62 @@ fn a_recording_comes_back_as_it_was_left() {
     assert!(!window.exits);
 }
 
+/// Prevents measurements that are lost by one key: of the recording that is shown, and of others that are open.
+#[test]
+fn what_was_measured_is_not_lost_without_a_question() {
+    let device = Device::new();
+    let mut window = Window::new(&device, "/data/a.mha", &["/data/b.mha"], reads_all());
+    let measure = |window: &mut Window, x: f64| {
+        window.console.execute(&Command::Tool(Tool::Measure(MeasureKind::Distance)), Instant::now());
+        for x in [0.0, x] {
+            window.console.execute(&Command::Point([x, 50.0, 0.0], false), Instant::now());
+        }
+        window.console.execute(&Command::Tool(Tool::default()), Instant::now());
+    };
+    window.shows("/data/a.mha");
+    window.press(false, Key::Char('8'));
+    measure(&mut window, 10.0);
+    window.press(true, Key::Char('w'));
+    let warning = "Measurements or cuts of a.mha are not saved";
+    window.until("a warning", |window| window.find(Role::Alert, warning).map(|_| ()));
+    assert_eq!(window.listed(), ["> a.mha", "b.mha"]);
+    window.press(true, Key::PageDown);
+    window.shows("/data/b.mha");
+    window.press(false, Key::Char('8'));
+    measure(&mut window, 20.0);
+    window.click(Role::Button, "Close a.mha");
+    assert_eq!(window.listed(), ["a.mha", "> b.mha"]);
+    // All of it is saved before the program ends.
+    window.press(false, Key::Char('q'));
+    window.until("the question", |window| {
+        window.find(Role::AlertDialog, "Measurements or cuts are not saved").map(|_| ())
+    });
+    assert!(!window.exits && window.console.asks_to_leave());
+    window.press(false, Key::Enter);
+    window.until("the end", |window| window.exits.then_some(()));
+    let files = std::fs::read_dir(&window.folder.0).expect("listed").map(|file| file.expect("a file").path());
+    let mut saved: Vec<_> = files.map(|file| Workspace::read(&file).expect("a workspace")).collect();
+    saved.sort_by(|a, b| a.origin.recording.cmp(&b.origin.recording));
+    for (workspace, (name, length)) in saved.iter().zip([("/data/a.mha", 10.0), ("/data/b.mha", 20.0)]) {
+        assert_eq!(workspace.origin.recording.as_deref(), Some(Path::new(name)));
+        let measure = workspace.layers.clone().finish().expect("settings").measure;
+        assert_eq!(measure.len(), 1);
+        let [from, to] = [0, 1].map(|n| glam::DVec3::from(measure[0].points[n]));
+        assert!((from.distance(to) - length).abs() < 1e-9, "{name}: {from} to {to}");
+    }
+    assert_eq!(saved.len(), 2);
+    // What is saved is not asked about.
+    window.exits = false;
+    window.press(false, Key::Char('q'));
+    assert!(window.exits && !window.console.asks_to_leave());
+    // Asked for twice, it is lost.
+    measure(&mut window, 30.0);
+    window.press(true, Key::Char('w'));
+    window.press(true, Key::Char('w'));
+    window.shows("/data/a.mha");
+    assert!(window.listed().is_empty());
+}
+
 #[test]
 fn a_recording_that_cannot_be_opened_changes_nothing() {
     let device = Device::new();
@@ -331,7 +395,15 @@ fn the_first_recording_is_read_in_sight() {
     });
     let mut window = Window::new(&device, "/data/a.mha", &[], reads_all());
     let made = |open: &OpenSource, own: &Progress| {
-        Window::console(&device, &window.recordings, &window.read, &window.next, open.clone(), own.clone())
+        Window::console(
+            &device,
+            &window.recordings,
+            &window.read,
+            &window.next,
+            &window.folder,
+            open.clone(),
+            own.clone(),
+        )
     };
     let console = made(&open, &own);
     window.console = console;
