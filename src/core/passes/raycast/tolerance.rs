@@ -245,6 +245,12 @@ pub(crate) const REFINE: Pass = Pass {
     },
     writes: |s, _| vec![whole("picture", rendered(s)), whole("errors", Slot::PixelErrors)],
     extent: ray_extent,
+    tolerance: Tolerance {
+        absolute: 5e-4,
+        outliers: 1e-2,
+        why: "sums in f32 along rays of short steps, stored in halves; a ray whose error is close to what is allowed may take other steps",
+        ..FIRST.tolerance
+    },
     reference: |scene, _, reads, writes| {
         let (medium, marks) = (Cast::new(scene, reads), reads.get("error_marks"));
         let [width, height, _] = writes.get("picture").size;
