@@ -88,6 +88,7 @@ const ROWS: &[Row] = &[
     ("slices.sigma.window_mm", Rays, "", &["slices.sigma={window_mm=9.0}"]),
     ("slices.sigma.sigma", Rays, "slices.sigma={}", &["slices.sigma={sigma=0.3}"]),
     ("slices.sigma.noise", Rays, "slices.sigma={}", &["slices.sigma={noise='multiplicative'}"]),
+    ("slices.sigma.repeat", Rays, "slices.sigma={}", &["slices.sigma={repeat=2}"]),
     ("slices.enhanced_sigma.window", Rays, "slices.enhanced_sigma={}", &["slices.enhanced_sigma={window=3}"]),
     (
         "slices.enhanced_sigma.largest",
@@ -348,6 +349,7 @@ const ROWS: &[Row] = &[
     ("distance.sigma.window_mm", Nothing, "", &["distance.sigma={window_mm=30.0}"]),
     ("distance.sigma.sigma", Nothing, "", &["distance.sigma={sigma=2.0}"]),
     ("distance.sigma.noise", Nothing, "", &["distance.sigma={noise='additive'}"]),
+    ("distance.sigma.repeat", Nothing, "", &["distance.sigma={repeat=2}"]),
     ("distance.enhanced_sigma.window", Nothing, "", &["distance.enhanced_sigma={window=3}"]),
     ("distance.enhanced_sigma.largest", Nothing, "", &["distance.enhanced_sigma={largest=7}"]),
     ("distance.enhanced_sigma.window_mm", Nothing, "", &["distance.enhanced_sigma={window_mm=30.0}"]),
@@ -421,6 +423,7 @@ const ROWS: &[Row] = &[
     ("post.sigma.window_mm", Nothing, "", &["post.sigma={window_mm=2.0}"]),
     ("post.sigma.sigma", Nothing, "", &["post.sigma={sigma=0.3}"]),
     ("post.sigma.noise", Nothing, "", &["post.sigma={noise='multiplicative'}"]),
+    ("post.sigma.repeat", Nothing, "", &["post.sigma={repeat=2}"]),
     ("post.enhanced_sigma.window", Nothing, "", &["post.enhanced_sigma={window=3}"]),
     ("post.enhanced_sigma.largest", Nothing, "", &["post.enhanced_sigma={largest=7}"]),
     ("post.enhanced_sigma.window_mm", Nothing, "", &["post.enhanced_sigma={window_mm=2.0}"]),
