@@ -24,7 +24,7 @@ const SETTINGS: &[(&str, &[&str])] = &[
     ("surface.threshold", &["1e-6", "0.1", "1"]),
     ("surface.rough", &["1", "3", "8"]),
     ("surface.number", &["1", "2", "8"]),
-    ("surface.sign", &["bright", "dark"]),
+    ("surface.sign", &["bright", "dark", "any"]),
     ("surface.place", &["peak", "middle", "first-crossing"]),
     ("surface.edge", &["0.5", "3", "40", "samples"]),
     ("surface.colour", &["rendered", "behind"]),

@@ -48,7 +48,7 @@ pub struct Ray {
     /// Growth of the step with the range, as the samples of a convex sweep spread apart: 0 keeps the step constant, 1 makes it
     /// proportional to the distance from the array's apex, up to 8 times. Curved arrays only.
     pub spread: f64,
-    /// The 3D filter of the thesis (4.3): a Gaussian of 3 or 5 samples along each axis, applied at every sample while the ray is
+    /// The 3D filter of the thesis (4.4.2): a Gaussian of 3 or 5 samples along each axis, applied at every sample while the ray is
     /// cast; 0 for none.
     pub sliding: u32,
     /// How the slice index at a position of the sweep is computed.
@@ -387,6 +387,8 @@ pub enum Sign {
     Bright,
     /// A dark cavity in bright tissue.
     Dark,
+    /// Both: the size of the difference counts (4.4.2.1 takes the sign "also"). With the detector by a plain threshold only.
+    Any,
 }
 
 /// Location of the surface within the edge.
