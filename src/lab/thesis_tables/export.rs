@@ -223,8 +223,8 @@ fn other_surface(report: &Report) -> Option<String> {
     let stored = depths(|f| matches!(f, Filter3d::Stored(_)))?;
     let along = depths(|f| matches!(f, Filter3d::Sliding(_)))?;
     Some(format!(
-        "3D filter slice by slice: as many pixels and slices as the other has samples of the ray, hence wider across slices, so that it finds \
-         another surface ({stored} mm against {along} mm): its times are not those of the thesis' filter"
+        "3D filter slice by slice: its kernel counts pixels and slices, the other samples of the ray, so that it is wider, above all across \
+         slices, and finds another surface ({stored} mm against {along} mm): its times are not those of the thesis' filter"
     ))
 }
 
@@ -234,7 +234,7 @@ fn hardware(report: &Report) -> Option<String> {
     let row = table.rows.get(table.usual)?;
     let (time, copy) = (Spread::new(&row.times.picture)?.median, report.copy?.median * 1e-9);
     Some(format!(
-        "hardware: the usual row takes {:.3} times the thesis' {} ms, on {:.2} times the memory bandwidth (copying reaches {copy:.1} GB/s here; \
+        "hardware: the usual row takes {:.3} times the thesis' {} ms, on {:.3} times the memory bandwidth (copying reaches {copy:.2} GB/s here; \
          the GTX 650 has {THESIS_BANDWIDTH} by its data sheet)",
         time / row.thesis.ms,
         row.thesis.ms,
@@ -313,7 +313,7 @@ mod tests {
         // 8 of 54.6 ms, 8 of 80 GB/s.
         assert!(
             text.contains(
-                "takes 0.147 times the thesis' 54.6 ms, on 0.10 times the memory bandwidth (copying reaches 8.0 GB/s"
+                "takes 0.147 times the thesis' 54.6 ms, on 0.100 times the memory bandwidth (copying reaches 8.00 GB/s"
             ),
             "{text}"
         );
