@@ -17,6 +17,8 @@ const SETTINGS: &[(&str, &[&str])] = &[
     ("volume.shading", &["none", "depth-coded", "first-hit"]),
     ("volume.compositing", &["riemann", "corrected", "pre-integrated", "exponential"]),
     ("volume.transfer", &["grey", "bone", "warm", "[{at=0,colour=[0,0,0],opacity=0},{at=1,colour=[1,0,2],opacity=1}]"]),
+    ("volume.colour", &["warm", "skin"]),
+    ("volume.opacity", &["bone", "sepia"]),
     ("volume.threshold", &["0", "0.3", "1"]),
     ("volume.window", &["[0,1]", "[-3,0.2]", "[0.9,0.1]"]),
     ("volume.veil", &["0", "0.5"]),

@@ -271,6 +271,8 @@ const ROWS: &[Row] = &[
             "volume.transfer=[{at=0.2,colour=[1,1,1],opacity=0.2}]",
         ],
     ),
+    ("volume.colour", Rays, "", &["volume.colour=warm", "volume.colour=skin"]),
+    ("volume.opacity", Rays, "", &["volume.opacity=bone", "volume.opacity=skin"]),
     ("volume.extinction", Rays, "", &["volume.extinction=0.05", "volume.extinction=0.6", "volume.extinction=40.0"]),
     ("volume.entries", Accuracy, "", &["volume.entries=32"]),
     ("volume.threshold", Rays, "", &["volume.threshold=0.35"]),

@@ -165,6 +165,10 @@ pub struct Volume {
     pub start_depth: Option<f64>,
     /// Transfer function.
     pub transfer: Transfer,
+    /// Colours of this function in place of those of `transfer` (thesis Figs. 34 and 35: curves of colour and opacity are chosen apart).
+    pub colour: Option<TransferName>,
+    /// Opacities of this function in place of those of `transfer`.
+    pub opacity: Option<TransferName>,
     /// Extinction where the transfer function's opacity is 1, in proportion to the opacity. Absent: opacities are those of one voxel
     /// (one slice pixel).
     pub extinction: Option<f64>,
@@ -193,6 +197,8 @@ impl Default for Volume {
             window: [0.0, 1.0],
             start_depth: None,
             transfer: Transfer::Named(TransferName::Grey),
+            colour: None,
+            opacity: None,
             extinction: None,
             entries: None,
             threshold: 0.0,
