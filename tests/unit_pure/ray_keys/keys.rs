@@ -88,7 +88,6 @@ const ROWS: &[Row] = &[
     ("slices.sigma.window_mm", Rays, "", &["slices.sigma={window_mm=9.0}"]),
     ("slices.sigma.sigma", Rays, "slices.sigma={}", &["slices.sigma={sigma=0.3}"]),
     ("slices.sigma.noise", Rays, "slices.sigma={}", &["slices.sigma={noise='multiplicative'}"]),
-    ("slices.sigma.repeat", Rays, "slices.sigma={}", &["slices.sigma={repeat=2}"]),
     ("slices.enhanced_sigma.window", Rays, "slices.enhanced_sigma={}", &["slices.enhanced_sigma={window=3}"]),
     (
         "slices.enhanced_sigma.largest",
@@ -271,8 +270,6 @@ const ROWS: &[Row] = &[
             "volume.transfer=[{at=0.2,colour=[1,1,1],opacity=0.2}]",
         ],
     ),
-    ("volume.colour", Rays, "", &["volume.colour=warm", "volume.colour=skin"]),
-    ("volume.opacity", Rays, "", &["volume.opacity=bone", "volume.opacity=skin"]),
     ("volume.extinction", Rays, "", &["volume.extinction=0.05", "volume.extinction=0.6", "volume.extinction=40.0"]),
     ("volume.entries", Accuracy, "", &["volume.entries=32"]),
     ("volume.threshold", Rays, "", &["volume.threshold=0.35"]),
@@ -476,6 +473,10 @@ const ROWS: &[Row] = &[
     ("cine.speed", Nothing, "", &["cine.speed=2.0"]),
     ("cine.back_and_forth", Nothing, "", &["cine.back_and_forth=true"]),
     ("ray.tolerance", Rays, "", &["ray.tolerance=2.0"]),
+    // A key's place decides which body it is tried on.
+    ("slices.sigma.repeat", Rays, "slices.sigma={}", &["slices.sigma={repeat=2}"]),
+    ("volume.colour", Rays, "", &["volume.colour=warm", "volume.colour=skin"]),
+    ("volume.opacity", Rays, "", &["volume.opacity=bone", "volume.opacity=skin"]),
 ];
 
 /// The keys of all settings, from the declaration of their types: those of tables within tables and lists after a dot.
