@@ -11,6 +11,7 @@ layout(constant_id = 4) const int GROWTH = 0;         // 1: the result is the nu
 #extension GL_EXT_scalar_block_layout : require
 layout(scalar) uniform Params {
     float range; // 2 sigma, at most 1e30
+    float tie;   // added to the range: a value at its end is within it, however it is rounded
     float few;   // K
     float edge;  // k of a Perona-Malik centre
     float least; // smallest difference that a gradient-inverse centre distinguishes
@@ -52,7 +53,7 @@ void main() {
         return;
     }
     centre = estimate(at.xy, last);
-    within = MULTIPLICATIVE != 0 ? range * abs(centre) : range;
+    within = (MULTIPLICATIVE != 0 ? range * abs(centre) : range) + tie;
     for (int y = at.y - RADIUS; y <= at.y + RADIUS; ++y) {
         bool has_row = uint(y) <= uint(last.y);
         for (int x = at.x - RADIUS; x <= at.x + RADIUS; ++x) add(ivec2(x, y), last, has_row && uint(x) <= uint(last.x));

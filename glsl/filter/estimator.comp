@@ -1,4 +1,4 @@
-// A local estimator as a filter: median, Perona-Malik, gradient-inverse, Nagao-Matsuyama (thesis 5.4).
+// A local estimator as a filter: median, Perona-Malik, gradient-inverse, Nagao-Matsuyama (thesis 5.3.1).
 #version 460
 layout(constant_id = 0) const int ESTIMATOR = 0;
 #extension GL_EXT_scalar_block_layout : require

@@ -14,6 +14,7 @@ layout(constant_id = 2) const int TILED = 0; // 1: a workgroup reads its texels 
 #extension GL_EXT_control_flow_attributes : require
 layout(scalar) uniform Params {
     float range; // 2 sigma, at most 1e30
+    float tie;   // added to the range: a value at its end is within it, however it is rounded
     float few;   // K
 #include "slice_params.glsl"
 };
@@ -70,7 +71,7 @@ void main() {
     float there[RUN];
     [[unroll]] for (int i = 0; i < RUN; ++i) {
         centre[i] = read_at(ivec3(at.x, min(at.y + i, last.y), at.z));
-        within[i] = MULTIPLICATIVE != 0 ? range * abs(centre[i]) : T(range);
+        within[i] = (MULTIPLICATIVE != 0 ? range * abs(centre[i]) : T(range)) + tie;
         sum[i] = count[i] = T(0.0);
         there[i] = 0.0;
     }

@@ -123,13 +123,16 @@ void skip_sample(inout int i) {
     }
 }
 
+// A difference by the sign that is looked for; of either, its size.
+float judged(float difference) { return polarity == 0.0 ? abs(difference) : polarity * difference; }
+
 // Adds a sample to the ring; returns the new difference.
 float push_sample(float value) {
     if (HALF == 4) {
         older = vec4(older.yzw, newer.x);
         newer = vec4(newer.yzw, value);
         ++filled;
-        return polarity * dot(newer - older, QUARTER);
+        return judged(dot(newer - older, QUARTER));
     }
     if (filled == 0) older_sum = newer_sum = quiet_samples = 0;
     int at = filled % RING;
@@ -144,7 +147,7 @@ float push_sample(float value) {
     newer_sum += rounded;
     quiet_samples = value <= quiet_level ? quiet_samples + 1 : 0;
     ++filled;
-    return polarity * float(newer_sum - older_sum) / (UNIT * float(HALF));
+    return judged(float(newer_sum - older_sum) / (UNIT * float(HALF)));
 }
 
 // The bar that an edge must exceed because of noise, after sample i entered the ring. The bar is higher while few samples are

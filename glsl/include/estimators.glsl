@@ -1,4 +1,4 @@
-// Local estimators of a pixel from its neighbours (thesis 5.4). The including shader declares `constant ESTIMATOR`, the parameters
+// Local estimators of a pixel from its neighbours (thesis 5.3.1). The including shader declares `constant ESTIMATOR`, the parameters
 // `edge` and `least`, and `float level(ivec2)`: a pixel as one number. Beyond the border the nearest pixel repeats. Misses are
 // ignored. `at` itself must not be a miss.
 #include "conductance.glsl"

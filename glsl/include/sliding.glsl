@@ -1,4 +1,4 @@
-// The 3D filter of the thesis (4.3): a Gaussian around each sample of the ray, across and along it, computed while the ray is
+// The 3D filter of the thesis (4.4.2): a Gaussian around each sample of the ray, across and along it, computed while the ray is
 // cast. Each step adds the front slice only; the sums of the slices behind it are kept. Taps outside the insonified region are
 // omitted and the weights renormalised.
 

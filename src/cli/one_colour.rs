@@ -178,7 +178,7 @@ fn nothing_insonified(scene: &Scene) -> String {
 /// True if the transfer function has no opacity between two windowed values.
 fn is_transparent(scene: &Scene, [low, high]: [f64; 2]) -> bool {
     let entries = scene.transfer_entries();
-    let table = transfer::table(&scene.settings.volume.transfer, scene.settings.volume.threshold, entries);
+    let table = transfer::table(&transfer::of(&scene.settings.volume), scene.settings.volume.threshold, entries);
     let last = entries - 1;
     let [from, to] = [low, high].map(|v| v * last as f64);
     let touched = (from.floor() as usize).min(last)..=(to.ceil() as usize).min(last);

@@ -110,7 +110,9 @@ impl ProbeFile {
             ("motion.fan_angle_deg", motion.fan_angle_deg, true, fan),
             ("motion.pitch_mm", motion.pitch_mm, false, translated),
             ("motion.thickness_mm", motion.thickness_mm, false, true),
-            ("motion.speed_ratio", Some(motion.speed_ratio), true, true),
+            ("motion.speed_ratio", motion.speed_ratio, true, true),
+            ("motion.motor_deg_per_s", motion.motor_deg_per_s, true, fan),
+            ("motion.motor_mm_per_s", motion.motor_mm_per_s, true, translated),
             ("sound.speed_m_per_s", Some(self.tables.sound.speed_m_per_s), false, true),
         ];
         for (field, value, zero, applies) in numbers {
@@ -134,8 +136,11 @@ impl ProbeFile {
                 return self.fault(field, "does not apply to this kind of array or motion");
             }
         }
-        if motion.speed_ratio > 1.0 {
-            return self.fault("motion.speed_ratio", format!("is {}, must be 0 to 1", motion.speed_ratio));
+        if let Some(ratio) = motion.speed_ratio.filter(|ratio| *ratio > 1.0) {
+            return self.fault("motion.speed_ratio", format!("is {ratio}, must be 0 to 1"));
+        }
+        if motion.speed_ratio.is_some() && motion.motor_speed().is_some() {
+            return self.fault("motion.speed_ratio", "follows from the speed of the motor: leave one of them out");
         }
         if motion.kind == MotionKind::Still && motion.frames_per_volume > 1 {
             return self.fault("motion.frames_per_volume", "must be 1 when the probe is still");
@@ -157,7 +162,7 @@ impl ProbeFile {
     /// # Errors
     /// Tables of another length, fewer frames than one volume, and numbers that make no valid [`Probe`].
     pub fn geometry(&self, samples: usize, lines: usize, frames: usize) -> Result<(Probe, Volumes), InputError> {
-        let volumes = self.volumes(frames)?;
+        let mut volumes = self.volumes(frames)?;
         let (motion, slices) = self.motion(volumes.frames)?;
         let (array, lines) = self.lines(lines)?;
         let depth = &self.tables.depth;
@@ -178,12 +183,37 @@ impl ProbeFile {
             sound_speed: self.tables.sound.speed_m_per_s,
         };
         probe.check().map_err(|e| geometry_error(&self.path, &e))?;
+        if let Some(speed) = self.tables.motion.motor_speed() {
+            volumes.speed_ratio = self.speed_ratio(&probe, speed)?;
+        }
         for volume in 0..volumes.count.min(2) {
             let advance = volumes.advance(volume, &probe.slices);
             let moving = Probe { advance, ..probe.clone() };
             moving.check().map_err(|e| geometry_error(&self.path, &e))?;
         }
         Ok((probe, volumes))
+    }
+
+    /// The share of the way to the next frame that the motor travels while one is acquired, as sound fires its lines one after the other
+    /// without a pause (thesis 4.4.2.2): it follows from depth and speed, and is said.
+    fn speed_ratio(&self, probe: &Probe, (field, speed): (&'static str, f64)) -> Result<f64, InputError> {
+        let count = probe.slices.len();
+        if count < 2 {
+            return Ok(0.0);
+        }
+        let frame_time = probe.acquisition_time() / count as f64;
+        let pitch = (probe.slices.last() - probe.slices.first()) / (count - 1) as f64;
+        let ratio = speed * frame_time / pitch;
+        let lines = probe.lines.len();
+        let said = format!(
+            "the motor travels {ratio:.3} of the way to the next frame while {lines} lines take {:.2} ms",
+            frame_time * 1e3
+        );
+        if ratio > 1.0 {
+            return self.fault(field, format!("{said}: at most 1"));
+        }
+        tracing::warn!(file = %self.path.display(), "{field}: {said}");
+        Ok(ratio)
     }
 
     fn volumes(&self, frames: usize) -> Result<Volumes, InputError> {
@@ -202,7 +232,7 @@ impl ProbeFile {
             left_over: frames % each,
             both_ways: motion.both_ways,
             first_backward: motion.first_direction == Direction::Backward,
-            speed_ratio: motion.speed_ratio,
+            speed_ratio: motion.speed_ratio.unwrap_or(0.0),
         })
     }
 
@@ -370,8 +400,18 @@ struct MotionTable {
     both_ways: bool,
     #[serde(default)]
     first_direction: Direction,
-    #[serde(default)]
-    speed_ratio: f64,
+    speed_ratio: Option<f64>,
+    /// Speed of the motor, from which the ratio follows, in the unit of the motion.
+    motor_deg_per_s: Option<f64>,
+    motor_mm_per_s: Option<f64>,
+}
+
+impl MotionTable {
+    /// The key of the motor's speed, and the speed in rad/s or mm/s.
+    fn motor_speed(&self) -> Option<(&'static str, f64)> {
+        let turning = self.motor_deg_per_s.map(|speed| ("motion.motor_deg_per_s", speed.to_radians()));
+        turning.or(self.motor_mm_per_s.map(|speed| ("motion.motor_mm_per_s", speed)))
+    }
 }
 
 #[derive(Clone, Debug, PartialEq, Deserialize)]
@@ -521,6 +561,25 @@ mod tests {
         assert!(file.geometry(160, 71, 9).is_err());
     }
 
+    /// 71 lines to 159 mm take 71 x 2 x 0.159 / 1540 s = 14.66 ms, in which 60 deg/s turn 0.8797 of the 1 degree between two of 61 frames.
+    #[test]
+    fn the_speed_ratio_follows_from_the_speed_of_the_motor_and_the_depth() {
+        let turning = format!("{FAN}motor_deg_per_s = 60\nfirst_direction = 'backward'\n");
+        let (_, volumes) = parse(&turning).unwrap().geometry(160, 71, 61).unwrap();
+        assert!((volumes.speed_ratio - 60.0 * 71.0 * 2.0 * 0.159 / 1540.0).abs() < 1e-12, "{}", volumes.speed_ratio);
+        assert_eq!(parse(&turning).unwrap().geometry(160, 71, 1).unwrap().1.speed_ratio, 0.0, "one frame is no sweep");
+        let pushed = FAN.replace(
+            "kind = 'fan'\nwobble_radius_mm = 25\nfan_angle_deg = 60",
+            "kind = 'translated'\npitch_mm = 0.5\nmotor_mm_per_s = 20",
+        );
+        let (_, volumes) = parse(&pushed).unwrap().geometry(160, 71, 5).unwrap();
+        assert!(
+            (volumes.speed_ratio - 20.0 / 0.5 * 71.0 * 2.0 * 0.159 / 1540.0).abs() < 1e-12,
+            "{}",
+            volumes.speed_ratio
+        );
+    }
+
     #[test]
     fn one_frame_of_a_fan_is_a_slab() {
         let (probe, _) = parse(FAN).unwrap().geometry(160, 71, 1).unwrap();
@@ -540,6 +599,9 @@ mod tests {
             ("fan_angle_deg = 60", "frame_angles_deg = [1, 2, 3]", "motion.frame_angles_deg"),
             ("fan_angle_deg = 60", "fan_angle_deg = 60\npitch_mm = 1", "motion.pitch_mm"),
             ("fan_angle_deg = 60", "fan_angle_deg = 60\nspeed_ratio = 1.5", "motion.speed_ratio"),
+            ("fan_angle_deg = 60", "fan_angle_deg = 60\nmotor_mm_per_s = 3", "motion.motor_mm_per_s"),
+            ("fan_angle_deg = 60", "fan_angle_deg = 60\nmotor_deg_per_s = 140", "at most 1"),
+            ("fan_angle_deg = 60", "fan_angle_deg = 60\nmotor_deg_per_s = 3\nspeed_ratio = 0", "motion.speed_ratio"),
             ("fan_angle_deg = 60", "fan_angle_deg = 60\n[samples]\nrange = [1, 1]", "samples.range"),
             ("sector_angle_deg = 70", "sector_angle_deg = 370", "sector angle"),
             ("wobble_radius_mm = 25", "wobble_radius_mm = -1", "wobble"),

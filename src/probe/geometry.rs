@@ -324,7 +324,7 @@ impl Probe {
         }
     }
 
-    /// Time that sound needs for one volume, s: 2 d / c for each line (thesis 4.3). No system can acquire faster.
+    /// Time that sound needs for one volume, s: 2 d / c for each line (thesis 4.5). No system can acquire faster.
     pub fn acquisition_time(&self) -> f64 {
         let depth = (self.start_depth + self.sample_pitch * (self.samples - 1) as f64) * 1e-3;
         (self.slices.len() * self.lines.len()) as f64 * 2.0 * depth / self.sound_speed

@@ -62,6 +62,8 @@ pub enum Command {
     /// Moves a slider by a number of its steps.
     StepSlider(usize, i32),
     Transfer(TransferName),
+    /// The opacities of a volume by name; those of its transfer function.
+    Opacity(Option<TransferName>),
     ColourMap(ColourMap),
     Shadow(bool),
     /// Restores all settings of the start. A frozen picture stays frozen, and measurements stay.

@@ -238,11 +238,11 @@ fn set_start_depth(s: &mut Settings, value: f64) {
     }
 }
 
-/// The largest opacity of the points of a transfer function; 0 for a named one.
+/// The largest opacity of the points of a transfer function; 0 for that of a name.
 fn opacity(s: &Settings) -> f64 {
     match &s.volume.transfer {
-        Transfer::Points(points) => points.iter().map(|p| p.opacity).fold(0.0, f64::max),
-        Transfer::Named(_) => 0.0,
+        Transfer::Points(points) if s.volume.opacity.is_none() => points.iter().map(|p| p.opacity).fold(0.0, f64::max),
+        _ => 0.0,
     }
 }
 

@@ -644,6 +644,7 @@ fn ray_scenes() -> Vec<SceneSpec> {
             "dark cavity, roughest",
             "surface = { sign = 'dark', rough = 8, rough_threshold = 0.05 }\nslices = { pixels = 30 }",
         ),
+        ("either sign", "surface = { sign = 'any', rough = 2 }\nslices = { pixels = 30 }"),
         (
             "long ring, middle of the edge",
             "surface = { edge = 12, threshold = 0.03, place = 'middle', rough = 1 }\nslices = { pixels = 60 }",

@@ -88,6 +88,38 @@ fn a_step_wall_is_within_a_tenth_of_a_step_wherever_the_samples_fall() {
     }
 }
 
+/// The size of the difference finds what either sign does, bit for bit, and both faces of a plate one after the other.
+#[test]
+fn either_sign_finds_the_edges_of_both() {
+    let device = Device::new();
+    let (voxel, edge, thick) = (STEP / 20.0, 36.0 * STEP, 16.0 * STEP);
+    // Walls that are brighter and darker than what is before them, by column, and a plate of each kind.
+    let value = |[x, y, _]: [usize; 3]| {
+        let depth = y as f64 * voxel;
+        let share = ramp(depth, edge, STEP) - if x >= 2 { ramp(depth, edge + thick, STEP) } else { 0.0 };
+        if x % 2 == 0 { 0.2 + 0.6 * share } else { 0.8 - 0.6 * share }
+    };
+    for rough in [1, 2] {
+        let found = |sign: &str, number: u32| -> Vec<Option<f64>> {
+            let surface = format!("threshold = 0.1\nsign = '{sign}'\nrough = {rough}\nnumber = {number}");
+            let scene = columns([4, 1400, 1], voxel, &surface);
+            depths(&device, &scene, &frames(&scene, value)).into_iter().map(|(_, depth)| depth).collect()
+        };
+        let (bright, dark, any) = (found("bright", 1), found("dark", 1), found("any", 1));
+        assert_eq!(any, [bright[0], dark[1], bright[2], dark[3]], "rough {rough}");
+        assert!(any.iter().all(|depth| (depth.expect("an edge") - edge).abs() < 0.1 * STEP), "{any:?}");
+        // Behind the plate: of one sign the second face of the other kind.
+        let second = found("any", 2);
+        assert_eq!((second[0], second[1]), (None, None), "a wall has one face");
+        for depth in &second[2..] {
+            assert!((depth.expect("its other face") - edge - thick).abs() < 0.1 * STEP, "{second:?}");
+        }
+    }
+    let learns = crate::common::scenes::settings("surface = { sign = 'any', detector = 'adaptive' }");
+    let error = Scene::new(cartesian([8, 8, 8]), BYTES, learns).expect_err("noise of one side").to_string();
+    assert!(error.contains("surface.sign") && error.contains("detector=threshold"), "{error}");
+}
+
 /// Prevents the position of the thesis from drifting: the newest sample is between (4 threshold / height - 0.5) and one
 /// more step past the edge. The default, the peak, does not depend on the height.
 #[test]

@@ -167,6 +167,78 @@ fn noise_stays_in_range_and_multiplicative_noise_is_judged_by_the_centre() {
     assert!(uneven > 2.0, "{uneven}");
 }
 
+/// Blocks of 3 x 3 samples of 8 bits, a centre of `level` and, in this order, what lies `away` levels from it. Levels of which one would leave
+/// 0..255 are left out.
+fn blocks(range: fn(i32) -> i32, away: fn(i32) -> [i32; 8]) -> (Texels, Vec<i32>) {
+    let around = |level: i32| away(range(level)).map(|d| level + d);
+    let fits = |level: &i32| (range(*level) > 0) && around(*level).iter().all(|v| (0..=255).contains(v));
+    let levels: Vec<i32> = (0..=255).filter(fits).collect();
+    let picture = texels([3, 3 * levels.len()], |x, y| {
+        let n = 3 * (y % 3) + x;
+        let level = levels[y / 3];
+        f64::from(if n == 4 { level } else { around(level)[n - usize::from(n > 4)] }) / 255.0
+    });
+    (picture, levels)
+}
+
+/// Twice a sigma of 0.1 is 51 of 255 levels: what is 51 levels away is within the interval (5-3), at every level, however f32 rounds their
+/// difference, and what is 52 away is not. The same of a fifth of the centre, for multiplicative noise.
+#[test]
+fn samples_at_the_very_end_of_the_range_are_within_it() {
+    let device = Device::new();
+    let mut single = PassRunner::new(&device).expect("single");
+    let additive: fn(i32) -> i32 = |_| 51;
+    let multiplicative: fn(i32) -> i32 = |level| if level % 5 == 0 { level / 5 } else { 0 };
+    for (noise, range) in [("additive", additive), ("multiplicative", multiplicative)] {
+        // Four at the upper end, two at the lower, two a level beyond: the centre is the median, and the mean of seven two ranges / 7 off.
+        let (mixed, levels) = blocks(range, |r| [r, -r, r, -r - 1, -r - 1, r, -r, r]);
+        assert!(levels.len() > 35, "{levels:?}");
+        let settings = format!("sigma = 0.1, noise = '{noise}'");
+        let growing =
+            format!("enhanced_sigma = {{ window = 3, largest = 3, centre = 'median', growth = true, {settings} }}");
+        let lee = format!("sigma = {{ window = 3, {settings} }}");
+        for (filter, pass) in [(&lee, "sigma_slice"), (&growing, "enhanced_sigma_slice")] {
+            for input in [FLOATS, BYTES] {
+                let of = format!("slices = {{ format = 'r32f', {filter} }}");
+                let scene = scene(cartesian([3, 3 * levels.len(), 1]), input, &of);
+                let (got, reference) =
+                    (on_device(&mut single, &scene, pass, &mixed), by_reference(&scene, pass, &mixed));
+                for (n, level) in levels.iter().enumerate() {
+                    let expected = (f64::from(*level) + f64::from(2 * range(*level)) / 7.0) / 255.0;
+                    for (by, picture) in [("device", &got), ("reference", &reference)] {
+                        let value = picture.one(1, 3 * n + 1, 0);
+                        assert!(
+                            (value - expected).abs() < 1e-6,
+                            "{filter} at level {level}, {by}: {value}, {expected}"
+                        );
+                    }
+                }
+            }
+        }
+        // All nine are within the range, so that no window grows.
+        let (ends, levels) = blocks(range, |r| [r, -r, r, -r, -r, r, -r, r]);
+        let scene = plane([3, 3 * levels.len()], &growing.replace("largest = 3", "largest = 5"));
+        for rings in
+            [on_device(&mut single, &scene, "growth_slice", &ends), by_reference(&scene, "growth_slice", &ends)]
+        {
+            assert!((0..levels.len()).all(|n| rings.one(1, 3 * n + 1, 0) == 0.0), "{noise}: {:?}", rings.values);
+        }
+    }
+}
+
+#[test]
+fn a_second_sigma_filter_runs_on_the_result_of_the_first() {
+    let device = Device::new();
+    let mut single = PassRunner::new(&device).expect("single");
+    let source = noise([33, 27], 5);
+    let once = plane([33, 27], "sigma = { window = 5, sigma = 0.2 }");
+    let twice = plane([33, 27], "sigma = { window = 5, sigma = 0.2, repeat = 2 }");
+    let first = on_device(&mut single, &once, "sigma_slice", &source);
+    let both = on_device(&mut single, &twice, "sigma_slice", &source);
+    assert_eq!(both, on_device(&mut single, &once, "sigma_slice", &first));
+    assert!(largest_difference(&both, &first) > 0.01);
+}
+
 #[test]
 fn no_filter_of_distances_invents_a_surface() {
     let device = Device::new();

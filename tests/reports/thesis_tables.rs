@@ -37,7 +37,7 @@ fn scenes_have_exactly_the_stated_sizes_and_passes() {
             let n = c.volume;
             assert_eq!(scene.frame_size(), [512, c.lines as u32], "{}", row.label);
             assert_eq!(scene.volume_size(), [n, n, c.frames as u32], "{}", row.label);
-            assert_eq!((scene.picture_size(), scene.ray_size()), ([n, n], [n, n]), "{}", row.label);
+            assert_eq!((scene.picture_size(), scene.ray_size()), ([c.picture; 2], [c.picture; 2]), "{}", row.label);
             assert!((scene.high.y - scene.low.y - f64::from(n) * scene.step).abs() < 1e-9, "{} samples", row.label);
             assert!((scene.high.y - scene.low.y - 160.0).abs() < 1e-9 && !scene.rays.is_perspective);
             // Pixels reach exactly to the ends of the sector.
@@ -51,8 +51,24 @@ fn scenes_have_exactly_the_stated_sizes_and_passes() {
                 Filter3d::Sliding(n) => (n, 0),
                 Filter3d::Stored(n) => (0, n),
             };
-            let expected = [&["scan_convert"][..], if taps > 0 { &gaussian } else { &[] }].concat();
+            let growing: &[&str] = if c.is_composited { &["enhanced_sigma_slice"] } else { &[] };
+            let expected = [&["scan_convert"][..], growing, if taps > 0 { &gaussian } else { &[] }].concat();
             assert_eq!(pass_names(&plan, true), expected, "{}", row.label);
+            if c.is_composited {
+                let marched = [
+                    "raycast_surface_and_volume",
+                    "enhanced_sigma_distance",
+                    "light",
+                    "enhanced_sigma_picture",
+                    "tone",
+                ];
+                assert_eq!(pass_names(&plan, false), marched, "{}", row.label);
+                for pass in ["enhanced_sigma_slice", "enhanced_sigma_distance", "enhanced_sigma_picture"] {
+                    let windows = ["RADIUS", "MAX_RADIUS"].map(|name| constant(&plan, &scene, pass, name));
+                    assert_eq!(windows, [(c.filter_2d / 2) as i32, 10], "{pass}");
+                }
+                continue;
+            }
             assert_eq!(
                 pass_names(&plan, false),
                 ["raycast_surface", "sigma_distance", "light", "tone"],
@@ -112,7 +128,7 @@ fn a_quick_run_fills_every_row() {
     let asked = TableOptions { quick: true, repeats: 2, warm_up: 1 };
     let mut volumes = 0;
     let report = run(&context, &asked, &mut || volumes += 1).expect("run");
-    assert_eq!((volumes, asked.volumes()), (18 * 3, 18 * 3));
+    assert_eq!((volumes, asked.volumes()), (23 * 3, 23 * 3));
     let repeats = if context.candidate.valid_bits() > 0 { 2 } else { 0 };
     for row in report.tables.iter().flat_map(|t| &t.rows) {
         for times in [&row.times.picture, &row.times.preprocess] {

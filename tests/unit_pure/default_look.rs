@@ -349,7 +349,7 @@ fn same_as(path: &str) -> &'static [&'static str] {
     match path {
         _ if filters.iter().any(|filter| starts(&format!("slices.{filter}"))) => &["slices"],
         // Bright windows and the filters of the distance map have a default each.
-        "volume.window" | "volume.threshold" | "volume.transfer" => &["volume", "light"],
+        "volume.window" | "volume.threshold" | "volume.transfer" | "volume.opacity" => &["volume", "light"],
         "surface.window" | "surface.threshold" => &["surface"],
         "volume.shading" => &["light"],
         // Refuses light in the volume, so that the default has none.

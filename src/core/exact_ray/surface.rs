@@ -42,6 +42,9 @@ pub fn fault(scene: &Scene) -> Option<&'static str> {
             Some("surface.edge=samples counts steps: set surface.edge to a length in mm")
         }
         _ if surface.rough > 1 => Some("surface.rough searches by steps of its own: set surface.rough=1"),
+        _ if surface.sign == Sign::Any => Some(
+            "surface.sign=any takes the size of the difference, which is no polynomial: set surface.sign=bright or dark",
+        ),
         _ if surface.detector != Detector::Threshold => {
             Some("surface.detector learns noise from samples: set surface.detector=threshold")
         }

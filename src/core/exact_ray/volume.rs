@@ -97,7 +97,7 @@ impl<'a> Medium<'a> {
     /// The medium of a scene's ray that begins at `line.base`.
     pub fn of(scene: &'a Scene, line: &super::Line<'a>, tolerance: f64) -> Medium<'a> {
         let volume = &scene.settings.volume;
-        let points = transfer::resolved(&volume.transfer);
+        let points = transfer::of(volume);
         let absorption = Absorption::of(volume, reference_length(scene));
         let mut medium = Medium::new(&points, volume.threshold, absorption, tolerance);
         medium.fade = Fade::of(line);

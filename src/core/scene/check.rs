@@ -2,9 +2,9 @@
 
 use super::planes::{MAX_SLAB, MAX_TILES, SAME_POINT};
 use super::{
-    Cine, Clip, Compositing, Conditioning, Curve, Distance, Elevation, EnhancedSigma, Layout, Light, MAX_BODY_MARKS,
-    MAX_CLIPS, MAX_CURVE_POINTS, MAX_DEVIATION, MAX_PICTURE, Mode, Noise, PeronaMalik, Scene, SceneError, Scheme,
-    Settings, Smooth, refuse, transfer,
+    Cine, Clip, Compositing, Conditioning, Curve, Detector, Distance, Elevation, EnhancedSigma, Layout, Light,
+    MAX_BODY_MARKS, MAX_CLIPS, MAX_CURVE_POINTS, MAX_DEVIATION, MAX_PICTURE, Mode, Noise, PeronaMalik, Scene,
+    SceneError, Scheme, Settings, Sign, Smooth, refuse, transfer,
 };
 use crate::probe::Geometry;
 use glam::DVec3;
@@ -46,6 +46,12 @@ pub(super) fn check(settings: &Settings) -> Result<(), SceneError> {
     }
     if settings.layout == Layout::Four && settings.mode.is_flat() {
         return refuse("layout", "four shows three planes and a rendering: the mode must be one that renders");
+    }
+    if settings.surface.sign == Sign::Any && settings.surface.detector != Detector::Threshold {
+        return refuse(
+            "surface.sign",
+            "any takes surface.detector=threshold: the others learn the noise on one side of an edge",
+        );
     }
     if settings.layout == Layout::Pair && settings.mode != Mode::Surface {
         return refuse("layout", "pair shows a volume and the surface found in the same march: set mode=surface");

@@ -203,8 +203,12 @@ impl Scene {
                 let entry = if value > 0.5 { table.last() } else { table.first() };
                 entry.is_some_and(|entry| entry[3] > 0.0)
             };
-            let dark = self.settings.surface.sign == Sign::Dark;
-            let is_detected = self.detects_surface() && dark == (value < 0.5);
+            let is_detected = self.detects_surface()
+                && match self.settings.surface.sign {
+                    Sign::Bright => value > 0.5,
+                    Sign::Dark => value < 0.5,
+                    Sign::Any => true,
+                };
             let is_kept = self.settings.mode == Mode::MinIp && value < 0.5;
             is_composited || is_detected || is_kept
         };
@@ -359,7 +363,7 @@ pub(super) fn check_removal(
         true => refuse(
             setting,
             format!(
-                "the rendering draws both what is dark and what is bright, so nothing can be removed from it (surface.sign=dark, or a \
+                "the rendering draws both what is dark and what is bright, so nothing can be removed from it (surface.sign=dark or any, or a \
                  transfer function that is opaque at 0 and at 1): {remedy}"
             ),
         ),

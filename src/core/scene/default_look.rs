@@ -402,7 +402,7 @@ impl Found<'_> {
         let mut has_ramp = false;
         if matches!(mode, Mode::Volume | Mode::Mixed | Mode::Surface) {
             let is_window = layers.gives("volume.window") || layers.gives("volume.threshold");
-            if layers.gives("volume.transfer") {
+            if layers.gives("volume.transfer") || layers.gives("volume.opacity") {
                 if !is_window {
                     // Transfer functions with a name are transparent up to a fifth of the window.
                     set("volume.window", window(threshold - (bright - threshold), high), under, said);

@@ -27,7 +27,7 @@ impl Scene {
             };
             Some(sample(volume.window, last as f64 / (table.len() - 1) as f64))
         };
-        let of_surface = || (surface.sign == Sign::Bright).then(|| sample(surface.window, surface.threshold));
+        let of_surface = || (surface.sign != Sign::Dark).then(|| sample(surface.window, surface.threshold));
         match (self.composites(), self.detects_surface()) {
             (true, true) => Some(of_volume()?.min(of_surface()?)),
             (true, false) => of_volume(),

@@ -732,7 +732,7 @@ impl Scene {
         blur && smooth.kernel.is_none() && smooth.lateral == 0.0 && smooth.depth == 0.0
     }
 
-    /// Estimator of the centre of an enhanced sigma filter: Perona-Malik for planes, the median otherwise (thesis 5.5).
+    /// Estimator of the centre of an enhanced sigma filter: Perona-Malik for planes, the median otherwise (thesis 5.7).
     pub fn centre(&self, enhanced: EnhancedSigma) -> Estimator {
         let usual = if self.is_flat() { Estimator::PeronaMalik } else { Estimator::Median };
         enhanced.centre.unwrap_or(usual)
@@ -777,7 +777,7 @@ impl Scene {
         let [lateral, depth, _] = self.smoothing_radius().map(f64::from);
         let median = if self.settings.slices.median { 1.0 } else { 0.0 };
         let slices = &self.slice_filters;
-        let sigma = slices.sigma.map_or(0.0, |s| f64::from(s.window / 2));
+        let sigma = slices.sigma.map_or(0.0, |s| f64::from(s.repeat * (s.window / 2)));
         let enhanced = slices.enhanced_sigma.map_or(0.0, |e| f64::from(e.largest / 2));
         let estimator = match slices.estimator {
             Some(Estimator::NagaoMatsuyama) => 2.0,

@@ -141,7 +141,7 @@ mod tests {
 
     #[test]
     fn a_step_is_the_ray_integral() {
-        let bone = transfer::table(&Transfer::Named(TransferName::Bone), 0.4, transfer::ENTRIES);
+        let bone = transfer::table(&transfer::resolved(&Transfer::Named(TransferName::Bone)), 0.4, transfer::ENTRIES);
         for (front, back) in [(0.1, 0.9), (0.9, 0.1), (0.37, 0.371), (0.6, 0.6), (0.0, 1.0), (0.1, 0.3)] {
             for length in [1e-3, 0.3, 1.0, 30.0, 3000.0] {
                 let (got, expected) = (step(&bone, front, back, length), by_midpoints(&bone, front, back, length));

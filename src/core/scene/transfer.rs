@@ -66,6 +66,24 @@ pub fn resolved(transfer: &Transfer) -> Vec<TransferPoint> {
     }
 }
 
+/// The points of a volume's transfer function, with the colours and the opacities of others where these are named.
+pub fn of(volume: &Volume) -> Vec<TransferPoint> {
+    let whole = resolved(&volume.transfer);
+    if volume.colour.is_none() && volume.opacity.is_none() {
+        return whole;
+    }
+    let [colours, opacities] = [volume.colour, volume.opacity].map(|name| name.map_or_else(|| whole.clone(), named));
+    // Both are linear between the points of either.
+    let mut places: Vec<f64> = colours.iter().chain(&opacities).map(|point| point.at).collect();
+    places.sort_by(f64::total_cmp);
+    places.dedup();
+    let point = |value: f64| {
+        let ([r, g, b, _], [.., opacity]) = (at(&colours, value), at(&opacities, value));
+        TransferPoint { at: value, colour: [r, g, b], opacity }
+    };
+    places.into_iter().map(point).collect()
+}
+
 /// Entries of the table of a scene's transfer function: those of the setting; without it [`ENTRIES`], or more if two points are closer
 /// than an entry, which would miss what lies between them: then the fewest that meet every point, or four between the closest points.
 ///
@@ -75,7 +93,7 @@ pub fn entries(volume: &Volume) -> Result<usize, String> {
     let [least, most] = ENTRIES_RANGE;
     let pairs = matches!(volume.compositing, Compositing::PreIntegrated | Compositing::Exponential);
     let most = if pairs { MAX_PRE_INTEGRATED } else { most };
-    let points = resolved(&volume.transfer);
+    let points = of(volume);
     let gaps = points.windows(2).enumerate().map(|(n, pair)| (n + 1, pair[1].at - pair[0].at));
     let (first, gap) = gaps.min_by(|a, b| a.1.total_cmp(&b.1)).unwrap_or((1, 1.0));
     // The slack is that of rounding: points at neighbouring entries are an entry apart.
@@ -111,21 +129,20 @@ pub fn entries(volume: &Volume) -> Result<usize, String> {
 
 /// Red, green, blue and absorption at `entries` equidistant sample values from 0 to 1 (at least 2). Below `threshold` the absorption
 /// is 0.
-pub fn table(transfer: &Transfer, threshold: f64, entries: usize) -> Vec<[f64; 4]> {
-    table_by(transfer, threshold, entries, Absorption::of_length(1.0))
+pub fn table(points: &[TransferPoint], threshold: f64, entries: usize) -> Vec<[f64; 4]> {
+    table_by(points, threshold, entries, Absorption::of_length(1.0))
 }
 
 /// The same for volume rendering: with [`Volume::extinction`] in place of opacities of one reference length, mm.
 pub(crate) fn table_of(volume: &Volume, reference_length: f64, entries: usize) -> Vec<[f64; 4]> {
-    table_by(&volume.transfer, volume.threshold, entries, Absorption::of(volume, reference_length))
+    table_by(&of(volume), volume.threshold, entries, Absorption::of(volume, reference_length))
 }
 
-fn table_by(transfer: &Transfer, threshold: f64, entries: usize, absorption: Absorption) -> Vec<[f64; 4]> {
-    let points = resolved(transfer);
+fn table_by(points: &[TransferPoint], threshold: f64, entries: usize, absorption: Absorption) -> Vec<[f64; 4]> {
     (0..entries)
         .map(|i| {
             let value = i as f64 / (entries - 1) as f64;
-            let [r, g, b, a] = at(&points, value);
+            let [r, g, b, a] = at(points, value);
             [r, g, b, if value < threshold { 0.0 } else { absorption.over_length(a) }]
         })
         .collect()
@@ -254,6 +271,24 @@ mod tests {
     use super::*;
 
     #[test]
+    fn colours_and_opacities_are_chosen_apart() {
+        let whole = Volume { transfer: Transfer::Named(TransferName::Skin), ..Volume::default() };
+        assert_eq!(of(&whole), named(TransferName::Skin));
+        let mixed = Volume { colour: Some(TransferName::Warm), opacity: Some(TransferName::Bone), ..whole.clone() };
+        let (skin, warm, bone) = (of(&whole), named(TransferName::Warm), named(TransferName::Bone));
+        for value in (0..=1000).map(|n| f64::from(n) / 1000.0) {
+            let [r, g, b, a] = at(&of(&mixed), value);
+            let ([wr, wg, wb, _], [.., ba]) = (at(&warm, value), at(&bone, value));
+            assert!([r - wr, g - wg, b - wb, a - ba].iter().all(|off| off.abs() < 1e-12), "{value}");
+            let [.., a] = at(&of(&Volume { colour: None, ..mixed.clone() }), value);
+            let [r, ..] = at(&of(&Volume { opacity: None, ..mixed.clone() }), value);
+            assert!((a - ba).abs() < 1e-12 && (r - wr).abs() < 1e-12);
+            let coloured = at(&of(&Volume { colour: None, ..mixed.clone() }), value);
+            assert!((coloured[0] - at(&skin, value)[0]).abs() < 1e-12, "{value}");
+        }
+    }
+
+    #[test]
     fn a_small_opacity_keeps_its_digits_and_full_opacity_stays_finite() {
         for a in [1e-7, 1e-4, 0.5, 0.999] {
             assert!((opacity(absorption(a)) / a - 1.0).abs() < 1e-12, "{a}");
@@ -268,7 +303,7 @@ mod tests {
         let transfer =
             Transfer::Points(points(&[(0.2, [0.0, 0.0, 0.0], 0.0), (0.6, [1.0, 0.5, 0.0], 0.5), (0.7, [0.0; 3], 1.0)]));
         assert_eq!(fault(&transfer), None);
-        let table = table(&transfer, 0.0, ENTRIES);
+        let table = table(&resolved(&transfer), 0.0, ENTRIES);
         assert_eq!(table[0], [0.0, 0.0, 0.0, 0.0]);
         assert!((table[102][0] - 0.5).abs() < 1e-9, "{:?}", table[102]);
         assert_eq!(table[255], [0.0, 0.0, 0.0, OPAQUE]);
@@ -288,9 +323,8 @@ mod tests {
         assert_eq!(entries(&Volume::default()), Ok(ENTRIES));
         assert_eq!(entries(&spike(0.01)), Ok(ENTRIES));
         assert_eq!(entries(&spike(0.001)), Ok(1001));
-        let tallest = |volume: &Volume, count: usize| {
-            table(&volume.transfer, 0.0, count).iter().map(|e| e[3]).fold(0.0, f64::max)
-        };
+        let tallest =
+            |volume: &Volume, count: usize| table(&of(volume), 0.0, count).iter().map(|e| e[3]).fold(0.0, f64::max);
         assert_eq!(tallest(&spike(0.001), 1001), absorption(0.5));
         // What the default table made of it.
         assert_eq!(tallest(&spike(0.001), ENTRIES), 0.0);

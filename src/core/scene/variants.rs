@@ -34,9 +34,10 @@ const MODES: [(Mode, &str); 10] = [
 const SAMPLINGS: [&str; 3] = ["hardware", "exact", "quads"];
 
 /// Filters, lights and other choices that are structure: each line is a table of a scene file.
-const CHOICES: [&str; 51] = [
+const CHOICES: [&str; 52] = [
     "slices.median = true",
     "slices.sigma = {}",
+    "slices.sigma = { repeat = 2 }",
     "slices.enhanced_sigma = { window = 5, largest = 19, sigma = 0.1 }",
     "slices.enhanced_sigma = { growth = true }",
     "slices.perona_malik = {}",

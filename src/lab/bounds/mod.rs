@@ -181,7 +181,7 @@ fn bounds_of(
     if path <= 0.0 {
         return ray::Bounds { rgba: [Interval::ZERO; 4], parts: 0 };
     }
-    let points = transfer::resolved(&settings.transfer);
+    let points = transfer::of(settings);
     let absorption = Absorption::of(settings, reference_length(scene));
     let mut medium = ray::Medium::new(points, settings.threshold, absorption).faded(ray::Fade::of(line));
     if settings.shading == Shading::DepthCoded {

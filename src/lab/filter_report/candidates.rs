@@ -15,6 +15,10 @@ pub struct Candidate {
 const WINDOWS: [u32; 4] = [5, 9, 13, 17];
 /// Starting and largest windows of the enhanced sigma filter, pixels (thesis Tables 7-9).
 const GROWING: [[u32; 2]; 4] = [[3, 17], [5, 19], [9, 21], [13, 23]];
+/// Starting windows and sigma of thesis Figs. 46-53, and how far those of 46-50 grow here: as in Tables 7-9, whose growth of 15 is that of 13.
+/// The kernels of 51-53 are fixed: the largest window is the starting one.
+const FIGURES: [[u32; 2]; 7] = [[3, 17], [5, 19], [7, 19], [9, 21], [11, 21], [13, 23], [15, 25]];
+const FIGURE_SIGMA: f64 = 0.03;
 /// Standard deviations of the noise, 0..1. Fully developed speckle has 5.57 dB, which is 0.11 of 50 dB.
 const SIGMAS: [f64; 5] = [0.05, 0.1, 0.15, 0.2, 0.3];
 /// Edge constants of Perona-Malik diffusion, 0..1.
@@ -66,6 +70,20 @@ fn candidates_of_all(pitch: [f64; 2]) -> Vec<Candidate> {
                 format!("{window}x{window} to {largest}x{largest}, sigma {sigma}"),
                 &[format!("slices.enhanced_sigma={{{keys}}}")],
             );
+        }
+    }
+    for (filter, centre, is_fixed) in [
+        ("thesis Figs. 46-50, median centre", "median", false),
+        ("thesis Figs. 46-50, PM centre", "perona-malik", false),
+        ("thesis Figs. 51-53, median centre", "median", true),
+        ("thesis Figs. 51-53, PM centre", "perona-malik", true),
+    ] {
+        for [window, largest] in FIGURES {
+            let largest = if is_fixed { window } else { largest };
+            let keys = format!("window={window},largest={largest},sigma={FIGURE_SIGMA:?},centre='{centre}'");
+            let growth = if is_fixed { String::new() } else { format!(" to {largest}x{largest}") };
+            let label = format!("{window}x{window}{growth}, sigma {FIGURE_SIGMA}");
+            add(filter, label, &[format!("slices.enhanced_sigma={{{keys}}}")]);
         }
     }
     for (edge, time) in pairs(&EDGES, &TIMES) {

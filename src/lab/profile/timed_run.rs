@@ -373,7 +373,7 @@ const CEILING_REPEATS: u32 = 15;
 ///
 /// # Errors
 /// The device cannot hold a volume of 128^3 and pictures of 2048^2, or fails.
-fn measure_ceilings(context: &Arc<Context>) -> Result<Option<Ceilings>, GpuError> {
+pub(crate) fn measure_ceilings(context: &Arc<Context>) -> Result<Option<Ceilings>, GpuError> {
     let broken = |e: crate::scene::SceneError| GpuError::Broken(format!("the scene that measures: {e}"));
     // Larger than the caches of a GPU; on a software device the smallest size with steady times.
     let pixels = if context.candidate.is_software() { 256 } else { 2048 };

@@ -1,7 +1,10 @@
 //! The thesis' tables as Markdown and as CSV.
 
 use super::growth::{Grown, Growth, THESIS};
-use super::{Conditions, DEPTH, FAN_ANGLE, Report, Row, SAMPLES, SECTOR_ANGLE, SOUND_SPEED, Spread, Table};
+use super::{
+    Conditions, DEPTH, FAN_ANGLE, Filter3d, Report, Row, SAMPLES, SECTOR_ANGLE, SOUND_SPEED, Spread, THESIS_BANDWIDTH,
+    Table,
+};
 use crate::passes::times::acquisition_floor;
 use crate::scene::Estimator;
 use crate::text::{csv_quoted, markdown_table, markdown_text};
@@ -11,7 +14,8 @@ use std::fmt::Write as _;
 pub fn tables_csv(report: &Report) -> String {
     let mut text = String::from(
         "table,varied,value,usual,picture_ms,picture_least_ms,picture_most_ms,ratio,thesis_ms,thesis_ratio,stage_1_ms,\
-         stage_1_least_ms,stage_1_most_ms,surface_mm,surface_share,repeats,frames,lines,samples,volume,filter_3d,filter_2d,device,driver,date\n",
+         stage_1_least_ms,stage_1_most_ms,surface_mm,surface_share,repeats,frames,lines,samples,volume,picture,filter_3d,filter_2d,composited,\
+         device,driver,date\n",
     );
     for table in &report.tables {
         for (n, row) in table.rows.iter().enumerate() {
@@ -28,13 +32,15 @@ fn csv_row(report: &Report, table: &Table, row: &Row, usual: bool) -> String {
         let spread = Spread::new(ns);
         [spread.map(|s| s.median), spread.map(|s| s.min), spread.map(|s| s.max)].map(number)
     };
-    let mut fields = vec![table.number.to_string(), table.varied.into(), csv_quoted(&row.label), usual.to_string()];
+    let table_number = table.number.map_or(String::new(), |n| n.to_string());
+    let mut fields = vec![table_number, table.varied.into(), csv_quoted(&row.label), usual.to_string()];
     fields.extend(three(&row.times.picture));
     fields.extend([number(table.ratio(row)), row.thesis.ms.to_string(), number(table.thesis_ratio(row))]);
     fields.extend(three(&row.times.preprocess));
     fields.extend([row.reached.map(|r| r.depth), row.reached.map(|r| r.share)].map(number));
     fields.extend([report.repeats, c.frames, c.lines, SAMPLES].map(|n| n.to_string()));
-    fields.extend([c.volume.to_string(), c.filter_3d.name(), c.filter_2d.to_string()]);
+    fields.extend([c.volume, c.picture].map(|n| n.to_string()));
+    fields.extend([c.filter_3d.name(), c.filter_2d.to_string(), c.is_composited.to_string()]);
     fields.extend([&report.device.name, &report.device.driver, &report.date].map(|t| csv_quoted(t)));
     fields.join(",") + "\n"
 }
@@ -59,7 +65,7 @@ pub fn growth_csv(grown: &[Grown]) -> String {
 /// The thesis' example of the acquisition floor: frames, lines.
 const THESIS_FLOOR: [usize; 2] = [35, 64];
 
-/// Travel time of sound for a volume, s: 2 d / c per line (thesis 4.3).
+/// Travel time of sound for a volume, s: 2 d / c per line (thesis 4.5).
 fn acquisition(frames: usize, lines: usize) -> f64 {
     (frames * lines) as f64 * 2.0 * DEPTH * 1e-3 / SOUND_SPEED
 }
@@ -73,7 +79,8 @@ pub fn markdown(report: &Report) -> String {
     let mut text = String::from("# Tables of the thesis on this device\n\n");
     conditions(&mut text, report);
     for table in &report.tables {
-        let _ = write!(text, "\n## Table {}: {}\n\n{}", table.number, table.varied, markdown_table(&rows(table)));
+        let title = table.number.map_or("The usual row".into(), |n| format!("Table {n}"));
+        let _ = write!(text, "\n## {title}: {}\n\n{}", table.varied, markdown_table(&rows(table)));
     }
     text.push('\n');
     for note in notes(report) {
@@ -172,7 +179,7 @@ fn notes(report: &Report) -> Vec<String> {
     let usual = Conditions::usual(report.quick);
     let [frames, lines] = THESIS_FLOOR;
     let mut notes = vec![
-        "thesis: a GTX 650 (4.3; 3.8 says GT 630), time per rendered volume: stages 2-4 here. Stage 1 of all frames stands \
+        "thesis: a GTX 650 (4.5; 3.8 says GT 630), time per rendered volume: stages 2-4 here. Stage 1 of all frames stands \
          beside it, since frames go through it while they arrive"
             .into(),
         "3D filter along the ray: the thesis' own, made anew for every picture. Slice by slice: separable, in stage 1, so that \
@@ -183,7 +190,13 @@ fn notes(report: &Report) -> Vec<String> {
          texture units at 1058 MHz); on 37 slices it would be 430 G/s"
             .into(),
         "(54.6): Table 6 of the thesis has no such row; its figure of the same conditions in Tables 3-5, which lies below its \
-         5x5 and 7x7"
+         5x5 and 7x7. In Table 5 in brackets: its figure of the filter along the ray"
+            .into(),
+        "the thesis composites each ray and filters with the enhanced sigma filter in stages 1, 3 and 4 (4.1, chapter 6), but the tables do \
+         not say what was on: the usual row is measured as the least that they name, and as that pipeline"
+            .into(),
+        "Table 4: 4.5 calls it linear in the volume's size, O(n). Of its figures those of 256, 384 and 512 lie on a line within 0.6 %, which \
+         is below 0 at 128. Whether the picture grew with the volume it does not say: both are measured, and neither reading is proven"
             .into(),
         format!("lines: the thesis has 64 to 256; here {}. Slices are resampled, so stages 2-4 do not see lines", usual.lines),
         format!("as of the usual row: {}", acquisition_floor(acquisition(usual.frames, usual.lines), SOUND_SPEED)),
@@ -192,10 +205,41 @@ fn notes(report: &Report) -> Vec<String> {
             acquisition(frames, lines) * 1e3
         ),
     ];
+    notes.extend(other_surface(report));
+    notes.extend(hardware(report));
     if report.device.is_software && report.has_times() {
         notes.push("a software device stamps times by the CPU's clock, and shares the CPU with everything else".into());
     }
     notes
+}
+
+/// What the filter kept slice by slice finds, beside the one along the ray.
+fn other_surface(report: &Report) -> Option<String> {
+    let table = report.tables.iter().find(|t| t.number == Some(5))?;
+    let depths = |is_wanted: fn(&Filter3d) -> bool| -> Option<String> {
+        let rows = table.rows.iter().filter(|r| is_wanted(&r.conditions.filter_3d));
+        Some(rows.map(|r| Some(format!("{:.1}", r.reached?.depth))).collect::<Option<Vec<_>>>()?.join(" and "))
+    };
+    let stored = depths(|f| matches!(f, Filter3d::Stored(_)))?;
+    let along = depths(|f| matches!(f, Filter3d::Sliding(_)))?;
+    Some(format!(
+        "3D filter slice by slice: its kernel counts pixels and slices, the other samples of the ray, so that it is wider, above all across \
+         slices, and finds another surface ({stored} mm against {along} mm): its times are not those of the thesis' filter"
+    ))
+}
+
+/// The times of the usual row, and the bandwidths of both memories: a ratio of times says little without the other.
+fn hardware(report: &Report) -> Option<String> {
+    let table = report.tables.first()?;
+    let row = table.rows.get(table.usual)?;
+    let (time, copy) = (Spread::new(&row.times.picture)?.median, report.copy?.median * 1e-9);
+    Some(format!(
+        "hardware: the usual row takes {:.3} times the thesis' {} ms, on {:.3} times the memory bandwidth (copying reaches {copy:.2} GB/s here; \
+         the GTX 650 has {THESIS_BANDWIDTH} by its data sheet)",
+        time / row.thesis.ms,
+        row.thesis.ms,
+        copy / THESIS_BANDWIDTH
+    ))
 }
 
 fn growth(text: &mut String, grown: &Grown) {
@@ -218,7 +262,7 @@ fn growth(text: &mut String, grown: &Grown) {
         }
         let _ = write!(text, "\ncentre {}, sigma {sigma}\n\n{}", centre.name(), markdown_table(&rows));
     }
-    let _ = writeln!(text, "\nThe thesis, on pictures of its own:\n");
+    let _ = writeln!(text, "\nThe thesis, on pictures of its own, rows of 3x3 and 7x7:\n");
     let mut rows = vec![["table", "window", "+0, %", "+2, %", "+4, %"].map(str::to_string).to_vec()];
     for (table, window, shares) in THESIS {
         let mut cells = vec![table.to_string(), window.to_string()];
@@ -245,7 +289,7 @@ mod tests {
             assert_eq!(text.matches(&head).count(), 1, "{text}");
         }
         let lines: Vec<&str> = text.lines().filter(|l| l.starts_with('|')).collect();
-        assert_eq!(lines.len(), 4 + 4 + 5 + 5 + 2 * 4, "{text}");
+        assert_eq!(lines.len(), 4 + 7 + 5 + 5 + 2 + 2 * 5, "{text}");
         let pipes = |l: &str| l.chars().enumerate().filter(|c| c.1 == '|').map(|c| c.0).collect::<Vec<_>>();
         for table in text.split("\n## ").skip(1) {
             let rows: Vec<_> = table.lines().filter(|l| l.starts_with('|')).map(pipes).collect();
@@ -261,7 +305,18 @@ mod tests {
             ["6.000", "3.000..9.000", "1.50", "187.0", "3.42", "60.000", "60.000..60.000", "71.2 mm, 98.7 %"]
         );
         assert_eq!(cells("| 9x9 *")[0][3..6], ["1.00", "(54.6)", "1.00"]);
+        assert_eq!(cells("| 3x3x3 slice")[0][4], "(54.6)");
+        assert_eq!(cells("| composited")[0][3..5], ["2.00", "(54.6)"]);
+        assert_eq!(cells("| 128^3, picture 512^2")[0][3..5], ["1.25", "13.2"]);
         assert!(text.contains("465.5 ms (thesis: around 466 ms)"), "{text}");
+        assert!(text.contains("another surface (71.2 and 71.2 mm against 71.2 and 71.2 mm)"), "{text}");
+        // 8 of 54.6 ms, 8 of 80 GB/s.
+        assert!(
+            text.contains(
+                "takes 0.147 times the thesis' 54.6 ms, on 0.100 times the memory bandwidth (copying reaches 8.00 GB/s"
+            ),
+            "{text}"
+        );
         assert!(text.contains("Some, \"device\" \\| one (software") && text.contains("2026-01-02"), "{text}");
     }
 
@@ -294,14 +349,14 @@ mod tests {
     #[test]
     fn csv_has_a_line_a_row_and_as_many_fields_in_each() {
         let text = tables_csv(&measured());
-        assert_eq!(text.lines().count(), 1 + 4 + 4 + 5 + 5);
+        assert_eq!(text.lines().count(), 1 + 4 + 7 + 5 + 5 + 2);
         // Commas within quotes are not separators.
         let fields = |line: &str| {
             let outside = line.split('"').step_by(2).map(|part| part.matches(',').count());
             outside.sum::<usize>() + 1
         };
         let counts: Vec<_> = text.lines().map(fields).collect();
-        assert!(counts.iter().all(|n| *n == 25), "{counts:?}");
+        assert!(counts.iter().all(|n| *n == 27), "{counts:?}");
         assert!(
             text.contains("3,frames,\"37\",true,8.000000,4.000000,12.000000,1.000000,54.6,1.000000,80.000000"),
             "{text}"

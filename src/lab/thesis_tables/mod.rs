@@ -1,4 +1,4 @@
-//! The tables of the thesis, next to the times of this device: Tables 3-6 (4.3), time per rendered volume in surface mode, and
+//! The tables of the thesis, next to the times of this device: Tables 3-6 (4.5), time per rendered volume in surface mode, and
 //! Tables 7-9 (5.5), the growth of filter windows. This file has the rows, their conditions and the figures of the thesis;
 //! [`row_times`] and [`growth`] fill them, [`export`] writes Markdown and CSV.
 
@@ -7,10 +7,11 @@ pub mod growth;
 pub mod row_times;
 
 use crate::machine::Device;
+use crate::profile::Ceiling;
 use crate::profile::statistics::Sample;
 use growth::Grown;
 
-/// Conditions of the thesis (4.3) unless varied. Angle over the scan lines of a frame, deg.
+/// Conditions of the thesis (4.5) unless varied. Angle over the scan lines of a frame, deg.
 pub(crate) const SECTOR_ANGLE: f64 = 77.0;
 /// Angle over the frames of a volume, deg.
 pub(crate) const FAN_ANGLE: f64 = 61.0;
@@ -22,6 +23,8 @@ pub const SAMPLES: usize = 512;
 pub const SOUND_SPEED: f64 = 1540.0;
 /// Time that the thesis measured under these conditions, ms.
 const USUAL_MS: f64 = 54.6;
+/// Memory bandwidth of the thesis' GTX 650, GB/s (128 bits at 5 GHz).
+pub(crate) const THESIS_BANDWIDTH: f64 = 80.0;
 
 /// The 3D filter on the samples of the volume, and where it runs.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -51,18 +54,24 @@ pub struct Conditions {
     pub frames: usize,
     /// Scan lines per frame, of [`SAMPLES`] samples.
     pub lines: usize,
-    /// n of n^3: slices of n x n pixels, n samples per ray from the face to the end of the volume, picture of n x n pixels.
+    /// n of n^3: slices of n x n pixels, n samples per ray from the face to the end of the volume.
     pub volume: u32,
+    /// Edge of the picture, pixels: that of the volume, unless the picture is held fixed.
+    pub picture: u32,
     pub filter_3d: Filter3d,
-    /// Edge of the sigma filter's window on the distance map, pixels.
+    /// Edge of the sigma filter's window, pixels: on the distance map, or, where rays are composited, the starting one of all three stages.
     pub filter_2d: u32,
+    /// As the thesis' pipeline has it (4.1, chapter 6): whole rays are composited and their colour is lit, and the enhanced sigma filter
+    /// runs in stages 1, 3 and 4. Otherwise the surface alone is found, in one colour, and a plain sigma filter runs in stage 3.
+    pub is_composited: bool,
 }
 
 impl Conditions {
     /// The conditions of the thesis; if `quick`, with a quarter of the edge of the volume and half of the lines.
     pub fn usual(quick: bool) -> Conditions {
         let (lines, volume) = if quick { (64, 128) } else { (128, 512) };
-        Conditions { frames: 37, lines, volume, filter_3d: Filter3d::Sliding(3), filter_2d: 9 }
+        let filter_3d = Filter3d::Sliding(3);
+        Conditions { frames: 37, lines, volume, picture: volume, filter_3d, filter_2d: 9, is_composited: false }
     }
 }
 
@@ -97,7 +106,8 @@ impl Spread {
 pub struct Thesis {
     /// Time per rendered volume, ms.
     pub ms: f64,
-    /// True if its table has no such row: the figure is from other tables of the thesis, under the same conditions.
+    /// True if its table has no such row: the figure is of another one, under the same conditions in Table 6, of the filter along the ray
+    /// in Table 5.
     pub(crate) from_others: bool,
 }
 
@@ -114,11 +124,11 @@ pub struct Row {
     pub reached: Option<Reached>,
 }
 
-/// One of Tables 3-6.
+/// One of Tables 3-6, or the usual row by another pipeline.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Table {
-    /// Number in the thesis.
-    pub number: u32,
+    /// Number in the thesis; None of a table that it does not have.
+    pub number: Option<u32>,
     /// Name of the varied condition.
     pub varied: &'static str,
     pub rows: Vec<Row>,
@@ -140,13 +150,16 @@ impl Table {
     }
 }
 
-/// Tables 3-6 without times. `quick`: see [`Conditions::usual`].
+/// Tables 3-6, and the usual row by both pipelines, without times. `quick`: see [`Conditions::usual`].
 pub fn tables(quick: bool) -> Vec<Table> {
     let usual = Conditions::usual(quick);
     let table = |number, varied, rows: Vec<(String, Conditions, f64)>| {
         let row = |(label, conditions, ms): (String, Conditions, f64)| {
-            // Table 6 has no row for the conditions of the other tables.
-            let from_others = number == 6 && conditions == usual;
+            let from_others = match number {
+                Some(5) => matches!(conditions.filter_3d, Filter3d::Stored(_)),
+                Some(6) => conditions == usual,
+                number => number.is_none(),
+            };
             Row { label, conditions, thesis: Thesis { ms, from_others }, times: Times::default(), reached: None }
         };
         let at = rows.iter().position(|(_, conditions, _)| *conditions == usual).unwrap_or(0);
@@ -162,20 +175,34 @@ pub fn tables(quick: bool) -> Vec<Table> {
         (Filter3d::Stored(5), 187.0),
     ];
     let windows = [(3, 54.3), (5, 54.9), (7, 55.5), (9, USUAL_MS), (11, 56.8)];
-    let volume = |(n, ms): (u32, f64)| {
+    let volume = |fixed: bool, (n, ms): (u32, f64)| {
         let edge = n / (512 / usual.volume);
+        let picture = if fixed { usual.picture } else { edge };
         let label = if quick { format!("{edge}^3 (for {n}^3)") } else { format!("{n}^3") };
-        (label, Conditions { volume: edge, ..usual }, ms)
+        let label = if fixed { format!("{label}, picture {picture}^2") } else { label };
+        (label, Conditions { volume: edge, picture, ..usual }, ms)
     };
+    // Of the largest both readings are the same.
+    let readings =
+        [volumes.map(|v| volume(false, v)).to_vec(), volumes[..3].iter().map(|v| volume(true, *v)).collect()];
+    let pipelines =
+        [("one colour, sigma filter in stage 3", false), ("composited, enhanced sigma filter in stages 1, 3, 4", true)];
+    let pipeline =
+        |(name, is_composited): (&str, bool)| (name.to_string(), Conditions { is_composited, ..usual }, USUAL_MS);
     vec![
-        table(3, "frames", frames.map(|(n, ms)| (n.to_string(), Conditions { frames: n, ..usual }, ms)).to_vec()),
-        table(4, "volume", volumes.map(volume).to_vec()),
-        table(5, "3D filter", filters.map(|(f, ms)| (f.name(), Conditions { filter_3d: f, ..usual }, ms)).to_vec()),
+        table(Some(3), "frames", frames.map(|(n, ms)| (n.to_string(), Conditions { frames: n, ..usual }, ms)).to_vec()),
+        table(Some(4), "volume", readings.concat()),
         table(
-            6,
+            Some(5),
+            "3D filter",
+            filters.map(|(f, ms)| (f.name(), Conditions { filter_3d: f, ..usual }, ms)).to_vec(),
+        ),
+        table(
+            Some(6),
             "2D filter",
             windows.map(|(n, ms)| (format!("{n}x{n}"), Conditions { filter_2d: n, ..usual }, ms)).to_vec(),
         ),
+        table(None, "pipeline", pipelines.map(pipeline).to_vec()),
     ]
 }
 
@@ -200,6 +227,8 @@ pub struct Report {
     pub repeats: usize,
     /// Volumes rendered before those, not measured.
     pub warm_up: usize,
+    /// What copying reaches on this device, bytes/s; None without time stamps.
+    pub copy: Option<Ceiling>,
     pub tables: Vec<Table>,
     pub grown: Vec<Grown>,
 }
@@ -233,6 +262,7 @@ pub mod tests {
             quick: false,
             repeats: 3,
             warm_up: 1,
+            copy: None,
             tables: tables(false),
             grown: Vec::new(),
         }
@@ -241,6 +271,7 @@ pub mod tests {
     /// Row n takes 2 (n + 1) ms and in stage 1 ten times as long.
     pub fn measured() -> Report {
         let mut report = report();
+        report.copy = Some(Ceiling { median: 8e9, low: 7e9, high: 9e9 });
         for table in &mut report.tables {
             for (n, row) in table.rows.iter_mut().enumerate() {
                 let ns = 2e6 * (n + 1) as f64;
@@ -257,10 +288,10 @@ pub mod tests {
         for quick in [false, true] {
             let usual = Conditions::usual(quick);
             let counts: Vec<_> = tables(quick).iter().map(|t| (t.number, t.rows.len())).collect();
-            assert_eq!(counts, [(3, 4), (4, 4), (5, 5), (6, 5)]);
+            assert_eq!(counts, [(Some(3), 4), (Some(4), 7), (Some(5), 5), (Some(6), 5), (None, 2)]);
             for table in tables(quick) {
                 let at_usual: Vec<_> = table.rows.iter().filter(|r| r.conditions == usual).collect();
-                assert_eq!(at_usual.len(), 1, "table {}", table.number);
+                assert_eq!(at_usual.len(), 1, "table {}", table.varied);
                 assert_eq!(table.rows[table.usual].conditions, usual);
                 assert_eq!(at_usual[0].thesis.ms, 54.6);
                 for row in &table.rows {
@@ -270,9 +301,12 @@ pub mod tests {
                         c.volume != u.volume,
                         c.filter_3d != u.filter_3d,
                         c.filter_2d != u.filter_2d,
+                        c.is_composited != u.is_composited,
                     ];
-                    let expected = [3, 4, 5, 6].map(|n| n == table.number && c != u);
-                    assert_eq!((differs, c.lines), (expected, u.lines), "table {}: {}", table.number, row.label);
+                    let expected = [Some(3), Some(4), Some(5), Some(6), None].map(|n| n == table.number && c != u);
+                    assert_eq!((differs, c.lines), (expected, u.lines), "table {}: {}", table.varied, row.label);
+                    let is_fixed = row.label.contains("picture");
+                    assert_eq!(c.picture, if is_fixed { u.picture } else { c.volume }, "{}", row.label);
                 }
             }
         }

@@ -1,13 +1,17 @@
 //! Measures Tables 3-6 of the thesis on a device: renders the scene of every row repeatedly.
 //!
-//! The input is synthetic: a sweep with the geometry of the thesis (4.3) through a ball in front of a wall, both in dark fluid, so that
+//! The input is synthetic: a sweep with the geometry of the thesis (4.5) through a ball in front of a wall, both in dark fluid, so that
 //! rays end where those of an examination do. Computed from a formula, so it is the same on every machine.
 
 use crate::gpu::{self, Context, GpuError, Renderer};
 use crate::machine;
 use crate::passes::{PassTime, Slot, Stage, by_name, is_hit};
 use crate::probe::{Advance, Array, Axis, Indices, Motion, Probe};
-use crate::scene::{Edge, EdgeName, Input, Mode, Place, Scene, SceneError, Settings, Sigma, SliceGrid, Smooth};
+use crate::profile::timed_run::measure_ceilings;
+use crate::scene::{
+    Edge, EdgeName, EnhancedSigma, Input, Mode, Place, Scene, SceneError, Settings, Sigma, SliceGrid, Smooth,
+    SurfaceColour,
+};
 use crate::source::{Frame, Geometry, StoredType};
 use crate::thesis_tables::{
     Conditions, DEPTH, FAN_ANGLE, Filter3d, Reached, Report, Row, SAMPLES, SECTOR_ANGLE, SOUND_SPEED, Table, tables,
@@ -21,6 +25,11 @@ use std::sync::Arc;
 const HALF_REGION: f64 = 45.0;
 /// Sigma of the 2D filter, mm.
 const SIGMA: f64 = 0.5;
+/// Of slices and of pictures, 0..1.
+const SLICE_SIGMA: f64 = 0.1;
+const PICTURE_SIGMA: f64 = 0.03;
+/// Largest window of a growing one that starts at 9x9 (Tables 7-9), pixels.
+const GROWING_TO: u32 = 21;
 
 /// How to measure the tables.
 #[derive(Clone, Copy, Debug)]
@@ -62,6 +71,7 @@ pub fn run(context: &Arc<Context>, options: &TableOptions, after_each: &mut dyn 
         quick: options.quick,
         repeats: options.repeats,
         warm_up: options.warm_up,
+        copy: measure_ceilings(context)?.map(|ceilings| ceilings.copy),
         tables,
         grown: Vec::new(),
     })
@@ -131,14 +141,14 @@ fn broken(error: &SceneError) -> GpuError {
 }
 
 /// The scene of a row: only the filters that the conditions of the thesis name, no shadow. The coarse detector is off, so that a
-/// ray takes all of its samples.
+/// ray takes all of its samples. Composited, the filters have the sigmas and the largest window of preset `thesis`.
 ///
 /// # Errors
 /// None for the conditions of [`tables`].
 pub fn scene(conditions: &Conditions) -> Result<Scene, SceneError> {
     let n = conditions.volume;
     let mut settings = Settings { mode: Mode::Surface, ..Settings::default() };
-    settings.picture.size = [n, n];
+    settings.picture.size = [conditions.picture; 2];
     settings.slices.pixels = n;
     settings.region.lateral = Some([-HALF_REGION, HALF_REGION]);
     settings.region.elevation = Some([-HALF_REGION, HALF_REGION]);
@@ -150,7 +160,17 @@ pub fn scene(conditions: &Conditions) -> Result<Scene, SceneError> {
     settings.surface.rough = 1;
     settings.post.antialias = false;
     settings.surface.place = Place::FirstCrossing;
-    settings.distance.sigma = Some(Sigma { window: conditions.filter_2d, sigma: SIGMA, ..Sigma::default() });
+    let window = conditions.filter_2d;
+    if conditions.is_composited {
+        settings.surface.colour = SurfaceColour::Rendered;
+        let largest = GROWING_TO.max(window);
+        let of = |sigma: f64| Some(EnhancedSigma { window, largest, sigma, ..EnhancedSigma::default() });
+        settings.slices.enhanced_sigma = of(SLICE_SIGMA);
+        settings.distance.enhanced_sigma = of(SIGMA);
+        settings.post.enhanced_sigma = of(PICTURE_SIGMA);
+    } else {
+        settings.distance.sigma = Some(Sigma { window, sigma: SIGMA, ..Sigma::default() });
+    }
     match conditions.filter_3d {
         Filter3d::None => {}
         Filter3d::Sliding(samples) => settings.ray.sliding = samples,

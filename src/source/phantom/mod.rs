@@ -268,7 +268,7 @@ impl Phantom {
         if self.volumes.backward(volume) { self.options.frames - 1 - slice } else { slice }
     }
 
-    /// When a line is fired, s. A line takes 2 d / c (thesis 4.3), and the next one follows at once.
+    /// When a line is fired, s. A line takes 2 d / c (thesis 4.5), and the next one follows at once.
     fn line_time(&self, volume: usize, slice: usize, line: usize) -> f64 {
         let PhantomOptions { frames, lines, .. } = self.options;
         let each = self.probe.acquisition_time() / (frames * lines) as f64;

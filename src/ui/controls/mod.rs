@@ -434,7 +434,11 @@ impl Controls {
                 let value = slider.get(&new) + f64::from(steps) * slider.step;
                 set_slider(&mut new, now, index, value)?;
             }
-            Command::Transfer(name) => new.volume.transfer = Transfer::Named(name),
+            Command::Transfer(name) => {
+                new.volume.transfer = Transfer::Named(name);
+                new.volume.colour = None;
+            }
+            Command::Opacity(name) => new.volume.opacity = name,
             Command::ColourMap(map) => new.post.colour_map = map,
             Command::Shadow(on) => new.light.shadow = self.switch_shadow(on),
             _ => return None,

@@ -309,7 +309,7 @@ fn colour_bar(painter: &Painter, taken: &mut Taken, picture: Rect, scene: &Scene
     };
     let table = scene
         .composites()
-        .then(|| transfer::table(&settings.volume.transfer, settings.volume.threshold, scene.transfer_entries()));
+        .then(|| transfer::table(&transfer::of(&settings.volume), settings.volume.threshold, scene.transfer_entries()));
     let ramp = |value: f64| {
         let Some(table) = &table else { return [value; 3] };
         let last = table.len() - 1;

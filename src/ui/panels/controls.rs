@@ -266,6 +266,17 @@ const OF_PICTURE: [(Colour, &str); 5] = [
     (Colour::Map(ColourMap::Ice), texts::ICE),
 ];
 
+/// Whose opacities a volume has: those of its own function, or of another.
+const OPACITIES: [(Option<TransferName>, &str); 7] = [
+    (None, texts::SAME_AS_COLOUR),
+    (Some(TransferName::Grey), texts::GREY),
+    (Some(TransferName::Sepia), texts::SEPIA),
+    (Some(TransferName::Skin), texts::SKIN),
+    (Some(TransferName::Bone), texts::BONE),
+    (Some(TransferName::Cool), texts::COOL),
+    (Some(TransferName::Warm), texts::WARM),
+];
+
 fn colours(settings: &Settings) -> &'static [(Colour, &'static str)] {
     match settings.mode {
         Mode::Volume | Mode::Mixed => &OF_VOLUME,
@@ -319,7 +330,10 @@ fn show_controls(ui: &mut Ui, state: &PanelState, width: f32, execute: &mut dyn 
             let colours = colours(settings);
             ui.add_space(4.0);
             let is = |colour| match colour {
-                Colour::Transfer(name) => settings.volume.transfer == Transfer::Named(name),
+                Colour::Transfer(name) => match settings.volume.colour {
+                    Some(colour) => colour == name,
+                    None => settings.volume.transfer == Transfer::Named(name),
+                },
                 Colour::Map(map) => settings.post.colour_map == map,
             };
             let hint = |_| texts::COLOUR_HINT;
@@ -334,6 +348,17 @@ fn show_controls(ui: &mut Ui, state: &PanelState, width: f32, execute: &mut dyn 
                     Colour::Map(map) => execute(Command::ColourMap(map)),
                 },
             );
+            if matches!(settings.mode, Mode::Volume | Mode::Mixed) {
+                Row { width: width - 24.0, height: TOUCH_SIZE * 0.8, title: texts::OPACITY_OF, is_large_title: true }
+                    .show(
+                        ui,
+                        &OPACITIES,
+                        if width < NARROW { 2 } else { 3 },
+                        |name| settings.volume.opacity == name,
+                        |_| texts::OPACITY_OF_HINT,
+                        |name| execute(Command::Opacity(name)),
+                    );
+            }
             if front(&["light.shadow.strength"], settings).is_some() {
                 let mut on = settings.light.shadow.is_some_and(|shadow| shadow.strength > 0.0);
                 if switch(ui, &mut on, texts::CAST_SHADOWS, texts::CAST_SHADOWS_HINT) {

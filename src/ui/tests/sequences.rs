@@ -56,6 +56,7 @@ fn command() -> impl Strategy<Value = Command> {
         6 => (0..SLIDERS.len() + 1, number()).prop_map(|(place, value)| Command::SetSlider(place, value)),
         4 => (0..SLIDERS.len() + 1, any::<i32>()).prop_map(|(place, steps)| Command::StepSlider(place, steps % 20)),
         1 => prop::sample::select(vec![TransferName::Grey, TransferName::Bone]).prop_map(Command::Transfer),
+        1 => prop::option::of(Just(TransferName::Bone)).prop_map(Command::Opacity),
         1 => prop::sample::select(vec![ColourMap::None, ColourMap::Ice]).prop_map(Command::ColourMap),
         1 => any::<bool>().prop_map(Command::Shadow),
         1 => Just(Command::Reset),

@@ -134,10 +134,10 @@ fn the_growth_table_is_that_of_the_filter() {
     let noisy = folder.write("noisy.pgm", pgm(48, 40, false, |x, y| 100 + (noise(x, y) >> 10)));
     let said = done(&[&noisy, "--growth-table", "--csv", &csv]);
     let table = rows(&fs::read_to_string(&csv).expect("the table"));
-    let windows: Vec<[f64; 2]> = table[..6].iter().map(|r| [r[2], r[3]]).collect();
-    assert_eq!(windows, [[3., 17.], [5., 19.], [7., 21.], [9., 21.], [11., 21.], [13., 23.]], "Tables 7-9");
-    let sigmas: Vec<f64> = table.iter().step_by(6).map(|r| r[1]).collect();
-    assert_eq!((table.len(), sigmas), (36, vec![0.03, 0.1, 0.17, 0.03, 0.1, 0.17]));
+    let windows: Vec<[f64; 2]> = table[..7].iter().map(|r| [r[2], r[3]]).collect();
+    assert_eq!(windows, [[3., 17.], [5., 19.], [7., 19.], [7., 21.], [9., 21.], [11., 21.], [13., 23.]], "Tables 7-9");
+    let sigmas: Vec<f64> = table.iter().step_by(7).map(|r| r[1]).collect();
+    assert_eq!((table.len(), sigmas), (42, vec![0.03, 0.1, 0.17, 0.03, 0.1, 0.17]));
     let centres: Vec<String> = fs::read_to_string(&csv)
         .expect("the table")
         .lines()
@@ -145,10 +145,10 @@ fn the_growth_table_is_that_of_the_filter() {
         .map(|l| l.split(',').next().unwrap_or("").into())
         .collect();
     assert!(
-        centres[..18].iter().all(|c| c == "median") && centres[18..].iter().all(|c| c == "perona-malik"),
+        centres[..21].iter().all(|c| c == "median") && centres[21..].iter().all(|c| c == "perona-malik"),
         "{centres:?}"
     );
-    assert_eq!(said.lines().filter(|l| l.contains(" %")).count(), 36);
+    assert_eq!(said.lines().filter(|l| l.contains(" %")).count(), 42);
     let given = Grey::load(noisy.as_ref()).expect("input");
     let mut grown = 0.0;
     for (row, centre) in table.iter().zip(&centres) {

@@ -82,7 +82,7 @@ pub fn transfer_file(bytes: &[u8]) -> String {
     if let Some(fault) = transfer::fault(&settings.volume.transfer) {
         return told(fault);
     }
-    let table = transfer::table(&settings.volume.transfer, 0.1, transfer::ENTRIES);
+    let table = transfer::table(&transfer::of(&settings.volume), 0.1, transfer::ENTRIES);
     assert!(table.iter().flatten().all(|v| v.is_finite()));
     assert!(transfer::pre_integrated(&table).iter().flatten().all(|v| v.is_finite()));
     "a table".into()

@@ -348,6 +348,7 @@ const ROWS: &[Row] = &[
     ("distance.sigma.window_mm", Nothing, "", &["distance.sigma={window_mm=30.0}"]),
     ("distance.sigma.sigma", Nothing, "", &["distance.sigma={sigma=2.0}"]),
     ("distance.sigma.noise", Nothing, "", &["distance.sigma={noise='additive'}"]),
+    ("distance.sigma.repeat", Nothing, "", &["distance.sigma={repeat=2}"]),
     ("distance.enhanced_sigma.window", Nothing, "", &["distance.enhanced_sigma={window=3}"]),
     ("distance.enhanced_sigma.largest", Nothing, "", &["distance.enhanced_sigma={largest=7}"]),
     ("distance.enhanced_sigma.window_mm", Nothing, "", &["distance.enhanced_sigma={window_mm=30.0}"]),
@@ -421,6 +422,7 @@ const ROWS: &[Row] = &[
     ("post.sigma.window_mm", Nothing, "", &["post.sigma={window_mm=2.0}"]),
     ("post.sigma.sigma", Nothing, "", &["post.sigma={sigma=0.3}"]),
     ("post.sigma.noise", Nothing, "", &["post.sigma={noise='multiplicative'}"]),
+    ("post.sigma.repeat", Nothing, "", &["post.sigma={repeat=2}"]),
     ("post.enhanced_sigma.window", Nothing, "", &["post.enhanced_sigma={window=3}"]),
     ("post.enhanced_sigma.largest", Nothing, "", &["post.enhanced_sigma={largest=7}"]),
     ("post.enhanced_sigma.window_mm", Nothing, "", &["post.enhanced_sigma={window_mm=2.0}"]),
@@ -471,6 +473,10 @@ const ROWS: &[Row] = &[
     ("cine.speed", Nothing, "", &["cine.speed=2.0"]),
     ("cine.back_and_forth", Nothing, "", &["cine.back_and_forth=true"]),
     ("ray.tolerance", Rays, "", &["ray.tolerance=2.0"]),
+    // A key's place decides which body it is tried on.
+    ("slices.sigma.repeat", Rays, "slices.sigma={}", &["slices.sigma={repeat=2}"]),
+    ("volume.colour", Rays, "", &["volume.colour=warm", "volume.colour=skin"]),
+    ("volume.opacity", Rays, "", &["volume.opacity=bone", "volume.opacity=skin"]),
 ];
 
 /// The keys of all settings, from the declaration of their types: those of tables within tables and lists after a dot.

@@ -110,7 +110,7 @@ impl<'a> Samples<'a> {
     /// Emission and absorption between two distances.
     pub fn light(&self, [origin, direction]: [DVec3; 2], [least, most]: [f64; 2]) -> Light {
         let volume = &self.scene.settings.volume;
-        let points = transfer::resolved(&volume.transfer);
+        let points = transfer::of(volume);
         let pixel = self.scene.grid.pitch[0].min(self.scene.grid.pitch[1]);
         let step = self.stretch(origin, direction)[2];
         let forward = self.scene.rays.forward;

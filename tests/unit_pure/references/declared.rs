@@ -232,7 +232,8 @@ fn shaders_and_references_get_the_same_parameters() {
          enhanced_sigma = { window = 7, largest = 13, sigma = 0.25, edge = 0.5, centre = 'nagao-matsuyama' },
          perona_malik = { edge = 0.5, step = 0.125, conductance = 'exponential' }, smooth = { lateral = 2.0, depth = 1.0, elevation = 0.5 }",
     );
-    assert_eq!(numbers(&scene, "sigma_slice"), [("range", 0.25), ("few", 4.0), ("slice", 1.0)]);
+    let tie = f64::from(1e-6f32);
+    assert_eq!(numbers(&scene, "sigma_slice"), [("range", 0.25), ("tie", tie), ("few", 4.0), ("slice", 1.0)]);
     for (shared_memory, tiled) in [(0, 0), (4 << 10, 1)] {
         let scene = Scene { shared_memory, ..scene.clone() };
         assert_eq!(constants(&scene, "sigma_slice", 0), [("RADIUS", 4), ("MULTIPLICATIVE", 1), ("TILED", tiled)]);
@@ -242,7 +243,7 @@ fn shaders_and_references_get_the_same_parameters() {
     let wide = Scene { shared_memory: 16 << 10, ..wide };
     assert_eq!(constants(&wide, "sigma_slice", 0)[2], ("TILED", 0));
     let least = f64::from((1.0 / 510.0) as f32);
-    let expected = [("range", 0.5), ("few", 3.0), ("edge", 0.5), ("least", least), ("slice", 1.0)];
+    let expected = [("range", 0.5), ("tie", tie), ("few", 3.0), ("edge", 0.5), ("least", least), ("slice", 1.0)];
     assert_eq!(numbers(&scene, "enhanced_sigma_slice"), expected);
     assert_eq!(numbers(&scene, "growth_slice"), expected);
     let expected = [("RADIUS", 3), ("MAX_RADIUS", 6), ("ESTIMATOR", 3), ("MULTIPLICATIVE", 0), ("GROWTH", 0)];
@@ -272,6 +273,8 @@ fn shaders_and_references_get_the_same_parameters() {
     }
     // An infinite sigma becomes the largest f32 that can be multiplied.
     let endless = slices([8, 8], "sigma = { window = 3, sigma = inf }");
-    assert_eq!(numbers(&endless, "sigma_slice")[..2], [("range", f64::from(1e30f32)), ("few", 1.0)]);
+    assert_eq!(numbers(&endless, "sigma_slice")[..3], [("range", f64::from(1e30f32)), ("tie", tie), ("few", 1.0)]);
+    // Distances have no levels.
+    assert_eq!(numbers(&distances([4, 4], "sigma = {}"), "sigma_distance")[1], ("tie", 0.0));
     assert_eq!(Slot::Growth.name(), "growth");
 }

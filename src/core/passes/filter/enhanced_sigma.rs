@@ -2,12 +2,12 @@
 //! fewer pixels than the starting window holds lie within two sigma of it, the window grows by one on every side.
 
 use super::estimator::{self, LEAST, least_distance};
-use super::sigma::{few, range};
+use super::sigma::{TIE, few, range};
 use crate::passes::pass::*;
 use crate::scene::{EnhancedSigma, Noise, Scene};
 
-const WHY: &str = "a mean of at most 63^2 values in f32; a pixel at exactly 2 sigma may count or not, and with it a whole ring; \
-                   R16F stores 1 to 4.9e-4";
+const WHY: &str = "a mean of at most 63^2 values in f32; a pixel within rounding of the range's end may count or not, and with it a \
+                   whole ring; R16F stores 1 to 4.9e-4";
 
 pub const SLICE: Pass = Pass {
     name: "enhanced_sigma_slice",
@@ -20,11 +20,11 @@ pub const SLICE: Pass = Pass {
     writes: writes_target,
     extent: slice_extent,
     repeat: once,
-    params: |s, t| params(s.slice_filters.enhanced_sigma, LEAST, t),
+    params: |s, t| params(s.slice_filters.enhanced_sigma, [LEAST, TIE], t),
     constants: |s, _| constants(s, s.slice_filters.enhanced_sigma, false),
     tolerance: Tolerance { absolute: 6e-4, relative: 0.0, outliers: 2e-3, why: WHY },
     reference: |s, t, reads, writes| {
-        let enhanced = Enhanced::new(s, s.slice_filters.enhanced_sigma, LEAST, |_| true);
+        let enhanced = Enhanced::new(s, s.slice_filters.enhanced_sigma, [LEAST, TIE], |_| true);
         enhanced.filter(t, reads, writes, |found| found.mean);
     },
 };
@@ -43,12 +43,12 @@ pub(crate) const DISTANCE: Pass = Pass {
     writes: writes_target,
     extent: ray_extent,
     repeat: once,
-    params: |s, t| params(s.distance.enhanced_sigma, least_distance(s), t),
+    params: |s, t| params(s.distance.enhanced_sigma, [least_distance(s), 0.0], t),
     constants: |s, _| constants(s, s.distance.enhanced_sigma, false),
     // A pixel in mm differs by 4e-6 between f32 and f64, a hundred times as much as one in 0..1.
     tolerance: Tolerance { absolute: 2e-5, relative: 1e-6, outliers: 5e-3, why: WHY },
     reference: |s, t, reads, writes| {
-        let enhanced = Enhanced::new(s, s.distance.enhanced_sigma, least_distance(s), is_hit);
+        let enhanced = Enhanced::new(s, s.distance.enhanced_sigma, [least_distance(s), 0.0], is_hit);
         enhanced.filter(t, reads, writes, |found| found.mean);
     },
 };
@@ -64,11 +64,11 @@ pub const PICTURE: Pass = Pass {
     writes: writes_target,
     extent: picture_extent,
     repeat: once,
-    params: |s, t| params(s.settings.post.enhanced_sigma, LEAST, t),
+    params: |s, t| params(s.settings.post.enhanced_sigma, [LEAST, TIE], t),
     constants: |s, _| constants(s, s.settings.post.enhanced_sigma, false),
     tolerance: Tolerance { absolute: 1e-3, relative: 1e-3, outliers: 1e-2, why: WHY },
     reference: |s, t, reads, writes| {
-        let enhanced = Enhanced::new(s, s.settings.post.enhanced_sigma, LEAST, |_| true);
+        let enhanced = Enhanced::new(s, s.settings.post.enhanced_sigma, [LEAST, TIE], |_| true);
         enhanced.filter(t, reads, writes, |found| found.mean);
     },
 };
@@ -90,16 +90,16 @@ pub const GROWTH: Pass = Pass {
     writes: |_, _| vec![slices("target", Slot::Growth)],
     extent: slice_extent,
     repeat: once,
-    params: |s, t| params(s.slice_filters.enhanced_sigma, LEAST, t),
+    params: |s, t| params(s.slice_filters.enhanced_sigma, [LEAST, TIE], t),
     constants: |s, _| constants(s, s.slice_filters.enhanced_sigma, true),
     tolerance: Tolerance {
         absolute: 0.0,
         relative: 0.0,
         outliers: 2e-3,
-        why: "whole rings; a pixel at exactly 2 sigma may count or not, and with it a ring",
+        why: "whole rings; a pixel within rounding of the range's end may count or not, and with it a ring",
     },
     reference: |s, t, reads, writes| {
-        let enhanced = Enhanced::new(s, s.slice_filters.enhanced_sigma, LEAST, |_| true);
+        let enhanced = Enhanced::new(s, s.slice_filters.enhanced_sigma, [LEAST, TIE], |_| true);
         enhanced.filter(t, reads, writes, |found| vec![f64::from(found.rings)]);
     },
 };
@@ -118,9 +118,9 @@ fn reach(scene: &Scene, enhanced: Option<EnhancedSigma>) -> u32 {
     enhanced.map_or(0, |e| (e.largest / 2).max(estimator::reach(scene.centre(e))))
 }
 
-fn params(enhanced: Option<EnhancedSigma>, least: f64, args: &DispatchArgs) -> Params {
+fn params(enhanced: Option<EnhancedSigma>, [least, tie]: [f64; 2], args: &DispatchArgs) -> Params {
     let e = enhanced.unwrap_or_default();
-    let params = Params::default().f32("range", range(e.sigma)).f32("few", f64::from(few(e.window)));
+    let params = Params::default().f32("range", range(e.sigma)).f32("tie", tie).f32("few", f64::from(few(e.window)));
     estimator::params(params, e.edge, least).i32("slice", args.slice)
 }
 
@@ -146,6 +146,7 @@ struct Enhanced {
     settings: EnhancedSigma,
     centre: crate::scene::Estimator,
     least: f64,
+    tie: f64,
     valid: fn(f64) -> bool,
 }
 
@@ -157,9 +158,9 @@ struct Found {
 }
 
 impl Enhanced {
-    fn new(scene: &Scene, settings: Option<EnhancedSigma>, least: f64, valid: fn(f64) -> bool) -> Enhanced {
+    fn new(scene: &Scene, settings: Option<EnhancedSigma>, [least, tie]: [f64; 2], valid: fn(f64) -> bool) -> Enhanced {
         let settings = settings.unwrap_or_default();
-        Enhanced { settings, centre: scene.centre(settings), least, valid }
+        Enhanced { settings, centre: scene.centre(settings), least, tie, valid }
     }
 
     fn filter(&self, args: &DispatchArgs, reads: &Arrays, writes: &mut Arrays, value: fn(Found) -> Vec<f64>) {
@@ -198,7 +199,8 @@ impl Enhanced {
             let all = (y - radius..=y + radius).flat_map(move |j| (x - radius..=x + radius).map(move |i| (i, j)));
             let there: Vec<&[f64]> = all.filter_map(|(i, j)| there(i, j)).collect();
             let count = there.len();
-            let alike: Vec<&[f64]> = there.into_iter().filter(|v| (brightness(v) - centre).abs() <= range).collect();
+            let alike: Vec<&[f64]> =
+                there.into_iter().filter(|v| (brightness(v) - centre).abs() <= range + self.tie).collect();
             (count, alike)
         };
         let (start, largest) = (i64::from(e.window / 2), i64::from(e.largest / 2));

@@ -1,4 +1,4 @@
-//! Local estimators of a pixel from its neighbours, which thesis 5.4 compares: as a filter of slices, and as the centre of the
+//! Local estimators of a pixel from its neighbours, which thesis 5.3.1 compares: as a filter of slices, and as the centre of the
 //! enhanced sigma filter. Beyond the border the nearest pixel repeats; of distances, misses are ignored.
 
 use crate::passes::pass::*;

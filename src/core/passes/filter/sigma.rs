@@ -5,8 +5,12 @@
 use crate::passes::pass::*;
 use crate::scene;
 
-const WHY: &str = "a sum of at most 63^2 differences in f32; a pixel at exactly 2 sigma may fall on either side; the slice's \
-                   R16F stores 1 to 4.9e-4";
+const WHY: &str = "a sum of at most 63^2 differences in f32; a pixel within rounding of the range's end may fall on either side; the \
+                   slice's R16F stores 1 to 4.9e-4";
+
+/// Widens the range of values, of full scale: 5-3 counts what lies at its very end, as 51 of 255 levels do at a sigma of 0.1. It is ten times
+/// what f32 rounds there, and a fifteenth of a level of 16 bits. Distances have no levels and no scale.
+pub(super) const TIE: f64 = 1e-6;
 
 pub const SLICE: Pass = Pass {
     name: "sigma_slice",
@@ -18,15 +22,15 @@ pub const SLICE: Pass = Pass {
     reads: reads_source,
     writes: writes_target,
     extent: |s, t| in_runs(slice_extent(s, t), 1),
-    repeat: once,
-    params: |s, t| params(s.slice_filters.sigma, t),
+    repeat: |s| s.slice_filters.sigma.unwrap_or_default().repeat,
+    params: |s, t| params(s.slice_filters.sigma, TIE, t),
     constants: |s, _| {
         let sigma = s.slice_filters.sigma;
         let is_tiled = reads_tile(s, tile_words(radius(sigma)));
         [constants(sigma), vec![("TILED", i32::from(is_tiled))]].concat()
     },
     tolerance: Tolerance { absolute: 6e-4, relative: 0.0, outliers: 1e-3, why: WHY },
-    reference: |s, t, reads, writes| reference(s.slice_filters.sigma, t, reads, writes, |_| true),
+    reference: |s, t, reads, writes| reference(s.slice_filters.sigma, TIE, t, reads, writes, |_| true),
 };
 
 pub(crate) const DISTANCE: Pass = Pass {
@@ -39,11 +43,11 @@ pub(crate) const DISTANCE: Pass = Pass {
     reads: reads_source,
     writes: writes_target,
     extent: |s, t| in_runs(ray_extent(s, t), 1),
-    repeat: once,
-    params: |s, t| params(s.distance.sigma, t),
+    repeat: |s| s.distance.sigma.unwrap_or_default().repeat,
+    params: |s, t| params(s.distance.sigma, 0.0, t),
     constants: |s, _| constants(s.distance.sigma),
     tolerance: Tolerance { absolute: 1e-5, relative: 1e-6, outliers: 1e-3, why: WHY },
-    reference: |s, t, reads, writes| reference(s.distance.sigma, t, reads, writes, is_hit),
+    reference: |s, t, reads, writes| reference(s.distance.sigma, 0.0, t, reads, writes, is_hit),
 };
 
 pub const PICTURE: Pass = Pass {
@@ -56,11 +60,11 @@ pub const PICTURE: Pass = Pass {
     reads: reads_source,
     writes: writes_target,
     extent: |s, t| in_runs_of(PICTURE_RUN, picture_extent(s, t), 1),
-    repeat: once,
-    params: |s, t| params(s.settings.post.sigma, t),
+    repeat: |s| s.settings.post.sigma.unwrap_or_default().repeat,
+    params: |s, t| params(s.settings.post.sigma, TIE, t),
     constants: |s, _| constants(s.settings.post.sigma),
     tolerance: Tolerance { absolute: 6e-4, relative: 1e-3, outliers: 1e-3, why: WHY },
-    reference: |s, t, reads, writes| reference(s.settings.post.sigma, t, reads, writes, |_| true),
+    reference: |s, t, reads, writes| reference(s.settings.post.sigma, TIE, t, reads, writes, |_| true),
 };
 
 /// Pixels that one invocation makes of a picture: RUN of the shader's variant.
@@ -80,15 +84,15 @@ pub(super) fn few(window: u32) -> u32 {
     window.saturating_sub(1) / 2
 }
 
-/// D, or D over the centre: 2 sigma. As the shader gets it, so that a pixel at its very edge counts on both sides; 1e30 is
-/// infinite to every value there is, and stays finite when multiplied by one.
+/// D, or D over the centre: 2 sigma, as the shader gets it. 1e30 is infinite to every value there is, and stays finite when multiplied by one.
 pub(super) fn range(sigma: f64) -> f64 {
     f64::from((2.0 * sigma).min(1e30) as f32)
 }
 
-fn params(sigma: Option<scene::Sigma>, args: &DispatchArgs) -> Params {
+fn params(sigma: Option<scene::Sigma>, tie: f64, args: &DispatchArgs) -> Params {
     let sigma = sigma.unwrap_or_default();
-    Params::default().f32("range", range(sigma.sigma)).f32("few", f64::from(few(sigma.window))).i32("slice", args.slice)
+    let params = Params::default().f32("range", range(sigma.sigma)).f32("tie", tie);
+    params.f32("few", f64::from(few(sigma.window))).i32("slice", args.slice)
 }
 
 /// Half the window's edge, texels.
@@ -111,6 +115,7 @@ fn constants(sigma: Option<scene::Sigma>) -> Vec<(&'static str, i32)> {
 
 fn reference(
     sigma: Option<scene::Sigma>,
+    tie: f64,
     args: &DispatchArgs,
     reads: &Arrays,
     writes: &mut Arrays,
@@ -139,7 +144,8 @@ fn reference(
                     let window = (y - radius..=y + radius).flat_map(|j| (x - radius..=x + radius).map(move |i| (i, j)));
                     let there: Vec<f64> =
                         window.filter(|&(i, j)| inside(i, j)).map(|(i, j)| at(i, j)).filter(|v| valid(*v)).collect();
-                    let close: Vec<f64> = there.iter().copied().filter(|v| (v - centre[c]).abs() <= range).collect();
+                    let close: Vec<f64> =
+                        there.iter().copied().filter(|v| (v - centre[c]).abs() <= range + tie).collect();
                     if close.len() as u32 > few(sigma.window) || close.len() == there.len() {
                         return close.iter().sum::<f64>() / close.len() as f64;
                     }

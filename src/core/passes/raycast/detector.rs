@@ -20,11 +20,18 @@ use crate::scene::{Detector, Place, Ring, Scene, Sign, Surface};
 /// An edge has been followed when the difference falls below this share of its maximum.
 const FOLLOW_LEVEL: f64 = 0.7;
 
+/// The factor of the difference; 0 if its size counts.
 pub(super) fn polarity(scene: &Scene) -> f64 {
     match scene.settings.surface.sign {
         Sign::Bright => 1.0,
         Sign::Dark => -1.0,
+        Sign::Any => 0.0,
     }
+}
+
+/// A difference as the detector judges it.
+pub(super) fn judged(polarity: f64, difference: f64) -> f64 {
+    if polarity == 0.0 { difference.abs() } else { polarity * difference }
 }
 
 /// Place of the surface in samples, and the echo behind it. Sample n is the ray's sample `first + n`; the region begins at its
@@ -121,7 +128,7 @@ impl Ray<'_> {
     /// The difference at i, if a full ring since `since` precedes it and none of the ring is outside.
     fn difference(&self, i: usize, stride: usize, since: usize) -> Option<f64> {
         (i < self.samples.len() && i >= since + (self.len() - 1) * stride)
-            .then(|| Some(self.polarity * (self.mean(i, stride, 0)? - self.mean(i, stride, self.half_len())?)))
+            .then(|| Some(judged(self.polarity, self.mean(i, stride, 0)? - self.mean(i, stride, self.half_len())?)))
             .flatten()
     }
 

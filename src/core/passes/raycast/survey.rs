@@ -1,5 +1,6 @@
 //! A survey of what the rays or planes of a picture meet, in f64 on the CPU: where a picture is wholly one colour, it tells why.
 
+use super::detector::{judged, polarity};
 use super::ray::{Ray, interpolated, texel};
 use crate::passes::texels::Texels;
 use crate::scene::{Mode, Scene, View};
@@ -80,7 +81,7 @@ fn largest_edge(scene: &Scene, [low, high]: [f64; 2], samples: &[Option<f64>]) -
     let differences = samples.windows(2 * half).filter_map(|ring| {
         let sum = |half: &[Option<f64>]| half.iter().map(|v| v.map(windowed)).sum::<Option<f64>>();
         let (older, newer) = ring.split_at(half);
-        Some(super::detector::polarity(scene) * (sum(newer)? - sum(older)?) / half as f64)
+        Some(judged(polarity(scene), sum(newer)? - sum(older)?) / half as f64)
     });
     differences.fold(0.0, f64::max)
 }

@@ -175,11 +175,13 @@ pub struct Sigma {
     pub sigma: f64,
     /// Model of the noise.
     pub noise: Noise,
+    /// How often the filter runs, each time on its own result; thesis 5.3: one or two.
+    pub repeat: u32,
 }
 
 impl Default for Sigma {
     fn default() -> Self {
-        Sigma { window: 7, window_mm: None, sigma: 0.1, noise: Noise::Additive }
+        Sigma { window: 7, window_mm: None, sigma: 0.1, noise: Noise::Additive, repeat: 1 }
     }
 }
 
@@ -201,7 +203,7 @@ pub enum Noise {
 pub struct EnhancedSigma {
     /// Starting window size, pixels.
     pub window: u32,
-    /// Largest window size, pixels. Thesis Tables 7-9: 17, 19, 19, 21, 21, 23 for starts of 3, 5, 7, 9, 11, 13.
+    /// Largest window size, pixels. Thesis Tables 7-9: 17, 19, 19 (21 in Table 8), 21, 21, 23 for starts of 3, 5, 7, 9, 11, 13.
     pub largest: u32,
     /// The starting window in mm, in place of `window`: the nearest odd number of pixels. Not in `post`.
     pub window_mm: Option<f64>,
@@ -212,7 +214,7 @@ pub struct EnhancedSigma {
     pub sigma: f64,
     /// Model of the noise.
     pub noise: Noise,
-    /// Estimator of the centre. Absent: Perona-Malik in modes of planes, the median in all others (thesis 5.5).
+    /// Estimator of the centre. Absent: Perona-Malik in modes of planes, the median in all others (thesis 5.7).
     pub centre: Option<Estimator>,
     /// Edge constant k of a Perona-Malik centre, in the units of sigma.
     pub edge: f64,
@@ -236,7 +238,7 @@ impl Default for EnhancedSigma {
     }
 }
 
-/// Estimate of a pixel without noise from its neighbourhood (thesis 5.4).
+/// Estimate of a pixel without noise from its neighbourhood (thesis 5.3.1).
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Estimator {
@@ -378,6 +380,7 @@ macro_rules! filters {
         &[
             number!($of.sigma => window, "", WINDOW),
             number!($of.sigma => window_mm, "mm", LENGTH),
+            number!($of.sigma => repeat, "", Range(1.0, 10.0)),
             number!($of.enhanced_sigma => window, "", WINDOW),
             number!($of.enhanced_sigma => largest, "", WINDOW),
             number!($of.enhanced_sigma => window_mm, "mm", LENGTH),

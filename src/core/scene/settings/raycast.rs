@@ -48,7 +48,7 @@ pub struct Ray {
     /// Growth of the step with the range, as the samples of a convex sweep spread apart: 0 keeps the step constant, 1 makes it
     /// proportional to the distance from the array's apex, up to 8 times. Curved arrays only.
     pub spread: f64,
-    /// The 3D filter of the thesis (4.3): a Gaussian of 3 or 5 samples along each axis, applied at every sample while the ray is
+    /// The 3D filter of the thesis (4.4.2): a Gaussian of 3 or 5 samples along each axis, applied at every sample while the ray is
     /// cast; 0 for none.
     pub sliding: u32,
     /// How the slice index at a position of the sweep is computed.
@@ -165,6 +165,10 @@ pub struct Volume {
     pub start_depth: Option<f64>,
     /// Transfer function.
     pub transfer: Transfer,
+    /// Colours of this function in place of those of `transfer` (thesis Figs. 34 and 35: curves of colour and opacity are chosen apart).
+    pub colour: Option<TransferName>,
+    /// Opacities of this function in place of those of `transfer`.
+    pub opacity: Option<TransferName>,
     /// Extinction where the transfer function's opacity is 1, in proportion to the opacity. Absent: opacities are those of one voxel
     /// (one slice pixel).
     pub extinction: Option<f64>,
@@ -193,6 +197,8 @@ impl Default for Volume {
             window: [0.0, 1.0],
             start_depth: None,
             transfer: Transfer::Named(TransferName::Grey),
+            colour: None,
+            opacity: None,
             extinction: None,
             entries: None,
             threshold: 0.0,
@@ -387,6 +393,8 @@ pub enum Sign {
     Bright,
     /// A dark cavity in bright tissue.
     Dark,
+    /// Both: the size of the difference counts (4.4.2.1 takes the sign "also"). With the detector by a plain threshold only.
+    Any,
 }
 
 /// Location of the surface within the edge.
