@@ -15,11 +15,13 @@ pub(super) struct Connection {
     disconnected: Option<String>,
     /// Number of frames that came.
     frames: u64,
+    /// When a probe or a pipe ended for good.
+    ended: Option<Instant>,
 }
 
 impl Connection {
     pub(super) fn new(source: SourceSupervisor, kind: SourceKind, now: Instant) -> Connection {
-        Connection { source, kind, silence: Silence::new(now), disconnected: None, frames: 0 }
+        Connection { source, kind, silence: Silence::new(now), disconnected: None, frames: 0, ended: None }
     }
 
     pub(super) fn kind(&self) -> SourceKind {
@@ -37,6 +39,11 @@ impl Connection {
     /// True if it ended for good.
     pub(super) fn is_over(&self) -> bool {
         matches!(self.source.state(), SourceState::Ended(_))
+    }
+
+    /// How long ago a probe or a pipe ended for good. Nothing is live since.
+    pub(super) fn ended_for(&self, now: Instant) -> Option<Duration> {
+        self.ended.map(|at| now.saturating_duration_since(at))
     }
 
     /// How often it could not be opened.
@@ -93,6 +100,8 @@ impl Connection {
             tracing::warn!("source: {why}");
         }
         self.source.ended(why, now);
+        let is_live = matches!(self.kind, SourceKind::Pipe | SourceKind::Probe);
+        self.ended = Some(now).filter(|_| is_live && self.is_over());
     }
 
     /// What there is to say of it. `disconnected`: why it is not connected. `has_shown`: a volume was shown.
@@ -165,7 +174,9 @@ mod tests {
         assert!(!source.follow(1, None, at(2000)));
         assert_eq!(says(&source, false, 3000), None, "a frame came");
         assert!(source.follow(1, Some("cable".into()), at(2000)) && !source.follow(1, Some("cable".into()), at(2000)));
+        assert_eq!(source.ended_for(at(9000)), None);
         source.ended(Some("gone".into()), at(9000));
         assert!(source.is_over() && source.fault().is_none(), "it was open before");
+        assert_eq!(source.ended_for(at(14_000)), Some(Duration::from_secs(5)), "nothing is live any more");
     }
 }

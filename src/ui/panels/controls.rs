@@ -2,7 +2,7 @@
 //! every examination needs are in front; the others are below them, by stage.
 
 use super::colours::{
-    self, ABSENT, ACCENT, EDGE, ON_SELECTED, ON_WARNING, OUTLINE, SELECTED, TEXT, WARNING, WEAK_TEXT,
+    self, ABSENT, ACCENT, BUTTON, EDGE, ON_SELECTED, ON_WARNING, OUTLINE, SELECTED, TEXT, WARNING, WEAK_TEXT,
 };
 use super::names::{self, Tell};
 use super::widgets::{front, name_and_value, slider, switch};
@@ -21,6 +21,7 @@ use egui::{
     Align, Button, CollapsingHeader, FontId, Label, Panel, RichText, ScrollArea, Sense, Slider, Stroke, Ui, WidgetInfo,
     WidgetType, vec2,
 };
+use std::time::Duration;
 
 const TOOLS: [(Tool, &str); 8] = [
     (Tool::Rotate, texts::TURN),
@@ -466,16 +467,25 @@ pub(super) fn show_cine_bar(ui: &mut Ui, state: &PanelState, height: f32, execut
         ui.horizontal_centered(|ui| {
             let room = ui.available_width();
             let is_narrow = room < 420.0;
-            let (label, fill, colour) = match state.is_frozen {
-                true => (texts::FROZEN, WARNING, ON_WARNING),
-                false => (texts::FREEZE, SELECTED, ON_SELECTED),
+            let (label, fill, colour) = match (state.is_frozen, state.ended) {
+                (true, _) => (texts::FROZEN.to_string(), WARNING, ON_WARNING),
+                (false, None) => (texts::FREEZE.into(), SELECTED, ON_SELECTED),
+                (false, Some(_)) if is_narrow => (texts::ENDED.into(), BUTTON, TEXT),
+                (false, Some(ago)) => {
+                    // It says another time then.
+                    ui.ctx().request_repaint_after(Duration::from_secs(1));
+                    (texts::ended_for(ago), BUTTON, TEXT)
+                }
             };
-            let text = RichText::new(label).color(colour).strong();
+            let text = RichText::new(&label).color(colour).strong();
             let width = if is_narrow { 84.0 } else { 120.0 };
-            let hint = texts::FREEZE_HINT;
+            let (name, hint) = match (state.is_frozen, state.ended) {
+                (true, _) => (texts::UNFREEZE, texts::FREEZE_HINT),
+                (false, None) => (texts::FREEZE, texts::FREEZE_HINT),
+                (false, Some(_)) => (label.as_str(), texts::ENDED_HINT),
+            };
             let freeze = Button::new(text).fill(fill).min_size(vec2(width, touch));
-            if ui.add(freeze).tell(hint).named(if state.is_frozen { texts::UNFREEZE } else { texts::FREEZE }).clicked()
-            {
+            if ui.add(freeze).tell(hint).named(name).clicked() {
                 execute(Command::Freeze);
             }
             let mut left = room - width - ui.spacing().item_spacing.x;

@@ -458,6 +458,8 @@ pub(super) struct PanelState<'a> {
     /// The name of the export in work, and how far it is.
     pub(super) exporting: Option<(&'a str, Option<Progress>)>,
     pub(super) is_frozen: bool,
+    /// How long ago the probe or the pipe ended: nothing is live since.
+    pub(super) ended: Option<Duration>,
     pub(super) cine: CineState,
     /// True after the first picture.
     pub(super) has_drawn: bool,

@@ -144,7 +144,11 @@ fn in_words(state: &PanelState) -> (String, String) {
         Layout::Four => texts::WITH_THREE_PLANES,
         Layout::Pair => texts::BESIDE_THE_VOLUME,
     };
-    let time = if state.is_frozen { texts::IS_FROZEN } else { texts::IS_LIVE };
+    let time = match (state.is_frozen, state.ended) {
+        (true, _) => texts::IS_FROZEN,
+        (false, None) => texts::IS_LIVE,
+        (false, Some(_)) => texts::HAS_ENDED,
+    };
     let origin = state.origin.map_or(String::new(), |origin| format!(", {origin}"));
     let name = format!("{}{layout}{}, {time}{origin}", settings.mode.title(), view_in_words(scene));
     let volume = match (state.cine.count, state.cine.shown) {

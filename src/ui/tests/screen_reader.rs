@@ -9,6 +9,7 @@ use crate::panels::accesskit::{Action, ActionData, Node, NodeId, Role, Toggled};
 use crate::panels::{self, Banner, Note, Reading};
 use crate::scene::MeasureKind;
 use std::collections::{BTreeMap, BTreeSet};
+use std::time::Duration;
 
 impl Shown {
     pub(super) fn key(&mut self, key: Key, shift: bool) -> Vec<Command> {
@@ -206,6 +207,12 @@ fn the_picture_is_described() {
         [image.label(), image.description()].map(|text| text.unwrap_or_default().to_string())
     };
     assert_eq!(picture(&shown)[0], "Surface from the front, live, Demo data (phantom)");
+    for (seconds, said) in [(7, "Ended 7 s"), (119, "Ended 1 min"), (7200, "Ended 2 h")] {
+        shown.ended = Some(Duration::from_secs(seconds));
+        shown.settle();
+        assert_eq!(picture(&shown)[0], "Surface from the front, the source has ended, Demo data (phantom)");
+        shown.find("Cine loop", Role::Button, said);
+    }
     shown.apply(Command::Rotate([30.0, 20.0]));
     shown.is_frozen = true;
     shown.apply(Command::Layout(Layout::Four));

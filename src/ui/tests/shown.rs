@@ -20,6 +20,7 @@ use crate::texts::{UNSAVED_LOOP, Unsaved};
 use crate::times::Times;
 use std::collections::BTreeMap;
 use std::sync::Arc;
+use std::time::Duration;
 
 /// The usual window.
 pub(super) const SIZE: [u32; 2] = [1280, 800];
@@ -38,6 +39,7 @@ pub(super) struct Shown {
     pub(super) leaving: Option<&'static Unsaved>,
     pub(super) has_drawn: bool,
     pub(super) is_frozen: bool,
+    pub(super) ended: Option<Duration>,
     pub(super) cine: CineState,
     pub(super) banner: Option<Banner>,
     pub(super) notes: Vec<Note>,
@@ -85,6 +87,7 @@ impl Shown {
             leaving: None,
             has_drawn: true,
             is_frozen: false,
+            ended: None,
             cine: CinePlayer::default().state(
                 Loop { cine: &Cine::default(), volumes: &(0..20).map(|_| CineVolume::default()).collect() },
                 Some(2),
@@ -156,6 +159,7 @@ impl Shown {
             exporting: Some(("Surface", Some(Progress { done: 12, of: 72 }))),
             presets: self.presets.as_ref().map(|(own, naming)| presets(own, naming.as_deref())),
             is_frozen: self.is_frozen,
+            ended: self.ended,
             cine: self.cine.clone(),
             has_drawn: self.has_drawn,
             quality: ("full", self.budget),

@@ -1,6 +1,7 @@
 //! Buttons, titles and tooltips of the panels and lists, the help and the times.
 
 use std::fmt::Display;
+use std::time::Duration;
 
 // Modes, tools and controls.
 pub const TURN: &str = "Turn";
@@ -90,7 +91,7 @@ pub(crate) const COLOUR_HINT: &str = "Colours of the tissue; they stand for no f
 pub const COLOUR: &str = "Colour";
 pub(crate) const OPACITY_OF: &str = "Opacity of";
 pub(crate) const OPACITY_OF_HINT: &str = "Whose opacities the volume has, whatever its colours.";
-pub(crate) const SAME_AS_COLOUR: &str = "Colour's own";
+pub(crate) const SAME_AS_COLOUR: &str = "Own";
 pub(crate) const CAST_SHADOWS: &str = "Cast shadows";
 pub(crate) const CAST_SHADOWS_HINT: &str = "The lamp casts shadows on the surface.";
 pub(crate) const REFERENCE_PICTURE_HINT: &str =
@@ -125,6 +126,15 @@ pub const FROZEN: &str = "FROZEN";
 pub(crate) const FREEZE: &str = "Freeze";
 pub(crate) const FREEZE_HINT: &str = "Keeps this volume on the screen (Space).";
 pub(crate) const UNFREEZE: &str = "Unfreeze";
+pub(crate) const ENDED: &str = "Ended";
+pub(crate) const ENDED_HINT: &str = "The source has ended: no more frames come, and the loop is what came.";
+pub(crate) fn ended_for(ago: Duration) -> String {
+    match ago.as_secs() {
+        seconds @ 0..60 => format!("{ENDED} {seconds} s"),
+        seconds @ 60..3600 => format!("{ENDED} {} min", seconds / 60),
+        seconds => format!("{ENDED} {} h", seconds / 3600),
+    }
+}
 pub(crate) const SAVE_PICTURE: &str = "Save picture";
 pub(crate) const SAVE_PICTURE_HINT: &str = "Saves the picture (P).";
 pub(crate) const HELP_HINT: &str = "All keys and gestures (H).";
@@ -231,6 +241,7 @@ pub(crate) const WITH_THREE_PLANES: &str = " with three planes";
 pub(crate) const BESIDE_THE_VOLUME: &str = " beside the volume";
 pub(crate) const IS_FROZEN: &str = "frozen";
 pub(crate) const IS_LIVE: &str = "live";
+pub(crate) const HAS_ENDED: &str = "the source has ended";
 pub(crate) fn volume_of_loop(number: impl Display, count: impl Display) -> String {
     format!("Volume {number} of {count}. ")
 }
