@@ -47,6 +47,12 @@ pub(super) fn check(settings: &Settings) -> Result<(), SceneError> {
     if settings.layout == Layout::Four && settings.mode.is_flat() {
         return refuse("layout", "four shows three planes and a rendering: the mode must be one that renders");
     }
+    if settings.marks.are_mirrored() {
+        return refuse(
+            "marks.elevation",
+            "sides of a mirrored patient: with these of lateral and depth it is the other way round (or lateral is)",
+        );
+    }
     if settings.surface.sign == Sign::Any && settings.surface.detector != Detector::Threshold {
         return refuse(
             "surface.sign",

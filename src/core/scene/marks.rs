@@ -29,27 +29,61 @@ impl Marks {
         }
     }
 
-    /// These marks with other sides along an axis. A pair of sides lies along one axis: another axis that had it has none then.
+    fn sides_mut(&mut self, axis: VolumeAxis) -> &mut Sides {
+        match axis {
+            VolumeAxis::Lateral => &mut self.lateral,
+            VolumeAxis::Depth => &mut self.depth,
+            VolumeAxis::Elevation => &mut self.elevation,
+        }
+    }
+
+    /// True if the three axes have sides that only the mirror image of a patient has.
+    pub fn are_mirrored(&self) -> bool {
+        self.lateral.direction().dot(self.depth.direction().cross(self.elevation.direction())) < 0.0
+    }
+
+    /// These marks with other sides along an axis. A pair of sides lies along one axis: another axis that had it has none then. With the second axis the
+    /// third is known, too. Where all are known, a probe that is turned has two axes the other way: lateral and elevation, or depth and elevation.
     pub fn with_sides(mut self, axis: VolumeAxis, sides: Sides) -> Marks {
         for other in [&mut self.lateral, &mut self.depth, &mut self.elevation] {
             if *other == sides || *other == sides.exchanged() {
                 *other = Sides::None;
             }
         }
-        *match axis {
-            VolumeAxis::Lateral => &mut self.lateral,
-            VolumeAxis::Depth => &mut self.depth,
-            VolumeAxis::Elevation => &mut self.elevation,
-        } = sides;
-        self
+        *self.sides_mut(axis) = sides;
+        if sides == Sides::None {
+            return self;
+        }
+        let [lateral, depth, elevation] = [self.lateral, self.depth, self.elevation].map(Sides::direction);
+        let third = [
+            (VolumeAxis::Lateral, depth.cross(elevation)),
+            (VolumeAxis::Depth, elevation.cross(lateral)),
+            (VolumeAxis::Elevation, lateral.cross(depth)),
+        ];
+        for (unknown, direction) in third {
+            if self.sides(unknown) == Sides::None && direction != DVec3::ZERO {
+                *self.sides_mut(unknown) = Sides::along(direction);
+            }
+        }
+        self.turned_with(axis)
     }
 
-    /// These marks with L in place of R, and R in place of L.
+    /// These marks with L in place of R, and R in place of L, as of a probe that is turned.
     pub fn left_and_right_exchanged(mut self) -> Marks {
-        for sides in [&mut self.lateral, &mut self.depth, &mut self.elevation] {
-            if matches!(sides, Sides::LeftRight | Sides::RightLeft) {
-                *sides = sides.exchanged();
-            }
+        let is_across = |axis: &VolumeAxis| matches!(self.sides(*axis), Sides::LeftRight | Sides::RightLeft);
+        let Some(axis) = [VolumeAxis::Lateral, VolumeAxis::Depth, VolumeAxis::Elevation].into_iter().find(is_across)
+        else {
+            return self;
+        };
+        *self.sides_mut(axis) = self.sides(axis).exchanged();
+        self.turned_with(axis)
+    }
+
+    /// These marks without a mirror: a second axis is the other way, too, if `axis` was changed alone.
+    fn turned_with(mut self, axis: VolumeAxis) -> Marks {
+        if self.are_mirrored() {
+            let second = if axis == VolumeAxis::Elevation { VolumeAxis::Lateral } else { VolumeAxis::Elevation };
+            *self.sides_mut(second) = self.sides(second).exchanged();
         }
         self
     }
@@ -271,6 +305,58 @@ mod tests {
     }
 
     const SIDES: [&str; 2] = ["marks.lateral='right-left'", "marks.elevation='feet-head'"];
+
+    /// Requirement: only sides that a patient has can be stated; the third axis follows from two.
+    #[test]
+    fn no_sequence_of_statements_gives_a_mirrored_patient() {
+        use VolumeAxis::{Depth, Elevation, Lateral};
+        let all = [
+            Sides::None,
+            Sides::LeftRight,
+            Sides::RightLeft,
+            Sides::HeadFeet,
+            Sides::FeetHead,
+            Sides::FrontBack,
+            Sides::BackFront,
+        ];
+        // A probe on the belly, with its first scan line at the patient's right.
+        let marks = Marks::default().with_sides(Lateral, Sides::RightLeft);
+        assert_eq!([marks.depth, marks.elevation], [Sides::None; 2]);
+        let marks = marks.with_sides(Depth, Sides::FrontBack);
+        assert_eq!(marks.elevation, Sides::FeetHead);
+        let turned = marks.clone().with_sides(Lateral, Sides::LeftRight);
+        assert_eq!(
+            [turned.lateral, turned.depth, turned.elevation],
+            [Sides::LeftRight, Sides::FrontBack, Sides::HeadFeet]
+        );
+        assert_eq!(marks.clone().left_and_right_exchanged(), turned);
+        assert_eq!(marks.with_sides(Elevation, Sides::HeadFeet), turned, "the other way round");
+        // All that can be reached.
+        let mut reached = vec![Marks::default()];
+        let mut n = 0;
+        while n < reached.len() {
+            let from = reached[n].clone();
+            let stated = [Lateral, Depth, Elevation].into_iter().flat_map(|axis| all.map(|sides| (axis, sides)));
+            let mut next: Vec<Marks> = stated.map(|(axis, sides)| from.clone().with_sides(axis, sides)).collect();
+            next.push(from.left_and_right_exchanged());
+            next.retain(|marks| !reached.contains(marks));
+            next.dedup();
+            reached.extend(next);
+            n += 1;
+        }
+        let whole = |marks: &&Marks| ![marks.lateral, marks.depth, marks.elevation].contains(&Sides::None);
+        assert!(reached.iter().all(|marks| !marks.are_mirrored()));
+        let mut wholes: Vec<_> = reached.iter().filter(whole).map(|m| format!("{m:?}")).collect();
+        wholes.sort();
+        wholes.dedup();
+        assert_eq!(wholes.len(), 24, "each way to hold a probe");
+        for axes in [[1, 3, 5], [2, 3, 5], [1, 4, 5], [1, 3, 6]].map(|axes| axes.map(|n: usize| all[n])) {
+            let [lateral, elevation, depth] = axes;
+            let marks = Marks { lateral, depth, elevation, ..Marks::default() };
+            let volume = lateral.direction().cross(depth.direction()).dot(elevation.direction());
+            assert_eq!(marks.are_mirrored(), volume < 0.0, "{marks:?}");
+        }
+    }
 
     #[test]
     fn letters_stand_where_the_axes_point() {

@@ -34,7 +34,7 @@ pub(crate) fn files_as_series(count: usize) -> String {
 pub(crate) const OPENS_NO_OTHER_FILES: &str = "This view opens no other files";
 pub(crate) const SAVE_THE_WORKSPACE_FIRST: &str =
     "Measurements or cuts are not saved: save the workspace first (Ctrl+S)";
-pub fn loses_work(name: impl Display) -> String {
+pub(crate) fn loses_work(name: impl Display) -> String {
     format!(
         "Measurements or cuts of {name} are not saved: save the workspace first (Ctrl+S), or close it again to lose them"
     )

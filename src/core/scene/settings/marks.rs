@@ -1,5 +1,6 @@
 //! Settings of marks: the sides of the patient on every tile, and the bar of a written picture. No pass reads them.
 
+use glam::DVec3;
 use serde::{Deserialize, Serialize};
 
 /// Marks beside and on the picture. The viewer shows the sides on every tile; `render` draws them only with `bar`.
@@ -8,7 +9,8 @@ use serde::{Deserialize, Serialize};
 pub struct Marks {
     /// The scan line at which the marker on the probe's housing is. A dot shows its side on every tile.
     pub probe: ProbeMarker,
-    /// The patient's sides from the first scan line (-lateral) to the last (+lateral).
+    /// The patient's sides from the first scan line (-lateral) to the last (+lateral). Of three axes two say the third: others are refused as those of a
+    /// mirrored patient.
     pub lateral: Sides,
     /// The patient's sides from the probe's face down.
     pub depth: Sides,
@@ -65,6 +67,24 @@ impl Sides {
             Sides::FrontBack => Sides::BackFront,
             Sides::BackFront => Sides::FrontBack,
         }
+    }
+
+    /// The direction from its first end to its last, in axes of the patient to the left, to the back and to the head; 0 if it is not known.
+    pub(crate) fn direction(self) -> DVec3 {
+        match self {
+            Sides::None => DVec3::ZERO,
+            Sides::RightLeft => DVec3::X,
+            Sides::FrontBack => DVec3::Y,
+            Sides::FeetHead => DVec3::Z,
+            other => -other.exchanged().direction(),
+        }
+    }
+
+    /// The sides in this direction.
+    pub(crate) fn along(direction: DVec3) -> Sides {
+        let all = [Sides::RightLeft, Sides::FrontBack, Sides::FeetHead];
+        let all = all.into_iter().flat_map(|sides| [sides, sides.exchanged()]);
+        all.max_by(|a, b| a.direction().dot(direction).total_cmp(&b.direction().dot(direction))).unwrap_or_default()
     }
 
     /// The letters at the two ends of the axis.
