@@ -38,7 +38,7 @@ impl Marks {
     }
 
     /// True if the three axes have sides that only the mirror image of a patient has.
-    pub fn are_mirrored(&self) -> bool {
+    pub(crate) fn are_mirrored(&self) -> bool {
         self.lateral.direction().dot(self.depth.direction().cross(self.elevation.direction())) < 0.0
     }
 
