@@ -50,7 +50,7 @@ pub(super) fn check(settings: &Settings) -> Result<(), SceneError> {
     if settings.marks.are_mirrored() {
         return refuse(
             "marks.elevation",
-            "sides of a mirrored patient: with these of lateral and depth it is the other way round (or lateral is)",
+            "lateral, depth and elevation are those of a mirror image: exchange the sides of one",
         );
     }
     if settings.surface.sign == Sign::Any && settings.surface.detector != Detector::Threshold {
