@@ -317,15 +317,16 @@ mod tests {
             names,
             [
                 ("range", 0, true),
-                ("few", 4, true),
-                ("slice", 8, false),
-                ("first_column", 12, false),
-                ("first_row", 16, false),
-                ("end_column", 20, false),
-                ("end_row", 24, false),
-                ("first_stored_column", 28, false),
-                ("first_stored_row", 32, false),
-                ("first_stored_slice", 36, false)
+                ("tie", 4, true),
+                ("few", 8, true),
+                ("slice", 12, false),
+                ("first_column", 16, false),
+                ("first_row", 20, false),
+                ("end_column", 24, false),
+                ("end_row", 28, false),
+                ("first_stored_column", 32, false),
+                ("first_stored_row", 36, false),
+                ("first_stored_slice", 40, false)
             ]
         );
         let gaussian = reflect(&words(embedded("filter/gaussian").unwrap())).unwrap();
