@@ -3,16 +3,15 @@
 //! The numbers of samples, lines and frames are not in it. They come from the recording.
 
 use super::axis::Axis;
-use super::geometry::{Advance, Array, GeometryError, Motion, Probe, Volumes};
+use super::geometry::{Advance, Array, Firing, GeometryError, Motion, Probe, Volumes};
 use super::motor::MotorTable;
 use crate::files::{self, InputError};
 use crate::tree;
 use serde::Deserialize;
-use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 
 /// Largest probe file, bytes.
-const MAX_BYTES: u64 = 1 << 20;
+pub(super) const MAX_BYTES: u64 = 1 << 20;
 /// Thickness of the slab that a single frame is drawn as, mm.
 pub const SLAB: f64 = 1.0;
 
@@ -21,6 +20,7 @@ pub const SLAB: f64 = 1.0;
 pub struct ProbeFile {
     path: PathBuf,
     tables: Tables,
+    interval: Option<f64>,
 }
 
 impl ProbeFile {
@@ -34,13 +34,13 @@ impl ProbeFile {
         ProbeFile::parse(path, &text)
     }
 
-    fn parse(path: &Path, text: &str) -> Result<ProbeFile, InputError> {
+    pub(super) fn parse(path: &Path, text: &str) -> Result<ProbeFile, InputError> {
         let tables = tree::from_text::<Tables>(text).map_err(|e| {
             let before = e.span().and_then(|s| text.get(..s.start)).unwrap_or("");
             let line = before.matches('\n').count() + 1;
             InputError::new(path, format!("line {line}"), e.message().trim().replace('\n', ", "))
         })?;
-        ProbeFile { path: path.into(), tables }.checked()
+        ProbeFile { path: path.into(), tables, interval: None }.checked()
     }
 
     /// As [`ProbeFile::read`], from the tables as JSON objects. `path` names their origin in messages.
@@ -49,7 +49,7 @@ impl ProbeFile {
     /// As [`ProbeFile::read`].
     pub fn from_json(path: &Path, tables: serde_json::Value) -> Result<ProbeFile, InputError> {
         let tables = serde_json::from_value(tables).map_err(|e| InputError::new(path, "probe", e.to_string()))?;
-        ProbeFile { path: path.into(), tables }.checked()
+        ProbeFile { path: path.into(), tables, interval: None }.checked()
     }
 
     fn checked(self) -> Result<ProbeFile, InputError> {
@@ -71,6 +71,11 @@ impl ProbeFile {
     /// The file that was read.
     pub fn path(&self) -> &Path {
         &self.path
+    }
+
+    /// As this file, for a recording whose frames follow each other after so many seconds by its time stamps.
+    pub fn timed(self, interval: Option<f64>) -> ProbeFile {
+        ProbeFile { interval, ..self }
     }
 
     /// Sample values that are shown as 0 and 1, in the unit of the recording; None if the file has none.
@@ -139,8 +144,11 @@ impl ProbeFile {
         if let Some(ratio) = motion.speed_ratio.filter(|ratio| *ratio > 1.0) {
             return self.fault("motion.speed_ratio", format!("is {ratio}, must be 0 to 1"));
         }
-        if motion.speed_ratio.is_some() && motion.motor_speed().is_some() {
-            return self.fault("motion.speed_ratio", "follows from the speed of the motor: leave one of them out");
+        let ways = [motion.speed_ratio.is_some(), motion.motor_speed().is_some(), motion.steady];
+        if ways.into_iter().filter(|is_stated| *is_stated).count() > 1 {
+            let fault =
+                "follows from the speed of the motor, and from a steady motor and time stamps: leave all but one out";
+            return self.fault("motion.speed_ratio", fault);
         }
         if motion.kind == MotionKind::Still && motion.frames_per_volume > 1 {
             return self.fault("motion.frames_per_volume", "must be 1 when the probe is still");
@@ -157,7 +165,7 @@ impl ProbeFile {
     }
 
     /// The probe, without [`Advance`], and the volumes of a recording with so many samples a line, lines a frame, and frames.
-    /// [`Volumes::advance`] gives the advance of each volume.
+    /// [`Volumes::swept`] gives the probe in each volume.
     ///
     /// # Errors
     /// Tables of another length, fewer frames than one volume, and numbers that make no valid [`Probe`].
@@ -183,37 +191,44 @@ impl ProbeFile {
             sound_speed: self.tables.sound.speed_m_per_s,
         };
         probe.check().map_err(|e| geometry_error(&self.path, &e))?;
-        if let Some(speed) = self.tables.motion.motor_speed() {
-            volumes.speed_ratio = self.speed_ratio(&probe, speed)?;
+        if let Some(ratio) = self.speed_ratio(&probe)? {
+            volumes.speed_ratio = ratio;
         }
         for volume in 0..volumes.count.min(2) {
-            let advance = volumes.advance(volume, &probe.slices);
-            let moving = Probe { advance, ..probe.clone() };
-            moving.check().map_err(|e| geometry_error(&self.path, &e))?;
+            volumes.swept(volume, &probe).check().map_err(|e| geometry_error(&self.path, &e))?;
         }
         Ok((probe, volumes))
     }
 
     /// The share of the way to the next frame that the motor travels while one is acquired, as sound fires its lines one after the other
-    /// without a pause (thesis 4.4.2.2): it follows from depth and speed, and is said.
-    fn speed_ratio(&self, probe: &Probe, (field, speed): (&'static str, f64)) -> Result<f64, InputError> {
-        let count = probe.slices.len();
-        if count < 2 {
-            return Ok(0.0);
-        }
+    /// without a pause (thesis 4.4.2.2), where it follows from depth and the speed of the motor or the time between frames. It is said.
+    fn speed_ratio(&self, probe: &Probe) -> Result<Option<f64>, InputError> {
+        let (motion, count, lines) = (&self.tables.motion, probe.slices.len(), probe.lines.len());
         let frame_time = probe.acquisition_time() / count as f64;
-        let pitch = (probe.slices.last() - probe.slices.first()) / (count - 1) as f64;
-        let ratio = speed * frame_time / pitch;
-        let lines = probe.lines.len();
+        let pitch = (probe.slices.last() - probe.slices.first()) / (count.max(2) - 1) as f64;
+        let (field, ratio, after) = match (motion.motor_speed(), motion.steady, self.interval) {
+            (None, false, _) => return Ok(None),
+            _ if count < 2 => return Ok(Some(0.0)),
+            (Some((field, speed)), ..) => (field, speed * frame_time / pitch, String::new()),
+            (None, true, Some(interval)) => {
+                let after = format!(" of {:.2} ms between time stamps", interval * 1e3);
+                ("motion.steady", frame_time / interval, after)
+            }
+            (None, true, None) => {
+                let fault =
+                    "needs time stamps of the frames, which are missing here: state speed_ratio or the motor's speed";
+                return self.fault("motion.steady", fault);
+            }
+        };
         let said = format!(
-            "the motor travels {ratio:.3} of the way to the next frame while {lines} lines take {:.2} ms",
+            "the motor travels {ratio:.3} of the way to the next frame while {lines} lines take {:.2} ms{after}",
             frame_time * 1e3
         );
         if ratio > 1.0 {
             return self.fault(field, format!("{said}: at most 1"));
         }
         tracing::warn!(file = %self.path.display(), "{field}: {said}");
-        Ok(ratio)
+        Ok(Some(ratio))
     }
 
     fn volumes(&self, frames: usize) -> Result<Volumes, InputError> {
@@ -233,6 +248,7 @@ impl ProbeFile {
             both_ways: motion.both_ways,
             first_backward: motion.first_direction == Direction::Backward,
             speed_ratio: motion.speed_ratio.unwrap_or(0.0),
+            firing: self.tables.lines.firing,
         })
     }
 
@@ -353,6 +369,8 @@ struct LinesTable {
     width_mm: Option<f64>,
     angles_deg: Option<Vec<f64>>,
     positions_mm: Option<Vec<f64>>,
+    #[serde(default)]
+    firing: Firing,
 }
 
 #[derive(Clone, Debug, PartialEq, Deserialize)]
@@ -404,6 +422,9 @@ struct MotionTable {
     /// Speed of the motor, from which the ratio follows, in the unit of the motion.
     motor_deg_per_s: Option<f64>,
     motor_mm_per_s: Option<f64>,
+    /// The motor never stops between frames: the ratio follows from their time stamps.
+    #[serde(default)]
+    steady: bool,
 }
 
 impl MotionTable {
@@ -430,106 +451,6 @@ impl Default for SoundTable {
 #[serde(deny_unknown_fields)]
 struct SamplesTable {
     range: Option<[f64; 2]>,
-}
-
-/// Positions that differ by no more, in rad or mm, are equal: converting angles to degrees and back rounds.
-const POSITION_TOLERANCE: f64 = 1e-9;
-
-impl ProbeFile {
-    /// The text of a probe file that [`ProbeFile::read`] and [`ProbeFile::geometry`] turn into this probe and these volumes again.
-    /// `probe`: of the first volume. `range`: the values that are shown as 0 and 1.
-    ///
-    /// # Errors
-    /// In words, a probe that no file can describe: an advance that is not that of a motor at constant speed, or tables that are longer
-    /// than a file may be.
-    pub fn to_toml(probe: &Probe, volumes: &Volumes, range: [f64; 2]) -> Result<String, String> {
-        let gap = probe.slices.at(1.0) - probe.slices.at(0.0);
-        let advance = probe.slice_position(probe.lines.len() as f64, 0.0) - probe.slice_position(0.0, 0.0);
-        let speed_ratio = if probe.slices.len() > 1 { (advance / gap).abs() } else { 0.0 };
-        let text = written(probe, &Volumes { speed_ratio, ..volumes.clone() }, range);
-        let read = ProbeFile::parse(Path::new("probe.toml"), &text)
-            .and_then(|file| file.geometry(probe.samples, probe.lines.len(), volumes.frames * volumes.count));
-        let (read, read_volumes) = read.map_err(|e| format!("{}: {}", e.field(), e.fault()))?;
-        let read = Probe { advance: read_volumes.advance(0, &read.slices), ..read };
-        match is_same(probe, &read) && text.len() as u64 <= MAX_BYTES {
-            true => Ok(text),
-            false => Err("cannot be described by a probe file".into()),
-        }
-    }
-}
-
-fn written(probe: &Probe, volumes: &Volumes, [low, high]: [f64; 2]) -> String {
-    let mut text = String::from("# Lengths in mm, angles in degrees.\n");
-    let mut say = |line: std::fmt::Arguments| {
-        // Writing to a String cannot fail.
-        let _ = writeln!(text, "{line}");
-    };
-    match probe.array {
-        Array::Curved { radius } => {
-            say(format_args!("[array]\nkind = \"curved\"\nradius_mm = {radius:?}\n\n[lines]"));
-            say(format_args!("{}\n", angles("sector_angle_deg", "angles_deg", &probe.lines)));
-        }
-        Array::Linear => {
-            say(format_args!("[array]\nkind = \"linear\"\n\n[lines]"));
-            let span = probe.lines.last() - probe.lines.first();
-            say(format_args!("{}\n", axis(("width_mm", span), "positions_mm", &probe.lines, 1.0)));
-        }
-    }
-    say(format_args!("[depth]\nstart_mm = {:?}\nsample_pitch_mm = {:?}\n", probe.start_depth, probe.sample_pitch));
-    match probe.motion {
-        Motion::Still { thickness } => say(format_args!("[motion]\nkind = \"still\"\nthickness_mm = {thickness:?}")),
-        Motion::Translated => {
-            say(format_args!("[motion]\nkind = \"translated\""));
-            say(format_args!("{}", axis(("pitch_mm", probe.slices.pitch()), "frame_positions_mm", &probe.slices, 1.0)));
-        }
-        Motion::Fan { wobble_radius } => {
-            say(format_args!("[motion]\nkind = \"fan\"\nwobble_radius_mm = {wobble_radius:?}"));
-            say(format_args!("{}", angles("fan_angle_deg", "frame_angles_deg", &probe.slices)));
-        }
-    }
-    let direction = if volumes.first_backward { "backward" } else { "forward" };
-    say(format_args!("frames_per_volume = {}\nboth_ways = {}", volumes.frames, volumes.both_ways));
-    say(format_args!("first_direction = \"{direction}\"\nspeed_ratio = {:?}\n", volumes.speed_ratio));
-    say(format_args!("[sound]\nspeed_m_per_s = {:?}\n\n[samples]\nrange = [{low:?}, {high:?}]", probe.sound_speed));
-    text
-}
-
-fn angles(even: &str, table: &str, positions: &Axis) -> String {
-    let span = (positions.last() - positions.first()).to_degrees();
-    axis((even, span), table, positions, 180.0 / std::f64::consts::PI)
-}
-
-/// One number for positions that are uniform and centred, otherwise all of them.
-fn axis((even, number): (&str, f64), table: &str, positions: &Axis, scale: f64) -> String {
-    let is_centred = (positions.first() + positions.last()).abs() <= POSITION_TOLERANCE;
-    match positions {
-        Axis::Even { .. } if is_centred => format!("{even} = {number:?}"),
-        _ => {
-            let all: Vec<String> =
-                (0..positions.len()).map(|k| format!("{:?}", positions.at(k as f64) * scale)).collect();
-            format!("{table} = [{}]", all.join(", "))
-        }
-    }
-}
-
-fn is_same(a: &Probe, b: &Probe) -> bool {
-    let equal = |a: f64, b: f64| (a - b).abs() <= POSITION_TOLERANCE * a.abs().max(1.0);
-    let kinds = match (a.motion, b.motion) {
-        (Motion::Fan { wobble_radius: a }, Motion::Fan { wobble_radius: b }) => equal(a, b),
-        (Motion::Still { thickness: a }, Motion::Still { thickness: b }) => equal(a, b),
-        (a, b) => a == b,
-    };
-    let sizes = |p: &Probe| [p.samples, p.lines.len(), p.slices.len()];
-    let numbers = |p: &Probe| [p.array_radius(), p.start_depth, p.sample_pitch, p.sound_speed];
-    let last = a.lines.len() as f64;
-    kinds
-        && std::mem::discriminant(&a.array) == std::mem::discriminant(&b.array)
-        && sizes(a) == sizes(b)
-        && numbers(a).into_iter().zip(numbers(b)).all(|(a, b)| equal(a, b))
-        && (0..a.lines.len()).map(|k| k as f64).all(|k| equal(a.lines.at(k), b.lines.at(k)))
-        && (0..a.slices.len())
-            .map(|k| k as f64)
-            .all(|k| [0.0, last].into_iter().all(|line| equal(a.slice_position(line, k), b.slice_position(line, k))))
 }
 
 #[cfg(test)]
@@ -580,6 +501,18 @@ mod tests {
         );
     }
 
+    /// 14.66 ms of the 20 ms from frame to frame; without time stamps, or with frames that follow sooner, it is refused.
+    #[test]
+    fn the_speed_ratio_of_a_steady_motor_follows_from_time_stamps() {
+        let of = |interval| parse(&format!("{FAN}steady = true\n")).unwrap().timed(interval).geometry(160, 71, 61);
+        let ratio = of(Some(0.02)).unwrap().1.speed_ratio;
+        assert!((ratio - 71.0 * 2.0 * 0.159 / 1540.0 / 0.02).abs() < 1e-12, "{ratio}");
+        for (interval, named) in [(None, "needs time stamps"), (Some(0.01), "at most 1")] {
+            let error = of(interval).unwrap_err().to_string();
+            assert!(error.contains("motion.steady") && error.contains(named), "{error}");
+        }
+    }
+
     #[test]
     fn one_frame_of_a_fan_is_a_slab() {
         let (probe, _) = parse(FAN).unwrap().geometry(160, 71, 1).unwrap();
@@ -602,6 +535,8 @@ mod tests {
             ("fan_angle_deg = 60", "fan_angle_deg = 60\nmotor_mm_per_s = 3", "motion.motor_mm_per_s"),
             ("fan_angle_deg = 60", "fan_angle_deg = 60\nmotor_deg_per_s = 140", "at most 1"),
             ("fan_angle_deg = 60", "fan_angle_deg = 60\nmotor_deg_per_s = 3\nspeed_ratio = 0", "motion.speed_ratio"),
+            ("fan_angle_deg = 60", "fan_angle_deg = 60\nmotor_deg_per_s = 3\nsteady = true", "motion.speed_ratio"),
+            ("sector_angle_deg = 70", "sector_angle_deg = 70\nfiring = 'sideways'", "sideways"),
             ("fan_angle_deg = 60", "fan_angle_deg = 60\n[samples]\nrange = [1, 1]", "samples.range"),
             ("sector_angle_deg = 70", "sector_angle_deg = 370", "sector angle"),
             ("wobble_radius_mm = 25", "wobble_radius_mm = -1", "wobble"),
@@ -612,67 +547,5 @@ mod tests {
             assert!(error.starts_with("probe.toml: ") && error.contains(named), "{error}");
             assert_eq!(error.lines().count(), 1);
         }
-    }
-}
-
-#[cfg(test)]
-mod writing_tests {
-    use super::*;
-
-    fn probe() -> Probe {
-        let volumes = Volumes { speed_ratio: 0.4, ..Volumes::forward(7, 2) };
-        let slices = Axis::centred(0.03, 7);
-        Probe {
-            array: Array::Curved { radius: 39.8 },
-            lines: Axis::centred(0.011, 40),
-            start_depth: 1.5,
-            sample_pitch: 0.25,
-            samples: 100,
-            motion: Motion::Fan { wobble_radius: 20.0 },
-            advance: volumes.advance(0, &slices),
-            slices,
-            sound_speed: 1480.0,
-        }
-    }
-
-    #[test]
-    fn a_written_probe_is_read_as_the_same() {
-        let uneven = Axis::Table(vec![-0.1, -0.05, 0.01, 0.05, 0.06, 0.09, 0.2]);
-        let off_centre = Axis::Even { first: 0.01, pitch: 0.02, count: 40 };
-        let volumes = Volumes { both_ways: true, ..Volumes::forward(7, 2) };
-        let moving = Volumes { speed_ratio: 0.3, first_backward: true, ..volumes.clone() };
-        let linear =
-            Probe { array: Array::Linear, lines: Axis::centred(0.3, 40), motion: Motion::Translated, ..probe() };
-        for (probe, volumes) in [
-            (probe(), volumes.clone()),
-            (Probe { lines: off_centre, ..probe() }, volumes.clone()),
-            (Probe { slices: uneven.clone(), advance: moving.advance(0, &uneven), ..probe() }, moving),
-            (linear.clone(), volumes.clone()),
-            (
-                Probe { slices: Axis::Even { first: 4.0, pitch: 0.5, count: 7 }, advance: Advance::None, ..linear },
-                volumes,
-            ),
-            (
-                Probe {
-                    motion: Motion::Still { thickness: 2.5 },
-                    slices: Axis::centred(1.0, 1),
-                    advance: Advance::None,
-                    ..probe()
-                },
-                Volumes::forward(1, 3),
-            ),
-        ] {
-            let text = ProbeFile::to_toml(&probe, &volumes, [3.0, 250.0]).unwrap();
-            let file = ProbeFile::parse(Path::new("probe.toml"), &text).unwrap();
-            let (read, read_volumes) = file.geometry(100, 40, volumes.frames * volumes.count).unwrap();
-            assert!(is_same(&Probe { advance: read_volumes.advance(0, &read.slices), ..read }, &probe), "{text}");
-            assert_eq!(
-                (read_volumes.both_ways, read_volumes.first_backward),
-                (volumes.both_ways, volumes.first_backward)
-            );
-            assert_eq!(file.range(), Some([3.0, 250.0]));
-        }
-        let irregular = Probe { advance: Advance::Each(vec![0.01, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0]), ..probe() };
-        assert!(ProbeFile::to_toml(&irregular, &Volumes::forward(7, 1), [0.0, 1.0]).is_err());
     }
 }

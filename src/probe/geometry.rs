@@ -430,12 +430,34 @@ pub struct Volumes {
     pub first_backward: bool,
     /// Fraction of the distance to the next frame that the motor travels while one frame is acquired (s), 0..=1.
     pub speed_ratio: f64,
+    pub firing: Firing,
+}
+
+/// Order in which the lines of a frame fire.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Firing {
+    /// From line 0.
+    #[default]
+    Forward,
+    /// From the last line.
+    Backward,
+    /// In each volume the first frame in time fires from line 0, the next from the last line, and so on.
+    Alternating,
 }
 
 impl Volumes {
     /// `count` volumes of `frames`, all swept forwards by a motor that stops for each frame.
     pub fn forward(frames: usize, count: usize) -> Volumes {
-        Volumes { frames, count, left_over: 0, both_ways: false, first_backward: false, speed_ratio: 0.0 }
+        Volumes {
+            frames,
+            count,
+            left_over: 0,
+            both_ways: false,
+            first_backward: false,
+            speed_ratio: 0.0,
+            firing: Firing::Forward,
+        }
     }
 
     /// True if this volume was swept backwards.
@@ -443,9 +465,40 @@ impl Volumes {
         self.first_backward ^ (self.both_ways && volume % 2 == 1)
     }
 
+    /// True if slice k of a volume fires from its last line.
+    pub(super) fn fires_from_last(&self, volume: usize, k: usize) -> bool {
+        match self.firing {
+            Firing::Forward => false,
+            Firing::Backward => true,
+            Firing::Alternating => (if self.backward(volume) { self.frames - 1 - k } else { k }) % 2 == 1,
+        }
+    }
+
+    /// The probe in this volume: where each slice was at its line 0, and how far the motor travels over its lines. The line that fires
+    /// j-th in frame k, in the order of time, is at f = f_first + dir df (k + s j / L) (thesis 4.4.2.2, Fig. 40).
+    pub fn swept(&self, volume: usize, probe: &Probe) -> Probe {
+        let (lines, last) = (probe.lines.len() as f64, probe.slices.len() - 1);
+        let late = (lines - 1.0) / lines;
+        let is_turned = |k| self.fires_from_last(volume, k);
+        let (slices, advance) = match (self.advance(volume, &probe.slices), &probe.slices, self.firing) {
+            (advance @ Advance::None, slices, _) | (advance, slices, Firing::Forward) => (slices.clone(), advance),
+            (Advance::Same(travel), Axis::Even { first, pitch, count }, Firing::Backward) => {
+                (Axis::Even { first: first + late * travel, pitch: *pitch, count: *count }, Advance::Same(-travel))
+            }
+            (advance, slices, _) => {
+                let moving = Probe { advance, ..probe.clone() };
+                let travel = |k: usize| moving.advance_at(k as f64);
+                let start = |k: usize| slices.at(k as f64) + if is_turned(k) { late * travel(k) } else { 0.0 };
+                let turned = |k: usize| if is_turned(k) { -travel(k) } else { travel(k) };
+                (Axis::Table((0..=last).map(start).collect()), Advance::Each((0..=last).map(turned).collect()))
+            }
+        };
+        Probe { slices, advance, ..probe.clone() }
+    }
+
     /// Travel of the motor while each frame of this volume was acquired: towards the frame that followed in time, so negative for a
-    /// backward sweep: f = f_first + dir df (k + s j / L) for line j of frame k (thesis 4.4.2.2, Fig. 40).
-    pub fn advance(&self, volume: usize, slices: &Axis) -> Advance {
+    /// backward sweep.
+    fn advance(&self, volume: usize, slices: &Axis) -> Advance {
         if self.speed_ratio == 0.0 || slices.len() < 2 {
             return Advance::None;
         }
@@ -467,6 +520,41 @@ impl Volumes {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// Against the motor's place at the time of each line, for each order of firing, both ways.
+    #[test]
+    fn lines_lie_where_the_motor_was_when_they_fired() {
+        let probe = Probe {
+            array: Array::Linear,
+            lines: Axis::centred(0.3, 5),
+            start_depth: 0.0,
+            sample_pitch: 0.2,
+            samples: 10,
+            motion: Motion::Translated,
+            slices: Axis::centred(2.0, 6),
+            advance: Advance::None,
+            sound_speed: 1540.0,
+        };
+        for firing in [Firing::Forward, Firing::Backward, Firing::Alternating] {
+            let volumes = Volumes { both_ways: true, speed_ratio: 0.75, firing, ..Volumes::forward(6, 2) };
+            for volume in 0..2 {
+                let swept = volumes.swept(volume, &probe);
+                swept.check().unwrap();
+                for frame in 0..6 {
+                    let from_last = firing == Firing::Backward || (firing == Firing::Alternating && frame % 2 == 1);
+                    for fired in 0..5 {
+                        let way = 2.0 * (f64::from(frame) + 0.75 * f64::from(fired) / 5.0);
+                        let (slice, expected) = if volume == 0 { (frame, way - 5.0) } else { (5 - frame, 5.0 - way) };
+                        let line = if from_last { 4 - fired } else { fired };
+                        let at = swept.slice_position(f64::from(line), f64::from(slice));
+                        assert!((at - expected).abs() < 1e-12, "{firing:?} {volume} {frame} {fired}: {at} {expected}");
+                    }
+                }
+            }
+        }
+        let volumes = Volumes { firing: Firing::Alternating, ..Volumes::forward(6, 2) };
+        assert_eq!(volumes.swept(0, &probe), probe, "a motor that stops for each frame");
+    }
 
     /// Line 0 of the next frame in time is where the motor is when the last line of this one is done.
     #[test]

@@ -1,5 +1,6 @@
 //! The geometry of a volume: polar frames of a swept probe, or slices of a Cartesian grid.
 
+use super::axis::Axis;
 use super::geometry::{Advance, GeometryError, Probe};
 use serde::{Deserialize, Serialize};
 
@@ -79,6 +80,20 @@ impl Geometry {
         }
     }
 
+    /// True if the two differ at most in the motor's travel during a frame and in the line that fires first: a slice is where the other's is, or
+    /// within the travel of both.
+    pub fn equals_except_travel(&self, other: &Geometry) -> bool {
+        let (Geometry::Sweep(a), Geometry::Sweep(b)) = (self, other) else { return self == other };
+        let moved = Geometry::Sweep(Probe { slices: a.slices.clone(), ..b.clone() });
+        let is_near = |k: f64| {
+            let travel = a.advance_at(k).abs() + b.advance_at(k).abs();
+            a.slices.at(k) == b.slices.at(k) || (a.slices.at(k) - b.slices.at(k)).abs() <= travel
+        };
+        a.slices.len() == b.slices.len()
+            && self.equals_except_advance(&moved)
+            && (0..a.slices.len()).all(|k| is_near(k as f64))
+    }
+
     /// True if the two differ at most in the direction of the motor's travel during each frame.
     pub fn equals_except_direction(&self, other: &Geometry) -> bool {
         let travels = |geometry: &Geometry| match geometry {
@@ -92,12 +107,15 @@ impl Geometry {
     /// of neighbouring slices would cross, or if the two geometries differ in more than the motor's travel.
     pub fn with_mixed_directions(&self, backward: &Geometry, marked: &[bool]) -> Option<Geometry> {
         let (Geometry::Sweep(forward), Geometry::Sweep(back)) = (self, backward) else { return None };
-        let travel = |k: usize| {
-            if marked.get(k) == Some(&true) { back.advance_at(k as f64) } else { forward.advance_at(k as f64) }
+        let of = |k: usize| if marked.get(k) == Some(&true) { back } else { forward };
+        let all = 0..forward.slices.len();
+        let slices = match forward.slices == back.slices {
+            true => forward.slices.clone(),
+            false => Axis::Table(all.clone().map(|k| of(k).slices.at(k as f64)).collect()),
         };
-        let each = (0..forward.slices.len()).map(travel).collect();
-        let probe = Probe { advance: Advance::Each(each), ..forward.clone() };
-        (self.equals_except_advance(backward) && probe.check().is_ok()).then_some(Geometry::Sweep(probe))
+        let each = all.map(|k| of(k).advance_at(k as f64)).collect();
+        let probe = Probe { slices, advance: Advance::Each(each), ..forward.clone() };
+        (self.equals_except_travel(backward) && probe.check().is_ok()).then_some(Geometry::Sweep(probe))
     }
 }
 

@@ -5,6 +5,7 @@
 
 pub mod axis;
 pub mod file;
+mod file_text;
 mod frame;
 pub mod geometry;
 pub mod grid;
@@ -17,7 +18,7 @@ use echolume_base::{files, tree};
 pub use axis::Axis;
 pub use file::ProbeFile;
 pub use frame::Frame;
-pub use geometry::{Advance, Array, GeometryError, Indices, Motion, Probe, Volumes};
+pub use geometry::{Advance, Array, Firing, GeometryError, Indices, Motion, Probe, Volumes};
 pub use grid::{Geometry, Grid};
 pub use samples::{SampleType, StoredType};
 pub use world::{AxisOrder, DepthAxis, World, is_rigid};

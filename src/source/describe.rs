@@ -1,7 +1,7 @@
 //! Descriptions of geometry, volumes and times for users, in mm, degrees and seconds.
 
 use crate::files::escaped;
-use crate::probe::{Array, Axis, Grid, Motion, Probe, Volumes};
+use crate::probe::{Array, Axis, Firing, Grid, Motion, Probe, Volumes};
 use std::collections::BTreeMap;
 use std::path::Path;
 
@@ -35,6 +35,11 @@ pub(super) fn volumes(volumes: &Volumes) -> String {
     }
     if volumes.speed_ratio > 0.0 {
         text += &format!(", motor moving for {} of each frame", number(volumes.speed_ratio));
+        text += match volumes.firing {
+            Firing::Forward => "",
+            Firing::Backward => ", the last line first",
+            Firing::Alternating => ", the first line and the last first in turn",
+        };
     }
     text
 }

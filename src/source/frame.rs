@@ -106,7 +106,7 @@ impl Header {
         if of(&self.forward) != of(&self.backward) {
             return Err(("backward", "has frames of another size or number than forward".into()));
         }
-        if !self.forward.equals_except_advance(&self.backward) {
+        if !self.forward.equals_except_travel(&self.backward) {
             return Err(("backward", "differs from forward in more than the motor's travel during a frame".into()));
         }
         if self.frame_bytes().is_none() {
@@ -154,6 +154,10 @@ pub trait Source: Send {
     /// Data that cannot be read.
     fn prepare(&mut self) -> Result<(), InputError> {
         Ok(())
+    }
+    /// True if the first volume is swept backwards.
+    fn goes_back(&self) -> bool {
+        travels_back(&self.geometry(0))
     }
     /// What all frames have in common.
     fn header(&self) -> Header {
@@ -203,13 +207,13 @@ pub(super) fn file_bytes(source: &dyn Source) -> u64 {
 fn header_of<S: Source + ?Sized>(source: &S) -> Header {
     let forward = source.geometry(0);
     let second = if source.volumes() > 1 { source.geometry(1) } else { forward.clone() };
-    let (forward, backward) = if goes_back(&forward) { (second, forward) } else { (forward, second) };
+    let (forward, backward) = if source.goes_back() { (second, forward) } else { (forward, second) };
     let (posed, synthetic) = (source.pose().is_some(), source.is_synthetic());
     Header { forward, backward, stored: source.stored_type(), range: source.range(), posed, synthetic }
 }
 
-/// True if this geometry is of a backward sweep.
-fn goes_back(geometry: &Geometry) -> bool {
+/// True if the motor travels back between the first line of each frame and its last.
+fn travels_back(geometry: &Geometry) -> bool {
     let Geometry::Sweep(probe) = geometry else { return false };
     match &probe.advance {
         Advance::None => false,

@@ -31,7 +31,7 @@ use super::samples::{self, Replaced};
 use crate::Frame;
 use crate::SampleType;
 use crate::files::InputError;
-use crate::probe::{Geometry, Grid, Probe, ProbeFile, Volumes};
+use crate::probe::{Geometry, Grid, ProbeFile, Volumes};
 use glam::DAffine3;
 use serde::Deserialize;
 use std::collections::VecDeque;
@@ -328,10 +328,7 @@ fn geometries(
     if !(0.0..=1.0).contains(&volumes.speed_ratio) {
         return fault("speed_ratio", format!("is {}, must be 0 to 1", volumes.speed_ratio));
     }
-    let swept = |first_backward| {
-        let advance = Volumes { first_backward, ..volumes.clone() }.advance(0, &probe.slices);
-        Geometry::Sweep(Probe { advance, ..probe.clone() })
-    };
+    let swept = |first_backward| Geometry::Sweep(Volumes { first_backward, ..volumes.clone() }.swept(0, &probe));
     Ok((swept(false), swept(true), volumes))
 }
 

@@ -15,6 +15,7 @@ use crate::probe::file::geometry_error;
 use crate::probe::{Geometry, Probe, ProbeFile, Volumes, World};
 use crate::{Frame, Source};
 use crate::{SampleType, StoredType};
+use std::collections::BTreeMap;
 use std::io;
 use std::path::{Path, PathBuf};
 
@@ -78,6 +79,7 @@ impl Recording {
         let mut remarks = Vec::from_iter(layout.pixel.remark().map(|text| ("pixels".to_string(), text)));
         let (placement, volumes) = match (&probe_file, &layout.geometry) {
             (Some(file), _) => {
+                let file = file.clone().timed(interval(&layout.times));
                 let (probe, volumes) = file.geometry(layout.frame_size[0], layout.frame_size[1], layout.frames)?;
                 (Placement::Sweep(Box::new(probe)), volumes)
             }
@@ -178,10 +180,7 @@ impl Recording {
     /// Geometry of a volume, including the motor's travel during each frame.
     pub fn geometry(&self, volume: usize) -> Geometry {
         match &self.placement {
-            Placement::Sweep(probe) => {
-                let advance = self.volumes.advance(volume, &probe.slices);
-                Geometry::Sweep(Probe { advance, ..(**probe).clone() })
-            }
+            Placement::Sweep(probe) => Geometry::Sweep(self.volumes.swept(volume, probe)),
             Placement::Cartesian(drawn) => Geometry::Cartesian(drawn.grid),
         }
     }
@@ -440,6 +439,14 @@ impl Recording {
 
 /// The probe file to use. None if there is none, or if the `probe.toml` of the folder does not apply to this recording: it is for those
 /// that do not state their own geometry.
+/// The median time from a frame to the next, s; None if no two that follow each other have time stamps that rise.
+fn interval(times: &BTreeMap<usize, f64>) -> Option<f64> {
+    let next = |(index, time): (&usize, &f64)| times.get(&(index + 1)).map(|next| next - time);
+    let mut intervals: Vec<f64> = times.iter().filter_map(next).filter(|interval| *interval > 0.0).collect();
+    intervals.sort_by(f64::total_cmp);
+    intervals.get(intervals.len() / 2).copied()
+}
+
 fn choose_probe_file(path: &Path, given: Option<&Path>, layout: &mut Layout) -> Result<Option<ProbeFile>, InputError> {
     if layout.pixels.pictures.is_some() && layout.states_geometry {
         return Ok(None);
@@ -474,6 +481,10 @@ fn choose_probe_file(path: &Path, given: Option<&Path>, layout: &mut Layout) -> 
 }
 
 impl Source for Recording {
+    fn goes_back(&self) -> bool {
+        self.volumes.backward(0)
+    }
+
     fn geometry(&self, volume: usize) -> Geometry {
         self.geometry(volume)
     }

@@ -53,7 +53,7 @@ impl VolumeSequence {
         let Some(first) = kept.first() else { return Err(fault(format!("none of {count} is whole"))) };
         let (world, geometry) = (source.world_of(first.place), source.geometry(first.place));
         for Whole { place, .. } in &kept {
-            if source.world_of(*place) != world || !source.geometry(*place).equals_except_advance(&geometry) {
+            if source.world_of(*place) != world || !source.geometry(*place).equals_except_travel(&geometry) {
                 let why = format!("{place} lies elsewhere than {}, a sequence has one place", first.place);
                 return Err(fault(format!("{why}; --volume takes one")));
             }

@@ -690,6 +690,12 @@ fn ray_scenes() -> Vec<SceneSpec> {
             "lasting, no rough detector, first crossing",
             "surface = { detector = 'lasting', threshold = 0.02, rough = 1, noise = 1.0, place = 'first-crossing' }\nslices = { pixels = 30 }",
         ),
+        ("consistent", "surface = { detector = 'consistent', threshold = 0.02, rough = 1 }\nslices = { pixels = 30 }"),
+        (
+            "consistent, long ring, dark, skin, clipped, sliding",
+            "surface = { detector = 'consistent', edge = 8, sign = 'dark', threshold = 0.02, rough = 1 }\nray = { sliding = 3 }\n\
+             light = { skin = { translucency = 1.0 } }\nclip = [{ at = [0, 25, 0], normal = [0.3, -1, 0.2] }]\nslices = { pixels = 60 }",
+        ),
         (
             "lasting, dark, second surface",
             "surface = { detector = 'lasting', threshold = 0.02, sign = 'dark', number = 2, noise = 0.0, rough = 3 }\nslices = { pixels = 30 }",

@@ -53,6 +53,7 @@ fn views() -> Vec<(&'static str, Subject, &'static str)> {
             "mode = 'sr'\nsurface = { threshold = 0.15 }\nlight = { shadow = { softness = 0.3 }, occlusion = {}, skin = {}, position = [20.0, 10.0, 20.0] }",
         ),
         ("surface, adaptive detector", fan(), "mode = 'sr'\nsurface = { detector = 'adaptive', threshold = 0.1 }"),
+        ("surface, consistent detector", fan(), "mode = 'sr'\nsurface = { detector = 'consistent', threshold = 0.1 }"),
         ("surface, lasting detector", fan(), "mode = 'sr'\nsurface = { detector = 'lasting', threshold = 0.1 }"),
         ("volume", fan(), "mode = 'vr'\nvolume = { transfer = 'skin' }"),
         ("volume, lit", fan(), "mode = 'vr'\nvolume = { shading = 'first-hit' }\nlight = { shadow = {} }"),

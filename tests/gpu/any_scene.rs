@@ -22,7 +22,7 @@ const SETTINGS: &[(&str, &[&str])] = &[
     ("volume.threshold", &["0", "0.3", "1"]),
     ("volume.window", &["[0,1]", "[-3,0.2]", "[0.9,0.1]"]),
     ("volume.veil", &["0", "0.5"]),
-    ("surface.detector", &["threshold", "adaptive", "lasting"]),
+    ("surface.detector", &["threshold", "adaptive", "lasting", "consistent"]),
     ("surface.threshold", &["1e-6", "0.1", "1"]),
     ("surface.rough", &["1", "3", "8"]),
     ("surface.number", &["1", "2", "8"]),

@@ -13,11 +13,12 @@ use std::sync::atomic::Ordering;
 const INVOCATIONS: u64 = 64;
 
 /// Together they need every pass, each with several rows of workgroups.
-const SCENES: [&str; 18] = [
+const SCENES: [&str; 19] = [
     ALL_FILTERS,
     "mode = 'vr'\nray = { brick = 4 }\nfloating = 5.0",
     "mode = 'vr'\ncuts = [{ contour = [[-8, -6], [9, -5], [3, 9]], view = { at = [0, 20, 0], direction = [0.2, 1, 0], up = [0, 0, 1] } }]",
     "mode = 'sr'\nray = { brick = 4 }",
+    "mode = 'sr'\nsurface = { detector = 'consistent' }",
     "mode = 'vr'\nlight = { volume = { cell = 1.5 } }",
     "mode = 'vr'\nray = { brick = 4 }\nstill = { samples = 3, batch = 2, events = 4 }",
     "mode = 'vr'\nray = { rays = 2, adaptive = true }",

@@ -134,24 +134,24 @@ fn only_long_steps_pass_over_specks_in_the_fluid() {
 /// Results of rays onto a wall, as shares of all rays: a surface more than 3 steps before it, none or one more than 4
 /// steps behind it; and the error of the others, RMS in steps.
 #[derive(Debug)]
-struct Found {
-    early: f64,
-    missed: f64,
-    steps: f64,
+pub struct Found {
+    pub early: f64,
+    pub missed: f64,
+    pub steps: f64,
 }
 
 /// A wall in one column: its values by depth, in steps, and where it is.
-type Column = (Vec<f64>, f64);
+pub type Column = (Vec<f64>, f64);
 
-const DEPTH: usize = 140;
+pub const DEPTH: usize = 140;
 
 /// Columns of one seed: the same for every detector.
-fn walls_of(seed: u64, mut column: impl FnMut(&mut Noise) -> Column) -> Vec<Column> {
+pub fn walls_of(seed: u64, mut column: impl FnMut(&mut Noise) -> Column) -> Vec<Column> {
     let mut noise = Noise(seed);
     (0..48 * 48).map(|_| column(&mut noise)).collect()
 }
 
-fn walls(device: &Device, surface: &str, wall: &[Column]) -> Found {
+pub fn walls(device: &Device, surface: &str, wall: &[Column]) -> Found {
     let scene = columns([48, DEPTH, 48], STEP, surface);
     let frames = frames(&scene, |[x, y, z]| wall[z * 48 + x].0[y]);
     let mut found = Found { early: 0.0, missed: 0.0, steps: 0.0 };
@@ -167,12 +167,12 @@ fn walls(device: &Device, surface: &str, wall: &[Column]) -> Found {
     found
 }
 
-fn normal(noise: &mut Noise) -> f64 {
+pub fn normal(noise: &mut Noise) -> f64 {
     (-2.0 * (1.0 - noise.next()).ln()).sqrt() * (std::f64::consts::TAU * noise.next()).cos()
 }
 
 /// White noise of a deviation, clamped to the window, on a wall two steps wide: fluid at `low`, tissue `height` above it.
-fn noisy(noise: &mut Noise, deviation: f64, low: f64, height: f64) -> Column {
+pub fn noisy(noise: &mut Noise, deviation: f64, low: f64, height: f64) -> Column {
     let edge = 60.0 + noise.next();
     let value = |i: usize| low + height * ramp(i as f64, edge, 2.0);
     ((0..DEPTH).map(|i| (value(i) + deviation * normal(noise)).clamp(0.0, 1.0)).collect(), edge)
@@ -182,7 +182,7 @@ fn noisy(noise: &mut Noise, deviation: f64, low: f64, height: f64) -> Column {
 /// function, magnitude, logarithm, and the mean of `looks` neighbours as a filter before the detector takes it. Fluid
 /// at -35 dB, tissue at -12. The wall is where the mean power crosses the middle in dB: compression makes its blurred
 /// front bright, some samples before the tissue begins.
-fn speckle(noise: &mut Noise, deviation: f64, looks: usize) -> Column {
+pub fn speckle(noise: &mut Noise, deviation: f64, looks: usize) -> Column {
     let (tissue, low, high) = (64.0 + noise.next(), -35.0, -12.0);
     let reach = (3.0 * deviation).ceil() as usize;
     let taps: Vec<f64> =

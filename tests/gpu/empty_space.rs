@@ -56,13 +56,14 @@ fn geometries() -> Vec<(&'static str, Geometry)> {
     ]
 }
 
-const MODES: [&str; 31] = [
+const MODES: [&str; 32] = [
     "mode = 'sr'\nsurface = { threshold = 0.2 }",
     "mode = 'sr'\nsurface = { threshold = 0.2, rough = 1 }",
     "mode = 'sr'\nsurface = { threshold = 0.2, rough = 4, rough_threshold = 0.1, number = 2 }",
     "mode = 'sr'\nsurface = { threshold = 0.2, sign = 'dark' }\nlight = { skin = {} }",
     "mode = 'sr'\nsurface = { threshold = 0.1, place = 'first-crossing', window = [0.1, 0.7] }",
     "mode = 'sr'\nsurface = { detector = 'adaptive', threshold = 0.1 }",
+    "mode = 'sr'\nsurface = { detector = 'consistent', threshold = 0.1 }",
     "mode = 'sr'\nsurface = { detector = 'lasting', threshold = 0.1, rough = 1 }",
     "mode = 'sr'\nsurface = { threshold = 0.2, edge = 5, place = 'middle' }",
     "mode = 'sr'\nsurface = { detector = 'lasting', threshold = 0.1, edge = 7 }",

@@ -17,6 +17,7 @@ mod curved_plane;
 mod cuts;
 mod deep_pictures;
 mod detector;
+mod detector_agreement;
 mod detector_convergence;
 mod detector_false_positives;
 mod diffusion;

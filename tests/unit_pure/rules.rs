@@ -370,6 +370,7 @@ fn scenes() -> Vec<Scene> {
                 "'vr'\ncuts = [{ contour = [[0, 0], [1, 0], [0, 1]], view = { at = [0, 0, 0], direction = [0, 1, 0], up = [0, 0, 1] } }]",
                 "'vr'\nlayout = 'four'\nplanes = { smooth = { lateral = 1.0, depth = 1.0, elevation = 1.0 } }",
                 "'sr'\nlayout = 'pair'",
+                "'sr'\nsurface = { detector = 'consistent' }",
             ] {
                 scenes.push(scene(geometry.clone(), BYTES, &format!("mode = {mode}\n{filters}")));
             }

@@ -46,7 +46,7 @@ pub fn fault(scene: &Scene) -> Option<&'static str> {
             "surface.sign=any takes the size of the difference, which is no polynomial: set surface.sign=bright or dark",
         ),
         _ if surface.detector != Detector::Threshold => {
-            Some("surface.detector learns noise from samples: set surface.detector=threshold")
+            Some("surface.detector learns noise from samples, or asks neighbours: set surface.detector=threshold")
         }
         _ => None,
     }

@@ -31,6 +31,7 @@ pub mod filter {
 pub mod raycast {
     pub mod cap;
     pub mod composite;
+    pub mod consistent;
     pub mod cube;
     mod detector;
     pub mod planes;
@@ -84,6 +85,9 @@ pub const PASSES: &[Pass] = &[
     empty_space::DISTANCE_SURFACE,
     raycast::cap::PASS,
     raycast::surface::PASS,
+    raycast::consistent::CANDIDATES,
+    raycast::consistent::PATHS,
+    raycast::consistent::CHOICE,
     empty_space::CLASSIFY_VOLUME,
     empty_space::DISTANCE_VOLUME,
     light_volume::MATTER,

@@ -60,6 +60,7 @@ pub(crate) struct Meaning {
 
 const GREY: &[&str] = &["value"];
 const COLOUR: &[&str] = &["red", "green", "blue", "alpha"];
+const COST: &str = "cost of a candidate above that of no surface";
 /// Of samples of the recording.
 const SHARE_OF_RANGE: &str = "share of the range of the recording's samples, 0..1, before the grey window";
 
@@ -422,6 +423,14 @@ slots! {
     /// The cut faces of clip planes: echo where a ray ends at one, and its opacity.
     Cap = D::image("cap", per_ray, |_| Format::Rg16f)
         .of(&["echo", "opacity"], "echo 0..1 after the grey window of planes, where a ray ends at a cut face; opacity, 0..1");
+    /// The two edges of each ray that are most likely its surface, for the detector that chooses among neighbours.
+    Candidates = D::image("candidates", per_ray, |_| Format::Rgba32f)
+        .of(&["first", "second", "first_weight", "second_weight"], "mm along the ray, the largest float where there is none; weight, 0..1");
+    /// How much more either candidate costs than no surface, by paths along rows and columns.
+    PathsFromLeft = D::image("from_left", per_ray, |_| Format::Rg32f).of(&["first", "second"], COST);
+    PathsFromRight = D::image("from_right", per_ray, |_| Format::Rg32f).of(&["first", "second"], COST);
+    PathsFromTop = D::image("from_top", per_ray, |_| Format::Rg32f).of(&["first", "second"], COST);
+    PathsFromBottom = D::image("from_bottom", per_ray, |_| Format::Rg32f).of(&["first", "second"], COST);
     /// Distance along each pixel's ray, mm; the largest float where nothing was hit.
     Distance = D::image("distance_map", per_ray, |_| Format::R32f).distances();
     DistanceA = D::image("distance_a", per_ray, |_| Format::R32f).distances();

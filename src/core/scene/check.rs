@@ -3,8 +3,8 @@
 use super::planes::{MAX_SLAB, MAX_TILES, SAME_POINT};
 use super::{
     Cine, Clip, Compositing, Conditioning, Curve, Detector, Distance, Elevation, EnhancedSigma, Layout, Light,
-    MAX_BODY_MARKS, MAX_CLIPS, MAX_CURVE_POINTS, MAX_DEVIATION, MAX_PICTURE, Mode, Noise, PeronaMalik, Scene,
-    SceneError, Scheme, Settings, Sign, Smooth, refuse, transfer,
+    MAX_BODY_MARKS, MAX_CLIPS, MAX_CURVE_POINTS, MAX_DEVIATION, MAX_PICTURE, Mode, Noise, PeronaMalik, Place, Scene,
+    SceneError, Scheme, Settings, Sign, Smooth, Surface, refuse, transfer,
 };
 use crate::probe::Geometry;
 use glam::DVec3;
@@ -28,6 +28,23 @@ fn check_tolerance(settings: &Settings) -> Result<(), SceneError> {
     refuse("ray.tolerance", fault)
 }
 
+/// A detector that chooses among neighbouring rays looks at all edges of a ray in one march.
+fn check_consistent(surface: &Surface) -> Result<(), SceneError> {
+    if surface.detector != Detector::Consistent {
+        return Ok(());
+    }
+    for (field, is_other, needed) in [
+        ("surface.rough", surface.rough != 1, "1"),
+        ("surface.number", surface.number != 1, "1"),
+        ("surface.place", surface.place != Place::Peak, "peak"),
+    ] {
+        if is_other {
+            return refuse(field, format!("must be {needed} with surface.detector=consistent"));
+        }
+    }
+    Ok(())
+}
+
 /// Checks that need no geometry.
 pub(super) fn check(settings: &Settings) -> Result<(), SceneError> {
     check_clip(&settings.clip)?;
@@ -40,6 +57,7 @@ pub(super) fn check(settings: &Settings) -> Result<(), SceneError> {
         );
     }
     check_tolerance(settings)?;
+    check_consistent(&settings.surface)?;
     let [width, height] = super::camera::ray_size(settings);
     if width > MAX_PICTURE || height > MAX_PICTURE {
         return refuse("ray.rays", format!("makes {width}x{height} rays, each edge must lie in 1..={MAX_PICTURE}"));

@@ -514,6 +514,11 @@ impl Scene {
         matches!(self.settings.mode, Mode::Surface | Mode::Mixed)
     }
 
+    /// True if the surface is chosen among the candidates of neighbouring rays.
+    pub(crate) fn chooses_surface(&self) -> bool {
+        self.detects_surface() && self.settings.surface.detector == Detector::Consistent
+    }
+
     /// True if stage 3 lights a distance map.
     pub fn has_distance(&self) -> bool {
         self.detects_surface() || self.lights_volume()
@@ -610,6 +615,9 @@ impl Scene {
         }
         if !is_whole {
             return Err("no whole ray is composited");
+        }
+        if self.chooses_surface() {
+            return Err("two passes: the surface is chosen among neighbouring rays");
         }
         if settings.ray.sliding == 0 && !self.is_pair() {
             // Measured: docs/performance.md, "One march for surface and volume".

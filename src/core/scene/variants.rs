@@ -34,7 +34,7 @@ const MODES: [(Mode, &str); 10] = [
 const SAMPLINGS: [&str; 3] = ["hardware", "exact", "quads"];
 
 /// Filters, lights and other choices that are structure: each line is a table of a scene file.
-const CHOICES: [&str; 52] = [
+const CHOICES: [&str; 53] = [
     "slices.median = true",
     "slices.sigma = {}",
     "slices.sigma = { repeat = 2 }",
@@ -66,6 +66,7 @@ const CHOICES: [&str; 52] = [
     "light = { shadow = {}, occlusion = {}, skin = {} }",
     "surface.detector = 'adaptive'",
     "surface.detector = 'lasting'",
+    "surface.detector = 'consistent'",
     "surface.colour = 'rendered'",
     "surface.colour = 'behind'",
     "ray.subsampling = 2",

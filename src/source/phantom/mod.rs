@@ -206,7 +206,7 @@ impl Phantom {
 
     /// The probe of a volume, including the motor's travel during each frame.
     pub fn probe(&self, volume: usize) -> Probe {
-        Probe { advance: self.volumes.advance(volume, &self.probe.slices), ..self.probe.clone() }
+        self.volumes.swept(volume, &self.probe)
     }
 
     /// The ground truth of the body, in the space of [`Probe`] and in grey values without speckle.

@@ -22,7 +22,7 @@ pub fn probe_file(bytes: &[u8]) -> String {
             Ok((probe, volumes)) => {
                 places(&probe);
                 for volume in 0..2 {
-                    places(&Probe { advance: volumes.advance(volume, &probe.slices), ..probe.clone() });
+                    places(&volumes.swept(volume, &probe));
                 }
                 outcome += "a probe";
             }

@@ -133,3 +133,21 @@ fn what_lies_beside_the_sector_is_an_empty_box_and_not_one_turned_inside_out() {
         );
     }
 }
+
+/// Prevents passes of the detector that chooses among neighbours in other plans, and settings of it that nothing would follow.
+#[test]
+fn the_consistent_detector_has_passes_of_its_own() {
+    let with = |surface: &str| scene(voxels([20, 20, 20]), &format!("mode = 'sr'\n[surface]\n{surface}"));
+    let passes = |scene: &Scene| -> Vec<_> { Plan::new(scene).steps.iter().map(|s| s.pass.name).collect() };
+    let own = ["raycast_candidates", "surface_paths", "choose_surface"];
+    let (plain, consistent) = (passes(&with("")), passes(&with("detector = 'consistent'")));
+    assert!(plain.contains(&"raycast_surface") && !own.iter().any(|p| plain.contains(p)), "{plain:?}");
+    assert!(!consistent.contains(&"raycast_surface") && own.iter().all(|p| consistent.contains(p)), "{consistent:?}");
+    assert!(!Plan::new(&with("")).slots.contains(&Slot::Candidates));
+    for (other, word) in [("rough = 2", "rough"), ("number = 2", "number"), ("place = 'middle'", "place")] {
+        let toml = format!("mode = 'sr'\n[surface]\ndetector = 'consistent'\n{other}");
+        let fault = Scene::new(voxels([20, 20, 20]), SCALED, scenes::settings(&toml)).err().map(|e| e.to_string());
+        let names = |f: &String| f.contains(&format!("surface.{word}")) && f.contains("surface.detector=consistent");
+        assert!(fault.as_ref().is_some_and(names), "{fault:?}");
+    }
+}

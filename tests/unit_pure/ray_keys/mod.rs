@@ -34,9 +34,12 @@ const CASTS_RAYS: [&str; 6] = [
     "raycast_projection",
     "raycast_cap",
 ];
-/// Planes and the block cast none; bricks and marks of edges tell which rays and samples can be left out; light volumes and stills are refused.
-const CASTS_NONE: [&str; 24] = [
+/// Planes and the block cast none; bricks and marks of edges tell which rays and samples can be left out; light volumes, stills and the consistent detector are refused.
+const CASTS_NONE: [&str; 27] = [
     "raycast_planes",
+    "raycast_candidates",
+    "surface_paths",
+    "choose_surface",
     "raycast_planes_toned",
     "raycast_cube",
     "mark_edges",

@@ -18,7 +18,7 @@ use crate::probe::Geometry;
 use crate::scene::{Detector, Place, Ring, Scene, Sign, Surface};
 
 /// An edge has been followed when the difference falls below this share of its maximum.
-const FOLLOW_LEVEL: f64 = 0.7;
+pub(super) const FOLLOW_LEVEL: f64 = 0.7;
 
 /// The factor of the difference; 0 if its size counts.
 pub(super) fn polarity(scene: &Scene) -> f64 {
@@ -396,15 +396,15 @@ const MEMORY: f64 = 4.0;
 
 /// Mean and variance of the `learnt` samples that have left the ring's newer half.
 #[derive(Clone, Copy, Debug, Default)]
-struct Noise {
+pub(super) struct Noise {
     learnt: f64,
-    mean: f64,
+    pub(super) mean: f64,
     variance: f64,
 }
 
 impl Noise {
     /// Takes the ring's older half, newest first: the first time all of it, then only its newest sample.
-    fn learn(&mut self, older: &[f64]) {
+    pub(super) fn learn(&mut self, older: &[f64]) {
         let count = older.len() as f64;
         if self.learnt == 0.0 {
             self.learnt = count;

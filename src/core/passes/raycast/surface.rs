@@ -15,6 +15,7 @@ pub(crate) const PASS: Pass = Pass {
     shader: |_, _| "raycast/surface",
     needed: |s| match (s.detects_surface(), s.marches_once()) {
         (false, _) => Err("no surface in this mode"),
+        (true, _) if s.chooses_surface() => Err("chosen among the candidates of neighbouring rays"),
         (true, Ok(_)) => Err("found in the march that composites"),
         (true, Err(_)) => Ok("the mode shows a surface"),
     },
@@ -67,7 +68,7 @@ pub(super) fn constants(scene: &Scene) -> Vec<(&'static str, i32)> {
     let surface = &scene.settings.surface;
     let mut constants = ray::marching_constants(scene, empty_space::surface_skipping(scene));
     let detector = match surface.detector {
-        Detector::Threshold => 0,
+        Detector::Threshold | Detector::Consistent => 0,
         Detector::Adaptive => 1,
         Detector::Lasting => 2,
     };
@@ -120,7 +121,7 @@ pub(super) fn reference_ray(scene: &Scene, reads: &Arrays, writes: &mut Arrays, 
 }
 
 /// Mean echo over the depth behind the surface that skin shading needs.
-fn behind(scene: &Scene, ray: &ray::Ray, distance: f64) -> f64 {
+pub(super) fn behind(scene: &Scene, ray: &ray::Ray, distance: f64) -> f64 {
     let count = scene.samples_behind();
     let sum: f64 = (1..=count).filter_map(|i| ray.echo(distance + f64::from(i) * scene.step_behind())).sum();
     sum / f64::from(count.max(1))

@@ -382,6 +382,9 @@ pub enum Detector {
     /// Like `adaptive`, and ignores edges whose echo has gone half a ring behind them (specks in fluid, thin shells before a wall) unless
     /// the ray has no other.
     Lasting,
+    /// Of the two edges of each ray that are most likely a surface, the one on which neighbouring rays agree, or none: for speckle and noise that no filter
+    /// removes. Takes no rough search, and the outermost surface at the peak of its edge.
+    Consistent,
 }
 
 /// Sign of the edge at a surface.
