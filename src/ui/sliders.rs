@@ -11,7 +11,7 @@ pub(super) const GROUPS: [(Group, &str); 7] = [
     (Group::Image, texts::IMAGE),
     (Group::Surface, texts::SURFACE),
     (Group::Volume, texts::VOLUME),
-    (Group::Light, texts::LIGHT),
+    (Group::Light, texts::LIGHTING),
     (Group::Planes, texts::PLANES),
     (Group::Filters, texts::FILTERS),
     (Group::Quality, texts::QUALITY),

@@ -140,7 +140,10 @@ impl MonitorChoice {
         let found = monitors.iter().position(|m| is_it(m) && !m.modes.is_empty());
         let Some(monitor) = found else {
             return Err(match (&self.monitor, monitors.is_empty()) {
-                (_, true) => "no monitor is connected to this device".into(),
+                (_, true) => {
+                    "no monitor is connected to this device: a window needs display.direct = false, or no --direct"
+                        .into()
+                }
                 (Some(part), _) => format!("no monitor is called {part:?}; there are: {}", all()),
                 (None, _) => format!("no monitor has a mode; there are: {}", all()),
             });

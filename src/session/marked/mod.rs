@@ -222,9 +222,11 @@ impl Bar {
         let of = if has_several { " (rendering)" } else { "" };
         let scale = scaled.and_then(|tile| tile.bar(0.3)).map(|(mm, pixels)| (mm, pixels, of));
         let face = scene.probe().map_or(0.0, |probe| probe.array_radius());
+        // Planes beside a rendering show all depths.
+        let shown = if has_several { "rendered" } else { "depth" };
         let mut items = vec![
             scene.settings.mode.title().to_string(),
-            format!("depth {:.0} to {:.0} mm", (scene.low.y - face).max(0.0), scene.high.y - face),
+            format!("{shown} {:.0} to {:.0} mm", (scene.low.y - face).max(0.0), scene.high.y - face),
         ];
         items.extend(origin.map(str::to_string));
         items.extend([time.to_string(), "Echolume".into(), "not a medical device".into()]);

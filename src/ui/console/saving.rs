@@ -112,7 +112,7 @@ impl Console {
                     if file.extension().is_some_and(|end| end == "toml") {
                         self.opening.remember(&file);
                     }
-                    self.notify(&texts::saved(file.display()), false);
+                    self.notify(&texts::saved(&file), false);
                 }
                 Err(fault) => {
                     self.leaving.not_saved(&saved.holds);

@@ -30,7 +30,7 @@ const TOOLS: [(Tool, &str); 8] = [
     (Tool::Clip, texts::CLIP),
     (Tool::Cut, texts::CUT),
     (Tool::Brush, texts::BRUSH),
-    (Tool::Plane, texts::PLANES),
+    (Tool::Plane, texts::CROSSHAIR),
     (Tool::Curve, texts::CURVE),
 ];
 
@@ -45,7 +45,7 @@ const FRONT: [(&str, &[&str]); 6] = [
     (texts::GAIN, &["post.brightness"]),
     (texts::SMOOTH, &["smoothing"]),
     (texts::BRIGHTNESS, &["light.volume.exposure", "post.gamma"]),
-    (texts::LIGHT, &["light.diffuse"]),
+    (texts::LAMP, &["light.diffuse"]),
     (texts::DEPTH, &["start_depth"]),
 ];
 
@@ -306,7 +306,7 @@ fn show_controls(ui: &mut Ui, state: &PanelState, width: f32, execute: &mut dyn 
             let elsewhere = [&start[..], &tools::of_clip(settings)[..], &[with_cuts]].concat();
             for (name, number) in in_front {
                 match number {
-                    Some(number) if name == texts::LIGHT => {
+                    Some(number) if name == texts::LAMP => {
                         ui.horizontal_top(|ui| {
                             let width = ui.available_width() - BALL - ui.spacing().item_spacing.x;
                             ui.vertical(|ui| {
@@ -603,8 +603,8 @@ fn cine(ui: &mut Ui, state: &PanelState, room: f32, touch: f32, needed: &LoopRoo
     let label = if cine.is_playing { texts::STOP } else { texts::PLAY };
     button(ui, label, 64.0, label, texts::PLAY_HINT, Command::PlayCine);
     if room >= needed.steps {
-        button(ui, "<", 44.0, texts::ONE_VOLUME_BACK, texts::ONE_VOLUME_BACK_HINT, Command::StepCine(-1));
-        button(ui, ">", 44.0, texts::ONE_VOLUME_FORTH, texts::ONE_VOLUME_FORTH_HINT, Command::StepCine(1));
+        button(ui, "<", 44.0, texts::PREVIOUS_VOLUME, texts::PREVIOUS_VOLUME_HINT, Command::StepCine(-1));
+        button(ui, ">", 44.0, texts::NEXT_VOLUME, texts::NEXT_VOLUME_HINT, Command::StepCine(1));
         let has_tools = room >= needed.steps + LoopRoom::TOOLS;
         if has_tools {
             let speed = format!("{}x", cine.speed);

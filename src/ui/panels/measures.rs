@@ -20,8 +20,8 @@ const TOOLS: [(MeasureKind, &str); 9] = [
     (MeasureKind::Angle, texts::ANGLE),
     (MeasureKind::Ellipse, texts::ELLIPSE),
     (MeasureKind::Trace, texts::TRACE),
-    (MeasureKind::Surface, texts::SURFACE),
-    (MeasureKind::Volume, texts::VOLUME),
+    (MeasureKind::Surface, texts::TAPE),
+    (MeasureKind::Volume, texts::CONTOURS),
     (MeasureKind::Threshold, texts::VOLUME_BY_THRESHOLD),
     (MeasureKind::Text, texts::TEXT),
     (MeasureKind::Arrow, texts::ARROW),
@@ -98,7 +98,7 @@ fn results(ui: &mut Ui, state: &PanelState, width: f32, execute: &mut dyn FnMut(
             let main = found.first().map_or(String::new(), Quantity::shown);
             let name = match (measured.kind, measured.text.is_empty()) {
                 (_, false) => &measured.text,
-                (MeasureKind::Threshold, true) => texts::ECHOES,
+                (MeasureKind::Threshold, true) => texts::VOLUME_BY_THRESHOLD,
                 (_, true) => measured.title(),
             };
             let typing = if state.controls.typing() == Some(n) { "_" } else { "" };

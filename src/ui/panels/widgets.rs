@@ -42,7 +42,7 @@ pub(super) fn slider(
     let space = if slider.unit.is_empty() || slider.unit == "°" { "" } else { " " };
     let shown = match slider.key {
         "cuts.depth" if before <= 0.0 => texts::THROUGH_ALL.to_string(),
-        "cap.level" if before <= 0.0 => texts::AUTOMATIC.to_string(),
+        "cap.level" | "ray.step" | "planes.spacing" if before <= 0.0 => texts::AUTOMATIC.to_string(),
         _ => format!("{before:.digits$}{space}{}", slider.unit),
     };
     let text = RichText::new(name);

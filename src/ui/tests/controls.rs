@@ -7,7 +7,7 @@ use crate::panels::drawn::Kind;
 use crate::panels::picture_area;
 use crate::scene::MeasureKind;
 
-const FRONT: [&str; 6] = ["Threshold", "Gain", "Smooth", "Brightness", "Light", "Depth"];
+const FRONT: [&str; 6] = ["Threshold", "Gain", "Smooth", "Brightness", "Lamp", "Depth"];
 
 /// Left, top, right, bottom of a control, points.
 fn place(shown: &Shown, role: Role, name: &str) -> [f64; 4] {

@@ -225,7 +225,7 @@ fn the_controls_in_front_are_reached_in_every_window() {
         assert_eq!(shown.visible.rail.tab == RailTab::Controls, !room.has_column, "{what}");
         let [window, picture] = places(&shown);
         let above_bar = [0.0, 0.0, window[2], picture[3]];
-        for name in ["Threshold", "Gain", "Smooth", "Brightness", "Light", "Depth"] {
+        for name in ["Threshold", "Gain", "Smooth", "Brightness", "Lamp", "Depth"] {
             let control = shown.find("Controls", Role::Slider, name);
             shown.ask(control, Action::Focus, None);
             (0..3).for_each(|_| shown.settle());

@@ -161,11 +161,8 @@ fn the_tools_and_the_controls_in_front_are_found_by_role_and_name() {
         ("Mode", &["Surface", "Volume", "Mixed", "MIP", "MinIP", "X-ray", "Plane", "3 planes", "Slices", "Cube"][..]),
         ("Layout", &["Single", "4-up", "VR | SR"]),
         ("View from", &["Front", "Left", "Right", "Top"]),
-        ("Drag", &["Turn", "Light", "Region", "Clip", "Planes"]),
-        (
-            "Measure",
-            &["Caliper", "Angle", "Ellipse", "Trace", "Surface", "Volume", "Vol. by threshold", "Text", "Arrow"],
-        ),
+        ("Drag", &["Turn", "Light", "Region", "Clip", "Crosshair"]),
+        ("Measure", &["Caliper", "Angle", "Ellipse", "Trace", "Tape", "Contours", "Threshold volume", "Text", "Arrow"]),
         ("Workspace", &["Open", "Save", "Export"]),
         ("Modes and tools", &["Undo", "Redo", "Presets"]),
         ("Cine loop", &["Freeze", "Play", "Save picture", "Save loop", "Reset", "Help"]),
@@ -176,7 +173,7 @@ fn the_tools_and_the_controls_in_front_are_found_by_role_and_name() {
     assert_eq!(chosen.toggled(), Some(Toggled::True));
     assert_eq!(shown.tree[&shown.find("Mode", Role::Button, "Volume")].toggled(), Some(Toggled::False));
     assert!(shown.tree[&shown.find("Modes and tools", Role::Button, "Redo")].is_disabled());
-    for name in ["Threshold", "Gain", "Smooth", "Brightness", "Light", "Depth"] {
+    for name in ["Threshold", "Gain", "Smooth", "Brightness", "Lamp", "Depth"] {
         let knob = &shown.tree[&shown.find("Controls", Role::Slider, name)];
         let [low, high] = [knob.min_numeric_value(), knob.max_numeric_value()].map(|n| n.expect("a range"));
         let value = knob.numeric_value().expect("a value");

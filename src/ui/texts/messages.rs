@@ -1,10 +1,12 @@
 //! Notes and banners over the picture. Names that begin with `WHY_` are the reason in a sentence of another text, so they begin in lower case.
 
 use std::fmt::Display;
+use std::path::Path;
 
 // What was saved, what a start is at.
-pub fn saved(file: impl Display) -> String {
-    format!("Saved {file}")
+/// The file with the folder that it is in.
+pub fn saved(file: &Path) -> String {
+    format!("Saved {}", std::path::absolute(file).unwrap_or_else(|_| file.into()).display())
 }
 pub(crate) fn not_saved(fault: impl Display) -> String {
     format!("Not saved: {fault}")
@@ -123,7 +125,7 @@ pub(crate) const BRUSH_NEEDS_SURFACE: &str = "The brush needs a surface: choose 
 pub(crate) const CUTS_IN_THE_WAY: &str =
     "That draws both what is dark and what is bright, of which nothing can be cut: remove the cuts first (Shift+F).";
 pub(crate) const TOO_MANY_CUTS: &str = "There are as many cuts as a scene can have: remove them, or take one back.";
-pub(crate) const CUTS_NEED_RENDERING: &str = "Cuts are made on a rendering: the block shows all of the volume.";
+pub(crate) const CUTS_NEED_RENDERING: &str = "Cuts are made on a rendering: the cube shows all of the volume.";
 pub(crate) const CONTOUR_TOO_SMALL: &str = "The contour is too small, or beside the volume.";
 pub(crate) const CANNOT_CUT_BOTH: &str = "Nothing can be cut where both what is dark and what is bright is drawn.";
 

@@ -11,6 +11,9 @@ pub(crate) const CLIP: &str = "Clip";
 pub(crate) const CUT: &str = "Cut";
 pub const BRUSH: &str = "Brush";
 pub const PLANES: &str = "Planes";
+pub const CROSSHAIR: &str = "Crosshair";
+pub(crate) const LAMP: &str = "Lamp";
+pub(crate) const LIGHTING: &str = "Lighting";
 pub(crate) const CURVE: &str = "Curve";
 pub const THRESHOLD: &str = "Threshold";
 pub const GAIN: &str = "Gain";
@@ -31,7 +34,7 @@ pub(crate) const DRAG: &str = "Drag";
 pub(crate) const PLANE_HINT: &str = "The plane that is shown and moved.";
 pub(crate) const PLANE: &str = "Plane";
 pub(crate) const RECENTRE_PLANES_HINT: &str =
-    "Moves the point where the planes cross to the middle (J; double click with Planes).";
+    "Moves the point where the planes cross to the middle (J; double click with Crosshair).";
 pub(crate) const RECENTRE_PLANES: &str = "Recentre planes";
 pub(crate) const MEASURE: &str = "Measure";
 pub(crate) const OPEN: &str = "Open";
@@ -151,18 +154,18 @@ pub(crate) const NO_VOLUMES_YET: &str = "no volumes yet";
 pub const STOP: &str = "Stop";
 pub(crate) const PLAY: &str = "Play";
 pub(crate) const PLAY_HINT: &str = "Plays the last volumes as a loop (Enter).";
-pub(crate) const ONE_VOLUME_BACK: &str = "One volume back";
-pub(crate) const ONE_VOLUME_BACK_HINT: &str = "One volume back (Left).";
-pub(crate) const ONE_VOLUME_FORTH: &str = "One volume forth";
-pub(crate) const ONE_VOLUME_FORTH_HINT: &str = "One volume forth (Right).";
+pub(crate) const PREVIOUS_VOLUME: &str = "Previous volume";
+pub(crate) const PREVIOUS_VOLUME_HINT: &str = "Shows the previous volume (Left).";
+pub(crate) const NEXT_VOLUME: &str = "Next volume";
+pub(crate) const NEXT_VOLUME_HINT: &str = "Shows the next volume (Right).";
 pub(crate) const SPEED_HINT: &str = "Speed of the loop; 1x is that of the acquisition (Ctrl+Left, Ctrl+Right).";
 pub fn speed(speed: impl Display) -> String {
     format!("Speed {speed}")
 }
 pub(crate) const BACK_AND_FORTH: &str = "Back and forth";
-pub(crate) const BACK_AND_FORTH_HINT: &str = "Back and forth; a click: forwards (Ctrl+Enter).";
+pub(crate) const BACK_AND_FORTH_HINT: &str = "The loop plays back and forth. A click: forwards (Ctrl+Enter).";
 pub(crate) const FORWARDS: &str = "Forwards";
-pub(crate) const FORWARDS_HINT: &str = "Forwards; a click: back and forth (Shift+Enter).";
+pub(crate) const FORWARDS_HINT: &str = "The loop plays forwards. A click: back and forth (Shift+Enter).";
 pub(crate) const LOOP_BEGINS_HERE_HINT: &str = "The loop begins with this volume (Shift+Home).";
 pub(crate) const LOOP_BEGINS_HERE: &str = "Loop begins here";
 pub(crate) const LOOP_ENDS_HERE_HINT: &str = "The loop ends with this volume (Shift+End).";
@@ -184,26 +187,30 @@ pub(crate) fn loop_rate(rate: impl Display) -> String {
 
 // Lists of files and formats.
 pub(crate) fn open_file_hint(name: impl Display) -> String {
-    format!("Opens {name} in place of what is shown.")
+    format!("Opens {name}.")
 }
 pub(crate) fn open_folder_hint(name: impl Display) -> String {
     format!("Lists the folder {name}")
 }
 pub(crate) const FOLDER_ABOVE_HINT: &str = "Lists the folder above.";
-pub(crate) const CLOSE_OPEN_HINT: &str = "Opens nothing.";
+pub(crate) const CLOSE_OPEN_HINT: &str = "Closes this list.";
 pub(crate) const NO_RECORDING_HERE: &str = "There is no recording and no workspace here.";
 pub(crate) const VOLUME_SHOWN: &str = "The volume that is shown";
 pub(crate) fn is_being_exported(name: impl Display) -> String {
     format!("{name} is being exported")
 }
-pub(crate) fn is_exported_so_far(name: impl Display, done: impl Display, of: impl Display) -> String {
-    format!("{name} is being exported: {done} of {of}")
+/// How much of it is done, rounded down: 100 % is said of what is complete.
+fn per_cent(done: u64, of: u64) -> String {
+    format!("{} %", 100 * done.min(of) / of.max(1))
 }
-pub(crate) fn export_so_far(name: impl Display, done: impl Display, of: impl Display) -> String {
-    format!("{name}: {done} of {of} (Ctrl+E)")
+pub(crate) fn is_exported_so_far(name: impl Display, done: u64, of: u64) -> String {
+    format!("{name} is being exported: {}", per_cent(done, of))
 }
-pub(crate) const CLOSE_EXPORT_HINT: &str = "Exports nothing more.";
-pub(crate) const CANCEL_EXPORT_HINT: &str = "Ends the export in work; nothing of it stays.";
+pub(crate) fn export_so_far(name: impl Display, done: u64, of: u64) -> String {
+    format!("{name}: {} (cancel: Ctrl+E)", per_cent(done, of))
+}
+pub(crate) const CLOSE_EXPORT_HINT: &str = "Closes this list.";
+pub(crate) const CANCEL_EXPORT_HINT: &str = "Cancels the export that is running; no file of it is kept.";
 pub(crate) const CANCEL_EXPORT: &str = "Cancel the export";
 pub(crate) const CLOSE_BUTTON: &str = "Close  (Esc)";
 pub(crate) const CLOSE: &str = "Close";
@@ -217,7 +224,7 @@ pub(crate) const KEEP_PRESET_HINT: &str =
 pub(crate) const KEEP_BUTTON: &str = "Keep  (Enter)";
 pub(crate) const KEEP: &str = "Keep";
 pub(crate) const CANCEL_BUTTON: &str = "Cancel  (Esc)";
-pub(crate) const CANCEL_NAMING_HINT: &str = "Keeps no name.";
+pub(crate) const CANCEL_NAMING_HINT: &str = "Goes back without a new name.";
 pub(crate) const CANCEL: &str = "Cancel";
 pub(crate) const SAVE_PRESENT_LOOK_HINT: &str =
     "Keeps the present look under a name: mode, filters, colours and light, without region and view.";
@@ -225,7 +232,7 @@ pub(crate) const SAVE_PRESENT_LOOK_BUTTON: &str = "Save present look  (S)";
 pub(crate) const SAVE_PRESENT_LOOK: &str = "Save present look";
 pub(crate) const UNDO_PRESETS_HINT: &str = "Brings your presets back as they were before the last change.";
 pub(crate) const UNDO_PRESETS_BUTTON: &str = "Undo  (Z)";
-pub(crate) const CLOSE_PRESETS_HINT: &str = "Changes nothing.";
+pub(crate) const CLOSE_PRESETS_HINT: &str = "Closes this list.";
 pub(crate) const RENAME: &str = "Rename";
 pub(crate) const RENAME_HINT: &str = "Gives this preset another name.";
 pub(crate) const DELETE: &str = "Delete";
@@ -299,7 +306,7 @@ pub(crate) fn more_passes(more: impl Display) -> String {
 }
 pub(crate) const TIMES_LEGEND: &str = "ms per run; bars: share of the device time";
 pub(crate) const DRAG_GESTURE: &str = "drag";
-pub(crate) const DRAG_DOES: &str = "use the tool: turn, light, region, clip, cut, brush, planes, curve";
+pub(crate) const DRAG_DOES: &str = "use the tool: turn, light, region, clip, cut, brush, crosshair, curve";
 pub(crate) const SHIFT_DRAG: &str = "Shift + drag, right or middle drag";
 pub(crate) const SHIFT_DRAG_DOES: &str = "move the picture; over a plane: step it";
 pub(crate) const CTRL_DRAG: &str = "Ctrl + drag";
@@ -316,7 +323,7 @@ pub(crate) const START_LINE_CLICK: &str = "Region, then double click the green l
 pub(crate) const START_LINE_CLICK_DOES: &str = "bend it; add or remove a handle";
 pub(crate) const REGION_DRAG_ON_PLANE: &str = "Region, then drag on a plane (4-up)";
 pub(crate) const REGION_DRAG_ON_PLANE_DOES: &str = "move a side of the box; from within: all of it";
-pub(crate) const LIGHT_BALL_DRAG: &str = "drag on the light ball (below Light)";
+pub(crate) const LIGHT_BALL_DRAG: &str = "drag on the light ball (beside Lamp)";
 pub(crate) const LIGHT_BALL_DRAG_DOES: &str = "move the lamp";
 pub(crate) const CLIP_DRAG: &str = "Clip, then drag up";
 pub(crate) const CLIP_DRAG_DOES: &str = "cut away what is nearer to the viewer";
@@ -324,7 +331,7 @@ pub(crate) const CUT_DRAG: &str = "Cut, then drag round";
 pub(crate) const CUT_DRAG_DOES: &str = "cut away what is within, along the view";
 pub(crate) const BRUSH_DRAG: &str = "Brush, then drag over it";
 pub(crate) const BRUSH_DRAG_DOES: &str = "remove what is near the surface there";
-pub(crate) const PLANES_CLICK: &str = "Planes, then click";
+pub(crate) const PLANES_CLICK: &str = "Crosshair, then click";
 pub(crate) const PLANES_CLICK_DOES: &str = "move the point where the three planes cross";
 pub(crate) const CURVE_CLICKS: &str = "Curve, then clicks on a plane, Enter";
 pub(crate) const CURVE_CLICKS_DO: &str = "curved plane along them; a drag: a straight line";
@@ -381,7 +388,7 @@ pub(crate) const CLOSE_HELP_HINT: &str = "Closes the help (H).";
 pub const FACE: &str = "Face";
 pub(crate) const FACE_HINT: &str = "Skin in fluid, under light that goes into it.";
 pub(crate) const SKELETON: &str = "Skeleton";
-pub(crate) const SKELETON_HINT: &str = "What reflects the most shines through a thin veil of soft tissue.";
+pub(crate) const SKELETON_HINT: &str = "What reflects the most shines through thin soft tissue.";
 pub(crate) const GLASS: &str = "Glass";
 pub(crate) const GLASS_HINT: &str = "Only the edges of tissue shine: everything can be seen through.";
 pub(crate) const VESSELS: &str = "Vessels";
@@ -430,4 +437,4 @@ pub(crate) const REMOVE_HANDLE_HINT: &str =
 pub(crate) const START_LINE_FULL: &str = "The start line has five handles, as many as it can have.";
 pub(crate) const START_LINE_LEAST: &str =
     "The start line has three handles, as few as it can have: Shift+G makes it straight.";
-pub(crate) const NOTHING_STARTS: &str = "The start line is that of a rendering: planes and the block show everything.";
+pub(crate) const NOTHING_STARTS: &str = "The start line is that of a rendering: planes and the cube show everything.";

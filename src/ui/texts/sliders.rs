@@ -2,6 +2,8 @@
 
 pub(crate) const IMAGE: &str = "Image";
 pub(crate) const FILTERS: &str = "Filters";
+pub const SURFACE: &str = "Surface";
+pub const VOLUME: &str = "Volume";
 pub(crate) const QUALITY: &str = "Quality";
 /// The name of the switch `unveil.enabled`.
 pub(crate) const AUTO_RENDER_START: &str = "Auto render start";

@@ -39,7 +39,7 @@ fn control_tab_gives_the_keyboard_to_the_panels_and_back() {
     assert_eq!(focused(&mut desk).as_deref(), Some("Freeze"));
     desk.press(Key::Tab);
     desk.press(Key::Tab);
-    assert_eq!(focused(&mut desk).as_deref(), Some("One volume back"));
+    assert_eq!(focused(&mut desk).as_deref(), Some("Previous volume"));
     assert_eq!(desk.console.controls().settings().layout, Layout::Single);
     let newest = desk.console.stream().cine_position();
     desk.press(Key::Space);

@@ -432,9 +432,9 @@ impl Default for Projection {
 
 pub(super) const NUMBERS: &[Number] = &[
     number!(volume.hit, "", Range(1e-3, 1.0);
-        Group, "Opacity of a hit", [0.01, 1.0], 0.02, Settings::is_first_hit, "How much the first surface hides what is behind it."),
+        Group, "Opacity of surface", [0.01, 1.0], 0.02, Settings::is_first_hit, "How much the first surface hides what is behind it."),
     number!(volume.veil, "", SHARE;
-        Group, "Veil", [0.0, 1.0], 0.05, |s| s.mode == Mode::Mixed, "How much of the volume is laid over the surface."),
+        Group, "Volume layer", [0.0, 1.0], 0.05, |s| s.mode == Mode::Mixed, "How much of the volume is laid over the surface."),
     number!(volume.threshold, "", SHARE;
         Group, "Volume threshold", [0.0, 1.0], 0.01, Settings::has_own_volume, "The threshold of the volume layer alone."),
     number!(volume.start_depth, "mm", Any;
