@@ -19,7 +19,13 @@ const GENERATED: [&str; 6] = [
     "docs/error-reports.md",
 ];
 /// Pages that do not pass yet, and how many faults each has. Who mends some takes them off here.
-const EXCEPTIONS: [(&str, usize); 0] = [];
+const EXCEPTIONS: [(&str, usize); 5] = [
+    ("docs/experiments.md", 15),
+    ("docs/formats.md", 14),
+    ("docs/numerics.md", 62),
+    ("docs/performance.md", 51),
+    ("docs/viewer.md", 30),
+];
 
 /// The paragraphs and the items of lists of a page, each with its first line, without code, tables, headings, pictures and comments.
 fn paragraphs(page: &str) -> Vec<(usize, String)> {
@@ -50,9 +56,11 @@ fn faults_of(sentence: &[(usize, &str)]) -> Vec<String> {
     let words = sentence.iter().filter(|(_, word)| word.contains(char::is_alphanumeric)).count();
     let long = (words > MOST_WORDS).then(|| format!("{first}: {words} words: {text}"));
     let bare = |word: &str| word.trim_matches(|c: char| !c.is_alphanumeric()).to_string();
+    let plain = sentence.iter().map(|(_, word)| bare(word).to_lowercase()).collect::<Vec<_>>().join(" ");
+    let plain = format!(" {plain} ");
     let persons = sentence.iter().filter(|(_, word)| FIRST_PERSON.contains(&bare(word).as_str()));
     let persons = persons.map(|(line, word)| format!("{line}: the first person: {word}"));
-    let phrases = PHRASES.iter().filter(|phrase| text.to_lowercase().contains(**phrase));
+    let phrases = PHRASES.iter().filter(|phrase| plain.contains(&format!(" {phrase} ")));
     long.into_iter().chain(persons).chain(phrases.map(|phrase| format!("{first}: {phrase}: {text}"))).collect()
 }
 
@@ -113,7 +121,10 @@ fn faults_of_prose_are_found() {
     assert_eq!(faults(&format!("- {}- {}", "a ".repeat(39) + "b\n", "a ".repeat(39) + "b")), Vec::<String>::new());
     assert_eq!(faults(&format!("{}\n{}", "a ".repeat(39), "b b")).len(), 1);
     assert_eq!(faults(&format!("`{}` {}", "a ".repeat(50), long(39))), Vec::<String>::new());
-    assert_eq!(faults("```\nwe\n```\n| I | our |\n<!-- we -->\n![we](p.png)\n`we` I/O wed us"), Vec::<String>::new());
+    assert_eq!(
+        faults("```\nwe\n```\n| I | our |\n<!-- we -->\n![we](p.png)\n`we` I/O wed us, of the nightly run"),
+        Vec::<String>::new()
+    );
     let found = faults("It is so.\nWe say (our) that.\n\nA run Later\nthat day.");
     let expected =
         ["2: the first person: We", "2: the first person: (our)", "4: later that day: A run Later that day."];
