@@ -25,6 +25,7 @@ mod numbers;
 mod phantom;
 mod plan;
 mod profile;
+mod prose;
 mod ray_keys;
 mod references;
 mod richardson;
