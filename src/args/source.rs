@@ -5,6 +5,7 @@ use super::recording::{GeometryArgs, open_recording, say_probe_file};
 use crate::gpu::TimeStamps;
 use crate::kiosk::config::Config;
 use crate::live::Update;
+use crate::memory;
 use crate::probe::Geometry;
 use crate::source::formats::described;
 use crate::source::freehand::FreehandArguments;
@@ -26,6 +27,9 @@ use std::path::Path;
 const PHANTOM_VOLUMES: usize = 4;
 /// Default rate of the phantom, volumes per second.
 const PHANTOM_RATE: f64 = 1.0;
+
+/// Largest memory of a voxel of a freehand volume, bytes: its sums, and a sample of 32 bits.
+const VOXEL_BYTES: u64 = 12;
 
 /// The source of live frames.
 #[derive(Clone, clap::Args)]
@@ -65,6 +69,12 @@ pub struct SourceArgs {
     /// Widest gap between tracked frames that is filled, mm [default: 2]
     #[arg(long, value_name = "MM")]
     hole: Option<f64>,
+    /// Length of a freehand sweep, mm: the volume has room for it from the first frames on, and does not begin again when it grows
+    #[arg(long, value_name = "MM")]
+    extent: Option<f64>,
+    /// Most memory of a volume that tracked frames are compounded into, such as 2G: up to that it grows with the sweep [default: 384M]
+    #[arg(long, value_name = "SIZE", value_parser = memory::parse)]
+    freehand_size: Option<u64>,
     #[command(flatten)]
     motor: MotorArgs,
 }
@@ -110,7 +120,15 @@ impl SourceArgs {
     #[cfg(feature = "view")]
     pub fn of_file(&self, file: &Path) -> SourceArgs {
         let geometry = GeometryArgs::default();
-        SourceArgs { geometry, clip: None, spacing: None, hole: None, ..self.at_file(file) }
+        SourceArgs {
+            geometry,
+            clip: None,
+            spacing: None,
+            hole: None,
+            extent: None,
+            freehand_size: None,
+            ..self.at_file(file)
+        }
     }
 
     /// The same arguments with the recording of a workspace.
@@ -272,7 +290,12 @@ impl SourceArgs {
         };
         let spacing = length("--spacing", self.spacing, 0.01)?;
         let max_hole = length("--hole", self.hole, 0.0)?;
-        Ok(FreehandArguments { clip: self.clip()?, spacing, max_hole })
+        let extent = length("--extent", self.extent, 0.0)?;
+        let max_voxels = self.freehand_size.map(|bytes| match memory::check(bytes) {
+            Ok(()) => Ok((bytes / VOXEL_BYTES).max(1) as usize),
+            Err(why) => Err(input(format!("--freehand-size: {why}"))),
+        });
+        Ok(FreehandArguments { clip: self.clip()?, spacing, max_hole, extent, max_voxels: max_voxels.transpose()? })
     }
 
     fn clip(&self) -> Result<Option<[usize; 4]>, Failure> {

@@ -52,7 +52,7 @@ pub enum Fault {
 
 impl NodeError {
     fn new(message: String, span: Option<Range<usize>>) -> NodeError {
-        NodeError { fault: Fault::Other, message, span }
+        NodeError { fault: Fault::Other, message: in_words(message), span }
     }
 
     pub fn fault(&self) -> Fault {
@@ -82,6 +82,19 @@ impl Display for NodeError {
     fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
         f.write_str(&self.message)
     }
+}
+
+/// A message with words that a user knows in place of the type that serde expected.
+fn in_words(message: String) -> String {
+    let Some((before, expected)) = message.rsplit_once("expected ") else { return message };
+    let words = match expected {
+        "f32" | "f64" => "a number",
+        "u8" | "u16" | "u32" | "u64" | "usize" | "i32" | "i64" => "a whole number",
+        "a boolean" => "true or false",
+        "a string" => "a text",
+        _ => return message,
+    };
+    format!("{before}expected {words}")
 }
 
 impl std::error::Error for NodeError {}
@@ -548,7 +561,7 @@ mod tests {
         for (text, fault, said) in [
             ("", Fault::MissingKey, "missing field `needed`"),
             ("needed = 1\nother = 2", Fault::UnknownKey, "unknown field `other`, expected `needed`"),
-            ("needed = 'x'", Fault::Other, "invalid type: string \"x\", expected u32"),
+            ("needed = 'x'", Fault::Other, "invalid type: string \"x\", expected a whole number"),
         ] {
             let error = from_text::<Two>(text).expect_err(text);
             assert_eq!((error.fault(), error.message()), (fault, said));
@@ -559,7 +572,7 @@ mod tests {
     fn what_is_too_large_or_a_date_is_refused_in_words() {
         for (text, said) in [
             ("count = 99999999999999999999", "integer number overflowed"),
-            ("number = 1979-05-27", "invalid type: date, expected f64"),
+            ("number = 1979-05-27", "invalid type: date, expected a number"),
         ] {
             assert_eq!(from_text::<All>(text).expect_err("it is refused").message(), said);
         }

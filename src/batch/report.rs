@@ -80,6 +80,9 @@ pub fn html(records: &[Record], torn: usize, folder: &Path) -> String {
                 li { strong { (units - failures) } " done" }
                 li { strong { (failures) } " failed" }
                 li { strong { (tries(records)) } " tries" }
+                @if let Some((first, last)) = dates(records) {
+                    li { "on " strong { (first) } @if last != first { " to " strong { (last) } } }
+                }
                 @if torn > 0 { li { strong { (torn) } " lines cut short by killed processes" } }
             }
         }
@@ -93,6 +96,12 @@ pub fn html(records: &[Record], torn: usize, folder: &Path) -> String {
         footer { p { "Written by " (escaped(&crate::machine::program())) "." } }
     };
     page(&format!("echolume batch: {verdict}"), STYLE, &body)
+}
+
+/// The days of the first and of the last try, UTC.
+fn dates(records: &[Record]) -> Option<(String, String)> {
+    let days = || records.iter().filter_map(|record| record.date.split('T').next()).filter(|day| !day.is_empty());
+    days().min().zip(days().max()).map(|(first, last)| (escaped(first), escaped(last)))
 }
 
 fn tries(records: &[Record]) -> usize {

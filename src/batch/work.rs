@@ -159,12 +159,16 @@ impl Job<'_> {
                 };
                 let mut record = worker.record(&task, key.as_ref());
                 record.seconds = Seconds { read: read_in, wait: waited, ..Seconds::default() };
-                let name = format!("{}: {}", task.numbered.line, task.numbered.unit.input);
+                let (line, unit) = (task.numbered.line, task.numbered.unit.input.clone());
+                let read = format!("{}: ", task.input.display());
                 let mut fails = |mut record: Record, status: Status, why: String| {
                     ended.failed += 1;
                     (record.status, record.error) = (status, Some(why.clone()));
                     results.add(&record).map_err(failed)?;
-                    progress.failed(cost(&task), &format!("unit {name}: {why}"));
+                    progress.failed(
+                        cost(&task),
+                        &format!("unit {line}: {unit}: {}", why.strip_prefix(&read).unwrap_or(&why)),
+                    );
                     Ok::<(), Failure>(())
                 };
                 match done {

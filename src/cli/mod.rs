@@ -50,6 +50,7 @@ mod error_report;
 mod filter;
 #[cfg(feature = "lab")]
 mod filter_report;
+mod help;
 mod machine;
 mod mesh;
 mod mesh_sheet;
@@ -117,7 +118,7 @@ use crate::kiosk::log_rotation::{self, RotatingLog};
 use crate::memory;
 use crate::source::standard_input;
 use crate::terminal::{self, Failure, failed, input};
-use clap::{CommandFactory, Parser, Subcommand};
+use clap::{CommandFactory, FromArgMatches, Parser, Subcommand};
 use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
@@ -204,13 +205,10 @@ enum Command {
 
 /// Parses the command line and runs it.
 pub fn run() -> ExitCode {
-    let arguments = match Arguments::try_parse() {
+    let arguments = match parsed() {
         Ok(arguments) => arguments,
-        Err(error) => {
-            let _ = error.print();
-            // --help and --version are reported as errors too, but are none.
-            return if error.use_stderr() { ExitCode::from(2) } else { ExitCode::SUCCESS };
-        }
+        // --help and --version are reported as errors too, but are none.
+        Err(error) => return if error.use_stderr() { ExitCode::from(2) } else { ExitCode::SUCCESS },
     };
     // A description needs one frame at a time.
     let all = matches!(arguments.command, Command::Info(_)).then_some(u64::MAX);
@@ -240,8 +238,8 @@ pub fn run() -> ExitCode {
         Command::Probe(probe) => probe.run(),
         Command::Devices(devices) => devices.run(),
         Command::SupportBundle(bundle) => bundle.run(),
-        Command::Completions(completions) => completions.run(Arguments::command()),
-        Command::Man(pages) => pages.run(Arguments::command()),
+        Command::Completions(completions) => completions.run(help::completed(Arguments::command())),
+        Command::Man(pages) => pages.run(help::grouped(Arguments::command())),
     });
     standard_input::forget();
     let done = done.and_then(|()| match terminal::take_write_error() {
@@ -251,6 +249,23 @@ pub fn run() -> ExitCode {
     let Err(failure) = done else { return ExitCode::SUCCESS };
     terminal::print_failure(&failure);
     ExitCode::from(failure.exit_code())
+}
+
+/// The arguments of this process. What is wrong with them is printed.
+fn parsed() -> Result<Arguments, clap::Error> {
+    let is_short = std::env::args_os().any(|word| word == "-h");
+    let program = help::grouped(Arguments::command());
+    let mut program = if is_short { help::short(program) } else { program };
+    let parsed = program.try_get_matches_from_mut(std::env::args_os());
+    let arguments = parsed.and_then(|matches| Arguments::from_arg_matches(&matches));
+    arguments.inspect_err(|error| {
+        // What the standard library says of a number that is none.
+        let plain = error.to_string();
+        let said = plain
+            .replace("invalid float literal", "must be a number")
+            .replace("invalid digit found in string", "must be a whole number");
+        let _ = if said == plain { error.print() } else { write!(std::io::stderr(), "{said}") };
+    })
 }
 
 impl Command {

@@ -158,6 +158,12 @@ impl Convert {
             let kept = "a secondary capture does not keep the place in the world";
             remark(&format!("{}: {kept}", self.output.display()));
         }
+        let is_enhanced =
+            matches!(VolumeFile::of(&self.output), Ok(VolumeFile::Dicom { .. })) && !self.secondary_capture;
+        if is_enhanced && target.world.directions().determinant() < 0.0 {
+            let unread = "its axes are left-handed, of which programs of ITK read neither place nor spacing in DICOM; .nrrd and .mha keep them";
+            remark(&format!("{}: {unread}", self.output.display()));
+        }
         target.check(&self.output).map_err(input)?;
         if let Some(mask) = &self.mask {
             VolumeFile::of(mask).map_err(input)?;

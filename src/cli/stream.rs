@@ -219,12 +219,16 @@ impl Stream {
         say!("in all    {}", all.line(stream.acquisition_time()));
         let counts = all.volumes;
         say!(
-            "{} frames, {} volumes shown, {} dropped, {} incomplete, {} pictures{}",
+            "{} frames, {} volumes shown, {} dropped, {} incomplete, {} pictures{}{}",
             all.frames,
             counts.shown,
             counts.dropped,
             counts.incomplete,
             all.pictures,
+            match stream.feed_counts().left_out {
+                0 => String::new(),
+                count => format!("; {count} frames of the sweep left out of the volume"),
+            },
             match (memory, resident()) {
                 (Some(then), Some(now)) => format!("; memory {then} MiB after 5 s, {now} MiB at the end"),
                 _ => String::new(),

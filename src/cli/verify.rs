@@ -389,14 +389,17 @@ impl Verify {
 
     /// The places of the checks that the flags select.
     fn chosen(&self, checks: &[CheckName]) -> Result<Vec<usize>, Failure> {
-        let wanted = |n: &usize| self.wants(&checks[*n]);
-        let chosen: Vec<usize> = (0..checks.len()).filter(wanted).collect();
-        // A filter that selects nothing is no error in a GoogleTest program.
-        match chosen.is_empty() && self.gtest_filter.is_none() {
-            true => {
-                Err(input(format!("--only {}: no check has this name; --list prints all names", self.only.join(", "))))
+        let unknown: Vec<&str> = self
+            .only
+            .iter()
+            .filter(|part| !checks.iter().any(|check| names(part, check)))
+            .map(String::as_str)
+            .collect();
+        match unknown.is_empty() {
+            true => Ok((0..checks.len()).filter(|n| self.wants(&checks[*n])).collect()),
+            false => {
+                Err(input(format!("--only {}: no check has this name; --list prints all names", unknown.join(", "))))
             }
-            false => Ok(chosen),
         }
     }
 
@@ -406,11 +409,8 @@ impl Verify {
     }
 
     fn wants(&self, check: &CheckName) -> bool {
-        let whole = format!("{} / {}", check.group, check.name);
-        let has =
-            |part: &String| whole == *part || check.group.contains(part.as_str()) || check.name.contains(part.as_str());
         let is_filtered = self.gtest_filter.as_ref().is_none_or(|filter| filter.selects(&gtest::full_name(check)));
-        is_filtered && (self.only.is_empty() || self.only.iter().any(has))
+        is_filtered && (self.only.is_empty() || self.only.iter().any(|part| names(part, check)))
     }
 
     /// Writes the pictures of each failure and stores their file names in it. If the folder cannot be written, only the pictures are lost.
@@ -474,6 +474,11 @@ impl Verify {
             (count, _) => Err(failed(format!("{count} of {all} checks failed{rest}"))),
         }
     }
+}
+
+/// True if a part of `--only` names a check: as a line of `--list`, or as a part of its group or name.
+fn names(part: &str, check: &CheckName) -> bool {
+    part == format!("{} / {}", check.group, check.name) || check.group.contains(part) || check.name.contains(part)
 }
 
 /// Writes a report file, if one was requested.

@@ -53,7 +53,7 @@ pub struct View {
     kiosk: bool,
     /// Read source, screen, keys and files from a TOML file (tools/kiosk/echolume.toml shows every key) [default with --kiosk:
     /// /etc/echolume/echolume.toml, if it exists]
-    #[arg(long, value_name = "FILE", conflicts_with_all = ["source", "probe", "rate", "real_time", "rounds", "tool", "clip", "spacing", "hole", "motor"])]
+    #[arg(long, value_name = "FILE", conflicts_with_all = ["source", "probe", "rate", "real_time", "rounds", "tool", "clip", "spacing", "hole", "extent", "freehand_size", "motor"])]
     config: Option<PathBuf>,
     /// Fill the screen
     #[arg(long)]

@@ -116,7 +116,11 @@ fn open_file(path: &Path, options: OpenOptions) -> Result<Box<dyn Source>, Input
         Some(Reads::Stream) => posed::Opened::new(path, Box::new(stream(path, options)?), options.freehand)?.source(),
         Some(Reads::Uff) => uff(path, options)?.0,
         _ if tracked::is_asked_for(&options) => Box::new(tracked_volume(path, options)?),
-        _ => Box::new(recording(path, options)?),
+        _ => {
+            let recording = recording(path, options)?;
+            recording.warn_of_tracking();
+            Box::new(recording)
+        }
     })
 }
 

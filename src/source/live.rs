@@ -58,6 +58,11 @@ pub trait Live: Send {
         None
     }
 
+    /// Pictures of a freehand sweep so far that are in no volume, or not wholly.
+    fn left_out(&self) -> u64 {
+        0
+    }
+
     /// Why nothing can arrive at the moment, on one line, such as a connection that was refused. None while the source is connected.
     fn disconnected(&self) -> Option<String> {
         None

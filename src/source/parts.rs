@@ -88,6 +88,10 @@ impl Live for WholeFrames {
         self.source.compounding()
     }
 
+    fn left_out(&self) -> u64 {
+        self.source.left_out()
+    }
+
     fn disconnected(&self) -> Option<String> {
         self.source.disconnected()
     }

@@ -2,7 +2,8 @@
 
 use super::frame::{Header, Source, file_bytes};
 use super::freehand::{
-    CompoundingOptions, FreehandArguments, FreehandFile, PlacedPicture, PlacedPictures, Pose, Refusal, Schedule, Sweep,
+    AT_ITS_LIMIT, CompoundingOptions, FreehandArguments, FreehandFile, PlacedPicture, PlacedPictures, Pose, Refusal,
+    Schedule, Sweep,
 };
 use super::live::Event;
 use crate::Frame;
@@ -37,9 +38,11 @@ pub struct Posed {
     sweep: Option<(Header, Sweep)>,
     time: Option<f64>,
     volumes: u32,
-    /// The header of the volume was emitted.
-    begun: bool,
+    /// The grid of the header that was emitted last.
+    begun: Option<Grid>,
     left_out: LeftOut,
+    /// Pictures without a pose, and all that are in no volume of an earlier header.
+    lost: u64,
 }
 
 /// Pictures that were left out since the last report.
@@ -79,7 +82,7 @@ impl LeftOut {
         let LeftOut { without, outside, refused, why, unplaced, .. } = std::mem::take(self);
         for (count, what) in [
             (without, "pictures without a valid pose are left out".to_string()),
-            (outside, "pictures lie outside of the volume, which is around the first ones".to_string()),
+            (outside, format!("pictures do not lie wholly in the volume; {AT_ITS_LIMIT}")),
             (refused, format!("pictures are refused, the last: {why}")),
         ] {
             if count > 0 {
@@ -92,7 +95,7 @@ impl LeftOut {
 
 impl Posed {
     pub fn new(options: CompoundingOptions) -> Posed {
-        Posed { options, sweep: None, time: None, volumes: 0, begun: false, left_out: LeftOut::default() }
+        Posed { options, sweep: None, time: None, volumes: 0, begun: None, left_out: LeftOut::default(), lost: 0 }
     }
 
     /// What becomes of an event: itself, or volumes of the pictures so far. A volume is emitted by an event after its interval, of any kind.
@@ -101,7 +104,7 @@ impl Posed {
         match event {
             Event::Begin(header) => {
                 self.emit(true, &mut events);
-                *self = Posed { volumes: self.volumes, ..Posed::new(self.options.clone()) };
+                *self = Posed { volumes: self.volumes, lost: self.lost(), ..Posed::new(self.options.clone()) };
                 match is_posed(&header) {
                     true => {
                         let sweep = Sweep::new(self.options.clone(), Schedule::default(), header.stored);
@@ -126,9 +129,15 @@ impl Posed {
         events
     }
 
+    /// Pictures so far that are in no volume, or not wholly.
+    pub fn lost(&self) -> u64 {
+        self.lost + self.sweep.as_ref().map_or(0, |(_, sweep)| sweep.left_out())
+    }
+
     fn picture(&mut self, frame: Frame) {
         let Some((Header { forward: Geometry::Cartesian(grid), .. }, sweep)) = &mut self.sweep else { return };
         let Some(pose) = frame.pose else {
+            self.lost += 1;
             return self.left_out.without_pose();
         };
         self.time = frame.time;
@@ -143,7 +152,7 @@ impl Posed {
         let changed = sweep.update(at_once, |refusal| self.left_out.refused(refusal));
         self.left_out.report(at_once, events);
         let Some(lattice) = sweep.lattice().filter(|_| changed == Some(true)) else { return };
-        if !std::mem::replace(&mut self.begun, true) {
+        if self.begun.replace(lattice.grid) != Some(lattice.grid) {
             let geometry = Geometry::Cartesian(lattice.grid);
             let (forward, backward) = (geometry.clone(), geometry);
             events.push(Event::Begin(Box::new(Header { forward, backward, ..pictures.clone() })));

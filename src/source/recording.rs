@@ -146,6 +146,15 @@ impl Recording {
         &self.layout.poses
     }
 
+    /// Says that tracked pictures stay single ones, and what makes a volume of them: otherwise a picture of the first passes for the sweep.
+    pub(super) fn warn_of_tracking(&self) {
+        let is_single = self.frames_per_volume() == 1 && self.volumes() > 1;
+        if let Some((_, how)) = self.poses().remark().filter(|_| is_single) {
+            let (file, count) = (describe::path(&self.path), self.volumes());
+            tracing::warn!(%file, "{count} single pictures, not one volume; tracking: {how}");
+        }
+    }
+
     /// Number of all frames, including those after the last complete volume.
     pub fn frames_in_file(&self) -> usize {
         self.layout.frames

@@ -49,6 +49,9 @@ impl VolumeFile {
         }
         match formats.iter().find(|(ending, _)| name.ends_with(ending)) {
             Some((_, format)) => Ok(*format),
+            None if [".stl", ".ply", ".glb"].iter().any(|ending| name.ends_with(ending)) => {
+                Err(InputError::new(path, "file", "is a surface by its name, which `echolume mesh` writes"))
+            }
             None => Err(InputError::new(path, "file", "must end in .mha, .nrrd, .nii, .nii.gz or .dcm")),
         }
     }

@@ -489,7 +489,7 @@ fn ramp_along(
     Ok(largest)
 }
 
-/// A hill under a low light, whose shadow is mostly edge, unlike that of noise. BaselineComparison with the reference: texels may be beyond tolerance
+/// A hill under a low light, whose shadow is mostly edge, unlike that of noise. Compared with the reference: texels may be beyond tolerance
 /// only where a ray to the light grazes the hill.
 fn shadow_of_a_hill(dut: &mut DeviceUnderTest) -> Result<Findings, GpuError> {
     let mut findings = Findings::default();

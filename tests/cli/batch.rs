@@ -102,7 +102,13 @@ fn no_unit_is_lost_or_half_written_whatever_ends_the_processes() {
         4,
         &["1 of 6 units failed"],
     );
-    assert!(err.lines().count() == 2 && err.contains("unit 3: cut.nrrd: ") && err.contains("cut short"), "{err}");
+    assert!(
+        err.lines().count() == 2
+            && err.contains("unit 3: cut.nrrd: ")
+            && err.matches("cut.nrrd").count() == 1
+            && err.contains("cut short"),
+        "{err}"
+    );
     let expected = outputs(one.as_ref());
     assert_eq!((expected.len(), records(one.as_ref()), lines(one.as_ref()).len()), (5, 5, 6));
     assert!(said.contains("5 done"), "{said}");
@@ -192,7 +198,12 @@ fn no_unit_is_lost_or_half_written_whatever_ends_the_processes() {
     let said = done(&["batch", "--report", &one, "-o", &page]);
     assert!(said.contains("6 units: 5 done, 1 failed"), "{said}");
     let html = fs::read_to_string(&page).expect("the page");
-    assert!(html.contains("cut short") && html.matches("data:image/png").count() == 2 && html.contains("bit for bit"));
+    assert!(
+        html.contains("cut short")
+            && html.contains("<li>on <strong>20")
+            && html.matches("data:image/png").count() == 2
+            && html.contains("bit for bit")
+    );
 }
 
 fn text_without_line(units: &[Value], left_out: usize) -> String {

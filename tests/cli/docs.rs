@@ -146,6 +146,42 @@ fn generated_command_line_page_is_what_the_program_prints() {
     hold("docs/cli.md", &format!("{head}{index}{page}"));
 }
 
+/// The usual flags fit on a screen, and are flags of the program.
+#[test]
+fn the_short_help_is_one_screen() {
+    let mut commands = subcommands(&help(&[]));
+    commands.retain(|name| name != "help");
+    for name in commands {
+        let output =
+            Command::new(PROGRAM).args([&name, "-h"]).env("COLUMNS", "100").output().expect("the program starts");
+        let text = String::from_utf8(output.stdout).expect("text");
+        let whole = help(std::slice::from_ref(&name));
+        assert!(output.status.success() && text.lines().count() <= 42, "{name}: {text}");
+        assert!(text.contains(&format!("echolume {name} --help")), "{name}: {text}");
+        for flag in text.split_whitespace().filter(|word| word.starts_with("--") && *word != "--help") {
+            let flag = flag.trim_end_matches("...");
+            assert!(whole.contains(flag), "{name} has no {flag}");
+        }
+    }
+    // What has few flags has all of them, and no command loses the values that `--help` says are usual.
+    let output = Command::new(PROGRAM).args(["render", "-h"]).output().expect("the program starts");
+    let text = String::from_utf8(output.stdout).expect("text");
+    assert!(["--preset", "--mode", "--set", "--output"].iter().all(|flag| text.contains(flag)), "{text}");
+    let order = ["Look:", "Device:", "Input:", "Output:", "Debugging:"].map(|group| text.find(group));
+    assert!(order.iter().all(Option::is_some), "{text}");
+}
+
+/// Presets, modes, bodies and settings are words that a shell completes.
+#[test]
+fn completions_know_values() {
+    let output = Command::new(PROGRAM).args(["completions", "bash"]).output().expect("the program starts");
+    let script = String::from_utf8(output.stdout).expect("text");
+    let keys = numbers().map(|number| format!("{}=", number.key));
+    for word in ["face-classic", "minip", "wires", "rolling"].map(String::from).into_iter().chain(keys) {
+        assert!(script.contains(&word), "{word}");
+    }
+}
+
 // The settings.
 
 /// A struct or an enum of the settings.

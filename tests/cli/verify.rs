@@ -150,6 +150,10 @@ fn refusals_of_verify_are_one_line_with_their_own_exit_code() {
         (vec!["--baseline", &text, "--threshold", "0.5"], "threshold"),
         (vec!["--only", "no such check"], "--list"),
         (vec!["--only", "passes / no such pass"], "--list"),
+        (
+            vec!["--list", "--only", "passes / median_slice", "--only", "no such check"],
+            "--only no such check: no check",
+        ),
     ] {
         refuses(&more, &verify(&more), 2, &[named]);
     }

@@ -145,6 +145,7 @@ fn the_command_writes_a_volume_or_one_line_and_nothing() {
         (vec![SWEEP, to, "--volume", "9"], "--volume 9"),
         (vec![SWEEP, "/dev/null/volume.mha"], "/dev/null/volume.mha"),
         (vec![SWEEP, "volume.png"], "must end in .mha, .nrrd"),
+        (vec![SWEEP, "face.stl"], "`echolume mesh`"),
         (vec!["nothing.mha", to], "nothing.mha"),
         (vec![to, to], "would replace an input"),
     ] {

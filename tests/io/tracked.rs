@@ -1,6 +1,7 @@
 //! Tracked pictures of the PLUS toolkit in a file become a freehand volume in its place.
 
 use crate::common::files::{BONE, Folder, SWEEP, data};
+use crate::common::program::run;
 use echolume::low_level::probe::{Geometry, Grid};
 use echolume::low_level::source::{Calibration, OpenOptions, Source, description, open_with};
 use glam::{DMat4, DVec3};
@@ -233,6 +234,12 @@ fn a_sweep_is_where_the_plus_toolkit_has_it() {
     let options = OpenOptions { plus_config: Some(&config), ..OpenOptions::default() };
     let ours = Volume::of(open_with(&sweep, options).expect("a freehand volume"));
     assert_eq!(ours.grid.spacing, [0.5; 3], "the configuration's");
+    // Without it they are drawn as what they are, and that is said.
+    let path = sweep.to_str().expect("a plain name");
+    let said = |more: &[&str]| run(&[&["render", path, "--explain"], more].concat()).2;
+    let warning = "97 single pictures, not one volume; tracking: ProbeToTracker";
+    assert!(said(&[]).contains(warning) && said(&[]).contains("--plus-config FILE.xml"), "{}", said(&[]));
+    assert!(!said(&["--plus-config", config.to_str().expect("a plain name")]).contains("single pictures"));
     let theirs = Volume::of(open_with(&data("plus/reconstructed.mha"), OpenOptions::default()).expect("a volume"));
     let to_world = theirs.to_voxel.inverse();
     let reached = |n: &usize| theirs.voxels[*n] > 0;

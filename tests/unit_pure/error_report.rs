@@ -373,6 +373,12 @@ fn names_are_not_joined_and_looks_have_a_figure_of_their_own() {
     assert!(Figure::Looks.is_in(&shown));
     let looks = plot::svg(&shown, Figure::Looks, Measure::Rmse, [1200, 800]).expect("a plot");
     let errors = plot::svg(&shown, Figure::Errors, Measure::Rmse, [1200, 800]).expect("a plot");
+    // More names than a panel has room for are numbers in it, and a line below.
+    let values: Vec<Point> = (0..17).map(|n| point(&format!("scheme {n}"), &[], f64::from(n), 0.01, 10.0)).collect();
+    let many = Report { dials: vec![dial("perona-malik", "step", 0, values)], ..shown.clone() };
+    let numbered = plot::svg(&many, Figure::Errors, Measure::Rmse, [1200, 800]).expect("a plot");
+    assert!(numbered.contains("perona-malik 1: scheme 0, 2: scheme 1"), "the key");
+    assert!(numbered.matches("scheme 7").count() == 1, "once, in the key");
     assert!(looks.contains("r16f") && !looks.contains(">step"), "looks alone");
     assert!(!errors.contains("r32f") && errors.contains("step"), "errors alone");
 }

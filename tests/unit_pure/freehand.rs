@@ -374,6 +374,112 @@ fn a_lattice_lies_around_its_frames_along_their_axes() {
     }
 }
 
+/// Pictures of 21 x 11 pixels, 0.5 mm apart, whose samples are a linear field of their place.
+fn picture(turn: DQuat, at: DVec3) -> (Pose, Vec<u8>) {
+    let pose = Pose {
+        to_space: DAffine3::from_scale_rotation_translation(DVec3::new(0.5, 0.5, 1.0), turn, at),
+        size: [21, 11],
+    };
+    let values: Vec<f32> = (0..231).map(|n| field(pose.place((n % 21) as f64, (n / 21) as f64)) as f32).collect();
+    (pose, floats(&values))
+}
+
+fn field(place: DVec3) -> f64 {
+    1000.0 + 3.0 * place.x - 2.0 * place.y + place.z
+}
+
+/// Every voxel of a sweep that is filled, as its difference from the field at its place.
+fn off(sweep: &Sweep) -> Vec<f64> {
+    let lattice = sweep.lattice().expect("a place");
+    let Grid { size: [x, y, z], spacing, origin } = lattice.grid;
+    let back = lattice.to_volume.inverse();
+    let mut off = Vec::new();
+    for k in 0..z {
+        for (n, value) in sweep.slice(k).expect("a slice").as_chunks().0.iter().enumerate().take(x * y) {
+            let cell = DVec3::new((n % x) as f64, (n / x) as f64, k as f64);
+            let place = back.transform_point3(DVec3::from(origin) + cell * DVec3::from(spacing));
+            let value = f64::from(f32::from_le_bytes(*value));
+            off.extend((value != 0.0).then(|| value - field(place)));
+        }
+    }
+    off
+}
+
+/// A sweep of 75 mm of which the first 25 mm or 5 mm place the volume.
+#[test]
+fn a_volume_grows_around_pictures_that_leave_it() {
+    let turn = DQuat::from_euler(glam::EulerRot::XYZ, 0.4, -0.3, 1.0);
+    let along = turn * DVec3::Z;
+    // The first is large enough to stay as fine as it began, the second becomes coarser, the third cannot grow so far.
+    for (most, first, coarser) in [(1 << 25, 100, 1.0..=1.0), (50_000, 100, 1.2..=2.01), (6_000, 20, 1.2..=2.01)] {
+        let options = CompoundingOptions { max_voxels: most, margin: 1.0, ..options() };
+        let mut sweep = Sweep::new(options, Schedule { first, ..Schedule::default() }, StoredType::F32);
+        let (mut lost, mut began, mut finest) = (0, None, 0.0);
+        for n in 0..300 {
+            let (pose, bytes) = picture(turn, DVec3::new(50.0, -20.0, 8.0) + along * 0.25 * f64::from(n));
+            lost += u32::from(sweep.push(pose, bytes) == Err(Refusal::Outside));
+            sweep.update(n == 299, |refusal| panic!("{refusal:?}"));
+            if began.is_none()
+                && let Some(lattice) = sweep.lattice()
+            {
+                (began, finest) = (Some(lattice.grid.size[2]), lattice.grid.spacing[0]);
+            }
+        }
+        let Grid { size, spacing, .. } = sweep.lattice().expect("a place").grid;
+        assert!(size.iter().product::<usize>() <= most && Some(size[2]) != began, "{size:?}");
+        let ratio = spacing[0] / finest;
+        assert!(coarser.contains(&((ratio * 1e6).round() / 1e6)), "{most}: {ratio}");
+        let off = off(&sweep);
+        let length = (size[2] - 1) as f64 * spacing[2];
+        match most {
+            6_000 => assert!(lost > 0 && length < 74.75, "{lost} lost, {length} mm"),
+            _ => assert!(lost == 0 && length >= 74.75, "{lost} lost, {length} mm"),
+        }
+        // At the border a pixel goes to voxels as far as a diagonal, 0.9 mm and more where it is coarser, of a slope of 3.7 a mm. Within that cancels.
+        let [worst, sum] = off.iter().fold([0.0f64, 0.0], |[most, sum], off| [most.max(off.abs()), sum + off.abs()]);
+        assert!(worst < 6.0 * ratio && sum / (off.len() as f64) < 0.9 * ratio, "{worst}, {}", sum / off.len() as f64);
+        assert!(off.len() > 1500, "{}", off.len());
+    }
+}
+
+/// With the same spacing nothing is computed again: the volume is that of one with the room from the beginning.
+#[test]
+fn growth_keeps_every_voxel() {
+    for overlap in [Overlap::Mean, Overlap::Latest, Overlap::Maximum] {
+        let swept = |extent: Option<f64>| {
+            let options = CompoundingOptions { overlap, extent, spacing: Some(0.5), margin: 1.0, ..options() };
+            let mut sweep = Sweep::new(options, Schedule { first: 3, ..Schedule::default() }, StoredType::F32);
+            let mut sizes = Vec::new();
+            for n in 0..30 {
+                let (pose, bytes) =
+                    picture(DQuat::IDENTITY, DVec3::new(0.0, 0.1 * f64::from(n % 3), -0.5 * f64::from(n)));
+                assert_eq!(sweep.push(pose, bytes), Ok(()));
+                sweep.update(n == 29, |refusal| panic!("{refusal:?}"));
+                sizes.extend(sweep.lattice().map(|lattice| lattice.grid.size));
+            }
+            sizes.dedup();
+            (off(&sweep), sizes.len(), sweep.lattice().expect("a place").grid)
+        };
+        let ((grown, sizes, _), (stated, one, grid)) = (swept(None), swept(Some(14.5)));
+        // In the direction of the sweep: 14.5 mm and 1 mm on either side, which nothing outgrows.
+        assert!(sizes > 2 && one == 1 && grid.size[2] == 34, "{sizes} {one} {grid:?}");
+        assert!(grown == stated && grown.len() > 6000, "{overlap:?}: {} {}", grown.len(), stated.len());
+    }
+}
+
+/// A sweep of fewer pictures than place a volume is placed when no more come.
+#[test]
+fn silence_ends_the_wait_for_the_first_pictures() {
+    for (silence, expected) in [(std::time::Duration::ZERO, Some(true)), (std::time::Duration::from_secs(60), None)] {
+        let mut sweep = Sweep::new(options(), Schedule { silence, ..Schedule::default() }, StoredType::F32);
+        for n in 0..5 {
+            let (pose, bytes) = picture(DQuat::IDENTITY, DVec3::Z * f64::from(n));
+            assert_eq!(sweep.push(pose, bytes), Ok(()));
+        }
+        assert_eq!(sweep.update(false, |refusal| panic!("{refusal:?}")), expected);
+    }
+}
+
 #[test]
 fn a_volume_that_is_too_large_is_refused_before_anything_is_allocated() {
     let huge = usize::MAX;

@@ -82,6 +82,10 @@ pub fn size(report: &Report, figure: Figure) -> [u32; 2] {
     [PANEL[0] * COLUMNS as u32, (HEAD as u32 + PANEL[1] * rows + key).clamp(MIN_SIZE[1], MAX_SIZE)]
 }
 
+/// Most names of a panel: more cover each other, and are numbered instead.
+const MOST: usize = 14;
+/// Longest line of the key that several names share, characters.
+const KEY_WIDTH: usize = 170;
 /// Height of a line of the key below the panels, pixels.
 const KEY_LINE: f64 = 16.0;
 
@@ -137,7 +141,6 @@ fn combinations(report: &Report, measure: Measure) -> Panel {
     points.sort_by(|a, b| a.time[1].total_cmp(&b.time[1]));
     // Names of many changes, or many names, fit into no panel: those of the front and of the scene as it is are numbered from the fastest on.
     const LONGEST: usize = 40;
-    const MOST: usize = 14;
     let mut key = Vec::new();
     if points.len() > MOST || points.iter().any(|p| p.name.chars().count() > LONGEST) {
         for point in &mut points {
@@ -182,7 +185,8 @@ fn of_dial(index: usize, dial: &Dial, measure: Measure) -> Panel {
         let (name, is_default, is_joined) = (point.label.clone(), point.is_default, dial.is_on_axis(point));
         Some(PlottedPoint { name, time, error, is_default, is_joined, on_front: false }).filter(|p| p.time[0] > 0.0)
     });
-    let points: Vec<_> = plotted.collect();
+    let mut points: Vec<_> = plotted.collect();
+    let key = if points.len() > MOST { numbered(&mut points, &dial.name) } else { Vec::new() };
     let other = dial.points.iter().find(|p| p.is_default).and_then(|p| p.times);
     let other = other.map(|t| match of_picture {
         true => format!("volume {} ms", rounded(t.volume.median * 1e-6)),
@@ -194,8 +198,22 @@ fn of_dial(index: usize, dial: &Dial, measure: Measure) -> Panel {
         time_axis: if of_picture { "picture (ms)" } else { "volume (ms)" },
         colour: index,
         points,
-        key: Vec::new(),
+        key,
     }
+}
+
+/// Gives points numbers for names. Returns the lines that say which number is which name.
+fn numbered(points: &mut [PlottedPoint], dial: &str) -> Vec<String> {
+    let mut lines: Vec<String> = Vec::new();
+    for (n, point) in points.iter_mut().enumerate() {
+        let name = format!("{}: {}", n + 1, point.name);
+        point.name = (n + 1).to_string();
+        match lines.last_mut().filter(|line| line.len() + name.len() < KEY_WIDTH) {
+            Some(line) => *line += &format!(", {name}"),
+            None => lines.push(format!("{dial} {name}")),
+        }
+    }
+    lines
 }
 
 /// The report as a diagram.

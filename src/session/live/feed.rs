@@ -41,6 +41,8 @@ pub struct FeedCounts {
     pub unrecorded: u64,
     /// How often the source was disconnected.
     pub disconnected: u64,
+    /// Pictures of a freehand sweep that are in no volume, or not wholly.
+    pub left_out: u64,
 }
 
 impl FeedCounts {
@@ -50,6 +52,7 @@ impl FeedCounts {
             lost: self.lost + other.lost,
             unrecorded: self.unrecorded + other.unrecorded,
             disconnected: self.disconnected + other.disconnected,
+            left_out: self.left_out + other.left_out,
         }
     }
 }
@@ -71,6 +74,7 @@ struct Shared {
     lost: AtomicU64,
     unrecorded: AtomicU64,
     disconnections: AtomicU64,
+    left_out: AtomicU64,
     wake: Option<Wake>,
 }
 
@@ -221,10 +225,10 @@ impl Feed {
 
     /// What was counted so far.
     pub fn counts(&self) -> FeedCounts {
-        let Shared { lost, unrecorded, disconnections, .. } = &*self.shared;
-        let [lost, unrecorded, disconnected] =
-            [lost, unrecorded, disconnections].map(|count| count.load(Ordering::Relaxed));
-        FeedCounts { lost, unrecorded, disconnected }
+        let Shared { lost, unrecorded, disconnections, left_out, .. } = &*self.shared;
+        let [lost, unrecorded, disconnected, left_out] =
+            [lost, unrecorded, disconnections, left_out].map(|count| count.load(Ordering::Relaxed));
+        FeedCounts { lost, unrecorded, disconnected, left_out }
     }
 }
 
@@ -275,6 +279,8 @@ fn listen(source: Box<dyn Live>, mut tap: Option<RecordingTap>, mut observer: Op
             Some(posed) => posed.take(event),
             None => vec![event],
         };
+        let left_out = source.left_out() + posed.as_ref().map_or(0, Posed::lost);
+        shared.left_out.store(left_out, Ordering::Relaxed);
         for event in events.into_iter().filter(|event| !matches!(event, Event::Idle)) {
             observer.iter_mut().for_each(|observer| observer(&event));
             shared.put(Arrived { event, at }, can_wait);

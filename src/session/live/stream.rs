@@ -701,7 +701,7 @@ impl Stream {
     /// Statistics since the stream was created. Latencies and pass times are those since they were last taken.
     pub fn statistics(&mut self) -> Result<Statistics, StreamError> {
         self.statistics.time = self.began.elapsed();
-        let FeedCounts { lost, unrecorded, disconnected } = self.feed_counts();
+        let FeedCounts { lost, unrecorded, disconnected, .. } = self.feed_counts();
         (self.statistics.lost, self.statistics.unrecorded) = (lost, unrecorded);
         self.statistics.faults.disconnected = disconnected;
         self.statistics.passes = self.session.as_mut().map_or(Vec::new(), |session| session.renderer.times_so_far());

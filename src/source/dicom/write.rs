@@ -272,7 +272,7 @@ impl Header {
     }
 
     /// Group 0028 up to the pixels' bits.
-    /// `increment`: the element that tells frames apart; `spacing`: of rows and of columns, mm. A capture has them here.
+    /// `increment`: the element that tells frames apart, of a capture; `spacing`: of rows and of columns, mm.
     fn pixels(&mut self, size: [usize; 3], width: usize, increment: Option<Tag>, spacing: Option<[f64; 2]>) {
         let [columns, rows, slices] = size;
         let bits = 8 * width as u16;
@@ -312,6 +312,11 @@ impl Header {
         self.text(tags::MODEL, b"LO", NAME);
         self.unknown(0x0008_2218);
         self.patient();
+        // Programs of ITK read place and spacing of this class here only. Their slices follow each other along rows x columns.
+        let is_right_handed = directions.determinant() > 0.0;
+        if is_right_handed {
+            self.text(tags::SPACING_BETWEEN_SLICES, b"DS", &decimal(spacing[2]));
+        }
         self.text(0x0018_1000, b"LO", "0");
         self.text(0x0018_1020, b"LO", env!("CARGO_PKG_VERSION"));
         self.text(0x0018_106a, b"CS", "NO TRIGGER");
@@ -325,6 +330,11 @@ impl Header {
         self.unknown(0x0018_980e);
         self.unknown(0x0018_980f);
         self.study();
+        let both = [directions.x_axis.to_array(), directions.y_axis.to_array()].map(decimals).join("\\");
+        if is_right_handed {
+            self.text(tags::POSITION_PATIENT, b"DS", &decimals(world.origin().to_array()));
+            self.text(tags::ORIENTATION_PATIENT, b"DS", &both);
+        }
         self.identifier(0x0020_0052, Identifier::Space);
         self.empty(0x0020_0060, b"CS");
         self.identifier(0x0020_0200, Identifier::Clock);
@@ -341,7 +351,7 @@ impl Header {
         self.text(0x0020_930c, b"CS", "ESTIMATED");
         self.text(0x0020_9311, b"CS", "3D");
         self.identifier(0x0020_9312, Identifier::VolumeSpace);
-        self.pixels(size, width, None, None);
+        self.pixels(size, width, None, is_right_handed.then_some([spacing[1], spacing[0]]));
         self.no_identity();
         self.text(tags::INTERCEPT, b"DS", "0");
         self.text(tags::SLOPE, b"DS", "1");
@@ -361,8 +371,7 @@ impl Header {
                 item.text(0x0018_980b, b"CS", "NO");
             });
             item.one(tags::PLANE_ORIENTATION, |item| {
-                let both = [directions.x_axis.to_array(), directions.y_axis.to_array()];
-                item.text(tags::ORIENTATION_PATIENT, b"DS", &both.map(decimals).join("\\"));
+                item.text(tags::ORIENTATION_PATIENT, b"DS", &both);
             });
             item.one(tags::PLANE_ORIENTATION_VOLUME, |item| {
                 item.reals(tags::ORIENTATION_VOLUME, &[1.0, 0.0, 0.0, 0.0, 1.0, 0.0]);

@@ -13,6 +13,10 @@ pub struct FreehandArguments {
     pub spacing: Option<f64>,
     /// As [`CompoundingOptions::max_hole`], mm.
     pub max_hole: Option<f64>,
+    /// As [`CompoundingOptions::extent`], mm.
+    pub extent: Option<f64>,
+    /// As [`CompoundingOptions::max_voxels`].
+    pub max_voxels: Option<usize>,
 }
 
 impl FreehandArguments {
@@ -22,6 +26,8 @@ impl FreehandArguments {
             clip: self.clip.or(options.clip),
             spacing: self.spacing.or(options.spacing),
             max_hole: self.max_hole.unwrap_or(options.max_hole),
+            extent: self.extent.or(options.extent),
+            max_voxels: self.max_voxels.unwrap_or(options.max_voxels),
             ..options
         }
     }
@@ -37,8 +43,14 @@ impl FreehandArguments {
 
     /// The flag of the first that was said.
     pub fn flag(&self) -> Option<&'static str> {
-        let FreehandArguments { clip, spacing, max_hole } = self;
-        let said = [("--clip", clip.is_some()), ("--spacing", spacing.is_some()), ("--hole", max_hole.is_some())];
+        let FreehandArguments { clip, spacing, max_hole, extent, max_voxels } = self;
+        let said = [
+            ("--clip", clip.is_some()),
+            ("--spacing", spacing.is_some()),
+            ("--hole", max_hole.is_some()),
+            ("--extent", extent.is_some()),
+            ("--freehand-size", max_voxels.is_some()),
+        ];
         said.iter().find(|(_, is_said)| *is_said).map(|(flag, _)| *flag)
     }
 }

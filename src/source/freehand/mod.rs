@@ -9,6 +9,7 @@
 
 mod file;
 mod given;
+mod growth;
 mod sweep;
 
 pub(super) use file::{FreehandFile, PlacedPicture, PlacedPictures};
@@ -19,6 +20,9 @@ use crate::probe::StoredType;
 use crate::probe::{Grid, World};
 use glam::{DAffine3, DMat3, DVec3};
 use rayon::prelude::*;
+
+/// Why pictures are not in a volume, for users.
+pub(super) const AT_ITS_LIMIT: &str = "it may not grow further; a larger --freehand-size or --spacing lets it";
 
 /// Default limit of the voxels of a volume: 2^25, about 320 along each edge.
 const DEFAULT_MAX_VOXELS: usize = 1 << 25;
@@ -69,6 +73,8 @@ pub struct CompoundingOptions {
     pub spacing: Option<f64>,
     /// Margin of the volume around the frames that it is placed around, mm.
     pub margin: f64,
+    /// Least length of the volume along the normal of the frames, mm, from the first of them in the direction in which they move.
+    pub extent: Option<f64>,
     /// Most voxels of the volume.
     pub max_voxels: usize,
 }
@@ -82,6 +88,7 @@ impl Default for CompoundingOptions {
             clip: None,
             spacing: None,
             margin: 5.0,
+            extent: None,
             max_voxels: DEFAULT_MAX_VOXELS,
         }
     }
@@ -115,6 +122,8 @@ pub struct Compounder {
     slices: Vec<Vec<u8>>,
     zero: Vec<u8>,
     counts: CompoundingCounts,
+    /// Lateral distance of the voxels before the volume grew, mm.
+    first_spacing: f64,
 }
 
 impl Compounder {
@@ -129,8 +138,9 @@ impl Compounder {
             return Err("the volume's own place is not finite".into());
         }
         let count = grid.size.iter().try_fold(1usize, |n, m| n.checked_mul(*m)).unwrap_or(usize::MAX);
-        if count > options.max_voxels.min(MAX_VOXELS) {
-            let ([x, y, z], most) = (grid.size, options.max_voxels.min(MAX_VOXELS));
+        let most = options.max_voxels.min(MAX_VOXELS);
+        if count > most {
+            let [x, y, z] = grid.size;
             return Err(format!("{x} x {y} x {z} voxels: at most {most} are allowed; take a larger spacing"));
         }
         let sticks = Sticks::new(grid, options.max_hole)?;
@@ -148,6 +158,7 @@ impl Compounder {
             slices,
             zero,
             counts: CompoundingCounts::default(),
+            first_spacing: lattice.grid.spacing[0],
         })
     }
 
@@ -157,6 +168,10 @@ impl Compounder {
 
     pub fn stored(&self) -> StoredType {
         self.stored
+    }
+
+    fn most_voxels(&self) -> usize {
+        self.options.max_voxels.min(MAX_VOXELS)
     }
 
     pub fn counts(&self) -> CompoundingCounts {
@@ -177,11 +192,7 @@ impl Compounder {
             }
         };
         self.voxels.begin();
-        let grid = &self.lattice.grid;
-        let to_index = |place: DVec3| {
-            let place = self.lattice.to_volume.transform_point3(place);
-            (place - DVec3::from(grid.origin)) / DVec3::from(grid.spacing)
-        };
+        let to_index = |place: DVec3| self.lattice.index_of(place);
         let origin = to_index(frame.pose.place(0.0, 0.0));
         let (right, down) =
             (to_index(frame.pose.place(1.0, 0.0)) - origin, to_index(frame.pose.place(0.0, 1.0)) - origin);
@@ -195,7 +206,7 @@ impl Compounder {
                     self.counts.pixels += 1;
                     continue;
                 }
-                inside += u64::from(self.voxels.splat(at, value, self.options.splat, &mut self.touched));
+                inside += u64::from(self.voxels.splat(at, value, 1.0, self.options.splat, &mut self.touched));
             }
         }
         self.counts.frames += 1;
@@ -365,7 +376,7 @@ impl Lattice {
     /// The lattice that contains the frames, with a margin of `options.margin`.
     ///
     /// Its axes are the mean of theirs: lateral along the rows, depth along the columns and perpendicular to lateral, elevation along the
-    /// normal (lateral x depth). The origin is the mean of the centres of their first rows, as if that were the face of the probe. Only the
+    /// normal (lateral x depth). It is as long as `options.extent` at least. The origin is the mean of the centres of their first rows, as if that were the face of the probe. Only the
     /// clipped part of the frames is used. The spacing is that of the options, otherwise that of the pixels along rows and columns, and the
     /// larger of both along the normal. It is made coarser until there are at most `options.max_voxels`, and at most 2048 along an edge.
     /// Poses that are not valid are left out.
@@ -379,6 +390,7 @@ impl Lattice {
         };
         length("margin", options.margin, 0.0)?;
         options.spacing.map_or(Ok(()), |mm| length("spacing", mm, 1e-6))?;
+        options.extent.map_or(Ok(()), |mm| length("extent", mm, 0.0))?;
         let placed: Vec<_> = poses
             .iter()
             .filter(|pose| pose.check().is_ok())
@@ -405,6 +417,15 @@ impl Lattice {
             {
                 let corner = to_volume.transform_point3(pose.place(column as f64, row as f64));
                 (low, high) = (low.min(corner), high.max(corner));
+            }
+        }
+        if let Some(beyond) = options.extent.map(|extent| extent - (high.z - low.z)).filter(|beyond| *beyond > 0.0) {
+            let height = |(pose, _): &(&Pose, PixelRange)| to_volume.transform_point3(pose.place(0.0, 0.0)).z;
+            // Pictures that do not move do not say whereto they will: to either side.
+            match placed.first().map(height).zip(placed.last().map(height)).map_or(0.0, |(from, to)| to - from) {
+                0.0 => (low.z, high.z) = (low.z - beyond / 2.0, high.z + beyond / 2.0),
+                up if up > 0.0 => high.z += beyond,
+                _ => low.z -= beyond,
             }
         }
         let pitch = [mean(&|p, _| DVec3::splat(right(p).length())).x, mean(&|p, _| DVec3::splat(down(p).length())).x];
@@ -471,8 +492,8 @@ impl Voxels {
         self.frame = self.frame.wrapping_add(1).max(1);
     }
 
-    /// Adds a pixel at a position in voxel indices. Sets `touched` for its slices. False if no voxel is there.
-    fn splat(&mut self, at: DVec3, value: f32, splat: Splat, touched: &mut [bool]) -> bool {
+    /// Adds pixels of a weight at a position in voxel indices. Sets `touched` for its slices. False if no voxel is there.
+    fn splat(&mut self, at: DVec3, value: f32, pixels: f32, splat: Splat, touched: &mut [bool]) -> bool {
         let size = DVec3::from_array(self.size.map(|n| n as f64));
         // No voxel is within reach, or NaN.
         if !(at.cmpgt(DVec3::NEG_ONE).all() && at.cmplt(size).all()) {
@@ -481,7 +502,7 @@ impl Voxels {
         if splat == Splat::Nearest {
             let near = (at + 0.5).floor();
             return near.cmpge(DVec3::ZERO).all() && near.cmplt(size).all() && {
-                self.add(near.to_array().map(|n| n as usize), value, 1.0, touched);
+                self.add(near.to_array().map(|n| n as usize), value, pixels, touched);
                 true
             };
         }
@@ -494,7 +515,7 @@ impl Voxels {
             let cell = [0, 1, 2].map(|a| low[a] + high[a] as isize);
             let there = (0..3).all(|a| cell[a] >= 0 && (cell[a] as usize) < self.size[a]);
             if weight >= MIN_WEIGHT && there {
-                self.add(cell.map(|n| n as usize), value, weight as f32, touched);
+                self.add(cell.map(|n| n as usize), value, pixels * weight as f32, touched);
                 inside = true;
             }
         }

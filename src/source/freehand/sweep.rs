@@ -1,5 +1,5 @@
 //! A freehand volume of pictures that arrive: the first are kept until the volume can be placed around them, later ones are compounded as
-//! they come.
+//! they come, and the volume grows around them.
 
 use super::{Compounder, CompoundingOptions, Lattice, Pose, TrackedFrame};
 use crate::probe::StoredType;
@@ -12,8 +12,10 @@ const MAX_FIRST_BYTES: usize = 256 << 20;
 /// When the volume of a [`Sweep`] is placed and emitted.
 #[derive(Clone, Debug)]
 pub struct Schedule {
-    /// It is placed around so many first pictures, or those of ten seconds or of 256 MiB.
+    /// It is placed around so many first pictures, or those of ten seconds or of 256 MiB, ...
     pub first: usize,
+    /// ... or those before none came for so long.
+    pub silence: Duration,
     /// It is emitted at this interval while pictures arrive ...
     pub interval: Duration,
     /// ... or after this number of pictures.
@@ -22,14 +24,14 @@ pub struct Schedule {
 
 impl Default for Schedule {
     fn default() -> Schedule {
-        Schedule { first: 100, interval: Duration::from_millis(500), pictures: 64 }
+        Schedule { first: 100, silence: Duration::from_secs(1), interval: Duration::from_millis(500), pictures: 64 }
     }
 }
 
 /// Why a picture, or all of them, are in no volume.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Refusal {
-    /// The picture lies outside of the volume, which was placed around the first ones.
+    /// The picture does not lie wholly in the volume, which may not grow further.
     Outside,
     /// The picture cannot be compounded, in words.
     Picture(String),
@@ -50,6 +52,9 @@ pub struct Sweep {
     /// When the first picture arrived that was not emitted yet, and how many have since.
     since: Option<Instant>,
     pictures: usize,
+    /// When the last picture arrived.
+    last: Option<Instant>,
+    left_out: u64,
 }
 
 impl Sweep {
@@ -64,6 +69,8 @@ impl Sweep {
             compounder: None,
             since: None,
             pictures: 0,
+            last: None,
+            left_out: 0,
         }
     }
 
@@ -81,13 +88,15 @@ impl Sweep {
     /// # Errors
     /// Why it is in no volume.
     pub fn push(&mut self, pose: Pose, bytes: Vec<u8>) -> Result<(), Refusal> {
+        self.last = Some(Instant::now());
         if bytes.len() != pose.size[0] * pose.size[1] * self.stored.bytes() {
+            self.left_out += 1;
             return Err(Refusal::Picture("it has another number of samples than its size".into()));
         }
         self.since.get_or_insert_with(Instant::now);
         self.pictures += 1;
         match &mut self.compounder {
-            Some(compounder) => add(compounder, pose, &bytes),
+            Some(compounder) => add(compounder, pose, &bytes).inspect_err(|_| self.left_out += 1),
             None => {
                 self.buffered_bytes += bytes.len();
                 self.buffered.push((pose, bytes));
@@ -105,7 +114,8 @@ impl Sweep {
             true => self.pictures >= self.schedule.pictures || waited >= self.schedule.interval,
             false => {
                 let is_full = self.buffered_bytes >= MAX_FIRST_BYTES || waited >= MAX_FIRST_WAIT;
-                is_full || self.buffered.len() >= self.schedule.first.max(1)
+                let is_silent = self.last.is_some_and(|last| last.elapsed() >= self.schedule.silence);
+                is_full || is_silent || self.buffered.len() >= self.schedule.first.max(1)
             }
         };
         if !is_time && !at_once {
@@ -123,15 +133,22 @@ impl Sweep {
         let buffered = std::mem::take(&mut self.buffered);
         self.buffered_bytes = 0;
         let poses: Vec<Pose> = buffered.iter().map(|(pose, _)| *pose).collect();
-        let lattice = Lattice::around(&poses, &self.options)?;
-        let mut compounder = Compounder::new(lattice, self.stored, self.options.clone())?;
+        let placed = Lattice::around(&poses, &self.options)
+            .and_then(|lattice| Compounder::new(lattice, self.stored, self.options.clone()));
+        let mut compounder = placed.inspect_err(|_| self.left_out += buffered.len() as u64)?;
         for (pose, bytes) in &buffered {
             if let Err(refusal) = add(&mut compounder, *pose, bytes) {
+                self.left_out += 1;
                 refuse(refusal);
             }
         }
         self.compounder = Some(compounder);
         Ok(())
+    }
+
+    /// Pictures so far that are in no volume, or not wholly.
+    pub(crate) fn left_out(&self) -> u64 {
+        self.left_out
     }
 
     /// None before the volume has its place.
@@ -146,8 +163,9 @@ impl Sweep {
 }
 
 fn add(compounder: &mut Compounder, pose: Pose, bytes: &[u8]) -> Result<(), Refusal> {
+    let is_inside = compounder.grow_around(&pose);
     match compounder.push(&TrackedFrame { pose, stored: compounder.stored(), bytes }) {
-        Ok(0) => Err(Refusal::Outside),
+        Ok(_) if !is_inside => Err(Refusal::Outside),
         Ok(_) => Ok(()),
         Err(fault) => Err(Refusal::Picture(fault)),
     }

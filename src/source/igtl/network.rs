@@ -10,10 +10,10 @@ use super::codec::BODY_LIMIT;
 use super::faults::{FaultKind, Faults};
 use super::message::{Coordinates, Image, Message};
 use super::names::Names;
-use super::pairing::Pairing;
+use super::pairing::{PairedFrame, Pairing};
 use super::pixels::{range_of, samples, stored};
 use crate::files::quoted;
-use crate::freehand::{CompoundingOptions, Pose, Refusal, Schedule, Sweep};
+use crate::freehand::{AT_ITS_LIMIT, CompoundingOptions, Pose, Refusal, Schedule, Sweep};
 use crate::live::{Event, Live};
 use crate::probe::StoredType;
 use crate::probe::{Geometry, is_rigid};
@@ -274,6 +274,10 @@ impl Live for Network {
         false
     }
 
+    fn left_out(&self) -> u64 {
+        self.sweep.lost + self.sweep.sweep.left_out()
+    }
+
     fn disconnected(&self) -> Option<String> {
         let is_connected = self.client.statistics().connected;
         (!is_connected).then(|| self.client.last_error().unwrap_or_else(|| "connecting".into()))
@@ -300,6 +304,10 @@ struct TrackedImages {
     /// Where the first frame lies, and how many do before one lies elsewhere.
     first: Option<DAffine3>,
     still: u64,
+    /// When the last message came.
+    last: Option<Instant>,
+    /// Frames without a pose, and all that are in no volume of an earlier sweep.
+    lost: u64,
 }
 
 impl TrackedImages {
@@ -325,11 +333,14 @@ impl TrackedImages {
             untracked: 0,
             first: None,
             still: 0,
+            last: None,
+            lost: 0,
         }
     }
 
     /// Takes frames and poses; skips other messages.
     fn take(&mut self, message: Message, faults: &mut Faults) {
+        self.last = Some(Instant::now());
         let is_image = matches!(message, Message::Image(_));
         if is_image && self.poses != Poses::Image && !self.pairing.has_transforms() {
             self.untracked = self.untracked.saturating_add(1);
@@ -341,14 +352,21 @@ impl TrackedImages {
             (Message::Image(image), Poses::Image) => self.frame(image, DAffine3::IDENTITY, faults),
             (message, _) => {
                 let before = self.pairing.counts().dropped;
-                for paired in self.pairing.push(message) {
-                    self.frame(paired.image, paired.pose, faults);
-                }
-                let dropped = self.pairing.counts().dropped - before;
-                if dropped > 0 {
-                    faults.note(FaultKind::Unpaired, dropped, &self.pairing.why_unpaired());
-                }
+                let paired = self.pairing.push(message);
+                self.frames(paired, before, faults);
             }
+        }
+    }
+
+    /// Takes frames with their poses. `before`: how many were without one before.
+    fn frames(&mut self, paired: Vec<PairedFrame>, before: u64, faults: &mut Faults) {
+        for paired in paired {
+            self.frame(paired.image, paired.pose, faults);
+        }
+        let dropped = self.pairing.counts().dropped - before;
+        if dropped > 0 {
+            self.lost += dropped;
+            faults.note(FaultKind::Unpaired, dropped, &self.pairing.why_unpaired());
         }
     }
 
@@ -377,6 +395,7 @@ impl TrackedImages {
         };
         if stored != self.sweep.stored() {
             // Values of two types cannot be mixed.
+            self.lost += self.sweep.left_out();
             self.sweep = Sweep::new(self.freehand.clone(), self.schedule.clone(), stored);
             self.values = ValueRange::new(stored);
         }
@@ -391,6 +410,13 @@ impl TrackedImages {
 
     /// Updates the volume if that is due. Then returns the time stamp of its last frame.
     fn update(&mut self, faults: &mut Faults) -> Option<Option<f64>> {
+        // Frames that wait for a later pose get none any more.
+        if self.last.is_some_and(|last| last.elapsed() >= self.schedule.silence) {
+            self.last = None;
+            let before = self.pairing.counts().dropped;
+            let paired = self.pairing.finish();
+            self.frames(paired, before, faults);
+        }
         let was_placed = self.sweep.is_placed();
         let changed = self.sweep.update(false, |refusal| note(refusal, faults));
         if self.sweep.is_placed() && !was_placed {
@@ -418,7 +444,7 @@ impl TrackedImages {
 fn note(refusal: Refusal, faults: &mut Faults) {
     match refusal {
         Refusal::Outside => {
-            faults.note(FaultKind::Outside, 1, "the volume was placed around the first frames of the sweep");
+            faults.note(FaultKind::Outside, 1, AT_ITS_LIMIT);
         }
         Refusal::Picture(fault) => faults.note(FaultKind::Pose, 1, &fault),
         Refusal::Volume(fault) => faults.note(FaultKind::Volume, 1, &fault),

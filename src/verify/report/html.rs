@@ -131,7 +131,7 @@ fn baseline(compared: &BaselineComparison) -> Markup {
     html! {
         section id="baseline" {
             h2 { "Since the earlier run" }
-            p class="dim" { "BaselineComparison with " (compared.baseline) "." }
+            p class="dim" { "Compared with " (compared.baseline) "." }
             @if !compared.differences.is_empty() || !compared.notes.is_empty() {
                 ul class="plain" {
                     @for line in compared.differences.iter().chain(&compared.notes) { li { (line) } }

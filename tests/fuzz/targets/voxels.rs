@@ -29,6 +29,7 @@ pub fn compounder(bytes: &[u8]) -> String {
         clip: (bytes.u8() > 200).then(|| std::array::from_fn(|_| usize::from(bytes.u8()) << (bytes.u8() % 8))),
         spacing: (bytes.u8() > 128).then(|| bytes.number()),
         margin: if bytes.u8() < 200 { 1.0 } else { bytes.number() },
+        extent: (bytes.u8() > 200).then(|| bytes.number()),
         max_voxels: MOST_VOXELS,
     };
     let first = (bytes.u8(), bytes.u8() < 200);

@@ -192,7 +192,8 @@ fn moved(k: u8) -> Message {
 fn sweep_options() -> NetworkOptions {
     let freehand =
         freehand::CompoundingOptions { margin: 1.0, spacing: Some(0.5), ..freehand::CompoundingOptions::default() };
-    let schedule = Schedule { first: 4, interval: Duration::from_millis(200), pictures: 2 };
+    let silence = Duration::from_secs(60);
+    let schedule = Schedule { first: 4, silence, interval: Duration::from_millis(200), pictures: 2 };
     NetworkOptions { freehand, schedule, ..options() }
 }
 
@@ -228,12 +229,13 @@ fn tracked_frames_become_a_volume_that_goes_on_growing() {
         let expected = [0, 0, 10, 15, 20, 25, 30, 35, 40, 45, 50, 0, 0];
         assert_eq!(middles(&grid, &frames), expected, "{poses:?}");
         assert_eq!((frames[0].bytes[0], frames[0].volume), (0, 0));
-        // There is no volume at 9 mm; the frame at 3 mm replaces only bridged voxels.
-        let events = until(&mut network, |e| matches!(e, Event::Frame(frame) if frame.slice == 12));
-        assert!(events.iter().any(is_fault("frames outside of the volume")), "{events:?}");
-        let frames: Vec<Frame> =
-            events.into_iter().filter_map(|e| if let Event::Frame(f) = e { Some(f) } else { None }).collect();
-        assert_eq!((middles(&grid, &frames), frames[0].volume), (expected.to_vec(), 1));
+        // The volume grows to 9 mm, and a quarter of its length beyond; what it had stays where it was. The frame at 3 mm replaces only bridged
+        // voxels.
+        let (header, frames) = volume(&mut network, 25);
+        let larger = self::grid(header);
+        assert_eq!((larger.size, larger.spacing, larger.origin), ([10, 7, 25], grid.spacing, grid.origin));
+        let expected = [&expected[..11], &[0; 9], &[100], &[0; 4]].concat();
+        assert_eq!((middles(&larger, &frames), frames[0].volume, network.left_out()), (expected, 1, 0));
     }
 }
 

@@ -57,6 +57,8 @@ pub struct Config {
     pub spacing: Option<f64>,
     /// Widest gap between tracked frames that is filled, 0 to 1000 mm. Default: 2.
     pub hole: Option<f64>,
+    /// Length of a freehand sweep, 0 to 1000 mm: its volume has room for it from the first frames on. Default: none is stated.
+    pub extent: Option<f64>,
     /// Presets of the scene, each over the one before. Default: none.
     pub preset: Vec<String>,
     /// Vulkan device, by number or part of its name. Default: the best.
@@ -195,6 +197,7 @@ impl Default for Config {
             clip: None,
             spacing: None,
             hole: None,
+            extent: None,
             preset: Vec::new(),
             device: None,
             motor: None,
@@ -438,6 +441,7 @@ const SOURCE_KEYS: &[&str] = &[
     "clip",
     "spacing",
     "hole",
+    "extent",
     "motor.port",
     "motor.angle",
     "motor.sweeps",
@@ -479,6 +483,7 @@ impl Config {
             ("clip", clip),
             ("spacing", text(self.spacing)),
             ("hole", text(self.hole)),
+            ("extent", text(self.extent)),
             ("motor.port", port),
             ("motor.angle", text(angle)),
             ("motor.sweeps", text(sweeps)),
@@ -672,6 +677,7 @@ const ALLOWED: &[(&str, &str)] = &[
     ("clip", "[x, y, width, height] in pixels"),
     ("spacing", "0.01 to 1000 mm"),
     ("hole", "0 to 1000 mm"),
+    ("extent", "0 to 1000 mm"),
     ("preset", "a list of names, as [\"fetal\"]"),
     ("device", "a text: the number of a device or a part of its name"),
     ("motor", "a table with port and sweeps"),
