@@ -1,7 +1,7 @@
 //! The values of a TOML text or table as a tree that types are read from, with the place of each value in the text.
 //!
 //! The compiler makes serde's code for a type once for each kind of input. `toml` has four: a table in memory, and three of a text. A [`Node`] is the one
-//! kind here. docs/experiments.md states what that saves.
+//! kind here. docs/experiments/compiling.md states what that saves.
 
 use serde::de::{self, DeserializeOwned, DeserializeSeed, Deserializer, Unexpected, Visitor};
 use std::fmt::{self, Display};

@@ -14,7 +14,7 @@ HEAD = """# Error reports
 
 What `echolume report error` measured. Errors are those of the picture: RMSE before the tone mapping of stage 4 (values in 0..1), and the median, the 95th
 percentile and the shares of the pixels that differ by more than 1 and 8 levels of 255 after it. Times are medians with intervals of 95 %, each run in turn with
-the scene as it is. How the reports are made and read: [performance.md](performance.md#error-against-run-time); what their references are:
+the scene as it is. How the reports are made and read: [measuring.md](measuring.md#error-against-run-time); what their references are:
 [numerics.md](numerics.md#the-exact-reference-of-a-ray).
 """
 

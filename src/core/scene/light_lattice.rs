@@ -4,7 +4,7 @@ use super::region::is_still;
 use super::{Compositing, Follows, LightVolume, Scene};
 use glam::DVec3;
 
-/// Edge of a cell where no setting says another, in standard deviations of the volume's smoothing: docs/performance.md, "The cells of the light volume".
+/// Edge of a cell where no setting says another, in standard deviations of the volume's smoothing: docs/experiments/light-volume.md.
 const CELL: f64 = 0.5;
 /// The least such edge, slice pixels: smaller cells show nothing more.
 const LEAST_PIXELS: f64 = 1.0;

@@ -620,7 +620,7 @@ impl Scene {
             return Err("two passes: the surface is chosen among neighbouring rays");
         }
         if settings.ray.sliding == 0 && !self.is_pair() {
-            // Measured: docs/performance.md, "One march for surface and volume".
+            // Measured: docs/experiments/one-march.md.
             return Err("two passes: where samples are cheap (no ray.sliding) they are no slower than one march");
         }
         if matches!(settings.volume.compositing, Compositing::PreIntegrated | Compositing::Exponential) {

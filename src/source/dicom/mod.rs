@@ -2,7 +2,7 @@
 //! and folders of files as one series. Enhanced US Volumes and secondary captures are written.
 //!
 //! The elements are read here and not by the crate `dicom-object` (0.10.1): it takes whatever memory a length field claims, and sequences
-//! that are nested some thousand times overflow its stack. "Readers of crates" in docs/experiments.md compares them.
+//! that are nested some thousand times overflow its stack. docs/experiments/readers-of-crates.md compares them.
 
 mod about;
 mod classes;
