@@ -167,8 +167,14 @@ impl Render {
             },
         )?;
         let compared = finer.map(|finer| (scene, finer));
-        let shown = marked::as_set(&picture, renderer.scene(), renderer.unveiled(), self.input.demo(&*source))
-            .map_err(failed)?;
+        let shown = marked::as_set(
+            &picture,
+            renderer.scene(),
+            u32::try_from(self.input.volume()?).ok(),
+            renderer.unveiled(),
+            self.input.demo(&*source),
+        )
+        .map_err(failed)?;
         output.write(|format| shown.encoded(format))?;
         if let Some(outcome) =
             renderer.unveiled().map(|unveiled| unveiled.outcome).filter(|outcome| !outcome.is_found())

@@ -296,7 +296,8 @@ impl Series<'_> {
                 renderer.show(0)?;
             }
             let picture = renderer.picture()?;
-            let shown = marked::as_set(&picture, renderer.scene(), renderer.unveiled(), self.demo)
+            let of = u32::try_from(volume(self, n).unwrap_or(self.chosen)).ok();
+            let shown = marked::as_set(&picture, renderer.scene(), of, renderer.unveiled(), self.demo)
                 .map_err(|e| DrawFault::Source(failed(e)))?;
             // Before the picture is written: a device that is lost here draws it again.
             let why = match one_colour::of(renderer.scene(), &picture).filter(|_| n == 0) {

@@ -260,7 +260,9 @@ impl Stream {
         };
         let file = folder.join(name);
         if let (Some(picture), Some(scene)) = (&shown.picture, scene) {
-            marked::as_set(picture, scene, start, demo).and_then(|picture| picture.save(&file)).map_err(failed)?;
+            marked::as_set(picture, scene, Some(shown.volume), start, demo)
+                .and_then(|picture| picture.save(&file))
+                .map_err(failed)?;
         }
         Ok(Some(file))
     }

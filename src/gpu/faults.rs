@@ -89,6 +89,8 @@ pub struct Faults {
     has_lost: AtomicBool,
     /// The host waits for each submission before the next.
     waits: AtomicBool,
+    /// Pictures in flight count as not done.
+    holds_pictures: AtomicBool,
 }
 
 impl Faults {
@@ -140,6 +142,15 @@ impl Faults {
 
     pub(super) fn waits(&self) -> bool {
         self.waits.load(Ordering::Relaxed)
+    }
+
+    /// While it is set, a picture in flight counts as being drawn, as on a device that takes long for it.
+    pub fn hold_pictures(&self, holds: bool) {
+        self.holds_pictures.store(holds, Ordering::Relaxed);
+    }
+
+    pub(super) fn holds_pictures(&self) -> bool {
+        self.holds_pictures.load(Ordering::Relaxed)
     }
 
     /// Cancels a planned failure that has not happened.

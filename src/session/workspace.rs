@@ -100,6 +100,7 @@ impl Workspace {
                 *file = folder.join(&*file);
             }
         }
+        belong_to(&mut table, origin.volume);
         let mut layers = Layers::default();
         layers.table(&path.display().to_string(), table, folder).map_err(|e| e.to_string())?;
         let settings = layers.clone().finish().map_err(|e| e.to_string())?;
@@ -119,6 +120,15 @@ impl Workspace {
             )
         };
         self.origin.recording.as_deref().ok_or_else(fault)
+    }
+}
+
+/// Measurements that do not say of which volume they are belong to the one that was shown.
+fn belong_to(table: &mut Table, volume: usize) {
+    let Some(Value::Array(all)) = table.get_mut("measure") else { return };
+    for measured in all.iter_mut().filter_map(Value::as_table_mut).filter(|measured| !measured.contains_key("made")) {
+        let volume = Value::Integer(i64::try_from(volume).unwrap_or(i64::MAX));
+        measured.insert("made".into(), Value::Table(Table::from_iter([("volume".to_string(), volume)])));
     }
 }
 

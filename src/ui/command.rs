@@ -445,8 +445,9 @@ pub const KEY_BINDINGS: &[Binding] = &[
     control(Key::Right, keys::LOOP_SPEED, Command::CineSpeed(1)),
     shift(Key::Enter, keys::LOOP_BACK_AND_FORTH, Command::BackAndForth(true)),
     control(Key::Enter, keys::LOOP_FORWARDS, Command::BackAndForth(false)),
-    on(Char('p'), keys::SAVE_THE_PICTURE, Command::SavePicture),
-    on(Char('r'), keys::SAVE_THE_RECORDING, Command::SaveLoop),
+    // What writes a file needs Ctrl: a letter that was meant for a text writes nothing.
+    control(Char('i'), keys::SAVE_THE_PICTURE, Command::SavePicture),
+    control(Char('r'), keys::SAVE_THE_RECORDING, Command::SaveLoop),
     control(Char('s'), keys::SAVE_WORKSPACE, Command::SaveWorkspace),
     control(Char('o'), keys::OPEN, Command::OpenFiles),
     control(Key::PageUp, keys::STEP_RECORDING, Command::StepRecording(-1)),
@@ -552,6 +553,14 @@ mod tests {
             );
             assert_eq!(command(a.key, a.modifiers), Some(a.command), "{} cannot be reached", key_label(a));
         }
+    }
+
+    /// Prevents files that someone writes who meant to type a text.
+    #[test]
+    fn no_letter_alone_writes_a_file() {
+        let writes = [Command::SavePicture, Command::SaveLoop, Command::SaveMeasures, Command::SaveWorkspace];
+        let bound: Vec<_> = KEY_BINDINGS.iter().filter(|b| writes.contains(&b.command)).collect();
+        assert!(bound.len() >= 3 && bound.iter().all(|b| b.modifiers.control), "{bound:?}");
     }
 
     #[test]

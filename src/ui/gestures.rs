@@ -259,15 +259,9 @@ impl Gestures {
                 let point = viewport.point_on_plane(tile, at).map(|point| view::below_face(scene, point).to_array());
                 point.map(Command::MoveCrossing).into_iter().collect()
             }
-            (Pane::Plane(tile), _) if matches!(tool, Tool::Measure(_)) => {
-                measured_at(viewport, tile, at).into_iter().collect()
-            }
+            (pane, _) if matches!(tool, Tool::Measure(_)) => point_at(viewport, pane, at).into_iter().collect(),
             (Pane::Plane(_), _) if tool == Tool::Curve && matches!(press.drag, Drag::Handle { .. }) => Vec::new(),
             (Pane::Plane(tile), _) if tool == Tool::Curve => line_point(viewport, tile, at).into_iter().collect(),
-            (Pane::Rendering, _) if matches!(tool, Tool::Measure(_)) => {
-                let pixel = viewport.pixel_at(at).map(|(_, [x, y])| [x + viewport.columns_to_surface(at), y]);
-                pixel.map(Command::PickSurface).into_iter().collect()
-            }
             _ => Vec::new(),
         }
     }
@@ -663,6 +657,22 @@ fn probe_to(viewport: &Viewport, index: usize, at: [f64; 2]) -> Option<Command> 
     let mark = viewport.body_marks.get(index)?;
     let size = scene.picture_size().map(f64::from);
     Some(Command::ChangeBodyMark(index, body_marks::with_probe_at(mark, size, pixel)))
+}
+
+/// The command that sets the place of a text that is begun by a letter: at the pointer, or in the middle of what is shown.
+pub(super) fn place_of_text(viewport: &Viewport, pointer: Option<[f64; 2]>) -> Option<Command> {
+    let pointer = pointer.filter(|at| !viewport.is_covered && viewport.pane_at(*at).is_some());
+    let at = pointer.or_else(|| viewport.middle())?;
+    point_at(viewport, viewport.pane_at(at)?, at)
+}
+
+/// The command that sets a point of a measurement at a position in the window.
+fn point_at(viewport: &Viewport, pane: Pane, at: [f64; 2]) -> Option<Command> {
+    let Pane::Plane(tile) = pane else {
+        let (_, [x, y]) = viewport.pixel_at(at)?;
+        return Some(Command::PickSurface([x + viewport.columns_to_surface(at), y]));
+    };
+    measured_at(viewport, tile, at)
 }
 
 /// The command that sets a point of a measurement at a position on a tile.

@@ -31,6 +31,7 @@ pub mod recordings;
 mod recovery;
 mod region_box;
 mod screen_reader;
+mod shown_picture;
 mod silence;
 pub mod sliders;
 pub mod source_supervisor;

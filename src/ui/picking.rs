@@ -24,6 +24,8 @@ pub(super) struct Viewport<'a> {
     pub(super) size: [f64; 2],
     /// The scene that it shows; without one nothing can be dragged.
     pub(super) scene: Option<&'a Scene>,
+    /// The number of the volume that it shows, where that is known.
+    pub(super) volume: Option<u32>,
     /// The measurements that are drawn over it.
     pub(super) measures: &'a [Measurement],
     /// The body marks that are drawn over it.
@@ -109,7 +111,8 @@ impl<'a> Viewport<'a> {
         let tiling = scene.tiling();
         let corner = tiling.tiles.get(tile)?.corner.map(f64::from);
         let reach = reach * self.scale();
-        let on_tile = overlay::drawn(scene, self.measures).into_iter().filter(|drawn| drawn.tile[0] == corner);
+        let on_tile = overlay::drawn(scene, self.volume, self.measures).into_iter();
+        let on_tile = on_tile.filter(|drawn| drawn.tile[0] == corner && !drawn.is_of_other);
         // The points of a way make one line.
         let on_tile = on_tile.filter(|drawn| self.measures[drawn.index].kind != MeasureKind::Surface);
         let near = on_tile.flat_map(|drawn| drawn.points.into_iter().map(move |(point, at)| (drawn.index, point, at)));
@@ -164,6 +167,19 @@ impl<'a> Viewport<'a> {
         let (scale, mut centre) = (self.scale(), self.scene.map_or([0.0; 2], |scene| Picker::of(scene).centre()));
         centre[0] -= self.columns_to_surface(at);
         std::array::from_fn(|a| self.corner[a] + if scale > 0.0 { centre[a] / scale } else { 0.0 })
+    }
+
+    /// The middle of the selected plane, or else of the rendering, pixels of the window.
+    pub(super) fn middle(&self) -> Option<[f64; 2]> {
+        let (scene, scale) = (self.scene?, self.scale());
+        if !scene.cuts_planes() || scale <= 0.0 {
+            return Some(self.rendering_centre(self.corner));
+        }
+        let tiles = scene.tiling().tiles;
+        let selected = (0..tiles.len()).find(|n| scene.plane_of_tile(*n) == Some(scene.settings.planes.plane));
+        let tile = tiles.get(selected.unwrap_or(0))?;
+        let middle = |a: usize| f64::from(tile.corner[a]) + f64::from(tile.size[a]) / 2.0;
+        Some(std::array::from_fn(|a| self.corner[a] + middle(a) / scale))
     }
 
     /// The plane of a tile, if the tiles show different planes; of a curved plane the one that it stands on.

@@ -2,7 +2,7 @@
 
 use crate::common::files::Folder;
 use echolume::low_level::scene::load::Layers;
-use echolume::low_level::scene::{Brush, Cut, CutView, KeptSide, MeasureKind, Measurement, Mode};
+use echolume::low_level::scene::{Brush, Cut, CutView, KeptSide, Made, MeasureKind, Measurement, Mode};
 use echolume::low_level::workspace::{Origin, Workspace, is_workspace, text};
 use std::path::{Path, PathBuf};
 
@@ -29,6 +29,12 @@ fn what_is_saved_is_read_again_exactly() {
                 kind: MeasureKind::Volume,
                 contours: vec![vec![[0.0; 3], [1.0; 3], [2.0, 0.0, 0.1]]; 2],
                 text: "a \"b\" = [c]\\".into(),
+                made: Some(Made {
+                    volume: 7,
+                    time: Some(1.0 / 3.0),
+                    plane: "A, \"x\"".into(),
+                    settings: "Plane 0".into(),
+                }),
                 ..Measurement::default()
             },
         ];
@@ -47,6 +53,8 @@ fn what_is_saved_is_read_again_exactly() {
         origin.volume = 3;
         let (folder, file) = kept("workspace-exact", &text(&settings, &origin).expect("text"));
         let read = Workspace::read(&file).expect("a workspace");
+        // Older workspaces do not say of which volume a measurement is: of the one that was shown.
+        settings.measure[0].made = Some(Made { volume: 3, ..Made::default() });
         assert_eq!(read.layers.clone().finish().expect("settings"), settings, "{preset}");
         assert_eq!(read.recording(&file).expect("a recording"), PathBuf::from(folder.path("sweep.mha")));
         assert!(read.origin.volume == 3 && is_workspace(&file));

@@ -93,8 +93,8 @@ fn saved_pictures_and_loops_have_names_without_patient_data() {
         let entries = std::fs::read_dir(folder.path("kept")).into_iter().flatten().flatten();
         entries.map(|e| e.file_name().to_string_lossy().into_owned()).filter(|n| !n.starts_with('.')).collect()
     };
-    desk.tap('p');
-    desk.tap('r');
+    desk.control('i');
+    desk.control('r');
     let names = until("two files", || Some(names()).filter(|n| n.len() == 2));
     assert!(names.iter().all(|n| n.starts_with("echolume-2") && !n.contains("sweep")), "{names:?}");
     let png = names.iter().find(|n| n.ends_with(".png")).expect("a picture");

@@ -228,7 +228,8 @@ fn what_is_drawn_by_the_mouse_is_measured_kept_and_copied() {
     }
     desk.control('c');
     let table = clipboard(&desk);
-    assert_eq!(table, outcome::csv(&settings.measure));
+    let name = Path::new(SWEEP).file_name().expect("a name").to_string_lossy();
+    assert_eq!(table, outcome::csv(&settings.measure, &name));
     for (n, (_, found)) in measured.iter().enumerate() {
         let line = table.lines().find(|line| line.starts_with(&format!("{},", n + 1))).expect("a line");
         let value: f64 = line.split(',').nth(4).and_then(|value| value.parse().ok()).expect("a number");

@@ -1,7 +1,8 @@
 //! Checks of measurements and annotations: their numbers of points, and their texts.
 
 use super::{
-    MAX_ALL_POINTS, MAX_CONTOURS, MAX_MEASURES, MAX_POINTS, MAX_TEXT, MeasureKind, Measurement, SceneError, refuse,
+    MAX_ALL_POINTS, MAX_CONTOURS, MAX_MADE, MAX_MEASURES, MAX_POINTS, MAX_TEXT, MeasureKind, Measurement, SceneError,
+    refuse,
 };
 
 pub(super) fn check_measures(all: &[Measurement]) -> Result<(), SceneError> {
@@ -42,12 +43,20 @@ fn check(number: usize, measured: &Measurement) -> Result<(), SceneError> {
         let fault = format!("entry {number}: must be one line of at most {MAX_TEXT} characters, has {letters}");
         return refuse("measure.text", fault);
     }
+    for words in measured.made.iter().flat_map(|made| [&made.plane, &made.settings]) {
+        let letters = words.chars().count();
+        if letters > MAX_MADE || words.chars().any(char::is_control) {
+            let fault = format!("entry {number}: must be one line of at most {MAX_MADE} characters, has {letters}");
+            return refuse("measure.made", fault);
+        }
+    }
     Ok(())
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::scene::Made;
 
     fn of(kind: MeasureKind, count: usize) -> Measurement {
         Measurement { kind, points: vec![[1.0, 2.0, 3.0]; count], ..Measurement::default() }
@@ -68,6 +77,8 @@ mod tests {
         }
         let long = Measurement { text: "a\nb".into(), ..of(MeasureKind::Text, 1) };
         assert!(check_measures(&[long]).is_err());
+        let made = Some(Made { plane: "A".repeat(201), ..Made::default() });
+        assert!(check_measures(&[Measurement { made, ..of(MeasureKind::Text, 1) }]).is_err());
         assert!(check_measures(&vec![of(MeasureKind::Text, 1); 65]).is_err());
     }
 }

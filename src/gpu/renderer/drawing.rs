@@ -226,7 +226,7 @@ impl Drawing {
 
     /// The device is at work on a picture. Submits what is held back of it and due.
     pub fn is_drawing(&self, queues: &DeviceQueues) -> Result<bool, GpuError> {
-        Ok(self.is_in_flight && !self.recorder.is_done(queues)?)
+        Ok(self.is_in_flight && (!self.recorder.is_done(queues)? || self.context.faults.holds_pictures()))
     }
 
     /// How much of the last picture was drawn.

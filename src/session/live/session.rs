@@ -121,8 +121,9 @@ pub(super) struct Session {
     pub phase: Phase,
     pub pending: Pending<Views>,
     pub display: Display,
-    /// When the last picture was begun.
+    /// When the last picture was begun, and of which volume.
     pub begun: Instant,
+    drawn: Option<u32>,
     /// By volume image: the volume of its last frame, and when those frames arrived that no picture shows yet.
     arrived: Vec<(u32, Vec<Instant>)>,
     /// By slice of the volume on display: swept backwards.
@@ -156,6 +157,7 @@ impl Session {
             pending: Pending::None,
             display: Display::Empty,
             begun: Instant::now(),
+            drawn: None,
             compiles_async,
             refused: None,
             to_restore,
@@ -261,6 +263,11 @@ impl Session {
         self.pool.waiting().or(self.display.volume()).or(self.to_restore)
     }
 
+    /// The volume of the last picture, also if it is being drawn.
+    pub(crate) fn drawn_volume(&self) -> Option<u32> {
+        self.drawn
+    }
+
     /// The volume that is being sent again, if any.
     pub(crate) fn replayed_volume(&self) -> Option<u32> {
         self.phase.replay().map(|replay| replay.volume.volume)
@@ -295,7 +302,7 @@ impl Session {
         }
         self.renderer.begin_picture()?;
         self.phase.begin(InFlight { volume, arrived });
-        (self.display, self.begun) = (Display::Current(volume), Instant::now());
+        (self.display, self.begun, self.drawn) = (Display::Current(volume), Instant::now(), Some(volume));
         Ok(Begun::Picture)
     }
 

@@ -772,6 +772,11 @@ impl Stream {
         self.session.as_ref().map(|session| session.renderer.scene())
     }
 
+    /// The number of the volume that the last picture shows, also if it is being drawn; none without one.
+    pub fn drawn_volume(&self) -> Option<u32> {
+        self.session.as_ref().and_then(Session::drawn_volume)
+    }
+
     /// The renderer, to read pictures and volumes from it; none before the first frame.
     pub fn renderer(&mut self) -> Option<&mut Renderer> {
         self.session.as_mut().map(|session| &mut session.renderer)

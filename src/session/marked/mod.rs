@@ -37,7 +37,8 @@ pub enum Demo {
     Always,
 }
 
-/// A picture of the scene as its settings ask for it to be saved: with its measurements and body marks, and with marks and a bar if `marks.bar` is set. `start`:
+/// A picture of the scene as its settings ask for it to be saved: with its measurements and body marks, and with marks and a bar if `marks.bar` is set.
+/// `volume`: the number of the volume that it shows; measurements of others are dimmed. `start`:
 /// where its rendering starts, if that follows the fluid. `demo`: None if the volume may be of a patient.
 ///
 /// # Errors
@@ -45,6 +46,7 @@ pub enum Demo {
 pub fn as_set<'a>(
     picture: &'a Picture,
     scene: &Scene,
+    volume: Option<u32>,
     start: Option<&Unveiled>,
     demo: Option<Demo>,
 ) -> Result<Cow<'a, Picture>, String> {
@@ -54,8 +56,8 @@ pub fn as_set<'a>(
     let origin = demo.map(|_| DEMO_DATA);
     match scene.settings.marks.bar {
         false if !is_drawn_on => Ok(Cow::Borrowed(picture)),
-        false => measured(picture, scene, start, origin).map(Cow::Owned),
-        true => marked(picture, scene, start, &time_line(SystemTime::now()), origin).map(Cow::Owned),
+        false => measured(picture, scene, volume, start, origin).map(Cow::Owned),
+        true => marked(picture, scene, volume, start, &time_line(SystemTime::now()), origin).map(Cow::Owned),
     }
 }
 
@@ -66,6 +68,7 @@ pub fn as_set<'a>(
 pub fn marked(
     picture: &Picture,
     scene: &Scene,
+    volume: Option<u32>,
     start: Option<&Unveiled>,
     time: &str,
     origin: Option<&str>,
@@ -75,7 +78,7 @@ pub fn marked(
         return Err(format!("a picture of {} x {} is no scene of {width} x {height}", picture.width, picture.height));
     }
     let marks = scene.marks();
-    let mut marked = measured(picture, scene, start, None)?;
+    let mut marked = measured(picture, scene, volume, start, None)?;
     let square = LETTER_SHARE * f64::from(picture.width.min(picture.height));
     let square = square.clamp(LETTER[0], LETTER[1]).round() as u32;
     for tile in &marks {
@@ -96,6 +99,7 @@ pub fn marked(
 pub fn measured(
     picture: &Picture,
     scene: &Scene,
+    volume: Option<u32>,
     start: Option<&Unveiled>,
     origin: Option<&str>,
 ) -> Result<Picture, String> {
@@ -104,7 +108,7 @@ pub fn measured(
         strokes::slices(&mut measured, scene)?;
         strokes::curve(&mut measured, scene)?;
         strokes::start(&mut measured, &unveil::lines(scene, start));
-        strokes::draw(&mut measured, scene)?;
+        strokes::draw(&mut measured, scene, volume)?;
         strokes::body_marks(&mut measured, scene);
     }
     origin.map_or(Ok(()), |origin| label(&mut measured, origin))?;
@@ -311,7 +315,7 @@ mod tests {
     fn the_bar_is_below_and_letters_and_dot_stand_at_their_edges() {
         let scene = scene(&["mode='plane'", "marks.lateral='right-left'"]);
         let drawn =
-            marked(&grey([120, 96]), &scene, None, "2026-11-23 20:00:00 UTC", Some("Demo data")).expect("marked");
+            marked(&grey([120, 96]), &scene, None, None, "2026-11-23 20:00:00 UTC", Some("Demo data")).expect("marked");
         assert!(drawn.width == 120 && drawn.height > 96 && drawn.rgba.len() == (4 * 120 * drawn.height) as usize);
         for (at, is) in
             [([0.1, 0.5], true), ([0.9, 0.5], true), ([0.1, 0.1], true), ([0.5, 0.5], false), ([0.9, 0.1], false)]
@@ -322,7 +326,7 @@ mod tests {
         let bright = bar.chunks_exact(4).filter(|p| p[0] > 180).count();
         assert!(bright > 100, "{bright} pixels of text and scale");
         let later =
-            marked(&grey([120, 96]), &scene, None, "2026-11-23 20:00:01 UTC", Some("Demo data")).expect("marked");
+            marked(&grey([120, 96]), &scene, None, None, "2026-11-23 20:00:01 UTC", Some("Demo data")).expect("marked");
         assert_ne!(later, drawn, "the time is written");
     }
 
@@ -343,7 +347,7 @@ mod tests {
     fn measurements_are_drawn_where_they_lie_and_without_a_bar_too() {
         let caliper = "measure=[{ kind = 'distance', points = [[-5, 14.5, 0], [5, 14.5, 0]] }]";
         let scene = scene(&["mode='plane'", caliper]);
-        let drawn = measured(&grey([120, 96]), &scene, None, None).expect("drawn");
+        let drawn = measured(&grey([120, 96]), &scene, None, None, None).expect("drawn");
         assert_eq!((drawn.width, drawn.height), (120, 96));
         // The middle of the line is in the middle of the plane.
         let middle = 4 * (48 * 120 + 60) as usize;
@@ -364,9 +368,9 @@ mod tests {
         ] {
             let measure = format!("measure=[{{ kind = '{kind}', points = {points}, text = 'lip' }}]");
             let grey = grey([120, 96]);
-            let drawn = as_set(&grey, &scene(&["mode='plane'", &measure]), None, None).expect("drawn");
+            let drawn = as_set(&grey, &scene(&["mode='plane'", &measure]), None, None, None).expect("drawn");
             assert!(is_marked(&drawn, at) && !is_marked(&drawn, [0.1, 0.1]), "{kind}");
-            assert_ne!(*as_set(&grey, &plain, None, None).expect("drawn"), *drawn, "{kind}");
+            assert_ne!(*as_set(&grey, &plain, None, None, None).expect("drawn"), *drawn, "{kind}");
         }
     }
 
@@ -376,7 +380,7 @@ mod tests {
             let mark = "body_marks=[{ body = 'neck', at = [0.75, 0.25], size = 0.4, probe = [0.5, 0.5], angle = 90 }]";
             let scene = scene(&[&format!("mode='{mode}'"), mark]);
             let grey = grey([120, 96]);
-            let drawn = as_set(&grey, &scene, None, None).expect("drawn");
+            let drawn = as_set(&grey, &scene, None, None, None).expect("drawn");
             assert_eq!((drawn.width, drawn.height), (120, 96));
             // Edge 38 pixels around (90, 24), and the reach of the probe's dot.
             let at = |n: usize| [(n % 120) as f64 + 0.5, (n / 120) as f64 + 0.5];
@@ -400,7 +404,7 @@ mod tests {
     fn pictures_of_demo_data_say_so_unless_they_are_rendered_pixels_alone() {
         let caliper = "measure=[{ kind = 'distance', points = [[-5, 14.5, 0], [5, 14.5, 0]] }]";
         let bare = grey([120, 96]);
-        let shown = |lines: &[&str], demo| as_set(&bare, &scene(lines), None, demo).expect("drawn").into_owned();
+        let shown = |lines: &[&str], demo| as_set(&bare, &scene(lines), None, None, demo).expect("drawn").into_owned();
         let corner = |picture: &Picture| -> usize {
             let is_in = |n: usize| n % 120 < 70 && (n / 120) >= 80 && n / 120 < 96;
             let pixels = picture.rgba.chunks_exact(4).enumerate().filter(|(n, _)| is_in(*n));
@@ -441,7 +445,7 @@ mod tests {
 
     #[test]
     fn a_picture_of_another_size_is_refused() {
-        let fault = marked(&grey([64, 64]), &scene(&[]), None, "", None).expect_err("refused");
+        let fault = marked(&grey([64, 64]), &scene(&[]), None, None, "", None).expect_err("refused");
         assert!(fault.contains("64 x 64"), "{fault}");
     }
 

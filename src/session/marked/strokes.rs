@@ -11,6 +11,8 @@ use plotters::prelude::{BLACK, DrawingBackend, ShapeStyle, WHITE};
 
 /// Colour of lines: yellow, which no tissue has.
 pub(super) const LINE: [u8; 3] = [255, 214, 64];
+/// Colour of lines of measurements that belong to another volume.
+const DIMMED: [u8; 3] = [150, 150, 150];
 /// Colour of the line at which rendering starts: green, as on scanners.
 const START: [u8; 3] = [64, 235, 96];
 /// Colour of the body of a body mark.
@@ -27,12 +29,12 @@ const TEXT: u32 = 14;
 /// Widest label, pixels.
 const WIDEST: f64 = 600.0;
 
-/// Draws the measurements of a scene into its picture.
+/// Draws the measurements of a scene into its picture, those of other volumes than this one dimmed.
 ///
 /// # Errors
 /// One line: the drawing of a label failed.
-pub(super) fn draw(picture: &mut Picture, scene: &Scene) -> Result<(), String> {
-    for drawn in overlay::drawn(scene, &scene.settings.measure) {
+pub(super) fn draw(picture: &mut Picture, scene: &Scene, volume: Option<u32>) -> Result<(), String> {
+    for drawn in overlay::drawn(scene, volume, &scene.settings.measure) {
         let mut strokes: Vec<[[f64; 2]; 2]> = Vec::new();
         for line in &drawn.lines {
             strokes.extend(line.windows(2).map(|ends| [ends[0], ends[1]]));
@@ -42,7 +44,8 @@ pub(super) fn draw(picture: &mut Picture, scene: &Scene) -> Result<(), String> {
             strokes.push([[*x, y - CROSS], [*x, y + CROSS]]);
         }
         strokes.extend(drawn.head.iter().flat_map(|head| overlay::arrow_head(*head, HEAD)));
-        for (half, colour) in [(HALF_EDGE, EDGE), (HALF, LINE)] {
+        let line = if drawn.is_of_other { DIMMED } else { LINE };
+        for (half, colour) in [(HALF_EDGE, EDGE), (HALF, line)] {
             strokes.iter().for_each(|ends| stroke(picture, drawn.tile, *ends, half, colour));
         }
         if !drawn.label.is_empty() {

@@ -4,6 +4,7 @@
 pub mod body_marks;
 mod body_outlines;
 pub mod contours;
+pub mod made;
 pub mod outcome;
 pub mod overlay;
 pub mod shapes;

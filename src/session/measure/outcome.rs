@@ -107,13 +107,20 @@ pub fn label(number: usize, measured: &Measurement) -> String {
     }
 }
 
-/// All results as CSV: a line for each quantity. Numbers have a point and four digits behind it.
-pub fn csv(all: &[Measurement]) -> String {
-    let mut text = String::from("number,measurement,text,quantity,value,unit\n");
+/// All results as CSV: a line for each quantity, and on what it was measured, as far as that is known. Numbers have a point and four digits behind it.
+/// `recording`: its name; empty for live volumes.
+pub fn csv(all: &[Measurement], recording: &str) -> String {
+    let mut text = String::from("number,measurement,text,quantity,value,unit,recording,volume,time,plane,settings\n");
+    let recording = csv_quoted(recording);
     for (n, measured) in all.iter().enumerate() {
+        let made = measured.made.as_ref();
+        let volume = made.map_or(String::new(), |made| made.volume.to_string());
+        let time = made.and_then(|made| made.time).map_or(String::new(), |time| format!("{time:.4}"));
+        let [plane, settings] = made.map_or([""; 2], |made| [&made.plane, &made.settings]).map(csv_quoted);
+        let on = format!("{recording},{volume},{time},{plane},{settings}");
         for Quantity { name, value, unit } in quantities(measured).unwrap_or_default() {
             let (kind, label) = (measured.title(), csv_quoted(&measured.text));
-            let _ = writeln!(text, "{},{kind},{label},{name},{value:.4},{unit}", n + 1);
+            let _ = writeln!(text, "{},{kind},{label},{name},{value:.4},{unit},{on}", n + 1);
         }
     }
     text
@@ -122,6 +129,7 @@ pub fn csv(all: &[Measurement]) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::scene::Made;
 
     fn of(kind: MeasureKind, points: &[[f64; 3]]) -> Measurement {
         Measurement { kind, points: points.to_vec(), ..Measurement::default() }
@@ -161,9 +169,14 @@ mod tests {
         assert_eq!(label(1, &nose), "1: nose, \"long\" 12.3 mm");
         assert_eq!(label(2, &note), "cord");
         assert_eq!(label(3, &of(MeasureKind::Distance, &[])), "3: -");
-        assert_eq!(
-            csv(&[note, nose]),
-            "number,measurement,text,quantity,value,unit\n2,Caliper,\"nose, \"\"long\"\"\",distance,12.3456,mm\n"
-        );
+        let made =
+            Made { volume: 7, time: Some(1.25), plane: "A at 0.0, 5.0, 0.0 mm".into(), settings: "Plane 1f".into() };
+        let other = Measurement { made: Some(made), ..nose.clone() };
+        let lines = [
+            "number,measurement,text,quantity,value,unit,recording,volume,time,plane,settings",
+            "2,Caliper,\"nose, \"\"long\"\"\",distance,12.3456,mm,\"a,b.mha\",,,\"\",\"\"",
+            "3,Caliper,\"nose, \"\"long\"\"\",distance,12.3456,mm,\"a,b.mha\",7,1.2500,\"A at 0.0, 5.0, 0.0 mm\",\"Plane 1f\"",
+        ];
+        assert_eq!(csv(&[note, nose, other], "a,b.mha").lines().collect::<Vec<_>>(), lines);
     }
 }

@@ -27,12 +27,15 @@ pub struct Drawn {
     /// Where an arrow's head is, and where its shaft comes from.
     pub head: Option<[[f64; 2]; 2]>,
     pub label: String,
+    /// It belongs to another volume than the one that is shown: it is dimmed, and cannot be grabbed.
+    pub is_of_other: bool,
     /// The lower left corner of the label.
     pub at: [f64; 2],
 }
 
-/// Everything that measurements draw over the picture of a scene. `all`: the list, as in [`crate::scene::Settings::measure`].
-pub fn drawn(scene: &Scene, all: &[Measurement]) -> Vec<Drawn> {
+/// Everything that measurements draw over the picture of a scene. `all`: the list, as in [`crate::scene::Settings::measure`]; `volume`: the number of the
+/// volume that the picture shows, where it is known.
+pub fn drawn(scene: &Scene, volume: Option<u32>, all: &[Measurement]) -> Vec<Drawn> {
     if all.is_empty() {
         return Vec::new();
     }
@@ -57,6 +60,12 @@ pub fn drawn(scene: &Scene, all: &[Measurement]) -> Vec<Drawn> {
         let area = [picker.corner(), picker.size()];
         found.extend(drawn.filter_map(|(index, measured)| of(scene, index, measured, area, |p| picker.project(p))));
     }
+    for drawn in &mut found {
+        if let Some(other) = all[drawn.index].other_volume(volume) {
+            drawn.is_of_other = true;
+            drawn.label = format!("{} (volume {})", drawn.label, u64::from(other) + 1).trim_start().to_string();
+        }
+    }
     found
 }
 
@@ -77,7 +86,7 @@ pub fn preview(
     {
         let points = way.into_iter().map(|place| scene.point_of(place)).collect();
         let way = Measurement { kind: MeasureKind::Surface, points, ..Measurement::default() };
-        let mut found = drawn(scene, &[way]);
+        let mut found = drawn(scene, None, &[way]);
         found.iter_mut().for_each(|drawn| drawn.label = drawn.label.replacen("1:", &format!("{number}:"), 1));
         return found;
     }
@@ -91,7 +100,7 @@ pub fn preview(
         (MeasureKind::Volume, _) => MeasureKind::Trace,
         (kind, _) => kind,
     };
-    let mut found = drawn(scene, &[shown, closed]);
+    let mut found = drawn(scene, None, &[shown, closed]);
     for drawn in &mut found {
         // What is not complete has no result yet.
         let is_caliper = work.kind == MeasureKind::Distance && drawn.points.len() == 2;
@@ -212,6 +221,7 @@ fn of(
         points,
         head,
         label: outcome::label(index + 1, measured),
+        is_of_other: false,
         at: [at[0] + 7.0, at[1] - 4.0],
     })
 }
@@ -219,6 +229,7 @@ fn of(
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::scene::Made;
     use crate::test_block::block;
 
     fn scene(lines: &[&str]) -> Scene {
@@ -234,7 +245,7 @@ mod tests {
         let across = caliper([-5.0, 15.0, 0.0], [5.0, 15.0, 0.0]);
         for (toml, tiles) in [("mode='plane'", 1), ("mode='orthogonal'", 2), ("planes.plane='b'", 0)] {
             let scene = scene(&["mode='plane'", toml]);
-            let found = drawn(&scene, std::slice::from_ref(&across));
+            let found = drawn(&scene, None, std::slice::from_ref(&across));
             assert_eq!(found.len(), tiles, "{toml}");
             for Drawn { points, label, .. } in &found {
                 let apart = points[1].1[0] - points[0].1[0];
@@ -243,9 +254,25 @@ mod tests {
             }
         }
         let stepped = scene(&["mode='plane'", "planes.position=[0,15,3]"]);
-        assert!(drawn(&stepped, std::slice::from_ref(&across)).is_empty(), "the plane was stepped away");
+        assert!(drawn(&stepped, None, std::slice::from_ref(&across)).is_empty(), "the plane was stepped away");
         let slab = scene(&["mode='plane'", "planes.position=[0,15,3]", "planes.thickness=8"]);
-        assert_eq!(drawn(&slab, &[across]).len(), 1, "the slab holds it");
+        assert_eq!(drawn(&slab, None, &[across]).len(), 1, "the slab holds it");
+    }
+
+    /// Prevents a caliper of one volume that lies over another as if it were that one's.
+    #[test]
+    fn a_caliper_of_another_volume_says_of_which() {
+        let scene = scene(&["mode='plane'"]);
+        let made = Some(Made { volume: 3, ..Made::default() });
+        let of_volume = Measurement { made, ..caliper([-5.0, 15.0, 0.0], [5.0, 15.0, 0.0]) };
+        let anywhere = Measurement { made: None, ..of_volume.clone() };
+        let all = [of_volume, anywhere];
+        for (shown, is_of_other) in [(Some(3), false), (None, false), (Some(2), true), (Some(4), true)] {
+            let found = drawn(&scene, shown, &all);
+            assert_eq!([0, 1].map(|n| found[n].is_of_other), [is_of_other, false], "{shown:?}");
+            let label = if is_of_other { "1: 10.0 mm (volume 4)" } else { "1: 10.0 mm" };
+            assert_eq!([0, 1].map(|n| found[n].label.as_str()), [label, "2: 10.0 mm"], "{shown:?}");
+        }
     }
 
     #[test]
@@ -282,7 +309,7 @@ mod tests {
             text: "nose".into(),
             ..Measurement::default()
         };
-        let found = drawn(&scene, &[arrow.clone(), text]);
+        let found = drawn(&scene, None, &[arrow.clone(), text]);
         let pixel = |point: [f64; 3]| scene.tiling().project(&scene.tiling().tiles[0], scene.place_of(point)).0;
         let [tip, tail] = [arrow.points[0], arrow.points[1]].map(pixel);
         let (drawn, head) = (&found[0], found[0].head.expect("a head"));
@@ -306,7 +333,7 @@ mod tests {
     fn what_is_on_the_surface_is_drawn_on_the_rendering_alone() {
         let on = Measurement { on_surface: true, ..caliper([0.0, 10.0, 0.0], [4.0, 10.0, 0.0]) };
         let four = scene(&["layout='four'"]);
-        let found = drawn(&four, &[on, caliper([0.0, 15.0, 0.0], [4.0, 15.0, 0.0])]);
+        let found = drawn(&four, None, &[on, caliper([0.0, 15.0, 0.0], [4.0, 15.0, 0.0])]);
         let on_rendering: Vec<usize> = found.iter().filter(|d| d.tile[0] == [100.0, 50.0]).map(|d| d.index).collect();
         assert_eq!(on_rendering, [0]);
         assert!(found.iter().filter(|d| d.tile[0] != [100.0, 50.0]).all(|d| d.index == 1) && found.len() > 1);

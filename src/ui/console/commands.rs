@@ -28,6 +28,7 @@ impl Console {
         if self.activity.has_paused(now) && !self.hands.holds() {
             self.controls.seal();
         }
+        self.note_what_is_measured_on(command);
         match self.controls.apply(command, self.stream.scene()) {
             Change::Nothing => return,
             Change::Tool => self.survey.end_distance(),

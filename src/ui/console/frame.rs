@@ -7,6 +7,7 @@ use crate::gpu::window::PresentOutcome;
 use crate::live::metrics::SourceStatus;
 use crate::live::{Feed, FinishedPicture, Step, StreamError};
 use crate::passes::unveil;
+use crate::shown_picture::ShownPicture;
 use crate::texts;
 use std::time::{Duration, Instant};
 
@@ -148,8 +149,7 @@ impl Console {
     }
 
     fn picture_finished(&mut self, picture: &FinishedPicture, now: Instant) {
-        self.presentation.picture_finished();
-        self.take_start(now);
+        self.take_picture(picture.volume, now);
         // A coarse one says nothing of what a picture of this quality takes.
         if !picture.is_coarse {
             self.quality.picture_took(picture.work, picture.took);
@@ -159,12 +159,13 @@ impl Console {
         self.faults.picture_finished();
     }
 
-    /// Takes where the rendering of the picture starts, and says so when the fluid is lost.
-    fn take_start(&mut self, now: Instant) {
-        let renderer = self.stream.renderer();
-        let outcome = renderer.as_ref().and_then(|renderer| renderer.unveiled()).map(|start| start.outcome);
-        let lines = renderer.map_or(Vec::new(), |renderer| unveil::lines(renderer.scene(), renderer.unveiled()));
-        if let Some(lost) = self.render_start.take(lines, outcome, now) {
+    /// Takes what a picture was drawn of, of a volume, and says so when the fluid is lost at which it should start.
+    fn take_picture(&mut self, volume: u32, now: Instant) {
+        let Some(renderer) = self.stream.renderer() else { return };
+        let outcome = renderer.unveiled().map(|start| start.outcome);
+        let start_lines = unveil::lines(renderer.scene(), renderer.unveiled());
+        self.presentation.picture_finished(ShownPicture { scene: renderer.scene().clone(), volume, start_lines });
+        if let Some(lost) = self.render_start.take(outcome, now) {
             self.notify(&texts::render_start(lost), false);
         }
     }
@@ -243,14 +244,15 @@ impl Console {
         let is_drawing = picture.is_drawing;
         // Demo data is named even where there are no panels.
         let is_laid_out = self.fixed.overlay || self.origin().is_some();
-        let panels = is_laid_out.then(|| self.lay_out_panels(now, has_drawn));
-        if !self.fixed.overlay && !has_drawn && self.presentation.shown()[0] > 0 {
+        let content = self.presentation.content(&picture);
+        let panels = is_laid_out.then(|| self.lay_out_panels(now, content.as_deref()));
+        if !self.fixed.overlay && !has_drawn && self.presentation.presentations()[0] > 0 {
             self.presentation.keep_content();
             return Ok(());
         }
         let corner = self.room().picture.0;
         let Some(screen) = &mut self.presentation.screen else {
-            self.presentation.up_to_date(self.panels.has_pending_input());
+            self.presentation.up_to_date(content, self.panels.has_pending_input());
             return Ok(());
         };
         let presented = match self.stream.renderer().filter(|_| has_drawn) {
@@ -261,7 +263,7 @@ impl Console {
         match presented {
             Ok(PresentOutcome::Presented) => {
                 screen.take_latencies().into_iter().for_each(|time| self.measured.reached_monitor(time));
-                self.presentation.presented(is_drawing, self.panels.has_pending_input());
+                self.presentation.presented(content, is_drawing, self.panels.has_pending_input());
                 if !has_drawn {
                     self.start.presented();
                 }
@@ -284,7 +286,7 @@ impl Console {
 
     /// A summary of the run in one line.
     pub fn summary(&mut self) -> String {
-        let ([shown, between], dispatched) = (self.presentation.shown(), self.stream.dispatches());
+        let ([shown, between], dispatched) = (self.presentation.presentations(), self.stream.dispatches());
         let still = self.stream.last_begun().map_or(0.0, |begun| begun.elapsed().as_secs_f64());
         format!(
             "{:.1} s: {} volumes, {shown} shown on the window, {between} of them while a picture was drawn, {dispatched} dispatches, none in the last \

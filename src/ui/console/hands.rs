@@ -1,7 +1,7 @@
 //! The keys that are held, the gestures of mice and fingers, and the pointer by keyboard.
 
 use crate::command::{Command, HeldKeys, Tool};
-use crate::gestures::Gestures;
+use crate::gestures::{self, Gestures};
 use crate::input::{Input, Key, Modifiers};
 use crate::keyboard_pointer::{KeyboardPointer, PictureArea, Pointed, PointerMark};
 use crate::picking::Viewport;
@@ -32,6 +32,11 @@ impl Hands {
     /// The commands of a gesture on the picture.
     pub(super) fn gesture(&mut self, input: &Input, on: &Viewport, tool: Tool, modifiers: Modifiers) -> Vec<Command> {
         self.gestures.input(input, on, tool, modifiers)
+    }
+
+    /// The command that sets the place of a text that is begun by a letter.
+    pub(super) fn place_of_text(&self, on: &Viewport) -> Option<Command> {
+        gestures::place_of_text(on, self.gestures.pointer())
     }
 
     /// Where an input is, or else the pointer, pixels of the window.
@@ -81,6 +86,7 @@ mod tests {
             corner: [0.0; 2],
             size: [200.0, 100.0],
             scene: None,
+            volume: None,
             measures: &[],
             body_marks: &[],
             start_line: &[],

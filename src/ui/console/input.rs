@@ -5,6 +5,7 @@ use crate::command::Command;
 use crate::input::{Input, Key, Modifiers};
 use crate::keyboard_pointer::Pointed;
 use crate::picking::Viewport;
+use crate::scene::Scene;
 use crate::texts::keys;
 use std::time::Instant;
 
@@ -42,25 +43,36 @@ impl Console {
 
     /// Executes what an input does on the picture.
     fn gesture(&mut self, input: &Input, modifiers: Modifiers, now: Instant) {
-        let area = self.room().picture;
-        let measures = self.controls.measures().to_vec();
-        let body_marks = self.controls.body_marks().to_vec();
-        let start_line = self.controls.start_line().to_vec();
         let is_over_panel = self.hands.place(input).is_some_and(|at| self.panels.covers(at));
-        let on = Viewport {
-            corner: area.0.map(f64::from),
-            size: area.1.map(f64::from),
-            scene: self.stream.scene(),
-            measures: &measures,
-            body_marks: &body_marks,
-            start_line: &start_line,
+        let (mut hands, tool) = (std::mem::take(&mut self.hands), self.controls.tool());
+        let commands = hands.gesture(input, &self.viewport(is_over_panel, now), tool, modifiers);
+        self.hands = hands;
+        commands.iter().for_each(|command| self.execute(command, now));
+    }
+
+    /// The picture as an input meets it.
+    fn viewport(&self, is_over_panel: bool, now: Instant) -> Viewport<'_> {
+        let (corner, size) = self.room().picture;
+        // What is clicked is what is seen, also while the settings already ask for another picture.
+        let scene = self.presentation.shown().map(|picture| &picture.scene);
+        Viewport {
+            corner: corner.map(f64::from),
+            size: scene.map_or(size, Scene::picture_size).map(f64::from),
+            scene,
+            volume: self.presentation.shown().map(|picture| picture.volume),
+            measures: self.controls.measures(),
+            body_marks: self.controls.body_marks(),
+            start_line: self.controls.start_line(),
             has_work: self.controls.work().is_some() || self.controls.line().is_some(),
             is_covered: self.leaving.asks() || (is_over_panel && self.fixed.overlay),
             now: now.saturating_duration_since(self.fixed.started),
-        };
-        for command in self.hands.gesture(input, &on, self.controls.tool(), modifiers) {
-            self.execute(&command, now);
         }
+    }
+
+    /// What a letter begins with the tool for texts: the place of a text.
+    pub(super) fn place_of_text(&self) -> Option<Command> {
+        let is_over_panel = self.hands.place(&Input::FocusLost).is_some_and(|at| self.panels.covers(at));
+        self.hands.place_of_text(&self.viewport(is_over_panel, Instant::now()))
     }
 
     /// Turns the pointer by keyboard on or off. Without panels nobody would see it.

@@ -3,13 +3,14 @@
 use super::Console;
 use crate::gpu;
 use crate::panels::{Banner, PanelState, first_steps};
+use crate::shown_picture::ShownPicture;
 use std::time::Instant;
 
 impl Console {
     /// Lays out the panels and executes the commands that they give.
-    pub(super) fn lay_out_panels(&mut self, now: Instant, has_drawn: bool) -> gpu::window::Panels {
+    pub(super) fn lay_out_panels(&mut self, now: Instant, picture: Option<&ShownPicture>) -> gpu::window::Panels {
         let banner = self.banner(now);
-        let shows_first_steps = self.shows_first_steps(has_drawn && banner.is_none());
+        let shows_first_steps = self.shows_first_steps(picture.is_some() && banner.is_none());
         let notes: Vec<_> = self.export_note().into_iter().chain(self.notes.shown()).collect();
         let recordings = self.opening.named();
         let exit_key = self.fixed.exit.as_ref().filter(|_| self.fixed.is_kiosk).map(ToString::to_string);
@@ -33,12 +34,11 @@ impl Console {
             is_frozen: self.stream.is_frozen(),
             ended: self.connection.ended_for(now),
             cine: self.replay.state(self.cine_loop(), self.stream.cine_position()),
-            has_drawn,
+            picture,
             quality: (self.quality.label(), self.quality.budget()),
             banner,
             notes: &notes,
             exit_key: exit_key.as_deref().unwrap_or_default(),
-            start_lines: self.render_start.lines(),
             pointer: self.presentation.pointer(),
             keyboard_pointer: self.hands.mark(room.picture),
         };

@@ -18,6 +18,8 @@ use std::path::PathBuf;
 use std::sync::Arc;
 use std::time::Instant;
 
+/// The tool with which letters are a text.
+const TEXT: Tool = Tool::Measure(MeasureKind::Text);
 /// Edge of the voxels that are counted, mm.
 const VOXEL: f64 = 0.5;
 
@@ -96,7 +98,8 @@ impl Console {
         };
         let volumes = self.stream.cine().volumes();
         let shown = self.stream.cine_position().and_then(|at| volumes.get(at)).or(volumes.back());
-        let frames = shown.map(|kept| kept.frames.clone()).ok_or(texts::NO_VOLUME_IN_LOOP)?;
+        let shown = shown.ok_or(texts::NO_VOLUME_IN_LOOP)?;
+        let (frames, made) = (shown.frames.clone(), Some(self.made_on(shown.volume)));
         let is_backward = frames.first().is_some_and(|frame| frame.backward);
         let geometry = if is_backward { header.backward.clone() } else { header.forward.clone() };
         let (stored, [low, high]) = (header.stored, header.range);
@@ -110,7 +113,7 @@ impl Console {
             frames.iter().for_each(|frame: &Arc<Frame>| volume.take((**frame).clone()));
             let counted = voxels::count(&volume, corners, VOXEL, low + threshold * (high - low))?;
             let (kind, counted) = (MeasureKind::Threshold, Some(counted.volume));
-            Some(Measurement { kind, points, threshold: Some(threshold), counted, ..Measurement::default() })
+            Some(Measurement { kind, points, threshold: Some(threshold), counted, made, ..Measurement::default() })
         })
     }
 
@@ -130,7 +133,7 @@ impl Console {
         if self.controls.measures().is_empty() {
             return self.notify(texts::NO_MEASUREMENTS_YET, true);
         }
-        match self.survey.copy(outcome::csv(self.controls.measures())) {
+        match self.survey.copy(outcome::csv(self.controls.measures(), &self.recording_name())) {
             Ok(()) => self.notify(texts::RESULTS_COPIED, false),
             Err(fault) => {
                 self.notify(&texts::no_clipboard(fault), true);
@@ -143,7 +146,11 @@ impl Console {
     pub(super) fn save_measures(&mut self) {
         let saved = match self.controls.measures().is_empty() {
             true => Err(texts::WHY_NO_MEASUREMENTS.into()),
-            false => self.exporter.text("csv", outcome::csv(self.controls.measures()), Holds::Nothing),
+            false => self.exporter.text(
+                "csv",
+                outcome::csv(self.controls.measures(), &self.recording_name()),
+                Holds::Nothing,
+            ),
         };
         if let Err(fault) = saved {
             self.notify(&texts::results_not_saved(fault), true);
@@ -228,17 +235,28 @@ impl Console {
             self.presentation.redraw_if(self.presets.is_naming());
             return commands;
         }
+        let letters = |letter: char| match modifiers.shift {
+            true => letter.to_uppercase().map(Command::Type).collect(),
+            false => vec![Command::Type(letter)],
+        };
         if self.controls.typing().is_some() {
             return Some(match key {
-                Key::Char(letter) if modifiers.shift => letter.to_uppercase().map(Command::Type).collect(),
-                Key::Char(letter) => vec![Command::Type(letter)],
+                Key::Char(letter) => letters(letter),
                 Key::Space => vec![Command::Type(' ')],
                 Key::Backspace => vec![Command::Untype],
                 Key::Enter | Key::Escape => vec![Command::EndTyping],
                 _ => Vec::new(),
             });
         }
-        self.what_enter_ends().filter(|_| key == Key::Enter).map(|command| vec![command])
+        // Whoever chose this tool is about to type: a letter is no command, and nothing is to be taken back yet.
+        match key {
+            Key::Char(letter) if self.controls.tool() == TEXT && letter.is_alphabetic() => {
+                Some(self.place_of_text().into_iter().chain(letters(letter)).collect())
+            }
+            Key::Backspace if self.controls.tool() == TEXT => Some(Vec::new()),
+            Key::Enter => self.what_enter_ends().map(|command| vec![command]),
+            _ => None,
+        }
     }
 
     /// Ends the contour or the line in work.

@@ -14,6 +14,7 @@ mod layout;
 mod leaving;
 mod looks;
 mod measured;
+mod measured_on;
 mod measuring;
 mod notes;
 mod opening;

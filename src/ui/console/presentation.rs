@@ -2,6 +2,8 @@
 
 use crate::gpu::window::Screen;
 use crate::panels::accesskit::TreeUpdate;
+use crate::shown_picture::ShownPicture;
+use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 /// While the next picture is not ready, the window keeps the old content for so long: less disturbing than a black moment.
@@ -43,6 +45,10 @@ pub(super) struct Presentation {
     needs_redraw: bool,
     /// A picture was drawn that has not been shown.
     has_new_picture: bool,
+    /// The last picture that was drawn: the device's image holds it until the next one begins.
+    drawn: Option<Arc<ShownPicture>>,
+    /// The last one that was shown: the screen has a copy of it while the next one is drawn.
+    shown: Option<Arc<ShownPicture>>,
     /// Since when there is no picture to show.
     blank_since: Option<Instant>,
     /// When the panels want to be drawn again.
@@ -66,6 +72,8 @@ impl Presentation {
             is_full_screen: false,
             needs_redraw: true,
             has_new_picture: false,
+            drawn: None,
+            shown: None,
             blank_since: None,
             repaint_at: None,
             retry_at: None,
@@ -80,6 +88,8 @@ impl Presentation {
         // Drop the old one first: a window has one surface at a time.
         self.screen = None;
         self.screen = screen;
+        // The copy was the old one's.
+        self.shown = None;
         self.redraw();
     }
 
@@ -110,7 +120,7 @@ impl Presentation {
     }
 
     /// Number of presentations, and of those while a picture was being drawn.
-    pub(super) fn shown(&self) -> [u64; 2] {
+    pub(super) fn presentations(&self) -> [u64; 2] {
         [self.screen.as_ref().map_or(0, |screen| screen.shown()), self.shown_between]
     }
 
@@ -129,8 +139,21 @@ impl Presentation {
         (self.needs_redraw, self.retry_at) = (true, None);
     }
 
-    pub(super) fn picture_finished(&mut self) {
+    /// A picture was drawn.
+    pub(super) fn picture_finished(&mut self, picture: ShownPicture) {
+        self.drawn = Some(Arc::new(picture));
         self.has_new_picture = true;
+    }
+
+    /// The picture that the window shows; before the first, and without one, the last that it showed.
+    pub(super) fn shown(&self) -> Option<&ShownPicture> {
+        self.shown.as_deref()
+    }
+
+    /// The picture that is shown if the window is presented now.
+    pub(super) fn content(&self, picture: &PictureState) -> Option<Arc<ShownPicture>> {
+        let latest = if picture.is_drawing { &self.shown } else { &self.drawn };
+        latest.clone().filter(|_| picture.has_drawn)
     }
 
     /// Where to draw the pointer, pixels of the window, if no windowing system draws one.
@@ -186,14 +209,15 @@ impl Presentation {
         self.needs_redraw = false;
     }
 
-    /// The panels show what there is. `has_more`: inputs for them remain.
-    pub(super) fn up_to_date(&mut self, has_more: bool) {
+    /// The window shows this picture, if any, and the panels show what there is. `has_more`: inputs for them remain.
+    pub(super) fn up_to_date(&mut self, content: Option<Arc<ShownPicture>>, has_more: bool) {
         (self.has_new_picture, self.needs_redraw) = (false, has_more);
+        self.shown = content.or(self.shown.take());
     }
 
-    /// The window was presented. `is_between`: while a picture was being drawn.
-    pub(super) fn presented(&mut self, is_between: bool, has_more: bool) {
-        self.up_to_date(has_more);
+    /// The window was presented with this picture. `is_between`: while another one was being drawn.
+    pub(super) fn presented(&mut self, content: Option<Arc<ShownPicture>>, is_between: bool, has_more: bool) {
+        self.up_to_date(content, has_more);
         self.shown_between += u64::from(is_between);
         self.retry_at = None;
     }
@@ -218,6 +242,9 @@ impl Presentation {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::probe::{Geometry, Grid};
+    use crate::scene::{Input, Scene, Settings};
+    use crate::source::StoredType;
 
     const SHOWN: PictureState = PictureState {
         has_drawn: true,
@@ -228,6 +255,63 @@ mod tests {
         has_started: true,
     };
 
+    /// A picture of the volume with this number.
+    fn picture(volume: u32) -> ShownPicture {
+        let grid = Grid { size: [4, 4, 4], spacing: [1.0; 3], origin: [0.0; 3] };
+        let input = Input { stored: StoredType::U8, range: [0.0, 255.0] };
+        let scene = Scene::new(Geometry::Cartesian(grid), input, Settings::default()).expect("a scene");
+        ShownPicture { scene, volume, start_lines: Vec::new() }
+    }
+
+    /// Prevents marks of another picture than the one that the window shows: the device's image, or the screen's copy of the last one that was presented,
+    /// over every order of pictures that begin, are held up, are finished, and cannot be presented.
+    #[test]
+    fn marks_are_those_of_the_picture_that_is_shown() {
+        let mut random = 1_u64;
+        let mut next = |of: u64| {
+            random = random.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+            (random >> 33) % of
+        };
+        let mut window = Presentation::new([64, 64]);
+        // What the device's image and the screen's copy hold.
+        let (mut image, mut copy, mut drawing) = (None, None, None);
+        let mut seen = [0; 3];
+        for volume in 0..4000 {
+            match next(5) {
+                0 => drawing = drawing.or(Some(volume)),
+                1 => {
+                    if let Some(volume) = drawing.take() {
+                        image = Some(volume);
+                        window.picture_finished(picture(volume));
+                    }
+                }
+                // Another size, or another geometry.
+                2 if next(20) == 0 => (image, drawing) = (None, None),
+                3 if next(50) == 0 => {
+                    window.set_screen(None);
+                    copy = None;
+                }
+                _ => {
+                    let has_drawn = image.is_some() || drawing.is_some();
+                    let state = PictureState { has_drawn, is_drawing: drawing.is_some(), ..SHOWN };
+                    let expected = if drawing.is_some() { copy } else { image };
+                    let content = window.content(&state);
+                    assert_eq!(content.as_ref().map(|picture| picture.volume), expected);
+                    seen[usize::from(drawing.is_some()) + usize::from(expected.is_none())] += 1;
+                    match next(3) {
+                        0 => window.not_presentable(Instant::now()),
+                        _ => {
+                            window.presented(content, drawing.is_some(), false);
+                            copy = expected.or(copy);
+                            assert_eq!(window.shown().map(|picture| picture.volume), copy);
+                        }
+                    }
+                }
+            }
+        }
+        assert!(seen.iter().all(|count| *count > 20), "{seen:?}");
+    }
+
     /// Prevents a window that is drawn although nothing changed, panels that hold a picture up, and a black moment between two volumes.
     #[test]
     fn a_window_is_presented_when_something_changed_and_a_picture_is_not_held_up() {
@@ -235,19 +319,19 @@ mod tests {
         let at = |ms: u64| begin + Duration::from_millis(ms);
         let mut window = Presentation::new([64, 64]);
         assert!(window.is_due(&SHOWN, at(0)), "the first time");
-        window.presented(false, false);
+        window.presented(None, false, false);
         assert!(!window.is_due(&SHOWN, at(1)), "nothing changed");
-        window.picture_finished();
+        window.picture_finished(picture(1));
         assert!(window.is_due(&SHOWN, at(2)));
-        window.presented(false, true);
+        window.presented(None, false, true);
         assert!(window.is_due(&SHOWN, at(3)), "inputs for the panels remain");
         // A picture is being drawn.
         let drawn_for = |ms| PictureState { is_drawing: true, drawn_for: Some(Duration::from_millis(ms)), ..SHOWN };
         assert!(!window.is_due(&drawn_for(99), at(4)) && window.is_due(&drawn_for(100), at(4)));
         assert!(!window.is_due(&PictureState { is_paced: false, ..drawn_for(900) }, at(4)));
         assert!(!window.is_due(&PictureState { has_started: false, ..drawn_for(900) }, at(4)));
-        window.presented(true, false);
-        assert_eq!(window.shown(), [0, 1]);
+        window.presented(None, true, false);
+        assert_eq!(window.presentations(), [0, 1]);
         // The next volume has no picture yet.
         let blank = PictureState { has_drawn: false, is_idle: false, ..SHOWN };
         window.redraw();
@@ -265,7 +349,7 @@ mod tests {
         assert_eq!(window.due(at(0)).collect::<Vec<_>>(), [at(100)]);
         window.content_lost();
         assert!(window.is_due(&SHOWN, at(1)));
-        window.presented(false, false);
+        window.presented(None, false, false);
         window.laid_out(None, Duration::from_millis(50), at(10));
         window.repaint(at(59));
         assert!(!window.is_due(&SHOWN, at(59)), "no panel moves yet");

@@ -1,26 +1,20 @@
-//! Where the rendering that is shown starts, and when it is said that the fluid is lost at which it should.
+//! When it is said that the fluid is lost at which it should.
 
-use crate::passes::unveil::{Outcome, StartLine};
+use crate::passes::unveil::Outcome;
 use std::time::{Duration, Instant};
 
 /// That fluid is lost is said at most so often: it may come and go with each live volume.
 const LOST_INTERVAL: Duration = Duration::from_secs(20);
 
-/// The start of the rendering that is shown.
+/// What is said of the start of the rendering.
 #[derive(Debug, Default)]
 pub(super) struct RenderStart {
-    /// Where it is on planes beside the rendering.
-    lines: Vec<StartLine>,
     /// The fluid is lost, and this was said.
     is_told: bool,
     told_at: Option<Instant>,
 }
 
 impl RenderStart {
-    pub(super) fn lines(&self) -> &[StartLine] {
-        &self.lines
-    }
-
     /// The next loss is another one: the source is another, or the search is switched off.
     pub(super) fn forget(&mut self) {
         (self.is_told, self.told_at) = (false, None);
@@ -28,8 +22,7 @@ impl RenderStart {
 
     /// Takes what a picture found; no outcome if it did not search. Returns the outcome if the fluid is lost and that is to be said now: once each time,
     /// and not more often than every [`LOST_INTERVAL`].
-    pub(super) fn take(&mut self, lines: Vec<StartLine>, outcome: Option<Outcome>, now: Instant) -> Option<Outcome> {
-        self.lines = lines;
+    pub(super) fn take(&mut self, outcome: Option<Outcome>, now: Instant) -> Option<Outcome> {
         if outcome.is_none() {
             self.forget();
         }
@@ -55,7 +48,7 @@ mod tests {
         let begin = Instant::now();
         let mut start = RenderStart::default();
         let found = Outcome::Found(Evidence { tissue: 9, pocket: 1, share: 90 });
-        let mut take = |seconds: u64, outcome| start.take(Vec::new(), outcome, begin + Duration::from_secs(seconds));
+        let mut take = |seconds: u64, outcome| start.take(outcome, begin + Duration::from_secs(seconds));
         let mut said = |seconds: u64, is_lost: bool| {
             take(seconds, Some(if is_lost { Outcome::NoPocket } else { found })) == Some(Outcome::NoPocket)
         };

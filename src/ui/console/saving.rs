@@ -32,11 +32,11 @@ impl Console {
             None => Err(texts::WHY_NO_PICTURE.into()),
         };
         let (has_bar, time) = (self.controls.settings().marks.bar, marked::time_line(SystemTime::now()));
-        let origin = self.origin();
+        let (origin, volume) = (self.origin(), self.stream.drawn_volume());
         let saved = picture.and_then(|(picture, scene, start)| {
             self.exporter.picture(move || match has_bar {
-                true => marked::marked(&picture, &scene, start.as_ref(), &time, origin),
-                false => marked::measured(&picture, &scene, start.as_ref(), origin),
+                true => marked::marked(&picture, &scene, volume, start.as_ref(), &time, origin),
+                false => marked::measured(&picture, &scene, volume, start.as_ref(), origin),
             })
         });
         if let Err(fault) = saved {

@@ -3,7 +3,7 @@
 use super::{Change, Controls};
 use crate::command::{Command, Tool};
 use crate::measure::outcome;
-use crate::scene::{MAX_ALL_POINTS, MAX_CONTOURS, MAX_MEASURES, MAX_POINTS, MAX_TEXT, MeasureKind, Measurement};
+use crate::scene::{MAX_ALL_POINTS, MAX_CONTOURS, MAX_MEASURES, MAX_POINTS, MAX_TEXT, Made, MeasureKind, Measurement};
 use crate::texts;
 
 /// Farthest place of a point, mm.
@@ -30,8 +30,14 @@ impl Controls {
         self.defaults.as_ref()?.levels.as_ref().map(|levels| levels.threshold)
     }
 
+    /// On what the next point is set; none: nobody knows.
+    pub(crate) fn measure_on(&mut self, made: Option<Made>) {
+        self.made = made;
+    }
+
     /// Adds a measurement that is complete.
     pub(crate) fn add_measure(&mut self, measured: Measurement) -> Change {
+        let measured = Measurement { made: measured.made.clone().or_else(|| self.made.clone()), ..measured };
         if self.is_full(measured.count()) {
             return Change::Refused(texts::TOO_MANY_MEASUREMENTS);
         }
@@ -144,6 +150,8 @@ impl Controls {
         let fits = |work: &Measurement| work.kind == kind && work.on_surface == on_surface;
         let new = || Measurement { kind, on_surface, ..Measurement::default() };
         let mut work = self.work.take().filter(fits).unwrap_or_else(new);
+        // It belongs to the volume on which it was begun, and to the plane that holds all of it.
+        work.made = self.made.clone();
         self.typing = None;
         // A tenth of a micrometre: files stay short.
         let point = point.map(|mm| (mm * 1e4).round() / 1e4);

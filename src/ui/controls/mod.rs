@@ -17,7 +17,7 @@ use crate::scene::default_look::Defaults;
 use crate::scene::load;
 use crate::scene::planes::MAX_TILES;
 use crate::scene::{
-    BodyMark, Camera, Cube, Curve, Cut, Inset, KeptSide, Layout, MAX_PICTURE, Measurement, Mode, Planes, Scene,
+    BodyMark, Camera, Cube, Curve, Cut, Inset, KeptSide, Layout, MAX_PICTURE, Made, Measurement, Mode, Planes, Scene,
     Settings, Shadow, Tilt, Transfer,
 };
 pub(super) use cutting::BRUSH_RADII;
@@ -72,6 +72,8 @@ pub struct Controls {
     history: History,
     /// The measurement whose points are being set.
     work: Option<Measurement>,
+    /// On what the next point of a measurement is set.
+    made: Option<Made>,
     /// The measurement whose text is being typed.
     typing: Option<usize>,
     /// The line of a curved plane in work.
@@ -98,6 +100,7 @@ impl Controls {
             defaults: None,
             history: History::default(),
             work: None,
+            made: None,
             typing: None,
             line: None,
             outline: Vec::new(),

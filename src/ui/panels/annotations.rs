@@ -2,7 +2,7 @@
 //! bar.
 
 use super::colours::{self, ACCENT, AXES, BACKING, MEASURE, ON_PLANE, OUTLINE, SIDES, START, TEXT, WARNING, WEAK_TEXT};
-use super::{PanelState, SMALL_TEXT, body_marks, picture_rect, recordings};
+use super::{PanelState, SMALL_TEXT, body_marks, picture_rect, recordings, shown};
 use crate::command::Tool;
 use crate::measure::overlay;
 use crate::passes::postprocess;
@@ -21,17 +21,15 @@ const MIN_FOR_COLOURS: f32 = 300.0;
 const MIN_FOR_SCALE: f32 = 90.0;
 
 pub(super) fn paint(ui: &Ui, state: &PanelState, scale: f32) {
-    let Some(scene) = state.scene else { return };
-    let picture = picture_rect(state, scale);
-    // During a resize the scene has another size for a moment.
-    if scene.picture_size() != state.room.picture.1 {
-        return;
-    }
+    let Some((shown, whole)) = shown(state, scale) else { return };
+    let scene = &shown.scene;
+    // The part of it that is in sight.
+    let picture = whole.intersect(picture_rect(state, scale));
     let painter = ui.ctx().layer_painter(egui::LayerId::background()).with_clip_rect(picture);
     let marks = scene.marks_with(&state.controls.settings().marks);
     let area_of = |tile: &TileMarks| {
         let [corner, size] = [tile.corner, tile.size].map(|[x, y]| vec2(x as f32, y as f32) / scale);
-        Rect::from_min_size(picture.min + corner, size)
+        Rect::from_min_size(whole.min + corner, size)
     };
     let has_room = |area: &Rect, least: f32| area.width().min(area.height()) >= least;
     let tiles = || marks.iter().enumerate().map(|(n, tile)| (n, tile, area_of(tile)));
@@ -45,7 +43,7 @@ pub(super) fn paint(ui: &Ui, state: &PanelState, scale: f32) {
     let is_shown = state.controls.tool() == Tool::Region
         && !scene.unveils()
         && region_box::start_line(scene, &scene.tiling(), 0, state.controls.start_line()).is_some();
-    for line in state.start_lines.iter().skip(usize::from(is_shown)) {
+    for line in shown.start_lines.iter().skip(usize::from(is_shown)) {
         let [corner, size] = line.tile.map(|[x, y]| vec2(x as f32, y as f32) / scale);
         let painter = painter.with_clip_rect(Rect::from_min_size(picture.min + corner, size).intersect(picture));
         for ends in &line.pieces {

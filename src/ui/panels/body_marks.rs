@@ -3,7 +3,7 @@
 use super::colours::{BODY, MEASURE, OUTLINE, SELECTED, TEXT, WEAK_TEXT};
 use super::names::{self, Tell};
 use super::widgets::{scale_slider, switch};
-use super::{PanelState, SMALL_TEXT, TOUCH_SIZE, heading, picture_rect};
+use super::{PanelState, SMALL_TEXT, TOUCH_SIZE, heading, picture_rect, shown};
 use crate::command::{Command, Tool};
 use crate::measure::body_marks::{self, Drawn};
 use crate::scene::{BODY_MARK_SIZES, Body, BodyMark, MAX_BODY_MARKS};
@@ -15,11 +15,11 @@ const COLUMNS: usize = 4;
 
 /// Draws the marks; while their tool is chosen also their squares, the one that controls are about brighter.
 pub(super) fn paint(ui: &Ui, state: &PanelState, scale: f32) {
-    let picture = picture_rect(state, scale);
-    let painter = ui.ctx().layer_painter(egui::LayerId::background()).with_clip_rect(picture);
+    let Some((shown, picture)) = shown(state, scale) else { return };
+    let painter = ui.ctx().layer_painter(egui::LayerId::background()).with_clip_rect(picture_rect(state, scale));
     let is_chosen = state.controls.tool() == Tool::BodyMark;
     let about = state.controls.body_mark().map(|(index, _)| index);
-    for drawn in body_marks::drawn(state.controls.body_marks(), state.room.picture.1.map(f64::from)) {
+    for drawn in body_marks::drawn(state.controls.body_marks(), shown.scene.picture_size().map(f64::from)) {
         if is_chosen {
             let colour = if about == Some(drawn.index) { MEASURE } else { WEAK_TEXT };
             let edge = vec2(1.0, 1.0) * drawn.edge as f32 / scale;
@@ -32,8 +32,8 @@ pub(super) fn paint(ui: &Ui, state: &PanelState, scale: f32) {
 
 /// The squares that the marks take from other marks of the picture, points.
 pub(super) fn areas(state: &PanelState, scale: f32) -> Vec<Rect> {
-    let picture = picture_rect(state, scale);
-    let marks = body_marks::drawn(state.controls.body_marks(), state.room.picture.1.map(f64::from));
+    let Some((shown, picture)) = shown(state, scale) else { return Vec::new() };
+    let marks = body_marks::drawn(state.controls.body_marks(), shown.scene.picture_size().map(f64::from));
     let area = |drawn: Drawn| {
         Rect::from_min_size(at(&picture, scale, drawn.corner), vec2(1.0, 1.0) * drawn.edge as f32 / scale)
     };

@@ -1,7 +1,7 @@
 //! The line of the curved plane on the plane that it is drawn on, with its points while its tool is chosen; and the line in work.
 
 use super::colours::{self, OUTLINE, TEXT};
-use super::{PanelState, picture_rect};
+use super::{PanelState, ShownPicture, picture_rect, shown};
 use crate::command::Tool;
 use crate::measure::overlay;
 use crate::scene::Curve;
@@ -14,14 +14,12 @@ const POINT: f32 = 4.5;
 const HEAD: f64 = 12.0;
 
 pub(super) fn paint(ui: &Ui, state: &PanelState, scale: f32) {
-    let Some(scene) = state.scene else { return };
+    let Some((ShownPicture { scene, .. }, picture)) = shown(state, scale) else { return };
     let (is_chosen, work) = (state.controls.tool() == Tool::Curve, state.controls.line());
-    // During a resize the scene has another size for a moment.
-    if scene.picture_size() != state.room.picture.1 || (scene.settings.planes.curve.is_none() && work.is_none()) {
+    if scene.settings.planes.curve.is_none() && work.is_none() {
         return;
     }
-    let picture = picture_rect(state, scale);
-    let painter = ui.ctx().layer_painter(egui::LayerId::background()).with_clip_rect(picture);
+    let painter = ui.ctx().layer_painter(egui::LayerId::background()).with_clip_rect(picture_rect(state, scale));
     let tiling = scene.tiling();
     let area = |tile: usize| {
         let [corner, size] =
@@ -29,10 +27,10 @@ pub(super) fn paint(ui: &Ui, state: &PanelState, scale: f32) {
         Rect::from_min_size(picture.min + corner / scale, size / scale)
     };
     let draw = |line: &CurveLine, has_points: bool| {
-        let painter = painter.with_clip_rect(area(line.tile).intersect(picture));
+        let painter = painter.with_clip_rect(area(line.tile).intersect(painter.clip_rect()));
         draw(&painter, picture, scale, line, has_points);
     };
-    let hover = ui.ctx().pointer_hover_pos().filter(|at| picture.contains(*at));
+    let hover = ui.ctx().pointer_hover_pos().filter(|at| painter.clip_rect().contains(*at));
     let hover = hover.map(|at| ((at - picture.min) * scale).into()).map(|[x, y]: [f32; 2]| [x, y].map(f64::from));
     // The tile under the pointer, and the place in space.
     let under = hover.and_then(|at| {
@@ -46,7 +44,7 @@ pub(super) fn paint(ui: &Ui, state: &PanelState, scale: f32) {
         if let Some((_, place)) = under.filter(|(number, _)| tiling.tiles[*number].section.is_some()) {
             let [x, y] = tiling.project(&tiling.tiles[line.tile], place).0.map(|v| v as f32);
             let at = picture.min + vec2(x, y) / scale;
-            let painter = painter.with_clip_rect(area(line.tile).intersect(picture));
+            let painter = painter.with_clip_rect(area(line.tile).intersect(painter.clip_rect()));
             [Stroke::new(4.0, OUTLINE), Stroke::new(2.0, colours::of_scene(CURVE_COLOUR))].into_iter().for_each(
                 |stroke| {
                     painter.circle_stroke(at, POINT + 2.0, stroke);

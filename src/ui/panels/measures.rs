@@ -1,9 +1,9 @@
 //! Measuring: its tools, the list of results, and what is drawn of both over the picture.
 
-use super::colours::{ACCENT, BACKING, MEASURE, OUTLINE, TEXT, WARNING};
+use super::colours::{ACCENT, BACKING, MEASURE, OUTLINE, TEXT, WARNING, WEAK_TEXT};
 use super::names::{self, Tell};
 use super::overlays::first;
-use super::{PanelState, SMALL_TEXT, TEXT_SIZE, TOUCH_SIZE, heading, picture_rect};
+use super::{PanelState, SMALL_TEXT, ShownPicture, TEXT_SIZE, TOUCH_SIZE, heading, picture_rect, shown};
 use crate::command::{Command, Tool};
 use crate::measure::outcome::{self, Quantity};
 use crate::measure::overlay::{self, Drawn};
@@ -12,7 +12,7 @@ use crate::scene::{MeasureKind, Scene};
 use crate::texts;
 use crate::texts::hints;
 use egui::accesskit::Role;
-use egui::{Button, FontId, Label, Painter, Pos2, Rect, RichText, Stroke, StrokeKind, Ui, pos2, vec2};
+use egui::{Button, Color32, FontId, Label, Painter, Pos2, Rect, RichText, Stroke, StrokeKind, Ui, pos2, vec2};
 
 /// The tools of the rail and their names there.
 const TOOLS: [(MeasureKind, &str); 9] = [
@@ -176,24 +176,24 @@ fn next_step(state: &PanelState, kind: MeasureKind) -> &'static str {
 
 /// Draws measurements and annotations over the picture, and the contour of a cut in work.
 pub(super) fn paint(ui: &Ui, state: &PanelState, scale: f32) {
-    let Some(scene) = state.scene else { return };
+    let Some((ShownPicture { scene, volume, .. }, picture)) = shown(state, scale) else { return };
     let (measures, outline) = (state.controls.measures(), state.controls.outline());
     let is_brush = state.controls.tool() == Tool::Brush && !scene.is_flat();
     let is_empty = measures.is_empty() && state.controls.work().is_none() && outline.is_empty() && !is_brush;
-    if is_empty || scene.picture_size() != state.room.picture.1 {
+    if is_empty {
         return;
     }
-    let picture = picture_rect(state, scale);
-    let painter = ui.ctx().layer_painter(egui::LayerId::background()).with_clip_rect(picture);
+    let in_sight = picture_rect(state, scale);
+    let painter = ui.ctx().layer_painter(egui::LayerId::background()).with_clip_rect(in_sight);
     let canvas = Canvas { painter, origin: picture.min, scale };
-    for mut drawn in overlay::drawn(scene, measures) {
+    for mut drawn in overlay::drawn(scene, Some(*volume), measures) {
         if state.controls.typing() == Some(drawn.index) {
             drawn.label.push('_');
         }
         canvas.draw(&drawn);
     }
     if is_brush {
-        let hover = ui.ctx().pointer_hover_pos().filter(|at| picture.contains(*at));
+        let hover = ui.ctx().pointer_hover_pos().filter(|at| in_sight.contains(*at));
         let place = outline.last().map(|at| canvas.at(*at)).or(hover);
         let radius = (state.controls.brush_radius() / Picker::of(scene).mm_per_pixel()) as f32 / scale;
         if let Some(place) = place.filter(|_| radius.is_finite()) {
@@ -206,10 +206,10 @@ pub(super) fn paint(ui: &Ui, state: &PanelState, scale: f32) {
         // A contour goes back to where it began, as it will be closed.
         let closing = [[*last, outline[0]]].into_iter().filter(|_| !is_brush);
         let ends = outline.windows(2).map(|ends| [ends[0], ends[1]]).chain(closing);
-        canvas.lines(&canvas.painter, &ends.map(|ends| ends.map(|at| canvas.at(at))).collect::<Vec<_>>());
+        canvas.lines(&canvas.painter, &ends.map(|ends| ends.map(|at| canvas.at(at))).collect::<Vec<_>>(), MEASURE);
     }
     if let Some(work) = state.controls.work() {
-        let hover = ui.ctx().pointer_hover_pos().filter(|at| picture.contains(*at));
+        let hover = ui.ctx().pointer_hover_pos().filter(|at| in_sight.contains(*at));
         let hover = hover.and_then(|at| place_at(scene, ((at - picture.min) * scale).into()));
         let hover = hover.filter(|_| !work.on_surface);
         let is_curved = hover.is_some_and(|(_, is_curved)| is_curved);
@@ -246,8 +246,8 @@ impl Canvas {
     }
 
     /// A dark edge along the bright line is visible on any picture.
-    fn lines(&self, painter: &Painter, strokes: &[[Pos2; 2]]) {
-        for stroke in [Stroke::new(3.5, OUTLINE), Stroke::new(1.5, MEASURE)] {
+    fn lines(&self, painter: &Painter, strokes: &[[Pos2; 2]], colour: Color32) {
+        for stroke in [Stroke::new(3.5, OUTLINE), Stroke::new(1.5, colour)] {
             strokes.iter().for_each(|ends| _ = painter.line_segment(*ends, stroke));
         }
     }
@@ -255,7 +255,8 @@ impl Canvas {
     fn draw(&self, drawn: &Drawn) {
         let [corner, size] = drawn.tile;
         let end = [corner[0] + size[0], corner[1] + size[1]];
-        let painter = self.painter.with_clip_rect(Rect::from_min_max(self.at(corner), self.at(end)));
+        let area = Rect::from_min_max(self.at(corner), self.at(end));
+        let painter = self.painter.with_clip_rect(area.intersect(self.painter.clip_rect()));
         let mut strokes: Vec<[Pos2; 2]> = Vec::new();
         for line in &drawn.lines {
             strokes.extend(line.windows(2).map(|ends| [self.at(ends[0]), self.at(ends[1])]));
@@ -267,17 +268,23 @@ impl Canvas {
         }
         let heads = drawn.head.iter().flat_map(|head| overlay::arrow_head(*head, HEAD * f64::from(self.scale)));
         strokes.extend(heads.map(|ends| ends.map(|at| self.at(at))));
-        self.lines(&painter, &strokes);
+        // What belongs to another volume is dimmed.
+        let line = if drawn.is_of_other { WEAK_TEXT } else { MEASURE };
+        self.lines(&painter, &strokes, line);
         if drawn.label.is_empty() {
             return;
         }
-        let colour = if drawn.label == "_" { WARNING } else { TEXT };
+        let colour = match (drawn.label.as_str(), drawn.is_of_other) {
+            ("_", _) => WARNING,
+            (_, true) => WEAK_TEXT,
+            (_, false) => TEXT,
+        };
         let galley = painter.layout_no_wrap(drawn.label.clone(), FontId::proportional(TEXT_SIZE - 2.0), colour);
         let size = (galley.size() + vec2(8.0, 2.0)) * self.scale;
         let corner = self.at(overlay::label_corner(drawn, [f64::from(size.x), f64::from(size.y)]));
         let area = Rect::from_min_size(corner, size / self.scale);
         painter.rect_filled(area, 3.0, BACKING);
-        painter.rect_stroke(area, 3.0, Stroke::new(1.0, MEASURE.gamma_multiply(0.5)), StrokeKind::Inside);
+        painter.rect_stroke(area, 3.0, Stroke::new(1.0, line.gamma_multiply(0.5)), StrokeKind::Inside);
         painter.galley(pos2(area.left() + 4.0, area.center().y - galley.size().y / 2.0), galley, colour);
     }
 }

@@ -35,10 +35,10 @@ use crate::cine_player::CineState;
 use crate::controls::Controls;
 use crate::gpu;
 use crate::keyboard_pointer::PointerMark;
-use crate::passes::unveil::StartLine;
 use crate::progress_lines::Progress;
 use crate::recordings::Named;
 use crate::scene::Scene;
+use crate::shown_picture::ShownPicture;
 use crate::texts::Unsaved;
 use crate::times::Times;
 pub use egui::accesskit;
@@ -225,7 +225,7 @@ impl Panels {
             let from_panels = commands.len();
             let execute = &mut |command| commands.push(command);
             if state.shows_only_origin {
-                if state.has_drawn {
+                if state.picture.is_some() {
                     annotations::paint_origin(ui, state, self.scale);
                 }
                 return;
@@ -245,11 +245,11 @@ impl Panels {
                 }
             }
             match state.visible.panels {
-                true if state.has_drawn => annotations::paint(ui, state, self.scale),
-                false if state.has_drawn => annotations::paint_origin(ui, state, self.scale),
+                true if state.picture.is_some() => annotations::paint(ui, state, self.scale),
+                false if state.picture.is_some() => annotations::paint_origin(ui, state, self.scale),
                 _ => {}
             }
-            if state.has_drawn {
+            if state.picture.is_some() {
                 region::paint(ui, state, self.scale);
                 curve::paint(ui, state, self.scale);
                 measures::paint(ui, state, self.scale);
@@ -434,7 +434,10 @@ impl Edges {
 /// What the panels show.
 pub(super) struct PanelState<'a> {
     pub(super) controls: &'a Controls,
+    /// The scene that is drawn next or last, which controls are about.
     pub(super) scene: Option<&'a Scene>,
+    /// The picture that is shown, which marks over it are about; none before the first.
+    pub(super) picture: Option<&'a ShownPicture>,
     pub(super) times: &'a Times,
     pub(super) room: Room,
     pub(super) visible: &'a Visible,
@@ -461,16 +464,12 @@ pub(super) struct PanelState<'a> {
     /// How long ago the probe or the pipe ended: nothing is live since.
     pub(super) ended: Option<Duration>,
     pub(super) cine: CineState,
-    /// True after the first picture.
-    pub(super) has_drawn: bool,
     /// The current rung of the quality ladder, and the frame budget.
     pub(super) quality: (&'a str, Option<Duration>),
     pub(super) banner: Option<Banner>,
     pub(super) notes: &'a [Note],
     /// The keys that end the program, for the help.
     pub(super) exit_key: &'a str,
-    /// Where rendering starts on planes beside it, if that follows the fluid.
-    pub(super) start_lines: &'a [StartLine],
     /// Where to draw a pointer, pixels of the window. None if the windowing system draws it.
     pub(super) pointer: Option<[f64; 2]>,
     /// The pointer by keyboard, while it is on.
@@ -529,6 +528,13 @@ fn picture_rect(state: &PanelState, scale: f32) -> Rect {
     let ([x, y], [w, h]) = state.room.picture;
     let [x, y, w, h] = [x, y, w, h].map(|n| n as f32 / scale);
     Rect::from_min_size(pos2(x, y), vec2(w, h))
+}
+
+/// The picture that is shown and its area in points, which reaches beyond that of the picture in the window while one of another size is still shown.
+fn shown<'a>(state: &PanelState<'a>, scale: f32) -> Option<(&'a ShownPicture, Rect)> {
+    let picture = state.picture?;
+    let size = picture.scene.picture_size().map(|n| n as f32 / scale);
+    Some((picture, Rect::from_min_size(picture_rect(state, scale).min, size.into())))
 }
 
 /// Size of running text, points: at a scale of 1 on a monitor with 96 dots per inch it is 5 mm high, which a healthy eye reads from 2 m.

@@ -135,7 +135,7 @@ pub(super) fn picture(ui: &Ui, state: &PanelState, scale: f32) {
 
 /// The name of the picture, such as "Surface from the front, live, Demo data (phantom)", and what else is to be said of it.
 fn in_words(state: &PanelState) -> (String, String) {
-    let Some(scene) = state.scene.filter(|_| state.has_drawn) else {
+    let Some(scene) = state.picture.map(|picture| &picture.scene) else {
         return (texts::NO_PICTURE_YET.into(), String::new());
     };
     let settings = &scene.settings;

@@ -102,7 +102,7 @@ pub(super) fn show_notes(ui: &mut Ui, state: &PanelState, scale: f32, taken: f32
     let banner = banner.filter(|banner| banner.height() + newest <= room.y);
     let mut left = room.y - banner.as_ref().map_or(0.0, |banner| banner.height() + BETWEEN_MESSAGES);
     // In the centre without a picture and without notes, at the top over one.
-    let is_at_top = state.has_drawn || !state.notes.is_empty();
+    let is_at_top = state.picture.is_some() || !state.notes.is_empty();
     let mut shown: Vec<Message> = Vec::new();
     for message in state.notes.iter().rev().map(note) {
         left -= message.height() + BETWEEN_MESSAGES;
@@ -484,7 +484,7 @@ mod tests {
         let names = |search: &str| -> Vec<String> {
             found("Ctrl+Alt+Q", search, false).into_iter().flat_map(|(_, lines)| lines).map(|(key, _)| key).collect()
         };
-        assert!(names("save picture").contains(&"P".to_string()));
+        assert!(names("save picture").contains(&"Ctrl+I".to_string()));
         assert!(names("SPECKLE").contains(&"Smoothing".to_string()), "controls are found by what they do");
         assert_eq!(names("patient's sides"), ["Sides"]);
         assert_eq!(names("ctrl+alt quit"), ["Ctrl+Alt+Q"]);

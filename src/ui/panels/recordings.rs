@@ -72,7 +72,7 @@ fn reading_place(state: &PanelState, scale: f32) -> ReadingPlace {
     let has_bar = picture.height() >= MIN_FOR_BAR;
     let height = HEIGHTS[usize::from(!has_bar)];
     let width = (picture.width() - 60.0).clamp(60.0, 420.0);
-    let is_alone = !state.has_drawn && state.notes.is_empty() && state.banner.is_none();
+    let is_alone = state.picture.is_none() && state.notes.is_empty() && state.banner.is_none();
     let low = picture.center_bottom() - vec2(0.0, MESSAGE_EDGES[1] + height);
     let top = if is_alone { picture.center() - vec2(0.0, height / 2.0) } else { low };
     ReadingPlace { has_bar, height, width, top, is_alone }

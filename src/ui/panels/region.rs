@@ -2,7 +2,7 @@
 //! plane A, and its edges in the rendering.
 
 use super::colours::{OUTLINE, START, TEXT};
-use super::{PanelState, picture_rect};
+use super::{PanelState, ShownPicture, picture_rect, shown};
 use crate::command::Tool;
 use crate::region_box;
 use egui::{Painter, Pos2, Rect, Stroke, Ui, pos2, vec2};
@@ -15,23 +15,19 @@ const START_HANDLE: f32 = 6.5;
 const DASH: f32 = 6.0;
 
 pub(super) fn paint(ui: &Ui, state: &PanelState, scale: f32) {
-    let Some(scene) = state.scene.filter(|_| state.controls.tool() == Tool::Region) else { return };
-    // During a resize the scene has another size for a moment.
-    if scene.picture_size() != state.room.picture.1 {
-        return;
-    }
-    let picture = picture_rect(state, scale);
+    let shown = shown(state, scale).filter(|_| state.controls.tool() == Tool::Region);
+    let Some((ShownPicture { scene, .. }, picture)) = shown else { return };
     let at = |[x, y]: [f64; 2]| {
         let near = |v: f64| (v / f64::from(scale)).clamp(-1e5, 1e5) as f32;
         picture.min + vec2(near(x), near(y))
     };
-    let painter = ui.ctx().layer_painter(egui::LayerId::background()).with_clip_rect(picture);
+    let painter = ui.ctx().layer_painter(egui::LayerId::background()).with_clip_rect(picture_rect(state, scale));
     if region_box::is_on_planes(scene) {
         let tiling = scene.tiling();
         for (n, tile) in tiling.tiles.iter().enumerate() {
             let [corner, size] = [tile.corner, tile.size].map(|v| v.map(f64::from));
             let area = Rect::from_min_max(at(corner), at([corner[0] + size[0], corner[1] + size[1]]));
-            let painter = painter.with_clip_rect(area.intersect(picture));
+            let painter = painter.with_clip_rect(area.intersect(painter.clip_rect()));
             let sides = region_box::section(scene, &tiling, tile);
             sides.iter().for_each(|side| line(&painter, side.ends.map(at), 1.5));
             sides.iter().filter_map(|side| side.handle).for_each(|place| handle(&painter, at(place)));
@@ -50,7 +46,7 @@ pub(super) fn paint(ui: &Ui, state: &PanelState, scale: f32) {
     let Some(tile) = tile else { return };
     let (corner, size) = (tile.corner, tile.size);
     let area = Rect::from_min_max(at(corner), at([corner[0] + size[0], corner[1] + size[1]]));
-    let painter = painter.with_clip_rect(area.intersect(picture));
+    let painter = painter.with_clip_rect(area.intersect(painter.clip_rect()));
     let (behind, before): (Vec<_>, Vec<_>) = region_box::wireframe(scene).into_iter().partition(|edge| edge.is_behind);
     behind.iter().for_each(|edge| dashes(&painter, edge.ends.map(at)));
     before.iter().for_each(|edge| line(&painter, edge.ends.map(at), 1.5));

@@ -415,7 +415,7 @@ fn what_colours_alone_do_not_tell_has_another_sign() {
     for at in [[100.0, 100.0], [180.0, 140.0]] {
         measured.apply(Command::Point(measured.scene.point_of(tiling.point(tile, at)), false));
     }
-    let found = overlay::drawn(&measured.scene, measured.controls.measures());
+    let found = overlay::drawn(&measured.scene, None, measured.controls.measures());
     assert!(!found.is_empty() && found.iter().all(|drawn| drawn.points.len() == 2), "{found:?}");
     for drawn in &found {
         assert!(drawn.label.starts_with("1: ") && texts(&measured).contains(&drawn.label), "{}", drawn.label);

@@ -155,7 +155,7 @@ fn a_caliper_on_the_section_measures_along_the_line() {
         assert!(label.ends_with(" mm along the line"), "{label}");
         let scene = window.scene();
         let section = scene.tiling().tiles[3].corner.map(f64::from);
-        let drawn = overlay::drawn(&scene, &[measured]);
+        let drawn = overlay::drawn(&scene, None, &[measured]);
         let shown = drawn.iter().find(|drawn| drawn.tile[0] == section).expect("it is drawn on the section");
         let off = [0, 1].map(|end| {
             let at = shown.points[end].1;
@@ -170,7 +170,7 @@ fn a_caliper_on_the_section_measures_along_the_line() {
     };
     let scene = window.scene();
     let section = scene.tiling().tiles[3].corner.map(f64::from);
-    assert!(overlay::drawn(&scene, &[straight]).iter().all(|drawn| drawn.tile[0] != section));
+    assert!(overlay::drawn(&scene, None, &[straight]).iter().all(|drawn| drawn.tile[0] != section));
     // One end on A is no distance on the section; an angle is refused in words, whether clicked or dragged.
     let beside = pixel(&window, 0, [0.0, 20.0]);
     let on = on_section(&window, 10.0, 0.0);

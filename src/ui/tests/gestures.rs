@@ -237,6 +237,7 @@ fn a_press_outside_of_the_picture_and_a_lost_focus_drag_nothing() {
         corner: [0.0; 2],
         size: [512.0; 2],
         scene: Some(&scene),
+        volume: None,
         measures: &[],
         body_marks: &[],
         start_line: &[],

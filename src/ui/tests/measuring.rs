@@ -105,7 +105,7 @@ fn the_balls_diameter_area_and_angle_are_measured_to_a_tenth_of_a_millimetre() {
                 // It is drawn where it was set.
                 let scene = on.window.scene();
                 let corner = scene.tiling().tiles[tile].corner.map(f64::from);
-                let drawn = overlay::drawn(&scene, on.window.controls.measures());
+                let drawn = overlay::drawn(&scene, None, on.window.controls.measures());
                 let caliper = drawn.iter().find(|d| d.tile[0] == corner && d.points.len() == 2).expect("drawn");
                 let at = on.pixel(tile, centre - right * radius);
                 let off = (caliper.points[0].1[0] - at[0]).hypot(caliper.points[0].1[1] - at[1]);

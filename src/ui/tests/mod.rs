@@ -10,6 +10,7 @@ mod curving;
 mod cutting;
 mod first_steps;
 mod gestures;
+mod kept_picture;
 mod keyboard_pointer;
 mod layout;
 mod measuring;
@@ -142,6 +143,7 @@ impl TestWindow {
             corner,
             size,
             scene: scene_shown,
+            volume: None,
             measures: &measures,
             body_marks: &body_marks,
             start_line,

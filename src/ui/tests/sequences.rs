@@ -167,7 +167,7 @@ proptest! {
                     let start_line = &controls.start_line().to_vec();
                     let is_covered = !follows;
                     let on =
-                        Viewport { corner, size, scene, measures: &measures, body_marks: &body_marks, start_line, has_work, is_covered, now };
+                        Viewport { corner, size, scene, volume: None, measures: &measures, body_marks: &body_marks, start_line, has_work, is_covered, now };
                     let mut commands = gestures.input(input, &on, *tool, keys.modifiers());
                     commands.extend(keys.input(input));
                     for command in commands {

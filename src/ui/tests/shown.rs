@@ -15,6 +15,7 @@ use crate::picture::Picture;
 use crate::progress_lines::Progress;
 use crate::recordings::Named;
 use crate::scene::Cine;
+use crate::shown_picture::ShownPicture;
 use crate::source::phantom::{Phantom, PhantomOptions};
 use crate::texts::{UNSAVED_LOOP, Unsaved};
 use crate::times::Times;
@@ -38,6 +39,8 @@ pub(super) struct Shown {
     pub(super) visible: Visible,
     pub(super) leaving: Option<&'static Unsaved>,
     pub(super) has_drawn: bool,
+    /// The scene of the picture that is shown while another one is drawn; none: the present one's.
+    pub(super) kept: Option<Scene>,
     pub(super) is_frozen: bool,
     pub(super) ended: Option<Duration>,
     pub(super) cine: CineState,
@@ -86,6 +89,7 @@ impl Shown {
             visible: Visible { panels: true, ..Visible::default() },
             leaving: None,
             has_drawn: true,
+            kept: None,
             is_frozen: false,
             ended: None,
             cine: CinePlayer::default().state(
@@ -142,9 +146,15 @@ impl Shown {
             |(n, name): (usize, &String)| Named { name: name.clone(), path: format!("/data/{name}"), is_shown: n == 1 };
         let recordings: Vec<Named> = self.recordings.iter().enumerate().map(named).collect();
         let room = Room::of(self.size, scale, self.visible.panels);
+        let picture = ShownPicture {
+            scene: self.kept.clone().unwrap_or_else(|| self.scene.clone()),
+            volume: 2,
+            start_lines: self.start_lines.clone(),
+        };
         let state = PanelState {
             controls: &self.controls,
             scene: Some(&self.scene),
+            picture: self.has_drawn.then_some(&picture),
             times: &self.times,
             room,
             visible: &self.visible,
@@ -161,12 +171,10 @@ impl Shown {
             is_frozen: self.is_frozen,
             ended: self.ended,
             cine: self.cine.clone(),
-            has_drawn: self.has_drawn,
             quality: ("full", self.budget),
             banner: self.banner.clone(),
             notes: &self.notes,
             exit_key: "",
-            start_lines: &self.start_lines,
             pointer: self.pointers.0,
             keyboard_pointer: self.pointers.1,
         };

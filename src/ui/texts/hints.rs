@@ -76,7 +76,7 @@ pub(crate) fn of_measure(kind: MeasureKind) -> &'static str {
             "Volume in cm³: trace the outline, step or turn the plane, trace again; Enter ends it. (W)"
         }
         MeasureKind::Threshold => "Volume of all echoes in the region from the threshold on, in cm³. (K)",
-        MeasureKind::Text => "Text: click its place, then type; Enter ends it. (I)",
+        MeasureKind::Text => "Text: click its place and type, or type it at the pointer; Enter ends it. (I)",
         MeasureKind::Arrow => "Arrow: click what it points to, then its other end, then type. (Y)",
     }
 }

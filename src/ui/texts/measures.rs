@@ -38,7 +38,7 @@ pub(crate) const STEP_SHORT_AXIS: &str = "Click the end of the short axis.";
 pub(crate) const STEP_NEXT_CONTOUR: &str = "Step or turn the plane and trace again, or press Enter.";
 pub(crate) const STEP_OUTLINE: &str = "Drag round the outline on a plane.";
 pub(crate) const STEP_CLOSE_OUTLINE: &str = "Enter closes the outline.";
-pub(crate) const STEP_TEXT: &str = "Click the place of the text.";
+pub(crate) const STEP_TEXT: &str = "Click the place of the text, or type it at the pointer. Esc leaves.";
 pub(crate) const STEP_ARROW_TIP: &str = "Click what the arrow points to.";
 
 // Limits.
@@ -70,7 +70,7 @@ pub(crate) fn results_not_saved(fault: impl Display) -> String {
     format!("The results were not saved: {fault}")
 }
 pub(crate) const WHY_NO_ORIGIN: &str = "this view has none";
-pub(crate) const VOLUMES_ARE_LIVE: &str = "The volumes are live and in no file: save the loop too (R)";
+pub(crate) const VOLUMES_ARE_LIVE: &str = "The volumes are live and in no file: save the loop too (Ctrl+R)";
 pub(crate) fn workspace_not_saved(fault: impl Display) -> String {
     format!("The workspace was not saved: {fault}")
 }

@@ -41,7 +41,7 @@ pub(crate) fn loses_work(name: impl Display) -> String {
         "Measurements or cuts of {name} are not saved: save the workspace first (Ctrl+S), or close it again to lose them"
     )
 }
-pub(crate) const SAVE_THE_LOOP_FIRST: &str = "The loop is not saved: save it first (R)";
+pub(crate) const SAVE_THE_LOOP_FIRST: &str = "The loop is not saved: save it first (Ctrl+R)";
 pub fn reading(name: impl Display) -> String {
     format!("Reading {name}")
 }

@@ -139,10 +139,10 @@ pub(crate) fn ended_for(ago: Duration) -> String {
     }
 }
 pub(crate) const SAVE_PICTURE: &str = "Save picture";
-pub(crate) const SAVE_PICTURE_HINT: &str = "Saves the picture (P).";
+pub(crate) const SAVE_PICTURE_HINT: &str = "Saves the picture (Ctrl+I).";
 pub(crate) const HELP_HINT: &str = "All keys and gestures (H).";
 pub(crate) const SAVE_LOOP: &str = "Save loop";
-pub(crate) const SAVE_LOOP_HINT: &str = "Saves the last volumes as a recording (R).";
+pub(crate) const SAVE_LOOP_HINT: &str = "Saves the last volumes as a recording (Ctrl+R).";
 pub(crate) const RESET: &str = "Reset";
 pub(crate) const RESET_HINT: &str = "All settings as at the start (Backspace).";
 pub(crate) const FULL_SCREEN: &str = "Full screen";

@@ -104,14 +104,14 @@ fn exported_files_are_what_was_shown_and_recorded() {
     let (device, folder) = (Device::new(), Folder::new("saved"));
     let mut desk = Desk::new(&device, ConsoleOptions { folder: folder.0.clone(), ..options() });
     // An export without a picture is no fault.
-    desk.press(Key::Char('p'));
-    desk.press(Key::Char('r'));
+    desk.held(CONTROL, Key::Char('i'));
+    desk.held(CONTROL, Key::Char('r'));
     desk.begin();
     let seen: Vec<_> = (0..3).map(|number| desk.live(number)).collect();
     desk.press(Key::Left);
     desk.rest();
-    desk.press(Key::Char('p'));
-    desk.press(Key::Char('r'));
+    desk.held(CONTROL, Key::Char('i'));
+    desk.held(CONTROL, Key::Char('r'));
     assert!(folder.wait("png", |file| Picture::load(file).ok()) == seen[1]);
     let mut replay = folder.wait("frames", |file| Reader::open(file).ok().filter(|r| !r.rebuilt() && r.frames() == 27));
     assert!(*replay.header() == header(0.3));
@@ -149,7 +149,7 @@ fn a_trimmed_loop_is_played_back_and_forth_and_saved() {
     let first_end = places.iter().position(|place| *place == 1).expect("the loop reaches its begin");
     assert_eq!(places[first_end..][..4], [1, 2, 3, 2], "{places:?}");
     desk.press(Key::Enter);
-    desk.press(Key::Char('r'));
+    desk.held(CONTROL, Key::Char('r'));
     let mut saved = folder.wait("frames", |file| Reader::open(file).ok().filter(|r| !r.rebuilt()));
     let volumes: Vec<u32> =
         std::iter::from_fn(|| saved.next_frame().expect("read")).map(|frame| frame.volume).collect();

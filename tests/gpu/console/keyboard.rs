@@ -2,9 +2,10 @@
 
 use super::*;
 use crate::common::wait;
+use echolume::low_level::scene::MeasureKind;
 use echolume::low_level::ui::panels::accesskit::{Action, ActionRequest, NodeId, Role, TreeId, TreeUpdate};
 
-const CONTROL: Modifiers = Modifiers { shift: false, control: true, alt: false };
+const TEXT: Tool = Tool::Measure(MeasureKind::Text);
 
 fn desk(device: &Arc<Context>) -> Desk {
     let mut desk = Desk::new(device, ConsoleOptions { panels: true, ..options() });
@@ -162,7 +163,7 @@ fn the_pointer_by_keyboard_does_what_the_mouse_does() {
     }
     assert_eq!(measured(&keys).last().map(|measured| measured.text.clone()).as_deref(), Some("a b"));
     // Escape gives the drag up, then leaves the pointer, then the tool; and never the program.
-    keys.press(Key::Char('t'));
+    keys.console.execute(&Command::Tool(Tool::Rotate), Instant::now());
     keys.press(Key::Char('1'));
     keys.rest();
     keys.press(Key::Space);
@@ -206,4 +207,51 @@ fn arrows_walk_through_a_list_and_escape_closes_it() {
     desk.press(Key::Left);
     desk.rest();
     assert!(desk.console.stream().is_frozen());
+}
+
+/// Prevents "cord" as four commands: a letter that was meant for a text chose another tool, wrote files, and Backspace reset everything.
+#[test]
+fn with_the_tool_for_texts_letters_are_a_text_wherever_the_pointer_is() {
+    let (device, folder) = (Device::new(), Folder::new("letters"));
+    let mut desk = Desk::new(&device, ConsoleOptions { folder: folder.0.clone(), ..options() });
+    desk.begin();
+    desk.live(0);
+    let texts = |desk: &Desk| -> Vec<String> {
+        desk.console.controls().measures().iter().map(|measured| measured.text.clone()).collect()
+    };
+    desk.press(Key::Char('7'));
+    desk.press(Key::Char(']'));
+    desk.rest();
+    desk.press(Key::Char('i'));
+    let before = desk.console.controls().settings().clone().without_drawings();
+    desk.press(Key::Backspace);
+    assert_eq!(desk.console.controls().settings().clone().without_drawings(), before, "nothing is reset");
+    // Outside of the picture first, then over it.
+    desk.console.input(&Input::Moved([-40.0, 9.0]));
+    "cord".chars().for_each(|letter| desk.press(Key::Char(letter)));
+    (0..6).for_each(|_| desk.press(Key::Backspace));
+    assert_eq!((texts(&desk), desk.console.controls().typing()), (vec![String::new()], Some(0)));
+    "cord".chars().for_each(|letter| desk.press(Key::Char(letter)));
+    desk.press(Key::Enter);
+    desk.press(Key::Backspace);
+    desk.console.input(&Input::Moved([50.0, 30.0]));
+    desk.held(Modifiers { shift: true, ..Modifiers::default() }, Key::Char('p'));
+    "r".chars().for_each(|letter| desk.press(Key::Char(letter)));
+    desk.press(Key::Enter);
+    assert_eq!(texts(&desk), ["cord", "Pr"]);
+    let after = desk.console.controls().settings().clone();
+    assert_eq!((desk.console.controls().tool(), after.clone().without_drawings()), (TEXT, before));
+    let scene = desk.console.stream().scene().expect("begun");
+    let (tiling, at) = (scene.tiling(), |n: usize| scene.place_of(after.measure[n].points[0]));
+    let [middle, pointed] = [0, 1].map(|n| tiling.project(&tiling.tiles[0], at(n)).0);
+    for (found, [x, y]) in [(middle, SIZE.map(|n| f64::from(n) / 2.0)), (pointed, [50.0, 30.0])] {
+        assert!((found[0] - x).hypot(found[1] - y) < 0.1, "{found:?}, not {x}, {y}");
+    }
+    assert!(std::fs::read_dir(&folder.0).expect("its folder").next().is_none(), "a file was written");
+    // Ctrl is a command still, and Esc leaves the tool.
+    desk.held(CONTROL, Key::Char('z'));
+    assert_ne!(texts(&desk), ["cord", "Pr"]);
+    desk.press(Key::Escape);
+    desk.press(Key::Char('o'));
+    assert_eq!(desk.console.controls().tool(), Tool::Measure(MeasureKind::Trace));
 }

@@ -4,6 +4,7 @@ mod budget;
 mod failures;
 mod gestures;
 mod idle;
+mod kept_picture;
 mod keyboard;
 mod metrics;
 mod monkey;
@@ -36,6 +37,7 @@ use std::sync::mpsc::{Receiver, Sender, channel};
 use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
 
+const CONTROL: Modifiers = Modifiers { shift: false, control: true, alt: false };
 pub const SIZE: [u32; 2] = [80, 72];
 /// Longer than a view counts as moving after an input.
 const LATER: Duration = Duration::from_millis(300);

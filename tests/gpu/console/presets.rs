@@ -6,7 +6,6 @@ use echolume::low_level::scene::{Mode, TransferName};
 use echolume::low_level::user_presets::read;
 use std::path::PathBuf;
 
-const CONTROL: Modifiers = Modifiers { shift: false, control: true, alt: false };
 /// The built-in presets of the list.
 const BUILT_IN: usize = 6;
 

@@ -15,6 +15,8 @@ pub const MAX_ALL_POINTS: usize = 20_000;
 pub const MAX_CONTOURS: usize = 64;
 /// Longest text of a measurement, characters.
 pub const MAX_TEXT: usize = 80;
+/// Longest words on what a measurement was made on, characters.
+pub(crate) const MAX_MADE: usize = 200;
 
 /// A measurement or an annotation. It keeps its place in the volume whatever the view.
 #[derive(Clone, Debug, Default, PartialEq, Deserialize, Serialize)]
@@ -42,6 +44,26 @@ pub struct Measurement {
     /// Its points were picked on the rendered surface: it is drawn on renderings. Others are drawn on the planes that they lie in.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub on_surface: bool,
+    /// On what it was made. Absent: on nothing in particular; on other volumes than its own it is drawn dimmed.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub made: Option<Made>,
+}
+
+/// On what a measurement was made. The viewer writes it.
+#[derive(Clone, Debug, Default, PartialEq, Deserialize, Serialize)]
+#[serde(deny_unknown_fields)]
+pub struct Made {
+    /// The number of its volume in the recording, or since the start of a live source, from 0.
+    pub volume: u32,
+    /// The time stamp of that volume, s. Absent: the source states none.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub time: Option<f64>,
+    /// The plane or the view, in words with its place in mm and its directions, at most 200 characters.
+    #[serde(default, skip_serializing_if = "String::is_empty")]
+    pub plane: String,
+    /// The mode, and a digest of all settings of the picture: pictures of equal digests have equal settings. At most 200 characters.
+    #[serde(default, skip_serializing_if = "String::is_empty")]
+    pub settings: String,
 }
 
 /// What is measured or marked.
@@ -70,6 +92,11 @@ pub enum MeasureKind {
 }
 
 impl Measurement {
+    /// The number of its volume, if it is another one than that which is shown.
+    pub fn other_volume(&self, shown: Option<u32>) -> Option<u32> {
+        self.made.as_ref().map(|made| made.volume).filter(|volume| shown.is_some_and(|shown| shown != *volume))
+    }
+
     /// Number of its points, those of its contours included.
     pub fn count(&self) -> usize {
         self.points.len() + self.contours.iter().map(Vec::len).sum::<usize>()
@@ -133,5 +160,6 @@ pub(super) const NUMBERS: &[Number] = &[
     number!(measure => points, "mm", Range(-1e6, 1e6)),
     number!(measure => contours, "mm", Range(-1e6, 1e6)),
     number!(measure => threshold, "", SHARE),
+    number!(measure => made => time, "s", Range(-1e15, 1e15)),
     number!(measure => counted, "mm^3", Range(0.0, 1e18)),
 ];

@@ -15,7 +15,7 @@ pub(super) fn results(user: &mut User) -> String {
 
 pub(super) fn picture(user: &mut User) -> String {
     user.has_caliper(10.0);
-    user.letter('p');
+    user.control('i');
     let file = user.saved("png");
     let saved = user.until("whole picture", |_| Picture::load(&file).ok());
     let size = picture_area(WINDOW, 1.0, true).1;

@@ -1,0 +1,86 @@
+//! On what a measurement was made, in words: the plane or the view, and the settings of the picture. Results leave the program with these.
+
+use crate::scene::{Scene, Settings};
+
+/// A point lies on a plane that is no farther away, mm: coordinates are kept to a tenth of a micrometre.
+const ON_PLANE: f64 = 1e-3;
+
+/// The plane of a picture that holds all of these points, with its middle (lateral, depth, elevation, mm) and its normal; of points on the rendered surface
+/// the direction of the view. Empty if they lie on none.
+pub fn plane(scene: &Scene, points: &[[f64; 3]], on_surface: bool) -> String {
+    if on_surface {
+        let camera = &scene.settings.camera;
+        let [azimuth, elevation, roll] = [camera.azimuth, camera.elevation, camera.roll];
+        return format!("rendering, azimuth {azimuth:.1}, elevation {elevation:.1}, roll {roll:.1} deg");
+    }
+    if !scene.cuts_planes() {
+        return String::new();
+    }
+    let tiling = scene.tiling();
+    let holds = |n: &usize| {
+        let off = |point: &[f64; 3]| tiling.project(&tiling.tiles[*n], scene.place_of(*point)).1.abs();
+        points.iter().all(|point| off(point) <= ON_PLANE)
+    };
+    let Some(n) = (0..tiling.tiles.len()).find(holds) else { return String::new() };
+    let plane = tiling.tiles[n].plane;
+    let [at, normal] = [scene.point_of(plane.at), plane.normal.to_array()];
+    let [x, y, z] = at.map(|mm| format!("{mm:.1}"));
+    let [along_x, along_y, along_z] = normal.map(|share| format!("{share:.3}"));
+    let name = match (&tiling.tiles[n].section, scene.curve(), scene.plane_of_tile(n)) {
+        (Some(_), Some(curve), _) => format!("curved plane on {}", curve.plane.letter()),
+        (_, _, Some(name)) => name.letter().to_string(),
+        _ => scene.settings.planes.plane.letter().to_string(),
+    };
+    format!("{name} at {x}, {y}, {z} mm, normal {along_x}, {along_y}, {along_z}")
+}
+
+/// The mode, and a digest of all settings but the size of the picture and what is drawn over it (FNV-1a of their text, 64 bits).
+pub fn settings(of: &Settings) -> String {
+    let settings = Settings { picture: Settings::default().picture, ..of.clone().without_drawings() };
+    let text = settings.to_toml().unwrap_or_default();
+    let digest = text
+        .bytes()
+        .fold(0xcbf2_9ce4_8422_2325_u64, |digest, byte| (digest ^ u64::from(byte)).wrapping_mul(0x0100_0000_01b3));
+    format!("{} {digest:016x}", of.mode.title())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::test_block::block;
+
+    fn scene(lines: &[&str]) -> Scene {
+        block(&[&["picture.size=[200,100]"], lines].concat(), [41, 31, 21])
+    }
+
+    /// Prevents a table that names another plane than the one that was measured on.
+    #[test]
+    fn the_plane_of_a_measurement_is_the_one_that_holds_all_of_its_points() {
+        let three = scene(&["mode='orthogonal'", "planes.position=[1,15,2]"]);
+        let cross = [1.0, 15.0, 2.0];
+        for (end, letter) in [([5.0, 18.0, 2.0], "A"), ([1.0, 18.0, 6.0], "B"), ([5.0, 15.0, 6.0], "C")] {
+            let words = plane(&three, &[cross, end], false);
+            assert!(words.starts_with(&format!("{letter} at ")), "{words}");
+        }
+        assert_eq!(plane(&three, &[cross, [5.0, 18.0, 6.0]], false), "", "on none of them");
+        let sliced = scene(&["mode='tomography'", "planes.plane='c'"]);
+        let slice = sliced.tiling().tiles[3].plane;
+        let words = plane(&sliced, &[sliced.point_of(slice.at)], false);
+        assert!(
+            words.starts_with("C at ") && words.contains(&format!(", {:.1}, ", sliced.point_of(slice.at)[1])),
+            "{words}"
+        );
+        let rendered = scene(&["camera.azimuth=30"]);
+        let words = plane(&rendered, &[cross], true);
+        assert!(words.contains("azimuth 30.0") && plane(&rendered, &[cross], false).is_empty(), "{words}");
+    }
+
+    #[test]
+    fn settings_of_one_look_have_one_digest_and_others_another() {
+        let words = |lines: &[&str]| settings(&scene(lines).settings);
+        let plain = words(&["mode='plane'"]);
+        assert!(plain.starts_with("Plane ") && plain.len() == "Plane ".len() + 16, "{plain}");
+        assert_eq!(plain, words(&["mode='plane'", "picture.size=[90,80]", "marks.bar=true"]));
+        assert_ne!(plain, words(&["mode='plane'", "planes.zoom=2"]));
+    }
+}
