@@ -14,7 +14,7 @@ use crate::scene::{Input, depth_offset};
 use crate::source::convert::Volume;
 use crate::terminal::{self, Failure, failed, input, say};
 use indicatif::ProgressBar;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 #[derive(clap::Args)]
 #[command(
@@ -31,7 +31,11 @@ pub struct MakeMesh {
     #[arg(help = recording_help())]
     input: PathBuf,
     /// File to write: .stl, .ply or .glb
-    output: PathBuf,
+    #[arg(value_name = "OUTPUT", required_unless_present = "named")]
+    output: Option<PathBuf>,
+    /// The file to write, as other commands take it
+    #[arg(short = 'o', long = "output", value_name = "OUTPUT", id = "named", conflicts_with = "output")]
+    named: Option<PathBuf>,
     /// Value of the surface, 0..1 of the sample range as volume.threshold [default: between the darker and the brighter class of echoes]
     #[arg(long, value_name = "SHARE", allow_negative_numbers = true)]
     threshold: Option<f64>,
@@ -76,8 +80,13 @@ const MAX_ROWS: usize = 16_384;
 const MAX_DEVIATION: f64 = 32.0;
 
 impl MakeMesh {
+    /// The file to write: clap has seen to it that it is stated once.
+    fn output(&self) -> &Path {
+        self.named.as_deref().or(self.output.as_deref()).unwrap_or(Path::new(""))
+    }
+
     pub fn run(&self) -> Result<(), Failure> {
-        let format = MeshFile::of(&self.output).map_err(input)?;
+        let format = MeshFile::of(self.output()).map_err(input)?;
         let colour = COLOURS.iter().find(|(name, _)| self.colour.eq_ignore_ascii_case(name));
         let (_, colour) = colour.ok_or_else(|| input(format!("--colour {}: must be grey or skin", self.colour)))?;
         if let Some(share) = self.threshold.filter(|share| !(0.0..=1.0).contains(share)) {
@@ -95,7 +104,7 @@ impl MakeMesh {
         let mut recording = open_recording(&self.input, self.geometry.options())?;
         let read = recording.files();
         let read = read.iter().chain(&self.geometry.probe).map(PathBuf::as_path);
-        check_outputs(&[(OUTPUT, Some(&self.output))], read)?;
+        check_outputs(&[(OUTPUT, Some(self.output()))], read)?;
         let samples = Input { stored: recording.stored_type(), range: recording.range() };
         let (shift, world) = (recording.sample_type().shift(), recording.world_of(self.volume));
         let (geometry, volume, found) = read_with_threshold(&mut *recording, &self.input, self.volume, samples)?;
@@ -120,7 +129,7 @@ impl MakeMesh {
         if mesh.triangles.is_empty() {
             let fault =
                 format!("no voxel differs from the others at --threshold {share:.3} ({in_file:.4} in the file)");
-            return Err(input(format!("{}: nothing is written: {fault}", self.output.display())));
+            return Err(input(format!("{}: nothing is written: {fault}", self.output().display())));
         }
         let mut how = format!("threshold {share:.3} ({in_file:.4} in the file), smoothed by {deviation:.2} mm");
         if let Some(depth) = start {
@@ -143,7 +152,7 @@ impl MakeMesh {
                 simple
             }
         };
-        format.write(&mesh, Colours::One(*colour), &self.output).map_err(failed)?;
+        format.write(&mesh, Colours::One(*colour), self.output()).map_err(failed)?;
         self.say(&mesh, &how);
         Ok(())
     }
@@ -233,7 +242,7 @@ impl MakeMesh {
             0 => format!("closed, {:.3} ml, {area:.3} cm2", mesh.volume() / 1000.0),
             _ => format!("open at the border, {area:.3} cm2"),
         };
-        say!("mesh: {}, {triangles} triangles of {vertices} vertices, {extent}; {how}", self.output.display());
+        say!("mesh: {}, {triangles} triangles of {vertices} vertices, {extent}; {how}", self.output().display());
     }
 }
 

@@ -97,7 +97,11 @@ pub struct Convert {
     input: PathBuf,
     /// File to write: .mha, .nrrd, .nii, .nii.gz or .dcm (Enhanced US Volume) for a volume, .seq.nrrd for all volumes in time, .seg.nrrd for the voxels above --threshold as a
     /// segmentation, .frames for every frame unchanged, .mha with --sequence
-    output: PathBuf,
+    #[arg(value_name = "OUTPUT", required_unless_present = "named")]
+    output: Option<PathBuf>,
+    /// The file to write, as other commands take it
+    #[arg(short = 'o', long = "output", value_name = "OUTPUT", id = "named", conflicts_with = "output")]
+    named: Option<PathBuf>,
     /// Voxel spacing along every axis, mm [default: a Cartesian volume keeps its voxels; a sweep gets the sample spacing of a scan line]
     #[arg(long, value_name = "MM", allow_negative_numbers = true)]
     spacing: Option<f64>,
@@ -125,18 +129,23 @@ pub struct Convert {
 }
 
 impl Convert {
+    /// The file to write: clap has seen to it that it is stated once.
+    fn output(&self) -> &Path {
+        self.named.as_deref().or(self.output.as_deref()).unwrap_or(Path::new(""))
+    }
+
     pub fn run(&self) -> Result<(), Failure> {
-        if self.output.as_os_str() == "-" {
+        if self.output().as_os_str() == "-" {
             return Err(input(
                 "-: a volume is written to a file, whole or not at all, and the file's ending says its format",
             ));
         }
-        let is_segmented = segmentation::is_one(&self.output);
+        let is_segmented = segmentation::is_one(self.output());
         if let Some(share) = self.threshold.filter(|share| !is_segmented || !(0.0..=1.0).contains(share)) {
             let fault = if is_segmented { "must lie in 0..=1" } else { "is for .seg.nrrd" };
             return Err(input(format!("--threshold {share}: {fault}")));
         }
-        if self.output.extension().is_some_and(|e| e.eq_ignore_ascii_case("frames")) {
+        if self.output().extension().is_some_and(|e| e.eq_ignore_ascii_case("frames")) {
             return self.record();
         }
         if self.sequence {
@@ -145,10 +154,10 @@ impl Convert {
         if is_segmented {
             return self.segment();
         }
-        if volume_sequence::is_one(&self.output) {
+        if volume_sequence::is_one(self.output()) {
             return self.volumes();
         }
-        VolumeFile::of(&self.output).map_err(input)?;
+        VolumeFile::of(self.output()).map_err(input)?;
         let mut recording = open_recording(&self.input, self.geometry.options())?;
         let number = self.volume.unwrap_or(0);
         check_number(&*recording, &self.input, number)?;
@@ -156,27 +165,27 @@ impl Convert {
         let grid = target.grid;
         if self.secondary_capture && target.world != World::of(&grid) {
             let kept = "a secondary capture does not keep the place in the world";
-            remark(&format!("{}: {kept}", self.output.display()));
+            remark(&format!("{}: {kept}", self.output().display()));
         }
         let is_enhanced =
-            matches!(VolumeFile::of(&self.output), Ok(VolumeFile::Dicom { .. })) && !self.secondary_capture;
+            matches!(VolumeFile::of(self.output()), Ok(VolumeFile::Dicom { .. })) && !self.secondary_capture;
         if is_enhanced && target.world.directions().determinant() < 0.0 {
             let unread = "its axes are left-handed, of which programs of ITK read neither place nor spacing in DICOM; .nrrd and .mha keep them";
-            remark(&format!("{}: {unread}", self.output.display()));
+            remark(&format!("{}: {unread}", self.output().display()));
         }
-        target.check(&self.output).map_err(input)?;
+        target.check(self.output()).map_err(input)?;
         if let Some(mask) = &self.mask {
             VolumeFile::of(mask).map_err(input)?;
         }
-        self.check_outputs(&[(OUTPUT, Some(&self.output)), ("--mask", self.mask.as_deref())], &*recording)?;
+        self.check_outputs(&[(OUTPUT, Some(self.output())), ("--mask", self.mask.as_deref())], &*recording)?;
         let each = recording.frames_per_volume();
         let (geometry, volume, there) = read_volume(&mut *recording, &self.input, number, |_, _| ())?;
         let bar = progress_bar(grid.size[2] as u64).with_message("slices");
-        volume.write(&target, &self.output, || bar.inc(1)).map_err(failed)?;
+        volume.write(&target, self.output(), || bar.inc(1)).map_err(failed)?;
         bar.finish_and_clear();
         self.write_mask(&volume, &target)?;
         let missing = if there < each { format!(", {there} of {each} frames are there") } else { String::new() };
-        say!("volume: {}, {}{missing}", self.output.display(), self.voxels(&target, &geometry));
+        say!("volume: {}, {}{missing}", self.output().display(), self.voxels(&target, &geometry));
         self.remark_others(&*recording);
         self.remark_size(&volume, &grid);
         Ok(())
@@ -190,13 +199,13 @@ impl Convert {
         let mut recording = open_recording(&self.input, self.geometry.options())?;
         let numbers = self.volume.map_or(0..recording.volumes(), |number| number..number.saturating_add(1));
         check_number(&*recording, &self.input, numbers.start)?;
-        VolumeSequence::check(&self.target(&*recording, numbers.start)?, &self.output).map_err(input)?;
-        self.check_outputs(&[(OUTPUT, Some(&self.output)), ("--mask", self.mask.as_deref())], &*recording)?;
+        VolumeSequence::check(&self.target(&*recording, numbers.start)?, self.output()).map_err(input)?;
+        self.check_outputs(&[(OUTPUT, Some(self.output())), ("--mask", self.mask.as_deref())], &*recording)?;
         let sequence = VolumeSequence::of(&mut *recording, numbers, &self.input).map_err(input)?;
         // Of the first volume that is whole.
         let (geometry, target) = (recording.geometry(sequence.first()), self.target(&*recording, sequence.first())?);
         let bar = progress_bar(sequence.volumes() as u64).with_message("volumes");
-        sequence.write(&mut *recording, &target, &self.output, || bar.inc(1)).map_err(failed)?;
+        sequence.write(&mut *recording, &target, self.output(), || bar.inc(1)).map_err(failed)?;
         bar.finish_and_clear();
         let empty = Volume::new(geometry.clone(), recording.stored_type());
         self.write_mask(&empty, &target)?;
@@ -204,7 +213,7 @@ impl Convert {
             0 => String::new(),
             n => format!("; {n} volumes are left out, with frames missing"),
         };
-        let (shown, count) = (self.output.display(), sequence.volumes());
+        let (shown, count) = (self.output().display(), sequence.volumes());
         say!("sequence: {shown}, {count} volumes of {}{left_out}", self.voxels(&target, &geometry));
         if let Err(why) = sequence.times() {
             remark(&format!("{shown}: {why}"));
@@ -247,7 +256,7 @@ impl Convert {
 
     /// Says that a recording has more volumes than the file, unless one was chosen.
     fn remark_others(&self, recording: &dyn Source) {
-        let (count, shown) = (recording.volumes(), self.output.display());
+        let (count, shown) = (recording.volumes(), self.output().display());
         if self.volume.is_none() && count > 1 {
             remark(&format!("{shown}: volume 1 of {count}; NAME.seq.nrrd takes all, --volume another"));
         }
@@ -255,7 +264,7 @@ impl Convert {
 
     /// Says if a lattice leaves little or nothing of a volume.
     fn remark_size(&self, volume: &Volume, grid: &Grid) {
-        let (shown, geometry) = (self.output.display(), volume.geometry());
+        let (shown, geometry) = (self.output().display(), volume.geometry());
         if !volume.meets(grid) {
             remark(&format!("{shown}: is empty: {}", thinner_than(grid, geometry)));
         } else if let Some(left) = self.spacing.and_then(|mm| what_is_left(mm, grid, geometry)) {
@@ -266,11 +275,11 @@ impl Convert {
     /// Writes the voxels above a threshold as a segmentation.
     fn segment(&self) -> Result<(), Failure> {
         if self.secondary_capture || self.outside.is_some() {
-            let shown = self.output.display();
+            let shown = self.output().display();
             return Err(input(format!("{shown}: --secondary-capture and --outside are for volumes of samples")));
         }
         let mut recording = open_recording(&self.input, self.geometry.options())?;
-        self.check_outputs(&[(OUTPUT, Some(&self.output)), ("--mask", self.mask.as_deref())], &*recording)?;
+        self.check_outputs(&[(OUTPUT, Some(self.output())), ("--mask", self.mask.as_deref())], &*recording)?;
         let samples = Input { stored: recording.stored_type(), range: recording.range() };
         let (sample, number) = (recording.sample_type(), self.volume.unwrap_or(0));
         let (_, volume, found) = read_with_threshold(&mut *recording, &self.input, number, samples)?;
@@ -278,12 +287,12 @@ impl Convert {
         let share = share_of(self.threshold, found.as_ref(), &self.input)?;
         let threshold = samples.range[0] + share * (samples.range[1] - samples.range[0]);
         let bar = progress_bar(target.grid.size[2] as u64).with_message("slices");
-        volume.write_tissue(&target, threshold, &self.output, || bar.inc(1)).map_err(failed)?;
+        volume.write_tissue(&target, threshold, self.output(), || bar.inc(1)).map_err(failed)?;
         bar.finish_and_clear();
         self.write_mask(&volume, &target)?;
         let [x, y, z] = target.grid.size;
         let in_file = threshold - sample.shift();
-        let shown = self.output.display();
+        let shown = self.output().display();
         say!(
             "segmentation: {shown}, {x} x {y} x {z} voxels, 1 tissue; threshold {share:.3} ({in_file:.4} in the file)"
         );
@@ -298,22 +307,22 @@ impl Convert {
 
     /// Writes the frames of all complete volumes as a PLUS sequence.
     fn sequence(&self) -> Result<(), Failure> {
-        if VolumeFile::of(&self.output).map_err(input)? != VolumeFile::MetaImage {
-            return Err(input(format!("{}: a sequence must end in .mha", self.output.display())));
+        if VolumeFile::of(self.output()).map_err(input)? != VolumeFile::MetaImage {
+            return Err(input(format!("{}: a sequence must end in .mha", self.output().display())));
         }
         let mut recording = open_recording(&self.input, self.geometry.options())?;
-        let beside = sequence::probe_file_path(&self.output);
-        self.check_outputs(&[(OUTPUT, Some(&self.output)), (OUTPUT, Some(&beside))], &*recording)?;
+        let beside = sequence::probe_file_path(self.output());
+        self.check_outputs(&[(OUTPUT, Some(self.output())), (OUTPUT, Some(&beside))], &*recording)?;
         let sequence = Sequence::of(&mut *recording, &self.input).map_err(input)?;
         let (frames, volumes) = (sequence.frames(), sequence.volumes());
         let bar = progress_bar(volumes as u64).with_message("volumes");
-        sequence.write(&mut *recording, &self.output, || bar.inc(1)).map_err(failed)?;
+        sequence.write(&mut *recording, self.output(), || bar.inc(1)).map_err(failed)?;
         bar.finish_and_clear();
         let left_out = match sequence.left_out() {
             0 => String::new(),
             n => format!("; {n} volumes are left out, with frames missing or swept the same way twice"),
         };
-        say!("sequence: {}, {frames} frames of {volumes} volumes{left_out}", self.output.display());
+        say!("sequence: {}, {frames} frames of {volumes} volumes{left_out}", self.output().display());
         Ok(())
     }
 
@@ -337,13 +346,13 @@ impl Convert {
         let header = Header { forward, backward, stored, range, posed, synthetic };
         // A signal ends the process only after the incomplete file is deleted.
         let signals = Writing::begin();
-        let mut writer = Writer::create(&self.output, header).map_err(failed)?;
+        let mut writer = Writer::create(self.output(), header).map_err(failed)?;
         let bar = progress_bar((recording.volumes() * recording.frames_per_volume()) as u64);
         let mut copy = || {
             while let Some(mut there) = frame.take() {
                 there.pose = there.pose.or(pose);
                 if let Some(signal) = signals.signal() {
-                    return Err(failed(format!("{}: stopped by {signal}", self.output.display())));
+                    return Err(failed(format!("{}: stopped by {signal}", self.output().display())));
                 }
                 let arrived = recording.arrival().or(there.time).unwrap_or(0.0);
                 writer.frame(&there, arrived).map_err(failed)?;
@@ -359,7 +368,7 @@ impl Convert {
         bar.finish_and_clear();
         let frames = writer.frames();
         writer.finish().map_err(failed)?;
-        say!("recording: {}, {frames} frames of {} volumes", self.output.display(), recording.volumes());
+        say!("recording: {}, {frames} frames of {} volumes", self.output().display(), recording.volumes());
         Ok(())
     }
 }

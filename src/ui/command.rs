@@ -70,6 +70,8 @@ pub enum Command {
     Reset,
     /// Takes the last change back: of settings, planes, region or measurements.
     Undo,
+    /// Takes all changes back; undone step by step, they come again.
+    UndoAll,
     /// Does again what was undone.
     Redo,
     /// Moves the point where the planes cross to the middle of the region.
@@ -384,6 +386,10 @@ pub const KEY_BINDINGS: &[Binding] = &[
     on(Char('-'), keys::FARTHER, Command::Zoom(1.0 / 1.1)).repeating(),
     on(Key::Backspace, keys::RESET_ALL_SETTINGS, Command::Reset),
     control(Char('z'), keys::UNDO, Command::Undo),
+    Binding {
+        modifiers: Modifiers { control: true, alt: true, shift: false },
+        ..on(Char('z'), keys::UNDO_ALL, Command::UndoAll)
+    },
     control(Char('y'), keys::REDO, Command::Redo),
     Binding {
         modifiers: Modifiers { control: true, shift: true, alt: false },

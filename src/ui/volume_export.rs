@@ -5,6 +5,7 @@ use crate::files::WorkFolder;
 use crate::files::signals::Writing;
 use crate::live::cine::CineVolume;
 use crate::progress_lines::{self, Progress};
+use crate::scene::Measurement;
 use crate::source::recorder::{Header, Writer};
 use crate::text::printable;
 use crate::texts;
@@ -54,6 +55,8 @@ enum Work {
     Relief,
     Turntable,
     Loop,
+    /// A picture whose longer edge has so many pixels.
+    Picture(u32),
 }
 
 const fn format(name: &'static str, ending: &'static str, work: Work, hint: &'static str) -> Format {
@@ -72,6 +75,9 @@ pub const FORMATS: &[Format] = &[
     format(texts::TURNTABLE_PICTURES, "turntable", Work::Turntable, texts::TURNTABLE_PICTURES_HINT),
     #[cfg(feature = "video")]
     format(texts::TURNTABLE_FILM, "mp4", Work::Turntable, texts::TURNTABLE_FILM_HINT),
+    format(texts::PICTURE_1000, "png", Work::Picture(1000), texts::PICTURE_HINT),
+    format(texts::PICTURE_2000, "png", Work::Picture(2000), texts::PICTURE_HINT),
+    format(texts::PICTURE_4000, "png", Work::Picture(4000), texts::PICTURE_HINT),
     format(texts::LOOP_PICTURES, "loop", Work::Loop, texts::LOOP_PICTURES_HINT),
     #[cfg(feature = "video")]
     format(texts::LOOP_FILM, "mp4", Work::Loop, texts::LOOP_FILM_HINT),
@@ -239,6 +245,15 @@ impl Job {
             Work::Convert => command.arg("convert").args([recording, made]),
             Work::Mesh => command.arg("mesh").args([recording, made]),
             Work::Relief => command.arg("mesh").args([recording, made]).args(["--base", BASE]),
+            Work::Picture(edge) => {
+                let scene = self.workspace(recording)?;
+                let [width, height] = enlarged(self.settings.picture.size, edge);
+                command
+                    .arg("render")
+                    .arg(scene)
+                    .args(["--size", &format!("{width}x{height}"), "--device", &self.device, "-o"])
+                    .arg(made)
+            }
             Work::Turntable => {
                 let scene = self.workspace(recording)?;
                 let series = ["--turntable", TURNTABLE].map(String::from);
@@ -278,9 +293,44 @@ impl Job {
     }
 }
 
+/// The size of a picture of this shape whose longer edge has so many pixels.
+fn enlarged(size: [u32; 2], edge: u32) -> [u32; 2] {
+    let longest = f64::from(size[0].max(size[1]).max(1));
+    size.map(|n| ((f64::from(n) * f64::from(edge) / longest).round() as u32).max(1))
+}
+
+/// Measurements of the volumes of these numbers alone, as they are numbered in a recording of them.
+pub(super) fn renumbered(measures: &[Measurement], volumes: &[u32]) -> Vec<Measurement> {
+    let place = |number: u32| volumes.iter().position(|volume| *volume == number);
+    let renumber = |measured: &Measurement| {
+        let mut measured = measured.clone();
+        if let Some(made) = &mut measured.made {
+            made.volume = place(made.volume)? as u32;
+        }
+        Some(measured)
+    };
+    measures.iter().filter_map(renumber).collect()
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::scene::Made;
+
+    #[test]
+    fn a_picture_of_another_size_keeps_its_shape() {
+        assert_eq!(enlarged([1280, 720], 4000), [4000, 2250]);
+        assert_eq!(enlarged([300, 900], 1000), [333, 1000]);
+        assert_eq!(enlarged([1, 0], 2000), [2000, 1]);
+    }
+
+    /// Prevents a file whose measurements count as those of another volume than they were made on.
+    #[test]
+    fn measurements_are_of_the_volumes_of_the_file() {
+        let on = |volume| Measurement { made: Some(Made { volume, ..Made::default() }), ..Measurement::default() };
+        let found = renumbered(&[on(7), on(6), Measurement::default(), on(4)], &[4, 5, 7]);
+        assert_eq!(found, [on(2), Measurement::default(), on(0)]);
+    }
 
     #[test]
     fn what_the_process_says_of_its_fault_is_reported() {

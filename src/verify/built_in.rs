@@ -690,7 +690,11 @@ fn ray_scenes() -> Vec<SceneSpec> {
             "lasting, no rough detector, first crossing",
             "surface = { detector = 'lasting', threshold = 0.02, rough = 1, noise = 1.0, place = 'first-crossing' }\nslices = { pixels = 30 }",
         ),
-        ("consistent", "surface = { detector = 'consistent', threshold = 0.02, rough = 1 }\nslices = { pixels = 30 }"),
+        (
+            // A workgroup takes 64 lines of the picture.
+            "consistent, many columns",
+            "surface = { detector = 'consistent', threshold = 0.02, rough = 1 }\nslices = { pixels = 30 }\npicture = { size = [520, 72] }",
+        ),
         (
             "consistent, long ring, dark, skin, clipped, sliding",
             "surface = { detector = 'consistent', edge = 8, sign = 'dark', threshold = 0.02, rough = 1 }\nray = { sliding = 3 }\n\

@@ -11,7 +11,7 @@ use crate::scene::{Sampling, Scene};
 
 /// Scenes that together need every pass, with pictures as large as a tile of a small display. A pass is timed in the first scene that
 /// needs it.
-const SCENES: [&str; 22] = [
+const SCENES: [&str; 23] = [
     "mode = 'sr'",
     "mode = 'vr'",
     "mode = 'vr'\nlight = { volume = {} }",
@@ -26,6 +26,7 @@ const SCENES: [&str; 22] = [
     "mode = 'mixed'\nlayout = 'four'\nplanes = { smooth = { lateral = 1.0, depth = 1.0, elevation = 1.0 } }",
     "mode = 'vr'\nfloating = 50",
     "mode = 'vr'\ncuts = [{ contour = [[-8, -6], [9, -5], [3, 2], [2, 9]], view = { at = [0, 20, 0], direction = [0.2, 1, 0], up = [0, 0, 1] } }]",
+    "mode = 'sr'\nsurface = { detector = 'consistent', rough = 1 }",
     "mode = 'sr'\nlayout = 'pair'",
     "mode = 'sr'\nlight = { shadow = {}, occlusion = {}, skin = {} }\nslices = { blur = true, smooth = { lateral = 1.0, depth = 1.0, elevation = 1.0 } }\nray = { sampling = 'quads' }",
     "mode = 'vr'\nconditioning = { samples = 120, low_pass = 1.0, dynamic_range = 50 }\nslices = { estimator = 'median' }",

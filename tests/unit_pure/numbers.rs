@@ -29,6 +29,8 @@ const OTHERS: &[(&str, &str)] = &[
     ("cine.first", "any number of a volume"),
     ("cine.last", "is not below cine.first"),
     ("still.seed", "any number"),
+    ("measure.made.volume", "any number of a volume"),
+    ("measure.made.time", "any time stamp"),
 ];
 
 #[test]

@@ -1,7 +1,7 @@
 //! Marks of a picture: by tile its place, its scale, the letters of the patient's sides at its edges, and the side of the probe's marker.
 //! The viewer and written pictures draw the same.
 
-use super::planes::{CURVE_COLOUR, cell, colour};
+use super::planes::{CURVE_COLOUR, Plane, cell, colour};
 use super::region::depth_offset;
 use super::{Layout, Marks, Mode, PlaneName, ProbeMarker, Scene, Sides};
 use glam::DVec3;
@@ -138,6 +138,8 @@ pub struct TileMarks {
     pub plane: Option<(&'static str, [f64; 3])>,
     /// Of a curved plane: the length of its line, mm.
     pub along: Option<f64>,
+    /// Of a plane across an axis of the volume: the axis, and where on it the plane is, mm.
+    pub place: Option<(&'static str, f64)>,
 }
 
 impl Scene {
@@ -173,6 +175,7 @@ impl Scene {
                         None => None,
                     },
                     along: tile.section.as_ref().map(|section| section.line.length()),
+                    place: (tile.section.is_none()).then(|| self.place_of_plane(&tile.plane)).flatten(),
                 }
             }));
         }
@@ -180,6 +183,13 @@ impl Scene {
             all.push(self.marks_of_rendering(marks));
         }
         all
+    }
+
+    fn place_of_plane(&self, plane: &Plane) -> Option<(&'static str, f64)> {
+        let at = self.point_of(plane.at);
+        let axes = [("lateral", plane.normal.x), ("depth", plane.normal.y), ("elevation", plane.normal.z)];
+        let across = axes.iter().position(|(_, share)| share.abs() > 1.0 - 1e-6)?;
+        Some((axes[across].0, at[across]))
     }
 
     fn marks_of_rendering(&self, marks: &Marks) -> TileMarks {
@@ -205,6 +215,7 @@ impl Scene {
             probe,
             plane: None,
             along: None,
+            place: None,
         }
     }
 }
@@ -267,6 +278,12 @@ impl TileMarks {
     /// What a curved plane says of itself: across it shows the length along its line.
     pub fn along_label(&self) -> Option<String> {
         self.along.map(|mm| format!("along the line: {mm:.1} mm"))
+    }
+
+    /// Where a plane is, such as "elevation 2.5 mm".
+    pub fn place_label(&self) -> Option<String> {
+        // Without the sign of a zero.
+        self.place.map(|(axis, mm)| format!("{axis} {:.1} mm", (mm * 10.0).round() / 10.0 + 0.0))
     }
 
     /// The longest scale bar of at most a share of the tile's width: its length, mm and pixels.

@@ -106,6 +106,7 @@ pub fn measured(
     let mut measured = picture.clone();
     if [picture.width, picture.height] == scene.picture_size() {
         strokes::slices(&mut measured, scene)?;
+        strokes::places(&mut measured, scene)?;
         strokes::curve(&mut measured, scene)?;
         strokes::start(&mut measured, &unveil::lines(scene, start));
         strokes::draw(&mut measured, scene, volume)?;

@@ -5,8 +5,8 @@ use crate::canvas::{self, Canvas, Drawing, Drawn};
 use crate::measure::{body_marks as bodies, overlay};
 use crate::passes::unveil::StartLine;
 use crate::picture::Picture;
-use crate::scene::Scene;
 use crate::scene::planes::CURVE_COLOUR;
+use crate::scene::{Mode, Scene};
 use plotters::prelude::{BLACK, DrawingBackend, ShapeStyle, WHITE};
 
 /// Colour of lines: yellow, which no tissue has.
@@ -77,6 +77,25 @@ pub(super) fn slices(picture: &mut Picture, scene: &Scene) -> Result<(), String>
     let label = canvas::picture([width, TEXT + 6], &Label(&text))?;
     let bottom = tile[0][1] + tile[1][1] - f64::from(TEXT + 8);
     blend(picture, &label, [tile[0][0].round() as i64 + 2, bottom.round() as i64]);
+    Ok(())
+}
+
+/// Writes on each slice of a tomography where it is.
+///
+/// # Errors
+/// One line: the drawing of a label failed.
+pub(super) fn places(picture: &mut Picture, scene: &Scene) -> Result<(), String> {
+    if scene.settings.mode != Mode::Tomography {
+        return Ok(());
+    }
+    for tile in scene.marks().iter().skip(usize::from(scene.has_reference())) {
+        let Some(text) = tile.place_label() else { continue };
+        let width = canvas::text_width(&text, TEXT)?.ceil() as u32 + 6;
+        if f64::from(width) < tile.size[0] {
+            let label = canvas::picture([width, TEXT + 6], &Label(&text))?;
+            blend(picture, &label, [tile.corner[0].round() as i64 + 2, tile.corner[1].round() as i64 + 2]);
+        }
+    }
     Ok(())
 }
 

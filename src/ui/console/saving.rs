@@ -8,7 +8,7 @@ use crate::panels::Note;
 use crate::progress_lines::Progress;
 use crate::source::live::SourceKind;
 use crate::texts;
-use crate::volume_export::{FORMATS, Job};
+use crate::volume_export::{FORMATS, Job, renumbered};
 use std::time::SystemTime;
 
 impl Console {
@@ -80,7 +80,9 @@ impl Console {
         let rate = self.cine_loop().played_rate();
         let begun = match self.stream.header().cloned() {
             Some(header) if !volumes.is_empty() => {
-                let settings = self.controls.settings().clone();
+                let mut settings = self.controls.settings().clone();
+                let numbers: Vec<u32> = volumes.iter().map(|volume| volume.volume).collect();
+                settings.measure = renumbered(&settings.measure, &numbers);
                 self.exporter.export(Job {
                     format,
                     header,

@@ -30,8 +30,8 @@ impl Turntable {
 
     /// A command of the user that turns the view ends it. True if it did.
     pub(super) fn stop_for(&mut self, command: &Command) -> bool {
-        use Command::{LookFrom, Redo, Reset, Roll, Rotate, Undo};
-        matches!(command, Rotate(_) | LookFrom(_) | Roll(_) | Reset | Undo | Redo) && self.stop()
+        use Command::{LookFrom, Redo, Reset, Roll, Rotate, Undo, UndoAll};
+        matches!(command, Rotate(_) | LookFrom(_) | Roll(_) | Reset | Undo | UndoAll | Redo) && self.stop()
     }
 
     /// The angle to turn by now, degrees, by the time since the last step. `can_draw`: the picture before is finished; a slow device turns in larger

@@ -263,6 +263,17 @@ impl Controls {
                 return Change::Settings;
             }
             Command::Undo => return self.travel(true, scene),
+            Command::UndoAll => {
+                let mut change = Change::Nothing;
+                while self.can_undo()[0] {
+                    change = match (self.travel(true, scene), change) {
+                        (Change::Nothing, before) => before,
+                        (Change::Marks, Change::Settings) => Change::Settings,
+                        (step, _) => step,
+                    };
+                }
+                return change;
+            }
             Command::Redo => return self.travel(false, scene),
             Command::Sides(..) | Command::ExchangeLeftAndRight | Command::ProbeMarker(_) | Command::SavesBar(_) => {
                 return self.mark_sides(command);

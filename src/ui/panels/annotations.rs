@@ -14,7 +14,7 @@ use egui::{Align2, Color32, FontId, Painter, Pos2, Rect, Stroke, Ui, Vec2, pos2,
 use glam::DVec3;
 
 /// A smaller tile has no axes, points: they would lie over the anatomy.
-const MIN_FOR_AXES: f32 = 480.0;
+pub(super) const MIN_FOR_AXES: f32 = 480.0;
 /// A smaller picture has no colour bar, points.
 const MIN_FOR_COLOURS: f32 = 300.0;
 /// A smaller tile has no scale either, points.
@@ -62,6 +62,14 @@ pub(super) fn paint(ui: &Ui, state: &PanelState, scale: f32) {
         colour_bar(&painter, &mut taken, picture, scene);
     }
     for (n, tile, area) in tiles() {
+        let label = tile.place_label().filter(|_| n > 0 || !scene.has_reference());
+        if let Some(label) = label {
+            // Beside the letter of the plane, or of the upper edge.
+            let places = [vec2(34.0, 6.0), vec2(34.0, 26.0), vec2(6.0, 46.0)].map(|away| area.left_top() + away);
+            let right = [vec2(-34.0, 6.0), vec2(-34.0, 26.0)].map(|away| area.right_top() + away);
+            let has_it = text_at_one_of(&painter, &mut taken, places, Align2::LEFT_TOP, &label, TEXT);
+            _ = has_it || text_at_one_of(&painter, &mut taken, right, Align2::RIGHT_TOP, &label, TEXT);
+        }
         // All tiles of a tomography have the same scale: only the first one shows it.
         if n > 0 && scene.settings.mode == Mode::Tomography {
             continue;

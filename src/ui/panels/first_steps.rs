@@ -1,5 +1,6 @@
-//! The hints of the first start: a card over the lower part of the picture.
+//! The hints of the first start: a card in the lower left part of the picture, beside what is in its middle.
 
+use super::annotations::MIN_FOR_AXES;
 use super::colours::{ACCENT, MESSAGE, TEXT};
 use super::names::{self, Tell};
 use super::{PanelState, SMALL_TEXT, TEXT_SIZE, TOUCH_SIZE, picture_rect};
@@ -14,6 +15,10 @@ const MIN_PICTURE: [f32; 2] = [360.0, 280.0];
 const WIDTH: f32 = 320.0;
 /// Between the card and the lower edge of the picture, where the letter of that edge is, points.
 const BELOW: f32 = 40.0;
+/// The same where the axes are in that corner.
+const ABOVE_AXES: f32 = 118.0;
+/// Between the card and the left edge, where a letter is, points.
+const BESIDE: f32 = 28.0;
 
 /// True if a picture of this size, pixels, has room for the hints.
 pub(crate) fn has_room(picture: [u32; 2], scale: f32) -> bool {
@@ -22,8 +27,10 @@ pub(crate) fn has_room(picture: [u32; 2], scale: f32) -> bool {
 }
 
 pub(super) fn show(ui: &Ui, state: &PanelState, scale: f32, execute: &mut dyn FnMut(Command)) {
-    let at = picture_rect(state, scale).center_bottom() - vec2(0.0, BELOW);
-    let area = Area::new(Id::new(texts::FIRST_STEPS)).order(Order::Middle).pivot(Align2::CENTER_BOTTOM).fixed_pos(at);
+    let picture = picture_rect(state, scale);
+    let below = if picture.width().min(picture.height()) >= MIN_FOR_AXES { ABOVE_AXES } else { BELOW };
+    let at = picture.left_bottom() + vec2(BESIDE, -below);
+    let area = Area::new(Id::new(texts::FIRST_STEPS)).order(Order::Middle).pivot(Align2::LEFT_BOTTOM).fixed_pos(at);
     area.show(ui.ctx(), |ui| {
         names::name(ui, Role::Group, texts::FIRST_STEPS);
         let frame = Frame::new().fill(MESSAGE).inner_margin(Margin::symmetric(14, 10)).corner_radius(8);

@@ -22,6 +22,10 @@ pub(crate) const TURNTABLE_PICTURES_HINT: &str = "A folder of 72 PNG files: one 
 pub(crate) const TURNTABLE_FILM: &str = "Turntable, film";
 #[cfg(feature = "video")]
 pub(crate) const TURNTABLE_FILM_HINT: &str = "One turn of the rendering as it is shown, as AV1 in MP4.";
+pub(crate) const PICTURE_1000: &str = "Picture, 1000 pixels";
+pub(crate) const PICTURE_2000: &str = "Picture, 2000 pixels";
+pub(crate) const PICTURE_4000: &str = "Picture, 4000 pixels";
+pub(crate) const PICTURE_HINT: &str = "The picture as it is shown in full quality, as PNG; its longer edge has so many pixels. Ctrl+I saves it at the size of the window.";
 pub(crate) const LOOP_PICTURES: &str = "Loop, pictures";
 pub(crate) const LOOP_PICTURES_HINT: &str =
     "A folder of PNG files: the rendering as it is shown, of each volume of the loop from its first mark to its last.";

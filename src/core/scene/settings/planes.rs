@@ -213,8 +213,10 @@ pub(super) const NUMBERS: &[Number] = &[
         Group, "Planes tilt", TURN, 5.0, Settings::shows_planes, "Tilts the planes about the lateral axis."),
     number!(planes.roll, "°", ANGLE;
         Group, "Planes roll", TURN, 5.0, Settings::shows_planes, "Turns the planes about the elevation axis."),
-    number!(planes.columns, "", Range(1.0, MAX_TILES as f64)),
-    number!(planes.rows, "", Range(1.0, MAX_TILES as f64)),
+    number!(planes.columns, "", Range(1.0, MAX_TILES as f64);
+        Group, "Columns", [1.0, 8.0], 1.0, |s| s.mode == Mode::Tomography, "Slices beside each other."),
+    number!(planes.rows, "", Range(1.0, MAX_TILES as f64);
+        Group, "Rows", [1.0, 8.0], 1.0, |s| s.mode == Mode::Tomography, "Slices above each other."),
     number!(planes.curve => points, "mm", Range(-LARGEST, LARGEST)),
     inset!(left, 0, right, "Cut left", "Cuts the block from its left face."),
     inset!(right, 0, left, "Cut right", "Cuts the block from its right face."),
