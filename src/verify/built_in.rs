@@ -157,6 +157,14 @@ fn wide_scenes() -> Vec<SceneSpec> {
         );
         scenes.push(SceneSpec::new(&format!("picture of {size}, steps by their error"), &small, BYTES, toml));
     }
+    // A workgroup takes 64 lines.
+    for size in ["[520, 9]", "[9, 520]"] {
+        let toml = format!(
+            "mode = 'sr'\nsurface = {{ detector = 'consistent', threshold = 0.02, rough = 1 }}\nray.sampling = 'exact'\n\
+             picture.size = {size}\nslices.pixels = 24"
+        );
+        scenes.push(SceneSpec::new(&format!("picture of {size}, consistent surface"), &small, BYTES, toml));
+    }
     for size in ["[79, 9]", "[9, 79]"] {
         let wide = ALL_FILTERS.replace("[37, 29]", size);
         for (name, toml) in MODES {
@@ -690,11 +698,7 @@ fn ray_scenes() -> Vec<SceneSpec> {
             "lasting, no rough detector, first crossing",
             "surface = { detector = 'lasting', threshold = 0.02, rough = 1, noise = 1.0, place = 'first-crossing' }\nslices = { pixels = 30 }",
         ),
-        (
-            // A workgroup takes 64 lines of the picture.
-            "consistent, many columns",
-            "surface = { detector = 'consistent', threshold = 0.02, rough = 1 }\nslices = { pixels = 30 }\npicture = { size = [520, 72] }",
-        ),
+        ("consistent", "surface = { detector = 'consistent', threshold = 0.02, rough = 1 }\nslices = { pixels = 30 }"),
         (
             "consistent, long ring, dark, skin, clipped, sliding",
             "surface = { detector = 'consistent', edge = 8, sign = 'dark', threshold = 0.02, rough = 1 }\nray = { sliding = 3 }\n\

@@ -30,7 +30,6 @@ const OTHERS: &[(&str, &str)] = &[
     ("cine.last", "is not below cine.first"),
     ("still.seed", "any number"),
     ("measure.made.volume", "any number of a volume"),
-    ("measure.made.time", "any time stamp"),
 ];
 
 #[test]
