@@ -14,6 +14,8 @@ use std::path::{Path, PathBuf};
 pub(super) const MAX_BYTES: u64 = 1 << 20;
 /// Thickness of the slab that a single frame is drawn as, mm.
 pub const SLAB: f64 = 1.0;
+/// Time stamps are rounded: a motor that turns by one frame in a frame's time may seem to turn by so much more, as a share.
+const ROUNDED: f64 = 1e-3;
 
 /// A probe file that was read. `tests/data/*/probe.toml` are commented examples.
 #[derive(Clone, Debug, PartialEq)]
@@ -224,11 +226,11 @@ impl ProbeFile {
             "the motor travels {ratio:.3} of the way to the next frame while {lines} lines take {:.2} ms{after}",
             frame_time * 1e3
         );
-        if ratio > 1.0 {
+        if ratio > 1.0 + ROUNDED {
             return self.fault(field, format!("{said}: at most 1"));
         }
         tracing::warn!(file = %self.path.display(), "{field}: {said}");
-        Ok(Some(ratio))
+        Ok(Some(ratio.min(1.0)))
     }
 
     fn volumes(&self, frames: usize) -> Result<Volumes, InputError> {
@@ -507,6 +509,7 @@ mod tests {
         let of = |interval| parse(&format!("{FAN}steady = true\n")).unwrap().timed(interval).geometry(160, 71, 61);
         let ratio = of(Some(0.02)).unwrap().1.speed_ratio;
         assert!((ratio - 71.0 * 2.0 * 0.159 / 1540.0 / 0.02).abs() < 1e-12, "{ratio}");
+        assert_eq!(of(Some(0.01466)).unwrap().1.speed_ratio, 1.0, "a rounded time stamp");
         for (interval, named) in [(None, "needs time stamps"), (Some(0.01), "at most 1")] {
             let error = of(interval).unwrap_err().to_string();
             assert!(error.contains("motion.steady") && error.contains(named), "{error}");
