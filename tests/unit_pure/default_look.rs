@@ -194,7 +194,7 @@ fn a_single_frame_is_a_plane_unless_a_mode_is_chosen() {
 
 #[test]
 fn sections_show_the_whole_sector_hardly_filtered() {
-    for preset in ["face", "face-classic", "glass", "skeleton", "vessel"] {
+    for preset in ["bone", "face", "face-classic", "fetal", "glass", "skeleton", "vessel"] {
         for mode in ["mode=orthogonal", "mode=plane", "mode=cube"] {
             let settings = completed(&fan(), &[preset], &[mode]);
             assert_eq!((settings.region.depth, settings.region.fade, settings.slices.median), (None, 0.0, false));

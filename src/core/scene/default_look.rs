@@ -12,7 +12,7 @@
 //! default. No default makes a scene that is refused: it is cut, or left out, and one line says so.
 
 use super::echo_levels::EchoLevels;
-use super::load::{Layers, LoadError, preset_settings, rebase};
+use super::load::{Layers, LoadError, PRESETS, preset_settings, rebase};
 use super::region::{insonified_box, slice_grid};
 use super::{
     Compositing, EchoHistogram, Elevation, Input, Layout, MAX_DEVIATION, Mode, Scene, SceneError, Settings, Transfer,
@@ -22,9 +22,7 @@ use crate::probe::{Geometry, Motion};
 use std::path::Path;
 use toml::{Table, Value};
 
-/// Presets that smooth and crop the volume for a rendering of the built-in phantom.
-const RENDERINGS: [&str; 5] = ["face", "face-classic", "glass", "skeleton", "vessel"];
-/// Presets whose planes are those of their filters, also beside a rendering.
+/// Presets whose planes are those of their filters. The others smooth and crop the volume for a rendering.
 const AS_THEY_ARE: [&str; 2] = ["bmode", "thesis"];
 /// Share of the volume's longest edge that the smoothing has as its standard deviation: 1.1 mm of 120.
 const SMOOTHING: f64 = 0.009;
@@ -208,7 +206,9 @@ impl Layers {
         let mode = found.mode(geometry);
         let is_plain = self.presets().is_empty();
         let is_section = mode.is_flat() || mode == Mode::Cube;
-        if is_section && (is_plain || self.presets().iter().all(|preset| RENDERINGS.contains(&preset.as_str()))) {
+        // A preset of the user's may be of planes.
+        let is_built_in = |name: &String| PRESETS.iter().any(|(preset, _)| preset == name);
+        if is_section && !found.is_as_it_is() && self.presets().iter().all(is_built_in) {
             found.section(geometry);
         }
         if mode == Mode::Cube {
@@ -273,6 +273,11 @@ impl Found<'_> {
         table
     }
 
+    /// True if a preset's filters are those of its planes, too.
+    fn is_as_it_is(&self) -> bool {
+        self.layers.presets().iter().any(|preset| AS_THEY_ARE.contains(&preset.as_str()))
+    }
+
     fn mode(&mut self, geometry: &Geometry) -> Mode {
         let chosen = self.chosen;
         let is_frame = geometry.slices() == 1
@@ -293,8 +298,7 @@ impl Found<'_> {
 
     /// The planes of a 4-up picture have a lightly filtered volume over the full sector: the rendering has its own filters and region.
     fn planes_beside_rendering(&mut self, geometry: &Geometry) {
-        let is_as_it_is = self.layers.presets().iter().any(|preset| AS_THEY_ARE.contains(&preset.as_str()));
-        if is_as_it_is || self.layers.has("planes.smooth") {
+        if self.is_as_it_is() || self.layers.has("planes.smooth") {
             return;
         }
         let deviation = rounded(LIGHT * smoothing(geometry));
