@@ -10,6 +10,7 @@
 
 #![forbid(unsafe_code)]
 
+mod anatomy;
 mod cine_player;
 mod clipboard;
 pub mod command;

@@ -75,6 +75,33 @@ pub(super) fn entries(folder: &Path) -> Vec<(Kind, PathBuf)> {
     above.into_iter().chain(series).chain(folders).chain(files).take(MAX_LISTED).collect()
 }
 
+/// The path that a typed text means: `~` is the user's own folder.
+pub(super) fn expanded(typed: &str) -> PathBuf {
+    let home = std::env::var_os("HOME").map(PathBuf::from).filter(|home| home.is_absolute());
+    match (typed.strip_prefix('~'), home) {
+        (Some(""), Some(home)) => home,
+        (Some(rest), Some(home)) if rest.starts_with('/') => home.join(rest.trim_start_matches('/')),
+        _ => PathBuf::from(typed),
+    }
+}
+
+/// What all names that go on from a typed path have in common, with `/` after a folder that is the only one. Hidden ones need their dot.
+pub(super) fn completion(typed: &str) -> String {
+    let Some((folder, begun)) = typed.rsplit_once('/') else {
+        return if typed == "~" { "/".into() } else { String::new() };
+    };
+    let folder = expanded(&format!("{folder}/"));
+    let read = std::fs::read_dir(folder.as_path()).into_iter().flatten().take(MAX_READ).flatten();
+    let names = read.filter_map(|entry| entry.file_name().into_string().ok());
+    let rests = names.filter(|name| begun.starts_with('.') || !name.starts_with('.'));
+    let rests: Vec<String> = rests.filter_map(|name| name.strip_prefix(begun).map(str::to_string)).collect();
+    let Some((first, others)) = rests.split_first() else { return String::new() };
+    let agree = |other: &String| first.chars().zip(other.chars()).take_while(|(a, b)| a == b).count();
+    let count = others.iter().map(agree).min().unwrap_or(first.chars().count());
+    let is_folder = others.is_empty() && folder.join(format!("{begun}{first}")).is_dir();
+    first.chars().take(count).chain(is_folder.then_some('/')).collect()
+}
+
 fn ending(path: &Path) -> Option<String> {
     path.extension().map(|end| end.to_string_lossy().to_lowercase())
 }

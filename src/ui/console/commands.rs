@@ -192,6 +192,7 @@ impl Console {
     /// Closes the uppermost of what is open; else leaves full screen; else leaves the program.
     fn go_back(&mut self) {
         let is_closed = self.leaving.dismiss()
+            || self.opening.stop_typing()
             || self.opening.close_list()
             || self.visible.close_exports()
             || self.presets.leave()

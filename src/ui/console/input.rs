@@ -125,7 +125,7 @@ impl Console {
     fn key_of_panels(&mut self, input: &Input) -> bool {
         let Input::Key { key, pressed: true } = *input else { return false };
         let (modifiers, shows_list) = (self.hands.modifiers(), self.shows_list());
-        let has_keys_of_its_own = self.leaving.asks() || self.controls.typing().is_some();
+        let has_keys_of_its_own = self.leaving.asks() || self.controls.typing().is_some() || self.opening.is_typing();
         if !self.fixed.overlay || has_keys_of_its_own || (shows_list && key == Key::Escape) {
             return false;
         }

@@ -1,6 +1,7 @@
 //! Measuring in the console: points of the rendered surface, counted voxels, typed texts, and results that leave the program.
 
 use super::Console;
+use super::opening::ListKey;
 use super::surface::SurfaceMap;
 use crate::command::{Command, Tool};
 use crate::export::Holds;
@@ -222,10 +223,21 @@ impl Console {
         if modifiers.control || modifiers.alt || self.leaving.asks() {
             return None;
         }
-        if self.opening.is_shown() || self.visible.exports {
-            let choose = if self.opening.is_shown() { Command::OpenFile } else { Command::Export };
+        if self.opening.is_shown() {
+            let done = self.opening.key(key, modifiers.shift)?;
+            self.presentation.redraw();
+            return Some(match done {
+                ListKey::Entry(n) => vec![Command::OpenFile(n)],
+                ListKey::Open(path) => {
+                    self.open_path(&path);
+                    Vec::new()
+                }
+                ListKey::Taken => Vec::new(),
+            });
+        }
+        if self.visible.exports {
             return match key {
-                Key::Char(digit @ '1'..='9') => Some(vec![choose(digit as usize - '1' as usize)]),
+                Key::Char(digit @ '1'..='9') => Some(vec![Command::Export(digit as usize - '1' as usize)]),
                 Key::Escape => None,
                 _ => Some(Vec::new()),
             };

@@ -5,8 +5,9 @@ use super::options::{OpenFile, Opened, OpeningOptions};
 use crate::controls::Handiwork;
 use crate::files::progress::{Progress, Share};
 use crate::gpu::Wake;
+use crate::input::Key;
 use crate::open_list::{self, Kind};
-use crate::panels::Reading;
+use crate::panels::{FilesShown, Reading};
 use crate::recordings::{Display, Kept, MAX_OPEN, Named, OpenRecordings, Recordings};
 use crate::texts;
 use std::path::{Path, PathBuf};
@@ -68,10 +69,27 @@ impl Drop for Opening {
 }
 
 struct List {
-    /// What the list says of itself.
-    title: String,
+    folder: String,
+    /// So many of the entries are the recent files, which come first.
+    recent: usize,
     entries: Vec<(Kind, PathBuf)>,
     names: Vec<String>,
+    /// The path that is being typed, and why it was not taken.
+    typed: Option<(String, Option<String>)>,
+}
+
+/// Longest path that is typed, characters.
+const MAX_TYPED: usize = 1000;
+
+/// What a key does while the list is shown.
+#[derive(Debug, PartialEq, Eq)]
+pub(super) enum ListKey {
+    /// Chooses the n-th entry.
+    Entry(usize),
+    /// Opens a file.
+    Open(PathBuf),
+    /// It was typed, or does nothing.
+    Taken,
 }
 
 impl Opening {
@@ -85,9 +103,69 @@ impl Opening {
         self.list.is_some()
     }
 
-    /// The list while it is shown: its title and its entries.
-    pub(super) fn shown(&self) -> Option<(&str, &[String])> {
-        self.list.as_ref().map(|list| (list.title.as_str(), list.names.as_slice()))
+    /// The list while it is shown.
+    pub(super) fn shown(&self) -> Option<FilesShown<'_>> {
+        let List { folder, recent, names, typed, .. } = self.list.as_ref()?;
+        let typed = typed.as_ref().map(|(text, fault)| (text.as_str(), fault.as_deref()));
+        Some(FilesShown { folder, recent: *recent, names, typed })
+    }
+
+    /// True while a path is being typed.
+    pub(super) fn is_typing(&self) -> bool {
+        self.list.as_ref().is_some_and(|list| list.typed.is_some())
+    }
+
+    /// Takes the path back that is being typed. False if none is.
+    pub(super) fn stop_typing(&mut self) -> bool {
+        self.list.as_mut().is_some_and(|list| list.typed.take().is_some())
+    }
+
+    /// Takes a key while the list is shown; none for Escape. `is_upper`: Shift is held.
+    pub(super) fn key(&mut self, key: Key, is_upper: bool) -> Option<ListKey> {
+        let list = self.list.as_mut()?;
+        // A keyboard without a windowing system tells its keys, not their signs.
+        let key = match key {
+            Key::Char('`') if is_upper => Key::Char('~'),
+            Key::Char('-') if is_upper => Key::Char('_'),
+            key => key,
+        };
+        let Some((text, fault)) = &mut list.typed else {
+            match key {
+                Key::Char(digit @ '1'..='9') => return Some(ListKey::Entry(digit as usize - '1' as usize)),
+                Key::Char(letter @ ('/' | '~')) => list.typed = Some((letter.into(), None)),
+                Key::Escape => return None,
+                _ => {}
+            }
+            return Some(ListKey::Taken);
+        };
+        match key {
+            Key::Escape => return None,
+            Key::Enter => {
+                let path = open_list::expanded(text);
+                if path.is_dir() {
+                    self.list = Some(self.list(&path, false));
+                } else if path.exists() {
+                    self.list = None;
+                    return Some(ListKey::Open(path));
+                } else {
+                    *fault = Some(texts::is_not_there(text));
+                }
+                return Some(ListKey::Taken);
+            }
+            Key::Backspace => _ = text.pop(),
+            Key::Tab => text.push_str(&open_list::completion(text)),
+            Key::Space if text.chars().count() < MAX_TYPED => text.push(' '),
+            Key::Char(letter) if text.chars().count() < MAX_TYPED => match is_upper {
+                true => text.extend(letter.to_uppercase()),
+                false => text.push(letter),
+            },
+            _ => return Some(ListKey::Taken),
+        }
+        *fault = None;
+        if text.is_empty() {
+            list.typed = None;
+        }
+        Some(ListKey::Taken)
     }
 
     /// The recordings that are open.
@@ -113,6 +191,7 @@ impl Opening {
     fn list(&self, folder: &Path, with_recent: bool) -> List {
         let folder = std::path::absolute(folder).unwrap_or_else(|_| folder.to_path_buf());
         let recent = self.recent.as_deref().filter(|_| with_recent).map(open_list::recent).unwrap_or_default();
+        let count = recent.len();
         let mut names: Vec<String> = recent.iter().map(|file| file.display().to_string()).collect();
         let mut entries: Vec<_> = recent.into_iter().map(|file| (Kind::File, file)).collect();
         for (kind, path) in open_list::entries(&folder) {
@@ -125,7 +204,7 @@ impl Opening {
             });
             entries.push((kind, path));
         }
-        List { title: folder.display().to_string(), entries, names }
+        List { folder: folder.display().to_string(), recent: count, entries, names, typed: None }
     }
 
     /// True if other files can be opened.
@@ -393,5 +472,46 @@ mod tests {
         opening.read(Path::new("other"), false).expect("a thread");
         assert_eq!((opening.end_reading().as_deref(), opening.named().len()), (Some("other"), 2));
         assert_eq!(opening.end_reading(), None);
+    }
+
+    /// Prevents a digit of a path that opens an entry, a path that is lost because a letter of it is wrong, and one that Escape does not take back.
+    #[test]
+    fn a_path_is_typed_completed_and_opened() {
+        let work = crate::files::WorkFolder::new(&std::env::temp_dir(), "echolume-test-").expect("a folder");
+        std::fs::create_dir(work.path().join("Heart 2")).expect("a folder");
+        for name in ["Heart 2/a1.mha", "Heart 2/a12.mha"] {
+            std::fs::write(work.path().join(name), "").expect("a file");
+        }
+        let (mut opening, ..) = opening();
+        opening.show_list(work.path());
+        let text = |opening: &Opening| opening.shown().and_then(|shown| shown.typed.map(|typed| typed.0.to_string()));
+        let type_text = |opening: &mut Opening, text: &str| {
+            for letter in text.chars() {
+                let key = if letter == ' ' { Key::Space } else { Key::Char(letter.to_ascii_lowercase()) };
+                assert_eq!(opening.key(key, letter.is_uppercase()), Some(ListKey::Taken), "{letter}");
+            }
+        };
+        assert_eq!(opening.key(Key::Char('2'), false), Some(ListKey::Entry(1)));
+        assert_eq!((opening.key(Key::Char('x'), false), text(&opening)), (Some(ListKey::Taken), None));
+        let folder = work.path().display().to_string();
+        type_text(&mut opening, &format!("{folder}/H"));
+        opening.key(Key::Tab, false);
+        assert_eq!(text(&opening), Some(format!("{folder}/Heart 2/")));
+        opening.key(Key::Tab, false);
+        assert_eq!(text(&opening), Some(format!("{folder}/Heart 2/a1")), "as far as both names agree");
+        opening.key(Key::Enter, false);
+        let fault = opening.shown().and_then(|shown| shown.typed.and_then(|typed| typed.1.map(str::to_string)));
+        assert!(fault.is_some_and(|fault| fault.contains("a1") && !fault.contains('\n')) && opening.is_typing());
+        opening.key(Key::Backspace, false);
+        assert!(opening.shown().is_some_and(|shown| shown.typed.is_some_and(|typed| typed.1.is_none())));
+        assert_eq!((opening.key(Key::Escape, false), opening.stop_typing()), (None, true));
+        assert!(!opening.is_typing() && opening.is_shown() && !opening.stop_typing());
+        type_text(&mut opening, &format!("{folder}/Heart 2"));
+        assert_eq!(opening.key(Key::Enter, false), Some(ListKey::Taken));
+        assert_eq!(opening.shown().map(|shown| shown.folder.to_string()), Some(format!("{folder}/Heart 2")));
+        type_text(&mut opening, &format!("{folder}/Heart 2/a12.mha"));
+        let file = work.path().join("Heart 2").join("a12.mha");
+        assert_eq!((opening.key(Key::Enter, false), opening.is_shown()), (Some(ListKey::Open(file)), false));
+        assert_eq!(opening.key(Key::Enter, false), None);
     }
 }

@@ -3,6 +3,7 @@
 
 use super::colours::{self, ACCENT, AXES, BACKING, MEASURE, ON_PLANE, OUTLINE, SIDES, START, TEXT, WARNING, WEAK_TEXT};
 use super::{PanelState, SMALL_TEXT, body_marks, picture_rect, recordings, shown};
+use crate::anatomy::Anatomy;
 use crate::command::Tool;
 use crate::measure::overlay;
 use crate::passes::postprocess;
@@ -20,24 +21,75 @@ const MIN_FOR_COLOURS: f32 = 300.0;
 /// A smaller tile has no scale either, points.
 const MIN_FOR_SCALE: f32 = 90.0;
 
-pub(super) fn paint(ui: &Ui, state: &PanelState, scale: f32) {
+/// Room that a ruler has along the left edge of its tile, and a scale bar in the lower right corner: width as a share of the tile, and height, points.
+const RULER_WIDTH: f32 = 60.0;
+const BAR_ROOM: (f32, f32) = (0.35, 46.0);
+
+/// Where marks are that messages keep away from: those that stay where they are, and those that would give way.
+pub(super) fn areas(state: &PanelState, scale: f32) -> [Vec<Rect>; 2] {
+    let Some((shown, whole)) = shown(state, scale) else { return Default::default() };
+    let (mut fixed, mut others) = (body_marks::areas(state, scale), Vec::new());
+    for tile in shown.scene.marks_with(&state.controls.settings().marks) {
+        let area = area_of(whole, &tile, scale);
+        if !has_room(&area, MIN_FOR_SCALE) {
+            continue;
+        }
+        fixed.extend(tile.letters.iter().map(|(edge, _)| letter_area(area, edge.offset())));
+        fixed.extend(tile.probe.map(|edge| marker_area(area, edge.offset())));
+        fixed.extend(tile.plane.map(|_| plane_area(area, &tile)));
+        others.push(match tile.depth_from {
+            Some(_) => area.with_max_x(area.left() + RULER_WIDTH),
+            None => Rect::from_min_max(area.max - vec2(area.width() * BAR_ROOM.0, BAR_ROOM.1), area.max),
+        });
+    }
+    [fixed, others]
+}
+
+/// The area of a tile in a picture, points.
+fn area_of(picture: Rect, tile: &TileMarks, scale: f32) -> Rect {
+    let [corner, size] = [tile.corner, tile.size].map(|[x, y]| vec2(x as f32, y as f32) / scale);
+    Rect::from_min_size(picture.min + corner, size)
+}
+
+fn has_room(area: &Rect, least: f32) -> bool {
+    area.width().min(area.height()) >= least
+}
+
+/// A place near the edges of a tile: -1 is left and above, 1 right and below.
+fn near_edge(area: Rect, [x, y]: [f64; 2]) -> Pos2 {
+    let half = area.size() / 2.0 - vec2(16.0, 16.0);
+    area.center() + vec2(x as f32 * half.x, y as f32 * half.y)
+}
+
+fn letter_area(area: Rect, edge: [f64; 2]) -> Rect {
+    Rect::from_center_size(near_edge(area, edge), vec2(16.0, 20.0))
+}
+
+/// In the corner of the marker's side, where no letter is.
+fn marker_area(area: Rect, edge: [f64; 2]) -> Rect {
+    let corner = edge.map(|n| if n == 0.0 { -1.0 } else { n });
+    Rect::from_center_size(near_edge(area, corner), vec2(14.0, 14.0))
+}
+
+fn plane_area(area: Rect, tile: &TileMarks) -> Rect {
+    Rect::from_center_size(near_edge(area, tile.plane_corner()), vec2(20.0, 20.0))
+}
+
+/// `messages`: areas that are covered.
+pub(super) fn paint(ui: &Ui, state: &PanelState, scale: f32, messages: &[Rect]) {
     let Some((shown, whole)) = shown(state, scale) else { return };
     let scene = &shown.scene;
     // The part of it that is in sight.
     let picture = whole.intersect(picture_rect(state, scale));
     let painter = ui.ctx().layer_painter(egui::LayerId::background()).with_clip_rect(picture);
     let marks = scene.marks_with(&state.controls.settings().marks);
-    let area_of = |tile: &TileMarks| {
-        let [corner, size] = [tile.corner, tile.size].map(|[x, y]| vec2(x as f32, y as f32) / scale);
-        Rect::from_min_size(whole.min + corner, size)
-    };
-    let has_room = |area: &Rect, least: f32| area.width().min(area.height()) >= least;
-    let tiles = || marks.iter().enumerate().map(|(n, tile)| (n, tile, area_of(tile)));
+    let tiles = || marks.iter().enumerate().map(|(n, tile)| (n, tile, area_of(whole, tile, scale)));
     let tiles = || tiles().filter(|(.., area)| has_room(area, MIN_FOR_SCALE));
     // What tells the sides goes before what tells sizes: that gives way.
     let mut taken = Taken(body_marks::areas(state, scale));
     taken.0.extend(recordings::reading_area(state, scale));
-    tiles().for_each(|(_, tile, area)| sides(&painter, &mut taken, area, tile));
+    taken.0.extend(messages);
+    tiles().for_each(|(_, tile, area)| sides(&painter, &mut taken, area, tile, messages));
     state.origin.iter().for_each(|origin| name_origin(&painter, &mut taken, picture, origin));
     // While it is bent, plane A has the line as it will be, not as the picture has it.
     let is_shown = state.controls.tool() == Tool::Region
@@ -59,7 +111,7 @@ pub(super) fn paint(ui: &Ui, state: &PanelState, scale: f32) {
         }
     }
     if has_room(&picture, MIN_FOR_COLOURS) && scene.settings.layout != Layout::Four {
-        colour_bar(&painter, &mut taken, picture, scene);
+        colour_bar(&painter, &mut taken, picture, scene, scale);
     }
     for (n, tile, area) in tiles() {
         let label = tile.place_label().filter(|_| n > 0 || !scene.has_reference());
@@ -143,27 +195,38 @@ fn text_at_one_of(
     at.is_some()
 }
 
-/// The letters of the patient's sides, and a dot on the side of the probe's marker.
-fn sides(painter: &Painter, taken: &mut Taken, area: Rect, tile: &TileMarks) {
-    let at = |[x, y]: [f64; 2]| {
-        let half = area.size() / 2.0 - vec2(16.0, 16.0);
-        area.center() + vec2(x as f32 * half.x, y as f32 * half.y)
+/// The place of a mark; if a message covers it, the nearest along its edge that is free, or else further in. `edge`: as of [`near_edge`].
+fn uncovered(place: Rect, edge: [f64; 2], tile: Rect, taken: &Taken, messages: &[Rect]) -> Rect {
+    if !messages.iter().any(|message| message.expand(2.0).intersects(place)) {
+        return place;
+    }
+    let [x, y] = edge.map(|n| n.abs() as f32);
+    let moves = |along: Vec2| (1..60).flat_map(move |n| [1.0, -1.0].map(|way| along * (way * 5.0 * n as f32)));
+    let places = moves(vec2(y, x)).chain(moves(vec2(x, y))).map(|by| place.translate(by));
+    // It stays on its side of the tile.
+    let is_on_its_side = |place: &Rect| {
+        let away = place.center() - tile.center();
+        edge[0] as f32 * away.x + edge[1] as f32 * away.y > 12.0
     };
+    let mut places = places.filter(|place| tile.shrink(4.0).contains_rect(*place) && is_on_its_side(place));
+    places.find(|place| taken.is_free(*place)).unwrap_or(place)
+}
+
+/// The letters of the patient's sides, and a dot on the side of the probe's marker.
+fn sides(painter: &Painter, taken: &mut Taken, area: Rect, tile: &TileMarks, messages: &[Rect]) {
     for (edge, letter) in &tile.letters {
-        let place = at(edge.offset());
-        taken.take(Rect::from_center_size(place, vec2(16.0, 20.0)));
-        outlined(painter, place, Align2::CENTER_CENTER, letter, SMALL_TEXT * 1.3, SIDES);
+        let place = uncovered(letter_area(area, edge.offset()), edge.offset(), area, taken, messages);
+        taken.take(place);
+        outlined(painter, place.center(), Align2::CENTER_CENTER, letter, SMALL_TEXT * 1.3, SIDES);
     }
     if let Some(edge) = tile.probe {
-        // In the corner of that side, where no letter is.
-        let [x, y] = edge.offset();
-        let place = at([if x == 0.0 { -1.0 } else { x }, if y == 0.0 { -1.0 } else { y }]);
-        taken.take(Rect::from_center_size(place, vec2(14.0, 14.0)));
-        painter.circle_filled(place, 7.0, OUTLINE);
-        painter.circle_filled(place, 5.0, ACCENT);
+        let place = uncovered(marker_area(area, edge.offset()), edge.offset(), area, taken, messages);
+        taken.take(place);
+        painter.circle_filled(place.center(), 7.0, OUTLINE);
+        painter.circle_filled(place.center(), 5.0, ACCENT);
     }
     if let Some((letter, colour)) = tile.plane {
-        let place = Rect::from_center_size(at(tile.plane_corner()), vec2(20.0, 20.0));
+        let place = uncovered(plane_area(area, tile), tile.plane_corner(), area, taken, messages);
         taken.take(place);
         painter.rect_filled(place, 3.0, colours::of_scene(colour));
         painter.text(place.center(), Align2::CENTER_CENTER, letter, FontId::proportional(SMALL_TEXT), ON_PLANE);
@@ -240,7 +303,9 @@ fn bar(painter: &Painter, taken: &mut Taken, area: Rect, per_point: f64) {
     let width = (mm / per_point) as f32;
     let label = texts::bar_length(mm);
     let words = painter.layout_no_wrap(label.clone(), FontId::proportional(SMALL_TEXT), TEXT).size();
-    let places = (0..8).map(|n| area.right_bottom() - vec2(16.0, 16.0 + 24.0 * n as f32));
+    // Or further left, if a message is there.
+    let up = |left: f32| (0..8).map(move |n| area.right_bottom() - vec2(16.0 + left, 16.0 + 24.0 * n as f32));
+    let places = [0.0, 0.3, 0.55].into_iter().flat_map(|share| up(share * area.width()));
     let right = places.into_iter().find(|right| {
         let half = width.max(words.x) / 2.0;
         let middle = right.x - width / 2.0;
@@ -301,8 +366,9 @@ fn axes(painter: &Painter, taken: &mut Taken, area: Rect, scene: &Scene) {
     }
 }
 
-/// A bar of the colours of all values, with the limits of the window.
-fn colour_bar(painter: &Painter, taken: &mut Taken, picture: Rect, scene: &Scene) {
+/// A bar of the colours of all values, with the limits of the window, in a corner of the picture that shows nothing that was recorded. Without such a
+/// corner there is none: the controls have the limits too.
+fn colour_bar(painter: &Painter, taken: &mut Taken, picture: Rect, scene: &Scene, scale: f32) {
     let settings = &scene.settings;
     let window = match settings.mode {
         // The colours of a lit surface do not stand for values.
@@ -324,14 +390,41 @@ fn colour_bar(painter: &Painter, taken: &mut Taken, picture: Rect, scene: &Scene
         [r, g, b].map(|c| if absorption > 0.0 { c } else { 0.15 * c })
     };
     const STEPS: usize = 64;
-    let height = (picture.height() * 0.3).clamp(60.0, 220.0);
-    // With its numbers on the left. In the right corner, or beside the letter of the right edge.
-    let places = [[34.0, 26.0], [62.0, 26.0], [34.0, 56.0], [62.0, 56.0]];
-    let places = places.map(|[left, below]| {
-        Rect::from_min_size(pos2(picture.right() - left, picture.top() + below), vec2(16.0, height))
-    });
+    let highest = (picture.height() * 0.3).clamp(60.0, 220.0);
+    // In the right corners, or beside the letter of the right edge; on the left beside a ruler; below above a scale.
+    let (right, left) = (picture.right(), picture.left() + 104.0);
+    let places = |height: f32| {
+        let (above, below) = (picture.top(), picture.bottom() - height);
+        let places = [
+            [right - 34.0, above + 26.0],
+            [right - 62.0, above + 26.0],
+            [right - 34.0, above + 56.0],
+            [right - 62.0, above + 56.0],
+            [left, above + 26.0],
+            [left, above + 56.0],
+            [right - 34.0, below - 64.0],
+            [right - 62.0, below - 64.0],
+            [left, below - 26.0],
+            [left, below - 56.0],
+        ];
+        places.map(|[left, top]| Rect::from_min_size(pos2(left, top), vec2(16.0, height)))
+    };
+    // Its numbers are on the left.
     let with_numbers = |area: Rect| Rect::from_min_max(area.min - vec2(36.0, 4.0), area.max + vec2(2.0, 4.0));
-    let Some(area) = places.into_iter().find(|area| taken.take(with_numbers(*area))) else { return };
+    let anatomy = Anatomy::of(scene);
+    let is_bare = |area: Rect| {
+        let part = |from: f32, to: f32, n: u32, of: u32| from + (to - from) * n as f32 / of as f32;
+        let at = |n: u32| pos2(part(area.left(), area.right(), n % 5, 4), part(area.top(), area.bottom(), n / 5, 16));
+        (0..5 * 17).map(at).map(|at| (at - picture.min) * scale).all(|at| !anatomy.is_at([at.x, at.y].map(f64::from)))
+    };
+    let is_free = |area: &Rect| {
+        let area = with_numbers(*area);
+        picture.contains_rect(area) && taken.is_free(area) && is_bare(area)
+    };
+    let mut all = [highest, 0.7 * highest, 0.45 * highest].into_iter().flat_map(|height| places(height.max(60.0)));
+    let Some(area) = all.find(is_free) else { return };
+    taken.take(with_numbers(area));
+    let height = area.height();
     for n in 0..STEPS {
         let value = (n as f64 + 0.5) / STEPS as f64;
         let colour = colours::of_scene(postprocess::toned(scene, ramp(value)));

@@ -1,31 +1,64 @@
 //! Lists over the window of which an entry is chosen: the files to open, and the formats of an export.
 
-use super::colours::{ACCENT, PANEL, WEAK_TEXT};
+use super::colours::{ACCENT, FAULT, PANEL, TEXT, WEAK_TEXT};
 use super::names::{self, Tell};
 use super::overlays::LOW_WINDOW;
 use super::walking::Walk;
-use super::{SMALL_TEXT, TOUCH_SIZE};
+use super::{SMALL_TEXT, TOUCH_SIZE, heading};
 use crate::command::Command;
 use crate::progress_lines::Progress;
 use crate::texts;
 use crate::volume_export::FORMATS;
 use egui::accesskit::Role;
-use egui::{Align2, Area, Button, Frame, Id, Label, Margin, Order, RichText, ScrollArea, Stroke, Ui, vec2};
+use egui::{
+    Align2, Area, Button, Color32, FontId, Frame, Id, Label, Margin, Order, RichText, ScrollArea, Stroke, Ui, vec2,
+};
+use std::ffi::OsStr;
+use std::path::Path;
+
+/// The list of files to open.
+pub(in super::super) struct FilesShown<'a> {
+    pub(in super::super) folder: &'a str,
+    /// So many of the entries are the recent files, which come first.
+    pub(in super::super) recent: usize,
+    pub(in super::super) names: &'a [String],
+    /// The path that is being typed, and why it was not taken.
+    pub(in super::super) typed: Option<(&'a str, Option<&'a str>)>,
+}
+
+/// A list with a line below what it is about has this height of the window, at most.
+const SHARE: f32 = 0.6;
 
 struct List<'a> {
     title: &'a str,
     about: &'a str,
+    /// The path that is typed in place of what it is about.
+    typed: Option<&'a str>,
+    /// A line below that: the list keeps its size.
+    line: Option<(&'a str, Color32)>,
+    /// Headings before the n-th entry.
+    headings: &'a [(usize, &'a str)],
     /// The tooltip of closing it, and what does so.
     close: (&'a str, Command),
     /// What an empty list says.
     empty: &'a str,
 }
 
-/// Shows the files to open. `files`: where they are, and their names.
-pub(super) fn show_files(ui: &Ui, files: (&str, &[String]), execute: &mut dyn FnMut(Command)) {
+/// Shows the files to open.
+pub(super) fn show_files(ui: &Ui, files: &FilesShown, execute: &mut dyn FnMut(Command)) {
+    let line = match files.typed {
+        Some((_, Some(fault))) => (fault, FAULT),
+        Some((_, None)) => (texts::HOW_TO_TYPE_A_PATH, WEAK_TEXT),
+        None => (texts::HOW_TO_BEGIN_A_PATH, WEAK_TEXT),
+    };
+    let folder = Path::new(files.folder).file_name().and_then(OsStr::to_str).unwrap_or(files.folder);
+    let headings = [(0, texts::RECENT), (files.recent, folder)];
     let list = List {
         title: texts::OPEN,
-        about: files.0,
+        about: files.folder,
+        typed: files.typed.map(|typed| typed.0),
+        line: Some(line),
+        headings: &headings[usize::from(files.recent == 0)..],
         close: (texts::CLOSE_OPEN_HINT, Command::OpenFiles),
         empty: texts::NO_RECORDING_HERE,
     };
@@ -34,8 +67,8 @@ pub(super) fn show_files(ui: &Ui, files: (&str, &[String]), execute: &mut dyn Fn
         name if name.ends_with('/') => texts::open_folder_hint(name),
         name => texts::open_file_hint(name),
     };
-    let hints: Vec<String> = files.1.iter().map(hint).collect();
-    let entries = files.1.iter().zip(&hints).map(|(name, hint)| (name.as_str(), hint.as_str()));
+    let hints: Vec<String> = files.names.iter().map(hint).collect();
+    let entries = files.names.iter().zip(&hints).map(|(name, hint)| (name.as_str(), hint.as_str()));
     list.show(ui, entries, |n, execute| execute(Command::OpenFile(n)), |_, _| {}, execute);
 }
 
@@ -46,8 +79,8 @@ pub(super) fn show_exports(ui: &Ui, running: Option<(&str, Option<Progress>)>, e
         Some((name, None)) => texts::is_being_exported(name),
         None => texts::VOLUME_SHOWN.into(),
     };
-    let list =
-        List { title: texts::EXPORT, about: &about, close: (texts::CLOSE_EXPORT_HINT, Command::Exports), empty: "" };
+    let close = (texts::CLOSE_EXPORT_HINT, Command::Exports);
+    let list = List { title: texts::EXPORT, about: &about, typed: None, line: None, headings: &[], close, empty: "" };
     let entries = FORMATS.iter().map(|format| (format.name, format.hint));
     let cancel = |ui: &mut Ui, execute: &mut dyn FnMut(Command)| {
         let hint = texts::CANCEL_EXPORT_HINT;
@@ -56,6 +89,20 @@ pub(super) fn show_exports(ui: &Ui, running: Option<(&str, Option<Progress>)>, e
         }
     };
     list.show(ui, entries, |n, execute| execute(Command::Export(n)), cancel, execute);
+}
+
+/// A text that is being typed, with a mark where it goes on; without its beginning, if that has no room.
+fn end_of(ui: &Ui, typed: &str, width: f32) -> String {
+    let font = FontId::proportional(SMALL_TEXT);
+    let mut left = width - 40.0;
+    let fits = |(_, letter): &(usize, char)| {
+        left -= ui.fonts_mut(|fonts| fonts.glyph_width(&font, *letter));
+        left > 0.0
+    };
+    match typed.char_indices().rev().take_while(fits).last() {
+        Some((0, _)) | None => format!("{typed}_"),
+        Some((from, _)) => format!("...{}_", &typed[from..]),
+    }
 }
 
 impl List<'_> {
@@ -87,10 +134,24 @@ impl List<'_> {
                         }
                     });
                 });
-                ui.add(Label::new(RichText::new(self.about).size(SMALL_TEXT).color(WEAK_TEXT)).truncate());
+                let small =
+                    |text: &str, colour| Label::new(RichText::new(text).size(SMALL_TEXT).color(colour)).truncate();
+                match self.typed {
+                    Some(typed) => {
+                        let label = small(&end_of(ui, typed, width), TEXT);
+                        ui.add(label).named(texts::PATH).with_value(typed);
+                    }
+                    None => _ = ui.add(small(self.about, WEAK_TEXT)),
+                }
                 // Below the title and what it is about.
-                let height = (screen.height() - if is_low { 100.0 } else { 160.0 }).max(30.0);
-                ScrollArea::vertical().max_height(height).min_scrolled_height(0.0).show(ui, |ui| {
+                let mut height = (screen.height() - if is_low { 100.0 } else { 160.0 }).max(30.0);
+                if let Some((line, colour)) = self.line {
+                    ui.add(small(line, colour));
+                    height = (height - 30.0).min(screen.height() * SHARE).max(20.0);
+                }
+                // Another folder is seen from its beginning.
+                let area = ScrollArea::vertical().id_salt(self.about).max_height(height).min_scrolled_height(0.0);
+                area.auto_shrink([true, self.line.is_none()]).show(ui, |ui| {
                     more(ui, execute);
                     names::list(ui, self.about, |ui| {
                         if entries.len() == 0 {
@@ -98,6 +159,7 @@ impl List<'_> {
                         }
                         let walk = Walk::new(ui, self.title, entries.len(), 1);
                         for (n, (name, hint)) in entries.enumerate() {
+                            self.headings.iter().filter(|(at, _)| *at == n).for_each(|(_, text)| heading(ui, text));
                             let key = if n < 9 { format!("{}   ", n + 1) } else { "     ".into() };
                             let button = Button::new(format!("{key}{name}")).truncate();
                             let button = button.min_size(vec2(width - 20.0, TOUCH_SIZE * 0.7));

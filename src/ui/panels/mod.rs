@@ -26,6 +26,7 @@ mod walking;
 mod widgets;
 
 use self::colours::{BACKGROUND, BUTTON, EDGE, ON_SELECTED, PANEL, SELECTED, TEXT, WEAK_TEXT};
+pub(super) use self::lists::FilesShown;
 pub(super) use self::presets::{PresetTile, PresetsShown};
 pub(super) use self::recordings::Reading;
 pub(super) use self::visible::Visible;
@@ -244,8 +245,10 @@ impl Panels {
                     controls::show_column(ui, state, right, execute);
                 }
             }
+            let taken = recordings::show_reading(ui, state, self.scale, execute);
+            let messages = overlays::show_notes(ui, state, self.scale, taken);
             match state.visible.panels {
-                true if state.picture.is_some() => annotations::paint(ui, state, self.scale),
+                true if state.picture.is_some() => annotations::paint(ui, state, self.scale, &messages),
                 false if state.picture.is_some() => annotations::paint_origin(ui, state, self.scale),
                 _ => {}
             }
@@ -258,8 +261,6 @@ impl Panels {
             if state.visible.times {
                 overlays::show_times(ui, state, self.scale);
             }
-            let taken = recordings::show_reading(ui, state, self.scale, execute);
-            overlays::show_notes(ui, state, self.scale, taken);
             if state.shows_first_steps {
                 first_steps::show(ui, state, self.scale, execute);
             }
@@ -267,7 +268,7 @@ impl Panels {
             if state.visible.help && size[1] as f32 > MIN_HELP_HEIGHT * self.scale {
                 overlays::show_help(ui, state, execute);
             }
-            if let Some(files) = state.files {
+            if let Some(files) = &state.files {
                 lists::show_files(ui, files, execute);
             }
             if state.visible.exports {
@@ -449,8 +450,8 @@ pub(super) struct PanelState<'a> {
     pub(super) shows_only_origin: bool,
     /// The question about what leaving would lose.
     pub(super) leaving: Option<&'static Unsaved>,
-    /// The list of files to open, while it is shown: its title and its entries.
-    pub(super) files: Option<(&'a str, &'a [String])>,
+    /// The list of files to open, while it is shown.
+    pub(super) files: Option<FilesShown<'a>>,
     /// The recordings that are open, and what is being read.
     pub(super) recordings: &'a [Named],
     pub(super) reading: Option<&'a Reading>,

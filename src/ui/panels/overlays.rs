@@ -1,5 +1,6 @@
 //! What is drawn over the picture: banner and notes, times, help, a question with its answers, and the pointer where no windowing system draws one.
 
+use super::annotations;
 use super::colours::{
     ACCENT, BAR, FAULT, FOCUS, FOCUS_EDGE, GOOD, MESSAGE, ON_SELECTED, PANEL, POINTER, SELECTED, SHADE, TEXT, WARNING,
     WEAK_TEXT, WHOLE_BAR,
@@ -72,6 +73,11 @@ impl Message {
         self.parts.iter().map(|part| part.size().y).sum::<f32>() + gaps + MESSAGE_FRAME[1]
     }
 
+    fn size(&self) -> Vec2 {
+        let width = self.parts.iter().map(|part| part.size().x).fold(0.0, f32::max);
+        vec2(width + MESSAGE_FRAME[0], self.height())
+    }
+
     fn show(self, ui: &mut Ui) {
         message_frame(self.edge).show(ui, |ui| {
             names::announce(ui, &self.spoken, self.is_fault);
@@ -81,13 +87,66 @@ impl Message {
 }
 
 /// Shows banner and notes in the picture, one above the other. The newest notes go before the older ones, and where there is no room for both, before the banner,
-/// which comes back when they have gone. `taken`: height at the lower edge of the picture that is not theirs.
-pub(super) fn show_notes(ui: &mut Ui, state: &PanelState, scale: f32, taken: f32) {
+/// which comes back when they have gone. `taken`: height at the lower edge of the picture that is not theirs. Returns the areas that they cover: no side
+/// letter and no marker is there, and no scale if they have room elsewhere.
+pub(super) fn show_notes(ui: &mut Ui, state: &PanelState, scale: f32, taken: f32) -> Vec<Rect> {
+    if state.banner.is_none() && state.notes.is_empty() {
+        return Vec::new();
+    }
     let picture = picture_rect(state, scale);
+    let marks = if state.visible.panels { annotations::areas(state, scale) } else { Default::default() };
+    // Messages are narrower where whole ones would cover a mark; and the newest one is alone where all would.
+    let attempts = [usize::MAX, 1].into_iter().flat_map(|count| WIDTHS.map(|share| (count, share)));
+    let placed = attempts.map(|(count, share)| messages(ui, state, picture, taken, (count, share), &marks));
+    let mut least: Option<Messages> = None;
+    for messages in placed {
+        if least.as_ref().is_none_or(|least| messages.covered < least.covered) {
+            least = Some(messages);
+        }
+        if least.as_ref().is_some_and(|least| least.covered == 0.0) {
+            break;
+        }
+    }
+    let Some(Messages { banner, notes, .. }) = least else { return Vec::new() };
+    let mut areas = Vec::new();
+    for (name, place, messages) in [("banner", banner.0, banner.1), ("notes", notes.0, notes.1)] {
+        if messages.is_empty() {
+            continue;
+        }
+        areas.push(place);
+        let area = Area::new(Id::new(name)).order(Order::Middle).fixed_pos(place.min).interactable(false);
+        area.show(ui.ctx(), |ui| {
+            ui.spacing_mut().item_spacing.y = BETWEEN_MESSAGES;
+            ui.set_width(place.width());
+            ui.vertical_centered(|ui| messages.into_iter().for_each(|message| message.show(ui)));
+        });
+    }
+    areas
+}
+
+/// Shares of the room's width that messages may have.
+const WIDTHS: [f32; 4] = [1.0, 0.7, 0.5, 0.35];
+
+/// Banner and notes where they are shown, the oldest first.
+struct Messages {
+    banner: (Rect, Vec<Message>),
+    notes: (Rect, Vec<Message>),
+    /// How bad it is what they cover; 0 for nothing.
+    covered: f32,
+}
+
+fn messages(
+    ui: &Ui,
+    state: &PanelState,
+    picture: Rect,
+    taken: f32,
+    (count, share): (usize, f32),
+    marks: &[Vec<Rect>; 2],
+) -> Messages {
     let is_large = picture.width() >= MIN_FOR_LARGE_MESSAGES[0] && picture.height() >= MIN_FOR_LARGE_MESSAGES[1];
     let [title_size, text_size] = if is_large { MESSAGE_TEXT } else { SMALL_MESSAGE_TEXT };
     let [above, below] = [MESSAGE_EDGES[0], MESSAGE_EDGES[1] + taken];
-    let room = vec2(picture.width() - 24.0, picture.height() - above - below);
+    let room = vec2((picture.width() - 24.0) * share, picture.height() - above - below);
     let note = |note: &Note| {
         let texts = [(note.text.as_str(), text_size, TEXT)];
         Message::new(ui, &texts, room, if note.is_fault { FAULT } else { ACCENT }, note.text.clone(), note.is_fault)
@@ -104,32 +163,63 @@ pub(super) fn show_notes(ui: &mut Ui, state: &PanelState, scale: f32, taken: f32
     // In the centre without a picture and without notes, at the top over one.
     let is_at_top = state.picture.is_some() || !state.notes.is_empty();
     let mut shown: Vec<Message> = Vec::new();
-    for message in state.notes.iter().rev().map(note) {
+    for message in state.notes.iter().rev().take(count).map(note) {
         left -= message.height() + BETWEEN_MESSAGES;
         if left < -BETWEEN_MESSAGES && !shown.is_empty() {
             break;
         }
         shown.push(message);
     }
-    if let Some(banner) = banner {
-        let (align, at) = match is_at_top {
-            true => (Align2::CENTER_TOP, picture.center_top() + vec2(0.0, above)),
-            false => (Align2::CENTER_CENTER, picture.center()),
-        };
-        let area = Area::new(Id::new("banner")).order(Order::Middle).pivot(align).fixed_pos(at).interactable(false);
-        area.show(ui.ctx(), |ui| banner.show(ui));
+    shown.reverse();
+    let free = Rect::from_min_max(picture.min + vec2(12.0, above), picture.max - vec2(12.0, below));
+    let mut covered = 0.0;
+    let mut place = |messages: Vec<Message>, from: Align2, others: &[Rect]| {
+        let (place, is_bad) = place(stack(&messages), free, from, marks, others);
+        covered += if messages.is_empty() { 0.0 } else { is_bad };
+        (place, messages)
+    };
+    let from = if is_at_top { Align2::CENTER_TOP } else { Align2::CENTER_CENTER };
+    let banner = place(banner.into_iter().collect(), from, &[]);
+    let notes =
+        place(shown, Align2::CENTER_BOTTOM, if banner.1.is_empty() { &[] } else { std::slice::from_ref(&banner.0) });
+    Messages { banner, notes, covered }
+}
+
+/// The size of messages one above the other.
+fn stack(messages: &[Message]) -> Vec2 {
+    let sizes = messages.iter().map(Message::size);
+    let size = sizes.fold(Vec2::ZERO, |all, one| vec2(all.x.max(one.x), all.y + one.y + BETWEEN_MESSAGES));
+    size - vec2(0.0, BETWEEN_MESSAGES)
+}
+
+/// The place of messages nearest to where they belong that covers no mark and nothing else, or as little as possible; and how bad that is.
+fn place(size: Vec2, free: Rect, from: Align2, marks: &[Vec<Rect>; 2], others: &[Rect]) -> (Rect, f32) {
+    const STEPS: f32 = 24.0;
+    let home = from.align_size_within_rect(size, free);
+    let moves = |room: f32| {
+        let step = (room / STEPS).max(6.0);
+        (0..=(room.max(0.0) / step) as i32).map(move |n| n as f32 * step)
+    };
+    let [fixed, giving_way] = marks;
+    let is_on =
+        |area: Rect, marks: &[Rect]| marks.iter().filter(|mark| mark.expand(2.0).intersects(area)).count() as f32;
+    let mut best = (home, f32::INFINITY);
+    for down in moves(free.height() - size.y) {
+        for across in moves((free.width() - size.x) / 2.0) {
+            for (x, y) in [(1.0, 1.0), (-1.0, 1.0), (1.0, -1.0), (-1.0, -1.0)] {
+                let area = home.translate(vec2(x * across, y * down));
+                let is_in = down == 0.0 && across == 0.0 || free.expand(0.5).contains_rect(area);
+                let bad = 1000.0 * is_on(area, others) + 10.0 * is_on(area, fixed) + is_on(area, giving_way);
+                if is_in && bad < best.1 {
+                    best = (area, bad);
+                }
+                if best.1 == 0.0 {
+                    return best;
+                }
+            }
+        }
     }
-    if shown.is_empty() {
-        return;
-    }
-    // An area is placed by its size of the layout before, so the place of its top is told.
-    let height = shown.iter().map(|note| note.height() + BETWEEN_MESSAGES).sum::<f32>() - BETWEEN_MESSAGES;
-    let at = picture.center_bottom() - vec2(0.0, below + height);
-    let area = Area::new(Id::new("notes")).order(Order::Middle).pivot(Align2::CENTER_TOP).fixed_pos(at);
-    area.interactable(false).show(ui.ctx(), |ui| {
-        ui.spacing_mut().item_spacing.y = BETWEEN_MESSAGES;
-        shown.into_iter().rev().for_each(|note| note.show(ui));
-    });
+    best
 }
 
 pub(super) fn message_frame(edge: Color32) -> Frame {

@@ -7,6 +7,8 @@ use crate::panels::accesskit::{Action, Node, Role};
 use crate::panels::colours::{BACKING, MESSAGE, OUTLINE, PANEL};
 use crate::panels::drawn::{Area, Kind};
 use crate::panels::{self, Banner, Note, Reading};
+use crate::picking::Picker;
+use crate::probe::Indices;
 
 const SIZES: [[u32; 2]; 8] =
     [[640, 480], [800, 600], [1024, 768], [1280, 720], [1280, 1024], [1920, 1080], [2560, 1440], [3840, 2160]];
@@ -279,6 +281,134 @@ fn messages_stay_in_the_picture_and_apart() {
         let newest =
             shown.drawn.iter().any(|drawn| matches!(&drawn.kind, Kind::Text { text, .. } if *text == confirmed));
         assert!(newest, "the newest message is shown: {what}");
+    }
+}
+
+/// Prevents a message over a letter of a side, a marker, a ruler or a scale, and one that makes them vanish.
+#[test]
+fn messages_cover_no_mark() {
+    let is_fixed = |(name, _): &(String, Area)| name == "probe" || (name.len() == 1 && name.parse::<u32>().is_err());
+    let is_mark = |mark: &(String, Area)| is_fixed(mark) || mark.0.parse::<u32>().is_ok() || mark.0.ends_with(" mm");
+    for (size, scale) in windows() {
+        let settings = "marks.lateral='right-left'\nmarks.elevation='head-feet'";
+        let mut shown = Shown::sized(settings, size, scale);
+        for (mode, layout) in [
+            (Mode::Surface, Layout::Single),
+            (Mode::Surface, Layout::Pair),
+            (Mode::Volume, Layout::Four),
+            (Mode::Plane, Layout::Single),
+            (Mode::Orthogonal, Layout::Single),
+            (Mode::Tomography, Layout::Single),
+        ] {
+            let what = format!("{size:?} at {scale}, {mode:?} {layout:?}");
+            shown.apply(Command::Mode(mode));
+            shown.apply(Command::Layout(layout));
+            let marks = |shown: &Shown| annotations(shown).into_iter().filter(is_mark).collect::<Vec<_>>();
+            let fixed = |marks: &[(String, Area)]| marks.iter().filter(|mark| is_fixed(mark)).count();
+            let before = marks(&shown);
+            let (title, text) = ("No frames from the probe".into(), "It is connected but sends nothing.".into());
+            shown.banner = Some(Banner { title, text, is_fault: true });
+            let names = ["echolume-20261123-231205-1.png", "echolume-20261123-231206-2.png"];
+            shown.notes =
+                names.map(|name| Note { text: format!("Saved /home/operator/{name}"), is_fault: false }).into();
+            shown.settle();
+            let messages = shown.drawn.iter().filter_map(|drawn| match &drawn.kind {
+                Kind::Rect { area, fill, .. } if *fill == MESSAGE.to_array() => Some(*area),
+                _ => None,
+            });
+            let (messages, after) = (messages.collect::<Vec<_>>(), marks(&shown));
+            assert!(!messages.is_empty(), "{what}");
+            // Between messages, tiles of less than 140 points may have no place that is free.
+            let edges = shown.scene.marks().into_iter().flat_map(|tile| tile.size);
+            let is_small = edges.fold(f64::INFINITY, f64::min) < 140.0 * f64::from(scale);
+            for (name, area) in &after {
+                let covers = |message: &&Area| overlap(**message, *area);
+                let message = messages.iter().find(covers);
+                assert!(is_small || message.is_none(), "{what}: {message:?} covers {name} at {area:?}");
+            }
+            assert_eq!(fixed(&before), fixed(&after), "{what}");
+            // In the smallest pictures a scale may give way.
+            let has_room = size[0].min(size[1]) as f32 / scale >= 400.0;
+            let scales = |marks: &[(String, Area)]| marks.iter().any(|(name, _)| name.ends_with(" mm"));
+            assert!(!has_room || scales(&after) || !scales(&before), "{what}: {before:?} {messages:?}");
+            (shown.banner, shown.notes) = (None, Vec::new());
+            shown.settle();
+        }
+    }
+}
+
+/// Prevents a colour bar over anatomy, and a corner beside it that stays empty.
+#[test]
+fn the_colour_bar_lies_beside_what_was_recorded() {
+    let steps = |count: usize| (0..=120).map(move |n| f64::from(n) / 120.0 * (count - 1) as f64);
+    for (settings, is_there) in [
+        ("mode='volume'", false),
+        ("mode='mip'\ncamera.zoom=0.5", true),
+        ("mode='volume'\ncamera.zoom=6", false),
+        ("mode='plane'\nplanes.zoom=0.6", true),
+        ("mode='plane'\nplanes.zoom=6", false),
+    ] {
+        let shown = Shown::new(settings);
+        let [_, picture] = places(&shown);
+        let bar = shown.drawn.iter().find_map(|drawn| match &drawn.kind {
+            Kind::Rect { area, fill, .. } if fill[3] == 0 && area[2] - area[0] == 16.0 => Some(*area),
+            _ => None,
+        });
+        assert_eq!(bar.is_some(), is_there, "{settings}: {bar:?} of {picture:?}");
+        let Some([left, top, right, bottom]) = bar else { continue };
+        let probe = shown.scene.probe().expect("a probe");
+        let (tiling, picker) = (shown.scene.cuts_planes().then(|| shown.scene.tiling()), Picker::of(&shown.scene));
+        let at = |place: DVec3| match &tiling {
+            Some(tiling) => {
+                let (at, away) = tiling.project(&tiling.tiles[0], place);
+                (away.abs() < 1.0).then_some(at)
+            }
+            None => picker.project(place),
+        };
+        let mut seen = 0;
+        for (sample, line) in
+            steps(probe.samples).flat_map(|sample| steps(probe.lines.len()).map(move |line| (sample, line)))
+        {
+            for slice in steps(probe.slices.len()) {
+                let place = probe.to_space(Indices { sample, line, slice });
+                let is_in_region = place.cmpge(shown.scene.low).all() && place.cmple(shown.scene.high).all();
+                let Some([x, y]) = at(place).filter(|_| is_in_region) else { continue };
+                let (x, y) = (x as f32 + picture[0], y as f32 + picture[1]);
+                seen += usize::from(x >= picture[0] && x < picture[2] && y >= picture[1] && y < picture[3]);
+                let is_beside = x < left || x > right || y < top || y > bottom;
+                assert!(is_beside, "{settings}: {sample} {line} {slice} is under {bar:?}");
+            }
+        }
+        assert!(seen > 1000, "{settings}: {seen}");
+    }
+}
+
+/// Prevents a list whose size depends on how many entries a folder has, and a folder or a recent file without its heading.
+#[test]
+fn the_list_of_files_keeps_its_size_and_has_headings() {
+    for (size, scale) in windows() {
+        let mut shown = Shown::sized("mode='surface'", size, scale);
+        let mut areas = Vec::new();
+        let not_there = Some("There is no file and no folder /data/x".to_string());
+        for (count, typed) in
+            [(1, None), (3, Some(("/da".to_string(), None))), (60, Some(("/data/x".into(), not_there)))]
+        {
+            shown.files = Some(("/data/heart".into(), (0..count).map(|n| format!("{n}.mha")).collect()));
+            shown.typed = typed.clone();
+            (0..3).for_each(|_| shown.settle());
+            areas.extend(shown.drawn.iter().filter_map(|drawn| match &drawn.kind {
+                Kind::Rect { area, fill, edge } if *fill == PANEL.to_array() && edge[3] > 0 => Some(*area),
+                _ => None,
+            }));
+            let has = |wanted: &str| {
+                shown.drawn.iter().any(|drawn| matches!(&drawn.kind, Kind::Text { text, .. } if text == wanted))
+            };
+            let path = typed.as_ref().map_or("/data/heart".into(), |(text, _)| format!("{text}_"));
+            assert!(has("Recent") && has(&path), "{size:?} at {scale}: {path}");
+            assert!(count == 1 || size[1] as f32 / scale < 400.0 || has("heart"), "{size:?} at {scale}");
+            assert!(typed.and_then(|typed| typed.1).is_none_or(|fault| has(&fault)), "{size:?} at {scale}");
+        }
+        assert!(areas.len() == 3 && areas.iter().all(|area| *area == areas[0]), "{size:?} at {scale}: {areas:?}");
     }
 }
 

@@ -8,7 +8,7 @@ use crate::live::cine::CineVolume;
 use crate::panels::accesskit::{Action, ActionData, ActionRequest, Node, NodeId, TreeId, TreeUpdate};
 use crate::panels::drawn::Drawn;
 use crate::panels::{
-    self, Banner, Note, PanelOutput, PanelState, Panels, PresetTile, PresetsShown, Reading, Room, Visible,
+    self, Banner, FilesShown, Note, PanelOutput, PanelState, Panels, PresetTile, PresetsShown, Reading, Room, Visible,
 };
 use crate::passes::unveil::StartLine;
 use crate::picture::Picture;
@@ -46,7 +46,9 @@ pub(super) struct Shown {
     pub(super) cine: CineState,
     pub(super) banner: Option<Banner>,
     pub(super) notes: Vec<Note>,
+    /// The folder whose files are listed, and their names; the first is a recent one. And the path that is being typed, with its fault.
     pub(super) files: Option<(String, Vec<String>)>,
+    pub(super) typed: Option<(String, Option<String>)>,
     /// Names of the recordings that are open; the second is shown.
     pub(super) recordings: Vec<String>,
     pub(super) reading: Option<Reading>,
@@ -99,6 +101,7 @@ impl Shown {
             banner: None,
             notes: Vec::new(),
             files: None,
+            typed: None,
             recordings: Vec::new(),
             reading: None,
             presets: None,
@@ -162,7 +165,12 @@ impl Shown {
             shows_first_steps: self.shows[0],
             shows_only_origin: self.shows[1],
             leaving: self.leaving,
-            files: self.files.as_ref().map(|(title, names)| (title.as_str(), names.as_slice())),
+            files: self.files.as_ref().map(|(folder, names)| FilesShown {
+                folder,
+                recent: names.len().min(1),
+                names,
+                typed: self.typed.as_ref().map(|(text, fault)| (text.as_str(), fault.as_deref())),
+            }),
             recordings: &recordings,
             reading: self.reading.as_ref(),
             is_turning: false,

@@ -30,6 +30,9 @@ pub(crate) const DEVICE_OPENED_AGAIN: &str = "The device was lost and opened aga
 
 // Opening files.
 pub(crate) const FOLDER_ABOVE: &str = "..  (the folder above)";
+pub(crate) fn is_not_there(path: &str) -> String {
+    format!("There is no file and no folder {path}")
+}
 pub(crate) fn files_as_series(count: usize) -> String {
     format!("all {count} DICOM files of this folder as one recording")
 }

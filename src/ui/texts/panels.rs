@@ -193,6 +193,10 @@ pub(crate) fn open_folder_hint(name: impl Display) -> String {
     format!("Lists the folder {name}")
 }
 pub(crate) const FOLDER_ABOVE_HINT: &str = "Lists the folder above.";
+pub(crate) const RECENT: &str = "Recent";
+pub(crate) const PATH: &str = "Path";
+pub(crate) const HOW_TO_BEGIN_A_PATH: &str = "/ or ~ begins to type a path";
+pub(crate) const HOW_TO_TYPE_A_PATH: &str = "Tab completes the path, Enter opens it, Esc takes it back";
 pub(crate) const CLOSE_OPEN_HINT: &str = "Closes this list.";
 pub(crate) const NO_RECORDING_HERE: &str = "There is no recording and no workspace here.";
 pub(crate) const VOLUME_SHOWN: &str = "The volume that is shown";
