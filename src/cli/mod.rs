@@ -114,7 +114,7 @@ left_out!(view, View, "view");
 
 use crate::files::signals::hangups;
 use crate::files::{self, Lock};
-use crate::kiosk::log_rotation::{self, RotatingLog};
+use crate::kiosk::log_rotation::{self, LateLog, RotatingLog};
 use crate::memory;
 use crate::source::standard_input;
 use crate::terminal::{self, Failure, failed, input};
@@ -122,7 +122,8 @@ use clap::{CommandFactory, FromArgMatches, Parser, Subcommand};
 use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
-use std::sync::Mutex;
+use std::sync::{Arc, Mutex, PoisonError};
+use std::time::Duration;
 use tracing_subscriber::filter::filter_fn;
 use tracing_subscriber::layer::SubscriberExt;
 use tracing_subscriber::util::SubscriberInitExt;
@@ -219,7 +220,7 @@ pub fn run() -> ExitCode {
     let log = arguments.command.log();
     let log = start_log(arguments.verbose, arguments.log_file.as_deref(), log, &arguments.command);
     // To the end no other process writes to the log.
-    let (_lock, log) = log.map_or_else(|failure| (None, Err(failure)), |lock| (lock, Ok(())));
+    let (lock, log) = log.map_or_else(|failure| (LogLock::default(), Err(failure)), |lock| (lock, Ok(())));
     let log = log.and_then(|()| check_environment());
     let done = log.and_then(|()| match arguments.command {
         Command::Render(render) => render.run(),
@@ -246,6 +247,8 @@ pub fn run() -> ExitCode {
         Some(error) => Err(failed(format!("standard output: cannot be written: {error}"))),
         None => Ok(()),
     });
+    // The log itself stays open: the process ends before it is dropped.
+    *lock.lock().unwrap_or_else(PoisonError::into_inner) = None;
     let Err(failure) = done else { return ExitCode::SUCCESS };
     terminal::print_failure(&failure);
     ExitCode::from(failure.exit_code())
@@ -307,13 +310,35 @@ fn check_environment() -> Result<(), Failure> {
     }
 }
 
-/// Opens a log that no other process writes to.
-fn open_log(path: &Path, bytes: u64, files: u32, command: &Command) -> Result<RotatingLog, String> {
-    let log = RotatingLog::open(path, bytes, files)?;
-    match command.reopens_log() {
-        true => hangups().map(|reopens| log.reopened(reopens)).map_err(|e| format!("SIGHUP cannot be caught: {e}")),
-        false => Ok(log),
+/// Time between two tries to open the log of a kiosk.
+const LOG_PAUSE: Duration = Duration::from_secs(5);
+
+/// The lock of the log, as soon as it can be locked.
+type LogLock = Arc<Mutex<Option<Lock>>>;
+
+/// Opens a log that no other process writes to. A kiosk that cannot logs to standard error until it can: it still shows pictures.
+fn open_log(
+    (path, bytes, files): (PathBuf, u64, u32),
+    command: &Command,
+    lock: &LogLock,
+) -> Result<Box<dyn Write + Send>, String> {
+    if !command.reopens_log() {
+        return Ok(Box::new(RotatingLog::open(&path, bytes, files)?));
     }
+    let reopens = hangups().map_err(|e| format!("SIGHUP cannot be caught: {e}"))?;
+    let lock = lock.clone();
+    let open = move || {
+        let mut lock = lock.lock().unwrap_or_else(PoisonError::into_inner);
+        if !lock.as_ref().is_some_and(Lock::is_held) {
+            *lock = Some(Lock::take(&path)?);
+        }
+        Ok(RotatingLog::open(&path, bytes, files)?.reopened(reopens.clone()))
+    };
+    let log = LateLog::new(open, std::io::stderr(), LOG_PAUSE);
+    if let Some(fault) = log.fault() {
+        let _ = writeln!(std::io::stderr(), "echolume: log: {fault}; logging to standard error");
+    }
+    Ok(Box::new(log))
 }
 
 /// Starts logging, and locks the log. A command that reports validation messages itself logs them only with `-v`.
@@ -322,10 +347,11 @@ fn start_log(
     file: Option<&Path>,
     configured: Option<(PathBuf, u64, u32)>,
     command: &Command,
-) -> Result<Option<Lock>, Failure> {
+) -> Result<LogLock, Failure> {
     let reports_validation = matches!(command, Command::Verify(_));
     let path = file.or(configured.as_ref().map(|(path, ..)| path.as_path()));
     let lock = path.map(Lock::take).transpose().map_err(|fault| failed(format!("log {fault}")))?;
+    let lock = Arc::new(Mutex::new(lock));
     let level = match verbose {
         0 => tracing::Level::WARN,
         1 => tracing::Level::INFO,
@@ -333,8 +359,8 @@ fn start_log(
     };
     let log = tracing_subscriber::fmt().with_max_level(level).with_target(false);
     // A kiosk without a log still shows pictures.
-    let configured = configured.filter(|_| file.is_none()).and_then(|(path, bytes, files)| {
-        let opened = open_log(&path, bytes, files, command);
+    let configured = configured.filter(|_| file.is_none()).and_then(|place| {
+        let opened = open_log(place, command, &lock);
         opened
             .inspect_err(|fault| drop(writeln!(std::io::stderr(), "echolume: log: {fault}; logging to standard error")))
             .ok()
@@ -361,8 +387,8 @@ fn start_log(
                 .init();
         }
         Some(path) => {
-            let file = open_log(path, log_rotation::DEFAULT_FILE_BYTES, log_rotation::DEFAULT_FILES, command);
-            let file = file.map_err(|fault| input(format!("--log-file {fault}")))?;
+            let place = (path.into(), log_rotation::DEFAULT_FILE_BYTES, log_rotation::DEFAULT_FILES);
+            let file = open_log(place, command, &lock).map_err(|fault| input(format!("--log-file {fault}")))?;
             log.with_ansi(false).with_writer(Mutex::new(file)).init();
         }
     }

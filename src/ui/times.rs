@@ -30,6 +30,9 @@ impl RecentTimes {
     }
 }
 
+/// Longest delay of a live picture that is not told, ms.
+const UNTOLD_DELAY: f64 = 1000.0;
+
 /// The content of the display of times.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Times {
@@ -55,6 +58,12 @@ pub(super) struct Times {
 }
 
 impl Times {
+    /// How far pictures are behind the frames, s, if that is worth a word. That a frame waits for the last one of its volume is no delay.
+    pub(super) fn delay(&self) -> Option<f64> {
+        let acquired = 1e3 * self.acquisition_time.unwrap_or(0.0);
+        self.latency.map(|ms| ms - acquired).filter(|ms| *ms > UNTOLD_DELAY).map(|ms| ms / 1e3)
+    }
+
     /// Adds the statistics of about a second.
     pub(super) fn add(&mut self, statistics: &Statistics, acquisition_time: Option<f64>) {
         let rate = |n: u64| n as f64 / statistics.time.as_secs_f64().max(1e-3);
@@ -84,6 +93,13 @@ impl Times {
 mod tests {
     use super::*;
     use crate::passes::PassTime;
+
+    #[test]
+    fn the_time_to_acquire_a_volume_is_no_delay() {
+        let times = Times { latency: Some(2500.0), acquisition_time: Some(0.5), ..Times::default() };
+        assert_eq!(times.delay(), Some(2.0));
+        assert_eq!(Times { acquisition_time: Some(1.5), ..times }.delay(), None);
+    }
 
     #[test]
     fn percentiles_are_of_the_recent_times() {

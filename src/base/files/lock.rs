@@ -13,6 +13,11 @@ pub struct Lock {
 }
 
 impl Lock {
+    /// False where the place cannot be locked, as in a folder that is missing.
+    pub fn is_held(&self) -> bool {
+        self.held.is_some()
+    }
+
     /// Locks the place of a file or a folder. A device or a pipe is not locked, and neither is a place beside which no file can be made: what cannot be
     /// written there is said by whoever writes.
     ///

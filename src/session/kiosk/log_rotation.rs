@@ -7,7 +7,7 @@ use std::io::{self, ErrorKind, Read, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::time::SystemTime;
+use std::time::{Duration, Instant, SystemTime};
 
 /// Default size of one log file, bytes.
 pub const DEFAULT_FILE_BYTES: u64 = 10 << 20;
@@ -231,6 +231,59 @@ impl Drop for RotatingLog {
     }
 }
 
+/// A log whose file may not be there yet: until it can be opened, lines go to another place.
+///
+/// Writing never fails. A write tries to open the file if the last try is at least `pause` ago. The first line of the file then says where the lines
+/// before it are.
+pub struct LateLog<O, W> {
+    open: O,
+    until: W,
+    pause: Duration,
+    tried: Instant,
+    /// The log, or why there is none yet.
+    log: Result<RotatingLog, String>,
+}
+
+impl<O: FnMut() -> Result<RotatingLog, String>, W: Write> LateLog<O, W> {
+    /// Tries to open the log. `until`: takes the lines as long as that fails.
+    pub fn new(mut open: O, until: W, pause: Duration) -> LateLog<O, W> {
+        LateLog { log: open(), open, until, pause, tried: Instant::now() }
+    }
+
+    /// Why the file could not be opened, on one line.
+    pub fn fault(&self) -> Option<&str> {
+        self.log.as_ref().err().map(String::as_str)
+    }
+}
+
+impl<O: FnMut() -> Result<RotatingLog, String>, W: Write> Write for LateLog<O, W> {
+    /// Always accepts everything: a fault of the log must not stop the program.
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        if let Err(fault) = &mut self.log
+            && self.tried.elapsed() >= self.pause
+        {
+            let opened = (self.open)().map(|mut log| {
+                let now = humantime::format_rfc3339_micros(SystemTime::now());
+                log.write_or_count(format!("{now}  WARN the log begins here, until now: {fault}\n").as_bytes());
+                log
+            });
+            (self.log, self.tried) = (opened, Instant::now());
+        }
+        match &mut self.log {
+            Ok(log) => log.write(bytes),
+            // There is no other place to say that standard error is closed.
+            Err(_) => {
+                let _ = self.until.write_all(bytes);
+                Ok(bytes.len())
+            }
+        }
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        Ok(())
+    }
+}
+
 /// Size of a file, and whether its last line is incomplete.
 fn end_of(mut file: &File) -> io::Result<(u64, bool)> {
     let size = file.seek(SeekFrom::End(0))?;
@@ -352,6 +405,41 @@ mod tests {
         (4..100).for_each(write);
         let texts = folder.texts();
         assert!(texts.len() == 2 && texts.iter().all(|t| t.len() <= 5000), "{}", texts.len());
+    }
+
+    #[test]
+    fn a_log_whose_folder_is_made_later_begins_there() {
+        let folder = Folder::new("late");
+        let path = folder.0.join("later/a.log");
+        let shared: Arc<Mutex<Vec<u8>>> = Arc::default();
+        struct Until(Arc<Mutex<Vec<u8>>>);
+        impl Write for Until {
+            fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+                self.0.lock().expect("no panic").write(bytes)
+            }
+            fn flush(&mut self) -> io::Result<()> {
+                Ok(())
+            }
+        }
+        let open = || RotatingLog::open(&path, 5000, 2);
+        let late = |pause| LateLog::new(open, Until(shared.clone()), pause);
+        let (mut log, mut patient) = (late(Duration::ZERO), late(Duration::MAX));
+        assert!(log.fault().is_some_and(|fault| fault.contains("later/a.log: cannot be written")), "{:?}", log.fault());
+        (0..2).for_each(|n| log.write_all(line(n).as_bytes()).expect("never fails"));
+        fs::create_dir(folder.0.join("later")).expect("make the folder");
+        patient.write_all(line(2).as_bytes()).expect("never fails");
+        assert!(!path.exists(), "the pause between tries was not kept");
+        (3..5).for_each(|n| log.write_all(line(n).as_bytes()).expect("never fails"));
+        let until = String::from_utf8(shared.lock().expect("no panic").clone()).expect("text");
+        assert_eq!(until, line(0) + &line(1) + &line(2));
+        let text = fs::read_to_string(&path).expect("the log");
+        let (first, rest) = text.split_once('\n').expect("lines");
+        assert!(
+            first.contains("WARN the log begins here, until now: ") && first.contains("cannot be written"),
+            "{first}"
+        );
+        assert_eq!((rest, log.fault()), ((line(3) + &line(4)).as_str(), None));
+        assert!(is_log_file(&path));
     }
 
     #[test]

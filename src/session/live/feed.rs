@@ -1,6 +1,6 @@
 //! A live source on its own thread, and a bounded queue of what it reported. Frames that arrive in lines are assembled here, so that
-//! everything that follows has whole ones. If the queue is full, a source that can wait is kept
-//! waiting; a source that cannot wait loses frames, which are counted. The thread also records the frames.
+//! everything that follows has whole ones. If the queue is full, a source that can wait is kept waiting; a source that cannot wait loses frames,
+//! the oldest first, which are counted. The thread also records the frames.
 
 use crate::gpu::Wake;
 use crate::source::live::{Event, Live};
@@ -90,6 +90,23 @@ struct Queue {
     disconnected: Option<String>,
 }
 
+impl Queue {
+    /// Loses the oldest volume that is queued, if a newer one has come before `volume`: it would not be shown. False if there is none.
+    fn discard_before(&mut self, volume: u32, lost: &AtomicU64) -> bool {
+        let volume_of = |arrived: &Arrived| match &arrived.event {
+            Event::Frame(frame) => Some(frame.volume),
+            _ => None,
+        };
+        let oldest = self.events.iter().find_map(volume_of);
+        let Some(oldest) = oldest.filter(|oldest| oldest.saturating_add(1) < volume) else { return false };
+        let before = self.events.len();
+        self.events.retain(|arrived| volume_of(arrived) != Some(oldest));
+        self.bytes = self.events.iter().map(|arrived| bytes_of(&arrived.event)).sum();
+        lost.fetch_add((before - self.events.len()) as u64, Ordering::Relaxed);
+        true
+    }
+}
+
 fn bytes_of(event: &Event) -> usize {
     match event {
         Event::Frame(frame) => frame.bytes.len(),
@@ -114,7 +131,8 @@ impl Shared {
         }
     }
 
-    /// Adds an event. For a frame, waits until it fits, or loses it together with the rest of its volume. Other events are never lost.
+    /// Adds an event. For a frame, waits until it fits, or loses volumes that are over to the newest one, or it together with the rest of its
+    /// volume. Other events are never lost.
     fn put(&self, arrived: Arrived, can_wait: bool) {
         let bytes = bytes_of(&arrived.event);
         let mut queue = self.lock();
@@ -124,6 +142,7 @@ impl Shared {
                 queue = self.changed.wait_timeout(queue, PATIENCE).map_or_else(|e| e.into_inner().0, |w| w.0);
             }
             queue.newest = Some(frame.volume);
+            while !can_wait && is_full(&queue) && queue.discard_before(frame.volume, &self.lost) {}
             if is_full(&queue) {
                 queue.lost_volume = Some(frame.volume);
             }
@@ -442,6 +461,20 @@ mod tests {
         for pair in came.windows(2).filter(|w| w[0] + 1 != w[1]) {
             assert_eq!(pair[1] % 3, 0, "what follows a gap begins a volume: {came:?}");
         }
+    }
+
+    #[test]
+    fn a_full_queue_keeps_the_newest_volume() {
+        let source = FastSource { next: 0, frames: 30, bytes: MAX_BYTES / 8, waits: false };
+        let feed = Feed::new(Box::new(source), None).expect("thread");
+        let begun = Instant::now();
+        while !feed.shared.lock().events.back().is_some_and(|last| matches!(last.event, Event::End(_))) {
+            assert!(begun.elapsed() < Duration::from_secs(60), "the source does not end");
+            std::thread::sleep(Duration::from_millis(1));
+        }
+        let came = all(&feed, Duration::ZERO);
+        assert_eq!(came, (24..30).collect::<Vec<_>>());
+        assert_eq!(feed.counts().lost, 24);
     }
 
     #[test]

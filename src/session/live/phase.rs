@@ -12,8 +12,8 @@ pub(super) enum Phase {
     Idle,
     /// A picture is being drawn. Until it is done, steps continue the replay or take events.
     Drawing { picture: InFlight, replay: Option<Replay> },
-    /// Rolling volumes only: so many queued events are taken before the next picture begins. A picture after the first of them
-    /// would show an older state with every frame.
+    /// Rolling volumes, and sources that do not wait: so many queued events are taken before the next picture begins. A picture after the
+    /// first of them would show an older state with every frame or volume.
     Draining { events: usize, replay: Option<Replay> },
     /// As `Idle`, but a volume of the cine loop is being sent to the device, and events wait until that is done.
     Replaying(Replay),

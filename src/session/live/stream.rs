@@ -224,7 +224,9 @@ impl Stream {
     /// Waits for the picture in flight.
     fn finish_picture(&mut self, is_ending: bool) -> Result<Step, StreamError> {
         let Some(session) = &mut self.session else { return Ok(Step::Progress) };
-        let queued = if session.pool.is_rolling() && !is_ending { self.feed.waiting() } else { 0 };
+        // Of a source that does not wait, a newer volume may have come whole meanwhile: that one is to be shown next.
+        let drains = (session.pool.is_rolling() || !self.feed.can_wait()) && !is_ending;
+        let queued = if drains { self.feed.waiting() } else { 0 };
         let picture = session.finish(queued, &mut self.statistics)?;
         let is_coarse = self.draw_in_full()?;
         Ok(Step::Picture(FinishedPicture { is_coarse, ..picture }))

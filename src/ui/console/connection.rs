@@ -100,8 +100,12 @@ impl Connection {
             tracing::warn!("source: {why}");
         }
         self.source.ended(why, now);
-        let is_live = matches!(self.kind, SourceKind::Pipe | SourceKind::Probe);
-        self.ended = Some(now).filter(|_| is_live && self.is_over());
+        self.ended = Some(now).filter(|_| self.is_live() && self.is_over());
+    }
+
+    /// True for a probe or a pipe.
+    pub(super) fn is_live(&self) -> bool {
+        matches!(self.kind, SourceKind::Pipe | SourceKind::Probe)
     }
 
     /// What there is to say of it. `disconnected`: why it is not connected. `has_shown`: a volume was shown.

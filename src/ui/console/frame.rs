@@ -176,11 +176,19 @@ impl Console {
             return;
         }
         let acquisition_time = self.stream.acquisition_time();
+        let delay = self.measured.times().delay();
         // Without a picture or a frame they cannot fail; a fault here must not stop the view.
         if let Ok(statistics) = self.stream.take_statistics() {
             let is_active = self.measured.add(&statistics, acquisition_time, || self.stream.totals());
-            self.presentation.redraw_if(self.visible.times && is_active);
+            let is_other = delay.is_some() || self.measured.times().delay().is_some();
+            self.presentation.redraw_if(self.visible.times && is_active || self.connection.is_live() && is_other);
         }
+    }
+
+    /// True while frames come from a probe or a pipe, or are still to be shown.
+    pub(super) fn is_followed(&self) -> bool {
+        let comes = self.measured.times().frames > 0.0 || !self.stream.is_idle();
+        comes && self.connection.is_live() && self.stream.is_connected()
     }
 
     /// Writes the metrics if they are due.
@@ -207,6 +215,7 @@ impl Console {
         if !self.stream.is_idle() || self.presentation.waits() {
             return Some(now);
         }
+        let tells_delay = self.is_followed() && self.measured.times().delay().is_some();
         [
             self.quality.rests_at(now),
             self.replay.due(),
@@ -221,7 +230,7 @@ impl Console {
         .chain(self.presentation.due(now))
         .chain(self.connection.due(self.stream.is_frozen(), now))
         .chain(self.faults.due())
-        .chain(self.measured.due(self.visible.times))
+        .chain(self.measured.due(self.visible.times || tells_delay))
         .chain(self.notes.due())
         .min()
     }

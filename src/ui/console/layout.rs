@@ -32,6 +32,7 @@ impl Console {
             shows_only_origin: !self.fixed.overlay,
             leaving: self.leaving.question(),
             is_frozen: self.stream.is_frozen(),
+            is_live: self.is_followed(),
             ended: self.connection.ended_for(now),
             cine: self.replay.state(self.cine_loop(), self.stream.cine_position()),
             picture,

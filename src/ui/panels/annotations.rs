@@ -91,6 +91,7 @@ pub(super) fn paint(ui: &Ui, state: &PanelState, scale: f32, messages: &[Rect]) 
     taken.0.extend(messages);
     tiles().for_each(|(_, tile, area)| sides(&painter, &mut taken, area, tile, messages));
     state.origin.iter().for_each(|origin| name_origin(&painter, &mut taken, picture, origin));
+    state.delay().iter().for_each(|delay| tell_delay(&painter, &mut taken, picture, delay));
     // While it is bent, plane A has the line as it will be, not as the picture has it.
     let is_shown = state.controls.tool() == Tool::Region
         && !scene.unveils()
@@ -137,12 +138,21 @@ pub(super) fn paint(ui: &Ui, state: &PanelState, scale: f32, messages: &[Rect]) 
     }
 }
 
-/// Says what the picture is of, if that is no patient, where nothing else is drawn over it.
+/// Says what the picture is of, if that is no patient, and its delay, where nothing else is drawn over it.
 pub(super) fn paint_origin(ui: &Ui, state: &PanelState, scale: f32) {
-    let Some(origin) = state.origin else { return };
     let picture = picture_rect(state, scale);
     let painter = ui.ctx().layer_painter(egui::LayerId::background()).with_clip_rect(picture);
-    name_origin(&painter, &mut Taken::default(), picture, origin);
+    let mut taken = Taken::default();
+    state.origin.iter().for_each(|origin| name_origin(&painter, &mut taken, picture, origin));
+    let delay = state.delay().filter(|_| !state.shows_only_origin);
+    delay.iter().for_each(|delay| tell_delay(&painter, &mut taken, picture, delay));
+}
+
+/// Says how far the picture is behind what arrives, near its upper left corner: beside the letter there, or further down.
+fn tell_delay(painter: &Painter, taken: &mut Taken, picture: Rect, delay: &str) {
+    let lower = (0..20).map(|n| vec2(6.0, 26.0 + 10.0 * n as f32));
+    let places = [vec2(34.0, 6.0)].into_iter().chain(lower).map(|away| picture.left_top() + away);
+    text_at_one_of(painter, taken, places, Align2::LEFT_TOP, delay, WARNING);
 }
 
 /// Says what the picture is of, near its upper right corner.

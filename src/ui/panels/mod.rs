@@ -40,7 +40,7 @@ use crate::progress_lines::Progress;
 use crate::recordings::Named;
 use crate::scene::Scene;
 use crate::shown_picture::ShownPicture;
-use crate::texts::Unsaved;
+use crate::texts::{self, Unsaved};
 use crate::times::Times;
 pub use egui::accesskit;
 use egui::accesskit::{ActionRequest, TreeUpdate};
@@ -462,6 +462,8 @@ pub(super) struct PanelState<'a> {
     /// The name of the export in work, and how far it is.
     pub(super) exporting: Option<(&'a str, Option<Progress>)>,
     pub(super) is_frozen: bool,
+    /// Frames come from a probe or a pipe.
+    pub(super) is_live: bool,
     /// How long ago the probe or the pipe ended: nothing is live since.
     pub(super) ended: Option<Duration>,
     pub(super) cine: CineState,
@@ -475,6 +477,14 @@ pub(super) struct PanelState<'a> {
     pub(super) pointer: Option<[f64; 2]>,
     /// The pointer by keyboard, while it is on.
     pub(super) keyboard_pointer: Option<PointerMark>,
+}
+
+impl PanelState<'_> {
+    /// How far a live picture is behind what arrives, in words, if it is by more than a second.
+    fn delay(&self) -> Option<String> {
+        let is_live = self.is_live && !self.is_frozen && self.ended.is_none();
+        self.times.delay().filter(|_| is_live).map(|s| texts::behind(format!("{s:.1} s")))
+    }
 }
 
 /// A message that lasts.

@@ -149,8 +149,9 @@ fn in_words(state: &PanelState) -> (String, String) {
         (false, None) => texts::IS_LIVE,
         (false, Some(_)) => texts::HAS_ENDED,
     };
+    let delay = state.delay().map_or(String::new(), |delay| format!(", {delay}"));
     let origin = state.origin.map_or(String::new(), |origin| format!(", {origin}"));
-    let name = format!("{}{layout}{}, {time}{origin}", settings.mode.title(), view_in_words(scene));
+    let name = format!("{}{layout}{}, {time}{delay}{origin}", settings.mode.title(), view_in_words(scene));
     let volume = match (state.cine.count, state.cine.shown) {
         (count, Some(at)) => texts::volume_of_loop(at + 1, count),
         _ => String::new(),

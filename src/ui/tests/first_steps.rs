@@ -45,6 +45,48 @@ fn the_hints_stay_in_the_picture_and_are_closed() {
     assert!(!first_steps::has_room([300, 250], 1.0) && !first_steps::has_room([700, 500], 2.0));
 }
 
+/// Prevents live pictures that are seconds old without a word of it, and a word of it where nothing is live.
+#[test]
+fn a_live_picture_that_is_more_than_a_second_behind_says_so() {
+    let delays = |shown: &Shown| -> Vec<(String, Area)> {
+        texts_of(shown).into_iter().filter(|(text, _)| text.ends_with("behind")).collect()
+    };
+    let is_named = |shown: &Shown| {
+        let mut labels = shown.tree.values().filter(|node| node.role() == Role::Image).filter_map(|node| node.label());
+        labels.any(|label| label.contains(", live, 2.4 s behind, Demo data"))
+    };
+    for (toml, size) in
+        [("mode='surface'", SIZE), ("mode='surface'\nlayout='four'", SIZE), ("mode='plane'", [300, 250])]
+    {
+        let mut shown = Shown::sized(toml, size, 1.0);
+        (shown.is_live, shown.times.latency) = (true, Some(999.0));
+        shown.settle();
+        assert!(delays(&shown).is_empty() && !is_named(&shown), "{toml}: under a second");
+        shown.times.latency = Some(2410.0);
+        shown.settle();
+        let told = delays(&shown);
+        let [(text, at)] = &told[..] else { panic!("{toml}: {:?}", texts_of(&shown)) };
+        let ([x, y], [width, height]) = panels::picture_area(size, 1.0, true);
+        let [x, y, width, height] = [x, y, width, height].map(|n| n as f32);
+        assert_eq!(text, "2.4 s behind");
+        assert!(at[0] >= x && at[0] < x + 0.3 * width && at[2] <= x + width, "{toml}: {at:?}");
+        assert!(at[1] >= y && at[3] <= y + 0.5 * height && is_named(&shown), "{toml}: {at:?}");
+        shown.visible.panels = false;
+        shown.settle();
+        assert_eq!(delays(&shown).len(), 1, "{toml}: without panels");
+        shown.visible.panels = true;
+        let mut is_silent = |change: &dyn Fn(&mut Shown, bool), what: &str| {
+            change(&mut shown, true);
+            shown.settle();
+            assert!(delays(&shown).is_empty() && !is_named(&shown), "{toml}: {what}");
+            change(&mut shown, false);
+        };
+        is_silent(&|shown, is_on| shown.is_frozen = is_on, "frozen");
+        is_silent(&|shown, is_on| shown.is_live = !is_on, "a recording");
+        is_silent(&|shown, is_on| shown.ended = is_on.then_some(Duration::from_secs(3)), "ended");
+    }
+}
+
 /// Prevents pictures of the phantom without a word of it: without panels, and with no interface at all.
 #[test]
 fn demo_data_is_named_without_panels_too() {

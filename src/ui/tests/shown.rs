@@ -42,6 +42,7 @@ pub(super) struct Shown {
     /// The scene of the picture that is shown while another one is drawn; none: the present one's.
     pub(super) kept: Option<Scene>,
     pub(super) is_frozen: bool,
+    pub(super) is_live: bool,
     pub(super) ended: Option<Duration>,
     pub(super) cine: CineState,
     pub(super) banner: Option<Banner>,
@@ -93,6 +94,7 @@ impl Shown {
             has_drawn: true,
             kept: None,
             is_frozen: false,
+            is_live: false,
             ended: None,
             cine: CinePlayer::default().state(
                 Loop { cine: &Cine::default(), volumes: &(0..20).map(|_| CineVolume::default()).collect() },
@@ -177,6 +179,7 @@ impl Shown {
             exporting: Some(("Surface", Some(Progress { done: 12, of: 72 }))),
             presets: self.presets.as_ref().map(|(own, naming)| presets(own, naming.as_deref())),
             is_frozen: self.is_frozen,
+            is_live: self.is_live,
             ended: self.ended,
             cine: self.cine.clone(),
             quality: ("full", self.budget),

@@ -252,6 +252,9 @@ pub(crate) const WITH_THREE_PLANES: &str = " with three planes";
 pub(crate) const BESIDE_THE_VOLUME: &str = " beside the volume";
 pub(crate) const IS_FROZEN: &str = "frozen";
 pub(crate) const IS_LIVE: &str = "live";
+pub(crate) fn behind(time: impl Display) -> String {
+    format!("{time} behind")
+}
 pub(crate) const HAS_ENDED: &str = "the source has ended";
 pub(crate) fn volume_of_loop(number: impl Display, count: impl Display) -> String {
     format!("Volume {number} of {count}. ")

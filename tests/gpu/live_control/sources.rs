@@ -2,7 +2,55 @@
 
 use super::*;
 use crate::common::wait;
+use echolume::low_level::gpu::Wake;
 use echolume::low_level::probe::Geometry;
+use std::sync::Arc;
+use std::sync::atomic::AtomicU64;
+
+/// A source that waits for pictures, or does not.
+struct Paced(Fed, bool);
+
+impl Live for Paced {
+    fn next(&mut self, patience: Duration) -> Event {
+        self.0.next(patience)
+    }
+
+    fn can_wait(&self) -> bool {
+        self.1
+    }
+}
+
+/// Prevents a live picture that falls further behind with every slow one, and volumes of a recording that are never shown.
+#[test]
+fn after_a_slow_picture_a_live_source_shows_its_newest_volume_and_a_recording_each() {
+    let device = Device::alone();
+    for (waits, shown, dropped) in [(false, vec![0, 6], 5), (true, (0..=6).collect::<Vec<_>>(), 0)] {
+        let (say, said) = channel();
+        let count = Arc::new(AtomicU64::new(0));
+        let counted = count.clone();
+        let wake: Wake = Arc::new(move || _ = counted.fetch_add(1, Ordering::Relaxed));
+        let source = Box::new(Paced(Fed { said, is_recording: false }, waits));
+        let feed = Feed::waking(source, None, Some(wake)).expect("thread");
+        let stream = Stream::new(&device, feed, settings("mode = 'mip'"), kept(Update::Whole));
+        let mut bench = Bench { stream, say, faults: Vec::new() };
+        bench.begin(header(0.3));
+        bench.frames(speckled(0));
+        let begun = Instant::now();
+        while !bench.stream.is_drawing() {
+            assert!(begun.elapsed() < BOUND, "no picture begins");
+            bench.stream.step(Duration::from_millis(1)).expect("step");
+        }
+        // All of this comes while the first picture is drawn.
+        (1..=6).for_each(|number| bench.frames(speckled(number)));
+        wait::until("the frames", || (count.load(Ordering::Relaxed) == 1 + 7 * 9).then_some(()));
+        let is_done = |stream: &mut Stream| !stream.renderer().expect("begun").is_drawing().expect("drawing");
+        wait::until("the picture", || is_done(&mut bench.stream).then_some(()));
+        let pictures = bench.settle();
+        assert_eq!(pictures.iter().map(|picture| picture.volume).collect::<Vec<_>>(), shown, "waits: {waits}");
+        assert_eq!(bench.stream.statistics().expect("statistics").volumes.dropped, dropped, "waits: {waits}");
+        assert!(pictures.last().and_then(|last| last.picture.as_ref()) == Some(&of(&device, "mode = 'mip'", 6)));
+    }
+}
 
 /// Frames of another probe.
 fn other() -> (Header, Vec<Frame>) {
