@@ -6,6 +6,7 @@ use super::colours::{
     WEAK_TEXT, WHOLE_BAR,
 };
 use super::names::{self, Tell};
+use super::widgets::{BETWEEN_MESSAGES, MESSAGE_EDGES, message_frame};
 use super::{LARGE_TEXT, Note, PanelState, SMALL_TEXT, TEXT_SIZE, TOUCH_SIZE, picture_rect};
 use crate::command::{self, Command};
 use crate::sliders::SLIDERS;
@@ -24,11 +25,8 @@ const MESSAGE_TEXT: [f32; 2] = [LARGE_TEXT, TEXT_SIZE];
 const SMALL_MESSAGE_TEXT: [f32; 2] = [TEXT_SIZE, SMALL_TEXT];
 /// A picture with less room has small messages, points.
 const MIN_FOR_LARGE_MESSAGES: [f32; 2] = [340.0, 260.0];
-/// Frame and margins of a message, together on two sides; and what is between messages.
+/// Frame and margins of a message, together on two sides.
 const MESSAGE_FRAME: [f32; 2] = [36.0, 24.0];
-pub(super) const BETWEEN_MESSAGES: f32 = 8.0;
-/// Between messages and the upper and the lower edge of the picture.
-pub(super) const MESSAGE_EDGES: [f32; 2] = [12.0, 14.0];
 
 /// A message whose text is laid out.
 struct Message {
@@ -220,10 +218,6 @@ fn place(size: Vec2, free: Rect, from: Align2, marks: &[Vec<Rect>; 2], others: &
         }
     }
     best
-}
-
-pub(super) fn message_frame(edge: Color32) -> Frame {
-    Frame::new().fill(MESSAGE).inner_margin(Margin::symmetric(16, 10)).corner_radius(8).stroke(Stroke::new(2.0, edge))
 }
 
 const WIDTH: f32 = 316.0;

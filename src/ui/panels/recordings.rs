@@ -2,7 +2,7 @@
 
 use super::colours::{ACCENT, BAR, EDGE, TEXT, WHOLE_BAR};
 use super::names::{self, Tell};
-use super::overlays::{BETWEEN_MESSAGES, MESSAGE_EDGES, message_frame};
+use super::widgets::{BETWEEN_MESSAGES, MESSAGE_EDGES, message_frame};
 use super::{PanelState, SMALL_TEXT, TEXT_SIZE, TOUCH_SIZE, heading, picture_rect};
 use crate::command::Command;
 use crate::texts;

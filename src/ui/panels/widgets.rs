@@ -1,6 +1,6 @@
-//! What controls are made of: the sliders of settings, those of other lengths, and switches.
+//! What controls are made of: the sliders of settings, those of other lengths, switches, and the frame of messages.
 
-use super::colours::{ACCENT, BUTTON, ON_SELECTED, SELECTED, TEXT, WEAK_TEXT};
+use super::colours::{ACCENT, BUTTON, MESSAGE, ON_SELECTED, SELECTED, TEXT, WEAK_TEXT};
 use super::names::{self, Tell};
 use super::{PanelState, TEXT_SIZE, TOUCH_SIZE};
 use crate::command::Command;
@@ -9,9 +9,19 @@ use crate::sliders::SLIDERS;
 use crate::texts;
 use egui::accesskit::Role;
 use egui::{
-    Align, FontId, PointerButton, Rect, RichText, Sense, Slider, Stroke, StrokeKind, Ui, WidgetInfo, WidgetType, pos2,
-    vec2,
+    Align, Color32, FontId, Frame, Margin, PointerButton, Rect, RichText, Sense, Slider, Stroke, StrokeKind, Ui,
+    WidgetInfo, WidgetType, pos2, vec2,
 };
+
+/// Between messages, points.
+pub(super) const BETWEEN_MESSAGES: f32 = 8.0;
+/// Between messages and the upper and the lower edge of the picture.
+pub(super) const MESSAGE_EDGES: [f32; 2] = [12.0, 14.0];
+
+/// The frame of a message with an edge of this colour.
+pub(super) fn message_frame(edge: Color32) -> Frame {
+    Frame::new().fill(MESSAGE).inner_margin(Margin::symmetric(16, 10)).corner_radius(8).stroke(Stroke::new(2.0, edge))
+}
 
 /// The index of the first slider of these keys that the mode has.
 pub(super) fn front(keys: &[&str], settings: &Settings) -> Option<usize> {
