@@ -75,12 +75,12 @@ pub const FORMATS: &[Format] = &[
     format(texts::TURNTABLE_PICTURES, "turntable", Work::Turntable, texts::TURNTABLE_PICTURES_HINT),
     #[cfg(feature = "video")]
     format(texts::TURNTABLE_FILM, "mp4", Work::Turntable, texts::TURNTABLE_FILM_HINT),
-    format(texts::PICTURE_1000, "png", Work::Picture(1000), texts::PICTURE_HINT),
-    format(texts::PICTURE_2000, "png", Work::Picture(2000), texts::PICTURE_HINT),
-    format(texts::PICTURE_4000, "png", Work::Picture(4000), texts::PICTURE_HINT),
     format(texts::LOOP_PICTURES, "loop", Work::Loop, texts::LOOP_PICTURES_HINT),
     #[cfg(feature = "video")]
     format(texts::LOOP_FILM, "mp4", Work::Loop, texts::LOOP_FILM_HINT),
+    format(texts::PICTURE_1000, "png", Work::Picture(1000), texts::PICTURE_HINT),
+    format(texts::PICTURE_2000, "png", Work::Picture(2000), texts::PICTURE_HINT),
+    format(texts::PICTURE_4000, "png", Work::Picture(4000), texts::PICTURE_HINT),
 ];
 
 /// An export in work.
