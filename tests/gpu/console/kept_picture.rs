@@ -5,11 +5,12 @@ use echolume::low_level::measure::outcome;
 use echolume::low_level::scene::{MeasureKind, Mode};
 use echolume::low_level::ui::panels::accesskit::Role;
 
-/// What a screen reader is told of the picture: the panels describe what their marks are drawn of.
+/// What a screen reader is told of the picture: the panels describe what their marks are drawn of. Without the delay, which other programs cause, too.
 fn words(desk: &mut Desk) -> Option<String> {
     let tree = desk.console.take_tree()?;
     let node = tree.nodes.into_iter().find(|(_, node)| node.role() == Role::Image)?.1;
-    node.label().map(str::to_string)
+    let parts = node.label()?.split(", ").filter(|part| !part.ends_with(" behind"));
+    Some(parts.collect::<Vec<_>>().join(", "))
 }
 
 /// The words of a layout from now on.
