@@ -116,6 +116,11 @@ pub const SCENES: &[Stated] = &[
     sweep("rkl1", &["slices.perona_malik={ scheme = 'rkl1', step = 5.0, repeat = 1 }"], &["rkl1_slice"]),
     sweep("adaptive detector", &["surface.detector=adaptive"], &["raycast_surface"]),
     sweep("lasting detector", &["surface.detector=lasting"], &["raycast_surface"]),
+    sweep(
+        "consistent detector",
+        &["surface.detector=consistent"],
+        &["raycast_candidates", "surface_paths", "choose_surface"],
+    ),
     sweep("exact sampling", &["ray.sampling=exact"], &["raycast_surface"]),
     sweep("quads", &["ray.sampling=quads"], &["packed_neighbours", "raycast_surface"]),
     sweep("hardware sampling", &["ray.sampling=hardware"], &["raycast_surface"]),
