@@ -90,6 +90,8 @@ pub(super) struct CineState {
     pub(super) goes_back_and_forth: bool,
     /// Time of the shown volume after the first of the loop, s.
     pub(super) seconds: Option<f64>,
+    /// The same of the last volume.
+    pub(super) length: Option<f64>,
     /// Volumes a second as they were acquired, of the part that is played.
     pub(super) rate: Option<f64>,
 }
@@ -172,6 +174,7 @@ impl CinePlayer {
             speed: of.cine.speed,
             goes_back_and_forth: of.cine.back_and_forth,
             seconds: shown.and_then(since).filter(|s| s.is_finite() && *s >= 0.0),
+            length: volumes.len().checked_sub(1).and_then(since).filter(|s| s.is_finite() && *s >= 0.0),
             rate: of.rate(),
         }
     }

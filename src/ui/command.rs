@@ -17,6 +17,8 @@ use Key::{Char, Function};
 pub enum Command {
     Mode(Mode),
     Layout(Layout),
+    /// Shows the rendering alone, in the mode that was rendered last.
+    Rendering,
     /// Selects what a drag on the picture does.
     Tool(Tool),
     /// Rotates the camera, degrees: azimuth (towards +lateral), elevation (towards +elevation).
@@ -57,6 +59,8 @@ pub enum Command {
     RotatePlanes([f64; 2]),
     /// Sets a slider, by its index in [`super::sliders::SLIDERS`], to a value.
     SetSlider(usize, f64),
+    /// Sets a slider to a value in the unit that it shows.
+    SetShown(usize, f64),
     /// Sets a slider to the value of the start.
     ResetSlider(usize),
     /// Moves a slider by a number of its steps.
@@ -185,6 +189,8 @@ pub enum Command {
     PlayCine,
     /// The cine loop begins with the volume that is shown; `true`: it ends with it.
     MarkCine(bool),
+    /// The cine loop begins with the volume at this index; `true`: it ends with it.
+    TrimCine(usize, bool),
     /// The cine loop is all volumes again.
     WholeCine,
     /// Plays the cine loop so many steps faster.
@@ -197,8 +203,12 @@ pub enum Command {
     ToggleHelp,
     /// Closes the hints of the first start.
     CloseHints,
-    /// Starts a search of the help.
-    SearchHelp,
+    /// Shows or hides the search of all commands and controls.
+    Find,
+    /// Shows the slider with this index of [`super::sliders::SLIDERS`] in the inspector, and gives it the keyboard.
+    ShowControl(usize),
+    /// Begins to type the value of the slider with this index.
+    TypeValue(usize),
     /// Saves pictures with a bar, or without.
     SavesBar(bool),
     /// Shows or hides the times of the passes.
@@ -207,11 +217,11 @@ pub enum Command {
     TogglePanels,
     /// Gives the keyboard to the panels, or back to the picture.
     FocusPanels,
-    /// Shows modes and tools, or the controls, in a window without a column.
-    RailTab(RailTab),
-    /// Shows the other of both; where they are in a drawer, opens, turns or closes it.
-    SwitchRail,
-    /// Opens or closes the drawer of a small window.
+    /// Shows this part of the inspector.
+    InspectorTab(InspectorTab),
+    /// Shows the next part of the inspector; where that is a drawer, opens it first and closes it after the last part.
+    NextTab,
+    /// Opens or closes the inspector of a window that has no room for it beside the picture.
     ToggleDrawer,
     /// Turns the pointer by keyboard on or off.
     KeyboardPointer,
@@ -250,12 +260,16 @@ pub enum Tool {
     Measure(MeasureKind),
 }
 
-/// What the rail on the left shows in a window that has no column of controls.
+/// The parts of the inspector.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum RailTab {
-    #[default]
+pub enum InspectorTab {
+    /// Tools and views, in a window that has no room for them at its edges.
     Tools,
-    Controls,
+    #[default]
+    Look,
+    Planes,
+    Measure,
+    Marks,
 }
 
 impl Command {
@@ -464,9 +478,11 @@ pub const KEY_BINDINGS: &[Binding] = &[
     // The screen.
     on(Char('h'), keys::THIS_HELP, Command::ToggleHelp),
     on(Function(1), keys::THIS_HELP, Command::ToggleHelp),
+    on(Char('/'), keys::FIND, Command::Find),
+    control(Char('k'), keys::FIND, Command::Find),
     on(Function(2), keys::TIMES_OF_THE_PASSES, Command::ToggleTimes),
     on(Function(3), keys::SLIDERS, Command::TogglePanels),
-    shift(Function(3), keys::SWITCH_RAIL, Command::SwitchRail),
+    shift(Function(3), keys::NEXT_TAB, Command::NextTab),
     control(Key::Tab, keys::FOCUS_PANELS, Command::FocusPanels),
     shift(Char('m'), keys::KEYBOARD_POINTER, Command::KeyboardPointer),
     on(Function(11), keys::FULL_SCREEN, Command::ToggleFullScreen),
@@ -496,7 +512,7 @@ pub(super) fn help() -> impl Iterator<Item = (String, &'static str)> {
     })
 }
 
-fn key_label(binding: &Binding) -> String {
+pub(super) fn key_label(binding: &Binding) -> String {
     let Modifiers { shift, control, alt } = binding.modifiers;
     let held = [(control, keys::CTRL), (alt, keys::ALT), (shift, keys::SHIFT)];
     let held: String = held.iter().filter(|(is_held, _)| *is_held).map(|(_, name)| *name).collect();

@@ -26,6 +26,7 @@ mod gestures;
 pub mod input;
 mod keyboard_pointer;
 mod open_list;
+mod palette;
 pub mod panels;
 mod picking;
 pub mod recordings;

@@ -35,6 +35,27 @@ pub static SLIDERS: LazyLock<Vec<Slider>> = LazyLock::new(|| {
     all
 });
 
+/// Sliders of echoes: they are shown in the unit of the samples, and stored as a share of their range.
+const OF_ECHOES: [&str; 6] =
+    ["threshold", "window.low", "window.high", "planes.window.low", "planes.window.high", "cap.level"];
+
+/// The limits of the samples in the unit that a slider of echoes shows; 0 to 1 for other sliders.
+fn unit_of(slider: &Slider, scene: &Scene) -> [f64; 2] {
+    if OF_ECHOES.contains(&slider.key) { scene.input.range } else { [0.0, 1.0] }
+}
+
+/// A value of a slider as it is shown.
+pub(super) fn to_shown(slider: &Slider, scene: &Scene, value: f64) -> f64 {
+    let [low, high] = unit_of(slider, scene);
+    low + value * (high - low)
+}
+
+/// A value as it is shown, as the slider takes it.
+pub(super) fn from_shown(slider: &Slider, scene: &Scene, shown: f64) -> f64 {
+    let [low, high] = unit_of(slider, scene);
+    if high > low { (shown - low) / (high - low) } else { shown }
+}
+
 /// Sliders of no single setting, each with the one that they stand in front of.
 const OF_SEVERAL: [(&str, &[Slider]); 5] = [
     (

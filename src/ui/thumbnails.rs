@@ -1,5 +1,5 @@
-//! Small pictures of the present volume, one for each preset of the list, made beside the view by a renderer of their own. They are made of a
-//! coarse copy of the volume, and each one waits for the view to rest. Without the list there is neither copy nor renderer.
+//! Small pictures of volumes, one for each preset or for each volume of the loop, made beside the view by a renderer of their own. They are made of a
+//! coarse copy of the volume, and each one waits for the view to rest. While none is made there is neither copy nor renderer.
 
 use crate::gpu::{Context, Renderer, RendererOptions, Wake};
 use crate::picture::Picture;
@@ -7,8 +7,8 @@ use crate::probe::Geometry;
 use crate::scene::{
     Bilateral, Conditioning, Distance, Input, Layout, LightVolume, Marks, Post, Ray, Scene, Settings, Slices,
 };
-use crate::source::Frame;
 use crate::source::coarse::coarse;
+use crate::source::{Frame, StoredType};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{Receiver, Sender, TryRecvError, channel};
@@ -30,11 +30,16 @@ const POLL: Duration = Duration::from_millis(10);
 /// What pictures are made of.
 pub(super) struct Job {
     pub(super) context: Arc<Context>,
-    pub(super) geometry: Geometry,
     pub(super) input: Input,
-    pub(super) frames: Vec<Arc<Frame>>,
     /// One for each picture; none where there is nothing to draw.
-    pub(super) settings: Vec<Option<Settings>>,
+    pub(super) pictures: Vec<Option<Wanted>>,
+}
+
+/// What one picture is made of.
+pub(super) struct Wanted {
+    pub(super) geometry: Geometry,
+    pub(super) frames: Vec<Arc<Frame>>,
+    pub(super) settings: Settings,
 }
 
 /// The pictures, and the thread that makes them.
@@ -77,7 +82,9 @@ impl Thumbnails {
     /// Begins to make pictures in place of those that are being made.
     pub(super) fn begin(&mut self, job: Job) {
         self.stop();
-        self.pictures.resize(job.settings.len(), None);
+        self.pictures.resize(job.pictures.len(), None);
+        let nothing = job.pictures.iter().zip(&mut self.pictures).filter(|(wanted, _)| wanted.is_none());
+        nothing.for_each(|(_, picture)| *picture = None);
         let (sender, made) = channel();
         let orders = Arc::new(Orders::default());
         let (heard, wake) = (orders.clone(), self.wake.clone());
@@ -86,6 +93,12 @@ impl Thumbnails {
             Ok(thread) => self.work = Some(Work { made, orders, thread }),
             Err(e) => tracing::debug!("no thumbnails are made: {e}"),
         }
+    }
+
+    /// The same, where a picture that the job has none for stays as it is in `kept`.
+    pub(super) fn begin_with(&mut self, job: Job, kept: Vec<Option<Arc<Picture>>>) {
+        self.begin(job);
+        self.pictures = kept;
     }
 
     /// Takes what was made. `may_draw`: the view rests. True if there is another picture.
@@ -142,13 +155,8 @@ impl Drop for Thumbnails {
 
 impl Job {
     fn draw(self, orders: &Orders, made: &Sender<(usize, Option<Picture>)>, wake: &Wake) {
-        let Some((geometry, frames)) = coarse(&self.geometry, self.input.stored, &self.frames) else {
-            // Pictures of an earlier volume are not to stay.
-            (0..self.settings.len()).for_each(|n| drop(made.send((n, None))));
-            return wake();
-        };
-        let mut renderer = None;
-        for (n, settings) in self.settings.iter().enumerate() {
+        let (mut renderer, mut copy) = (None, None);
+        for (n, wanted) in self.pictures.iter().enumerate() {
             let since = Instant::now();
             while !orders.may_draw.load(Ordering::Relaxed) && since.elapsed() < PATIENCE {
                 if orders.must_stop.load(Ordering::Relaxed) {
@@ -159,13 +167,32 @@ impl Job {
             if orders.must_stop.load(Ordering::Relaxed) {
                 return;
             }
-            let scene = settings.as_ref().and_then(|s| Scene::new(geometry.clone(), self.input, thumbnail(s)).ok());
-            let picture = scene.and_then(|scene| drawn(&self.context, &mut renderer, scene, &frames, orders));
+            let Some(wanted) = wanted else { continue };
+            let picture = wanted.coarse(self.input.stored, &mut copy).and_then(|(geometry, frames)| {
+                let scene = Scene::new(geometry.clone(), self.input, thumbnail(&wanted.settings)).ok()?;
+                drawn(&self.context, &mut renderer, scene, frames, orders)
+            });
+            // A picture of an earlier volume is not to stay.
             if made.send((n, picture)).is_err() {
                 return;
             }
             wake();
         }
+    }
+}
+
+/// A coarse copy, and the first of the frames that it was made of.
+type Copy = (Arc<Frame>, Geometry, Vec<Frame>);
+
+impl Wanted {
+    /// A coarse copy of the volume: the one before if it is of the same frames.
+    fn coarse<'a>(&self, stored: StoredType, copy: &'a mut Option<Copy>) -> Option<(&'a Geometry, &'a [Frame])> {
+        let first = self.frames.first()?;
+        if copy.as_ref().is_none_or(|(of, ..)| !Arc::ptr_eq(of, first)) {
+            *copy = coarse(&self.geometry, stored, &self.frames)
+                .map(|(geometry, frames)| (first.clone(), geometry, frames));
+        }
+        copy.as_ref().map(|(_, geometry, frames)| (geometry, frames.as_slice()))
     }
 }
 
@@ -241,7 +268,6 @@ mod tests {
     use super::*;
     use crate::probe::Geometry;
     use crate::scene::load::{Layers, PRESETS};
-    use crate::source::StoredType;
     use crate::source::phantom::{Phantom, PhantomOptions};
 
     /// Prevents a preset whose thumbnail is refused, or as large as the picture itself.

@@ -296,7 +296,7 @@ impl TileMarks {
 
 impl Mode {
     /// The name of the mode for the user.
-    pub fn title(self) -> &'static str {
+    pub const fn title(self) -> &'static str {
         match self {
             Mode::Volume => "Volume",
             Mode::Surface => "Surface",

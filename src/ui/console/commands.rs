@@ -29,7 +29,12 @@ impl Console {
             self.controls.seal();
         }
         self.note_what_is_measured_on(command);
-        match self.controls.apply(command, self.stream.scene()) {
+        let tool = self.controls.tool();
+        let change = self.controls.apply(command, self.stream.scene());
+        if self.controls.tool() != tool {
+            self.visible.inspector.follow(self.controls.tool());
+        }
+        match change {
             Change::Nothing => return,
             Change::Tool => self.survey.end_distance(),
             Change::Marks => self.activity.changes(now),
@@ -87,12 +92,9 @@ impl Console {
                 self.replay.toggle(loop_of(&self.controls, &self.stream), now);
             }
             Command::MarkCine(end) => {
-                let at = self.stream.cine_position().unwrap_or(count.saturating_sub(1));
-                let volume = self.stream.cine().volumes().get(at).map(|kept| kept.volume);
-                if volume.is_some_and(|volume| self.controls.mark_cine(volume, end) == Change::Marks) {
-                    self.activity.changes(now);
-                }
+                self.mark_cine(self.stream.cine_position().unwrap_or(count.saturating_sub(1)), end, now);
             }
+            Command::TrimCine(index, end) => self.mark_cine(index, end, now),
             Command::SavePicture => self.save_picture(),
             Command::SaveLoop => _ = self.save_loop(),
             Command::TogglePanels => {
@@ -134,7 +136,24 @@ impl Console {
             Command::Exit if self.asks_before_leaving() => {}
             Command::Exit | Command::Discard => self.request.exit |= !self.fixed.is_kiosk,
             Command::SaveAndExit => self.save_and_leave(),
-            _ => _ = self.visible.apply(command, self.room().has_drawer),
+            Command::ShowControl(_) => {
+                self.visible.panels = self.fixed.overlay;
+                self.resize_picture();
+                let room = self.room();
+                self.visible.apply(command, &room);
+            }
+            _ => {
+                let room = self.room();
+                self.visible.apply(command, &room);
+            }
+        }
+    }
+
+    /// The loop begins or ends with the volume at this index.
+    fn mark_cine(&mut self, index: usize, end: bool, now: Instant) {
+        let volume = self.stream.cine().volumes().get(index).map(|kept| kept.volume);
+        if volume.is_some_and(|volume| self.controls.mark_cine(volume, end) == Change::Marks) {
+            self.activity.changes(now);
         }
     }
 
@@ -191,6 +210,7 @@ impl Console {
 
     /// Closes the uppermost of what is open; else leaves full screen; else leaves the program.
     fn go_back(&mut self) {
+        let room = self.room();
         let is_closed = self.leaving.dismiss()
             || self.opening.stop_typing()
             || self.opening.close_list()
@@ -199,7 +219,7 @@ impl Console {
             || self.visible.close_help()
             || self.cancel_reading()
             || self.visible.close_times()
-            || self.visible.close_drawer(self.room().has_drawer);
+            || self.visible.close_drawer(&room);
         if is_closed {
             return;
         }

@@ -26,15 +26,15 @@ impl Console {
             self.request.exit = true;
         }
         self.hands.see(input);
-        let is_search = self.key_of_search(input);
-        let is_of_panels = self.key_of_panels(input);
-        let is_taken = is_of_panels || (!is_search && self.key_of_pointer(input, now));
-        let typed = if is_taken { Some(Vec::new()) } else { self.typed(input) };
+        let typed = self.key_of_search(input).or_else(|| {
+            let is_taken = self.key_of_panels(input) || self.key_of_pointer(input, now);
+            if is_taken { Some(Vec::new()) } else { self.typed(input) }
+        });
         if typed.is_some() {
             // The keys go on to be held, and give nothing else.
             self.hands.key(input);
             typed.iter().flatten().for_each(|command| self.execute(command, now));
-        } else if let Some(command) = self.hands.key(input).filter(|_| !is_search) {
+        } else if let Some(command) = self.hands.key(input) {
             let command = if self.leaving.asks() { answer(input) } else { Some(command) };
             command.iter().for_each(|command| self.execute(command, now));
         }
@@ -115,10 +115,10 @@ impl Console {
         self.presentation.redraw();
     }
 
-    /// Takes a key for the search of the help. True if it is none of the view's own.
-    fn key_of_search(&mut self, input: &Input) -> bool {
-        let Input::Key { key, pressed: true } = *input else { return false };
-        !self.leaving.asks() && self.visible.search(key, self.hands.modifiers())
+    /// Takes a key for the search, or for a number that is typed: what it does, or none if it is another one's key.
+    fn key_of_search(&mut self, input: &Input) -> Option<Vec<Command>> {
+        let Input::Key { key, pressed: true } = *input else { return None };
+        if self.leaving.asks() { None } else { self.visible.key(key, self.hands.modifiers()) }
     }
 
     /// Takes a key for the control that has the keyboard. True if it is none of the view's own.

@@ -14,6 +14,7 @@ impl Console {
         let notes: Vec<_> = self.export_note().into_iter().chain(self.notes.shown()).collect();
         let recordings = self.opening.named();
         let exit_key = self.fixed.exit.as_ref().filter(|_| self.fixed.is_kiosk).map(ToString::to_string);
+        let loop_pictures = self.reel.pictures(self.stream.cine().volumes());
         let room = self.room();
         let state = PanelState {
             shows_first_steps,
@@ -28,6 +29,8 @@ impl Console {
             is_turning: self.turntable.is_on(),
             exporting: self.exporter.exporting().map(|name| (name, self.exporter.progress())),
             presets: self.presets.shown(),
+            looks: self.presets.tiles(),
+            loop_pictures: &loop_pictures,
             origin: self.origin(),
             shows_only_origin: !self.fixed.overlay,
             leaving: self.leaving.question(),
@@ -56,7 +59,7 @@ impl Console {
     fn shows_first_steps(&mut self, is_free: bool) -> bool {
         let room = self.room();
         let is_seen = self.fixed.overlay && self.visible.panels && !self.fixed.is_kiosk;
-        let is_open = self.visible.is_any_open(room.has_drawer)
+        let is_open = self.visible.is_any_open(&room)
             || self.leaving.asks()
             || self.opening.is_shown()
             || self.presets.is_shown();

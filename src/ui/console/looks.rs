@@ -1,13 +1,14 @@
 //! Presets in the console: taking one, keeping the present look, and the pictures of the list.
 
 use super::Console;
-use crate::command::Command;
+use crate::command::{Command, InspectorTab};
 use crate::controls::Change;
+use crate::live::cine::CineVolume;
 use crate::picture::Picture;
 use crate::scene::{Scene, Settings};
 use crate::source::live::SourceKind;
 use crate::texts;
-use crate::thumbnails::Job;
+use crate::thumbnails::{Job, Wanted};
 use std::sync::Arc;
 use std::time::Instant;
 
@@ -84,28 +85,37 @@ impl Console {
         }
     }
 
-    /// While the list is shown, makes thumbnails of the present volume, and makes them again when volume or view change much.
+    /// Makes small pictures of the present volume in each look, and again when volume or view change much; and of the volumes of the loop.
     pub(super) fn poll_thumbnails(&mut self, now: Instant) {
-        let has_new = self.presets.poll(self.activity.acted(), self.stream.is_drawing(), now);
+        let (acted, is_drawing) = (self.activity.acted(), self.stream.is_drawing());
+        let has_new = self.presets.poll(acted, is_drawing, now) | self.reel.poll(acted, is_drawing, now);
         self.presentation.redraw_if(has_new);
+        let in_panels = self.fixed.small_pictures && self.visible.panels && self.start.is_over();
+        let rests = self.stream.is_frozen() || !self.is_followed();
         let volumes = self.stream.cine().volumes();
         let shown = self.stream.cine_position().and_then(|at| volumes.get(at)).or(volumes.back());
         let (Some(shown), Some(scene), Some(header)) = (shown, self.stream.scene(), self.stream.header()) else {
             return;
         };
-        let (volume, settings) = (shown.volume, self.controls.settings());
-        if !self.presets.wants_thumbnails(volume, settings, self.stream.is_frozen(), now) {
-            return;
-        }
-        let is_backward = shown.frames.first().is_some_and(|frame| frame.backward);
-        let geometry = if is_backward { header.backward.clone() } else { header.forward.clone() };
-        let job = Job {
-            context: self.context.clone(),
-            geometry,
-            input: scene.input,
-            frames: shown.frames.clone(),
-            settings: (0..self.presets.count()).map(|n| self.with_preset(n, scene).ok()).collect(),
+        let settings = self.controls.settings();
+        let wanted = |of: &CineVolume, settings: Settings| {
+            let is_backward = of.frames.first().is_some_and(|frame| frame.backward);
+            let geometry = if is_backward { header.backward.clone() } else { header.forward.clone() };
+            Wanted { geometry, frames: of.frames.clone(), settings }
         };
-        self.presets.make_thumbnails(job, volume, settings, now);
+        let job = |pictures| Job { context: self.context.clone(), input: scene.input, pictures };
+        let of_inspector = in_panels && self.visible.inspector.tab(&self.room()) == InspectorTab::Look;
+        let volume = shown.volume;
+        if self.presets.wants_thumbnails((volume, settings), (of_inspector, rests), acted, now) {
+            let looks = (0..self.presets.count()).map(|n| Some(wanted(shown, self.with_preset(n, scene).ok()?)));
+            let job = job(looks.collect());
+            return self.presets.make_thumbnails(job, volume, settings, now);
+        }
+        if in_panels && rests && self.reel.wants(volumes, settings, acted, now) {
+            let missing = self.reel.missing(volumes, settings);
+            let of_loop = volumes.iter().zip(missing);
+            let job = job(of_loop.map(|(of, is_missing)| is_missing.then(|| wanted(of, settings.clone()))).collect());
+            self.reel.make(job, volumes, settings);
+        }
     }
 }

@@ -22,6 +22,7 @@ mod options;
 mod presentation;
 mod presets;
 mod quality;
+mod reel;
 mod render_start;
 mod replay;
 mod saving;
@@ -44,6 +45,7 @@ pub use self::options::{ConsoleOptions, OpenFile, Opened, OpeningOptions, Startu
 use self::presentation::Presentation;
 use self::presets::Presets;
 use self::quality::PictureQuality;
+use self::reel::Reel;
 use self::render_start::RenderStart;
 use self::replay::Replay;
 use self::start::Start;
@@ -106,6 +108,7 @@ pub struct Console {
     exporter: Exporter,
     opening: Opening,
     presets: Presets,
+    reel: Reel,
     replay: Replay,
     survey: Survey,
     turntable: Turntable,
@@ -126,6 +129,8 @@ struct Fixed {
     /// What a workspace keeps of the source.
     origin: Option<Origin>,
     plays_once: bool,
+    /// Panels have small pictures of looks and volumes.
+    small_pictures: bool,
     /// Most volumes of the cine loop.
     cine_volumes: usize,
     /// The settings are those with which the recording was left.
@@ -194,7 +199,8 @@ impl Console {
             leaving: Leaving::new(options.source, is_recorded),
             exporter: Exporter::new(options.folder, wake.clone()),
             opening: Opening::new(options.opening, wake.clone()),
-            presets: Presets::new(options.presets, wake.clone()),
+            presets: Presets::new(options.presets, options.small_pictures, wake.clone()),
+            reel: Reel::new(wake.clone()),
             replay: Replay::new(frozen),
             survey: Survey::new(wake),
             turntable: Turntable::default(),
@@ -209,6 +215,7 @@ impl Console {
                 is_kiosk: options.is_kiosk,
                 origin: options.origin,
                 plays_once: options.plays_once,
+                small_pictures: options.small_pictures,
                 cine_volumes,
                 is_kept,
                 follows_another: display.is_some(),
@@ -248,6 +255,7 @@ impl Console {
     pub fn revive(&mut self, context: &Arc<Context>, screen: Option<Screen>) -> Result<(), StreamError> {
         self.presentation.screen = None;
         self.presets.device_lost();
+        self.reel.forget();
         self.context = context.clone();
         let revived = self.stream.revive(context);
         self.set_screen(screen);

@@ -59,6 +59,8 @@ pub struct ConsoleOptions {
     pub startup_fault: Option<StartupFault>,
     /// Compiles the pipelines of every mode, layout and preset in advance while the user rests.
     pub warms: bool,
+    /// While the user rests, makes small pictures of looks and of the volumes of the loop for the panels.
+    pub small_pictures: bool,
 }
 
 impl Default for ConsoleOptions {
@@ -88,6 +90,7 @@ impl Default for ConsoleOptions {
             wake: Arc::new(|| ()),
             startup_fault: None,
             warms: true,
+            small_pictures: true,
         }
     }
 }

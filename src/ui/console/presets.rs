@@ -17,7 +17,9 @@ use std::time::{Duration, Instant};
 /// Least time between two rounds of thumbnails of volumes that go on coming.
 const LIVE_INTERVAL: Duration = Duration::from_secs(5);
 /// How long after an input thumbnails are made.
-const REST: Duration = Duration::from_millis(300);
+pub(super) const REST: Duration = Duration::from_millis(300);
+/// The same of those that nobody asked for.
+pub(super) const LONG_REST: Duration = Duration::from_secs(2);
 /// The view changed much: it turned by so many degrees, or zoom or an edge of the region changed by this share.
 const MUCH_DEGREES: f64 = 15.0;
 const MUCH: f64 = 0.1;
@@ -33,6 +35,7 @@ pub(super) struct Presets {
     naming: Option<Naming>,
     /// Those of the user before the last change.
     before: Option<Vec<UserPreset>>,
+    keeps_pictures: bool,
     thumbnails: Thumbnails,
     /// What the thumbnails were made of.
     made_of: Option<MadeOf>,
@@ -53,8 +56,10 @@ struct MadeOf {
 }
 
 impl Presets {
-    pub(super) fn new(file: Option<PathBuf>, wake: Wake) -> Presets {
-        Presets {
+    /// `keeps_pictures`: the inspector shows them, too.
+    pub(super) fn new(file: Option<PathBuf>, keeps_pictures: bool, wake: Wake) -> Presets {
+        let mut presets = Presets {
+            keeps_pictures,
             file,
             is_shown: false,
             own: Vec::new(),
@@ -63,7 +68,11 @@ impl Presets {
             before: None,
             thumbnails: Thumbnails::new(wake),
             made_of: None,
+        };
+        if keeps_pictures {
+            presets.read();
         }
+        presets
     }
 
     pub(super) fn is_shown(&self) -> bool {
@@ -81,8 +90,11 @@ impl Presets {
     }
 
     pub(super) fn close(&mut self) {
-        (self.is_shown, self.naming, self.before, self.made_of) = (false, None, None, None);
-        self.thumbnails.clear();
+        (self.is_shown, self.naming, self.before) = (false, None, None);
+        if !self.keeps_pictures {
+            self.made_of = None;
+            self.thumbnails.clear();
+        }
     }
 
     fn read(&mut self) {
@@ -95,9 +107,17 @@ impl Presets {
 
     /// What the panels show of the list.
     pub(super) fn shown(&self) -> Option<PresetsShown<'_>> {
-        if !self.is_shown {
-            return None;
-        }
+        self.is_shown.then(|| PresetsShown {
+            tiles: self.tiles(),
+            can_save: self.file.is_some() && self.fault.is_none(),
+            fault: self.fault.as_deref(),
+            naming: self.naming.as_ref().map(|naming| (naming.text.as_str(), naming.of.is_some())),
+            can_restore: self.before.is_some(),
+        })
+    }
+
+    /// Every preset, with its picture as far as it is made.
+    pub(super) fn tiles(&self) -> Vec<PresetTile<'_>> {
         let pictures = self.thumbnails.pictures();
         let picture = |n: usize| pictures.get(n).cloned().flatten();
         let built_in = EXAMS.iter().enumerate().map(|(n, exam)| PresetTile {
@@ -112,13 +132,7 @@ impl Presets {
             picture: picture(EXAMS.len() + n),
             own: Some(n),
         });
-        Some(PresetsShown {
-            tiles: built_in.chain(own).collect(),
-            can_save: self.file.is_some() && self.fault.is_none(),
-            fault: self.fault.as_deref(),
-            naming: self.naming.as_ref().map(|naming| (naming.text.as_str(), naming.of.is_some())),
-            can_restore: self.before.is_some(),
-        })
+        built_in.chain(own).collect()
     }
 
     /// Shows the list, or closes it. The fault, if those of the user cannot be read.
@@ -299,19 +313,27 @@ impl Presets {
 
     /// Goes on with the thumbnails; `acted`: when the user acted last. True if there are new ones.
     pub(super) fn poll(&mut self, acted: Instant, is_drawing: bool, now: Instant) -> bool {
-        self.is_shown && self.thumbnails.poll(now >= acted + REST && !is_drawing)
+        self.thumbnails.poll(now >= acted + REST && !is_drawing)
     }
 
-    /// True if thumbnails are to be made: of another volume, another view, or other presets. Those of volumes that go on coming are made more rarely than
-    /// those of one that is `frozen`.
-    pub(super) fn wants_thumbnails(&self, volume: u32, settings: &Settings, frozen: bool, now: Instant) -> bool {
-        if !self.is_shown || self.thumbnails.is_working() {
+    /// True if thumbnails are to be made: of another volume, another view, or other presets. In the list those of volumes that go on coming are made more
+    /// rarely than those of one that `rests`; in the inspector those of a first volume and of one that rests alone, after a longer rest.
+    pub(super) fn wants_thumbnails(
+        &self,
+        (volume, settings): (u32, &Settings),
+        (in_inspector, rests): (bool, bool),
+        acted: Instant,
+        now: Instant,
+    ) -> bool {
+        let may_be = self.is_shown || (in_inspector && now >= acted + LONG_REST);
+        if !may_be || self.thumbnails.is_working() {
             return false;
         }
         self.made_of.as_ref().is_none_or(|made| {
-            let is_rare = frozen || now.saturating_duration_since(made.at) >= LIVE_INTERVAL;
+            let is_rare = rests || (self.is_shown && now.saturating_duration_since(made.at) >= LIVE_INTERVAL);
             let is_other_volume = made.volume != volume && is_rare;
-            made.own != self.own || is_other_volume || differs_much(&made.settings, settings)
+            let is_other_view = (self.is_shown || rests) && differs_much(&made.settings, settings);
+            made.own != self.own || is_other_volume || is_other_view
         })
     }
 
@@ -322,10 +344,12 @@ impl Presets {
     }
 
     /// When thumbnails are looked at again, while the list is shown.
-    pub(super) fn due(&self, now: Instant) -> Option<Instant> {
+    pub(super) fn due(&self, acted: Instant, now: Instant) -> Option<Instant> {
         let at = if self.thumbnails.is_working() { Duration::from_millis(50) } else { REST };
-        let is_waiting = self.thumbnails.is_working() || self.made_of.is_none();
-        (self.is_shown && is_waiting).then_some(now + at)
+        let is_waiting = self.thumbnails.is_working() || (self.is_shown && self.made_of.is_none());
+        let rested = acted + LONG_REST;
+        let of_inspector = (self.keeps_pictures && rested > now).then_some(rested);
+        is_waiting.then_some(now + at).or(of_inspector)
     }
 }
 
@@ -380,7 +404,7 @@ mod tests {
     #[test]
     fn presets_are_named_deleted_and_brought_back() {
         let folder = crate::files::WorkFolder::new(&std::env::temp_dir(), "echolume-test-").expect("a folder");
-        let mut presets = Presets::new(Some(folder.path().join("presets.toml")), Arc::new(|| ()));
+        let mut presets = Presets::new(Some(folder.path().join("presets.toml")), false, Arc::new(|| ()));
         let settings = Settings::default();
         assert_eq!(presets.begin_naming(None), Ok(false), "the list is not shown");
         assert_eq!(presets.toggle(), None);
@@ -403,8 +427,13 @@ mod tests {
         assert_eq!((presets.count(), presets.restore()), (EXAMS.len() + 1, Ok(true)));
         assert_eq!(presets.count(), EXAMS.len() + 2);
         let now = Instant::now();
-        assert!(presets.wants_thumbnails(3, &settings, false, now) && presets.due(now) == Some(now + REST));
+        let wants = |presets: &Presets, in_inspector, rests, at| {
+            presets.wants_thumbnails((3, &settings), (in_inspector, rests), now, at)
+        };
+        assert!(wants(&presets, false, false, now) && presets.due(now, now) == Some(now + REST));
         assert!(presets.leave() && !presets.is_shown() && !presets.leave());
-        assert!(!presets.wants_thumbnails(3, &settings, false, now) && presets.due(now).is_none());
+        assert!(!wants(&presets, false, true, now) && presets.due(now, now).is_none());
+        // In the inspector after a longer rest.
+        assert!(!wants(&presets, true, true, now) && wants(&presets, true, true, now + LONG_REST));
     }
 }

@@ -11,7 +11,7 @@ mod sides;
 mod starting;
 
 use super::command::{Command, Tool};
-use super::sliders::SLIDERS;
+use super::sliders::{self, SLIDERS};
 use super::view;
 use crate::scene::default_look::Defaults;
 use crate::scene::load;
@@ -283,16 +283,19 @@ impl Controls {
             | Command::SeekCine(_)
             | Command::PlayCine
             | Command::MarkCine(_)
+            | Command::TrimCine(..)
             | Command::SavePicture
             | Command::SaveLoop
             | Command::ToggleHelp
             | Command::CloseHints
-            | Command::SearchHelp
+            | Command::Find
+            | Command::ShowControl(_)
+            | Command::TypeValue(_)
             | Command::ToggleTimes
             | Command::TogglePanels
             | Command::FocusPanels
-            | Command::RailTab(_)
-            | Command::SwitchRail
+            | Command::InspectorTab(_)
+            | Command::NextTab
             | Command::ToggleDrawer
             | Command::KeyboardPointer
             | Command::ToggleFullScreen
@@ -377,6 +380,12 @@ impl Controls {
                     new.mode = Mode::Surface;
                 }
             }
+            Command::Rendering => {
+                new.layout = Layout::Single;
+                if new.mode.is_flat() {
+                    new.set_mode(self.rendered);
+                }
+            }
             Command::LookFrom(viewpoint) if !now.is_flat() => {
                 new.camera = view::look_from(now, viewpoint);
                 return view::keep_scale(now, new);
@@ -438,6 +447,10 @@ impl Controls {
                 new.planes.tilt = view::wrap_degrees(new.planes.tilt + by[1]);
             }
             Command::SetSlider(index, value) => set_slider(&mut new, now, index, value)?,
+            Command::SetShown(index, value) if finite(&[value]) => {
+                let slider = SLIDERS.get(index)?;
+                set_slider(&mut new, now, index, sliders::from_shown(slider, now, value))?;
+            }
             Command::ResetSlider(index) => {
                 let start = self.switched_start();
                 let slider = SLIDERS.get(index).filter(|slider| slider.applies(&start))?;

@@ -2,7 +2,7 @@
 //! bar.
 
 use super::colours::{self, ACCENT, AXES, BACKING, MEASURE, ON_PLANE, OUTLINE, SIDES, START, TEXT, WARNING, WEAK_TEXT};
-use super::{PanelState, SMALL_TEXT, body_marks, picture_rect, recordings, shown};
+use super::{MARK_TEXT, PanelState, body_marks, picture_rect, recordings, shown};
 use crate::anatomy::Anatomy;
 use crate::command::Tool;
 use crate::measure::overlay;
@@ -90,7 +90,12 @@ pub(super) fn paint(ui: &Ui, state: &PanelState, scale: f32, messages: &[Rect]) 
     taken.0.extend(recordings::reading_area(state, scale));
     taken.0.extend(messages);
     tiles().for_each(|(_, tile, area)| sides(&painter, &mut taken, area, tile, messages));
-    state.origin.iter().for_each(|origin| name_origin(&painter, &mut taken, picture, origin));
+    match (state.origin, state.recordings.iter().find(|recording| recording.is_shown)) {
+        (Some(origin), _) => name_origin(&painter, &mut taken, picture, origin, WARNING),
+        (None, Some(shown)) => name_origin(&painter, &mut taken, picture, &shown.name, TEXT),
+        (None, None) => {}
+    }
+    tell_state(&painter, &mut taken, picture, state);
     state.delay().iter().for_each(|delay| tell_delay(&painter, &mut taken, picture, delay));
     // While it is bent, plane A has the line as it will be, not as the picture has it.
     let is_shown = state.controls.tool() == Tool::Region
@@ -143,9 +148,32 @@ pub(super) fn paint_origin(ui: &Ui, state: &PanelState, scale: f32) {
     let picture = picture_rect(state, scale);
     let painter = ui.ctx().layer_painter(egui::LayerId::background()).with_clip_rect(picture);
     let mut taken = Taken::default();
-    state.origin.iter().for_each(|origin| name_origin(&painter, &mut taken, picture, origin));
+    state.origin.iter().for_each(|origin| name_origin(&painter, &mut taken, picture, origin, WARNING));
     let delay = state.delay().filter(|_| !state.shows_only_origin);
     delay.iter().for_each(|delay| tell_delay(&painter, &mut taken, picture, delay));
+}
+
+/// Says near the upper left corner whether the picture is live, and which volume of the loop it shows, in as many words as have room.
+fn tell_state(painter: &Painter, taken: &mut Taken, picture: Rect, state: &PanelState) {
+    let cine = &state.cine;
+    let (what, colour) = match (state.is_frozen, state.ended) {
+        (true, _) if cine.is_playing => (texts::STATE_PLAYING.to_string(), WARNING),
+        (true, _) => (texts::STATE_FROZEN.to_string(), WARNING),
+        (false, Some(ago)) => (texts::ended_for(ago), TEXT),
+        (false, None) if state.is_live => (texts::STATE_LIVE.to_string(), TEXT),
+        (false, None) => (String::new(), TEXT),
+    };
+    let volume = cine.shown.map(|at| texts::volume_in_loop(at + 1, cine.count));
+    let time = cine.seconds.map(texts::seconds);
+    let parts = [Some(what).filter(|what| !what.is_empty()), volume, time];
+    let lower = (0..12).map(|n| vec2(6.0, 26.0 + 10.0 * n as f32));
+    let places = [vec2(12.0, 8.0), vec2(34.0, 6.0)].into_iter().chain(lower).map(|away| picture.left_top() + away);
+    for count in (1..=parts.len()).rev() {
+        let text = parts[..count].iter().flatten().map(String::as_str).collect::<Vec<_>>().join(" · ");
+        if text.is_empty() || text_at_one_of(painter, taken, places.clone(), Align2::LEFT_TOP, &text, colour) {
+            return;
+        }
+    }
 }
 
 /// Says how far the picture is behind what arrives, near its upper left corner: beside the letter there, or further down.
@@ -156,7 +184,7 @@ fn tell_delay(painter: &Painter, taken: &mut Taken, picture: Rect, delay: &str) 
 }
 
 /// Says what the picture is of, near its upper right corner.
-fn name_origin(painter: &Painter, taken: &mut Taken, picture: Rect, origin: &str) {
+fn name_origin(painter: &Painter, taken: &mut Taken, picture: Rect, origin: &str, colour: Color32) {
     // Between the letter of the upper edge and a marker in the corner; in a narrow picture further down.
     let lower = (5..40).map(|n| vec2(-6.0, 6.0 + 5.0 * n as f32));
     // On the right or the left of that letter, or of the lower edge's.
@@ -166,8 +194,8 @@ fn name_origin(painter: &Painter, taken: &mut Taken, picture: Rect, origin: &str
     let places = places.map(|away| picture.right_top() + away);
     // In the smallest pictures without what stands in brackets.
     let short = origin.split(" (").next().unwrap_or(origin);
-    _ = text_at_one_of(painter, taken, places.clone(), Align2::RIGHT_TOP, origin, WARNING)
-        || text_at_one_of(painter, taken, places, Align2::RIGHT_TOP, short, WARNING);
+    _ = text_at_one_of(painter, taken, places.clone(), Align2::RIGHT_TOP, origin, colour)
+        || text_at_one_of(painter, taken, places, Align2::RIGHT_TOP, short, colour);
 }
 
 /// The areas that marks have taken: no other is drawn there.
@@ -198,7 +226,7 @@ fn text_at_one_of(
     label: &str,
     colour: Color32,
 ) -> bool {
-    let size = painter.layout_no_wrap(label.into(), FontId::proportional(SMALL_TEXT), colour).size();
+    let size = painter.layout_no_wrap(label.into(), FontId::proportional(MARK_TEXT), colour).size();
     let area = |at: &Pos2| Some(align.anchor_size(*at, size)).filter(|area| painter.clip_rect().contains_rect(*area));
     let at = places.into_iter().find(|at| area(at).is_some_and(|area| taken.take(area)));
     at.iter().for_each(|at| text(painter, *at, align, label, colour));
@@ -227,7 +255,7 @@ fn sides(painter: &Painter, taken: &mut Taken, area: Rect, tile: &TileMarks, mes
     for (edge, letter) in &tile.letters {
         let place = uncovered(letter_area(area, edge.offset()), edge.offset(), area, taken, messages);
         taken.take(place);
-        outlined(painter, place.center(), Align2::CENTER_CENTER, letter, SMALL_TEXT * 1.3, SIDES);
+        outlined(painter, place.center(), Align2::CENTER_CENTER, letter, MARK_TEXT * 1.3, SIDES);
     }
     if let Some(edge) = tile.probe {
         let place = uncovered(marker_area(area, edge.offset()), edge.offset(), area, taken, messages);
@@ -239,7 +267,7 @@ fn sides(painter: &Painter, taken: &mut Taken, area: Rect, tile: &TileMarks, mes
         let place = uncovered(plane_area(area, tile), tile.plane_corner(), area, taken, messages);
         taken.take(place);
         painter.rect_filled(place, 3.0, colours::of_scene(colour));
-        painter.text(place.center(), Align2::CENTER_CENTER, letter, FontId::proportional(SMALL_TEXT), ON_PLANE);
+        painter.text(place.center(), Align2::CENTER_CENTER, letter, FontId::proportional(MARK_TEXT), ON_PLANE);
     }
 }
 
@@ -254,7 +282,7 @@ fn stroke(painter: &Painter, ends: [Pos2; 2], width: f32, colour: Color32) {
 }
 
 fn text(painter: &Painter, at: Pos2, align: Align2, label: &str, colour: Color32) {
-    outlined(painter, at, align, label, SMALL_TEXT, colour);
+    outlined(painter, at, align, label, MARK_TEXT, colour);
 }
 
 /// Bright text with a dark edge all round, which is readable on any picture.
@@ -312,7 +340,7 @@ fn bar(painter: &Painter, taken: &mut Taken, area: Rect, per_point: f64) {
     let Some(mm) = BAR_LENGTHS.into_iter().rev().find(|mm| *mm <= max_length) else { return };
     let width = (mm / per_point) as f32;
     let label = texts::bar_length(mm);
-    let words = painter.layout_no_wrap(label.clone(), FontId::proportional(SMALL_TEXT), TEXT).size();
+    let words = painter.layout_no_wrap(label.clone(), FontId::proportional(MARK_TEXT), TEXT).size();
     // Or further left, if a message is there.
     let up = |left: f32| (0..8).map(move |n| area.right_bottom() - vec2(16.0 + left, 16.0 + 24.0 * n as f32));
     let places = [0.0, 0.3, 0.55].into_iter().flat_map(|share| up(share * area.width()));

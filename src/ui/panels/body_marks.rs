@@ -3,7 +3,7 @@
 use super::colours::{BODY, MEASURE, OUTLINE, SELECTED, TEXT, WEAK_TEXT};
 use super::names::{self, Tell};
 use super::widgets::{scale_slider, switch};
-use super::{PanelState, SMALL_TEXT, TOUCH_SIZE, heading, picture_rect, shown};
+use super::{PanelState, ROW_HEIGHT, SMALL_TEXT, heading, picture_rect, shown};
 use crate::command::{Command, Tool};
 use crate::measure::body_marks::{self, Drawn};
 use crate::scene::{BODY_MARK_SIZES, Body, BodyMark, MAX_BODY_MARKS};
@@ -115,7 +115,7 @@ pub(super) fn show(ui: &mut Ui, state: &PanelState, width: f32, execute: &mut dy
 /// Buttons with the parts of the body: a press gives the mark that part, or adds the first mark.
 fn bodies(ui: &mut Ui, about: Option<(usize, BodyMark)>, width: f32, execute: &mut dyn FnMut(Command)) {
     let gap = ui.spacing().item_spacing.x;
-    let edge = ((width - gap * (COLUMNS - 1) as f32) / COLUMNS as f32).min(TOUCH_SIZE);
+    let edge = ((width - gap * (COLUMNS - 1) as f32) / COLUMNS as f32).min(52.0);
     for some in Body::ALL.chunks(COLUMNS) {
         ui.horizontal(|ui| {
             for body in some {
@@ -159,7 +159,7 @@ fn others(
 ) {
     let (count, gap) = (state.controls.body_marks().len(), ui.spacing().item_spacing.x);
     if count > 1 {
-        let each = vec2((width - gap * (count - 1) as f32) / count as f32, TOUCH_SIZE * 0.65);
+        let each = vec2((width - gap * (count - 1) as f32) / count as f32, ROW_HEIGHT);
         ui.horizontal(|ui| {
             for n in 0..count {
                 let name = texts::body_mark(n + 1);
@@ -170,7 +170,7 @@ fn others(
             }
         });
     }
-    let half = vec2((width - gap) / 2.0, TOUCH_SIZE * 0.75);
+    let half = vec2((width - gap) / 2.0, ROW_HEIGHT);
     ui.horizontal(|ui| {
         for (command, [word, name], is_there, hint) in [
             (

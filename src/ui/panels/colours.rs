@@ -12,6 +12,11 @@ pub(crate) const BUTTON: Color32 = Color32::from_rgb(36, 42, 50);
 pub const EDGE: Color32 = Color32::from_rgb(110, 119, 130);
 /// Fill of what is chosen, of the filled part of a rail, and of a button that is meant first.
 pub(crate) const SELECTED: Color32 = Color32::from_rgb(42, 124, 152);
+/// Behind what is chosen and stays where it is, such as a tool or a view.
+pub(crate) const CHOSEN: Color32 = Color32::from_rgb(17, 52, 64);
+/// The mark of the program.
+pub(crate) const MARK: Color32 = Color32::from_rgb(214, 122, 82);
+pub(crate) const MARK_LIGHT: Color32 = Color32::from_rgb(247, 205, 172);
 pub const TEXT: Color32 = Color32::from_rgb(214, 221, 229);
 /// Text on [`SELECTED`].
 pub(crate) const ON_SELECTED: Color32 = Color32::WHITE;

@@ -3,7 +3,7 @@
 use super::colours::{ACCENT, BACKING, MEASURE, OUTLINE, TEXT, WARNING, WEAK_TEXT};
 use super::names::{self, Tell};
 use super::overlays::first;
-use super::{PanelState, SMALL_TEXT, ShownPicture, TEXT_SIZE, TOUCH_SIZE, heading, picture_rect, shown};
+use super::{PanelState, ROW_HEIGHT, SMALL_TEXT, ShownPicture, TEXT_SIZE, heading, icons, picture_rect, rail, shown};
 use crate::command::{Command, Tool};
 use crate::measure::outcome::{self, Quantity};
 use crate::measure::overlay::{self, Drawn};
@@ -14,50 +14,70 @@ use crate::texts::hints;
 use egui::accesskit::Role;
 use egui::{Button, Color32, FontId, Label, Painter, Pos2, Rect, RichText, Stroke, StrokeKind, Ui, pos2, vec2};
 
-/// The tools of the rail and their names there.
-const TOOLS: [(MeasureKind, &str); 9] = [
+/// Tools that measure, and those that mark.
+const MEASURING: [(MeasureKind, &str); 7] = [
     (MeasureKind::Distance, texts::CALIPER),
+    (MeasureKind::Surface, texts::TAPE),
     (MeasureKind::Angle, texts::ANGLE),
     (MeasureKind::Ellipse, texts::ELLIPSE),
     (MeasureKind::Trace, texts::TRACE),
-    (MeasureKind::Surface, texts::TAPE),
     (MeasureKind::Volume, texts::CONTOURS),
     (MeasureKind::Threshold, texts::VOLUME_BY_THRESHOLD),
-    (MeasureKind::Text, texts::TEXT),
-    (MeasureKind::Arrow, texts::ARROW),
 ];
+const MARKING: [(MeasureKind, &str); 2] = [(MeasureKind::Text, texts::TEXT), (MeasureKind::Arrow, texts::ARROW)];
 
 /// Half the size of a cross, and the length of an arrow's head, points.
 const CROSS: f32 = 5.0;
 const HEAD: f64 = 12.0;
 
-/// The buttons of the tools in this width, points.
+/// The buttons of the tools that measure in this width, points.
 pub(super) fn show_tools(ui: &mut Ui, state: &PanelState, width: f32, execute: &mut dyn FnMut(Command)) {
-    let gap = ui.spacing().item_spacing.x;
-    let half = (width - gap) / 2.0;
-    let button = |ui: &mut Ui, kind: MeasureKind, name: &str, width: f32, execute: &mut dyn FnMut(Command)| {
-        let (command, is_on) = match kind {
-            MeasureKind::Threshold => (Command::CountVoxels, false),
-            kind => (Command::Tool(Tool::Measure(kind)), state.controls.tool() == Tool::Measure(kind)),
-        };
-        let button = Button::selectable(is_on, name).frame_when_inactive(true).min_size(vec2(width, TOUCH_SIZE * 0.75));
-        if ui.add(button).tell(hints::of_measure(kind)).clicked() {
-            // A second click leaves the tool.
-            execute(if is_on { Command::Tool(Tool::default()) } else { command });
+    names::group(ui, texts::MEASURE, |ui| {
+        ui.add_space(2.0);
+        for row in MEASURING.chunks(3) {
+            let gaps = ui.spacing().item_spacing.x * (row.len() - 1) as f32;
+            // What counts at once has the longest name, alone in its row.
+            let size = vec2((width - gaps) / row.len() as f32, ROW_HEIGHT);
+            ui.horizontal(|ui| row.iter().for_each(|(kind, name)| kind_button(ui, state, *kind, name, size, execute)));
         }
+    });
+}
+
+/// The buttons of texts, arrows and body marks.
+pub(super) fn show_marks(ui: &mut Ui, state: &PanelState, width: f32, execute: &mut dyn FnMut(Command)) {
+    names::group(ui, texts::TAB_MARKS, |ui| {
+        ui.add_space(2.0);
+        let size = vec2((width - 2.0 * ui.spacing().item_spacing.x) / 3.0, ROW_HEIGHT);
+        ui.horizontal(|ui| {
+            MARKING.iter().for_each(|(kind, name)| kind_button(ui, state, *kind, name, size, execute));
+            let is_on = state.controls.tool() == Tool::BodyMark;
+            let marks = Button::selectable(is_on, texts::BODY_MARK).frame_when_inactive(true).min_size(size);
+            if ui.add(marks).tell(hints::of_tool(Tool::BodyMark)).clicked() {
+                execute(Command::Tool(if is_on { Tool::default() } else { Tool::BodyMark }));
+            }
+        });
+        if let Tool::Measure(kind @ (MeasureKind::Text | MeasureKind::Arrow)) = state.controls.tool() {
+            say_next_step(ui, state, kind);
+        }
+    });
+}
+
+fn kind_button(
+    ui: &mut Ui,
+    state: &PanelState,
+    kind: MeasureKind,
+    name: &str,
+    size: egui::Vec2,
+    execute: &mut dyn FnMut(Command),
+) {
+    let (command, is_on) = match kind {
+        MeasureKind::Threshold => (Command::CountVoxels, false),
+        kind => (Command::Tool(Tool::Measure(kind)), state.controls.tool() == Tool::Measure(kind)),
     };
-    let (wide, paired): (Vec<_>, Vec<_>) = TOOLS.iter().partition(|(kind, _)| *kind == MeasureKind::Threshold);
-    for pair in paired.chunks(2) {
-        ui.horizontal(|ui| pair.iter().for_each(|(kind, name)| button(ui, *kind, name, half, execute)));
-    }
-    for (kind, name) in wide {
-        button(ui, kind, name, width, execute);
-    }
-    let is_on = state.controls.tool() == Tool::BodyMark;
-    let marks = Button::selectable(is_on, texts::BODY_MARK).frame_when_inactive(true);
-    let marks = ui.add_sized(vec2(width, TOUCH_SIZE * 0.75), marks).tell(hints::of_tool(Tool::BodyMark));
-    if marks.clicked() {
-        execute(Command::Tool(if is_on { Tool::default() } else { Tool::BodyMark }));
+    let button = Button::selectable(is_on, name).frame_when_inactive(true).min_size(size);
+    if ui.add(button).tell(hints::of_measure(kind)).clicked() {
+        // A second click leaves the tool.
+        execute(if is_on { Command::Tool(Tool::default()) } else { command });
     }
 }
 
@@ -66,6 +86,7 @@ pub(super) fn show_results(ui: &mut Ui, state: &PanelState, width: f32, execute:
     let measures = state.controls.measures();
     let is_measuring = matches!(state.controls.tool(), Tool::Measure(_));
     if measures.is_empty() && state.controls.work().is_none() && !is_measuring {
+        ui.add(Label::new(RichText::new(texts::NO_MEASUREMENTS).size(SMALL_TEXT).color(WEAK_TEXT)).wrap());
         return;
     }
     names::group(ui, texts::MEASUREMENTS, |ui| results(ui, state, width, execute));
@@ -75,11 +96,7 @@ fn results(ui: &mut Ui, state: &PanelState, width: f32, execute: &mut dyn FnMut(
     let measures = state.controls.measures();
     heading(ui, texts::MEASUREMENTS);
     if let Tool::Measure(kind) = state.controls.tool() {
-        let step = next_step(state, kind);
-        names::group(ui, step, |ui| {
-            names::announce(ui, step, false);
-            ui.add(Label::new(RichText::new(step).size(SMALL_TEXT).color(ACCENT)).wrap());
-        });
+        say_next_step(ui, state, kind);
     }
     if let Some(work) = state.controls.work().filter(|work| work.kind.complete_at().is_none()) {
         let name = if work.kind == MeasureKind::Volume && work.points.is_empty() {
@@ -87,7 +104,7 @@ fn results(ui: &mut Ui, state: &PanelState, width: f32, execute: &mut dyn FnMut(
         } else {
             texts::CLOSE_CONTOUR
         };
-        let size = vec2(width, TOUCH_SIZE * 0.65);
+        let size = vec2(width, ROW_HEIGHT);
         if ui.add_sized(size, first(RichText::new(name))).tell(texts::END_TRACING_HINT).clicked() {
             execute(Command::EndMeasure);
         }
@@ -104,7 +121,7 @@ fn results(ui: &mut Ui, state: &PanelState, width: f32, execute: &mut dyn FnMut(
             let typing = if state.controls.typing() == Some(n) { "_" } else { "" };
             let text = RichText::new(format!("{} {name}{typing}", n + 1)).size(SMALL_TEXT);
             ui.spacing_mut().item_spacing.x = 4.0;
-            let row = vec2((width - 26.0).max(40.0), TOUCH_SIZE * 0.6);
+            let row = vec2((width - 32.0).max(40.0), ROW_HEIGHT);
             ui.allocate_ui_with_layout(row, egui::Layout::left_to_right(egui::Align::Center), |ui| {
                 ui.set_min_width(row.x);
                 let rest = found.iter().map(|q| format!("{}: {}", q.name, q.shown()));
@@ -121,9 +138,8 @@ fn results(ui: &mut Ui, state: &PanelState, width: f32, execute: &mut dyn FnMut(
                     });
                 });
             });
-            ui.spacing_mut().button_padding.x = 3.0;
-            let delete = Button::new("x").min_size(vec2(22.0, TOUCH_SIZE * 0.55));
-            let delete = ui.add(delete).tell(texts::DELETE_MEASUREMENT_HINT);
+            let delete = rail::icon_button(ui, icons::CLOSE, ("", texts::DELETE), vec2(26.0, 28.0), (true, false));
+            let delete = delete.tell(texts::DELETE_MEASUREMENT_HINT);
             if delete.named(&texts::delete_measurement(n + 1)).clicked() {
                 execute(Command::DeleteMeasure(n));
             }
@@ -131,7 +147,7 @@ fn results(ui: &mut Ui, state: &PanelState, width: f32, execute: &mut dyn FnMut(
     }
     if !measures.is_empty() {
         let gap = ui.spacing().item_spacing.x;
-        let third = vec2((width - 2.0 * gap) / 3.0, TOUCH_SIZE * 0.65);
+        let third = vec2((width - 2.0 * gap) / 3.0, ROW_HEIGHT);
         ui.horizontal(|ui| {
             for (command, name, hint) in [
                 (Command::CopyMeasures, texts::COPY, texts::COPY_HINT),
@@ -145,6 +161,14 @@ fn results(ui: &mut Ui, state: &PanelState, width: f32, execute: &mut dyn FnMut(
             }
         });
     }
+}
+
+fn say_next_step(ui: &mut Ui, state: &PanelState, kind: MeasureKind) {
+    let step = next_step(state, kind);
+    names::group(ui, step, |ui| {
+        names::announce(ui, step, false);
+        ui.add(Label::new(RichText::new(step).size(SMALL_TEXT).color(ACCENT)).wrap());
+    });
 }
 
 /// What to do next with a tool.

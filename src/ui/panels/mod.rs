@@ -1,26 +1,33 @@
 //! The panels around and over the picture, laid out by egui. They show a [`PanelState`] and return commands. Their positions depend only on
 //! the size of the window, so that the size of the picture is known before anything is drawn.
 //!
-//! The theme is dark, so that the picture is the brightest part of the screen, and large enough for gloves and for reading from 2 m.
+//! The theme is dark, so that the picture is the brightest part of the screen. Tools, the button that freezes and those that save are large enough for
+//! gloves; a larger scale makes everything readable from 2 m.
 
 mod annotations;
+mod bar;
 mod body_marks;
 pub(super) mod colours;
-mod controls;
 mod curve;
 #[cfg(test)]
 pub(super) mod drawn;
 pub(super) mod first_steps;
+mod icons;
+mod inspector;
 mod lists;
+mod look;
 mod measures;
 mod names;
 mod overlays;
+mod planes;
 mod presets;
 mod rail;
 mod recordings;
 mod region;
+mod search;
 mod sides;
 mod tools;
+mod top;
 mod visible;
 mod walking;
 mod widgets;
@@ -36,6 +43,7 @@ use crate::cine_player::CineState;
 use crate::controls::Controls;
 use crate::gpu;
 use crate::keyboard_pointer::PointerMark;
+use crate::picture::Picture;
 use crate::progress_lines::Progress;
 use crate::recordings::Named;
 use crate::scene::Scene;
@@ -220,7 +228,10 @@ impl Panels {
         }
         let mut commands = Vec::new();
         self.gets_focus &= self.has_pending_input();
-        let thumbnails = self.thumbnails.of(&self.context, state.presets.as_ref());
+        let pictures = |tiles: &[PresetTile]| tiles.iter().map(|tile| tile.picture.clone()).collect::<Vec<_>>();
+        let listed = state.presets.as_ref().map_or(Vec::new(), |shown| pictures(&shown.tiles));
+        let [looks, thumbnails, of_loop] =
+            self.thumbnails.of(&self.context, [&pictures(&state.looks), &listed, state.loop_pictures]);
         // egui may lay out twice, to place what it sees for the first time: the inputs are in the first.
         let output = self.context.run_ui(input, |ui| {
             let from_panels = commands.len();
@@ -234,15 +245,18 @@ impl Panels {
             names::picture(ui, state, self.scale);
             let shows_panels = state.visible.panels && state.room.picture.1 != size;
             if shows_panels {
-                let Edges { left, right, below } = Edges::of(points.into(), true);
-                controls::show_cine_bar(ui, state, below, execute);
-                if left > 0.0 {
-                    controls::show_modes(ui, state, left, execute);
-                } else if state.visible.rail.is_open {
-                    controls::show_drawer(ui, state, rail::drawer_size(points.into(), below), execute);
+                let edges = Edges::of(points.into(), true);
+                if edges.above > 0.0 {
+                    top::show(ui, state, edges.above, execute);
                 }
-                if right > 0.0 {
-                    controls::show_column(ui, state, right, execute);
+                bar::show(ui, state, edges.below, &of_loop, execute);
+                if edges.left > 0.0 {
+                    rail::show(ui, state, points.y - edges.above - edges.below, execute);
+                }
+                if edges.right > 0.0 {
+                    inspector::show_column(ui, state, edges.right, &looks, execute);
+                } else if state.visible.inspector.is_open {
+                    inspector::show_drawer(ui, state, points.into(), edges, &looks, execute);
                 }
             }
             let taken = recordings::show_reading(ui, state, self.scale, execute);
@@ -273,6 +287,9 @@ impl Panels {
             }
             if state.visible.exports {
                 lists::show_exports(ui, state.exporting, execute);
+            }
+            if let Some(search) = &state.visible.search {
+                search::show(ui, search, execute);
             }
             if let Some(shown) = &state.presets {
                 presets::show(ui, shown, &thumbnails, execute);
@@ -393,26 +410,25 @@ impl EguiInput {
     }
 }
 
-/// Sizes of the panels, points: buttons on the left, controls on the right, cine loop below.
-const MODES_WIDTH: f32 = 208.0;
-const CONTROLS_WIDTH: [f32; 2] = [212.0, 330.0];
-const CINE_BAR_HEIGHT: [f32; 2] = [60.0, 76.0];
+/// Sizes of the panels, points.
+const TOP_HEIGHT: f32 = 48.0;
+const RAIL_WIDTH: f32 = 64.0;
+const INSPECTOR_WIDTH: f32 = 300.0;
+/// Of the bar at the bottom, in windows of these heights.
+const BAR_HEIGHTS: [(f32, f32); 3] = [(700.0, 88.0), (560.0, 72.0), (0.0, 60.0)];
 /// A smaller window shows the picture without panels, points.
 const MIN_WINDOW: [f32; 2] = [180.0, 150.0];
-/// A smaller window has only the bar below, points.
-const MIN_FOR_MODES: [f32; 2] = [600.0, 300.0];
-/// A lower window has no controls, points.
-const MIN_FOR_CONTROLS: f32 = 440.0;
-/// A window of this height has a high bar, points.
-const HIGH_WINDOW: f32 = 600.0;
-/// Largest share of the width that both columns have together: the picture keeps half of the window.
-const COLUMNS_SHARE: f32 = 0.42;
+/// A smaller window has only the bar at the bottom, points.
+const MIN_FOR_RAIL: [f32; 2] = [600.0, 340.0];
+/// The picture keeps this share of the window; with less there is no inspector beside it.
+const LEAST_SHARE: f32 = 0.5;
 /// The help needs a window of this height, points.
 const MIN_HELP_HEIGHT: f32 = 200.0;
 
 /// What the panels take of a window at its edges, points; 0 without a panel.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 struct Edges {
+    above: f32,
     left: f32,
     right: f32,
     below: f32,
@@ -424,11 +440,11 @@ impl Edges {
         if !shows_panels || !fits(MIN_WINDOW) {
             return Edges::default();
         }
-        let left = if fits(MIN_FOR_MODES) { MODES_WIDTH } else { 0.0 };
-        let room = (COLUMNS_SHARE * width - left).min(CONTROLS_WIDTH[1]);
-        let has_controls = left > 0.0 && height >= MIN_FOR_CONTROLS && room >= CONTROLS_WIDTH[0];
-        let below = CINE_BAR_HEIGHT[usize::from(height >= HIGH_WINDOW)];
-        Edges { left, right: if has_controls { room } else { 0.0 }, below }
+        let below = BAR_HEIGHTS.into_iter().find(|(least, _)| height >= *least).map_or(0.0, |(_, bar)| bar);
+        let (left, above) = if fits(MIN_FOR_RAIL) { (RAIL_WIDTH, TOP_HEIGHT) } else { (0.0, 0.0) };
+        let picture = (width - left - INSPECTOR_WIDTH).max(0.0) * (height - above - below);
+        let has_inspector = left > 0.0 && picture >= LEAST_SHARE * width * height;
+        Edges { above, left, right: if has_inspector { INSPECTOR_WIDTH } else { 0.0 }, below }
     }
 }
 
@@ -457,6 +473,10 @@ pub(super) struct PanelState<'a> {
     pub(super) reading: Option<&'a Reading>,
     /// The list of presets, while it is shown.
     pub(super) presets: Option<PresetsShown<'a>>,
+    /// Every preset, and those that can be kept.
+    pub(super) looks: Vec<PresetTile<'a>>,
+    /// Small pictures of the volumes of the loop, as far as they are made.
+    pub(super) loop_pictures: &'a [Option<Arc<Picture>>],
     /// The view turns by itself.
     pub(super) is_turning: bool,
     /// The name of the export in work, and how far it is.
@@ -504,9 +524,10 @@ pub(super) struct Note {
 
 /// The area that the panels leave for the picture in a window of this size: upper left corner and size, pixels.
 pub fn picture_area(size: [u32; 2], scale: f32, shows_panels: bool) -> ([u32; 2], [u32; 2]) {
-    let Edges { left, right, below } = Edges::of(size.map(|n| n as f32 / scale), shows_panels);
-    let [left, right, below] = [left, right, below].map(|edge| (edge * scale).round() as u32);
-    ([left, 0], [size[0].saturating_sub(left + right).max(1), size[1].saturating_sub(below).max(1)])
+    let edges = Edges::of(size.map(|n| n as f32 / scale), shows_panels);
+    let Edges { above, left, right, below } = edges;
+    let [above, left, right, below] = [above, left, right, below].map(|edge| (edge * scale).round() as u32);
+    ([left, above], [size[0].saturating_sub(left + right).max(1), size[1].saturating_sub(above + below).max(1)])
 }
 
 /// What the panels leave and have in a window.
@@ -514,23 +535,31 @@ pub fn picture_area(size: [u32; 2], scale: f32, shows_panels: bool) -> ([u32; 2]
 pub(super) struct Room {
     /// Upper left corner and size of the picture, pixels.
     pub(super) picture: ([u32; 2], [u32; 2]),
-    /// There is a column of controls on the right.
-    pub(super) has_column: bool,
-    /// Tools and controls are in a drawer: there is no room for a rail.
+    /// There is a bar at the top.
+    pub(super) has_top: bool,
+    /// The inspector is over the picture: beside it there is no room.
     pub(super) has_drawer: bool,
+    /// Tools are a part of the inspector: not all of them have room in the rail.
+    pub(super) has_tools_tab: bool,
 }
 
 impl Room {
     /// `size`: of the window, pixels; `scale`: pixels per point.
     pub(super) fn of(size: [u32; 2], scale: f32, shows_panels: bool) -> Room {
-        let Edges { left, right, below } = Edges::of(size.map(|n| n as f32 / scale), shows_panels);
-        let picture = picture_area(size, scale, shows_panels);
-        Room { picture, has_column: right > 0.0, has_drawer: left == 0.0 && below > 0.0 }
+        let points = size.map(|n| n as f32 / scale);
+        let Edges { above, left, right, below } = Edges::of(points, shows_panels);
+        Room {
+            picture: picture_area(size, scale, shows_panels),
+            has_top: above > 0.0,
+            has_drawer: right == 0.0 && below > 0.0,
+            has_tools_tab: below > 0.0 && (left == 0.0 || !rail::has_all(points[1] - above - below)),
+        }
     }
 }
 
 /// A small heading above a group of controls.
 fn heading(ui: &mut egui::Ui, text: &str) {
+    ui.add_space(4.0);
     ui.label(egui::RichText::new(text).size(SMALL_TEXT).color(WEAK_TEXT));
 }
 
@@ -548,13 +577,17 @@ fn shown<'a>(state: &PanelState<'a>, scale: f32) -> Option<(&'a ShownPicture, Re
     Some((picture, Rect::from_min_size(picture_rect(state, scale).min, size.into())))
 }
 
-/// Size of running text, points: at a scale of 1 on a monitor with 96 dots per inch it is 5 mm high, which a healthy eye reads from 2 m.
-const TEXT_SIZE: f32 = 19.0;
-/// Size of important text, such as messages.
+/// Size of running text, points.
+const TEXT_SIZE: f32 = 16.0;
+/// Size of important text, such as messages: at a scale of 1 on a monitor with 96 dots per inch it is read from 2 m.
 const LARGE_TEXT: f32 = 26.0;
-const SMALL_TEXT: f32 = 15.0;
-/// Minimum size of a button for a gloved finger, points: 14 mm at 96 dots per inch.
+const SMALL_TEXT: f32 = 13.0;
+/// Size of the text of marks over the picture.
+const MARK_TEXT: f32 = 15.0;
+/// Minimum size of a button over the picture for a gloved finger, points: 14 mm at 96 dots per inch.
 const TOUCH_SIZE: f32 = 52.0;
+/// Height of a button in the bar at the top and in the inspector, points.
+const ROW_HEIGHT: f32 = 34.0;
 
 /// Sets typeface, sizes and colours.
 fn apply_theme(context: &egui::Context) {
@@ -582,8 +615,8 @@ fn apply_theme(context: &egui::Context) {
     style.spacing.item_spacing = vec2(8.0, 8.0);
     style.spacing.button_padding = vec2(8.0, 6.0);
     style.spacing.interact_size = vec2(TOUCH_SIZE, TOUCH_SIZE * 0.7);
-    style.spacing.slider_rail_height = 10.0;
-    style.spacing.scroll.bar_width = 14.0;
+    style.spacing.slider_rail_height = 6.0;
+    style.spacing.scroll.bar_width = 10.0;
     style.interaction.selectable_labels = false;
     style.interaction.tooltip_delay = 0.6;
     let visuals = &mut style.visuals;
@@ -625,7 +658,7 @@ mod tests {
                 assert!(corner[0] + picture[0] <= size[0], "{size:?} at {scale}: {corner:?} {picture:?}");
             }
         }
-        assert!(picture_area([1280, 800], 1.0, true).1[0] + 208 < 1280, "controls");
+        assert!(picture_area([1280, 800], 1.0, true).1[0] + 364 == 1280, "rail and inspector");
         assert_eq!(picture_area([1280, 800], 1.0, false), ([0, 0], [1280, 800]));
         assert_eq!(picture_area([1, 0], 1.0, true), ([0, 0], [1, 1]));
     }

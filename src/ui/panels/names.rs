@@ -87,6 +87,16 @@ pub(super) fn progress(bar: &Response, share: Option<f32>) {
     });
 }
 
+/// The range of what is set as a slider is, and its step.
+pub(super) fn range(control: &Response, [low, high]: [f64; 2], step: f64) {
+    node(&control.ctx, control.id, |node| {
+        node.set_min_numeric_value(low);
+        node.set_max_numeric_value(high);
+        node.set_numeric_value_step(step);
+        [Action::SetValue, Action::Increment, Action::Decrement].into_iter().for_each(|action| node.add_action(action));
+    });
+}
+
 /// Gives what a [`Ui`] holds a role and a name.
 pub(super) fn name(ui: &Ui, role: Role, name: &str) {
     node(ui.ctx(), ui.unique_id(), |node| {

@@ -9,7 +9,6 @@ use super::names::{self, Tell};
 use super::widgets::{BETWEEN_MESSAGES, MESSAGE_EDGES, message_frame};
 use super::{LARGE_TEXT, Note, PanelState, SMALL_TEXT, TEXT_SIZE, TOUCH_SIZE, picture_rect};
 use crate::command::{self, Command};
-use crate::sliders::SLIDERS;
 use crate::texts::keys;
 use crate::texts::{self, Unsaved};
 use egui::accesskit::Role;
@@ -338,31 +337,17 @@ const GESTURES: [(&str, &str); 17] = [
 /// A line of the help: keys or gesture, and what it does.
 type HelpLine = (String, String);
 
-/// The groups of the help that contain a text, with those of their lines that do; all for an empty text.
-fn found(exit_key: &str, search: &str, has_keyboard_pointer: bool) -> Vec<(&'static str, Vec<HelpLine>)> {
+/// The groups of the help. All of it has to fit one page.
+fn groups(exit_key: &str, has_keyboard_pointer: bool) -> Vec<(&'static str, Vec<HelpLine>)> {
     let in_table = command::help().map(|(key, label)| (key, label.to_string()));
     let exit = (!exit_key.is_empty()).then(|| (exit_key.to_string(), texts::QUIT.to_string()));
-    let gestures = GESTURES.iter().map(|(gesture, label)| (gesture.to_string(), label.to_string()));
-    let controls = SLIDERS.iter().map(|slider| (slider.name, slider.hint));
-    let controls = controls.chain([(texts::SIDES, texts::SIDES_HINT)]);
-    let controls = controls.map(|(name, hint)| (name.to_string(), hint.to_string()));
-    // Without a search all of it has to fit one page.
-    let controls: Vec<HelpLine> = if search.is_empty() { Vec::new() } else { controls.collect() };
-    let wanted: Vec<String> = search.split_whitespace().map(str::to_lowercase).collect();
-    let has_pointer = has_keyboard_pointer || !search.is_empty();
-    let of_pointer = keys::POINTER_KEYS.iter().filter(|_| has_pointer);
-    let of_pointer = of_pointer.map(|(key, label)| ((*key).to_string(), (*label).to_string()));
+    let pairs = |of: &[(&str, &str)]| of.iter().map(|(key, label)| (key.to_string(), label.to_string())).collect();
+    let of_pointer: Vec<HelpLine> = if has_keyboard_pointer { pairs(&keys::POINTER_KEYS) } else { Vec::new() };
     let groups = [
-        (keys::BY_KEYBOARD, of_pointer.collect()),
-        (texts::KEYS, in_table.chain(exit).collect::<Vec<_>>()),
-        (texts::GESTURES, gestures.collect()),
-        (texts::CONTROLS, controls),
+        (keys::BY_KEYBOARD, of_pointer),
+        (texts::KEYS, in_table.chain(exit).collect()),
+        (texts::GESTURES, pairs(&GESTURES)),
     ];
-    let has = |line: &HelpLine| {
-        let text = format!("{} {}", line.0, line.1).to_lowercase();
-        wanted.iter().all(|word| text.contains(word))
-    };
-    let groups = groups.map(|(name, lines)| (name, lines.into_iter().filter(has).collect::<Vec<_>>()));
     groups.into_iter().filter(|(_, lines)| !lines.is_empty()).collect()
 }
 
@@ -386,22 +371,15 @@ pub(super) fn show_help(ui: &mut Ui, state: &PanelState, execute: &mut dyn FnMut
                     ui.heading(texts::KEYS_AND_GESTURES);
                     ui.with_layout(egui::Layout::right_to_left(egui::Align::Center), |ui| {
                         is_closed = ui.button(texts::CLOSE).tell(texts::CLOSE_HELP_HINT).clicked();
-                        let label = match &state.visible.search {
-                            Some(text) => texts::searching_for(text),
-                            None => texts::SEARCH_BUTTON.into(),
-                        };
-                        let button = ui.button(label).tell(texts::SEARCH_HINT).named(texts::SEARCH);
-                        if button.with_value(state.visible.search.as_deref().unwrap_or_default()).clicked() {
-                            execute(Command::SearchHelp);
+                        let find = ui.button(texts::FIND).tell(texts::FIND_HINT);
+                        if find.clicked() {
+                            execute(Command::ToggleHelp);
+                            execute(Command::Find);
                         }
                     });
                 });
                 let height = (screen.height() - 110.0).max(0.0);
-                let lines = lines_of(&found(
-                    state.exit_key,
-                    state.visible.search.as_deref().unwrap_or_default(),
-                    state.keyboard_pointer.is_some(),
-                ));
+                let lines = lines_of(&groups(state.exit_key, state.keyboard_pointer.is_some()));
                 ScrollArea::vertical().max_height(height).min_scrolled_height(height).show(ui, |ui| {
                     let columns = ((width / 330.0) as usize).clamp(1, 3);
                     let each = lines.len().div_ceil(columns).max(1);
@@ -412,9 +390,6 @@ pub(super) fn show_help(ui: &mut Ui, state: &PanelState, execute: &mut dyn FnMut
                             lines.iter().for_each(|line| help_line(column, line, size));
                         }
                     });
-                    if lines.is_empty() {
-                        ui.label(texts::NOTHING_FOUND);
-                    }
                     ui.label(RichText::new(texts::NO_MEDICAL_DEVICE).size(MIN_HELP_TEXT).color(WEAK_TEXT));
                 });
             });
@@ -560,20 +535,12 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_help_is_searched_by_all_of_its_words() {
-        let all: usize = found("", "", false).iter().map(|(_, lines)| lines.len()).sum();
-        assert_eq!(all, command::help().count() + GESTURES.len());
-        let first = found("", "", true).swap_remove(0);
+    fn the_help_has_every_key_and_gesture() {
+        let count = |groups: &[(&str, Vec<HelpLine>)]| groups.iter().map(|(_, lines)| lines.len()).sum::<usize>();
+        assert_eq!(count(&groups("", false)), command::help().count() + GESTURES.len());
+        let first = groups("Ctrl+Alt+Q", true).swap_remove(0);
         assert_eq!((first.0, first.1.len()), (keys::BY_KEYBOARD, keys::POINTER_KEYS.len()), "while it is on");
-        let names = |search: &str| -> Vec<String> {
-            found("Ctrl+Alt+Q", search, false).into_iter().flat_map(|(_, lines)| lines).map(|(key, _)| key).collect()
-        };
-        assert!(names("save picture").contains(&"Ctrl+I".to_string()));
-        assert!(names("SPECKLE").contains(&"Smoothing".to_string()), "controls are found by what they do");
-        assert_eq!(names("patient's sides"), ["Sides"]);
-        assert_eq!(names("ctrl+alt quit"), ["Ctrl+Alt+Q"]);
-        assert!(names("double click").contains(&"Shift+Enter".to_string()));
-        assert!(names("no such thing").is_empty());
+        assert!(groups("Ctrl+Alt+Q", false)[0].1.iter().any(|(key, _)| key == "Ctrl+Alt+Q"));
     }
 
     #[test]

@@ -4,7 +4,7 @@ use super::colours::{ACCENT, BACKGROUND, BUTTON, EDGE, FAULT, PANEL, TEXT, UNCOL
 use super::names::{self, Tell};
 use super::overlays::{LOW_WINDOW, first};
 use super::walking::Walk;
-use super::{SMALL_TEXT, TEXT_SIZE, TOUCH_SIZE};
+use super::{PanelState, SMALL_TEXT, TEXT_SIZE, TOUCH_SIZE};
 use crate::command::Command;
 use crate::picture::Picture;
 use crate::texts;
@@ -51,11 +51,14 @@ const BUTTONS: f32 = 36.0;
 pub(super) struct Textures(Vec<(Arc<Picture>, TextureHandle)>);
 
 impl Textures {
-    /// The texture of each tile that has a picture. Those of other pictures are given back.
-    pub(super) fn of(&mut self, context: &Context, shown: Option<&PresetsShown>) -> Vec<Option<TextureId>> {
-        let tiles = shown.map_or(&[][..], |shown| &shown.tiles);
+    /// The textures of pictures, for each of the lists. Those of other pictures are given back.
+    pub(super) fn of<const N: usize>(
+        &mut self,
+        context: &Context,
+        lists: [&[Option<Arc<Picture>>]; N],
+    ) -> [Vec<Option<TextureId>>; N] {
         let is_shown = |picture: &Arc<Picture>| {
-            tiles.iter().any(|tile| tile.picture.as_ref().is_some_and(|other| Arc::ptr_eq(picture, other)))
+            lists.iter().any(|list| list.iter().flatten().any(|other| Arc::ptr_eq(picture, other)))
         };
         self.0.retain(|(picture, _)| is_shown(picture));
         let mut texture = |picture: &Arc<Picture>| {
@@ -69,7 +72,67 @@ impl Textures {
             self.0.push((picture.clone(), texture));
             id
         };
-        tiles.iter().map(|tile| tile.picture.as_ref().map(&mut texture)).collect()
+        lists.map(|list| list.iter().map(|picture| picture.as_ref().map(&mut texture)).collect())
+    }
+}
+
+/// Columns of the looks in the inspector, and height of the name below a picture, points.
+const COLUMNS: usize = 4;
+const SMALL_NAME: f32 = 16.0;
+
+/// Every look as a small picture, and what opens the list in which they are saved, renamed and deleted.
+pub(super) fn show_strip(
+    ui: &mut Ui,
+    state: &PanelState,
+    textures: &[Option<TextureId>],
+    width: f32,
+    execute: &mut dyn FnMut(Command),
+) {
+    names::group(ui, texts::QUICK_LOOKS, |ui| {
+        ui.horizontal(|ui| {
+            ui.label(RichText::new(texts::LOOKS).size(SMALL_TEXT).color(WEAK_TEXT));
+            ui.with_layout(egui::Layout::right_to_left(egui::Align::Center), |ui| {
+                let manage = Button::new(RichText::new(texts::MANAGE_LOOKS).size(SMALL_TEXT).color(ACCENT));
+                if ui.add(manage.frame(false)).tell(texts::PRESETS_HINT).named(texts::PRESETS).clicked() {
+                    execute(Command::Presets);
+                }
+            });
+        });
+        ui.spacing_mut().item_spacing = vec2(6.0, 4.0);
+        let each = (width - 6.0 * (COLUMNS - 1) as f32) / COLUMNS as f32;
+        let all: Vec<(usize, &PresetTile)> = state.looks.iter().enumerate().collect();
+        for row in all.chunks(COLUMNS) {
+            ui.horizontal(|ui| {
+                for (n, tile) in row {
+                    let picture = vec2(each, each / SHAPE);
+                    let (area, response) = ui.allocate_exact_size(picture + vec2(0.0, SMALL_NAME), Sense::click());
+                    response.widget_info(|| WidgetInfo::labeled(WidgetType::Button, true, tile.name));
+                    let inside = Rect::from_min_size(area.min, picture);
+                    paint_picture(ui, inside, textures.get(*n).copied().flatten());
+                    let is_over = response.hovered() || response.has_focus();
+                    let stroke = Stroke::new(if is_over { 2.0 } else { 1.0 }, if is_over { TEXT } else { EDGE });
+                    ui.painter().rect_stroke(inside, 4.0, stroke, StrokeKind::Inside);
+                    let font = FontId::proportional(SMALL_TEXT);
+                    let mut job = egui::text::LayoutJob::simple_singleline(tile.name.to_string(), font, TEXT);
+                    job.wrap = egui::text::TextWrapping::truncate_at_width(each);
+                    let galley = ui.painter().layout_job(job);
+                    let at = pos2(area.center().x - galley.size().x / 2.0, inside.bottom() + 1.0);
+                    ui.painter().galley(at, galley, TEXT);
+                    if response.tell(tile.hint).named(tile.name).clicked() {
+                        execute(Command::Preset(*n));
+                    }
+                }
+            });
+        }
+    });
+}
+
+/// A picture, or a dark area while there is none.
+fn paint_picture(ui: &Ui, area: Rect, texture: Option<TextureId>) {
+    let whole = Rect::from_min_max(Pos2::ZERO, pos2(1.0, 1.0));
+    match texture {
+        Some(texture) => _ = ui.painter().image(texture, area, whole, UNCOLOURED),
+        None => _ = ui.painter().rect_filled(area, 4.0, BACKGROUND),
     }
 }
 
@@ -184,13 +247,7 @@ fn button(ui: &mut Ui, n: usize, tile: &PresetTile, texture: Option<TextureId>, 
     let stroke = Stroke::new(if response.hovered() { 2.0 } else { 1.0 }, if response.hovered() { TEXT } else { EDGE });
     painter.rect(area, 6.0, BUTTON, stroke, StrokeKind::Inside);
     let inside = Rect::from_min_size(area.min + vec2(edge, edge), picture);
-    match texture {
-        Some(texture) => {
-            let whole = Rect::from_min_max(Pos2::ZERO, pos2(1.0, 1.0));
-            painter.image(texture, inside, whole, UNCOLOURED);
-        }
-        None => _ = painter.rect_filled(inside, 2.0, BACKGROUND),
-    }
+    paint_picture(ui, inside, texture);
     let key = if n < 9 { format!("{}  ", n + 1) } else { String::new() };
     let font = FontId::proportional(TEXT_SIZE - 2.0);
     let mut job = egui::text::LayoutJob::default();

@@ -1,106 +1,203 @@
-//! The rail on the left: modes and tools, and in a window without a column the controls too, each under a tab. A window that has no room for a rail has it as a
-//! drawer over the picture, which a button of the bar opens.
+//! The rail on the left: every tool as an icon, with a word where there is room. Where not even the icons have room, a button opens them in the inspector.
 
-use super::colours::{EDGE, PANEL};
+use super::colours::{ACCENT, BUTTON, CHOSEN, EDGE, PANEL, TEXT, WEAK_TEXT};
+use super::icons::{self, Icon};
 use super::names::{self, Tell};
-use super::{MODES_WIDTH, PanelState, TOUCH_SIZE};
-use crate::command::{Command, RailTab};
+use super::{PanelState, RAIL_WIDTH, SMALL_TEXT, heading};
+use crate::command::{Command, InspectorTab, Tool};
+use crate::scene::MeasureKind;
 use crate::texts;
+use crate::texts::hints;
 use egui::accesskit::Role;
-use egui::{Area, Button, Frame, Id, Margin, Order, Panel, Stroke, Ui, pos2, vec2};
+use egui::{
+    Align2, FontId, Frame, Panel, Rect, Response, Sense, Stroke, StrokeKind, Ui, Vec2, WidgetInfo, WidgetType, vec2,
+};
 
-const TABS: [(RailTab, &str, &str); 2] = [
-    (RailTab::Tools, texts::TAB_TOOLS, texts::TAB_TOOLS_HINT),
-    (RailTab::Controls, texts::CONTROLS, texts::TAB_CONTROLS_HINT),
-];
-/// In a lower drawer the tabs are low, points.
-const LOW_DRAWER: f32 = 150.0;
-
-/// What of the rail the user chose.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub(crate) struct Rail {
-    pub tab: RailTab,
-    /// The drawer is open, in a window that has one.
-    pub is_open: bool,
+/// A button of the rail: what it is called, the tools that it stands for (the first is chosen by it), and the explanation.
+struct Place {
+    name: &'static str,
+    icon: Icon,
+    tools: &'static [Tool],
 }
 
-impl Rail {
-    /// Executes a command for the rail; false if it is another one's.
-    pub fn apply(&mut self, command: &Command, has_drawer: bool) -> bool {
-        match *command {
-            Command::RailTab(tab) => self.tab = tab,
-            Command::ToggleDrawer => self.is_open = !self.is_open,
-            Command::SwitchRail if has_drawer => {
-                (self.is_open, self.tab) = match (self.is_open, self.tab) {
-                    (false, _) => (true, RailTab::Controls),
-                    (true, RailTab::Controls) => (true, RailTab::Tools),
-                    (true, RailTab::Tools) => (false, RailTab::Tools),
-                }
+const fn place(name: &'static str, icon: Icon, tools: &'static [Tool]) -> Place {
+    Place { name, icon, tools }
+}
+
+/// In the order of the rail; measuring begins with the second part.
+const PLACES: [&[Place]; 2] = [
+    &[
+        place(texts::TURN, icons::TURN, &[Tool::Rotate]),
+        place(texts::LIGHT, icons::LIGHT, &[Tool::Light]),
+        place(texts::REGION, icons::REGION, &[Tool::Region]),
+        place(texts::CLIP, icons::CLIP, &[Tool::Clip]),
+        place(texts::CUT, icons::CUT, &[Tool::Cut]),
+        place(texts::BRUSH, icons::BRUSH, &[Tool::Brush]),
+        place(texts::CROSSHAIR, icons::CROSSHAIR, &[Tool::Plane]),
+        place(texts::CURVE, icons::CURVE, &[Tool::Curve]),
+    ],
+    &[
+        place(
+            texts::DISTANCE,
+            icons::DISTANCE,
+            &[Tool::Measure(MeasureKind::Distance), Tool::Measure(MeasureKind::Surface)],
+        ),
+        place(texts::AREA, icons::AREA, &[Tool::Measure(MeasureKind::Ellipse), Tool::Measure(MeasureKind::Trace)]),
+        place(texts::ANGLE, icons::ANGLE, &[Tool::Measure(MeasureKind::Angle)]),
+        place(texts::MEASURED_VOLUME, icons::VOLUME, &[Tool::Measure(MeasureKind::Volume)]),
+        place(texts::TEXT, icons::TEXT, &[Tool::Measure(MeasureKind::Text), Tool::Measure(MeasureKind::Arrow)]),
+        place(texts::BODY, icons::BODY, &[Tool::BodyMark]),
+    ],
+];
+
+/// Height of a button: at most, the least with a word, and the least with the icon alone, points.
+const HEIGHTS: [f32; 3] = [52.0, 38.0, 28.0];
+/// Between the two parts, and above and below all, points.
+const GAPS: f32 = 16.0;
+
+fn count() -> usize {
+    PLACES.iter().map(|part| part.len()).sum()
+}
+
+/// Height of a button in a rail of this height, points; none if not all of them have room.
+fn button_height(height: f32) -> Option<f32> {
+    let each = (height - GAPS) / count() as f32;
+    (each >= HEIGHTS[2]).then(|| each.min(HEIGHTS[0]).floor())
+}
+
+/// True if a rail of this height has every tool, points.
+pub(super) fn has_all(height: f32) -> bool {
+    button_height(height).is_some()
+}
+
+pub(super) fn show(ui: &mut Ui, state: &PanelState, height: f32, execute: &mut dyn FnMut(Command)) {
+    let frame = Frame::new().fill(PANEL);
+    let rail = Panel::left("rail").exact_size(RAIL_WIDTH).resizable(false).show_separator_line(false).frame(frame);
+    rail.show(ui, |ui| {
+        names::name(ui, Role::Toolbar, texts::TOOLS);
+        ui.spacing_mut().item_spacing = Vec2::ZERO;
+        ui.add_space(4.0);
+        let size = |height: f32| vec2(RAIL_WIDTH, height);
+        let Some(each) = button_height(height) else {
+            // The most used, as many as have room, and what opens all.
+            let shown = ((height - 8.0) / HEIGHTS[0]).floor() as usize;
+            for place in PLACES.into_iter().flatten().take(shown.saturating_sub(1)) {
+                tool(ui, state, place, size(HEIGHTS[0]), execute);
             }
-            Command::SwitchRail => {
-                self.tab = if self.tab == RailTab::Tools { RailTab::Controls } else { RailTab::Tools };
+            let more = button(ui, icons::TOOLS, texts::TAB_TOOLS, size(HEIGHTS[0]), false);
+            if more.tell(texts::TAB_TOOLS_HINT).clicked() {
+                execute(Command::InspectorTab(InspectorTab::Tools));
             }
-            _ => return false,
+            return;
+        };
+        for (n, part) in PLACES.into_iter().enumerate() {
+            if n > 0 {
+                let (line, _) = ui.allocate_exact_size(size(GAPS - 8.0), Sense::hover());
+                ui.painter().hline(line.x_range().shrink(16.0), line.center().y, Stroke::new(1.0, EDGE));
+            }
+            part.iter().for_each(|place| tool(ui, state, place, size(each), execute));
         }
-        true
+    });
+}
+
+/// Tools in the inspector.
+pub(super) fn show_grid(ui: &mut Ui, state: &PanelState, width: f32, execute: &mut dyn FnMut(Command)) {
+    names::group(ui, texts::TOOLS, |ui| {
+        heading(ui, texts::TOOLS);
+        let columns = (width / RAIL_WIDTH).floor().max(1.0);
+        let size = vec2(width / columns, HEIGHTS[0]);
+        let all: Vec<&Place> = PLACES.into_iter().flatten().collect();
+        ui.spacing_mut().item_spacing = Vec2::ZERO;
+        for row in all.chunks(columns as usize) {
+            ui.horizontal(|ui| row.iter().for_each(|place| tool(ui, state, place, size, execute)));
+        }
+    });
+}
+
+fn tool(ui: &mut Ui, state: &PanelState, place: &Place, size: Vec2, execute: &mut dyn FnMut(Command)) {
+    let chosen = state.controls.tool();
+    let is_chosen = place.tools.contains(&chosen);
+    let response = button(ui, place.icon, place.name, size, is_chosen);
+    if response.tell(hints::of_tool(place.tools[0])).clicked() {
+        // A second click leaves a tool.
+        execute(Command::Tool(if is_chosen { Tool::default() } else { place.tools[0] }));
     }
 }
 
-/// Shows the rail at the edge of the window. `show`: shows what a tab has.
-pub(super) fn show_rail(
+/// An icon, with its name below it where there is room.
+fn button(ui: &mut Ui, icon: Icon, name: &str, size: Vec2, is_chosen: bool) -> Response {
+    let (area, response) = ui.allocate_exact_size(size, Sense::click());
+    response.widget_info(|| WidgetInfo::selected(WidgetType::SelectableLabel, true, is_chosen, name));
+    let inner = area.shrink2(vec2(4.0, 1.0));
+    let is_over = response.hovered() || response.has_focus();
+    let painter = ui.painter();
+    if is_chosen {
+        painter.rect(inner, 6.0, CHOSEN, Stroke::new(1.0, ACCENT), StrokeKind::Inside);
+    } else if is_over {
+        painter.rect_filled(inner, 6.0, BUTTON);
+    }
+    let has_word = size.y >= HEIGHTS[1];
+    let colour = match (is_chosen, is_over) {
+        (true, _) => ACCENT,
+        (false, true) => TEXT,
+        (false, false) => WEAK_TEXT,
+    };
+    let edge = if has_word { (size.y - 20.0).clamp(16.0, 22.0) } else { 20.0_f32.min(size.y - 8.0) };
+    let rows = edge + if has_word { SMALL_TEXT + 1.0 } else { 0.0 };
+    let top = area.center().y - rows / 2.0;
+    let middle = Rect::from_min_size(egui::pos2(area.center().x - edge / 2.0, top), vec2(edge, edge));
+    paint(painter, icon, middle, colour);
+    if has_word {
+        let at = egui::pos2(area.center().x, top + rows);
+        let word = if is_chosen { ACCENT } else { TEXT };
+        painter.text(at, Align2::CENTER_BOTTOM, name, FontId::proportional(SMALL_TEXT - 1.0), word);
+    }
+    response
+}
+
+/// Draws an icon in a square.
+pub(super) fn paint(painter: &egui::Painter, icon: Icon, square: Rect, colour: egui::Color32) {
+    let stroke = Stroke::new((square.width() / 12.0).max(1.2), colour);
+    for line in icon.split(|n| *n == u8::MAX) {
+        let (points, _) = line.as_chunks::<2>();
+        let at = |[x, y]: &[u8; 2]| square.min + vec2(f32::from(*x), f32::from(*y)) * (square.width() / 240.0);
+        painter.line(points.iter().map(at).collect(), stroke);
+    }
+}
+
+/// A button with an icon and perhaps a text, as wide as it is told; `name`: what a screen reader calls it.
+pub(super) fn icon_button(
     ui: &mut Ui,
-    state: &PanelState,
-    width: f32,
-    execute: &mut dyn FnMut(Command),
-    show: impl FnOnce(&mut Ui, RailTab, &mut dyn FnMut(Command)),
-) {
-    Panel::left("rail").exact_size(width).resizable(false).show_separator_line(false).show(ui, |ui| {
-        if state.room.has_column {
-            return show(ui, RailTab::Tools, execute);
-        }
-        ui.add_space(6.0);
-        tabs(ui, state, [width, TOUCH_SIZE * 0.75], execute);
-        show(ui, state.visible.rail.tab, execute);
-    });
-}
-
-/// Width and height of the drawer in a window of this size above its bar, points.
-pub(super) fn drawer_size([width, height]: [f32; 2], below: f32) -> [f32; 2] {
-    [width.min(MODES_WIDTH), (height - below).max(1.0)]
-}
-
-/// Shows the rail as a drawer over the picture.
-pub(super) fn show_drawer(
-    ui: &mut Ui,
-    state: &PanelState,
-    [width, height]: [f32; 2],
-    execute: &mut dyn FnMut(Command),
-    show: impl FnOnce(&mut Ui, RailTab, &mut dyn FnMut(Command)),
-) {
-    let area = Area::new(Id::new("drawer")).order(Order::Middle).fixed_pos(pos2(0.0, 0.0)).constrain(false);
-    area.show(ui.ctx(), |ui| {
-        let frame = Frame::new().fill(PANEL).stroke(Stroke::new(1.0, EDGE)).inner_margin(Margin::symmetric(7, 5));
-        frame.show(ui, |ui| {
-            let inner = vec2(width - 16.0, height - 12.0);
-            ui.set_min_size(inner);
-            ui.set_max_size(inner);
-            let tab = if height < LOW_DRAWER { 28.0 } else { TOUCH_SIZE * 0.75 };
-            tabs(ui, state, [width, tab], execute);
-            show(ui, state.visible.rail.tab, execute);
-        });
-    });
-}
-
-fn tabs(ui: &mut Ui, state: &PanelState, [width, height]: [f32; 2], execute: &mut dyn FnMut(Command)) {
-    let each = vec2((width - 16.0 - ui.spacing().item_spacing.x) / 2.0, height);
-    ui.horizontal(|ui| {
-        names::name(ui, Role::TabList, texts::TABS);
-        for (tab, name, hint) in TABS {
-            let is_chosen = state.visible.rail.tab == tab;
-            let button = Button::selectable(is_chosen, name).frame_when_inactive(true).min_size(each);
-            if ui.add(button).tell(hint).with_role(Role::Tab).chosen(is_chosen).clicked() {
-                execute(Command::RailTab(tab));
-            }
-        }
-    });
+    icon: Icon,
+    (text, name): (&str, &str),
+    size: Vec2,
+    (is_enabled, is_chosen): (bool, bool),
+) -> Response {
+    let sense = if is_enabled { Sense::click() } else { Sense::hover() };
+    let response = ui.add_enabled_ui(is_enabled, |ui| ui.allocate_exact_size(size, sense).1).inner;
+    response.widget_info(|| WidgetInfo::labeled(WidgetType::Button, is_enabled, name));
+    let area = response.rect;
+    let (is_over, painter) = (is_enabled && (response.hovered() || response.has_focus()), ui.painter());
+    let fill = if is_chosen { CHOSEN } else { BUTTON };
+    let edge = if is_over { TEXT } else { EDGE };
+    let stroke = Stroke::new(1.0, if is_chosen { ACCENT } else { edge });
+    painter.rect(area.shrink(0.5), 6.0, fill, stroke, StrokeKind::Inside);
+    let colour = match (is_enabled, is_chosen) {
+        (false, _) => super::colours::ABSENT,
+        (true, true) => ACCENT,
+        (true, false) => TEXT,
+    };
+    let edge = 18.0_f32.min(size.y - 8.0);
+    let font = FontId::proportional(super::TEXT_SIZE);
+    let words = painter.layout_no_wrap(text.to_string(), font, colour);
+    let gap = if text.is_empty() { 0.0 } else { 8.0 };
+    let left = area.center().x - (edge + gap + words.size().x) / 2.0;
+    paint(
+        painter,
+        icon,
+        Rect::from_center_size(egui::pos2(left + edge / 2.0, area.center().y), vec2(edge, edge)),
+        colour,
+    );
+    painter.galley(egui::pos2(left + edge + gap, area.center().y - words.size().y / 2.0), words, colour);
+    response
 }

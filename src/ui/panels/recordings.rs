@@ -3,7 +3,7 @@
 use super::colours::{ACCENT, BAR, EDGE, TEXT, WHOLE_BAR};
 use super::names::{self, Tell};
 use super::widgets::{BETWEEN_MESSAGES, MESSAGE_EDGES, message_frame};
-use super::{PanelState, SMALL_TEXT, TEXT_SIZE, TOUCH_SIZE, heading, picture_rect};
+use super::{PanelState, ROW_HEIGHT, SMALL_TEXT, TEXT_SIZE, TOUCH_SIZE, heading, icons, picture_rect, rail};
 use crate::command::Command;
 use crate::texts;
 use egui::accesskit::Role;
@@ -29,7 +29,7 @@ pub(super) fn show_list(ui: &mut Ui, state: &PanelState, width: f32, execute: &m
     if state.recordings.len() < 2 {
         return;
     }
-    let height = TOUCH_SIZE * 0.75;
+    let height = ROW_HEIGHT;
     let name = vec2(width - CLOSE - ui.spacing().item_spacing.x, height);
     names::group(ui, texts::RECORDINGS, |ui| {
         heading(ui, texts::RECORDINGS);
@@ -40,7 +40,7 @@ pub(super) fn show_list(ui: &mut Ui, state: &PanelState, width: f32, execute: &m
                 if button.tell(&texts::recording_hint(&recording.path)).named(&recording.name).clicked() {
                     execute(Command::ShowRecording(n));
                 }
-                let close = ui.add_sized(vec2(CLOSE, height), Button::new(texts::CLOSE_RECORDING_BUTTON));
+                let close = rail::icon_button(ui, icons::CLOSE, ("", texts::CLOSE), vec2(CLOSE, height), (true, false));
                 let close = close.tell(texts::CLOSE_RECORDING_HINT);
                 if close.named(&texts::close_recording(&recording.name)).clicked() {
                     execute(Command::CloseRecording(n));

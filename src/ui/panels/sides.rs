@@ -1,7 +1,8 @@
 //! The patient's sides along the axes of the volume, and the place of the probe's marker: what the user states of both.
 
 use super::names::{self, Tell};
-use super::{PanelState, SMALL_TEXT, TOUCH_SIZE, heading};
+use super::widgets::switch;
+use super::{PanelState, ROW_HEIGHT, SMALL_TEXT, heading};
 use crate::command::Command;
 use crate::scene::{Marks, ProbeMarker, Sides, VolumeAxis};
 use crate::texts;
@@ -24,7 +25,7 @@ pub(super) fn show(ui: &mut Ui, state: &PanelState, width: f32, execute: &mut dy
         ui.spacing_mut().item_spacing.x = 4.0;
         ui.spacing_mut().button_padding.x = 3.0;
         let has = |axis| matches!(marks.sides(axis), Sides::LeftRight | Sides::RightLeft);
-        let exchange = Button::new(texts::EXCHANGE_LEFT_AND_RIGHT).min_size(vec2(width, TOUCH_SIZE * 0.75));
+        let exchange = Button::new(texts::EXCHANGE_LEFT_AND_RIGHT).min_size(vec2(width, ROW_HEIGHT));
         let hint = texts::EXCHANGE_LEFT_AND_RIGHT_HINT;
         let exchange = ui.add_enabled(AXES.into_iter().any(has), exchange);
         if exchange.tell(hint).on_disabled_hover_text(hint).clicked() {
@@ -64,6 +65,10 @@ pub(super) fn show(ui: &mut Ui, state: &PanelState, width: f32, execute: &mut dy
             });
         });
     });
+    let mut saves_bar = marks.bar;
+    if switch(ui, &mut saves_bar, texts::BAR_ON_SAVED_PICTURES, texts::BAR_ON_SAVED_PICTURES_HINT) {
+        execute(Command::SavesBar(saves_bar));
+    }
     let header = shown.header_response.expanded(shown.openness > 0.5);
     header.tell(texts::SIDES_HINT).named(texts::SIDES).with_value(&known(marks));
 }
@@ -89,7 +94,7 @@ fn in_short(sides: Sides) -> String {
 /// The size of one of so many buttons in a row.
 fn size_in(ui: &Ui, width: f32, count: usize) -> egui::Vec2 {
     let gaps = ui.spacing().item_spacing.x * count.saturating_sub(1) as f32;
-    vec2((width - gaps) / count.max(1) as f32, TOUCH_SIZE * 0.75)
+    vec2((width - gaps) / count.max(1) as f32, ROW_HEIGHT)
 }
 
 /// A button of which one is chosen. True if it is clicked.

@@ -1,9 +1,9 @@
-//! What belongs to a tool, in the column of the controls: clip faces, cuts and the brush, the curved plane, the start line.
+//! What belongs to a tool, first in the inspector: clip faces, cuts and the brush, the curved plane, the start line.
 
 use super::colours::ACCENT;
 use super::names::{self, Tell};
 use super::widgets::{front, plain_slider, slider, switch};
-use super::{PanelState, SMALL_TEXT, TOUCH_SIZE, heading};
+use super::{PanelState, ROW_HEIGHT, SMALL_TEXT, heading};
 use crate::command::{Command, Tool};
 use crate::controls::BRUSH_RADII;
 use crate::scene::{KeptSide, MAX_START_POINTS, MIN_START_POINTS, Settings};
@@ -27,7 +27,7 @@ pub(super) fn clip(ui: &mut Ui, state: &PanelState, width: f32, execute: &mut dy
         heading(ui, texts::CLIP);
         ui.set_max_width(width);
         for number in there.into_iter().flatten() {
-            slider(ui, state, number, SLIDERS[number].name, false, execute);
+            slider(ui, state, number, SLIDERS[number].name, execute);
         }
     });
 }
@@ -58,10 +58,10 @@ pub(super) fn cuts(ui: &mut Ui, state: &PanelState, width: f32, execute: &mut dy
             brush_radius(ui, state, execute);
         }
         if let Some(number) = depth_of_cut(state) {
-            slider(ui, state, number, SLIDERS[number].name, false, execute);
+            slider(ui, state, number, SLIDERS[number].name, execute);
         }
         if !state.controls.settings().cuts.is_empty() {
-            let size = vec2(width, TOUCH_SIZE * 0.75);
+            let size = vec2(width, ROW_HEIGHT);
             let hint = texts::REMOVE_ALL_CUTS_HINT;
             if ui.add_sized(size, Button::new(texts::REMOVE_ALL_CUTS)).tell(hint).clicked() {
                 execute(Command::ClearCuts);
@@ -92,7 +92,7 @@ pub(super) fn curve(ui: &mut Ui, state: &PanelState, width: f32, execute: &mut d
                 ui.add(Label::new(RichText::new(step).size(SMALL_TEXT).color(ACCENT)).wrap());
             });
         }
-        let size = vec2(width, TOUCH_SIZE * 0.75);
+        let size = vec2(width, ROW_HEIGHT);
         if line.is_some_and(|line| line.points.len() > 1) {
             let hint = texts::END_CURVE_HINT;
             let button = super::overlays::first(RichText::new(texts::END_CURVE));
@@ -134,7 +134,7 @@ pub(super) fn start_line(ui: &mut Ui, state: &PanelState, width: f32, execute: &
                 execute(Command::MoveStartHandle(n, [*lateral, depth]));
             }
         }
-        let half = vec2((width - ui.spacing().item_spacing.x) / 2.0, TOUCH_SIZE * 0.75);
+        let half = vec2((width - ui.spacing().item_spacing.x) / 2.0, ROW_HEIGHT);
         ui.horizontal(|ui| {
             for (command, [word, name], is_there, hint) in [
                 (

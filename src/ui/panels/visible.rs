@@ -1,43 +1,59 @@
-//! What the user chose to see: panels, lists and texts over the picture, each opened and closed by a command.
+//! What the user chose to see: panels, lists and texts over the picture, each opened and closed by a command; and what is typed for them.
 
-use super::rail::Rail;
+use super::Room;
+use super::inspector::Inspector;
 use crate::command::Command;
 use crate::input::{Key, Modifiers};
+use crate::palette;
 
-/// Longest text that the help is searched for, characters.
+/// Longest text that is searched for, and longest number, characters.
 const MAX_SEARCH: usize = 40;
+const MAX_NUMBER: usize = 10;
+
+/// The search of all commands and controls.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub(crate) struct Search {
+    pub text: String,
+    /// The place of the chosen entry among what is found.
+    pub chosen: usize,
+}
 
 /// What is to be seen besides the picture.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub(crate) struct Visible {
-    /// Sliders and buttons.
+    /// Bars and inspector.
     pub panels: bool,
     pub help: bool,
-    /// What the help is searched for; none while it is not.
-    pub search: Option<String>,
+    pub search: Option<Search>,
     /// The display of times.
     pub times: bool,
     /// The list of formats.
     pub exports: bool,
-    pub rail: Rail,
+    pub inspector: Inspector,
+    /// The number that is typed for a slider, by its index.
+    pub value: Option<(usize, String)>,
 }
 
 impl Visible {
     /// Executes a command that opens or closes something; false if it is another one.
-    pub(crate) fn apply(&mut self, command: &Command, has_drawer: bool) -> bool {
+    pub(crate) fn apply(&mut self, command: &Command, room: &Room) -> bool {
         match *command {
-            Command::ToggleHelp => (self.help, self.search) = (!self.help, None),
-            Command::SearchHelp => self.search = Some(String::new()),
+            Command::ToggleHelp => self.help = !self.help,
+            Command::Find => {
+                self.search = if self.search.is_some() { None } else { Some(Search::default()) };
+                self.value = None;
+            }
             Command::ToggleTimes => self.times = !self.times,
             Command::Exports => self.exports = !self.exports,
-            _ => return self.rail.apply(command, has_drawer),
+            Command::TypeValue(number) => self.value = Some((number, String::new())),
+            _ => return self.inspector.apply(command, room),
         }
         true
     }
 
     /// True if something is open that the user may want to close.
-    pub(crate) fn is_any_open(&self, has_drawer: bool) -> bool {
-        self.help || self.times || self.exports || (self.rail.is_open && has_drawer)
+    pub(crate) fn is_any_open(&self, room: &Room) -> bool {
+        self.help || self.times || self.exports || self.search.is_some() || self.inspector.is_drawn_over(room)
     }
 
     /// Closes the list of formats. False if it is not open.
@@ -45,9 +61,9 @@ impl Visible {
         std::mem::take(&mut self.exports)
     }
 
-    /// Ends the search of the help, or else closes the help. False if neither is open.
+    /// Closes what is typed, the search or the help, one of them. False if none is open.
     pub(crate) fn close_help(&mut self) -> bool {
-        self.search.take().is_some() || std::mem::take(&mut self.help)
+        self.value.take().is_some() || self.search.take().is_some() || std::mem::take(&mut self.help)
     }
 
     /// Closes the display of times. False if it is not open.
@@ -56,72 +72,140 @@ impl Visible {
     }
 
     /// Closes the drawer. False if it is not open, or the window has none.
-    pub(crate) fn close_drawer(&mut self, has_drawer: bool) -> bool {
-        has_drawer && std::mem::take(&mut self.rail.is_open)
+    pub(crate) fn close_drawer(&mut self, room: &Room) -> bool {
+        let is_open = self.inspector.is_drawn_over(room);
+        self.inspector.is_open &= !is_open;
+        is_open
     }
 
-    /// Takes a key for the search of the help. True if it is none of the view's own.
-    pub(crate) fn search(&mut self, key: Key, modifiers: Modifiers) -> bool {
-        match (&mut self.search, key) {
-            _ if !self.help => return false,
-            (None, Key::Char('/')) => self.search = Some(String::new()),
-            (Some(text), key) if !modifiers.control && !modifiers.alt => return edit(text, key),
-            _ => return false,
+    /// Takes a key for the number that is typed, or for the search: the commands that it gives, or none if it is another one's key.
+    pub(crate) fn key(&mut self, key: Key, modifiers: Modifiers) -> Option<Vec<Command>> {
+        if modifiers.control || modifiers.alt {
+            return None;
         }
-        true
+        if let Some((number, text)) = &mut self.value {
+            match key {
+                Key::Char(letter) if letter.is_ascii_digit() || "+-.,".contains(letter) => {
+                    if text.chars().count() < MAX_NUMBER {
+                        text.push(if letter == ',' { '.' } else { letter });
+                    }
+                }
+                Key::Backspace => _ = text.pop(),
+                Key::Enter => {
+                    let typed = text.parse::<f64>().ok().filter(|value| value.is_finite());
+                    let number = *number;
+                    self.value = None;
+                    return Some(typed.map(|value| Command::SetShown(number, value)).into_iter().collect());
+                }
+                _ => return None,
+            }
+            return Some(Vec::new());
+        }
+        let search = self.search.as_mut()?;
+        let last = || palette::found(&search.text).len().saturating_sub(1);
+        match key {
+            Key::Down => search.chosen = (search.chosen + 1).min(last()),
+            Key::Up => search.chosen = search.chosen.saturating_sub(1),
+            Key::Enter => {
+                let command = palette::found(&search.text).get(search.chosen).map(|entry| entry.command);
+                self.search = None;
+                return Some(command.into_iter().collect());
+            }
+            Key::Char(letter) => search.push(letter),
+            Key::Space => search.push(' '),
+            Key::Backspace => {
+                _ = search.text.pop();
+                search.chosen = 0;
+            }
+            _ => return None,
+        }
+        Some(Vec::new())
     }
 }
 
-/// Takes a key for the text that the help is searched for. False if it is none of a text's.
-fn edit(text: &mut String, key: Key) -> bool {
-    let letter = match key {
-        Key::Char(letter) => letter,
-        Key::Space => ' ',
-        Key::Backspace => {
-            text.pop();
-            return true;
+impl Search {
+    fn push(&mut self, letter: char) {
+        if self.text.chars().count() < MAX_SEARCH {
+            self.text.push(letter);
         }
-        _ => return false,
-    };
-    if text.chars().count() < MAX_SEARCH {
-        text.push(letter);
+        self.chosen = 0;
     }
-    true
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::command::InspectorTab;
 
-    /// Prevents a search that grows while a key is held, and one that takes the keys of the view.
+    const PLAIN: Modifiers = Modifiers { shift: false, control: false, alt: false };
+
+    /// A window in which the inspector is a drawer.
+    fn small() -> Room {
+        Room::of([640, 480], 1.0, true)
+    }
+
+    /// Prevents a search that grows while a key is held, and one that takes keys with Ctrl.
     #[test]
-    fn the_search_of_the_help_has_a_longest_text_and_begins_with_a_slash() {
-        let (mut visible, plain) = (Visible::default(), Modifiers::default());
-        assert!(!visible.search(Key::Char('/'), plain), "the help is not open");
-        assert!(visible.apply(&Command::ToggleHelp, false) && !visible.search(Key::Char('a'), plain));
-        assert!(visible.search(Key::Char('/'), plain));
+    fn the_search_has_a_longest_text_and_enter_gives_the_chosen_command() {
+        let mut visible = Visible::default();
+        assert_eq!(visible.key(Key::Char('a'), PLAIN), None, "the search is not open");
+        assert!(visible.apply(&Command::Find, &small()));
         for key in [Key::Char('ä'), Key::Space, Key::Char('b')].into_iter().cycle().take(3 * MAX_SEARCH) {
-            assert!(visible.search(key, plain));
+            assert_eq!(visible.key(key, PLAIN), Some(vec![]));
         }
-        assert!(!visible.search(Key::Char('s'), Modifiers { control: true, ..plain }));
-        assert_eq!(visible.search.as_ref().map(|text| text.chars().count()), Some(MAX_SEARCH));
-        (0..MAX_SEARCH + 1).for_each(|_| assert!(visible.search(Key::Backspace, plain)));
-        assert!(visible.search.as_deref() == Some("") && !visible.search(Key::Escape, plain));
+        assert_eq!(visible.key(Key::Char('s'), Modifiers { control: true, ..PLAIN }), None);
+        assert_eq!(visible.search.as_ref().map(|search| search.text.chars().count()), Some(MAX_SEARCH));
+        (0..MAX_SEARCH + 1).for_each(|_| assert_eq!(visible.key(Key::Backspace, PLAIN), Some(vec![])));
+        "three planes".chars().for_each(|letter| _ = visible.key(Key::Char(letter), PLAIN));
+        let found = palette::found("three planes");
+        assert!(found.len() > 1);
+        for key in [Key::Down, Key::Up, Key::Up, Key::Down] {
+            assert_eq!(visible.key(key, PLAIN), Some(vec![]));
+        }
+        assert_eq!(visible.key(Key::Enter, PLAIN), Some(vec![found[1].command]));
+        assert!(visible.search.is_none());
+        visible.apply(&Command::Find, &small());
+        "no such thing".chars().for_each(|letter| _ = visible.key(Key::Char(letter), PLAIN));
+        assert_eq!(visible.key(Key::Down, PLAIN), Some(vec![]));
+        assert_eq!(visible.key(Key::Enter, PLAIN), Some(vec![]), "nothing is found, and nothing happens");
+    }
+
+    #[test]
+    fn a_number_is_typed_for_a_slider() {
+        let mut visible = Visible::default();
+        let mut typed = |text: &str| {
+            visible.apply(&Command::TypeValue(4), &small());
+            text.chars().for_each(|letter| _ = visible.key(Key::Char(letter), PLAIN));
+            let commands = visible.key(Key::Enter, PLAIN);
+            assert!(visible.value.is_none());
+            commands
+        };
+        assert_eq!(typed("-1,25"), Some(vec![Command::SetShown(4, -1.25)]));
+        assert_eq!(typed("31"), Some(vec![Command::SetShown(4, 31.0)]));
+        for wrong in ["", "-", "1.2.3", "12345678901234567890"] {
+            let commands = typed(wrong).expect("its key");
+            assert!(commands.iter().all(|command| *command == Command::SetShown(4, 1_234_567_890.0)), "{wrong}");
+            assert_eq!(commands.is_empty(), wrong.len() < 9, "{wrong}");
+        }
+        visible.apply(&Command::TypeValue(4), &small());
+        assert_eq!(visible.key(Key::Char('x'), PLAIN), None, "no letter of a number");
+        assert!(visible.close_help() && visible.value.is_none());
     }
 
     /// Prevents an Escape that closes two things, and a drawer that no window shows keeping it from the others.
     #[test]
     fn each_thing_closes_once_and_the_search_before_the_help() {
-        let mut visible = Visible::default();
-        assert!(!visible.is_any_open(true));
-        for command in [Command::ToggleHelp, Command::SearchHelp, Command::ToggleTimes, Command::Exports] {
-            assert!(visible.apply(&command, true) && visible.is_any_open(true), "{command:?}");
+        let (mut visible, small, large) = (Visible::default(), small(), Room::of([1920, 1080], 1.0, true));
+        assert!(!visible.is_any_open(&small));
+        for command in [Command::ToggleHelp, Command::Find, Command::ToggleTimes, Command::Exports] {
+            assert!(visible.apply(&command, &small) && visible.is_any_open(&small), "{command:?}");
         }
-        assert!(visible.apply(&Command::ToggleDrawer, true) && !visible.apply(&Command::Freeze, true));
+        assert!(visible.apply(&Command::InspectorTab(InspectorTab::Planes), &small));
+        assert!(visible.inspector.is_open && !visible.apply(&Command::Freeze, &small));
         assert!(visible.close_exports() && !visible.close_exports());
         assert!(visible.close_help() && visible.help && visible.close_help() && !visible.close_help());
         assert!(visible.close_times() && !visible.close_times());
-        assert!(!visible.is_any_open(false) && !visible.close_drawer(false));
-        assert!(visible.close_drawer(true) && !visible.is_any_open(true) && !visible.close_drawer(true));
+        assert!(!visible.is_any_open(&large) && !visible.close_drawer(&large));
+        assert!(visible.close_drawer(&small) && !visible.is_any_open(&small) && !visible.close_drawer(&small));
     }
 }

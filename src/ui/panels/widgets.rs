@@ -1,22 +1,25 @@
 //! What controls are made of: the sliders of settings, those of other lengths, switches, and the frame of messages.
 
-use super::colours::{ACCENT, BUTTON, MESSAGE, ON_SELECTED, SELECTED, TEXT, WEAK_TEXT};
+use super::colours::{ABSENT, ACCENT, BACKGROUND, BUTTON, EDGE, MESSAGE, ON_SELECTED, SELECTED, TEXT, WEAK_TEXT};
 use super::names::{self, Tell};
-use super::{PanelState, TEXT_SIZE, TOUCH_SIZE};
+use super::{PanelState, ROW_HEIGHT, TEXT_SIZE, heading};
 use crate::command::Command;
 use crate::scene::Settings;
-use crate::sliders::SLIDERS;
+use crate::sliders::{self, SLIDERS};
 use crate::texts;
 use egui::accesskit::Role;
 use egui::{
-    Align, Color32, FontId, Frame, Margin, PointerButton, Rect, RichText, Sense, Slider, Stroke, StrokeKind, Ui,
-    WidgetInfo, WidgetType, pos2, vec2,
+    Align, Button, Color32, FontId, Frame, Margin, PointerButton, Rect, RichText, Sense, Slider, Stroke, StrokeKind,
+    Ui, WidgetInfo, WidgetType, pos2, vec2,
 };
 
 /// Between messages, points.
 pub(super) const BETWEEN_MESSAGES: f32 = 8.0;
 /// Between messages and the upper and the lower edge of the picture.
 pub(super) const MESSAGE_EDGES: [f32; 2] = [12.0, 14.0];
+
+/// Height of a row with a slider or a switch, points: a finger has it, too.
+const SLIDER_ROW: f32 = 36.0;
 
 /// The frame of a message with an edge of this colour.
 pub(super) fn message_frame(edge: Color32) -> Frame {
@@ -28,40 +31,38 @@ pub(super) fn front(keys: &[&str], settings: &Settings) -> Option<usize> {
     keys.iter().find_map(|key| SLIDERS.iter().position(|s| s.key == *key && s.applies(settings)))
 }
 
-pub(super) fn slider(
-    ui: &mut Ui,
-    state: &PanelState,
-    number: usize,
-    name: &str,
-    is_large: bool,
-    execute: &mut dyn FnMut(Command),
-) {
+/// A slider of the settings: its name, the rail, and its value, which a click begins to type.
+pub(super) fn slider(ui: &mut Ui, state: &PanelState, number: usize, name: &str, execute: &mut dyn FnMut(Command)) {
     let slider = &SLIDERS[number];
     let settings = state.controls.settings();
     let [low, high] = state.scene.map_or(slider.range, |scene| slider.range_in(scene));
     let before = slider.get(settings);
+    let is_sought = state.visible.inspector.sought == Some(number);
     if slider.is_switch() {
         let mut on = before >= 0.5;
-        if switch(ui, &mut on, name, slider.hint) {
+        let response = switch_row(ui, &mut on, name, slider.hint);
+        if response.clicked() {
             execute(Command::SetSlider(number, f64::from(u8::from(on))));
+        }
+        if is_sought {
+            find(&response);
         }
         return;
     }
+    let shown = shown_value(slider, state, before);
+    let typed = state.visible.value.as_ref().filter(|(typed, _)| *typed == number).map(|(_, text)| format!("{text}_"));
     let mut value = before.clamp(low, high.max(low));
-    let digits = (-slider.step.log10().floor()).clamp(0.0, 3.0) as usize;
-    let space = if slider.unit.is_empty() || slider.unit == "°" { "" } else { " " };
-    let shown = match slider.key {
-        "cuts.depth" if before <= 0.0 => texts::THROUGH_ALL.to_string(),
-        "cap.level" | "ray.step" | "planes.spacing" if before <= 0.0 => texts::AUTOMATIC.to_string(),
-        _ => format!("{before:.digits$}{space}{}", slider.unit),
-    };
-    let text = RichText::new(name);
-    name_and_value(ui, if is_large { text.strong() } else { text }, RichText::new(&shown).color(ACCENT));
-    ui.spacing_mut().slider_width = ui.available_width();
-    // Tall enough for a finger, although the rail is thin.
-    ui.spacing_mut().interact_size.y = TOUCH_SIZE * if is_large { 0.62 } else { 0.5 };
-    let response = ui.add(Slider::new(&mut value, low..=high.max(low)).show_value(false).step_by(slider.step));
-    let response = response.tell(&texts::slider_hint(slider.hint)).named(name).with_value(&shown);
+    let hint = texts::slider_hint(slider.hint);
+    let (response, about) = row(ui, name, typed.as_deref().unwrap_or(&shown), typed.is_some(), |ui| {
+        let slider = Slider::new(&mut value, low..=high.max(low)).show_value(false).step_by(slider.step);
+        ui.add(slider).tell(&hint).named(name).with_value(&shown)
+    });
+    if about.tell(texts::TYPE_VALUE_HINT).named(&texts::value_of(name)).clicked() {
+        execute(Command::TypeValue(number));
+    }
+    if is_sought {
+        find(&response);
+    }
     // egui's sliders are dragged, not clicked.
     let is_on_it = response.drag_stopped() || response.contains_pointer();
     if is_on_it && ui.input(|input| input.pointer.button_double_clicked(PointerButton::Primary)) {
@@ -76,17 +77,123 @@ pub(super) fn slider(
     }
 }
 
-/// The name of a slider and its value, in a row as low as its text: every control in front is to be in sight.
-pub(super) fn name_and_value(ui: &mut Ui, name: RichText, value: RichText) {
-    let finger = std::mem::replace(&mut ui.spacing_mut().interact_size.y, TEXT_SIZE);
+/// Gives the keyboard to a control that was searched for, once, and scrolls to it.
+fn find(control: &egui::Response) {
+    let id = egui::Id::new("sought");
+    let is_new = control.ctx.data_mut(|data| data.get_temp(id) != Some(control.id));
+    if is_new {
+        control.ctx.data_mut(|data| data.insert_temp(id, control.id));
+        control.request_focus();
+    }
+    if control.has_focus() {
+        control.scroll_to_me(Some(Align::Center));
+    }
+}
+
+/// A value with its unit, as the user reads it.
+fn shown_value(slider: &crate::scene::Slider, state: &PanelState, value: f64) -> String {
+    match slider.key {
+        "cuts.depth" if value <= 0.0 => return texts::THROUGH_ALL.to_string(),
+        "cap.level" | "ray.step" | "planes.spacing" if value <= 0.0 => return texts::AUTOMATIC.to_string(),
+        _ => {}
+    }
+    let in_unit = |value: f64| state.scene.map_or(value, |scene| sliders::to_shown(slider, scene, value));
+    let step = in_unit(slider.step) - in_unit(0.0);
+    let digits = (-(step * 1.01).log10().floor()).clamp(0.0, 3.0) as usize;
+    let shown = in_unit(value);
+    let most = in_unit(1.0);
+    match slider.unit {
+        "" if most > 1.0 => format!("{shown:.digits$} /{most:.0}"),
+        "" | "°" => format!("{shown:.digits$}{}", slider.unit),
+        unit => format!("{shown:.digits$} {unit}"),
+    }
+}
+
+/// Width of the name of a control and of its value in a row, points.
+const NAME: f32 = 98.0;
+const VALUE: f32 = 70.0;
+
+/// A row with a name, what sets a value, and the value in a frame. A long name has a line of its own.
+fn row(
+    ui: &mut Ui,
+    name: &str,
+    value: &str,
+    is_typed: bool,
+    add: impl FnOnce(&mut Ui) -> egui::Response,
+) -> (egui::Response, egui::Response) {
+    let width = ui.available_width();
+    let font = FontId::proportional(TEXT_SIZE);
+    let words = ui.painter().layout_no_wrap(name.to_string(), font.clone(), TEXT);
+    let is_long = words.size().x > NAME || width < 2.5 * NAME;
+    if is_long {
+        let (area, _) = ui.allocate_exact_size(vec2(width, TEXT_SIZE + 4.0), Sense::hover());
+        ui.painter().galley(area.left_top(), words.clone(), TEXT);
+        ui.add_space(-6.0);
+    }
     ui.horizontal(|ui| {
-        ui.label(name);
-        ui.with_layout(egui::Layout::right_to_left(Align::Center), |ui| {
-            ui.label(value);
-        });
+        ui.set_min_height(SLIDER_ROW);
+        ui.spacing_mut().item_spacing.x = 8.0;
+        let mut rest = width - VALUE - 8.0;
+        if !is_long {
+            let (area, _) = ui.allocate_exact_size(vec2(NAME, SLIDER_ROW), Sense::hover());
+            ui.painter().galley(pos2(area.left(), area.center().y - words.size().y / 2.0), words, TEXT);
+            rest -= NAME + 8.0;
+        }
+        ui.spacing_mut().slider_width = rest.max(40.0);
+        ui.spacing_mut().interact_size.y = SLIDER_ROW;
+        let set = add(ui);
+        let (area, shown) = ui.allocate_exact_size(vec2(VALUE, SLIDER_ROW - 6.0), Sense::click());
+        shown.widget_info(|| WidgetInfo::labeled(WidgetType::Button, true, value));
+        let painter = ui.painter();
+        let is_over = is_typed || shown.hovered() || shown.has_focus();
+        let stroke = Stroke::new(1.0, if is_over { ACCENT } else { EDGE });
+        painter.rect(area, 4.0, BACKGROUND, stroke, StrokeKind::Inside);
+        let mut job = egui::text::LayoutJob::simple_singleline(value.to_string(), font.clone(), TEXT);
+        job.wrap = egui::text::TextWrapping::truncate_at_width(VALUE - 8.0);
+        let text = painter.layout_job(job);
+        let at = pos2(area.right() - 6.0 - text.size().x, area.center().y - text.size().y / 2.0);
+        painter.galley(at.max(area.left_top()), text, TEXT);
+        (set, shown)
+    })
+    .inner
+}
+
+/// A control that the mode has not: it keeps its place.
+pub(super) fn absent(ui: &mut Ui, name: &str) {
+    let (area, response) = ui.allocate_exact_size(vec2(ui.available_width(), SLIDER_ROW), Sense::hover());
+    let font = FontId::proportional(TEXT_SIZE);
+    let at = area.left_center();
+    ui.painter().text(at, egui::Align2::LEFT_CENTER, name, font.clone(), ABSENT);
+    ui.painter().text(area.right_center() - vec2(6.0, 0.0), egui::Align2::RIGHT_CENTER, "-", font, ABSENT);
+    response.on_hover_text(texts::NO_SUCH_CONTROL);
+}
+
+/// Buttons of which one is chosen, in rows of so many in this width, points, under a title.
+pub(super) fn row_of<T: Copy>(
+    ui: &mut Ui,
+    title: &str,
+    all: &[(T, &str)],
+    (columns, width): (usize, f32),
+    is_chosen: impl Fn(T) -> bool,
+    hint: impl Fn(T) -> &'static str,
+    mut select: impl FnMut(T),
+) {
+    names::group(ui, title, |ui| {
+        heading(ui, title);
+        ui.spacing_mut().item_spacing = vec2(4.0, 4.0);
+        ui.spacing_mut().button_padding.x = 2.0;
+        let each = (width - 4.0 * (columns - 1) as f32) / columns as f32;
+        for some in all.chunks(columns) {
+            ui.horizontal(|ui| {
+                for (value, name) in some {
+                    let button = Button::selectable(is_chosen(*value), *name).frame_when_inactive(true);
+                    if ui.add(button.min_size(vec2(each, ROW_HEIGHT))).tell(hint(*value)).clicked() {
+                        select(*value);
+                    }
+                }
+            });
+        }
     });
-    ui.spacing_mut().interact_size.y = finger;
-    ui.add_space(-ui.spacing().item_spacing.y / 2.0);
 }
 
 /// A slider in mm of what is no setting of its own. Returns the value that the user sets.
@@ -105,9 +212,16 @@ pub(super) fn scale_slider(
     hint: &str,
 ) -> Option<f64> {
     let mut value = before.clamp(low, high.max(low));
-    name_and_value(ui, RichText::new(name), RichText::new(&shown).color(ACCENT));
-    ui.spacing_mut().slider_width = ui.available_width();
-    ui.spacing_mut().interact_size.y = TOUCH_SIZE * 0.5;
+    let width = ui.available_width();
+    ui.horizontal(|ui| {
+        ui.label(RichText::new(name));
+        ui.with_layout(egui::Layout::right_to_left(Align::Center), |ui| {
+            ui.label(RichText::new(&shown).color(ACCENT));
+        });
+    });
+    ui.add_space(-6.0);
+    ui.spacing_mut().slider_width = width;
+    ui.spacing_mut().interact_size.y = SLIDER_ROW - 8.0;
     let slider = ui.add(Slider::new(&mut value, low..=high.max(low)).show_value(false).step_by(step));
     let slider = slider.tell(hint).named(name).with_value(&shown);
     let is_held = slider.dragged() || slider.clicked() || slider.is_pointer_button_down_on();
@@ -116,11 +230,15 @@ pub(super) fn scale_slider(
 
 /// A switch with its name; the whole row reacts. True if the user changed it.
 pub(super) fn switch(ui: &mut Ui, on: &mut bool, name: &str, hint: &str) -> bool {
-    let (width, height) = (44.0, 24.0);
+    switch_row(ui, on, name, hint).clicked()
+}
+
+fn switch_row(ui: &mut Ui, on: &mut bool, name: &str, hint: &str) -> egui::Response {
+    let (width, height) = (40.0, 22.0);
     // A long name has two lines, and ends before the switch.
     let room = (ui.available_width() - width - 6.0).max(0.0);
     let label = ui.painter().layout(name.to_string(), FontId::proportional(TEXT_SIZE), TEXT, room);
-    let size = vec2(ui.available_width(), (TOUCH_SIZE * 0.75).max(label.size().y + 4.0));
+    let size = vec2(ui.available_width(), SLIDER_ROW.max(label.size().y + 4.0));
     let (area, response) = ui.allocate_exact_size(size, Sense::click());
     if response.clicked() {
         *on = !*on;
@@ -139,5 +257,5 @@ pub(super) fn switch(ui: &mut Ui, on: &mut bool, name: &str, hint: &str) -> bool
     let at = pos2(area.left(), area.center().y - label.size().y / 2.0);
     let clip = Rect::from_min_max(area.min, pos2(track.left() - 6.0, area.bottom()));
     painter.with_clip_rect(clip).galley(at, label, TEXT);
-    response.clicked()
+    response
 }

@@ -2,6 +2,7 @@
 
 use super::shown::Shown;
 use super::*;
+use crate::command::InspectorTab;
 use crate::panels::accesskit::{Action, Role};
 use crate::scene::Cine;
 use crate::workspace::{Origin, text};
@@ -49,7 +50,8 @@ fn how_the_loop_is_played_is_undone_step_by_step() {
 #[test]
 fn a_workspace_keeps_the_bar_and_the_loop() {
     let mut shown = Shown::new("marks.bar=true\ncine={first=2,speed=4}");
-    let bar = shown.find("Controls", Role::Switch, "Bar on saved pictures");
+    shown.tab(InspectorTab::Marks);
+    let bar = shown.find("Marks", Role::Switch, "Bar on saved pictures");
     assert_eq!(shown.ask(bar, Action::Click, None), [Command::SavesBar(false)]);
     let read = |shown: &Shown| {
         let saved = text(shown.controls.settings(), &Origin::of(None)).expect("a workspace");
@@ -63,4 +65,41 @@ fn a_workspace_keeps_the_bar_and_the_loop() {
     assert_eq!((settings.marks.bar, settings.cine), (false, Cine { first: Some(2), speed: 4.0, ..Cine::default() }));
     assert_eq!(shown.apply(Command::Undo), Change::Marks);
     assert!(read(&shown).marks.bar);
+}
+
+/// Requirement: on the line of time a press shows a volume, the ends of the loop are dragged, a double click plays all, and keys and a screen reader
+/// step.
+#[test]
+fn the_line_of_time_seeks_and_trims() {
+    let mut shown = Shown::new("mode='surface'");
+    let line = shown.find("Cine loop", Role::Slider, "Volume of the loop");
+    let bounds = shown.tree[&line].bounds().expect("its place");
+    // The area that reacts is wider than the line.
+    let (left, width) = (bounds.x0 + 4.0, bounds.x1 - bounds.x0 - 8.0);
+    let y = (bounds.y0 + bounds.y1) / 2.0;
+    let at = |index: f64| [left + width * index / 20.0, y];
+    let button = |pressed| Input::Button { button: Button::Left, pressed };
+    let mut does = |inputs: &[Input]| {
+        let mut commands = Vec::new();
+        for input in inputs {
+            shown.panels.input(input);
+            commands.extend(shown.lay_out());
+        }
+        shown.time += 1.0;
+        commands
+    };
+    let seeks = does(&[Input::Moved(at(7.5)), button(true), button(false)]);
+    assert!(!seeks.is_empty() && seeks.iter().all(|command| *command == Command::SeekCine(7)), "{seeks:?}");
+    let drags =
+        does(&[Input::Moved(at(0.0)), button(true), Input::Moved(at(3.1)), Input::Moved(at(4.0)), button(false)]);
+    assert!(drags.contains(&Command::TrimCine(3, false)) && drags.contains(&Command::TrimCine(4, false)), "{drags:?}");
+    let drags = does(&[Input::Moved(at(20.0)), button(true), Input::Moved(at(12.0)), button(false)]);
+    assert!(drags.contains(&Command::TrimCine(11, true)), "{drags:?}");
+    let twice = does(&[Input::Moved(at(9.5)), button(true), button(false), button(true), button(false)]);
+    assert!(twice.contains(&Command::WholeCine), "{twice:?}");
+    assert_eq!(shown.ask(line, Action::Increment, None), [Command::SeekCine(3)], "the third of 20 is shown");
+    shown.ask(line, Action::Focus, None);
+    assert_eq!(shown.key(crate::input::Key::Left, false), [Command::SeekCine(1)]);
+    let data = Some(crate::panels::accesskit::ActionData::NumericValue(20.0));
+    assert_eq!(shown.ask(line, Action::SetValue, data), [Command::SeekCine(19)]);
 }

@@ -2,7 +2,6 @@
 
 use super::shown::Shown;
 use super::*;
-use crate::command::RailTab;
 use crate::panels::accesskit::{Action, Node, Role};
 use crate::panels::colours::{BACKING, MESSAGE, OUTLINE, PANEL};
 use crate::panels::drawn::{Area, Kind};
@@ -47,8 +46,9 @@ fn place(node: &Node) -> Option<Area> {
 /// The controls of the panels with their names, as far as they are in sight: a column ends above the bar, and scrolls.
 fn controls(shown: &Shown) -> Vec<(String, Area)> {
     let [window, picture] = places(shown);
-    let columns = [[0.0, 0.0, picture[0], picture[3]], [picture[2], 0.0, window[2], picture[3]]];
-    let bar = [0.0, picture[3], window[2], window[3]];
+    let columns = [[0.0, picture[1], picture[0], picture[3]], [picture[2], picture[1], window[2], picture[3]]];
+    let bars = [[0.0, 0.0, window[2], picture[1]], [0.0, picture[3], window[2], window[3]]];
+    let names = ["Files, views and search", "Cine loop"].map(|name| shown.names_of_bar(name));
     let controls = shown
         .tree
         .values()
@@ -57,12 +57,13 @@ fn controls(shown: &Shown) -> Vec<(String, Area)> {
         let area = place(node)?;
         // Of a row of a column, the middle decides where it belongs.
         let middle = (area[0] + area[2]) / 2.0;
-        let home =
-            if area[1] >= bar[1] - NEAR && shown.names_of_bar().contains(&node.label().unwrap_or_default().into()) {
-                bar
-            } else {
-                *columns.iter().find(|column| (column[0]..column[2]).contains(&middle)).unwrap_or(&bar)
-            };
+        let label = node.label().unwrap_or_default().to_string();
+        let at_bar =
+            bars.iter().zip(&names).find(|(bar, names)| names.contains(&label) && common(area, **bar).is_some());
+        let home = match at_bar {
+            Some((bar, _)) => *bar,
+            None => *columns.iter().find(|column| (column[0]..column[2]).contains(&middle)).unwrap_or(&bars[1]),
+        };
         Some((node.label().unwrap_or_default().to_string(), common(area, home)?, area, home))
     });
     seen.map(|(name, seen, area, home)| {
@@ -139,8 +140,8 @@ fn check(shown: &Shown, what: &str) {
 }
 
 impl Shown {
-    fn names_of_bar(&self) -> Vec<String> {
-        let bar = self.tree.values().find(|node| node.role() == Role::Toolbar && node.label() == Some("Cine loop"));
+    fn names_of_bar(&self, name: &str) -> Vec<String> {
+        let bar = self.tree.values().find(|node| node.role() == Role::Toolbar && node.label() == Some(name));
         let mut found = Vec::new();
         let mut left: Vec<_> = bar.map(|bar| bar.children().to_vec()).unwrap_or_default();
         while let Some(id) = left.pop() {
@@ -196,35 +197,34 @@ fn nothing_covers_anything_in_any_window_mode_and_layout() {
     }
 }
 
-/// Prevents a small window or a large scale without the controls that every examination needs: they are in a column, under a tab, or in a drawer.
+/// A click of the pointer on a control.
+fn press(shown: &mut Shown, group: &str, role: Role, name: &str) {
+    let control = shown.find(group, role, name);
+    let [left, top, right, bottom] = place(&shown.tree[&control]).expect("its place");
+    let at = [(left + right) / 2.0, (top + bottom) / 2.0].map(|n| f64::from(n * shown.panels.scale()));
+    let button = |pressed| Input::Button { button: Button::Left, pressed };
+    for input in [Input::Moved(at), button(true), button(false)] {
+        shown.panels.input(&input);
+        shown.lay_out();
+    }
+    shown.settle();
+}
+
+/// Prevents a small window or a large scale without the controls that every examination needs: they are in the inspector, beside the picture or over it.
 #[test]
 fn the_controls_in_front_are_reached_in_every_window() {
     for (size, scale) in windows() {
         let what = format!("{size:?} at {scale}");
         let mut shown = Shown::sized("mode='surface'", size, scale);
-        let press = |shown: &mut Shown, group: &str, role: Role, name: &str| {
-            let control = shown.find(group, role, name);
-            let [left, top, right, bottom] = place(&shown.tree[&control]).expect("its place");
-            let at = [(left + right) / 2.0, (top + bottom) / 2.0].map(|n| f64::from(n * scale));
-            let button = |pressed| Input::Button { button: Button::Left, pressed };
-            for input in [Input::Moved(at), button(true), button(false)] {
-                shown.panels.input(&input);
-                shown.lay_out();
-            }
-            shown.settle();
-        };
         let room = panels::Room::of(size, scale, true);
         if room.has_drawer {
-            press(&mut shown, "Cine loop", Role::Button, "Tools and controls");
-            assert!(shown.visible.rail.is_open, "{what}");
-        }
-        if !room.has_column {
-            press(&mut shown, "Tools or controls", Role::Tab, "Controls");
-        }
-        if !room.has_drawer {
+            let bar = if room.has_top { "Files, views and search" } else { "Cine loop" };
+            press(&mut shown, bar, Role::Button, "Inspector");
+            assert!(shown.visible.inspector.is_open, "{what}");
+        } else {
             check(&shown, &format!("{what}, the controls"));
         }
-        assert_eq!(shown.visible.rail.tab == RailTab::Controls, !room.has_column, "{what}");
+        press(&mut shown, "Inspector", Role::Tab, "Look");
         let [window, picture] = places(&shown);
         let above_bar = [0.0, 0.0, window[2], picture[3]];
         for name in ["Threshold", "Gain", "Smooth", "Brightness", "Lamp", "Depth"] {
@@ -233,7 +233,113 @@ fn the_controls_in_front_are_reached_in_every_window() {
             (0..3).for_each(|_| shown.settle());
             let area = place(&shown.tree[&control]).expect("its place");
             assert!(is_inside(area, above_bar), "{what}: {name} at {area:?} is not in {above_bar:?}");
-            assert!(area[2] - area[0] > 60.0 && area[3] - area[1] > 20.0, "{what}: {name} at {area:?}");
+            assert!(area[2] - area[0] > 38.0 && area[3] - area[1] > 20.0, "{what}: {name} at {area:?}");
+        }
+    }
+}
+
+/// Requirement: no tool, view or command is hidden without a visible way to it. Tools and views are at the edges of the window, or in the part "Tools" of the
+/// inspector, whose button is in sight; the search, which has every command, has a button there too, or in that part.
+#[test]
+fn every_tool_view_and_command_has_a_visible_way_to_it_in_every_window() {
+    const TOOLS: [&str; 14] = [
+        "Turn",
+        "Light",
+        "Region",
+        "Clip",
+        "Cut",
+        "Brush",
+        "Crosshair",
+        "Curve",
+        "Distance",
+        "Area",
+        "Angle",
+        "Contours",
+        "Text",
+        "Body",
+    ];
+    for (size, scale) in windows() {
+        let what = format!("{size:?} at {scale}");
+        let mut shown = Shown::sized("mode='surface'", size, scale);
+        let room = panels::Room::of(size, scale, true);
+        let [window, picture] = places(&shown);
+        let in_sight = |shown: &Shown, name: &str, least: f32| {
+            let found = shown.tree.values().filter(|node| node.role() == Role::Button && node.label() == Some(name));
+            found.filter_map(place).any(|area| is_inside(area, window) && area[3] - area[1] >= least)
+        };
+        if room.has_tools_tab {
+            if room.has_drawer {
+                let bar = if room.has_top { "Files, views and search" } else { "Cine loop" };
+                press(&mut shown, bar, Role::Button, "Inspector");
+            }
+            press(&mut shown, "Inspector", Role::Tab, "Tools");
+            // What is below is scrolled to.
+            let names = TOOLS.into_iter().chain(["3D", "4-up", "Slices", "Find a command", "Open"]);
+            for name in names.filter(|name| room.has_top || !name.is_empty()) {
+                let there =
+                    shown.tree.iter().find(|(_, node)| node.role() == Role::Button && node.label() == Some(name));
+                let (id, _) = there.unwrap_or_else(|| panic!("{what}: no {name}"));
+                shown.ask(*id, Action::Focus, None);
+                (0..3).for_each(|_| shown.settle());
+                assert!(in_sight(&shown, name, 20.0), "{what}: {name} is out of sight");
+            }
+            continue;
+        }
+        for name in TOOLS {
+            assert!(in_sight(&shown, name, 28.0), "{what}: {name}");
+        }
+        for name in ["3D", "VR | SR", "4-up", "3 planes", "Plane", "Slices", "Open", "Undo", "Find a command", "Help"] {
+            assert!(in_sight(&shown, name, 30.0), "{what}: {name}");
+        }
+        // With words where the smallest usual window is.
+        let has_word = |name: &str| {
+            let is_it =
+                |kind: &Kind| matches!(kind, Kind::Text { area, text, .. } if text == name && area[2] < picture[0]);
+            shown.drawn.iter().any(|drawn| is_it(&drawn.kind))
+        };
+        if size[1] as f32 / scale >= 720.0 {
+            assert!(TOOLS.iter().all(|name| has_word(name)), "{what}: tools without their words");
+        }
+    }
+}
+
+/// Prevents a bar whose buttons move or change their width with what they say: live for ten seconds, frozen, trimmed, played, at other speeds, ended.
+#[test]
+fn the_controls_of_the_bar_stand_still() {
+    for (size, scale) in windows() {
+        let mut shown = Shown::sized("mode='surface'", size, scale);
+        let ids = |shown: &Shown| {
+            let bar =
+                shown.tree.values().find(|node| node.role() == Role::Toolbar && node.label() == Some("Cine loop"));
+            let mut left: Vec<_> = bar.map(|bar| bar.children().to_vec()).unwrap_or_default();
+            let mut found = Vec::new();
+            while let Some(id) = left.pop() {
+                let node = &shown.tree[&id];
+                if matches!(node.role(), Role::Button | Role::Slider) {
+                    found.extend(place(node).map(|area| (id, area)));
+                }
+                left.extend(node.children());
+            }
+            found
+        };
+        let before = ids(&shown);
+        assert!(before.len() >= 2, "{size:?} at {scale}: {before:?}");
+        for n in 0..40_u32 {
+            shown.is_live = n < 20;
+            shown.is_frozen = (20..30).contains(&n);
+            shown.ended = (n >= 30).then(|| Duration::from_secs(u64::from(10_u32.pow(n % 5))));
+            shown.cine.count = (n as usize + 1).min(20);
+            shown.cine.shown = Some(shown.cine.count - 1);
+            shown.cine.range = n as usize / 4..=shown.cine.count - 1;
+            shown.cine.is_trimmed = n > 8;
+            shown.cine.is_playing = n % 3 == 1;
+            shown.cine.speed = [0.1, 0.25, 0.5, 1.0, 8.0][n as usize % 5];
+            shown.cine.goes_back_and_forth = n % 2 == 1;
+            shown.cine.seconds = Some(f64::from(n * n) * 7.3);
+            shown.cine.length = Some(f64::from(n * n) * 9.1);
+            shown.cine.range = (n as usize / 4).min(shown.cine.count - 1)..=shown.cine.count - 1;
+            shown.settle();
+            assert_eq!(ids(&shown), before, "{size:?} at {scale}, {n}");
         }
     }
 }

@@ -3,7 +3,7 @@
 
 use super::shown::{SIZE, Shown};
 use super::*;
-use crate::command::{RailTab, Viewpoint};
+use crate::command::{InspectorTab, Viewpoint};
 use crate::input::Key;
 use crate::panels::accesskit::{Action, ActionData, Node, NodeId, Role, Toggled};
 use crate::panels::{self, Banner, Note, Reading};
@@ -106,7 +106,10 @@ fn every_control_has_a_name_of_its_own_and_a_tooltip_in_every_mode_and_list() {
             let mut shown = Shown::new("");
             shown.apply(Command::Mode(mode));
             shown.apply(Command::Layout(layout));
-            shown.check(&format!("{mode:?} {layout:?}"));
+            for tab in [InspectorTab::Look, InspectorTab::Planes, InspectorTab::Measure, InspectorTab::Marks] {
+                shown.tab(tab);
+                shown.check(&format!("{mode:?} {layout:?} {tab:?}"));
+            }
         }
     }
     let mut shown = Shown::new("mode='plane'");
@@ -144,35 +147,42 @@ fn what_tools_add_and_what_is_folded_has_names_and_tooltips() {
         let mut shown = Shown::new(&format!("mode='{mode}'"));
         let is_folded = |node: &&Node| node.is_expanded() == Some(false);
         while let Some(name) = shown.tree.values().find(is_folded).and_then(|node| node.label()).map(str::to_string) {
-            let header = shown.find("Controls", Role::Button, &name);
+            let header = shown.find("Look", Role::Button, &name);
             shown.ask(header, Action::Click, None);
             shown.settle();
         }
-        assert!(shown.names("Filters").len() > 1 && shown.names("Sides").len() > 1, "{mode}");
+        assert!(shown.names("Filters").len() > 1, "{mode}");
         shown.check(&format!("{mode}, all unfolded"));
+        shown.tab(InspectorTab::Marks);
+        let header = shown.find("Marks", Role::Button, "Sides");
+        shown.ask(header, Action::Click, None);
+        shown.settle();
+        assert!(shown.names("Sides").len() > 1, "{mode}");
+        shown.check(&format!("{mode}, the sides unfolded"));
     }
 }
 
 /// Prevents a tool or a control in front that cannot be found by what it is called.
 #[test]
 fn the_tools_and_the_controls_in_front_are_found_by_role_and_name() {
-    let shown = Shown::new("mode='surface'");
+    let mut shown = Shown::new("mode='surface'");
     for (group, names) in [
-        ("Mode", &["Surface", "Volume", "Mixed", "MIP", "MinIP", "X-ray", "Plane", "3 planes", "Slices", "Cube"][..]),
-        ("Layout", &["Single", "4-up", "VR | SR"]),
+        ("Rendering", &["Surface", "Volume", "Mixed", "Cube", "MIP", "MinIP", "X-ray"][..]),
+        ("View", &["3D", "VR | SR", "4-up", "3 planes", "Plane", "Slices"]),
         ("View from", &["Front", "Left", "Right", "Top"]),
-        ("Drag", &["Turn", "Light", "Region", "Clip", "Crosshair"]),
-        ("Measure", &["Caliper", "Angle", "Ellipse", "Trace", "Tape", "Contours", "Threshold volume", "Text", "Arrow"]),
-        ("Workspace", &["Open", "Save", "Export"]),
-        ("Modes and tools", &["Undo", "Redo", "Presets"]),
-        ("Cine loop", &["Freeze", "Play", "Save picture", "Save loop", "Reset", "Help"]),
+        ("Tools", &["Turn", "Light", "Region", "Clip", "Cut", "Brush", "Crosshair", "Curve"]),
+        ("Tools", &["Distance", "Area", "Angle", "Contours", "Text", "Body"]),
+        ("Files, views and search", &["Open", "Save workspace", "Undo", "Redo", "Find a command", "Help"]),
+        ("Quick looks", &["Face", "Skeleton", "Presets"]),
+        ("Cine loop", &["Freeze", "Previous volume", "Play", "Next volume", "Export", "Save loop", "Save picture"]),
     ] {
         names.iter().for_each(|name| _ = shown.find(group, Role::Button, name));
     }
-    let chosen = &shown.tree[&shown.find("Mode", Role::Button, "Surface")];
+    let chosen = &shown.tree[&shown.find("Rendering", Role::Button, "Surface")];
     assert_eq!(chosen.toggled(), Some(Toggled::True));
-    assert_eq!(shown.tree[&shown.find("Mode", Role::Button, "Volume")].toggled(), Some(Toggled::False));
-    assert!(shown.tree[&shown.find("Modes and tools", Role::Button, "Redo")].is_disabled());
+    assert_eq!(shown.tree[&shown.find("Rendering", Role::Button, "Volume")].toggled(), Some(Toggled::False));
+    assert_eq!(shown.tree[&shown.find("View", Role::Button, "3D")].toggled(), Some(Toggled::True));
+    assert!(shown.tree[&shown.find("Files, views and search", Role::Button, "Redo")].is_disabled());
     for name in ["Threshold", "Gain", "Smooth", "Brightness", "Lamp", "Depth"] {
         let knob = &shown.tree[&shown.find("Controls", Role::Slider, name)];
         let [low, high] = [knob.min_numeric_value(), knob.max_numeric_value()].map(|n| n.expect("a range"));
@@ -184,9 +194,17 @@ fn the_tools_and_the_controls_in_front_are_found_by_role_and_name() {
     let unit = shown.tree[&shown.find("Controls", Role::Slider, "Depth")].value().map(str::to_string);
     assert!(unit.as_ref().is_some_and(|value| value.ends_with(" mm")), "{unit:?}");
     shown.find("Controls", Role::Switch, "Cast shadows");
-    shown.find("Controls", Role::Switch, "Bar on saved pictures");
-    let advanced = &shown.tree[&shown.find("Controls", Role::Button, "Advanced: Filters")];
+    let advanced = &shown.tree[&shown.find("Look", Role::Button, "Advanced: Filters")];
     assert_eq!(advanced.is_expanded(), Some(false));
+    shown.tab(InspectorTab::Measure);
+    for name in ["Caliper", "Tape", "Angle", "Ellipse", "Trace", "Contours", "Threshold volume"] {
+        shown.find("Measure", Role::Button, name);
+    }
+    shown.tab(InspectorTab::Marks);
+    for name in ["Text", "Arrow", "Body mark"] {
+        shown.find("Marks", Role::Button, name);
+    }
+    shown.find("Marks", Role::Switch, "Bar on saved pictures");
 }
 
 #[test]
@@ -314,7 +332,7 @@ fn lists_and_questions_are_answered_by_a_screen_reader() {
     shown.lay_out();
     shown.lay_out();
     shown.check("the question");
-    let behind = shown.find("Cine loop", Role::Button, "Reset");
+    let behind = shown.find("Cine loop", Role::Button, "Save loop");
     assert_eq!(shown.ask(behind, Action::Click, None), [], "nothing behind it reacts");
     let leave = shown.find("The loop is not saved", Role::Button, "Leave without saving  (L)");
     assert_eq!(shown.ask(leave, Action::Click, None), [Command::Discard]);
@@ -335,7 +353,7 @@ fn a_screen_reader_sets_a_slider_and_presses_buttons() {
     shown.ask(gain, Action::SetValue, Some(ActionData::NumericValue(1e9)));
     assert_eq!(SLIDERS[GAIN].get(shown.controls.settings()), SLIDERS[GAIN].range[1], "beyond its range");
     // A button does what a click with the pointer does.
-    let volume = shown.find("Mode", Role::Button, "Volume");
+    let volume = shown.find("Rendering", Role::Button, "Volume");
     let asked = shown.ask(volume, Action::Click, None);
     assert_eq!(asked, [Command::Mode(Mode::Volume)]);
     let mut clicked = Shown::new("mode='surface'");
@@ -354,11 +372,12 @@ fn a_screen_reader_sets_a_slider_and_presses_buttons() {
     .collect();
     assert_eq!(commands, asked);
     // A switch.
-    let bar = shown.find("Controls", Role::Switch, "Bar on saved pictures");
+    shown.tab(InspectorTab::Marks);
+    let bar = shown.find("Marks", Role::Switch, "Bar on saved pictures");
     assert_eq!(shown.tree[&bar].toggled(), Some(Toggled::False));
     assert_eq!(shown.ask(bar, Action::Click, None), [Command::SavesBar(true)]);
     // What is switched off does nothing.
-    let redo = shown.find("Modes and tools", Role::Button, "Redo");
+    let redo = shown.find("Files, views and search", Role::Button, "Redo");
     assert_eq!(shown.ask(redo, Action::Click, None), []);
 }
 
@@ -395,17 +414,21 @@ fn tab_reaches_every_control_and_marks_it() {
     shown.settle();
     shown.tab_reaches_all("the exports");
     shown.close();
+    shown.inspector_does(&Command::Find);
+    shown.tab_reaches_all("the search");
+    shown.inspector_does(&Command::Find);
+    shown.close();
     shown.presets = Some((vec!["Profile".into()], None));
     shown.settle();
     shown.tab_reaches_all("the presets");
     for (size, commands) in [
         ([800, 600], &[][..]),
-        ([800, 600], &[Command::SwitchRail]),
-        ([480, 400], &[Command::SwitchRail]),
-        ([480, 400], &[Command::SwitchRail, Command::SwitchRail]),
+        ([800, 600], &[Command::NextTab]),
+        ([480, 400], &[Command::NextTab]),
+        ([480, 400], &[Command::NextTab, Command::NextTab]),
     ] {
         let mut shown = Shown::sized("mode='surface'", size, 1.0);
-        commands.iter().for_each(|command| shown.rail_does(command));
+        commands.iter().for_each(|command| shown.inspector_does(command));
         shown.tab_reaches_all(&format!("{size:?} {commands:?}"));
     }
 }
@@ -471,12 +494,6 @@ impl Shown {
         *reached.last().expect("a control")
     }
 
-    /// Executes a command for the rail, as the console does.
-    pub(super) fn rail_does(&mut self, command: &Command) {
-        assert!(self.visible.apply(command, panels::Room::of(self.size, self.panels.scale(), true).has_drawer));
-        self.settle();
-    }
-
     /// Walks through the list that is open, and returns the name of the entry that has the keyboard then.
     fn walked(&mut self, keys: &[Key], is_grid: bool) -> String {
         for key in keys {
@@ -535,33 +552,77 @@ fn arrows_walk_through_lists_and_enter_chooses() {
     assert!(!shown.panels.has_focus(), "a name has the keys");
 }
 
-/// Prevents a window without a column that says nothing of its tabs.
+/// Prevents tabs and a drawer that do not say what they show.
 #[test]
 fn tabs_and_drawer_say_what_they_show() {
-    let mut shown = Shown::sized("mode='surface'", [800, 600], 1.0);
-    let tabs = |shown: &Shown| {
-        ["Tools", "Controls"].map(|name| shown.tree[&shown.find("Tools or controls", Role::Tab, name)].is_selected())
+    const NAMES: [&str; 5] = ["Tools", "Look", "Planes", "Measure", "Marks"];
+    let selected = |shown: &Shown, names: &[&str]| {
+        let names = names.iter().map(|name| shown.tree[&shown.find("Inspector", Role::Tab, name)].is_selected());
+        names.map(|is_selected| is_selected.expect("a tab")).collect::<Vec<bool>>()
     };
-    shown.check("tools");
-    assert_eq!(tabs(&shown), [Some(true), Some(false)]);
-    let controls = shown.find("Tools or controls", Role::Tab, "Controls");
-    assert_eq!(shown.ask(controls, Action::Click, None), [Command::RailTab(RailTab::Controls)]);
+    let mut shown = Shown::new("mode='surface'");
+    assert_eq!(selected(&shown, &NAMES[1..]), [true, false, false, false]);
+    assert!(!shown.names("Inspector").contains(&"Tools".to_string()), "they are in the rail");
+    let measure = shown.find("Inspector", Role::Tab, "Measure");
+    assert_eq!(shown.ask(measure, Action::Click, None), [Command::InspectorTab(InspectorTab::Measure)]);
     shown.settle();
-    shown.check("controls");
-    assert_eq!(tabs(&shown), [Some(false), Some(true)]);
-    shown.find("Controls", Role::Slider, "Threshold");
-    assert!(shown.names("Measure").is_empty());
+    assert_eq!(selected(&shown, &NAMES[1..]), [false, false, true, false]);
+    // A tool brings the part with its options.
+    shown.apply(Command::Tool(Tool::Curve));
+    assert_eq!(selected(&shown, &NAMES[1..]), [false, true, false, false]);
+    // In a small window it is a drawer, with tools and views too.
     let mut shown = Shown::sized("mode='surface'", [480, 400], 1.0);
-    let drawer = shown.find("Cine loop", Role::Button, "Tools and controls");
+    let drawer = shown.find("Cine loop", Role::Button, "Inspector");
     assert_eq!(shown.tree[&drawer].is_expanded(), Some(false));
     assert_eq!(shown.ask(drawer, Action::Click, None), [Command::ToggleDrawer]);
     shown.settle();
     shown.check("the drawer");
     assert_eq!(shown.tree[&drawer].is_expanded(), Some(true));
-    assert_eq!(tabs(&shown), [Some(true), Some(false)]);
-    shown.find("Measure", Role::Button, "Caliper");
-    // Where there is a column, there are no tabs.
-    assert!(Shown::new("").names("Tools or controls").is_empty());
+    shown.tab(InspectorTab::Tools);
+    shown.check("the tools");
+    assert_eq!(selected(&shown, &NAMES), [true, false, false, false, false]);
+    shown.find("Tools", Role::Button, "Distance");
+    shown.find("View", Role::Button, "4-up");
+    for (tab, name) in [(true, "Look"), (true, "Planes"), (true, "Measure"), (true, "Marks"), (false, "")] {
+        shown.inspector_does(&Command::NextTab);
+        assert_eq!(shown.visible.inspector.is_open, tab, "{name}");
+        assert!(!tab || selected(&shown, &[name]) == [true], "{name}");
+    }
+}
+
+/// Prevents a search whose results no screen reader can choose.
+#[test]
+fn the_search_is_read_and_its_results_are_pressed() {
+    let mut shown = Shown::new("mode='surface'");
+    shown.inspector_does(&Command::Find);
+    for letter in "save the pic".chars() {
+        let key = if letter == ' ' { Key::Space } else { Key::Char(letter) };
+        assert_eq!(shown.visible.key(key, Modifiers::default()), Some(Vec::new()));
+    }
+    shown.settle();
+    shown.check("the search");
+    let found = shown.find("Found", Role::Button, "Save the picture Ctrl+I");
+    assert_eq!(shown.ask(found, Action::Click, None), [Command::Find, Command::SavePicture]);
+}
+
+/// Requirement: what the search finds among the controls is shown and has the keyboard, also where it is folded or in another part.
+#[test]
+fn a_control_that_is_searched_for_is_shown_and_has_the_keyboard() {
+    for mode in ["surface", "volume", "tomography"] {
+        let mut shown = Shown::new(&format!("mode='{mode}'"));
+        for number in 0..SLIDERS.len() {
+            let slider = &SLIDERS[number];
+            if !slider.applies(shown.controls.settings()) {
+                continue;
+            }
+            shown.panels.drop_focus();
+            shown.inspector_does(&Command::ShowControl(number));
+            (0..3).for_each(|_| shown.settle());
+            let focus = shown.focus.unwrap_or_else(|| panic!("{mode}: {} has not the keyboard", slider.key));
+            assert!(shown.is_in_sight(focus), "{mode}: {}", slider.key);
+            assert!(matches!(shown.tree[&focus].role(), Role::Slider | Role::Switch), "{mode}: {}", slider.key);
+        }
+    }
 }
 
 #[test]

@@ -2,6 +2,7 @@
 
 use super::*;
 use crate::cine_player::{CinePlayer, CineState, Loop};
+use crate::command::InspectorTab;
 use crate::controls::EXAMS;
 use crate::keyboard_pointer::PointerMark;
 use crate::live::cine::CineVolume;
@@ -129,6 +130,17 @@ impl Shown {
         self.open(usize::MAX);
     }
 
+    /// Shows a part of the inspector.
+    pub(super) fn tab(&mut self, tab: InspectorTab) {
+        self.inspector_does(&Command::InspectorTab(tab));
+    }
+
+    /// Executes a command for the inspector, as the console does.
+    pub(super) fn inspector_does(&mut self, command: &Command) {
+        assert!(self.visible.apply(command, &Room::of(self.size, self.panels.scale(), true)));
+        self.settle();
+    }
+
     /// Lays the panels out until they stay: scroll areas know their content from the layout before, and what opens fades in.
     pub(super) fn settle(&mut self) {
         self.lay_out();
@@ -137,9 +149,19 @@ impl Shown {
     }
 
     pub(super) fn apply(&mut self, command: Command) -> Change {
-        let change = self.controls.apply(&command, Some(&self.scene));
+        let change = self.execute(&command);
         self.scene = scene(&self.scene.geometry, &self.controls.settings().clone().without_drawings());
         self.settle();
+        change
+    }
+
+    /// As the console does: another tool brings its part of the inspector.
+    fn execute(&mut self, command: &Command) -> Change {
+        let tool = self.controls.tool();
+        let change = self.controls.apply(command, Some(&self.scene));
+        if self.controls.tool() != tool {
+            self.visible.inspector.follow(self.controls.tool());
+        }
         change
     }
 
@@ -178,6 +200,8 @@ impl Shown {
             is_turning: false,
             exporting: Some(("Surface", Some(Progress { done: 12, of: 72 }))),
             presets: self.presets.as_ref().map(|(own, naming)| presets(own, naming.as_deref())),
+            looks: presets(&[], None).tiles,
+            loop_pictures: &[],
             is_frozen: self.is_frozen,
             is_live: self.is_live,
             ended: self.ended,
@@ -198,8 +222,8 @@ impl Shown {
         self.tree = nodes.into_iter().collect();
         self.focus = Some(focus).filter(|focus| *focus != root);
         for command in &commands {
-            self.controls.apply(command, Some(&self.scene));
-            self.visible.rail.apply(command, room.has_drawer);
+            self.execute(command);
+            self.visible.inspector.apply(command, &room);
         }
         self.scene = scene(&self.scene.geometry, &self.controls.settings().clone().without_drawings());
         commands

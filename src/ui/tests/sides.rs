@@ -2,6 +2,7 @@
 
 use super::shown::Shown;
 use super::*;
+use crate::command::InspectorTab;
 use crate::panels::accesskit::{Action, Role};
 use crate::panels::colours::{ACCENT, SIDES};
 use crate::panels::drawn::Kind;
@@ -11,10 +12,11 @@ use crate::workspace::{Origin, text};
 
 const LATERAL: &str = "Scan lines, first to last";
 
-/// Opens the group in the column.
+/// Opens the group in the inspector.
 fn opened(toml: &str) -> Shown {
     let mut shown = Shown::new(toml);
-    press(&mut shown, "Controls", "Sides");
+    shown.tab(InspectorTab::Marks);
+    press(&mut shown, "Marks", "Sides");
     shown.settle();
     shown
 }
@@ -28,8 +30,15 @@ fn press(shown: &mut Shown, group: &str, name: &str) -> Vec<Command> {
 
 /// The letters over the picture, and the number of dots.
 fn marks(shown: &Shown) -> (Vec<String>, usize) {
+    // Controls may have a white letter too.
+    let ([left, _], [width, _]) = crate::panels::picture_area(shown.size, 1.0, true);
+    let picture = left as f32..(left + width) as f32;
     let letters = shown.drawn.iter().filter_map(|drawn| match &drawn.kind {
-        Kind::Text { text, colours, .. } if text.len() == 1 && colours[0] == SIDES.to_array() => Some(text.clone()),
+        Kind::Text { area, text, colours, .. }
+            if text.len() == 1 && colours[0] == SIDES.to_array() && picture.contains(&area[0]) =>
+        {
+            Some(text.clone())
+        }
         _ => None,
     });
     let is_dot = |kind: &Kind| matches!(kind, Kind::Circle { radius: 5.0, fill, .. } if *fill == ACCENT.to_array());
@@ -52,7 +61,7 @@ fn the_user_states_the_sides_by_controls_and_takes_them_back() {
     let (mut letters, dots) = marks(&shown);
     letters.sort();
     assert_eq!((letters.concat().as_str(), dots), ("LLLRRR", 3), "on each tile that shows the axis");
-    let header = shown.find("Controls", Role::Button, "Sides");
+    let header = shown.find("Marks", Role::Button, "Sides");
     assert_eq!(shown.tree[&header].value(), Some("R-L"));
     let saved = text(shown.controls.settings(), &Origin::of(None)).expect("a workspace");
     assert!(saved.contains("lateral = \"right-left\""), "{saved}");
@@ -105,8 +114,8 @@ fn the_group_is_reached_by_the_keyboard_and_in_a_window_without_a_column() {
     shown.ask(button, Action::Focus, None);
     assert_eq!(shown.key(crate::input::Key::Space, false), [Command::Sides(VolumeAxis::Lateral, Sides::LeftRight)]);
     let mut narrow = Shown::sized("mode='plane'", [640, 480], 1.0);
-    narrow.rail_does(&Command::SwitchRail);
-    press(&mut narrow, "Controls", "Sides");
+    narrow.tab(InspectorTab::Marks);
+    press(&mut narrow, "Marks", "Sides");
     narrow.settle();
     narrow.check("a narrow window");
     assert_eq!(press(&mut narrow, LATERAL, "right to left"), [Command::Sides(VolumeAxis::Lateral, Sides::RightLeft)]);

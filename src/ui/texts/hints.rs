@@ -4,7 +4,7 @@ use crate::command::{Tool, Viewpoint};
 use crate::scene::{Layout, MeasureKind, Mode};
 
 /// What a mode shows.
-pub fn of_mode(mode: Mode) -> &'static str {
+pub const fn of_mode(mode: Mode) -> &'static str {
     match mode {
         Mode::Surface => "The first surface, lit: faces, limbs.",
         Mode::Volume => "Tissue as a lit, partly transparent volume.",
@@ -20,7 +20,7 @@ pub fn of_mode(mode: Mode) -> &'static str {
 }
 
 /// What a layout shows.
-pub(crate) fn of_layout(layout: Layout) -> &'static str {
+pub(crate) const fn of_layout(layout: Layout) -> &'static str {
     match layout {
         Layout::Single => "One picture.",
         Layout::Four => "Three planes and the rendering.",

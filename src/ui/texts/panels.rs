@@ -20,17 +20,90 @@ pub const GAIN: &str = "Gain";
 pub const SMOOTH: &str = "Smooth";
 pub const BRIGHTNESS: &str = "Brightness";
 pub const DEPTH: &str = "Depth";
-pub(crate) const MODES_AND_TOOLS: &str = "Modes and tools";
 pub(crate) const PRESETS_HINT: &str =
     "The looks of an examination, with small pictures of this volume, and your own. (Ctrl+P)";
 pub const PRESETS: &str = "Presets";
-pub(crate) const MODE: &str = "Mode";
-pub(crate) const LAYOUT_SINGLE: &str = "Single";
 pub(crate) const LAYOUT_FOUR: &str = "4-up";
 pub(crate) const LAYOUT_PAIR: &str = "VR | SR";
-pub const LAYOUT: &str = "Layout";
+pub(crate) const PROGRAM: &str = "Echolume";
+pub(crate) const TOP_BAR: &str = "Files, views and search";
+pub(crate) const TOOLS: &str = "Tools";
+pub(crate) const TAB_TOOLS_HINT: &str = "All tools and views (Shift+F3).";
+pub(crate) const INSPECTOR: &str = "Inspector";
+pub(crate) const TAB_LOOK: &str = "Look";
+pub(crate) const TAB_LOOK_HINT: &str =
+    "Looks, modes, threshold, gain, light, colours, and all other controls of the rendering (Shift+F3).";
+pub(crate) const TAB_PLANES_HINT: &str =
+    "The planes: which one moves, where they cross, slices, and their look (Shift+F3).";
+pub(crate) const TAB_MEASURE_HINT: &str = "Tools that measure, and their results (Shift+F3).";
+pub(crate) const TAB_MARKS: &str = "Marks";
+pub(crate) const TAB_MARKS_HINT: &str =
+    "Texts, arrows, body marks, the patient's sides and the probe's marker (Shift+F3).";
+pub(crate) const DRAWER_HINT: &str = "Opens all controls over the picture, or closes them (Shift+F3).";
+pub(crate) const DISTANCE: &str = "Distance";
+pub(crate) const AREA: &str = "Area";
+pub(crate) const MEASURED_VOLUME: &str = "Contours";
+pub(crate) const BODY: &str = "Body";
+pub(crate) const VIEW: &str = "View";
+pub(crate) const VIEW_3D: &str = "3D";
+pub(crate) const VIEW_3D_HINT: &str = "The rendering alone (Shift+Tab: one picture).";
+pub(crate) const RENDERING: &str = "Rendering";
+pub(crate) const RENDER_START: &str = "Where rendering starts";
+pub(crate) const NO_PLANES: &str = "4-up, 3 planes, Plane and Slices show planes.";
+pub(crate) const NO_MEASUREMENTS: &str = "Nothing is measured yet.";
+pub(crate) const QUICK_LOOKS: &str = "Quick looks";
+pub(crate) const MANAGE_LOOKS: &str = "Manage";
+pub(crate) const MORE: &str = "...";
+pub(crate) const NEXT_RECORDING: &str = "Next recording";
+pub(crate) const NEXT_RECORDING_HINT: &str = "Shows the next of the recordings that are open (Ctrl+Page down).";
+pub(crate) const SAVE_WORKSPACE: &str = "Save workspace";
+pub(crate) const TYPE_VALUE_HINT: &str = "A click types the value; Enter sets it, Esc leaves it.";
+pub(crate) fn value_of(name: impl Display) -> String {
+    format!("Value of {name}")
+}
+pub(crate) const LIVE: &str = "LIVE";
+pub(crate) const HAS_ENDED_BUTTON: &str = "ENDED";
+pub(crate) const TO_FREEZE: &str = "Space: freeze";
+pub(crate) const GO_LIVE: &str = "Space: go live";
+pub(crate) fn seconds(seconds: impl Display) -> String {
+    format!("{seconds:.1} s")
+}
+pub(crate) fn played_part(first: usize, last: usize) -> String {
+    format!("loop {first} to {last}")
+}
+
+/// What the picture is, such as "Frozen".
+pub(crate) const STATE_FROZEN: &str = "Frozen";
+pub(crate) const STATE_LIVE: &str = "Live";
+pub(crate) const STATE_PLAYING: &str = "Playing";
+pub(crate) fn volume_in_loop(number: impl Display, count: impl Display) -> String {
+    format!("volume {number} of {count}")
+}
+
+// The search.
+pub(crate) const FIND: &str = "Find a command";
+pub(crate) const FIND_HINT: &str = "Finds every command and control by its name (/ or Ctrl+K).";
+pub(crate) const HOW_TO_FIND: &str = "Type a word: measure, threshold, export ...";
+pub(crate) const FOUND: &str = "Found";
+pub(crate) const CLOSE_SEARCH_HINT: &str = "Closes the search (Esc).";
+pub(crate) const A_COMMAND: &str = "Command";
+pub(crate) fn look(name: impl Display) -> String {
+    format!("Look: {name}")
+}
+pub(crate) fn export_as(name: impl Display) -> String {
+    format!("Export: {name}")
+}
+pub(crate) fn control_in(group: &str, hint: &str) -> String {
+    format!("{group}: {hint}")
+}
+pub(crate) const SAVE_RESULTS: &str = "Save the results (CSV)";
+pub(crate) const CLEAR_RESULTS: &str = "Clear all measurements";
+pub(crate) const SAVES_BAR: &str = "Bar on saved pictures: on";
+pub(crate) const SAVES_NO_BAR: &str = "Bar on saved pictures: off";
+pub(crate) const REFERENCE_PICTURE_ON: &str = "Reference picture of slices: on";
+pub(crate) const REFERENCE_PICTURE_OFF: &str = "Reference picture of slices: off";
+
 pub(crate) const VIEW_FROM: &str = "View from";
-pub(crate) const DRAG: &str = "Drag";
 pub(crate) const PLANE_HINT: &str = "The plane that is shown and moved.";
 pub(crate) const PLANE: &str = "Plane";
 pub(crate) const RECENTRE_PLANES_HINT: &str =
@@ -43,7 +116,6 @@ pub(crate) const SAVE: &str = "Save";
 pub(crate) const SAVE_WORKSPACE_HINT: &str = "Saves settings, recording and measurements together (Ctrl+S).";
 pub(crate) const EXPORT_HINT: &str =
     "Exports the volume that is shown: as a volume, a surface to print, or a turntable (Ctrl+E).";
-pub(crate) const WORKSPACE: &str = "Workspace";
 pub(crate) const RECORDINGS: &str = "Recordings";
 pub(crate) fn recording_hint(path: impl Display) -> String {
     format!("{path}: shows it as it was left (Ctrl+Page up, Ctrl+Page down).")
@@ -52,7 +124,6 @@ pub(crate) fn close_recording(name: impl Display) -> String {
     format!("Close {name}")
 }
 pub(crate) const CLOSE_RECORDING_HINT: &str = "Takes it from the list; its file stays, its settings and measurements are forgotten (Ctrl+W: the one that is shown).";
-pub(crate) const CLOSE_RECORDING_BUTTON: &str = "x";
 pub(crate) const EXPORT: &str = "Export";
 pub const CUTS: &str = "Cuts";
 pub(crate) const KEEP_INSIDE_HINT: &str = "The next contour takes away what is outside of it, not what is within.";
@@ -83,13 +154,7 @@ pub(crate) const WARM: &str = "Warm";
 pub(crate) const AS_IS: &str = "As is";
 pub(crate) const ICE: &str = "Ice";
 pub(crate) const CONTROLS: &str = "Controls";
-pub(crate) const TABS: &str = "Tools or controls";
 pub(crate) const TAB_TOOLS: &str = "Tools";
-pub(crate) const TAB_TOOLS_HINT: &str = "Modes, tools and measurements (Shift+F3).";
-pub(crate) const TAB_CONTROLS_HINT: &str = "Threshold, gain, light and all other controls (Shift+F3).";
-pub(crate) const DRAWER_SIGN: &str = "≡";
-pub(crate) const DRAWER: &str = "Tools and controls";
-pub(crate) const DRAWER_HINT: &str = "Opens tools and controls over the picture, or closes them (Shift+F3).";
 pub(crate) const COLOUR_HINT: &str = "Colours of the tissue; they stand for no flow.";
 pub const COLOUR: &str = "Colour";
 pub(crate) const OPACITY_OF: &str = "Opacity of";
@@ -166,23 +231,10 @@ pub(crate) const BACK_AND_FORTH: &str = "Back and forth";
 pub(crate) const BACK_AND_FORTH_HINT: &str = "The loop plays back and forth. A click: forwards (Ctrl+Enter).";
 pub(crate) const FORWARDS: &str = "Forwards";
 pub(crate) const FORWARDS_HINT: &str = "The loop plays forwards. A click: back and forth (Shift+Enter).";
-pub(crate) const LOOP_BEGINS_HERE_HINT: &str = "The loop begins with this volume (Shift+Home).";
-pub(crate) const LOOP_BEGINS_HERE: &str = "Loop begins here";
-pub(crate) const LOOP_ENDS_HERE_HINT: &str = "The loop ends with this volume (Shift+End).";
-pub(crate) const LOOP_ENDS_HERE: &str = "Loop ends here";
-pub(crate) const ALL_SHORT: &str = "All";
-pub(crate) const ALL_VOLUMES_HINT: &str = "The loop is all volumes (Ctrl+Home).";
-pub(crate) const ALL_VOLUMES: &str = "All volumes";
-pub(crate) const VOLUME_OF_THE_LOOP_HINT: &str = "The volumes of the loop, oldest first.";
+pub(crate) const VOLUME_OF_THE_LOOP_HINT: &str = "The volumes of the loop, oldest first. Drag its ends to play a part of it; a double click plays all (Shift+Home, Shift+End, Ctrl+Home).";
 pub(crate) const VOLUME_OF_THE_LOOP: &str = "Volume of the loop";
 pub(crate) fn place_in_loop(place: impl Display, count: impl Display) -> String {
     format!("{place} of {count}")
-}
-pub(crate) fn loop_seconds(seconds: impl Display) -> String {
-    format!("  {seconds:.1} s")
-}
-pub(crate) fn loop_rate(rate: impl Display) -> String {
-    format!("  {rate:.1}/s")
 }
 
 // Lists of files and formats.
@@ -350,12 +402,6 @@ pub(crate) const QUIT: &str = "quit";
 pub const KEYS: &str = "Keys";
 pub(crate) const GESTURES: &str = "Gestures";
 pub(crate) const KEYS_AND_GESTURES: &str = "Keys and gestures";
-pub(crate) fn searching_for(text: impl Display) -> String {
-    format!("Search: {text}_")
-}
-pub(crate) const SEARCH_BUTTON: &str = "Search  ( / )";
-pub(crate) const SEARCH_HINT: &str = "Finds keys, gestures and controls ( / ).";
-pub(crate) const SEARCH: &str = "Search";
 pub(crate) const NOTHING_FOUND: &str = "Nothing is found.";
 pub(crate) const NO_MEDICAL_DEVICE: &str = "Echolume is not a medical device.";
 pub(crate) const SAVE_AND_LEAVE: &str = "Save and leave  (Enter)";

@@ -68,6 +68,7 @@ pub fn options() -> ConsoleOptions {
         origin: None,
         plays_once: false,
         first_steps: None,
+        small_pictures: false,
         opening: OpeningOptions::default(),
         presets: None,
         startup_fault: None,

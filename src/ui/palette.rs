@@ -1,0 +1,123 @@
+//! Every command and control by name, for the search of the window.
+
+use crate::command::{self, Command, InspectorTab, KEY_BINDINGS};
+use crate::controls::EXAMS;
+use crate::sliders::{GROUPS, SLIDERS};
+use crate::texts;
+use crate::volume_export::FORMATS;
+
+/// Something that the search finds.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct Entry {
+    pub name: String,
+    /// What it does, or where it is.
+    pub about: String,
+    /// Its key, if it has one.
+    pub key: String,
+    pub command: Command,
+}
+
+/// What no key does.
+const WITHOUT_KEY: [(&str, &str, Command); 14] = [
+    (texts::VIEW_3D, texts::VIEW_3D_HINT, Command::Rendering),
+    (texts::EXCHANGE_LEFT_AND_RIGHT, texts::EXCHANGE_LEFT_AND_RIGHT_HINT, Command::ExchangeLeftAndRight),
+    (texts::SAVE_RESULTS, texts::SAVE_RESULTS_HINT, Command::SaveMeasures),
+    (texts::CLEAR_RESULTS, texts::CLEAR_HINT, Command::ClearMeasures),
+    (texts::CANCEL_EXPORT, texts::CANCEL_EXPORT_HINT, Command::CancelExport),
+    (texts::SAVES_BAR, texts::BAR_ON_SAVED_PICTURES_HINT, Command::SavesBar(true)),
+    (texts::SAVES_NO_BAR, texts::BAR_ON_SAVED_PICTURES_HINT, Command::SavesBar(false)),
+    (texts::REFERENCE_PICTURE_ON, texts::REFERENCE_PICTURE_HINT, Command::Reference(true)),
+    (texts::REFERENCE_PICTURE_OFF, texts::REFERENCE_PICTURE_HINT, Command::Reference(false)),
+    (texts::SIDES, texts::SIDES_HINT, Command::InspectorTab(InspectorTab::Marks)),
+    (texts::PROBE_MARKER, texts::SIDES_HINT, Command::InspectorTab(InspectorTab::Marks)),
+    (texts::MEASUREMENTS, texts::TAB_MEASURE_HINT, Command::InspectorTab(InspectorTab::Measure)),
+    (texts::COLOUR, texts::COLOUR_HINT, Command::InspectorTab(InspectorTab::Look)),
+    (texts::OPACITY_OF, texts::OPACITY_OF_HINT, Command::InspectorTab(InspectorTab::Look)),
+];
+
+/// All that can be found: commands, looks, formats of exports, controls.
+pub(crate) fn entries() -> impl Iterator<Item = Entry> {
+    // A key beside another for the same is not told.
+    let is_first = |n: &usize| !KEY_BINDINGS[..*n].iter().any(|other| other.command == KEY_BINDINGS[*n].command);
+    let by_key = (0..KEY_BINDINGS.len()).filter(is_first).map(|n| {
+        let binding = &KEY_BINDINGS[n];
+        let (name, key) = (capitalised(binding.description), command::key_label(binding));
+        Entry { name, about: texts::A_COMMAND.into(), key, command: binding.command }
+    });
+    let entry = |name: &str, about: &str, command| Entry {
+        name: name.into(),
+        about: about.into(),
+        key: String::new(),
+        command,
+    };
+    let others = WITHOUT_KEY.into_iter().map(move |(name, about, command)| entry(name, about, command));
+    let looks = EXAMS.iter().enumerate();
+    let looks = looks.map(move |(n, exam)| entry(&texts::look(exam.title), exam.hint, Command::Preset(n)));
+    let formats = FORMATS.iter().enumerate();
+    let formats =
+        formats.map(move |(n, format)| entry(&texts::export_as(format.name), format.hint, Command::Export(n)));
+    let controls = SLIDERS.iter().enumerate().map(move |(n, slider)| {
+        let group = GROUPS.iter().find(|(group, _)| *group == slider.group).map_or("", |(_, name)| name);
+        entry(slider.name, &texts::control_in(group, slider.hint), Command::ShowControl(n))
+    });
+    by_key.chain(others).chain(looks).chain(formats).chain(controls)
+}
+
+fn capitalised(text: &str) -> String {
+    let mut letters = text.chars();
+    letters.next().map_or(String::new(), |first| first.to_uppercase().chain(letters).collect())
+}
+
+/// Those that have all words of a text: first those whose name begins with it, then those whose name has all words, then those of which it is said.
+pub(crate) fn found(text: &str) -> Vec<Entry> {
+    let text = text.trim().to_lowercase();
+    let words: Vec<&str> = text.split_whitespace().collect();
+    let has = |in_text: &str| words.iter().all(|word| in_text.contains(word));
+    let rank = |entry: &Entry| {
+        let name = entry.name.to_lowercase();
+        let all = format!("{name} {} {}", entry.about, entry.key).to_lowercase();
+        match () {
+            () if name.starts_with(&text) => Some(0),
+            () if has(&name) => Some(1),
+            () => has(&all).then_some(2),
+        }
+    };
+    let mut found: Vec<_> = entries().filter_map(|entry| Some((rank(&entry)?, entry))).collect();
+    found.sort_by_key(|(rank, _)| *rank);
+    found.into_iter().map(|(_, entry)| entry).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::command::Tool;
+    use crate::scene::MeasureKind;
+
+    /// Prevents a command or a control that no search finds by its own name.
+    #[test]
+    fn every_command_and_control_is_found_by_its_name() {
+        for entry in entries() {
+            let found = found(&entry.name);
+            assert!(found.iter().any(|other| *other == entry), "{entry:?}");
+            assert!(!entry.name.is_empty() && !entry.about.is_empty(), "{entry:?}");
+        }
+        for binding in KEY_BINDINGS {
+            assert!(entries().any(|entry| entry.command == binding.command), "{binding:?}");
+        }
+        for n in 0..SLIDERS.len() {
+            assert!(entries().any(|entry| entry.command == Command::ShowControl(n)), "{}", SLIDERS[n].key);
+        }
+    }
+
+    #[test]
+    fn the_nearest_name_comes_first_and_all_words_count() {
+        let first = |text: &str| found(text).first().map(|entry| entry.command);
+        assert_eq!(first("measure: cal"), Some(Command::Tool(Tool::Measure(MeasureKind::Distance))));
+        assert!(found("measure").iter().any(|entry| entry.command == Command::Tool(Tool::Measure(MeasureKind::Angle))));
+        assert_eq!(first("look: face"), Some(Command::Preset(0)));
+        assert_eq!(first("picture save"), Some(Command::SavePicture));
+        assert_eq!(first("ctrl+i"), Some(Command::SavePicture));
+        assert!(found("speckle").iter().any(|entry| entry.name == "Smoothing"), "a control is found by what it does");
+        assert!(found("no such thing").is_empty());
+    }
+}

@@ -1,0 +1,249 @@
+//! The part of the inspector for the look: the mode of a rendering and its view, the six controls that every examination needs in front, colours, and
+//! all other controls by stage.
+
+use super::colours::{self, EDGE, ON_SELECTED, OUTLINE, TEXT};
+use super::names::{self, Tell};
+use super::widgets::{absent, front, row_of, slider, switch};
+use super::{PanelState, ROW_HEIGHT, heading, tools};
+use crate::command::Command;
+use crate::scene::Slider as Control;
+use crate::scene::{ColourMap, Group, Mode, Settings, Transfer, TransferName};
+use crate::sliders::{GROUPS, SLIDERS};
+use crate::texts;
+use crate::texts::hints;
+use crate::view;
+use egui::{Button, CollapsingHeader, Sense, Stroke, Ui, WidgetInfo, WidgetType, vec2};
+
+/// The modes that render; the others are views of planes.
+const RENDERED: [Mode; 7] = [Mode::Surface, Mode::Volume, Mode::Mixed, Mode::Cube, Mode::Mip, Mode::MinIp, Mode::Mean];
+
+/// The controls in front: their names, and the keys of the sliders of which the first that the mode has is meant.
+const FRONT: [(&str, &[&str]); 6] = [
+    (texts::THRESHOLD, &["threshold"]),
+    (texts::GAIN, &["post.brightness"]),
+    (texts::SMOOTH, &["smoothing"]),
+    (texts::BRIGHTNESS, &["light.volume.exposure", "post.gamma"]),
+    (texts::LAMP, &["light.diffuse"]),
+    (texts::DEPTH, &["start_depth"]),
+];
+
+/// Colours of what is shown: of a volume those of its transfer function, of other modes those of the picture.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Colour {
+    Transfer(TransferName),
+    Map(ColourMap),
+}
+
+const OF_VOLUME: [(Colour, &str); 6] = [
+    (Colour::Transfer(TransferName::Grey), texts::GREY),
+    (Colour::Transfer(TransferName::Sepia), texts::SEPIA),
+    (Colour::Transfer(TransferName::Skin), texts::SKIN),
+    (Colour::Transfer(TransferName::Bone), texts::BONE),
+    (Colour::Transfer(TransferName::Cool), texts::COOL),
+    (Colour::Transfer(TransferName::Warm), texts::WARM),
+];
+
+const OF_PICTURE: [(Colour, &str); 5] = [
+    (Colour::Map(ColourMap::None), texts::AS_IS),
+    (Colour::Map(ColourMap::Grey), texts::GREY),
+    (Colour::Map(ColourMap::Sepia), texts::SEPIA),
+    (Colour::Map(ColourMap::Skin), texts::SKIN),
+    (Colour::Map(ColourMap::Ice), texts::ICE),
+];
+
+/// Whose opacities a volume has: those of its own function, or of another.
+const OPACITIES: [(Option<TransferName>, &str); 7] = [
+    (None, texts::SAME_AS_COLOUR),
+    (Some(TransferName::Grey), texts::GREY),
+    (Some(TransferName::Sepia), texts::SEPIA),
+    (Some(TransferName::Skin), texts::SKIN),
+    (Some(TransferName::Bone), texts::BONE),
+    (Some(TransferName::Cool), texts::COOL),
+    (Some(TransferName::Warm), texts::WARM),
+];
+
+fn colours(settings: &Settings) -> &'static [(Colour, &'static str)] {
+    match settings.mode {
+        Mode::Volume | Mode::Mixed => &OF_VOLUME,
+        _ => &OF_PICTURE,
+    }
+}
+
+/// In this width, points.
+pub(super) fn show(ui: &mut Ui, state: &PanelState, width: f32, execute: &mut dyn FnMut(Command)) {
+    let settings = state.controls.settings();
+    let modes = RENDERED.map(|mode| (mode, mode.title()));
+    let of_mode = |mode| settings.mode == mode;
+    row_of(ui, texts::RENDERING, &modes, (4, width), of_mode, hints::of_mode, |mode| execute(Command::Mode(mode)));
+    let in_front = FRONT.map(|(name, sliders)| (name, front(sliders, settings)));
+    names::group(ui, texts::CONTROLS, |ui| {
+        heading(ui, texts::CONTROLS);
+        for (name, number) in in_front {
+            match number {
+                Some(number) if name == texts::LAMP => {
+                    ui.horizontal_top(|ui| {
+                        let width = ui.available_width() - BALL - ui.spacing().item_spacing.x;
+                        ui.vertical(|ui| {
+                            ui.set_width(width);
+                            slider(ui, state, number, name, execute);
+                        });
+                        light_ball(ui, settings, execute);
+                    });
+                }
+                Some(number) => slider(ui, state, number, name, execute),
+                None => absent(ui, name),
+            }
+        }
+        if front(&["light.shadow.strength"], settings).is_some() {
+            let mut on = settings.light.shadow.is_some_and(|shadow| shadow.strength > 0.0);
+            if switch(ui, &mut on, texts::CAST_SHADOWS, texts::CAST_SHADOWS_HINT) {
+                execute(Command::Shadow(on));
+            }
+        }
+    });
+    let start = ["unveil.enabled", "unveil.offset"].map(|key| front(&[key], settings));
+    if start.iter().any(Option::is_some) {
+        names::group(ui, texts::RENDER_START, |ui| {
+            heading(ui, texts::RENDER_START);
+            for number in start.iter().flatten() {
+                slider(ui, state, *number, SLIDERS[*number].name, execute);
+            }
+        });
+    }
+    show_colours(ui, settings, width, execute);
+    if !settings.mode.is_flat() {
+        views(ui, state, width, execute);
+    }
+    ui.add_space(8.0);
+    if ui.add(Button::new(texts::RESET).min_size(vec2(width, ROW_HEIGHT))).tell(texts::RESET_HINT).clicked() {
+        execute(Command::Reset);
+    }
+    ui.add_space(4.0);
+    heading(ui, texts::ADVANCED);
+    let elsewhere = [&start[..], &tools::of_clip(settings)[..], &[tools::depth_of_cut(state)]].concat();
+    for (group, name) in GROUPS.into_iter().filter(|(group, _)| *group != Group::Planes) {
+        let is_there = |(number, s): &(usize, &Control)| {
+            let is_elsewhere =
+                elsewhere.contains(&Some(*number)) || in_front.iter().any(|(_, front)| *front == Some(*number));
+            s.group == group && s.applies(settings) && !is_elsewhere
+        };
+        let there: Vec<usize> = SLIDERS.iter().enumerate().filter(is_there).map(|(number, _)| number).collect();
+        if there.is_empty() {
+            continue;
+        }
+        let is_sought = state.visible.inspector.sought.is_some_and(|number| there.contains(&number));
+        let header = CollapsingHeader::new(name).id_salt(name).open(is_sought.then_some(true));
+        let shown = header.show_unindented(ui, |ui| {
+            names::name(ui, egui::accesskit::Role::Group, name);
+            for number in there {
+                slider(ui, state, number, SLIDERS[number].name, execute);
+            }
+        });
+        // A control in front may have the name of a stage.
+        let header = shown.header_response.expanded(shown.openness > 0.5);
+        header.tell(&texts::advanced_hint(name)).named(&texts::advanced_group(name));
+    }
+}
+
+/// Where a rendering is seen from.
+fn views(ui: &mut Ui, state: &PanelState, width: f32, execute: &mut dyn FnMut(Command)) {
+    let is_there = |v| state.scene.is_some_and(|scene| view::is_seen_from(scene, v));
+    let views = names::VIEWPOINTS;
+    row_of(ui, texts::VIEW_FROM, &views, (4, width), is_there, hints::of_viewpoint, |v| execute(Command::LookFrom(v)));
+    let turntable = Button::selectable(state.is_turning, texts::TURNTABLE).frame_when_inactive(true);
+    if ui.add(turntable.min_size(vec2(width, ROW_HEIGHT))).tell(texts::TURNTABLE_HINT).clicked() {
+        execute(Command::Turntable);
+    }
+}
+
+fn show_colours(ui: &mut Ui, settings: &Settings, width: f32, execute: &mut dyn FnMut(Command)) {
+    let is_chosen = |colour| match colour {
+        Colour::Transfer(name) => match settings.volume.colour {
+            Some(colour) => colour == name,
+            None => settings.volume.transfer == Transfer::Named(name),
+        },
+        Colour::Map(map) => settings.post.colour_map == map,
+    };
+    let hint = |_| texts::COLOUR_HINT;
+    row_of(ui, texts::COLOUR, colours(settings), (3, width), is_chosen, hint, |colour| match colour {
+        Colour::Transfer(name) => execute(Command::Transfer(name)),
+        Colour::Map(map) => execute(Command::ColourMap(map)),
+    });
+    if matches!(settings.mode, Mode::Volume | Mode::Mixed) {
+        let is_chosen = |name| settings.volume.opacity == name;
+        let hint = |_| texts::OPACITY_OF_HINT;
+        let select = |name| execute(Command::Opacity(name));
+        row_of(ui, texts::OPACITY_OF, &OPACITIES, (4, width), is_chosen, hint, select);
+    }
+}
+
+/// Width of the light ball, points.
+const BALL: f32 = 68.0;
+
+/// A ball under the lamp, which a drag on it moves.
+fn light_ball(ui: &mut Ui, settings: &Settings, execute: &mut dyn FnMut(Command)) {
+    let (area, response) = ui.allocate_exact_size(vec2(BALL, BALL), Sense::DRAG);
+    let light = settings.light.position.unwrap_or(settings.light.direction).normalize_or(glam::DVec3::Z);
+    response.widget_info(|| WidgetInfo::labeled(WidgetType::Image, true, texts::LIGHT_BALL));
+    let [right, up] = [light.x.atan2(light.z), light.y.clamp(-1.0, 1.0).asin()].map(|angle| angle.to_degrees().round());
+    let response = response.tell(texts::LIGHT_BALL_HINT).with_value(&texts::lamp_place(right, up));
+    let (centre, radius) = (area.center(), BALL / 2.0 - 2.0);
+    // The ball in rings, lit as a matt one is.
+    const RINGS: u32 = 8;
+    const SPOKES: u32 = 24;
+    let mut mesh = egui::Mesh::default();
+    for ring in 0..=RINGS {
+        for spoke in 0..SPOKES {
+            let out = f64::from(ring) / f64::from(RINGS);
+            let (sin, cos) = (f64::from(spoke) / f64::from(SPOKES) * std::f64::consts::TAU).sin_cos();
+            let normal = glam::DVec3::new(out * cos, out * sin, (1.0 - out * out).max(0.0).sqrt());
+            let bright = 0.12 + 0.6 * normal.dot(light).max(0.0);
+            let at = centre + vec2(normal.x as f32, -normal.y as f32) * radius;
+            mesh.colored_vertex(at, colours::of_scene([bright; 3]));
+        }
+    }
+    for (ring, spoke) in (0..RINGS).flat_map(|ring| (0..SPOKES).map(move |spoke| (ring, spoke))) {
+        let corner = |ring: u32, spoke: u32| ring * SPOKES + spoke % SPOKES;
+        let [a, b] = [corner(ring, spoke), corner(ring, spoke + 1)];
+        let [c, d] = [corner(ring + 1, spoke), corner(ring + 1, spoke + 1)];
+        mesh.add_triangle(a, c, d);
+        mesh.add_triangle(a, d, b);
+    }
+    let painter = ui.painter();
+    painter.add(mesh);
+    let edge = if response.hovered() || response.dragged() { TEXT } else { EDGE };
+    painter.circle_stroke(centre, radius, Stroke::new(1.5, edge));
+    let lamp = centre + vec2(light.x as f32, -light.y as f32) * radius;
+    painter.circle(lamp, 5.0, ON_SELECTED, Stroke::new(1.5, OUTLINE));
+    let by = response.drag_delta();
+    if response.dragged() && by != egui::Vec2::ZERO {
+        // The width of the ball is that of the dome over which the lamp moves.
+        execute(Command::MoveLight([by.x, by.y].map(|points| f64::from(points / (2.0 * radius)))));
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scene::load::Layers;
+
+    #[test]
+    fn every_mode_has_the_controls_in_front_that_it_can_have() {
+        for mode in Mode::ALL {
+            let mut settings = Layers::default().finish().expect("settings");
+            settings.set_mode(mode);
+            let names: Vec<&str> = FRONT
+                .iter()
+                .filter(|(_, sliders)| front(sliders, &settings).is_some())
+                .map(|(name, _)| *name)
+                .collect();
+            assert!(["Gain", "Smooth", "Brightness"].iter().all(|name| names.contains(name)), "{mode:?}: {names:?}");
+            assert!(mode != Mode::Surface || names.len() == FRONT.len(), "{mode:?}: {names:?}");
+        }
+        for (name, sliders) in FRONT {
+            for slider in sliders {
+                assert!(SLIDERS.iter().any(|s| s.key == *slider), "{name}: no slider {slider}");
+            }
+        }
+    }
+}

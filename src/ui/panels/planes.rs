@@ -1,0 +1,45 @@
+//! The part of the inspector for planes: which one is moved, where they cross, and how they look.
+
+use super::names::{self, Tell};
+use super::widgets::{row_of, slider, switch};
+use super::{PanelState, ROW_HEIGHT, SMALL_TEXT, tools};
+use crate::command::Command;
+use crate::scene::{Group, Layout, Mode, PlaneName};
+use crate::sliders::SLIDERS;
+use crate::texts;
+use egui::{Button, Label, RichText, Ui, vec2};
+
+const PLANES: [(PlaneName, &str); 3] = [(PlaneName::A, "A"), (PlaneName::B, "B"), (PlaneName::C, "C")];
+
+pub(super) fn show(ui: &mut Ui, state: &PanelState, width: f32, execute: &mut dyn FnMut(Command)) {
+    let settings = state.controls.settings();
+    let has_planes = settings.mode.is_flat() || settings.layout == Layout::Four;
+    tools::curve(ui, state, width, execute);
+    if has_planes && settings.mode != Mode::Orthogonal {
+        let is_chosen = |plane| settings.planes.plane == plane;
+        let hint = |_| texts::PLANE_HINT;
+        row_of(ui, texts::PLANE, &PLANES, (3, width), is_chosen, hint, |plane| execute(Command::Plane(plane)));
+    }
+    if has_planes {
+        let recentre = Button::new(texts::RECENTRE_PLANES).min_size(vec2(width, ROW_HEIGHT));
+        if ui.add(recentre).tell(texts::RECENTRE_PLANES_HINT).clicked() {
+            execute(Command::Recentre);
+        }
+    } else {
+        let text = RichText::new(texts::NO_PLANES).size(SMALL_TEXT).color(super::colours::WEAK_TEXT);
+        ui.add(Label::new(text).wrap());
+    }
+    if settings.mode == Mode::Tomography {
+        let mut on = settings.planes.reference;
+        if switch(ui, &mut on, texts::REFERENCE_PICTURE, texts::REFERENCE_PICTURE_HINT) {
+            execute(Command::Reference(on));
+        }
+    }
+    names::group(ui, texts::PLANES, |ui| {
+        for (number, control) in SLIDERS.iter().enumerate() {
+            if control.group == Group::Planes && control.applies(settings) {
+                slider(ui, state, number, control.name, execute);
+            }
+        }
+    });
+}

@@ -1,0 +1,266 @@
+//! The bar at the top: files and the recordings that are open, the views, undo and redo, the search of all commands, and help.
+
+use super::colours::{ACCENT, BUTTON, CHOSEN, EDGE, PANEL, TEXT, WARNING, WEAK_TEXT};
+use super::icons::{self, Icon};
+use super::names::{self, Tell};
+use super::rail::{icon_button, paint};
+use super::widgets::row_of;
+use super::{PanelState, ROW_HEIGHT, TEXT_SIZE};
+use crate::command::Command;
+use crate::scene::{Layout, Mode, Settings};
+use crate::texts;
+use crate::texts::hints;
+use egui::accesskit::Role;
+use egui::{
+    Align, Align2, Button, FontId, Frame, Panel, Rect, Sense, Stroke, StrokeKind, Ui, UiBuilder, WidgetInfo,
+    WidgetType, pos2, vec2,
+};
+
+/// The views: their names, what chooses them, and what they show.
+const VIEWS: [(&str, Command, &str); 6] = [
+    (texts::VIEW_3D, Command::Rendering, texts::VIEW_3D_HINT),
+    (texts::LAYOUT_PAIR, Command::Layout(Layout::Pair), hints::of_layout(Layout::Pair)),
+    (texts::LAYOUT_FOUR, Command::Layout(Layout::Four), hints::of_layout(Layout::Four)),
+    (Mode::Orthogonal.title(), Command::Mode(Mode::Orthogonal), hints::of_mode(Mode::Orthogonal)),
+    (Mode::Plane.title(), Command::Mode(Mode::Plane), hints::of_mode(Mode::Plane)),
+    (Mode::Tomography.title(), Command::Mode(Mode::Tomography), hints::of_mode(Mode::Tomography)),
+];
+
+fn is_view(settings: &Settings, view: Command) -> bool {
+    match view {
+        Command::Mode(mode) => settings.mode == mode,
+        Command::Layout(layout) => settings.layout == layout && !settings.mode.is_flat(),
+        _ => settings.layout == Layout::Single && !settings.mode.is_flat(),
+    }
+}
+
+/// What each button does: its icon, name, command and explanation.
+type Item = (Icon, &'static str, Command, &'static str);
+const OPEN: Item = (icons::OPEN, texts::OPEN, Command::OpenFiles, texts::OPEN_HINT);
+const SAVE: Item = (icons::SAVE, texts::SAVE_WORKSPACE, Command::SaveWorkspace, texts::SAVE_WORKSPACE_HINT);
+const UNDO: Item = (icons::UNDO, texts::UNDO, Command::Undo, texts::UNDO_HINT);
+const REDO: Item = (icons::REDO, texts::REDO, Command::Redo, texts::REDO_HINT);
+const FIND: Item = (icons::SEARCH, texts::FIND, Command::Find, texts::FIND_HINT);
+const TIMES: Item = (icons::TIMES, texts::TIMES, Command::ToggleTimes, texts::TIMES_HINT);
+const FULL_SCREEN: Item = (icons::FULL_SCREEN, texts::FULL_SCREEN, Command::ToggleFullScreen, texts::FULL_SCREEN_HINT);
+const HELP: Item = (icons::HELP, texts::HELP, Command::ToggleHelp, texts::HELP_HINT);
+const INSPECTOR: Item = (icons::INSPECTOR, texts::INSPECTOR, Command::ToggleDrawer, texts::DRAWER_HINT);
+
+/// Width of a button with its icon alone, with a text, and of the search with its text, points.
+const ICON: f32 = 38.0;
+const WITH_TEXT: f32 = 92.0;
+const SEARCH: f32 = 190.0;
+const GAP: f32 = 6.0;
+/// In a window of this width there are texts beside the icons, and in one of that the name of the program.
+const WIDE: f32 = 1180.0;
+const WIDEST: f32 = 1360.0;
+/// A bar of less width has not the times and full screen, points.
+const NARROW: f32 = 760.0;
+/// Widths of a tab, points.
+const TAB: [f32; 2] = [72.0, 190.0];
+
+pub(super) fn show(ui: &mut Ui, state: &PanelState, height: f32, execute: &mut dyn FnMut(Command)) {
+    let panel = Panel::top("top").exact_size(height).resizable(false).show_separator_line(false);
+    panel.frame(Frame::new().fill(PANEL)).show(ui, |ui| {
+        names::name(ui, Role::Toolbar, texts::TOP_BAR);
+        let bar = ui.max_rect();
+        let is_wide = bar.width() >= WIDE;
+        let row = bar.shrink2(vec2(GAP + 2.0, (height - ROW_HEIGHT) / 2.0));
+        let (mut left, mut right) = (row.left(), row.right());
+        if bar.width() >= WIDEST {
+            left = name_program(ui, row) + 2.0 * GAP;
+        }
+        for item in [OPEN, SAVE] {
+            let has_text = is_wide && item.2 == Command::OpenFiles;
+            let width = if has_text { WITH_TEXT } else { ICON };
+            show_item(ui, state, item, has_text, place(row, left, width), execute);
+            left += width + GAP;
+        }
+        let drawer = state.room.has_drawer.then_some(INSPECTOR);
+        let extra = (bar.width() >= NARROW).then_some([FULL_SCREEN, TIMES]);
+        let of_right = drawer.into_iter().chain([HELP]).chain(extra.into_iter().flatten()).chain([FIND, REDO, UNDO]);
+        for item in of_right {
+            let has_text = is_wide && item.2 == Command::Find;
+            let width = if has_text { SEARCH } else { ICON };
+            right -= width;
+            show_item(ui, state, item, has_text, place(row, right, width), execute);
+            right -= GAP;
+        }
+        let font = FontId::proportional(TEXT_SIZE);
+        let words = |ui: &Ui, text: &str| ui.painter().layout_no_wrap(text.into(), font.clone(), TEXT).size().x;
+        let spare = if is_wide { 24.0 } else { 14.0 };
+        let segments = VIEWS.map(|(name, ..)| words(ui, name) + spare);
+        let all: f32 = segments.iter().sum();
+        // In the middle of the picture where there is room, else as far to the right as it goes.
+        let middle = bar.center().x - all / 2.0;
+        let from = middle.clamp(left, (right - all - GAP).max(left));
+        let tabs = from - GAP - left;
+        show_views(ui, state, place(row, from, all.min(right - from)), &segments, execute);
+        if tabs >= TAB[0] {
+            show_tabs(ui, state, place(row, left, tabs), execute);
+        }
+    });
+}
+
+fn place(row: Rect, left: f32, width: f32) -> Rect {
+    Rect::from_min_size(pos2(left, row.top()), vec2(width, row.height()))
+}
+
+/// The name of the program with its mark. Returns where it ends.
+fn name_program(ui: &Ui, row: Rect) -> f32 {
+    let painter = ui.painter();
+    let centre = pos2(row.left() + 12.0, row.center().y);
+    painter.circle_filled(centre, 8.0, super::colours::MARK);
+    painter.circle_filled(centre + vec2(-2.5, -2.5), 3.0, super::colours::MARK_LIGHT);
+    let at = pos2(row.left() + 28.0, row.center().y);
+    painter.text(at, Align2::LEFT_CENTER, texts::PROGRAM, FontId::proportional(TEXT_SIZE), TEXT).right()
+}
+
+fn show_item(
+    ui: &mut Ui,
+    state: &PanelState,
+    (icon, name, command, hint): Item,
+    has_text: bool,
+    area: Rect,
+    execute: &mut dyn FnMut(Command),
+) {
+    let [can_undo, can_redo] = state.controls.can_undo();
+    let is_enabled = match command {
+        Command::Undo => can_undo,
+        Command::Redo => can_redo,
+        _ => true,
+    };
+    let is_on = match command {
+        Command::ToggleTimes => state.visible.times,
+        Command::ToggleDrawer => state.visible.inspector.is_open,
+        _ => false,
+    };
+    ui.scope_builder(UiBuilder::new().max_rect(area), |ui| {
+        let text = if has_text { name } else { "" };
+        let button = icon_button(ui, icon, (text, name), area.size(), (is_enabled, is_on));
+        let button = button.tell(hint).named(name);
+        let button = if command == Command::ToggleDrawer { button.expanded(is_on) } else { button };
+        if button.on_disabled_hover_text(hint).clicked() {
+            execute(command);
+        }
+    });
+}
+
+/// The views as parts of one button.
+fn show_views(ui: &mut Ui, state: &PanelState, area: Rect, segments: &[f32], execute: &mut dyn FnMut(Command)) {
+    let settings = state.controls.settings();
+    ui.scope_builder(UiBuilder::new().max_rect(area), |ui| {
+        names::name(ui, Role::Group, texts::VIEW);
+        ui.painter().rect_stroke(area, 6.0, Stroke::new(1.0, EDGE), StrokeKind::Inside);
+        let share = area.width() / segments.iter().sum::<f32>();
+        let mut left = area.left();
+        for ((name, command, hint), width) in VIEWS.into_iter().zip(segments) {
+            let part = place(area, left, width * share);
+            left += width * share;
+            let is_chosen = is_view(settings, command);
+            let response = ui.allocate_rect(part, Sense::click());
+            response.widget_info(|| WidgetInfo::selected(WidgetType::SelectableLabel, true, is_chosen, name));
+            let is_over = response.hovered() || response.has_focus();
+            let painter = ui.painter();
+            if is_chosen {
+                painter.rect(part.shrink(2.0), 5.0, CHOSEN, Stroke::new(1.0, ACCENT), StrokeKind::Inside);
+            } else if is_over {
+                painter.rect_filled(part.shrink(2.0), 5.0, BUTTON);
+            }
+            let colour = if is_chosen || is_over { TEXT } else { WEAK_TEXT };
+            painter.text(part.center(), Align2::CENTER_CENTER, name, FontId::proportional(TEXT_SIZE), colour);
+            if response.tell(hint).clicked() {
+                execute(command);
+            }
+        }
+    });
+}
+
+/// The recordings that are open, as tabs, in order; those that have no room are reached by the last button.
+fn show_tabs(ui: &mut Ui, state: &PanelState, area: Rect, execute: &mut dyn FnMut(Command)) {
+    let count = state.recordings.len();
+    if count < 2 {
+        let name = state.origin.or(state.recordings.first().map(|recording| recording.name.as_str()));
+        if let Some(name) = name {
+            let colour = if state.origin.is_some() { WARNING } else { TEXT };
+            ui.painter().circle_filled(pos2(area.left() + 8.0, area.center().y), 3.5, colour);
+            clipped(ui, name, Rect::from_min_max(pos2(area.left() + 18.0, area.top()), area.max));
+        }
+        return;
+    }
+    let fit = ((area.width() / TAB[0]).floor() as usize).max(1);
+    let has_all = fit >= count;
+    let shown = state.recordings.iter().position(|recording| recording.is_shown).unwrap_or_default();
+    let room = if has_all { area.width() } else { area.width() - 34.0 };
+    let fit = if has_all { count } else { ((room / TAB[0]).floor() as usize).max(1) };
+    let first = (shown + 1).saturating_sub(fit).min(count - fit);
+    let width = (room / fit as f32 - 4.0).min(TAB[1]);
+    ui.scope_builder(UiBuilder::new().max_rect(area), |ui| {
+        names::name(ui, Role::Group, texts::RECORDINGS);
+        for (n, recording) in state.recordings.iter().enumerate().skip(first).take(fit) {
+            let tab = place(area, area.left() + (n - first) as f32 * (width + 4.0), width);
+            let [name, close] = [tab.with_max_x(tab.right() - 26.0), tab.with_min_x(tab.right() - 26.0)];
+            let response = ui.allocate_rect(name, Sense::click());
+            let is_shown = recording.is_shown;
+            response.widget_info(|| WidgetInfo::selected(WidgetType::SelectableLabel, true, is_shown, &recording.name));
+            let is_over = response.hovered() || response.has_focus();
+            if is_shown || is_over {
+                ui.painter().rect_filled(tab, 6.0, if is_shown { CHOSEN } else { BUTTON });
+            }
+            clipped(ui, &recording.name, name.shrink2(vec2(8.0, 0.0)));
+            let response = response.tell(&texts::recording_hint(&recording.path)).named(&recording.name);
+            if response.clicked() {
+                execute(Command::ShowRecording(n));
+            }
+            let response = ui.allocate_rect(close, Sense::click());
+            let closes = texts::close_recording(&recording.name);
+            response.widget_info(|| WidgetInfo::labeled(WidgetType::Button, true, &closes));
+            let colour = if response.hovered() || response.has_focus() { TEXT } else { WEAK_TEXT };
+            paint(ui.painter(), icons::CLOSE, Rect::from_center_size(close.center(), vec2(14.0, 14.0)), colour);
+            if response.tell(texts::CLOSE_RECORDING_HINT).named(&closes).clicked() {
+                execute(Command::CloseRecording(n));
+            }
+        }
+        if !has_all {
+            let more = place(area, area.right() - 30.0, 30.0);
+            let response = ui.put(more, Button::new(texts::MORE)).tell(texts::NEXT_RECORDING_HINT);
+            if response.named(texts::NEXT_RECORDING).clicked() {
+                execute(Command::StepRecording(1));
+            }
+        }
+    });
+}
+
+/// A text that ends in dots where it has no room.
+fn clipped(ui: &Ui, text: &str, area: Rect) {
+    let mut job =
+        egui::text::LayoutJob::simple_singleline(text.to_string(), FontId::proportional(TEXT_SIZE - 1.0), TEXT);
+    job.wrap = egui::text::TextWrapping::truncate_at_width(area.width());
+    let galley = ui.painter().layout_job(job);
+    ui.painter().galley(pos2(area.left(), area.center().y - galley.size().y / 2.0), galley, TEXT);
+}
+
+/// The same in the inspector of a window without this bar.
+pub(super) fn show_buttons(ui: &mut Ui, state: &PanelState, width: f32, execute: &mut dyn FnMut(Command)) {
+    if state.room.has_top {
+        return;
+    }
+    let settings = state.controls.settings();
+    let views = VIEWS.map(|(name, command, _)| (command, name));
+    let hint = |command| VIEWS.iter().find(|(_, other, _)| *other == command).map_or("", |(.., hint)| hint);
+    row_of(ui, texts::VIEW, &views, (3, width), |view| is_view(settings, view), hint, &mut *execute);
+    names::group(ui, texts::PROGRAM, |ui| {
+        let all = [OPEN, SAVE, UNDO, REDO, FIND, HELP, TIMES, FULL_SCREEN];
+        let columns = (width / 52.0).floor().clamp(1.0, 8.0);
+        let size = vec2(width / columns - 4.0, ROW_HEIGHT + 4.0);
+        ui.spacing_mut().item_spacing = vec2(4.0, 4.0);
+        for row in all.chunks(columns as usize) {
+            ui.with_layout(egui::Layout::left_to_right(Align::Min).with_main_wrap(false), |ui| {
+                for item in row {
+                    let (area, _) = ui.allocate_exact_size(size, Sense::hover());
+                    show_item(ui, state, *item, false, area, execute);
+                }
+            });
+        }
+    });
+}
