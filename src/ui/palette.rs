@@ -98,7 +98,7 @@ mod tests {
     fn every_command_and_control_is_found_by_its_name() {
         for entry in entries() {
             let found = found(&entry.name);
-            assert!(found.iter().any(|other| *other == entry), "{entry:?}");
+            assert!(found.contains(&entry), "{entry:?}");
             assert!(!entry.name.is_empty() && !entry.about.is_empty(), "{entry:?}");
         }
         for binding in KEY_BINDINGS {

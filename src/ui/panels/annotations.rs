@@ -160,7 +160,7 @@ fn tell_state(painter: &Painter, taken: &mut Taken, picture: Rect, state: &Panel
         (true, _) if cine.is_playing => (texts::STATE_PLAYING.to_string(), WARNING),
         (true, _) => (texts::STATE_FROZEN.to_string(), WARNING),
         (false, Some(ago)) => (texts::ended_for(ago), TEXT),
-        (false, None) if state.is_live => (texts::STATE_LIVE.to_string(), TEXT),
+        (false, None) if state.is_live || state.origin.is_some() => (texts::STATE_LIVE.to_string(), TEXT),
         (false, None) => (String::new(), TEXT),
     };
     let volume = cine.shown.map(|at| texts::volume_in_loop(at + 1, cine.count));

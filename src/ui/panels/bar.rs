@@ -43,7 +43,7 @@ pub(super) fn show(
         let width = bar.width();
         let row = bar.shrink2(vec2(GAP, if height > 70.0 { 12.0 } else { 6.0 }));
         let icon = ICON[usize::from(width < WITH_LINE)];
-        let (mut left, mut right) = (row.left(), row.right());
+        let mut left = row.left();
         let frozen = match width {
             WITH_TEXTS.. => 132.0,
             WITH_STEPS.. => 112.0,
@@ -52,45 +52,31 @@ pub(super) fn show(
         };
         freeze(ui, state, at(row, left, frozen), execute);
         left += frozen + GAP;
-        // From the right.
         let has_texts = width >= WITH_TEXTS;
         let with_text = |text: f32| if has_texts { text } else { icon };
-        let save: (Icon, &str, f32, Command, &str) = (
-            icons::CAMERA,
-            texts::SAVE_PICTURE,
-            if width >= WITH_STEPS { with_text(140.0) } else { icon },
-            Command::SavePicture,
-            texts::SAVE_PICTURE_HINT,
-        );
-        let more = [
-            (icons::FILM, texts::SAVE_LOOP, with_text(120.0), Command::SaveLoop, texts::SAVE_LOOP_HINT),
-            (icons::EXPORT, texts::EXPORT, with_text(100.0), Command::Exports, texts::EXPORT_HINT),
-        ];
+        let exports = (icons::EXPORT, texts::EXPORT, with_text(100.0), Command::Exports, texts::EXPORT_HINT);
+        let save_loop = (icons::FILM, texts::SAVE_LOOP, with_text(120.0), Command::SaveLoop, texts::SAVE_LOOP_HINT);
+        let save =
+            (icons::CAMERA, texts::SAVE_PICTURE, with_text(140.0), Command::SavePicture, texts::SAVE_PICTURE_HINT);
         let drawer = (icons::INSPECTOR, texts::INSPECTOR, icon, Command::ToggleDrawer, texts::DRAWER_HINT);
+        let more = (width >= WITH_STEPS).then_some([exports, save_loop]);
         let drawer = (state.room.has_drawer && !state.room.has_top).then_some(drawer);
-        let has_more = width >= WITH_STEPS;
-        for (icon, name, width, command, hint) in
-            [save].into_iter().chain(more.into_iter().filter(|_| has_more)).chain(drawer)
-        {
-            right -= width;
+        let of_right: Vec<_> = more.into_iter().flatten().chain([save]).chain(drawer).collect();
+        let right = row.right() - of_right.iter().map(|(_, _, width, ..)| width + GAP).sum::<f32>();
+        cine(ui, state, (row.with_min_x(left).with_max_x(right), width), pictures, execute);
+        let mut from = right + GAP;
+        for (icon, name, width, command, hint) in of_right {
             let is_on = command == Command::ToggleDrawer && state.visible.inspector.is_open;
             let text = if has_texts { name } else { "" };
-            let response =
-                part(ui, at(row, right, width), |ui, size| icon_button(ui, icon, (text, name), size, (true, is_on)));
+            let area = at(row, from, width);
+            let response = part(ui, area, |ui, size| icon_button(ui, icon, (text, name), size, (true, is_on)));
             let response = response.tell(hint).named(name);
             let response = if command == Command::ToggleDrawer { response.expanded(is_on) } else { response };
             if response.clicked() {
                 execute(command);
             }
-            right -= GAP;
+            from += width + GAP;
         }
-        cine(
-            ui,
-            state,
-            (Rect::from_min_max(pos2(left, row.top()), pos2(right, row.bottom())), width),
-            pictures,
-            execute,
-        );
     });
 }
 
@@ -106,7 +92,10 @@ fn part(ui: &mut Ui, area: Rect, add: impl FnOnce(&mut Ui, Vec2) -> Response) ->
 fn freeze(ui: &mut Ui, state: &PanelState, area: Rect, execute: &mut dyn FnMut(Command)) {
     let (title, about, fill, colour) = match (state.is_frozen, state.ended) {
         (true, _) => (texts::FROZEN, texts::GO_LIVE, WARNING, ON_WARNING),
-        (false, None) => (texts::LIVE, texts::TO_FREEZE, SELECTED, ON_SELECTED),
+        (false, None) if state.is_live || state.origin.is_some() => {
+            (texts::LIVE, texts::TO_FREEZE, SELECTED, ON_SELECTED)
+        }
+        (false, None) => (texts::NEWEST, texts::TO_FREEZE, SELECTED, ON_SELECTED),
         (false, Some(_)) => (texts::HAS_ENDED_BUTTON, texts::TO_FREEZE, BUTTON, TEXT),
     };
     let ended = state.ended.map(texts::ended_for);

@@ -3,7 +3,7 @@
 use super::annotations::MIN_FOR_AXES;
 use super::colours::{ACCENT, MESSAGE, TEXT};
 use super::names::{self, Tell};
-use super::{PanelState, SMALL_TEXT, TEXT_SIZE, TOUCH_SIZE, picture_rect};
+use super::{PanelState, ROW_HEIGHT, SMALL_TEXT, TEXT_SIZE, picture_rect};
 use crate::command::Command;
 use crate::texts;
 use egui::accesskit::Role;
@@ -37,6 +37,7 @@ pub(super) fn show(ui: &Ui, state: &PanelState, scale: f32, execute: &mut dyn Fn
         frame.stroke(Stroke::new(2.0, ACCENT)).show(ui, |ui| {
             ui.set_width(WIDTH);
             ui.spacing_mut().item_spacing.y = 4.0;
+            ui.spacing_mut().interact_size.y = TEXT_SIZE;
             for (action, effect) in texts::HINTS {
                 ui.horizontal(|ui| {
                     let size = vec2(64.0, TEXT_SIZE + 4.0);
@@ -48,7 +49,7 @@ pub(super) fn show(ui: &Ui, state: &PanelState, scale: f32, execute: &mut dyn Fn
                     ui.add(Label::new(RichText::new(effect).color(TEXT).size(SMALL_TEXT)));
                 });
             }
-            let close = Button::new(texts::CLOSE_BUTTON).min_size(vec2(WIDTH, TOUCH_SIZE * 0.7));
+            let close = Button::new(texts::CLOSE_BUTTON).min_size(vec2(WIDTH, ROW_HEIGHT));
             if ui.add(close).tell(texts::CLOSE_HINTS_HINT).named(texts::CLOSE).clicked() {
                 execute(Command::CloseHints);
             }

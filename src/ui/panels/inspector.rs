@@ -139,7 +139,7 @@ fn show(
     looks: &[Option<TextureId>],
     execute: &mut dyn FnMut(Command),
 ) {
-    ui.spacing_mut().item_spacing = vec2(8.0, 6.0);
+    ui.spacing_mut().item_spacing = vec2(8.0, 4.0);
     show_tabs(ui, state, [width, tabs_height], execute);
     let content = width - MARGINS[0] - MARGINS[1];
     let tab = state.visible.inspector.tab(&state.room);

@@ -626,6 +626,7 @@ fn apply_theme(context: &egui::Context) {
     visuals.selection.bg_fill = SELECTED;
     visuals.selection.stroke = Stroke::new(1.5, ON_SELECTED);
     visuals.slider_trailing_fill = true;
+    visuals.handle_shape = egui::style::HandleShape::Circle;
     visuals.widgets.noninteractive.fg_stroke = Stroke::new(1.0, TEXT);
     let widgets = &mut visuals.widgets;
     for widget in [&mut widgets.inactive, &mut widgets.hovered, &mut widgets.active, &mut widgets.open] {

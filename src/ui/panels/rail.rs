@@ -187,10 +187,10 @@ pub(super) fn icon_button(
         (true, true) => ACCENT,
         (true, false) => TEXT,
     };
-    let edge = 18.0_f32.min(size.y - 8.0);
+    let edge = if icon.is_empty() { 0.0 } else { 18.0_f32.min(size.y - 8.0) };
     let font = FontId::proportional(super::TEXT_SIZE);
     let words = painter.layout_no_wrap(text.to_string(), font, colour);
-    let gap = if text.is_empty() { 0.0 } else { 8.0 };
+    let gap = if text.is_empty() || icon.is_empty() { 0.0 } else { 8.0 };
     let left = area.center().x - (edge + gap + words.size().x) / 2.0;
     paint(
         painter,

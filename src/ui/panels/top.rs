@@ -66,7 +66,7 @@ pub(super) fn show(ui: &mut Ui, state: &PanelState, height: f32, execute: &mut d
         let bar = ui.max_rect();
         let is_wide = bar.width() >= WIDE;
         let row = bar.shrink2(vec2(GAP + 2.0, (height - ROW_HEIGHT) / 2.0));
-        let (mut left, mut right) = (row.left(), row.right());
+        let mut left = row.left();
         if bar.width() >= WIDEST {
             left = name_program(ui, row) + 2.0 * GAP;
         }
@@ -77,27 +77,29 @@ pub(super) fn show(ui: &mut Ui, state: &PanelState, height: f32, execute: &mut d
             left += width + GAP;
         }
         let drawer = state.room.has_drawer.then_some(INSPECTOR);
-        let extra = (bar.width() >= NARROW).then_some([FULL_SCREEN, TIMES]);
-        let of_right = drawer.into_iter().chain([HELP]).chain(extra.into_iter().flatten()).chain([FIND, REDO, UNDO]);
-        for item in of_right {
-            let has_text = is_wide && item.2 == Command::Find;
-            let width = if has_text { SEARCH } else { ICON };
-            right -= width;
-            show_item(ui, state, item, has_text, place(row, right, width), execute);
-            right -= GAP;
-        }
+        let extra = if bar.width() >= NARROW { &[TIMES, FULL_SCREEN][..] } else { &[] };
+        let of_right: Vec<Item> =
+            [UNDO, REDO, FIND].iter().chain(extra).chain(&[HELP]).copied().chain(drawer).collect();
+        let width_of = |item: &Item| if is_wide && item.2 == Command::Find { SEARCH } else { ICON };
+        let right = row.right() - of_right.iter().map(|item| width_of(item) + GAP).sum::<f32>() + GAP;
         let font = FontId::proportional(TEXT_SIZE);
         let words = |ui: &Ui, text: &str| ui.painter().layout_no_wrap(text.into(), font.clone(), TEXT).size().x;
         let spare = if is_wide { 24.0 } else { 14.0 };
         let segments = VIEWS.map(|(name, ..)| words(ui, name) + spare);
         let all: f32 = segments.iter().sum();
-        // In the middle of the picture where there is room, else as far to the right as it goes.
-        let middle = bar.center().x - all / 2.0;
-        let from = middle.clamp(left, (right - all - GAP).max(left));
+        // In the middle of the window where there is room, else as far to the right as it goes.
+        let from = (bar.center().x - all / 2.0).clamp(left, (right - all - 2.0 * GAP).max(left));
         let tabs = from - GAP - left;
-        show_views(ui, state, place(row, from, all.min(right - from)), &segments, execute);
+        // In the order in which they are read.
         if tabs >= TAB[0] {
             show_tabs(ui, state, place(row, left, tabs), execute);
+        }
+        show_views(ui, state, place(row, from, all.min(right - 2.0 * GAP - from)), &segments, execute);
+        let mut at = right;
+        for item in of_right {
+            let width = width_of(&item);
+            show_item(ui, state, item, width > ICON, place(row, at, width), execute);
+            at += width + GAP;
         }
     });
 }

@@ -19,7 +19,9 @@ pub(super) const BETWEEN_MESSAGES: f32 = 8.0;
 pub(super) const MESSAGE_EDGES: [f32; 2] = [12.0, 14.0];
 
 /// Height of a row with a slider or a switch, points: a finger has it, too.
-const SLIDER_ROW: f32 = 36.0;
+const SLIDER_ROW: f32 = 34.0;
+/// Height of a slider, points; its knob has 0.8 of it.
+const KNOB: f32 = 26.0;
 
 /// The frame of a message with an edge of this colour.
 pub(super) fn message_frame(edge: Color32) -> Frame {
@@ -140,7 +142,7 @@ fn row(
             rest -= NAME + 8.0;
         }
         ui.spacing_mut().slider_width = rest.max(40.0);
-        ui.spacing_mut().interact_size.y = SLIDER_ROW;
+        ui.spacing_mut().interact_size.y = KNOB;
         let set = add(ui);
         let (area, shown) = ui.allocate_exact_size(vec2(VALUE, SLIDER_ROW - 6.0), Sense::click());
         shown.widget_info(|| WidgetInfo::labeled(WidgetType::Button, true, value));
@@ -221,7 +223,7 @@ pub(super) fn scale_slider(
     });
     ui.add_space(-6.0);
     ui.spacing_mut().slider_width = width;
-    ui.spacing_mut().interact_size.y = SLIDER_ROW - 8.0;
+    ui.spacing_mut().interact_size.y = KNOB;
     let slider = ui.add(Slider::new(&mut value, low..=high.max(low)).show_value(false).step_by(step));
     let slider = slider.tell(hint).named(name).with_value(&shown);
     let is_held = slider.dragged() || slider.clicked() || slider.is_pointer_button_down_on();

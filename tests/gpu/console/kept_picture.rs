@@ -8,7 +8,8 @@ use echolume::low_level::ui::panels::accesskit::Role;
 /// What a screen reader is told of the picture: the panels describe what their marks are drawn of. Without the delay, which other programs cause, too.
 fn words(desk: &mut Desk) -> Option<String> {
     let tree = desk.console.take_tree()?;
-    let node = tree.nodes.into_iter().find(|(_, node)| node.role() == Role::Image)?.1;
+    let node =
+        tree.nodes.into_iter().find(|(_, node)| node.role() == Role::Image && node.label() != Some("Light ball"))?.1;
     let parts = node.label()?.split(", ").filter(|part| !part.ends_with(" behind"));
     Some(parts.collect::<Vec<_>>().join(", "))
 }

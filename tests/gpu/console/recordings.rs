@@ -11,7 +11,7 @@ use echolume::low_level::ui::recordings::{OpenRecordings, Recordings};
 use echolume::low_level::workspace::{Origin, Workspace};
 use std::path::{Path, PathBuf};
 
-const WINDOW: [u32; 2] = [900, 700];
+const WINDOW: [u32; 2] = [1100, 480];
 
 /// What opening a path does: the reason why it cannot be opened.
 type Read = Arc<dyn Fn(&Path, &Progress) -> Result<(), String> + Send + Sync>;
@@ -160,9 +160,9 @@ impl Window {
         (0..3).for_each(|_| self.update());
         let name = |node: &Node| {
             let name = node.label()?.strip_prefix("Close ")?.to_string();
-            Some((node.bounds().unwrap_or_default().y0, name))
+            Some((node.bounds().unwrap_or_default().x0, name))
         };
-        // The nodes of a tree have no order: from the top of the list to its end.
+        // The nodes of a tree have no order: the tabs from left to right.
         let mut close: Vec<(f64, String)> = self.tree.iter().filter_map(name).collect();
         close.sort_by(|a, b| a.0.total_cmp(&b.0));
         let close: Vec<String> = close.into_iter().map(|(_, name)| name).collect();
