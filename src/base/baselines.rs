@@ -1,4 +1,4 @@
-//! Results of earlier runs: JSON files that state their format and its version, and what two runs have in common and not.
+//! Results of earlier runs: JSON files that state their format and its version, and comparisons of two runs.
 
 use crate::files::read_text;
 use crate::text::escaped;
@@ -9,7 +9,7 @@ use std::fmt::Display;
 use std::hash::Hash;
 use std::path::Path;
 
-/// A result that is kept in a JSON file, whose field `format` is the name and the version of the format.
+/// A result that is stored as a JSON file. The field `format` of the file is the name and the version of the format.
 pub trait Stored: Serialize + DeserializeOwned {
     /// The format that is written.
     const FORMAT: &'static str;
@@ -76,10 +76,10 @@ pub trait Stored: Serialize + DeserializeOwned {
     }
 }
 
-/// The format that a text states. It is read first, to tell another version from a file that is none.
+/// Reads the field `format` of a JSON text. Callers read it first, to tell a file of another version from a file of another kind.
 ///
 /// # Errors
-/// The text is no JSON of a table with a format.
+/// The text is not JSON, or is not a table with a field `format`.
 pub fn stated_format(text: &str) -> serde_json::Result<String> {
     #[derive(Deserialize)]
     struct Version {
@@ -88,10 +88,11 @@ pub fn stated_format(text: &str) -> serde_json::Result<String> {
     serde_json::from_str(text).map(|Version { format }| format)
 }
 
-/// An entry of the old run and the one of the new run; one of them is None if the other run alone has it.
+/// An entry of the old run and the matching entry of the new run. One of them is None if only the other run has the entry.
 pub type Match<'a, T> = (Option<&'a T>, Option<&'a T>);
 
-/// The entries of two runs by a key that is unique in each: those of the new run in its order, then those that only the old one has.
+/// Matches the entries of two runs by a key that is unique in each run. The entries of the new run come first, in their order; those that
+/// only the old run has follow.
 pub fn matched<'a, T, K: Eq + Hash>(old: &'a [T], new: &'a [T], key: impl Fn(&'a T) -> K) -> Vec<Match<'a, T>> {
     let before: HashMap<K, &T> = old.iter().map(|entry| (key(entry), entry)).collect();
     let now: HashSet<K> = new.iter().map(&key).collect();
@@ -99,7 +100,8 @@ pub fn matched<'a, T, K: Eq + Hash>(old: &'a [T], new: &'a [T], key: impl Fn(&'a
     new.iter().map(|entry| (before.get(&key(entry)).copied(), Some(entry))).chain(gone).collect()
 }
 
-/// The conditions that differ, one line each, old before new. Both runs list the same names in the same order.
+/// Lists the conditions that differ between two runs, one line each, the old value before the new one. Both runs must list the same names
+/// in the same order.
 pub fn differing<N: Display>(
     old: impl IntoIterator<Item = (N, String)>,
     new: impl IntoIterator<Item = (N, String)>,
@@ -108,7 +110,7 @@ pub fn differing<N: Display>(
     both.map(|((name, old), (_, new))| format!("{name}: {old} -> {new}")).collect()
 }
 
-/// Ratio of times, new over old, above which what is slower fails a comparison.
+/// Largest accepted ratio of the new time to the old one. A larger ratio is a failure of the comparison.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Threshold(f64);
 
@@ -120,7 +122,7 @@ impl Default for Threshold {
 
 impl Threshold {
     /// # Errors
-    /// One line: it is not finite or below 1.
+    /// One line: the ratio is not finite or is below 1.
     pub fn new(ratio: f64) -> Result<Threshold, String> {
         match ratio.is_finite() && ratio >= 1.0 {
             true => Ok(Threshold(ratio)),

@@ -31,7 +31,7 @@ pub type Frame = [f64; 4];
 struct Medium {
     /// Supersampling factor along each edge, for smooth text and slanted lines.
     pub scale: u32,
-    /// How far plotters places text too high, as a share of its size.
+    /// Offset by which `plotters` places text too high, as a share of the text's size.
     pub raised: f64,
 }
 
@@ -114,7 +114,7 @@ impl<'a, B: DrawingBackend> Canvas<'a, B> {
         Ok([w, h].map(|n| f64::from(n) / f64::from(self.medium.scale)))
     }
 
-    /// The text, cut with an ellipsis if it is wider than `max_width` pixels.
+    /// Returns the text, shortened with an ellipsis if it is wider than `max_width` pixels.
     pub fn cut(&self, text: &str, size: u32, max_width: f64) -> Result<String, String> {
         let mut cut = text.to_string();
         while self.measure(&cut, size)?[0] > max_width && cut.chars().count() > 1 {
@@ -133,14 +133,14 @@ fn fault(e: &dyn std::fmt::Display) -> String {
     format!("plot: cannot be drawn: {e}")
 }
 
-/// What can be drawn as SVG and as a picture alike.
+/// A drawing that can be rendered as SVG and as a picture.
 pub trait Drawing {
     /// # Errors
     /// One line: the drawing failed.
     fn draw<B: DrawingBackend>(&self, canvas: &Canvas<B>) -> Drawn;
 }
 
-/// A drawing as SVG, `size` in pixels.
+/// Renders a drawing as SVG. `size`: width and height, pixels.
 ///
 /// # Errors
 /// One line: the drawing failed.
@@ -152,7 +152,7 @@ pub fn svg(size: [u32; 2], drawing: &impl Drawing) -> Result<String, String> {
     Ok(text)
 }
 
-/// A drawing as a picture, `size` in pixels.
+/// Renders a drawing as a picture. `size`: width and height, pixels.
 ///
 /// # Errors
 /// One line: the drawing failed.

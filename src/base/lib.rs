@@ -1,6 +1,7 @@
-//! What every other member stands on: files that are read with limits and written atomically ([`files`]), how much [`memory`] a volume may take, pictures and films
-//! ([`picture`]), drawings and plots ([`canvas`]), lines of text ([`text`]), values of TOML that types are read from ([`tree`]), what is said on a terminal ([`terminal`]), pages of HTML
-//! ([`html_page`]), tables for Prometheus ([`metrics`]), and results of earlier runs that new ones are compared with ([`baselines`]).
+//! The code that every other member uses: bounded reading and atomic writing of files ([`files`]), the limit of the [`memory`] of a volume,
+//! pictures and films ([`picture`]), drawings and plots ([`canvas`]), lines of text ([`text`]), values of TOML from which types are
+//! deserialized ([`tree`]), output of commands ([`terminal`]), pages of HTML ([`html_page`]), metrics for Prometheus ([`metrics`]), and
+//! results of earlier runs that new ones are compared with ([`baselines`]).
 
 #![forbid(unsafe_code)]
 

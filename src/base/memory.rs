@@ -1,5 +1,5 @@
-//! How much memory a volume may take: half of what this process may have, unless the user says otherwise. A header of a few bytes can state any
-//! size, so that this is asked before anything is allocated.
+//! The limit of the memory of a volume: half of the memory that this process may have, unless the user sets another limit. A header of a
+//! few bytes can state any size, so the limit is checked before anything is allocated.
 
 use std::fs::read_to_string;
 use std::path::{Path, PathBuf};
@@ -8,15 +8,15 @@ use std::sync::OnceLock;
 /// Largest volume, bytes.
 static LIMIT: OnceLock<u64> = OnceLock::new();
 
-/// Sets the largest volume, bytes. What was set or asked for first stays.
+/// Sets the limit, bytes. It has no effect once a limit was set or checked.
 pub fn set_limit(bytes: u64) {
     LIMIT.get_or_init(|| bytes);
 }
 
-/// Refuses a volume of so many bytes that is larger than may be.
+/// Checks that a volume of `bytes` bytes does not exceed the limit.
 ///
 /// # Errors
-/// What is wrong, on one line.
+/// One line: the size and the limit.
 pub fn check(bytes: u64) -> Result<(), String> {
     let limit = *LIMIT.get_or_init(|| available().unwrap_or(u64::MAX) / 2);
     match bytes <= limit {
@@ -29,10 +29,10 @@ pub fn check(bytes: u64) -> Result<(), String> {
     }
 }
 
-/// Bytes as users type them: a number with K, M, G or T, which are powers of 1024, or `none` for any number.
+/// Parses a number of bytes as users type it: a number with K, M, G or T, which are powers of 1024, or `none` for no limit.
 ///
 /// # Errors
-/// What is allowed.
+/// One line: what is allowed.
 pub fn parse(text: &str) -> Result<u64, String> {
     if text == "none" {
         return Ok(u64::MAX);

@@ -1,4 +1,4 @@
-//! Progress as lines of text, for a program that runs this one: the view shows how far an export is.
+//! Progress as lines of text for the program that started this one. The viewer shows the progress of an export by them.
 
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle, TermLike};
 use std::fmt::{self, Debug, Formatter};
@@ -12,26 +12,26 @@ const PREFIX: &str = "progress: ";
 /// Most lines a second.
 const RATE: u8 = 10;
 
-/// How far a piece of work is.
+/// Progress of a task.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Progress {
     pub done: u64,
     pub of: u64,
 }
 
-/// What a line says of the progress; none if it says something else.
+/// Parses a progress line. None if the line is something else.
 pub fn parse(line: &str) -> Option<Progress> {
     let (done, rest) = line.strip_prefix(PREFIX)?.split_once('/')?;
     let of = rest.split_whitespace().next()?;
     Some(Progress { done: done.parse().ok()?, of: of.parse().ok()? })
 }
 
-/// True if the environment asks for lines.
+/// True if the environment asks for progress lines ([`ASKED_BY`]).
 pub fn is_asked() -> bool {
     std::env::var_os(ASKED_BY.0).is_some_and(|value| value == ASKED_BY.1)
 }
 
-/// A bar that writes a line to standard error where others are drawn, such as `progress: 12/72 pictures`.
+/// A progress bar that writes lines such as `progress: 12/72 pictures` to standard error instead of drawing itself.
 pub fn bar(count: u64) -> ProgressBar {
     to(count, io::stderr())
 }

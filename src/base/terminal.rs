@@ -1,4 +1,4 @@
-//! What a command says to the terminal: lines on standard output, and the one line that ends a command that failed.
+//! Output of a command: lines on standard output, and the line on standard error that ends a failed command.
 
 use crate::progress_lines;
 use indicatif::ProgressBar;
@@ -31,15 +31,15 @@ pub enum Failure {
     Input(String),
     /// The request was valid but could not be carried out: exit code 1.
     Failed(String),
-    /// There is no Vulkan device, not the one that was asked for, or `batch` lost it: exit code 3.
+    /// No Vulkan device was found, or not the requested one, or `batch` lost its device: exit code 3.
     NoDevice(String),
-    /// A signal ended the work before all of it was done, and none of what was done has failed: exit code 4.
+    /// A signal ended the work early, and nothing had failed until then: exit code 4.
     Interrupted(String),
     /// Some units of a `batch` failed, and the others are done: exit code 4.
     SomeFailed(String),
-    /// `profile --compare` or `--against`: a slowdown that counts may have been overlooked: exit code 5.
+    /// `profile --compare` or `--against`: the noise may hide a slowdown above the threshold: exit code 5.
     CannotTell(String),
-    /// `verify --bisect` has no device to check: exit code 125, by which `git bisect run` passes over a version.
+    /// `verify --bisect` has no device to check: exit code 125, by which `git bisect run` skips a version.
     Untestable(String),
 }
 
@@ -93,7 +93,7 @@ pub fn print(line: std::fmt::Arguments) {
 /// Keeps standard output for data: lines go to standard error from here on.
 ///
 /// # Errors
-/// In words: standard output is a terminal.
+/// Standard output is a terminal.
 pub fn keep_standard_output() -> Result<(), &'static str> {
     if std::io::stdout().is_terminal() {
         return Err("standard output is a terminal; send it to a file or a pipe");
@@ -137,8 +137,8 @@ fn is_dumb() -> bool {
     std::env::var_os("TERM").is_some_and(|name| name == "dumb")
 }
 
-/// A bar of the progress to `count` on standard error. It draws nothing unless that is a terminal that can move its cursor, or lines are asked
-/// for.
+/// A progress bar up to `count` on standard error. It draws only on a terminal that can move its cursor. If progress lines are requested,
+/// it writes those instead.
 pub fn progress_bar(count: u64) -> ProgressBar {
     if progress_lines::is_asked() {
         return progress_lines::bar(count);

@@ -8,7 +8,8 @@ const MAX_LINE: usize = 400;
 /// Length of [`escaped`] after which the text is cut, bytes.
 const MAX_ESCAPED: usize = 600;
 
-/// The message on one line: line breaks become spaces, other control characters escapes. A key that it names may hold anything.
+/// Returns the message on one line: line breaks become spaces, other control characters become escapes. A message may quote a key of a
+/// file, which can hold any character.
 pub fn printable(message: &str) -> String {
     let mut line = String::new();
     for c in message.lines().collect::<Vec<_>>().join(" ").chars() {

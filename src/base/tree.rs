@@ -1,7 +1,7 @@
-//! The values of a TOML text or table as a tree that types are read from, with the place of each value in the text.
+//! Values of a TOML text or table as a tree from which types are deserialized. Each value keeps its position in the text.
 //!
-//! The compiler makes serde's code for a type once for each kind of input. `toml` has four: a table in memory, and three of a text. A [`Node`] is the one
-//! kind here. docs/experiments/compiling.md states what that saves.
+//! The compiler generates serde's code for a type once for each kind of input. `toml` has four kinds: a table in memory and three for text.
+//! [`Node`] is the only kind here. docs/experiments/compiling.md states the savings.
 
 use serde::de::{self, DeserializeOwned, DeserializeSeed, Deserializer, Unexpected, Visitor};
 use std::fmt::{self, Display};
@@ -9,7 +9,7 @@ use std::ops::Range;
 use toml::Value;
 use toml::de::{DeTable, DeValue};
 
-/// A value, and the bytes of the text that it stands in.
+/// A value and the range of bytes of the text that it was read from.
 #[derive(Clone, Debug)]
 pub struct Node {
     span: Option<Range<usize>>,
@@ -22,16 +22,16 @@ enum Content {
     Integer(i64),
     Float(f64),
     Text(String),
-    /// No type that is read has one.
+    /// A date or a time. No type that is read here has one.
     Date,
     List(Vec<Node>),
-    /// In the order of their names, as far as they come from a text.
+    /// Pairs of key and value, in the order of the keys if they come from a text.
     Table(Vec<(Node, Node)>),
     /// A number that its type cannot hold, in words.
     Overflow(&'static str),
 }
 
-/// Why a value is not of the type that is read, in one line.
+/// Why a value does not fit the type that is deserialized, in one line.
 #[derive(Clone, Debug, PartialEq)]
 pub struct NodeError {
     fault: Fault,
@@ -39,14 +39,14 @@ pub struct NodeError {
     span: Option<Range<usize>>,
 }
 
-/// What kind of fault a value has.
+/// The kind of a fault.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Fault {
     /// A table lacks a key that its type needs.
     MissingKey,
     /// A table has a key that its type does not have.
     UnknownKey,
-    /// Any other, also all of the text itself.
+    /// Any other fault, such as a syntax error of the text.
     Other,
 }
 
@@ -59,12 +59,12 @@ impl NodeError {
         self.fault
     }
 
-    /// What is wrong, without a place.
+    /// The message, without the position.
     pub fn message(&self) -> &str {
         &self.message
     }
 
-    /// The bytes of the text that are wrong; none of a table in memory.
+    /// The faulty bytes of the text. None if the value comes from a table in memory.
     pub fn span(&self) -> Option<Range<usize>> {
         self.span.clone()
     }
@@ -139,33 +139,33 @@ impl From<toml::de::Error> for NodeError {
     }
 }
 
-/// Reads a type from a TOML text.
+/// Deserializes a type from a TOML text.
 ///
 /// # Errors
-/// The text is no TOML, or a value is not what the type asks for; with its place.
+/// The text is not valid TOML, or a value does not fit the type. The error has the position.
 pub fn from_text<T: DeserializeOwned>(text: &str) -> Result<T, NodeError> {
     T::deserialize(Node::parse(text)?)
 }
 
-/// Reads a type from a table in memory.
+/// Deserializes a type from a table in memory.
 ///
 /// # Errors
-/// A value is not what the type asks for.
+/// A value does not fit the type.
 pub fn from_table<T: DeserializeOwned>(table: toml::Table) -> Result<T, NodeError> {
     T::deserialize(Node::from(Value::Table(table)))
 }
 
 impl Node {
-    /// The values of a TOML text.
+    /// Parses a TOML text.
     ///
     /// # Errors
-    /// The text is no TOML.
+    /// The text is not valid TOML.
     pub fn parse(text: &str) -> Result<Node, NodeError> {
         let table = DeTable::parse(text)?;
         Ok(Node { span: Some(table.span()), content: content_of_table(table.into_inner()) })
     }
 
-    /// The value of a key of a table, which is taken out of it.
+    /// Removes the value of a key from a table and returns it.
     pub fn take(&mut self, key: &str) -> Option<Node> {
         let Content::Table(table) = &mut self.content else { return None };
         let at = table.iter().position(|(name, _)| matches!(&name.content, Content::Text(name) if name == key))?;

@@ -130,7 +130,7 @@ impl BarrierTracker {
         barrier
     }
 
-    /// The last recording was not submitted, so its barriers do not count: the next operation waits for everything.
+    /// Call it when the last recording was not submitted: its barriers do not count, and the next operation waits for all earlier ones.
     pub fn invalidate(&mut self) {
         self.is_invalid = true;
     }

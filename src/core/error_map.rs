@@ -1,6 +1,6 @@
-//! A map of the error of a picture's step: each pixel's difference from the picture of half the step, which for a rule of order 1 is half
-//! of the error, and of order 2 three quarters. Both pictures have the same `ray.early_end`, tables, formats and bricks, whose errors it
-//! does not show.
+//! A map of the error that the step along rays leaves in a picture: for each pixel the difference from the picture of half the step. For a
+//! rule of order 1 this is half of the error, for order 2 three quarters of it. Both pictures have the same `ray.early_end`, tables,
+//! formats and bricks, so the map does not show the errors of these.
 
 use crate::passes::Texels;
 use crate::picture::Picture;
@@ -17,7 +17,7 @@ const HATCH: usize = 6;
 const COLOURS: [[f64; 3]; 5] =
     [[0.07, 0.08, 0.17], [0.41, 0.15, 0.46], [0.80, 0.33, 0.38], [0.97, 0.64, 0.35], [0.99, 0.95, 0.75]];
 
-/// The map and what it says.
+/// A map of the error with its statistics.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ErrorMap {
     pub picture: Picture,
@@ -28,8 +28,8 @@ pub struct ErrorMap {
     pub share_above: f64,
 }
 
-/// Why a shorter step along rays makes another picture, not a more accurate one, and what to set instead, as the end of a sentence; none if
-/// it does not.
+/// Why a shorter step along rays makes a different picture instead of a more accurate one, and what to set instead, as the end of a
+/// sentence. None if a shorter step is more accurate.
 pub fn step_fault(scene: &Scene) -> Option<&'static str> {
     let settings = &scene.settings;
     if scene.is_flat() || settings.mode == Mode::Cube || scene.still().is_some() {
@@ -50,10 +50,10 @@ pub fn step_fault(scene: &Scene) -> Option<&'static str> {
     )
 }
 
-/// The scene with rays of half the step; of surfaces alone, with half the step of their detector, which may be shorter than `ray.step`.
+/// The scene with half the step along rays. For surfaces alone it is half the step of their detector, which may be shorter than `ray.step`.
 ///
 /// # Errors
-/// Why half the step says nothing of this picture's error, and what to set instead, as the end of a sentence.
+/// The reason why half the step tells nothing about the error of this picture, and what to set instead, as the end of a sentence.
 pub fn finer(scene: &Scene) -> Result<Scene, String> {
     if let Some(why) = step_fault(scene) {
         return Err(why.into());

@@ -1,4 +1,4 @@
-//! What is rendered, without a GPU.
+//! Everything that determines and describes a rendered picture, without a GPU.
 //!
 //! - [`scene`] is everything that determines a picture: geometry, mode, filters, camera, light.
 //! - [`passes`] declares every compute pass in one place: its slots (GPU resources), parameters, constants, tolerance and f64 reference.

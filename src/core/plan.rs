@@ -20,30 +20,31 @@ pub struct Plan {
     pub slots: Vec<Slot>,
 }
 
-/// What has to run again after a change of scene.
+/// The work that a change of scene requires.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Rerun {
     /// Slots or pipelines differ: the plan is rebuilt, and all frames have to be sent again.
     Everything,
     /// All frames have to be sent again, through stage 1.
     Frames,
-    /// These steps over the volume and the picture, by their index in [`Plan::steps`], and these slots that the CPU computes.
+    /// These steps over the volume and the picture have to run again, by their index in [`Plan::steps`], and the CPU has to compute these
+    /// slots again.
     Steps { steps: Vec<usize>, slots: Vec<Slot> },
 }
 
-/// How much of a picture a change draws again, from the least to the most.
+/// The part of the rendering that a change repeats, from the least to the most.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Work {
-    /// Planes beside a rendering, and stage 4: both take little time.
+    /// Planes beside a rendering, and stage 4. Both take little time.
     Tone,
-    /// Stage 3, on the distance map as it is.
+    /// Stage 3, on the present distance map.
     Shading,
     /// Rays are cast.
     Rays,
 }
 
 impl Work {
-    /// What a change from `before` to `after` draws again.
+    /// The work that a change from `before` to `after` repeats.
     pub fn between(before: &Scene, after: &Scene) -> Work {
         let plan = Plan::new(after);
         match plan.rerun(before, after) {
@@ -54,7 +55,7 @@ impl Work {
 }
 
 impl Plan {
-    /// How much of a picture these steps draw, by their index in [`Plan::steps`].
+    /// The work of these steps, given by their index in [`Plan::steps`].
     pub fn work(&self, scene: &Scene, steps: impl IntoIterator<Item = usize>) -> Work {
         let of_planes = |slot: &Slot| matches!(slot, Slot::SharpSectionVolume | Slot::SectionVolume);
         let work_of = |step: &Step| match step.pass.stage {
@@ -224,7 +225,7 @@ impl Plan {
         Rerun::Steps { steps, slots }
     }
 
-    /// What has to run again where shaders are other ones in the same scene.
+    /// The steps that have to run again in the same scene after shaders changed.
     pub fn rerun_shaders(&self, scene: &Scene, is_changed: impl Fn(&str) -> bool) -> Rerun {
         let (mut changed, mut steps) = (Vec::new(), Vec::new());
         for (i, step) in self.steps.iter().enumerate() {
@@ -242,7 +243,7 @@ impl Plan {
     }
 }
 
-/// By slot: the step (pass and iteration) that wrote it last.
+/// For each slot, the step (pass and iteration) that wrote it last.
 pub type Contents = BTreeMap<Slot, (&'static str, u32)>;
 
 impl Plan {
@@ -292,7 +293,7 @@ impl Step {
         reads.iter().map(|b| if let Part::Around(more) = b.part { more } else { 0 }).max().unwrap_or(0)
     }
 
-    /// Its pass and iteration.
+    /// The step's pass and iteration.
     pub fn id(&self) -> (&'static str, u32) {
         (self.pass.name, self.iteration)
     }
@@ -307,7 +308,7 @@ impl Step {
         self.pass.writes(scene, &self.args()).iter().map(|b| b.slot).collect()
     }
 
-    /// Its dispatch arguments, for layer, slice and image 0.
+    /// Dispatch arguments of the step, for layer, slice and image 0.
     pub fn args(&self) -> DispatchArgs {
         DispatchArgs { iteration: self.iteration, ..DispatchArgs::default() }
     }

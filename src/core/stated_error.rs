@@ -1,4 +1,4 @@
-//! What a picture with `ray.tolerance` says of its own error.
+//! The errors that a picture with `ray.tolerance` states.
 
 use crate::passes::raycast::tolerance::LEVELS;
 use crate::passes::{Slot, Texels};
@@ -11,23 +11,23 @@ const MISSED: f64 = 0.006;
 /// Bits of a word of marks, four rows of eight pixels, whose pixels are those of the lattice.
 const OF_LATTICE: u32 = 0x0055_0055;
 
-/// The errors that the pixels of a picture state.
+/// Statistics of the errors that the pixels of a picture state.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Stated {
-    /// What each may be, levels of 8 bits.
+    /// The tolerance of each pixel, levels of 8 bits.
     pub tolerance: f64,
-    /// Share of the pixels whose own rays meet only empty bricks: these have no error.
+    /// Share of the pixels whose own rays meet only empty bricks. These have no error.
     pub certain: f64,
-    /// Share of the pixels whose error is under the tolerance by their own estimate, less those that estimates miss.
+    /// Share of the pixels whose estimated error is below the tolerance, less the share that estimates miss.
     pub estimated: f64,
-    /// Share of the pixels with a ray of their own; the others are means of the rays beside them.
+    /// Share of the pixels that have a ray of their own. The others are means of neighbouring rays.
     pub with_rays: f64,
     /// The largest error that a pixel states, levels of 8 bits.
     pub largest: f64,
 }
 
 impl Stated {
-    /// The slots of a drawn picture that it is made from.
+    /// The slots that this is computed from.
     pub const SLOTS: [Slot; 2] = [Slot::PixelErrors, Slot::ErrorMarks];
 
     /// `errors` and `marks`: texels of [`Stated::SLOTS`]. `tolerance`: levels of 8 bits.

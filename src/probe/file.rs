@@ -75,7 +75,7 @@ impl ProbeFile {
         &self.path
     }
 
-    /// As this file, for a recording whose frames follow each other after so many seconds by its time stamps.
+    /// The same probe file for a recording whose time stamps state an interval of `interval` s between frames.
     pub fn timed(self, interval: Option<f64>) -> ProbeFile {
         ProbeFile { interval, ..self }
     }
@@ -85,7 +85,7 @@ impl ProbeFile {
         self.tables.samples.range
     }
 
-    /// Angle from the first to the last frame of a fan, degrees.
+    /// Angle from the first to the last frame of a fan, degrees. None for other motions.
     pub fn fan_angle(&self) -> Option<f64> {
         let motion = &self.tables.motion;
         let table = motion.frame_angles_deg.as_ref().and_then(|table| Some(table.last()? - table.first()?));
@@ -325,7 +325,7 @@ impl ProbeFile {
     }
 }
 
-/// A fault of the geometry as one of the file that it comes from.
+/// Converts a fault of the geometry to an error of the file that the geometry comes from.
 pub fn geometry_error(file: &Path, error: &GeometryError) -> InputError {
     InputError::new(file, error.field, &error.fault)
 }

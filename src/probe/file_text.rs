@@ -1,4 +1,4 @@
-//! The text of the probe file that describes a probe.
+//! Writes the probe file that describes a probe.
 
 use super::axis::Axis;
 use super::file::{MAX_BYTES, ProbeFile};
@@ -14,7 +14,7 @@ impl ProbeFile {
     /// `probe`: of the first volume. `range`: the values that are shown as 0 and 1.
     ///
     /// # Errors
-    /// In words, a probe that no file can describe: an advance that is not that of a motor at constant speed, or tables that are longer
+    /// One line: a probe that no file can describe: an advance that is not that of a motor at constant speed, or tables that are longer
     /// than a file may be.
     pub fn to_toml(probe: &Probe, volumes: &Volumes, range: [f64; 2]) -> Result<String, String> {
         for firing in [Firing::Forward, Firing::Backward, Firing::Alternating] {

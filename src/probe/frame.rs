@@ -15,15 +15,15 @@ pub struct Frame {
     pub backward: bool,
     /// Time stamp, s, on the clock of the device that acquired it.
     pub time: Option<f64>,
-    /// From the space of the geometry, mm, to the world (LPS) or the space of a tracker: rigid. Of a volume the
-    /// pose of its first frame that has one counts.
+    /// Rigid map from the space of the geometry, mm, to the world (LPS) or to the space of a tracker. The pose of a volume is that of its
+    /// first frame that has one.
     pub pose: Option<DAffine3>,
     /// Samples of the stored type (`Header::stored` of the source), little-endian, line by line (samples fastest).
     pub bytes: Vec<u8>,
 }
 
 impl Frame {
-    /// Slice `slice` of a volume that was swept forwards, without time and pose.
+    /// A frame of a volume that was swept forwards, without time stamp and pose.
     pub fn of_slice(volume: u32, slice: usize, bytes: Vec<u8>) -> Frame {
         Frame { volume, number: slice as u32, slice, backward: false, time: None, pose: None, bytes }
     }

@@ -236,9 +236,10 @@ impl Probe {
         (low, high)
     }
 
-    /// Share of a frame's samples that lie before the wobble axis (at a smaller y), 0..=1. They are not drawn. While a frame turns about the
-    /// axis they move the opposite way, so that they sweep a second fan, mirrored at the axis. A point of space is found in the frames by its
-    /// distance from the axis and its angle ([`Probe::inverse_sweep_map`]), and these describe the fan beyond the axis only.
+    /// Share of a frame's samples that lie before the wobble axis (at a smaller y), 0..=1. These samples are not drawn. While a frame turns
+    /// about the axis they move the opposite way, so that they sweep a second fan, mirrored at the axis. The inverse map
+    /// ([`Probe::inverse_sweep_map`]) finds a point by its distance from the axis and its angle, which describe only the fan beyond the
+    /// axis.
     pub fn folded_share(&self) -> f64 {
         let (axis, count) = (self.axis_depth(), self.lines.len());
         if !matches!(self.motion, Motion::Fan { .. }) {
@@ -262,7 +263,7 @@ impl Probe {
         folded / (count * self.samples) as f64
     }
 
-    /// What is cut from the sector, on one line; none if all of it is drawn.
+    /// A line for users on the part of the sector that is not drawn. None if all of it is drawn.
     pub fn folded(&self) -> Option<String> {
         let share = 100.0 * self.folded_share();
         (share > 0.0).then(|| {

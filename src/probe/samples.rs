@@ -29,7 +29,7 @@ impl SampleType {
         self.stored().bytes()
     }
 
-    /// The type that it is stored as.
+    /// The type that samples of this type are stored as.
     pub fn stored(self) -> StoredType {
         match self {
             SampleType::U8 => StoredType::U8,
@@ -74,7 +74,7 @@ impl StoredType {
         }
     }
 
-    /// The sample that these bytes are, little-endian; 0 of another number of bytes.
+    /// Value of a little-endian sample. 0 if the number of bytes is not that of the type.
     pub fn value(self, bytes: &[u8]) -> f64 {
         match (self, bytes) {
             (StoredType::U8, [a]) => f64::from(*a),
@@ -84,7 +84,7 @@ impl StoredType {
         }
     }
 
-    /// Appends a sample; integers are rounded.
+    /// Appends a little-endian sample. Integers are rounded.
     pub fn append(self, value: f64, bytes: &mut Vec<u8>) {
         match self {
             StoredType::U8 => bytes.push(value.round() as u8),

@@ -22,7 +22,7 @@ impl World {
     /// The world of a lattice whose voxels are `axes` apart (mm, LPS), with voxel (0, 0, 0) centred on `origin`.
     ///
     /// # Errors
-    /// In words: numbers that are not finite, an axis of no length, axes that are not perpendicular to 0.06 degrees.
+    /// One line: numbers that are not finite, an axis of no length, axes that are not perpendicular to 0.06 degrees.
     pub fn new(axes: [DVec3; 3], origin: DVec3) -> Result<World, String> {
         if !(origin.is_finite() && axes.iter().all(|a| a.is_finite())) {
             return Err("holds a number that is not finite".into());

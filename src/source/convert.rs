@@ -23,9 +23,9 @@ pub struct Target {
     /// Where the voxels are (LPS).
     pub world: World,
     pub sample: SampleType,
-    /// In the units of the file.
+    /// Value outside the insonified region, in the units of the file.
     pub outside: f64,
-    /// Write a DICOM secondary capture: stored values that become 0 and 255. None: a volume with the values of the file.
+    /// Some: write a DICOM secondary capture; the stored values that become 0 and 255. None: write a volume with the values of the file.
     pub capture: Option<[f64; 2]>,
 }
 
@@ -35,7 +35,7 @@ impl Target {
         Target { grid, world: World::of(&grid), sample, outside: 0.0, capture: None }
     }
 
-    /// As a DICOM secondary capture of 8 bits. `shown`: the stored values that become 0 and 255.
+    /// The same target as a DICOM secondary capture of 8 bits. `shown`: the stored values that become 0 and 255.
     pub fn captured(self, shown: [f64; 2]) -> Target {
         Target { sample: SampleType::U8, capture: Some(shown), ..self }
     }
@@ -49,7 +49,7 @@ impl Target {
         }
     }
 
-    /// Checks that a file can hold it, before any work is done.
+    /// Checks that a file can hold the volume, before any work is done.
     ///
     /// # Errors
     /// An extension that is not a format, an axis that is too long for the format, an outside value that the type of the samples does not
@@ -84,7 +84,7 @@ impl Target {
 /// The grid of uniform spacing, mm, over the insonified region of a geometry: lateral, depth (Y of the probe), elevation.
 ///
 /// # Errors
-/// In words, without the file's name: a spacing that is not a length, or that makes too many voxels.
+/// One line without the file's name: a spacing that is not a length, or that makes too many voxels.
 pub fn lattice(geometry: &Geometry, spacing: f64) -> Result<Grid, String> {
     if !(spacing.is_finite() && spacing > 0.0) {
         return Err(format!("{spacing} mm: must be a finite length above 0"));

@@ -1,4 +1,5 @@
-//! The formats of recordings, in one table, and which reader a file is for: its content decides, then its name. What is not read is named in one line.
+//! The formats of recordings, in one table, and the choice of the reader for a file: by its content, then by its name. A file that is not
+//! read is refused with one line.
 
 use super::keys::{self, Row};
 use super::layout::Layout;
@@ -21,11 +22,11 @@ const PACKED: &str = "gz";
 
 /// A format of recordings.
 pub struct Format {
-    /// As helps and messages name it.
+    /// Name of the format in helps and messages.
     pub name: &'static str,
-    /// Endings that its files usually have, lower case; none if they have no name of their own.
+    /// Endings that its files usually have, in lower case. Empty if the files have no ending of their own.
     pub endings: &'static [&'static str],
-    /// Endings of the files beside them that hold their samples.
+    /// Endings of the files that hold the samples beside a header.
     pub data: &'static [&'static str],
     /// True if a file begins with these bytes: its first 1024, or all that it has.
     is_one: fn(&[u8]) -> bool,
@@ -118,7 +119,7 @@ pub static FORMATS: [Format; 8] = [
 ];
 
 impl Format {
-    /// What is done with each key of its files; empty if all that they state is read.
+    /// How the reader treats each key of the format. Empty if it reads everything that a file can state.
     #[must_use]
     pub fn keys(&self) -> Vec<Row> {
         (self.keys)()
@@ -143,7 +144,7 @@ fn uff_keys() -> Vec<Row> {
     Vec::new()
 }
 
-/// What is read, for helps and messages.
+/// The readable formats, for helps and messages.
 pub fn described() -> String {
     let of = |packed: bool| {
         let named = FORMATS.iter().filter(|format| !format.endings.is_empty() && format.may_be_packed() == packed);
@@ -152,7 +153,7 @@ pub fn described() -> String {
     format!("{}, each also as .{PACKED}, {}", of(true), of(false))
 }
 
-/// True if a recording may have this ending, in lower case and without its dot; of packed files it is `gz`.
+/// True if a recording may have this ending, in lower case and without its dot. Packed files have the ending `gz`.
 pub fn is_ending(ending: &str) -> bool {
     ending == PACKED || FORMATS.iter().any(|format| format.endings.contains(&ending))
 }

@@ -37,7 +37,7 @@ pub struct Header {
     pub stored: StoredType,
     /// Stored values that are shown as 0 and 1; finite, the second above the first.
     pub range: [f64; 2],
-    /// Frames may have poses.
+    /// True if frames may have poses.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub posed: bool,
     /// The frames are of the phantom, not of a patient. A recording says so in its frames.
@@ -45,7 +45,7 @@ pub struct Header {
     pub synthetic: bool,
 }
 
-/// What pictures of the phantom say of themselves, and recordings where their format has a comment.
+/// Text that marks pictures of the phantom, and recordings of it whose format has a comment.
 pub const DEMO_DATA: &str = "Demo data (phantom)";
 
 /// Size of a pose as it is stored, bytes: the upper three rows of a 4 x 4 matrix, row by row, f64.

@@ -1,4 +1,5 @@
-//! What a reader does with each key of its format, and which keys of a file it did not use. docs/formats.md is generated from the tables.
+//! The keys of each format: how its reader treats them, and which keys of a file it did not use. A part of docs/formats.md is generated
+//! from the tables.
 
 use super::describe::warned;
 use crate::files::escaped;
@@ -10,10 +11,10 @@ use std::path::Path;
 const MAX_NAME: usize = 64;
 const MAX_NAMES: usize = 256;
 
-/// What a key says of the samples.
+/// The property of the samples that a key describes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Aspect {
-    /// Sizes, spacings and places.
+    /// Sizes, spacings and positions.
     Geometry,
     /// What the numbers mean.
     Value,
@@ -27,7 +28,7 @@ pub enum Aspect {
 }
 
 impl Aspect {
-    /// As messages and pages name it.
+    /// Name of the property in messages and in docs/formats.md.
     pub fn name(self) -> &'static str {
         match self {
             Aspect::Geometry => "geometry",
@@ -45,18 +46,18 @@ impl Aspect {
     }
 }
 
-/// What becomes of a key. The words of a value that changes nothing are its neutral ones; they are compared as numbers where they are numbers.
+/// How a reader treats a key. A neutral value is one that changes nothing. Values that are numbers are compared as numbers.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Use {
-    /// It is read. Where another key comes before it, that is a warning if it matters.
+    /// The key is read. If another key takes precedence and the value matters, there is a warning.
     Used,
-    /// It is read, or another key that says the same comes before it.
+    /// The key is read, unless another key of the same meaning takes precedence.
     Optional,
-    /// It is not read. A value that is not neutral is a warning.
+    /// The key is not read. A value that is not neutral gives a warning.
     Warned(&'static [&'static str]),
-    /// A file with a value that is not neutral is not read.
+    /// A file whose value is not neutral is refused.
     Refused(&'static [&'static str]),
-    /// It is not read, and changes nothing that is drawn.
+    /// The key is not read and has no effect on pictures.
     Listed,
 }
 
@@ -128,7 +129,7 @@ impl Unused {
         }
     }
 
-    /// A line for each.
+    /// One line for each name.
     #[must_use]
     pub fn lines(&self) -> Vec<String> {
         let line = |(pattern, (name, count)): (&String, &(String, usize))| match count {

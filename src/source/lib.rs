@@ -66,10 +66,10 @@ use formats::Reads;
 use keys::Unused;
 use std::path::Path;
 
-/// What a user can say about a file that is opened.
+/// Options of a file that a user opens.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct OpenOptions<'a> {
-    /// The probe file to use.
+    /// The probe file. None: the one that belongs to the recording.
     pub probe: Option<&'a Path>,
     /// The stored axis of a Cartesian volume that is drawn as depth; None: that of the file's orientation, or y.
     pub depth_axis: Option<DepthAxis>,
@@ -81,7 +81,7 @@ pub struct OpenOptions<'a> {
     pub calibration: &'a [Calibration],
     /// The coordinate frame of the tracking that the volume is placed in. None: that of the configuration, or Reference, Tracker or World.
     pub reference: Option<&'a str>,
-    /// Of pictures with poses, which become a freehand volume.
+    /// Options of pictures with poses, which become a freehand volume.
     pub freehand: freehand::FreehandArguments,
 }
 
@@ -124,7 +124,7 @@ fn open_file(path: &Path, options: OpenOptions) -> Result<Box<dyn Source>, Input
     })
 }
 
-/// A description of such a file for users: pairs of title and value. Never a patient's name or number.
+/// A description of such a file for users. It has no name or number of a patient.
 ///
 /// # Errors
 /// As [`open_with`]; a `.frames` file is read completely, and may fail while that is done.
@@ -135,7 +135,7 @@ pub fn description(path: &Path, options: OpenOptions) -> Result<Description, Inp
     file_description(path, options)
 }
 
-/// What a file is, for users.
+/// A description of a file for users.
 #[derive(Clone, Debug)]
 pub struct Description {
     /// Pairs of title and value. Never a patient's name or number.

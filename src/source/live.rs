@@ -5,7 +5,7 @@ use super::freehand::CompoundingOptions;
 use glam::DAffine3;
 use std::time::{Duration, Instant};
 
-/// Where frames come from, for messages.
+/// The kind of a source, for messages.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum SourceKind {
     /// The built-in phantom.
@@ -22,15 +22,15 @@ pub enum SourceKind {
 /// An event of a live source.
 #[derive(Clone, Debug)]
 pub enum Event {
-    /// The header of the frames that follow: before the first frame, and whenever it changes. All earlier volumes are over.
+    /// Header of the frames that follow. It comes before the first frame and whenever it changes. No frame of an earlier volume follows it.
     Begin(Box<Header>),
     /// A complete frame.
     Frame(Frame),
     /// Scan lines of a frame, from line `first` on, in `frame.bytes`. The lines of a frame arrive in order; the last one completes it.
     Lines { frame: Frame, first: usize },
-    /// Something was left out, and why. The source goes on.
+    /// Data were left out, with the reason. The source continues.
     Fault(String),
-    /// Nothing arrived within the given time.
+    /// Nothing arrived within the time-out of the call.
     Idle,
     /// The source has ended, with the reason if that was unexpected.
     End(Option<String>),
@@ -74,9 +74,9 @@ pub trait Live: Send {
 pub enum Playback {
     /// As soon as they are requested.
     Fast,
-    /// So many volumes a second, with their frames evenly spaced.
+    /// At this number of volumes a second, with evenly spaced frames.
     Volumes(f64),
-    /// By their recorded time of arrival, otherwise by their time stamp. Frames without either follow at once.
+    /// At the recorded times of arrival, otherwise by the time stamps. Frames without either follow at once.
     Recorded,
 }
 

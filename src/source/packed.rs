@@ -31,7 +31,7 @@ pub(super) enum Encoding {
 }
 
 impl Encoding {
-    /// Its name for users.
+    /// Name of the compression for users.
     pub fn name(self) -> &'static str {
         match self {
             Encoding::Raw | Encoding::Dicom(Coding::Native) => "none",
@@ -153,11 +153,11 @@ pub(super) struct Pixels {
     pub encoding: Encoding,
     /// Bytes of the decompressed stream that come before the samples.
     pub inside: u64,
-    /// Of a stack, instead of a file.
+    /// The pictures of a stack, in place of a file.
     pub pictures: Option<Pictures>,
-    /// Of DICOM, instead of a file.
+    /// The frames of DICOM files, in place of a file.
     pub frames: Option<Frames>,
-    /// Of several files or in another order, instead of a file.
+    /// Samples of several files or in another order, in place of a file.
     pub gathered: Option<Arc<dyn Gathered>>,
 }
 

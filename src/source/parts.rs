@@ -1,4 +1,4 @@
-//! Frames that arrive in parts of lines, put together. Everything behind sees whole frames.
+//! Assembles frames that arrive in groups of lines, so that consumers see complete frames only.
 
 use crate::Frame;
 use crate::freehand::CompoundingOptions;
@@ -36,7 +36,7 @@ impl FrameParts {
     }
 }
 
-/// A source whose frames are whole: lines of the source that it is made of ([`Event::Lines`]) wait for the rest of their frame.
+/// A source of complete frames: groups of lines ([`Event::Lines`]) of the underlying source are kept until their frame is complete.
 pub struct WholeFrames {
     source: Box<dyn Live>,
     /// Of a line and of a frame, bytes.

@@ -15,7 +15,7 @@ pub const ENDINGS: [&str; 7] = ["png", "jpg", "jpeg", "bmp", "pgm", "ppm", "pnm"
 #[derive(Clone, Debug)]
 pub(super) struct Pictures {
     pub files: Arc<[PathBuf]>,
-    /// One of them has colour: all are read with three channels.
+    /// True if a picture has colour. All pictures are then read with three channels.
     pub is_colour: bool,
     /// Samples of one of them, bytes.
     pub each: usize,
@@ -29,13 +29,13 @@ pub(super) struct About {
     pub is_colour: bool,
     /// Length of the file, bytes.
     pub length: u64,
-    /// It says that it is to be turned or mirrored (EXIF).
+    /// True if the picture states that it is to be turned or mirrored (EXIF).
     pub is_turned: bool,
 }
 
 impl About {
     /// # Errors
-    /// In words: a file that cannot be read, or is no picture that is read.
+    /// One line: a file that cannot be read, or is no picture that is read.
     pub fn of(picture: &Path) -> Result<About, String> {
         let length = std::fs::metadata(picture).map_err(|e| format!("cannot be read: {e}"))?.len();
         let mut decoder = reader(picture)?.into_decoder().map_err(unreadable)?;

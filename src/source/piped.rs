@@ -75,7 +75,7 @@ impl Piped {
         Ok(Piped { queue, compounding })
     }
 
-    /// The same, with other options for pictures that have poses.
+    /// Sets the options for pictures that have poses.
     pub fn compounded(mut self, compounding: CompoundingOptions) -> Piped {
         self.compounding = compounding;
         self

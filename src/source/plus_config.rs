@@ -17,9 +17,9 @@ pub(super) struct PlusConfig {
     /// The frames of `VolumeReconstructor`: of pictures and of the volume.
     pub image: Option<String>,
     pub reference: Option<String>,
-    /// Its clip: first column, first row, columns, rows.
+    /// Clip of the volume reconstructor: first column, first row, columns, rows.
     pub clip: Option<[usize; 4]>,
-    /// Its spacing of voxels, mm; the finest of the three axes.
+    /// Spacing of voxels of the volume reconstructor, mm; the finest of the three axes.
     pub spacing: Option<f64>,
 }
 

@@ -98,7 +98,8 @@ impl Posed {
         Posed { options, sweep: None, time: None, volumes: 0, begun: None, left_out: LeftOut::default(), lost: 0 }
     }
 
-    /// What becomes of an event: itself, or volumes of the pictures so far. A volume is emitted by an event after its interval, of any kind.
+    /// Processes an event. Returns the event itself, or volumes of the pictures so far: the first event of any kind after the interval
+    /// emits a volume.
     pub fn take(&mut self, event: Event) -> Vec<Event> {
         let mut events = Vec::new();
         match event {
@@ -129,7 +130,7 @@ impl Posed {
         events
     }
 
-    /// Pictures so far that are in no volume, or not wholly.
+    /// Number of pictures so far that are in no volume, or only partly.
     pub fn lost(&self) -> u64 {
         self.lost + self.sweep.as_ref().map_or(0, |(_, sweep)| sweep.left_out())
     }

@@ -200,12 +200,13 @@ impl Recording {
         self.range
     }
 
-    /// Number of samples that were NaN or infinite and read as 0, in the frames read so far; in all frames if the range was measured.
+    /// Number of samples that were NaN or infinite and were replaced by 0: in the frames read so far, or in all frames if the range was
+    /// measured.
     pub fn replaced(&self) -> u64 {
         self.replaced.not_finite
     }
 
-    /// Number of denormal f32 samples that read as 0, counted like [`Recording::replaced`].
+    /// Number of denormal f32 samples that were replaced by 0, counted like [`Recording::replaced`].
     pub fn flushed(&self) -> u64 {
         self.replaced.denormal
     }

@@ -1,5 +1,5 @@
-//! Label volumes with the names of what they hold: NRRD segmentations (`.seg.nrrd`) as 3D Slicer and its readers take them, one layer of
-//! bytes packed by gzip. A file is whole or does not exist.
+//! Label volumes with the names of their labels: NRRD segmentations (`.seg.nrrd`) in the form of 3D Slicer, one layer of bytes packed by
+//! gzip. A file is complete or absent.
 
 use super::volume_file::{self, nrrd_axes, three};
 use crate::files::{InputError, Unfinished};
@@ -22,7 +22,7 @@ pub struct Segment {
     pub colour: [f64; 3],
 }
 
-/// True if a name asks for a segmentation.
+/// True if a file name has the ending of a segmentation, `.seg.nrrd`.
 pub fn is_one(path: &Path) -> bool {
     stem(path).is_some()
 }
@@ -32,7 +32,7 @@ pub fn stem(path: &Path) -> Option<String> {
     volume_file::stem(path, ENDING)
 }
 
-/// Writes the label of each voxel of a lattice; 0 is no segment. `each` is called after every slice.
+/// Writes the label of each voxel of a lattice. Label 0 is no segment. `each` is called after every slice.
 ///
 /// # Errors
 /// A full disk, a folder that cannot be written.

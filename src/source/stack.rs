@@ -228,7 +228,7 @@ fn parts(name: &str) -> (Vec<&str>, Vec<u64>) {
 /// move all slices after it.
 ///
 /// # Errors
-/// In words: what is not so.
+/// One line: what is wrong.
 fn order(names: &[String]) -> Result<Vec<usize>, String> {
     let Some((first, others)) = names.split_first() else { return Ok(Vec::new()) };
     let shown = |name: &str| quoted(&escaped(name, 60));

@@ -1,4 +1,4 @@
-//! Standard input as a recording: `-` in place of a file. It is kept in a temporary file, once, so that readers can go back in it.
+//! Standard input as a recording: `-` in place of a file. It is copied once to a temporary file, so that readers can seek.
 
 use super::formats;
 use super::frame::{Frame, Header, Source};
@@ -27,7 +27,7 @@ pub(super) fn is_meant(path: &Path) -> bool {
     path.as_os_str() == "-"
 }
 
-/// Removes what was kept. Sources that are still open then fail.
+/// Removes the temporary file. Sources that are still open fail afterwards.
 pub fn forget() {
     kept().take();
 }

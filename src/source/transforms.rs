@@ -12,7 +12,7 @@ pub(super) const HOW: &str = "give the calibration: --plus-config FILE.xml, or -
 /// Most names of transforms in a file.
 const MAX_NAMES: usize = 256;
 
-/// The frames that a transform is between.
+/// The names of the two coordinate frames of a transform.
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub struct TransformName {
     pub from: String,
@@ -60,7 +60,7 @@ impl FromStr for Calibration {
 /// A matrix of 16 numbers, or 12 without the last row, row by row.
 ///
 /// # Errors
-/// In words: another number of them, one that is not finite, a last row that is not 0 0 0 1, a matrix that has no inverse.
+/// One line: another number of them, one that is not finite, a last row that is not 0 0 0 1, a matrix that has no inverse.
 pub(super) fn matrix(text: &str) -> Result<DMat4, String> {
     let words: Vec<&str> =
         text.split(|c: char| c.is_whitespace() || c == ',').filter(|word| !word.is_empty()).collect();
@@ -101,14 +101,14 @@ impl Poses {
         }
     }
 
-    /// Takes one away: its status is not OK.
+    /// Removes a transform whose status is not OK.
     pub fn remove(&mut self, name: &TransformName, picture: usize) {
         if let Some(pictures) = self.by_name.get_mut(name) {
             pictures.remove(&picture);
         }
     }
 
-    /// What the pictures are tracked by, and how they become a volume, for users; None if they are not.
+    /// How the pictures are tracked and how they become a volume, for users. None if they are not tracked.
     pub fn remark(&self) -> Option<(String, String)> {
         let is_there = !self.by_name.is_empty();
         is_there.then(|| ("tracking".into(), format!("{}; for a freehand volume {HOW}", self.names())))

@@ -207,7 +207,7 @@ impl Beamformed {
         rows
     }
 
-    /// What stands beside the data and is not used.
+    /// Names of the objects beside the data that are not used.
     pub fn unused(&self) -> &Unused {
         &self.unused
     }

@@ -1,4 +1,4 @@
-//! Volume files that are written: MetaImage, NRRD, NIfTI-1 and DICOM, each with its voxel-to-world matrix. A file is whole or does not exist.
+//! Volume files that are written: MetaImage, NRRD, NIfTI-1 and DICOM, each with its voxel-to-world matrix. A file is complete or absent.
 
 use super::dicom::{DicomWriter, Form, MOST_BYTES};
 use crate::files::{InputError, Unfinished};
@@ -68,7 +68,7 @@ impl VolumeFile {
     /// Checks that the format holds so many samples of this type.
     ///
     /// # Errors
-    /// In words: samples or a length that DICOM does not hold.
+    /// One line: samples or a length that DICOM does not hold.
     pub(super) fn check(self, size: [usize; 3], sample: SampleType) -> Result<(), String> {
         let VolumeFile::Dicom { capture } = self else { return Ok(()) };
         let bytes = size.iter().fold(sample.bytes() as u64, |all, n| all.saturating_mul(*n as u64));

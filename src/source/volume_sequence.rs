@@ -1,5 +1,5 @@
-//! Volumes in time in one file: NRRD sequences (`.seq.nrrd`) as 3D Slicer writes them since version 5.8, packed by gzip. One volume is in
-//! memory at a time. A file is whole or does not exist.
+//! Volumes in time in one file: NRRD sequences (`.seq.nrrd`) as 3D Slicer writes them since version 5.8, packed by gzip. One volume at a
+//! time is in memory. A file is complete or absent.
 
 use super::convert::{Target, Volume};
 use super::frame::{Frame, Source};
@@ -11,12 +11,12 @@ use std::io::Write;
 use std::ops::Range;
 use std::path::Path;
 
-/// True if a name asks for a sequence of volumes.
+/// True if a file name has the ending of a sequence, `.seq.nrrd`.
 pub fn is_one(path: &Path) -> bool {
     stem(path, SEQUENCE).is_some()
 }
 
-/// The complete ones among volumes of a source.
+/// The complete volumes among a range of volumes of a source.
 pub struct VolumeSequence {
     kept: Vec<Whole>,
     left_out: usize,
@@ -85,10 +85,10 @@ impl VolumeSequence {
         self.left_out
     }
 
-    /// Whether the file states times.
+    /// Checks that the file states times.
     ///
     /// # Errors
-    /// Why it does not, in words.
+    /// The reason why it states none.
     pub fn times(&self) -> Result<(), &'static str> {
         self.times
     }

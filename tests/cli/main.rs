@@ -33,6 +33,7 @@ mod standard_streams;
 mod stic;
 mod stream;
 mod support_bundle;
+mod tutorial;
 mod verify;
 mod verify_gtest;
 mod verify_isolated;

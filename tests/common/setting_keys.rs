@@ -1,4 +1,4 @@
-//! The keys of all settings, from docs/settings.md, which a test of tests/cli/docs.rs holds equal to the declarations in src/core/scene/settings. A key that is
+//! The keys of all settings, from docs/settings.md, which a test of tests/cli/docs holds equal to the declarations in src/core/scene/settings. A key that is
 //! declared is here without a list of its own.
 
 use std::collections::BTreeMap;

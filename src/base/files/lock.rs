@@ -1,11 +1,12 @@
-//! A lock on a place that one process at a time may write to: metrics, a log, a folder. The system releases it when the process ends, however it does.
+//! A lock on a file or folder that only one process at a time may write to: metrics, a log, results. The operating system releases the lock
+//! when the process ends in any way.
 
 use std::fs::{File, OpenOptions, TryLockError, metadata, remove_file};
 use std::io::{Read, Write};
 use std::path::{Path, PathBuf};
 
-/// Holds the lock until it is dropped. It is on a hidden file beside the place, `.NAME.lock`, or in a folder `.echolume.lock`, which a crash leaves there
-/// unlocked.
+/// Holds the lock until it is dropped. The lock is on a hidden file: `.NAME.lock` beside a file, `.echolume.lock` in a folder. After a
+/// crash this file remains, unlocked.
 #[derive(Debug)]
 pub struct Lock {
     /// None: the place cannot be locked.
@@ -13,16 +14,16 @@ pub struct Lock {
 }
 
 impl Lock {
-    /// False where the place cannot be locked, as in a folder that is missing.
+    /// False if no lock file can be made, such as in a missing folder.
     pub fn is_held(&self) -> bool {
         self.held.is_some()
     }
 
-    /// Locks the place of a file or a folder. A device or a pipe is not locked, and neither is a place beside which no file can be made: what cannot be
-    /// written there is said by whoever writes.
+    /// Locks a file or a folder. Devices and pipes are not locked, and neither is a place where no lock file can be made: writing there
+    /// then reports the fault.
     ///
     /// # Errors
-    /// Another process holds the lock: one line with the path, and who it is if that is known.
+    /// Another process holds the lock: one line with the path, and with the process if it is known.
     pub fn take(place: &Path) -> Result<Lock, String> {
         let Some(path) = file_of(place) else { return Ok(Lock { held: None }) };
         loop {

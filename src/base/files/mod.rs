@@ -50,9 +50,9 @@ pub fn read_text(path: &Path, max_bytes: u64, what: &str) -> Result<String, Stri
 /// Who may read a new file. Only its owner writes to it.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Readers {
-    /// Its owner, because it may hold frames of a patient, unless [`follow_umask`] was called or `ECHOLUME_PRIVATE` is 0.
+    /// The owner alone, because the file may hold frames of a patient, unless [`follow_umask`] was called or `ECHOLUME_PRIVATE` is 0.
     Owner,
-    /// Whom the umask lets.
+    /// The users that the umask allows.
     Umask,
     /// Everyone, whatever the umask says.
     All,
@@ -61,12 +61,13 @@ enum Readers {
 /// The files of this process follow the umask.
 static FOLLOWS_UMASK: AtomicBool = AtomicBool::new(false);
 
-/// Lets the umask say from now on who may read the files that are made.
+/// From now on the umask decides who may read new files.
 pub fn follow_umask() {
     FOLLOWS_UMASK.store(true, Ordering::Relaxed);
 }
 
-/// Options of a file that may hold frames of a patient: one that is made is for its owner alone, as those of [`Unfinished`] and [`replace`].
+/// Sets the options for a file that may hold frames of a patient: only its owner may read a new file, as with [`Unfinished`] and
+/// [`replace`].
 pub fn private(options: &mut OpenOptions) -> &mut OpenOptions {
     #[cfg(unix)]
     std::os::unix::fs::OpenOptionsExt::mode(options, Readers::Owner.mode());
@@ -83,7 +84,7 @@ impl Readers {
     }
 }
 
-/// The variable of the environment that is 0 where files follow the umask.
+/// Name of the environment variable that is 0 where the umask decides who may read new files.
 pub const PRIVATE: &str = "ECHOLUME_PRIVATE";
 
 /// Replaces a file atomically: writes a temporary file next to it, then renames. A full disk or a signal leaves the old file unchanged. Only
@@ -95,7 +96,7 @@ pub fn replace(file: &Path, bytes: &[u8]) -> Result<(), String> {
     replace_file(file, bytes, Readers::Owner)
 }
 
-/// Like [`replace`], and the umask says who may read the file: for what tells nothing about patients.
+/// Like [`replace`], but the umask decides who may read the file: for content that tells nothing about patients.
 ///
 /// # Errors
 /// As for [`replace`].
@@ -103,7 +104,7 @@ pub fn replace_shared(file: &Path, bytes: &[u8]) -> Result<(), String> {
     replace_file(file, bytes, Readers::Umask)
 }
 
-/// Like [`replace_shared`], and every user may read the file, whatever the umask says: it is read by another service.
+/// Like [`replace_shared`], but every user may read the file, whatever the umask is: another service reads it.
 ///
 /// # Errors
 /// As for [`replace`].
@@ -160,7 +161,7 @@ fn is_special(file: &Path) -> bool {
     metadata(file).is_ok_and(|there| !there.is_file() && !there.is_dir())
 }
 
-/// A folder for files that are not yet whole. Dropping it deletes it with all that is in it.
+/// A temporary folder for incomplete files. Dropping it deletes the folder and its content.
 #[derive(Debug)]
 pub struct WorkFolder(tempfile::TempDir);
 
@@ -168,7 +169,7 @@ impl WorkFolder {
     /// A new folder in `parent`, whose name begins with `prefix`.
     ///
     /// # Errors
-    /// One line: it cannot be created.
+    /// One line: the folder cannot be created.
     pub fn new(parent: &Path, prefix: &str) -> Result<WorkFolder, String> {
         let created = tempfile::Builder::new().prefix(prefix).tempdir_in(parent);
         created.map(WorkFolder).map_err(|e| format!("{}: {e}", parent.display()))
@@ -324,17 +325,17 @@ impl InputError {
         InputError::new(file, "file", format!("cannot be written: {error}"))
     }
 
-    /// The same error of a file that the user knows by another name.
+    /// The same error under the name by which the user knows the file.
     pub fn renamed(self, name: &str) -> InputError {
         InputError { file: escaped(name, MAX_PART), ..self }
     }
 
-    /// The field that is wrong.
+    /// Name of the faulty field.
     pub fn field(&self) -> &str {
         &self.field
     }
 
-    /// What is wrong with it.
+    /// What is wrong with the field.
     pub fn fault(&self) -> &str {
         &self.fault
     }

@@ -1,7 +1,7 @@
-//! How much of a recording has been read, for whoever waits for it, and a way to end the reading.
+//! Progress of reading a recording, for a thread that waits for it, and a way to cancel the reading.
 //!
-//! The thread that reads has a [`Progress`] for the time of its work. Files that it opens as [`CountedFile`] add what is read from them; a
-//! reader only says how much there will be ([`expect_bytes`], [`expect_files`]). Without a progress all of this does nothing.
+//! The reading thread has a [`Progress`] during its work. Files that it opens as [`CountedFile`] count the bytes that are read from them; a
+//! reader only announces how many there will be ([`expect_bytes`], [`expect_files`]). Without a [`Progress`] these functions do nothing.
 
 use std::cell::RefCell;
 use std::fs::{File, Metadata};
@@ -10,7 +10,7 @@ use std::path::Path;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 
-/// What is being read, counted by the thread that reads and looked at by another one.
+/// Progress of one reading: the reading thread counts, and another thread asks for the state.
 #[derive(Clone, Debug, Default)]
 pub struct Progress(Arc<Counts>);
 
@@ -27,14 +27,14 @@ struct Counts {
     is_cancelled: AtomicBool,
 }
 
-/// How far the reading is.
+/// State of a reading.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Share {
-    /// It is not known how much there is.
+    /// The total is not known.
     Unknown,
-    /// Headers of so many files of a folder.
+    /// `done` of `count` headers of the files of a folder were read.
     Files { done: u64, count: u64 },
-    /// Per cent of the data.
+    /// Share of the data that was read, per cent.
     Percent(u8),
 }
 
@@ -43,7 +43,7 @@ thread_local! {
 }
 
 impl Progress {
-    /// Does work whose reading counts here, on this thread.
+    /// Runs `work` on this thread and counts what it reads.
     pub fn during<T>(&self, work: impl FnOnce() -> T) -> T {
         /// Puts back what was there before, also if the work panics.
         struct Before(Option<Progress>);
@@ -56,7 +56,7 @@ impl Progress {
         work()
     }
 
-    /// Lets every read of the work fail from now on.
+    /// Cancels the reading: every later read of the work fails.
     pub fn cancel(&self) {
         self.0.is_cancelled.store(true, Ordering::Relaxed);
     }
@@ -65,7 +65,7 @@ impl Progress {
         self.0.is_cancelled.load(Ordering::Relaxed)
     }
 
-    /// How far the reading is.
+    /// State of the reading.
     pub fn share(&self) -> Share {
         let get = |count: &AtomicU64| count.load(Ordering::Relaxed);
         let counts = &*self.0;
@@ -93,7 +93,8 @@ fn of_thread() -> Option<Progress> {
     OF_THREAD.with_borrow(Clone::clone)
 }
 
-/// A pass over the data begins, which reads so many bytes of files. It is part of an earlier one that expected more than it has read.
+/// Announces a pass over the data that reads `bytes` bytes of files. If an earlier pass still expects at least as many bytes, this one is a
+/// part of it.
 pub fn expect_bytes(bytes: u64) {
     if let Some(Progress(counts)) = of_thread() {
         let done = counts.bytes.load(Ordering::Relaxed) - counts.before.load(Ordering::Relaxed);
@@ -105,7 +106,7 @@ pub fn expect_bytes(bytes: u64) {
     }
 }
 
-/// The headers of so many files are read next.
+/// Announces that the headers of `count` files are read next.
 pub fn expect_files(count: u64) {
     if let Some(Progress(counts)) = of_thread() {
         counts.files.store(0, Ordering::Relaxed);
@@ -113,14 +114,14 @@ pub fn expect_files(count: u64) {
     }
 }
 
-/// One of these headers was read.
+/// Counts one of the announced headers as read.
 pub fn file_read() {
     if let Some(Progress(counts)) = of_thread() {
         counts.files.fetch_add(1, Ordering::Relaxed);
     }
 }
 
-/// Bytes were read by a library that opens its file itself.
+/// Counts bytes that were read by a library which opens its file itself.
 ///
 /// # Errors
 /// The reading was cancelled.

@@ -1,5 +1,5 @@
-//! SIGINT, SIGTERM and SIGHUP for code that must finish something first: a moving motor, a recording without its index, an incomplete
-//! file. Otherwise the signals end the process by default. Where SIGHUP means something else ([`hangups`]) it does neither.
+//! SIGINT, SIGTERM and SIGHUP for code that must finish something first: a moving motor, a recording without its index, an incomplete file.
+//! At other times the signals end the process. After [`hangups`] SIGHUP does neither.
 
 use signal_hook::SigId;
 use signal_hook::consts::{SIGINT, SIGTERM};
@@ -53,7 +53,7 @@ fn handlers() -> &'static Handlers {
 /// Becomes true with SIGHUP, where that does not end the process.
 static HANGUPS: OnceLock<Arc<AtomicBool>> = OnceLock::new();
 
-/// From now on SIGHUP does not end this process: it makes the value true. To be called before signals are held.
+/// From now on SIGHUP does not end this process but sets the returned value to true. Call it before a [`Held`] exists.
 ///
 /// # Errors
 /// The signal cannot be caught.
@@ -115,7 +115,7 @@ pub fn name_of(signal: i32) -> Option<&'static str> {
     low_level::signal_name(signal)
 }
 
-/// Sends this process a segmentation fault, as a driver that writes where it must not.
+/// Sends this process a segmentation fault, to simulate a driver that accesses invalid memory.
 pub fn raise_segmentation_fault() {
     // The first one only removes the handler of the standard library, which looks for an exhausted stack.
     for _ in 0..2 {
@@ -123,7 +123,7 @@ pub fn raise_segmentation_fault() {
     }
 }
 
-/// The last signal that arrived while a [`Held`] existed, if any. For work that can end early.
+/// The last signal that arrived while a [`Held`] existed, if any. Work that can end early asks for it.
 pub fn received() -> Option<&'static str> {
     handlers().signal().map(|(_, name)| name)
 }

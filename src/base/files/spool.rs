@@ -1,10 +1,10 @@
-//! A stream that is kept on the disk, so that what must be read twice, or from any place, can come from a pipe.
+//! A stream that is copied to a temporary file, so that data from a pipe can be read twice and at any offset.
 
 use std::io::{self, Read, Write};
 use std::path::{Path, PathBuf};
 
-/// A temporary file with the bytes of a stream. On Linux it has no name and is gone with the process, whatever ends it; elsewhere it is
-/// removed when this is dropped.
+/// A temporary file with the bytes of a stream. On Linux the file has no name and vanishes when the process ends in any way. Elsewhere it
+/// is removed when this is dropped.
 pub struct Spool {
     path: PathBuf,
     // Open, or kept by its name, as long as this lives.
@@ -20,7 +20,7 @@ impl Spool {
     /// Reads a stream of at most `most` bytes to its end.
     ///
     /// # Errors
-    /// A stream that cannot be read or is longer, a full disk.
+    /// The stream cannot be read or is longer than `most`, or the disk is full.
     pub fn of(input: &mut impl Read, most: u64) -> io::Result<Spool> {
         #[cfg(target_os = "linux")]
         let mut file = tempfile::tempfile()?;
@@ -37,7 +37,7 @@ impl Spool {
         Ok(Spool { path, _file: file })
     }
 
-    /// A path by which the bytes are opened.
+    /// A path that opens the bytes.
     pub fn path(&self) -> &Path {
         &self.path
     }

@@ -1,6 +1,6 @@
-//! A histogram as Prometheus has it: counts of values by fixed limits, and their sum.
+//! A Prometheus histogram: counts of values up to fixed limits, and the sum of the values.
 
-/// Counts of values. It takes the same memory however many there are.
+/// Counts of values. Its memory does not depend on the number of values.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Histogram {
     /// Rising. A value belongs to the first limit that it does not exceed.
@@ -11,7 +11,7 @@ pub struct Histogram {
 }
 
 impl Histogram {
-    /// An empty histogram. `limits`: rising and finite.
+    /// An empty histogram. `limits`: upper limits of the counts, rising and finite.
     pub fn new(limits: &'static [f64]) -> Histogram {
         Histogram { limits, counts: vec![0; limits.len() + 1], sum: 0.0 }
     }
@@ -30,7 +30,7 @@ impl Histogram {
         self.sum += other.sum;
     }
 
-    /// Forgets all values.
+    /// Removes all values.
     pub fn reset(&mut self) {
         self.counts.fill(0);
         self.sum = 0.0;

@@ -1,6 +1,6 @@
-//! What the program tells Prometheus: the table of all metrics ([`table`]), the text format that they are written in ([`text_format`]), and
-//! the file that holds them while the program runs ([`textfile`]). Who measures something writes it by a metric of the table, so that
-//! rules and dashboards are tested against the same names.
+//! Metrics for Prometheus: the table of all metrics ([`table`]), their text format ([`text_format`]), and the file that holds them while
+//! the program runs ([`textfile`]). Every value is written by a metric of the table, so that rules and dashboards are tested against the
+//! same names.
 
 pub mod histogram;
 pub mod table;
@@ -10,9 +10,9 @@ pub mod textfile;
 /// What a metric counts or measures.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Kind {
-    /// Only grows, until the program starts again.
+    /// A value that only grows until the program restarts.
     Counter,
-    /// Goes up and down.
+    /// A value that rises and falls.
     Gauge,
     /// Counts of values by limits.
     Histogram,
@@ -21,7 +21,7 @@ pub enum Kind {
 }
 
 impl Kind {
-    /// As the line `# TYPE` names it.
+    /// The kind in the line `# TYPE` of the text format.
     pub fn word(self) -> &'static str {
         match self {
             Kind::Counter => "counter",

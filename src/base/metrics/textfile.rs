@@ -10,7 +10,7 @@ use std::time::Duration;
 /// Longest wait for the last text at the end.
 const PATIENCE: Duration = Duration::from_secs(2);
 
-/// The file. When it is dropped, what was put last is written.
+/// The file. Dropping it writes the last text.
 pub struct Textfile {
     shared: Arc<Shared>,
 }
@@ -48,14 +48,14 @@ impl Textfile {
         }
     }
 
-    /// Replaces the content of the file, soon. A text that waits to be written is dropped for the newer one. A file that cannot be written
-    /// is said once, until it can be written again.
+    /// Replaces the content of the file soon. A text that still waits to be written is discarded for a newer one. A write error is reported
+    /// once, until a write succeeds again.
     pub fn put(&self, text: String) {
         self.shared.lock().text = Some(text);
         self.shared.changed.notify_all();
     }
 
-    /// How often the file could not be written.
+    /// Number of failed writes.
     pub fn failures(&self) -> u64 {
         self.shared.failures.load(Ordering::Relaxed)
     }

@@ -1,4 +1,4 @@
-//! Films of pictures: AV1 in MP4. A file is whole or does not exist.
+//! Films of pictures: AV1 in MP4. A file is complete or absent.
 //!
 //! Colours are stored as BT.709 of limited range with half the resolution of brightness in both directions (4:2:0), which every player of
 //! AV1 decodes.
@@ -32,7 +32,7 @@ const TILES: usize = 4;
 const SEQUENCE_HEADER: u8 = 1;
 const TEMPORAL_DELIMITER: u8 = 2;
 
-/// An MP4 file of pictures of one size, as it is written. The encoder keeps the pictures that it compares, some forty; encoded ones are
+/// An MP4 file of pictures of one size that is being written. The encoder keeps about forty pictures for comparison; encoded pictures are
 /// written at once.
 pub struct FilmWriter {
     encoder: Context<u8>,
@@ -48,10 +48,10 @@ pub struct FilmWriter {
 }
 
 impl FilmWriter {
-    /// Begins a film of pictures of `size` pixels, of which `rate` are shown in a second.
+    /// Begins a film of pictures of `size` pixels at `rate` pictures a second.
     ///
     /// # Errors
-    /// In words, without the file's name: a size that AV1 does not have, a folder that cannot be written.
+    /// One line without the file's name: a size that AV1 does not have, a folder that cannot be written.
     pub fn create(path: &Path, size: [u32; 2], rate: f64) -> Result<FilmWriter, String> {
         let [width, height] = size.map(|n| n as usize);
         let duration = (f64::from(TIME_SCALE.get()) / rate).round().max(1.0) as u32;
@@ -90,7 +90,7 @@ impl FilmWriter {
     /// Adds a picture.
     ///
     /// # Errors
-    /// In words: a picture of another size, a full disk, a signal.
+    /// One line: a picture of another size, a full disk, a signal.
     pub fn picture(&mut self, picture: &Picture) -> Result<(), String> {
         let [width, height] = self.size;
         if [picture.width, picture.height] != self.size || picture.rgba.len() != 4 * width as usize * height as usize {
@@ -110,7 +110,7 @@ impl FilmWriter {
     /// Writes what is left, and puts the complete file in its place.
     ///
     /// # Errors
-    /// In words: no picture was added, a full disk, a signal.
+    /// One line: no picture was added, a full disk, a signal.
     pub fn finish(mut self) -> Result<(), String> {
         self.encoder.flush();
         self.take_packets()?;

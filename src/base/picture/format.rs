@@ -32,10 +32,11 @@ const ENDINGS: [(&str, PictureFormat); 7] = [
 ];
 
 impl PictureFormat {
-    /// The format for the ending of a file name. A name without an ending is a PNG, as is what is no regular file: a device, a pipe.
+    /// The format for the ending of a file name. A name without an ending means PNG, and so does a path that is not a regular file, such as
+    /// a device or a pipe.
     ///
     /// # Errors
-    /// One line that names the endings that are known.
+    /// One line that names the known endings.
     pub fn of(file: &Path) -> Result<PictureFormat, String> {
         let Some(ending) = file.extension() else { return Ok(PictureFormat::Png) };
         if let Some((_, format)) = ENDINGS.iter().find(|(known, _)| ending.eq_ignore_ascii_case(known)) {
@@ -48,7 +49,7 @@ impl PictureFormat {
     /// Encodes pixels, rows from the top; 16-bit ones in the byte order of this machine.
     ///
     /// # Errors
-    /// In words: what the format cannot hold.
+    /// One line: what the format cannot hold.
     pub(super) fn encode(self, pixels: &[u8], size: [u32; 2], colour: ExtendedColorType) -> Result<Vec<u8>, String> {
         let mut bytes = Vec::new();
         let [width, height] = size;

@@ -152,7 +152,7 @@ impl Grey {
     /// Encodes a grey picture of 8 or 16 bits.
     ///
     /// # Errors
-    /// In words: 16 bits in a format of 8.
+    /// One line: 16 bits in a format of 8.
     pub fn encoded(&self, format: PictureFormat) -> Result<Vec<u8>, String> {
         // Encoders take 16 bits in native byte order.
         let (texels, colour) = match self.sixteen {
@@ -202,7 +202,7 @@ impl FromStr for Region {
     }
 }
 
-/// Mean and population standard deviation of the pixels, 0..1.
+/// Mean and population standard deviation of the pixels of a region, 0..1.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Level {
     pub mean: f64,
@@ -213,7 +213,7 @@ impl Region {
     /// Checks that the region is within a picture of `size` pixels.
     ///
     /// # Errors
-    /// It is not.
+    /// The region reaches beyond the picture.
     pub fn check(&self, size: [u32; 2]) -> Result<(), String> {
         let [right, lower] = [0, 1].map(|i| u64::from(self.at[i]) + u64::from(self.size[i]));
         match right <= u64::from(size[0]) && lower <= u64::from(size[1]) {

@@ -1,6 +1,7 @@
 //! Texture coordinates along a ray, and the places at which they enter another cell or leave the insonified region.
 //!
-//! A place too many does no harm: both sides of it are then one cell. So the solutions of squared equations are not tested for their sign.
+//! An additional breakpoint does no harm, because the field is the same polynomial on both sides of it. Therefore the solutions of squared
+//! equations are not tested for their sign.
 
 use super::polynomial::{Polynomial, bracketed};
 use crate::probe::{Advance, Array, Axis, Geometry, Motion, Probe};
@@ -11,7 +12,7 @@ use glam::DVec3;
 #[derive(Clone, Copy, Debug)]
 pub struct Line<'a> {
     pub scene: &'a Scene,
-    /// mm. Rounding is least if it lies near the volume.
+    /// A point of the line, mm. Rounding errors are smallest if it lies near the volume.
     pub base: DVec3,
     /// Unit length.
     pub direction: DVec3,

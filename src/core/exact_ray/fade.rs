@@ -1,5 +1,5 @@
-//! What `region.fade` leaves of the matter along a line ([`Scene::faded`](crate::scene::Scene::faded)): a smooth function of the place
-//! between the kinks that are found here.
+//! The share of matter that `region.fade` leaves along a line ([`Scene::faded`](crate::scene::Scene::faded)). It is a smooth function of
+//! the position between the kinks that are found here.
 //!
 //! With the distances d of a place from the faces, the matter left is the smooth step of 1 - |b|, b = max(1 - d / fade, 0) for each axis. Each
 //! component is linear along the line but where it begins, and where the nearer one of two opposite faces changes. Between these places

@@ -16,15 +16,15 @@ const AGREEMENT: f64 = 2e-13;
 /// Times that a part of a cell may be halved.
 const HALVINGS: u32 = 6;
 
-/// A stretch of a ray with one polynomial.
+/// A part of a ray on which the field is one polynomial.
 #[derive(Clone, Copy, Debug)]
 pub struct Segment {
-    /// mm along the ray.
+    /// Begin of the segment, mm along the ray.
     pub from: f64,
     pub to: f64,
     /// The field after the grey window, not clamped, on -1..1.
     pub field: Polynomial,
-    /// Largest difference of the polynomial from the field at places between the nodes: an estimate of its error.
+    /// Largest difference between the polynomial and the field at positions between the nodes: an estimate of its error.
     pub off: f64,
 }
 
@@ -37,7 +37,7 @@ impl Segment {
         self.from + self.half()
     }
 
-    /// mm along the ray of a place in -1..1.
+    /// Converts a position in -1..1 to mm along the ray.
     pub fn place(&self, x: f64) -> f64 {
         self.middle() + self.half() * x
     }

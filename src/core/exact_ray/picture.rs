@@ -14,19 +14,19 @@ use rayon::prelude::*;
 /// Largest difference of two quadrature rules on one piece of a ray, in light of 0..1.
 pub const TOLERANCE: f64 = 1e-12;
 
-/// What the exact rays of a picture cost, and how accurate they are by their own estimate.
+/// The cost of the exact rays of a picture, and their estimated error.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Effort {
-    /// Root mean square over the rays of the estimated error of a ray: an estimate, no bound. Of a channel of the picture, or, of
-    /// surfaces, of the distance in mm.
+    /// Root mean square over the rays of the estimated error of a ray, which is no bound. For pictures it is the error of a channel, for
+    /// surfaces that of the distance in mm.
     pub estimate: f64,
     /// Parts of rays that were integrated or searched.
     pub pieces: u64,
     pub rays: u64,
 }
 
-/// Why there is no exact reference of a scene's stage 2, and what to set instead, as the end of a sentence; none if there is one. Every
-/// setting that a ray reads is honoured by [`replace`] or named here (tests/unit_pure/ray_keys.rs).
+/// Why the scene's stage 2 has no exact reference, and what to set instead, as the end of a sentence. None if it has one. Every setting
+/// that a ray reads is either used by [`replace`] or named here (tests/unit_pure/ray_keys).
 pub fn fault(scene: &Scene) -> Option<String> {
     fault_of(scene).map(str::to_string)
 }
@@ -51,7 +51,7 @@ fn fault_of(scene: &Scene) -> Option<&'static str> {
     scene.detects_surface().then(|| surface::fault(scene)).flatten()
 }
 
-/// Number of segments of all rays of a scene, roughly: what the time is proportional to.
+/// Approximate number of segments of all rays of a scene. The time is proportional to it.
 pub fn cost(scene: &Scene) -> f64 {
     let rays = scene.ray_size().iter().map(|n| f64::from(*n)).product::<f64>();
     // A ray crosses a face of a cell on each axis about once a texel.
@@ -60,7 +60,7 @@ pub fn cost(scene: &Scene) -> f64 {
     rays * 2.0 * across / pitch
 }
 
-/// Replaces the reference of a pass of stage 2: writes what it writes. False for a pass that casts no ray through the volume.
+/// Replaces the reference of a pass of stage 2 and writes the outputs of that pass. False if the pass casts no ray through the volume.
 pub fn replace(scene: &Scene, pass: &str, reads: &Arrays, writes: &mut Arrays, effort: &mut Effort) -> bool {
     match pass {
         "raycast_volume" => {

@@ -9,8 +9,8 @@ use crate::scene::Mode;
 const GAUSS_4: [[f64; 2]; 2] =
     [[0.339_981_043_584_856_26, 0.652_145_154_862_546_1], [0.861_136_311_594_052_6, 0.347_854_845_137_453_85]];
 
-/// The value that a projection keeps of a ray, clamped to 0..1; none if the ray meets nothing. `mode`: the largest value unless it is
-/// the smallest (MinIP) or the mean over the length inside the insonified region.
+/// The value of a ray in a projection, clamped to 0..1. None if the ray meets nothing. `mode`: MinIP takes the smallest value, the mean is
+/// taken over the length inside the insonified region, all other modes take the largest value.
 pub fn projected(segments: &[Segment], mode: Mode) -> Option<f64> {
     if segments.is_empty() {
         return None;

@@ -21,20 +21,20 @@ use crate::scene::{Detector, Edge, EdgeName, Place, Scene, Sign};
 /// Share of the largest difference below which an edge has been followed.
 const FOLLOW_LEVEL: f64 = 0.7;
 
-/// A surface on a ray.
+/// A surface that was found on a ray.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Found {
-    /// mm along the line.
+    /// Position of the surface, mm along the line.
     pub place: f64,
     /// Mean field over an edge's length behind the largest difference.
     pub echo: f64,
-    /// Mean field over the depth that skin shading asks for, 0 where nothing is.
+    /// Mean field over the depth of skin shading behind the surface. 0 outside the insonified region.
     pub behind: f64,
-    /// Estimated error of the place, mm: what the error of the difference makes of its crossing or of its summit.
+    /// Estimated error of the position, mm: the effect of the error of the difference on its crossing or its maximum.
     pub off: f64,
 }
 
-/// Why the scene's detector has no form without samples, and what to set instead; none if it has one.
+/// Why the scene's detector has no definition without samples, and what to set instead. None if it has one.
 pub fn fault(scene: &Scene) -> Option<&'static str> {
     let surface = &scene.settings.surface;
     match surface {

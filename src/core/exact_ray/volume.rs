@@ -25,9 +25,9 @@ use crate::scene::{Scene, Shading, TransferPoint};
 pub struct Light {
     /// Red, green, blue, opacity.
     pub rgba: [f64; 4],
-    /// mm along the ray to where the opacity reaches `volume.hit`.
+    /// Distance along the ray at which the opacity reaches `volume.hit`, mm. None if it does not.
     pub hit: Option<f64>,
-    /// Sum of the differences of the rules of 7 and 15 nodes: an estimate of the error of each channel, usually far too large.
+    /// Sum of the differences between the rules of 7 and 15 nodes: an estimate of the error of each channel, usually much too large.
     pub estimate: f64,
     /// Pieces that were integrated.
     pub pieces: u64,
@@ -44,7 +44,7 @@ struct Linear {
     transparent: bool,
 }
 
-/// What the values along a ray look like.
+/// Colour and absorption along rays as a function of the field.
 #[derive(Clone, Debug)]
 pub struct Medium<'a> {
     /// Values at which colour or opacity have a kink or a step, in rising order.

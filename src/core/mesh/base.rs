@@ -1,9 +1,9 @@
-//! A solid to print: all that lies behind the surface, as the probe sees it, is filled down to a flat base.
+//! Fills a surface to a solid that can be printed: everything behind the surface, as seen from the probe, down to a flat base.
 //!
 //! Rows of a slice run into the body. In each column the first crossing of the threshold stays where it is, and from there on everything is
 //! inside, up to one plane for all columns. A column that crosses nowhere stays empty.
 
-/// Fills slices. They are read twice: first to find how deep the surface lies, then to be filled.
+/// Fills slices in two readings: the first finds the depth of the surface, the second fills.
 #[derive(Clone, Debug)]
 pub struct Base {
     width: usize,
@@ -18,7 +18,7 @@ impl Base {
         Base { width, threshold, deepest: None }
     }
 
-    /// Takes in a slice of the first reading.
+    /// Takes a slice in the first reading.
     pub fn survey(&mut self, slice: &[f64]) {
         for column in 0..self.width {
             let mut values = slice.iter().skip(column).step_by(self.width);
@@ -26,12 +26,12 @@ impl Base {
         }
     }
 
-    /// The deepest row at which a column is inside for the first time. None if nothing is inside.
+    /// The deepest row at which a column enters the body. None if no column does.
     pub fn deepest(&self) -> Option<usize> {
         self.deepest
     }
 
-    /// Fills `out`, which has rows below the deepest place, from a slice. NaN where nothing is known and nothing is filled.
+    /// Fills `out`, which also has the rows below the deepest position, from a slice. NaN where nothing is known and nothing is filled.
     pub fn fill(&self, slice: &[f64], out: &mut [f64]) {
         for column in 0..self.width {
             let mut values = slice.iter().skip(column).step_by(self.width);

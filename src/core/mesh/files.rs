@@ -1,4 +1,4 @@
-//! Files of meshes: binary STL, binary little-endian PLY, and GLB (glTF 2.0). A file is whole or does not exist.
+//! Files of meshes: binary STL, binary little-endian PLY, and GLB (glTF 2.0). A file is complete or absent.
 
 use super::Mesh;
 use crate::files::{InputError, Unfinished};
@@ -21,9 +21,9 @@ pub enum MeshFile {
 /// Colours of vertices, sRGB.
 #[derive(Clone, Copy, Debug)]
 pub enum Colours<'a> {
-    /// One for all, to be lit by who shows the mesh.
+    /// One colour for all vertices, without light.
     One([u8; 3]),
-    /// By vertex, those of a picture: lit already.
+    /// A colour for each vertex, from a picture that already contains the light.
     OfPicture(&'a [[u8; 3]]),
 }
 

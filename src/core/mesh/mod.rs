@@ -21,7 +21,8 @@ pub struct Mesh {
     pub vertices: Vec<DVec3>,
     /// Indices of vertices; anticlockwise as seen from outside, where the values are below the threshold.
     pub triangles: Vec<[u32; 3]>,
-    /// Lattice edges through which the surface goes on where no triangle is: at the border of what is known. 0 for a closed surface.
+    /// Number of lattice edges at which the surface continues without a triangle, at the border of the known values. 0 for a closed
+    /// surface.
     pub open_edges: u64,
 }
 

@@ -22,9 +22,10 @@ const LAYERS_AHEAD: usize = 2;
 /// The surface to find.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Surface {
-    /// Values from here on are inside.
+    /// Values of at least this are inside.
     pub threshold: f64,
-    /// Closes the surface at the border of the lattice and of what is known, half a voxel outside of the last one. Otherwise it ends there.
+    /// True: close the surface at the border of the lattice and of the known values, half a voxel outside of the last voxel. False: the
+    /// surface ends there.
     pub closed: bool,
 }
 

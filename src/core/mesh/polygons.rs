@@ -1,5 +1,5 @@
-//! From the crossed cells of a lattice to a mesh: which vertices there are, and the polygons between them. Signs decide both. Where a vertex lies is
-//! asked for.
+//! Builds a mesh from the crossed cells of a lattice: its vertices and the polygons between them. Both follow from signs alone. The caller
+//! computes the positions of the vertices.
 //!
 //! Only crossed cells are kept, of two layers. Layers, cells and vertices are in the order of the lattice: the same values make the same file.
 
@@ -88,7 +88,7 @@ impl<P: Fn(DVec3) -> DVec3> Builder<P> {
     /// Takes the crossed cells of the next layer, in order. `offset`: of a vertex from the first corner of its cell, voxels.
     ///
     /// # Errors
-    /// In words, more triangles than are made.
+    /// One line: more triangles than are made.
     pub fn take(&mut self, cells: Vec<Cell>, offset: impl Fn(&Vertex) -> DVec3) -> Result<(), String> {
         let (z, begin) = (self.taken, self.mesh.vertices.len());
         // Those of the layer before are still needed.

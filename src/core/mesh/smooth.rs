@@ -1,4 +1,4 @@
-//! A Gaussian over the slices of a lattice as they come: normalized convolution, which leaves out what is not known.
+//! A Gaussian filter over the slices of a lattice in their order, as a normalized convolution that leaves out unknown values.
 
 use rayon::prelude::*;
 use std::collections::VecDeque;
@@ -30,8 +30,8 @@ impl Smoother {
         Smoother { width: size[0], kernels, depth: size[2], slices: VecDeque::new(), first: 0 }
     }
 
-    /// Fills a slice. Slices are asked for in order. `raw` fills one that is not smoothed, NaN where nothing is known; what is not known
-    /// stays so.
+    /// Fills a slice with smoothed values. Slices are requested in order. `raw` fills one with unsmoothed values, NaN where they are not
+    /// known. Unknown values stay unknown.
     pub fn slice(&mut self, z: usize, out: &mut [f64], raw: impl Fn(usize, &mut [f64])) {
         let reach = self.kernels[2].len() - 1;
         let (from, to) = (z.saturating_sub(reach), (z + reach).min(self.depth.saturating_sub(1)));

@@ -1,6 +1,6 @@
-//! What a pass does at its place in [`PASSES`]: the slots that it reads and writes as a link of a filter chain, and the part of
-//! a slice that it makes. Between the first and the last slot of a chain its filters alternate between two spare slots. A
-//! filter that is not needed leaves no copy behind.
+//! What follows from the place of a pass in [`PASSES`]: the slots that it reads and writes as a link of a filter chain, and the part of a
+//! slice that it computes. Between the first and the last slot of a chain its filters alternate between two spare slots. A filter that is
+//! not needed leaves no copy behind.
 
 use super::PASSES;
 use super::pass::{
@@ -90,18 +90,18 @@ impl Chain {
     }
 }
 
-/// The distance map after its filters.
+/// The slot of the distance map after its filters.
 pub fn distance_end(scene: &Scene) -> Slot {
     Chain::Distances.end(scene)
 }
 
-/// The picture after its filters.
+/// The slot of the picture after its filters.
 pub fn picture_end(scene: &Scene) -> Slot {
     Chain::Pictures.end(scene)
 }
 
-/// The slot that frames are copied into as they arrive, if nothing is done to them: the chain of slices is one link that would store
-/// what it reads without loss, and nothing else reads them.
+/// The slot that frames are copied into as they arrive, if no pass changes them: the only link of the chain of slices would store its input
+/// without loss, and no other pass reads the frames.
 pub fn copied(scene: &Scene) -> Option<Slot> {
     if scene.has_sections() {
         return None;
@@ -160,7 +160,8 @@ impl Pass {
         (self.shader)(scene, &Dispatch::new(args, self.link_slots(scene, args)))
     }
 
-    /// Structure of a dispatch: specialization constants by name; of slices on their way to the volume, with whether they go to layers.
+    /// Specialization constants of a dispatch, by name. For passes on slices before the volume they include whether the slices go to
+    /// layers.
     pub fn constants(&self, scene: &Scene, args: &DispatchArgs) -> Vec<(&'static str, i32)> {
         let mut constants = (self.constants)(scene, &Dispatch::new(args, self.link_slots(scene, args)));
         let is_of_frames = match self.link {
@@ -175,12 +176,12 @@ impl Pass {
         constants
     }
 
-    /// What a dispatch reads, by the names that the shader gives it.
+    /// The slots that a dispatch reads, by their names in the shader.
     pub fn reads(&self, scene: &Scene, args: &DispatchArgs) -> Vec<Bind> {
         (self.reads)(scene, &Dispatch::new(args, self.link_slots(scene, args)))
     }
 
-    /// What a dispatch writes, by the names that the shader gives it.
+    /// The slots that a dispatch writes, by their names in the shader.
     pub fn writes(&self, scene: &Scene, args: &DispatchArgs) -> Vec<Bind> {
         (self.writes)(scene, &Dispatch::new(args, self.link_slots(scene, args)))
     }
@@ -225,8 +226,9 @@ impl Pass {
         if self.frequency == Frequency::Volume { scene.slices() } else { 1 }
     }
 
-    /// What a pass over slices has to make of each: what is visible, and as far around it as the filters after it look. None for
-    /// passes that make all of their extent: lines of a frame, and the rows and columns of AOS, where each texel depends on all.
+    /// The part of each slice that a pass over slices has to compute: the visible part, and as much around it as the later filters read.
+    /// None for passes that compute all of their extent: lines of a frame, and the rows and columns of AOS, where each texel depends on
+    /// all.
     pub fn rectangle(&self, scene: &Scene, args: &DispatchArgs) -> Option<Rectangle> {
         let all = Rectangle { first: [0; 2], size: scene.grid.size };
         let mut around = [0, 0];
@@ -253,7 +255,7 @@ impl Pass {
         Some(scene.visible_rectangle(around))
     }
 
-    /// Invocations of a dispatch; of a slice only what is visible.
+    /// Invocations of a dispatch. For slices only the visible part counts.
     pub fn invocations(&self, scene: &Scene, args: &DispatchArgs) -> [u32; 3] {
         let extent = (self.extent)(scene, args);
         let Some(visible) = self.rectangle(scene, args) else { return extent };

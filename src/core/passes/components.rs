@@ -1,10 +1,10 @@
-//! Connected components of a volume: which of its texels float, in parts below a size. Integers throughout, so that the result is exact and does
-//! not depend on an order. Runs of set texels along the rows are joined by union-find (Tarjan 1975, path halving): its root is always the first
-//! run of a part.
+//! Connected components of a volume: which of its texels belong to parts below a size. All values are integers, so that the result is exact
+//! and does not depend on an order. Runs of set texels along the rows are joined by union-find (Tarjan 1975, path halving). The root of a
+//! part is always its first run.
 
 use std::ops::Range;
 
-/// The texels that belong together, and the size of each.
+/// A lattice of texels, which texels of it are connected, and the size of each texel.
 pub struct Lattice<'a> {
     /// Columns, rows, slices.
     pub size: [usize; 3],
@@ -30,7 +30,7 @@ pub struct Parts {
 }
 
 impl Lattice<'_> {
-    /// By texel, the column fastest: true in a part whose size is below `least`. `is_set` holds for the texels of parts.
+    /// True for each texel, the column fastest, of a part whose size is below `least`. `is_set` holds for the texels of parts.
     pub fn floating(&self, is_set: impl Fn(usize) -> bool, least: u64) -> Vec<bool> {
         let [columns, rows, slices] = self.size;
         let parts = self.parts(is_set);
@@ -86,7 +86,7 @@ impl Lattice<'_> {
 }
 
 impl Parts {
-    /// By texel: the part that it belongs to, in the order of their first texels from 1 on; 0 in none.
+    /// The part of each texel: parts are numbered from 1 in the order of their first texels. 0 for texels of no part.
     pub fn numbers(&self, texels: usize) -> Vec<u32> {
         let mut numbers = vec![0; texels];
         let (mut of_root, mut count) = (vec![0; self.runs.len()], 0);

@@ -1,18 +1,18 @@
-//! The device's limits for every pass: how fast it samples, fetches and copies without computing. These passes are in no plan;
-//! `profile` runs each alone and compares the other passes with them.
+//! Passes that measure the limits of a device: how fast it samples, fetches and copies without computing. No plan has them. `profile` runs
+//! each alone and compares the other passes with them.
 
 use super::pass::*;
 use crate::probe::StoredType;
 use crate::probe::{Geometry, Grid};
 use crate::scene::{Input, Scene, SceneError, Settings};
 
-/// Samples of each invocation.
+/// Samples that each invocation takes.
 pub const SAMPLES: u32 = 256;
 
-/// Measured in this order.
+/// The measured passes, in this order.
 pub const MEASURES: &[Pass] = &[FILTERED, EIGHT_FETCHES, ONE_FETCH, COPY];
 
-/// The device's own trilinear filter.
+/// Samples through the device's trilinear filter.
 pub const FILTERED: Pass = Pass {
     name: "measure_filtered",
     stage: Stage::Raycast,
@@ -37,7 +37,7 @@ pub const FILTERED: Pass = Pass {
     },
 };
 
-/// Trilinear interpolation of our own: eight texels, fetched or loaded as the device reads them fastest.
+/// Trilinear interpolation in the shader: eight texels, fetched or loaded in the way that is fastest on the device.
 pub const EIGHT_FETCHES: Pass = Pass {
     name: "measure_eight_fetches",
     reads: |_, _| vec![whole("volume", Slot::Volume)],
@@ -58,7 +58,7 @@ pub const ONE_FETCH: Pass = Pass {
     ..FILTERED
 };
 
-/// 8 bytes a pixel read and written.
+/// Reads and writes 8 bytes a pixel.
 pub const COPY: Pass = Pass {
     name: "measure_copy",
     shader: |_, _| "measure/copy",
@@ -73,7 +73,7 @@ pub const COPY: Pass = Pass {
     ..FILTERED
 };
 
-/// One sample for each texel of the output, at [`sample_position`]: to judge a device's filter. No profile times it.
+/// Takes one sample for each texel of the output, at [`sample_position`], to test a device's filter. No profile measures it.
 pub const POSITIONS: Pass = Pass {
     name: "measure_positions",
     shader: |_, _| "measure/positions",
@@ -93,8 +93,8 @@ pub const POSITIONS: Pass = Pass {
     ..FILTERED
 };
 
-/// Where [`POSITIONS`] samples for a texel of its output of this size: shares of the volume's size, from an eighth before its border to an
-/// eighth behind it. The same as in glsl/measure/positions.comp.
+/// The position at which [`POSITIONS`] samples for a texel of its output of this size: a share of the volume's size, from an eighth before
+/// its border to an eighth behind it. It is the same as in glsl/measure/positions.comp.
 pub fn sample_position(texel: [usize; 2], size: [usize; 2]) -> [f64; 3] {
     let turn = (13 * texel[0] + 29 * texel[1]) % 61;
     let across = |axis: usize| (texel[axis] as f64 + 0.5) / size[axis] as f64;

@@ -16,7 +16,7 @@ pub struct InjectedFault {
     pub change: Change,
 }
 
-/// What is changed. A pass name means all passes whose names begin with it.
+/// The data that a fault changes. A pass name applies to all passes whose names begin with it.
 #[derive(Clone, Copy)]
 pub enum Change {
     /// Numbers of a dispatch.
@@ -27,7 +27,7 @@ pub enum Change {
     Shader { pass: &'static str, by: fn(&[u32]) -> Result<Vec<u32>, SpirvError> },
     /// Arguments of a dispatch.
     DispatchArgs { pass: &'static str, by: fn(&Scene, &mut DispatchArgs) },
-    /// A dispatch that never runs: its outputs keep their old content.
+    /// A dispatch that is left out: its outputs keep their old content.
     LeftOut { pass: &'static str, which: fn(&Scene, &DispatchArgs) -> bool },
     /// Invocations of a dispatch.
     Extent { pass: &'static str, by: fn(&mut [u32; 3]) },
@@ -37,10 +37,10 @@ pub enum Change {
     Frame(fn([usize; 3], &mut [u8])),
     /// The sampler takes the nearest texel.
     Nearest,
-    /// One instruction of a class in every shader of the pass that has one, which the compiler translates wrongly: at this share (0 to 1) of those there
-    /// are.
+    /// In every shader of the pass, one instruction of a class is changed as if the compiler had translated it wrongly. `share` (0 to 1)
+    /// chooses which one.
     Mutant { pass: &'static str, mutation: &'static Mutation, share: f32 },
-    /// A command that the driver carries out wrongly.
+    /// A Vulkan command that the driver executes wrongly.
     Command(Command),
 }
 
@@ -79,7 +79,7 @@ impl Change {
     }
 
     /// # Errors
-    /// A module that breaks the format, or has not what is to be changed.
+    /// A module that breaks the format, or does not have the instruction or name to change.
     pub fn words(&self, pass: &str, words: &mut Vec<u32>) -> Result<bool, SpirvError> {
         match self {
             Change::Shader { pass: name, by } if pass.starts_with(name) => {

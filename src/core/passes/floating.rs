@@ -64,8 +64,8 @@ fn lowered(scene: &Scene) -> f64 {
     (level(scene) - MARGIN).max(0.0)
 }
 
-/// What [`Slot::Floating`] holds for a volume: 255 in parts that float. `bytes` are its texels in the format of [`Slot::WholeVolume`], which
-/// is stored whole.
+/// Finds the texels of floating parts: the content of [`Slot::Floating`] for a volume, 255 in such parts. `bytes` are the texels in the
+/// format of [`Slot::WholeVolume`], which is stored completely.
 pub fn find(scene: &Scene, bytes: &[u8]) -> Vec<u8> {
     /// Texels that are decoded at a time.
     const CHUNK: usize = 1 << 16;
@@ -82,7 +82,7 @@ pub fn find(scene: &Scene, bytes: &[u8]) -> Vec<u8> {
     floats.into_iter().map(|floats| if floats { 255 } else { 0 }).collect()
 }
 
-/// The same in f64, by filling every part from a texel of it.
+/// The same in f64, by flood fill from a texel of each part.
 pub fn reference(scene: &Scene, volume: &Texels) -> Texels {
     let [columns, rows, slices] = volume.size;
     let (level, reach, sizes) = (level(scene), scene.part_reach() as i64, scene.texel_sizes());

@@ -51,8 +51,8 @@ const OPTIONAL: [&str; 37] = [
     "volume_layer",
 ];
 
-/// A pass's shader as this scene needs it: without the textures and tables that the scene does not have, and with an array of layers
-/// for each volume that is one.
+/// Rewrites a pass's shader for a scene: without the textures and tables that the scene does not have, and with an array of layers for each
+/// volume that is one.
 ///
 /// # Errors
 /// A module that breaks the format.
@@ -64,8 +64,8 @@ pub fn for_scene(pass: &Pass, scene: &Scene, args: &DispatchArgs, words: &[u32])
     volumes_to_layers(&words, &layered).map_err(|e| e.to_string())
 }
 
-/// A pass's shader as a CPU runs it fastest: its numbers loaded once, what it only fetches texels of as storage images, and its
-/// tables as storage texel buffers, where `stores` says that the slot can be one.
+/// Rewrites a pass's shader for fast execution on a CPU: numbers are loaded once, textures that it only fetches become storage images, and
+/// tables become storage texel buffers where `stores` allows it.
 ///
 /// # Errors
 /// A module that breaks the format.
@@ -113,7 +113,7 @@ fn image_format(format: Format) -> Option<ImageFormat> {
     })
 }
 
-/// The first disagreement, naming both sides.
+/// Checks a pass's declaration. The error is the first disagreement and names both sides.
 pub fn check(pass: &Pass, scene: &Scene, args: &DispatchArgs, module: &Module) -> Result<(), String> {
     let (reads, writes) = (pass.reads(scene, args), pass.writes(scene, args));
     for bind in &reads {
@@ -212,7 +212,7 @@ fn type_name(member: &Member) -> String {
     if member.components == 1 { scalar.into() } else { format!("{scalar} x {}", member.components) }
 }
 
-/// The parameter block as the shader lays it out.
+/// Packs the parameters into the block that the shader declares.
 pub fn pack(module: &Module, params: &Params) -> Vec<u8> {
     let mut block = vec![0; module.params_size as usize];
     for member in &module.params {

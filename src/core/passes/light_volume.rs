@@ -1,5 +1,5 @@
-//! The light volume: a lattice of cells over the region in which light is absorbed by what the transfer function makes opaque, spreads, and is
-//! scattered on (half angle slicing, Kniss et al. 2003; extinction pyramids, Schlegel, Makhinya and Pajarola 2011). It does not depend on the
+//! The light volume: a lattice of cells over the region. In it light is absorbed by the opacity of the transfer function, widens, and is
+//! scattered (half angle slicing, Kniss et al. 2003; extinction pyramids, Schlegel, Makhinya and Pajarola 2011). It does not depend on the
 //! view unless the light follows the camera. Volume rendering takes the light of each sample from it.
 
 use super::raycast::ray;
@@ -170,7 +170,8 @@ fn level(n: u32) -> Slot {
     }
 }
 
-/// The least edge of a cell at which the light is the one that is asked for, mm: in smaller ones kernels and cones would be wider than they can be.
+/// Smallest edge of a cell, mm, at which the light is the requested one. In smaller cells kernels and cones would have to be wider than
+/// they can be.
 pub fn least_cell(scene: &Scene) -> f64 {
     let light = light_of(scene);
     let scattered = light.scatter_deviations().into_iter().fold(0.0, f64::max) / MAX_SCATTER;
@@ -587,7 +588,7 @@ fn cones() -> [DVec3; 7] {
     })
 }
 
-/// What leaves each cell, and its orientation.
+/// The light that leaves each cell, and the orientation of the cell.
 pub const SHADE: Pass = Pass {
     name: "light_shade",
     shader: |_, _| "light_volume/shade",
@@ -750,7 +751,7 @@ pub(super) fn developed(scene: &Scene, is_alone: bool, rgba: [f64; 4], at: [f64;
     }
 }
 
-/// What a ray through a place of the picture, rays from its corner, shows where it meets no matter: none without a ground.
+/// Colour of a ray that meets no matter, through a position of the picture in rays from its corner. None without a ground.
 pub fn bare_ground(scene: &Scene, at: [f64; 2]) -> Option<[f64; 3]> {
     let is_alone = scene.settings.mode == Mode::Volume && !scene.lights_volume() && scene.still().is_none();
     ground_of(scene, is_alone)?;
@@ -800,7 +801,7 @@ impl<'a> Lit<'a> {
         })
     }
 
-    /// Light that white matter at a place scatters along a unit direction, without a highlight.
+    /// Light that white matter at a position scatters along a unit direction, without a highlight.
     pub fn scattered(&self, place: DVec3, along: DVec3) -> [f64; 3] {
         let cells = (place - self.lattice.low) / self.lattice.cell - 0.5;
         let at = clamped(cells.to_array(), self.shade);
@@ -813,7 +814,7 @@ impl<'a> Lit<'a> {
         std::array::from_fn(|c| shade[c] + shade[3] * SHEEN * grazing.powi(3))
     }
 
-    /// The light of matter of this colour at a place in space that is seen along a unit direction.
+    /// Light of matter of this colour at a position in space, seen along a unit direction.
     pub fn light(&self, scene: &Scene, albedo: [f64; 3], place: DVec3, along: DVec3) -> [f64; 3] {
         let cells = (place - self.lattice.low) / self.lattice.cell - 0.5;
         let at = clamped(cells.to_array(), self.shade);

@@ -130,16 +130,16 @@ pub const PASSES: &[Pass] = &[
     postprocess::TONE,
 ];
 
-/// Something that took time, on the clock of the run: ns since it began.
+/// A measured interval, ns since the begin of the run.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Span {
     pub name: &'static str,
     pub on_device: bool,
     pub begin: f64,
     pub end: f64,
-    /// How many runs it counts as: one for each frame of a batch.
+    /// Number of runs that it counts as: one for each frame of a batch.
     pub runs: u32,
-    /// Shader invocations that the device counted, where it does.
+    /// Number of shader invocations. None if the device does not count them.
     pub invocations: Option<u64>,
 }
 

@@ -8,7 +8,7 @@ use crate::scene::Scene;
 use glam::DVec3;
 use std::ops::Deref;
 
-/// A distance that hit nothing: the largest finite float, so that no shader has to keep infinities.
+/// The distance of a ray that hit nothing: the largest finite float, so that shaders need no infinities.
 pub const MISS: f64 = f32::MAX as f64;
 
 pub fn is_hit(distance: f64) -> bool {
@@ -37,11 +37,11 @@ impl Stage {
 /// How often a pass runs.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Frequency {
-    /// For each frame that arrives.
+    /// Once for each frame.
     Frame,
-    /// For a volume whose frames have all arrived.
+    /// Once for each complete volume.
     Volume,
-    /// For each picture.
+    /// Once for each picture.
     Picture,
 }
 
@@ -50,13 +50,13 @@ pub enum Frequency {
 pub struct DispatchArgs {
     /// Layer of the frame array that holds the first frame.
     pub layer: u32,
-    /// The first slice that it writes, of frames the one that the first frame becomes.
+    /// The first slice that the dispatch writes. For a pass over frames it is the slice of the first frame.
     pub slice: u32,
-    /// Slices that it writes: of a pass over frames, the number of frames.
+    /// Number of slices that the dispatch writes. For a pass over frames it is the number of frames.
     pub slices: u32,
-    /// 0.. of a pass that repeats.
+    /// Number of the dispatch, from 0, within a pass that repeats.
     pub iteration: u32,
-    /// Which copy of the multi-buffered slots it uses.
+    /// Index of the copy of multi-buffered slots that the dispatch uses.
     pub image: u32,
 }
 
@@ -125,7 +125,8 @@ pub enum Part {
     Layers,
     /// The dispatch's slices of a 3D texture, and that many more on either side.
     Around(u32),
-    /// All of it: the first three texels are the workgroups along x, y and z that the dispatch has. The device reads them when it gets there.
+    /// All of it. The first three texels are the number of workgroups along x, y and z. The device reads them when it executes the
+    /// dispatch.
     Groups,
 }
 
@@ -135,7 +136,7 @@ pub struct Bind {
     pub name: &'static str,
     pub slot: Slot,
     pub part: Part,
-    /// Samples are taken of it through the device's linear filter; otherwise only texels are fetched.
+    /// True if the device's linear filter samples the slot. Otherwise the shader only fetches texels.
     pub filtered: bool,
 }
 
@@ -167,7 +168,7 @@ pub(super) fn writes_target(_: &Scene, dispatch: &Dispatch) -> Vec<Bind> {
     vec![slices("target", dispatch.target())]
 }
 
-/// A sequence of filters, each of which reads what the one before it wrote. Their order is that of [`PASSES`](super::PASSES).
+/// A sequence of filters. Each reads the output of the one before it. Their order is that of [`PASSES`](super::PASSES).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Chain {
     /// The slices of stage 1, from the frame to the 3D texture.
@@ -200,11 +201,11 @@ pub(super) fn of_sections(scene: &Scene, need: Need) -> Need {
 /// How a pass takes part in a filter chain. Its slots and the part of a slice that it makes follow from this.
 #[derive(Clone, Copy)]
 pub enum Link {
-    /// Not at all: the pass names its own slots and makes all of its extent.
+    /// It takes no part: the pass names its own slots and computes all of its extent.
     None,
-    /// Filters what the link before it left.
+    /// It filters the output of the link before it.
     Filter(Filter),
-    /// Reads what the chain holds at this place of `PASSES` and passes nothing on: the end of the chain for a pass after it.
+    /// It reads the state of the chain at this place of `PASSES` and passes nothing on. A pass after the chain reads its end.
     Observer(Chain),
     /// Reads the slices of the volume after their chain, and makes the visible part of each.
     AfterSlices,
@@ -214,21 +215,21 @@ pub enum Link {
 #[derive(Clone, Copy)]
 pub struct Filter {
     pub chain: Chain,
-    /// Dispatches that make one step; what they leave between them stays within the pass.
+    /// Number of dispatches of one step. Their intermediate results stay within the pass.
     pub dispatches: fn(&Scene) -> u32,
-    /// How many columns and rows away one step on slices looks; none: from border to border. Filters before it make that much
-    /// more than is visible.
+    /// How many columns and rows around a texel one step on slices reads. None: from border to border. Filters before it compute this much
+    /// more than the visible part.
     pub reach: fn(&Scene) -> Option<[u32; 2]>,
     /// Adjacent texels that an invocation makes, along an axis that the pass's extent shortens.
     pub run: u32,
-    /// True if a step would store what it reads without loss: alone in its chain it is left out, and frames are copied.
+    /// True if a step would store its input without loss. Alone in its chain such a step is left out, and frames are copied.
     pub copies: fn(&Scene) -> bool,
-    /// True if the next filter could as well read what a step reads: before another filter the step is left out.
+    /// True if the next filter could read the input of a step instead of its output. Before another filter such a step is left out.
     pub is_identity: fn(&Scene) -> bool,
 }
 
 impl Filter {
-    /// A filter of that chain that reads one texel and takes one dispatch per step.
+    /// A filter of that chain that reads one texel and takes one dispatch a step.
     pub const fn of(chain: Chain) -> Filter {
         Filter { chain, dispatches: once, reach: |_| Some([0; 2]), run: RUN, copies: |_| false, is_identity: |_| false }
     }
@@ -239,7 +240,7 @@ impl Filter {
     }
 }
 
-/// Whether a scene needs a pass, and why (or why not), for `--explain`.
+/// Whether a scene needs a pass, with the reason, for `--explain`.
 pub type Need = Result<&'static str, &'static str>;
 
 /// Largest error against the reference on the test inputs.
@@ -247,20 +248,20 @@ pub type Need = Result<&'static str, &'static str>;
 pub struct Tolerance {
     /// Absolute, in the units of the output.
     pub absolute: f64,
-    /// Relative to the expected value; the larger of the two holds.
+    /// Relative to the expected value. The larger of the two tolerances applies.
     pub relative: f64,
-    /// Share of texels that may be further off, where a branch flips.
+    /// Share of texels whose error may be larger, because a branch may take the other side.
     pub outliers: f64,
     pub why: &'static str,
 }
 
-/// One compute dispatch: the only place where it is described. Callers use the methods of the fields' names.
+/// One compute dispatch. This is the only place where it is described. Callers use the methods with the names of the fields.
 pub struct Pass {
     /// Debug label, time stamp and test case; unique.
     pub name: &'static str,
     pub stage: Stage,
     pub frequency: Frequency,
-    /// Part in a filter chain.
+    /// The pass's part in a filter chain.
     pub link: Link,
     /// Path below glsl/ and variant.
     pub shader: fn(&Scene, &Dispatch) -> &'static str,
@@ -271,13 +272,13 @@ pub struct Pass {
     pub extent: fn(&Scene, &DispatchArgs) -> [u32; 3],
     /// Dispatches in a row, with [`DispatchArgs::iteration`] counting.
     pub repeat: fn(&Scene) -> u32,
-    /// Numbers: they change from picture to picture and compile nothing.
+    /// The numbers of a dispatch. They change from picture to picture without compiling anything.
     pub params: fn(&Scene, &DispatchArgs) -> Params,
-    /// Structure: a change of it is another pipeline.
+    /// Specialization constants: the structure of a dispatch. Another value is another pipeline.
     pub constants: fn(&Scene, &Dispatch) -> Vec<(&'static str, i32)>,
     pub tolerance: Tolerance,
-    /// The same from the formula, in f64. Reads arrays by the shader's names; texels it leaves NaN stay untouched. Of a pass over
-    /// frames it is called for each frame, with that frame's layer of every array of layers.
+    /// The same result computed from the formula in f64. It reads arrays by the shader's names. Texels that it leaves NaN stay untouched.
+    /// For a pass over frames it is called for each frame, with that frame's layer of every array of layers.
     pub reference: fn(&Scene, &Dispatch, &Arrays, &mut Arrays),
 }
 
@@ -309,7 +310,7 @@ pub(super) fn rendering_extent(scene: &Scene, _: &DispatchArgs) -> [u32; 3] {
     [scene.rendering_size()[0], scene.rendering_size()[1], 1]
 }
 
-/// Neighbours that one invocation of some filters makes, because their windows share most texels: RUN of glsl/filter.
+/// Number of adjacent texels that one invocation of some filters computes, because their windows share most texels: RUN of glsl/filter.
 pub const RUN: u32 = 4;
 
 /// Invocations that make so many texels in runs along an axis.
@@ -317,7 +318,7 @@ pub(crate) fn in_runs(texels: [u32; 3], axis: usize) -> [u32; 3] {
     in_runs_of(RUN, texels, axis)
 }
 
-/// The same in runs of another length.
+/// Number of invocations that compute these texels in runs of this length along an axis.
 pub fn in_runs_of(run: u32, mut texels: [u32; 3], axis: usize) -> [u32; 3] {
     texels[axis] = texels[axis].div_ceil(run);
     texels
@@ -359,7 +360,7 @@ fn finite(value: f64) -> f32 {
 }
 
 impl Params {
-    /// Clamped to what is finite: shaders need not keep infinities.
+    /// Adds a number, clamped to finite values, so that shaders need no infinities.
     pub fn f32(mut self, name: &'static str, value: f64) -> Params {
         self.0.push((name, Value::F32(finite(value))));
         self

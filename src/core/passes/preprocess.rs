@@ -243,7 +243,7 @@ fn load_params(scene: &Scene, args: &DispatchArgs) -> Params {
     Params::default().f32("gain", gain).f32("offset", offset).i32("slice", args.slice)
 }
 
-/// Every texel of a slice together with its neighbours one column and one row on. An interpolated sample then takes two loads, one per
+/// Stores every texel of a slice together with its neighbours one column and one row on. An interpolated sample then takes two loads, one a
 /// slice. This needs four times the volume's memory, and one more pass over every new slice.
 pub const PACKED_NEIGHBOURS: Pass = Pass {
     name: "packed_neighbours",

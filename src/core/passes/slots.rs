@@ -8,19 +8,19 @@ use crate::probe::StoredType;
 use crate::scene::planes::{TILE_VECTORS, cell};
 use crate::scene::{Propagation, Scene, SurfaceColour, VolumeFormat, WindowTexels};
 
-/// Batches of frames that may be in flight at once: entries of the staging ring. The frame array has layers for each.
+/// Largest number of batches of frames in flight: entries of the staging ring. The frame array has layers for each.
 pub const BATCHES_IN_FLIGHT: u32 = 4;
 
 /// Most frames that go through stage 1 at once. Submitting a batch of so many costs little more than a single frame.
 const MAX_FRAMES: u64 = 16;
 
-/// Maximum bytes of the samples of a batch, and of each slot between its filters, unless a single frame is larger: what stays in the caches of a
-/// CPU, and what takes a GPU several times longer than the host needs to submit it.
+/// Maximum bytes of the samples of a batch, and of each slot between its filters, unless a single frame is larger. This much stays in the
+/// caches of a CPU, and takes a GPU several times longer than the host needs to submit it.
 pub fn batch_bytes(scene: &Scene) -> u64 {
     if scene.is_for_cpu() { 4 << 20 } else { 16 << 20 }
 }
 
-/// Consecutive frames that go through stage 1 at once, each pass in one dispatch.
+/// Number of consecutive frames that go through stage 1 together, each pass in one dispatch.
 pub fn frames_per_batch(scene: &Scene) -> u32 {
     let bytes =
         |[width, height]: [u32; 2], format: Format| u64::from(width) * u64::from(height) * format.texel_bytes() as u64;
@@ -64,27 +64,27 @@ const COST: &str = "cost of a candidate above that of no surface";
 /// Of samples of the recording.
 const SHARE_OF_RANGE: &str = "share of the range of the recording's samples, 0..1, before the grey window";
 
-/// Who writes a slot first.
+/// The first writer of a slot.
 #[derive(Clone, Copy)]
 pub enum Initializer {
     ByPasses,
     ByFrames,
-    /// Made from the scene by the CPU, in f64, stored as f32.
+    /// The CPU computes the content from the scene in f64. It is stored as f32.
     ByScene(fn(&Scene) -> Vec<f32>),
-    /// Found by the CPU in a volume, when that is complete.
+    /// The CPU finds the content in a volume when the volume is complete.
     ByVolume(Search),
 }
 
-/// A search of the CPU in a volume.
+/// A search in a volume by the CPU.
 #[derive(Clone, Copy)]
 pub struct Search {
-    /// For the times of the host.
+    /// Name of the search in the times of the host.
     pub name: &'static str,
     /// The volume that is searched.
     pub within: Slot,
-    /// Gets its texels, in their format.
+    /// The search. It gets the texels of the volume, in their format.
     pub find: fn(&Scene, &[u8]) -> Found,
-    /// The same in f64, another way.
+    /// The same search in f64, by another method.
     pub reference: fn(&Scene, &Texels) -> Texels,
 }
 
@@ -92,7 +92,7 @@ pub struct Search {
 pub struct Found {
     /// Texels of the slot, in its format.
     pub texels: Vec<u8>,
-    /// Where rendering starts, if that was asked for.
+    /// Where rendering starts, if the search was for that.
     pub unveiled: Option<Unveiled>,
 }
 
@@ -488,7 +488,7 @@ fn frame_layers(scene: &Scene) -> Shape {
     Shape::Layers([width, height, BATCHES_IN_FLIGHT * frames_per_batch(scene)])
 }
 
-/// Of a frame array with so many layers, the layer behind those of the ring entry that holds `layer`.
+/// For a frame array with `layers` layers: the end of the ring entry that holds `layer`.
 pub fn ring_entry_end(layers: u32, layer: u32) -> u32 {
     let entry = (layers / BATCHES_IN_FLIGHT).max(1);
     layer - layer % entry + entry
@@ -590,7 +590,7 @@ impl Slot {
         &DESCRIPTORS[self as usize]
     }
 
-    /// How the CPU finds the content in a volume, where it does.
+    /// The CPU's search for the content of this slot. None if it has none.
     pub fn search(self) -> Option<Search> {
         match self.initializer() {
             Initializer::ByVolume(search) => Some(search),
@@ -602,7 +602,7 @@ impl Slot {
         self.descriptor().meaning
     }
 
-    /// Debug name; also the GLSL variable's unless a pass gives an alias.
+    /// Debug name. It is also the name of the GLSL variable unless a pass gives an alias.
     pub fn name(self) -> &'static str {
         self.descriptor().name
     }
@@ -629,12 +629,12 @@ impl Slot {
         self.descriptor().starts_clear
     }
 
-    /// True if different queues use it where the device has several.
+    /// True if several queues use it, on devices that have several.
     pub fn crosses_queues(self) -> bool {
         self.descriptor().crosses_queues
     }
 
-    /// True if the CPU makes the slot's content from the scene, or finds it in a volume, and makes it differently of these two.
+    /// True if the CPU makes the slot's content from the scene, or finds it in a volume, and the content differs between these two scenes.
     pub fn differs(self, old: &Scene, new: &Scene) -> bool {
         match (self.initializer(), self.descriptor().differs) {
             (Initializer::ByScene(make), ByContent) => make(old) != make(new),
@@ -648,20 +648,20 @@ impl Slot {
         matches!(self.shape(scene), Shape::Layers(_))
     }
 
-    /// True if the slot has a texel for each of the volume, of which the visible part is stored.
+    /// True if the slot has one texel for each texel of the volume. Only the visible part of it is stored.
     pub fn is_volume(self) -> bool {
         let of_rays =
             matches!(self, Slot::Volume | Slot::SharpVolume | Slot::WholeVolume | Slot::Floating | Slot::CutVolume);
         of_rays || matches!(self, Slot::SectionVolume | Slot::SharpSectionVolume)
     }
 
-    /// The volume that rays are cast through: without what is removed.
+    /// The volume through which rays are cast, without removed parts.
     pub fn of_rays(scene: &Scene) -> Slot {
         if scene.removes() { Slot::CutVolume } else { Slot::Volume }
     }
 
-    /// The volume that planes are cut from: their own beside a rendering if they have one, otherwise that of the rays, with what is dropped
-    /// for these alone.
+    /// The volume that planes are cut from: their own beside a rendering if they have one, otherwise the volume before cuts, with its
+    /// floating parts.
     pub fn of_planes(scene: &Scene) -> Slot {
         match (scene.has_sections(), scene.drops_floating()) {
             (true, _) => Slot::SectionVolume,
@@ -670,7 +670,7 @@ impl Slot {
         }
     }
 
-    /// The texel of the whole volume that the image begins with; 0 of a slot that is no part of it.
+    /// The texel of the whole volume at which the image begins. 0 for slots that are not part of a volume.
     pub fn first_texel(self, scene: &Scene) -> [u32; 3] {
         match self {
             Slot::PackedNeighbours => scene.stored_bounds().low,
@@ -679,7 +679,7 @@ impl Slot {
         }
     }
 
-    /// Size of the slot's array in references and in what is read back. Of the volume it is all of it, so that its indices are texel
+    /// Size of the slot's array in references and readbacks. For a volume it is the whole volume, so that its indices are texel
     /// coordinates.
     pub fn array_size(self, scene: &Scene) -> [usize; 3] {
         match self {

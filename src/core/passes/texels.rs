@@ -1,4 +1,4 @@
-//! Arrays of the f64 references.
+//! Arrays of texels for the f64 references.
 
 use super::slots::{Format, Slot};
 use crate::scene::Scene;
@@ -14,7 +14,7 @@ pub struct Texels {
 }
 
 impl Texels {
-    /// All values NaN: texels that a reference leaves NaN are not written by the pass either.
+    /// All values are NaN. Texels that a reference leaves NaN are not written by the pass either.
     pub fn untouched(size: [usize; 3], channels: usize) -> Texels {
         Texels { size, channels, values: vec![f64::NAN; size.iter().product::<usize>() * channels] }
     }
@@ -95,7 +95,7 @@ impl Texels {
         }
     }
 
-    /// The slot's array of which the device stores this part; `outside` is all of the rest.
+    /// The slot's array of which the device stores this part. The rest is `outside`.
     pub fn with_outside(self, slot: Slot, scene: &Scene, outside: f64) -> Texels {
         if self.size == slot.array_size(scene) {
             return self;
@@ -105,7 +105,7 @@ impl Texels {
         array
     }
 
-    /// First channel between texels, beyond the border that of the nearest.
+    /// First channel, interpolated between texels. Beyond the border the nearest texel counts.
     pub fn trilinear(&self, at: [f64; 3]) -> f64 {
         let low = at.map(f64::floor);
         let mut sum = 0.0;
@@ -123,7 +123,7 @@ impl Texels {
         sum
     }
 
-    /// Up to four channels between texels, all of which exist.
+    /// Up to four channels, interpolated between texels, all of which exist.
     pub fn interpolated(&self, at: [f64; 3]) -> [f64; 4] {
         let mut sum = [0.0; 4];
         for corner in 0..8 {
@@ -195,7 +195,7 @@ impl Texels {
         Texels { size, channels: format.channels(), values: in_order(format, &values).into_owned() }
     }
 
-    /// A value as the format stores it.
+    /// The value that the format stores for a value.
     pub fn stored(format: Format, value: f64) -> f64 {
         let one = Texels { size: [1; 3], channels: format.channels(), values: vec![value; format.channels()] };
         Texels::decode([1; 3], format, &one.encode(format)).values[0]

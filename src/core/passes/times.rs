@@ -8,9 +8,9 @@ use std::fmt::Write as _;
 #[derive(Clone, Debug, PartialEq)]
 pub struct PassTime {
     pub name: &'static str,
-    /// Of a batch of frames, one for each frame.
+    /// Number of runs: one for each frame of a batch.
     pub runs: u32,
-    /// ns, all runs together.
+    /// Sum over all runs, ns.
     pub total: f64,
 }
 

@@ -21,7 +21,7 @@ pub enum QueueRole {
 }
 
 impl QueueRole {
-    /// Its queue, given the number of queues: queue 0 renders, 1 ingests frames, 2 copies them.
+    /// The queue of this work: 0 renders, 1 ingests frames, 2 copies them. `queues`: number of queues.
     pub fn queue(self, queues: usize) -> usize {
         (self as usize).min(queues.clamp(1, MAX_QUEUES) - 1)
     }
@@ -95,7 +95,7 @@ impl QueueTracker {
         }
     }
 
-    /// The waits that the submission recorded on this queue needs, without those that another of them implies.
+    /// The semaphore waits that the recorded submission to this queue needs, without those that other waits imply.
     pub fn waits(&self, queue: usize) -> Vec<Wait> {
         let me = &self.each[queue];
         let mut needed = Vec::new();
@@ -112,7 +112,7 @@ impl QueueTracker {
         needed.iter().map(|(wait, _)| *wait).filter(|wait| !implied(wait)).collect()
     }
 
-    /// The recording of this queue was submitted with these waits; it is complete at this value of the queue's timeline.
+    /// Records that the recording of this queue was submitted with these waits. It is complete at this value of the queue's timeline.
     pub fn submitted(&mut self, queue: usize, waits: &[Wait], value: u64) {
         self.each[queue].recording = false;
         if self.count() == 1 {

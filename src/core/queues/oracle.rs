@@ -16,7 +16,7 @@ pub enum Event {
     Operation(Vec<Access>),
     /// A time stamp.
     Stamp,
-    /// A barrier of execution alone, around a time stamp. It makes no memory visible, so that no order is derived from it.
+    /// A barrier of execution only, around a time stamp. It makes no memory visible, so the oracle derives no order from it.
     Serialize,
 }
 
@@ -30,14 +30,14 @@ pub struct Submission {
     pub events: Vec<Event>,
 }
 
-/// Everything that was submitted, in order, and what is recorded but not submitted yet.
+/// All submissions in order, and the recordings that are not submitted yet.
 #[derive(Clone, Debug, Default)]
 pub struct SubmissionLog {
     pub submissions: Vec<Submission>,
     open: Vec<(usize, Vec<Event>)>,
 }
 
-/// Two conflicting accesses of a resource that nothing orders, by submission and event.
+/// Two conflicting accesses to a resource without an order between them, by submission and event.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Hazard {
     pub earlier: (usize, usize),
@@ -103,7 +103,7 @@ impl SubmissionLog {
         log
     }
 
-    /// The first two conflicting accesses that nothing orders. The scene says which slots are 3D images.
+    /// The first two conflicting accesses without an order between them. The scene says which slots are 3D images.
     pub fn find_hazard(&self, scene: &Scene) -> Option<Hazard> {
         let is_volume = |slot: Slot| matches!(slot.shape(scene), Shape::Three(_));
         (0..self.submissions.len()).find_map(|s| {

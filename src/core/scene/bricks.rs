@@ -71,7 +71,7 @@ impl Bricks {
 }
 
 impl Scene {
-    /// Edge of a brick, texels; 0 if none is asked for.
+    /// Edge of a brick, texels. 0 if no bricks are used.
     pub fn brick(&self) -> u32 {
         self.settings.ray.brick.unwrap_or(EDGE)
     }

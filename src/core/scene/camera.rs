@@ -47,7 +47,7 @@ pub fn ray_size(settings: &Settings) -> [u32; 2] {
     full_size(settings).map(|n| n.div_ceil(settings.ray.subsampling))
 }
 
-/// The same where every pixel has a ray.
+/// As [`ray_size`], with a ray for every pixel.
 pub fn full_size(settings: &Settings) -> [u32; 2] {
     let tile = match settings.layout {
         Layout::Single => settings.picture.size,

@@ -1,4 +1,4 @@
-//! Caps: which cut faces of clip planes show their echoes, and from which echo on there is tissue.
+//! Caps: which cut faces of clip planes show their echoes, and the echo from which on matter counts as tissue.
 
 use super::{Mode, Scene, Settings, Sign, View, transfer};
 
@@ -20,7 +20,8 @@ impl Settings {
 }
 
 impl Scene {
-    /// True if clip planes have cut faces: in a still what they cut is lit. Whether anything is tissue (`cap_level`) is a number, and so no reason for another plan.
+    /// True if clip planes have cut faces. Stills have none: what they cut is lit. Whether any matter is tissue (`cap_level`) is a number
+    /// and does not change the plan.
     pub fn has_caps(&self) -> bool {
         self.settings.cap.enabled && self.settings.can_cap() && self.still().is_none()
     }
@@ -34,8 +35,8 @@ impl Scene {
         View { window: self.settings.planes.window, low, high: self.high }
     }
 
-    /// The echo from which on there is tissue, before any window. None if nothing is capped: what is dark is drawn, or everything lets
-    /// light through.
+    /// The echo from which on matter counts as tissue, before any window. None if nothing is capped: the rendering draws dark matter, or
+    /// everything is translucent.
     pub fn cap_level(&self) -> Option<f64> {
         let solid = self.solid_from()?;
         let level = self.settings.cap.level.unwrap_or(solid);

@@ -45,7 +45,7 @@ impl Segment {
     }
 }
 
-/// The line, its places found by their distance along it.
+/// A smooth line. Positions on it are found by their distance along the line.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Line {
     segments: Vec<Segment>,
@@ -90,12 +90,12 @@ impl Line {
         line
     }
 
-    /// Its length, mm.
+    /// Length of the line, mm.
     pub fn length(&self) -> f64 {
         self.starts.last().copied().unwrap_or(0.0)
     }
 
-    /// The place at a distance along the line, and the unit direction of the line there. Beyond an end it is that end.
+    /// Position and unit direction at a distance along the line, mm. Beyond an end the end counts.
     pub fn at(&self, along: f64) -> (DVec2, DVec2) {
         let along = along.clamp(0.0, self.length());
         let piece = self.starts.partition_point(|start| *start <= along).clamp(1, self.starts.len().max(2) - 1) - 1;
@@ -114,7 +114,7 @@ impl Line {
         (segment.at(t), direction.unwrap_or(DVec2::X))
     }
 
-    /// The distance along the line of its place nearest to a point, and how far that is, mm.
+    /// Distance along the line of the point of the line that is nearest to `point`, and the distance between both, mm.
     pub fn nearest(&self, point: DVec2) -> (f64, f64) {
         self.near(point, 0.0).into_iter().min_by(|a, b| a.1.total_cmp(&b.1)).unwrap_or((0.0, f64::INFINITY))
     }
@@ -166,7 +166,7 @@ impl Line {
         }
     }
 
-    /// Places along the line, to draw it.
+    /// Positions along the line from which it can be drawn.
     pub fn outline(&self) -> Vec<DVec2> {
         if self.segments.is_empty() {
             return Vec::new();
@@ -175,7 +175,7 @@ impl Line {
         (0..self.starts.len()).filter(|n| !straight || n % PIECES == 0).map(|n| self.place_of(n)).collect()
     }
 
-    /// The direction that all of the line keeps to within 45 degrees; none if it bends more.
+    /// A direction from which the whole line deviates by at most 45 degrees. None if the line bends more.
     pub fn heading(&self) -> Option<DVec2> {
         let (first, last) = (self.segments.first()?, self.segments.last()?);
         let chord = (last.to - first.from).try_normalize()?;

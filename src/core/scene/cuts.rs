@@ -20,15 +20,15 @@ pub struct CutShape {
     pub right: DVec3,
     pub up: DVec3,
     pub forward: DVec3,
-    /// Distance of the eye from the plane, mm; none in parallel projection.
+    /// Distance of the eye from the plane, mm. None in parallel projection.
     pub eye: Option<f64>,
     /// Corners in the plane, mm.
     pub contour: Vec<DVec2>,
     /// What is removed is within the contour; otherwise it is outside.
     pub(crate) removes_inside: bool,
-    /// Nothing is removed farther behind the plane, mm.
+    /// Largest distance behind the plane at which matter is removed, mm. None: any distance.
     pub depth: Option<f64>,
-    /// What is removed is near these strokes; the contour is then empty.
+    /// Strokes near which matter is removed. The contour is then empty.
     pub brush: Option<BrushShape>,
 }
 
@@ -80,7 +80,8 @@ impl CutShape {
         }
     }
 
-    /// Where the line of sight through a place crosses the contour's plane, mm; none behind the eye. And how far the place is behind the plane.
+    /// The point at which the line of sight through `place` crosses the contour's plane, mm, and the distance of `place` behind the plane.
+    /// The point is None behind the eye.
     pub fn project(&self, place: DVec3) -> (Option<DVec2>, f64) {
         let from = place - self.at;
         let behind = from.dot(self.forward);
@@ -123,8 +124,8 @@ impl CutShape {
 }
 
 impl Scene {
-    /// True if a rendering has cuts: it casts rays through a volume without what they remove. Planes and the block of mode cube show the echoes as
-    /// they are.
+    /// True if a rendering has cuts: it casts rays through a volume from which they have removed matter. Planes and the block of mode cube
+    /// show the volume without cuts.
     pub(crate) fn has_cuts(&self) -> bool {
         !self.settings.cuts.is_empty() && self.renders()
     }
@@ -193,8 +194,8 @@ impl Scene {
         Some(Cut { contour: contour.collect(), view, keep, depth: None, brush: None })
     }
 
-    /// The value of what is removed: one of which the rendering draws nothing. 0, or 1 where what is dark is drawn. The mean takes it for dark matter.
-    /// None if the rendering draws both.
+    /// The value of removed texels, of which the rendering draws nothing: 0, or 1 where dark matter is drawn. In mode mean it counts as
+    /// dark matter. None if the rendering draws both.
     pub fn removed_value(&self) -> Option<f64> {
         let is_drawn = |value: f64| {
             let is_composited = self.composites() && {

@@ -1,4 +1,4 @@
-//! Settings that nobody chose, from the recording itself: so that the first picture of a recording without a preset shows something.
+//! Default settings that follow from the recording itself, so that a recording without a preset gives a useful picture.
 //!
 //! - Without a preset, windows, threshold and ramp follow from the levels of the echoes ([`EchoLevels`]), and filters from the size of the volume:
 //!   volume rendering under light, with a ramp between the threshold and the brighter class.
@@ -55,7 +55,7 @@ const REGION: [&str; 4] = ["region.lateral", "region.depth", "region.elevation",
 const UNKNOWN: EchoLevels =
     EchoLevels { dark: 0.05, threshold: 0.4, bright: 0.68, mean: 0.3, low: 0.02, high: 0.95, start: None };
 
-/// Settings and how those that nobody chose were found, one line each.
+/// Settings, and one line for each default on how it was found.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Completed {
     pub settings: Settings,
@@ -75,22 +75,22 @@ pub fn block_edge(geometry: &Geometry) -> f64 {
     BLOCK * smoothing(geometry)
 }
 
-/// What all scenes of one recorded volume have in common. Every command that renders a recording makes its scenes here, so that a picture, a
-/// report and a profile of the same arguments are of the same scene.
+/// What all scenes of one recorded volume have in common. Every command that renders a recording makes its scenes here, so that a picture,
+/// a report and a profile of the same arguments show the same scene.
 #[derive(Clone, Debug)]
 pub struct Recorded {
     pub geometry: Geometry,
     /// The type of the samples, and the range that the source states.
     pub stated: Input,
-    /// What signed samples are stored with ([`SampleType::shift`](crate::probe::SampleType::shift)).
+    /// Offset that signed samples are stored with ([`SampleType::shift`](crate::probe::SampleType::shift)).
     pub shift: f64,
-    /// None if they decide nothing, or if all samples are the same.
+    /// Levels of the echoes. None if they decide nothing, or if all samples are equal.
     pub levels: Option<EchoLevels>,
-    /// False where the settings are complete, as those of a workspace: nothing is added to them.
+    /// False if the settings are complete, such as those of a workspace. No defaults are added then.
     pub is_completed: bool,
 }
 
-/// Why layers of settings make no scene of a recording.
+/// Why layers of settings and a recording give no scene.
 #[derive(Debug, thiserror::Error)]
 pub enum RecordedFault {
     #[error("{0}")]
@@ -100,7 +100,7 @@ pub enum RecordedFault {
 }
 
 impl Recorded {
-    /// Scenes of settings as they are.
+    /// Scenes of settings without defaults.
     pub fn as_set(geometry: Geometry, stated: Input) -> Recorded {
         Recorded { geometry, stated, shift: 0.0, levels: None, is_completed: false }
     }
@@ -110,12 +110,12 @@ impl Recorded {
         self.stated.in_range_of(settings, self.shift)
     }
 
-    /// True if the levels of the echoes decide anything of a scene of these layers.
+    /// True if the scene of these layers depends on the levels of the echoes.
     pub fn needs_levels(&self, layers: &Layers) -> bool {
         self.is_completed && layers.needs_levels()
     }
 
-    /// What counts the echoes of the frames of the volume, for [`Recorded::levels`].
+    /// A histogram that counts the echoes of the volume's frames, for [`Recorded::levels`].
     ///
     /// # Errors
     /// As for [`Layers::finish`].
@@ -124,7 +124,7 @@ impl Recorded {
         Ok(EchoHistogram::new(&self.geometry, samples, block_edge(&self.geometry)))
     }
 
-    /// The scene of some layers of settings, with what nobody chose.
+    /// The scene of some layers of settings, completed by defaults.
     ///
     /// # Errors
     /// As for [`Layers::finish`] and [`Scene::new`].
@@ -142,7 +142,7 @@ impl Recorded {
     }
 }
 
-/// What settings that nobody chose follow from.
+/// The facts from which default settings follow.
 #[derive(Clone, Debug)]
 pub struct Defaults {
     pub layers: Layers,
@@ -152,7 +152,7 @@ pub struct Defaults {
 }
 
 impl Defaults {
-    /// The settings for the mode that was chosen.
+    /// The settings for the chosen mode.
     ///
     /// # Errors
     /// As for [`Layers::finish`].
@@ -166,8 +166,8 @@ impl Defaults {
         Some(layers.completed(&self.geometry, self.levels.as_ref()).ok()?.settings)
     }
 
-    /// Settings whose mode or layout was changed to those of `to`. What still is as it was found for the mode of `from` becomes what is found for
-    /// the new one; what was set meanwhile stays.
+    /// Settings whose mode or layout was changed to that of `to`. Values that still equal the defaults for the mode of `from` become the
+    /// defaults for the new mode. Values that were set meanwhile stay.
     pub fn switched(&self, from: &Settings, to: Settings) -> Settings {
         if (from.mode, from.layout) == (to.mode, to.layout) {
             return to;
@@ -190,12 +190,12 @@ impl Layers {
         Some(self)
     }
 
-    /// True if the levels of the echoes decide anything: no preset describes the recording.
+    /// True if the settings depend on the levels of the echoes: no preset describes the recording.
     pub fn needs_levels(&self) -> bool {
         self.presets().is_empty()
     }
 
-    /// The settings for a geometry, with what nobody chose. Without `levels` windows are those of a face in fluid.
+    /// The settings for a geometry, completed by defaults. Without `levels` windows are those of a face in fluid.
     ///
     /// # Errors
     /// As for [`Layers::finish`].

@@ -37,11 +37,12 @@ pub struct EchoLevels {
     pub bright: f64,
     /// Mean of all blocks.
     pub mean: f64,
-    /// Two per cent of the samples are darker.
+    /// The sample value below which two per cent of the samples lie.
     pub low: f64,
-    /// Three samples of a thousand are brighter.
+    /// The sample value above which three of a thousand samples lie.
     pub high: f64,
-    /// Depth at which what is of interest begins behind a bright layer next to the probe, mm as in `region.depth`. None if there is none.
+    /// Depth at which the region of interest begins behind a bright layer next to the probe, mm as in `region.depth`. None without such a
+    /// layer.
     pub start: Option<f64>,
 }
 
@@ -96,7 +97,7 @@ impl EchoHistogram {
         }
     }
 
-    /// Takes the stored samples of a frame. One that is too short counts as far as it goes.
+    /// Adds the stored samples of a frame. A frame that is too short counts as far as it goes.
     pub fn take(&mut self, bytes: &[u8]) {
         let [low, high] = self.input.range;
         let scaled = |value: f64| ((value - low) / (high - low)).clamp(0.0, 1.0);
@@ -138,7 +139,7 @@ impl EchoHistogram {
         }
     }
 
-    /// The levels of what was taken. None if it is too little, or all the same.
+    /// The levels of the samples so far. None if they are too few, or all equal.
     pub fn levels(&self) -> Option<EchoLevels> {
         let all: u64 = self.blocks.iter().sum();
         if all < FEWEST {

@@ -1,4 +1,4 @@
-//! What floats: parts of a volume that touch nothing else that is drawn, and are small.
+//! Floating parts: small parts of a volume that touch no other drawn part.
 
 use super::{Scene, SceneError, Sign, refuse, transfer};
 use crate::probe::{Geometry, Motion};
@@ -13,8 +13,8 @@ impl Scene {
         self.settings.floating > 0.0 && (self.composites() || self.detects_surface()) && self.slices() > 1 && !is_still
     }
 
-    /// The largest sample of which nothing is drawn: below it the transfer function is transparent, and no edge has the height of the
-    /// detector's threshold. None if dark samples are drawn.
+    /// The largest sample of which nothing is drawn. Below it the transfer function is transparent, and no edge reaches the threshold of
+    /// the detector. None if dark samples are drawn.
     pub fn floating_level(&self) -> Option<f64> {
         let (volume, surface) = (&self.settings.volume, &self.settings.surface);
         let sample = |[low, high]: [f64; 2], share: f64| low + (high - low) * share;
@@ -35,7 +35,7 @@ impl Scene {
         }
     }
 
-    /// The unit of the sizes of parts, mm^3: a share of a texel, whatever its size in mm is.
+    /// The unit in which sizes of parts are counted, mm^3. It is a share of a texel, whatever the size of a texel is.
     pub fn part_unit(&self) -> f64 {
         let [across, down] = self.grid.pitch;
         let along = match &self.geometry {

@@ -42,13 +42,13 @@ impl LightLattice {
     }
 }
 
-/// The levels of the pyramid of matter, from 0, that the cones of ambient light run through. Their cells are as wide as the cones, so that a lattice of other
-/// cells has the same cones. Where there are none as narrow, or as wide, the cones are as the lattice has them.
+/// The levels of the pyramid of matter, from 0, that the cones of ambient light pass. Their cells are as wide as the cones, so that another
+/// lattice has the same cones. Cones that are narrower or wider than any cell have the width of the narrowest or widest cells.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct AmbientCones {
-    /// Of the nearest place; below 0 its cells are narrower than any there are.
+    /// Level of the nearest position. Below 0 its cells would be narrower than any of the lattice.
     pub narrowest: i32,
-    /// The share of the next level, 0..1: the mixture of both levels has the variance of the cone's width.
+    /// Share of the next level, 0..1. The mixture of both levels has the variance of the cone's width.
     pub wider: f64,
 }
 
@@ -64,7 +64,7 @@ impl AmbientCones {
         AmbientCones { narrowest: whole as i32, wider }
     }
 
-    /// The level of the nth place, from 0.
+    /// Level of the n-th position, from 0.
     pub fn level(&self, n: i32) -> u32 {
         (self.narrowest + n).max(0) as u32
     }
@@ -75,7 +75,7 @@ impl AmbientCones {
     }
 }
 
-/// How light comes through the lattice: layer by layer across one axis.
+/// The path of light through the lattice: layer by layer across one axis.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Propagation {
     /// The axis that the light is nearest to.
@@ -152,7 +152,8 @@ impl LightVolume {
 }
 
 impl Scene {
-    /// The light volume, if something is composited that it lights. A still follows light itself.
+    /// The settings of the light volume if they apply: something is composited that the light volume lights. Stills compute light
+    /// themselves.
     pub fn lit_by_volume(&self) -> Option<LightVolume> {
         self.settings.light.volume.filter(|_| self.composites() && self.still().is_none())
     }
@@ -219,7 +220,8 @@ impl Scene {
         AmbientCones::new(light.reach, self.light_lattice().cell)
     }
 
-    /// Steps of a ray that share the light in their middle: two, where together they are no longer than a cell of the lattice, and each has one sample.
+    /// Number of consecutive steps of a ray that share the light of their middle: two, if together they are no longer than a cell of the
+    /// lattice and each has one sample.
     pub fn lit_steps(&self) -> u32 {
         let has_one_sample = matches!(self.settings.volume.compositing, Compositing::Riemann | Compositing::Corrected);
         let is_fine = !self.spreads() && 2.0 * self.step <= self.light_lattice().cell;
@@ -242,7 +244,7 @@ impl Scene {
         Some(self.settings.region.fade).filter(|fade| *fade > 0.0)
     }
 
-    /// The share of the matter that is left at a place in space, near the faces of the region.
+    /// Share of the matter that the fade leaves at a position in space, near the faces of the region.
     pub fn faded(&self, place: DVec3) -> f64 {
         let Some(fade) = self.region_fade() else { return 1.0 };
         let (low, high) = (place - self.volume_view().low, self.high - place);

@@ -102,7 +102,7 @@ impl Layers {
         Ok(())
     }
 
-    /// Adds a preset of a user: the whole look of `settings` in place of the look of the layers so far. Its values count as given.
+    /// Adds a preset of a user: the complete look of `settings` replaces the look of the layers so far. Its values count as given.
     ///
     /// # Errors
     /// The settings cannot be written as TOML.
@@ -210,8 +210,8 @@ impl Layers {
     }
 }
 
-/// `current` with what changed from `before` to `after`, value by value. A value that is not as it was before stays; so does a table with such a
-/// value that is no longer in `after`. None if that makes no settings.
+/// `current` with the values that changed from `before` to `after`. A value of `current` that differs from `before` stays. So does a table
+/// with such a value that `after` no longer has. None if the result is no valid settings.
 pub fn rebase(current: &Settings, before: &Settings, after: &Settings) -> Option<Settings> {
     let table = |settings: &Settings| settings.to_table().ok();
     let mut rebased = table(current)?;

@@ -1,5 +1,5 @@
-//! The look of a scene: its mode, filters, transfer function, light and tone, without what belongs to one examination: region, camera, places of
-//! planes, clip planes, cuts, marks, measurements, body marks and the cine loop. A preset of a user keeps a look.
+//! The look of a scene: its mode, filters, transfer function, light and tone. It excludes what belongs to one examination: region, camera,
+//! positions of planes, clip planes, cuts, marks, measurements, body marks and the cine loop. A user preset keeps a look.
 
 use super::{Cap, Cube, Planes, Projection, Region, Settings, Slices, Surface, Volume};
 
@@ -43,7 +43,7 @@ pub fn is_look(path: &str) -> bool {
 }
 
 impl Settings {
-    /// The look of these settings over the examination of others.
+    /// The look of these settings with the examination of other settings.
     pub fn look_over(&self, other: &Settings) -> Settings {
         let (look, kept) = (self.clone(), other.clone());
         Settings {
@@ -77,7 +77,7 @@ impl Settings {
         }
     }
 
-    /// These settings as another examination begins with them: their look, and all else as it is without a choice.
+    /// These settings as another examination begins with them: their look, and defaults for everything else.
     pub fn look(&self) -> Settings {
         self.look_over(&Settings::default())
     }

@@ -1,5 +1,5 @@
-//! Marks of a picture: by tile its place, its scale, the letters of the patient's sides at its edges, and the side of the probe's marker.
-//! The viewer and written pictures draw the same.
+//! Marks of a picture: for each tile its position, its scale, the letters of the patient's sides at its edges, and the side of the probe's
+//! marker. The viewer and written pictures draw the same marks.
 
 use super::planes::{CURVE_COLOUR, Plane, cell, colour};
 use super::region::depth_offset;
@@ -42,8 +42,9 @@ impl Marks {
         self.lateral.direction().dot(self.depth.direction().cross(self.elevation.direction())) < 0.0
     }
 
-    /// These marks with other sides along an axis. A pair of sides lies along one axis: another axis that had it has none then. With the second axis the
-    /// third is known, too. Where all are known, a probe that is turned has two axes the other way: lateral and elevation, or depth and elevation.
+    /// These marks with other sides along an axis. A pair of sides lies along one axis: another axis that had it loses it. Two axes
+    /// determine the third. If all three are known and the probe turns, two axes are reversed: lateral and elevation, or depth and
+    /// elevation.
     pub fn with_sides(mut self, axis: VolumeAxis, sides: Sides) -> Marks {
         for other in [&mut self.lateral, &mut self.depth, &mut self.elevation] {
             if *other == sides || *other == sides.exchanged() {
@@ -68,7 +69,7 @@ impl Marks {
         self.turned_with(axis)
     }
 
-    /// These marks with L in place of R, and R in place of L, as of a probe that is turned.
+    /// These marks with L and R exchanged, as for a probe that is turned.
     pub fn left_and_right_exchanged(mut self) -> Marks {
         let is_across = |axis: &VolumeAxis| matches!(self.sides(*axis), Sides::LeftRight | Sides::RightLeft);
         let Some(axis) = [VolumeAxis::Lateral, VolumeAxis::Depth, VolumeAxis::Elevation].into_iter().find(is_across)
@@ -122,7 +123,7 @@ impl Edge {
 /// The marks of a tile.
 #[derive(Clone, Debug, PartialEq)]
 pub struct TileMarks {
-    /// Its upper left corner and its size, pixels of the picture.
+    /// Upper left corner and size of the tile, pixels of the picture.
     pub corner: [f64; 2],
     pub size: [f64; 2],
     /// Size of a pixel, mm; of a rendering at the camera's target.
@@ -136,9 +137,9 @@ pub struct TileMarks {
     pub probe: Option<Edge>,
     /// The letter of the plane and its colour, where several planes are shown.
     pub plane: Option<(&'static str, [f64; 3])>,
-    /// Of a curved plane: the length of its line, mm.
+    /// For a curved plane, the length of its line, mm.
     pub along: Option<f64>,
-    /// Of a plane across an axis of the volume: the axis, and where on it the plane is, mm.
+    /// For a plane across an axis of the volume, the axis and the position on it, mm.
     pub place: Option<(&'static str, f64)>,
 }
 
@@ -148,7 +149,7 @@ impl Scene {
         self.marks_with(&self.settings.marks)
     }
 
-    /// The same with other settings of the marks: those of a picture that is shown may be newer than its own.
+    /// As [`Scene::marks`], with other settings of the marks. Those of a picture that is shown may be newer than the scene's.
     pub fn marks_with(&self, marks: &Marks) -> Vec<TileMarks> {
         let mut all = Vec::new();
         if self.cuts_planes() {
@@ -256,7 +257,7 @@ fn sides(marks: &Marks, right: DVec3, down: DVec3) -> (Vec<(Edge, &'static str)>
 }
 
 impl PlaneName {
-    /// Its letter.
+    /// Letter of the plane.
     pub fn letter(self) -> &'static str {
         match self {
             PlaneName::A => "A",
@@ -275,12 +276,12 @@ impl TileMarks {
         }
     }
 
-    /// What a curved plane says of itself: across it shows the length along its line.
+    /// The label of a curved plane: its horizontal axis is the length along its line.
     pub fn along_label(&self) -> Option<String> {
         self.along.map(|mm| format!("along the line: {mm:.1} mm"))
     }
 
-    /// Where a plane is, such as "elevation 2.5 mm".
+    /// The label of a plane's position, such as "elevation 2.5 mm".
     pub fn place_label(&self) -> Option<String> {
         // Without the sign of a zero.
         self.place.map(|(axis, mm)| format!("{axis} {:.1} mm", (mm * 10.0).round() / 10.0 + 0.0))

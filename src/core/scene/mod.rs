@@ -74,8 +74,8 @@ pub struct Input {
 }
 
 impl Input {
-    /// The same samples with the range that the settings ask for, if they do. `shift`: what signed samples are stored with
-    /// ([`SampleType::shift`](crate::probe::SampleType::shift)), which the setting does not have.
+    /// The same samples with the range that the settings ask for, if they do. `shift`: offset that signed samples are stored with
+    /// ([`SampleType::shift`](crate::probe::SampleType::shift)). The setting does not contain it.
     pub fn in_range_of(self, settings: &Settings, shift: f64) -> Input {
         let asked = settings.samples.range.map(|range| range.map(|value| value + shift));
         Input { range: asked.unwrap_or(self.range), ..self }
@@ -96,7 +96,8 @@ impl SliceGrid {
     }
 }
 
-/// The region, grey window and start depth of a pass of stage 2. They belong to the mode: rays that start at the probe meet the wall first.
+/// The region, grey window and start depth of a pass of stage 2. They belong to the mode: rays that start at the probe would meet the
+/// uterine wall first.
 #[derive(Clone, Copy, Debug)]
 pub struct View {
     pub window: [f64; 2],
@@ -113,7 +114,7 @@ pub struct Ring {
     pub step: f64,
     /// Samples of a half, 4..=256.
     pub half: u32,
-    /// The largest difference is among this many samples from the crossing of the threshold on.
+    /// Number of samples, from the crossing of the threshold on, among which the largest difference is.
     pub follow: u32,
 }
 
@@ -148,7 +149,7 @@ impl Ring {
     }
 }
 
-/// How a window stores pixels. A picture that is stored so is copied to it as it is.
+/// The pixel formats of windows. A picture in the format of the window is copied to it without a conversion.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum WindowTexels {
     #[default]
@@ -172,14 +173,15 @@ pub struct Scene {
     pub step: f64,
     /// Samples of the surface detector, whose step divides the length of an edge.
     pub ring: Ring,
-    /// Whether rays skip bricks if no setting says so: true, or the last choice of [`Scene::sampled`].
+    /// Whether rays skip bricks if no setting decides it: true, or the last choice of [`Scene::sampled`].
     pub bricks_pay: bool,
-    /// How the picture is stored: as the window takes it without a conversion. The device resolves this.
+    /// Pixel format of the picture: that of the window, so that no conversion is needed. The device resolves this.
     pub window_texels: WindowTexels,
-    /// Bytes of shared memory of a workgroup of a GPU, which solves a row or a column under AOS in it, propagates light through several layers, and reads the
-    /// texels of filters once; 0 on a CPU, where single invocations do all that faster. The device resolves this.
+    /// Bytes of shared memory of a workgroup on a GPU. AOS solves a row or a column in it, the light volume propagates light through
+    /// several layers in it, and filters keep their texels in it. 0 on a CPU, where single invocations do all this faster. The device
+    /// resolves this.
     pub shared_memory: u32,
-    /// Half-precision floats are truncated where they are stored, not rounded. The device resolves this.
+    /// True if the device truncates half-precision floats when it stores them, instead of rounding. The device resolves this.
     pub truncates_halves: bool,
     /// Maximum number of frames that go through stage 1 at once, 1... The device resolves this.
     pub frames_at_once: u32,
@@ -196,15 +198,15 @@ pub struct Scene {
     pub section_smooth: Option<Smooth>,
     /// Filters of the distance map, sizes in rays.
     pub distance: Distance,
-    /// What became of sizes in mm, for `--explain`.
+    /// How sizes in mm were resolved, for `--explain`.
     pub resolved_sizes: Vec<ResolvedSize>,
-    /// How settings that nobody chose were found, for `--explain`; one line each.
+    /// How defaults were found, for `--explain`; one line each.
     pub found: Vec<String>,
     /// The texels of the volume that stage 2 may read. Stage 1 computes only these.
     pub visible_bounds: visible_bounds::VisibleBounds,
-    /// What a renderer stores beyond what this scene shows, from an earlier scene: [`Scene::keeping`].
+    /// The texels that a renderer stores beyond those that this scene shows, from an earlier scene: [`Scene::keeping`].
     pub kept_bounds: visible_bounds::VisibleBounds,
-    /// What stage 1 prepares for other pictures of the same volume: [`Scene::sharing`].
+    /// The work of stage 1 for other pictures of the same volume: [`Scene::sharing`].
     pub shared: Option<Shared>,
 }
 
@@ -460,21 +462,22 @@ impl Scene {
         self.ray_size().map(|n| n / self.settings.ray.rays)
     }
 
-    /// True if only pixels at edges have several rays: where the colour along each ray is all that makes the picture.
+    /// True if only pixels at edges have several rays. The picture must follow from the colour along each ray alone.
     pub fn adapts_rays(&self) -> bool {
         let ray = &self.settings.ray;
         let is_alone = self.settings.mode == Mode::Volume && !self.lights_volume();
         ray.adaptive && ray.rays > 1 && is_alone && self.still().is_none() && !self.has_caps()
     }
 
-    /// The error that each pixel may have, levels of 8 bits, if its steps follow from that: where the colour along each ray is all that makes the picture.
+    /// The largest error of each pixel, levels of 8 bits. None if steps do not follow from an error. The picture must follow from the
+    /// colour along each ray alone.
     pub fn tolerance(&self) -> Option<f64> {
         let is_alone = self.settings.mode == Mode::Volume && !self.lights_volume() && self.still().is_none();
         Some(self.settings.ray.tolerance).filter(|levels| *levels > 0.0 && is_alone)
     }
 
-    /// True if pixels at edges of a surface, or of a cut face, show what is near and what is far, by the share that each covers. Where several rays make a
-    /// pixel they tell.
+    /// True if pixels at edges of a surface, or of a cut face, mix the near and the far side by the shares that each covers. With several
+    /// rays a pixel the rays do this.
     pub fn antialiases(&self) -> bool {
         let ray = &self.settings.ray;
         self.settings.post.antialias
@@ -483,8 +486,8 @@ impl Scene {
             && ray.subsampling == 1
     }
 
-    /// True if stage 2 and 3 render beside the picture: several rays make a pixel, one ray makes several, edges are antialiased, or planes or the volume
-    /// are shown next to the rendering.
+    /// True if stages 2 and 3 render into a slot other than the picture: several rays make a pixel, one ray makes several pixels, edges are
+    /// antialiased, or planes or the volume are shown next to the rendering.
     pub fn assembles(&self) -> bool {
         let ray = &self.settings.ray;
         let is_beside =
@@ -550,7 +553,8 @@ impl Scene {
         self.view(self.settings.projection.window, self.settings.projection.start_depth)
     }
 
-    /// Depth at which rendering starts, where nothing else is in front of it, mm: that of the surface and of the volume layer in mode mixed, whichever is deeper.
+    /// Depth at which rendering starts, mm, if nothing else is in front of it. In mode mixed it is the deeper one of the surface and the
+    /// volume layer.
     pub fn start_depth(&self) -> f64 {
         let (surface, volume, projection) = (self.surface_view(), self.volume_view(), self.projection_view());
         match self.settings.mode {

@@ -1,5 +1,5 @@
-//! Numbers of the settings. A row beside each field, in `settings`, says what is allowed and which slider of the view sets it; the check, its message, the
-//! slider, its name for screen readers and the line of docs/settings.md follow from it.
+//! Numbers of the settings. A row beside each field, in `settings`, states the allowed values and the slider of the viewer that sets it.
+//! The check, its message, the slider, its name for screen readers and the line of docs/settings.md follow from the row.
 
 use super::region::depth_offset;
 use super::{Edge, Layout, Mode, Scene, SceneError, Settings, Shading, refuse};
@@ -83,20 +83,20 @@ pub enum Group {
 /// Gives each value of a number that is there.
 type Each = fn(&Settings, &mut dyn FnMut(f64));
 
-/// A slider of the view.
+/// A slider of the viewer.
 #[derive(Clone, Copy, Debug)]
 pub struct Slider {
-    /// The setting that it changes, or a word of its own where it changes several.
+    /// The setting that the slider changes, or a name of its own if it changes several.
     pub key: &'static str,
     pub name: &'static str,
-    /// What it does: a sentence.
+    /// What the slider does: a sentence.
     pub hint: &'static str,
     /// Unit of its value; may be empty.
     pub unit: &'static str,
     pub group: Group,
-    /// Its range for any volume; [`Slider::range_in`] gives the range for one scene.
+    /// Range for any volume. [`Slider::range_in`] gives the range for one scene.
     pub range: [f64; 2],
-    /// How far a key moves it.
+    /// Change of the value by a key press.
     pub step: f64,
     /// Values below are 0.
     least: f64,
@@ -107,7 +107,7 @@ pub struct Slider {
 }
 
 impl Slider {
-    /// A slider of what is no single setting.
+    /// A slider that sets several settings.
     pub const fn of_several(
         [key, name, unit, hint]: [&'static str; 4],
         group: Group,
@@ -133,7 +133,7 @@ impl Slider {
         }
     }
 
-    /// The same slider, of which pictures depend only with some settings.
+    /// The same slider, which affects pictures only with some settings.
     pub const fn when(self, applies: fn(&Settings) -> bool) -> Slider {
         Slider { applies, ..self }
     }
@@ -143,12 +143,12 @@ impl Slider {
         Slider { limits, ..self }
     }
 
-    /// True if the picture depends on it.
+    /// True if the slider affects the picture.
     pub fn applies(&self, settings: &Settings) -> bool {
         (self.applies)(settings)
     }
 
-    /// Its value; outside of the range if a scene file set it so, 0 if there is none.
+    /// Value of the setting. It may lie outside of the range if a scene file set it so. 0 if it has none.
     pub fn get(&self, settings: &Settings) -> f64 {
         let mut found = None;
         (self.each)(settings, &mut |value| found = found.or(Some(value)));
@@ -170,16 +170,16 @@ impl Slider {
         [low, self.range[1].min(high).max(low)]
     }
 
-    /// True if it is a switch: 0 is off and 1 on.
+    /// True if the slider is a switch: 0 is off and 1 is on.
     pub fn is_switch(&self) -> bool {
         self.range == [0.0, 1.0] && self.step == 1.0
     }
 }
 
-/// A number of the settings, or several of one meaning, such as the coordinates of a point.
+/// A number of the settings, or several numbers of one meaning, such as the coordinates of a point.
 #[derive(Clone, Copy, Debug)]
 pub struct Number {
-    /// Its path in a scene file.
+    /// Path of the number in a scene file.
     pub key: &'static str,
     /// Unit of its values; may be empty.
     pub unit: &'static str,

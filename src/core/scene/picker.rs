@@ -78,8 +78,8 @@ impl<'a> Picker<'a> {
         is_in.then(|| (place.map(|n| n as usize), place.map(f64::fract)))
     }
 
-    /// The column and row of the picture that a ray's centre is in. It may be the first outside of the picture, where rays are coarser than
-    /// pixels.
+    /// The column and row of the pixel that contains a ray's centre. If rays are coarser than pixels, this may be the first pixel outside
+    /// of the picture.
     pub fn pixel_of_ray(&self, ray: [usize; 2]) -> [usize; 2] {
         std::array::from_fn(|a| ((ray[a] as f64 + 0.5) / self.rays_per_pixel + self.corner[a]) as usize)
     }

@@ -38,7 +38,7 @@ pub struct Tile {
     /// Position of the tile in the picture and its size, pixels.
     pub corner: [u32; 2],
     pub size: [u32; 2],
-    /// Its scale, mm per pixel.
+    /// Scale of the tile, mm per pixel.
     pub pixel: f64,
     /// Of a curved plane: the line that it follows. `plane` then goes through the middle of the line, `right` along its chord.
     pub section: Option<Section>,
@@ -51,7 +51,7 @@ pub struct Tile {
 #[derive(Clone, Debug, PartialEq)]
 pub struct Section {
     pub line: Line,
-    /// Where the line's point (0, 0) is, at the level of the middle of the tile, and the axes of the reference plane.
+    /// Point of the line's coordinates (0, 0), at the level of the middle of the tile, and the axes of the reference plane.
     pub origin: DVec3,
     pub axes: [DVec3; 2],
 }
@@ -192,7 +192,7 @@ impl Scene {
             * DMat3::from_rotation_z(-settings.roll.to_radians())
     }
 
-    /// How far apart two points of the line of a curved plane are at least where it is drawn, mm.
+    /// Smallest distance of two points of the line of a curved plane where it is drawn, mm.
     pub fn least_apart(&self) -> f64 {
         let (low, high) = self.planes_box();
         NEXT_POINT * (high - low).length()
@@ -328,7 +328,7 @@ impl Scene {
         self.line_on_tile(tiling, self.settings.planes.curve.as_ref()?)
     }
 
-    /// The same of a line that is not in the settings.
+    /// As [`Scene::curve_line`], for a line that is not in the settings.
     pub fn line_on_tile(&self, tiling: &Tiling, curve: &Curve) -> Option<CurveLine> {
         let is_its = |n: &usize| self.plane_of_tile(*n) == Some(curve.plane);
         let number = (0..tiling.tiles.len()).find(is_its).filter(|_| self.cuts_planes())?;

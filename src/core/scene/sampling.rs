@@ -28,8 +28,8 @@ const EXTREME_SAVING: f64 = 1.4;
 const NO_SAVING: f64 = 0.0;
 
 impl Scene {
-    /// How the volume is stored: the setting, or what `auto` stands for on the device. R16F has 11 bits, and a store that truncates loses one more of
-    /// them, always downwards; R16 has 16 bits of 0..1, which is what frames become and filters keep.
+    /// The stored format of the volume: the setting, or the meaning of `auto` on the device. R16F has 11 bits, and a store that truncates
+    /// loses one more of them, always downwards. R16 has 16 bits of 0..1, the range of frames and filter results.
     pub fn volume_format(&self) -> VolumeFormat {
         match self.settings.slices.format {
             VolumeFormat::Auto if self.truncates_halves && !self.may_overshoot() => VolumeFormat::R16,

@@ -11,7 +11,7 @@ use std::fmt;
 /// Maximum number of steps of a diffusion.
 const MAX_STEPS: f64 = 1000.0;
 
-/// A size that was asked for in mm, and what is taken in its place.
+/// A size that was given in mm, and the size that is used for it.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ResolvedSize {
     /// The setting.

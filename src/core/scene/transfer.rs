@@ -24,17 +24,17 @@ pub fn absorption(opacity: f64) -> f64 {
 pub struct Absorption {
     /// Absorption per mm of opacity 1, in proportion to the opacity; none: opacities are those of one reference length.
     pub extinction: Option<f64>,
-    /// mm.
+    /// Reference length, mm.
     pub reference_length: f64,
 }
 
 impl Absorption {
-    /// Of opacities of one reference length, mm.
+    /// Absorption by opacities of one reference length, mm.
     pub fn of_length(reference_length: f64) -> Absorption {
         Absorption { extinction: None, reference_length }
     }
 
-    /// Of volume rendering, in which a reference length has so many mm.
+    /// Absorption of volume rendering. `reference_length`: mm.
     pub fn of(volume: &Volume, reference_length: f64) -> Absorption {
         Absorption { extinction: volume.extinction, reference_length }
     }

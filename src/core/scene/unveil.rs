@@ -58,7 +58,7 @@ impl Scene {
         row.round().clamp(0.0, f64::from(self.grid.size[1] - 1)) as u32
     }
 
-    /// By texel of a slice, the column fastest: true within the sector.
+    /// True for each texel of a slice within the sector, the column fastest.
     pub fn sector_mask(&self) -> Vec<bool> {
         let [columns, rows] = self.grid.size;
         let texels = (0..rows).flat_map(|row| (0..columns).map(move |column| (column, row)));

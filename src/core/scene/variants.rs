@@ -1,4 +1,4 @@
-//! Settings that may follow upon others: what a view compiles in advance, and what `profile --pipelines --all` measures.
+//! Settings that a user may switch to. A viewer compiles their pipelines in advance, and `profile --pipelines --all` measures them.
 
 use super::load::{Layers, PRESETS};
 use super::{Layout, Mode, Settings};
@@ -90,8 +90,8 @@ const CHOICES: [&str; 53] = [
     "mode = 'vr'\nvolume.shading = 'depth-coded'",
 ];
 
-/// Every mode, layout and preset that a user may switch to from these settings; these are first. A preset is laid over them. `follow` adds what
-/// follows from another mode or layout.
+/// Every mode, layout and preset that a user may switch to from these settings, beginning with these. A preset is laid over them. `follow`
+/// adds the settings that follow from another mode or layout.
 pub fn switches(from: &Settings, follow: impl Fn(Settings) -> Settings) -> Vec<Variant> {
     let mut variants = vec![Variant::new("as it is", from.clone())];
     for (mode, name) in MODES {

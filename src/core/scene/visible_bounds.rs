@@ -49,7 +49,7 @@ impl VisibleBounds {
     }
 }
 
-/// What stage 1 prepares for the pictures of a volume that are drawn in turn: those of a view at rest and of the same view in motion.
+/// The work of stage 1 for pictures of a volume that are drawn alternately: those of a view at rest and of the same view in motion.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Shared {
     /// Step along a ray of the picture at rest, mm.
@@ -125,8 +125,8 @@ impl Scene {
         if all.is_empty() { VisibleBounds::all([1; 3]) } else { all }
     }
 
-    /// The scene, which stores all that `before` stores if that holds what this scene shows: a region that shrinks needs no other
-    /// memory, and finds its slices where they are.
+    /// The scene with the stored bounds of `before`, if these hold everything that this scene shows. A region that shrinks then needs no
+    /// other memory and keeps its slices.
     pub fn keeping(self, before: &Scene) -> Scene {
         let stored = before.stored_bounds();
         let shown = Scene { kept_bounds: VisibleBounds::default(), ..self };
@@ -135,8 +135,8 @@ impl Scene {
         Scene { kept_bounds: if is_kept { stored } else { VisibleBounds::default() }, ..shown }
     }
 
-    /// The scene with a stage 1 that serves `full`, itself and `others`, scenes of the same volume and the same filters. What follows from the
-    /// number of samples follows from those of `full`, so that no change among them sends a frame again.
+    /// The scene with a stage 1 that serves `full`, itself and `others`, which are scenes of the same volume with the same filters. Values
+    /// that follow from the number of samples are those of `full`, so that a change among these scenes needs no frame again.
     pub fn sharing(self, full: &Scene, others: &[&Scene]) -> Scene {
         let all = || others.iter().copied().chain([full, &self]);
         let visible_bounds = all().map(|scene| scene.visible_bounds).fold(self.visible_bounds, VisibleBounds::with);

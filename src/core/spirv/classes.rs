@@ -1,4 +1,4 @@
-//! The classes of instructions that a module has: what the compiler of a driver must translate right.
+//! The classes of instructions of a module, which a driver's compiler has to translate correctly.
 
 use super::module::{decode, op, storage_class};
 use std::collections::BTreeSet;
@@ -7,12 +7,12 @@ use std::collections::BTreeSet;
 const WORKGROUP: u32 = 4;
 const VOTES: &str = "votes of a subgroup";
 
-/// The classes of instructions in a module; none for words that are no module.
+/// The classes of instructions in a module. Empty if the words are not a module.
 pub fn classes(words: &[u32]) -> BTreeSet<&'static str> {
     decode(words).unwrap_or_default().iter().filter_map(|i| class(i.opcode, i.operands)).collect()
 }
 
-/// True if invocations of a subgroup vote in a module.
+/// True if invocations of a subgroup vote in the module.
 pub fn has_votes(words: &[u32]) -> bool {
     classes(words).contains(VOTES)
 }

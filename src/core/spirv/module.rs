@@ -133,14 +133,14 @@ pub(super) const MAX_BOUND: u32 = 0x3f_ffff;
 pub(super) const HEADER_WORDS: usize = 5;
 pub(super) const BOUND: usize = 3;
 
-/// The hash of each shader's expanded source, a line each.
+/// The hash of each shader's expanded source, one line each.
 pub const SOURCES: &str = include_str!("../../../spirv/SOURCES");
 
 /// Word of a module's header that names the tool that made it; the lower half is the tool's version.
 const GENERATOR: usize = 2;
 
-/// Changes the version of the tool that a module names, and nothing that it means: a driver does not find it in its own cache of
-/// compiled shaders. `number` tells the modules of one run of the program from those of another.
+/// Changes the tool version in the header of a module, which has no meaning for the code. Changing this word invalidates the driver's cache
+/// entry. `number` differs between runs of the program.
 pub fn set_tool_version(words: &mut [u32], number: u16) {
     if let Some(word) = words.get_mut(GENERATOR) {
         // Versions from 0x8000 on are later than any that a driver works around.
@@ -153,7 +153,7 @@ pub fn set_tool_version(words: &mut [u32], number: u16) {
 #[error("SPIR-V: {0}")]
 pub struct SpirvError(String);
 
-/// The words of a module.
+/// Decodes the words of a module.
 pub fn words(bytes: &[u8]) -> Vec<u32> {
     bytes.chunks_exact(4).map(|b| u32::from_le_bytes([b[0], b[1], b[2], b[3]])).collect()
 }

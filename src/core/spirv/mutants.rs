@@ -1,5 +1,5 @@
-//! Faults by class of instruction: for each class one way in which the compiler of a driver translates an instruction wrongly. A mutant is a
-//! module with one instruction changed so; it is valid, and ends.
+//! Faults by class of instruction: for each class, one way in which a driver's compiler may translate an instruction wrongly. A mutant is a
+//! module with one such change. It is valid and terminates.
 
 use super::classes::class;
 use super::module::{BOUND, HEADER_WORDS, Instruction, SpirvError, decode, encode, error, op};
@@ -23,7 +23,7 @@ enum Change {
     Rounded,
 }
 
-/// A fault of the instructions of a class.
+/// A fault in how the instructions of a class are translated.
 pub struct Mutation {
     pub class: &'static str,
     pub what: &'static str,
@@ -179,12 +179,12 @@ impl Types {
     }
 }
 
-/// Number of mutants that a mutation has of a module; 0 for words that are no module.
+/// Number of mutants of a module by this mutation. 0 if the words are not a module.
 pub fn count(words: &[u32], mutation: &Mutation) -> usize {
     decode(words).map_or(0, |instructions| sites(&instructions, mutation).len())
 }
 
-/// A mutant of a module, by its number below [`count`].
+/// The mutant of a module with this number, which is below [`count`].
 ///
 /// # Errors
 /// A module that breaks the format, or has no such mutant.

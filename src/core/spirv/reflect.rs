@@ -68,19 +68,19 @@ pub struct Member {
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Constant {
     pub name: String,
-    /// Its `constant_id`.
+    /// The `constant_id` of the constant.
     pub id: u32,
 }
 
 /// The interface of a module.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Module {
-    /// By binding number.
+    /// Bindings in the order of their numbers.
     pub bindings: Vec<Binding>,
     pub params: Vec<Member>,
     /// Size of the parameter block, bytes.
     pub params_size: u32,
-    /// By id.
+    /// Constants in the order of their ids.
     pub constants: Vec<Constant>,
     /// Invocations of a workgroup along x, y, z.
     pub local_size: [u32; 3],

@@ -13,8 +13,8 @@ const MIN_POSITIONS: usize = 4096;
 /// Between two positions that are further apart the position is not known, s. At 9600 baud a position takes 20 ms, three requests 60.
 const MAX_GAP: f64 = 0.1;
 
-/// A motor that sweeps until this is dropped, or until it fails. Dropping it stops the motor and waits for that: one request and its
-/// reply, or all attempts to stop if the module no longer replies.
+/// A motor that sweeps until this is dropped, or until it fails. Dropping it stops the motor and waits for one request and its reply, or
+/// for all attempts to stop if the module no longer replies.
 pub struct BackgroundSweep {
     port: String,
     positions: PositionLog,
@@ -133,7 +133,7 @@ impl PositionLog {
         self.lock().ended = ended.err();
     }
 
-    /// An instant on the clock of the positions, s.
+    /// Converts an instant to the clock of the positions, s.
     pub fn time(&self, at: Instant) -> f64 {
         match at.checked_duration_since(self.start) {
             Some(since) => since.as_secs_f64(),
@@ -141,12 +141,13 @@ impl PositionLog {
         }
     }
 
-    /// A time stamp in s since 1970 on the clock of the positions. Off by as much as the system's clock was adjusted since the start.
+    /// Converts a time stamp in s since 1970 to the clock of the positions, s. The error is the adjustment of the system's clock since the
+    /// start.
     pub fn time_of_stamp(&self, stamp: f64) -> f64 {
         stamp - self.start_since_1970
     }
 
-    /// The instant of a time on the clock of the positions. The start for a time that is not finite or before it.
+    /// Converts a time on the clock of the positions to an instant. Times that are not finite or lie before the start give the start.
     pub fn instant(&self, time: f64) -> Instant {
         let since = Duration::try_from_secs_f64(time.max(0.0)).unwrap_or_default();
         self.start.checked_add(since).unwrap_or(self.start)

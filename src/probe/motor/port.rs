@@ -49,7 +49,7 @@ impl PortSettings {
     }
 }
 
-/// A successful reply.
+/// A reply that reports success.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Answer {
     pub value: i32,
@@ -126,7 +126,7 @@ impl Port {
         bytes.ok_or(Fault::NoReply { request: request.to_string(), timeout: self.settings.timeout })
     }
 
-    /// The next request is sent at once, even if the reply to an earlier one may still arrive.
+    /// Sends the next request at once, even if the reply to an earlier one may still arrive.
     pub(crate) fn hurry(&mut self) {
         self.late = false;
     }
@@ -228,7 +228,7 @@ fn gone(error: serialport::Error) -> Fault {
 /// The serial ports of this machine: name and description.
 ///
 /// # Errors
-/// In words, where the system cannot list them.
+/// One line: the system cannot list them.
 pub fn list() -> Result<Vec<(String, String)>, String> {
     let ports = serialport::available_ports().map_err(|e| format!("the serial ports cannot be listed: {e}"))?;
     let about = |kind| match kind {

@@ -54,7 +54,8 @@ impl FaultKind {
     ];
 }
 
-/// A fault and when it begins: `NAME` at once; `NAME@SECONDS` so long after the first move to a position, which is when a sweep begins.
+/// A fault and its time: `NAME` begins at once, `NAME@SECONDS` that long after the first move to a position, which is the beginning of a
+/// sweep.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SimulatedFault {
     pub kind: FaultKind,
@@ -123,7 +124,7 @@ impl Simulator {
         Ok(Simulator { path, shared, thread: Some(thread) })
     }
 
-    /// The port to open.
+    /// Path of the serial port to open.
     pub fn path(&self) -> &Path {
         &self.path
     }
@@ -143,7 +144,7 @@ impl Simulator {
         locked(&self.shared.module).angle()
     }
 
-    /// True if it was unplugged or its port has failed.
+    /// True if the port was unplugged or has failed.
     pub fn ended(&self) -> bool {
         self.thread.as_ref().is_none_or(JoinHandle::is_finished)
     }

@@ -122,7 +122,7 @@ impl Track {
     /// Positions in order of time. Between two that are more than `longest_gap` seconds apart the position is not known.
     ///
     /// # Errors
-    /// In words: a time or an angle is not finite, the times do not rise, or the gap is not above 0.
+    /// One line: a time or an angle is not finite, the times do not rise, or the gap is not above 0.
     pub fn new(positions: Vec<Position>, longest_gap: f64) -> Result<Track, String> {
         if let Some(at) = positions.iter().position(|p| !p.time.is_finite() || !p.angle.is_finite()) {
             return Err(format!("position {at} is not finite"));

@@ -98,8 +98,8 @@ pub struct MotorTable {
     pub pulse_divisor: u8,
     #[serde(default)]
     pub ramp_divisor: u8,
-    /// The module's own watchdog, 100 to 65535 ms: the motor is stopped if no command arrives for so long. 0 switches it off. None leaves
-    /// the setting of the module unchanged.
+    /// Time-out of the module's own watchdog, 100 to 65535 ms: the module stops the motor if no command arrives for this time. 0 switches
+    /// the watchdog off. None leaves the setting of the module unchanged.
     pub watchdog_ms: Option<u16>,
 }
 
@@ -219,7 +219,7 @@ impl MotorTable {
         acceleration * self.steps_per_degree() * self.acceleration_scale()
     }
 
-    /// One microstep/s in the module's unit.
+    /// Size of one microstep/s in the module's unit of velocity.
     pub(crate) fn speed_scale(&self) -> f64 {
         match self.units {
             Units::Pps => 1.0,
@@ -228,7 +228,7 @@ impl MotorTable {
         }
     }
 
-    /// One microstep/s2 in the module's unit.
+    /// Size of one microstep/s2 in the module's unit of acceleration.
     pub(crate) fn acceleration_scale(&self) -> f64 {
         match self.units {
             Units::Pps => 1.0,

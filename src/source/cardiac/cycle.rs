@@ -12,22 +12,23 @@ const MOST: usize = 1024;
 /// Most volumes of a cycle where nothing else is asked for.
 const USUAL: usize = 20;
 
-/// What is made of a sweep.
+/// Options of the sorting.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct CycleOptions {
-    /// Volumes of one cycle, 2..=1024. None: as many as a cycle has frames, at most 20, which the cine loop of the viewer holds.
+    /// Number of volumes of one cycle, 2..=1024. None: the number of frames of a cycle, at most 20, the length of the viewer's cine loop.
     pub phases: Option<usize>,
-    /// Slices of a volume, 2..=1024. None: one less than there are cycles, as many places of the sweep as are seen at every phase.
+    /// Slices of a volume, 2..=1024. None: one less than the number of cycles, which is the number of positions of the sweep that are seen
+    /// at every phase.
     pub slices: Option<usize>,
 }
 
-/// A sweep that is sorted into the volumes of one cycle.
+/// A sweep that was sorted into the volumes of one cycle.
 pub struct Cycle {
     /// Geometry of the volumes: the part of the sweep that is seen at every phase.
     pub probe: Probe,
     /// Number of volumes.
     pub phases: usize,
-    /// Length of a cycle, s: the mean.
+    /// Mean length of a cycle, s.
     pub seconds: f64,
     stored: StoredType,
     /// By frame of the sweep.
@@ -41,7 +42,7 @@ impl Cycle {
     /// Sorts the frames of a volume, which are in order of acquisition, at `rate` frames a second.
     ///
     /// # Errors
-    /// In words: fewer than four cycles, or numbers of phases or slices out of their range.
+    /// One line: fewer than four cycles, or numbers of phases or slices out of their range.
     pub fn new(
         probe: &Probe,
         stored: StoredType,
@@ -87,7 +88,7 @@ impl Cycle {
         }
     }
 
-    /// The frames of a volume of the cycle, 0..phases, by slice. All have the time of the phase.
+    /// The frames of a volume of the cycle, 0..phases, by slice. All have the time stamp of the phase.
     pub fn volume(&self, phase: usize) -> Vec<Frame> {
         let share = phase as f64 / self.phases as f64;
         let (begin, end) = (self.rhythm.phases[0], self.rhythm.phases[0] + self.rhythm.cycles());

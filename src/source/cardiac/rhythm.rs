@@ -58,12 +58,12 @@ pub struct Motion {
 }
 
 impl Motion {
-    /// Of frames with that many samples a line and lines.
+    /// A motion without frames. `size`: samples a line, lines a frame.
     pub fn new(size: [usize; 2], stored: StoredType) -> Motion {
         Motion { size, stored, means: Vec::new() }
     }
 
-    /// Takes the next frame. One of another size is taken as black.
+    /// Adds the next frame. A frame of another size counts as black.
     pub fn take(&mut self, frame: &Frame) {
         let [samples, lines] = self.size;
         let (mut sums, mut counts) = (vec![0.0; BLOCKS * BLOCKS], vec![0usize; BLOCKS * BLOCKS]);
@@ -196,14 +196,14 @@ impl Spectrum {
     }
 }
 
-/// The cycles of the heart, by frame.
+/// The cycles of a heart, by frame.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Rhythm {
     /// Cycles since the first frame, or since the first R wave; rising.
     pub phases: Vec<f64>,
     /// Mean rate, cycles a frame: over the frames that show a heart, or in all.
     pub mean: f64,
-    /// How far the rate's peak rises above the spectrum around it, dB; `None` if the cycles were given.
+    /// Height of the rate's peak above the spectrum around it, dB. None if the times of R waves were given.
     pub height: Option<f64>,
 }
 
@@ -211,7 +211,7 @@ impl Rhythm {
     /// Finds the rhythm of frames that follow each other at `rate` frames a second. `heart_rate`: least and largest, cycles a minute.
     ///
     /// # Errors
-    /// In words: too few frames for such a rate, or nothing that repeats.
+    /// One line: too few frames for such a rate, or nothing that repeats.
     pub fn find(motion: &Motion, rate: f64, heart_rate: [f64; 2]) -> Result<Rhythm, String> {
         let frames = motion.means.len() as f64;
         let [least, most] = heart_rate;
@@ -256,7 +256,7 @@ impl Rhythm {
     /// repeats.
     ///
     /// # Errors
-    /// In words: fewer than two R waves during the sweep, or times that do not rise.
+    /// One line: fewer than two R waves during the sweep, or times that do not rise.
     pub fn of_triggers(times: &[f64], triggers: &[f64]) -> Result<Rhythm, String> {
         for (name, of) in [("R wave", triggers), ("frame", times)] {
             if let Some(n) = (1..of.len()).find(|n| !(of[*n] > of[*n - 1] && of[*n].is_finite() && of[0].is_finite())) {

@@ -131,7 +131,7 @@ pub(super) struct Fragment {
     /// Offset in the file and length, bytes.
     pub at: u64,
     pub length: u64,
-    /// Its first bytes, and zeros if there are fewer.
+    /// First bytes of the fragment, filled up with zeros.
     pub head: [u8; 8],
     /// The end mark of a JPEG or JPEG 2000 is in it, with nothing but padding behind it.
     pub ends: bool,

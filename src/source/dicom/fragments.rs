@@ -5,9 +5,9 @@ use super::elements::Fragment;
 /// Fragments divided among frames.
 #[derive(Debug, PartialEq)]
 pub(super) struct Divided {
-    /// Of each frame: its first fragment, and their number.
+    /// For each frame, the index of its first fragment and the number of its fragments.
     pub frames: Vec<(usize, usize)>,
-    /// What the file states and is not so.
+    /// Statements of the file that are not true.
     pub warnings: Vec<String>,
 }
 
@@ -24,7 +24,7 @@ pub(super) struct Stream<'a> {
 /// where the number, the table and the code streams contradict each other, and a warning says so.
 ///
 /// # Errors
-/// In words: fragments that nothing divides, fewer frames than stated.
+/// One line: fragments that nothing divides, fewer frames than stated.
 pub(super) fn divided(
     stated: &[usize],
     table: &[u64],
@@ -64,7 +64,7 @@ pub(super) fn divided(
 }
 
 /// # Errors
-/// In words, fewer frames than stated.
+/// One line: fewer frames than stated.
 fn warnings(stated: &[usize], table: &[u64], firsts: &[usize]) -> Result<Vec<String>, String> {
     let there = firsts.len();
     let mut warnings = Vec::new();

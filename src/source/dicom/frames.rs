@@ -42,7 +42,7 @@ pub(super) struct Place {
     /// The first of its parts, and their number.
     pub first: usize,
     pub count: usize,
-    /// Its first byte is the second one of a word, where bytes stand in words.
+    /// True if bytes stand in words and the first byte of the frame is the second one of its word.
     pub odd: bool,
 }
 

@@ -27,14 +27,14 @@ pub(super) struct Image {
     pub pixel: PixelFormat,
     pub coding: Coding,
     pub arrangement: Arrangement,
-    /// Of each frame, in the order of the file.
+    /// Place of each frame, in the order of the file.
     pub places: Vec<Place>,
     pub parts: Vec<(u64, u64)>,
     /// Luminance is taken of colours that the format of the pixels does not tell.
     pub from_colour: bool,
     /// Native bytes stand in words whose highest byte comes first.
     pub swapped: bool,
-    /// What the file states and is not so, or does not state.
+    /// Statements of the file that are not true or that are missing.
     pub warnings: BTreeSet<String>,
 }
 
@@ -151,7 +151,7 @@ impl StatedFrames {
     /// Where uncompressed frames are, in pixel data of `length` bytes.
     ///
     /// # Errors
-    /// In words, pixel data that are cut short.
+    /// One line: pixel data that are cut short.
     fn native(
         &self,
         offset: u64,
@@ -191,7 +191,7 @@ impl StatedFrames {
     /// Where compressed frames are.
     ///
     /// # Errors
-    /// In words, fragments that nothing divides, or that are too small.
+    /// One line: fragments that nothing divides, or that are too small.
     fn encapsulated(
         &self,
         coding: Coding,

@@ -24,7 +24,7 @@ impl Expected {
     }
 
     /// # Errors
-    /// In words, a picture of another size.
+    /// One line: a picture of another size.
     fn check_size(&self, columns: usize, rows: usize) -> Result<(), String> {
         match [columns, rows] == self.size {
             true => Ok(()),
@@ -51,7 +51,7 @@ pub(super) fn has_end(tail: &[u8]) -> bool {
 /// The frame without padding. The decoders make up what is missing at the end, and do not see a second picture.
 ///
 /// # Errors
-/// In words, a missing end, or several pictures.
+/// One line: a missing end, or several pictures.
 fn whole(bytes: &[u8]) -> Result<&[u8], String> {
     let frame = without_padding(bytes);
     if !frame.ends_with(&END) {
@@ -77,7 +77,7 @@ fn unreadable(kind: &str, fault: impl ToString) -> String {
 /// JPEG baseline and extended, 8 bits: grey, or red, green and blue.
 ///
 /// # Errors
-/// In words, what is wrong with the frame.
+/// One line: what is wrong with the frame.
 pub(super) fn baseline(bytes: &[u8], expected: Expected) -> Result<Vec<u8>, String> {
     let bytes = whole(bytes)?;
     let reader = ImageReader::with_format(Cursor::new(bytes), ImageFormat::Jpeg);
@@ -148,7 +148,7 @@ fn word(bytes: &[u8], at: usize) -> Option<u16> {
 /// wrongly after a restart, and numbers whose last bits are cut off (0.3.2): both are refused.
 ///
 /// # Errors
-/// In words, what is wrong with the frame.
+/// One line: what is wrong with the frame.
 pub(super) fn lossless(bytes: &[u8], expected: Expected) -> Result<Vec<u8>, String> {
     const KIND: &str = "lossless JPEG";
     let bytes = whole(bytes)?;
@@ -187,7 +187,7 @@ const LEAST_PRECINCT: u8 = 4;
 /// Checks what a code stream (ITU-T T.800 annex A) says of its size, since the decoder allocates by that alone.
 ///
 /// # Errors
-/// In words, what is not read.
+/// One line: what is not read.
 fn check_code_stream(bytes: &[u8], expected: Expected) -> Result<(), String> {
     let cut = || "its headers are cut short".to_string();
     let long = |at: usize| {
@@ -283,7 +283,7 @@ const JPEG_2000: &str = "JPEG 2000";
 /// JPEG 2000, lossless or not: the bare code stream that DICOM asks for, up to 16 bits without a sign, grey or three channels.
 ///
 /// # Errors
-/// In words, what is wrong with the frame.
+/// One line: what is wrong with the frame.
 pub(super) fn jpeg_2000(bytes: &[u8], expected: Expected) -> Result<Vec<u8>, String> {
     let bytes = whole(bytes)?;
     check_code_stream(bytes, expected).map_err(|why| unreadable(JPEG_2000, why))?;
@@ -296,7 +296,7 @@ fn decoded_2000(_: &[u8], _: Expected) -> Result<Vec<u8>, String> {
 }
 
 /// # Errors
-/// In words, what is wrong with the frame.
+/// One line: what is wrong with the frame.
 #[cfg(feature = "jpeg2000")]
 fn decoded_2000(bytes: &[u8], expected: Expected) -> Result<Vec<u8>, String> {
     // Of what is damaged nothing is made up.

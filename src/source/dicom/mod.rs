@@ -28,5 +28,5 @@ pub(super) use series::{is_dicom, is_series, read_series};
 pub(super) use tags::rows;
 pub(super) use write::{DicomWriter, Form, MOST_BYTES};
 
-/// Endings of its files, which often have none, or the end of a number.
+/// Usual endings of DICOM files, which often have none, or a number.
 pub const ENDINGS: [&str; 3] = ["dcm", "dicom", "ima"];

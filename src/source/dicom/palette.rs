@@ -53,7 +53,7 @@ impl Palette {
     /// The palette of a picture, and what of it is not as the file states.
     ///
     /// # Errors
-    /// In words, a palette that is missing, cut short or contradicts itself.
+    /// One line: a palette that is missing, cut short or contradicts itself.
     pub fn of(tables: &Tables, numbers: Indices) -> Result<(Palette, Vec<String>), String> {
         let Tables { about, plain, segmented } = tables;
         let [count, first, bits] = about[0][..] else { return Err("is missing, or has not three numbers".into()) };
@@ -102,7 +102,7 @@ impl Palette {
 /// Entries as shares of the largest one that so many bits hold, 0 .. 255.
 ///
 /// # Errors
-/// In words, entries of a width that is not read.
+/// One line: entries of a width that is not read.
 fn shares(entries: impl Iterator<Item = u16>, bits: u16) -> Result<Vec<f64>, String> {
     match bits {
         8..=16 => {
@@ -136,7 +136,7 @@ const MOST: usize = 65536;
 /// The entries of a segmented table. Its numbers are bytes where entries have 8 bits, otherwise words.
 ///
 /// # Errors
-/// In words, a segment that is cut short or not known.
+/// One line: a segment that is cut short or not known.
 fn expanded(words: &[u16], bits: u16) -> Result<Vec<f64>, String> {
     let (numbers, width): (Vec<u16>, usize) = match bits {
         8 => (words.iter().flat_map(|word| word.to_le_bytes()).map(u16::from).collect(), 1),

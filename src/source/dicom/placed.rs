@@ -21,10 +21,10 @@ pub(super) struct Placed {
     pub part: [usize; 4],
     /// The file states the distance of its pixels.
     pub has_spacing: bool,
-    /// By place in `order`, s.
+    /// Time of each frame by its index in `order`, s.
     pub times: BTreeMap<usize, f64>,
     pub remarks: Vec<(String, String)>,
-    /// What the file states and is not so, or does not state; one line each.
+    /// Statements of the file that are not true or that are missing; one line each.
     pub warnings: BTreeSet<String>,
 }
 

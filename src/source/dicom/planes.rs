@@ -20,7 +20,7 @@ pub(super) struct Plane {
     pub column: DVec3,
     /// Number of its volume in time, if it is stated.
     pub index: Option<u32>,
-    /// s.
+    /// Time stamp, s.
     pub time: Option<f64>,
 }
 
@@ -31,16 +31,16 @@ pub(super) struct Sorted {
     pub order: Vec<usize>,
     pub slices: usize,
     pub volumes: usize,
-    /// From slice to slice, mm; None of a single one.
+    /// Step from slice to slice, mm. None for a single slice.
     pub step: Option<DVec3>,
-    /// By place in `order`, s.
+    /// Time of each slice by its index in `order`, s.
     pub times: BTreeMap<usize, f64>,
 }
 
 /// Sorts planes by time, then along their normal.
 ///
 /// # Errors
-/// In words: no planes, planes that are not parallel or not evenly spaced, volumes of different slices.
+/// One line: no planes, planes that are not parallel or not evenly spaced, volumes of different slices.
 pub(super) fn sorted(planes: &[Plane]) -> Result<Sorted, String> {
     let Some(first) = planes.first() else { return Err("there are none".into()) };
     let finite = |p: &Plane| p.position.is_finite() && p.row.is_finite() && p.column.is_finite();

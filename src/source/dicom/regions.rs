@@ -85,12 +85,12 @@ impl Region {
 pub(super) struct Flat {
     /// The part that is read: first column and row, columns and rows.
     pub part: [usize; 4],
-    /// mm; None if nothing states it.
+    /// Distance of pixels, mm. None if nothing states it.
     pub spacing: Option<[f64; 2]>,
     /// The first pixel of the part, mm.
     pub origin: [f64; 2],
     pub remarks: Vec<(String, String)>,
-    /// What the file states and is not so.
+    /// Statements of the file that are not true.
     pub warnings: BTreeSet<String>,
 }
 

@@ -1,10 +1,10 @@
-//! What a user says about a freehand volume.
+//! Options of a freehand volume that a user gives.
 
 use super::CompoundingOptions;
 use crate::files::InputError;
 use std::path::Path;
 
-/// What a user says about a freehand volume; None: what the file says, otherwise the default.
+/// Options of a freehand volume that a user gives. None: the value that the file states, otherwise the default.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct FreehandArguments {
     /// As [`CompoundingOptions::clip`].
@@ -20,7 +20,7 @@ pub struct FreehandArguments {
 }
 
 impl FreehandArguments {
-    /// These options with what was said.
+    /// Returns `options` with the values that the user gave.
     pub fn over(&self, options: CompoundingOptions) -> CompoundingOptions {
         CompoundingOptions {
             clip: self.clip.or(options.clip),
@@ -32,16 +32,16 @@ impl FreehandArguments {
         }
     }
 
-    /// Refuses what was said of a file that is no freehand volume.
+    /// Refuses the options for a file that is not a freehand volume.
     ///
     /// # Errors
-    /// Anything was said.
+    /// Any option is set.
     pub fn refused(&self, path: &Path) -> Result<(), InputError> {
         let fault = "is for pictures with poses that differ, which become a freehand volume";
         self.flag().map_or(Ok(()), |flag| Err(InputError::new(path, flag, fault)))
     }
 
-    /// The flag of the first that was said.
+    /// The command-line flag of the first option that is set.
     pub fn flag(&self) -> Option<&'static str> {
         let FreehandArguments { clip, spacing, max_hole, extent, max_voxels } = self;
         let said = [

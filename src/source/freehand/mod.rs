@@ -130,7 +130,7 @@ impl Compounder {
     /// An empty volume with voxels of type `stored`. Frames may have any type; their values are not scaled.
     ///
     /// # Errors
-    /// In words: a lattice or options that are not valid, or more voxels than the options allow. Nothing is allocated then.
+    /// One line: a lattice or options that are not valid, or more voxels than the options allow. Nothing is allocated then.
     pub fn new(lattice: Lattice, stored: StoredType, options: CompoundingOptions) -> Result<Compounder, String> {
         let grid = &lattice.grid;
         grid.check().map_err(|e| format!("{} {}", e.field, e.fault))?;
@@ -181,7 +181,7 @@ impl Compounder {
     /// Compounds a frame. Returns the number of its pixels in the volume.
     ///
     /// # Errors
-    /// In words, why the frame is refused. It is counted, and the volume is not changed.
+    /// One line: why the frame is refused. It is counted, and the volume is not changed.
     pub fn push(&mut self, frame: &TrackedFrame) -> Result<u64, String> {
         let checked = frame.check().and_then(|()| frame.pose.clipped(self.options.clip));
         let [columns, rows] = match checked {
@@ -272,7 +272,7 @@ impl Pose {
     /// Checks the pose.
     ///
     /// # Errors
-    /// In words: no pixels, or a pose that is not finite, is degenerate, or is beyond 1e6 mm.
+    /// One line: no pixels, or a pose that is not finite, is degenerate, or is beyond 1e6 mm.
     pub fn check(&self) -> Result<(), String> {
         let [columns, rows] = self.size;
         if !(1..=MAX_PIXELS).contains(&columns) || !(1..=MAX_PIXELS).contains(&rows) {
@@ -359,7 +359,7 @@ impl Lattice {
     /// Where the voxels are in the space of the tracker.
     ///
     /// # Errors
-    /// In words, a lattice that has no place.
+    /// One line: a lattice that has no place.
     pub fn world(&self) -> Result<World, String> {
         let back = self.to_volume.inverse();
         let (spacing, origin) = (self.grid.spacing, self.grid.origin.into());
@@ -382,7 +382,7 @@ impl Lattice {
     /// Poses that are not valid are left out.
     ///
     /// # Errors
-    /// In words: no valid pose, an option out of its range, or no spacing that is coarse enough.
+    /// One line: no valid pose, an option out of its range, or no spacing that is coarse enough.
     pub fn around(poses: &[Pose], options: &CompoundingOptions) -> Result<Lattice, String> {
         let length = |what, mm: f64, least: f64| match (least..=1e6).contains(&mm) {
             true => Ok(()),

@@ -1,5 +1,5 @@
-//! A freehand volume of pictures that arrive: the first are kept until the volume can be placed around them, later ones are compounded as
-//! they come, and the volume grows around them.
+//! A freehand volume of pictures that arrive. The first pictures are kept until the volume can be placed around them; later ones are
+//! compounded as they arrive, and the volume grows around them.
 
 use super::{Compounder, CompoundingOptions, Lattice, Pose, TrackedFrame};
 use crate::probe::StoredType;
@@ -12,11 +12,11 @@ const MAX_FIRST_BYTES: usize = 256 << 20;
 /// When the volume of a [`Sweep`] is placed and emitted.
 #[derive(Clone, Debug)]
 pub struct Schedule {
-    /// It is placed around so many first pictures, or those of ten seconds or of 256 MiB, ...
+    /// The volume is placed around this number of first pictures, or around those of ten seconds or of 256 MiB, ...
     pub first: usize,
-    /// ... or those before none came for so long.
+    /// ... or earlier, when no picture arrived for this time.
     pub silence: Duration,
-    /// It is emitted at this interval while pictures arrive ...
+    /// The volume is emitted at this interval while pictures arrive ...
     pub interval: Duration,
     /// ... or after this number of pictures.
     pub pictures: usize,
@@ -28,7 +28,7 @@ impl Default for Schedule {
     }
 }
 
-/// Why a picture, or all of them, are in no volume.
+/// Why one picture, or all pictures, are in no volume.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Refusal {
     /// The picture does not lie wholly in the volume, which may not grow further.
@@ -58,7 +58,7 @@ pub struct Sweep {
 }
 
 impl Sweep {
-    /// `stored`: the type of the samples of all pictures.
+    /// A sweep without pictures. `stored`: type of the samples of all pictures.
     pub fn new(options: CompoundingOptions, schedule: Schedule, stored: StoredType) -> Sweep {
         Sweep {
             options,
@@ -86,7 +86,7 @@ impl Sweep {
     /// Adds a picture: one sample a pixel, column fastest.
     ///
     /// # Errors
-    /// Why it is in no volume.
+    /// The reason why the picture is in no volume.
     pub fn push(&mut self, pose: Pose, bytes: Vec<u8>) -> Result<(), Refusal> {
         self.last = Some(Instant::now());
         if bytes.len() != pose.size[0] * pose.size[1] * self.stored.bytes() {
@@ -105,8 +105,8 @@ impl Sweep {
         }
     }
 
-    /// None before the volume is to be emitted again, then true if a slice changed. Places the volume first if it has no place yet, and hands
-    /// what goes wrong with that to `refuse`. `at_once`: no more pictures come.
+    /// None while the volume is not due to be emitted. Otherwise true if a slice changed. A volume that has no place yet is placed first,
+    /// and a fault of that goes to `refuse`. `at_once`: no more pictures follow, so that the volume is due now.
     pub fn update(&mut self, at_once: bool, mut refuse: impl FnMut(Refusal)) -> Option<bool> {
         let waited = self.since?.elapsed();
         let is_placed = self.is_placed();
@@ -151,7 +151,7 @@ impl Sweep {
         self.left_out
     }
 
-    /// None before the volume has its place.
+    /// The lattice of the volume. None before the volume is placed.
     pub fn lattice(&self) -> Option<&Lattice> {
         Some(self.compounder.as_ref()?.lattice())
     }

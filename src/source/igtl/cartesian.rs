@@ -49,7 +49,7 @@ impl CartesianVolume {
     /// handedness is used: rows of a left-handed image are reversed. The values shown as 0 and 1 are 0 and 255 for 8 bits, otherwise the smallest and largest of the first message.
     ///
     /// # Errors
-    /// In words, an image that cannot be used. The volume is not changed.
+    /// One line: an image that cannot be used. The volume is not changed.
     pub(super) fn take(volume: &mut Option<CartesianVolume>, image: Image, max_bytes: usize) -> Result<Taken, String> {
         let [i, j, _] = image.size;
         let ([x, y, first], [columns, rows, slices]) = (image.region.offset, image.region.size);

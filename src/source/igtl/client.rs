@@ -37,10 +37,10 @@ pub struct ClientOptions {
     pub connect_timeout: Duration,
     /// Longest pause within a message before the connection is closed.
     pub stall_timeout: Duration,
-    /// Longest time from the first byte of a message to its last, and a second more for each megabyte of it: a peer that sends a byte a second is no
-    /// source.
+    /// Longest time from the first byte of a message to its last, plus a second for each megabyte of the message. It ends connections to
+    /// peers that send a byte now and then.
     pub message_timeout: Duration,
-    /// Longest time without any message before the connection is closed: a peer that lost power does not close it.
+    /// Longest time without a message before the connection is closed. A peer that lost power does not close it.
     pub silence_timeout: Duration,
     /// Wait before the first reconnection. Doubled with every connection that brings no message.
     pub first_wait: Duration,
@@ -52,7 +52,7 @@ pub struct ClientOptions {
     pub queue_messages: usize,
     /// Most memory of the queued messages, bytes. A single larger one is still kept.
     pub queue_bytes: usize,
-    /// Messages with a checksum of 0 are taken unchecked.
+    /// Accept messages with a checksum of 0 without a check.
     pub takes_no_checksum: bool,
 }
 

@@ -16,7 +16,7 @@ pub enum Message {
 /// TRANSFORM: one pose.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Transform {
-    /// At most 20 bytes on the wire.
+    /// Name of the device, at most 20 bytes on the wire.
     pub device: String,
     /// Time stamp, s since 1970; 0: none.
     pub time: f64,
@@ -37,7 +37,7 @@ pub struct TrackingData {
 /// One tool of a [`TrackingData`].
 #[derive(Clone, Debug, PartialEq)]
 pub struct Tool {
-    /// At most 20 bytes on the wire.
+    /// Name of the tool, at most 20 bytes on the wire.
     pub name: String,
     pub kind: ToolKind,
     /// As in [`Transform`].
@@ -67,7 +67,7 @@ pub struct Status {
     pub code: u16,
     /// Defined by the device.
     pub subcode: i64,
-    /// At most 20 bytes on the wire.
+    /// Name of the fault, at most 20 bytes on the wire.
     pub name: String,
     pub text: String,
 }

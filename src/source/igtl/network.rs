@@ -77,7 +77,7 @@ const REMEDY: &str = "let the server send the TRANSFORM or TDATA of a tracked pr
 /// reported as [`Event::Fault`], each kind at most once a second and with its count.
 ///
 /// Memory: that of the [`Client`], one volume of at most `volume_bytes` and its message, the first frames of a sweep (256 MiB), and that
-/// of a [`Compounder`] and a [`Pairing`].
+/// of a [`Compounder`](crate::freehand::Compounder) and a [`Pairing`].
 pub struct Network {
     client: Client,
     /// Statistics that were reported as faults.

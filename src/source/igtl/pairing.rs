@@ -63,9 +63,9 @@ struct Pose {
 }
 
 impl Pairing {
-    /// `device`: device of the TRANSFORM, or name of the tool in TDATA; None: the nearest TRANSFORM, the last of several. `tolerance`:
-    /// largest difference between the stamps of a frame and its pose, s. `patience`: how far frames may be ahead of the poses, s.
-    /// Negative values and NaN count as 0.
+    /// `device`: device of the TRANSFORM, or name of the tool in TDATA. None: the nearest TRANSFORM, the last one of several. `tolerance`:
+    /// largest difference between the time stamps of a frame and its pose, s. `patience`: largest time by which frames may be ahead of the
+    /// poses, s. Negative values and NaN count as 0.
     pub fn new(device: Option<String>, tolerance: f64, patience: f64) -> Pairing {
         Pairing {
             seen: Names::new(device.clone()),

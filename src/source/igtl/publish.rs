@@ -1,7 +1,7 @@
-//! What a stream shows, sent to the clients of a [`Server`]: each picture, and each volume that is whole, as a Cartesian lattice in its place.
+//! Sends the output of a stream to the clients of a [`Server`]: each picture, and each complete volume as a Cartesian lattice in its place.
 //!
-//! A thread of its own converts volumes and encodes messages, so that the stream only hands them over. What it cannot keep up with is
-//! replaced by what is newer, and counted.
+//! A thread of its own converts volumes and encodes messages, so that the stream does not wait. Pictures and volumes that this thread
+//! cannot keep up with are replaced by newer ones and counted.
 
 use super::message::{Coordinates, Image, Message, Region, Scalar};
 use super::server::{Server, ServerOptions, ServerStatistics, now};
@@ -15,7 +15,7 @@ use std::net::SocketAddr;
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::thread::{self, JoinHandle};
 
-/// Devices of the messages.
+/// Names of the devices in the messages.
 pub const PICTURE: &str = "EcholumePicture";
 pub const VOLUME: &str = "EcholumeVolume";
 /// Most voxels of a volume, one byte each: 255 MiB. Clients take 256 MiB in one message, with its headers.
@@ -27,18 +27,18 @@ const MAX_EDGE: usize = 65_535;
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct PublisherStatistics {
     pub server: ServerStatistics,
-    /// Pictures and volumes that were handed to the server.
+    /// Number of pictures that were handed to the server. `volumes` counts volumes.
     pub pictures: u64,
     pub volumes: u64,
-    /// Pictures and volumes that were replaced by newer ones before they were converted.
+    /// Number of pictures and volumes that newer ones replaced before they were converted.
     pub replaced: u64,
-    /// Why a volume or picture could not be sent, the last time.
+    /// The last reason why a picture or a volume could not be sent.
     pub fault: Option<String>,
 }
 
-/// Sends pictures and volumes. Dropping it sends what waits in the server, and ends all connections.
+/// Sends pictures and volumes. Dropping it sends what still waits in the server, and ends all connections.
 ///
-/// Memory: a volume that is collected, one that waits, one that is converted, its voxels, and that of the [`Server`].
+/// Memory: the volume that is collected, one that waits, one that is converted, its voxels, and that of the [`Server`].
 pub struct Publisher {
     shared: Arc<Shared>,
     server: Arc<Server>,
@@ -130,7 +130,7 @@ impl Publisher {
         }
     }
 
-    /// Sends what waits, ends all connections, and returns the counts.
+    /// Sends what still waits, ends all connections, and returns the counts.
     pub fn finish(mut self) -> PublisherStatistics {
         self.stop();
         self.server.finish();
@@ -145,7 +145,7 @@ impl Publisher {
         }
     }
 
-    /// What is to see every event of a source: it hands over each volume that is whole.
+    /// A function that has to see every event of a source. It hands complete volumes to the publisher.
     pub fn listener(&self) -> impl FnMut(&Event) + Send + use<> {
         let (shared, server) = (self.shared.clone(), self.server.clone());
         let mut listener = Listener { shared, server, header: None, filling: None };

@@ -1,4 +1,5 @@
-//! A server on threads of its own: messages go to every client that is connected, and a slow client loses the oldest of its own.
+//! A server on threads of its own. It sends each message to all connected clients. If a client is slow, the oldest messages of its own
+//! queue are dropped.
 
 use super::begun::Begun;
 use super::codec::{self, BODY_LIMIT, DecodeError, Decoded, MessageError, Version, decode, encode};
@@ -25,19 +26,19 @@ const ERROR: u8 = 1;
 /// Options of a [`Server`].
 #[derive(Clone, Debug)]
 pub struct ServerOptions {
-    /// Most clients at a time. Others are disconnected at once.
+    /// Largest number of clients at a time. Further ones are disconnected at once.
     pub clients: usize,
     /// Most messages of each device that wait for a client; the oldest are dropped for newer ones.
     pub queue_messages: usize,
     /// Most bytes that wait for a client. The newest message is always kept.
     pub queue_bytes: usize,
-    /// A client that reads nothing for so long is disconnected.
+    /// A client that reads nothing for this time is disconnected.
     pub stall_timeout: Duration,
-    /// A client whose message takes so long from its first byte to its last is disconnected, however many bytes come meanwhile.
+    /// A client whose message takes this time from its first byte to its last is disconnected, however many bytes arrive meanwhile.
     pub message_timeout: Duration,
-    /// How long dropping the server waits until its last messages are sent.
+    /// Longest time for which dropping the server waits until its last messages are sent.
     pub last: Duration,
-    /// Who answers queries of the status, and text of its STRING.
+    /// Device name in answers to status queries, and text of the server's STRING.
     pub name: String,
 }
 
@@ -60,19 +61,19 @@ impl Default for ServerOptions {
 pub struct ServerStatistics {
     /// Clients that are connected.
     pub clients: usize,
-    /// Clients that were, and are.
+    /// Number of clients that have connected so far.
     pub connections: u64,
-    /// Clients beyond the most, disconnected at once.
+    /// Clients that were disconnected at once because the largest number was reached.
     pub refused: u64,
     /// Messages that were sent whole, to all clients.
     pub sent: u64,
     /// Messages that were dropped from a client's queue for newer ones.
     pub dropped: u64,
-    /// Clients that were disconnected because they read nothing, or sent what is no message.
+    /// Clients that were disconnected because they read nothing or sent something that is not a message.
     pub disconnected: u64,
 }
 
-/// An OpenIGTLink server. Dropping it sends what waits, for [`ServerOptions::last`] at most, and ends all connections.
+/// An OpenIGTLink server. Dropping it sends the waiting messages, for [`ServerOptions::last`] at most, and ends all connections.
 ///
 /// Memory: the last message of each device, and [`ServerOptions::queue_bytes`] a client; messages are shared among clients.
 pub struct Server {
@@ -209,7 +210,7 @@ impl Server {
 }
 
 impl Server {
-    /// Sends what waits, for [`ServerOptions::last`] at most, and ends all connections. The counts stay.
+    /// Sends the waiting messages, for [`ServerOptions::last`] at most, and ends all connections. The counts stay.
     pub fn finish(&self) {
         let mut state = self.shared.lock();
         state.stop = true;

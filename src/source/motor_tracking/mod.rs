@@ -50,8 +50,8 @@ pub enum Clock {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct MotorTrackingOptions {
     pub clock: Clock,
-    /// The source is not asked for frames before the array sweeps, which suits a file. A source with its own clock is read from the
-    /// start, because frames that waited would be taken for new ones.
+    /// Do not ask the source for frames before the array sweeps, which suits a file. A source with its own clock is read from the start,
+    /// because frames that had waited would be taken for new ones.
     pub holds: bool,
 }
 
@@ -99,7 +99,7 @@ impl MotorTracked {
         }
     }
 
-    /// What happened to the frames so far.
+    /// Counts of the frames so far.
     pub fn counts(&self) -> TrackingCounts {
         self.counts
     }
@@ -246,7 +246,7 @@ impl Live for MotorTracked {
 /// The header of frames that are swept at `speed` deg/s, the slices in rad, and the time that sound needs for a frame, s.
 ///
 /// # Errors
-/// In words: a geometry that is not a fan, or a speed at which neighbouring slices would cross.
+/// One line: a geometry that is not a fan, or a speed at which neighbouring slices would cross.
 fn motor_header(header: Header, speed: f64) -> Result<(Header, Axis, f64), String> {
     let probe = match &header.forward {
         Geometry::Sweep(probe) if matches!(probe.motion, Motion::Fan { .. }) && probe.slices.len() > 1 => probe.clone(),

@@ -178,7 +178,7 @@ impl Passes {
     }
 }
 
-/// What happened to the frames. Counts frames unless stated otherwise.
+/// Counts of frames, unless a field states otherwise.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct TrackingCounts {
     /// Placed in a slice.
@@ -220,7 +220,8 @@ impl TrackingCounts {
         }
     }
 
-    /// What deserves a report, on one line. Frames that were left out because there were more than needed do not.
+    /// One line on the counts that need a report. None if there is nothing to report: frames that were left out because there were more
+    /// than needed are normal.
     pub fn fault(&self) -> Option<String> {
         let parts = [
             (self.filled, "slices had no frame of their own and were given a neighbour's"),

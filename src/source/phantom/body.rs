@@ -51,7 +51,7 @@ impl Body {
         }
     }
 
-    /// Of what its truth consists; nothing where a formula says what is where.
+    /// The labels of the body's truth. Empty if a formula describes the body.
     pub fn labels(self) -> &'static [Label] {
         match self {
             Body::Head => &Label::ALL[..10],
@@ -118,7 +118,7 @@ impl RampTruth {
 /// Edges are linear in grey over one sample along the beam, with the middle grey on the edge itself.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Truth {
-    /// There is no formula.
+    /// No formula describes the body.
     Head,
     Sphere {
         centre: DVec3,
@@ -151,11 +151,11 @@ pub enum Truth {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct HeartTruth {
     pub centre: DVec3,
-    /// Of the blood, mm: at the end of systole, and of diastole.
+    /// Radius of the blood, mm: at the end of systole and at the end of diastole.
     pub radii: [f64; 2],
     /// Thickness of the wall, mm.
     pub wall: f64,
-    /// Length of a cycle, s, where the rate is the mean one.
+    /// Length of a cycle at the mean rate, s.
     pub period: f64,
     /// Share of the mean rate by which the rate rises and falls, within 8 s.
     pub swing: f64,
@@ -170,13 +170,13 @@ impl HeartTruth {
     /// In so many seconds the rate rises, falls below the mean and comes back.
     const SWING_SECONDS: f64 = 8.0;
 
-    /// Cycles since time 0; whole ones at the end of diastole.
+    /// Number of cycles since time 0. It is whole at the end of each diastole.
     pub fn cycles(&self, time: f64) -> f64 {
         let turn = std::f64::consts::TAU / HeartTruth::SWING_SECONDS;
         (time + self.swing * (1.0 - (turn * time).cos()) / turn) / self.period
     }
 
-    /// Radius of the blood at a phase, of which 1 is a cycle, mm: largest at phase 0.
+    /// Radius of the blood, mm, at a phase in cycles. It is largest at phase 0.
     pub fn radius(&self, phase: f64) -> f64 {
         let phase = phase.rem_euclid(1.0);
         let filled = match phase < HeartTruth::SYSTOLE {
@@ -207,7 +207,7 @@ pub(super) enum Scatterers {
 }
 
 impl Scatterers {
-    /// Of the body that the options name.
+    /// The scatterers of the body that the options name.
     pub fn new(options: &PhantomOptions, probe: &Probe) -> Scatterers {
         let PhantomOptions { still, gap, clutter_db, .. } = *options;
         let face = probe.array_radius();

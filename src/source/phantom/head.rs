@@ -214,7 +214,7 @@ impl Head {
         if here.abs() > NEAR { here } else { here / gradient(place, distance).length().clamp(0.5, 2.0) }
     }
 
-    /// What is at a place at a time.
+    /// The label at a position and a time.
     pub fn label(&self, place: Vec3, time: f64) -> Label {
         let pose = self.pose(time);
         match self.tissue(place, &pose) {

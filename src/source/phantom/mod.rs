@@ -45,7 +45,7 @@ const WOBBLE_RADIUS: f64 = 25.0;
 const SECTOR_ANGLE_DEG: f64 = 75.0;
 /// Default angle from the first frame to the last.
 pub const FAN_ANGLE_DEG: f64 = 61.0;
-/// Fluid between the near wall and the fetus where they are nearest, mm.
+/// Default distance of the near wall from the fetus where they are nearest, mm, which is also the largest.
 pub const GAP: f64 = 29.9;
 /// Depth of the last sample, mm.
 const END_DEPTH: f64 = 120.0;
@@ -55,14 +55,14 @@ const SOUND_SPEED: f64 = 1540.0;
 /// Most samples of one volume. Its complex field takes eight bytes a sample.
 const MAX_VOLUME_SAMPLES: usize = 1 << 25;
 
-/// What becomes of the unresolved scatterers.
+/// How speckle is simulated.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Speckle {
-    /// One realisation, as a probe sees it.
+    /// One realisation of the speckle, as a probe sees it.
     Random,
     /// The mean grey value over all realisations, blurred by the probe: what a filter of speckle should find.
     Mean,
-    /// None: samples are the exact echogenicity, without the blur of the probe.
+    /// No speckle: samples are the exact echogenicity, without the blur of the probe.
     None,
 }
 
@@ -76,7 +76,7 @@ impl Speckle {
     }
 }
 
-/// What to simulate.
+/// Options of a [`Phantom`].
 #[derive(Clone, Debug, PartialEq)]
 pub struct PhantomOptions {
     /// Seed of the speckle. The body does not depend on it.
@@ -130,7 +130,7 @@ impl Default for PhantomOptions {
     }
 }
 
-/// PhantomOptions that were checked, and the probe that they make. Frames are computed when asked for.
+/// A simulated sweep: the checked options and the probe that they define. Frames are computed on request.
 pub struct Phantom {
     options: PhantomOptions,
     /// Without its advance.

@@ -18,7 +18,7 @@ pub(super) struct Beam {
     pub first: DVec3,
     /// Step from one sample to the next. Both maps of the probe are linear along a line.
     pub step: DVec3,
-    /// mm from sample to sample.
+    /// Distance from sample to sample, mm.
     pub pitch: f64,
     /// Depth of sample 0 below the array, mm.
     pub start_depth: f64,
@@ -31,7 +31,7 @@ pub(super) struct Beam {
 }
 
 impl Beam {
-    /// At a fractional slice, which may lie beyond the ends of the sweep.
+    /// The beam of a line at a fractional slice, which may lie beyond the ends of the sweep.
     pub fn new(probe: &Probe, line: usize, slice: f64, time: f64) -> Beam {
         let line = line as f64;
         let place = |sample| probe.to_space(Indices { sample, line, slice });
@@ -67,9 +67,9 @@ impl Beam {
 /// Echo of a point, dB re full scale.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Echo {
-    /// From many unresolved scatterers, which give speckle.
+    /// Level of the echo from many unresolved scatterers, which give speckle.
     pub diffuse: f32,
-    /// From a surface or wire, without speckle.
+    /// Level of the echo from a surface or wire, without speckle.
     pub mirror: f32,
 }
 

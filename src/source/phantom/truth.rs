@@ -14,7 +14,7 @@ use crate::volume_file::VolumeFile;
 use glam::DVec3;
 use std::path::{Path, PathBuf};
 
-/// Where the signed distance goes that belongs to a label volume: `truth.mha` and `truth.seg.nrrd` give `truth.distance.mha`.
+/// Path of the file of signed distances that belongs to a label volume: `truth.mha` and `truth.seg.nrrd` give `truth.distance.mha`.
 pub fn distance_path(labels: &Path) -> PathBuf {
     match segmentation::stem(labels) {
         Some(stem) => labels.with_file_name(format!("{stem}.distance.mha")),

@@ -11,9 +11,9 @@ use glam::{DQuat, DVec3};
 pub struct Vessel {
     pub from: DVec3,
     pub to: DVec3,
-    /// Of the blood: at `from`, and at `to`.
+    /// Radius of the blood at `from` and at `to`.
     pub radii: [f64; 2],
-    /// Index of the vessel that it leaves; none of the trunk.
+    /// Index of the vessel that this one branches from. None for the trunk.
     pub parent: Option<usize>,
 }
 
@@ -30,7 +30,7 @@ impl Vessel {
 /// A tree of vessels with the same wall around all, and the grey values of blood, wall and tissue.
 #[derive(Clone, Debug, PartialEq)]
 pub struct VesselTree {
-    /// The trunk first; each behind its parent.
+    /// The trunk comes first, and each vessel after its parent.
     pub vessels: Vec<Vessel>,
     /// Thickness of the wall, mm.
     pub wall: f64,
@@ -92,7 +92,7 @@ struct Bud {
 }
 
 impl VesselTree {
-    /// In front of an array whose face is at Y = `face` mm, with grey values of blood, wall and tissue.
+    /// A tree in front of an array whose face is at Y = `face` mm, with the grey values of blood, wall and tissue.
     pub fn new(face: f64, [blood, muscle, tissue]: [f64; 3]) -> VesselTree {
         let towards = DVec3::from(TOWARDS).normalize();
         let mut vessels = Vec::new();

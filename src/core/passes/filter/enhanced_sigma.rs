@@ -73,7 +73,7 @@ pub const PICTURE: Pass = Pass {
     },
 };
 
-/// How far the window grew at each pixel of a slice: what Tables 7-9 of the thesis count. Reads the same slice as the filter, which
+/// How far the window grew at each pixel of a slice, which Tables 7-9 of the thesis count. It reads the same slice as the filter, which
 /// runs next.
 pub const GROWTH: Pass = Pass {
     name: "growth_slice",

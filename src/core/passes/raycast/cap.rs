@@ -74,7 +74,7 @@ pub(crate) fn cut_at(scene: &Scene, reads: &Arrays, x: usize, y: usize) -> Optio
     (cut[1] > 0.0).then_some(Cut { echo: cut[0], opacity: cut[1] })
 }
 
-/// What a ray shows of a cut face.
+/// The part of a cut face that a ray shows.
 #[derive(Clone, Copy)]
 pub struct Cut {
     echo: f64,

@@ -1,5 +1,5 @@
-//! The emission-absorption sum along one ray in f64, front to back (thesis 4-1, 4-2), whatever it goes through: the volume
-//! renderer's reference goes through a texture, the orders of the sum's error are found in analytic fields.
+//! The emission-absorption sum along one ray in f64, front to back (thesis 4-1, 4-2), through any medium. The reference of the volume
+//! renderer passes a texture; tests of the order of the error pass analytic fields.
 
 use crate::scene::{Compositing, transfer};
 
@@ -10,7 +10,7 @@ pub enum Rule {
     Riemann,
     /// a = 1 - exp(-y), kappa from the step's middle.
     Corrected,
-    /// The same, kappa from where the step begins. Not offered: it shows what the middle is worth.
+    /// The same, with kappa from the begin of the step. No setting offers it. It shows what the middle of the step gains.
     CorrectedLeft,
     /// The same with the mean kappa, and the mean colour weighted by it, between the values at the step's two ends.
     PreIntegrated,
@@ -40,7 +40,7 @@ pub struct Place {
     pub n: f64,
 }
 
-/// What a ray goes through: red, green, blue, and the absorption over one reference length; none where nothing is.
+/// The medium of a ray: red, green, blue, and the absorption over one reference length. None outside of everything.
 pub trait Medium {
     /// The part of a step, from offset to offset, that is inside the medium; none if neither end is. A part that begins or ends within the
     /// step has one value, that of the step's end inside.
@@ -55,17 +55,17 @@ pub trait Medium {
     fn self_attenuated(&self, from: Place, to: Place, length: f64) -> Option<[f64; 4]>;
 }
 
-/// One ray's sum.
+/// The emission-absorption sum of one ray.
 #[derive(Clone, Copy, Debug)]
 pub struct March {
     pub rule: Rule,
-    /// How far it goes behind its entry, mm. The last step is as long as what is left.
+    /// Length of the ray behind its entry, mm. The last step is as long as the remainder.
     pub path: f64,
     /// The length for which absorption is given, mm.
     pub reference_length: f64,
-    /// It ends when less than this share of light is left; 0 never ends early.
+    /// The ray ends when less than this share of light is left. With 0 it never ends early.
     pub early_end: f64,
-    /// The opacity at which it has hit something.
+    /// Opacity from which on the ray has hit something.
     pub hit: f64,
 }
 

@@ -275,7 +275,7 @@ impl<'a> Ray<'a> {
         if self.path() > 0.0 { self.enter } else { MISS }
     }
 
-    /// mm behind the entry after n steps: dt/dn = step (wider + widening t).
+    /// Distance behind the entry after n steps, mm: dt/dn = step (wider + widening t).
     pub fn offset(&self, n: f64) -> f64 {
         let rate = self.step * self.widening;
         match rate == 0.0 {
@@ -307,7 +307,7 @@ impl<'a> Ray<'a> {
         self.direction
     }
 
-    /// Whether a place that many mm behind the entry is in the insonified region.
+    /// True if the position at this distance behind the entry, mm, is in the insonified region.
     pub fn is_inside(&self, offset: f64) -> bool {
         texel(self.scene, self.place(offset)).is_some()
     }

@@ -1,4 +1,4 @@
-//! A survey of what the rays or planes of a picture meet, in f64 on the CPU: where a picture is wholly one colour, it tells why.
+//! A survey of what the rays or planes of a picture meet, in f64 on the CPU. It tells why a picture has a single colour.
 
 use super::detector::{judged, polarity};
 use super::ray::{Ray, interpolated, texel};
@@ -9,10 +9,10 @@ use crate::scene::{Mode, Scene, View};
 const RAYS: usize = 4096;
 const SAMPLES: f64 = 1024.0;
 
-/// What rays, or the points of planes, meet.
+/// What the rays, or the points of planes, meet.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Survey {
-    /// Number of rays that pass through the rendered box within all clip planes; of planes, points there.
+    /// Number of rays that pass through the rendered box within all clip planes. For planes, number of points there.
     pub met: usize,
     /// Number of samples in the insonified region, of at most 4096 of those rays.
     pub insonified: usize,

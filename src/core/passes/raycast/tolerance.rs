@@ -1,4 +1,5 @@
-//! Volume rendering with an error that every pixel states: each region has the rays, and each ray the steps, that keep it under a tolerance.
+//! Volume rendering with an error that every pixel states. Regions get as many rays, and rays as many steps, as keep the error below a
+//! tolerance.
 //!
 //! Light is integrated between every two samples of a ray, as if the value went evenly from one to the other: by the integral of the transfer function over the
 //! values ([`Slot::TransferIntegral`]), so that no thin shell of it is missed. From the same samples it is integrated between every second, beginning with
@@ -20,7 +21,7 @@ use crate::passes::postprocess::{tone_constants, tone_params, toned};
 use crate::scene::{Scene, transfer};
 use glam::DVec3;
 
-/// Levels of the screen.
+/// Levels of the screen in the range 0..1.
 pub const LEVELS: f64 = 255.0;
 
 /// How often a step is halved, at most.

@@ -1,4 +1,4 @@
-//! Where rendering starts, as lines on the planes beside a rendering: at the start surface, at the curve that the user drew, or at the deeper of both.
+//! The render start as lines on the planes beside a rendering: the start surface, the curve that the user drew, or the deeper of both.
 
 use super::Unveiled;
 use crate::passes::raycast::ray;
@@ -19,8 +19,8 @@ pub struct StartLine {
     pub pieces: Vec<[[f64; 2]; 2]>,
 }
 
-/// Where the planes beside a rendering cut the render start, by tile; nothing where nothing is removed, and without lines over planes. `unveiled`: what was
-/// found of the volume that is drawn.
+/// The lines at which the planes beside a rendering cut the render start, by tile. Empty if nothing is removed, or if planes have no lines.
+/// `unveiled`: the result of the search in the volume that is drawn.
 pub fn lines(scene: &Scene, unveiled: Option<&Unveiled>) -> Vec<StartLine> {
     let removes = |unveiled: &&Unveiled| unveiled.outcome.is_found() && unveiled.rows.iter().any(|row| *row > 0.0);
     let start = Start {

@@ -40,34 +40,34 @@ const LEAST_CONTRAST: u32 = LEVELS / 8;
 /// Least share of the columns in view that have a near face, per cent.
 const LEAST_SHARE: u32 = 40;
 
-/// What was found of a volume.
+/// The result of the search in a volume.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Unveiled {
     pub outcome: Outcome,
-    /// By column and slice of the volume, the column fastest: the row at which rendering starts. All 0 where the pocket cannot be told.
+    /// Row at which rendering starts, by column and slice of the volume, the column fastest. All 0 if the pocket was not recognised.
     pub rows: Vec<f32>,
 }
 
-/// Whether the pocket of fluid can be told.
+/// Whether the pocket of fluid was recognised.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Outcome {
-    /// It can.
+    /// The pocket was recognised.
     Found(Evidence),
     /// No fluid lies in front of tissue.
     NoPocket,
-    /// It is hardly darker than the tissue around it.
+    /// The pocket is hardly darker than the tissue around it.
     NoContrast(Evidence),
-    /// Too few columns in view have it.
+    /// Too few columns in view meet the pocket.
     TooSmall(Evidence),
 }
 
-/// How sure a pocket is.
+/// The evidence for a pocket.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Evidence {
-    /// Levels of the tissue in front of the pocket and behind it, whichever is darker, and of the pocket.
+    /// Grey level of the tissue in front of the pocket or behind it, whichever is darker. `pocket` is that of the pocket.
     pub tissue: u32,
     pub pocket: u32,
-    /// Columns in view whose near face was found, or that begin in the pocket, per cent.
+    /// Share of the columns in view whose near face was found, or that begin in the pocket, per cent.
     pub share: u32,
 }
 
@@ -116,7 +116,7 @@ pub(super) const SEARCH: Search = Search {
     reference: |scene, volume| reference(scene, volume).0,
 };
 
-/// Where rendering starts in a volume. `bytes` are its texels in the format of [`Slot::Volume`], which is stored whole.
+/// Finds where rendering starts in a volume. `bytes` are the texels in the format of [`Slot::Volume`], which is stored completely.
 pub fn find(scene: &Scene, bytes: &[u8]) -> Unveiled {
     let lattice = scene.fluid_lattice();
     let cells = smoothed_cells(&lattice, cells(scene, &lattice, bytes));

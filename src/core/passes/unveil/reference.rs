@@ -1,5 +1,5 @@
-//! Where rendering starts, cell by cell from the definition: without runs, threads or 16-bit cells. Integers as well, and equal to what
-//! [`find`](super::find) finds.
+//! The reference of [`find`](super::find): where rendering starts, computed cell by cell from the definition, without runs, threads or
+//! 16-bit cells. All values are integers, and equal to those of [`find`](super::find).
 
 use super::{Evidence, Kernels, LEAST_CONTRAST, LEAST_SHARE, Outcome, PARTS, RELAXATIONS, THICKNESS, level_of};
 use crate::passes::pass::*;

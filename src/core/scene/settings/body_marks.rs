@@ -1,5 +1,5 @@
-//! Settings of body marks: small outlines of a part of the body with the place and the direction of the probe. No pass reads them: the viewer draws
-//! them over the picture, and `render` into the picture that it writes.
+//! Settings of body marks: small outlines of a part of the body with the position and the direction of the probe. No pass reads them: the
+//! viewer draws them over the picture, and `render` into the picture that it writes.
 
 use crate::scene::number::Allowed::Range;
 use crate::scene::number::{ANGLE, Number, SHARE, number};
@@ -79,7 +79,7 @@ impl Body {
         Body::Breast,
     ];
 
-    /// Its name for the user.
+    /// Name of the part for the user.
     pub fn title(self) -> &'static str {
         match self {
             Body::Abdomen => "Abdomen",

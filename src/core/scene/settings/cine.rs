@@ -1,4 +1,4 @@
-//! Settings of the cine loop: what of it is played, and how. No pass reads them.
+//! Settings of the cine loop: its first and last volume, its speed and its direction. No pass reads them.
 
 use crate::scene::number::Allowed::Range;
 use crate::scene::number::{Number, number};
@@ -25,14 +25,14 @@ impl Default for Cine {
 }
 
 impl Cine {
-    /// The numbers of the volumes of a recording of `count` that are played, ascending; none if the marks are not among them.
+    /// The numbers of the volumes that are played, ascending, for a recording of `count` volumes. Empty if the marks are not among them.
     pub fn volumes(&self, count: usize) -> Vec<usize> {
         let first = self.first.map_or(0, |first| first as usize);
         let last = self.last.map_or(count.saturating_sub(1), |last| last as usize);
         (first..count.min(last.saturating_add(1))).collect()
     }
 
-    /// The same in the order of a film that is repeated: back as well, if the loop is played so. The ends are there once.
+    /// The same in the order of a film that is repeated, also backwards if the loop is played back and forth. Each end is there once.
     pub fn film(&self, count: usize) -> Vec<usize> {
         let mut order = self.volumes(count);
         if self.back_and_forth {

@@ -102,12 +102,12 @@ impl Measurement {
         self.points.len() + self.contours.iter().map(Vec::len).sum::<usize>()
     }
 
-    /// What the length of a way is along.
+    /// Words on the line along which a length is measured.
     pub fn way(&self) -> &'static str {
         if self.on_surface { "along the surface" } else { "along the line" }
     }
 
-    /// Its name for the user.
+    /// Name of the measurement for the user.
     pub fn title(&self) -> &'static str {
         match (self.kind, self.on_surface) {
             (MeasureKind::Surface, false) => "Along a line",
@@ -130,7 +130,7 @@ impl MeasureKind {
         MeasureKind::Arrow,
     ];
 
-    /// Its name for the user.
+    /// Name of the kind for the user.
     pub fn title(self) -> &'static str {
         match self {
             MeasureKind::Distance => "Caliper",
@@ -145,7 +145,7 @@ impl MeasureKind {
         }
     }
 
-    /// How many points complete it; none for those that the user ends.
+    /// Number of points that complete the measurement. None for kinds that the user ends.
     pub fn complete_at(self) -> Option<usize> {
         match self {
             MeasureKind::Text => Some(1),

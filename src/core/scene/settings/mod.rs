@@ -105,8 +105,8 @@ impl Settings {
         Settings { ray: Ray { subsampling, rays: 1, ..self.ray.clone() }, ..self.clone() }
     }
 
-    /// These settings with what no pass reads of others: measurements, annotations, body marks and marks, which are drawn over the picture, and how
-    /// the cine loop is played.
+    /// These settings with those of `other` that no pass reads: measurements, annotations, body marks and marks, which are drawn over the
+    /// picture, and the settings of the cine loop.
     pub fn with_drawings_of(self, other: &Settings) -> Settings {
         let (measure, body_marks) = (other.measure.clone(), other.body_marks.clone());
         Settings { measure, body_marks, marks: other.marks.clone(), cine: other.cine, ..self }

@@ -1,5 +1,5 @@
-//! Settings as TOML and JSON. The code of serde for their some hundred types is compiled here, once for reading and once for writing: other members call
-//! these functions.
+//! Settings as TOML and JSON. Serde's code for their some hundred types is compiled here, once for reading and once for writing. Other
+//! members call these functions.
 
 use super::Settings;
 use crate::tree::{Node, NodeError};
@@ -23,7 +23,7 @@ impl Settings {
     /// The settings of a scene file.
     ///
     /// # Errors
-    /// The text is no TOML, or a value is not what its setting asks for; with its place.
+    /// The text is not valid TOML, or a value does not fit its setting. The error has the position.
     pub fn from_toml(text: &str) -> Result<Settings, NodeError> {
         Settings::from_node(Node::parse(text)?)
     }
@@ -31,7 +31,7 @@ impl Settings {
     /// The settings of a part of a larger text.
     ///
     /// # Errors
-    /// A value is not what its setting asks for; with its place in the text.
+    /// A value does not fit its setting. The error has the position in the text.
     pub fn from_node(mut node: Node) -> Result<Settings, NodeError> {
         if let Some(ray) = node.at("ray") {
             let pixels = subsampling(|name| {
@@ -48,7 +48,7 @@ impl Settings {
     /// The settings of a table with the keys of a scene file.
     ///
     /// # Errors
-    /// A value is not what its setting asks for.
+    /// A value does not fit its setting.
     pub fn from_table(table: Table) -> Result<Settings, NodeError> {
         Settings::from_node(Node::from(Value::Table(table)))
     }
@@ -56,7 +56,7 @@ impl Settings {
     /// The settings as a scene file.
     ///
     /// # Errors
-    /// A value that TOML does not have.
+    /// TOML cannot represent a value.
     pub fn to_toml(&self) -> Result<String, toml::ser::Error> {
         toml::to_string(self.erased())
     }
@@ -64,7 +64,7 @@ impl Settings {
     /// The settings as a table with the keys of a scene file.
     ///
     /// # Errors
-    /// A value that TOML does not have.
+    /// TOML cannot represent a value.
     pub fn to_table(&self) -> Result<Table, toml::ser::Error> {
         Table::try_from(self.erased())
     }
@@ -72,7 +72,7 @@ impl Settings {
     /// The settings as JSON.
     ///
     /// # Errors
-    /// A value that JSON does not have.
+    /// JSON cannot represent a value.
     pub fn to_json(&self) -> Result<String, serde_json::Error> {
         serde_json::to_string(self.erased())
     }

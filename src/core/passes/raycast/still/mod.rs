@@ -1,5 +1,5 @@
-//! A still: volume rendering by paths of light, from the camera to the lights. Light collides with the medium that the transfer function makes of
-//! the volume, and is scattered as often as it happens. Nothing is denoised: the picture is the mean of independent paths, whose expectation is
+//! A still: volume rendering by paths of light, from the camera to the lights. Light collides with the medium that the transfer function
+//! defines, and is scattered any number of times. Nothing is denoised: the picture is the mean of independent paths, whose expectation is
 //! the solution of the equation of radiative transfer (docs/numerics.md).
 
 mod path;
@@ -85,7 +85,7 @@ pub(crate) const MAJORANTS: Pass = Pass {
     },
 };
 
-/// The sums before the first path.
+/// Clears the sums before the first path.
 pub const BEGIN: Pass = Pass {
     name: "still_begin",
     shader: |_, _| "raycast/still_begin",

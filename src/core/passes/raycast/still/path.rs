@@ -12,7 +12,7 @@ const LEAST_TRANSMITTANCE: f64 = 0.1;
 /// Collisions from which on Russian roulette decides whether a path goes on.
 const SURE_EVENTS: u32 = 4;
 
-/// The medium of a still: what a place scatters and absorbs, and bounds of it.
+/// The medium of a still: scattering and absorption at each position, and bounds of them.
 pub struct Medium<'a> {
     scene: &'a Scene,
     volume: &'a Texels,
@@ -140,7 +140,7 @@ impl<'a> Medium<'a> {
         if is_ended.is_some() { 0.0 } else { transmitted }
     }
 
-    /// Light of one path of a pixel, and 1 if it collided.
+    /// The light of one path of a pixel, and 1 in the last component if the path collided.
     pub fn path(&self, [x, y]: [usize; 2], mut stream: Stream) -> [f64; 4] {
         let settings = self.scene.still().copied().unwrap_or_default();
         let lights = &self.lights;

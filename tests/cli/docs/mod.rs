@@ -1,6 +1,9 @@
 //! The pages that a reader meets: docs/cli.md and docs/settings.md are what the program and the settings types say (`tools/docs` writes
 //! them again), README.md stays short, and no link leads nowhere.
 
+mod counts;
+mod site;
+
 use crate::common::files::repository;
 use crate::common::program::PROGRAM;
 use echolume::low_level::scene::{Number, Settings, numbers};
@@ -364,7 +367,7 @@ fn type_words(of: &Type, types: &BTreeMap<String, Described>) -> String {
         ("DVec3", None) => "3 x number".to_string(),
         ("String", None) => "text".to_string(),
         (name, None) if types.contains_key(name) => format!("[{name}](#{})", slug(name)),
-        (name, _) => panic!("a setting of type {name} cannot be described: add it to tests/docs.rs"),
+        (name, _) => panic!("a setting of type {name} cannot be described: add it to tests/cli/docs/mod.rs"),
     }
 }
 
