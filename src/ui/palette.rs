@@ -4,6 +4,7 @@ use crate::command::{self, Command, InspectorTab, KEY_BINDINGS};
 use crate::controls::EXAMS;
 use crate::sliders::{GROUPS, SLIDERS};
 use crate::texts;
+use crate::texts::hints;
 use crate::volume_export::FORMATS;
 
 /// Something that the search finds.
@@ -42,7 +43,7 @@ pub(crate) fn entries() -> impl Iterator<Item = Entry> {
     let by_key = (0..KEY_BINDINGS.len()).filter(is_first).map(|n| {
         let binding = &KEY_BINDINGS[n];
         let (name, key) = (capitalised(binding.description), command::key_label(binding));
-        Entry { name, about: texts::A_COMMAND.into(), key, command: binding.command }
+        Entry { name, about: about(binding.command).into(), key, command: binding.command }
     });
     let entry = |name: &str, about: &str, command| Entry {
         name: name.into(),
@@ -61,6 +62,17 @@ pub(crate) fn entries() -> impl Iterator<Item = Entry> {
         entry(slider.name, &texts::control_in(group, slider.hint), Command::ShowControl(n))
     });
     by_key.chain(others).chain(looks).chain(formats).chain(controls)
+}
+
+/// What a command does, as its button says it; nothing for those whose name says all.
+fn about(command: Command) -> &'static str {
+    match command {
+        Command::Mode(mode) => hints::of_mode(mode),
+        Command::Layout(layout) => hints::of_layout(layout),
+        Command::Tool(tool) => hints::of_tool(tool),
+        Command::LookFrom(viewpoint) => hints::of_viewpoint(viewpoint),
+        _ => "",
+    }
 }
 
 fn capitalised(text: &str) -> String {
@@ -99,7 +111,8 @@ mod tests {
         for entry in entries() {
             let found = found(&entry.name);
             assert!(found.contains(&entry), "{entry:?}");
-            assert!(!entry.name.is_empty() && !entry.about.is_empty(), "{entry:?}");
+            let says = entry.about.len() + entry.key.len();
+            assert!(!entry.name.is_empty() && says > 0, "{entry:?}");
         }
         for binding in KEY_BINDINGS {
             assert!(entries().any(|entry| entry.command == binding.command), "{binding:?}");

@@ -105,9 +105,10 @@ fn row(ui: &mut Ui, entry: &Entry, is_chosen: bool, width: f32) -> bool {
     );
     let painter = painter.with_clip_rect(area.shrink2(vec2(8.0, 0.0)).with_max_x(key.left() - 8.0));
     let name = FontId::proportional(TEXT_SIZE);
-    painter.text(area.left_center() + vec2(8.0, -8.0), Align2::LEFT_CENTER, &entry.name, name, TEXT);
+    let up = if entry.about.is_empty() { 0.0 } else { 8.0 };
+    painter.text(area.left_center() + vec2(8.0, -up), Align2::LEFT_CENTER, &entry.name, name, TEXT);
     let about = FontId::proportional(SMALL_TEXT - 1.0);
     painter.text(area.left_center() + vec2(8.0, 10.0), Align2::LEFT_CENTER, &entry.about, about, WEAK_TEXT);
-    let told = format!("{}: {}", entry.name, entry.about);
+    let told = if entry.about.is_empty() { format!("{}: {}", entry.name, entry.key) } else { entry.about.clone() };
     response.tell(&told).named(spoken.trim_end()).with_role(Role::Button).clicked()
 }

@@ -87,7 +87,6 @@ pub(crate) const FIND_HINT: &str = "Finds every command and control by its name 
 pub(crate) const HOW_TO_FIND: &str = "Type a word: measure, threshold, export ...";
 pub(crate) const FOUND: &str = "Found";
 pub(crate) const CLOSE_SEARCH_HINT: &str = "Closes the search (Esc).";
-pub(crate) const A_COMMAND: &str = "Command";
 pub(crate) fn look(name: impl Display) -> String {
     format!("Look: {name}")
 }
