@@ -4,6 +4,7 @@
 
 #![forbid(unsafe_code)]
 
+#[cfg(feature = "kiosk")]
 pub mod kiosk;
 pub mod live;
 pub mod marked;

@@ -159,6 +159,28 @@ fn the_crates_beside_the_program_have_locked_what_the_library_needs() {
                 assert!(all.keys().any(|known| *known == there), "{lock}, {package}: {there} is needed no more");
             }
         }
-        assert!(entries.package.iter().any(|entry| entry.name == "echolume"), "{lock} has no library");
+        let has = |name: &str| entries.package.iter().any(|entry| entry.name == name);
+        assert!(has("echolume-core"), "{lock} has no library");
+        // What builds the wheel needs neither the command line nor the window.
+        let others = ["echolume", "echolume-lab", "echolume-ui", "echolume-verify", "clap", "egui", "tar", "winit"];
+        if lock.starts_with("tools/python") {
+            assert_eq!(others.into_iter().find(|name| has(name)), None, "{lock}");
+        }
     }
+}
+
+/// The Python module has the version of the program, and its types know the presets.
+#[test]
+fn the_python_module_is_of_this_version_and_knows_the_presets() {
+    let version = |path: &str, keys: [&str; 2]| {
+        let manifest: toml::Table = toml(path);
+        let table = manifest[keys[0]].as_table().expect("a table");
+        let table = if keys[1].is_empty() { table } else { table[keys[1]].as_table().expect("a table") };
+        table["version"].as_str().expect("a version").to_string()
+    };
+    assert_eq!(version("tools/python/Cargo.toml", ["package", ""]), version("Cargo.toml", ["workspace", "package"]));
+    let types = std::fs::read_to_string(repository("tools/python/python/echolume/_inputs.py")).expect("the module");
+    let line = types.lines().find(|line| line.starts_with("Preset = ")).expect("the type of presets");
+    let named: Vec<&str> = line.split('"').skip(1).step_by(2).collect();
+    assert_eq!(named, echolume::low_level::scene::load::PRESETS.iter().map(|preset| preset.0).collect::<Vec<_>>());
 }
