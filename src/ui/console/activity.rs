@@ -5,6 +5,9 @@ use std::time::{Duration, Instant};
 /// A pause after which the same drag or key is another step for undo.
 const STEP_PAUSE: Duration = Duration::from_millis(500);
 
+/// A picture that takes longer is said to be drawn.
+const PATIENCE: Duration = Duration::from_millis(500);
+
 /// What the user did last, and what of it no picture shows yet.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Activity {
@@ -58,6 +61,12 @@ impl Activity {
         self.unshown = first.map(|input| (input, now));
     }
 
+    /// When it is to be said that a picture of what the user did is being drawn; none while nothing waits for one.
+    pub(super) fn says_it_works_at(&self) -> Option<Instant> {
+        let since = self.unshown.map(|(input, _)| input).or(self.unsent)?;
+        Some(since + PATIENCE)
+    }
+
     /// A picture is shown that was begun then. The input whose effect it is the first to show, if there is one.
     pub(super) fn answered_by(&mut self, begun: Option<Instant>) -> Option<Instant> {
         let answered = self.unshown.take_if(|(_, sent)| begun.is_some_and(|begun| begun >= *sent));
@@ -81,6 +90,7 @@ mod tests {
         activity.changes_settings(at(12));
         assert_eq!(activity.answered_by(Some(at(13))), None, "not sent yet");
         activity.settings_sent(at(14));
+        assert_eq!(activity.says_it_works_at(), Some(at(510)), "counted from the first input");
         assert_eq!(activity.answered_by(None), None);
         assert_eq!(activity.answered_by(Some(at(13))), None, "of earlier settings");
         // The view rests and is drawn in full: the input still waits.
@@ -88,6 +98,7 @@ mod tests {
         assert_eq!(activity.answered_by(Some(at(15))), None);
         assert_eq!(activity.answered_by(Some(at(20))), Some(at(10)));
         assert_eq!(activity.answered_by(Some(at(30))), None, "once");
+        assert_eq!(activity.says_it_works_at(), None);
     }
 
     #[test]

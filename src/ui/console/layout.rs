@@ -4,7 +4,7 @@ use super::Console;
 use crate::gpu;
 use crate::panels::{Banner, PanelState, first_steps};
 use crate::shown_picture::ShownPicture;
-use std::time::Instant;
+use std::time::{Duration, Instant};
 
 impl Console {
     /// Lays out the panels and executes the commands that they give.
@@ -15,6 +15,8 @@ impl Console {
         let recordings = self.opening.named();
         let exit_key = self.fixed.exit.as_ref().filter(|_| self.fixed.is_kiosk).map(ToString::to_string);
         let loop_pictures = self.reel.pictures(self.stream.cine().volumes());
+        let says_work_at = self.activity.says_it_works_at().filter(|_| !self.stream.is_idle());
+        let is_late = says_work_at.is_some_and(|at| at <= now);
         let room = self.room();
         let state = PanelState {
             shows_first_steps,
@@ -36,6 +38,7 @@ impl Console {
             leaving: self.leaving.question(),
             is_frozen: self.stream.is_frozen(),
             is_live: self.is_followed(),
+            is_late,
             ended: self.connection.ended_for(now),
             cine: self.replay.state(self.cine_loop(), self.stream.cine_position()),
             picture,
@@ -48,7 +51,9 @@ impl Console {
         };
         let time = now.saturating_duration_since(self.fixed.started).as_secs_f64();
         let output = self.panels.lay_out(&state, self.presentation.size(), time);
-        self.presentation.laid_out(output.tree, output.repaint_after, now);
+        let to_be_said = says_work_at.map_or(Duration::MAX, |at| at.saturating_duration_since(now));
+        let repaint_after = if is_late { output.repaint_after } else { output.repaint_after.min(to_be_said) };
+        self.presentation.laid_out(output.tree, repaint_after, now);
         for command in output.commands {
             self.execute(&command, now);
         }

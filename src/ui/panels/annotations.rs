@@ -165,7 +165,8 @@ fn tell_state(painter: &Painter, taken: &mut Taken, picture: Rect, state: &Panel
     };
     let volume = cine.shown.map(|at| texts::volume_in_loop(at + 1, cine.count));
     let time = cine.seconds.map(texts::seconds);
-    let parts = [Some(what).filter(|what| !what.is_empty()), volume, time];
+    let drawing = state.is_late.then(|| texts::STATE_DRAWING.to_string());
+    let parts = [drawing, Some(what).filter(|what| !what.is_empty()), volume, time];
     let lower = (0..12).map(|n| vec2(6.0, 26.0 + 10.0 * n as f32));
     let places = [vec2(12.0, 8.0), vec2(34.0, 6.0)].into_iter().chain(lower).map(|away| picture.left_top() + away);
     for count in (1..=parts.len()).rev() {

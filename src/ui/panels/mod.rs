@@ -484,6 +484,8 @@ pub(super) struct PanelState<'a> {
     pub(super) is_frozen: bool,
     /// Frames come from a probe or a pipe.
     pub(super) is_live: bool,
+    /// A picture of what the user did is being drawn, for more than a moment.
+    pub(super) is_late: bool,
     /// How long ago the probe or the pipe ended: nothing is live since.
     pub(super) ended: Option<Duration>,
     pub(super) cine: CineState,

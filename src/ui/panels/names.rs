@@ -167,7 +167,8 @@ fn in_words(state: &PanelState) -> (String, String) {
         _ => String::new(),
     };
     let count = state.controls.measures().len();
-    (name, volume + &texts::count_of_measurements(count))
+    let drawn = if state.is_late { texts::IS_DRAWN } else { "" };
+    (name, format!("{drawn}{volume}{}", texts::count_of_measurements(count)))
 }
 
 fn view_in_words(scene: &Scene) -> String {

@@ -90,7 +90,7 @@ fn row(ui: &mut Ui, entry: &Entry, is_chosen: bool, width: f32) -> bool {
         ui.painter().rect_filled(area, 6.0, CHOSEN);
     }
     // Once: the pointer and the keyboard scroll too.
-    let id = egui::Id::new("chosen in the search");
+    let id = egui::Id::new("chosen");
     if is_chosen && ui.data_mut(|data| data.get_temp(id) != Some(spoken.clone())) {
         ui.data_mut(|data| data.insert_temp(id, spoken.clone()));
         response.scroll_to_me(None);

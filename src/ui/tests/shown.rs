@@ -44,6 +44,7 @@ pub(super) struct Shown {
     pub(super) kept: Option<Scene>,
     pub(super) is_frozen: bool,
     pub(super) is_live: bool,
+    pub(super) is_late: bool,
     pub(super) ended: Option<Duration>,
     pub(super) cine: CineState,
     pub(super) banner: Option<Banner>,
@@ -96,6 +97,7 @@ impl Shown {
             kept: None,
             is_frozen: false,
             is_live: false,
+            is_late: false,
             ended: None,
             cine: CinePlayer::default().state(
                 Loop { cine: &Cine::default(), volumes: &(0..20).map(|_| CineVolume::default()).collect() },
@@ -204,6 +206,7 @@ impl Shown {
             loop_pictures: &[],
             is_frozen: self.is_frozen,
             is_live: self.is_live,
+            is_late: self.is_late,
             ended: self.ended,
             cine: self.cine.clone(),
             quality: ("full", self.budget),

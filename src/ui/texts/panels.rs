@@ -76,6 +76,8 @@ pub(crate) fn played_part(first: usize, last: usize) -> String {
 /// What the picture is, such as "Frozen".
 pub(crate) const STATE_FROZEN: &str = "Frozen";
 pub(crate) const STATE_LIVE: &str = "Live";
+pub(crate) const STATE_DRAWING: &str = "drawing ...";
+pub(crate) const IS_DRAWN: &str = "The next picture is being drawn. ";
 pub(crate) const STATE_PLAYING: &str = "Playing";
 pub(crate) fn volume_in_loop(number: impl Display, count: impl Display) -> String {
     format!("volume {number} of {count}")
@@ -194,7 +196,7 @@ pub const FROZEN: &str = "FROZEN";
 pub(crate) const FREEZE: &str = "Freeze";
 pub(crate) const FREEZE_HINT: &str = "Keeps this volume on the screen (Space).";
 pub(crate) const UNFREEZE: &str = "Unfreeze";
-pub(crate) const ENDED: &str = "Ended";
+const ENDED: &str = "Ended";
 pub(crate) const ENDED_HINT: &str = "The source has ended: no more frames come, and the loop is what came.";
 pub(crate) fn ended_for(ago: Duration) -> String {
     match ago.as_secs() {

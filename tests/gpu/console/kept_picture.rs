@@ -77,6 +77,44 @@ fn the_panels_are_about_the_picture_that_is_shown_until_the_next_one_is_there() 
     assert!(others >= 8, "only {others} changes are told");
 }
 
+/// Requirement: a change whose picture takes more than half a second says that it works, and no other does.
+#[test]
+fn a_picture_that_takes_long_is_said_to_be_drawn() {
+    let device = Device::alone();
+    let mut desk = Desk::new(&device, ConsoleOptions { panels: true, ..options() });
+    desk.console.resize([1000, 700]);
+    desk.begin();
+    (0..2).for_each(|number| _ = desk.live(number));
+    desk.console.describe(true);
+    let says = |desk: &mut Desk, at: Instant| {
+        _ = desk.console.take_tree();
+        let begun = Instant::now();
+        loop {
+            desk.tick(at);
+            let tree = desk.console.take_tree();
+            let nodes = tree.into_iter().flat_map(|tree| tree.nodes).map(|(_, node)| node);
+            let mut pictures = nodes.filter(|node| node.role() == Role::Image && node.label() != Some("Light ball"));
+            if let Some(picture) = pictures.next() {
+                return picture.description().unwrap_or_default().starts_with("The next picture is being drawn");
+            }
+            assert!(begun.elapsed() < BOUND, "no layout");
+            desk.console.redraw();
+            wait::poll();
+        }
+    };
+    for command in [Command::Preset(4), Command::Layout(Layout::Four)] {
+        device.faults.hold_pictures(true);
+        let now = Instant::now();
+        desk.console.execute(&command, now);
+        until_drawing(&mut desk);
+        assert!(!says(&mut desk, now + Duration::from_millis(450)), "{command:?}: too early");
+        assert!(says(&mut desk, now + Duration::from_millis(2000)), "{command:?}: it is not said");
+        device.faults.hold_pictures(false);
+        desk.rest();
+        assert!(!says(&mut desk, now + Duration::from_secs(60)), "{command:?}: it is done");
+    }
+}
+
 /// Requirement: a measurement says on which volume it was made, and lies on no other as if it were that one's.
 #[test]
 fn a_measurement_belongs_to_the_volume_on_which_it_was_made() {
