@@ -14,8 +14,8 @@ use egui_ash_renderer::vulkan::{create_vulkan_descriptor_set, create_vulkan_desc
 use std::collections::HashMap;
 use std::sync::Arc;
 
-/// Number of textures at a time. egui has one for its glyphs, the panels a few more.
-const MAX_TEXTURES: u32 = 64;
+/// Number of textures at a time. egui has one for its glyphs, the panels one for each small picture: of looks, and of volumes of the loop.
+const MAX_TEXTURES: u32 = 160;
 /// What egui expects: its colours are in sRGB.
 const FORMAT: vk::Format = vk::Format::R8G8B8A8_SRGB;
 
@@ -199,7 +199,9 @@ impl PanelTextures {
                 .image_subresource(layers)
                 .image_offset(vk::Offset3D { x: at[0] as i32, y: at[1] as i32, z: 0 })
                 .image_extent(vk::Extent3D { width: size[0], height: size[1], depth: 1 });
-            turn((before, copied), (read.0, vk::AccessFlags2::NONE), written);
+            // The memory of a new one may have been that of something else, which is done; layers before 2024 do not know it.
+            let last = if texture.is_filled { read.0 } else { vk::PipelineStageFlags2::ALL_COMMANDS };
+            turn((before, copied), (last, vk::AccessFlags2::NONE), written);
             // SAFETY: the staging buffer holds the bytes of the region, which egui places inside its texture; both live until the device
             // is done.
             unsafe {

@@ -316,7 +316,11 @@ impl Screen {
         }
         .context(|| "record the window".into())?;
         let is_laid_out = self.composition.as_ref().is_some_and(|composition| composition.is_laid_out);
-        let mut at = if is_laid_out { Stage::Composed } else { Stage::Acquired };
+        let mut at = match (is_laid_out, &self.composition) {
+            (true, _) => Stage::Composed,
+            (false, Some(_)) => Stage::New,
+            (false, None) => Stage::Acquired,
+        };
         let mut go = |to: Stage| {
             barrier(&device, commands, target, at, to);
             at = to;
@@ -565,6 +569,8 @@ fn clear(device: &ash::Device, commands: vk::CommandBuffer, areas: &[[[u32; 2]; 
 /// The stages of an image of the window, in order.
 #[derive(Clone, Copy)]
 enum Stage {
+    /// Nothing is in it. Its memory may have been that of something else, which is done; layers before 2024 do not know it.
+    New,
     Acquired,
     Copied,
     Drawn,
@@ -576,7 +582,7 @@ enum Stage {
 impl Stage {
     fn layout(self) -> vk::ImageLayout {
         match self {
-            Stage::Acquired => vk::ImageLayout::UNDEFINED,
+            Stage::New | Stage::Acquired => vk::ImageLayout::UNDEFINED,
             Stage::Copied => vk::ImageLayout::TRANSFER_DST_OPTIMAL,
             Stage::Drawn => vk::ImageLayout::COLOR_ATTACHMENT_OPTIMAL,
             Stage::Composed => vk::ImageLayout::TRANSFER_SRC_OPTIMAL,
@@ -590,13 +596,13 @@ impl Stage {
             Stage::Acquired | Stage::Copied | Stage::Composed => vk::PipelineStageFlags2::ALL_TRANSFER,
             Stage::Drawn => vk::PipelineStageFlags2::COLOR_ATTACHMENT_OUTPUT,
             // The stage of the semaphore that presentation waits for.
-            Stage::Shown => vk::PipelineStageFlags2::ALL_COMMANDS,
+            Stage::New | Stage::Shown => vk::PipelineStageFlags2::ALL_COMMANDS,
         }
     }
 
     fn accesses(self) -> vk::AccessFlags2 {
         match self {
-            Stage::Acquired | Stage::Shown => vk::AccessFlags2::NONE,
+            Stage::New | Stage::Acquired | Stage::Shown => vk::AccessFlags2::NONE,
             Stage::Copied => vk::AccessFlags2::TRANSFER_WRITE,
             Stage::Composed => vk::AccessFlags2::TRANSFER_READ,
             Stage::Drawn => vk::AccessFlags2::COLOR_ATTACHMENT_WRITE | vk::AccessFlags2::COLOR_ATTACHMENT_READ,

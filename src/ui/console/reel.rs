@@ -10,6 +10,14 @@ use std::collections::VecDeque;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
+/// Most pictures: of a longer loop every second volume has one, or every third and so on.
+const MOST: usize = 48;
+
+/// Volumes for each picture of a loop of so many.
+fn stride(count: usize) -> usize {
+    count.div_ceil(MOST).max(1)
+}
+
 /// The pictures, and what they are of.
 pub(super) struct Reel {
     thumbnails: Thumbnails,
@@ -33,9 +41,10 @@ impl Reel {
         self.thumbnails.poll(now >= acted + REST && !is_drawing)
     }
 
-    /// The picture of each volume of the loop, as far as it is made.
+    /// The picture of each volume of the loop, as far as it is made, or of the volume before it in a long loop.
     pub(super) fn pictures(&self, volumes: &VecDeque<CineVolume>) -> Vec<Option<Arc<Picture>>> {
-        volumes.iter().map(|of| self.picture(of.volume)).collect()
+        let stride = stride(volumes.len());
+        (0..volumes.len()).map(|n| self.picture(volumes.get(n - n % stride)?.volume)).collect()
     }
 
     fn picture(&self, volume: u32) -> Option<Arc<Picture>> {
@@ -43,10 +52,12 @@ impl Reel {
         self.thumbnails.pictures().get(at).cloned().flatten()
     }
 
-    /// For each volume of the loop, whether it has no picture in the present mode.
+    /// For each volume of the loop, whether it is to have a picture and has none in the present mode.
     pub(super) fn missing(&self, volumes: &VecDeque<CineVolume>, settings: &Settings) -> Vec<bool> {
         let is_same = self.look == Some(look_of(settings));
-        volumes.iter().map(|of| !is_same || !self.volumes.contains(&of.volume)).collect()
+        let stride = stride(volumes.len());
+        let is_missing = |of: &CineVolume| !is_same || !self.volumes.contains(&of.volume);
+        volumes.iter().enumerate().map(|(n, of)| n % stride == 0 && is_missing(of)).collect()
     }
 
     /// True if pictures are to be made: of several volumes, of which some have none, after a rest.
@@ -63,7 +74,7 @@ impl Reel {
 
     /// Begins to make the pictures of a job, which has none for volumes whose picture stays.
     pub(super) fn make(&mut self, job: Job, volumes: &VecDeque<CineVolume>, settings: &Settings) {
-        let kept = self.pictures(volumes);
+        let kept = volumes.iter().map(|of| self.picture(of.volume)).collect();
         self.volumes = volumes.iter().map(|of| of.volume).collect();
         self.look = Some(look_of(settings));
         self.thumbnails.begin_with(job, kept);
@@ -77,5 +88,33 @@ impl Reel {
 
     pub(super) fn due(&self, now: Instant) -> Option<Instant> {
         self.thumbnails.is_working().then_some(now + Duration::from_millis(50))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Prevents a loop of hundreds of volumes with a texture for each.
+    #[test]
+    fn a_long_loop_has_a_bounded_number_of_pictures() {
+        let volumes = |count: u32| -> VecDeque<CineVolume> {
+            let numbered = |n| {
+                let mut volume = CineVolume::default();
+                volume.volume = n;
+                volume
+            };
+            (0..count).map(numbered).collect()
+        };
+        let reel = Reel::new(Arc::new(|| ()));
+        let settings = Settings::default();
+        for (count, wanted) in [(0, 0), (1, 1), (20, 20), (48, 48), (49, 25), (480, 48), (481, 44)] {
+            let missing = reel.missing(&volumes(count), &settings);
+            assert_eq!(missing.iter().filter(|is_missing| **is_missing).count(), wanted, "{count}");
+            assert_eq!(reel.pictures(&volumes(count)).len(), count as usize);
+        }
+        let (now, later) = (Instant::now(), Instant::now() + LONG_REST);
+        assert!(!reel.wants(&volumes(20), &settings, now, now) && reel.wants(&volumes(20), &settings, now, later));
+        assert!(!reel.wants(&volumes(1), &settings, now, later), "one volume needs no line");
     }
 }

@@ -76,11 +76,12 @@ impl Textures {
     }
 }
 
-/// Columns of the looks in the inspector, and height of the name below a picture, points.
+/// Columns and rows of the looks in the inspector, and height of the name below a picture, points.
 const COLUMNS: usize = 4;
+const ROWS: usize = 2;
 const SMALL_NAME: f32 = 16.0;
 
-/// Every look as a small picture, and what opens the list in which they are saved, renamed and deleted.
+/// Looks as small pictures, and what opens the list in which they are saved, renamed and deleted.
 pub(super) fn show_strip(
     ui: &mut Ui,
     state: &PanelState,
@@ -100,7 +101,8 @@ pub(super) fn show_strip(
         });
         ui.spacing_mut().item_spacing = vec2(6.0, 4.0);
         let each = (width - 6.0 * (COLUMNS - 1) as f32) / COLUMNS as f32;
-        let all: Vec<(usize, &PresetTile)> = state.looks.iter().enumerate().collect();
+        // The others are in the list.
+        let all: Vec<(usize, &PresetTile)> = state.looks.iter().enumerate().take(ROWS * COLUMNS).collect();
         for row in all.chunks(COLUMNS) {
             ui.horizontal(|ui| {
                 for (n, tile) in row {

@@ -20,51 +20,52 @@ const MARKERS: [ProbeMarker; 3] = [ProbeMarker::First, ProbeMarker::Last, ProbeM
 
 pub(super) fn show(ui: &mut Ui, state: &PanelState, width: f32, execute: &mut dyn FnMut(Command)) {
     let marks = &state.controls.settings().marks;
-    let shown = CollapsingHeader::new(title(marks)).id_salt(texts::SIDES).show_unindented(ui, |ui| {
-        names::name(ui, Role::Group, texts::SIDES);
-        ui.spacing_mut().item_spacing.x = 4.0;
-        ui.spacing_mut().button_padding.x = 3.0;
-        let has = |axis| matches!(marks.sides(axis), Sides::LeftRight | Sides::RightLeft);
-        let exchange = Button::new(texts::EXCHANGE_LEFT_AND_RIGHT).min_size(vec2(width, ROW_HEIGHT));
-        let hint = texts::EXCHANGE_LEFT_AND_RIGHT_HINT;
-        let exchange = ui.add_enabled(AXES.into_iter().any(has), exchange);
-        if exchange.tell(hint).on_disabled_hover_text(hint).clicked() {
-            execute(Command::ExchangeLeftAndRight);
-        }
-        for axis in AXES {
-            names::group(ui, texts::axis(axis), |ui| {
-                heading(ui, texts::axis(axis));
-                for row in CHOICES {
-                    ui.horizontal(|ui| {
-                        let size = size_in(ui, width, row.len());
-                        for sides in row {
-                            let Some(sides) = sides else {
-                                ui.add_space(size.x + ui.spacing().item_spacing.x);
-                                continue;
-                            };
-                            let is_chosen = marks.sides(axis) == sides;
-                            let (text, name) = (in_short(sides), texts::sides(sides));
-                            if choice(ui, is_chosen, &text, size, &texts::sides_hint(axis, sides), name) {
-                                execute(Command::Sides(axis, sides));
+    let shown =
+        CollapsingHeader::new(title(marks)).id_salt(texts::SIDES).default_open(true).show_unindented(ui, |ui| {
+            names::name(ui, Role::Group, texts::SIDES);
+            ui.spacing_mut().item_spacing.x = 4.0;
+            ui.spacing_mut().button_padding.x = 3.0;
+            let has = |axis| matches!(marks.sides(axis), Sides::LeftRight | Sides::RightLeft);
+            let exchange = Button::new(texts::EXCHANGE_LEFT_AND_RIGHT).min_size(vec2(width, ROW_HEIGHT));
+            let hint = texts::EXCHANGE_LEFT_AND_RIGHT_HINT;
+            let exchange = ui.add_enabled(AXES.into_iter().any(has), exchange);
+            if exchange.tell(hint).on_disabled_hover_text(hint).clicked() {
+                execute(Command::ExchangeLeftAndRight);
+            }
+            for axis in AXES {
+                names::group(ui, texts::axis(axis), |ui| {
+                    heading(ui, texts::axis(axis));
+                    for row in CHOICES {
+                        ui.horizontal(|ui| {
+                            let size = size_in(ui, width, row.len());
+                            for sides in row {
+                                let Some(sides) = sides else {
+                                    ui.add_space(size.x + ui.spacing().item_spacing.x);
+                                    continue;
+                                };
+                                let is_chosen = marks.sides(axis) == sides;
+                                let (text, name) = (in_short(sides), texts::sides(sides));
+                                if choice(ui, is_chosen, &text, size, &texts::sides_hint(axis, sides), name) {
+                                    execute(Command::Sides(axis, sides));
+                                }
                             }
-                        }
-                    });
-                }
-            });
-        }
-        names::group(ui, texts::PROBE_MARKER, |ui| {
-            heading(ui, texts::PROBE_MARKER);
-            ui.horizontal(|ui| {
-                let size = size_in(ui, width, MARKERS.len());
-                for marker in MARKERS {
-                    let name = texts::probe_marker(marker);
-                    if choice(ui, marks.probe == marker, name, size, texts::probe_marker_hint(marker), name) {
-                        execute(Command::ProbeMarker(marker));
+                        });
                     }
-                }
+                });
+            }
+            names::group(ui, texts::PROBE_MARKER, |ui| {
+                heading(ui, texts::PROBE_MARKER);
+                ui.horizontal(|ui| {
+                    let size = size_in(ui, width, MARKERS.len());
+                    for marker in MARKERS {
+                        let name = texts::probe_marker(marker);
+                        if choice(ui, marks.probe == marker, name, size, texts::probe_marker_hint(marker), name) {
+                            execute(Command::ProbeMarker(marker));
+                        }
+                    }
+                });
             });
         });
-    });
     let mut saves_bar = marks.bar;
     if switch(ui, &mut saves_bar, texts::BAR_ON_SAVED_PICTURES, texts::BAR_ON_SAVED_PICTURES_HINT) {
         execute(Command::SavesBar(saves_bar));

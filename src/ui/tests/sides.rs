@@ -12,12 +12,10 @@ use crate::workspace::{Origin, text};
 
 const LATERAL: &str = "Scan lines, first to last";
 
-/// Opens the group in the inspector.
+/// The inspector with the sides.
 fn opened(toml: &str) -> Shown {
     let mut shown = Shown::new(toml);
     shown.tab(InspectorTab::Marks);
-    press(&mut shown, "Marks", "Sides");
-    shown.settle();
     shown
 }
 
@@ -115,8 +113,6 @@ fn the_group_is_reached_by_the_keyboard_and_in_a_window_without_a_column() {
     assert_eq!(shown.key(crate::input::Key::Space, false), [Command::Sides(VolumeAxis::Lateral, Sides::LeftRight)]);
     let mut narrow = Shown::sized("mode='plane'", [640, 480], 1.0);
     narrow.tab(InspectorTab::Marks);
-    press(&mut narrow, "Marks", "Sides");
-    narrow.settle();
     narrow.check("a narrow window");
     assert_eq!(press(&mut narrow, LATERAL, "right to left"), [Command::Sides(VolumeAxis::Lateral, Sides::RightLeft)]);
 }

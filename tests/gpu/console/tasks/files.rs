@@ -74,6 +74,19 @@ pub(super) fn another(user: &mut User) -> String {
     user.count()
 }
 
+pub(super) fn by_path(user: &mut User) -> String {
+    let file = user.folder.0.join("path.mha");
+    std::fs::write(&file, b"header").expect("a file");
+    user.control('o');
+    user.types(file.to_str().expect("a path"));
+    user.actions += 1;
+    user.console.input(&Input::Key { key: Key::Enter, pressed: true });
+    user.console.input(&Input::Key { key: Key::Enter, pressed: false });
+    user.opens(&file);
+    std::fs::remove_file(&file).expect("the file");
+    user.count()
+}
+
 impl User {
     /// Waits until the console asks to be replaced, as a window would do at once, by one that shows this.
     fn opens(&mut self, path: &Path) {

@@ -159,3 +159,13 @@ pub(super) fn wrong_trace(user: &mut User) -> String {
     assert_eq!(user.console.controls().measures().len(), 0);
     user.count()
 }
+
+pub(super) fn sides(user: &mut User) -> String {
+    user.on_planes();
+    user.click_on(Role::Tab, "Marks");
+    user.click_on(Role::Button, "right to left");
+    let scene = user.scene();
+    let tiles = scene.marks_with(&user.console.controls().settings().marks);
+    assert_eq!(tiles[0].letters.iter().map(|(_, letter)| *letter).collect::<Vec<_>>(), ["R", "L"]);
+    user.count()
+}

@@ -19,6 +19,7 @@ use echolume::low_level::scene::picker::Picker;
 use echolume::low_level::scene::{Mode, PlaneName, Scene};
 use echolume::low_level::source::live::{Playback, PlaybackSource};
 use echolume::low_level::source::phantom::{Body, CachedPhantom, Label, Phantom, PhantomOptions, Speckle, Truth};
+use echolume::low_level::ui::command::InspectorTab;
 use echolume::low_level::ui::panels::accesskit::{Node, Role};
 use echolume::low_level::ui::panels::picture_area;
 use echolume::low_level::workspace::Origin;
@@ -51,6 +52,7 @@ const TASKS: &[(&str, Perform)] = &[
     ("name a structure", structure),
     ("point at a structure", arrow),
     ("mark where the probe was", body_mark),
+    ("state the patient's sides", sides),
     ("name a measurement", measurement),
     ("correct a caliper", caliper),
     ("take a wrong trace back", wrong_trace),
@@ -63,15 +65,18 @@ const TASKS: &[(&str, Perform)] = &[
     ("the volume for 3D Slicer", |user| export(user, '1', "Volume, NRRD")),
     ("go on tomorrow", tomorrow),
     ("another recording", another),
+    ("open a file by its path", by_path),
     ("two recordings in turn", in_turn),
     ("go back to the first recording", first_again),
     ("the look of bone", bone),
     ("keep a look for the next patient", kept_look),
     ("the planes through a point", point),
     ("the planes back to the middle", middle),
+    ("nine slices at 4 mm", nine_slices),
     ("show the section along a straight line", straight_section),
     ("show the section along a curved line", curved_section),
     ("why is there no picture", no_picture),
+    ("see that a source died", dead_source),
     ("leave without loss", leave),
 ];
 
@@ -179,7 +184,13 @@ impl User {
 
     /// The state before a task: the settings of the start, and no measurements. What is set up for a task is no action of it.
     fn begin(&mut self, task: &str) {
-        for command in [Command::CancelMeasure, Command::ClearMeasures, Command::Tool(Tool::Rotate), Command::Reset] {
+        for command in [
+            Command::CancelMeasure,
+            Command::ClearMeasures,
+            Command::Tool(Tool::Rotate),
+            Command::Reset,
+            Command::InspectorTab(InspectorTab::Look),
+        ] {
             self.console.execute(&command, Instant::now());
         }
         self.settle();
@@ -349,6 +360,24 @@ impl User {
         let is_it = |node: &&Node| node.role() == role && node.label().is_some_and(|label| label.starts_with(name));
         let bounds = self.tree.iter().find(is_it)?.bounds().unwrap_or_default();
         Some([(bounds.x0 + bounds.x1) / 2.0, (bounds.y0 + bounds.y1) / 2.0])
+    }
+
+    /// Clicks a control of this role whose name begins so.
+    fn click_on(&mut self, role: Role, name: &str) {
+        let at = self.until(name, |user| user.shown(role, name));
+        self.click(at);
+    }
+
+    /// Clicks the rail of a slider where its value is this.
+    fn sets(&mut self, name: &str, value: f64) {
+        let is_it = |node: &&Node| node.role() == Role::Slider && node.label() == Some(name);
+        let slider = self.until(name, |user| user.tree.iter().find(is_it).cloned());
+        let bounds = slider.bounds().expect("its place");
+        let [low, high] = [slider.min_numeric_value(), slider.max_numeric_value()].map(|n| n.expect("a range"));
+        // The middle of the knob, which has 0.8 of the height, stays within the rail.
+        let knob = (bounds.y1 - bounds.y0) / 2.5;
+        let x = bounds.x0 + knob + (bounds.x1 - bounds.x0 - 2.0 * knob) * (value - low) / (high - low);
+        self.click([x, (bounds.y0 + bounds.y1) / 2.0]);
     }
 
     /// Waits for a file with this ending.

@@ -59,3 +59,17 @@ pub(super) fn curved_section(user: &mut User) -> String {
     assert!(scene.has_curve() && user.actions == 2 + points.len());
     "2 + 1 a point".into()
 }
+
+pub(super) fn nine_slices(user: &mut User) -> String {
+    user.letter('9');
+    user.actions += 1;
+    user.press(Modifiers { shift: true, ..Modifiers::default() }, Key::Function(3));
+    for (name, value) in [("Columns", 3.0), ("Rows", 3.0), ("Spacing", 4.0)] {
+        user.sets(name, value);
+    }
+    let scene = user.scene();
+    let tiles = scene.tiling().tiles;
+    let away: Vec<f64> = tiles.windows(2).map(|two| (two[1].plane.at - two[0].plane.at).length()).collect();
+    assert!(tiles.len() == 9 && away.iter().all(|mm| (mm - 4.0).abs() < 1e-6), "{away:?}");
+    user.count()
+}

@@ -21,6 +21,15 @@ pub(super) fn no_picture(user: &mut User) -> String {
     user.count()
 }
 
+/// At another console, whose probe sends a volume and ends: what the window shows says so.
+pub(super) fn dead_source(user: &mut User) -> String {
+    let options = ConsoleOptions { source: SourceKind::Probe, ..ball_options(&user.folder) };
+    user.console = Console::new(&user.device, source(ball), options, WINDOW);
+    user.console.describe(true);
+    user.until("word of the end", |user| user.shown(Role::Button, "Ended "));
+    user.count()
+}
+
 /// At another console, of a probe whose volume is in no file.
 pub(super) fn leave(user: &mut User) -> String {
     let options = ConsoleOptions { source: SourceKind::Probe, ..ball_options(&user.folder) };
